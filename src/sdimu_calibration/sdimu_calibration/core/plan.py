@@ -1,0 +1,49 @@
+"""A test plan as data: stops and the turns between them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Turn:
+    """One rotation of the table.
+
+    Attributes
+    ----------
+    axis : str
+        ``X``, ``Y`` or ``Z``: the IMU axis about which the table turns, right-hand positive.
+    angle_rad : float
+        Signed angle.
+    rate_rad_s : float
+        Mean rate over the turn (> 0).
+    """
+
+    axis: str
+    angle_rad: float
+    rate_rad_s: float
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Stops and turns: dwell 0, turn 0, dwell 1, ... turn n-1, dwell n.
+
+    Attributes
+    ----------
+    name : str
+    dwell_s : tuple of float
+        Length of each stop (s), one more than turns.
+    turns : tuple of Turn
+    acceleration_rad_s2 : float
+        Limit of the angular acceleration.
+    """
+
+    name: str
+    dwell_s: tuple[float, ...]
+    turns: tuple[Turn, ...]
+    acceleration_rad_s2: float
+
+    @property
+    def duration_s(self) -> float:
+        """Length of the whole test (s)."""
+        return sum(self.dwell_s) + sum(abs(t.angle_rad) / t.rate_rad_s for t in self.turns)

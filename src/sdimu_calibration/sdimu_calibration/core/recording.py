@@ -1,0 +1,89 @@
+"""A recording: what the topics of one test say, as arrays, and nothing about where it came from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+
+class DataError(ValueError):
+    """Data or options that cannot be used; its text is the one line shown to the user."""
+
+
+@dataclass(frozen=True)
+class PhaseLog:
+    """What the rate table said about itself; each entry holds from its time on.
+
+    Attributes
+    ----------
+    t : ndarray, shape (m,)
+        Seconds after the recording's `start_ns`, ascending.
+    dwell : ndarray of bool, shape (m,)
+        True for ``dwell``, False for ``rotating``.
+    stop : ndarray of int, shape (m,)
+        Index of the stop.
+    """
+
+    t: Floats
+    dwell: NDArray[np.bool_]
+    stop: NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class TemperatureLog:
+    """IMU temperature: `t` (m,) seconds after `start_ns`, ascending; `value` (m,) in deg C."""
+
+    t: Floats
+    value: Floats
+
+
+@dataclass(frozen=True)
+class TableLog:
+    """Table axis angles: `t` (m,) s, `names` (k), `angle` (m, k) rad. Never used by the estimator."""
+
+    t: Floats
+    names: tuple[str, ...]
+    angle: Floats
+
+
+@dataclass(frozen=True)
+class Recording:
+    """Samples of an IMU and what came with them.
+
+    Attributes
+    ----------
+    start_ns : int
+        Stamp (ns) from which all times count.
+    t : ndarray, shape (n,)
+        End of each sample's interval (s after `start_ns`), strictly ascending.
+    omega_ib_b : ndarray, shape (n, 3)
+        Mean body rate against inertial space over the interval, as measured (rad/s).
+    f_ib_b : ndarray, shape (n, 3)
+        Mean specific force over the interval, as measured (m/s^2).
+    phase : PhaseLog or None
+    temperature : TemperatureLog or None
+    table : TableLog or None
+    rejected : int
+        Samples dropped when the recording was made into arrays (not finite, repeated stamp).
+    notes : tuple of str
+        What was mended or ignored, one line each.
+    """
+
+    start_ns: int
+    t: Floats
+    omega_ib_b: Floats
+    f_ib_b: Floats
+    phase: PhaseLog | None = None
+    temperature: TemperatureLog | None = None
+    table: TableLog | None = None
+    rejected: int = 0
+    notes: tuple[str, ...] = field(default=())
+
+    @property
+    def interval_s(self) -> float:
+        """Nominal sample interval (s): the median of the stamp differences."""
+        return float(np.median(np.diff(self.t)))

@@ -1,0 +1,79 @@
+"""What the user states before a test: the site, the IMU's specification, the model to estimate."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Site:
+    """Where the test is made.
+
+    Attributes
+    ----------
+    latitude_rad, height_m : float
+        Geodetic latitude and ellipsoidal height.
+    gravity_m_s2 : float or None
+        Measured gravity; None takes WGS-84 normal gravity.
+    initial_azimuth_rad : float or None
+        Azimuth of the body X axis (of Y, when X starts within 45 deg of the vertical) at the start;
+        None gyrocompasses.
+    initial_azimuth_sigma_rad : float
+        Its standard deviation; used only with an azimuth.
+    """
+
+    latitude_rad: float
+    height_m: float = 0.0
+    gravity_m_s2: float | None = None
+    initial_azimuth_rad: float | None = None
+    initial_azimuth_sigma_rad: float = np.radians(3.0)
+
+
+@dataclass(frozen=True)
+class ImuSpecification:
+    """An IMU as its data sheet gives it.
+
+    Attributes
+    ----------
+    name : str
+    gyro_white_noise : float
+        Angle random walk as a density (rad/s/sqrt(Hz)): the sigma of a 1 s mean.
+    accel_white_noise : float
+        Velocity random walk as a density (m/s^2/sqrt(Hz)).
+    prior : mapping of str to float
+        One-sigma size of every parameter of an effect, by effect name, SI.
+    grade : str
+        ``navigation``, ``tactical`` or ``mems``: which default priors hold for effects not named.
+    """
+
+    name: str
+    gyro_white_noise: float
+    accel_white_noise: float
+    prior: Mapping[str, float] = field(default_factory=dict)
+    grade: str = "navigation"
+
+
+@dataclass(frozen=True)
+class Model:
+    """What is estimated and how the measurements are weighed.
+
+    Attributes
+    ----------
+    effects : tuple of str
+        Names of registered sensor effects, in the order of the state.
+    velocity_sigma, position_sigma : float
+        One-sigma of "the table stands still, at the known point" per epoch (m/s, m).
+    settle_s : float
+        Time after the end of motion in which no measurement is taken (s).
+    body_frame : str
+        Frame of the reported coefficients: ``accelerometer_triad`` or ``prior``.
+    """
+
+    effects: tuple[str, ...]
+    velocity_sigma: float = 1e-3
+    position_sigma: float = 1e-2
+    settle_s: float = 1.0
+    body_frame: str = "accelerometer_triad"

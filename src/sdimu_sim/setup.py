@@ -1,0 +1,25 @@
+"""Package the sdimu_sim ROS 2 package; the entry points are the nodes and the command-line verbs."""
+
+from setuptools import find_packages, setup
+
+NAME = "sdimu_sim"
+
+setup(
+    name=NAME,
+    version="0.1.0",
+    description="Simulated strapdown IMU on a rate table, with hidden effects",
+    license="Apache-2.0",
+    packages=find_packages(),
+    data_files=[
+        ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
+        (f"share/{NAME}", ["package.xml"]),
+    ],
+    zip_safe=False,
+    entry_points={
+        "console_scripts": ["sdimu_node = sdimu_sim.nodes.sdimu_node:main"],
+        "sdimu_calibration.verbs": [
+            "simulate = sdimu_sim.cli.simulate:simulate",
+            "run = sdimu_sim.cli.run:run",
+        ],
+    },
+)
