@@ -1,0 +1,1 @@
+"""Bags, configuration files and result files, to and from the dataclasses of the core."""

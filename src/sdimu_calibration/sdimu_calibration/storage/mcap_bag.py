@@ -1,0 +1,200 @@
+"""A rosbag2 folder being written: one MCAP file and its metadata.yaml."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import yaml
+from mcap.writer import CompressionType, Writer
+
+from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.storage.message_definition import definition, type_hash
+
+# rosbags compares the QoS in the MCAP channel with the one in metadata.yaml and yields no message, and no
+# error, when they differ: both come from here. An empty list lets every player take its defaults.
+_OFFERED_QOS: list[Mapping[str, Any]] = []
+
+
+@dataclass
+class _Topic:
+    channel: int
+    type_name: str
+    count: int = 0
+
+
+class McapBag:
+    """Writer of one bag; messages are CDR bytes.
+
+    A metadata.yaml is there from the start, so that a bag cut by a crash is still a folder that
+    `sdimu bag recover` can mend; `close` writes the final one.
+
+    Parameters
+    ----------
+    path : Path
+        Folder to make.
+    replace : bool
+        Delete a bag that is already there.
+
+    Raises
+    ------
+    DataError
+        When the folder exists and is not to be replaced, or holds something else than a bag.
+    """
+
+    def __init__(self, path: Path, *, replace: bool = False) -> None:
+        self.path = Path(path)
+        _make_room(self.path, replace)
+        self._file_name = f"{self.path.name}_0.mcap"
+        self._topics: dict[str, _Topic] = {}
+        self._schemas: dict[str, int] = {}
+        self._first_ns: int | None = None
+        self._last_ns = 0
+        self._stream = (self.path / self._file_name).open("wb")
+        self._writer = Writer(self._stream, compression=CompressionType.ZSTD)
+        self._writer.start(profile="ros2", library="sdimu-calibration")
+        self._write_metadata()
+
+    def topic(self, name: str, type_name: str) -> int:
+        """Announce a topic; announcing it again with the same type does nothing.
+
+        Parameters
+        ----------
+        name, type_name : str
+            Such as ``/imu/data_raw`` and ``sensor_msgs/msg/Imu``.
+
+        Returns
+        -------
+        int
+            MCAP channel.
+
+        Raises
+        ------
+        DataError
+            When the type is not installed, or the topic is already there with another type.
+        """
+        known = self._topics.get(name)
+        if known is not None:
+            if known.type_name != type_name:
+                raise DataError(f"topic {name} is already in the bag as {known.type_name}, not {type_name}")
+            return known.channel
+        if type_name not in self._schemas:
+            text = definition(type_name).encode()
+            self._schemas[type_name] = self._writer.register_schema(type_name, "ros2msg", text)
+        metadata = {
+            "offered_qos_profiles": yaml.safe_dump(_OFFERED_QOS).strip(),
+            "topic_type_hash": type_hash(type_name),
+        }
+        channel = int(self._writer.register_channel(name, "cdr", self._schemas[type_name], metadata))
+        self._topics[name] = _Topic(channel, type_name)
+        self._write_metadata()
+        return channel
+
+    def write(self, name: str, data: bytes, log_time_ns: int) -> None:
+        """Append a message.
+
+        Parameters
+        ----------
+        name : str
+            An announced topic.
+        data : bytes
+            The message in CDR, with its 4-byte encapsulation header.
+        log_time_ns : int
+            Time (ns) under which it is filed: the stamp in its header, where it has one.
+        """
+        topic = self._topics[name]
+        self._writer.add_message(topic.channel, log_time_ns, data, log_time_ns, topic.count)
+        topic.count += 1
+        if self._first_ns is None or log_time_ns < self._first_ns:
+            self._first_ns = log_time_ns
+        self._last_ns = max(self._last_ns, log_time_ns)
+
+    def flush(self) -> None:
+        """Close the chunk and hand it to the system: what was written until now survives a kill."""
+        self._writer.flush()
+
+    def close(self) -> None:
+        """Finish the file and write the final metadata.yaml; a second call does nothing."""
+        if self._stream.closed:
+            return
+        self._writer.finish()
+        self._stream.close()
+        self._write_metadata()
+
+    def __enter__(self) -> McapBag:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Messages written so far, by topic."""
+        return {name: topic.count for name, topic in self._topics.items()}
+
+    def _write_metadata(self) -> None:
+        first = self._first_ns or 0
+        span = {
+            "starting_time": {"nanoseconds_since_epoch": first},
+            "duration": {"nanoseconds": max(0, self._last_ns - first)},
+            "message_count": sum(topic.count for topic in self._topics.values()),
+        }
+        content = {
+            "version": 9,
+            "storage_identifier": "mcap",
+            "relative_file_paths": [self._file_name],
+            **span,
+            "topics_with_message_count": [_topic_entry(name, topic) for name, topic in self._topics.items()],
+            "compression_format": "",
+            "compression_mode": "",
+            "files": [{"path": self._file_name, **span}],
+            "custom_data": None,
+            "ros_distro": "jazzy",
+        }
+        # Renaming keeps the file whole whatever happens in between.
+        temporary = self.path / "metadata.yaml.part"
+        temporary.write_text(
+            yaml.dump({"rosbag2_bagfile_information": content}, Dumper=_PlainDumper, sort_keys=False),
+            encoding="utf-8",
+        )
+        temporary.replace(self.path / "metadata.yaml")
+
+
+class _PlainDumper(yaml.SafeDumper):
+    """YAML without anchors: other readers of bags need not know them."""
+
+    def ignore_aliases(self, data: Any) -> bool:  # noqa: ARG002 (the name is the base class')
+        return True
+
+
+def _topic_entry(name: str, topic: _Topic) -> dict[str, Any]:
+    return {
+        "topic_metadata": {
+            "name": name,
+            "type": topic.type_name,
+            "serialization_format": "cdr",
+            "offered_qos_profiles": _OFFERED_QOS,
+            "type_description_hash": type_hash(topic.type_name),
+        },
+        "message_count": topic.count,
+    }
+
+
+def _make_room(path: Path, replace: bool) -> None:
+    """Make the folder; an old bag goes only when asked to, anything else never."""
+    if path.is_dir() and any(path.iterdir()):
+        if not (path / "metadata.yaml").is_file():
+            raise DataError(f"{path}: the folder is not empty and not a bag; choose another one")
+        if not replace:
+            raise DataError(f"{path}: a bag is already there; remove it or choose another folder")
+        shutil.rmtree(path)
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except (FileExistsError, NotADirectoryError) as error:
+        raise DataError(f"{path}: a file is in the way of the bag folder; choose another one") from error
