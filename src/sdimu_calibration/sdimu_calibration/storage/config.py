@@ -1,0 +1,293 @@
+"""Configuration files (YAML) <-> the core's dataclasses.
+
+A file is named by a path, or by its bare name in ``config/<kind>/``. Quantities are text with a unit
+(``"2 deg/s"``); every other spelling is refused with one line that names file and key.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import re
+import sys
+from collections.abc import Hashable, Mapping
+from pathlib import Path
+from typing import Annotated, Any, Literal, TypeVar, get_args
+
+import yaml
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+
+from sdimu_calibration.core.plan import Plan, Turn
+from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.specification import ImuSpecification, Model, Site
+from sdimu_calibration.core.units import parse_quantity
+
+CONFIG_VARIABLE = "SDIMU_CONFIG"
+"""Environment variable that names the config folder."""
+
+_SUFFIXES = (".yaml", ".yml", ".json")
+
+
+class Schema(BaseModel):
+    """Base of every file schema: no unknown keys, no infinities."""
+
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False, frozen=True, protected_namespaces=())
+
+
+S = TypeVar("S", bound=Schema)
+
+
+def quantity(expected: str) -> BeforeValidator:
+    """Read text such as ``"2 deg/s"`` into SI, refusing every dimension but that of `expected`."""
+    return BeforeValidator(lambda value: parse_quantity(_as_text(value, expected), expected))
+
+
+def _as_text(value: Any, expected: str) -> str:
+    if isinstance(value, bool) or not isinstance(value, str | int | float):
+        raise ValueError(f"expected a number with a unit, something like '1 {expected}'")
+    return str(value)
+
+
+def _quantity_of_any_unit(value: Any) -> float:
+    # The effect that owns a prior knows its dimension; the file reader does not know effects.
+    text = _as_text(value, "ppm")
+    unit = re.sub(r"^\s*[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?\s*", "", text)
+    return parse_quantity(text, unit or "1")
+
+
+def config_folder() -> Path:
+    """Folder of the configuration: `SDIMU_CONFIG`, else the repository's ``config/``, else the share folder.
+
+    Raises
+    ------
+    DataError
+        When there is none.
+    """
+    named = os.environ.get(CONFIG_VARIABLE)
+    if named:
+        if not Path(named).is_dir():
+            raise DataError(f"{named}: not a folder (environment variable {CONFIG_VARIABLE})")
+        return Path(named)
+    for parent in Path(__file__).resolve().parents:
+        if (parent / "config" / "plan").is_dir():
+            return parent / "config"
+    share = Path(sys.prefix) / "share" / "sdimu_calibration" / "config"
+    if share.is_dir():
+        return share
+    raise DataError(f"no config folder found; set {CONFIG_VARIABLE} to the folder that holds plan/, imu/, model/")
+
+
+def find_config(kind: str, name_or_path: str | Path) -> Path:
+    """Path of a configuration file.
+
+    Parameters
+    ----------
+    kind : str
+        Folder inside the config folder: ``plan``, ``imu``, ``model``, ``site``, ``table``, ``temperature``.
+    name_or_path : str or Path
+        A bare name is looked up in the config folder; whatever looks like a path is taken as it is.
+
+    Raises
+    ------
+    DataError
+        When there is no such file; the text lists the names there are.
+    """
+    text = str(name_or_path)
+    path = Path(text)
+    if isinstance(name_or_path, Path) or path.suffix in _SUFFIXES or path.name != text:
+        if path.is_file():
+            return path
+        raise DataError(f"{path}: no such {kind} file")
+    folder = config_folder() / kind
+    for suffix in _SUFFIXES:
+        if (folder / f"{text}{suffix}").is_file():
+            return folder / f"{text}{suffix}"
+    known = sorted(p.stem for p in folder.glob("*") if p.suffix in _SUFFIXES)
+    raise DataError(f"no {kind} named '{text}' (there are: {', '.join(known) or 'none'}; or give a path to a file)")
+
+
+class _UniqueKeys(yaml.SafeLoader):
+    """YAML of plain values in which a key written twice is an error, not a silent choice."""
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Hashable, Any]:
+        keys = [self.construct_object(k, deep=True) for k, _ in node.value]
+        for key in keys:
+            if keys.count(key) > 1:
+                raise yaml.constructor.ConstructorError(None, None, f"key '{key}' is there twice", node.start_mark)
+        return super().construct_mapping(node, deep)
+
+
+def read_mapping(path: Path) -> dict[str, Any]:
+    """Content of a YAML file that holds keys and values; DataError with file and line otherwise."""
+    try:
+        data = yaml.load(path.read_text(encoding="utf-8"), Loader=_UniqueKeys)
+    except OSError as error:
+        raise DataError(f"{path}: cannot be read ({error.strerror})") from error
+    except UnicodeDecodeError as error:
+        raise DataError(f"{path}: is not text (expected YAML in UTF-8)") from error
+    except yaml.YAMLError as error:
+        mark = getattr(error, "problem_mark", None)
+        where = f" line {mark.line + 1}:" if mark else ""
+        what = getattr(error, "problem", None) or "cannot be read"
+        raise DataError(f"{path}:{where} not valid YAML: {what}") from error
+    if not isinstance(data, dict):
+        raise DataError(f"{path}: expected 'key: value' lines, found {'nothing' if data is None else 'something else'}")
+    return data
+
+
+def read_yaml(path: Path, schema: type[S]) -> S:
+    """Read a YAML file into a schema.
+
+    Raises
+    ------
+    DataError
+        One line: file, key path, what is wrong, what is expected.
+    """
+    return check(read_mapping(path), schema, str(path))
+
+
+def check(data: Mapping[str, Any], schema: type[S], source: str) -> S:
+    """Validate plain data against a schema; `source` names it in the DataError."""
+    try:
+        return schema.model_validate(data)
+    except ValidationError as error:
+        first = error.errors()[0]
+        key = ".".join(str(part) for part in first["loc"])
+        raise DataError(f"{source}: {key}: {_message(first, schema)}" if key else f"{source}: {first['msg']}") from error
+
+
+def _message(error: Any, schema: type[BaseModel]) -> str:
+    kind, found = error["type"], error.get("input")
+    if kind == "extra_forbidden":
+        return f"unknown key (known keys: {', '.join(_known_keys(schema, error['loc'][:-1]))})"
+    if kind == "missing":
+        return "missing key"
+    text = str(error["msg"]).removeprefix("Value error, ")
+    text = text[:1].lower() + text[1:] if kind != "value_error" else text
+    return text if kind == "value_error" else f"{text} (found: {found!r})"
+
+
+def _known_keys(schema: type[BaseModel], loc: tuple[Any, ...]) -> list[str]:
+    for part in loc:
+        if isinstance(part, str) and part in schema.model_fields:
+            annotation = schema.model_fields[part].annotation
+            for inner in (annotation, *get_args(annotation)):
+                if isinstance(inner, type) and issubclass(inner, BaseModel):
+                    schema = inner
+    return list(schema.model_fields)
+
+
+class _TurnFile(Schema):
+    axis: Literal["X", "Y", "Z"]
+    angle: Annotated[float, quantity("deg")]
+    rate: Annotated[float, quantity("deg/s"), Field(gt=0)] | None = None
+    dwell: Annotated[float, quantity("s"), Field(gt=0)] | None = None
+
+
+class _PlanFile(Schema):
+    format: Literal["sdimu-plan/1"] = "sdimu-plan/1"
+    name: str | None = None
+    dwell: Annotated[float, quantity("s"), Field(gt=0)]
+    first_dwell: Annotated[float, quantity("s"), Field(gt=0)] | None = None
+    rate: Annotated[float, quantity("deg/s"), Field(gt=0)]
+    acceleration: Annotated[float, quantity("deg/s^2"), Field(gt=0)]
+    turns: tuple[_TurnFile, ...]
+
+
+class _NoiseFile(Schema):
+    gyro: Annotated[float, quantity("deg/h/sqrt(Hz)"), Field(ge=0)]
+    accel: Annotated[float, quantity("ug/sqrt(Hz)"), Field(ge=0)]
+
+
+class _ImuFile(Schema):
+    format: Literal["sdimu-imu/1"] = "sdimu-imu/1"
+    name: str | None = None
+    grade: Literal["navigation", "tactical", "mems"] = "navigation"
+    noise: _NoiseFile
+    prior: dict[str, Annotated[float, BeforeValidator(_quantity_of_any_unit), Field(ge=0)]] = {}
+
+
+class _ModelFile(Schema):
+    format: Literal["sdimu-model/1"] = "sdimu-model/1"
+    name: str | None = None
+    effects: tuple[str, ...] = Field(min_length=1)
+    velocity_sigma: Annotated[float, quantity("m/s"), Field(gt=0)] = Model.velocity_sigma
+    position_sigma: Annotated[float, quantity("m"), Field(gt=0)] = Model.position_sigma
+    settle: Annotated[float, quantity("s"), Field(ge=0)] = Model.settle_s
+    body_frame: Literal["accelerometer_triad", "prior"] = "accelerometer_triad"
+
+
+class _SiteFile(Schema):
+    format: Literal["sdimu-site/1"] = "sdimu-site/1"
+    name: str | None = None
+    latitude_deg: float = Field(ge=-90.0, le=90.0)
+    height_m: float
+    gravity_m_s2: float | None = Field(default=None, gt=9.5, lt=10.0)
+    initial_azimuth_deg: float | None = None
+    initial_azimuth_sigma_deg: float = Field(default=math.degrees(Site.initial_azimuth_sigma_rad), gt=0.0)
+
+
+def load_plan(name_or_path: str | Path) -> Plan:
+    """Read a test plan.
+
+    ``rate`` and ``dwell`` of a turn replace the plan's for that turn and for the stop after it;
+    ``first_dwell`` is the stop before the first turn.
+
+    Raises
+    ------
+    DataError
+        When the file is missing or wrong, or a turn has no angle.
+    """
+    path = find_config("plan", name_or_path)
+    file = read_yaml(path, _PlanFile)
+    for number, turn in enumerate(file.turns, start=1):
+        if turn.angle == 0.0:
+            raise DataError(f"{path}: turn {number}: angle is zero (expected a signed angle such as '90 deg')")
+    return Plan(
+        name=file.name or path.stem,
+        dwell_s=(file.first_dwell or file.dwell, *(t.dwell or file.dwell for t in file.turns)),
+        turns=tuple(Turn(t.axis, t.angle, t.rate or file.rate) for t in file.turns),
+        acceleration_rad_s2=file.acceleration,
+    )
+
+
+def load_imu(name_or_path: str | Path) -> ImuSpecification:
+    """Read an IMU's specification; priors come in SI, their dimensions are the registry's to check."""
+    path = find_config("imu", name_or_path)
+    file = read_yaml(path, _ImuFile)
+    return ImuSpecification(
+        name=file.name or path.stem,
+        gyro_white_noise=file.noise.gyro,
+        accel_white_noise=file.noise.accel,
+        prior=file.prior,
+        grade=file.grade,
+    )
+
+
+def load_model(name_or_path: str | Path) -> Model:
+    """Read a model to estimate; whether its effects exist is the registry's to say."""
+    path = find_config("model", name_or_path)
+    file = read_yaml(path, _ModelFile)
+    repeated = sorted({e for e in file.effects if file.effects.count(e) > 1})
+    if repeated:
+        raise DataError(f"{path}: effects: '{repeated[0]}' is there twice (name every effect once)")
+    return Model(
+        effects=file.effects,
+        velocity_sigma=file.velocity_sigma,
+        position_sigma=file.position_sigma,
+        settle_s=file.settle,
+        body_frame=file.body_frame,
+    )
+
+
+def load_site(name_or_path: str | Path) -> Site:
+    """Read a site."""
+    file = read_yaml(find_config("site", name_or_path), _SiteFile)
+    azimuth = file.initial_azimuth_deg
+    return Site(
+        latitude_rad=math.radians(file.latitude_deg),
+        height_m=file.height_m,
+        gravity_m_s2=file.gravity_m_s2,
+        initial_azimuth_rad=None if azimuth is None else math.radians(azimuth),
+        initial_azimuth_sigma_rad=math.radians(file.initial_azimuth_sigma_deg),
+    )
