@@ -153,7 +153,9 @@ def check(data: Mapping[str, Any], schema: type[S], source: str) -> S:
     except ValidationError as error:
         first = error.errors()[0]
         key = ".".join(str(part) for part in first["loc"])
-        raise DataError(f"{source}: {key}: {_message(first, schema)}" if key else f"{source}: {first['msg']}") from error
+        raise DataError(
+            f"{source}: {key}: {_message(first, schema)}" if key else f"{source}: {first['msg']}"
+        ) from error
 
 
 def _message(error: Any, schema: type[BaseModel]) -> str:
