@@ -10,9 +10,9 @@ from types import TracebackType
 from typing import Any
 
 import yaml
-from mcap.writer import CompressionType, Writer
 
 from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.storage.mcap_file import McapFile
 from sdimu_calibration.storage.message_definition import definition, type_hash
 
 # rosbags compares the QoS in the MCAP channel with the one in metadata.yaml and yields no message, and no
@@ -55,8 +55,7 @@ class McapBag:
         self._first_ns: int | None = None
         self._last_ns = 0
         self._stream = (self.path / self._file_name).open("wb")
-        self._writer = Writer(self._stream, compression=CompressionType.ZSTD)
-        self._writer.start(profile="ros2", library="sdimu-calibration")
+        self._writer = McapFile(self._stream)
         self._write_metadata()
 
     def topic(self, name: str, type_name: str) -> int:
@@ -83,13 +82,12 @@ class McapBag:
                 raise DataError(f"topic {name} is already in the bag as {known.type_name}, not {type_name}")
             return known.channel
         if type_name not in self._schemas:
-            text = definition(type_name).encode()
-            self._schemas[type_name] = self._writer.register_schema(type_name, "ros2msg", text)
+            self._schemas[type_name] = self._writer.schema(type_name, definition(type_name))
         metadata = {
             "offered_qos_profiles": yaml.safe_dump(_OFFERED_QOS).strip(),
             "topic_type_hash": type_hash(type_name),
         }
-        channel = int(self._writer.register_channel(name, "cdr", self._schemas[type_name], metadata))
+        channel = self._writer.channel(name, self._schemas[type_name], metadata)
         self._topics[name] = _Topic(channel, type_name)
         self._write_metadata()
         return channel
@@ -107,7 +105,7 @@ class McapBag:
             Time (ns) under which it is filed: the stamp in its header, where it has one.
         """
         topic = self._topics[name]
-        self._writer.add_message(topic.channel, log_time_ns, data, log_time_ns, topic.count)
+        self._writer.message(topic.channel, data, log_time_ns)
         topic.count += 1
         if self._first_ns is None or log_time_ns < self._first_ns:
             self._first_ns = log_time_ns

@@ -17,10 +17,12 @@ from pathlib import Path
 
 from sdimu_calibration.core.recording import DataError
 
-_PRIMITIVES = frozenset(
-    ["bool", "byte", "char", "float32", "float64", "int8", "uint8", "int16", "uint16", "int32", "uint32"]
-    + ["int64", "uint64", "string", "wstring"]
+_NUMBERS = frozenset(
+    f"{kind}{bits}"
+    for kind, sizes in (("float", (32, 64)), ("int", (8, 16, 32, 64)), ("uint", (8, 16, 32, 64)))
+    for bits in sizes
 )
+_PRIMITIVES = _NUMBERS | {"bool", "byte", "char", "string", "wstring"}
 _SEPARATOR = "=" * 80
 
 

@@ -1,0 +1,197 @@
+"""A bag read into a Recording, with everything that real recordings bring along."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rosbags.typesys import Stores, get_typestore
+
+from sdimu_calibration.core.recording import DataError, Floats, PhaseLog, Recording, TableLog, TemperatureLog
+from sdimu_calibration.storage import cdr
+from sdimu_calibration.storage.bag_file import raw_messages
+from sdimu_calibration.storage.cdr import LayoutError, Stamps
+from sdimu_calibration.storage.topics import Topics
+
+_MINIMUM_SAMPLES = 2
+
+
+def read_recording(path: Path, topics: Topics | None = None) -> Recording:
+    """Read a bag.
+
+    Samples that are not finite and samples with a stamp that was there before are dropped and counted;
+    samples out of order are sorted by stamp. What was mended is told in `notes`.
+
+    Parameters
+    ----------
+    path : Path
+        rosbag2 folder (MCAP or SQLite), or a bare .mcap or .db3 file.
+    topics : Topics, optional
+        Names of the topics; the project's own by default.
+
+    Returns
+    -------
+    Recording
+        Time counts from one nominal sample interval before the first stamp.
+
+    Raises
+    ------
+    DataError
+        When it is not a bag, has no IMU topic, or no usable sample; one line that says what to do.
+    """
+    path = Path(path)
+    topics = topics or Topics()
+    wanted = {
+        topics.imu: cdr.IMU,
+        topics.status: cdr.STATUS,
+        topics.joint_states: cdr.JOINT_STATE,
+        topics.temperature: cdr.TEMPERATURE,
+    }
+    raw = raw_messages(path, wanted, required=topics.imu)
+    notes: list[str] = []
+    ns, omega_ib_b, f_ib_b = _imu(raw[topics.imu])
+    total = len(ns)
+    chosen = _usable(ns, omega_ib_b, f_ib_b, f"{path}: {topics.imu}", notes)
+    ns, omega_ib_b, f_ib_b = ns[chosen], omega_ib_b[chosen], f_ib_b[chosen]
+    start_ns = int(ns[0]) - round(float(np.median(np.diff(ns))))
+    return Recording(
+        start_ns=start_ns,
+        t=_seconds(ns, start_ns),
+        omega_ib_b=omega_ib_b,
+        f_ib_b=f_ib_b,
+        phase=_phase(raw.get(topics.status, []), start_ns, topics.status, notes),
+        temperature=_temperature(raw.get(topics.temperature, []), start_ns, topics.temperature, notes),
+        table=_table(raw.get(topics.joint_states, []), start_ns, topics.joint_states, notes),
+        rejected=total - len(ns),
+        notes=tuple(notes),
+    )
+
+
+def _usable(ns: Stamps, omega_ib_b: Floats, f_ib_b: Floats, where: str, notes: list[str]) -> Stamps:
+    """Choose the samples to use: indices in the order of their stamps, every stamp once."""
+    finite = np.isfinite(omega_ib_b).all(axis=1) & np.isfinite(f_ib_b).all(axis=1)
+    if not finite.any():
+        raise DataError(f"{where}: all {len(ns)} samples are NaN or infinite; check the driver of the IMU")
+    chosen: Stamps = np.flatnonzero(finite)
+    if len(chosen) < len(ns):
+        notes.append(f"{len(ns) - len(chosen)} samples were not finite and were dropped")
+    late = int(np.count_nonzero(np.diff(ns[chosen]) < 0))
+    if late:
+        notes.append(f"{late} samples came out of order and were sorted by their stamps")
+        chosen = chosen[np.argsort(ns[chosen], kind="stable")]
+    new = np.concatenate([[True], np.diff(ns[chosen]) > 0])
+    if not new.all():
+        notes.append(f"{np.count_nonzero(~new)} samples repeated a stamp and were dropped")
+    chosen = chosen[new]
+    if len(chosen) < _MINIMUM_SAMPLES:
+        raise DataError(f"{where}: only one stamp in {len(ns)} samples; check header.stamp of the driver")
+    return chosen
+
+
+def _phase(raw: list[bytes], start_ns: int, topic: str, notes: list[str]) -> PhaseLog | None:
+    """Phases in the order of their stamps; a message without a phase is ignored."""
+    parsed = [entry for entry in map(_status, raw) if entry is not None]
+    if len(parsed) < len(raw):
+        notes.append(f"{len(raw) - len(parsed)} messages of {topic} had no phase and were ignored")
+    if not parsed:
+        return None
+    ns = np.array([entry[0] for entry in parsed], np.int64)
+    order = np.argsort(ns, kind="stable")
+    dwell = np.array([entry[1] for entry in parsed])[order]
+    counted = np.cumsum(dwell & ~np.concatenate([[False], dwell[:-1]])) - 1
+    said = np.array([-1 if entry[2] is None else entry[2] for entry in parsed])[order]
+    if (said < 0).any():
+        notes.append(f"{topic} does not always say the stop: stops are counted from the dwells")
+        said = np.maximum(counted, 0)
+    return PhaseLog(_seconds(ns[order], start_ns), dwell, said.astype(np.int64))
+
+
+def _status(raw: bytes) -> tuple[int, bool, int | None] | None:
+    """Stamp (ns), True for dwell, stop; None without a phase. A phase of any other name is no dwell."""
+    message = _message(raw, cdr.STATUS)
+    if not message.status:
+        return None
+    values = {entry.key: entry.value for entry in message.status[0].values}
+    phase = (values.get("phase") or message.status[0].message).strip().lower()
+    if not phase:
+        return None
+    stop = values.get("stop", "").strip()
+    return _stamp(message), phase == "dwell", int(stop) if stop.isdecimal() else None
+
+
+def _temperature(raw: list[bytes], start_ns: int, topic: str, notes: list[str]) -> TemperatureLog | None:
+    if not raw:
+        return None
+    try:
+        ns, values = cdr.decode_doubles(raw, 2)
+        value = values[:, 0]
+    except LayoutError:
+        ns, value = _one_by_one(raw, cdr.TEMPERATURE, lambda message: message.temperature)
+    chosen = np.flatnonzero(np.isfinite(value))
+    if len(chosen) < len(value):
+        notes.append(f"{len(value) - len(chosen)} temperatures of {topic} were not finite and were dropped")
+    chosen = chosen[np.unique(ns[chosen], return_index=True)[1]]
+    return TemperatureLog(_seconds(ns[chosen], start_ns), value[chosen]) if len(chosen) else None
+
+
+def _table(raw: list[bytes], start_ns: int, topic: str, notes: list[str]) -> TableLog | None:
+    if not raw:
+        return None
+    first = _message(raw[0], cdr.JOINT_STATE)
+    names = tuple(first.name)
+    try:
+        ns, angle = cdr.decode_joint_positions(raw, names, np.asarray(first.position, float))
+    except LayoutError:
+        try:
+            ns, angle = _one_by_one(raw, cdr.JOINT_STATE, lambda message: message.position)
+        except ValueError:
+            notes.append(f"{topic} changes its axes on the way and was ignored")
+            return None
+    if angle.ndim != 2 or angle.shape[1] != len(names):
+        notes.append(f"{topic} has no angle for every axis and was ignored")
+        return None
+    _, chosen = np.unique(ns, return_index=True)
+    return TableLog(_seconds(ns[chosen], start_ns), names, angle[chosen])
+
+
+def _imu(raw: list[bytes]) -> tuple[Stamps, Floats, Floats]:
+    try:
+        return cdr.decode_imu(raw)
+    except LayoutError:
+        ns, values = _one_by_one(raw, cdr.IMU, _imu_values)
+        return ns, values[:, :3], values[:, 3:]
+
+
+def _imu_values(message: Any) -> list[float]:
+    rate, force = message.angular_velocity, message.linear_acceleration
+    return [rate.x, rate.y, rate.z, force.x, force.y, force.z]
+
+
+def _one_by_one(raw: list[bytes], type_name: str, values: Callable[[Any], Any]) -> tuple[Stamps, Floats]:
+    """Decode messages that share no layout; slow, and right for every encoding rosbags knows."""
+    messages = [_message(data, type_name) for data in raw]
+    stamps = np.array([_stamp(message) for message in messages], np.int64)
+    return stamps, np.array([values(message) for message in messages], float)
+
+
+def _seconds(ns: Stamps, start_ns: int) -> Floats:
+    return np.asarray((ns - start_ns) * 1e-9, np.float64)
+
+
+def _stamp(message: Any) -> int:
+    return int(message.header.stamp.sec) * 1_000_000_000 + int(message.header.stamp.nanosec)
+
+
+def _message(raw: bytes, type_name: str) -> Any:
+    return _typestore().deserialize_cdr(raw, type_name)
+
+
+@cache
+def _typestore() -> Any:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        return get_typestore(Stores.ROS2_JAZZY)
