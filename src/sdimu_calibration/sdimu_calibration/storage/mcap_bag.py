@@ -3,21 +3,17 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
-from typing import Any
-
-import yaml
 
 from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.storage.bag_metadata import FileEntry, TopicEntry, write_metadata
 from sdimu_calibration.storage.mcap_file import McapFile
 from sdimu_calibration.storage.message_definition import definition, type_hash
 
-# rosbags compares the QoS in the MCAP channel with the one in metadata.yaml and yields no message, and no
-# error, when they differ: both come from here. An empty list lets every player take its defaults.
-_OFFERED_QOS: list[Mapping[str, Any]] = []
+# No profile: every player takes its defaults.
+_OFFERED_QOS = "[]"
 
 
 @dataclass
@@ -82,11 +78,8 @@ class McapBag:
                 raise DataError(f"topic {name} is already in the bag as {known.type_name}, not {type_name}")
             return known.channel
         if type_name not in self._schemas:
-            self._schemas[type_name] = self._writer.schema(type_name, definition(type_name))
-        metadata = {
-            "offered_qos_profiles": yaml.safe_dump(_OFFERED_QOS).strip(),
-            "topic_type_hash": type_hash(type_name),
-        }
+            self._schemas[type_name] = self._writer.schema(type_name, definition(type_name).encode())
+        metadata = {"offered_qos_profiles": _OFFERED_QOS, "topic_type_hash": type_hash(type_name)}
         channel = self._writer.channel(name, self._schemas[type_name], metadata)
         self._topics[name] = _Topic(channel, type_name)
         self._write_metadata()
@@ -137,51 +130,13 @@ class McapBag:
         return {name: topic.count for name, topic in self._topics.items()}
 
     def _write_metadata(self) -> None:
-        first = self._first_ns or 0
-        span = {
-            "starting_time": {"nanoseconds_since_epoch": first},
-            "duration": {"nanoseconds": max(0, self._last_ns - first)},
-            "message_count": sum(topic.count for topic in self._topics.values()),
-        }
-        content = {
-            "version": 9,
-            "storage_identifier": "mcap",
-            "relative_file_paths": [self._file_name],
-            **span,
-            "topics_with_message_count": [_topic_entry(name, topic) for name, topic in self._topics.items()],
-            "compression_format": "",
-            "compression_mode": "",
-            "files": [{"path": self._file_name, **span}],
-            "custom_data": None,
-            "ros_distro": "jazzy",
-        }
-        # Renaming keeps the file whole whatever happens in between.
-        temporary = self.path / "metadata.yaml.part"
-        temporary.write_text(
-            yaml.dump({"rosbag2_bagfile_information": content}, Dumper=_PlainDumper, sort_keys=False),
-            encoding="utf-8",
-        )
-        temporary.replace(self.path / "metadata.yaml")
-
-
-class _PlainDumper(yaml.SafeDumper):
-    """YAML without anchors: other readers of bags need not know them."""
-
-    def ignore_aliases(self, data: Any) -> bool:  # noqa: ARG002 (the name is the base class')
-        return True
-
-
-def _topic_entry(name: str, topic: _Topic) -> dict[str, Any]:
-    return {
-        "topic_metadata": {
-            "name": name,
-            "type": topic.type_name,
-            "serialization_format": "cdr",
-            "offered_qos_profiles": _OFFERED_QOS,
-            "type_description_hash": type_hash(topic.type_name),
-        },
-        "message_count": topic.count,
-    }
+        count = sum(topic.count for topic in self._topics.values())
+        file = FileEntry(self._file_name, self._first_ns or 0, self._last_ns, count)
+        topics = [
+            TopicEntry(name, topic.type_name, topic.count, type_hash(topic.type_name), _OFFERED_QOS)
+            for name, topic in self._topics.items()
+        ]
+        write_metadata(self.path, [file], topics)
 
 
 def _make_room(path: Path, replace: bool) -> None:

@@ -40,13 +40,13 @@ class McapFile:
         self._channels: list[records.Channel] = []
         self._counts: list[int] = []
         self._chunks: list[records.ChunkIndex] = []
-        self._first_ns, self._last_ns = 0, 0
+        self.first_ns, self.last_ns = 0, 0
         self._start_chunk()
         self._put(MCAP0_MAGIC + _record(records.Header(profile="ros2", library="sdimu-calibration")))
 
-    def schema(self, name: str, text: str) -> int:
-        """Register a message type with its ``ros2msg`` definition; return its id."""
-        schema = records.Schema(id=len(self._schemas) + 1, data=text.encode(), encoding="ros2msg", name=name)
+    def schema(self, name: str, text: bytes, encoding: str = "ros2msg") -> int:
+        """Register a message type with its definition; return its id."""
+        schema = records.Schema(id=len(self._schemas) + 1, data=text, encoding=encoding, name=name)
         self._schemas.append(schema)
         self._add(_record(schema))
         return len(self._schemas)
@@ -118,8 +118,8 @@ class McapFile:
             return
         index = np.array(self._index, np.uint64)
         first, last = int(index[:, 1].min()), int(index[:, 1].max())
-        self._first_ns = first if not self._chunks else min(first, self._first_ns)
-        self._last_ns = max(last, self._last_ns)
+        self.first_ns = first if not self._chunks else min(first, self.first_ns)
+        self.last_ns = max(last, self.last_ns)
         content = b"".join(self._parts)
         packed = zstandard.compress(content)
         chunk = _record(
@@ -162,8 +162,8 @@ class McapFile:
             chunk_count=len(self._chunks),
             message_count=sum(self._counts),
             metadata_count=0,
-            message_start_time=self._first_ns,
-            message_end_time=self._last_ns,
+            message_start_time=self.first_ns,
+            message_end_time=self.last_ns,
             schema_count=len(self._schemas),
         )
 

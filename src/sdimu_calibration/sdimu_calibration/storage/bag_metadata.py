@@ -1,0 +1,93 @@
+"""The metadata.yaml of a rosbag2 folder (version 9)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+
+@dataclass(frozen=True)
+class TopicEntry:
+    """A topic: name, type, number of messages, hash of the type, QoS as the YAML text of its MCAP channel."""
+
+    name: str
+    type_name: str
+    count: int
+    type_hash: str
+    offered_qos: str
+
+
+@dataclass(frozen=True)
+class FileEntry:
+    """A file of the bag: its name, first and last log time (ns), number of messages."""
+
+    name: str
+    first_ns: int
+    last_ns: int
+    count: int
+
+
+def write_metadata(folder: Path, files: Sequence[FileEntry], topics: Sequence[TopicEntry]) -> None:
+    """Write metadata.yaml into `folder`, whole or not at all.
+
+    Parameters
+    ----------
+    folder : Path
+    files : sequence of FileEntry
+        In the order in which they are to be read.
+    topics : sequence of TopicEntry
+    """
+    filled = [file for file in files if file.count] or list(files)
+    whole = FileEntry(
+        "", min(f.first_ns for f in filled), max(f.last_ns for f in filled), sum(f.count for f in files)
+    )
+    content = {
+        "version": 9,
+        "storage_identifier": "mcap",
+        "relative_file_paths": [file.name for file in files],
+        **_span(whole),
+        "topics_with_message_count": [_topic(topic) for topic in topics],
+        "compression_format": "",
+        "compression_mode": "",
+        "files": [{"path": file.name, **_span(file)} for file in files],
+        "custom_data": None,
+        "ros_distro": "jazzy",
+    }
+    text = yaml.dump({"rosbag2_bagfile_information": content}, Dumper=_PlainDumper, sort_keys=False)
+    temporary = folder / "metadata.yaml.part"
+    temporary.write_text(text, encoding="utf-8")
+    temporary.replace(folder / "metadata.yaml")
+
+
+class _PlainDumper(yaml.SafeDumper):
+    """YAML without anchors: other readers of bags need not know them."""
+
+    def ignore_aliases(self, data: Any) -> bool:  # noqa: ARG002 (the name is the base class')
+        return True
+
+
+def _span(file: FileEntry) -> dict[str, Any]:
+    return {
+        "duration": {"nanoseconds": max(0, file.last_ns - file.first_ns)},
+        "starting_time": {"nanoseconds_since_epoch": file.first_ns},
+        "message_count": file.count,
+    }
+
+
+def _topic(topic: TopicEntry) -> dict[str, Any]:
+    # rosbags compares the QoS of the MCAP channel with the one here and yields no message, and no error,
+    # when they differ: this one is parsed from the channel's.
+    return {
+        "topic_metadata": {
+            "name": topic.name,
+            "type": topic.type_name,
+            "serialization_format": "cdr",
+            "offered_qos_profiles": yaml.safe_load(topic.offered_qos) or [],
+            "type_description_hash": topic.type_hash,
+        },
+        "message_count": topic.count,
+    }

@@ -1,0 +1,118 @@
+"""The result of a calibration as result.json (format ``sdimu-result/1``)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sdimu_calibration.core.calibrate import Calibration, History
+from sdimu_calibration.core.recording import DataError, Floats
+from sdimu_calibration.storage.json_file import read_json, write_json
+
+FORMAT = "sdimu-result/1"
+
+
+def write_result(path: Path, calibration: Calibration) -> None:
+    """Write result.json: SI numbers, ``null`` for what is not a finite number.
+
+    Parameters
+    ----------
+    path : Path
+        File to make or replace; its folder is made too.
+    calibration : Calibration
+    """
+    history = calibration.history
+    content = {
+        "format": FORMAT,
+        "body_frame": calibration.body_frame,
+        "model": list(calibration.model),
+        "coefficients": [
+            {"name": name, "value": value, "sigma": sigma, "unit": unit, "display_unit": display}
+            for name, value, sigma, unit, display in zip(
+                calibration.names,
+                calibration.values.tolist(),
+                np.sqrt(np.diag(calibration.covariance)).tolist(),
+                calibration.units,
+                calibration.display_units,
+                strict=True,
+            )
+        ],
+        "covariance": calibration.covariance.tolist(),
+        "fit": dict(calibration.fit),
+        "data": dict(calibration.data),
+        "notes": list(calibration.notes),
+        "history": {
+            "t": history.t.tolist(),
+            "sigma": history.sigma.tolist(),
+            "value": history.value.tolist(),
+            "stop": history.stop.tolist(),
+            "dwell": history.dwell.tolist(),
+        },
+    }
+    write_json(path, content)
+
+
+def read_result(path: Path) -> Calibration:
+    """Read result.json, or the result.json in a folder.
+
+    Parameters
+    ----------
+    path : Path
+
+    Returns
+    -------
+    Calibration
+
+    Raises
+    ------
+    DataError
+        When it is not there or not of this format.
+    """
+    path = Path(path)
+    if path.is_dir():
+        path = path / "result.json"
+    content = read_json(path, FORMAT)
+    try:
+        return _calibration(content)
+    except (KeyError, TypeError, ValueError) as error:
+        raise DataError(f"{path}: not a complete {FORMAT} file ({type(error).__name__}: {error})") from error
+
+
+def _calibration(content: Mapping[str, Any]) -> Calibration:
+    coefficients = content["coefficients"]
+    number = len(coefficients)
+    return Calibration(
+        body_frame=content["body_frame"],
+        model=tuple(content["model"]),
+        names=tuple(c["name"] for c in coefficients),
+        units=tuple(c["unit"] for c in coefficients),
+        # Files written by others need not carry display units: then people see SI.
+        display_units=tuple(c.get("display_unit", c["unit"]) for c in coefficients),
+        values=_array([c["value"] for c in coefficients], (number,)),
+        covariance=_array(content["covariance"], (number, number)),
+        fit=dict(content["fit"]),
+        data=dict(content["data"]),
+        notes=tuple(content.get("notes", ())),
+        history=_history(content.get("history") or {}, number),
+    )
+
+
+def _history(content: Mapping[str, Any], number: int) -> History:
+    t = content.get("t", [])
+    return History(
+        t=_array(t, (len(t),)),
+        sigma=_array(content.get("sigma", []), (len(t), number)),
+        value=_array(content.get("value", []), (len(t), number)),
+        stop=np.array(content.get("stop", []), np.int64),
+        dwell=np.array(content.get("dwell", []), np.bool_),
+    )
+
+
+def _array(values: list[Any], shape: tuple[int, ...]) -> Floats:
+    """Numbers with null for NaN as an array of that shape; ValueError when they do not fit."""
+    return np.array(values, float).reshape(shape)
+
+
