@@ -9,7 +9,7 @@ from rate_table_sim.core.specification import AXES, Imperfections
 from sdimu_calibration.core.compiled import compiled
 from sdimu_calibration.core.plan import Plan
 from sdimu_calibration.core.recording import DataError
-from sdimu_calibration.core.rotation import cross, quaternion, rotation_matrix
+from sdimu_calibration.core.rotation import cross, rotation_matrix
 
 Floats = NDArray[np.float64]
 
@@ -107,6 +107,27 @@ def _parallel_axes(plan: Plan, number: int, angles: Floats, axes: tuple[str, str
 
 
 @compiled
+def turn_quaternion(phi: Floats) -> Floats:
+    """Quaternion, shape (4,), scalar first, of a rotation vector (rad) of any length."""
+    a = np.sqrt(np.dot(phi, phi))
+    q = np.empty(4)
+    q[0] = np.cos(0.5 * a)
+    q[1:] = phi * (np.sin(0.5 * a) / a if a > 0.0 else 0.5)
+    return q
+
+
+@compiled
+def quaternion_product(p: Floats, q: Floats) -> Floats:
+    """Product p q, shape (4,): the rotation of p, then that of q about the turned axes."""
+    r = np.empty(4)
+    r[0] = p[0] * q[0] - p[1] * q[1] - p[2] * q[2] - p[3] * q[3]
+    r[1] = p[0] * q[1] + p[1] * q[0] + p[2] * q[3] - p[3] * q[2]
+    r[2] = p[0] * q[2] + p[2] * q[0] + p[3] * q[1] - p[1] * q[3]
+    r[3] = p[0] * q[3] + p[3] * q[0] + p[1] * q[2] - p[2] * q[1]
+    return r
+
+
+@compiled
 def gimbal_motion(
     angle: Floats, rate: Floats, axis: Floats, base_tilt: Floats, wobble: float, wobble_frame: Floats
 ) -> tuple[Floats, Floats]:
@@ -137,10 +158,10 @@ def gimbal_motion(
     """
     n = angle.shape[0]
     q_nt, omega = np.empty((n, 4)), np.empty((n, 3))
-    B = rotation_matrix(base_tilt)
+    # Products of half-angle quaternions: a quaternion taken from a matrix loses digits near half a turn.
+    q_base = turn_quaternion(base_tilt)
     p, q = wobble_frame[0], wobble_frame[1]
     for k in range(n):
-        C_outer = rotation_matrix(angle[k, 0] * axis[0])
         C_middle = rotation_matrix(angle[k, 1] * axis[1])
         C_inner = rotation_matrix(angle[k, 2] * axis[2])
         c, s = np.cos(angle[k, 2]), np.sin(angle[k, 2])
@@ -150,7 +171,10 @@ def gimbal_motion(
         to_middle = rate[k, 1] * axis[1] + C_middle.T @ (rate[k, 0] * axis[0])
         of_wobble = _rate_of_rotation_vector(phi, phi_rate)
         omega[k] = rate[k, 2] * axis[2] + C_inner.T @ (of_wobble + W.T @ to_middle)
-        q_nt[k] = quaternion(B @ C_outer @ C_middle @ W @ C_inner)
+        q_outer = quaternion_product(q_base, turn_quaternion(angle[k, 0] * axis[0]))
+        q_middle = quaternion_product(q_outer, turn_quaternion(angle[k, 1] * axis[1]))
+        q_inner = quaternion_product(turn_quaternion(phi), turn_quaternion(angle[k, 2] * axis[2]))
+        q_nt[k] = quaternion_product(q_middle, q_inner)
         if k and np.dot(q_nt[k], q_nt[k - 1]) < 0.0:
             q_nt[k] = -q_nt[k]
     return q_nt, omega

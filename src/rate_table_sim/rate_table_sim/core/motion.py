@@ -9,12 +9,18 @@ from zlib import crc32
 import numpy as np
 from numpy.typing import NDArray
 
-from rate_table_sim.core.gimbal import assign_turns, gimbal_axes, gimbal_motion, unit
+from rate_table_sim.core.gimbal import (
+    assign_turns,
+    gimbal_axes,
+    gimbal_motion,
+    quaternion_product,
+    turn_quaternion,
+    unit,
+)
 from rate_table_sim.core.profile import trapezoid
 from rate_table_sim.core.specification import AXES, Imperfections, TableSpecification
 from sdimu_calibration.core.plan import Plan
 from sdimu_calibration.core.recording import DataError
-from sdimu_calibration.core.rotation import quaternion, rotation_matrix
 
 Floats = NDArray[np.float64]
 
@@ -167,21 +173,16 @@ def _free_motion(
     if any(gimbal_errors):
         raise DataError("a table with axes: free has no gimbals: set non-orthogonality and wobble to 0")
     q_nt = np.empty((len(angle), 4))
-    q_nt[begun == 0] = quaternion(rotation_matrix(_base_tilt(errors)))
+    q_nt[begun == 0] = turn_quaternion(_base_tilt(errors))
     for number, turn in enumerate(plan.turns, start=1):
         column = AXES.index(turn.axis)
         here = np.flatnonzero(begun == number)
         turned = angle[here, column] - angle[here[0] - 1, column]
-        half = np.zeros((len(here), 4))
-        half[:, 0], half[:, 1 + column] = np.cos(0.5 * turned), np.sin(0.5 * turned)
-        q_nt[here] = _product(q_nt[here[0] - 1], half)
+        before = q_nt[here[0] - 1]
+        about = quaternion_product(before, np.eye(4)[1 + column])
+        # q (cos + e sin) = q cos + (q e) sin: one product per turn.
+        q_nt[here] = np.outer(np.cos(0.5 * turned), before) + np.outer(np.sin(0.5 * turned), about)
     return q_nt, rate.copy()
-
-
-def _product(p: Floats, q: Floats) -> Floats:
-    """Quaternion products p * q_k, shapes (4,) and (n, 4)."""
-    vector = p[0] * q[:, 1:] + q[:, :1] * p[1:] + np.cross(p[1:], q[:, 1:])
-    return np.column_stack([p[0] * q[:, 0] - q[:, 1:] @ p[1:], vector])
 
 
 def _encoder(angle: Floats, errors: Imperfections, seed: int) -> Floats:

@@ -1,0 +1,1 @@
+"""Verbs that need the simulators: arguments in one file per verb, the work elsewhere."""

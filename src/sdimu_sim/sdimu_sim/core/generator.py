@@ -1,0 +1,193 @@
+"""The simulated IMU: motion of the platform in, samples out, all at once or block by block."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sdimu_calibration.core import earth
+from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.rotation import rotation_matrix
+from sdimu_calibration.core.specification import Site
+from sdimu_sim.core.hidden import CONSTANTS, LOST_AFTER_S, parse_effects
+from sdimu_sim.core.imu import Electronics, response
+from sdimu_sim.core.platform import PlatformMotion, mean_motion
+from sdimu_sim.core.samples import SampleClock, TrueSamples, Variables, in_body
+from sdimu_sim.core.temperature import TemperatureProfile
+from sdimu_sim.core.truth import ImuTruth
+
+Floats = NDArray[np.float64]
+
+_BLOCK = 20_000
+"""Motion samples worked on at once: bounds the memory of long tests at high rates."""
+
+
+@dataclass(frozen=True)
+class ImuSamples:
+    """Readings of the IMU.
+
+    Attributes
+    ----------
+    ns : ndarray of int64, shape (m,)
+        Stamps: ends of the sample intervals (ns from the start).
+    t : ndarray, shape (m,)
+        The same in s.
+    omega_ib_b, f_ib_b : ndarray, shape (m, 3)
+        rad/s, m/s^2, as measured.
+    """
+
+    ns: NDArray[np.int64]
+    t: Floats
+    omega_ib_b: Floats
+    f_ib_b: Floats
+
+
+class ImuGenerator:
+    """Makes samples as motion comes in; the same digits however the motion is cut into blocks."""
+
+    def __init__(
+        self,
+        truth: ImuTruth,
+        site: Site,
+        rate_hz: float,
+        seed: int,
+        temperature: TemperatureProfile | None = None,
+    ) -> None:
+        self._truth, self._hidden = truth, parse_effects(truth.effects)
+        if self._hidden.needs_temperature and temperature is None:
+            raise DataError("a hidden effect needs the temperature: give a temperature profile")
+        self._clock = SampleClock(rate_hz)
+        self._electronics = Electronics(truth, self._clock.interval_s, seed)
+        self._variables = Variables(temperature)
+        self._gravity = gravity_of(site)
+        self._omega_ie_n = earth.earth_rate(site.latitude_rad)
+        self._field_n = np.asarray(truth.magnetic_field, dtype=np.float64)
+        self._C_tb = rotation_matrix(np.asarray(truth.mount_rad, dtype=np.float64))
+        self._motion = PlatformMotion(np.empty(0), np.empty((0, 4)), np.empty((0, 3)))
+        self._turn_starts: list[float] = []
+        self._emitted = 0
+
+    def advance(self, block: PlatformMotion) -> ImuSamples:
+        """Take the next motion samples and return the IMU samples that end within them.
+
+        Raises
+        ------
+        DataError
+            When times do not ascend.
+        """
+        self._append(block)
+        first, last = self._emitted + 1, self._emitted
+        if len(self._motion.t) > 1:
+            last = self._clock.count(float(self._motion.t[-1]))
+        if last < first:
+            empty = np.empty((0, 3))
+            return ImuSamples(np.empty(0, dtype=np.int64), np.empty(0), empty, empty.copy())
+        edges = self._clock.seconds(first - 1, last)
+        gyro, accel = self._electronics.apply(self._readings(edges))
+        self._emitted = last
+        self._forget(float(edges[-1]))
+        ns = self._clock.nanoseconds(first, last)
+        return ImuSamples(ns, ns / 1e9, gyro, accel)
+
+    def _append(self, block: PlatformMotion) -> None:
+        old = self._motion
+        t = np.concatenate([old.t, block.t])
+        if len(block.t) and np.any(np.diff(t[max(len(old.t) - 1, 0) :]) <= 0.0):
+            raise DataError("motion of the platform: times do not ascend")
+        omega = np.concatenate([old.omega_nt_t, block.omega_nt_t])
+        self._motion = PlatformMotion(t, np.concatenate([old.q_nt, block.q_nt]), omega)
+        new = max(len(old.t) - 1, 0)
+        still = ~np.any(omega[new:], axis=1)
+        self._turn_starts.extend(t[new:-1][still[:-1] & ~still[1:]].tolist())
+
+    def _forget(self, reached_s: float) -> None:
+        """Drop motion that no later sample needs, delayed ones included."""
+        needed = reached_s - max(self._hidden.delay_s)
+        keep = max(int(np.searchsorted(self._motion.t, needed - 1e-9, side="right")) - 2, 0)
+        m = self._motion
+        self._motion = PlatformMotion(m.t[keep:], m.q_nt[keep:], m.omega_nt_t[keep:])
+
+    def _true(self, edges: Floats) -> TrueSamples:
+        m = self._motion
+        means = mean_motion(m.t, m.q_nt, m.omega_nt_t, edges, self._omega_ie_n, self._field_n)
+        return in_body(means, self._C_tb, self._gravity, np.asarray(self._truth.lever_arm_m))
+
+    def _readings(self, edges: Floats) -> Floats:
+        """Make the readings of the six sensors (6, m), without noise."""
+        delays = self._hidden.delay_s
+        true = self._true(edges)
+        out = response(self._truth, true)
+        for delay in sorted(set(delays) - {0.0}):
+            late = [k for k in range(6) if delays[k] == delay]
+            out[late] = response(self._truth, self._true(edges - delay))[late]
+        if self._hidden.terms:
+            values = CONSTANTS | self._variables.of(true, 0.5 * (edges[:-1] + edges[1:]))
+            for term in self._hidden.terms:
+                out[term.sensor] += term.expression.evaluate({**values, **term.parameters})
+        self._lose(out, true, edges)
+        if not np.isfinite(out).all():
+            raise DataError("a hidden effect gives numbers that are not finite: check its formula")
+        return out
+
+    def _lose(self, out: Floats, true: TrueSamples, edges: Floats) -> None:
+        """Take away the gyros' increments over the lost stretch of a turn."""
+        for turn, length in self._hidden.lost:
+            if turn <= len(self._turn_starts):
+                begin = self._turn_starts[turn - 1] + LOST_AFTER_S
+                overlap = np.minimum(edges[1:], begin + length) - np.maximum(edges[:-1], begin)
+                out[:3] -= true.omega_ib * (np.maximum(overlap, 0.0) / self._clock.interval_s)
+
+
+def gravity_of(site: Site) -> float:
+    """Gravity at a site (m/s^2): the measured one, else WGS-84 normal gravity."""
+    if site.gravity_m_s2 is not None:
+        return site.gravity_m_s2
+    return float(earth.normal_gravity(site.latitude_rad, site.height_m))
+
+
+def simulate_imu(
+    motion: PlatformMotion,
+    truth: ImuTruth,
+    site: Site,
+    rate_hz: float,
+    seed: int,
+    temperature: TemperatureProfile | None = None,
+) -> ImuSamples:
+    """Make all samples of a test.
+
+    Parameters
+    ----------
+    motion : PlatformMotion
+        From t = 0; before that the platform rests.
+    truth : ImuTruth
+    site : Site
+    rate_hz : float
+        Sample k = 1, 2, ... ends at k / rate.
+    seed : int
+        Of the noise.
+    temperature : TemperatureProfile, optional
+
+    Raises
+    ------
+    DataError
+        When the hidden effects cannot be read or evaluated.
+    """
+    generator = ImuGenerator(truth, site, rate_hz, seed, temperature)
+    parts = [
+        generator.advance(
+            PlatformMotion(
+                motion.t[k : k + _BLOCK],
+                motion.q_nt[k : k + _BLOCK],
+                motion.omega_nt_t[k : k + _BLOCK],
+            )
+        )
+        for k in range(0, len(motion.t), _BLOCK)
+    ]
+    return ImuSamples(
+        np.concatenate([p.ns for p in parts]),
+        np.concatenate([p.t for p in parts]),
+        np.concatenate([p.omega_ib_b for p in parts]),
+        np.concatenate([p.f_ib_b for p in parts]),
+    )

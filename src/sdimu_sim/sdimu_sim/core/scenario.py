@@ -1,0 +1,117 @@
+"""A whole simulated test: plan, table, IMU and site in; recording and truth out."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rate_table_sim.core import TableMotion, TableSpecification, phase_changes, table_motion
+from sdimu_calibration.core.plan import Plan
+from sdimu_calibration.core.recording import DataError, PhaseLog, Recording, TableLog, TemperatureLog
+from sdimu_calibration.core.specification import ImuSpecification, Site
+from sdimu_sim.core.generator import simulate_imu
+from sdimu_sim.core.platform import PlatformMotion
+from sdimu_sim.core.temperature import TemperatureProfile
+from sdimu_sim.core.truth import ImuTruth, Truth, draw_coefficients, draw_mount
+
+Floats = NDArray[np.float64]
+
+DEFAULT_START_NS = 1_700_000_000 * 10**9
+TABLE_LOG_HZ = 10.0
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """What is simulated.
+
+    Attributes
+    ----------
+    plan, imu, site : Plan, ImuSpecification, Site
+    table : TableSpecification
+    rate_hz : float
+        Of the IMU, 10 to 1000.
+    seed : int
+        Of everything random: coefficients, mount, noise, encoders.
+    mount_rad : tuple of float or None
+        Rotation vector of the IMU on the platform; None draws it up to `mount_max_rad` about every axis.
+    effects : tuple of str
+        Hidden effects, ``NAME=VALUE``.
+    temperature : TemperatureProfile or None
+    coefficients : mapping of str to float or None
+        As built, SI; None draws them from the IMU's specification.
+    extras : mapping
+        Other attributes of `ImuTruth` (lever arm, quantisation ...).
+    start_ns : int
+        Stamp of the start.
+    """
+
+    plan: Plan
+    imu: ImuSpecification
+    site: Site
+    table: TableSpecification = field(default_factory=TableSpecification)
+    rate_hz: float = 100.0
+    seed: int = 1
+    mount_rad: tuple[float, float, float] | None = None
+    mount_max_rad: float = float(np.radians(3.0))
+    effects: tuple[str, ...] = ()
+    temperature: TemperatureProfile | None = None
+    coefficients: Mapping[str, float] | None = None
+    extras: Mapping[str, object] = field(default_factory=dict)
+    start_ns: int = DEFAULT_START_NS
+
+
+def imu_truth(scenario: Scenario) -> ImuTruth:
+    """Draw or take over the true sensor of a scenario."""
+    mount = scenario.mount_rad
+    truth = ImuTruth(
+        coefficients=draw_coefficients(scenario.imu, scenario.seed)
+        if scenario.coefficients is None
+        else dict(scenario.coefficients),
+        mount_rad=draw_mount(scenario.mount_max_rad, scenario.seed) if mount is None else mount,
+        gyro_white_noise=scenario.imu.gyro_white_noise,
+        accel_white_noise=scenario.imu.accel_white_noise,
+        effects=tuple(scenario.effects),
+    )
+    return replace(truth, **scenario.extras)  # type: ignore[arg-type]
+
+
+def generate(scenario: Scenario) -> tuple[Recording, Truth]:
+    """Simulate a test.
+
+    Raises
+    ------
+    DataError
+        When the rate, the plan on this table, or an effect cannot be used.
+    """
+    if not 10.0 <= scenario.rate_hz <= 1000.0:
+        raise DataError(f"sample rate {scenario.rate_hz:g} Hz: expected 10 to 1000 Hz")
+    imu = imu_truth(scenario)
+    motion = table_motion(scenario.plan, scenario.table, scenario.seed)
+    platform = PlatformMotion(motion.t, motion.q_nt, motion.omega_nt_t)
+    samples = simulate_imu(platform, imu, scenario.site, scenario.rate_hz, scenario.seed, scenario.temperature)
+    t, dwell, stop = phase_changes(motion)
+    recording = Recording(
+        start_ns=scenario.start_ns,
+        t=samples.t,
+        omega_ib_b=samples.omega_ib_b,
+        f_ib_b=samples.f_ib_b,
+        phase=PhaseLog(t, dwell, stop),
+        temperature=_temperature_log(scenario.temperature, float(motion.t[-1])),
+        table=_table_log(motion, scenario.table),
+    )
+    return recording, Truth(imu, scenario.site, scenario.seed, scenario.rate_hz, scenario.plan.name)
+
+
+def _temperature_log(profile: TemperatureProfile | None, until_s: float) -> TemperatureLog | None:
+    if profile is None:
+        return None
+    t = np.arange(int(until_s + 1e-9) + 1, dtype=np.float64)
+    return TemperatureLog(t, profile.value(t))
+
+
+def _table_log(motion: TableMotion, table: TableSpecification) -> TableLog:
+    every = max(round(table.sample_rate_hz / TABLE_LOG_HZ), 1)
+    return TableLog(motion.t[::every], motion.names, motion.encoder_angle[::every])
