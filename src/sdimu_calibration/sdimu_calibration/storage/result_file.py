@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from sdimu_calibration.core.calibrate import Calibration, History
 from sdimu_calibration.core.recording import DataError, Floats
+from sdimu_calibration.core.results import Calibration, History
 from sdimu_calibration.storage.json_file import read_json, write_json
 
 FORMAT = "sdimu-result/1"
@@ -24,7 +25,6 @@ def write_result(path: Path, calibration: Calibration) -> None:
         File to make or replace; its folder is made too.
     calibration : Calibration
     """
-    history = calibration.history
     content = {
         "format": FORMAT,
         "body_frame": calibration.body_frame,
@@ -44,13 +44,7 @@ def write_result(path: Path, calibration: Calibration) -> None:
         "fit": dict(calibration.fit),
         "data": dict(calibration.data),
         "notes": list(calibration.notes),
-        "history": {
-            "t": history.t.tolist(),
-            "sigma": history.sigma.tolist(),
-            "value": history.value.tolist(),
-            "stop": history.stop.tolist(),
-            "dwell": history.dwell.tolist(),
-        },
+        "history": {entry.name: getattr(calibration.history, entry.name).tolist() for entry in fields(History)},
     }
     write_json(path, content)
 
@@ -101,13 +95,17 @@ def _calibration(content: Mapping[str, Any]) -> Calibration:
 
 
 def _history(content: Mapping[str, Any], number: int) -> History:
-    t = content.get("t", [])
+    """History of a result; empty when the file, written by others, has none."""
+    m = len(content.get("t", ()))
     return History(
-        t=_array(t, (len(t),)),
-        sigma=_array(content.get("sigma", []), (len(t), number)),
-        value=_array(content.get("value", []), (len(t), number)),
+        t=_array(content.get("t", []), (m,)),
+        value=_array(content.get("value", []), (m, number)),
+        sigma=_array(content.get("sigma", []), (m, number)),
+        attitude_sigma=_array(content.get("attitude_sigma", []), (m, 3)),
         stop=np.array(content.get("stop", []), np.int64),
         dwell=np.array(content.get("dwell", []), np.bool_),
+        used=np.array(content.get("used", []), np.bool_),
+        nis=_array(content.get("nis", []), (m, 4)),
     )
 
 

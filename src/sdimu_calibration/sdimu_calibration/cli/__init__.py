@@ -1,0 +1,1 @@
+"""The command line `sdimu`: arguments in one file per verb, work elsewhere."""

@@ -1,0 +1,51 @@
+"""`sdimu bag`: look into recordings, and mend them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+app = typer.Typer(help="Look into a recording, or mend one that was cut.", no_args_is_help=True)
+
+Bag = Annotated[Path, typer.Argument(metavar="BAG", help="rosbag2 folder or .mcap file.")]
+
+
+@app.command()
+def info(bag: Bag) -> None:
+    """Show topics, types and counts."""
+    from rich.console import Console
+    from rich.table import Table
+
+    from sdimu_calibration.storage.bag_info import read_info
+
+    content = read_info(bag)
+    table = Table("topic", "type", "messages", pad_edge=False)
+    table.columns[2].justify = "right"
+    for topic, type_name in sorted(content.types.items()):
+        table.add_row(topic, type_name, str(content.counts[topic]))
+    console = Console()
+    console.print(table)
+    console.print(f"{(content.last_ns - content.first_ns) * 1e-9:.1f} s from {content.first_ns * 1e-9:.3f} s")
+    for part in content.damaged:
+        console.print(f"{part} is cut short or damaged; run: sdimu bag recover {bag}", soft_wrap=True)
+
+
+@app.command()
+def recover(bag: Bag) -> None:
+    """Mend a bag that was cut while it was being written; the cut file stays as NAME.damaged."""
+    from rich.console import Console
+
+    from sdimu_calibration.storage.recover import DAMAGED_SUFFIX
+    from sdimu_calibration.storage.recover import recover as mend
+
+    console = Console()
+    for salvage in mend(bag):
+        seconds = (salvage.last_ns - salvage.first_ns) * 1e-9
+        saved = ", ".join(f"{topic} {count}" for topic, count in sorted(salvage.counts.items()))
+        state = f"mended, was cut ({salvage.damage})" if salvage.damage else "whole, left as it is"
+        console.print(f"{salvage.path}: {state}", soft_wrap=True)
+        console.print(f"  {seconds:.1f} s: {saved}", soft_wrap=True)
+        if salvage.damage:
+            console.print(f"  the cut file is now {salvage.path.name}{DAMAGED_SUFFIX}", soft_wrap=True)

@@ -1,0 +1,67 @@
+"""`sdimu calibrate`: a bag to coefficients."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from sdimu_calibration.core.specification import Model
+
+
+def calibrate(
+    bag: Annotated[Path, typer.Argument(metavar="BAG", help="rosbag2 folder or .mcap file.")],
+    model: Annotated[str, typer.Option(help="Model to estimate: name in config/model or path.")] = "baseline",
+    site: Annotated[str, typer.Option(help="Where the test was: name in config/site or path.")] = "daejeon",
+    imu: Annotated[str, typer.Option(help="Specification of the IMU: name in config/imu or path.")] = "dtg",
+    add: Annotated[
+        list[str] | None, typer.Option(metavar="EFFECT", help="Effect to estimate besides; may be repeated.")
+    ] = None,
+    out: Annotated[Path | None, typer.Option(help="Folder of the results; BAG_calibration by default.")] = None,
+    truth: Annotated[Path | None, typer.Option(help="Truth of a simulation, to show the errors.")] = None,
+) -> None:
+    """Estimate the coefficients from a recording; leaves result.json and report.html."""
+    from rich.console import Console
+
+    from sdimu_calibration.cli.progress import bar
+    from sdimu_calibration.core.calibrate import calibrate as estimate
+    from sdimu_calibration.report.page import write_report
+    from sdimu_calibration.report.table import rich_table, rows
+    from sdimu_calibration.storage.bag_reader import read_recording
+    from sdimu_calibration.storage.config import load_imu, load_site
+    from sdimu_calibration.storage.reference_file import read_truth
+    from sdimu_calibration.storage.result_file import write_result
+
+    console = Console()
+    wanted = _model(model, add or [])
+    where, specification = load_site(site), load_imu(imu)
+    true = None if truth is None else read_truth(truth, wanted.body_frame)
+    recording = read_recording(bag)
+    with bar(console) as progress:
+        result = estimate(recording, where, specification, wanted, progress=progress)
+    folder = out or default_folder(bag)
+    write_result(folder / "result.json", result)
+    write_report(folder / "report.html", result, title=f"Calibration of {bag.name}", truth=true)
+    console.print(rich_table(rows(result, true), f"body frame: {result.body_frame}"))
+    for note in (*recording.notes, *(note for note in result.notes if note not in recording.notes)):
+        console.print(f"note: {note}", soft_wrap=True, markup=False, highlight=False)
+    console.print(f"results in {folder}", soft_wrap=True)
+
+
+def default_folder(bag: Path) -> Path:
+    """Folder of the results of a bag: beside it, its stem with ``_calibration``."""
+    bag = bag.resolve()
+    return bag.with_name(f"{bag.stem if bag.is_file() else bag.name}_calibration")
+
+
+def _model(name: str, added: list[str]) -> Model:
+    from dataclasses import replace
+
+    from sdimu_calibration.core.effects import registry
+    from sdimu_calibration.storage.config import load_model
+
+    model = load_model(name)
+    effects = dict.fromkeys([*model.effects, *(registry.get(effect).name for effect in added)])
+    return replace(model, effects=tuple(effects))

@@ -1,0 +1,110 @@
+"""Entry of `sdimu`: finds the verbs, and turns errors of data and options into one line.
+
+Verbs are loaded when they are asked for, so that the command starts fast and a package that adds broken
+verbs harms no other.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from importlib import import_module
+from importlib.metadata import entry_points
+from typing import Any
+
+import typer
+from typer.core import TyperGroup
+from typer.main import get_command
+
+from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.units import UnitError
+
+ENTRY_POINTS = "sdimu_calibration.verbs"
+
+_VERBS = {
+    "calibrate": "sdimu_calibration.cli.calibrate:calibrate",
+    "effects": "sdimu_calibration.cli.effects:effects",
+    "replay": "sdimu_calibration.cli.replay:replay",
+    "bag": "sdimu_calibration.cli.bag:app",
+}
+
+
+class Verbs(TyperGroup):
+    """The verbs of this package and of every package that adds some."""
+
+    def list_commands(self, ctx: Any) -> list[str]:  # noqa: ARG002 (the signature is the base class')
+        """Names of the verbs: those of other packages, which run tests, first."""
+        return [*_added(), *_VERBS]
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:  # noqa: ARG002
+        """Load a verb; None when there is none of that name."""
+        module, _, attribute = (_VERBS.get(cmd_name) or _added().get(cmd_name, "")).partition(":")
+        if not module:
+            return None
+        try:
+            return _command(cmd_name, getattr(import_module(module), attribute))
+        except ImportError as error:
+            return _command(cmd_name, _unavailable(cmd_name, error))
+
+
+app = typer.Typer(
+    name="sdimu",
+    cls=Verbs,
+    help="Calibrate a strapdown inertial measurement unit on a rate table at navigation level.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+
+
+@app.callback()
+def _root() -> None:
+    """Calibrate a strapdown inertial measurement unit on a rate table at navigation level."""
+
+
+def main() -> None:
+    """Run `sdimu`: exit 0 when done, 1 with one line when data or options are unusable, 2 on wrong usage."""
+    try:
+        app()
+    except (DataError, UnitError) as error:
+        sys.exit(_complain(str(error)))
+    except OSError as error:
+        sys.exit(_complain(f"{error.filename or 'system'}: {error.strerror or error}"))
+    except KeyboardInterrupt:
+        sys.exit(130)
+
+
+def _complain(text: str) -> int:
+    sys.stderr.write("sdimu: " + " ".join(text.split()) + "\n")
+    return 1
+
+
+def _added() -> dict[str, str]:
+    """Verbs of other packages, by name, as ``module:attribute``."""
+    return {point.name: point.value for point in entry_points(group=ENTRY_POINTS)}
+
+
+def _unavailable(name: str, error: ImportError) -> Callable[[], None]:
+    """Stand in for a verb whose package does not load, so that all others still work."""
+    reason = str(error)
+
+    def verb() -> None:
+        raise DataError(f"{name}: its package does not load ({reason}); run: make setup")
+
+    verb.__doc__ = f"(not available: {reason})"
+    return verb
+
+
+def _command(name: str, verb: Any) -> Any:
+    """Make a click command of a function or of a typer application."""
+    if not isinstance(verb, typer.Typer):
+        single = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
+        single.command(name=name)(verb)
+        verb = single
+    command = get_command(verb)
+    command.name = name
+    return command
+
+
+if __name__ == "__main__":
+    main()

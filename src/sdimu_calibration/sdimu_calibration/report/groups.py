@@ -1,0 +1,43 @@
+"""Coefficients sorted by the effect they belong to."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from sdimu_calibration.core.results import Calibration
+
+_FRAME_SHARE = 1e-6
+"""A sigma below this share of the effect's largest is rounding: the body frame makes the coefficient zero."""
+
+
+def effect_of(name: str, model: Sequence[str]) -> str:
+    """Find the effect of a coefficient: the longest effect name that `name` begins with, or `name` itself."""
+    fits = [effect for effect in model if name == effect or name.startswith(f"{effect}_")]
+    return max(fits, key=len) if fits else name
+
+
+def groups(names: Sequence[str], model: Sequence[str]) -> dict[str, list[int]]:
+    """Sort indices of coefficients by effect, both in the order of `names`."""
+    found: dict[str, list[int]] = {}
+    for index, name in enumerate(names):
+        found.setdefault(effect_of(name, model), []).append(index)
+    return found
+
+
+def short_name(name: str, effect: str) -> str:
+    """Cut the effect from a name: what tells it from others of the same effect, such as ``xy``."""
+    return name.removeprefix(effect).lstrip("_") or name
+
+
+def title(effect: str) -> str:
+    """Write an effect name in words."""
+    return effect.replace("_", " ")
+
+
+def is_free(calibration: Calibration, index: int) -> bool:
+    """Tell an estimated coefficient from one that the body frame makes zero by definition."""
+    sigma = np.sqrt(np.diag(calibration.covariance))
+    own = groups(calibration.names, calibration.model)[effect_of(calibration.names[index], calibration.model)]
+    return bool(sigma[index] > _FRAME_SHARE * sigma[own].max())

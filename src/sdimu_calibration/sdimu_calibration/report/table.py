@@ -1,0 +1,139 @@
+"""The table of coefficients, in customary units."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from rich.table import Table
+
+from sdimu_calibration.core.results import Calibration
+from sdimu_calibration.core.units import from_si
+from sdimu_calibration.report.groups import effect_of, is_free
+
+
+@dataclass(frozen=True)
+class Row:
+    """A coefficient, in `unit`; None where there is nothing to say.
+
+    Attributes
+    ----------
+    name, effect, unit : str
+    value, sigma : float
+        Both zero when the body frame makes the coefficient zero by definition.
+    truth, error, error_sigmas : float or None
+        True value, estimate minus truth, and that over sigma.
+    reference : float or None
+        Published sigma of its group.
+    """
+
+    name: str
+    effect: str
+    unit: str
+    value: float
+    sigma: float
+    truth: float | None = None
+    error: float | None = None
+    error_sigmas: float | None = None
+    reference: float | None = None
+
+
+def rows(
+    calibration: Calibration,
+    truth: Mapping[str, float] | None = None,
+    reference: Mapping[str, float] | None = None,
+) -> list[Row]:
+    """Make the rows of the table.
+
+    Parameters
+    ----------
+    calibration : Calibration
+    truth : mapping of str to float, optional
+        True value (SI) by coefficient name, in the body frame of the calibration.
+    reference : mapping of str to float, optional
+        Published sigma (SI) by effect name.
+
+    Returns
+    -------
+    list of Row
+        In the order of the calibration.
+    """
+    sigmas = np.sqrt(np.diag(calibration.covariance))
+    return [
+        _row(calibration, index, float(sigma) if is_free(calibration, index) else 0.0, truth or {}, reference or {})
+        for index, sigma in enumerate(sigmas)
+    ]
+
+
+def _row(
+    calibration: Calibration, index: int, sigma: float, truth: Mapping[str, float], reference: Mapping[str, float]
+) -> Row:
+    name, unit = calibration.names[index], calibration.display_units[index]
+    value = float(calibration.values[index]) if sigma > 0 else 0.0
+    effect = effect_of(name, calibration.model)
+    true = truth.get(name)
+    error = None if true is None else value - true
+    published = reference.get(effect)
+    return Row(
+        name=name,
+        effect=effect,
+        unit=unit,
+        value=from_si(value, unit),
+        sigma=from_si(sigma, unit),
+        truth=None if true is None else from_si(true, unit),
+        error=None if error is None else from_si(error, unit),
+        error_sigmas=error / sigma if error is not None and sigma > 0 else None,
+        reference=None if published is None else from_si(published, unit),
+    )
+
+
+def headings(table: list[Row]) -> list[str]:
+    """Column headings: those that have something to say."""
+    columns = ["coefficient", "estimate", "sigma", "unit"]
+    if any(row.truth is not None for row in table):
+        columns += ["truth", "error", "error / sigma"]
+    if any(row.reference is not None for row in table):
+        columns += ["published sigma"]
+    return columns
+
+
+def cells(row: Row, columns: list[str]) -> list[str]:
+    """Texts of a row under `columns`; estimate, truth and error go as far as sigma resolves."""
+    decimals = _decimals(row.sigma)
+    sigma = f"{row.sigma:.{decimals}f}" if row.sigma > 0 else "by the frame"
+    texts = {
+        "coefficient": row.name,
+        "estimate": f"{row.value:.{decimals}f}",
+        "sigma": sigma,
+        "unit": row.unit,
+        "truth": _number(row.truth, decimals),
+        "error": _number(row.error, decimals),
+        "error / sigma": _number(row.error_sigmas, 2),
+        "published sigma": "" if row.reference is None else f"{row.reference:.3g}",
+    }
+    return [texts[column] for column in columns]
+
+
+def rich_table(table: list[Row], title: str | None = None) -> Table:
+    """Lay the rows out for a terminal, a line between effects."""
+    columns = headings(table)
+    laid = Table(title=title, title_justify="left", pad_edge=False)
+    for column in columns:
+        laid.add_column(column, justify="left" if column in {"coefficient", "unit"} else "right", no_wrap=True)
+    for row, following in zip(table, [*table[1:], None], strict=True):
+        new = following is not None and following.effect != row.effect
+        laid.add_row(*cells(row, columns), end_section=new)
+    return laid
+
+
+def _decimals(sigma: float) -> int:
+    """Decimals that show two digits of sigma."""
+    if not math.isfinite(sigma) or sigma <= 0:
+        return 0
+    return max(0, 1 - math.floor(math.log10(sigma)))
+
+
+def _number(value: float | None, decimals: int) -> str:
+    return "" if value is None else f"{value:.{decimals}f}"

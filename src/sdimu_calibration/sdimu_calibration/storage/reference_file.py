@@ -1,0 +1,95 @@
+"""Published results to compare with (format ``sdimu-reference/1``) and the truth of a simulation."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.units import parse_quantity
+from sdimu_calibration.storage.config import find_config, read_mapping
+
+_TRUTH_FORMAT = "sdimu-truth/1"
+_REFERENCE_FORMAT = "sdimu-reference/1"
+_EXPECTED = {
+    "gyro_bias": "rad/s",
+    "gyro_scale": "ppm",
+    "gyro_misalignment": "rad",
+    "gyro_mass_unbalance": "rad/s/g",
+    "accel_bias": "m/s^2",
+    "accel_scale": "ppm",
+    "accel_misalignment": "rad",
+}
+
+
+def read_reference(name_or_path: str | Path = "table33", mount: str = "1 deg") -> dict[str, float]:
+    """Read published one-sigma errors.
+
+    Parameters
+    ----------
+    name_or_path : str or Path
+        Name in config/reference/ or path.
+    mount : str
+        Which column: misalignment between IMU and table.
+
+    Returns
+    -------
+    dict of str to float
+        Sigma (SI) by effect name.
+
+    Raises
+    ------
+    DataError
+        When the file or the column is not there.
+    """
+    path = find_config("reference", name_or_path)
+    content = read_mapping(path)
+    columns = content.get("mount")
+    if content.get("format") != _REFERENCE_FORMAT or not isinstance(columns, Mapping):
+        raise DataError(f"{path}: not a {_REFERENCE_FORMAT} file")
+    if mount not in columns:
+        raise DataError(f"{path}: no column '{mount}' (there are {', '.join(map(str, columns))})")
+    column = columns[mount]
+    return {name: parse_quantity(column[name], unit) for name, unit in _EXPECTED.items() if name in column}
+
+
+def read_truth(path: Path, body_frame: str) -> dict[str, float]:
+    """Read the true coefficients of a simulation, as they are in a body frame.
+
+    Parameters
+    ----------
+    path : Path
+        File that the simulator wrote beside the bag.
+    body_frame : str
+        ``accelerometer_triad`` or ``prior``.
+
+    Returns
+    -------
+    dict of str to float
+        True value (SI) by coefficient name.
+
+    Raises
+    ------
+    DataError
+        When it is no such file or does not know the frame.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise DataError(f"{path}: no such file")
+    content = read_mapping(path)
+    if content.get("format") != _TRUTH_FORMAT:
+        raise DataError(f"{path}: format is {content.get('format')!r}, expected '{_TRUTH_FORMAT}'")
+    key = "coefficients" if body_frame == "prior" else f"coefficients_{body_frame}"
+    values = content.get(key)
+    if not isinstance(values, Mapping):
+        raise DataError(f"{path}: no '{key}': the truth is not given in the body frame '{body_frame}'")
+    return {str(name): _number(path, str(name), value) for name, value in values.items()}
+
+
+def _number(path: Path, name: str, value: Any) -> float:
+    if isinstance(value, Mapping):
+        value = value.get("value")
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise DataError(f"{path}: {name}: expected a number in SI")
+    return float(value)
