@@ -10,6 +10,10 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 
+NOMINAL_FROM = 50
+"""Sample intervals that give the nominal one: the first ones, so that live and offline agree."""
+
+
 class DataError(ValueError):
     """Data or options that cannot be used; its text is the one line shown to the user."""
 
@@ -87,3 +91,18 @@ class Recording:
     def interval_s(self) -> float:
         """Nominal sample interval (s): the median of the stamp differences."""
         return float(np.median(np.diff(self.t)))
+
+
+def nominal_interval_ns(stamps_ns: NDArray[np.int64]) -> int:
+    """Nominal sample interval (ns) of ascending stamps, shape (n,): the median of the first `NOMINAL_FROM`."""
+    return round(float(np.median(np.diff(stamps_ns[: NOMINAL_FROM + 1]))))
+
+
+def origin_ns(stamps_ns: NDArray[np.int64]) -> int:
+    """Stamp from which a recording counts its times: one nominal interval before the first sample."""
+    return int(stamps_ns[0]) - nominal_interval_ns(stamps_ns)
+
+
+def seconds(stamps_ns: NDArray[np.int64], start_ns: int) -> Floats:
+    """Stamps (ns) as seconds after `start_ns`."""
+    return np.asarray((stamps_ns - start_ns) * 1e-9, dtype=np.float64)

@@ -70,6 +70,13 @@ class Model:
         Time after the end of motion in which no measurement is taken (s).
     body_frame : str
         Frame of the reported coefficients: ``accelerometer_triad`` or ``prior``.
+    zero_velocity : str
+        When Zp and Zv are taken: ``after_motion`` (once at each stop; later they only repeat what Zf says) or
+        ``every_epoch`` (as the paper).
+    shared_noise : bool
+        Model that the same samples drive the navigation and make Zw and Zf.
+    extra_rate_sigma, extra_force_sigma : float
+        Noise of Zw and Zf per epoch beyond the IMU's white noise (rad/s, m/s^2).
     """
 
     effects: tuple[str, ...]
@@ -77,3 +84,7 @@ class Model:
     position_sigma: float = 1e-2
     settle_s: float = 1.0
     body_frame: str = "accelerometer_triad"
+    zero_velocity: str = "after_motion"
+    shared_noise: bool = True
+    extra_rate_sigma: float = 0.0
+    extra_force_sigma: float = 0.0

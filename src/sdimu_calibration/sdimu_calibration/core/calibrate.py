@@ -1,0 +1,179 @@
+"""The orchestrator: (recording, site, IMU, model) -> Calibration. The live node ends with the same call."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sdimu_calibration.core import body_frame
+from sdimu_calibration.core.filter_pass import ALL, HELD_ALL, HELD_SENSORS, SENSORS, PassState, new_output, run_pass
+from sdimu_calibration.core.passes import (
+    Pass,
+    Progress,
+    Reduced,
+    Setup,
+    first_attitude,
+    one_pass,
+    pass_settings,
+    reduce,
+    refine,
+    set_up,
+)
+from sdimu_calibration.core.recording import Recording
+from sdimu_calibration.core.results import Calibration, History
+from sdimu_calibration.core.specification import ImuSpecification, Model, Site
+
+Floats = NDArray[np.float64]
+
+HELD_OUT_FOLDS = 3
+"""Every stop is held out once, in this many groups of stops."""
+
+
+def calibrate(
+    recording: Recording,
+    site: Site,
+    imu: ImuSpecification,
+    model: Model,
+    progress: Progress | None = None,
+    held_out: bool = True,
+) -> Calibration:
+    """Calibrate an IMU from one recording.
+
+    Parameters
+    ----------
+    recording : Recording
+    site : Site
+    imu : ImuSpecification
+        Noise densities and priors.
+    model : Model
+        Effects to estimate, weights of the measurements, frame of the report.
+    progress : callable, optional
+        Called with a word and the fraction done.
+    held_out : bool
+        Also predict every stop from the others (costs `HELD_OUT_FOLDS` passes).
+
+    Returns
+    -------
+    Calibration
+
+    Raises
+    ------
+    DataError
+        When the recording or the options cannot be used.
+    """
+    tell = progress or _silent
+    setup = set_up(site, imu, model)
+    tell("reduce", 0.0)
+    reduced = reduce(recording, setup)
+    start = first_attitude(reduced.epochs, reduced.phases, setup)
+    tell("passes", 0.2)
+    first = one_pass(reduced, setup, start, start.C_nb, np.zeros(len(setup.sensors.prior)), closed_loop=True, keep=False)
+    last, passes = refine(reduced, setup, start, first, tell, keep=False)
+    fit = fit_statistics(last)
+    fit["passes"] = float(passes)
+    fit["held_out_rms"] = held_out_rms(reduced, setup, last) if held_out else None
+    tell("done", 1.0)
+    return assemble(recording, reduced, setup, first, last, fit)
+
+
+def assemble(
+    recording: Recording, reduced: Reduced, setup: Setup, first: Pass, last: Pass, fit: dict[str, float | None]
+) -> Calibration:
+    """Put a result together in the reported body frame."""
+    names, frame = setup.sensors.names, setup.model.body_frame
+    J = body_frame.frame_jacobian(names, frame)
+    return Calibration(
+        body_frame=frame,
+        model=tuple(e.name for e in setup.sensors.effects),
+        names=names,
+        units=tuple(p.unit for p in setup.sensors.parameters),
+        display_units=tuple(p.display_unit for p in setup.sensors.parameters),
+        values=body_frame.values_in_frame(names, last.estimate, frame),
+        covariance=J @ last.covariance @ J.T,
+        fit=fit,
+        data=data_counts(recording, reduced),
+        notes=recording.notes,
+        history=history(reduced, setup, first),
+    )
+
+
+def fit_statistics(finished: Pass) -> dict[str, float | None]:
+    """Log-likelihood and mean normalised innovation squared of a pass."""
+    nis = finished.output.nis
+    dof = 3 * int(np.isfinite(nis).sum())
+    return {
+        "log_likelihood": float(finished.output.log_likelihood.sum()),
+        "nis_mean": float(np.nansum(nis) / max(dof, 1)),
+        "nis_dof": float(dof),
+    }
+
+
+def held_out_rms(reduced: Reduced, setup: Setup, last: Pass) -> float | None:
+    """RMS of normalised prediction errors at stops that the fit has not seen.
+
+    The first stop stays in every fit (it gives the attitude); the others are left out in turn, in
+    `HELD_OUT_FOLDS` interleaved groups. None when there are fewer than two stops.
+    """
+    stops = np.unique(reduced.phases.stop[reduced.phases.used])
+    if len(stops) < 2:
+        return None
+    total, count = 0.0, 0
+    for fold in range(HELD_OUT_FOLDS):
+        out = np.isin(reduced.phases.stop, stops[1:][fold::HELD_OUT_FOLDS]) & (reduced.kind > 0)
+        if not out.any():
+            continue
+        held = predict_stops(reduced, setup, last, out)
+        white = held.output.normalised[out]
+        total += float(np.nansum(white**2))
+        count += int(np.isfinite(white).sum())
+    return float(np.sqrt(total / count)) if count else None
+
+
+def predict_stops(reduced: Reduced, setup: Setup, last: Pass, out: NDArray[np.bool_]) -> Pass:
+    """Repeat the last pass with the epochs `out` (m,) predicted and scored but not taken."""
+    kind = reduced.kind.copy()
+    kind[out & (kind == SENSORS)] = HELD_SENSORS
+    kind[out & (kind == ALL)] = HELD_ALL
+    state = PassState(*(v.copy() for v in last.start))
+    output = new_output(len(reduced.epochs), len(setup.sensors.prior), False, len(reduced.epochs))
+    run_pass(last.data._replace(kind=kind), pass_settings(setup, closed_loop=False), state, output)
+    return replace(last, state=state, output=output)
+
+
+def data_counts(recording: Recording, reduced: Reduced) -> dict[str, float]:
+    """What the data section of a result says."""
+    phases, epochs = reduced.phases, reduced.epochs
+    return {
+        "samples": float(len(recording.t)),
+        "lost": float(reduced.cycles.lost.sum()),
+        "rejected": float(recording.rejected),
+        "contradicted_s": float((epochs.end - epochs.start)[phases.contradicted].sum()),
+        "duration_s": float(recording.t[-1]),
+        "stops": float(len(np.unique(phases.stop[phases.used]))),
+    }
+
+
+def history(reduced: Reduced, setup: Setup, first: Pass) -> History:
+    """History of the closed-loop pass in the reported frame, at the epochs whose covariance was kept."""
+    names, frame = setup.sensors.names, setup.model.body_frame
+    J = body_frame.frame_jacobian(names, frame)
+    out, phases = first.output, reduced.phases
+    rows = np.arange(0, len(reduced.epochs), out.stride)
+    variance = np.einsum("ij,kjl,il->ki", J, out.covariance[: len(rows)], J)
+    return History(
+        reduced.epochs.end[rows],
+        np.array([body_frame.values_in_frame(names, v, frame) for v in out.estimate[rows]]),
+        np.sqrt(variance),
+        out.sigma[rows, 6:9],
+        phases.stop[rows],
+        phases.dwell[rows],
+        phases.used[rows],
+        out.nis[rows],
+    )
+
+
+def _silent(_what: str, _fraction: float) -> None:
+    return None
+

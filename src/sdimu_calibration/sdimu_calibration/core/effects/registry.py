@@ -1,0 +1,44 @@
+"""The registry: every effect by its name, refused twice."""
+
+from __future__ import annotations
+
+from sdimu_calibration.core.effects.effect import Effect
+from sdimu_calibration.core.recording import DataError
+
+_EFFECTS: dict[str, Effect] = {}
+
+
+def register(effect: Effect) -> Effect:
+    """Add an effect.
+
+    Raises
+    ------
+    ValueError
+        When its name, or one of its parameters' names, is taken.
+    """
+    if effect.name in _EFFECTS:
+        raise ValueError(f"effect '{effect.name}' is registered twice")
+    taken = {p.name for e in _EFFECTS.values() for p in e.parameters}
+    for parameter in effect.parameters:
+        if parameter.name in taken:
+            raise ValueError(f"parameter '{parameter.name}' of '{effect.name}' is registered twice")
+    _EFFECTS[effect.name] = effect
+    return effect
+
+
+def names() -> tuple[str, ...]:
+    """Names of all registered effects, in order of registration."""
+    return tuple(_EFFECTS)
+
+
+def get(name: str) -> Effect:
+    """Look an effect up.
+
+    Raises
+    ------
+    DataError
+        When there is none of that name.
+    """
+    if name not in _EFFECTS:
+        raise DataError(f"unknown effect '{name}' (sdimu effects lists them)")
+    return _EFFECTS[name]

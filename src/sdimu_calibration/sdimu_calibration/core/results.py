@@ -1,0 +1,75 @@
+"""Result objects: what a calibration ends with, and how it got there."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class History:
+    """The closed-loop filter as the test went on, one row an epoch (m), in the reported body frame.
+
+    Attributes
+    ----------
+    t : ndarray, shape (m,)
+        End of the epoch (s).
+    value, sigma : ndarray, shape (m, p)
+        Coefficients (SI).
+    attitude_sigma : ndarray, shape (m, 3)
+        N, E, D (rad).
+    stop : ndarray of int, shape (m,)
+    dwell, used : ndarray of bool, shape (m,)
+    nis : ndarray, shape (m, 4)
+        Squared normalised innovation of position, velocity, rate, force (3 degrees of freedom each); NaN unmeasured.
+    """
+
+    t: Floats
+    value: Floats
+    sigma: Floats
+    attitude_sigma: Floats
+    stop: NDArray[np.int64]
+    dwell: NDArray[np.bool_]
+    used: NDArray[np.bool_]
+    nis: Floats
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """A calibration result.
+
+    Attributes
+    ----------
+    body_frame : str
+    model : tuple of str
+        Effects.
+    names, units, display_units : tuple of str, length p
+    values : ndarray, shape (p,)
+        SI, in `body_frame`.
+    covariance : ndarray, shape (p, p)
+    fit : mapping
+        log_likelihood, nis_mean, nis_dof, held_out_rms (None when not computed), passes.
+    data : mapping
+        samples, lost, rejected, contradicted_s, duration_s, stops.
+    notes : tuple of str
+        What the user should know, one line each.
+    history : History
+        Of the first, closed-loop pass.
+    """
+
+    body_frame: str
+    model: tuple[str, ...]
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    display_units: tuple[str, ...]
+    values: Floats
+    covariance: Floats
+    fit: Mapping[str, float | None]
+    data: Mapping[str, float]
+    notes: tuple[str, ...]
+    history: History

@@ -1,0 +1,230 @@
+"""Strapdown navigation in two speeds.
+
+Sample rate: angular-rate and specific-force samples become *cycles* of at most `CYCLE_S`, each with its
+integrated angle, velocity increment, coning and sculling (`Reducer`). Cycle rate: attitude, velocity and
+position in local-level NED (`navigate_cycle`).
+
+Source: P. G. Savage, "Strapdown Inertial Navigation Integration Algorithm Design", parts 1 and 2,
+J. Guidance, Control and Dynamics 21 (1998): coning eq. (48), rotation and sculling compensation eqs. (55)-(57), with
+the previous-sample terms that make both exact for a linear ramp of rate and force (drift of fourth order).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sdimu_calibration.core import earth
+from sdimu_calibration.core.compiled import compiled
+from sdimu_calibration.core.rotation import orthonormal, rotation_matrix
+
+Floats = NDArray[np.float64]
+
+CYCLE_S = 0.1
+"""Longest navigation cycle (s)."""
+CYCLE_ANGLE = 0.05
+"""A cycle closes early when the angle in it exceeds this (rad): the series of coning stops being short."""
+GAP = 1.5
+"""An interval longer than this many nominal ones has lost samples in it."""
+
+
+@dataclass(frozen=True)
+class Cycles:
+    """Navigation cycles; every array has n rows, SI, body frame at the start of the cycle.
+
+    Attributes
+    ----------
+    t, dt : ndarray, shape (n,)
+        End and length (s).
+    alpha, upsilon : ndarray, shape (n, 3)
+        Integrals of body rate (rad) and specific force (m/s).
+    coning, sculling : ndarray, shape (n, 3)
+        Their corrections: rotation vector = alpha + coning; velocity increment =
+        upsilon + alpha x upsilon / 2 + sculling.
+    samples, lost : ndarray of int, shape (n,)
+        Samples in the cycle, and samples missing before them.
+    gap_angle : ndarray, shape (n, 3)
+        Angle bridged by interpolation where samples are missing (rad).
+    """
+
+    t: Floats
+    dt: Floats
+    alpha: Floats
+    upsilon: Floats
+    coning: Floats
+    sculling: Floats
+    samples: NDArray[np.int64]
+    lost: NDArray[np.int64]
+    gap_angle: Floats
+
+    def __len__(self) -> int:
+        """Return the number of cycles."""
+        return len(self.t)
+
+    def __getitem__(self, rows: slice) -> Cycles:
+        """Return the cycles of a slice."""
+        return Cycles(*(getattr(self, name)[rows] for name in self.__dataclass_fields__))
+
+    @staticmethod
+    def concatenate(parts: list[Cycles]) -> Cycles:
+        """Join blocks of cycles."""
+        names = Cycles.__dataclass_fields__
+        return Cycles(*(np.concatenate([getattr(p, name) for p in parts]) for name in names))
+
+
+# Columns of the table that the compiled reducer fills, one row a cycle.
+_T, _DT, _ALPHA, _UPS, _CON, _SCUL, _N, _LOST, _GAP, _COLUMNS = 0, 1, 2, 5, 8, 11, 14, 15, 16, 19
+# The carry: open cycle in the same columns, then time, rate and force of the last sample, then "have one".
+_LAST_T, _LAST_W, _LAST_F, _HAVE, _CARRY = 19, 20, 23, 26, 27
+
+
+@compiled
+def _reduce(t: Floats, omega: Floats, force: Floats, nominal: float, carry: Floats, out: Floats) -> int:
+    """Add samples to the open cycle in `carry` and write closed ones to `out`; return their number."""
+    count = 0
+    for k in range(t.shape[0]):
+        dt = t[k] - carry[_LAST_T]
+        missing = 0.0
+        w0, w1, w2 = omega[k, 0], omega[k, 1], omega[k, 2]
+        f0, f1, f2 = force[k, 0], force[k, 1], force[k, 2]
+        p0, p1, p2, q0, q1, q2 = w0, w1, w2, f0, f1, f2
+        if carry[_HAVE] > 0.0:
+            p0, p1, p2 = carry[_LAST_W], carry[_LAST_W + 1], carry[_LAST_W + 2]
+            q0, q1, q2 = carry[_LAST_F], carry[_LAST_F + 1], carry[_LAST_F + 2]
+            if dt > GAP * nominal:
+                # The sample covers only its own interval; before it, the mean of its neighbours.
+                missing = np.round(dt / nominal) - 1.0
+                share = (dt - nominal) / dt
+                w0 += 0.5 * share * (p0 - w0)
+                w1 += 0.5 * share * (p1 - w1)
+                w2 += 0.5 * share * (p2 - w2)
+                f0 += 0.5 * share * (q0 - f0)
+                f1 += 0.5 * share * (q1 - f1)
+                f2 += 0.5 * share * (q2 - f2)
+                for i in range(3):
+                    carry[_GAP + i] += 0.5 * (omega[k, i] + carry[_LAST_W + i]) * (dt - nominal)
+        a0, a1, a2 = w0 * dt, w1 * dt, w2 * dt
+        u0, u1, u2 = f0 * dt, f1 * dt, f2 * dt
+        s = dt / 6.0
+        x0, x1, x2 = carry[_ALPHA] + s * p0, carry[_ALPHA + 1] + s * p1, carry[_ALPHA + 2] + s * p2
+        y0, y1, y2 = carry[_UPS] + s * q0, carry[_UPS + 1] + s * q1, carry[_UPS + 2] + s * q2
+        carry[_CON] += 0.5 * (x1 * a2 - x2 * a1)
+        carry[_CON + 1] += 0.5 * (x2 * a0 - x0 * a2)
+        carry[_CON + 2] += 0.5 * (x0 * a1 - x1 * a0)
+        carry[_SCUL] += 0.5 * (x1 * u2 - x2 * u1 + y1 * a2 - y2 * a1)
+        carry[_SCUL + 1] += 0.5 * (x2 * u0 - x0 * u2 + y2 * a0 - y0 * a2)
+        carry[_SCUL + 2] += 0.5 * (x0 * u1 - x1 * u0 + y0 * a1 - y1 * a0)
+        carry[_ALPHA] += a0
+        carry[_ALPHA + 1] += a1
+        carry[_ALPHA + 2] += a2
+        carry[_UPS] += u0
+        carry[_UPS + 1] += u1
+        carry[_UPS + 2] += u2
+        carry[_DT] += dt
+        carry[_N] += 1.0
+        carry[_LOST] += missing
+        carry[_LAST_T] = t[k]
+        carry[_HAVE] = 1.0
+        for i in range(3):
+            carry[_LAST_W + i] = omega[k, i]
+            carry[_LAST_F + i] = force[k, i]
+        # The next whole multiple of the cycle after the cycle's start.
+        boundary = (np.floor((t[k] - carry[_DT] + 0.5 * nominal) / CYCLE_S) + 1.0) * CYCLE_S
+        angle2 = carry[_ALPHA] ** 2 + carry[_ALPHA + 1] ** 2 + carry[_ALPHA + 2] ** 2
+        if t[k] >= boundary - 0.5 * nominal or angle2 > CYCLE_ANGLE**2:
+            carry[_T] = t[k]
+            out[count] = carry[:_COLUMNS]
+            count += 1
+            carry[:_COLUMNS] = 0.0
+    return count
+
+
+class Reducer:
+    """Samples in blocks of any length in, whole cycles out; the cuts between blocks leave no trace.
+
+    Parameters
+    ----------
+    nominal_s : float
+        Nominal sample interval (s); a cycle boundary takes the sample that ends nearest to it.
+    """
+
+    def __init__(self, nominal_s: float) -> None:
+        self.nominal_s = nominal_s
+        self._carry = np.zeros(_CARRY)
+
+    def add(self, t: Floats, omega_ib_b: Floats, f_ib_b: Floats) -> Cycles:
+        """Take samples and return the cycles that they close.
+
+        Parameters
+        ----------
+        t : ndarray, shape (n,)
+            End of each sample (s), ascending; the first interval starts at 0.
+        omega_ib_b, f_ib_b : ndarray, shape (n, 3)
+            Mean rate (rad/s) and specific force (m/s^2) over the interval.
+        """
+        out = np.empty((len(t), _COLUMNS))
+        n = _reduce(
+            np.ascontiguousarray(t), np.ascontiguousarray(omega_ib_b), np.ascontiguousarray(f_ib_b),
+            self.nominal_s, self._carry, out,
+        )  # fmt: skip
+        rows = out[:n]
+        return Cycles(
+            rows[:, _T].copy(), rows[:, _DT].copy(),
+            rows[:, _ALPHA:_UPS].copy(), rows[:, _UPS:_CON].copy(),
+            rows[:, _CON:_SCUL].copy(), rows[:, _SCUL:_N].copy(),
+            rows[:, _N].astype(np.int64), rows[:, _LOST].astype(np.int64),
+            rows[:, _GAP:_COLUMNS].copy(),
+        )  # fmt: skip
+
+
+@compiled
+def navigate_cycle(
+    C_nb: Floats, velocity: Floats, position: Floats, phi: Floats, dv: Floats, dt: float, gravity: float
+) -> None:
+    """Advance attitude, velocity and position by one cycle, in place.
+
+    Parameters
+    ----------
+    C_nb : ndarray, shape (3, 3)
+    velocity : ndarray, shape (3,)
+        N, E, D (m/s).
+    position : ndarray, shape (3,)
+        Latitude (rad), longitude (rad), height (m).
+    phi, dv : ndarray, shape (3,)
+        Rotation vector (rad) and velocity increment (m/s) in the body frame at the cycle's start.
+    dt : float
+    gravity : float
+        Magnitude of gravity at the present position (m/s^2).
+    """
+    lat = position[0]
+    w_n, w_d = earth.RATE * np.cos(lat), -earth.RATE * np.sin(lat)
+    lat_c = min(max(lat, -earth.POLE_LIMIT), earth.POLE_LIMIT)
+    r_n, r_e = earth.radii(lat_c)
+    r_n += position[2]
+    r_e += position[2]
+    t_n, t_e, t_d = velocity[1] / r_e, -velocity[0] / r_n, -velocity[1] * np.tan(lat_c) / r_e
+    # Turn of NED against inertial space in this cycle, and half of it for the mid-cycle attitude.
+    z = np.empty(3)
+    z[0], z[1], z[2] = -(w_n + t_n) * dt, -t_e * dt, -(w_d + t_d) * dt
+    u = C_nb @ dv
+    old = velocity.copy()
+    c_n, c_e, c_d = 2.0 * w_n + t_n, t_e, 2.0 * w_d + t_d
+    velocity[0] += u[0] + 0.5 * (z[1] * u[2] - z[2] * u[1]) - (c_e * old[2] - c_d * old[1]) * dt
+    velocity[1] += u[1] + 0.5 * (z[2] * u[0] - z[0] * u[2]) - (c_d * old[0] - c_n * old[2]) * dt
+    velocity[2] += u[2] + 0.5 * (z[0] * u[1] - z[1] * u[0]) - (c_n * old[1] - c_e * old[0]) * dt + gravity * dt
+    position[0] += 0.5 * (old[0] + velocity[0]) * dt / r_n
+    position[1] += 0.5 * (old[1] + velocity[1]) * dt / (r_e * np.cos(lat_c))
+    position[2] -= 0.5 * (old[2] + velocity[2]) * dt
+    C_nb[:, :] = orthonormal(rotation_matrix(z) @ C_nb @ rotation_matrix(phi))
+
+
+@compiled
+def velocity_increment(alpha: Floats, upsilon: Floats, sculling: Floats) -> Floats:
+    """Velocity increment in the frame at the start of the cycle: rotation and sculling terms added; (3,)."""
+    dv = np.empty(3)
+    dv[0] = upsilon[0] + 0.5 * (alpha[1] * upsilon[2] - alpha[2] * upsilon[1]) + sculling[0]
+    dv[1] = upsilon[1] + 0.5 * (alpha[2] * upsilon[0] - alpha[0] * upsilon[2]) + sculling[1]
+    dv[2] = upsilon[2] + 0.5 * (alpha[0] * upsilon[1] - alpha[1] * upsilon[0]) + sculling[2]
+    return dv

@@ -1,0 +1,124 @@
+"""From cycles to motion: attitude by integrating the gyros, then what the effects see."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sdimu_calibration.core import earth
+from sdimu_calibration.core.compiled import compiled
+from sdimu_calibration.core.imu_model import ImuModel
+from sdimu_calibration.core.motion import Motion
+from sdimu_calibration.core.recording import TemperatureLog
+from sdimu_calibration.core.rotation import orthonormal, rotation_matrix
+from sdimu_calibration.core.strapdown import Cycles
+
+Floats = NDArray[np.float64]
+
+_COMPENSATIONS = 3
+"""Rounds of "error at the compensated motion": each gains a factor of the size of the errors."""
+_TEMPERATURE_WINDOW_S = 60.0
+"""Base of the temperature rate (s): shorter ones differentiate the sensor's resolution."""
+
+
+@compiled
+def _attitudes(C_nb: Floats, alpha: Floats, coning: Floats, dt: Floats, latitude: float) -> Floats:
+    """Attitude at the middle of each cycle, (n, 3, 3); `C_nb` is moved to the end, in place."""
+    out = np.empty((dt.shape[0], 3, 3))
+    w_ie = earth.earth_rate(latitude)
+    for k in range(dt.shape[0]):
+        phi = alpha[k] + coning[k]
+        turn = rotation_matrix(-0.5 * dt[k] * w_ie)
+        half = rotation_matrix(0.5 * phi)
+        out[k] = turn @ C_nb @ half
+        C_nb[:, :] = orthonormal(turn @ out[k] @ half)
+    return out
+
+
+def temperatures(log: TemperatureLog | None, t: Floats, causal: bool) -> tuple[Floats, Floats]:
+    """Temperature (deg C) and its rate (deg C/s) at times `t`.
+
+    Parameters
+    ----------
+    log : TemperatureLog or None
+        None gives zeros.
+    t : ndarray, shape (n,)
+    causal : bool
+        Use only what was measured up to t, as a live filter must.
+    """
+    if log is None or not len(log.t):
+        return np.zeros(len(t)), np.zeros(len(t))
+    half = 0.5 * _TEMPERATURE_WINDOW_S
+    if causal:
+        index = np.maximum(np.searchsorted(log.t, t + 1e-9, side="right") - 1, 0)
+        before = np.maximum(np.searchsorted(log.t, t - 2.0 * half, side="right") - 1, 0)
+        span = np.maximum(log.t[index] - log.t[before], half)
+        return log.value[index], (log.value[index] - log.value[before]) / span
+    low, high = np.maximum(t - half, log.t[0]), np.minimum(t + half, log.t[-1])
+    rise = np.interp(high, log.t, log.value) - np.interp(low, log.t, log.value)
+    return np.interp(t, log.t, log.value), rise / np.maximum(high - low, 1e-3)
+
+
+def motion(
+    cycles: Cycles,
+    rest: NDArray[np.bool_],
+    model: ImuModel,
+    coefficients: Floats,
+    C_start: Floats,
+    latitude: float,
+    gravity: float,
+    temperature: TemperatureLog | None,
+    predicted: bool,
+    before: Motion | None = None,
+) -> Motion:
+    """Motion of each cycle.
+
+    Parameters
+    ----------
+    cycles : Cycles
+    rest : ndarray of bool, shape (n,)
+        Cycles in dwell.
+    model, coefficients : ImuModel and ndarray, shape (p,)
+        Sensor errors taken out of the samples.
+    C_start : ndarray, shape (3, 3)
+        Attitude at the start; moved to the end of the cycles, in place.
+    latitude, gravity : float
+        Of the site (rad, m/s^2).
+    temperature : TemperatureLog or None
+    predicted : bool
+        Put the rate and force that the attitude predicts in place of the measured ones at rest, so that regressors
+        such as sign(w) carry no noise there. Needs a good `C_start` and coefficients.
+    before : Motion, optional
+        Of the block before this one, where blocks follow each other.
+    """
+    dt = cycles.dt
+    w_measured, f_measured = cycles.alpha / dt[:, None], cycles.upsilon / dt[:, None]
+    heat, heat_rate = temperatures(temperature, cycles.t - 0.5 * dt, causal=not predicted)
+    w, f = w_measured, f_measured
+    C0 = C_start.copy()
+    rounds = _COMPENSATIONS if np.any(coefficients) else 0
+    for done in range(rounds + 1):
+        C = C0.copy()
+        C_nb = _attitudes(C, np.ascontiguousarray(w * dt[:, None]), cycles.coning, dt, latitude)
+        w_earth = np.einsum("kij,i->kj", C_nb, earth.earth_rate(latitude))
+        w_table = np.where(rest[:, None], 0.0, w - w_earth)
+        if predicted:
+            w_seen = w_earth + w_table
+            f_seen = np.where(rest[:, None], -gravity * C_nb[:, 2, :], f)
+        else:
+            w_seen, f_seen = w, f
+        alpha = _acceleration(w_table, cycles, before, causal=not predicted)
+        seen = Motion(cycles.t, dt, w_seen, f_seen, C_nb, w_table, alpha, rest, heat, heat_rate)
+        if done < rounds:
+            error = model.errors(model.regressors(seen), coefficients)
+            w, f = w_measured - error[:, :3], f_measured - error[:, 3:]
+    C_start[:, :] = C
+    return seen
+
+
+def _acceleration(w_table: Floats, cycles: Cycles, before: Motion | None, causal: bool) -> Floats:
+    """Angular acceleration (rad/s^2), shape (n, 3): central differences, or causal ones for a live filter."""
+    if not causal and len(w_table) > 1:
+        return np.asarray(np.gradient(w_table, cycles.t - 0.5 * cycles.dt, axis=0))
+    earlier = np.vstack([before.w_table[-1:] if before is not None else w_table[:1], w_table[:-1]])
+    return np.asarray((w_table - earlier) / cycles.dt[:, None])
