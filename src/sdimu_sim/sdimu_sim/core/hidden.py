@@ -132,6 +132,8 @@ class Term:
 
     Attributes
     ----------
+    name : str
+        Of the effect.
     sensor : int
         Index in `SENSORS`.
     expression : Expression
@@ -140,6 +142,7 @@ class Term:
         k and others, SI; constants for the expression.
     """
 
+    name: str
     sensor: int
     expression: Expression
     parameters: dict[str, float]
@@ -194,7 +197,7 @@ def parse_effects(texts: Iterable[str]) -> Hidden:
         if not equals or not value:
             raise DataError(f"effect '{text}': expected NAME=VALUE, such as accel_quadratic_x='20 ug/g^2'")
         if name in SENSORS:
-            terms.append(Term(SENSORS.index(name), parse_expression(value, (*VARIABLES, *CONSTANTS)), {}))
+            terms.append(Term(name, SENSORS.index(name), parse_expression(value, (*VARIABLES, *CONSTANTS)), {}))
         elif name in _DELAYS:
             (seconds,) = _values(name, value, (("k", "ms"),)).values()
             if seconds < 0.0:
@@ -219,7 +222,7 @@ def _named_term(name: str, value: str) -> Term:
     if values.get("tau", 1.0) <= 0.0:
         raise DataError(f"effect {name}: tau must be positive")
     known = (*VARIABLES, *CONSTANTS, *values)
-    return Term(SENSORS.index(sensor), parse_expression(row.formula, known), values)
+    return Term(name, SENSORS.index(sensor), parse_expression(row.formula, known), values)
 
 
 def _values(name: str, text: str, wanted: tuple[tuple[str, str], ...]) -> dict[str, float]:
@@ -236,7 +239,7 @@ def _values(name: str, text: str, wanted: tuple[tuple[str, str], ...]) -> dict[s
 
 
 def _suggestion(name: str) -> str:
-    import difflib  # noqa: PLC0415 - only for the message of an error
+    import difflib
 
     close = difflib.get_close_matches(name, effect_names(), n=3)
     return f" (did you mean {', '.join(close)}?)" if close else f" (known: {', '.join(effect_names()[:6])}, ...)"

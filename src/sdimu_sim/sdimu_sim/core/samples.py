@@ -45,7 +45,8 @@ class SampleClock:
         p, q = self._rate.numerator, self._rate.denominator
         whole, part = np.divmod(np.arange(first, last + 1, dtype=np.int64) * q, p)
         # Whole seconds apart: k * q * 10^9 would leave 64 bits for awkward rates.
-        return whole * 10**9 + (part * 10**9 + p // 2) // p
+        stamps: NDArray[np.int64] = whole * 10**9 + (part * 10**9 + p // 2) // p
+        return stamps
 
     def count(self, until_s: float) -> int:
         """Return how many samples end at or before a time, with a nanosecond of grace."""

@@ -12,7 +12,7 @@ from rate_table_sim.core import TableMotion, TableSpecification, phase_changes, 
 from sdimu_calibration.core.plan import Plan
 from sdimu_calibration.core.recording import DataError, PhaseLog, Recording, TableLog, TemperatureLog
 from sdimu_calibration.core.specification import ImuSpecification, Site
-from sdimu_sim.core.generator import simulate_imu
+from sdimu_sim.core.generator import ImuSamples, simulate_imu
 from sdimu_sim.core.platform import PlatformMotion
 from sdimu_sim.core.temperature import TemperatureProfile
 from sdimu_sim.core.truth import ImuTruth, Truth, draw_coefficients, draw_mount
@@ -78,8 +78,17 @@ def imu_truth(scenario: Scenario) -> ImuTruth:
     return replace(truth, **scenario.extras)  # type: ignore[arg-type]
 
 
-def generate(scenario: Scenario) -> tuple[Recording, Truth]:
-    """Simulate a test.
+@dataclass(frozen=True)
+class SimulatedTest:
+    """Everything that came of a scenario: motion of the table, samples of the IMU, and the truth."""
+
+    motion: TableMotion
+    samples: ImuSamples
+    truth: Truth
+
+
+def simulate_test(scenario: Scenario) -> SimulatedTest:
+    """Simulate a test, with the table's motion kept.
 
     Raises
     ------
@@ -88,30 +97,52 @@ def generate(scenario: Scenario) -> tuple[Recording, Truth]:
     """
     if not 10.0 <= scenario.rate_hz <= 1000.0:
         raise DataError(f"sample rate {scenario.rate_hz:g} Hz: expected 10 to 1000 Hz")
+    if scenario.seed < 0:
+        raise DataError(f"seed {scenario.seed}: expected a whole number from 0")
     imu = imu_truth(scenario)
     motion = table_motion(scenario.plan, scenario.table, scenario.seed)
     platform = PlatformMotion(motion.t, motion.q_nt, motion.omega_nt_t)
     samples = simulate_imu(platform, imu, scenario.site, scenario.rate_hz, scenario.seed, scenario.temperature)
-    t, dwell, stop = phase_changes(motion)
+    truth = Truth(imu, scenario.site, scenario.seed, scenario.rate_hz, scenario.plan.name)
+    return SimulatedTest(motion, samples, truth)
+
+
+def generate(scenario: Scenario) -> tuple[Recording, Truth]:
+    """Simulate a test into the recording that the topics would give, and its truth.
+
+    Raises
+    ------
+    DataError
+        When the rate, the plan on this table, or an effect cannot be used.
+    """
+    test = simulate_test(scenario)
+    t, dwell, stop = phase_changes(test.motion)
     recording = Recording(
         start_ns=scenario.start_ns,
-        t=samples.t,
-        omega_ib_b=samples.omega_ib_b,
-        f_ib_b=samples.f_ib_b,
+        t=test.samples.t,
+        omega_ib_b=test.samples.omega_ib_b,
+        f_ib_b=test.samples.f_ib_b,
         phase=PhaseLog(t, dwell, stop),
-        temperature=_temperature_log(scenario.temperature, float(motion.t[-1])),
-        table=_table_log(motion, scenario.table),
+        temperature=temperature_log(scenario.temperature, float(test.motion.t[-1])),
+        table=_table_log(test.motion),
     )
-    return recording, Truth(imu, scenario.site, scenario.seed, scenario.rate_hz, scenario.plan.name)
+    return recording, test.truth
 
 
-def _temperature_log(profile: TemperatureProfile | None, until_s: float) -> TemperatureLog | None:
+def temperature_log(profile: TemperatureProfile | None, until_s: float) -> TemperatureLog | None:
+    """Sample a temperature profile at 1 Hz, from 0 to a time (s)."""
     if profile is None:
         return None
     t = np.arange(int(until_s + 1e-9) + 1, dtype=np.float64)
     return TemperatureLog(t, profile.value(t))
 
 
-def _table_log(motion: TableMotion, table: TableSpecification) -> TableLog:
-    every = max(round(table.sample_rate_hz / TABLE_LOG_HZ), 1)
-    return TableLog(motion.t[::every], motion.names, motion.encoder_angle[::every])
+def table_log_rows(motion: TableMotion) -> slice:
+    """Rows of the motion that are logged as joint states: about `TABLE_LOG_HZ`."""
+    interval = float(motion.t[1] - motion.t[0]) if len(motion.t) > 1 else 1.0
+    return slice(None, None, max(round(1.0 / (interval * TABLE_LOG_HZ)), 1))
+
+
+def _table_log(motion: TableMotion) -> TableLog:
+    rows = table_log_rows(motion)
+    return TableLog(motion.t[rows], motion.names, motion.encoder_angle[rows])

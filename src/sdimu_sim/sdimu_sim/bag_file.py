@@ -1,0 +1,41 @@
+"""A simulated test as a bag: the same topics as over DDS."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rate_table_sim.core import phase_changes
+from sdimu_calibration.storage.bag_writer import write_recording
+from sdimu_sim.core.scenario import Scenario, SimulatedTest, table_log_rows, temperature_log
+
+
+def write_test(path: Path, scenario: Scenario, test: SimulatedTest, *, replace: bool = False) -> None:
+    """Write a simulated test to a rosbag2 folder.
+
+    Raises
+    ------
+    DataError
+        When something is in the way of the folder.
+    """
+    motion = test.motion
+    t, dwell, stop = phase_changes(motion)
+    rows = table_log_rows(motion)
+    heat = temperature_log(scenario.temperature, float(motion.t[-1]))
+    write_recording(
+        path,
+        start_ns=scenario.start_ns,
+        imu_ns=test.samples.ns,
+        omega_ib_b=test.samples.omega_ib_b,
+        f_ib_b=test.samples.f_ib_b,
+        status=(_nanoseconds(t), dwell, stop),
+        joint_states=(_nanoseconds(motion.t[rows]), motion.names, motion.encoder_angle[rows], motion.rate[rows]),
+        temperature=None if heat is None else (_nanoseconds(heat.t), heat.value),
+        replace=replace,
+    )
+
+
+def _nanoseconds(t: NDArray[np.float64]) -> NDArray[np.int64]:
+    return np.rint(t * 1e9).astype(np.int64)

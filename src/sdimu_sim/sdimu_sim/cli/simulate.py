@@ -1,0 +1,70 @@
+"""The verb `sdimu simulate`: a test without DDS, at full speed, into a bag."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from sdimu_calibration.core.recording import DataError
+
+_EFFECT = "Hide an effect, NAME=VALUE (accel_quadratic_x='20 ug/g^2') or SENSOR=FORMULA; repeatable."
+
+
+def simulate(
+    out: Annotated[Path, typer.Option(help="Bag (folder) to write.")],
+    plan: Annotated[str, typer.Option(help="Test plan: name in config/plan or path.")] = "kim18",
+    imu: Annotated[str, typer.Option(help="IMU specification, from which the true errors are drawn.")] = "dtg",
+    site: Annotated[str, typer.Option(help="Site.")] = "daejeon",
+    table: Annotated[str, typer.Option(help="Rate table.")] = "ideal",
+    rate: Annotated[float, typer.Option(help="Sample rate of the IMU (Hz), 10 to 1000.")] = 100.0,
+    seed: Annotated[int, typer.Option(help="Of coefficients, mount and noise.")] = 1,
+    mount: Annotated[str | None, typer.Option(help="Rotation of the IMU on the table: 'X,Y,Z' (deg).")] = None,
+    mount_max: Annotated[float, typer.Option(help="Without --mount: drawn up to this about every axis (deg).")] = 3.0,
+    effect: Annotated[list[str] | None, typer.Option(help=_EFFECT)] = None,
+    temperature: Annotated[str | None, typer.Option(help="Temperature profile: name or path.")] = None,
+    truth: Annotated[Path | None, typer.Option(help="Truth file; default: OUT.truth.yaml beside the bag.")] = None,
+    replace: Annotated[bool, typer.Option("--replace", help="Overwrite the bag if it exists.")] = False,
+) -> None:
+    """Simulate a whole test into a bag, with the truth in a separate file."""
+    # Inside the function: the help of `sdimu` must not wait for numerical libraries.
+    from rich.console import Console
+
+    from rate_table_sim.table_file import load_table
+    from sdimu_calibration.storage.config import load_imu, load_plan, load_site
+    from sdimu_sim.bag_file import write_test
+    from sdimu_sim.core.scenario import Scenario, simulate_test
+    from sdimu_sim.temperature_file import load_temperature
+    from sdimu_sim.truth_file import write_truth
+
+    scenario = Scenario(
+        plan=load_plan(plan),
+        imu=load_imu(imu),
+        site=load_site(site),
+        table=load_table(table),
+        rate_hz=rate,
+        seed=seed,
+        mount_rad=None if mount is None else mount_rad(mount),
+        mount_max_rad=math.radians(mount_max),
+        effects=tuple(effect or ()),
+        temperature=None if temperature is None else load_temperature(temperature),
+    )
+    test = simulate_test(scenario)
+    write_test(out, scenario, test, replace=replace)
+    truth_path = truth or out.with_name(f"{out.name}.truth.yaml")
+    write_truth(truth_path, test.truth)
+    count = len(test.samples.t)
+    Console().print(f"{out}: {count} samples, {test.motion.t[-1]:.0f} s; truth in {truth_path}", soft_wrap=True)
+
+
+def mount_rad(text: str) -> tuple[float, float, float]:
+    """Read ``"1,2,3"`` (deg) as the rotation vector of the IMU on the platform (rad)."""
+    try:
+        x, y, z = (math.radians(float(part)) for part in text.split(","))
+    except ValueError as error:
+        raise DataError(f"--mount '{text}': expected three angles in degrees, such as '1,2,3'") from error
+    if not all(map(math.isfinite, (x, y, z))):
+        raise DataError(f"--mount '{text}': expected three finite angles in degrees")
+    return x, y, z

@@ -1,0 +1,147 @@
+"""The truth of a simulated test as a file (``sdimu-truth/1``): YAML, all SI."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any, Literal
+
+import yaml
+from pydantic import Field
+
+from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.specification import Site
+from sdimu_calibration.storage.config import Schema, read_yaml
+from sdimu_sim.core.hidden import parse_effects
+from sdimu_sim.core.truth import ImuTruth, Truth, in_body_frame
+
+_Vector = tuple[float, float, float]
+
+
+class _SiteFile(Schema):
+    latitude_deg: float
+    height_m: float
+    gravity_m_s2: float | None = None
+
+
+class _NoiseFile(Schema):
+    gyro_rad_s_sqrt_hz: float = Field(ge=0)
+    accel_m_s2_sqrt_hz: float = Field(ge=0)
+
+
+class _ElectronicsFile(Schema):
+    gyro_step_rad: float = 0.0
+    accel_step_m_s: float = 0.0
+    gyro_limit_rad_s: float | None = None
+    accel_limit_m_s2: float | None = None
+
+
+class _TruthFile(Schema):
+    format: Literal["sdimu-truth/1"]
+    plan: str
+    rate_hz: float
+    seed: int
+    site: _SiteFile
+    coefficients: dict[str, float]
+    coefficients_accelerometer_triad: dict[str, float]
+    as_built: dict[str, float]
+    mount_rad: _Vector
+    noise: _NoiseFile
+    effects: tuple[str, ...] = ()
+    lever_arm_m: _Vector = (0.0, 0.0, 0.0)
+    magnetic_field_t: _Vector
+    electronics: _ElectronicsFile = _ElectronicsFile()
+
+
+def write_truth(path: Path, truth: Truth) -> None:
+    """Write the truth of a test.
+
+    ``coefficients`` are those of the error equations in the frame in which the IMU was built (body frame
+    ``prior``), ``coefficients_accelerometer_triad`` the same sensor in that frame, ``as_built`` the angles and scales
+    from which it was made, all SI. The size of every named hidden effect is listed with the coefficients, so that
+    an estimate finds its truth by name.
+
+    Raises
+    ------
+    OSError
+        When the file cannot be written.
+    """
+    imu = truth.imu
+    hidden = {t.name: t.parameters["k"] for t in parse_effects(imu.effects).terms if "k" in t.parameters}
+    content: dict[str, Any] = {
+        "format": "sdimu-truth/1",
+        "plan": truth.plan,
+        "rate_hz": float(truth.rate_hz),
+        "seed": int(truth.seed),
+        "site": {
+            "latitude_deg": math.degrees(truth.site.latitude_rad),
+            "height_m": truth.site.height_m,
+            "gravity_m_s2": truth.site.gravity_m_s2,
+        },
+        "coefficients": in_body_frame(imu.coefficients, "prior") | hidden,
+        "coefficients_accelerometer_triad": in_body_frame(imu.coefficients, "accelerometer_triad") | hidden,
+        "as_built": {name: float(value) for name, value in imu.coefficients.items()},
+        "mount_rad": [float(v) for v in imu.mount_rad],
+        "noise": {
+            "gyro_rad_s_sqrt_hz": float(imu.gyro_white_noise),
+            "accel_m_s2_sqrt_hz": float(imu.accel_white_noise),
+        },
+        "effects": list(imu.effects),
+        "lever_arm_m": [float(v) for v in imu.lever_arm_m],
+        "magnetic_field_t": [float(v) for v in imu.magnetic_field],
+        "electronics": {
+            "gyro_step_rad": float(imu.gyro_step_rad),
+            "accel_step_m_s": float(imu.accel_step_m_s),
+            "gyro_limit_rad_s": _finite(imu.gyro_limit_rad_s),
+            "accel_limit_m_s2": _finite(imu.accel_limit_m_s2),
+        },
+    }
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(yaml.dump(content, Dumper=_Exact, sort_keys=False, allow_unicode=True), encoding="utf-8")
+
+
+def read_truth(path: Path) -> Truth:
+    """Read the truth of a test; the same file gives the same recording again.
+
+    Raises
+    ------
+    DataError
+        When the file is missing or wrong.
+    """
+    if not path.is_file():
+        raise DataError(f"{path}: no such truth file")
+    file = read_yaml(path, _TruthFile)
+    limits = file.electronics
+    imu = ImuTruth(
+        coefficients=file.as_built,
+        mount_rad=file.mount_rad,
+        gyro_white_noise=file.noise.gyro_rad_s_sqrt_hz,
+        accel_white_noise=file.noise.accel_m_s2_sqrt_hz,
+        effects=file.effects,
+        lever_arm_m=file.lever_arm_m,
+        magnetic_field=file.magnetic_field_t,
+        gyro_step_rad=limits.gyro_step_rad,
+        accel_step_m_s=limits.accel_step_m_s,
+        gyro_limit_rad_s=math.inf if limits.gyro_limit_rad_s is None else limits.gyro_limit_rad_s,
+        accel_limit_m_s2=math.inf if limits.accel_limit_m_s2 is None else limits.accel_limit_m_s2,
+    )
+    site = Site(math.radians(file.site.latitude_deg), file.site.height_m, file.site.gravity_m_s2)
+    return Truth(imu, site, file.seed, file.rate_hz, file.plan)
+
+
+class _Exact(yaml.SafeDumper):
+    """Floats with a point and a signed exponent, so that YAML and JSON readers agree that they are numbers."""
+
+
+def _represent_float(dumper: yaml.SafeDumper, value: float) -> yaml.ScalarNode:
+    mantissa, e, exponent = repr(value).partition("e")
+    if e and "." not in mantissa:
+        mantissa += ".0"
+    return dumper.represent_scalar("tag:yaml.org,2002:float", mantissa + e + exponent)
+
+
+_Exact.add_representer(float, _represent_float)
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None
