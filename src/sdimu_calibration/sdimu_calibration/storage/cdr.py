@@ -38,6 +38,7 @@ class Layout:
 
     def __init__(self, frame_id: str) -> None:
         self._template = bytearray(_ENCAPSULATION)
+        self._padding: list[int] = []
         self._fields: dict[str, tuple[Any, int]] = {}
         self._number("sec", np.dtype("<i4"))
         self._number("nanosec", np.dtype("<u4"))
@@ -87,8 +88,15 @@ class Layout:
         """Place of the field `name` in the message (bytes)."""
         return self._fields[name][1]
 
+    @property
+    def padding(self) -> list[int]:
+        """Places of the bytes between fields; serializers leave in them whatever was there."""
+        return self._padding
+
     def _align(self, size: int) -> None:
-        self._template += bytes(-(len(self._template) - 4) % size)
+        missing = -(len(self._template) - 4) % size
+        self._padding += range(len(self._template), len(self._template) + missing)
+        self._template += bytes(missing)
 
     def _number(self, name: str, dtype: np.dtype[Any]) -> None:
         self._align(dtype.base.itemsize)
@@ -275,12 +283,16 @@ def decode_joint_positions(raw: list[bytes], names: tuple[str, ...], first: Floa
     if len(set(map(len, raw))) != 1:
         raise LayoutError("lengths differ")
     rows = np.frombuffer(b"".join(raw), np.uint8).reshape(len(raw), -1)
-    layout = Layout("-" * (int(rows[0, 12:16].copy().view("<u4")[0]) - 1)).count(len(names))
+    frame_id_length = int(rows[0, 12:16].copy().view("<u4")[0]) - 1
+    if not 0 <= frame_id_length < rows.shape[1]:
+        raise LayoutError("other layout")
+    layout = Layout("-" * frame_id_length).count(len(names))
     for name in names:
         layout.string(name)
     offset = layout.count(len(names)).doubles("position", len(names)).offset("position")
     end = offset + 8 * len(names)
-    if end > rows.shape[1] or (rows[:, 1] != 1).any() or (rows[:, 12:offset] != rows[0, 12:offset]).any():
+    fixed = np.setdiff1d(np.arange(12, offset), layout.padding)
+    if end > rows.shape[1] or (rows[:, 1] != 1).any() or (rows[:, fixed] != rows[0, fixed]).any():
         raise LayoutError("layouts differ")
     position = rows[:, offset:end].copy().view("<f8")
     if not np.array_equal(position[0], first, equal_nan=True):

@@ -1,0 +1,101 @@
+"""result.json is strict JSON and comes back as it went."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+
+from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.results import Calibration, History
+from sdimu_calibration.storage.result_file import read_result, write_result
+
+
+def calibration() -> Calibration:
+    generator = np.random.default_rng(3)
+    m, p = 7, 3
+    root = generator.standard_normal((p, p)) * 1e-8
+    return Calibration(
+        body_frame="accelerometer_triad",
+        model=("gyro_bias",),
+        names=("gyro_bias_x", "gyro_bias_y", "gyro_bias_z"),
+        units=("rad/s",) * 3,
+        display_units=("deg/h",) * 3,
+        values=generator.standard_normal(p) * 1e-6,
+        covariance=root @ root.T,
+        fit={"log_likelihood": 12.5, "nis_mean": 1.01, "nis_dof": 300, "held_out_rms": None},
+        data={"samples": 10, "lost": 0, "rejected": 1, "duration_s": 7.0, "stops": 2},
+        notes=("one", "two"),
+        history=History(
+            t=np.arange(1.0, m + 1),
+            value=generator.standard_normal((m, p)),
+            sigma=generator.random((m, p)),
+            attitude_sigma=generator.random((m, 3)),
+            stop=np.arange(m) // 4,
+            dwell=np.arange(m) % 4 != 3,
+            used=np.arange(m) % 4 == 1,
+            nis=np.where(np.arange(m)[:, None] % 4 == 1, 3.0, np.nan) * np.ones((m, 4)),
+        ),
+    )
+
+
+def no_constant(text: str) -> float:
+    raise AssertionError(f"{text} is not JSON")
+
+
+def test_a_result_comes_back_to_the_last_bit(tmp_path):
+    written = calibration()
+    write_result(tmp_path / "result.json", written)
+    again = read_result(tmp_path)
+    assert np.array_equal(again.values, written.values)
+    assert np.array_equal(again.covariance, written.covariance)
+    for entry in fields(History):
+        left, right = getattr(again.history, entry.name), getattr(written.history, entry.name)
+        assert left.dtype == right.dtype
+        assert np.array_equal(left, right, equal_nan=left.dtype.kind == "f")
+    assert replace(again, values=0, covariance=0, history=0) == replace(written, values=0, covariance=0, history=0)
+
+
+def test_the_file_has_the_fixed_keys_and_no_nan(tmp_path):
+    broken = replace(calibration(), fit={"log_likelihood": float("nan"), "held_out_rms": float("inf")})
+    write_result(tmp_path / "result.json", broken)
+    content = json.loads((tmp_path / "result.json").read_text(), parse_constant=no_constant)
+    assert content["format"] == "sdimu-result/1"
+    assert {"body_frame", "model", "coefficients", "covariance", "fit", "data"} <= content.keys()
+    first = content["coefficients"][0]
+    assert (first["name"], first["unit"]) == ("gyro_bias_x", "rad/s")
+    assert first["sigma"] == pytest.approx(content["covariance"][0][0] ** 0.5, rel=1e-12)
+    assert content["fit"] == {"log_likelihood": None, "held_out_rms": None}
+
+
+def test_a_result_with_the_fixed_keys_only_can_be_read(tmp_path):
+    write_result(tmp_path / "result.json", calibration())
+    content = json.loads((tmp_path / "result.json").read_text())
+    del content["history"], content["notes"]
+    for coefficient in content["coefficients"]:
+        del coefficient["display_unit"]
+    (tmp_path / "result.json").write_text(json.dumps(content))
+    again = read_result(tmp_path)
+    assert len(again.history.t) == 0
+    assert again.display_units == again.units
+
+
+@pytest.mark.parametrize(
+    "text", ["", "{", "[]", '{"format": "sdimu-result/9"}', '{"format": "sdimu-result/1", "coefficients": [{}]}']
+)
+def test_what_is_no_result_is_told_in_one_line(tmp_path, text):
+    (tmp_path / "result.json").write_text(text)
+    with pytest.raises(DataError) as error:
+        read_result(tmp_path)
+    assert str(tmp_path / "result.json") in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+def test_a_failed_write_leaves_the_old_file(tmp_path):
+    write_result(tmp_path / "result.json", calibration())
+    before = (tmp_path / "result.json").read_bytes()
+    with pytest.raises(TypeError):
+        write_result(tmp_path / "result.json", replace(calibration(), notes=(object(),)))
+    assert (tmp_path / "result.json").read_bytes() == before
