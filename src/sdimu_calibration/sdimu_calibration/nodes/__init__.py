@@ -1,0 +1,1 @@
+"""The ROS shell: convert, call the core, publish."""

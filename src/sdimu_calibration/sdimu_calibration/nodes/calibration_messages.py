@@ -1,0 +1,71 @@
+"""Estimates as messages."""
+
+from __future__ import annotations
+
+from array import array
+from collections.abc import Sequence
+
+import numpy as np
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from nav_msgs.msg import Odometry
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64MultiArray, MultiArrayDimension, MultiArrayLayout
+
+from sdimu_calibration.core.live import EpochEstimate
+from sdimu_calibration.core.recording import Floats
+from sdimu_calibration.nodes.credits import header
+
+
+def coefficients(
+    stamp_ns: int, body_frame: str, names: Sequence[str], values: Floats, covariance: Floats
+) -> JointState:
+    """Return names, values (SI) as positions and sigmas as efforts; frame_id is the body frame."""
+    message = JointState(header=header(stamp_ns, body_frame), name=list(names))
+    message.position = array("d", np.asarray(values, dtype=float))
+    message.effort = array("d", np.sqrt(np.maximum(np.diag(covariance), 0.0)))
+    return message
+
+
+def covariance_matrix(stamp_ns: int, names: Sequence[str], covariance: Floats) -> Float64MultiArray:
+    """Return a covariance (p, p), SI; the names label its dimensions, the stamp is in the last label."""
+    p = len(names)
+    label = ",".join(names)
+    dims = [
+        MultiArrayDimension(label=label, size=p, stride=p * p),
+        MultiArrayDimension(label=label, size=p, stride=p),
+        MultiArrayDimension(label=f"stamp_ns={stamp_ns}", size=1, stride=1),
+    ]
+    data = array("d", np.ascontiguousarray(covariance, dtype=float).tobytes())
+    return Float64MultiArray(layout=MultiArrayLayout(dim=dims), data=data)
+
+
+def navigation(stamp_ns: int, estimate: EpochEstimate) -> Odometry:
+    """Return navigation in the local-level NED frame.
+
+    pose: position error N, E, D (m) and q_nb, with the covariance of position and attitude error; twist.linear:
+    velocity N, E, D (m/s), resolved in NED although the field is called twist, with its covariance.
+    """
+    message = Odometry(header=header(stamp_ns, "ned"), child_frame_id="body")
+    position, orientation = message.pose.pose.position, message.pose.pose.orientation
+    position.x, position.y, position.z = map(float, estimate.position_error_m)
+    orientation.w, orientation.x, orientation.y, orientation.z = map(float, estimate.q_nb)
+    linear = message.twist.twist.linear
+    linear.x, linear.y, linear.z = map(float, estimate.velocity)
+    P = estimate.navigation_covariance
+    pose = [0, 1, 2, 6, 7, 8]
+    message.pose.covariance = P[np.ix_(pose, pose)].ravel()
+    twist = np.zeros((6, 6))
+    twist[:3, :3] = P[3:6, 3:6]
+    message.twist.covariance = twist.ravel()
+    return message
+
+
+def diagnostics(stamp_ns: int, estimate: EpochEstimate) -> DiagnosticArray:
+    """Return phase, stop, counts and innovation consistency; nothing of wall time, so runs can be compared."""
+    phase = "dwell" if estimate.dwell else "rotating"
+    values = {"phase": phase, "stop": str(estimate.stop), "used": str(estimate.used).lower()}
+    values |= {name: str(count) for name, count in estimate.counts.items()}
+    values |= {f"nis_{channel}": f"{nis:.6g}" for channel, nis in estimate.nis.items()}
+    status = DiagnosticStatus(name="calibration", message=phase, hardware_id="imu")
+    status.values = [KeyValue(key=key, value=value) for key, value in values.items()]
+    return DiagnosticArray(header=header(stamp_ns), status=[status])

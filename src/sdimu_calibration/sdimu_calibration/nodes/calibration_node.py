@@ -1,0 +1,193 @@
+"""Node that calibrates while the test runs.
+
+Parameters: site, imu, model (names or paths), out (folder for result.json), stay (do not leave at the end of the
+stream).
+Subscriptions (remap them at will): /imu/data_raw, /rate_table/status, /imu/temperature. Publications once a second of
+data: /calibration/coefficients, /calibration/covariance, /calibration/navigation, /diagnostics. Services: ~/save
+writes result.json from everything that has come, ~/reset forgets it.
+
+A header stamp decides what happens, never the order of arrival. At the end of the stream the whole test is calibrated
+once more as `sdimu calibrate` does it; the last coefficients and covariance are that result.
+"""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from diagnostic_msgs.msg import DiagnosticArray
+from nav_msgs.msg import Odometry
+from rclpy.node import Node
+from rclpy.task import Future
+from sensor_msgs.msg import Imu, JointState, Temperature
+from std_msgs.msg import Float64MultiArray
+from std_srvs.srv import Trigger
+
+from sdimu_calibration.core.live import EpochEstimate, LiveCalibration
+from sdimu_calibration.core.recording import DataError, Floats
+from sdimu_calibration.core.results import Calibration
+from sdimu_calibration.nodes import calibration_messages as messages
+from sdimu_calibration.nodes.credits import STREAM, Consumer, Producer, publish, to_ns
+from sdimu_calibration.nodes.feed import NS, Feed
+from sdimu_calibration.nodes.listening import Listener
+from sdimu_calibration.nodes.spinning import run_node
+from sdimu_calibration.nodes.ticking import Ticker
+from sdimu_calibration.storage.config import load_imu, load_model, load_site
+from sdimu_calibration.storage.result_file import write_result
+
+IMU, STATUS, TEMPERATURE = "/imu/data_raw", "/rate_table/status", "/imu/temperature"
+BLOCK = 20
+SETTLE_S = 2.0
+FAREWELL_S = 10.0
+GRAVITY = 9.8
+
+
+class CalibrationNode:
+    """Calibrates live; see the module for its parameters."""
+
+    def __init__(self) -> None:
+        self.node = Node("calibration")
+        self.done = Future()
+        declare = self.node.declare_parameter
+        self._site = load_site(str(declare("site", "daejeon").value))
+        self._imu = load_imu(str(declare("imu", "dtg").value))
+        self._model = load_model(str(declare("model", "baseline").value))
+        self._out = Path(str(declare("out", ".").value))
+        self._stay = bool(declare("stay", False).value)
+        _warm_up(self._make(0))
+        self._feed = Feed(self._make)
+        self._ended: float | None = None
+        self._departed: float | None = None
+
+        ticker = Ticker(self.node)
+        node = self.node
+        self._coefficients = Producer(node, ticker, JointState, "/calibration/coefficients")
+        self._covariance = node.create_publisher(Float64MultiArray, "/calibration/covariance", STREAM)
+        self._navigation = node.create_publisher(Odometry, "/calibration/navigation", STREAM)
+        self._diagnostics = node.create_publisher(DiagnosticArray, "/diagnostics", STREAM)
+        self._save = node.create_service(Trigger, "~/save", self._answer_save)
+        self._reset = node.create_service(Trigger, "~/reset", self._answer_reset)
+        self._stream = Consumer(node, ticker, IMU, every=BLOCK, on_end=self._take_end)
+        self._listeners = (
+            Listener(node, ticker, DiagnosticArray, STATUS, self._take_status),
+            Listener(node, ticker, Temperature, TEMPERATURE, self._take_temperature),
+            Listener(node, ticker, Imu, IMU, self._take_imu, raw=True),
+        )
+        ticker.every(0.05, self._tick)
+        self._stream.ready()
+
+    def close(self) -> None:
+        """Nothing to leave behind: result.json is written whole when it is written."""
+
+    def _make(self, start_ns: int) -> LiveCalibration:
+        return LiveCalibration(self._site, self._imu, self._model, start_ns)
+
+    def _take_imu(self, message: bytes) -> None:
+        self._feed.take_imu(message)
+        if self._feed.waiting >= BLOCK:
+            self._work()
+
+    def _take_status(self, message: DiagnosticArray) -> None:
+        if not message.status:
+            return
+        status = message.status[0]
+        values = {entry.key: entry.value for entry in status.values}
+        phase, stop = values.get("phase", status.message), values.get("stop", "0")
+        if phase not in {"dwell", "rotating"} or not stop.isdigit():
+            self.node.get_logger().warning(
+                f"{STATUS}: phase '{phase}', stop '{stop}' ignored; expected dwell or rotating, and a number", once=True
+            )
+            return
+        self._feed.take_status(to_ns(message.header.stamp), phase == "dwell", int(stop))
+
+    def _take_temperature(self, message: Temperature) -> None:
+        self._feed.take_temperature(to_ns(message.header.stamp), float(message.temperature))
+
+    def _work(self) -> None:
+        """Decode, process, publish, and grant a credit for what has been taken."""
+        count = self._feed.waiting
+        reached = self._feed.decode()
+        status, temperature = bool(self.node.count_publishers(STATUS)), bool(self.node.count_publishers(TEMPERATURE))
+        for estimate in self._feed.process(status, temperature):
+            self._publish(estimate)
+        if reached and count:
+            self._stream.reached(reached, count)
+
+    def _publish(self, e: EpochEstimate) -> None:
+        stamp = self._feed.start_ns + round(e.t * NS)
+        self._publish_coefficients(stamp, e.body_frame, e.names, e.coefficients, e.covariance)
+        publish(self._navigation, messages.navigation(stamp, e))
+        publish(self._diagnostics, messages.diagnostics(stamp, e))
+
+    def _publish_coefficients(self, stamp: int, frame: str, names: tuple[str, ...], values: Any, P: Any) -> None:
+        # Covariance first: the end of the coefficients is the end of everything.
+        publish(self._covariance, messages.covariance_matrix(stamp, names, P))
+        self._coefficients.publish(messages.coefficients(stamp, frame, names, values, P), stamp)
+
+    def _tick(self) -> None:
+        self._work()
+        if self._ended is not None and self._departed is None:
+            complete = self._feed.status.latest_s is None or self._feed.status.latest_s >= self._feed.imu_s - 1e-6
+            if complete or time.monotonic() - self._ended > SETTLE_S:
+                self._conclude()
+        if self._departed is not None and not self._stay and not self.done.done():
+            late = time.monotonic() - self._departed > FAREWELL_S
+            if self._coefficients.acknowledged or late:
+                self.done.set_result(None)
+
+    def _take_end(self) -> None:
+        self._ended = time.monotonic()
+
+    def _conclude(self) -> None:
+        """Calibrate on the whole test, publish that as the last word, and write it."""
+        for estimate in self._feed.process(False, False, final=True):
+            self._publish(estimate)
+        self._departed = time.monotonic()
+        try:
+            result = self._write_result()
+        except DataError as error:
+            if not self.done.done():
+                self.done.set_exception(error)
+            return
+        stamp = self._feed.start_ns + round(self._feed.imu_s * NS)
+        self._publish_coefficients(stamp, result.body_frame, result.names, result.values, result.covariance)
+        self._coefficients.end(stamp)
+        self._departed = time.monotonic()
+
+    def _write_result(self) -> Calibration:
+        result = self._feed.finish()
+        write_result(self._out / "result.json", result)
+        return result
+
+    def _answer_save(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        try:
+            self._write_result()
+            response.success, response.message = True, str(self._out / "result.json")
+        except (DataError, OSError) as error:
+            response.success, response.message = False, str(error)
+        return response
+
+    def _answer_reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        self._feed = Feed(self._make)
+        self._ended = self._departed = None
+        response.success = True
+        return response
+
+
+def _warm_up(live: LiveCalibration) -> None:
+    """Compile, or load from the cache, everything that a test at rest uses."""
+    t: Floats = np.arange(1.0, 401.0) * 0.1
+    live.add_phase(0.0, True, 0)
+    live.add_samples(t, np.full((len(t), 3), 4e-5), np.tile([0.0, 0.0, -GRAVITY], (len(t), 1)))
+    live.advance(float(t[-1]), True)
+
+
+def main() -> None:
+    """Run the node."""
+    run_node(CalibrationNode)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,273 @@
+"""Flow control and end of stream over DDS, driven by header stamps.
+
+RELIABLE + KEEP_ALL alone loses data when a reader is slow: the writer blocks at 5,000 unacknowledged
+samples and then refuses. So consumers grant credits, and a simulated producer stays within a window of them.
+
+=====================  ==========================================================================
+``<topic>``            the data, whatever their type
+``<topic>/credit``     std_msgs/Header, consumer to producer: stamp reached, frame_id = the consumer's full
+                       node name. Stamp 0 says "ready, nothing received": the producer counts it as being level.
+                       Sent every few samples, and repeated every 0.25 s while the consumer is idle.
+``<topic>/end``        std_msgs/Header, latched, producer to consumers: stamp of the last message.
+                       A consumer answers with a credit of that stamp once it holds everything.
+=====================  ==========================================================================
+
+Nothing here is needed to use a real driver: a consumer that never grants a credit never holds the
+producer, and a consumer without a crediting producer just listens. A consumer that vanished is
+forgotten when DDS has dropped it (the lease, 3 s with config/ros/fastdds.xml); one that stays idle at the same
+stamp for two seconds although more was sent has lost it, and is counted as being level.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import rclpy
+from rclpy.impl.implementation_singleton import rclpy_implementation
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from std_msgs.msg import Header
+
+from sdimu_calibration.nodes.ticking import Ticker
+
+STREAM = QoSProfile(history=HistoryPolicy.KEEP_ALL, reliability=ReliabilityPolicy.RELIABLE)
+"""For everything that must not be lost."""
+LATCHED = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+"""The last message also reaches who comes later."""
+HISTORY = QoSProfile(depth=1000, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+"""The last thousand messages also reach who comes later; for slow topics."""
+
+REPEAT_S = 0.25
+STALE_REPEATS = 8
+REFUSED_S = 20.0
+NO_LIMIT = 2**63 - 1
+NS = 1_000_000_000
+
+
+def to_ns(stamp: Any) -> int:
+    """Nanoseconds of a builtin_interfaces/Time."""
+    return int(stamp.sec) * NS + int(stamp.nanosec)
+
+
+def header(stamp_ns: int, frame_id: str = "") -> Header:
+    """Return a std_msgs/Header of a stamp in nanoseconds."""
+    message = Header(frame_id=frame_id)
+    message.stamp.sec, message.stamp.nanosec = divmod(int(stamp_ns), NS)
+    return message
+
+
+@dataclass
+class _Peer:
+    """A consumer as its producer sees it."""
+
+    reached_ns: int | None
+    """None: nothing was sent yet, level with the first stamp."""
+    repeats: int = 0
+
+
+class Producer:
+    """Send one topic and stay at most a window ahead of every consumer that grants credits.
+
+    Parameters
+    ----------
+    node : rclpy.node.Node
+    ticker : Ticker
+        Of this node.
+    message_type : type
+        ROS message class of the topic.
+    topic : str
+    window_ns : int
+        How far (ns of stamps) the producer may be ahead; `NO_LIMIT` only does the end of stream.
+    on_credit : callable or None
+        Called after each credit: time to send more.
+    qos : QoSProfile
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        ticker: Ticker,
+        message_type: type,
+        topic: str,
+        *,
+        window_ns: int = NO_LIMIT,
+        on_credit: Callable[[], None] | None = None,
+        qos: QoSProfile = STREAM,
+    ) -> None:
+        self._node = node
+        self._window_ns = window_ns
+        self._on_credit = on_credit
+        self._peers: dict[str, _Peer] = {}
+        self._sent_ns: int | None = None
+        self._end_ns: int | None = None
+        self.publisher = node.create_publisher(message_type, topic, qos)
+        self._end_publisher = node.create_publisher(Header, f"{topic}/end", LATCHED)
+        self._credit = node.create_subscription(Header, f"{topic}/credit", self._take_credit, STREAM)
+        ticker.every(0.5, self._forget_vanished)
+
+    @property
+    def consumers(self) -> int:
+        """How many consumers have granted a credit and are still there."""
+        return len(self._peers)
+
+    @property
+    def limit_ns(self) -> int:
+        """Stamp up to which messages may be sent now."""
+        reached = [peer.reached_ns for peer in self._peers.values() if peer.reached_ns is not None]
+        if not reached or self._window_ns == NO_LIMIT:
+            return NO_LIMIT
+        return min(reached) + self._window_ns
+
+    def publish(self, message: Any, stamp_ns: int) -> None:
+        """Send a message (or its CDR bytes); wait while DDS refuses because a reader is slow or was killed."""
+        publish(self.publisher, message)
+        if self._sent_ns is None:
+            for peer in self._peers.values():
+                peer.reached_ns = stamp_ns
+        self._sent_ns = stamp_ns
+
+    def end(self, stamp_ns: int) -> None:
+        """Say that `stamp_ns` was the last stamp."""
+        self._end_ns = stamp_ns
+        self._end_publisher.publish(header(stamp_ns, self._node.get_fully_qualified_name()))
+
+    @property
+    def acknowledged(self) -> bool:
+        """True when the end was said and every consumer that is still there holds everything."""
+        return self._end_ns is not None and all(
+            peer.reached_ns is not None and peer.reached_ns >= self._end_ns for peer in self._peers.values()
+        )
+
+    def _take_credit(self, message: Header) -> None:
+        reached = to_ns(message.stamp)
+        if reached == 0:
+            # Before the end "ready" means level; after it, the consumer has not yet heard of the end.
+            level = self._sent_ns if self._end_ns is None else -1
+            self._peers[message.frame_id] = _Peer(level)
+        else:
+            peer = self._peers.setdefault(message.frame_id, _Peer(reached))
+            peer.repeats = peer.repeats + 1 if reached == peer.reached_ns else 0
+            peer.reached_ns = reached
+            if peer.repeats >= STALE_REPEATS and self._sent_ns is not None and reached < self._sent_ns:
+                peer.reached_ns, peer.repeats = self._sent_ns, 0
+        if self._on_credit is not None:
+            self._on_credit()
+
+    def _forget_vanished(self) -> None:
+        if not self._peers:
+            return
+        infos = self._node.get_publishers_info_by_topic(self._credit.topic_name)
+        present = {f"{info.node_namespace.rstrip('/')}/{info.node_name}" for info in infos}
+        gone = [name for name in self._peers if name not in present]
+        for name in gone:
+            self._node.get_logger().warning(f"{name} has gone; no longer waiting for it")
+            del self._peers[name]
+        if gone and self._on_credit is not None:
+            self._on_credit()
+
+
+def publish(publisher: Any, message: Any) -> None:
+    """Publish; while DDS refuses (5,000 samples unacknowledged) try again for `REFUSED_S`, then drop."""
+    deadline = time.monotonic() + REFUSED_S
+    while rclpy.ok():
+        try:
+            publisher.publish(message)
+        except rclpy_implementation.RCLError:  # noqa: PERF203 (the loop is the retry)
+            if time.monotonic() > deadline:
+                raise
+        else:
+            return
+
+
+class Consumer:
+    """Grant credits for one topic and watch for its end.
+
+    Parameters
+    ----------
+    node : rclpy.node.Node
+    ticker : Ticker
+        Of this node.
+    topic : str
+        The data topic; the data subscription itself belongs to the caller.
+    every : int
+        Samples between credits.
+    busy : callable
+        True while samples are waiting inside the consumer; credits are then not repeated.
+    on_end : callable or None
+        Called once, when everything up to the end of the stream has been reached.
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        ticker: Ticker,
+        topic: str,
+        *,
+        every: int = 20,
+        busy: Callable[[], bool] = lambda: False,
+        on_end: Callable[[], None] | None = None,
+    ) -> None:
+        self._name = node.get_fully_qualified_name()
+        self.topic = topic
+        self._every = every
+        self._busy = busy
+        self._on_end = on_end
+        self._reached_ns = 0
+        self._count = 0
+        self._open = False
+        self._changed = time.monotonic()
+        self._end_ns: int | None = None
+        self.ended = False
+        self._publisher = node.create_publisher(Header, f"{topic}/credit", STREAM)
+        self._end = node.create_subscription(Header, f"{topic}/end", self._take_end, LATCHED)
+        ticker.every(REPEAT_S, self._repeat)
+
+    @property
+    def reached_ns(self) -> int:
+        """Latest stamp reached; 0 before the first."""
+        return self._reached_ns
+
+    def ready(self) -> None:
+        """Start granting credits: what is slow at the start (compiling) is done."""
+        if not self._open:
+            self._open = True
+            self._grant()
+
+    def reached(self, stamp_ns: int, samples: int = 1) -> None:
+        """Everything up to `stamp_ns` has been dealt with; `samples` more than at the last call."""
+        self._reached_ns = max(self._reached_ns, stamp_ns)
+        self._changed = time.monotonic()
+        self._count += samples
+        if self._count >= self._every:
+            self._grant()
+        self._check_end()
+
+    def _grant(self) -> None:
+        self._count = 0
+        if self._open:
+            publish(self._publisher, header(self._reached_ns, self._name))
+
+    def _repeat(self) -> None:
+        if self._busy():
+            return
+        # The end is said on another topic; data still on their way get two seconds to arrive.
+        if self._end_ns is not None and time.monotonic() - self._changed > 2.0:
+            self._reached_ns = max(self._reached_ns, self._end_ns)
+        self._check_end()
+        self._grant()
+
+    def _take_end(self, message: Header) -> None:
+        self._end_ns = to_ns(message.stamp)
+        self._changed = time.monotonic()
+        self._check_end()
+
+    def _check_end(self) -> None:
+        if self.ended or self._end_ns is None or self._reached_ns < self._end_ns:
+            return
+        self.ended = True
+        self._grant()
+        if self._on_end is not None:
+            self._on_end()

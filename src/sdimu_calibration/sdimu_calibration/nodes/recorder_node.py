@@ -1,0 +1,118 @@
+"""Node that records every topic in and out to one rosbag2 bag in MCAP, filed under header stamps.
+
+Parameters: out (folder of the bag), topics (list of NAME=TYPE; the default is every topic in and out), replace.
+Messages are written as they came, undecoded. The file is flushed every 0.25 s, so that a kill costs less than a
+second. The recorder grants credits like any consumer and leaves when the streams of `STREAMS` have ended.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from importlib import import_module
+from pathlib import Path
+
+from rclpy.node import Node
+from rclpy.task import Future
+
+from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.nodes.convert import stamp_in_label, stamp_of
+from sdimu_calibration.nodes.credits import Consumer
+from sdimu_calibration.nodes.listening import Listener
+from sdimu_calibration.nodes.spinning import run_node
+from sdimu_calibration.nodes.ticking import Ticker
+from sdimu_calibration.storage.mcap_bag import McapBag
+
+TOPICS = (
+    "/imu/data_raw=sensor_msgs/msg/Imu",
+    "/imu/temperature=sensor_msgs/msg/Temperature",
+    "/rate_table/status=diagnostic_msgs/msg/DiagnosticArray",
+    "/rate_table/joint_states=sensor_msgs/msg/JointState",
+    "/calibration/coefficients=sensor_msgs/msg/JointState",
+    "/calibration/covariance=std_msgs/msg/Float64MultiArray",
+    "/calibration/navigation=nav_msgs/msg/Odometry",
+    "/diagnostics=diagnostic_msgs/msg/DiagnosticArray",
+)
+STREAMS = ("/imu/data_raw", "/rate_table/status", "/calibration/coefficients")
+"""Topics with an end; the first must end, the others must have ended or lost their publisher."""
+
+FLUSH_S = 0.25
+QUIET_S = 0.4
+PEERS_PATIENCE_S = 5.0
+
+
+class RecorderNode:
+    """Writes topics to a bag; see the module for its parameters."""
+
+    def __init__(self) -> None:
+        self.node = Node("recorder")
+        self.done = Future()
+        out = Path(str(self.node.declare_parameter("out", "bag").value))
+        topics = [str(text) for text in self.node.declare_parameter("topics", list(TOPICS)).value]
+        replace = bool(self.node.declare_parameter("replace", False).value)
+        self._needed = [str(t) for t in self.node.declare_parameter("wait_for", [""]).value if t]
+        self._bag = McapBag(out, replace=replace)
+        self._born = self._latest = time.monotonic()
+        self._ticker = Ticker(self.node)
+        self._consumers = {name: Consumer(self.node, self._ticker, name) for name in STREAMS}
+        self._listeners: list[Listener] = []
+        for text in topics:
+            name, _, type_name = text.partition("=")
+            self._record(name, type_name)
+        self._bag.flush()
+        self._ticker.every(FLUSH_S, self._tick)
+
+    def close(self) -> None:
+        """Finish the bag."""
+        self._bag.close()
+
+    def _record(self, name: str, type_name: str) -> None:
+        self._bag.topic(name, type_name)
+        take = self._writer(name, type_name)
+        self._listeners.append(Listener(self.node, self._ticker, _message_class(type_name), name, take, raw=True))
+
+    def _writer(self, name: str, type_name: str) -> Callable[[bytes], None]:
+        """Return the callback of a topic, with everything it needs bound: it runs for every message."""
+        stamp = stamp_in_label if type_name.endswith("MultiArray") else stamp_of
+        write = self._bag.write
+        consumer = self._consumers.get(name)
+
+        def take(message: bytes) -> None:
+            at = stamp(message)
+            write(name, message, at)
+            self._latest = time.monotonic()
+            if consumer is not None:
+                consumer.reached(at)
+
+        return take
+
+    def _tick(self) -> None:
+        self._bag.flush()
+        now = time.monotonic()
+        if now - self._born > PEERS_PATIENCE_S or all(self.node.count_publishers(t) for t in self._needed):
+            for consumer in self._consumers.values():
+                consumer.ready()
+        if self._complete() and now - self._latest > QUIET_S and not self.done.done():
+            self.done.set_result(None)
+
+    def _complete(self) -> bool:
+        first, *others = (self._consumers[name] for name in STREAMS)
+        return first.ended and all(c.ended or not self.node.count_publishers(c.topic) for c in others)
+
+
+def _message_class(type_name: str) -> type:
+    package, _, rest = type_name.partition("/")
+    try:
+        module = import_module(f"{package}.msg")
+        return getattr(module, rest.rpartition("/")[2])  # type: ignore[no-any-return]
+    except (ImportError, AttributeError) as error:
+        raise DataError(f"topics: message type '{type_name}' is not installed") from error
+
+
+def main() -> None:
+    """Run the node."""
+    run_node(RecorderNode)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,169 @@
+"""Node of the simulated IMU: true motion of the table in, samples out.
+
+Parameters: imu, site, plan (for the truth file only), temperature (names or paths), mount ("X,Y,Z" in deg; empty
+draws it up to mount_max_deg), seed, rate_hz, effects (list of NAME=VALUE), truth_file (written at the start), frame_id,
+consumers (how many must have granted a credit on the IMU before this node grants one to the table).
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections import deque
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rclpy.node import Node
+from rclpy.task import Future
+from sensor_msgs.msg import Imu, Temperature
+from std_msgs.msg import Float64MultiArray
+
+from rate_table_sim.nodes.motion_message import decode_motion
+from sdimu_calibration.nodes.convert import encode_imu
+from sdimu_calibration.nodes.credits import NS, STREAM, Consumer, Producer, header, publish
+from sdimu_calibration.nodes.spinning import run_node
+from sdimu_calibration.nodes.ticking import Ticker
+from sdimu_calibration.storage.config import load_imu, load_plan, load_site
+from sdimu_sim.cli.simulate import mount_rad
+from sdimu_sim.core.generator import ImuGenerator
+from sdimu_sim.core.platform import PlatformMotion
+from sdimu_sim.core.scenario import Scenario, imu_truth
+from sdimu_sim.core.truth import Truth
+from sdimu_sim.temperature_file import load_temperature
+from sdimu_sim.truth_file import write_truth
+
+WINDOW_SAMPLES = 200
+FAREWELL_S = 20.0
+TRUE_MOTION = "/rate_table/true_motion"
+
+
+class SdimuNode:
+    """Simulated IMU; see the module for its parameters."""
+
+    def __init__(self) -> None:
+        self.node = Node("sdimu")
+        self.done = Future()
+        declare = self.node.declare_parameter
+        scenario = self._scenario()
+        truth_file = str(declare("truth_file", "").value)
+        self._needed = int(declare("consumers", 0).value)
+        self._frame = str(declare("frame_id", "imu_link").value)
+        self._profile = scenario.temperature
+        self._rate_hz = scenario.rate_hz
+        imu = imu_truth(scenario)
+        self._variance = (imu.gyro_white_noise**2 * self._rate_hz, imu.accel_white_noise**2 * self._rate_hz)
+        self._generator = ImuGenerator(imu, scenario.site, self._rate_hz, scenario.seed, self._profile)
+        _warm_up(ImuGenerator(imu, scenario.site, self._rate_hz, scenario.seed, self._profile))
+        if truth_file:
+            truth = Truth(imu, scenario.site, scenario.seed, self._rate_hz, scenario.plan.name)
+            write_truth(Path(truth_file), truth)
+
+        self._ready: deque[tuple[int, Any, Any]] = deque()  # stamp, publisher, message: in the order of stamps
+        self._motion_ns = self._last_ns = self._start_ns = 0
+        self._next_temperature = 0
+        self._over = False
+        self._departed: float | None = None
+        ticker = Ticker(self.node)
+        window = round(WINDOW_SAMPLES / self._rate_hz * NS)
+        self._imu = Producer(self.node, ticker, Imu, "/imu/data_raw", window_ns=window, on_credit=self._pump)
+        # Without a profile there must be no publisher: the calibrator would wait for it.
+        if self._profile is not None:
+            self._temperature = self.node.create_publisher(Temperature, "/imu/temperature", STREAM)
+        # A message of motion is a block: each one is acknowledged.
+        self._motion = Consumer(
+            self.node, ticker, TRUE_MOTION, every=1, busy=lambda: bool(self._ready), on_end=self._take_end
+        )
+        self.node.create_subscription(Float64MultiArray, TRUE_MOTION, self._take_motion, STREAM)
+        ticker.every(0.05, self._tick)
+
+    def close(self) -> None:
+        """Nothing to leave behind."""
+
+    def _scenario(self) -> Scenario:
+        declare = self.node.declare_parameter
+        mount = str(declare("mount", "").value)
+        temperature = str(declare("temperature", "").value)
+        return Scenario(
+            plan=load_plan(str(declare("plan", "kim18").value)),
+            imu=load_imu(str(declare("imu", "dtg").value)),
+            site=load_site(str(declare("site", "daejeon").value)),
+            rate_hz=float(declare("rate_hz", 100.0).value),
+            seed=int(declare("seed", 1).value),
+            mount_rad=mount_rad(mount) if mount else None,
+            mount_max_rad=math.radians(float(declare("mount_max_deg", 3.0).value)),
+            effects=tuple(str(e) for e in declare("effects", [""]).value if e),
+            temperature=load_temperature(temperature) if temperature else None,
+        )
+
+    def _take_motion(self, message: Float64MultiArray) -> None:
+        """Make the samples of a block of motion and queue them."""
+        self._start_ns, t, q_nt, omega_nt_t = decode_motion(message)
+        samples = self._generator.advance(PlatformMotion(t, q_nt, omega_nt_t))
+        stamps = self._start_ns + samples.ns
+        encoded = encode_imu(stamps, samples.omega_ib_b, samples.f_ib_b, self._frame, *self._variance)
+        queue: list[tuple[int, Any, Any]] = [
+            (stamp, self._imu, raw) for stamp, raw in zip(stamps.tolist(), encoded, strict=True)
+        ]
+        queue.extend(self._temperatures(float(t[-1])))
+        queue.sort(key=lambda entry: (entry[0], entry[1] is self._imu))
+        self._ready.extend(queue)
+        self._motion_ns = self._start_ns + round(float(t[-1]) * NS)
+        self._pump()
+
+    def _temperatures(self, until_s: float) -> list[tuple[int, Any, Any]]:
+        """Temperatures at 1 Hz up to a time."""
+        if self._profile is None:
+            return []
+        seconds = np.arange(self._next_temperature, int(until_s + 1e-9) + 1)
+        self._next_temperature += len(seconds)
+        entries = []
+        for second, value in zip(seconds.tolist(), self._profile.value(seconds.astype(float)).tolist(), strict=True):
+            stamp = self._start_ns + second * NS
+            message = Temperature(header=header(stamp, self._frame), temperature=value)
+            entries.append((stamp, self._temperature, message))
+        return entries
+
+    def _pump(self) -> None:
+        """Send what credits allow; the table gets its credit when all of its motion has become samples."""
+        limit = self._imu.limit_ns
+        while self._ready and self._ready[0][0] <= limit:
+            stamp, target, message = self._ready.popleft()
+            if target is self._imu:
+                self._imu.publish(message, stamp)
+                self._last_ns = stamp
+            else:
+                publish(target, message)
+        if not self._ready and self._motion_ns > self._motion.reached_ns:
+            self._motion.reached(self._motion_ns)
+
+    def _take_end(self) -> None:
+        self._over = True
+
+    def _tick(self) -> None:
+        if self._imu.consumers >= self._needed:
+            self._motion.ready()
+        if not self._over or self._ready:
+            self._pump()
+            return
+        if self._departed is None:
+            self._departed = time.monotonic()
+            self._imu.end(self._last_ns)
+        late = time.monotonic() - self._departed > FAREWELL_S
+        if (self._imu.acknowledged or late) and not self.done.done():
+            self.done.set_result(None)
+
+
+def _warm_up(generator: ImuGenerator) -> None:
+    """Compile what is compiled on its first use."""
+    t = np.linspace(0.0, 0.5, 6)
+    generator.advance(PlatformMotion(t, np.tile([1.0, 0.0, 0.0, 0.0], (6, 1)), np.zeros((6, 3))))
+
+
+def main() -> None:
+    """Run the node."""
+    run_node(SdimuNode)
+
+
+if __name__ == "__main__":
+    main()
