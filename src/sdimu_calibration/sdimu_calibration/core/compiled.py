@@ -2,17 +2,38 @@
 
 from __future__ import annotations
 
+import hashlib
+import os
 from collections.abc import Callable
+from functools import cache
+from pathlib import Path
 from typing import Any, TypeVar, cast
 
 import numba
 
 F = TypeVar("F", bound=Callable[..., Any])
 
+_CORE = Path(__file__).parent
+
+
+@cache
+def _sources_digest(folder: Path) -> str:
+    digest = hashlib.sha256()
+    for file in sorted({*_CORE.glob("*.py"), *folder.glob("*.py")}):
+        digest.update(file.read_bytes())
+    return digest.hexdigest()[:16]
+
 
 def compiled(function: F) -> F:
     """Compile a loop with numba, cached on disk, without the global lock.
 
     Not `fastmath`: NaN must stay NaN, and the same data must give the same digits in every process.
+
+    Numba's cache notices a change of the function's own file only, while functions of other files are compiled into it.
+    So the cache's folder is named by the sources of the function's folder and of the core.
     """
+    folder = Path(function.__code__.co_filename).parent
+    place = folder / "__pycache__"
+    if "NUMBA_CACHE_DIR" not in os.environ and os.access(folder, os.W_OK):
+        numba.config.CACHE_DIR = str(place / f"numba-{_sources_digest(folder)}")
     return cast(F, numba.njit(cache=True, nogil=True, error_model="numpy")(function))

@@ -40,7 +40,7 @@ from sdimu_calibration.core.track import motion
 Floats = NDArray[np.float64]
 Progress = Callable[[str, float], None]
 
-CONVERGED = 1e-3
+CONVERGED = 5e-3
 """Largest movement of a coefficient in its own sigma at which the passes end."""
 MOST_PASSES = 12
 SNAPSHOT_EPOCHS = 5

@@ -42,7 +42,7 @@ class Cycles:
         Integrals of body rate (rad) and specific force (m/s).
     coning, sculling : ndarray, shape (n, 3)
         Their corrections: rotation vector = alpha + coning; velocity increment =
-        upsilon + alpha x upsilon / 2 + sculling.
+        upsilon + alpha x upsilon / 2 + ... + sculling (`velocity_increment`).
     samples, lost : ndarray of int, shape (n,)
         Samples in the cycle, and samples missing before them.
     gap_angle : ndarray, shape (n, 3)
@@ -222,9 +222,19 @@ def navigate_cycle(
 
 @compiled
 def velocity_increment(alpha: Floats, upsilon: Floats, sculling: Floats) -> Floats:
-    """Velocity increment in the frame at the start of the cycle: rotation and sculling terms added; (3,)."""
+    """Velocity increment in the frame at the start of the cycle (m/s), shape (3,).
+
+    ``upsilon + alpha x upsilon / 2 + alpha x (alpha x upsilon) / 6 + sculling``: Savage's rotation compensation with its
+    coefficients (1 - cos a)/a^2 and (1 - sin a / a)/a^2 to second order. Without the last term a table at
+    2 deg/s makes the force across its axis 2 ppm too small.
+    """
+    c0 = alpha[1] * upsilon[2] - alpha[2] * upsilon[1]
+    c1 = alpha[2] * upsilon[0] - alpha[0] * upsilon[2]
+    c2 = alpha[0] * upsilon[1] - alpha[1] * upsilon[0]
+    a2 = alpha[0] ** 2 + alpha[1] ** 2 + alpha[2] ** 2
+    first, second = 0.5 - a2 / 24.0, 1.0 / 6.0 - a2 / 120.0
     dv = np.empty(3)
-    dv[0] = upsilon[0] + 0.5 * (alpha[1] * upsilon[2] - alpha[2] * upsilon[1]) + sculling[0]
-    dv[1] = upsilon[1] + 0.5 * (alpha[2] * upsilon[0] - alpha[0] * upsilon[2]) + sculling[1]
-    dv[2] = upsilon[2] + 0.5 * (alpha[0] * upsilon[1] - alpha[1] * upsilon[0]) + sculling[2]
+    dv[0] = upsilon[0] + first * c0 + second * (alpha[1] * c2 - alpha[2] * c1) + sculling[0]
+    dv[1] = upsilon[1] + first * c1 + second * (alpha[2] * c0 - alpha[0] * c2) + sculling[1]
+    dv[2] = upsilon[2] + first * c2 + second * (alpha[0] * c1 - alpha[1] * c0) + sculling[2]
     return dv
