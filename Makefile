@@ -1,8 +1,13 @@
-# make setup | demo | test | check | bench : each does its own set-up and needs nothing before it.
+# make setup | demo | test | check | colcon | bench | study : each does its own set-up and needs nothing before it.
 PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
 STAMP  := $(VENV)/.installed
+OUT    ?= out/demo
+PACKAGES := rate_table_sim sdimu_calibration sdimu_sim
+NUMBER   := $(words $(PACKAGES))
+
+export PATH := $(CURDIR)/$(BIN):$(PATH)
 
 setup: $(STAMP)
 
@@ -13,4 +18,34 @@ $(STAMP): requirements.lock src/sdimu_calibration/setup.py src/sdimu_sim/setup.p
 	    -e src/sdimu_calibration -e src/rate_table_sim -e src/sdimu_sim
 	touch $@
 
-.PHONY: setup
+# A whole simulated test over DDS, from the table to report.html.
+demo: setup
+	$(BIN)/sdimu run --out $(OUT)
+
+# Style, types and the direction of imports.
+check: setup
+	$(BIN)/ruff check .
+	$(BIN)/mypy $(foreach package,$(PACKAGES),src/$(package)/$(package))
+	$(BIN)/lint-imports
+
+test: check
+	$(BIN)/python -m pytest -n 2 -m "not slow and not bench"
+
+# As a user of ROS would: build the three packages and test what was installed.
+colcon: setup
+	work=$$(mktemp -d) && trap 'rm -rf "$$work"' EXIT && \
+	test "$$(colcon --log-base $$work/log list --base-paths src | grep -c '(ros.ament_python)')" -eq $(NUMBER) && \
+	colcon --log-base $$work/log build --base-paths src --build-base $$work/build --install-base $$work/install && \
+	SDIMU_CONFIG=$(CURDIR)/config colcon --log-base $$work/log test --base-paths src --build-base $$work/build \
+	    --install-base $$work/install --python-testing pytest --return-code-on-test-failure \
+	    --pytest-args -q -m "not slow and not bench and not ros"
+
+# How fast: samples a second, bags, start of the command line.
+bench: setup
+	$(BIN)/python -m pytest -m bench -s
+
+# Many runs: is sigma honest, is the bias nought. Minutes to hours.
+study: setup
+	$(BIN)/python -m pytest -n 2 -m slow --timeout 0
+
+.PHONY: setup demo check test colcon bench study

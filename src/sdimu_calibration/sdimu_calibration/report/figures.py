@@ -16,9 +16,10 @@ from sdimu_calibration.report.groups import groups, is_free, short_name, title
 
 _COLOURS = ("#0b5394", "#b45f06", "#38761d", "#741b47", "#134f5c", "#7f6000")
 _DASHES = ("solid", "dash", "dot", "dashdot", "longdash", "longdashdot")
-_BAND = "rgba(0, 0, 0, 0.07)"
+_BAND = "rgba(0, 0, 0, 0.10)"
 _COLUMNS = 2
-_PANEL_HEIGHT = 240
+_PANEL_HEIGHT = 260
+_GAP = 75
 _LABEL_GAP = 0.075
 """Least distance of two labels, as a share of a panel's height."""
 _MOST_POINTS = 1500
@@ -44,7 +45,7 @@ def sigma_history(calibration: Calibration) -> Any:
         rows=rows,
         cols=_COLUMNS,
         subplot_titles=[title(effect) for effect in panels],
-        vertical_spacing=0.36 / max(rows, 1) / 1.6,
+        vertical_spacing=min(_GAP / (_PANEL_HEIGHT * rows), 1.0 / max(rows - 1, 1)),
         horizontal_spacing=0.12,
     )
     kept = _thin(history)
@@ -53,8 +54,17 @@ def sigma_history(calibration: Calibration) -> Any:
         unit = calibration.display_units[indices[0]]
         labels = _draw(figure, calibration, effect, indices, kept, (row, column))
         _label(figure, labels, float(history.t[-1]) / 60.0, (row, column))
-        figure.update_yaxes(title_text=f"sigma ({unit})", type="log", row=row, col=column, exponentformat="power")
-        figure.update_xaxes(title_text="time (min)", row=row, col=column, range=[0, float(history.t[-1]) / 60.0])
+        figure.update_yaxes(
+            title_text=f"sigma ({unit})", type="log", dtick=1, exponentformat="power", row=row, col=column
+        )
+        last = panel >= len(panels) - _COLUMNS
+        figure.update_xaxes(
+            title_text="time (min)" if last else None,
+            title_standoff=6,
+            range=[0, float(history.t[-1]) / 60.0],
+            row=row,
+            col=column,
+        )
     _bands(figure, history, len(panels))
     figure.update_layout(
         template="simple_white",

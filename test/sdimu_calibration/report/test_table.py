@@ -1,0 +1,126 @@
+"""People read customary units, and the page says the same as the numbers."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sdimu_calibration.core.results import Calibration, History
+from sdimu_calibration.core.units import to_si
+from sdimu_calibration.report.figures import rotations, sigma_history, spread
+from sdimu_calibration.report.groups import groups, short_name
+from sdimu_calibration.report.page import page
+from sdimu_calibration.report.table import cells, headings, rows
+
+
+@pytest.fixture
+def calibration() -> Calibration:
+    names = ("gyro_bias_x", "gyro_bias_y", "accel_misalignment_xy", "accel_misalignment_zx")
+    display = ("deg/h", "deg/h", "arcmin", "arcmin")
+    values = np.array([to_si(v, u) for v, u in zip((1.25, -0.5, 0.0, 0.25), display, strict=True)])
+    sigmas = np.array([to_si(v, u) for v, u in zip((0.016, 0.02, 0.0, 0.028), display, strict=True)])
+    m = 600
+    decay = np.exp(-np.arange(m) / 100.0)[:, None]
+    return Calibration(
+        body_frame="accelerometer_triad",
+        model=("gyro_bias", "accel_misalignment"),
+        names=names,
+        units=("rad/s", "rad/s", "rad", "rad"),
+        display_units=display,
+        values=values,
+        covariance=np.diag(sigmas**2),
+        fit={"nis_mean": 1.02, "nis_dof": 900, "held_out_rms": None},
+        data={"samples": 60000, "lost": 2, "rejected": 0, "duration_s": 600.0, "stops": 3},
+        notes=("2 < 3 & more",),
+        history=History(
+            t=np.arange(1.0, m + 1),
+            value=np.zeros((m, 4)),
+            sigma=sigmas * (1.0 + 50.0 * decay),
+            attitude_sigma=np.ones((m, 3)),
+            stop=np.arange(m) // 200,
+            dwell=np.arange(m) % 200 < 150,
+            used=np.ones(m, bool),
+            nis=np.full((m, 4), 3.0),
+        ),
+    )
+
+
+def test_numbers_are_shown_in_customary_units_to_two_digits_of_sigma(calibration):
+    table = rows(calibration)
+    assert cells(table[0], headings(table)) == ["gyro_bias_x", "1.250", "0.016", "deg/h"]
+
+
+def test_a_coefficient_fixed_by_the_frame_has_no_sigma(calibration):
+    table = rows(calibration)
+    assert cells(table[2], headings(table)) == ["accel_misalignment_xy", "0", "by the frame", "arcmin"]
+
+
+def test_errors_are_estimate_minus_truth_in_sigmas(calibration):
+    table = rows(calibration, truth={"gyro_bias_x": to_si(1.20, "deg/h"), "accel_misalignment_xy": 0.0})
+    assert table[0].error == pytest.approx(0.05, rel=1e-9)
+    assert table[0].error_sigmas == pytest.approx(0.05 / 0.016, rel=1e-9)
+    assert table[1].truth is None
+    assert table[2].error_sigmas is None
+    assert "error / sigma" in headings(table)
+    assert "truth" not in headings(rows(calibration))
+
+
+def test_published_sigmas_stand_by_their_effect(calibration):
+    table = rows(calibration, reference={"gyro_bias": to_si(0.016, "deg/h")})
+    assert table[0].reference == pytest.approx(0.016, rel=1e-12)
+    assert table[1].reference == table[0].reference
+    assert table[3].reference is None
+
+
+def test_the_longest_effect_name_wins():
+    model = ("accel_scale", "accel_scale_cubic")
+    names = ("accel_scale_x", "accel_scale_cubic_x")
+    assert groups(names, model) == {"accel_scale": [0], "accel_scale_cubic": [1]}
+    assert short_name("accel_scale_cubic_x", "accel_scale_cubic") == "x"
+
+
+def test_the_page_needs_no_network_and_escapes_what_is_not_its_own(calibration):
+    text = page(calibration, "<Calibration>")
+    assert "&lt;Calibration&gt;" in text
+    assert "2 &lt; 3 &amp; more" in text
+    assert not re.search(r"<(script|link|img)[^>]+(src|href)=", text)
+    assert len(text) < 6e6
+
+
+def test_the_page_without_a_history_has_the_table_alone(calibration):
+    h = calibration.history
+    empty = replace(h, **{name: getattr(h, name)[:0] for name in h.__dataclass_fields__})
+    text = page(replace(calibration, history=empty), "x")
+    assert "gyro_bias_x" in text
+    assert "plotly" not in text
+
+
+def test_every_free_coefficient_has_a_line_that_ends_at_its_sigma(calibration):
+    figure = sigma_history(calibration)
+    ends = {trace.name: float(trace.y[-1]) for trace in figure.data}
+    assert ends.keys() == set(calibration.names) - {"accel_misalignment_xy"}
+    last = calibration.history.sigma[-1, 0] / to_si(1.0, "deg/h")
+    # Lines are kept in single precision.
+    assert ends["gyro_bias_x"] == pytest.approx(last, rel=1e-6)
+
+
+def test_lines_of_a_panel_differ_without_colour(calibration):
+    figure = sigma_history(calibration)
+    dashes = [trace.line.dash for trace in figure.data if trace.name.startswith("gyro_bias")]
+    assert len(set(dashes)) == len(dashes)
+
+
+def test_bands_lie_where_the_table_turns(calibration):
+    assert rotations(calibration.history) == [(150.0, 200.0), (350.0, 400.0), (550.0, 600.0)]
+
+
+def test_labels_are_pushed_apart_no_further_than_needed():
+    heights = np.array([0.0, 0.01, 5.0, 0.02])
+    apart = spread(heights, 1.0)
+    assert np.array_equal(np.argsort(apart), np.argsort(heights))
+    assert np.diff(np.sort(apart)).min() >= 1.0 - 1e-12
+    assert apart[2] == 5.0
+    assert apart[[0, 1, 3]].mean() == pytest.approx(heights[[0, 1, 3]].mean(), abs=1e-12)
