@@ -10,6 +10,7 @@ calibrator's regressors. Index letters: {i} the sensor's own axis, {j} and {k} t
 
 from __future__ import annotations
 
+import difflib
 import itertools
 import math
 from collections.abc import Iterable
@@ -176,6 +177,16 @@ def effect_names() -> tuple[str, ...]:
     return (*sorted(_TABLE), *sorted(_DELAYS), _LOST)
 
 
+def effect_example(name: str) -> str:
+    """Return a ``NAME=VALUE`` that is read, with the unit people use; `name` is one of `effect_names`."""
+    if name in _DELAYS:
+        return f"{name}=1 ms"
+    if name == _LOST:
+        return f"{name}=10 ms; turn=1"
+    _, row = _TABLE[name]
+    return f"{name}=1 {row.unit}" + "".join(f"; {key}=100 {unit}" for key, unit in row.parameters)
+
+
 def parse_effects(texts: Iterable[str]) -> Hidden:
     """Read hidden effects.
 
@@ -239,7 +250,5 @@ def _values(name: str, text: str, wanted: tuple[tuple[str, str], ...]) -> dict[s
 
 
 def _suggestion(name: str) -> str:
-    import difflib
-
     close = difflib.get_close_matches(name, effect_names(), n=3)
     return f" (did you mean {', '.join(close)}?)" if close else f" (known: {', '.join(effect_names()[:6])}, ...)"

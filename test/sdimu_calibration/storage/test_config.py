@@ -1,0 +1,127 @@
+"""Configuration files: what is read is SI, and what is wrong is said in one line."""
+
+import math
+
+import pytest
+
+from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.storage.config import config_folder, find_config, load_imu, load_model, load_plan, load_site
+
+PLAN = """
+format: sdimu-plan/1
+dwell: 100 s
+rate: 2 deg/s
+acceleration: 1 deg/s^2
+turns:
+  - {axis: Y, angle: 90 deg}
+  - {axis: Z, angle: -180 deg, rate: 10 deg/s, dwell: 1 min}
+"""
+IMU = """
+noise: {gyro: 0.1 deg/h/sqrt(Hz), accel: 10 ug/sqrt(Hz)}
+prior: {gyro_bias: 1 deg/h, accel_scale: 150 ppm, gyro_mass_unbalance: 1 deg/h/g}
+"""
+MODEL = "effects: [gyro_bias, accel_bias]\nvelocity_sigma: 1 mm/s\n"
+SITE = "latitude_deg: 36.4\nheight_m: 0\n"
+LOADERS = {"plan": (load_plan, PLAN), "imu": (load_imu, IMU), "model": (load_model, MODEL), "site": (load_site, SITE)}
+
+
+def written(tmp_path, text, name="mine.yaml"):
+    path = tmp_path / name
+    path.write_text(text)
+    return path
+
+
+def test_the_paper_plan_lasts_2980_s_in_19_stops():
+    plan = load_plan("kim18")
+    assert len(plan.dwell_s) == 19
+    assert plan.duration_s == pytest.approx(2980.0, abs=1e-9)
+
+
+@pytest.mark.parametrize("kind", LOADERS)
+def test_every_file_that_comes_along_loads(kind):
+    for path in (config_folder() / kind).glob("*.yaml"):
+        LOADERS[kind][0](path)
+        LOADERS[kind][0](path.stem)
+
+
+def test_rate_and_dwell_of_a_turn_replace_the_plan_values_there_only(tmp_path):
+    plan = load_plan(written(tmp_path, PLAN + "first_dwell: 300 s\n"))
+    assert plan.dwell_s == (300.0, 100.0, 60.0)
+    assert [math.degrees(t.rate_rad_s) for t in plan.turns] == pytest.approx([2.0, 10.0])
+    assert math.degrees(plan.turns[1].angle_rad) == pytest.approx(-180.0)
+
+
+def test_noise_and_priors_are_si(tmp_path):
+    imu = load_imu(written(tmp_path, IMU))
+    degph = math.pi / 180 / 3600
+    assert imu.gyro_white_noise == pytest.approx(0.1 * degph)
+    assert imu.accel_white_noise == pytest.approx(10e-6 * 9.80665)
+    assert imu.prior["gyro_bias"] == pytest.approx(degph)
+    assert imu.prior["accel_scale"] == pytest.approx(150e-6)
+    # Coefficients per g stay per g.
+    assert imu.prior["gyro_mass_unbalance"] == pytest.approx(degph)
+
+
+def test_a_site_without_format_or_azimuth_is_enough(tmp_path):
+    site = load_site(written(tmp_path, SITE))
+    assert math.degrees(site.latitude_rad) == pytest.approx(36.4)
+    assert site.gravity_m_s2 is None
+    assert site.initial_azimuth_rad is None
+    full = load_site(written(tmp_path, SITE + "initial_azimuth_deg: -30\ninitial_azimuth_sigma_deg: 0.5\n"))
+    assert full.initial_azimuth_rad == pytest.approx(math.radians(-30))
+    assert full.initial_azimuth_sigma_rad == pytest.approx(math.radians(0.5))
+
+
+@pytest.mark.parametrize(
+    ("kind", "old", "new", "message"),
+    [
+        ("plan", "rate: 2 deg/s", "rate: 2 deg", "rate: '2 deg' has the wrong unit"),
+        ("plan", "dwell: 100 s", "dwell: 100", "dwell: '100' has no unit"),
+        ("plan", "axis: Y", "axis: Q", r"turns\.0\.axis: .*'X', 'Y' or 'Z'"),
+        ("plan", "angle: 90 deg", "angel: 90 deg", r"turns\.0\.ang"),
+        ("plan", "angle: 90 deg", "angle: 0 deg", "turn 1: angle is zero"),
+        ("plan", "rate: 2 deg/s", "rate: -2 deg/s", "rate: .*greater than 0"),
+        ("plan", "acceleration: 1 deg/s^2", "", "acceleration: missing key"),
+        ("plan", "dwell: 100 s", "dwell: 100 s\ndwell: 1 s", "key 'dwell' is there twice"),
+        ("plan", "sdimu-plan/1", "sdimu-plan/9", "format: .*'sdimu-plan/1'"),
+        ("plan", "turns:", "turns: [", "line .*not valid YAML"),
+        ("imu", "gyro: 0.1 deg/h/sqrt(Hz)", "gyro: 0.1 deg/h", "noise.gyro: .*wrong unit"),
+        ("imu", "1 deg/h,", "1 dog/h,", "prior.gyro_bias: unknown unit 'dog'"),
+        ("imu", "prior:", "priors:", r"priors: unknown key \(known keys: .*prior"),
+        ("model", "velocity_sigma: 1 mm/s", "velocity_sigma: 1 mm", "velocity_sigma: .*wrong unit"),
+        ("model", "[gyro_bias, accel_bias]", "[]", "effects: .*at least 1"),
+        ("model", "accel_bias]", "gyro_bias]", "'gyro_bias' is there twice"),
+        ("site", "36.4", "136.4", "latitude_deg: .*less than or equal to 90"),
+        ("site", "height_m: 0", "", "height_m: missing key"),
+        ("site", "36.4", ".nan", "latitude_deg: "),
+        ("site", SITE, "", "found nothing"),
+    ],
+)
+def test_a_wrong_file_gives_one_line_with_file_and_key(tmp_path, kind, old, new, message):
+    load, text = LOADERS[kind]
+    assert old in text
+    path = written(tmp_path, text.replace(old, new))
+    with pytest.raises(DataError, match=message) as caught:
+        load(path)
+    assert str(caught.value).startswith(f"{path}:")
+    assert "\n" not in str(caught.value)
+
+
+def test_an_unknown_name_lists_the_names_there_are():
+    with pytest.raises(DataError, match=r"no plan named 'kim17'.*kim18"):
+        load_plan("kim17")
+
+
+def test_a_missing_path_is_named(tmp_path):
+    with pytest.raises(DataError, match="no such site file"):
+        load_site(tmp_path / "nowhere.yaml")
+
+
+def test_the_environment_names_another_config_folder(tmp_path, monkeypatch):
+    (tmp_path / "plan").mkdir()
+    written(tmp_path / "plan", PLAN, "short.yaml")
+    monkeypatch.setenv("SDIMU_CONFIG", str(tmp_path))
+    assert find_config("plan", "short") == tmp_path / "plan" / "short.yaml"
+    monkeypatch.setenv("SDIMU_CONFIG", str(tmp_path / "none"))
+    with pytest.raises(DataError, match="SDIMU_CONFIG"):
+        find_config("plan", "short")

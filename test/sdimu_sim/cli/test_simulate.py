@@ -1,0 +1,65 @@
+"""The verb simulate: a bag and a truth file that agree with each other."""
+
+import numpy as np
+import pytest
+import typer
+from typer.testing import CliRunner
+
+from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.storage.bag_reader import read_recording
+from sdimu_calibration.storage.config import load_imu, load_plan, load_site
+from sdimu_sim.cli.simulate import mount_rad, simulate
+from sdimu_sim.core import Scenario, generate
+from sdimu_sim.truth_file import read_truth
+
+PLAN = """
+dwell: 5 s
+rate: 10 deg/s
+acceleration: 20 deg/s^2
+turns: [{axis: Y, angle: 90 deg}, {axis: Z, angle: -90 deg}]
+"""
+
+
+@pytest.fixture
+def run(tmp_path):
+    (tmp_path / "short.yaml").write_text(PLAN)
+    app = typer.Typer()
+    app.command()(simulate)
+
+    def invoke(*options):
+        given = ["--out", str(tmp_path / "bag"), "--plan", str(tmp_path / "short.yaml"), *options]
+        return CliRunner().invoke(app, given, catch_exceptions=False)
+
+    return invoke
+
+
+def test_the_bag_holds_what_the_scenario_generates(run, tmp_path):
+    assert run("--seed", "3", "--rate", "50", "--temperature", "warm-up").exit_code == 0
+    recording = read_recording(tmp_path / "bag")
+    truth = read_truth(tmp_path / "bag.truth.yaml")
+    plan = load_plan(tmp_path / "short.yaml")
+    expected, true = generate(Scenario(plan, load_imu("dtg"), load_site("daejeon"), rate_hz=50.0, seed=3))
+    assert truth.imu == true.imu
+    np.testing.assert_array_equal(recording.omega_ib_b, expected.omega_ib_b)
+    np.testing.assert_array_equal(recording.f_ib_b, expected.f_ib_b)
+    np.testing.assert_allclose(recording.t, expected.t, rtol=0, atol=1e-9)
+    np.testing.assert_array_equal(recording.phase.dwell, expected.phase.dwell)
+    np.testing.assert_array_equal(recording.phase.stop, expected.phase.stop)
+    assert recording.temperature is not None
+
+
+def test_the_mount_is_taken_in_degrees(run, tmp_path):
+    assert run("--mount", "1,-2,3", "--truth", str(tmp_path / "t.yaml")).exit_code == 0
+    assert np.degrees(read_truth(tmp_path / "t.yaml").imu.mount_rad) == pytest.approx([1, -2, 3])
+
+
+@pytest.mark.parametrize("text", ["1,2", "a,b,c", "1,2,nan"])
+def test_a_mount_that_is_not_three_angles_is_refused(text):
+    with pytest.raises(DataError, match=r"three .*angles"):
+        mount_rad(text)
+
+
+def test_an_unknown_effect_leaves_no_bag(run, tmp_path):
+    with pytest.raises(DataError, match="unknown effect"):
+        run("--effect", "nothing=1")
+    assert not (tmp_path / "bag").exists()
