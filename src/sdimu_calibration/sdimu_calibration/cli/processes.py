@@ -1,0 +1,173 @@
+"""Nodes as child processes in a ROS domain of their own: started, watched, and never left behind."""
+
+from __future__ import annotations
+
+import ctypes
+import fcntl
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import IO, Any
+
+import yaml
+
+from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.storage.config import config_folder
+
+# 0 is where everyone else is; above 101 the ports of DDS reach into the system's ephemeral ones.
+DOMAINS = range(1, 102)
+POLITE_S = 5.0
+_DIE_WITH_PARENT = 1  # PR_SET_PDEATHSIG of Linux
+
+
+@contextmanager
+def own_domain(log: Path) -> Iterator[int]:
+    """Put this process, and the children it starts, into a ROS domain that no other run on this machine uses.
+
+    Traffic stays on the loopback interface. The domain is held by a lock file until the end.
+
+    Parameters
+    ----------
+    log : Path
+        Folder of the nodes' logs.
+
+    Yields
+    ------
+    int
+        The domain.
+
+    Raises
+    ------
+    DataError
+        When all domains are taken.
+    """
+    domain, lock = _free_domain()
+    os.environ |= {
+        "ROS_DOMAIN_ID": str(domain),
+        "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
+        "ROS_LOG_DIR": str(log.resolve()),
+    }
+    os.environ.setdefault("FASTRTPS_DEFAULT_PROFILES_FILE", str(config_folder() / "ros" / "fastdds.xml"))
+    try:
+        yield domain
+    finally:
+        lock.close()
+
+
+def _free_domain() -> tuple[int, IO[str]]:
+    folder = Path(tempfile.gettempdir())
+    # Starting at different places keeps two runs that begin together from racing for each lock.
+    start = os.getpid() % len(DOMAINS)
+    for number in [*DOMAINS[start:], *DOMAINS[:start]]:
+        try:
+            lock = (folder / f"sdimu-domain-{number}.lock").open("a", encoding="utf-8")
+        except OSError:
+            continue  # another user's
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            lock.close()
+        else:
+            return number, lock
+    raise DataError("all 101 ROS domains of this machine are in use; end other runs first")
+
+
+@dataclass
+class _Child:
+    process: subprocess.Popen[bytes]
+    log: Path
+
+
+class Children:
+    """A set of nodes, each a process; leaving the context ends them all.
+
+    Parameters
+    ----------
+    log : Path
+        Folder of their output, ``<name>.log``, and parameters, ``<name>.yaml``.
+    """
+
+    def __init__(self, log: Path) -> None:
+        self._log = log
+        self._children: dict[str, _Child] = {}
+        log.mkdir(parents=True, exist_ok=True)
+
+    def __enter__(self) -> Children:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.end()
+
+    def start(self, name: str, module: str, parameters: Mapping[str, Any]) -> None:
+        """Start a node.
+
+        Parameters
+        ----------
+        name : str
+            Of the ROS node.
+        module : str
+            Python module to run.
+        parameters : mapping of str to value
+            ROS parameters; empty lists are left out, ROS cannot type them.
+        """
+        given = {key: value for key, value in parameters.items() if value != []}
+        # A file, not -p NAME:=VALUE: there "1,2" or "on" would be read as something else than text.
+        file = self._log / f"{name}.yaml"
+        file.write_text(yaml.safe_dump({name: {"ros__parameters": given}}), encoding="utf-8")
+        path = self._log / f"{name}.log"
+        with path.open("wb") as output:
+            process = subprocess.Popen(
+                [sys.executable, "-m", module, "--ros-args", "--params-file", str(file)],
+                env=dict(os.environ),
+                stdin=subprocess.DEVNULL,
+                stdout=output,
+                stderr=subprocess.STDOUT,
+                preexec_fn=_die_with_parent,  # noqa: PLW1509 (no threads have been started yet)
+            )
+        self._children[name] = _Child(process, path)
+
+    def running(self) -> list[str]:
+        """Names of those still running.
+
+        Raises
+        ------
+        DataError
+            When one has ended with an error; the text is the last line it wrote.
+        """
+        for name, child in self._children.items():
+            code = child.process.poll()
+            if code:
+                raise DataError(f"{name}: {_last_words(child.log, code)}")
+        return [name for name, child in self._children.items() if child.process.poll() is None]
+
+    def end(self) -> None:
+        """End those still running: SIGINT first, so that files are closed, SIGKILL after five seconds."""
+        alive = [child.process for child in self._children.values() if child.process.poll() is None]
+        for process in alive:
+            process.send_signal(signal.SIGINT)
+        deadline = time.monotonic() + POLITE_S
+        for process in alive:
+            try:
+                process.wait(max(0.0, deadline - time.monotonic()))
+            except subprocess.TimeoutExpired:  # noqa: PERF203 (three processes)
+                process.kill()
+                process.wait()
+
+
+def _die_with_parent() -> None:
+    """Ask the kernel to stop this child when its parent is killed."""
+    ctypes.CDLL(None).prctl(_DIE_WITH_PARENT, signal.SIGTERM)
+
+
+def _last_words(log: Path, code: int) -> str:
+    if code < 0:
+        return f"was ended by {signal.Signals(-code).name}; see {log}"
+    lines = [line for line in log.read_text(encoding="utf-8", errors="replace").splitlines() if line.strip()]
+    return lines[-1] if lines else f"ended with status {code}; see {log}"

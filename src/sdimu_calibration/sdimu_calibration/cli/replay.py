@@ -1,0 +1,58 @@
+"""`sdimu replay`: a recording through DDS into the live calibration node."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def replay(
+    bag: Annotated[Path, typer.Argument(metavar="BAG", help="rosbag2 folder or .mcap file.")],
+    model: Annotated[str, typer.Option(help="Model to estimate: name in config/model or path.")] = "baseline",
+    site: Annotated[str, typer.Option(help="Where the test was: name in config/site or path.")] = "daejeon",
+    imu: Annotated[str, typer.Option(help="Specification of the IMU: name in config/imu or path.")] = "dtg",
+    speed: Annotated[float, typer.Option(help="Times real time; 0 is as fast as the calibration allows.")] = 0.0,
+    out: Annotated[Path | None, typer.Option(help="Folder of the results; BAG_replay by default.")] = None,
+    patience: Annotated[float, typer.Option(help="Longest time without an end (s); 0 waits for ever.")] = 0.0,
+) -> None:
+    """Play a recording into the live calibration node; leaves result.json."""
+    import time
+
+    from rich.console import Console
+
+    from sdimu_calibration.cli.processes import Children, own_domain
+    from sdimu_calibration.core.recording import DataError
+    from sdimu_calibration.report.table import rich_table, rows
+    from sdimu_calibration.storage.bag_file import bag_parts
+    from sdimu_calibration.storage.result_file import read_result
+
+    bag_parts(bag)  # what is wrong with the bag is said before anything is started
+    folder = out or bag.resolve().with_name(f"{bag.resolve().stem if bag.is_file() else bag.resolve().name}_replay")
+    result = folder / "result.json"
+    result.unlink(missing_ok=True)
+    console = Console()
+    begun = time.monotonic()
+    with (
+        own_domain(folder / "log"),
+        Children(folder / "log") as children,
+        console.status("replaying") if console.is_terminal else Console(quiet=True).status(""),
+    ):
+        options = {"site": site, "imu": imu, "model": model, "out": str(folder)}
+        children.start("calibration", "sdimu_calibration.nodes.calibration_node", options)
+        player = {"bag": str(bag), "speed": speed, "consumers": 1}
+        children.start("replay", "sdimu_calibration.nodes.replay_node", player)
+        while children.running():
+            if patience and time.monotonic() - begun > patience:
+                raise DataError(f"replay: not done after {patience:g} s; see {folder / 'log'}")
+            time.sleep(0.05)
+    calibration = read_result(result)
+    wall = time.monotonic() - begun
+    console.print(rich_table(rows(calibration), f"body frame: {calibration.body_frame}"))
+    duration, lost = calibration.data["duration_s"], calibration.data["lost"]
+    console.print(
+        f"{duration:.0f} s in {wall:.1f} s: {duration / wall:.0f} times real time; {lost:.0f} samples lost",
+        highlight=False,
+    )
+    console.print(f"results in {folder}", soft_wrap=True)

@@ -1,0 +1,94 @@
+"""What a person watching a test wants to know, taken from its topics."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.context import Context
+from rclpy.experimental import EventsExecutor
+from rclpy.node import Node
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.signals import SignalHandlerOptions
+from rclpy.task import Future
+from sensor_msgs.msg import JointState
+
+from sdimu_calibration.nodes.credits import NS, to_ns
+
+# Watching must never hold up what is watched.
+GLANCE = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+
+
+@dataclass
+class Progress:
+    """How far a test is.
+
+    Attributes
+    ----------
+    stop : int
+    phase : str
+    table_s, filter_s : float
+        Data time that table and filter have reached (s after the first status).
+    sigmas : dict of str to float
+        Sigma (SI) by coefficient, as last published.
+    first : dict of str to float
+        The first sigma published.
+    """
+
+    stop: int = 0
+    phase: str = "starting"
+    table_s: float = 0.0
+    filter_s: float = 0.0
+    sigmas: dict[str, float] = field(default_factory=dict)
+    first: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def least_improved(self) -> str | None:
+        """Coefficient whose sigma has fallen least since the start."""
+        ratios = {name: sigma / self.first[name] for name, sigma in self.sigmas.items() if self.first.get(name, 0) > 0}
+        return max(ratios, key=lambda name: ratios[name]) if ratios else None
+
+
+class Monitor:
+    """Listens to a running test inside the process that shows it; close it after use."""
+
+    def __init__(self) -> None:
+        self.progress = Progress()
+        self._start_ns: int | None = None
+        self._context = Context()
+        # Ctrl-C belongs to the command line.
+        rclpy.init(context=self._context, signal_handler_options=SignalHandlerOptions.NO)
+        self._node = Node("monitor", context=self._context)
+        self._node.create_subscription(DiagnosticArray, "/rate_table/status", self._take_status, GLANCE)
+        self._node.create_subscription(JointState, "/calibration/coefficients", self._take_coefficients, GLANCE)
+        self._executor = EventsExecutor(context=self._context)
+        self._executor.add_node(self._node)
+        self._never = Future()
+
+    def listen(self, seconds: float) -> Progress:
+        """Listen for a while; the progress now."""
+        self._executor.spin_until_future_complete(self._never, seconds)
+        return self.progress
+
+    def close(self) -> None:
+        """Leave the domain."""
+        self._executor.shutdown()
+        self._node.destroy_node()
+        self._context.try_shutdown()
+
+    def _take_status(self, message: DiagnosticArray) -> None:
+        values = {entry.key: entry.value for entry in message.status[0].values}
+        stamp = to_ns(message.header.stamp)
+        if self._start_ns is None:
+            self._start_ns = stamp
+        self.progress.phase = values.get("phase", "")
+        self.progress.stop = int(values.get("stop", "0"))
+        self.progress.table_s = (stamp - self._start_ns) / NS
+
+    def _take_coefficients(self, message: JointState) -> None:
+        if self._start_ns is not None:
+            self.progress.filter_s = (to_ns(message.header.stamp) - self._start_ns) / NS
+        self.progress.sigmas = dict(zip(message.name, message.effort, strict=True))
+        if not self.progress.first:
+            self.progress.first = dict(self.progress.sigmas)

@@ -1,0 +1,125 @@
+"""Node that plays a recording: raw messages of the input topics, in the order of their stamps, with credits.
+
+Parameters: bag (path), speed (0 = as fast as credits allow, N = N times real time), consumers (how many must
+have granted a credit before it starts).
+"""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.node import Node
+from rclpy.task import Future
+from sensor_msgs.msg import Imu, JointState, Temperature
+
+from sdimu_calibration.core.recording import NOMINAL_FROM, DataError
+from sdimu_calibration.nodes.convert import NS, stamp_of
+from sdimu_calibration.nodes.credits import HISTORY, STREAM, Producer, publish
+from sdimu_calibration.nodes.spinning import run_node
+from sdimu_calibration.nodes.ticking import Ticker
+from sdimu_calibration.storage.bag_file import raw_messages
+from sdimu_calibration.storage.cdr import IMU, JOINT_STATE, STATUS, TEMPERATURE
+from sdimu_calibration.storage.topics import Topics
+
+WINDOW_SAMPLES = 200
+FAREWELL_S = 20.0
+PEERS_PATIENCE_S = 5.0
+TICK_S = 0.005
+BURST = 400
+
+
+class ReplayNode:
+    """Plays a bag; see the module for its parameters."""
+
+    def __init__(self) -> None:
+        self.node = Node("replay")
+        self.done = Future()
+        declare = self.node.declare_parameter
+        bag = Path(str(declare("bag", "").value))
+        self._speed = float(declare("speed", 0.0).value)
+        self._needed = int(declare("consumers", 0).value)
+        topics = Topics()
+        kinds: dict[str, tuple[str, type]] = {
+            topics.status: (STATUS, DiagnosticArray),
+            topics.temperature: (TEMPERATURE, Temperature),
+            topics.joint_states: (JOINT_STATE, JointState),
+            topics.imu: (IMU, Imu),
+        }
+        found = raw_messages(bag, {topic: kind for topic, (kind, _) in kinds.items()}, topics.imu)
+        self._imu_topic = topics.imu
+        self._queue = _merge(found, list(kinds))
+        if len(found[topics.imu]) <= NOMINAL_FROM:
+            raise DataError(f"{bag}: topic {topics.imu} has only {len(found[topics.imu])} messages")
+        self._first_ns = self._queue[0][0]
+        self._end_ns = max(map(stamp_of, found[topics.imu]))
+        self._next = 0
+        self._born = time.monotonic()
+        self._begun: float | None = None
+        self._departed: float | None = None
+        window = round(WINDOW_SAMPLES * (self._end_ns - stamp_of(found[topics.imu][0])) / len(found[topics.imu]))
+        self._imu = Producer(self.node, Ticker(self.node), Imu, topics.imu, window_ns=window, on_credit=self._pump)
+        self._others: dict[str, Any] = {
+            topic: self.node.create_publisher(kinds[topic][1], topic, HISTORY if topic == topics.status else STREAM)
+            for topic, messages in found.items()
+            if topic != topics.imu and messages
+        }
+        self._timer = self.node.create_timer(TICK_S, self._pump)
+
+    def close(self) -> None:
+        """Nothing to leave behind."""
+
+    def _everyone_is_here(self) -> bool:
+        if self._imu.consumers < self._needed:
+            return False
+        watched = [p for topic, p in self._others.items() if not topic.endswith("joint_states")]
+        matched = not self._needed or all(p.get_subscription_count() for p in watched)
+        return matched or time.monotonic() - self._born > PEERS_PATIENCE_S
+
+    def _pump(self) -> None:
+        """Send what credits and the clock allow."""
+        if self._begun is None:
+            if not self._everyone_is_here():
+                return
+            self._begun = time.monotonic()
+        for _ in range(BURST):
+            if self._next >= len(self._queue):
+                self._farewell()
+                return
+            stamp, topic, message = self._queue[self._next]
+            if stamp > self._imu.limit_ns:
+                return
+            if self._speed > 0.0 and (stamp - self._first_ns) / NS > self._speed * (time.monotonic() - self._begun):
+                return
+            if topic == self._imu_topic:
+                self._imu.publish(message, stamp)
+            else:
+                publish(self._others[topic], message)
+            self._next += 1
+
+    def _farewell(self) -> None:
+        if self._departed is None:
+            self._departed = time.monotonic()
+            self._imu.end(self._end_ns)
+        late = time.monotonic() - self._departed > FAREWELL_S
+        if (self._imu.acknowledged or late) and not self.done.done():
+            self.done.set_result(None)
+
+
+def _merge(found: dict[str, list[bytes]], order: list[str]) -> list[tuple[int, str, bytes]]:
+    """All messages by stamp; at equal stamps in the order of topics, status before the samples it is about."""
+    rank = {topic: k for k, topic in enumerate(order)}
+    entries = [(stamp_of(message), topic, message) for topic, messages in found.items() for message in messages]
+    entries.sort(key=lambda entry: (entry[0], rank[entry[1]]))
+    return entries
+
+
+def main() -> None:
+    """Run the node."""
+    run_node(ReplayNode)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,210 @@
+"""The verb `sdimu run`: a whole test as separate processes over DDS, watched to its end."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from sdimu_calibration.cli.processes import Children
+    from sdimu_calibration.core.results import Calibration
+
+STALL_S = 180.0
+_EFFECT = "Hide an effect, NAME=VALUE (accel_quadratic_x='20 ug/g^2') or SENSOR=FORMULA; repeatable."
+
+
+def run(
+    plan: Annotated[str, typer.Option(help="Test plan: name in config/plan or path.")] = "kim18",
+    imu: Annotated[str, typer.Option(help="IMU specification, from which the true errors are drawn.")] = "dtg",
+    model: Annotated[str, typer.Option(help="Model to estimate.")] = "baseline",
+    site: Annotated[str, typer.Option(help="Site.")] = "daejeon",
+    table: Annotated[str, typer.Option(help="Rate table.")] = "ideal",
+    speed: Annotated[float, typer.Option(help="Times real time; 0 is as fast as nothing gets lost.")] = 0.0,
+    seed: Annotated[int, typer.Option(help="Of coefficients, mount and noise.")] = 1,
+    rate: Annotated[float, typer.Option(help="Sample rate of the IMU (Hz), 10 to 1000.")] = 100.0,
+    mount: Annotated[str | None, typer.Option(help="Rotation of the IMU on the table: 'X,Y,Z' (deg).")] = None,
+    mount_max: Annotated[float, typer.Option(help="Without --mount: drawn up to this about every axis (deg).")] = 3.0,
+    effect: Annotated[list[str] | None, typer.Option(help=_EFFECT)] = None,
+    temperature: Annotated[str | None, typer.Option(help="Temperature profile: name or path.")] = None,
+    out: Annotated[Path, typer.Option(help="Folder of the results.")] = Path("out/run"),
+) -> None:
+    """Run a whole simulated test over ROS 2: table, IMU, calibration and recorder, each its own process."""
+    import time
+
+    from rich.console import Console
+
+    from sdimu_calibration.cli.processes import Children, own_domain
+
+    options = {
+        "table": {"plan": plan, "table": table, "seed": seed, "speed": speed},
+        "imu": {
+            "imu": imu, "site": site, "plan": plan, "seed": seed, "rate_hz": rate, "mount": mount or "",
+            "mount_max_deg": mount_max, "effects": list(effect or ()), "temperature": temperature or "",
+            "truth_file": str(out / "truth.yaml"),
+        },
+        "calibration": {"site": site, "imu": imu, "model": model, "out": str(out)},
+    }  # fmt: skip
+    duration = _check(options)
+    console = Console()
+    # Only the bag of an earlier run is replaced, never one that someone put here.
+    replace = (out / "log" / "rate_table.yaml").is_file()
+    for stale in ("result.json", "report.html"):
+        (out / stale).unlink(missing_ok=True)
+    begun = time.monotonic()
+    with own_domain(out / "log"), Children(out / "log") as children:
+        _start(children, options, out / "bag", replace)
+        streamed = _watch(console, children, duration, model)
+    wall = time.monotonic() - begun
+    result = _report(console, out, model, plan)
+    _say_measured(console, out, result, streamed, wall)
+
+
+def _check(options: dict[str, dict[str, Any]]) -> float:
+    """Read everything once, so that a wrong option is one line before anything starts; length of the test (s)."""
+    from rate_table_sim.core import table_motion
+    from rate_table_sim.table_file import load_table
+    from sdimu_calibration.core.recording import DataError
+    from sdimu_calibration.storage.config import load_imu, load_model, load_plan, load_site
+    from sdimu_sim.cli.simulate import mount_rad
+    from sdimu_sim.core.hidden import parse_effects
+    from sdimu_sim.temperature_file import load_temperature
+
+    table, imu, calibration = options["table"], options["imu"], options["calibration"]
+    plan = load_plan(table["plan"])
+    motion = table_motion(plan, load_table(table["table"]), table["seed"])
+    load_imu(imu["imu"])
+    load_site(imu["site"])
+    load_model(calibration["model"])
+    parse_effects(tuple(imu["effects"]))
+    if imu["mount"]:
+        mount_rad(imu["mount"])
+    if imu["temperature"]:
+        load_temperature(imu["temperature"])
+    if table["speed"] < 0:
+        raise DataError(f"--speed {table['speed']:g}: expected 0 or more")
+    if not 10.0 <= imu["rate_hz"] <= 1000.0:
+        raise DataError(f"--rate {imu['rate_hz']:g}: expected 10 to 1000 Hz")
+    return float(motion.t[-1])
+
+
+def _start(children: Children, options: dict[str, dict[str, Any]], bag: Path, replace: bool) -> None:
+    """Start the four nodes; each waits for those it feeds, so their order does not matter."""
+    recorder = {
+        "out": str(bag),
+        "replace": replace,
+        "wait_for": ["/imu/data_raw", "/rate_table/status", "/calibration/coefficients"],
+    }
+    children.start("recorder", "sdimu_calibration.nodes.recorder_node", recorder)
+    children.start("calibration", "sdimu_calibration.nodes.calibration_node", options["calibration"])
+    children.start("sdimu", "sdimu_sim.nodes.sdimu_node", {**options["imu"], "consumers": 2})
+    table = {**options["table"], "consumers": 1, "status_peers": 2, "joint_peers": 1}
+    children.start("rate_table", "rate_table_sim.nodes.rate_table_node", table)
+
+
+def _watch(console: Console, children: Children, duration: float, model: str) -> float:
+    """Show the progress until every node has left; wall time (s) that the data took.
+
+    Raises
+    ------
+    DataError
+        When a node fails, or nothing moves for `STALL_S`.
+    """
+    import time
+
+    from rich.progress import BarColumn, Progress, TextColumn
+
+    from sdimu_calibration.core.recording import DataError
+    from sdimu_calibration.nodes.monitor import Monitor
+
+    units = _display_units(model)
+    monitor = Monitor()
+    columns = (TextColumn("{task.description}"), BarColumn(bar_width=20), TextColumn("{task.fields[facts]}"))
+    begun = moved = time.monotonic()
+    first: float | None = None
+    streamed = 0.0
+    mark: tuple[Any, ...] = ()
+    try:
+        with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as shown:
+            task = shown.add_task("starting", total=duration, facts="")
+            while running := children.running():
+                now_at = monitor.listen(0.1)
+                now = time.monotonic()
+                if first is None and now_at.table_s > 0.0:
+                    first = now
+                if first is not None and "sdimu" in running:
+                    streamed = now - first
+                seen = (now_at.table_s, now_at.filter_s, tuple(running))
+                if seen != mark:
+                    mark, moved = seen, now
+                if now - moved > STALL_S:
+                    raise DataError(f"nothing has moved for {STALL_S:.0f} s ({', '.join(running)} still running)")
+                stage = f"stop {now_at.stop} {now_at.phase}" if "sdimu" in running else "last calibration"
+                facts = f"{now_at.table_s:.0f} of {duration:.0f} s in {now - begun:.0f} s"
+                if streamed > 1.0:
+                    facts += f", {now_at.table_s / streamed:.0f} x"
+                worst = now_at.least_improved
+                if worst is not None:
+                    facts += f", {_customary(now_at.sigmas[worst], units.get(worst, ''))} left in {worst}"
+                shown.update(task, completed=now_at.table_s, description=stage, facts=facts)
+    finally:
+        monitor.close()
+    return streamed
+
+
+def _display_units(model: str) -> dict[str, str]:
+    from sdimu_calibration.core.effects import registry
+    from sdimu_calibration.storage.config import load_model
+
+    return {q.name: q.display_unit for effect in load_model(model).effects for q in registry.get(effect).parameters}
+
+
+def _customary(value: float, unit: str) -> str:
+    from sdimu_calibration.core.units import from_si
+
+    return f"{from_si(value, unit or '1'):.2g} {unit}"
+
+
+def _report(console: Console, out: Path, model: str, plan: str) -> Calibration:
+    """Print the table with the truth and write the page."""
+    from sdimu_calibration.report.page import write_report
+    from sdimu_calibration.report.table import rich_table, rows
+    from sdimu_calibration.storage.reference_file import read_truth
+    from sdimu_calibration.storage.result_file import read_result
+
+    result = read_result(out / "result.json")
+    truth = read_truth(out / "truth.yaml", result.body_frame)
+    write_report(out / "report.html", result, title=f"Simulated test: plan {plan}, model {model}", truth=truth)
+    console.print(rich_table(rows(result, truth), f"body frame: {result.body_frame}"))
+    return result
+
+
+def _say_measured(console: Console, out: Path, result: Calibration, streamed: float, wall: float) -> None:
+    """Say how fast it was and what was lost, counted by the stamps in the bag."""
+    taken, lost = _samples(out / "bag")
+    duration = result.data["duration_s"]
+    pace = f"{duration / streamed:.0f} times real time, " if streamed > 0.0 else ""
+    console.print(
+        f"{duration:.0f} s of data: {pace}{wall:.1f} s with start and last calibration ({duration / wall:.0f} times); "
+        f"{taken} samples recorded, {lost} lost",
+        soft_wrap=True,
+        highlight=False,
+    )
+    console.print(f"results in {out}", soft_wrap=True)
+
+
+def _samples(bag: Path) -> tuple[int, int]:
+    """Count the samples in a bag, and how many the gaps between their stamps leave room for."""
+    import numpy as np
+
+    from sdimu_calibration.storage.bag_file import raw_messages
+    from sdimu_calibration.storage.cdr import IMU, decode_imu
+    from sdimu_calibration.storage.topics import Topics
+
+    topic = Topics().imu
+    stamps = np.unique(decode_imu(raw_messages(bag, {topic: IMU}, topic)[topic])[0])
+    steps = np.diff(stamps)
+    return len(stamps), int(np.sum(np.rint(steps / np.median(steps)) - 1))
