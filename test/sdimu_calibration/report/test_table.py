@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from io import StringIO
 
 import numpy as np
 import pytest
+from rich.console import Console
 
 from sdimu_calibration.core.results import Calibration, History
 from sdimu_calibration.core.units import to_si
 from sdimu_calibration.report.figures import rotations, sigma_history, spread
 from sdimu_calibration.report.groups import groups, short_name
 from sdimu_calibration.report.page import page
-from sdimu_calibration.report.table import cells, headings, rows
+from sdimu_calibration.report.table import cells, headings, rich_table, rows
 
 
 @pytest.fixture
@@ -55,7 +57,16 @@ def test_numbers_are_shown_in_customary_units_to_two_digits_of_sigma(calibration
 
 def test_a_coefficient_fixed_by_the_frame_has_no_sigma(calibration):
     table = rows(calibration)
-    assert cells(table[2], headings(table)) == ["accel_misalignment_xy", "0", "by the frame", "arcmin"]
+    assert cells(table[2], headings(table)) == ["accel_misalignment_xy", "0", "fixed", "arcmin"]
+
+
+def test_a_narrow_terminal_cuts_no_digit(calibration):
+    table = rows(calibration, truth=dict.fromkeys(calibration.names, 1e-6))
+    console = Console(width=40, file=StringIO())
+    console.print(rich_table(table), soft_wrap=True)
+    for row in table:
+        for text in cells(row, headings(table)):
+            assert text in console.file.getvalue()
 
 
 def test_errors_are_estimate_minus_truth_in_sigmas(calibration):
@@ -64,7 +75,7 @@ def test_errors_are_estimate_minus_truth_in_sigmas(calibration):
     assert table[0].error_sigmas == pytest.approx(0.05 / 0.016, rel=1e-9)
     assert table[1].truth is None
     assert table[2].error_sigmas is None
-    assert "error / sigma" in headings(table)
+    assert "error/sigma" in headings(table)
     assert "truth" not in headings(rows(calibration))
 
 

@@ -44,7 +44,7 @@ def calibrate(
     folder = out or default_folder(bag)
     write_result(folder / "result.json", result)
     write_report(folder / "report.html", result, title=f"Calibration of {bag.name}", truth=true)
-    console.print(rich_table(rows(result, true), f"body frame: {result.body_frame}"))
+    console.print(rich_table(rows(result, true), f"body frame: {result.body_frame}"), soft_wrap=True)
     for note in (*recording.notes, *(note for note in result.notes if note not in recording.notes)):
         console.print(f"note: {note}", soft_wrap=True, markup=False, highlight=False)
     console.print(f"results in {folder}", soft_wrap=True)

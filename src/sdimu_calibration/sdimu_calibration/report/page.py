@@ -67,7 +67,8 @@ def page(
         _notes(calibration),
         "<h2>Coefficients</h2>",
         _table(table.rows(calibration, truth, reference)),
-        f'<p class="quiet">One sigma; body frame: {escape(calibration.body_frame.replace("_", " "))}.</p>',
+        f'<p class="quiet">One sigma; body frame: {escape(calibration.body_frame.replace("_", " "))}. '
+        "Fixed: zero by the choice of that frame.</p>",
     ]
     if len(calibration.history.t):
         figure = sigma_history(calibration).to_html(full_html=False, include_plotlyjs=True, config={"responsive": True})

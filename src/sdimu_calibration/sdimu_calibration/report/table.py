@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from sdimu_calibration.core.results import Calibration
@@ -93,7 +94,7 @@ def headings(table: list[Row]) -> list[str]:
     """Column headings: those that have something to say."""
     columns = ["coefficient", "estimate", "sigma", "unit"]
     if any(row.truth is not None for row in table):
-        columns += ["truth", "error", "error / sigma"]
+        columns += ["truth", "error", "error/sigma"]
     if any(row.reference is not None for row in table):
         columns += ["published sigma"]
     return columns
@@ -102,7 +103,7 @@ def headings(table: list[Row]) -> list[str]:
 def cells(row: Row, columns: list[str]) -> list[str]:
     """Texts of a row under `columns`; estimate, truth and error go as far as sigma resolves."""
     decimals = _decimals(row.sigma)
-    sigma = f"{row.sigma:.{decimals}f}" if row.sigma > 0 else "by the frame"
+    sigma = f"{row.sigma:.{decimals}f}" if row.sigma > 0 else "fixed"
     texts = {
         "coefficient": row.name,
         "estimate": f"{row.value:.{decimals}f}",
@@ -110,7 +111,7 @@ def cells(row: Row, columns: list[str]) -> list[str]:
         "unit": row.unit,
         "truth": _number(row.truth, decimals),
         "error": _number(row.error, decimals),
-        "error / sigma": _number(row.error_sigmas, 2),
+        "error/sigma": _number(row.error_sigmas, 2),
         "published sigma": "" if row.reference is None else f"{row.reference:.3g}",
     }
     return [texts[column] for column in columns]
@@ -119,12 +120,14 @@ def cells(row: Row, columns: list[str]) -> list[str]:
 def rich_table(table: list[Row], title: str | None = None) -> Table:
     """Lay the rows out for a terminal, a line between effects."""
     columns = headings(table)
-    laid = Table(title=title, title_justify="left", pad_edge=False)
-    for column in columns:
-        laid.add_column(column, justify="left" if column in {"coefficient", "unit"} else "right", no_wrap=True)
-    for row, following in zip(table, [*table[1:], None], strict=True):
-        new = following is not None and following.effect != row.effect
-        laid.add_row(*cells(row, columns), end_section=new)
+    texts = [cells(row, columns) for row in table]
+    laid = Table(title=title, title_justify="left", pad_edge=False, box=SIMPLE_HEAD)
+    for place, column in enumerate(columns):
+        # A narrow terminal may wrap lines; it must not cut digits.
+        width = max(len(text) for text in (column, *(line[place] for line in texts)))
+        laid.add_column(column, justify="left" if column in {"coefficient", "unit"} else "right", min_width=width)
+    for row, line, following in zip(table, texts, [*table[1:], None], strict=True):
+        laid.add_row(*line, end_section=following is not None and following.effect != row.effect)
     return laid
 
 
