@@ -69,7 +69,8 @@ def calibrate(
     reduced = reduce(recording, setup)
     start = first_attitude(reduced.epochs, reduced.phases, setup)
     tell("passes", 0.2)
-    first = one_pass(reduced, setup, start, start.C_nb, np.zeros(len(setup.sensors.prior)), closed_loop=True, keep=False)
+    none = np.zeros(len(setup.sensors.prior))
+    first = one_pass(reduced, setup, start, start.C_nb, none, closed_loop=True, keep=False)
     last, passes = refine(reduced, setup, start, first, tell, keep=False)
     fit = fit_statistics(last)
     fit["passes"] = float(passes)
@@ -143,7 +144,7 @@ def predict_stops(reduced: Reduced, setup: Setup, last: Pass, out: NDArray[np.bo
 
 
 def data_counts(recording: Recording, reduced: Reduced) -> dict[str, float]:
-    """What the data section of a result says."""
+    """Count what the data section of a result says."""
     phases, epochs = reduced.phases, reduced.epochs
     return {
         "samples": float(len(recording.t)),

@@ -65,7 +65,8 @@ def normal_gravity(latitude: float, height: float) -> float:
     g0 = GRAVITY_EQUATOR * (1.0 + SOMIGLIANA_K * s2) / np.sqrt(1.0 - ECCENTRICITY_SQUARED * s2)
     m = RATE**2 * SEMI_MAJOR**3 * (1.0 - FLATTENING) / GRAVITATION
     linear = 1.0 + FLATTENING + m - 2.0 * FLATTENING * s2
-    return g0 * (1.0 - 2.0 / SEMI_MAJOR * linear * height + 3.0 * height**2 / SEMI_MAJOR**2)
+    gravity: float = g0 * (1.0 - 2.0 / SEMI_MAJOR * linear * height + 3.0 * height**2 / SEMI_MAJOR**2)
+    return gravity
 
 
 @compiled

@@ -1,7 +1,7 @@
 """One pass of navigation and Kalman filter over epochs; the compiled heart.
 
-State: nine navigation errors (ins_errors), p coefficient deviations (true minus the value used in the sensor compensation),
-three copies of the initial attitude error, which let later passes start from the smoothed attitude.
+State: nine navigation errors (ins_errors), p coefficient deviations (true minus the value used in the sensor
+compensation), three copies of the initial attitude error, which let later passes start from the smoothed attitude.
 
 A dwell epoch of length T ends with, in this order,
 

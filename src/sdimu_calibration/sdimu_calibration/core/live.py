@@ -164,8 +164,8 @@ class LiveCalibration:
     def advance(self, until_s: float, status_known: bool = True) -> list[EpochEstimate]:
         """Process the whole epochs that end at or before `until_s` (s after `start_ns`).
 
-        The caller makes sure that all samples, and all status and temperature messages that will come, are in up to then.
-        `status_known` is False when there is no status topic.
+        The caller makes sure that all samples, and all status and temperature messages that will come, are in up to
+        then. `status_known` is False when there is no status topic.
 
         Returns
         -------
@@ -258,10 +258,11 @@ class LiveCalibration:
         """Run the filter over the epochs that wait, once the first dwell has given an attitude."""
         if self._state is None and not self._align():
             return []
-        estimates = []
-        for cycles, epochs, phases in self._waiting:
-            for k in range(len(epochs)):
-                estimates.append(self._one_epoch(cycles, epochs, phases, k))
+        estimates = [
+            self._one_epoch(cycles, epochs, phases, k)
+            for cycles, epochs, phases in self._waiting
+            for k in range(len(epochs))
+        ]
         self._waiting = []
         return estimates
 

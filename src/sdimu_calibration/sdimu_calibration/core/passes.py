@@ -1,8 +1,8 @@
 """Passes over a recording: from samples to the converged estimate.
 
-Pass 1 is closed loop. Each later pass is linearised about the coefficients and the smoothed initial attitude of the pass
-before, keeps them fixed, and estimates the deviation from them with the original prior; the passes end when
-the coefficients move by less than `CONVERGED` of their sigmas (Gauss-Newton on the whole test).
+Pass 1 is closed loop. Each later pass is linearised about the coefficients and the smoothed initial attitude of the
+pass before, keeps them fixed, and estimates the deviation from them with the original prior; the passes end when the
+coefficients move by less than `CONVERGED` of their sigmas (Gauss-Newton on the whole test).
 """
 
 from __future__ import annotations
@@ -113,7 +113,7 @@ def nominal_interval(t: Floats) -> float:
 
 
 def measurement_kinds(phases: Phases, every_epoch: bool) -> NDArray[np.int64]:
-    """What each epoch measures: Zw and Zf in every used one, Zp and Zv after motion (or always)."""
+    """Say what each epoch measures: Zw and Zf in every used one, Zp and Zv after motion (or always)."""
     kind = np.where(phases.used, SENSORS, SKIP).astype(np.int64)
     kind[phases.used if every_epoch else phases.first] = ALL
     return kind
@@ -162,8 +162,10 @@ def first_attitude(epochs: Epochs, phases: Phases, setup: Setup) -> Alignment:
     end = int(moving[0]) if len(moving) else len(phases.dwell)
     rows = slice(0, max(1, min(end, int(ALIGN_S))))
     weight = (epochs.end - epochs.start)[rows]
-    mean = lambda v: (v[rows] * weight[:, None]).sum(axis=0) / weight.sum()  # noqa: E731
-    return align(mean(epochs.w_mean), mean(epochs.f_mean), float(weight.sum()), setup.site, setup.imu)
+    w_mean, f_mean = (
+        (v[rows] * weight[:, None]).sum(axis=0) / weight.sum() for v in (epochs.w_mean, epochs.f_mean)
+    )
+    return align(w_mean, f_mean, float(weight.sum()), setup.site, setup.imu)
 
 
 def pass_settings(setup: Setup, closed_loop: bool) -> PassSettings:
@@ -232,16 +234,20 @@ def one_pass(
     output = new_output(len(reduced.epochs), len(sensors.prior), keep, SNAPSHOT_EPOCHS)
     run_pass(data, pass_settings(setup, closed_loop), state, output)
     if not (np.isfinite(state.x).all() and np.isfinite(state.P).all()):
-        raise DataError("the filter diverged: the recording contradicts the IMU's specification; check --imu and --site")
+        raise DataError(
+            "the filter diverged: the recording contradicts the IMU's specification; check --imu and --site"
+        )
     return Pass(C_nb, begin, state, output, data)
 
 
 def smoothed_start(finished: Pass) -> Floats:
-    """Initial attitude as the whole test sees it, shape (3, 3)."""
+    """Give the initial attitude as the whole test sees it, shape (3, 3)."""
     return np.asarray(rotation_matrix(finished.state.x[-COPY:].copy()) @ finished.C_start)
 
 
-def refine(reduced: Reduced, setup: Setup, start: Alignment, first: Pass, progress: Progress, keep: bool) -> tuple[Pass, int]:
+def refine(
+    reduced: Reduced, setup: Setup, start: Alignment, first: Pass, progress: Progress, keep: bool
+) -> tuple[Pass, int]:
     """Repeat open-loop passes until the coefficients stand still; return the last and the number of all passes."""
     last = first
     for count in range(2, MOST_PASSES + 1):

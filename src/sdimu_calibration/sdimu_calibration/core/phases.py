@@ -79,7 +79,7 @@ class Phases:
 
 
 def table_says(epochs: Epochs, log: PhaseLog | None) -> tuple[NDArray[np.int8], NDArray[np.int64]]:
-    """What the status says of each epoch: 1 dwell all through, 0 rotating in some of it, -1 nothing; and the stop."""
+    """Say what the status holds of each epoch: 1 dwell all through, 0 rotating in some, -1 nothing; and the stop."""
     m = len(epochs)
     if log is None or not len(log.t):
         return np.full(m, -1, dtype=np.int8), np.full(m, -1, dtype=np.int64)

@@ -74,9 +74,11 @@ def rotation_vector(C: Floats) -> Floats:
     cos2 = C[0, 0] + C[1, 1] + C[2, 2] - 1.0
     angle = np.arctan2(sin2, cos2)
     if sin2 > 1e-7:
-        return w * (angle / sin2)
+        w *= angle / sin2
+        return w
     if cos2 > 0.0:
-        return 0.5 * w
+        w *= 0.5
+        return w
     # Half a turn: the axis is the column of C + I with the largest diagonal.
     k = 0
     for i in range(1, 3):
@@ -84,18 +86,19 @@ def rotation_vector(C: Floats) -> Floats:
             k = i
     axis = C[:, k].copy()
     axis[k] += 1.0
-    return axis * (angle / np.sqrt(axis[0] ** 2 + axis[1] ** 2 + axis[2] ** 2))
+    axis *= angle / np.sqrt(axis[0] ** 2 + axis[1] ** 2 + axis[2] ** 2)
+    return axis
 
 
 @compiled
 def orthonormal(C: Floats) -> Floats:
-    """The nearest rotation matrix to one that rounding has bent a little (one Newton step)."""
+    """Give the nearest rotation matrix to one that rounding has bent a little (one Newton step)."""
     return 1.5 * C - 0.5 * C @ C.T @ C
 
 
 @compiled
 def quaternion(C: Floats) -> Floats:
-    """Unit quaternion (w, x, y, z), w >= 0, of a rotation matrix."""
+    """Convert a rotation matrix to a unit quaternion (w, x, y, z), w >= 0."""
     phi = rotation_vector(C)
     a = np.sqrt(phi[0] ** 2 + phi[1] ** 2 + phi[2] ** 2)
     q = np.empty(4)

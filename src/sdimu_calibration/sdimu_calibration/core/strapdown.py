@@ -224,9 +224,9 @@ def navigate_cycle(
 def velocity_increment(alpha: Floats, upsilon: Floats, sculling: Floats) -> Floats:
     """Velocity increment in the frame at the start of the cycle (m/s), shape (3,).
 
-    ``upsilon + alpha x upsilon / 2 + alpha x (alpha x upsilon) / 6 + sculling``: Savage's rotation compensation with its
-    coefficients (1 - cos a)/a^2 and (1 - sin a / a)/a^2 to second order. Without the last term a table at
-    2 deg/s makes the force across its axis 2 ppm too small.
+    ``upsilon + alpha x upsilon / 2 + alpha x (alpha x upsilon) / 6 + sculling``: Savage's rotation compensation with
+    its coefficients (1 - cos a)/a^2 and (1 - sin a / a)/a^2 to second order. Without the last term a table at 2 deg/s
+    makes the force across its axis 2 ppm too small.
     """
     c0 = alpha[1] * upsilon[2] - alpha[2] * upsilon[1]
     c1 = alpha[2] * upsilon[0] - alpha[0] * upsilon[2]

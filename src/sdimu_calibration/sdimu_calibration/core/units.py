@@ -100,8 +100,8 @@ def parse_unit(text: str) -> Unit:
         power = Fraction(-1 if below else 1)
         root = re.fullmatch(r"sqrt\((.*)\)", token)
         if root:
-            power, token = power / 2, root.group(1)
-        name, _, exponent = token.partition("^")
+            power /= 2
+        name, _, exponent = (root.group(1) if root else token).partition("^")
         if exponent:
             if not re.fullmatch(r"-?\d+", exponent):
                 raise UnitError(f"cannot read the power in unit '{text}'")
