@@ -149,7 +149,10 @@ def _add_response(G: Floats, att: Floats, vel: Floats, f_n: Floats, dt: float) -
 def _navigate_epoch(
     data: PassInput, e: int, settings: PassSettings, state: PassState, G: Floats, D: Floats, sums: Floats
 ) -> float:
-    """Navigate through an epoch, in place; fill G (9, p), D (6, p) and sums (6,); return its length (s)."""
+    """Navigate through an epoch, in place; return its length (s).
+
+    Filled: G (9, p), D (6, p), and sums (9,) of angle and velocity increment in b and of velocity increment in n.
+    """
     p = D.shape[1]
     att = np.zeros((3, p))
     vel = np.zeros((3, p))
@@ -177,9 +180,13 @@ def _navigate_epoch(
         gravity = earth.normal_gravity(state.position[0], state.position[2]) + settings.gravity_excess
         C_mid[:, :] = state.C_nb
         dv = velocity_increment(alpha, upsilon, data.sculling[c])
+        # Not the mean attitude times the mean force: that leans off the vertical in a turn, and a filter
+        # that sees it takes it for knowledge of azimuth.
+        f_n = state.C_nb @ dv / dt
+        for i in range(3):
+            sums[6 + i] += f_n[i] * dt
         navigate_cycle(state.C_nb, state.velocity, state.position, phi, dv, dt, gravity)
         C_mid[:, :] = 0.5 * (C_mid + state.C_nb)
-        f_n = C_mid @ upsilon / dt
         att[:, :] = 0.0
         vel[:, :] = 0.0
         for j in range(data.channel.shape[0]):
@@ -229,7 +236,7 @@ def _measurement(
     z[2] = height - state.position[2]
     z[3:6] = state.velocity
     z[6:9] = sums[:3] / T - C_bn @ w_ie
-    z[9:12] = sums[3:] / T + C_bn @ g_n
+    z[9:12] = sums[3:6] / T + C_bn @ g_n
     for i in range(3):
         H[i, i] = 1.0
         H[3 + i, 3 + i] = 1.0
@@ -283,16 +290,15 @@ def run_pass(data: PassInput, settings: PassSettings, state: PassState, out: Pas
     p = state.used.shape[0]
     G = np.zeros((NAV, p + COPY))
     D = np.zeros((6, p))
-    sums = np.zeros(6)
+    sums = np.zeros(9)
     decay = np.ones(p + COPY)
     drive = np.zeros(p + COPY)
     gyro = np.eye(3) * settings.gyro_psd
     accel = np.eye(3) * settings.accel_psd
     for e in range(data.first.shape[0]):
         position, velocity = state.position.copy(), state.velocity.copy()
-        C_start = state.C_nb.copy()
         T = _navigate_epoch(data, e, settings, state, G[:, :p], D, sums)
-        f_n = 0.5 * (C_start + state.C_nb) @ sums[3:] / T
+        f_n = sums[6:] / T
         Phi = transition(navigation_error_matrix(position, velocity, f_n), T)
         Q = process_noise(gyro, accel, f_n, T)
         _gap_noise(data, e, Q)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sdimu_calibration.core.effects import registry
+from sdimu_calibration.core.effects import selection
 from sdimu_calibration.core.effects.effect import Effect, Parameter
 from sdimu_calibration.core.motion import Motion
 from sdimu_calibration.core.recording import DataError
@@ -76,7 +76,7 @@ def build(effects: Sequence[str | Effect], imu: ImuSpecification) -> ImuModel:
     DataError
         When a name is unknown, stands twice, or has no prior.
     """
-    chosen = tuple(registry.get(e) if isinstance(e, str) else e for e in effects)
+    chosen = tuple(selection.resolve(e) if isinstance(e, str) else e for e in effects)
     seen: set[str] = set()
     channel: list[int] = []
     parameter: list[int] = []
@@ -85,13 +85,14 @@ def build(effects: Sequence[str | Effect], imu: ImuSpecification) -> ImuModel:
     decay: list[float] = []
     drive: list[float] = []
     for effect in chosen:
-        if effect.name in seen:
-            raise DataError(f"effect '{effect.name}' stands twice in the model")
-        seen.add(effect.name)
+        for p in effect.parameters:
+            if p.name in seen:
+                raise DataError(f"'{p.name}' of effect '{effect.name}' stands twice in the model")
+            seen.add(p.name)
         channel += [t.channel for t in effect.terms]
         parameter += [len(parameters) + t.parameter for t in effect.terms]
         parameters += effect.parameters
-        size = imu.prior.get(effect.name, effect.prior.get(imu.grade))
+        size = imu.prior.get(effect.family or effect.name, effect.prior.get(imu.grade))
         if size is None or not size > 0:
             raise DataError(f"IMU '{imu.name}' gives no prior for effect '{effect.name}': add it under prior:")
         prior += [size] * len(effect.parameters)

@@ -33,7 +33,11 @@ class Motion:
     rest : ndarray of bool, shape (n,)
         True where the table stands still.
     temperature, temperature_rate : ndarray, shape (n,)
-        deg C and deg C/s; zero where no temperature is recorded.
+        Change since the start (K) and rate (K/s); zero where no temperature is recorded.
+    turned, leant : ndarray, shape (n, 3)
+        Sign of the last turn about each axis, and of the last change of specific force along it; 0 before the first.
+    magnetic_n : ndarray, shape (3,)
+        Magnetic field of the site in NED (T).
     """
 
     t: Floats
@@ -46,8 +50,40 @@ class Motion:
     rest: NDArray[np.bool_]
     temperature: Floats
     temperature_rate: Floats
+    turned: Floats
+    leant: Floats
+    magnetic_n: Floats
 
     @property
     def a(self) -> Floats:
         """Specific force in units of standard gravity, shape (n, 3)."""
         return self.f / STANDARD_GRAVITY
+
+    @property
+    def a_rate(self) -> Floats:
+        """Rate of change of `a` by turning under gravity, ``-w_table x a`` (1/s), shape (n, 3)."""
+        return np.asarray(-np.cross(self.w_table, self.a))
+
+    @property
+    def moving(self) -> Floats:
+        """1 while the table turns, 0 at rest, shape (n,)."""
+        return (~self.rest).astype(np.float64)
+
+    @property
+    def field(self) -> Floats:
+        """Magnetic field in b (T), shape (n, 3)."""
+        return np.asarray(np.einsum("kij,i->kj", self.C_nb, self.magnetic_n))
+
+    @property
+    def lever(self) -> Floats:
+        """``[alpha x] + [w_table x]^2`` (1/s^2), shape (n, 3, 3): acceleration of a point at r is ``lever @ r``."""
+        w, d = self.w_table, self.alpha
+        out = np.einsum("ki,kj->kij", w, w)
+        out[:, range(3), range(3)] -= np.sum(w**2, axis=1)[:, None]
+        out[:, 0, 1] -= d[:, 2]
+        out[:, 0, 2] += d[:, 1]
+        out[:, 1, 0] += d[:, 2]
+        out[:, 1, 2] -= d[:, 0]
+        out[:, 2, 0] -= d[:, 1]
+        out[:, 2, 1] += d[:, 0]
+        return np.asarray(out)

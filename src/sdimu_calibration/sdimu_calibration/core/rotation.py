@@ -66,46 +66,45 @@ def rotation_matrix(phi: Floats) -> Floats:
 
 
 @compiled
-def rotation_vector(C: Floats) -> Floats:
-    """Rotation vector of a rotation matrix, angle in [0, pi]; the inverse of `rotation_matrix`."""
-    w = np.empty(3)
-    w[0], w[1], w[2] = C[2, 1] - C[1, 2], C[0, 2] - C[2, 0], C[1, 0] - C[0, 1]
-    sin2 = np.sqrt(w[0] ** 2 + w[1] ** 2 + w[2] ** 2)
-    cos2 = C[0, 0] + C[1, 1] + C[2, 2] - 1.0
-    angle = np.arctan2(sin2, cos2)
-    if sin2 > 1e-7:
-        w *= angle / sin2
-        return w
-    if cos2 > 0.0:
-        w *= 0.5
-        return w
-    # Half a turn: the axis is the column of C + I with the largest diagonal.
+def quaternion(C: Floats) -> Floats:
+    """Unit quaternion (w, x, y, z), w >= 0, of a rotation matrix.
+
+    Divides by the largest of the four components, so no angle loses digits (Shepperd, J. Guidance and Control 1, 1978).
+    """
+    q = np.empty(4)
+    trace = C[0, 0] + C[1, 1] + C[2, 2]
     k = 0
     for i in range(1, 3):
         if C[i, i] > C[k, k]:
             k = i
-    axis = C[:, k].copy()
-    axis[k] += 1.0
-    axis *= angle / np.sqrt(axis[0] ** 2 + axis[1] ** 2 + axis[2] ** 2)
-    return axis
+    if trace >= C[k, k]:
+        s = 2.0 * np.sqrt(1.0 + trace)
+        q[0] = 0.25 * s
+        q[1], q[2], q[3] = (C[2, 1] - C[1, 2]) / s, (C[0, 2] - C[2, 0]) / s, (C[1, 0] - C[0, 1]) / s
+    else:
+        i, j = (k + 1) % 3, (k + 2) % 3
+        s = 2.0 * np.sqrt(1.0 + C[k, k] - C[i, i] - C[j, j])
+        q[0] = (C[j, i] - C[i, j]) / s
+        q[1 + k] = 0.25 * s
+        q[1 + i], q[1 + j] = (C[i, k] + C[k, i]) / s, (C[j, k] + C[k, j]) / s
+    if q[0] < 0.0:
+        q *= -1.0
+    return q
+
+
+@compiled
+def rotation_vector(C: Floats) -> Floats:
+    """Rotation vector of a rotation matrix, angle in [0, pi]; the inverse of `rotation_matrix`."""
+    q = quaternion(C)
+    n = np.sqrt(q[1] ** 2 + q[2] ** 2 + q[3] ** 2)
+    scale = 2.0 if n < 1e-12 else 2.0 * np.arctan2(n, q[0]) / n
+    return scale * q[1:]
 
 
 @compiled
 def orthonormal(C: Floats) -> Floats:
     """Give the nearest rotation matrix to one that rounding has bent a little (one Newton step)."""
     return 1.5 * C - 0.5 * C @ C.T @ C
-
-
-@compiled
-def quaternion(C: Floats) -> Floats:
-    """Convert a rotation matrix to a unit quaternion (w, x, y, z), w >= 0."""
-    phi = rotation_vector(C)
-    a = np.sqrt(phi[0] ** 2 + phi[1] ** 2 + phi[2] ** 2)
-    q = np.empty(4)
-    q[0] = np.cos(0.5 * a)
-    s = 0.5 - a * a / 48.0 if a < 1e-4 else np.sin(0.5 * a) / a
-    q[1], q[2], q[3] = s * phi[0], s * phi[1], s * phi[2]
-    return q
 
 
 @compiled

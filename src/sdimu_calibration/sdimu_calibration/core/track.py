@@ -17,6 +17,10 @@ Floats = NDArray[np.float64]
 
 _COMPENSATIONS = 3
 """Rounds of "error at the compensated motion": each gains a factor of the size of the errors."""
+MAGNETIC_FIELD = np.array([30.0e-6, -4.5e-6, 40.0e-6])
+"""Field in NED (T) where the site gives none: size and dip of mid-northern latitudes."""
+_TURNING = np.radians(0.5)
+"""A body rate about an axis that counts as a turn about it (rad/s); a force that changes so fast (1/s) as leaning."""
 _TEMPERATURE_WINDOW_S = 60.0
 """Base of the temperature rate (s): shorter ones differentiate the sensor's resolution."""
 
@@ -36,7 +40,7 @@ def _attitudes(C_nb: Floats, alpha: Floats, coning: Floats, dt: Floats, latitude
 
 
 def temperatures(log: TemperatureLog | None, t: Floats, causal: bool) -> tuple[Floats, Floats]:
-    """Temperature (deg C) and its rate (deg C/s) at times `t`.
+    """Temperature since the start (K) and its rate (K/s) at times `t`.
 
     Parameters
     ----------
@@ -53,10 +57,10 @@ def temperatures(log: TemperatureLog | None, t: Floats, causal: bool) -> tuple[F
         index = np.maximum(np.searchsorted(log.t, t + 1e-9, side="right") - 1, 0)
         before = np.maximum(np.searchsorted(log.t, t - 2.0 * half, side="right") - 1, 0)
         span = np.maximum(log.t[index] - log.t[before], half)
-        return log.value[index], (log.value[index] - log.value[before]) / span
+        return log.value[index] - log.value[0], (log.value[index] - log.value[before]) / span
     low, high = np.maximum(t - half, log.t[0]), np.minimum(t + half, log.t[-1])
     rise = np.interp(high, log.t, log.value) - np.interp(low, log.t, log.value)
-    return np.interp(t, log.t, log.value), rise / np.maximum(high - low, 1e-3)
+    return np.interp(t, log.t, log.value) - log.value[0], rise / np.maximum(high - low, 1e-3)
 
 
 def motion(
@@ -70,6 +74,7 @@ def motion(
     temperature: TemperatureLog | None,
     predicted: bool,
     before: Motion | None = None,
+    magnetic_n: Floats = MAGNETIC_FIELD,
 ) -> Motion:
     """Motion of each cycle.
 
@@ -108,7 +113,11 @@ def motion(
         else:
             w_seen, f_seen = w, f
         alpha = _acceleration(w_table, cycles, before, causal=not predicted)
-        seen = Motion(cycles.t, dt, w_seen, f_seen, C_nb, w_table, alpha, rest, heat, heat_rate)
+        turned = _last_sign(w_table, None if before is None else before.turned[-1])
+        leant = _last_sign(-np.cross(w_table, f_seen) / gravity, None if before is None else before.leant[-1])
+        seen = Motion(
+            cycles.t, dt, w_seen, f_seen, C_nb, w_table, alpha, rest, heat, heat_rate, turned, leant, magnetic_n
+        )
         if done < rounds:
             error = model.errors(model.regressors(seen), coefficients)
             w, f = w_measured - error[:, :3], f_measured - error[:, 3:]
@@ -122,3 +131,12 @@ def _acceleration(w_table: Floats, cycles: Cycles, before: Motion | None, causal
         return np.asarray(np.gradient(w_table, cycles.t - 0.5 * cycles.dt, axis=0))
     earlier = np.vstack([before.w_table[-1:] if before is not None else w_table[:1], w_table[:-1]])
     return np.asarray((w_table - earlier) / cycles.dt[:, None])
+
+
+def _last_sign(rate: Floats, before: Floats | None) -> Floats:
+    """Sign of the last rate beyond `_TURNING` in each column, carried forward; shape (n, 3)."""
+    sign = np.where(np.abs(rate) > _TURNING, np.sign(rate), 0.0)
+    rows = np.where(sign != 0.0, np.arange(1, len(sign) + 1)[:, None], 0)
+    last = np.maximum.accumulate(rows, axis=0)
+    start = np.zeros(3) if before is None else before
+    return np.where(last > 0, np.take_along_axis(sign, np.maximum(last - 1, 0), axis=0), start)

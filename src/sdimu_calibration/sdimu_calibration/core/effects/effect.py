@@ -8,12 +8,14 @@ making several of them.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sdimu_calibration.core.motion import Motion
+from sdimu_calibration.core.units import to_si
 
 Floats = NDArray[np.float64]
 
@@ -78,6 +80,16 @@ class Effect:
         Correlation time of a first-order Gauss-Markov parameter; None for constants and random walks.
     random_walk : mapping of str to float
         Density of a random walk of the parameters by grade (SI/sqrt(s)); empty for constants.
+    family : str
+        Registry name of the effect of which this is a part; empty for whole effects.
+    needs : str
+        ``temperature``, ``magnetic`` or empty: what must be recorded or known for the effect to mean anything.
+    options : mapping of str to str
+        Fixed quantities that enter nonlinearly, such as ``{"tau": "1200 s"}``.
+    with_options : callable or None
+        Options (SI, as keywords) to the effect with these options.
+    scan : callable or None
+        Times of a test to the variants worth trying on it.
     """
 
     name: str
@@ -92,6 +104,106 @@ class Effect:
     confused_with: tuple[str, ...] = ()
     decay_s: float | None = None
     random_walk: Mapping[str, float] = field(default_factory=dict)
+    needs: str = ""
+    family: str = ""
+    options: Mapping[str, str] = field(default_factory=dict)
+    with_options: Callable[..., Effect] | None = None
+    scan: Callable[[TestTimes], tuple[Effect, ...]] | None = None
+
+    def only(self, names: tuple[str, ...]) -> Effect:
+        """Return the effect with the named parameters alone."""
+        kept = [i for i, p in enumerate(self.parameters) if p.name in names]
+        columns = [c for c, term in enumerate(self.terms) if term.parameter in kept]
+        whole = self.regressors
+        label = self.name if len(kept) == len(self.parameters) else "+".join(names) + self.variant
+        return replace(
+            self,
+            name=label,
+            family=self.family or self.name,
+            parameters=tuple(self.parameters[i] for i in kept),
+            terms=tuple(Term(self.terms[c].channel, kept.index(self.terms[c].parameter)) for c in columns),
+            regressors=lambda motion: whole(motion)[:, columns],
+        )
+
+    @property
+    def variant(self) -> str:
+        """What stands behind the name in brackets, e.g. ``(tau=1200 s)``; empty without options."""
+        return "(" + ", ".join(f"{k}={v}" for k, v in self.options.items()) + ")" if self.options else ""
+
+
+@dataclass(frozen=True)
+class TestTimes:
+    """When a test stands and turns.
+
+    Attributes
+    ----------
+    duration : float
+        Seconds.
+    stops, turns : tuple of (int, float, float)
+        Index of the stop (of the stop before the turn), start and end (s).
+    """
+
+    duration: float
+    stops: tuple[tuple[int, float, float], ...]
+    turns: tuple[tuple[int, float, float], ...]
+
+
+Column = Callable[[Motion], Floats]
+
+
+def family(
+    stem: str,
+    title: str,
+    equation: str,
+    columns: Mapping[str, tuple[int, Column]],
+    units: tuple[str, str],
+    prior: tuple[float, float, float],
+    **more: Any,
+) -> Effect:
+    """Effect with one regressor column a parameter.
+
+    Parameters
+    ----------
+    stem : str
+        Registry name; parameters are ``stem_suffix``.
+    columns : mapping of suffix to (channel, Motion -> ndarray (n,))
+    units : tuple of str
+        SI and display unit of the parameters.
+    prior : tuple of float
+        One-sigma for navigation, tactical and mems grade in the display unit.
+    more
+        Other attributes of `Effect`.
+    """
+    functions = [column for _, column in columns.values()]
+    si, display = units
+    factor = to_si(1.0, display)
+    return Effect(
+        name=stem,
+        title=title,
+        equation=equation,
+        parameters=tuple(Parameter(f"{stem}_{suffix}", si, display) for suffix in columns),
+        terms=tuple(Term(channel, i) for i, (channel, _) in enumerate(columns.values())),
+        regressors=lambda motion: np.column_stack([f(motion) for f in functions]),
+        prior=dict(zip(("navigation", "tactical", "mems"), (factor * v for v in prior), strict=True)),
+        **more,
+    )
+
+
+def per_axis_columns(triad: tuple[int, ...], of: Callable[[Motion], Floats]) -> dict[str, tuple[int, Column]]:
+    """Columns x, y, z: each sensor sees its own column of ``of(motion)``, shape (n, 3)."""
+    return {axis: (triad[i], lambda m, i=i: of(m)[:, i]) for i, axis in enumerate(AXES)}
+
+
+def matrix_columns(
+    triad: tuple[int, ...], of: Callable[[Motion], Floats], diagonal: bool = True
+) -> dict[str, tuple[int, Column]]:
+    """Columns xx, xy ... zz: sensor i sees column j of ``of(motion)``, shape (n, 3)."""
+    return {
+        AXES[i] + AXES[j]: (triad[i], lambda m, j=j: of(m)[:, j])
+        for i in range(3)
+        for j in range(3)
+        if diagonal or i != j
+    }
 
 
 def own_axis(triad: tuple[int, ...]) -> tuple[Term, ...]:

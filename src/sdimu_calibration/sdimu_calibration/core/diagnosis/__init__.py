@@ -1,0 +1,1 @@
+"""What is missing in the error model: evidence from the residuals of a calibration."""

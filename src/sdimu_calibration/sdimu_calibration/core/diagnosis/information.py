@@ -1,0 +1,60 @@
+"""Information form of linear least squares: J = W'W, d = W'e; conditioning on parameters is a Schur complement."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Information:
+    """What data say about parameters.
+
+    Attributes
+    ----------
+    J : ndarray, shape (q, q)
+        Information (inverse covariance) matrix.
+    d : ndarray, shape (q,)
+        Information vector; the estimate of parameter i alone is d_i / J_ii.
+    """
+
+    J: Floats
+    d: Floats
+
+    def given(self, known: Ints, weight: Floats) -> Information:
+        """Information on all parameters when those at `known` are estimated along with them.
+
+        Parameters
+        ----------
+        known : ndarray of int, shape (k,)
+        weight : ndarray, shape (k,)
+            Prior information of each (1/sigma^2), already in `d` where the prior mean is not zero.
+
+        Returns
+        -------
+        Information
+            Same size; rows of `known` are zero.
+        """
+        if not len(known):
+            return self
+        A = self.J[np.ix_(known, known)] + np.diag(weight)
+        scale = 1.0 / np.sqrt(np.diag(A))
+        B = self.J[:, known]
+        X = (scale[:, None] * np.linalg.solve(A * np.outer(scale, scale), scale[:, None] * np.column_stack([B.T, self.d[known]])))
+        J = self.J - B @ X[:, :-1]
+        d = self.d - B @ X[:, -1]
+        J[known, :] = J[:, known] = 0.0
+        d[known] = 0.0
+        return Information(0.5 * (J + J.T), d)
+
+    def estimate(self, chosen: Ints, weight: Floats) -> tuple[Floats, Floats]:
+        """Estimate and covariance of the parameters at `chosen`, with prior information `weight` each."""
+        A = self.J[np.ix_(chosen, chosen)] + np.diag(weight)
+        scale = 1.0 / np.sqrt(np.diag(A))
+        inverse = np.linalg.inv(A * np.outer(scale, scale)) * np.outer(scale, scale)
+        return inverse @ self.d[chosen], inverse

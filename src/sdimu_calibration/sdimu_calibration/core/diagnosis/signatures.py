@@ -1,0 +1,139 @@
+"""How a sensor error shows in the innovations: Friedland's separate-bias recursion.
+
+The navigation filter runs with the coefficients known. A parameter that adds ``A(t)`` to the sensors then adds the column W
+to its whitened innovations, by the recursion
+
+    U = Phi V + G_in,   S = H U + D,   W = L^-1 S,   V = U - K S,
+
+G_in the navigation's response over the epoch, D the direct term, Phi, H, L, K the filter's own. Given W for every parameter, known and
+suspected, everything that follows is linear least squares on the whitened innovations e: ``e = W theta + white noise``.
+
+Sources: B. Friedland, "Treatment of bias in recursive filtering", IEEE Trans. Automatic Control 14 (1969); A. Willsky, H. Jones,
+"A generalized likelihood ratio approach ...", ibid. 21 (1976).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sdimu_calibration.core.compiled import compiled
+from sdimu_calibration.core.filter_pass import MEASURED, NAV, PassOutput
+from sdimu_calibration.core.kalman import whiten
+from sdimu_calibration.core.motion import Motion
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+@compiled
+def _epoch_response(
+    C_nb: Floats, f_b: Floats, dt: Floats, first: int, last: int, values: Floats, channel: Ints, parameter: Ints,
+    G: Floats, D: Floats, att: Floats, vel: Floats,
+) -> float:  # fmt: skip
+    """Fill G (9, q) and D (6, q) with the response over an epoch; return its length (s)."""
+    G[:, :] = 0.0
+    D[:, :] = 0.0
+    T = 0.0
+    for c in range(first, last):
+        h = dt[c]
+        T += h
+        f0 = C_nb[c, 0, 0] * f_b[c, 0] + C_nb[c, 0, 1] * f_b[c, 1] + C_nb[c, 0, 2] * f_b[c, 2]
+        f1 = C_nb[c, 1, 0] * f_b[c, 0] + C_nb[c, 1, 1] * f_b[c, 1] + C_nb[c, 1, 2] * f_b[c, 2]
+        f2 = C_nb[c, 2, 0] * f_b[c, 0] + C_nb[c, 2, 1] * f_b[c, 1] + C_nb[c, 2, 2] * f_b[c, 2]
+        att[:, :] = 0.0
+        vel[:, :] = 0.0
+        for j in range(channel.shape[0]):
+            v = values[c, j] * h
+            ch, k = channel[j], parameter[j]
+            D[ch, k] += v
+            if ch < 3:
+                att[0, k] -= C_nb[c, 0, ch] * v
+                att[1, k] -= C_nb[c, 1, ch] * v
+                att[2, k] -= C_nb[c, 2, ch] * v
+            else:
+                vel[0, k] += C_nb[c, 0, ch - 3] * v
+                vel[1, k] += C_nb[c, 1, ch - 3] * v
+                vel[2, k] += C_nb[c, 2, ch - 3] * v
+        for k in range(G.shape[1]):
+            a0, a1, a2 = G[6, k] + 0.5 * att[0, k], G[7, k] + 0.5 * att[1, k], G[8, k] + 0.5 * att[2, k]
+            v0 = vel[0, k] + (f1 * a2 - f2 * a1) * h
+            v1 = vel[1, k] + (f2 * a0 - f0 * a2) * h
+            v2 = vel[2, k] + (f0 * a1 - f1 * a0) * h
+            G[0, k] += (G[3, k] + 0.5 * v0) * h
+            G[1, k] += (G[4, k] + 0.5 * v1) * h
+            G[2, k] += (G[5, k] + 0.5 * v2) * h
+            G[3, k] += v0
+            G[4, k] += v1
+            G[5, k] += v2
+            G[6, k] += att[0, k]
+            G[7, k] += att[1, k]
+            G[8, k] += att[2, k]
+    return T
+
+
+@compiled
+def _signatures(
+    C_nb: Floats, f_b: Floats, dt: Floats, first: Ints, last: Ints, kind: Ints,
+    values: Floats, channel: Ints, parameter: Ints, q: int,
+    Phi: Floats, H: Floats, L: Floats, K: Floats, W: Floats,
+) -> None:  # fmt: skip
+    """Fill W (rows, q), one row a measured scalar, in the order of epochs and channels."""
+    V = np.zeros((NAV, q))
+    G = np.zeros((NAV, q))
+    D = np.zeros((6, q))
+    att = np.zeros((3, q))
+    vel = np.zeros((3, q))
+    row = 0
+    for e in range(first.shape[0]):
+        T = _epoch_response(C_nb, f_b, dt, first[e], last[e], values, channel, parameter, G, D, att, vel)
+        V[:, :] = Phi[e] @ V + G
+        if kind[e] == 0:
+            continue
+        low = 0 if abs(kind[e]) == 2 else 6
+        m = MEASURED - low
+        S = np.ascontiguousarray(H[e, low:, :NAV]) @ V
+        S[6 - low :] += D / T
+        W[row : row + m] = whiten(np.ascontiguousarray(L[e, low:, low:]), S)
+        V -= np.ascontiguousarray(K[e, :NAV, low:]) @ S
+        row += m
+
+
+def signatures(
+    seen: Motion, first: Ints, last: Ints, kind: Ints, output: PassOutput,
+    values: Floats, channel: Ints, parameter: Ints, count: int,
+) -> Floats:  # fmt: skip
+    """Signatures of `count` parameters in the whitened innovations of a navigation filter.
+
+    Parameters
+    ----------
+    seen : Motion
+        Predicted motion, n cycles.
+    first, last, kind : ndarray of int, shape (e,)
+        Epochs, as in `filter_pass.PassInput`.
+    output : PassOutput
+        Of the pass with known coefficients, with its matrices kept.
+    values : ndarray, shape (n, m)
+        Regressor columns.
+    channel, parameter : ndarray of int, shape (m,)
+        Sensor axis and parameter of each column.
+    count : int
+        Number of parameters q.
+
+    Returns
+    -------
+    ndarray, shape (rows, q)
+        Rows in the order of `measured_rows`.
+    """
+    W = np.zeros((int(np.isfinite(output.normalised).sum()), count))
+    _signatures(
+        np.ascontiguousarray(seen.C_nb), np.ascontiguousarray(seen.f), seen.dt, first, last, kind,
+        np.ascontiguousarray(values), channel, parameter, count, output.Phi, output.H, output.L, output.K, W,
+    )  # fmt: skip
+    return W
+
+
+def measured_rows(output: PassOutput) -> tuple[Ints, Ints]:
+    """Epoch and channel (0-11: position, velocity, rate, force, three each) of every row."""
+    epoch, channel = np.nonzero(np.isfinite(output.normalised))
+    return epoch.astype(np.int64), channel.astype(np.int64)

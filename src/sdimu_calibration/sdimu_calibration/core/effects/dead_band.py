@@ -1,0 +1,29 @@
+"""Dead band, dead zone, lock-in: small rates are swallowed."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sdimu_calibration.core import earth
+from sdimu_calibration.core.effects.effect import GYRO, family, per_axis_columns
+from sdimu_calibration.core.effects.registry import register
+from sdimu_calibration.core.motion import Floats, Motion
+
+# sgn(w) at a rate of a few per cent of Earth rate is decided by noise: the step is as wide as that.
+_WIDTH = 0.01 * earth.RATE
+
+
+def _sign(motion: Motion) -> Floats:
+    return np.asarray(-np.tanh(motion.w / _WIDTH))
+
+
+DEAD_BAND = register(
+    family(
+        "gyro_dead_band", "gyro dead band (dead zone, lock-in residual)", "dw_i = -d_i sgn(w_i), |w_i| > d_i",
+        per_axis_columns(GYRO, _sign), ("rad/s", "deg/h"), (0.02, 0.05, 1),
+        typical="DTG 0.001-0.01, RLG residual, MEMS none (deg/h)",
+        description="The gyro stands still below a rate and is short by it above. Its sign at stops where an axis points "
+        "East-West hangs on noise.",
+        confused_with=("gyro_magnetic",),
+    )
+)  # fmt: skip

@@ -1,0 +1,65 @@
+"""Errors of what the test believes of its site; each equals a sensor error that turns with the attitude.
+
+A wrong Earth rate d in NED looks like a gyro error ``-C_bn d``, a wrong gravity d like an accelerometer error ``C_bn d``,
+in navigation as in Zw and Zf.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sdimu_calibration.core import earth
+from sdimu_calibration.core.effects.effect import ACCEL, GYRO, Effect, Parameter, Term
+from sdimu_calibration.core.effects.registry import register
+from sdimu_calibration.core.motion import Floats, Motion
+from sdimu_calibration.core.units import STANDARD_GRAVITY
+
+
+def _along(motion: Motion, direction: int) -> Floats:
+    """Direction N, E or D seen in b, shape (n, 3)."""
+    return np.asarray(motion.C_nb[:, direction, :])
+
+
+GRAVITY = register(
+    Effect(
+        name="reference_gravity",
+        title="gravity of the site",
+        equation="df = C_bn (0, 0, dg)",
+        parameters=(Parameter("reference_gravity", "m/s^2", "ug"),),
+        terms=tuple(Term(channel, 0) for channel in ACCEL),
+        regressors=lambda m: _along(m, 2),
+        prior=dict.fromkeys(("navigation", "tactical", "mems"), 1e-3),
+        typical="WGS-84 normal gravity: 10-50 ug; a survey: below 1 ug",
+        description="Cannot be told from a common scale factor of the accelerometers, whatever the plan: quote it as a floor of "
+        "the scale factor.",
+        confused_with=("accel_scale",),
+    )
+)
+
+DEFLECTION_EAST = register(
+    Effect(
+        name="reference_deflection_east",
+        title="deflection of the vertical, East",
+        equation="df = C_bn (0, g eta, 0)",
+        parameters=(Parameter("reference_deflection_east", "rad", "arcsec"),),
+        terms=tuple(Term(channel, 0) for channel in ACCEL),
+        regressors=lambda m: STANDARD_GRAVITY * _along(m, 1),
+        prior=dict.fromkeys(("navigation", "tactical", "mems"), 5e-5),
+        typical="1-20 arcsec",
+        description="Cannot be told from azimuth; harmless for the coefficients.",
+    )
+)
+
+LATITUDE = register(
+    Effect(
+        name="reference_latitude",
+        title="latitude (or North deflection, or size of Earth rate)",
+        equation="dw = -C_bn dw_ie/dlat dlat",
+        parameters=(Parameter("reference_latitude", "rad", "arcsec"),),
+        terms=tuple(Term(channel, 0) for channel in GYRO),
+        regressors=lambda m: earth.RATE * (_along(m, 0) + _along(m, 2)) / np.sqrt(2.0),
+        prior=dict.fromkeys(("navigation", "tactical", "mems"), 1e-4),
+        typical="a gross error of the site file only",
+        description="A wrong Earth rate in the meridian plane. Visible from some minutes of arc on.",
+    )
+)

@@ -1,0 +1,70 @@
+"""A named set of noise assumptions: what a filter is told, as against what the IMU has."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.specification import ImuSpecification, Model
+
+
+@dataclass(frozen=True)
+class NoiseSet:
+    """Process noise Q, measurement noise R and initial attitude of a filter.
+
+    Attributes
+    ----------
+    name : str
+    gyro_density, accel_density : float
+        Q: white noise that drives the navigation (rad/s/sqrt(Hz), m/s^2/sqrt(Hz)).
+    rate_sigma, force_sigma : float
+        R of Zw and Zf: one sigma of the mean over a second (rad/s, m/s^2); not below the densities.
+    velocity_sigma, position_sigma : float
+        R of Zv and Zp (m/s, m).
+    zero_velocity : str
+        ``every_epoch`` or ``after_motion``.
+    shared_noise : bool
+        Whether process and measurement noise are modelled as the same samples' noise.
+    level_sigma, azimuth_sigma : float
+        Initial attitude (rad).
+    """
+
+    name: str
+    gyro_density: float
+    accel_density: float
+    rate_sigma: float
+    force_sigma: float
+    velocity_sigma: float
+    position_sigma: float
+    zero_velocity: str
+    shared_noise: bool
+    level_sigma: float
+    azimuth_sigma: float
+
+
+def apply(noise: NoiseSet, imu: ImuSpecification, model: Model) -> tuple[ImuSpecification, Model]:
+    """IMU and model with the noise of a set in place of their own.
+
+    Raises
+    ------
+    DataError
+        When R is smaller than what Q alone makes of a mean over a second.
+    """
+    for what, sigma, density in (
+        ("rate_sigma", noise.rate_sigma, noise.gyro_density),
+        ("force_sigma", noise.force_sigma, noise.accel_density),
+    ):
+        if sigma < density:
+            raise DataError(f"noise set '{noise.name}': {what} is below the process noise over one second")
+    told = replace(imu, gyro_white_noise=noise.gyro_density, accel_white_noise=noise.accel_density)
+    return told, replace(
+        model,
+        velocity_sigma=noise.velocity_sigma,
+        position_sigma=noise.position_sigma,
+        zero_velocity=noise.zero_velocity,
+        shared_noise=noise.shared_noise,
+        extra_rate_sigma=float(np.sqrt(noise.rate_sigma**2 - noise.gyro_density**2)),
+        extra_force_sigma=float(np.sqrt(noise.force_sigma**2 - noise.accel_density**2)),
+    )

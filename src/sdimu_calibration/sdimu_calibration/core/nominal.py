@@ -1,0 +1,142 @@
+"""The recording that a perfect IMU would make of a plan: no sensor errors, no noise.
+
+The table turns about its own axes; a mount rotation stands between them and the IMU's. A turn is a rotation about one
+fixed axis with a trapezoidal rate, so the angle is a closed formula at every instant, and what the sensors see
+is a constant vector turned by that angle: its mean over a sample is a mean of a cosine and a sine, taken by
+Gauss-Legendre with three nodes (error of sixth order in the angle of one sample).
+
+For covariance simulation and for the batch estimator's bound. It is not the simulator of the tests: that one is written
+apart, on purpose.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sdimu_calibration.core import earth
+from sdimu_calibration.core.plan import Plan, Turn
+from sdimu_calibration.core.recording import DataError, PhaseLog, Recording
+from sdimu_calibration.core.rotation import rotation_matrix
+from sdimu_calibration.core.specification import Site
+
+Floats = NDArray[np.float64]
+
+RATE_HZ = 20.0
+"""Sample rate: two samples a navigation cycle."""
+_NODES = 0.5 + np.array([-1.0, 0.0, 1.0]) * math.sqrt(15.0) / 10.0
+_WEIGHTS = np.array([5.0, 8.0, 5.0]) / 18.0
+
+
+def ramp_length(turn: Turn, acceleration_rad_s2: float, number: int) -> float:
+    """Length of each ramp (s) of the trapezoid that makes a turn at its mean rate.
+
+    With angle A, length T and ramps t_r at acceleration a: ``A = a t_r (T - t_r)``, the smaller root.
+
+    Raises
+    ------
+    DataError
+        When the acceleration is too small for the mean rate; `number` names the turn.
+    """
+    size = abs(turn.angle_rad)
+    length = size / turn.rate_rad_s
+    root = length**2 - 4.0 * size / acceleration_rad_s2
+    if root < -1e-9 * length**2:
+        raise DataError(
+            f"turn {number}: {math.degrees(turn.angle_rad):g} deg about {turn.axis} at a mean of "
+            f"{math.degrees(turn.rate_rad_s):g} deg/s needs more than the limit of "
+            f"{math.degrees(acceleration_rad_s2):g} deg/s^2 (lower the rate or raise the acceleration)"
+        )
+    return 2.0 * size / acceleration_rad_s2 / (length + math.sqrt(max(root, 0.0)))
+
+
+def turned(t: Floats, turn: Turn, ramp_s: float) -> tuple[Floats, Floats]:
+    """Angle (rad) and rate (rad/s) at times `t` (s) after the start of a turn; constant outside it."""
+    length = abs(turn.angle_rad) / turn.rate_rad_s
+    peak = turn.angle_rad / (length - ramp_s)
+    at = np.clip(t, 0.0, length)
+    to_end = np.minimum(at, length - at)
+    ramp = np.minimum(to_end, ramp_s)
+    part = peak * (ramp**2 / (2.0 * ramp_s) + (to_end - ramp))
+    return np.where(2.0 * at <= length, part, turn.angle_rad - part), peak * ramp / ramp_s
+
+
+def nominal_recording(plan: Plan, site: Site, mount_rad: Floats | None = None, rate_hz: float = RATE_HZ) -> Recording:
+    """Record a plan with a perfect IMU.
+
+    Parameters
+    ----------
+    plan : Plan
+        At stop 0 the table's X, Y, Z point north, east, down.
+    site : Site
+    mount_rad : ndarray, shape (3,), optional
+        Rotation vector of the IMU on the table, ``C_tb = rotation_matrix(mount)``; none by default.
+    rate_hz : float
+
+    Returns
+    -------
+    Recording
+        With the table's phases, as the status topic would give them.
+
+    Raises
+    ------
+    DataError
+        When a turn needs more acceleration than the plan allows.
+    """
+    gravity = site.gravity_m_s2 or float(earth.normal_gravity(site.latitude_rad, site.height_m))
+    C_tb = rotation_matrix(np.zeros(3) if mount_rad is None else np.asarray(mount_rad, dtype=float))
+    begin, end, ramps = _schedule(plan)
+    total = end[-1] + plan.dwell_s[-1] if plan.turns else plan.dwell_s[0]
+    edges = np.arange(math.floor(total * rate_hz + 1e-6) + 1) / rate_hz
+    # Each sample lies in the span of one turn (from the start of the turn to that of the next), but for the few
+    # that a start cuts: those see the table at rest before it, which the clipped angle gives too.
+    span = np.maximum(np.searchsorted(begin, edges[1:] - 1e-9, side="left") - 1, 0)
+    omega, force = np.empty((len(edges) - 1, 3)), np.empty((len(edges) - 1, 3))
+    C_nt = np.eye(3)
+    w_ie, down = earth.earth_rate(site.latitude_rad), np.array([0.0, 0.0, 1.0])
+    for k, turn in enumerate(plan.turns):
+        rows = np.flatnonzero(span == k)
+        axis = _unit(turn.axis)
+        mean_cos, mean_sin, mean_rate = _means(edges[rows] - begin[k], 1.0 / rate_hz, turn, ramps[k])
+        omega[rows] = _turned_back(C_nt.T @ w_ie, axis, mean_cos, mean_sin) + mean_rate[:, None] * axis
+        force[rows] = -gravity * _turned_back(C_nt.T @ down, axis, mean_cos, mean_sin)
+        C_nt = C_nt @ rotation_matrix(turn.angle_rad * axis)
+    if not plan.turns:
+        omega[:], force[:] = w_ie, -gravity * down
+    return Recording(0, edges[1:], omega @ C_tb, force @ C_tb, phase=_phases(begin, end, total))
+
+
+def _schedule(plan: Plan) -> tuple[Floats, Floats, list[float]]:
+    """Start and end of every turn (s), shape (turns,), and its ramps."""
+    ramps = [ramp_length(t, plan.acceleration_rad_s2, k) for k, t in enumerate(plan.turns, start=1)]
+    length = np.array([abs(t.angle_rad) / t.rate_rad_s for t in plan.turns])
+    end = np.cumsum(np.asarray(plan.dwell_s[: len(length)]) + length)
+    return end - length, end, ramps
+
+
+def _means(start: Floats, interval: float, turn: Turn, ramp_s: float) -> tuple[Floats, Floats, Floats]:
+    """Mean cosine and sine of the turned angle and mean rate over samples that begin at `start` (m,)."""
+    angle, _ = turned(start[:, None] + interval * _NODES, turn, ramp_s)
+    first, _ = turned(start, turn, ramp_s)
+    last, _ = turned(start + interval, turn, ramp_s)
+    return np.cos(angle) @ _WEIGHTS, np.sin(angle) @ _WEIGHTS, (last - first) / interval
+
+
+def _turned_back(v: Floats, axis: Floats, cos: Floats, sin: Floats) -> Floats:
+    """Vector `v` (3,) seen from axes that have turned about `axis`; `cos`, `sin` (m,) of the angle; (m, 3)."""
+    along = axis * (axis @ v)
+    return np.asarray(along + cos[:, None] * (v - along) - sin[:, None] * np.cross(axis, v))
+
+
+def _phases(begin: Floats, end: Floats, total: float) -> PhaseLog:
+    """Status at every change and once a second, as a table sends it."""
+    t = np.union1d(np.arange(math.floor(total) + 1.0), np.concatenate([begin, end]))
+    stop = np.searchsorted(end, t, side="right")
+    dwell = np.searchsorted(begin, t, side="right") == stop
+    return PhaseLog(t, dwell, stop.astype(np.int64))
+
+
+def _unit(letter: str) -> Floats:
+    return np.eye(3)["XYZ".index(letter)]
