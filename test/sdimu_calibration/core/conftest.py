@@ -1,0 +1,82 @@
+"""What the tests of the core share: general attitudes, and small simulated tests without noise or with it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from hypothesis import settings
+
+from sdimu_calibration.core.plan import Plan, Turn
+from sdimu_calibration.core.recording import Recording
+from sdimu_calibration.core.rotation import rotation_matrix
+from sdimu_calibration.core.specification import ImuSpecification, Model, Site
+from sdimu_calibration.core.units import to_si
+from sdimu_sim.core.scenario import Scenario, generate
+
+# The first call of a compiled function may compile it: no deadline says anything about the claim.
+settings.register_profile("compiled", deadline=None)
+settings.load_profile("compiled")
+
+BASELINE = (
+    "gyro_bias",
+    "gyro_scale",
+    "gyro_misalignment",
+    "gyro_mass_unbalance",
+    "accel_bias",
+    "accel_scale",
+    "accel_misalignment",
+)
+
+
+@pytest.fixture
+def general_attitude():
+    """An attitude with no zero and no symmetry in it: from the identity a wrong order of products passes."""
+    return rotation_matrix(np.array([0.7, -1.1, 1.9]))
+
+
+@pytest.fixture
+def site() -> Site:
+    return Site(latitude_rad=np.radians(36.4), height_m=80.0)
+
+
+@pytest.fixture
+def imu() -> ImuSpecification:
+    """The specification of Kim, Song & Lyou."""
+    return ImuSpecification(
+        "paper",
+        gyro_white_noise=to_si(0.1, "deg/h/sqrt(Hz)"),
+        accel_white_noise=to_si(10, "ug/sqrt(Hz)"),
+        prior={
+            "gyro_bias": to_si(1, "deg/h"),
+            "gyro_scale": to_si(150, "ppm"),
+            "gyro_misalignment": to_si(1, "arcmin"),
+            "gyro_mass_unbalance": to_si(1, "deg/h/g"),
+            "accel_bias": to_si(150, "ug"),
+            "accel_scale": to_si(150, "ppm"),
+            "accel_misalignment": to_si(1, "arcmin"),
+        },
+    )
+
+
+@pytest.fixture
+def model() -> Model:
+    return Model(BASELINE)
+
+
+@pytest.fixture
+def three_stops() -> Plan:
+    """Three stops of 10 s with quick turns about two axes between them: 46 s."""
+    turns = (Turn("X", np.radians(100.0), np.radians(25.0)), Turn("Z", np.radians(-80.0), np.radians(40.0)))
+    return Plan("three stops", (10.0, 10.0, 10.0), turns, np.radians(200.0))
+
+
+@pytest.fixture
+def recorded_test(imu: ImuSpecification, site: Site) -> Callable[..., Recording]:
+    """Simulate a plan: ``recorded_test(plan, seed=1, **scenario)``."""
+
+    def make(plan: Plan, **options: object) -> Recording:
+        return generate(Scenario(plan, imu, site, **options))[0]  # type: ignore[arg-type]
+
+    return make
