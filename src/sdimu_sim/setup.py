@@ -20,6 +20,8 @@ setup(
         "sdimu_calibration.verbs": [
             "simulate = sdimu_sim.cli.simulate:simulate",
             "run = sdimu_sim.cli.run:run",
+            "monte-carlo = sdimu_sim.cli.monte_carlo:monte_carlo",
+            "bench = sdimu_sim.cli.bench:bench",
         ],
     },
 )

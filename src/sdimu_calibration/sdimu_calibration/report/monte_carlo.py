@@ -1,0 +1,168 @@
+"""A Monte-Carlo campaign for people: tables for the terminal, and a page that needs no network.
+
+Works on the content of the data file (``sdimu-monte-carlo/1``), wherever its runs came from.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from html import escape
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import plotly.graph_objects as go
+from plotly.subplots import make_subplots
+from rich.box import SIMPLE_HEAD
+from rich.table import Table
+from scipy import stats
+
+from sdimu_calibration.core.units import from_si
+from sdimu_calibration.report.page import _STYLE
+from sdimu_calibration.storage.json_file import read_json
+
+FORMAT = "sdimu-monte-carlo/1"
+
+_INK, _WARN = "#0b5394", "#b45f06"
+_BAND = "rgba(0, 0, 0, 0.10)"
+
+_COLUMNS = ("coefficient", "bias", "+-", "RMS error", "sigma", "bound", "unit", "RMS / sigma", "RMS / bound")
+
+
+def cells(coefficient: Mapping[str, Any]) -> list[str]:
+    """Texts of one coefficient under the columns of the table, in customary units."""
+    unit = coefficient["display_unit"]
+    values = [from_si(coefficient[key], unit) for key in ("bias", "bias_error", "rms", "sigma", "bound")]
+    ratio = coefficient["rms"] / coefficient["bound"]
+    return [
+        coefficient["name"], f"{values[0]:+.2g}", *(f"{v:.2g}" for v in values[1:2]), *(f"{v:.3g}" for v in values[2:]),
+        unit, f"{coefficient['rms_z']:.3f}", f"{ratio:.3f}",
+    ]  # fmt: skip
+
+
+def coefficients_table(content: Mapping[str, Any]) -> Table:
+    """Lay the coefficients out for a terminal."""
+    table = Table(title=f"{content['runs']} runs; bound: {content['bound_from']}", title_justify="left", pad_edge=False, box=SIMPLE_HEAD)
+    for column in _COLUMNS:
+        table.add_column(column, justify="left" if column in {"coefficient", "unit"} else "right", no_wrap=True)
+    for coefficient in content["coefficients"]:
+        table.add_row(*cells(coefficient))
+    return table
+
+
+def check_cells(check: Mapping[str, Any]) -> list[str]:
+    """Texts of one check: name, value, interval, verdict."""
+    return [
+        check["name"], f"{check['value']:.4g}", f"{check['low']:.4g} ... {check['high']:.4g}",
+        "yes" if check["passed"] else "NO",
+    ]  # fmt: skip
+
+
+def checks_table(content: Mapping[str, Any]) -> Table:
+    """Lay the checks out for a terminal."""
+    table = Table(pad_edge=False, box=SIMPLE_HEAD)
+    for column in ("check", "value", "interval", "passed"):
+        table.add_column(column, justify="left" if column == "check" else "right", no_wrap=True)
+    for check in content["checks"]:
+        table.add_row(*check_cells(check))
+    return table
+
+
+def write_page(path: Path, data: Path) -> None:
+    """Write the page of a campaign from its data file.
+
+    Raises
+    ------
+    DataError
+        When `data` is no such file.
+    """
+    text = page(read_json(data, FORMAT))
+    temporary = path.with_name(f".{path.name}.part")
+    temporary.write_text(text, encoding="utf-8")
+    temporary.replace(path)
+
+
+def page(content: Mapping[str, Any]) -> str:
+    """Make the page as HTML text."""
+    runs, lost = content["runs"], content["failed"]
+    bad = [c["name"] for c in content["checks"] if not c["passed"]]
+    verdict = f"{len(bad)} of {len(content['checks'])} checks failed." if bad else "All checks passed."
+    heading = f"Monte-Carlo campaign of {runs} runs"
+    figure = figures(content).to_html(full_html=False, include_plotlyjs=True, config={"responsive": True})
+    parts = [
+        f"<h1>{heading}</h1>",
+        f'<p class="quiet">body frame: {escape(str(content["body_frame"]).replace("_", " "))} · '
+        f"{content['time']['cpu_s_per_run']:.2f} s of processor a run · {len(lost)} failed</p>",
+        f"<p>{verdict} Intervals hold {100 * content['level']:.0f} % of what a right estimator gives.</p>",
+        _table(("check", "value", "interval", "passed"), [check_cells(c) for c in content["checks"]], {0}),
+        "<h2>Coefficients</h2>",
+        _table(_COLUMNS, [cells(c) for c in content["coefficients"]], {0, 6}),
+        f'<p class="quiet">RMS over the runs; bound: {escape(content["bound_from"])}.</p>',
+        "<h2>Distributions</h2>",
+        figure,
+        *(["<h2>Failed runs</h2>"] if lost else []),
+        *(f"<p>seed {run['seed']}: {escape(str(run['error']))}</p>" for run in lost),
+    ]
+    return (
+        f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><title>{heading}</title>'
+        f"<style>{_STYLE}</style></head><body>\n" + "\n".join(parts) + "\n</body></html>\n"
+    )
+
+
+def figures(content: Mapping[str, Any]) -> Any:
+    """Four panels: error over sigma, bias, NEES, autocorrelation; grey is where a right estimator falls."""
+    titles = ("RMS of error over sigma", "bias in standard errors", "NEES of the runs", "lag-1 autocorrelation")
+    figure = make_subplots(rows=2, cols=2, subplot_titles=titles, vertical_spacing=0.3, horizontal_spacing=0.1)
+    names = [c["name"] for c in content["coefficients"]]
+    _dots(figure, names, [c["rms_z"] for c in content["coefficients"]], content["rms_z_interval"], (1, 1))
+    bias = content["checks"][0]["high"]
+    _dots(figure, names, [c["bias"] / c["bias_error"] for c in content["coefficients"]], (-bias, bias), (1, 2))
+    _nees(figure, content["nees"], (2, 1))
+    measured = [a for a in content["autocorrelation"] if a["pairs"]]
+    limit = content["checks"][-1]["high"] / np.sqrt(min((a["pairs"] for a in measured), default=1))
+    _dots(figure, [a["channel"] for a in measured], [a["value"] for a in measured], (-limit, limit), (2, 2))
+    figure.update_layout(
+        template="simple_white", height=900, showlegend=False, margin={"l": 60, "r": 20, "t": 40, "b": 130},
+        font={"size": 12, "color": "#222"},
+    )  # fmt: skip
+    return figure
+
+
+def _dots(figure: Any, names: list[str], values: list[float], interval: Any, place: tuple[int, int]) -> None:
+    low, high = interval
+    inside = [low <= value <= high for value in values]
+    figure.add_trace(
+        go.Scatter(
+            x=names, y=values, mode="markers",
+            marker={
+                "color": [_INK if ok else _WARN for ok in inside], "size": 8,
+                "symbol": ["circle" if ok else "x" for ok in inside],
+            },
+        ),
+        row=place[0], col=place[1],
+    )  # fmt: skip
+    figure.add_hrect(y0=low, y1=high, fillcolor=_BAND, line_width=0, layer="below", row=place[0], col=place[1])
+    figure.update_xaxes(tickangle=-60, row=place[0], col=place[1])
+
+
+def _nees(figure: Any, nees: Mapping[str, Any], place: tuple[int, int]) -> None:
+    """Histogram of the NEES with the chi-square density that it should have."""
+    dof = nees["dof"]
+    values = np.asarray([v for v in nees["values"] if v is not None], dtype=float)
+    x = np.linspace(max(0.0, dof - 4.5 * np.sqrt(2 * dof)), dof + 6.0 * np.sqrt(2 * dof), 200)
+    figure.add_trace(
+        go.Histogram(x=values, histnorm="probability density", marker={"color": _INK}, opacity=0.5),
+        row=place[0], col=place[1],
+    )  # fmt: skip
+    figure.add_trace(
+        go.Scatter(x=x, y=stats.chi2.pdf(x, dof), mode="lines", line={"color": "#222"}), row=place[0], col=place[1]
+    )
+    figure.update_xaxes(title_text=f"chi-square of {dof} degrees of freedom (line)", row=place[0], col=place[1])
+
+
+def _table(columns: tuple[str, ...], lines: list[list[str]], text: set[int]) -> str:
+    kind = [' class="text"' if k in text else "" for k in range(len(columns))]
+    head = "".join(f"<th{k}>{escape(c)}</th>" for c, k in zip(columns, kind, strict=True))
+    cells_of = (zip(line, kind, strict=True) for line in lines)
+    body = "".join("<tr>" + "".join(f"<td{k}>{escape(c)}</td>" for c, k in line) + "</tr>" for line in cells_of)
+    return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"

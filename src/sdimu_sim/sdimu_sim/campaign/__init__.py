@@ -1,0 +1,1 @@
+"""Many runs: shared out over processes or a cluster, kept in shards, and judged by statistics."""

@@ -1,0 +1,73 @@
+"""Where work runs: a dask cluster, of local processes unless an address is given."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+from distributed import Client, LocalCluster, as_completed
+
+from sdimu_calibration.core.recording import DataError
+
+# One thread a worker: two libraries that each start a thread a core only wait for each other.
+_ENVIRONMENT = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
+_ANSWER_S = 10
+
+Run = Callable[[Callable[[Any], Any], Sequence[Any]], Iterator[tuple[Any, Any]]]
+
+
+@contextmanager
+def cluster(scheduler: str | None, workers: int) -> Iterator[Run]:
+    """Give ``run(function, arguments)``, which yields (argument, result) as results come in.
+
+    The result of a call whose worker was lost is the text of the error.
+
+    Parameters
+    ----------
+    scheduler : str or None
+        Address of a dask scheduler; None starts processes on this machine, which end with the context.
+    workers : int
+        Number of local processes.
+
+    Raises
+    ------
+    DataError
+        When the scheduler does not answer.
+    """
+    with _client(scheduler, workers) as client:
+
+        def run(function: Callable[[Any], Any], arguments: Sequence[Any]) -> Iterator[tuple[Any, Any]]:
+            futures = {client.submit(function, argument, pure=False): argument for argument in arguments}
+            for future in as_completed(futures):
+                yield futures.pop(future), _result(future)
+
+        yield run
+
+
+@contextmanager
+def _client(scheduler: str | None, workers: int) -> Iterator[Any]:
+    if scheduler is not None:
+        try:
+            client = Client(scheduler, timeout=_ANSWER_S)
+        except (OSError, TimeoutError, ValueError) as error:
+            raise DataError(f"--scheduler {scheduler}: no dask scheduler answers there") from error
+        with client:
+            yield client
+        return
+    with (
+        LocalCluster(
+            n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=None, memory_limit=None,
+            silence_logs=logging.CRITICAL, env=_ENVIRONMENT,
+        ) as local,
+        Client(local) as client,
+    ):  # fmt: skip
+        yield client
+
+
+def _result(future: Any) -> Any:
+    try:
+        return future.result()
+    except Exception as error:
+        return f"{type(error).__name__}: {error}"

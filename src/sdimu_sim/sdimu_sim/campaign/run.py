@@ -1,0 +1,144 @@
+"""One run of a Monte-Carlo campaign: a test simulated and calibrated in memory, estimate and truth side by side."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rate_table_sim.core import TableMotion, TableSpecification, phase_changes, table_motion
+from sdimu_calibration.core import body_frame
+from sdimu_calibration.core.passes import first_attitude, one_pass, reduce, refine, set_up
+from sdimu_calibration.core.plan import Plan
+from sdimu_calibration.core.recording import PhaseLog, Recording
+from sdimu_calibration.core.specification import Model
+from sdimu_sim.core.generator import simulate_imu
+from sdimu_sim.core.hidden import parse_effects
+from sdimu_sim.core.platform import PlatformMotion
+from sdimu_sim.core.scenario import Scenario, imu_truth, temperature_log
+from sdimu_sim.core.truth import ImuTruth, in_body_frame
+
+Floats = NDArray[np.float64]
+
+CHANNELS = tuple(f"{row}_{axis}" for row in ("position", "velocity") for axis in "NED") + tuple(
+    f"{row}_{axis}" for row in ("rate", "force") for axis in "xyz"
+)
+"""Rows of the filter's measurement. The whitening mixes a row with those before it."""
+
+_PINNED_SHARE = 1e-6
+"""A sigma below this share of its prior is rounding: the body frame makes the coefficient zero."""
+
+
+@dataclass(frozen=True)
+class CalibrationRun:
+    """Simulate and calibrate one test for a seed.
+
+    Attributes
+    ----------
+    scenario : Scenario
+        Its seed is replaced; coefficients and mount are drawn anew when it leaves them open.
+    model : Model
+        What is estimated.
+    """
+
+    scenario: Scenario
+    model: Model
+
+    def __call__(self, seed: int) -> dict[str, Any]:
+        """Run a seed.
+
+        Returns
+        -------
+        dict
+            ``names`` of the coefficients, then in this order and the reported frame ``estimate``, ``truth``,
+            ``sigma`` (SI) and ``covariance`` (lower triangle by rows); ``free``: coefficients that the frame does not
+            make zero; ``nees`` over these; ``nis`` and ``nis_dof`` (sum and number); ``lag1`` and ``lag1_count`` by
+            `CHANNELS`; ``passes``.
+
+        Raises
+        ------
+        DataError
+            When the scenario or the model cannot be used, or the filter diverges.
+        """
+        scenario = replace(self.scenario, seed=seed)
+        sensor = imu_truth(scenario)
+        setup = set_up(scenario.site, scenario.imu, self.model)
+        reduced = reduce(simulate(scenario, sensor), setup)
+        start = first_attitude(reduced.epochs, reduced.phases, setup)
+        none = np.zeros(len(setup.sensors.prior))
+        first = one_pass(reduced, setup, start, start.C_nb, none, closed_loop=True, keep=False)
+        last, passes = refine(reduced, setup, start, first, lambda _word, _share: None, keep=False)
+        names, frame = setup.sensors.names, self.model.body_frame
+        J = body_frame.frame_jacobian(names, frame)
+        P = J @ last.covariance @ J.T
+        estimate = body_frame.values_in_frame(names, last.estimate, frame)
+        truth = true_values(sensor, names, frame)
+        sigma = np.sqrt(np.diag(P))
+        free = sigma > _PINNED_SHARE * setup.sensors.prior
+        products, count = lag_one(last.output.normalised, reduced.phases.stop)
+        nis = last.output.nis
+        return {
+            "names": names, "estimate": estimate, "truth": truth, "sigma": sigma,
+            "covariance": P[np.tril_indices(len(P))], "free": free, "nees": nees(estimate - truth, P, free),
+            "nis": float(np.nansum(nis)), "nis_dof": 3 * int(np.isfinite(nis).sum()),
+            "lag1": products, "lag1_count": count, "passes": passes,
+        }  # fmt: skip
+
+
+def simulate(scenario: Scenario, sensor: ImuTruth) -> Recording:
+    """Make the recording of a scenario, as `sdimu_sim.core.scenario.generate` does, but without table angles.
+
+    The table's motion does not depend on the seed (its encoders do, which no estimator reads), so that each process
+    makes it once.
+    """
+    motion = _table_motion(scenario.plan, scenario.table)
+    platform = PlatformMotion(motion.t, motion.q_nt, motion.omega_nt_t)
+    samples = simulate_imu(platform, sensor, scenario.site, scenario.rate_hz, scenario.seed, scenario.temperature)
+    return Recording(
+        scenario.start_ns, samples.t, samples.omega_ib_b, samples.f_ib_b, PhaseLog(*phase_changes(motion)),
+        temperature_log(scenario.temperature, float(motion.t[-1])),
+    )  # fmt: skip
+
+
+@lru_cache(maxsize=2)
+def _table_motion(plan: Plan, table: TableSpecification) -> TableMotion:
+    return table_motion(plan, table, 0)
+
+
+def true_values(sensor: ImuTruth, names: tuple[str, ...], frame: str) -> Floats:
+    """Truth of the estimated coefficients by name, shape (p,); what the simulator does not have is zero."""
+    hidden = {t.name: t.parameters["k"] for t in parse_effects(sensor.effects).terms if "k" in t.parameters}
+    truth = in_body_frame(sensor.coefficients, frame) | hidden
+    return np.array([truth.get(name, 0.0) for name in names])
+
+
+def nees(error: Floats, P: Floats, free: NDArray[np.bool_]) -> float:
+    """Normalised estimation error squared of the coefficients `free` (p,): ``e' P^-1 e``."""
+    e, part = error[free], P[np.ix_(free, free)]
+    # Scaled by sigma first: the units differ by many orders of magnitude.
+    s = np.sqrt(np.diag(part))
+    return float((e / s) @ np.linalg.solve(part / np.outer(s, s), e / s))
+
+
+def lag_one(normalised: Floats, stop: NDArray[np.int64]) -> tuple[Floats, NDArray[np.int64]]:
+    """Sum of products of normalised innovations with those of the epoch before at the same stop.
+
+    Parameters
+    ----------
+    normalised : ndarray, shape (e, 12)
+        NaN where nothing was measured.
+    stop : ndarray of int, shape (e,)
+
+    Returns
+    -------
+    products : ndarray, shape (12,)
+        For white innovations of unit variance: mean 0, variance `count`.
+    count : ndarray of int, shape (12,)
+    """
+    pairs = np.where((stop[1:] == stop[:-1])[:, None], normalised[1:] * normalised[:-1], np.nan)
+    return np.nansum(pairs, axis=0), np.isfinite(pairs).sum(axis=0)
+
+

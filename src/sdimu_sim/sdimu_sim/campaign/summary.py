@@ -1,0 +1,110 @@
+"""From the rows of a campaign to its data file (format ``sdimu-monte-carlo/1``)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from sdimu_calibration.core import imu_model
+from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.specification import ImuSpecification, Model
+from sdimu_sim.campaign import statistics
+from sdimu_sim.campaign.run import CHANNELS
+from sdimu_sim.campaign.shards import failed
+
+FORMAT = "sdimu-monte-carlo/1"
+
+
+def summarise(
+    rows: Sequence[Mapping[str, Any]],
+    model: Model,
+    imu: ImuSpecification,
+    bound: Mapping[str, float] | None = None,
+    bound_from: str = "mean reported sigma",
+) -> dict[str, Any]:
+    """Judge the runs of a campaign.
+
+    Parameters
+    ----------
+    rows : sequence of mapping
+        What `sdimu_sim.campaign.run.CalibrationRun` gave for every seed; failed runs among them.
+    model, imu : Model, ImuSpecification
+        Of the campaign.
+    bound : mapping of str to float, optional
+        Least possible sigma (SI) by coefficient name.
+    bound_from : str
+        Where it comes from.
+
+    Returns
+    -------
+    dict
+        Content of the data file; SI.
+
+    Raises
+    ------
+    DataError
+        When fewer than two runs were finished.
+    """
+    good = [row for row in rows if "error" not in row]
+    if len(good) < 2:
+        reasons = "; ".join(sorted({str(row["error"]) for row in failed(rows)})) or "none was made"
+        raise DataError(f"{len(good)} finished runs are too few for statistics: expected at least 2 ({reasons})")
+    free = np.all(np.array([row["free"] for row in good], dtype=bool), axis=0)
+    names = [name for name, is_free in zip(good[0]["names"], free, strict=True) if is_free]
+    errors = (statistics.stack(good, "estimate") - statistics.stack(good, "truth"))[:, free]
+    sigmas = statistics.stack(good, "sigma")[:, free]
+    found = statistics.coefficient_statistics(names, errors, sigmas, bound)
+    n, p = errors.shape
+    nees, lag1, counts = (statistics.stack(good, key) for key in ("nees", "lag1", "lag1_count"))
+    nis, dof = statistics.stack(good, "nis"), statistics.stack(good, "nis_dof")
+    checks = [
+        statistics.bias_check(found, n),
+        *statistics.sigma_checks(found, n),
+        statistics.bound_check(found),
+        statistics.nees_check(nees, p),
+        statistics.nis_check(nis, dof),
+        statistics.lag_check(lag1, counts, CHANNELS),
+    ]
+    units = {q.name: (q.unit, q.display_unit) for q in imu_model.build(model.effects, imu).parameters}
+    z_low, z_high = statistics.rms_interval(n, p)
+    return {
+        "format": FORMAT,
+        "runs": n,
+        "failed": [{"seed": row["seed"], "error": row["error"]} for row in failed(rows)],
+        "body_frame": model.body_frame,
+        "model": list(model.effects),
+        "level": statistics.LEVEL,
+        "bound_from": bound_from,
+        "checks": [
+            {"name": c.name, "value": c.value, "low": c.low, "high": c.high, "passed": c.passed} for c in checks
+        ],
+        "rms_z_interval": [z_low, z_high],
+        "coefficients": [
+            {
+                "name": name, "unit": units[name][0], "display_unit": units[name][1], "bias": found.bias[k],
+                "bias_error": found.bias_error[k], "rms": found.rms[k], "sigma": found.sigma[k],
+                "bound": found.bound[k], "rms_z": found.rms_z[k],
+            }
+            for k, name in enumerate(names)
+        ],
+        "nees": {"dof": p, "values": nees},
+        "nis": {"values": nis / dof, "dof": dof},
+        "autocorrelation": [
+            {"channel": channel, "value": value, "standard_errors": score, "pairs": int(pairs)}
+            for channel, value, score, pairs in zip(
+                CHANNELS, _ratio(lag1.sum(axis=0), counts.sum(axis=0)), statistics.lag_scores(lag1, counts),
+                counts.sum(axis=0), strict=True,
+            )
+        ],
+        "time": {
+            "wall_s_per_run": float(np.mean([row["wall_s"] for row in good])),
+            "cpu_s_per_run": float(np.mean([row["cpu_s"] for row in good])),
+            "passes": float(np.mean([row["passes"] for row in good])),
+        },
+    }  # fmt: skip
+
+
+def _ratio(top: statistics.Floats, below: statistics.Floats) -> list[float]:
+    return [float(t / b) if b else float("nan") for t, b in zip(top, below, strict=True)]

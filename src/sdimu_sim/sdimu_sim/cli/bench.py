@@ -1,0 +1,104 @@
+"""The verb `sdimu bench`: how fast the core, the reader and the whole way from a bag to a result are."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Annotated, Any
+
+import typer
+
+
+def bench(
+    plan: Annotated[str, typer.Option(help="Test plan: name in config/plan or path.")] = "kim18",
+    rate: Annotated[float, typer.Option(help="Sample rate of the IMU (Hz), 10 to 1000.")] = 100.0,
+    repeats: Annotated[int, typer.Option(help="Each time is the best of so many.")] = 3,
+) -> None:
+    """Time the parts of a calibration on a simulated test, after a first run that compiles."""
+    from rich.box import SIMPLE_HEAD
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(pad_edge=False, box=SIMPLE_HEAD)
+    for column in ("what", "wall", "processor", "rate"):
+        table.add_column(column, justify="left" if column == "what" else "right", no_wrap=True)
+    with TemporaryDirectory() as folder:
+        for what, wall, cpu, count, noun in measure(plan, rate, repeats, Path(folder)):
+            table.add_row(what, f"{wall:.3f} s", f"{cpu:.3f} s", f"{count / wall:,.0f} {noun}/s")
+    Console().print(table, soft_wrap=True)
+
+
+def measure(plan: str, rate: float, repeats: int, folder: Path) -> list[tuple[str, float, float, int, str]]:
+    """Time the parts.
+
+    Parameters
+    ----------
+    plan : str
+        Name or path.
+    rate : float
+        Hz.
+    repeats : int
+    folder : Path
+        For the bag.
+
+    Returns
+    -------
+    list of (str, float, float, int, str)
+        What, wall and processor time (s; the smallest of `repeats`), how many of what it worked on.
+
+    Raises
+    ------
+    DataError
+        When the plan or the rate cannot be used.
+    """
+    from rate_table_sim.table_file import load_table
+    from sdimu_calibration.core.calibrate import calibrate
+    from sdimu_calibration.core.passes import first_attitude, one_pass, reduce, set_up
+    from sdimu_calibration.storage.bag_reader import read_recording
+    from sdimu_calibration.storage.config import load_imu, load_model, load_plan, load_site
+    from sdimu_calibration.storage.result_file import write_result
+    from sdimu_sim.bag_file import write_test
+    from sdimu_sim.campaign.run import CalibrationRun
+    from sdimu_sim.core.scenario import Scenario, simulate_test
+
+    imu, model, site = load_imu("dtg"), load_model("baseline"), load_site("daejeon")
+    scenario = Scenario(plan=load_plan(plan), imu=imu, site=site, table=load_table("ideal"), rate_hz=rate)
+    bag = folder / "bag"
+    write_test(bag, scenario, simulate_test(scenario))
+    recording = read_recording(bag)
+    setup = set_up(site, imu, model)
+    reduced = reduce(recording, setup)
+    start = first_attitude(reduced.epochs, reduced.phases, setup)
+    found = calibrate(recording, site, imu, model)
+    n = len(recording.t)
+
+    def one() -> None:
+        one_pass(reduced, setup, start, start.C_nb, found.values, closed_loop=False, keep=False)
+
+    def whole() -> None:
+        write_result(folder / "result.json", calibrate(read_recording(bag), site, imu, model))
+
+    parts: list[tuple[str, Callable[[], Any], int, str]] = [
+        ("reduce samples to cycles and epochs", lambda: reduce(recording, setup), n, "samples"),
+        ("one pass: motion, navigation, filter", one, n, "samples"),
+        ("calibrate with held-out stops", lambda: calibrate(recording, site, imu, model), n, "samples"),
+        ("read the bag", lambda: read_recording(bag), n, "samples"),
+        ("bag to result.json", whole, n, "samples"),
+        ("one Monte-Carlo run", lambda: CalibrationRun(scenario, model)(1), 1, "runs"),
+    ]
+    return [(what, *_best(work, repeats), count, noun) for what, work, count, noun in parts]
+
+
+def _best(work: Callable[[], Any], repeats: int) -> tuple[float, float]:
+    """Smallest wall and processor time (s): whatever disturbs only adds."""
+    import time
+
+    work()  # compiles, fills caches
+    walls, cpus = [], []
+    for _ in range(max(repeats, 1)):
+        wall, cpu = time.perf_counter(), time.process_time()
+        work()
+        walls.append(time.perf_counter() - wall)
+        cpus.append(time.process_time() - cpu)
+    return min(walls), min(cpus)
