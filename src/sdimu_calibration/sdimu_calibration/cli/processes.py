@@ -49,6 +49,7 @@ def own_domain(log: Path) -> Iterator[int]:
         When all domains are taken.
     """
     domain, lock = _free_domain()
+    before = dict(os.environ)
     os.environ |= {
         "ROS_DOMAIN_ID": str(domain),
         "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
@@ -58,6 +59,9 @@ def own_domain(log: Path) -> Iterator[int]:
     try:
         yield domain
     finally:
+        for name in os.environ.keys() - before.keys():
+            del os.environ[name]
+        os.environ |= before
         lock.close()
 
 
@@ -146,6 +150,18 @@ class Children:
             if code:
                 raise DataError(f"{name}: {_last_words(child.log, code)}")
         return [name for name, child in self._children.items() if child.process.poll() is None]
+
+    def kill(self, name: str) -> None:
+        """End a node without a warning, as a crash would; it no longer counts as failed."""
+        child = self._children.pop(name)
+        child.process.kill()
+        child.process.wait()
+
+    def stop(self, name: str, how: signal.Signals = signal.SIGINT) -> int:
+        """Stop a node with a signal; its exit status."""
+        child = self._children.pop(name)
+        child.process.send_signal(how)
+        return child.process.wait(POLITE_S)
 
     def end(self) -> None:
         """End those still running: SIGINT first, so that files are closed, SIGKILL after five seconds."""

@@ -25,12 +25,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-import rclpy
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from std_msgs.msg import Header
 
+from sdimu_calibration.nodes.stopping import asked_to_stop
 from sdimu_calibration.nodes.ticking import Ticker
 
 STREAM = QoSProfile(history=HistoryPolicy.KEEP_ALL, reliability=ReliabilityPolicy.RELIABLE)
@@ -172,7 +172,7 @@ class Producer:
 def publish(publisher: Any, message: Any) -> None:
     """Publish; while DDS refuses (5,000 samples unacknowledged) try again for `REFUSED_S`, then drop."""
     deadline = time.monotonic() + REFUSED_S
-    while rclpy.ok():
+    while not asked_to_stop():
         try:
             publisher.publish(message)
         except rclpy_implementation.RCLError:  # noqa: PERF203 (the loop is the retry)

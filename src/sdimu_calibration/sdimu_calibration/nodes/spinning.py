@@ -7,13 +7,14 @@ from collections.abc import Callable, Sequence
 from typing import Protocol
 
 import rclpy
-from rclpy.executors import ExternalShutdownException
 from rclpy.experimental import EventsExecutor
 from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 from rich.console import Console
 
 from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.nodes.stopping import asked_to_stop, watch_signals
 
 
 class Spinnable(Protocol):
@@ -30,25 +31,26 @@ def run_node(make: Callable[[], Spinnable], args: Sequence[str] | None = None) -
     """Make a node and spin it until it is done or told to stop; never returns.
 
     `EventsExecutor` keeps the order of arrival across topics and costs a fifth of the others per message. Its
-    plain ``spin()`` dispatches nothing and ignores signals, hence the loop.
+    plain ``spin()`` dispatches nothing and looks at no signal, hence the loop.
 
     Raises
     ------
     SystemExit
         0 when done or stopped by a signal, 1 on unusable data or options (one line on stderr).
     """
-    rclpy.init(args=list(args) if args is not None else None)
+    watch_signals()
+    rclpy.init(args=list(args) if args is not None else None, signal_handler_options=SignalHandlerOptions.NO)
     status = 0
     shell: Spinnable | None = None
     try:
         shell = make()
         executor = EventsExecutor()
         executor.add_node(shell.node)
-        while rclpy.ok() and not shell.done.done():
+        while not asked_to_stop() and not shell.done.done():
             executor.spin_until_future_complete(shell.done, 0.2)
         if shell.done.done():
             shell.done.result()
-    except (KeyboardInterrupt, ExternalShutdownException):
+    except KeyboardInterrupt:
         pass
     except (DataError, OSError) as error:
         Console(stderr=True, soft_wrap=True, markup=False, highlight=False).print(str(error))

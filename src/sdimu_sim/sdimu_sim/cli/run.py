@@ -39,7 +39,7 @@ def run(
 
     from sdimu_calibration.cli.processes import Children, own_domain
 
-    options = {
+    options: dict[str, dict[str, Any]] = {
         "table": {"plan": plan, "table": table, "seed": seed, "speed": speed},
         "imu": {
             "imu": imu, "site": site, "plan": plan, "seed": seed, "rate_hz": rate, "mount": mount or "",

@@ -1,0 +1,89 @@
+"""Real nodes over DDS: every test in a ROS domain of its own, bounded in time, and nothing left running."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sdimu_calibration.cli.processes import Children, own_domain
+from sdimu_calibration.storage.bag_file import raw_messages
+from sdimu_calibration.storage.cdr import IMU, decode_imu
+
+RATE_HZ = 100
+TURN_S = 3.0
+RECORDER = "sdimu_calibration.nodes.recorder_node"
+CALIBRATION = "sdimu_calibration.nodes.calibration_node"
+SDIMU = "sdimu_sim.nodes.sdimu_node"
+TABLE = "rate_table_sim.nodes.rate_table_node"
+DEADLINE_S = 60.0
+
+
+def write_plan(path: Path, dwell_s: float) -> Path:
+    """Three stops and two quarter turns of `TURN_S`."""
+    path.write_text(
+        f"format: sdimu-plan/1\nname: short\ndwell: {dwell_s} s\nrate: 30 deg/s\nacceleration: 60 deg/s^2\n"
+        "turns:\n  - {axis: Y, angle: 90 deg}\n  - {axis: Z, angle: 90 deg}\n",
+        encoding="utf-8",
+    )
+    return path
+
+
+def samples_of(dwell_s: float) -> int:
+    """IMU samples of such a plan: one for every interval, none at the start."""
+    return round((3 * dwell_s + 2 * TURN_S) * RATE_HZ)
+
+
+class Bench:
+    """The nodes of a test, to be started, killed and waited for one by one."""
+
+    def __init__(self, folder: Path, children: Children) -> None:
+        self.folder = folder
+        self.children = children
+        self.plan = folder / "plan.yaml"
+        self.speed = 0.0
+
+    def start(self, name: str, **more: object) -> None:
+        parameters: dict[str, dict[str, object]] = {
+            "recorder": {"out": str(self.folder / "bag"), "wait_for": ["/imu/data_raw", "/rate_table/status"]},
+            "calibration": {"out": str(self.folder)},
+            "sdimu": {"rate_hz": float(RATE_HZ), "consumers": 2},
+            "rate_table": {"plan": str(self.plan), "speed": self.speed, "consumers": 1},
+        }
+        parameters["rate_table"] |= {"status_peers": 2, "joint_peers": 1}
+        modules = {"recorder": RECORDER, "calibration": CALIBRATION, "sdimu": SDIMU, "rate_table": TABLE}
+        self.children.start(name, modules[name], parameters[name] | more)
+
+    def wait(self, condition: Callable[[], bool], what: str, deadline_s: float = DEADLINE_S) -> None:
+        begun = time.monotonic()
+        while not condition():
+            assert time.monotonic() - begun < deadline_s, f"{what}: not within {deadline_s} s"
+            time.sleep(0.05)
+
+    def wait_for_end(self, deadline_s: float = DEADLINE_S) -> None:
+        self.wait(lambda: not self.children.running(), "end of all nodes", deadline_s)
+
+    def recorded_bytes(self) -> int:
+        return sum(file.stat().st_size for file in (self.folder / "bag").glob("*.mcap"))
+
+
+@pytest.fixture
+def bench(tmp_path: Path) -> Iterator[Bench]:
+    with own_domain(tmp_path / "log"), Children(tmp_path / "log") as children:
+        yield Bench(tmp_path, children)
+
+
+def imu_stamps(bag: Path) -> np.ndarray:
+    """Stamps (ns) of the IMU samples in a bag, as recorded."""
+    return decode_imu(raw_messages(bag, {"/imu/data_raw": IMU}, "/imu/data_raw")["/imu/data_raw"])[0]
+
+
+def sdimu(*arguments: object) -> subprocess.Popen[str]:
+    """Start a verb of `sdimu` as a person does."""
+    command = [sys.executable, "-m", "sdimu_calibration.cli.main", *map(str, arguments)]
+    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)

@@ -1,0 +1,134 @@
+"""Nodes that come late, stop, or are killed."""
+
+from __future__ import annotations
+
+import signal
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.storage.bag_reader import read_recording
+from sdimu_calibration.storage.recover import recover
+from sdimu_calibration.storage.result_file import read_result
+
+from .conftest import RATE_HZ, Bench, imu_stamps, samples_of, write_plan
+
+pytestmark = pytest.mark.ros
+
+NODES = ("recorder", "calibration", "sdimu", "rate_table")
+LEASE_S = 3.0
+INTERVAL_NS = 10**9 // RATE_HZ
+
+
+@pytest.mark.parametrize("late", NODES)
+def test_a_node_may_come_late_and_nothing_is_lost(bench: Bench, late: str) -> None:
+    dwell_s = 12.0
+    write_plan(bench.plan, dwell_s)
+    for name in NODES:
+        if name != late:
+            bench.start(name)
+    time.sleep(2.0)
+    bench.start(late)
+    bench.wait_for_end()
+    stamps = imu_stamps(bench.folder / "bag")
+    assert len(stamps) == samples_of(dwell_s)
+    assert set(np.diff(stamps)) == {INTERVAL_NS}
+    assert read_result(bench.folder).data["samples"] == samples_of(dwell_s)
+
+
+def test_a_killed_calibration_is_not_waited_for_and_its_successor_goes_on(bench: Bench) -> None:
+    write_plan(bench.plan, 60.0)
+    bench.speed = 15.0
+    for name in NODES:
+        bench.start(name)
+    bench.wait(lambda: bench.recorded_bytes() > 100_000, "a third of the data")
+    bench.children.kill("calibration")
+    bench.start("calibration")
+    bench.wait_for_end()
+    assert len(imu_stamps(bench.folder / "bag")) == samples_of(60.0)
+    # The successor knows what came after it; it started in the first half.
+    taken = read_result(bench.folder).data["samples"]
+    assert samples_of(60.0) / 4 < taken < samples_of(60.0)
+
+
+def test_a_killed_recorder_loses_at_most_a_second_and_stalls_nobody(bench: Bench) -> None:
+    write_plan(bench.plan, 60.0)
+    bench.speed = 20.0
+    for name in NODES:
+        bench.start(name)
+    bench.wait(lambda: bench.recorded_bytes() > 100_000, "a third of the data")
+    time.sleep(2.0)
+    before = bench.recorded_bytes()
+    bench.children.kill("recorder")
+    killed = time.monotonic()
+    bench.wait_for_end()
+    # The rest of the data takes less than 10 s at this speed; the lease comes on top.
+    assert time.monotonic() - killed < 10.0 + LEASE_S + 5.0
+    assert read_result(bench.folder).data["samples"] == samples_of(60.0)
+    with pytest.raises(DataError, match="recover"):
+        read_recording(bench.folder / "bag")
+    recover(bench.folder / "bag")
+    stamps = imu_stamps(bench.folder / "bag")
+    assert set(np.diff(stamps)) == {INTERVAL_NS}
+    # What was in the file two seconds before its end, and a second more at the least.
+    assert before > 100_000
+    assert len(stamps) > 20.0 * RATE_HZ
+
+
+@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM])
+def test_a_stopped_recorder_closes_its_bag(bench: Bench, how: signal.Signals) -> None:
+    write_plan(bench.plan, 60.0)
+    bench.speed = 20.0
+    for name in NODES:
+        bench.start(name)
+    bench.wait(lambda: bench.recorded_bytes() > 50_000, "some data")
+    assert bench.children.stop("recorder", how) == 0
+    recording = read_recording(bench.folder / "bag")
+    assert set(np.rint(np.diff(recording.t) * 1e9)) == {INTERVAL_NS}
+    for name in ("rate_table", "sdimu", "calibration"):
+        assert bench.children.stop(name, how) == 0
+
+
+def test_a_node_that_fails_is_reported_in_one_line(bench: Bench) -> None:
+    complaints: list[str] = []
+    bench.start("rate_table", plan="nowhere")
+
+    def failed() -> bool:
+        try:
+            return not bench.children.running()
+        except DataError as error:
+            complaints.append(str(error))
+            return True
+
+    bench.wait(failed, "failure")
+    assert "nowhere" in complaints[0]
+    assert "\n" not in complaints[0]
+
+
+def test_a_run_whose_calibration_dies_ends_with_one_line(tmp_path: Path) -> None:
+    import psutil
+
+    from .conftest import sdimu
+
+    plan = write_plan(tmp_path / "plan.yaml", 60.0)
+    process = sdimu("run", "--plan", plan, "--speed", 5, "--out", tmp_path / "run")
+    parent = psutil.Process(process.pid)
+    deadline = time.monotonic() + 30.0
+    victim = None
+    while victim is None and time.monotonic() < deadline:
+        # The interpreter of the venv may start itself again before it is the node.
+        nodes = [child for child in parent.children(recursive=True) if "calibration_node" in " ".join(child.cmdline())]
+        victim = nodes[0] if nodes else None
+        time.sleep(0.1)
+    assert victim is not None
+    others = parent.children(recursive=True)
+    time.sleep(3.0)
+    victim.kill()
+    _, err = process.communicate(timeout=30.0)
+    assert process.returncode == 1
+    assert len(err.splitlines()) == 1
+    assert "calibration" in err
+    assert not [child for child in others if child.is_running() and child.status() != psutil.STATUS_ZOMBIE]
