@@ -86,7 +86,8 @@ def unobservable(
         direction = _rotation(names, prior, axis)
         if direction is None or np.linalg.norm(space.T @ direction) < _CONTAINED:
             continue
-        found.append(_named(names, direction, scaled, f"rotation of the body frame about {axis}, a matter of definition"))
+        meaning = f"rotation of the body frame about {axis}, a matter of definition"
+        found.append(_named(names, direction, scaled, meaning))
         inside = space.T @ direction
         keep = np.eye(len(inside)) - np.outer(inside, inside) / (inside @ inside)
         space = _orthonormal(space @ keep)

@@ -1,7 +1,7 @@
 """Covariance simulation: what a plan will tell, before it is run.
 
-The filter itself runs on the recording of a perfect IMU (`nominal`), so its covariance is the one that a real test would
-end with, to first order. No noise is drawn and nothing is estimated.
+The filter itself runs on the recording of a perfect IMU (`nominal`), so its covariance is the one that a real test
+would end with, to first order. No noise is drawn and nothing is estimated.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from sdimu_calibration.core import body_frame
 from sdimu_calibration.core.alignment import Alignment
 from sdimu_calibration.core.filter_pass import NAV
-from sdimu_calibration.core.nominal import nominal_recording
 from sdimu_calibration.core.noise_set import NoiseSet, apply
+from sdimu_calibration.core.nominal import nominal_recording
 from sdimu_calibration.core.observability import Combination, unobservable
 from sdimu_calibration.core.passes import Reduced, Setup, first_attitude, one_pass, reduce, set_up
 from sdimu_calibration.core.plan import Plan

@@ -1,0 +1,109 @@
+"""Least squares of a chain: unknowns that meet only their neighbours, and unknowns that meet all.
+
+Orthogonal elimination (Householder QR) link by link: the memory is that of one link, whatever the chain's length.
+
+Source: Bierman, *Factorization Methods for Discrete Sequential Estimation* (1977), ch. V; Björck, *Numerical Methods for
+Least Squares Problems* (1996), section 6.3.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Link:
+    """Rows of one link, whitened: ``own @ y_k + common @ c + residual`` and ``onward`` to the next link.
+
+    Attributes
+    ----------
+    own, common, residual : ndarray, shapes (r, q), (r, p), (r,)
+        Rows of this link alone.
+    step_own, step_next, step_common, step_residual : ndarray, shapes (s, q), (s, q), (s, p), (s,)
+        Rows that tie it to the next link; s = 0 at the last.
+    """
+
+    own: Floats
+    common: Floats
+    residual: Floats
+    step_own: Floats
+    step_next: Floats
+    step_common: Floats
+    step_residual: Floats
+
+
+@dataclass(frozen=True)
+class Solution:
+    """Minimum of the sum of squares.
+
+    Attributes
+    ----------
+    links : ndarray, shape (k, q)
+    common : ndarray, shape (p,)
+    covariance : ndarray, shape (p, p)
+        Of the common unknowns.
+    chi2 : float
+        Sum of squares at the minimum.
+    dof : int
+        Rows minus unknowns.
+    log_det : float
+        Sum of the logarithms of the triangular factor's diagonal.
+    """
+
+    links: Floats
+    common: Floats
+    covariance: Floats
+    chi2: float
+    dof: int
+    log_det: float
+
+
+def solve(links: list[Link]) -> Solution:
+    """Solve the chain; the residuals are those at zero, the answer is the step to take."""
+    q, p = links[0].own.shape[1], links[0].common.shape[1]
+    carry = np.zeros((0, q + p + 1))
+    eliminated: list[Floats] = []
+    chi2, rows, log_det = 0.0, 0, 0.0
+    for k, link in enumerate(links):
+        last = k == len(links) - 1
+        rows += len(link.residual) + len(link.step_residual)
+        here = np.vstack([carry, np.hstack([link.own, link.common, -link.residual[:, None]])])
+        if last:
+            block = here
+        else:
+            block = np.vstack([
+                np.hstack([here[:, :q], np.zeros((len(here), q)), here[:, q:]]),
+                np.hstack([link.step_own, link.step_next, link.step_common, -link.step_residual[:, None]]),
+            ])  # fmt: skip
+        R = np.linalg.qr(block, mode="r")
+        eliminated.append(R[:q])
+        log_det += float(np.sum(np.log(np.abs(np.diag(R[:q, :q])))))
+        # The last row of a factor that has one more row than unknowns is the residual that no unknown can take.
+        width = block.shape[1]
+        carry = R[q : width - 1, q:]
+        if len(R) >= width:
+            chi2 += float(R[width - 1, width - 1] ** 2)
+    R_c = carry[:p, :p]
+    common = np.linalg.solve(R_c, carry[:p, p])
+    log_det += float(np.sum(np.log(np.abs(np.diag(R_c)))))
+    inverse = np.linalg.inv(R_c)
+    return Solution(
+        _substitute(eliminated, common, q), common, inverse @ inverse.T, chi2, rows - q * len(links) - p, log_det
+    )
+
+
+def _substitute(eliminated: list[Floats], common: Floats, q: int) -> Floats:
+    """Go back through the links."""
+    out = np.zeros((len(eliminated), q))
+    following = np.zeros(0)
+    for k in range(len(eliminated) - 1, -1, -1):
+        R = eliminated[k]
+        rhs = R[:, -1] - R[:, q : q + len(following)] @ following - R[:, -1 - len(common) : -1] @ common
+        out[k] = np.linalg.solve(R[:, :q], rhs)
+        following = out[k]
+    return out
