@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.nodes.monitor import Monitor
 from sdimu_calibration.storage.bag_reader import read_recording
 from sdimu_calibration.storage.recover import recover
 from sdimu_calibration.storage.result_file import read_result
@@ -59,13 +60,16 @@ def test_a_killed_recorder_loses_at_most_a_second_and_stalls_nobody(bench: Bench
     bench.speed = 20.0
     for name in NODES:
         bench.start(name)
-    bench.wait(lambda: bench.recorded_bytes() > 100_000, "a third of the data")
-    time.sleep(2.0)
-    before = bench.recorded_bytes()
-    bench.children.kill("recorder")
+    monitor = Monitor()
+    try:
+        bench.wait(lambda: monitor.listen(0.05).table_s > 60.0, "a third of the data")
+        bench.children.kill("recorder")
+        reached_s = monitor.progress.table_s
+    finally:
+        monitor.close()
     killed = time.monotonic()
     bench.wait_for_end()
-    # The rest of the data takes less than 10 s at this speed; the lease comes on top.
+    # The rest of the data takes 6 s at this speed; the lease and the last calibration come on top.
     assert time.monotonic() - killed < 10.0 + LEASE_S + 5.0
     assert read_result(bench.folder).data["samples"] == samples_of(60.0)
     with pytest.raises(DataError, match="recover"):
@@ -73,9 +77,8 @@ def test_a_killed_recorder_loses_at_most_a_second_and_stalls_nobody(bench: Bench
     recover(bench.folder / "bag")
     stamps = imu_stamps(bench.folder / "bag")
     assert set(np.diff(stamps)) == {INTERVAL_NS}
-    # What was in the file two seconds before its end, and a second more at the least.
-    assert before > 100_000
-    assert len(stamps) > 20.0 * RATE_HZ
+    # One second of wall time, and what was on its way: two windows of two seconds of data.
+    assert len(stamps) / RATE_HZ > reached_s - bench.speed * 1.0 - 4.0
 
 
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM])

@@ -69,7 +69,7 @@ class RecorderNode:
     def _record(self, name: str, type_name: str) -> None:
         self._bag.topic(name, type_name)
         take = self._writer(name, type_name)
-        self._listeners.append(Listener(self.node, self._ticker, _message_class(type_name), name, take, raw=True))
+        self._listeners.append(Listener(self.node, self._ticker, message_class(type_name), name, take, raw=True))
 
     def _writer(self, name: str, type_name: str) -> Callable[[bytes], None]:
         """Return the callback of a topic, with everything it needs bound: it runs for every message."""
@@ -100,7 +100,8 @@ class RecorderNode:
         return first.ended and all(c.ended or not self.node.count_publishers(c.topic) for c in others)
 
 
-def _message_class(type_name: str) -> type:
+def message_class(type_name: str) -> type:
+    """Return the class of a type name such as ``sensor_msgs/msg/Imu``; DataError when it is not installed."""
     package, _, rest = type_name.partition("/")
     try:
         module = import_module(f"{package}.msg")
