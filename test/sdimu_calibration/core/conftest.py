@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import settings
 
+from rate_table_sim.core.specification import TableSpecification
 from sdimu_calibration.core.plan import Plan, Turn
 from sdimu_calibration.core.recording import Recording
 from sdimu_calibration.core.rotation import rotation_matrix
@@ -74,9 +75,10 @@ def three_stops() -> Plan:
 
 @pytest.fixture
 def recorded_test(imu: ImuSpecification, site: Site) -> Callable[..., Recording]:
-    """Simulate a plan: ``recorded_test(plan, seed=1, **scenario)``."""
+    """Simulate a plan on a table that turns about any axis: ``recorded_test(plan, seed=1, **scenario)``."""
 
     def make(plan: Plan, **options: object) -> Recording:
-        return generate(Scenario(plan, imu, site, **options))[0]  # type: ignore[arg-type]
+        table = TableSpecification(axes=None)
+        return generate(Scenario(plan, imu, site, table=table, **options))[0]  # type: ignore[arg-type]
 
     return make
