@@ -109,11 +109,14 @@ class CalibrationNode:
         """Decode, process, publish, and grant a credit for what has been taken."""
         count = self._feed.waiting
         reached = self._feed.decode()
-        status, temperature = bool(self.node.count_publishers(STATUS)), bool(self.node.count_publishers(TEMPERATURE))
-        for estimate in self._feed.process(status, temperature):
+        for estimate in self._feed.process(self._published(STATUS), self._published(TEMPERATURE)):
             self._publish(estimate)
         if reached and count:
             self._stream.reached(reached, count)
+
+    def _published(self, topic: str) -> bool:
+        # Counting does not follow remappings by itself.
+        return bool(self.node.count_publishers(self.node.resolve_topic_name(topic)))
 
     def _publish(self, e: EpochEstimate) -> None:
         stamp = self._feed.start_ns + round(e.t * NS)

@@ -104,6 +104,7 @@ class Producer:
         self._sent_ns: int | None = None
         self._end_ns: int | None = None
         self.publisher = node.create_publisher(message_type, topic, qos)
+        topic = node.resolve_topic_name(topic)  # credits go where the data go, remapped or not
         self._end_publisher = node.create_publisher(Header, f"{topic}/end", LATCHED)
         self._credit = node.create_subscription(Header, f"{topic}/credit", self._take_credit, STREAM)
         ticker.every(0.5, self._forget_vanished)
@@ -211,6 +212,7 @@ class Consumer:
         on_end: Callable[[], None] | None = None,
     ) -> None:
         self._name = node.get_fully_qualified_name()
+        topic = node.resolve_topic_name(topic)
         self.topic = topic
         self._every = every
         self._busy = busy
