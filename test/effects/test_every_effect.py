@@ -1,0 +1,294 @@
+"""Every registered effect: what it says of itself, its regressors against a simulated sensor, its way to the filter.
+
+The simulator's sensor is written from exact geometry and from formulas of its own (sdimu_sim.core); only names are
+shared. A wrong sign cannot cancel.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+import sdimu_calibration.core.effects  # noqa: F401  (fills the registry)
+from rate_table_sim.core.specification import TableSpecification
+from sdimu_calibration.core import earth
+from sdimu_calibration.core.effects import registry
+from sdimu_calibration.core.filter_pass import HELD_ALL, NAV, SKIP, PassState, new_output, run_pass
+from sdimu_calibration.core.passes import first_attitude, one_pass, pass_settings, reduce, set_up
+from sdimu_calibration.core.plan import Plan, Turn
+from sdimu_calibration.core.rotation import rotation_vector
+from sdimu_calibration.core.specification import ImuSpecification, Model, Site
+from sdimu_calibration.core.units import parse_unit, to_si
+from sdimu_sim.core.hidden import effect_names, parse_effects
+from sdimu_sim.core.scenario import Scenario, generate
+from sdimu_sim.core.temperature import TemperatureProfile
+from sdimu_sim.core.truth import COEFFICIENTS
+
+GRADES = ("navigation", "tactical", "mems")
+EFFECTS = registry.names()
+SITE = Site(latitude_rad=np.radians(36.4), height_m=80.0)
+IMU = ImuSpecification(
+    "navigation grade",
+    gyro_white_noise=to_si(0.1, "deg/h/sqrt(Hz)"),
+    accel_white_noise=to_si(10, "ug/sqrt(Hz)"),
+    prior={"gyro_bias": to_si(1, "deg/h"), "accel_bias": to_si(100, "ug")},
+)
+TEMPERATURE = TemperatureProfile(rise=80.0, tau_s=600.0)
+
+# A general attitude, then turns of both signs about every axis, slow enough for cycles of a tenth of a second; they
+# last whole seconds, because the core knows rest from motion by epochs of a second.
+PLAN = Plan(
+    "every effect",
+    (12.0, *[4.0] * 6),
+    (
+        Turn("X", 1.2, 0.2), Turn("Z", -0.8, 0.2), Turn("Y", 1.5, 0.25),
+        Turn("X", -1.0, 0.2), Turn("Z", 1.4, 0.2), Turn("Y", -0.8, 0.2),
+    ),
+    0.5,
+)  # fmt: skip
+STEP_AT, TURN = 27.0, 2
+"""Onset of the steps (s), and the turn in which data are lost."""
+
+
+def of(name):
+    """The effect, with what is fixed in it set to values that mean something in a test of two minutes."""
+    effect = registry.get(name)
+    values = {"tau": 40.0, "t0": STEP_AT, "span": 80.0, "turn": TURN, "start": 21.0, "end": 25.5}
+    if effect.with_options is None:
+        return effect
+    return effect.with_options(**{key: values[key] for key in effect.options})
+
+
+def simulated(**truth):
+    scenario = Scenario(
+        PLAN, replace(IMU, gyro_white_noise=0.0, accel_white_noise=0.0), truth.pop("site", SITE),
+        TableSpecification(axes=None),
+        mount_rad=(0.8, -0.5, 1.7), coefficients=truth.pop("coefficients", {}), temperature=TEMPERATURE, **truth,
+    )  # fmt: skip
+    return generate(scenario)[0]
+
+
+class Prepared(NamedTuple):
+    """A perfect sensor's test, reduced once for all effects."""
+
+    recording: object
+    reduced: object
+
+
+@pytest.fixture(scope="module")
+def perfect():
+    recording = simulated()
+    none = Model(("gyro_bias",))
+    return Prepared(recording, reduce(recording, set_up(SITE, IMU, none)))
+
+
+def passed(perfect, effect):
+    """Open-loop pass over the perfect test with this effect alone, linearised at zero."""
+    setup = set_up(SITE, IMU, Model((effect,)))
+    start = first_attitude(perfect.reduced.epochs, perfect.reduced.phases, setup)
+    none = np.zeros(len(setup.sensors.prior))
+    return one_pass(perfect.reduced, setup, start, start.C_nb, none, closed_loop=False, keep=True), setup
+
+
+# -- what an effect says of itself ------------------------------------------------------------------------------------
+
+
+def test_names_of_parameters_are_unique():
+    names = [p.name for effect in EFFECTS for p in registry.get(effect).parameters]
+    assert len(names) == len(set(names))
+    assert len(EFFECTS) >= 7
+
+
+@pytest.mark.parametrize("name", EFFECTS)
+def test_units_are_readable_si_and_the_displayed_one_has_their_dimension(name):
+    for parameter in registry.get(name).parameters:
+        si, shown = parse_unit(parameter.unit), parse_unit(parameter.display_unit)
+        assert si.dimension == shown.dimension, parameter
+        # K and degC, rad, s, m and 1 are their own SI; "per g" stays per g.
+        assert si.factor == 1.0, parameter
+
+
+@pytest.mark.parametrize("name", EFFECTS)
+def test_every_grade_has_a_prior_and_coarser_grades_are_not_better(name):
+    prior = registry.get(name).prior
+    sizes = [prior[grade] for grade in GRADES]
+    assert all(size > 0 for size in sizes)
+    assert sizes == sorted(sizes)
+
+
+@pytest.mark.parametrize("name", EFFECTS)
+def test_every_effect_explains_itself_and_knows_only_registered_lookalikes(name):
+    effect = registry.get(name)
+    assert effect.title
+    assert "=" in effect.equation
+    assert set(effect.confused_with) <= set(EFFECTS)
+    assert name not in effect.confused_with
+
+
+@pytest.mark.parametrize("name", EFFECTS)
+def test_every_parameter_acts_on_some_sensor_and_every_term_has_its_parameter(name):
+    effect = registry.get(name)
+    assert {t.parameter for t in effect.terms} == set(range(len(effect.parameters)))
+    assert {t.channel for t in effect.terms} <= set(range(6))
+
+
+# -- its regressors against the simulated sensor -----------------------------------------------------------------------
+
+
+def hidden_text(parameter, value):
+    """``NAME=VALUE`` of the simulator for an SI value, with what is fixed in the effect."""
+    name = parameter.name
+    factor = parse_unit(parameter.display_unit).factor
+    text = f"{name}={float(value / factor)!r} {parameter.display_unit}"
+    if "_warm_up_" in name:
+        text += "; tau=40 s"
+    if "_bias_step_" in name:
+        text += f"; t0={STEP_AT} s"
+    return text
+
+
+def with_errors(effect, sizes):
+    """Simulate the sensor with sizes (SI) of the parameters of an effect; None when the simulator has no such thing."""
+    names = [p.name for p in effect.parameters]
+    if set(names) <= set(COEFFICIENTS):
+        return simulated(coefficients=dict(zip(names, sizes, strict=True)))
+    if effect.name == "reference_gravity":
+        # What is believed is more than what is true.
+        return simulated(site=replace(SITE, gravity_m_s2=earth.normal_gravity(SITE.latitude_rad, 80.0) - sizes[0]))
+    if effect.name == "gyro_mass_unbalance_ramp":
+        mx, qx, my, qy, mz, qz = (float(v) for v in sizes)
+        terms = (f"{mx!r}*ax + {qx!r}*ay", f"{my!r}*ay + {qy!r}*ax", f"{mz!r}*az + {qz!r}*ay")
+        return simulated(effects=tuple(f"gyro_{axis}=t*({term})" for axis, term in zip("xyz", terms, strict=True)))
+    if effect.name == "lever_arm":
+        return simulated(extras={"lever_arm_m": tuple(sizes)})
+    if effect.name == "accel_triad_delay":
+        return simulated(effects=(f"accel_delay={float(sizes[0] * 1e3)!r} ms",))
+    if effect.name == "gyro_lost_data" or not set(names) <= set(effect_names()):
+        return None
+    texts = tuple(hidden_text(p, v) for p, v in zip(effect.parameters, sizes, strict=True))
+    assert parse_effects(texts)
+    return simulated(effects=texts)
+
+
+NOT_OF_THE_MEAN = {
+    # Derivatives of the motion: a cycle of 0.1 s and its neighbours smooth the ramps of the rate.
+    "gyro_acceleration_sensitivity": 0.2, "gyro_delay": 0.2, "accel_delay": 0.02, "accel_triad_delay": 0.02,
+    "accel_size": 0.2, "lever_arm": 0.2, "gyro_bias_temperature_rate": 0.05, "accel_bias_temperature_rate": 0.05,
+    # Switches: they change inside a cycle, and are softened where noise decides.
+    "gyro_dead_band": 0.1, "gyro_hysteresis": 0.1, "accel_hysteresis": 0.1, "gyro_bias_in_motion": 0.1,
+    "accel_bias_in_motion": 0.1, "accel_bias_asymmetry": 0.05,
+    # Powers and kinks: the mean over a cycle of a ramp is not that of its mean.
+    "gyro_scale_cubic": 0.01, "gyro_scale_quadratic": 0.01, "gyro_scale_asymmetry": 0.01, "gyro_anisoinertia": 0.01,
+    "gyro_misalignment_asymmetry": 0.01,
+}  # fmt: skip
+"""Share of the signal that regressors may miss because they are functions of a cycle's mean motion. For all others the
+second order of the coefficients and of half a cycle, 2e-3. A wrong sign or axis misses 100 %."""
+
+NOT_NEGATIVE = {"gyro_delay", "accel_delay", "accel_triad_delay", "gyro_dead_band"}
+
+
+@pytest.mark.parametrize("name", EFFECTS)
+def test_regressors_are_the_derivative_of_the_simulated_sensor(name, perfect):
+    effect = of(name)
+    rng = np.random.default_rng(len(name))
+    sizes = rng.uniform(0.5, 1.5, len(effect.parameters)) * effect.prior["navigation"]
+    if name not in NOT_NEGATIVE:
+        sizes *= rng.choice([-1.0, 1.0], len(effect.parameters))
+    recording = with_errors(effect, sizes)
+    if recording is None:
+        pytest.skip("the simulator has no sensor of this kind")
+    np.testing.assert_array_equal(recording.t, perfect.recording.t)
+    dt = np.diff(recording.t, prepend=0.0)[:, None]
+    cycles = perfect.reduced.cycles
+    ends = np.searchsorted(recording.t, cycles.t + 1e-6)
+
+    def per_cycle(error):
+        total = np.vstack([np.zeros(3), np.cumsum(error * dt, axis=0)])
+        return np.diff(total[np.concatenate([[0], ends])], axis=0) / cycles.dt[:, None]
+
+    measured = np.hstack(
+        [
+            per_cycle(recording.omega_ib_b - perfect.recording.omega_ib_b),
+            per_cycle(recording.f_ib_b - perfect.recording.f_ib_b),
+        ]
+    )
+    found, setup = passed(perfect, effect)
+    predicted = setup.sensors.errors(found.data.values, sizes)
+    allowed = NOT_OF_THE_MEAN.get(name, 2e-3)
+    for channel in sorted({t.channel for t in effect.terms}):
+        size = np.linalg.norm(measured[:, channel])
+        assert size > 0.0, channel
+        assert np.linalg.norm(predicted[:, channel] - measured[:, channel]) < allowed * size, channel
+    silent = sorted(set(range(6)) - {t.channel for t in effect.terms})
+    assert np.abs(measured[:, silent]).max(initial=0.0) <= 1e-3 * np.abs(measured).max()
+
+
+# -- its way through navigation and filter -----------------------------------------------------------------------------
+
+
+NOTHING = (1e-5, 1e-6, 2e-8)
+"""What nobody can measure in two minutes (m, m/s, rad) of the effect of a coefficient of usual size."""
+NOTHING_MEASURED = (1e-5, 1e-6, 2e-12, 2e-7)
+"""The same of position, velocity, rate (rad/s) and force (m/s^2)."""
+
+
+def run_with(found, settings, kind, coefficients):
+    """Free run with these coefficients in the compensation: measurements z and the last navigation state."""
+    state = PassState(*(v.copy() for v in found.start))
+    state.used[:] = coefficients
+    out = new_output(len(kind), len(coefficients), False, 1)
+    run_pass(found.data._replace(kind=kind), settings, state, out)
+    return out.innovation, state
+
+
+def predicted_chain(found, kind):
+    """Last navigation errors and all z per unit of each deviation, from Phi, G and H; the largest errors on the way."""
+    out = found.output
+    p = out.G.shape[2]
+    N, rows, largest = np.zeros((NAV, p)), [], np.zeros((NAV, p))
+    for e in range(len(kind)):
+        N = out.Phi[e] @ N + out.G[e]
+        largest = np.maximum(largest, np.abs(N))
+        if kind[e] != SKIP:
+            rows.append(out.H[e][:, :NAV] @ N + out.H[e][:, NAV : NAV + p])
+    return N, np.array(rows), largest
+
+
+@pytest.mark.parametrize("name", EFFECTS)
+def test_filter_matrices_are_the_derivative_of_compensation_and_navigation(name, perfect):
+    """Change each coefficient in the compensation, navigate freely, and compare with Phi, G and H."""
+    effect = of(name)
+    found, setup = passed(perfect, effect)
+    settings = pass_settings(setup, closed_loop=False)
+    settings = settings._replace(decay_rate=np.zeros_like(settings.decay_rate), drive=np.zeros_like(settings.drive))
+    kind = np.where(perfect.reduced.phases.used, HELD_ALL, SKIP).astype(np.int64)
+    free = replace(found, output=new_output(len(kind), len(setup.sensors.prior), True, 1))
+    state = PassState(*(v.copy() for v in found.start))
+    run_pass(found.data._replace(kind=kind), settings, state, free.output)
+    N, Z, largest = predicted_chain(free, kind)
+    measured = kind != SKIP
+    r_n, r_e, cos = 6.36e6, 6.38e6, np.cos(SITE.latitude_rad)
+    for j in range(len(setup.sensors.prior)):
+        step = np.zeros(len(setup.sensors.prior))
+        step[j] = effect.prior["navigation"]
+        (z_up, up), (z_down, down) = (run_with(found, settings, kind, s * step) for s in (1.0, -1.0))
+        # A coefficient put into the compensation is taken out of the sensor: the deviation goes the other way.
+        dz = -(z_up - z_down)[measured] / (2 * step[j])
+        moved = down.position - up.position
+        nav = np.concatenate(
+            [
+                moved * [r_n, r_e * cos, -1.0],
+                down.velocity - up.velocity,
+                -rotation_vector(down.C_nb @ up.C_nb.T),
+            ]
+        ) / (2 * step[j])
+        for k, rows in enumerate((slice(0, 3), slice(3, 6), slice(6, 9))):
+            atol = 5e-3 * largest[rows, j].max() + NOTHING[k] / step[j]
+            np.testing.assert_allclose(nav[rows], N[rows, j], rtol=0, atol=atol, err_msg=f"{rows}")
+        for k, rows in enumerate((slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 12))):
+            atol = 5e-3 * np.abs(Z[:, rows, j]).max() + NOTHING_MEASURED[k] / step[j]
+            np.testing.assert_allclose(dz[:, rows], Z[:, rows, j], rtol=0, atol=atol, err_msg=f"{rows}")
+        assert np.abs(Z[:, :, j]).max() > 0.0
