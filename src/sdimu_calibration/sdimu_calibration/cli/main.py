@@ -24,6 +24,7 @@ ENTRY_POINTS = "sdimu_calibration.verbs"
 _VERBS = {
     "calibrate": "sdimu_calibration.cli.calibrate:calibrate",
     "effects": "sdimu_calibration.cli.effects:effects",
+    "predict": "sdimu_calibration.cli.predict:predict",
     "replay": "sdimu_calibration.cli.replay:replay",
     "bag": "sdimu_calibration.cli.bag:app",
 }

@@ -4,7 +4,7 @@ While the table rests, the attitude is one unknown rotation and the means of the
 rests the IMU integrates a rotation, a velocity and a position, which must lead from one rest to the next. So
 the unknowns are
 
-    attitude of every stop (3), the velocity and position that the stop really has (3 + 3, nearly zero), coefficients (p)
+    attitude of every stop (3), velocity and position that the stop really has (3 + 3, nearly zero), coefficients (p)
 
 and the equations, all whitened,
 
@@ -13,8 +13,8 @@ and the equations, all whitened,
     (attitude, velocity, position) after a motion - those integrated through it = 9 x 9 noise of the motion
     velocity and position of a stop = 0 +- the model's sigmas; priors of coefficients and initial attitude.
 
-The noise of each rotation is thereby estimated with the rest. Nothing is linear in time here: no Kalman filter, no error
-dynamics, no shared noise to model. Gauss-Newton until the coefficients stand still.
+The noise of each rotation is thereby estimated with the rest. Nothing goes step by step here: no Kalman filter, no
+error dynamics, no shared noise to model. Gauss-Newton until the coefficients stand still.
 
 Shared with the filter: geometry (rotation, Earth, strapdown integration) and the regressors of the effects.
 """
@@ -174,7 +174,8 @@ def fit(reduced: Reduced, setup: Setup, start: Alignment, progress: Progress | N
                 point.coefficients, covariance, point.C_nb, solution.chi2, solution.dof, float(evidence), steps
             )
     raise DataError(
-        "batch least squares does not converge: the recording contradicts the IMU's specification; check --imu and --site"
+        "batch least squares does not converge: the recording contradicts the IMU's specification; "
+        "check --imu and --site"
     )
 
 
@@ -270,7 +271,7 @@ def _rest_residual(setup: Setup, mean: Floats, C_nb: Floats) -> tuple[Floats, Fl
 
 
 def _still(setup: Setup, velocity: Floats, position: Floats, p: int) -> tuple[Floats, Floats, Floats]:
-    """A stop stands still at the known point."""
+    """Say that a stop stands still at the known point."""
     sigma = np.repeat([setup.model.velocity_sigma, setup.model.position_sigma], 3)
     own = np.zeros((6, _PER_STOP))
     own[:, 3:] = np.diag(1.0 / sigma)
@@ -278,7 +279,7 @@ def _still(setup: Setup, velocity: Floats, position: Floats, p: int) -> tuple[Fl
 
 
 def _initial(start: Alignment, C_nb: Floats, p: int) -> tuple[Floats, Floats, Floats]:
-    """The first attitude is the alignment's within its sigma."""
+    """Say that the first attitude is the alignment's within its sigma."""
     own = np.zeros((3, _PER_STOP))
     own[:, :3] = np.diag(1.0 / start.filter_sigma)
     return own, np.zeros((3, p)), rotation_vector(C_nb @ start.C_nb.T) / start.filter_sigma

@@ -2,8 +2,8 @@
 
 Orthogonal elimination (Householder QR) link by link: the memory is that of one link, whatever the chain's length.
 
-Source: Bierman, *Factorization Methods for Discrete Sequential Estimation* (1977), ch. V; Björck, *Numerical Methods for
-Least Squares Problems* (1996), section 6.3.
+Source: Bierman, *Factorization Methods for Discrete Sequential Estimation* (1977), ch. V; Björck, *Numerical Methods
+for Least Squares Problems* (1996), section 6.3.
 """
 
 from __future__ import annotations

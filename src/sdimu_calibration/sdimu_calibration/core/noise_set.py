@@ -29,6 +29,8 @@ class NoiseSet:
         Whether process and measurement noise are modelled as the same samples' noise.
     level_sigma, azimuth_sigma : float
         Initial attitude (rad).
+    reference : str
+        Name of the published results that it was made to reproduce; empty for none.
     """
 
     name: str
@@ -42,6 +44,7 @@ class NoiseSet:
     shared_noise: bool
     level_sigma: float
     azimuth_sigma: float
+    reference: str = ""
 
 
 def apply(noise: NoiseSet, imu: ImuSpecification, model: Model) -> tuple[ImuSpecification, Model]:

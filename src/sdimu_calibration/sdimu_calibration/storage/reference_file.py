@@ -44,14 +44,31 @@ def read_reference(name_or_path: str | Path = "table33", mount: str = "1 deg") -
         When the file or the column is not there.
     """
     path = find_config("reference", name_or_path)
-    content = read_mapping(path)
-    columns = content.get("mount")
-    if content.get("format") != _REFERENCE_FORMAT or not isinstance(columns, Mapping):
-        raise DataError(f"{path}: not a {_REFERENCE_FORMAT} file")
+    columns = _columns(path)
     if mount not in columns:
         raise DataError(f"{path}: no column '{mount}' (there are {', '.join(map(str, columns))})")
     column = columns[mount]
     return {name: parse_quantity(column[name], unit) for name, unit in _EXPECTED.items() if name in column}
+
+
+def read_columns(name_or_path: str | Path) -> tuple[str, ...]:
+    """Read the names of the columns of a published table.
+
+    Raises
+    ------
+    DataError
+        When it is no such file.
+    """
+    path = find_config("reference", name_or_path)
+    return tuple(map(str, _columns(path)))
+
+
+def _columns(path: Path) -> Mapping[str, Any]:
+    content = read_mapping(path)
+    columns = content.get("mount")
+    if content.get("format") != _REFERENCE_FORMAT or not isinstance(columns, Mapping):
+        raise DataError(f"{path}: not a {_REFERENCE_FORMAT} file")
+    return columns
 
 
 def read_truth(path: Path, body_frame: str) -> dict[str, float]:

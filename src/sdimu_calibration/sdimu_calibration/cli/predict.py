@@ -1,0 +1,103 @@
+"""`sdimu predict`: what a plan will tell, before it is run."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from sdimu_calibration.core.recording import DataError
+
+if TYPE_CHECKING:
+    from sdimu_calibration.core.noise_set import NoiseSet
+    from sdimu_calibration.core.plan import Plan
+    from sdimu_calibration.core.predict import Prediction
+    from sdimu_calibration.core.specification import ImuSpecification, Model, Site
+
+_MOUNT = "Rotation of the IMU on the table: degrees about every axis, or 'X,Y,Z'."
+_NOISE = "Noise that the filter is told: name in config/noise (paper) or path; by default the IMU's own."
+
+
+def predict(
+    plan: Annotated[str, typer.Option(help="Test plan: name in config/plan or path.")] = "kim18",
+    imu: Annotated[str, typer.Option(help="Specification of the IMU: name in config/imu or path.")] = "dtg",
+    site: Annotated[str, typer.Option(help="Where the test will be: name in config/site or path.")] = "daejeon",
+    model: Annotated[str, typer.Option(help="Model to estimate: name in config/model or path.")] = "baseline",
+    mount: Annotated[str | None, typer.Option(metavar="DEG", help=_MOUNT)] = None,
+    noise: Annotated[str | None, typer.Option(help=_NOISE)] = None,
+    out: Annotated[Path, typer.Option(help="Folder of the results.")] = Path("out/predict"),
+) -> None:
+    """Simulate the covariance of a test; leaves prediction.json and prediction.html."""
+    from rich.console import Console
+
+    from sdimu_calibration.core.batch import bound_covariance
+    from sdimu_calibration.core.predict import predict as simulate
+    from sdimu_calibration.report.prediction import coefficient_table, published_table, write_page
+    from sdimu_calibration.storage.config import load_imu, load_model, load_plan, load_site
+    from sdimu_calibration.storage.noise_file import load_noise
+    from sdimu_calibration.storage.prediction_file import write_prediction
+
+    console = Console()
+    what = load_plan(plan), load_site(site), load_imu(imu), load_model(model)
+    told = None if noise is None else load_noise(noise)
+    printed = _published(told)
+    at = mount or (next(iter(printed)).removesuffix(" deg") if printed else "0")
+    prediction = simulate(*what, mount_rad=_radians(at), noise=told, bound=bound_covariance)
+    about: dict[str, Any] = {"plan": what[0].name, "imu": what[2].name, "site": site, "mount_deg": at}
+    about["noise"] = told.name if told else "the IMU's own"
+    published = None
+    if told is not None and printed:
+        rows = _beside(what, told, printed, prediction)
+        published = tuple(printed), rows
+        console.print(published_table(rows, tuple(printed), f"{told.reference}: here (printed), by mount"))
+    console.print(coefficient_table(prediction))
+    for found in prediction.unobservable:
+        console.print(f"not observable: {found.text}", soft_wrap=True, markup=False, highlight=False)
+    write_prediction(out / "prediction.json", prediction, about)
+    write_page(out / "prediction.html", prediction, about, published)
+    console.print(f"results in {out}", soft_wrap=True)
+
+
+def _published(noise: NoiseSet | None) -> dict[str, dict[str, float]]:
+    """Columns of the published table that a noise set reproduces; none without."""
+    from sdimu_calibration.storage.reference_file import read_columns, read_reference
+
+    if noise is None or not noise.reference:
+        return {}
+    return {column: read_reference(noise.reference, column) for column in read_columns(noise.reference)}
+
+
+def _beside(
+    what: tuple[Plan, Site, ImuSpecification, Model],
+    noise: NoiseSet,
+    printed: Mapping[str, Mapping[str, float]],
+    prediction: Prediction,
+) -> list[tuple[str, ...]]:
+    """Rows of the published table beside our own numbers."""
+    from sdimu_calibration.core.predict import largest_by_effect
+    from sdimu_calibration.core.predict import predict as simulate
+    from sdimu_calibration.report.prediction import display_units, published_rows
+
+    found = {
+        column: largest_by_effect(simulate(*what, mount_rad=_radians(column.removesuffix(" deg")), noise=noise))
+        for column in printed
+    }
+    listed = set.intersection(*(set(values) for values in printed.values()))
+    units = {effect: unit for effect, unit in display_units(prediction).items() if effect in listed}
+    return published_rows(found, printed, units)
+
+
+def _radians(text: str) -> Any:
+    """Read ``"2"`` or ``"1,2,3"`` (deg) as a rotation vector (rad), shape (3,)."""
+    import numpy as np
+
+    try:
+        values = [math.radians(float(part)) for part in text.split(",")]
+    except ValueError:
+        values = []
+    if len(values) not in (1, 3) or not all(map(math.isfinite, values)):
+        raise DataError(f"--mount '{text}': expected an angle in degrees, or three such as '1,2,3'")
+    return np.array(values * 3 if len(values) == 1 else values)

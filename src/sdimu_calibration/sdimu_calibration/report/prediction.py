@@ -1,0 +1,180 @@
+"""Tables and the page of a covariance simulation."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from html import escape
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.box import SIMPLE
+from rich.table import Table
+
+from sdimu_calibration.core.predict import Prediction
+from sdimu_calibration.core.results import Calibration, History
+from sdimu_calibration.core.units import from_si
+from sdimu_calibration.report.figures import sigma_history
+from sdimu_calibration.report.groups import effect_of, groups
+from sdimu_calibration.report.page import _STYLE
+
+_DEFINED = 1e-6
+"""A sigma below this share of the prior is rounding: the body frame makes the coefficient zero."""
+
+
+def coefficient_rows(prediction: Prediction) -> list[tuple[str, ...]]:
+    """Name, prior, sigma, bound, sigma over bound and unit of every coefficient, as text."""
+    rows = []
+    for k, name in enumerate(prediction.names):
+        unit = prediction.display_units[k]
+        sigma, bound = prediction.sigma[k], prediction.bound[k]
+        defined = sigma < _DEFINED * prediction.prior[k]
+        over = "" if defined or not np.isfinite(bound) else f"{sigma / bound:.2f}"
+        rows.append((
+            name, _short(from_si(prediction.prior[k], unit)),
+            "0" if defined else _short(from_si(sigma, unit)),
+            "0" if defined else _short(from_si(bound, unit)), over, unit,
+        ))  # fmt: skip
+    return rows
+
+
+COLUMNS = ("coefficient", "prior", "sigma", "bound", "sigma / bound", "unit")
+
+
+def coefficient_table(prediction: Prediction) -> Table:
+    """Table of every coefficient for the terminal."""
+    table = Table(*COLUMNS, pad_edge=False, title=f"body frame: {prediction.body_frame}")
+    for column in table.columns[1:5]:
+        column.justify = "right"
+    effects = [effect_of(name, prediction.model) for name in prediction.names]
+    for k, row in enumerate(coefficient_rows(prediction)):
+        table.add_row(*row, end_section=k + 1 < len(effects) and effects[k + 1] != effects[k])
+    return table
+
+
+def published_rows(
+    found: Mapping[str, Mapping[str, float]], printed: Mapping[str, Mapping[str, float]], units: Mapping[str, str]
+) -> list[tuple[str, ...]]:
+    """One row an effect: for every column "here (printed)", then the largest deviation in percent, then the unit.
+
+    Parameters
+    ----------
+    found, printed : mapping of column to mapping of effect to float
+        Largest sigma of the axes (SI).
+    units : mapping of str to str
+        Display unit by effect.
+    """
+    rows = []
+    for effect, unit in units.items():
+        cells, worst = [], 0.0
+        for column, values in printed.items():
+            here, there = found[column][effect], values[effect]
+            worst = max(worst, abs(here / there - 1.0), key=abs)
+            cells.append(f"{_short(from_si(here, unit))} ({_short(from_si(there, unit))})")
+        rows.append((effect, *cells, f"{100.0 * worst:.0f} %", unit))
+    return rows
+
+
+def published_table(rows: Sequence[Sequence[str]], columns: Sequence[str], title: str) -> Table:
+    """Table beside published values for the terminal."""
+    table = Table("largest of the axes", *columns, "off by", "unit", pad_edge=False, title=title, box=SIMPLE)
+    for column in table.columns[1:]:
+        column.justify, column.no_wrap = "right", True
+    for row in rows:
+        table.add_row(*row)
+    return table
+
+
+def write_page(
+    path: Path,
+    prediction: Prediction,
+    about: Mapping[str, Any],
+    published: tuple[Sequence[str], Sequence[Sequence[str]]] | None = None,
+) -> None:
+    """Write prediction.html: one file that needs no network.
+
+    Parameters
+    ----------
+    path : Path
+    prediction : Prediction
+    about : mapping
+        Of what: shown in the heading.
+    published : (columns, rows), optional
+        Table beside published values.
+    """
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    temporary = path.with_name(f".{path.name}.part")
+    temporary.write_text(page(prediction, about, published), encoding="utf-8")
+    temporary.replace(path)
+
+
+def page(
+    prediction: Prediction,
+    about: Mapping[str, Any],
+    published: tuple[Sequence[str], Sequence[Sequence[str]]] | None = None,
+) -> str:
+    """Make the page as HTML text; parameters as in `write_page`."""
+    heading = escape(f"Prediction of plan {about.get('plan', '')}")
+    words = [f"{key.replace('_', ' ')}: {value}" for key, value in about.items() if key != "plan"]
+    words.append(f"{prediction.duration_s / 60.0:.1f} min")
+    parts = [f"<h1>{heading}</h1>", f'<p class="quiet">{escape(" · ".join(words))}</p>']
+    if published is not None:
+        columns, rows = published
+        parts += [
+            "<h2>Beside the published values</h2>",
+            _html_table(("largest of the axes", *columns, "off by", "unit"), rows),
+            '<p class="quiet">In brackets: as printed.</p>',
+        ]
+    figure = sigma_history(as_history(prediction)).to_html(
+        full_html=False, include_plotlyjs=True, config={"responsive": True}
+    )
+    parts += ["<h2>Sigma of every coefficient against time</h2>", '<p class="quiet">Grey: the table turns.</p>', figure]
+    parts += ["<h2>At the end</h2>", _html_table(COLUMNS, coefficient_rows(prediction))]
+    parts += ["<h2>Not observable</h2>", _unobservable(prediction)]
+    return (
+        f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><title>{heading}</title>'
+        f"<style>{_STYLE}</style></head><body>\n" + "\n".join(parts) + "\n</body></html>\n"
+    )
+
+
+def as_history(prediction: Prediction) -> Calibration:
+    """Put a prediction into the shape that the figures draw: sigmas without values."""
+    m, p = prediction.history.shape
+    none = np.zeros((m, p))
+    stop = np.zeros(m, dtype=np.int64)
+    history = History(
+        prediction.t, none, prediction.history, prediction.attitude, stop, prediction.dwell, prediction.dwell,
+        np.zeros((m, 4)),
+    )  # fmt: skip
+    return Calibration(
+        prediction.body_frame, prediction.model, prediction.names, prediction.units, prediction.display_units,
+        np.zeros(p), prediction.covariance, {}, {}, (), history,
+    )  # fmt: skip
+
+
+def display_units(prediction: Prediction) -> dict[str, str]:
+    """Display unit of each effect."""
+    return {
+        effect: prediction.display_units[rows[0]] for effect, rows in groups(prediction.names, prediction.model).items()
+    }
+
+
+def _unobservable(prediction: Prediction) -> str:
+    if not prediction.unobservable:
+        return "<p>Everything is seen better than the prior knew it.</p>"
+    items = (f"<li>{escape(c.text)} ({100.0 * c.left:.0f} % of the prior variance is left)</li>"
+             for c in prediction.unobservable)  # fmt: skip
+    return f"<ul>{''.join(items)}</ul>"
+
+
+def _html_table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    text = {0, len(columns) - 1}
+    cell = lambda tag, k, word: f'<{tag}{" class=text" if k in text else ""}>{escape(word)}</{tag}>'  # noqa: E731
+    head = "".join(cell("th", k, word) for k, word in enumerate(columns))
+    body = "".join("<tr>" + "".join(cell("td", k, word) for k, word in enumerate(row)) + "</tr>" for row in rows)
+    return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
+
+
+def _short(value: float) -> str:
+    return f"{value:.3g}" if np.isfinite(value) else ""
