@@ -32,6 +32,7 @@ from sdimu_calibration.core import earth
 from sdimu_calibration.core.compiled import compiled
 from sdimu_calibration.core.ins_errors import navigation_error_matrix, process_noise, transition
 from sdimu_calibration.core.kalman import cholesky, propagate, update, whiten
+from sdimu_calibration.core.matrix3 import applied, elements
 from sdimu_calibration.core.rotation import orthonormal, rotation_matrix, skew
 from sdimu_calibration.core.strapdown import navigate_cycle, velocity_increment
 
@@ -160,6 +161,7 @@ def _navigate_epoch(
     phi = np.empty(3)
     alpha = np.empty(3)
     upsilon = np.empty(3)
+    f_n = np.empty(3)
     C_mid = np.empty((3, 3))
     G[:, :] = 0.0
     D[:, :] = 0.0
@@ -182,11 +184,13 @@ def _navigate_epoch(
         dv = velocity_increment(alpha, upsilon, data.sculling[c])
         # Not the mean attitude times the mean force: that leans off the vertical in a turn, and a filter
         # that sees it takes it for knowledge of azimuth.
-        f_n = state.C_nb @ dv / dt
+        f_n[0], f_n[1], f_n[2] = applied(elements(state.C_nb), dv[0] / dt, dv[1] / dt, dv[2] / dt)
         for i in range(3):
             sums[6 + i] += f_n[i] * dt
         navigate_cycle(state.C_nb, state.velocity, state.position, phi, dv, dt, gravity)
-        C_mid[:, :] = 0.5 * (C_mid + state.C_nb)
+        for i in range(3):
+            for j in range(3):
+                C_mid[i, j] = 0.5 * (C_mid[i, j] + state.C_nb[i, j])
         att[:, :] = 0.0
         vel[:, :] = 0.0
         for j in range(data.channel.shape[0]):

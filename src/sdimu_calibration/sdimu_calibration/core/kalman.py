@@ -5,8 +5,9 @@ Knows no navigation. The measurement noise may be correlated with the process no
 
 Source: the joint covariance of prediction error and measurement noise is [[P, M], [M', R]]; with gain K the error after
 the update is [I - KH, -K] times it, for every K (Jazwinski, *Stochastic Processes and Filtering Theory*,
-section 7.3; Simon, *Optimal State Estimation*, section 7.1). That product is Joseph's form and stays
-symmetric and positive whatever rounding does to K.
+section 7.3; Simon, *Optimal State Estimation*, section 7.1). That product, multiplied out with ``B = H P + M'`` and
+the innovation's covariance S, is ``P - K B - B' K' + K S K'``: as Joseph's form it is right for every K, so that
+rounding in K counts only squared, and as ``P - K F - F' K'`` with ``F = B - S K' / 2`` it is symmetric to the digit.
 """
 
 from __future__ import annotations
@@ -20,9 +21,20 @@ Floats = NDArray[np.float64]
 
 
 @compiled
-def propagate(
-    x: Floats, P: Floats, Phi: Floats, G: Floats, Q: Floats, decay: Floats, drive: Floats
-) -> None:
+def sparse_product(A: Floats, B: Floats) -> Floats:
+    """Product ``A @ B`` that skips the zeros of A; shapes (m, n) and (n, q)."""
+    out = np.zeros((A.shape[0], B.shape[1]))
+    for i in range(A.shape[0]):
+        for k in range(A.shape[1]):
+            a = A[i, k]
+            if a != 0.0:
+                for j in range(B.shape[1]):
+                    out[i, j] += a * B[k, j]
+    return out
+
+
+@compiled
+def propagate(x: Floats, P: Floats, Phi: Floats, G: Floats, Q: Floats, decay: Floats, drive: Floats) -> None:
     """Propagate mean and covariance over an interval, in place.
 
     Parameters
@@ -85,11 +97,14 @@ def cholesky(S: Floats) -> Floats:
 @compiled
 def whiten(L: Floats, B: Floats) -> Floats:
     """Solve ``L X = B`` for lower triangular L; `B` shape (m, q)."""
+    # Element by element: a row operation on arrays would allocate for every pair of rows.
     X = B.copy()
     for i in range(L.shape[0]):
         for m in range(i):
-            X[i] -= L[i, m] * X[m]
-        X[i] /= L[i, i]
+            for j in range(X.shape[1]):
+                X[i, j] -= L[i, m] * X[m, j]
+        for j in range(X.shape[1]):
+            X[i, j] /= L[i, i]
     return X
 
 
@@ -117,28 +132,42 @@ def update(x: Floats, P: Floats, z: Floats, H: Floats, R: Floats, M: Floats) -> 
     K : ndarray, shape (n, m)
         Gain.
     """
-    HP = H @ P
-    HM = H @ M
-    S = HP @ H.T + HM + HM.T + R
+    m, n = H.shape
+    B = sparse_product(H, P)
+    HM = sparse_product(H, M)
+    S = R + HM + HM.T
+    for i in range(m):
+        for k in range(n):
+            h = H[i, k]
+            if h != 0.0:
+                for j in range(m):
+                    S[j, i] += B[j, k] * h
+    for i in range(m):
+        for j in range(n):
+            B[i, j] += M[j, i]
     L = cholesky(S)
-    Y = whiten(L, HP + M.T)
-    # K' = S^-1 (HP + M') by back substitution of L' on the whitened rows.
-    m = L.shape[0]
-    Kt = Y.copy()
+    Kt = whiten(L, B)
+    # K' = S^-1 B by back substitution of L' on the whitened rows.
     for i in range(m - 1, -1, -1):
         for j in range(i + 1, m):
-            Kt[i] -= L[j, i] * Kt[j]
-        Kt[i] /= L[i, i]
-    K = np.ascontiguousarray(Kt.T)
-    innovation = z - H @ x
-    x += K @ innovation
-    A_P = P - K @ HP
-    A_M = M - K @ HM
-    P[:, :] = A_P - (A_P @ H.T + A_M - K @ R) @ Kt - K @ A_M.T
-    n = x.shape[0]
+            for k in range(n):
+                Kt[i, k] -= L[j, i] * Kt[j, k]
+        for k in range(n):
+            Kt[i, k] /= L[i, i]
+    innovation = z.copy()
+    for i in range(m):
+        for k in range(n):
+            innovation[i] -= H[i, k] * x[k]
+    for i in range(m):
+        for k in range(n):
+            x[k] += Kt[i, k] * innovation[i]
+    F = B - 0.5 * sparse_product(S, Kt)
+    for i in range(n):
+        for r in range(m):
+            a, b = Kt[r, i], F[r, i]
+            for j in range(i + 1):
+                P[i, j] -= a * F[r, j] + b * Kt[r, j]
     for i in range(n):
         for j in range(i):
-            mean = 0.5 * (P[i, j] + P[j, i])
-            P[i, j] = mean
-            P[j, i] = mean
-    return innovation, L, K
+            P[j, i] = P[i, j]
+    return innovation, L, np.ascontiguousarray(Kt.T)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sdimu_calibration.core.compiled import compiled
+from sdimu_calibration.core.matrix3 import elements, orthonormal3, rotation3, store
 
 Floats = NDArray[np.float64]
 
@@ -48,20 +49,8 @@ def rotation_matrix(phi: Floats) -> Floats:
     ndarray, shape (3, 3)
         ``I + sin(a)/a [phi x] + (1 - cos(a))/a^2 [phi x]^2``.
     """
-    a2 = phi[0] ** 2 + phi[1] ** 2 + phi[2] ** 2
-    if a2 < 1e-8:
-        s, c = 1.0 - a2 / 6.0, 0.5 - a2 / 24.0
-    else:
-        a = np.sqrt(a2)
-        s, c = np.sin(a) / a, (1.0 - np.cos(a)) / a2
     m = np.empty((3, 3))
-    x, y, z = phi[0], phi[1], phi[2]
-    m[0, 0] = 1.0 - c * (y * y + z * z)
-    m[1, 1] = 1.0 - c * (x * x + z * z)
-    m[2, 2] = 1.0 - c * (x * x + y * y)
-    m[0, 1], m[1, 0] = c * x * y - s * z, c * x * y + s * z
-    m[0, 2], m[2, 0] = c * x * z + s * y, c * x * z - s * y
-    m[1, 2], m[2, 1] = c * y * z - s * x, c * y * z + s * x
+    store(rotation3(phi[0], phi[1], phi[2]), m)
     return m
 
 
@@ -104,7 +93,9 @@ def rotation_vector(C: Floats) -> Floats:
 @compiled
 def orthonormal(C: Floats) -> Floats:
     """Give the nearest rotation matrix to one that rounding has bent a little (one Newton step)."""
-    return 1.5 * C - 0.5 * C @ C.T @ C
+    out = np.empty((3, 3))
+    store(orthonormal3(elements(C)), out)
+    return out
 
 
 @compiled

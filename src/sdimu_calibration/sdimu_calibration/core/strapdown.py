@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from sdimu_calibration.core import earth
 from sdimu_calibration.core.compiled import compiled
-from sdimu_calibration.core.rotation import orthonormal, rotation_matrix
+from sdimu_calibration.core.matrix3 import applied, elements, multiplied, orthonormal3, rotation3, store
 
 Floats = NDArray[np.float64]
 
@@ -206,18 +206,19 @@ def navigate_cycle(
     r_e += position[2]
     t_n, t_e, t_d = velocity[1] / r_e, -velocity[0] / r_n, -velocity[1] * np.tan(lat_c) / r_e
     # Turn of NED against inertial space in this cycle, and half of it for the mid-cycle attitude.
-    z = np.empty(3)
-    z[0], z[1], z[2] = -(w_n + t_n) * dt, -t_e * dt, -(w_d + t_d) * dt
-    u = C_nb @ dv
-    old = velocity.copy()
+    z0, z1, z2 = -(w_n + t_n) * dt, -t_e * dt, -(w_d + t_d) * dt
+    C = elements(C_nb)
+    u0, u1, u2 = applied(C, dv[0], dv[1], dv[2])
+    v0, v1, v2 = velocity[0], velocity[1], velocity[2]
     c_n, c_e, c_d = 2.0 * w_n + t_n, t_e, 2.0 * w_d + t_d
-    velocity[0] += u[0] + 0.5 * (z[1] * u[2] - z[2] * u[1]) - (c_e * old[2] - c_d * old[1]) * dt
-    velocity[1] += u[1] + 0.5 * (z[2] * u[0] - z[0] * u[2]) - (c_d * old[0] - c_n * old[2]) * dt
-    velocity[2] += u[2] + 0.5 * (z[0] * u[1] - z[1] * u[0]) - (c_n * old[1] - c_e * old[0]) * dt + gravity * dt
-    position[0] += 0.5 * (old[0] + velocity[0]) * dt / r_n
-    position[1] += 0.5 * (old[1] + velocity[1]) * dt / (r_e * np.cos(lat_c))
-    position[2] -= 0.5 * (old[2] + velocity[2]) * dt
-    C_nb[:, :] = orthonormal(rotation_matrix(z) @ C_nb @ rotation_matrix(phi))
+    velocity[0] += u0 + 0.5 * (z1 * u2 - z2 * u1) - (c_e * v2 - c_d * v1) * dt
+    velocity[1] += u1 + 0.5 * (z2 * u0 - z0 * u2) - (c_d * v0 - c_n * v2) * dt
+    velocity[2] += u2 + 0.5 * (z0 * u1 - z1 * u0) - (c_n * v1 - c_e * v0) * dt + gravity * dt
+    position[0] += 0.5 * (v0 + velocity[0]) * dt / r_n
+    position[1] += 0.5 * (v1 + velocity[1]) * dt / (r_e * np.cos(lat_c))
+    position[2] -= 0.5 * (v2 + velocity[2]) * dt
+    turned = multiplied(multiplied(rotation3(z0, z1, z2), C), rotation3(phi[0], phi[1], phi[2]))
+    store(orthonormal3(turned), C_nb)
 
 
 @compiled

@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 from sdimu_calibration.core import earth
 from sdimu_calibration.core.compiled import compiled
 from sdimu_calibration.core.imu_model import ImuModel
+from sdimu_calibration.core.matrix3 import elements, multiplied, orthonormal3, rotation3, store
 from sdimu_calibration.core.motion import Motion
 from sdimu_calibration.core.recording import TemperatureLog
-from sdimu_calibration.core.rotation import orthonormal, rotation_matrix
 from sdimu_calibration.core.strapdown import Cycles
 
 Floats = NDArray[np.float64]
@@ -30,12 +30,17 @@ def _attitudes(C_nb: Floats, alpha: Floats, coning: Floats, dt: Floats, latitude
     """Attitude at the middle of each cycle, (n, 3, 3); `C_nb` is moved to the end, in place."""
     out = np.empty((dt.shape[0], 3, 3))
     w_ie = earth.earth_rate(latitude)
+    C = elements(C_nb)
     for k in range(dt.shape[0]):
-        phi = alpha[k] + coning[k]
-        turn = rotation_matrix(-0.5 * dt[k] * w_ie)
-        half = rotation_matrix(0.5 * phi)
-        out[k] = turn @ C_nb @ half
-        C_nb[:, :] = orthonormal(turn @ out[k] @ half)
+        h = -0.5 * dt[k]
+        turn = rotation3(h * w_ie[0], h * w_ie[1], h * w_ie[2])
+        half = rotation3(
+            0.5 * (alpha[k, 0] + coning[k, 0]), 0.5 * (alpha[k, 1] + coning[k, 1]), 0.5 * (alpha[k, 2] + coning[k, 2])
+        )
+        middle = multiplied(multiplied(turn, C), half)
+        store(middle, out[k])
+        C = orthonormal3(multiplied(multiplied(turn, middle), half))
+    store(C, C_nb)
     return out
 
 

@@ -1,0 +1,80 @@
+"""3x3 matrices as nine numbers, row by row: what loops over cycles use, because it allocates nothing.
+
+A call of BLAS for a 3x3 product costs more than the product.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sdimu_calibration.core.compiled import compiled
+
+Floats = NDArray[np.float64]
+Matrix3 = tuple[float, float, float, float, float, float, float, float, float]
+
+
+@compiled
+def rotation3(x: float, y: float, z: float) -> Matrix3:
+    """Rotation matrix of a rotation vector (rad) by Rodrigues' formula, exact for every angle."""
+    a2 = x * x + y * y + z * z
+    if a2 < 1e-8:
+        s, c = 1.0 - a2 / 6.0, 0.5 - a2 / 24.0
+    else:
+        a = np.sqrt(a2)
+        s, c = np.sin(a) / a, (1.0 - np.cos(a)) / a2
+    return (
+        1.0 - c * (y * y + z * z), c * x * y - s * z, c * x * z + s * y,
+        c * x * y + s * z, 1.0 - c * (x * x + z * z), c * y * z - s * x,
+        c * x * z - s * y, c * y * z + s * x, 1.0 - c * (x * x + y * y),
+    )  # fmt: skip
+
+
+@compiled
+def elements(C: Floats) -> Matrix3:
+    """Take the elements of an array of shape (3, 3)."""
+    return C[0, 0], C[0, 1], C[0, 2], C[1, 0], C[1, 1], C[1, 2], C[2, 0], C[2, 1], C[2, 2]
+
+
+@compiled
+def store(m: Matrix3, out: Floats) -> None:
+    """Write elements to an array of shape (3, 3)."""
+    out[0, 0], out[0, 1], out[0, 2] = m[0], m[1], m[2]
+    out[1, 0], out[1, 1], out[1, 2] = m[3], m[4], m[5]
+    out[2, 0], out[2, 1], out[2, 2] = m[6], m[7], m[8]
+
+
+@compiled
+def transposed(m: Matrix3) -> Matrix3:
+    """Transpose."""
+    return m[0], m[3], m[6], m[1], m[4], m[7], m[2], m[5], m[8]
+
+
+@compiled
+def multiplied(a: Matrix3, b: Matrix3) -> Matrix3:
+    """Product ``a @ b``."""
+    return (
+        a[0] * b[0] + a[1] * b[3] + a[2] * b[6], a[0] * b[1] + a[1] * b[4] + a[2] * b[7],
+        a[0] * b[2] + a[1] * b[5] + a[2] * b[8],
+        a[3] * b[0] + a[4] * b[3] + a[5] * b[6], a[3] * b[1] + a[4] * b[4] + a[5] * b[7],
+        a[3] * b[2] + a[4] * b[5] + a[5] * b[8],
+        a[6] * b[0] + a[7] * b[3] + a[8] * b[6], a[6] * b[1] + a[7] * b[4] + a[8] * b[7],
+        a[6] * b[2] + a[7] * b[5] + a[8] * b[8],
+    )  # fmt: skip
+
+
+@compiled
+def applied(m: Matrix3, x: float, y: float, z: float) -> tuple[float, float, float]:
+    """Product of a matrix and a vector."""
+    return m[0] * x + m[1] * y + m[2] * z, m[3] * x + m[4] * y + m[5] * z, m[6] * x + m[7] * y + m[8] * z
+
+
+@compiled
+def orthonormal3(m: Matrix3) -> Matrix3:
+    """Nearest rotation matrix to one that rounding has bent a little: ``1.5 m - 0.5 m m' m`` (one Newton step)."""
+    b = multiplied(multiplied(m, transposed(m)), m)
+    return (
+        1.5 * m[0] - 0.5 * b[0], 1.5 * m[1] - 0.5 * b[1], 1.5 * m[2] - 0.5 * b[2],
+        1.5 * m[3] - 0.5 * b[3], 1.5 * m[4] - 0.5 * b[4], 1.5 * m[5] - 0.5 * b[5],
+        1.5 * m[6] - 0.5 * b[6], 1.5 * m[7] - 0.5 * b[7], 1.5 * m[8] - 0.5 * b[8],
+    )  # fmt: skip
