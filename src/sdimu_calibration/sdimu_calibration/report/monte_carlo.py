@@ -42,7 +42,8 @@ def cells(coefficient: Mapping[str, Any]) -> list[str]:
 
 def coefficients_table(content: Mapping[str, Any]) -> Table:
     """Lay the coefficients out for a terminal."""
-    table = Table(title=f"{content['runs']} runs; bound: {content['bound_from']}", title_justify="left", pad_edge=False, box=SIMPLE_HEAD)
+    title = f"{content['runs']} runs; bound: {content['bound_from']}"
+    table = Table(title=title, title_justify="left", pad_edge=False, box=SIMPLE_HEAD)
     for column in _COLUMNS:
         table.add_column(column, justify="left" if column in {"coefficient", "unit"} else "right", no_wrap=True)
     for coefficient in content["coefficients"]:
