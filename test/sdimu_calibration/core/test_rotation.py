@@ -60,7 +60,7 @@ def test_quaternion_comes_back(axis, angle):
     assert abs(np.linalg.norm(q) - 1.0) < 1e-14
     assert q[0] >= -1e-15
     np.testing.assert_allclose(quaternion_matrix(q), C, rtol=0, atol=2e-7 if np.pi - angle < 1e-6 else 1e-9)
-    np.testing.assert_allclose(quaternion_matrix(-3.0 * q), quaternion_matrix(q), rtol=0, atol=1e-15)
+    np.testing.assert_allclose(quaternion_matrix(-3.0 * q), quaternion_matrix(q), rtol=0, atol=1e-14)
 
 
 @given(directions, angles)
