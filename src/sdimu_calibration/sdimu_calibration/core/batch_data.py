@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from sdimu_calibration.core import earth
 from sdimu_calibration.core.compiled import compiled
 from sdimu_calibration.core.imu_model import ImuModel
+from sdimu_calibration.core.motion import Motion
 from sdimu_calibration.core.passes import Reduced
 from sdimu_calibration.core.rotation import rotation_matrix, skew
 from sdimu_calibration.core.strapdown import navigate_cycle, velocity_increment
@@ -21,6 +22,9 @@ BLOCK_EPOCHS = 20
 """A stop is cut into means of at most this many epochs, so that slow changes of a regressor are not lost."""
 GAP_SHARE = 0.1
 """Uncertainty of an angle that was bridged by interpolation, as a share of it."""
+
+_STEP = (1e-9, 1e-6)
+"""Steps of rate (rad/s) and force (m/s^2) for derivatives: below every threshold of an effect."""
 
 
 @dataclass(frozen=True)
@@ -115,6 +119,31 @@ class Travel:
     noise: Floats
 
 
+def error_slope(model: ImuModel, seen: Motion, rows: slice | Ints, coefficients: Floats) -> Floats:
+    """Change of the sensor errors per change of what the sensors see, shape (rows, 6, 6).
+
+    With errors of percents it is percents too, and Gauss-Newton needs it: the three rotations of the body frame, which
+    only priors hold, feel every inconsistency between the derivatives.
+    """
+    at = _at(seen, rows)
+    before = model.errors(model.regressors(at), coefficients)
+    slope = np.empty((len(before), 6, 6))
+    moving = np.where(at.rest, 0.0, 1.0)[:, None]
+    for i in range(6):
+        step = np.zeros(6)
+        step[i] = _STEP[i // 3]
+        moved = replace(at, w=at.w + step[:3], f=at.f + step[3:], w_table=at.w_table + moving * step[:3])
+        slope[:, :, i] = (model.errors(model.regressors(moved), coefficients) - before) / step[i]
+    return slope
+
+
+def _at(seen: Motion, rows: slice | Ints) -> Motion:
+    """Rows of a motion."""
+    n = len(seen.t)
+    columns = {f.name: getattr(seen, f.name) for f in fields(seen)}
+    return Motion(**{name: v[rows] if len(v) == n else v for name, v in columns.items()})
+
+
 @compiled
 def _navigate(
     C_nb: Floats, dt: Floats, alpha: Floats, upsilon: Floats, coning: Floats, sculling: Floats,
@@ -142,7 +171,7 @@ def _navigate(
 
 
 def travel(
-    reduced: Reduced, rows: slice, model: ImuModel, values: Floats, coefficients: Floats, C_nb: Floats,
+    reduced: Reduced, rows: slice, model: ImuModel, values: Floats, slope: Floats, coefficients: Floats, C_nb: Floats,
     latitude: float, height: float, gravity_excess: float, densities: tuple[float, float],
 ) -> Travel:  # fmt: skip
     """Integrate one motion and linearise it.
@@ -159,6 +188,8 @@ def travel(
     model : ImuModel
     values : ndarray, shape (n, m)
         Regressors of all cycles.
+    slope : ndarray, shape (rows, 6, 6)
+        `error_slope` of the cycles of the motion.
     coefficients : ndarray, shape (p,)
         Taken out of the samples.
     C_nb : ndarray, shape (3, 3)
@@ -180,10 +211,13 @@ def travel(
     velocity = np.cumsum(dv[::-1], axis=0)[::-1] - 0.5 * dv
     position = np.cumsum((velocity * c.dt[:, None])[::-1], axis=0)[::-1] - 0.5 * velocity * c.dt[:, None]
     by_angle, by_push = _transfers(velocity, position, left)
+    # A sample is (1 + slope) times the truth and more, so what is taken out of it weighs 1 / (1 + slope).
+    in_n = np.zeros((len(own), 6, 6))
+    in_n[:, :3, :3] = in_n[:, 3:, 3:] = still
+    weight = np.concatenate([by_angle, by_push], axis=2) @ in_n @ np.linalg.inv(np.eye(6) + slope)
     coefficient = np.zeros((9, len(model.prior)))
     for column, (channel, parameter) in enumerate(zip(model.channel, model.parameter, strict=True)):
-        push = still[:, :, channel % 3] * (own[:, column] * c.dt)[:, None]
-        coefficient[:, parameter] -= np.einsum("kij,kj->i", by_angle if channel < 3 else by_push, push)
+        coefficient[:, parameter] -= (own[:, column] * c.dt) @ weight[:, :, channel]
     noise = densities[0] * np.einsum("kij,klj,k->il", by_angle, by_angle, c.dt)
     noise += densities[1] * np.einsum("kij,klj,k->il", by_push, by_push, c.dt)
     noise[range(3), range(3)] += np.sum((GAP_SHARE * c.gap_angle) ** 2)

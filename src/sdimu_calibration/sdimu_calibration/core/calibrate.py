@@ -14,12 +14,11 @@ from sdimu_calibration.core.passes import (
     Progress,
     Reduced,
     Setup,
-    first_attitude,
-    one_pass,
+    Solution,
     pass_settings,
     reduce,
-    refine,
     set_up,
+    solve,
 )
 from sdimu_calibration.core.recording import Recording
 from sdimu_calibration.core.results import Calibration, History
@@ -67,23 +66,19 @@ def calibrate(
     setup = set_up(site, imu, model)
     tell("reduce", 0.0)
     reduced = reduce(recording, setup)
-    start = first_attitude(reduced.epochs, reduced.phases, setup)
-    tell("passes", 0.2)
-    none = np.zeros(len(setup.sensors.prior))
-    first = one_pass(reduced, setup, start, start.C_nb, none, closed_loop=True, keep=False)
-    last, passes = refine(reduced, setup, start, first, tell, keep=False)
-    fit = fit_statistics(last)
-    fit["passes"] = float(passes)
-    fit["held_out_rms"] = held_out_rms(reduced, setup, last) if held_out else None
+    solution = solve(setup, reduced, tell)
+    result = assemble(recording, solution, held_out)
     tell("done", 1.0)
-    return assemble(recording, reduced, setup, first, last, fit)
+    return result
 
 
-def assemble(
-    recording: Recording, reduced: Reduced, setup: Setup, first: Pass, last: Pass, fit: dict[str, float | None]
-) -> Calibration:
+def assemble(recording: Recording, solution: Solution, held_out: bool) -> Calibration:
     """Put a result together in the reported body frame."""
+    setup, reduced, last = solution.setup, solution.reduced, solution.last
     names, frame = setup.sensors.names, setup.model.body_frame
+    fit = fit_statistics(last)
+    fit["passes"] = float(solution.passes)
+    fit["held_out_rms"] = held_out_rms(reduced, setup, last) if held_out else None
     J = body_frame.frame_jacobian(names, frame)
     return Calibration(
         body_frame=frame,
@@ -96,7 +91,7 @@ def assemble(
         fit=fit,
         data=data_counts(recording, reduced),
         notes=recording.notes,
-        history=history(reduced, setup, first),
+        history=history(reduced, setup, solution.first),
     )
 
 

@@ -86,6 +86,7 @@ class Pass:
     state: PassState
     output: PassOutput
     data: PassInput
+    settings: PassSettings
 
     @property
     def estimate(self) -> Floats:
@@ -232,12 +233,13 @@ def one_pass(
     begin = start_state(setup, start, C_nb, reference)
     state = PassState(*(v.copy() for v in begin))
     output = new_output(len(reduced.epochs), len(sensors.prior), keep, SNAPSHOT_EPOCHS)
-    run_pass(data, pass_settings(setup, closed_loop), state, output)
+    settings = pass_settings(setup, closed_loop)
+    run_pass(data, settings, state, output)
     if not (np.isfinite(state.x).all() and np.isfinite(state.P).all()):
         raise DataError(
             "the filter diverged: the recording contradicts the IMU's specification; check --imu and --site"
         )
-    return Pass(C_nb, begin, state, output, data)
+    return Pass(C_nb, begin, state, output, data, settings)
 
 
 def smoothed_start(finished: Pass) -> Floats:
@@ -259,3 +261,47 @@ def refine(
         if count > 2 and moved < CONVERGED:
             break
     return last, count
+
+
+@dataclass(frozen=True)
+class Solution:
+    """A converged calibration with everything that led to it.
+
+    Attributes
+    ----------
+    setup, reduced, alignment : Setup, Reduced, Alignment
+    first, last : Pass
+        The closed-loop pass and the converged one.
+    passes : int
+        How many there were.
+    """
+
+    setup: Setup
+    reduced: Reduced
+    alignment: Alignment
+    first: Pass
+    last: Pass
+    passes: int
+
+
+def solve(setup: Setup, reduced: Reduced, progress: Progress, keep: bool = False) -> Solution:
+    """Align, run the closed loop, refine.
+
+    Parameters
+    ----------
+    setup, reduced : Setup, Reduced
+    progress : callable
+    keep : bool
+        Keep the matrices of the later passes.
+
+    Raises
+    ------
+    DataError
+        When the recording cannot be aligned, or contradicts the specification.
+    """
+    start = first_attitude(reduced.epochs, reduced.phases, setup)
+    progress("passes", 0.2)
+    none = np.zeros(len(setup.sensors.prior))
+    first = one_pass(reduced, setup, start, start.C_nb, none, closed_loop=True, keep=False)
+    last, passes = refine(reduced, setup, start, first, progress, keep=keep)
+    return Solution(setup, reduced, start, first, last, passes)

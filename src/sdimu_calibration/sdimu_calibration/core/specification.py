@@ -80,7 +80,7 @@ class Model:
     """
 
     effects: tuple[str, ...]
-    velocity_sigma: float = 1e-3
+    velocity_sigma: float = 1e-4
     position_sigma: float = 1e-2
     settle_s: float = 1.0
     body_frame: str = "accelerometer_triad"

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from sdimu_calibration.core.effects.effect import ACCEL, AXES, Column, family, matrix_columns
 from sdimu_calibration.core.effects.registry import register
-from sdimu_calibration.core.motion import Motion, Floats
+from sdimu_calibration.core.motion import Floats, Motion
 
 
 def _coupling(i: int, j: int) -> Column:

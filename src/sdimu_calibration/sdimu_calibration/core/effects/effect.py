@@ -80,6 +80,8 @@ class Effect:
         Correlation time of a first-order Gauss-Markov parameter; None for constants and random walks.
     random_walk : mapping of str to float
         Density of a random walk of the parameters by grade (SI/sqrt(s)); empty for constants.
+    run_local : bool
+        A fault of this one recording: it has no meaning for another.
     family : str
         Registry name of the effect of which this is a part; empty for whole effects.
     needs : str
@@ -104,6 +106,7 @@ class Effect:
     confused_with: tuple[str, ...] = ()
     decay_s: float | None = None
     random_walk: Mapping[str, float] = field(default_factory=dict)
+    run_local: bool = False
     needs: str = ""
     family: str = ""
     options: Mapping[str, str] = field(default_factory=dict)

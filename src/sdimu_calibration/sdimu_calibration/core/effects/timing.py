@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sdimu_calibration.core.effects.effect import ACCEL, GYRO, AXES, Effect, Parameter, Term, family, per_axis_columns
+from sdimu_calibration.core.effects.effect import ACCEL, AXES, GYRO, Effect, Parameter, Term, family, per_axis_columns
 from sdimu_calibration.core.effects.registry import register
 from sdimu_calibration.core.motion import Floats, Motion
 from sdimu_calibration.core.units import STANDARD_GRAVITY
@@ -68,6 +68,7 @@ def lost_data(start: float, end: float, turn: int) -> Effect:
         typical="one or a few samples; 10 ms at 2 deg/s are 72 arcsec",
         description="Samples dropped before the stamps were given: the angle of one turn is too small. A fault of the recording, "
         "not of the sensor.",
+        run_local=True,
         options={"turn": str(turn), "start": f"{start:g} s", "end": f"{end:g} s"},
         with_options=lambda turn, start, end: lost_data(start, end, int(turn)),
         scan=lambda times: tuple(lost_data(t0, t1, stop + 1) for stop, t0, t1 in times.turns),

@@ -1,0 +1,195 @@
+"""The columns that a diagnosis looks at: catalogue, free inputs, own equations."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from sdimu_calibration.core.effects import registry
+from sdimu_calibration.core.effects.effect import AXES, CHANNELS, Effect, Parameter, Term, TestTimes
+from sdimu_calibration.core.motion import Floats, Motion
+
+OWN = "own equation"
+"""Title of an equation that no registered effect has."""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """One parameter that might be missing.
+
+    Attributes
+    ----------
+    effect : Effect
+        With this parameter alone.
+    family : str
+        Registry name of the effect, or ``own`` for an equation that no registered effect has.
+    label : str
+        What `sdimu calibrate --add` takes.
+    """
+
+    effect: Effect
+    family: str
+    label: str
+
+    @property
+    def parameter(self) -> Parameter:
+        """The parameter."""
+        return self.effect.parameters[0]
+
+
+def split(effect: Effect) -> list[Candidate]:
+    """One candidate for each parameter of an effect."""
+    out = []
+    for parameter in effect.parameters:
+        one = effect.only((parameter.name,))
+        label = parameter.name + effect.variant
+        family = "own" if effect.title == OWN else effect.family or effect.name
+        out.append(Candidate(one, family, label))
+    return out
+
+
+def catalogue(times: TestTimes, in_model: set[str], has_temperature: bool) -> list[Effect]:
+    """Every effect of the catalogue with the parameters that the model does not have, scans spread out over the test."""
+    out: list[Effect] = []
+    for name in registry.names():
+        effect = registry.get(name)
+        if effect.needs == "temperature" and not has_temperature:
+            continue
+        variants = effect.scan(times) if effect.scan else (effect,)
+        for variant in variants:
+            out += without(variant, in_model)
+    return out
+
+
+def without(effect: Effect, in_model: set[str]) -> list[Effect]:
+    """Return the effect without the parameters that the model has: a list of one or none."""
+    missing = tuple(p.name for p in effect.parameters if p.name not in in_model)
+    return [effect.only(missing)] if missing else []
+
+
+def free_inputs(times: TestTimes) -> list[Effect]:
+    """A constant error of every sensor in every dwell and every turn of its own; one effect a segment."""
+
+    def segment(label: str, start: float, end: float) -> Effect:
+        def ones(motion: Motion) -> Floats:
+            overlap = np.minimum(motion.t, end) - np.maximum(motion.t - motion.dt, start)
+            share = np.clip(overlap / motion.dt, 0.0, 1.0)
+            return np.asarray(share[:, None].repeat(6, axis=1))
+
+        return Effect(
+            name=label, title=label, equation="constant in this stretch",
+            parameters=tuple(
+                Parameter(f"{c} in {label}", "rad/s" if i < 3 else "m/s^2", "deg/h" if i < 3 else "ug")
+                for i, c in enumerate(CHANNELS)
+            ),
+            terms=tuple(Term(i, i) for i in range(6)), regressors=ones, prior={},
+        )  # fmt: skip
+
+    stops = [segment(f"stop {k}", a, b) for k, a, b in times.stops]
+    turns = [segment(f"turn {k + 1}", a, b) for k, a, b in times.turns]
+    return stops + turns
+
+
+def equations(has_temperature: bool) -> list[Effect]:
+    """Monomials of the physical variables on every sensor: the alphabet of equations that no effect has.
+
+    Forces to third order, rates to second, their products, each also growing with time (and temperature); with |x| for
+    even terms. What a registered effect already is comes twice; the catalogue then has the word.
+    """
+    def powers(total: int, kinds: int) -> list[tuple[int, ...]]:
+        if kinds == 1:
+            return [(total,)]
+        return [(n, *rest) for n in range(total + 1) for rest in powers(total - n, kinds - 1)]
+
+    out: list[Effect] = []
+    for force in range(4):
+        for rate in range(3):
+            if force + rate == 0 or force + rate > 3:
+                continue
+            for pa in powers(force, 3):
+                for pw in powers(rate, 3):
+                    out += _monomial(pa, pw, "")
+                    if force + rate == 1:
+                        out += _monomial(pa, pw, "t")
+                        out += _monomial(pa, pw, "T") if has_temperature else []
+    for i in range(3):
+        out += _plain(f"e{AXES[i]}^2", lambda m, i=i: m.C_nb[:, 1, i] ** 2)
+        for j in range(3):
+            if j > i:
+                out += _plain(f"e{AXES[i]} e{AXES[j]}", lambda m, i=i, j=j: m.C_nb[:, 1, i] * m.C_nb[:, 1, j])
+            out += _plain(f"e{AXES[i]} a{AXES[j]}", lambda m, i=i, j=j: m.C_nb[:, 1, i] * m.a[:, j])
+    out += _monomial((0, 0, 0), (0, 0, 0), "t^2")
+    out += _monomial((0, 0, 0), (0, 0, 0), "T^2") if has_temperature else []
+    return out
+
+
+def periodic(duration: float) -> list[Effect]:
+    """Sine and cosine of time on every sensor, from one period a test to the Nyquist limit of the stops."""
+    out: list[Effect] = []
+    for cycles in np.arange(1.0, 20.0, 0.5):
+        rate = 2.0 * np.pi * cycles / duration
+        for word, function in (("sin", np.sin), ("cos", np.cos)):
+            text = f"{word}(2 pi t / {duration / cycles:.0f} s)"
+            out += _plain(text, lambda m, r=rate, g=function: g(r * (m.t - 0.5 * m.dt)))
+    return out
+
+
+# A term whose variable is of the order of one is not larger than the bias is.
+_OWN_GYRO, _OWN_ACCEL = registry.get("gyro_bias"), registry.get("accel_bias")
+
+
+def _plain(text: str, value: Callable[[Motion], Floats]) -> list[Effect]:
+    """Own equation with a pure number as variable."""
+    return _own(text, "", "", value)
+
+
+def _own(text: str, unit: str, shown: str, value: Callable[[Motion], Floats]) -> list[Effect]:
+    """Own equation ``d(sensor) = k text``, gyros and accelerometers; units are appended to those of the sensor."""
+
+    def triad(word: str, base: tuple[str, str], like: Effect) -> Effect:
+        first = CHANNELS.index(f"{word}_x")
+        return Effect(
+            name=f"{word}: {text}", title=OWN, equation=f"d{word}_i = k_i {text}",
+            parameters=tuple(Parameter(f"{word}_{a}: {text}", base[0] + unit, base[1] + shown) for a in AXES),
+            terms=tuple(Term(first + i, i) for i in range(3)),
+            regressors=lambda m: np.repeat(value(m)[:, None], 3, axis=1), prior=like.prior,
+        )  # fmt: skip
+
+    return [triad("gyro", ("rad/s", "deg/h"), _OWN_GYRO), triad("accel", ("m/s^2", "ug"), _OWN_ACCEL)]
+
+
+_TIME = {
+    "": lambda m: 1.0,
+    "t": lambda m: m.t - 0.5 * m.dt,
+    "t^2": lambda m: (m.t - 0.5 * m.dt) ** 2,
+    "T": lambda m: m.temperature,
+    "T^2": lambda m: m.temperature**2,
+}
+_TIME_UNIT = {"": "", "t": "/h", "t^2": "/h^2", "T": "/degC", "T^2": "/degC^2"}
+
+
+def _monomial(pa: tuple[int, ...], pw: tuple[int, ...], factor: str) -> list[Effect]:
+    """Own equation ``a^pa wt^pw factor`` on all six sensors; a in g, the rest in SI."""
+
+    def value(motion: Motion) -> Floats:
+        out = np.ones(len(motion.t)) * _TIME[factor](motion)
+        for i in range(3):
+            if pa[i]:
+                out = out * motion.a[:, i] ** pa[i]
+            if pw[i]:
+                out = out * motion.w_table[:, i] ** pw[i]
+        return out
+
+    parts = [f"a{AXES[i]}" + (f"^{n}" if n > 1 else "") for i, n in enumerate(pa) if n]
+    parts += [f"wt{AXES[i]}" + (f"^{n}" if n > 1 else "") for i, n in enumerate(pw) if n]
+    parts += [factor] if factor else []
+    text = " ".join(parts)
+    order_a, order_w = sum(pa), sum(pw)
+    power = f"^{order_w}" if order_w > 1 else ""
+    unit = f"*s{power}/deg{power}" if order_w else ""
+    unit += ("/g" + (f"^{order_a}" if order_a > 1 else "")) if order_a else ""
+    unit += _TIME_UNIT[factor]
+    si = unit.replace("deg", "rad").replace("/h", "/s").replace("radC", "K")
+    return _own(text, si, unit, value)

@@ -1,0 +1,165 @@
+"""Is the noise what the specification says, and are the innovations white? Necessary, and weak against effects."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2
+
+from sdimu_calibration.core.passes import Pass, Reduced
+
+Floats = NDArray[np.float64]
+
+CHANNEL_NAMES = (
+    "position_n", "position_e", "position_d", "velocity_n", "velocity_e", "velocity_d",
+    "gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z",
+)  # fmt: skip
+_GAUSS_MAD = 1.482602218505602
+_LAGS = 20
+_OUTLIER = 4.0
+_LEAST_PAIRS = 50
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Noise of one triad against its specification, from differences of neighbouring epochs at rest.
+
+    Attributes
+    ----------
+    ratio : float
+        Measured over specified standard deviation, from the median of absolute differences (blind to outliers).
+    sigma : float
+        Standard error of `ratio`.
+    kurtosis : float
+        Of the differences; 3 is Gaussian.
+    outliers : ndarray of int
+        Epochs that differ from both neighbours by more than four sigma of the difference.
+    """
+
+    ratio: float
+    sigma: float
+    kurtosis: float
+    outliers: NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class StopMean:
+    """Mean normalised innovation of a channel at a stop; standard normal when the model is right."""
+
+    channel: str
+    stop: int
+    normalised_mean: float
+
+
+@dataclass(frozen=True)
+class Consistency:
+    """Consistency of the innovations of the full filter.
+
+    Attributes
+    ----------
+    nis_mean, nis_p_value : float
+    first_nis : float
+        Mean NIS per degree of freedom at the first measurement of each stop: what the turns left.
+    ljung_box_p : float
+        Smallest p-value of the six sensor channels, times six.
+    gyro, accel : Noise
+    where : tuple of StopMean
+        Every channel and stop, largest first.
+    """
+
+    nis_mean: float
+    nis_p_value: float
+    first_nis: float
+    ljung_box_p: float
+    gyro: Noise
+    accel: Noise
+    where: tuple[StopMean, ...]
+
+
+def check(finished: Pass, reduced: Reduced) -> Consistency:
+    """Test the innovations of a finished pass."""
+    out = finished.output
+    total, dof = float(np.nansum(out.nis)), 3 * int(np.isfinite(out.nis).sum())
+    first = reduced.phases.first & (reduced.kind > 0)
+    at_first = out.nis[first]
+    standard = standardised(out.innovation, out.normalised, finished)
+    sensors = standard[reduced.kind > 0][:, 6:]
+    return Consistency(
+        nis_mean=total / max(dof, 1),
+        nis_p_value=float(2.0 * min(chi2.sf(total, dof), chi2.cdf(total, dof))),
+        first_nis=float(np.nanmean(at_first) / 3.0) if at_first.size else float("nan"),
+        ljung_box_p=ljung_box(sensors),
+        gyro=triad_noise(reduced, reduced.epochs.w_mean, finished.settings.gyro_psd**0.5),
+        accel=triad_noise(reduced, reduced.epochs.f_mean, finished.settings.accel_psd**0.5),
+        where=stop_means(standard, reduced),
+    )
+
+
+def standardised(innovation: Floats, normalised: Floats, finished: Pass) -> Floats:
+    """Innovations over their own predicted sigma, channel by channel, (e, 12); NaN where not measured."""
+    L = finished.output.L
+    if len(L):
+        sigma = np.sqrt(np.einsum("eij,eij->ei", L, L))
+        return np.where(np.isfinite(normalised), innovation / np.where(sigma > 0, sigma, 1.0), np.nan)
+    return normalised
+
+
+def ljung_box(series: Floats) -> float:
+    """Smallest Ljung-Box p-value over the columns of `series` (n, c), corrected for their number."""
+    n, count = series.shape
+    if n <= 2 * _LAGS:
+        return 1.0
+    worst = 1.0
+    for column in series.T:
+        x = column - column.mean()
+        r = np.array([x[lag:] @ x[:-lag] for lag in range(1, _LAGS + 1)]) / (x @ x)
+        q = n * (n + 2) * float(np.sum(r**2 / (n - np.arange(1, _LAGS + 1))))
+        worst = min(worst, float(chi2.sf(q, _LAGS)))
+    return min(1.0, worst * count)
+
+
+def triad_noise(reduced: Reduced, means: Floats, density: float) -> Noise:
+    """Noise of a triad from its epoch means at rest, neighbours of the same stop subtracted.
+
+    Parameters
+    ----------
+    reduced : Reduced
+    means : ndarray, shape (e, 3)
+        Mean rate or force of each epoch, as measured; biases and slow effects cancel in the differences.
+    density : float
+        Specified white noise (SI/sqrt(Hz)).
+    """
+    epochs = reduced.epochs
+    good = reduced.phases.used
+    pair = good[1:] & good[:-1] & (reduced.phases.stop[1:] == reduced.phases.stop[:-1])
+    if pair.sum() < _LEAST_PAIRS:
+        return Noise(1.0, 1.0, 3.0, np.empty(0, dtype=np.int64))
+    length = epochs.end - epochs.start
+    sigma = density * np.sqrt(1.0 / length[1:] + 1.0 / length[:-1])
+    difference = ((means[1:] - means[:-1]) / sigma[:, None])[pair]
+    ratio = _GAUSS_MAD * float(np.median(np.abs(difference)))
+    # An outlier differs from both its neighbours, to the same side.
+    at = np.flatnonzero(pair)
+    follows = at[1:] == at[:-1] + 1
+    far = np.abs(difference) > _OUTLIER * ratio
+    both = far[1:] & far[:-1] & (np.sign(difference[1:]) != np.sign(difference[:-1]))
+    outliers = at[1:][follows & both.any(axis=1)]
+    kurtosis = float(np.mean(difference**4) / np.mean(difference**2) ** 2)
+    # The median absolute deviation has 37 % of the efficiency of the standard deviation; differences share epochs.
+    return Noise(ratio, 1.4 * ratio / np.sqrt(2 * 0.37 * difference.size), kurtosis, outliers)
+
+
+def stop_means(standard: Floats, reduced: Reduced) -> tuple[StopMean, ...]:
+    """Mean over each stop times the root of its length, every channel; largest first."""
+    out = []
+    for stop in np.unique(reduced.phases.stop[reduced.kind > 0]):
+        rows = (reduced.phases.stop == stop) & (reduced.kind > 0)
+        for channel in range(12):
+            values = standard[rows, channel]
+            values = values[np.isfinite(values)]
+            if len(values):
+                mean = float(values.sum() / np.sqrt(len(values)))
+                out.append(StopMean(CHANNEL_NAMES[channel], int(stop), mean))
+    return tuple(sorted(out, key=lambda m: -abs(m.normalised_mean)))

@@ -1,0 +1,320 @@
+"""Is the model adequate, where does it fail, which effect is missing? The order of work is that of the files here.
+
+Screen of the data; noise scale; consistency; one scan over all candidates; search step by step with held-out score; free-input remainder;
+equations outside the catalogue; refit of what was found. Design: doc/diagnosis.md.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import norm
+
+from sdimu_calibration.core.calibrate import assemble
+from sdimu_calibration.core.diagnosis.candidates import Candidate, catalogue, equations, free_inputs, periodic, without
+from sdimu_calibration.core.diagnosis.consistency import Consistency, check
+from sdimu_calibration.core.diagnosis.evidence import Evidence, collect, test_times
+from sdimu_calibration.core.diagnosis.remainder import Remainder, remainder
+from sdimu_calibration.core.diagnosis.screen import Finding, screen
+from sdimu_calibration.core.diagnosis.search import FALSE_ALARM, Search, search
+from sdimu_calibration.core.effects.effect import Effect
+from sdimu_calibration.core.filter_pass import SKIP
+from sdimu_calibration.core.imu_model import build
+from sdimu_calibration.core.passes import Progress, Reduced, Setup, Solution, reduce, set_up, solve
+from sdimu_calibration.core.recording import Recording
+from sdimu_calibration.core.results import Calibration
+from sdimu_calibration.core.specification import ImuSpecification, Model, Site
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+UNEXPLAINED_P = 1e-3
+"""A free-input remainder less probable than this is not noise."""
+NOISE_OFF = 0.05
+"""Least deviation of the noise from its specification that is worth telling."""
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """What a diagnosis found.
+
+    Attributes
+    ----------
+    verdict : str
+        ``consistent``, ``noise model wrong``, ``one effect``, ``class of effects``, ``several effects``, ``own equation``,
+        ``unexplained``, ``data fault``.
+    sentence : str
+        The verdict for people.
+    adequate : bool
+    p_value : float
+        Of the model that was asked about, from scan, remainder and noise together.
+    findings : tuple of Finding
+        Of the data screen.
+    noise : tuple of str
+        What is wrong with the noise model, one line each.
+    consistency : Consistency
+    before, after : Calibration
+        With the model as given, and with what was found added (the same object when nothing was).
+    found : Search
+        Of the catalogue, or of own equations where those explain it.
+    evidence : Evidence
+    remainder_before, remainder_after : Remainder
+    free : ndarray of int
+        Columns of the free inputs in `evidence`.
+    own : bool
+        What was found are own equations, not registered effects.
+    unexplained : bool
+    """
+
+    verdict: str
+    sentence: str
+    adequate: bool
+    p_value: float
+    findings: tuple[Finding, ...]
+    noise: tuple[str, ...]
+    consistency: Consistency
+    before: Calibration
+    after: Calibration
+    found: Search
+    evidence: Evidence
+    remainder_before: Remainder
+    remainder_after: Remainder
+    free: Ints
+    own: bool
+    unexplained: bool
+
+    @property
+    def chosen(self) -> tuple[Candidate, ...]:
+        """What was found, accepted and kept, in the order of the search."""
+        p = len(self.evidence.weight)
+        return tuple(self.evidence.candidates[i - p] for i in self.found.chosen)
+
+    @property
+    def explained(self) -> float:
+        """Share of the misfit that what was found removes."""
+        before = max(self.remainder_before.chi2 - self.remainder_before.dof, 1e-9)
+        after = max(self.remainder_after.chi2 - self.remainder_after.dof, 0.0)
+        return float(np.clip(1.0 - after / before, 0.0, 1.0))
+
+
+def diagnose(
+    recording: Recording,
+    site: Site,
+    imu: ImuSpecification,
+    model: Model,
+    extra: Sequence[Effect] = (),
+    alpha: float = FALSE_ALARM,
+    progress: Progress | None = None,
+    refit: bool = True,
+) -> Diagnosis:
+    """Find what the model is missing.
+
+    Parameters
+    ----------
+    recording, site, imu, model
+        As for `calibrate`.
+    extra : sequence of Effect
+        Effects of the user's own, tried with the catalogue.
+    alpha : float
+        False-alarm probability of a whole scan.
+    progress : callable, optional
+    refit : bool
+        Calibrate again with what was found (costs a calibration).
+
+    Raises
+    ------
+    DataError
+        When the recording or the options cannot be used.
+    """
+    tell = progress or _silent
+    setup = set_up(site, imu, model)
+    reduced = reduce(recording, setup)
+    findings = screen(recording, reduced)
+    solution = solve(setup, reduced, tell, keep=True)
+    consistency = check(solution.last, reduced)
+    noise, setup, reduced = _mend_noise(consistency, setup, reduced)
+    if noise:
+        solution = solve(setup, reduced, tell, keep=True)
+    tell("candidates", 0.4)
+    evidence, groups = _first_evidence(solution, extra)
+    found = search(evidence, groups["catalogue"], alpha)
+    nothing = np.empty(0, dtype=np.int64)
+    before = _remainder(evidence, nothing, groups["free"], found.scale)
+    after = _remainder(evidence, found.chosen, groups["free"], found.scale)
+    own = False
+    if _suspect(found, after):
+        tell("equations", 0.6)
+        evidence, found, after, own = _try_equations(evidence, groups, found, after, setup, alpha)
+    unexplained = after.p_value < UNEXPLAINED_P
+    tell("refit", 0.8)
+    base = assemble(recording, solution, held_out=True)
+    final = base
+    if refit and len(found.chosen) and not own:
+        final = _refit(recording, setup, reduced, evidence, found, tell)
+    p_value = _p_value(found, before, consistency, noise)
+    verdict = _verdict(found, own, unexplained, noise, findings, evidence)
+    adequate = verdict == "consistent"
+    tell("done", 1.0)
+    partial = Diagnosis(
+        verdict, "", adequate, p_value, findings, noise, consistency, base, final, found, evidence, before, after,
+        groups["free"], own, unexplained,
+    )  # fmt: skip
+    return replace(partial, sentence=_sentence(partial))
+
+
+def _mend_noise(consistency: Consistency, setup: Setup, reduced: Reduced) -> tuple[tuple[str, ...], Setup, Reduced]:
+    """Put measured noise in place of a specification that is wrong, and leave outliers out."""
+    told: list[str] = []
+    scales = {}
+    kind = reduced.kind.copy()
+    for triad, noise in (("gyro", consistency.gyro), ("accel", consistency.accel)):
+        scales[triad] = 1.0
+        if abs(noise.ratio - 1.0) > max(NOISE_OFF, 4.0 * noise.sigma):
+            scales[triad] = noise.ratio
+            told.append(f"{triad} white noise is {noise.ratio:.2f} +- {noise.sigma:.2f} times the specification")
+        if noise.kurtosis > _KURTOSIS:
+            told.append(
+                f"{triad} noise has heavy tails: kurtosis {noise.kurtosis:.1f} (3 is Gaussian), "
+                f"{100 * len(noise.outliers) / max(1, int((kind != SKIP).sum())):.1f} % of the seconds are outliers"
+            )
+            kind[noise.outliers] = SKIP
+    if not told:
+        return (), setup, reduced
+    imu = replace(
+        setup.imu,
+        gyro_white_noise=setup.imu.gyro_white_noise * scales["gyro"],
+        accel_white_noise=setup.imu.accel_white_noise * scales["accel"],
+    )
+    return tuple(told), replace(setup, imu=imu), replace(reduced, kind=kind)
+
+
+_KURTOSIS = 4.0
+"""Of the differences of neighbouring seconds; Gaussian noise in a test of an hour stays below 3.3."""
+
+
+def _first_evidence(solution: Solution, extra: Sequence[Effect]) -> tuple[Evidence, dict[str, Ints]]:
+    """Evidence of the catalogue, the user's own effects and the free inputs; and which columns are which."""
+    setup, reduced = solution.setup, solution.reduced
+    times = test_times(reduced)
+    in_model = set(setup.sensors.names)
+    own = [part for effect in extra for part in without(effect, in_model)]
+    known = [*own, *catalogue(times, in_model, reduced.temperature is not None)]
+    free = free_inputs(times)
+    evidence = collect(reduced, setup, solution.last, [*known, *free])
+    p = len(setup.sensors.prior)
+    border = p + sum(len(effect.parameters) for effect in known)
+    return evidence, {"catalogue": np.arange(p, border), "free": np.arange(border, len(evidence.names))}
+
+
+def _remainder(evidence: Evidence, chosen: Ints, free: Ints, scale: float) -> Remainder:
+    known = np.concatenate([evidence.model, chosen]).astype(np.int64)
+    weight = np.concatenate([evidence.weight, np.zeros(len(chosen))])
+    return remainder(evidence.information, known, weight, free, scale)
+
+
+def _suspect(found: Search, after: Remainder) -> bool:
+    """Whether the catalogue leaves something, or needs suspiciously many terms."""
+    return after.p_value < UNEXPLAINED_P or len(found.chosen) >= _MANY
+
+
+_MANY = 3
+
+
+def _try_equations(
+    evidence: Evidence, groups: dict[str, Ints], found: Search, after: Remainder, setup: Setup, alpha: float
+) -> tuple[Evidence, Search, Remainder, bool]:
+    """Search monomials and periods; prefer them when they leave less with no more terms."""
+    has_temperature = evidence.reduced.temperature is not None
+    more = [*equations(has_temperature), *periodic(evidence.times.duration)]
+    wide = evidence.with_effects(more, setup.imu.grade)
+    columns = np.arange(len(evidence.names), len(wide.names))
+    other = search(wide, columns, alpha)
+    if not len(other.chosen):
+        return evidence, found, after, False
+    left = _remainder(wide, other.chosen, groups["free"], other.scale)
+    simpler = len(other.chosen) <= max(1, len(found.chosen))
+    # Less is left by more than the free inputs differ by chance; or as little, with fewer terms.
+    chance = 3.0 * np.sqrt(2.0 * after.dof)
+    if simpler and (left.chi2 < after.chi2 - chance or (left.chi2 < after.chi2 + chance and len(other.chosen) < len(found.chosen))):
+        return wide, other, left, True
+    return evidence, found, after, False
+
+
+def _refit(
+    recording: Recording, setup: Setup, reduced: Reduced, evidence: Evidence, found: Search, tell: Progress
+) -> Calibration:
+    """Calibrate with the effects that were found."""
+    p = len(evidence.weight)
+    added = [evidence.candidates[i - p].effect for i in found.chosen]
+    wide = replace(
+        setup,
+        sensors=build([*setup.sensors.effects, *added], setup.imu),
+    )
+    return assemble(recording, solve(wide, reduced, tell), held_out=True)
+
+
+def _p_value(found: Search, before: Remainder, consistency: Consistency, noise: tuple[str, ...]) -> float:
+    """Bonferroni over the three tests that can call a model inadequate."""
+    largest = float(np.max(np.abs(found.first.z), initial=0.0))
+    count = int(np.isfinite(found.first.sigma).sum())
+    of_scan = min(1.0, count * 2.0 * float(norm.sf(largest)))
+    of_noise = consistency.nis_p_value if noise else 1.0
+    return float(min(1.0, 3.0 * min(of_scan, before.p_value, of_noise)))
+
+
+def _verdict(
+    found: Search, own: bool, unexplained: bool, noise: tuple[str, ...], findings: tuple[Finding, ...], evidence: Evidence
+) -> str:
+    if any(f.grave for f in findings):
+        return "data fault"
+    if unexplained:
+        return "unexplained"
+    if len(found.chosen):
+        if own:
+            return "own equation"
+        if len(found.chosen) > 1:
+            return "several effects"
+        p = len(evidence.weight)
+        if evidence.candidates[found.chosen[0] - p].effect.run_local:
+            return "data fault"
+        return "class of effects" if found.steps[0].alike else "one effect"
+    if noise:
+        return "noise model wrong"
+    if any(not s.accepted for s in found.steps):
+        return "unexplained"
+    return "consistent"
+
+
+def _sentence(d: Diagnosis) -> str:
+    """The verdict in one sentence."""
+    names = " and ".join(c.label for c in d.chosen)
+    if d.verdict == "consistent":
+        return "The model explains the recording: nothing stands out of the noise."
+    if d.verdict == "noise model wrong":
+        return f"The noise model is wrong, the physics is not: {'; '.join(d.noise)}."
+    if d.verdict == "data fault":
+        faults = [f.text for f in d.findings if f.grave] or [f"{names} (a fault of this recording)"]
+        return f"The data have a fault: {'; '.join(faults)}."
+    if d.verdict == "unexplained":
+        tail = f"; {names} would take {100 * d.explained:.0f} % of it" if names else ""
+        return f"Something is missing that no effect of the catalogue explains{tail}."
+    if d.verdict == "own equation":
+        return f"Something is missing that is not in the catalogue; it follows {names}."
+    rest = f"held-out error {_rms(d.before):.3f} -> {_rms(d.after):.3f}"
+    if d.verdict == "class of effects":
+        others = ", ".join(d.found.steps[0].alike[:4])
+        return f"One effect is missing: {names}, or what looks the same here ({others}); {rest}."
+    return f"{'One effect is' if d.verdict == 'one effect' else 'Several effects are'} missing: {names}; {rest}."
+
+
+def _rms(calibration: Calibration) -> float:
+    value = calibration.fit.get("held_out_rms")
+    return float("nan") if value is None else float(value)
+
+
+def _silent(_what: str, _fraction: float) -> None:
+    return None
+

@@ -1,0 +1,189 @@
+"""Everything a diagnosis reads: whitened innovations and the signature of every known and suspected parameter."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sdimu_calibration.core.diagnosis.candidates import Candidate, split
+from sdimu_calibration.core.diagnosis.information import Information
+from sdimu_calibration.core.diagnosis.signatures import measured_rows, signatures
+from sdimu_calibration.core.effects.effect import Effect, TestTimes
+from sdimu_calibration.core.filter_pass import NAV, PassOutput, PassState, new_output, run_pass
+from sdimu_calibration.core.motion import Motion
+from sdimu_calibration.core.passes import Pass, Reduced, Setup, pass_settings
+from sdimu_calibration.core.track import motion
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """Linear model of one recording about a converged calibration.
+
+    Attributes
+    ----------
+    e : ndarray, shape (N,)
+        Whitened innovations of the navigation filter with all coefficients at the calibration's values.
+    W : ndarray, shape (N, p + q)
+        Signatures: p coefficients of the model, then q candidates.
+    epoch, channel, stop : ndarray of int, shape (N,)
+        Of each row; channels 0-11 are position, velocity, rate, force, three each.
+    names : tuple of str
+        Of the p + q parameters.
+    weight : ndarray, shape (p,)
+        Prior information of the coefficients (1/sigma^2).
+    shift : ndarray, shape (p,)
+        Prior mean minus the calibration's values.
+    candidates : tuple of Candidate, length q
+    prior : ndarray, shape (q,)
+        One-sigma that physics gives the candidates (inf where unknown).
+    output : PassOutput
+        Of the navigation filter.
+    seen : Motion
+    times : TestTimes
+    reduced : Reduced
+    """
+
+    e: Floats
+    W: Floats
+    epoch: Ints
+    channel: Ints
+    stop: Ints
+    names: tuple[str, ...]
+    weight: Floats
+    shift: Floats
+    candidates: tuple[Candidate, ...]
+    prior: Floats
+    output: PassOutput
+    seen: Motion
+    times: TestTimes
+    reduced: Reduced
+
+    @property
+    def model(self) -> Ints:
+        """Indices of the model's own coefficients."""
+        return np.arange(len(self.weight))
+
+    @cached_property
+    def information(self) -> Information:
+        """Information on all parameters, the prior's pull on the coefficients in d."""
+        d = self.W.T @ self.e
+        d[: len(self.weight)] += self.weight * self.shift
+        return Information(self.W.T @ self.W, d)
+
+    def with_effects(self, effects: Sequence[Effect], grade: str) -> Evidence:
+        """Return the evidence with the parameters of more effects behind the candidates it has."""
+        more = [c for effect in effects for c in split(effect)]
+        W = columns(self.reduced, self.output, self.seen, effects)
+        return replace(
+            self, W=np.hstack([self.W, W]), names=(*self.names, *(c.label for c in more)),
+            candidates=(*self.candidates, *more),
+            prior=np.concatenate([self.prior, [c.effect.prior.get(grade, np.inf) for c in more]]),
+        )  # fmt: skip
+
+    def only(self, columns: Ints) -> Evidence:
+        """Return the evidence with the model and the candidates at `columns` alone."""
+        p = len(self.weight)
+        keep = np.concatenate([self.model, columns]).astype(np.int64)
+        part = replace(
+            self, W=np.ascontiguousarray(self.W[:, keep]), names=tuple(self.names[i] for i in keep),
+            candidates=tuple(self.candidates[i - p] for i in columns), prior=self.prior[columns - p],
+        )  # fmt: skip
+        full = self.information
+        part.__dict__["information"] = Information(full.J[np.ix_(keep, keep)], full.d[keep])
+        return part
+
+
+def test_times(reduced: Reduced) -> TestTimes:
+    """When the test stood and turned, from the phases of the epochs."""
+    phases, epochs = reduced.phases, reduced.epochs
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], phases.dwell.astype(int), [0]])))
+    dwells = [(int(phases.stop[a]), float(epochs.start[a]), float(epochs.end[b - 1])) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+    dwells = [d for d in dwells if d[2] - d[1] >= 3.0]
+    turns = [(a[0], a[2], b[1]) for a, b in zip(dwells[:-1], dwells[1:], strict=True)]
+    return TestTimes(float(epochs.end[-1]), tuple(dwells), tuple(turns))
+
+
+test_times.__test__ = False  # type: ignore[attr-defined]
+
+
+def navigation_pass(reduced: Reduced, setup: Setup, finished: Pass) -> Pass:
+    """Repeat the last pass with the coefficients known at their final values: only navigation errors are estimated."""
+    p = len(setup.sensors.prior)
+    start = finished.start
+    x, P = start.x.copy(), start.P.copy()
+    # About the final coefficients: the deviation is zero and has no variance.
+    x[NAV : NAV + p] = 0.0
+    P[NAV : NAV + p, :] = P[:, NAV : NAV + p] = 0.0
+    state = PassState(x, P, start.C_nb.copy(), start.velocity.copy(), start.position.copy(), finished.estimate.copy())
+    output = new_output(len(reduced.epochs), p, True, len(reduced.epochs))
+    begin = PassState(*(v.copy() for v in state))
+    settings = pass_settings(setup, closed_loop=False)
+    run_pass(finished.data._replace(kind=reduced.kind), settings, state, output)
+    return Pass(finished.C_start, begin, state, output, finished.data, settings)
+
+
+def predicted_motion(reduced: Reduced, setup: Setup, finished: Pass) -> Motion:
+    """Motion that the finished calibration predicts."""
+    return motion(
+        reduced.cycles, reduced.rest, setup.sensors, finished.estimate, finished.C_start.copy(),
+        setup.site.latitude_rad, setup.gravity, reduced.temperature, predicted=True,
+    )  # fmt: skip
+
+
+def collect(reduced: Reduced, setup: Setup, finished: Pass, effects: Sequence[Effect]) -> Evidence:
+    """Run the navigation filter and the signature recursion.
+
+    Parameters
+    ----------
+    reduced, setup : Reduced, Setup
+    finished : Pass
+        The last pass of a converged calibration.
+    effects : sequence of Effect
+        Each of their parameters becomes a candidate.
+    """
+    known = navigation_pass(reduced, setup, finished)
+    seen = predicted_motion(reduced, setup, finished)
+    sensors = setup.sensors
+    p = len(sensors.prior)
+    candidates = [c for effect in effects for c in split(effect)]
+    W = columns(reduced, known.output, seen, [*sensors.effects, *effects])
+    epoch, channel = measured_rows(known.output)
+    prior = np.array([c.effect.prior.get(setup.imu.grade, np.inf) for c in candidates])
+    return Evidence(
+        e=known.output.normalised[epoch, channel], W=W, epoch=epoch, channel=channel, stop=reduced.phases.stop[epoch],
+        names=(*sensors.names, *(c.label for c in candidates)),
+        weight=1.0 / sensors.prior**2, shift=-finished.estimate, candidates=tuple(candidates), prior=prior,
+        output=known.output, seen=seen, times=test_times(reduced), reduced=reduced,
+    )  # fmt: skip
+
+
+_BLOCK = 24
+"""Effects whose regressors are in memory at a time."""
+
+
+def columns(reduced: Reduced, output: PassOutput, seen: Motion, effects: Sequence[Effect]) -> Floats:
+    """Signatures of all parameters of `effects`, shape (N, parameters)."""
+    epochs = reduced.epochs
+    parts = []
+    for start in range(0, len(effects), _BLOCK):
+        block = effects[start : start + _BLOCK]
+        values, channel, parameter, count = [], [], [], 0
+        for effect in block:
+            values.append(effect.regressors(seen))
+            channel += [t.channel for t in effect.terms]
+            parameter += [count + t.parameter for t in effect.terms]
+            count += len(effect.parameters)
+        parts.append(
+            signatures(
+                seen, epochs.first, epochs.last, reduced.kind, output, np.hstack(values),
+                np.array(channel, dtype=np.int64), np.array(parameter, dtype=np.int64), count,
+            )  # fmt: skip
+        )
+    return np.hstack(parts)

@@ -1,0 +1,113 @@
+"""One pass over all candidates: score, testability, threshold, class.
+
+A candidate's score z is its estimate over its sigma when it is added to the model alone, all coefficients being estimated again.
+For linear Gaussian data z^2 is the fall of chi-square of a refit (score test = likelihood ratio).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sdimu_calibration.core.diagnosis.information import Information
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+TESTABLE = 0.02
+"""Share of a signature's length that must be left after the model's coefficients have taken theirs."""
+POWER_80 = 4.13
+"""Size of an effect, in its sigma, that is found with 80 % power at a false-alarm rate of 0.001."""
+INDISTINGUISHABLE = 3.0
+"""A log Bayes factor within this of the best (odds of 20 to 1) does not tell two candidates apart."""
+_DRAWS = 4000
+_JITTER = 1e-6
+
+
+@dataclass(frozen=True)
+class Scan:
+    """Scores of all candidates given a model.
+
+    Attributes
+    ----------
+    z : ndarray, shape (q,)
+        Estimate over sigma; 0 where not testable.
+    estimate, sigma : ndarray, shape (q,)
+        SI; sigma is inf where not testable.
+    retention : ndarray, shape (q,)
+        Share of the signature that the model leaves.
+    smallest : ndarray, shape (q,)
+        Minimal detectable size (SI).
+    information : Information
+        On all parameters, given the model.
+    """
+
+    z: Floats
+    estimate: Floats
+    sigma: Floats
+    retention: Floats
+    smallest: Floats
+    information: Information
+
+
+def scan(full: Information, known: Ints, weight: Floats, scale: float = 1.0) -> Scan:
+    """Score every parameter given those at `known`.
+
+    Parameters
+    ----------
+    full : Information
+    known : ndarray of int, shape (k,)
+        Model and effects already added.
+    weight : ndarray, shape (k,)
+        Their prior information.
+    scale : float
+        Factor by which the noise is larger than the specification says.
+    """
+    given = full.given(known, weight)
+    J, J0 = np.diag(given.J), np.diag(full.J)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        retention = np.sqrt(np.maximum(J, 0.0) / J0)
+        testable = (retention > TESTABLE) & (J0 > 0.0)
+        testable[known] = False
+        sigma = np.where(testable, scale / np.sqrt(J), np.inf)
+        estimate = np.where(testable, given.d / J, 0.0)
+    z = np.where(testable, estimate / sigma, 0.0)
+    return Scan(z, estimate, sigma, np.nan_to_num(retention), POWER_80 * sigma, given)
+
+
+def threshold(scanned: Scan, alpha: float, seed: int = 1) -> float:
+    """Size of the largest ``|z|`` that pure noise exceeds with probability `alpha`.
+
+    The scores of pure noise are jointly normal with the correlation of the signatures, so the whole scan is simulated by
+    drawing from it; correlated candidates cost less than Bonferroni would charge.
+    """
+    C = correlation(scanned)
+    if not len(C):
+        return float("inf")
+    # The jitter stands for identical signatures, which make C singular.
+    root = np.linalg.cholesky(C + _JITTER * np.eye(len(C)))
+    rng = np.random.default_rng(seed)
+    largest = np.abs(root @ rng.standard_normal((len(C), _DRAWS))).max(axis=0)
+    return float(np.quantile(largest, 1.0 - alpha))
+
+
+def correlation(scanned: Scan) -> Floats:
+    """Correlation of the signatures of the testable candidates, shape (t, t)."""
+    rows = np.flatnonzero(np.isfinite(scanned.sigma))
+    J = scanned.information.J[np.ix_(rows, rows)]
+    s = 1.0 / np.sqrt(np.diag(J))
+    return np.asarray(J * np.outer(s, s))
+
+
+def cosine(scanned: Scan, i: int, j: int) -> float:
+    """Cosine of two signatures after the model has taken its share."""
+    J = scanned.information.J
+    return float(J[i, j] / np.sqrt(J[i, i] * J[j, j]))
+
+
+def alike(scores: Floats, best: int) -> list[int]:
+    """Candidates that the data cannot tell from `best` by their log Bayes factors; the nearest first."""
+    gap = scores[best] - scores
+    return [int(i) for i in np.argsort(gap) if i != best and gap[i] < INDISTINGUISHABLE]

@@ -1,0 +1,46 @@
+"""Faults in the data that are no physics: looked at first, because they pass for effects otherwise."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from sdimu_calibration.core.passes import Reduced
+from sdimu_calibration.core.recording import Recording
+
+_STUCK = 5
+
+
+@dataclass(frozen=True)
+class Finding:
+    """A fault: what, and whether results can still be trusted without mending it."""
+
+    text: str
+    grave: bool
+
+
+def screen(recording: Recording, reduced: Reduced) -> tuple[Finding, ...]:
+    """Look for gaps, stuck sensors, saturation and contradictions."""
+    out: list[Finding] = []
+    lost = int(reduced.cycles.lost.sum())
+    if lost:
+        turning = float(np.abs(reduced.cycles.gap_angle).sum()) > np.radians(0.01)
+        where = " in a turn" if turning else " at rest"
+        out.append(Finding(f"{lost} samples are missing by their stamps{where}", turning))
+    if recording.rejected:
+        out.append(Finding(f"{recording.rejected} samples were rejected (not finite or repeated stamps)", False))
+    for triad, data in (("gyro", recording.omega_ib_b), ("accelerometer", recording.f_ib_b)):
+        for axis in range(3):
+            x = data[:, axis]
+            same = np.flatnonzero(np.diff(x) != 0.0)
+            longest = int(np.max(np.diff(np.concatenate([[-1], same, [len(x) - 1]]))))
+            if longest * recording.interval_s > _STUCK:
+                out.append(Finding(f"{triad} {'xyz'[axis]} shows the same number for {longest * recording.interval_s:.0f} s", True))
+            top = np.abs(x) >= np.abs(x).max() * (1.0 - 1e-12)
+            if top.sum() > 20:
+                out.append(Finding(f"{triad} {'xyz'[axis]} is saturated in {int(top.sum())} samples", True))
+    contradicted = float((reduced.epochs.end - reduced.epochs.start)[reduced.phases.contradicted].sum())
+    if contradicted > 5.0:
+        out.append(Finding(f"the table said dwell for {contradicted:.0f} s in which the IMU moved", False))
+    return tuple(out)

@@ -1,0 +1,244 @@
+"""Step by step: add the best candidate, look again, until nothing stands out of the noise.
+
+Orthogonal matching pursuit on the signatures: each step conditions on everything chosen so far; a chosen effect is exchanged when another
+explains the same better once the others are in, and dropped when the others took its place. A step must beat the noise of the whole
+scan, be plausible in size (Bayes factor with the physical prior), and lower the error at stops that it has not seen.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sdimu_calibration.core.diagnosis.evidence import Evidence
+from sdimu_calibration.core.diagnosis.held_out import HeldOut, gain, predict
+from sdimu_calibration.core.diagnosis.scan import Scan, alike, scan, threshold
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+FALSE_ALARM = 0.02
+"""Probability that pure noise puts one of all candidates over the threshold."""
+MOST_STEPS = 8
+LOG_BAYES = 3.0
+"""Least log Bayes factor of an accepted step ("strong" on Jeffreys' scale)."""
+_WIDE = 3.0
+"""Physical priors are taken this much wider: a sensor may be out of its class."""
+_KEEP = 3.0
+"""A chosen effect smaller than this many of its sigmas, with the others in, is dropped."""
+
+
+@dataclass(frozen=True)
+class Step:
+    """One rung of the ladder.
+
+    Attributes
+    ----------
+    index : int
+        Column among the model's coefficients and the allowed ones.
+    label, family, unit, display_unit : str
+    z, threshold : float
+        Score when it was tried, and what noise reaches.
+    estimate, sigma : float
+        SI, with everything chosen up to this step.
+    log_likelihood_gain, log_bayes_factor : float
+    held_out_before, held_out_after : HeldOut
+    held_out_gain, held_out_error : float
+        Log score over all stops, and its standard error.
+    alike : tuple of str
+        Labels of candidates that the data cannot tell from it.
+    accepted : bool
+    reason : str
+        Why it was refused; empty when accepted.
+    moved : tuple of (str, float)
+        Coefficients of the model that it moves most, in their own sigmas.
+    """
+
+    index: int
+    label: str
+    family: str
+    unit: str
+    display_unit: str
+    z: float
+    threshold: float
+    estimate: float
+    sigma: float
+    log_likelihood_gain: float
+    log_bayes_factor: float
+    held_out_before: HeldOut
+    held_out_after: HeldOut
+    held_out_gain: float
+    held_out_error: float
+    alike: tuple[str, ...]
+    accepted: bool
+    reason: str
+    moved: tuple[tuple[str, float], ...] = field(default=())
+
+
+@dataclass(frozen=True)
+class Search:
+    """How far the search came.
+
+    Attributes
+    ----------
+    steps : tuple of Step
+        Accepted ones first to last; a refused one ends the list.
+    chosen : ndarray of int
+        Columns of the whole evidence: accepted candidates, pruned.
+    first, last : Scan
+        Before anything was added; after everything was. Their columns: the model's, then the allowed ones.
+    threshold : float
+        Of the first scan.
+    scale : float
+        Residual noise over specified noise at the end.
+    """
+
+    steps: tuple[Step, ...]
+    chosen: Ints
+    first: Scan
+    last: Scan
+    threshold: float
+    scale: float
+
+
+class _Problem:
+    """Evidence with the bookkeeping of priors for any set of chosen columns."""
+
+    def __init__(self, evidence: Evidence) -> None:
+        self.evidence = evidence
+        self.p = len(evidence.weight)
+
+    def known(self, chosen: Sequence[int]) -> tuple[Ints, Floats, Floats]:
+        """Model and chosen columns, their prior information and prior mean about the calibration."""
+        evidence = self.evidence
+        prior = evidence.prior[np.array(chosen, dtype=int) - self.p] if len(chosen) else np.empty(0)
+        weight = np.concatenate([evidence.weight, 1.0 / (_WIDE * prior) ** 2])
+        shift = np.concatenate([evidence.shift, np.zeros(len(chosen))])
+        return np.concatenate([evidence.model, np.array(chosen, dtype=np.int64)]).astype(np.int64), weight, shift
+
+    def scale(self, chosen: Sequence[int]) -> float:
+        """Residual noise over specified noise, at least 1."""
+        known, weight, _ = self.known(chosen)
+        information = self.evidence.information
+        estimate, _ = information.estimate(known, weight)
+        residual = self.evidence.e - self.evidence.W[:, known] @ estimate
+        return float(np.sqrt(max(1.0, residual @ residual / max(1, len(residual) - len(known)))))
+
+    def scan(self, chosen: Sequence[int], scale: float) -> Scan:
+        """Score the allowed columns given the chosen ones."""
+        known, weight, _ = self.known(chosen)
+        return scan(self.evidence.information, known, weight, scale)
+
+    def scores(self, scanned: Scan, scale: float = 1.0) -> Floats:
+        """Log Bayes factor of every column against the model without it; -inf where not testable."""
+        information, p = scanned.information, self.p
+        J = np.diag(information.J)[p:] / scale**2
+        d = information.d[p:] / scale**2
+        wide = 1.0 / (_WIDE * self.evidence.prior) ** 2
+        with np.errstate(divide="ignore", invalid="ignore"):
+            occam = np.where(wide > 0.0, 0.5 * np.log1p(J / wide), 0.0)
+            score = 0.5 * d**2 / (J + wide) - occam
+        return np.concatenate([np.full(p, -np.inf), np.where(np.isfinite(scanned.sigma[p:]), score, -np.inf)])
+
+    def held_out(self, chosen: Sequence[int], scale: float) -> HeldOut:
+        """Leave one stop out with the chosen columns in the model."""
+        known, weight, shift = self.known(chosen)
+        return predict(self.evidence, known, weight, shift, scale)
+
+
+def search(evidence: Evidence, allowed: Ints, alpha: float = FALSE_ALARM) -> Search:
+    """Grow the model from the allowed candidates.
+
+    Parameters
+    ----------
+    evidence : Evidence
+    allowed : ndarray of int
+        Columns that may be chosen.
+    alpha : float
+        False-alarm probability of a whole scan.
+    """
+    problem = _Problem(evidence.only(allowed))
+    chosen: list[int] = []
+    steps: list[Step] = []
+    scale = problem.scale(chosen)
+    first = problem.scan(chosen, scale)
+    limit = first_limit = threshold(first, alpha)
+    before = problem.held_out(chosen, 1.0)
+    scanned = first
+    while len(steps) < MOST_STEPS:
+        scores = np.where(np.abs(scanned.z) > limit, problem.scores(scanned, scale), -np.inf)
+        best = int(np.argmax(scores))
+        if not np.isfinite(scores[best]):
+            break
+        trial = _polish(problem, [*chosen, best])
+        after = problem.held_out(trial, 1.0)
+        step = _step(problem, scanned, scores, chosen, best, limit, before, after)
+        steps.append(step)
+        if not step.accepted:
+            break
+        chosen, before = trial, after
+        scale = problem.scale(chosen)
+        scanned = problem.scan(chosen, scale)
+        limit = threshold(scanned, alpha)
+    back = np.array([allowed[c - problem.p] for c in chosen], dtype=np.int64)
+    return Search(tuple(steps), back, first, scanned, first_limit, scale)
+
+
+def _polish(problem: _Problem, chosen: list[int]) -> list[int]:
+    """Exchange each chosen column for the best one given the others, until nothing changes; drop what the others explain."""
+    for _ in range(4):
+        changed = False
+        for place in range(len(chosen)):
+            others = chosen[:place] + chosen[place + 1 :]
+            scores = problem.scores(problem.scan(others, 1.0))
+            best = int(np.argmax(scores))
+            if best != chosen[place] and scores[best] > scores[chosen[place]] + 1e-6:
+                chosen = [*others[:place], best, *others[place:]]
+                changed = True
+        if not changed:
+            break
+    kept = list(chosen)
+    for column in chosen:
+        others = [c for c in kept if c != column]
+        if abs(problem.scan(others, 1.0).z[column]) < _KEEP:
+            kept = others
+    return kept
+
+
+def _step(
+    problem: _Problem, scanned: Scan, scores: Floats, chosen: Sequence[int], best: int, limit: float,
+    before: HeldOut, after: HeldOut,
+) -> Step:  # fmt: skip
+    evidence, p = problem.evidence, problem.p
+    candidate = evidence.candidates[best - p]
+    J, d = scanned.information.J[best, best], scanned.information.d[best]
+    bayes = float(scores[best])
+    won, error = gain(before, after)
+    reason = ""
+    if not bayes > LOG_BAYES:
+        reason = "not plausible in size for this grade of IMU"
+    elif not won > (2.0 * error if candidate.family == "own" else 0.0) and not candidate.effect.run_local:
+        reason = "does not lower the error at stops that the fit has not seen"
+    return Step(
+        index=best, label=candidate.label, family=candidate.family,
+        unit=candidate.parameter.unit, display_unit=candidate.parameter.display_unit, z=float(scanned.z[best]), threshold=limit,
+        estimate=float(scanned.estimate[best]), sigma=float(scanned.sigma[best]),
+        log_likelihood_gain=0.5 * d * d / J, log_bayes_factor=bayes, held_out_before=before, held_out_after=after,
+        held_out_gain=won, held_out_error=error, alike=tuple(evidence.names[i] for i in alike(scores, best)),
+        accepted=not reason, reason=reason, moved=_moved(problem, chosen, best, float(scanned.estimate[best])),
+    )  # fmt: skip
+
+
+def _moved(problem: _Problem, chosen: Sequence[int], best: int, size: float) -> tuple[tuple[str, float], ...]:
+    """Coefficients that the effect moves most, in their own sigmas: what it did to the baseline while it was missing."""
+    known, weight, _ = problem.known(chosen)
+    J = problem.evidence.information.J
+    A = J[np.ix_(known, known)] + np.diag(weight)
+    unit = 1.0 / np.sqrt(np.diag(A))
+    inverse = np.linalg.inv(A * np.outer(unit, unit)) * np.outer(unit, unit)
+    change = -inverse @ J[known, best] * size / np.sqrt(np.diag(inverse))
+    order = np.argsort(-np.abs(change))[:4]
+    return tuple((problem.evidence.names[known[i]], float(change[i])) for i in order)
