@@ -139,4 +139,4 @@ def _phases(begin: Floats, end: Floats, total: float) -> PhaseLog:
 
 
 def _unit(letter: str) -> Floats:
-    return np.eye(3)["XYZ".index(letter)]
+    return np.asarray(np.eye(3)["XYZ".index(letter)])

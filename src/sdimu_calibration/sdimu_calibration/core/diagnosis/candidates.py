@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sdimu_calibration.core.effects import registry
-from sdimu_calibration.core.effects.effect import AXES, CHANNELS, Effect, Parameter, Term, TestTimes
+from sdimu_calibration.core.effects.effect import AXES, CHANNELS, Column, Effect, Parameter, Term, TestTimes, product
 from sdimu_calibration.core.motion import Floats, Motion
 
 OWN = "own equation"
@@ -51,7 +51,7 @@ def split(effect: Effect) -> list[Candidate]:
 
 
 def catalogue(times: TestTimes, in_model: set[str], has_temperature: bool) -> list[Effect]:
-    """Every effect of the catalogue with the parameters that the model does not have, scans spread out over the test."""
+    """Every effect of the catalogue with the parameters that the model lacks, scans spread out over the test."""
     out: list[Effect] = []
     for name in registry.names():
         effect = registry.get(name)
@@ -70,7 +70,7 @@ def without(effect: Effect, in_model: set[str]) -> list[Effect]:
 
 
 def free_inputs(times: TestTimes) -> list[Effect]:
-    """A constant error of every sensor in every dwell and every turn of its own; one effect a segment."""
+    """Give every sensor a constant error of its own in every dwell and every turn; one effect a segment."""
 
     def segment(label: str, start: float, end: float) -> Effect:
         def ones(motion: Motion) -> Floats:
@@ -98,6 +98,7 @@ def equations(has_temperature: bool) -> list[Effect]:
     Forces to third order, rates to second, their products, each also growing with time (and temperature); with |x| for
     even terms. What a registered effect already is comes twice; the catalogue then has the word.
     """
+
     def powers(total: int, kinds: int) -> list[tuple[int, ...]]:
         if kinds == 1:
             return [(total,)]
@@ -115,11 +116,11 @@ def equations(has_temperature: bool) -> list[Effect]:
                         out += _monomial(pa, pw, "t")
                         out += _monomial(pa, pw, "T") if has_temperature else []
     for i in range(3):
-        out += _plain(f"e{AXES[i]}^2", lambda m, i=i: m.C_nb[:, 1, i] ** 2)
+        out += _plain(f"e{AXES[i]}^2", product(_east, i, _east, i))
         for j in range(3):
             if j > i:
-                out += _plain(f"e{AXES[i]} e{AXES[j]}", lambda m, i=i, j=j: m.C_nb[:, 1, i] * m.C_nb[:, 1, j])
-            out += _plain(f"e{AXES[i]} a{AXES[j]}", lambda m, i=i, j=j: m.C_nb[:, 1, i] * m.a[:, j])
+                out += _plain(f"e{AXES[i]} e{AXES[j]}", product(_east, i, _east, j))
+            out += _plain(f"e{AXES[i]} a{AXES[j]}", product(_east, i, lambda m: m.a, j))
     out += _monomial((0, 0, 0), (0, 0, 0), "t^2")
     out += _monomial((0, 0, 0), (0, 0, 0), "T^2") if has_temperature else []
     return out
@@ -130,10 +131,19 @@ def periodic(duration: float) -> list[Effect]:
     out: list[Effect] = []
     for cycles in np.arange(1.0, 20.0, 0.5):
         rate = 2.0 * np.pi * cycles / duration
-        for word, function in (("sin", np.sin), ("cos", np.cos)):
-            text = f"{word}(2 pi t / {duration / cycles:.0f} s)"
-            out += _plain(text, lambda m, r=rate, g=function: g(r * (m.t - 0.5 * m.dt)))
+        for word, lead in (("sin", 0.0), ("cos", 0.5 * np.pi)):
+            out += _plain(f"{word}(2 pi t / {duration / cycles:.0f} s)", _wave(rate, lead))
     return out
+
+
+def _east(motion: Motion) -> Floats:
+    """East component of each body axis, shape (n, 3)."""
+    return motion.C_nb[:, 1, :]
+
+
+def _wave(rate: float, lead: float) -> Column:
+    """Sine of time at `rate` (rad/s), `lead` (rad) ahead."""
+    return lambda motion: np.asarray(np.sin(rate * (motion.t - 0.5 * motion.dt) + lead))
 
 
 # A term whose variable is of the order of one is not larger than the bias is.
@@ -160,8 +170,8 @@ def _own(text: str, unit: str, shown: str, value: Callable[[Motion], Floats]) ->
     return [triad("gyro", ("rad/s", "deg/h"), _OWN_GYRO), triad("accel", ("m/s^2", "ug"), _OWN_ACCEL)]
 
 
-_TIME = {
-    "": lambda m: 1.0,
+_TIME: dict[str, Column] = {
+    "": lambda m: np.ones(len(m.t)),
     "t": lambda m: m.t - 0.5 * m.dt,
     "t^2": lambda m: (m.t - 0.5 * m.dt) ** 2,
     "T": lambda m: m.temperature,
@@ -174,7 +184,7 @@ def _monomial(pa: tuple[int, ...], pw: tuple[int, ...], factor: str) -> list[Eff
     """Own equation ``a^pa wt^pw factor`` on all six sensors; a in g, the rest in SI."""
 
     def value(motion: Motion) -> Floats:
-        out = np.ones(len(motion.t)) * _TIME[factor](motion)
+        out = _TIME[factor](motion)
         for i in range(3):
             if pa[i]:
                 out = out * motion.a[:, i] ** pa[i]

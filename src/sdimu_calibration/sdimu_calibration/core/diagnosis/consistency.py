@@ -112,12 +112,12 @@ def ljung_box(series: Floats) -> float:
     if n <= 2 * _LAGS:
         return 1.0
     worst = 1.0
-    for column in series.T:
-        x = column - column.mean()
-        r = np.array([x[lag:] @ x[:-lag] for lag in range(1, _LAGS + 1)]) / (x @ x)
+    for column in range(count):
+        x = series[:, column] - series[:, column].mean()
+        r = np.array([float(x[lag:] @ x[:-lag]) for lag in range(1, _LAGS + 1)]) / float(x @ x)
         q = n * (n + 2) * float(np.sum(r**2 / (n - np.arange(1, _LAGS + 1))))
         worst = min(worst, float(chi2.sf(q, _LAGS)))
-    return min(1.0, worst * count)
+    return float(min(1.0, worst * count))
 
 
 def triad_noise(reduced: Reduced, means: Floats, density: float) -> Noise:

@@ -1,7 +1,7 @@
 """Is the model adequate, where does it fail, which effect is missing? The order of work is that of the files here.
 
-Screen of the data; noise scale; consistency; one scan over all candidates; search step by step with held-out score; free-input remainder;
-equations outside the catalogue; refit of what was found. Design: doc/diagnosis.md.
+Screen of the data; noise scale; consistency; one scan over all candidates; search step by step with held-out score;
+free-input remainder; equations outside the catalogue; refit of what was found. Design: doc/diagnosis.md.
 """
 
 from __future__ import annotations
@@ -44,8 +44,8 @@ class Diagnosis:
     Attributes
     ----------
     verdict : str
-        ``consistent``, ``noise model wrong``, ``one effect``, ``class of effects``, ``several effects``, ``own equation``,
-        ``unexplained``, ``data fault``.
+        ``consistent``, ``noise model wrong``, ``one effect``, ``class of effects``, ``several effects``,
+        ``own equation``, ``unexplained``, ``data fault``.
     sentence : str
         The verdict for people.
     adequate : bool
@@ -238,7 +238,8 @@ def _try_equations(
     simpler = len(other.chosen) <= max(1, len(found.chosen))
     # Less is left by more than the free inputs differ by chance; or as little, with fewer terms.
     chance = 3.0 * np.sqrt(2.0 * after.dof)
-    if simpler and (left.chi2 < after.chi2 - chance or (left.chi2 < after.chi2 + chance and len(other.chosen) < len(found.chosen))):
+    fewer = len(other.chosen) < len(found.chosen)
+    if simpler and (left.chi2 < after.chi2 - chance or (fewer and left.chi2 < after.chi2 + chance)):
         return wide, other, left, True
     return evidence, found, after, False
 
@@ -266,7 +267,8 @@ def _p_value(found: Search, before: Remainder, consistency: Consistency, noise: 
 
 
 def _verdict(
-    found: Search, own: bool, unexplained: bool, noise: tuple[str, ...], findings: tuple[Finding, ...], evidence: Evidence
+    found: Search, own: bool, unexplained: bool, noise: tuple[str, ...], findings: tuple[Finding, ...],
+    evidence: Evidence,
 ) -> str:
     if any(f.grave for f in findings):
         return "data fault"
@@ -289,7 +291,7 @@ def _verdict(
 
 
 def _sentence(d: Diagnosis) -> str:
-    """The verdict in one sentence."""
+    """Put the verdict into one sentence."""
     names = " and ".join(c.label for c in d.chosen)
     if d.verdict == "consistent":
         return "The model explains the recording: nothing stands out of the noise."

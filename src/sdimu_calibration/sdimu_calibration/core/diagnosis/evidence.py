@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -104,9 +105,12 @@ def test_times(reduced: Reduced) -> TestTimes:
     """When the test stood and turned, from the phases of the epochs."""
     phases, epochs = reduced.phases, reduced.epochs
     edges = np.flatnonzero(np.diff(np.concatenate([[0], phases.dwell.astype(int), [0]])))
-    dwells = [(int(phases.stop[a]), float(epochs.start[a]), float(epochs.end[b - 1])) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+    dwells = [
+        (int(phases.stop[a]), float(epochs.start[a]), float(epochs.end[b - 1]))
+        for a, b in zip(edges[::2], edges[1::2], strict=True)
+    ]
     dwells = [d for d in dwells if d[2] - d[1] >= 3.0]
-    turns = [(a[0], a[2], b[1]) for a, b in zip(dwells[:-1], dwells[1:], strict=True)]
+    turns = [(a[0], a[2], b[1]) for a, b in pairwise(dwells)]
     return TestTimes(float(epochs.end[-1]), tuple(dwells), tuple(turns))
 
 
@@ -151,7 +155,6 @@ def collect(reduced: Reduced, setup: Setup, finished: Pass, effects: Sequence[Ef
     known = navigation_pass(reduced, setup, finished)
     seen = predicted_motion(reduced, setup, finished)
     sensors = setup.sensors
-    p = len(sensors.prior)
     candidates = [c for effect in effects for c in split(effect)]
     W = columns(reduced, known.output, seen, [*sensors.effects, *effects])
     epoch, channel = measured_rows(known.output)
@@ -184,6 +187,6 @@ def columns(reduced: Reduced, output: PassOutput, seen: Motion, effects: Sequenc
             signatures(
                 seen, epochs.first, epochs.last, reduced.kind, output, np.hstack(values),
                 np.array(channel, dtype=np.int64), np.array(parameter, dtype=np.int64), count,
-            )  # fmt: skip
-        )
+            )
+        )  # fmt: skip
     return np.hstack(parts)

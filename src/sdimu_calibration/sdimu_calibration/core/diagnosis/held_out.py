@@ -1,7 +1,7 @@
 """Does a model predict stops that it has not seen? Leave one stop out, turn before it included.
 
-The coefficients are fitted on the innovations of all other stops; those of the stop left out are predicted with the uncertainty of
-the fit. In-sample chi-square falls with every parameter; this does not.
+The coefficients are fitted on the innovations of all other stops; those of the stop left out are predicted with the
+uncertainty of the fit. In-sample chi-square falls with every parameter; this does not.
 """
 
 from __future__ import annotations

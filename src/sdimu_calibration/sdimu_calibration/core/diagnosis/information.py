@@ -45,7 +45,8 @@ class Information:
         A = self.J[np.ix_(known, known)] + np.diag(weight)
         scale = 1.0 / np.sqrt(np.diag(A))
         B = self.J[:, known]
-        X = (scale[:, None] * np.linalg.solve(A * np.outer(scale, scale), scale[:, None] * np.column_stack([B.T, self.d[known]])))
+        right = scale[:, None] * np.column_stack([B.T, self.d[known]])
+        X = scale[:, None] * np.linalg.solve(A * np.outer(scale, scale), right)
         J = self.J - B @ X[:, :-1]
         d = self.d - B @ X[:, -1]
         J[known, :] = J[:, known] = 0.0

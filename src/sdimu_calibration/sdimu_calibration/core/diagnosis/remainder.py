@@ -14,7 +14,8 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 _TESTABLE = 1e-2
-"""Directions of which the model leaves less than a tenth of the signature (a hundredth of the information) are not tested."""
+"""Directions of which the model leaves less than this share of the information (a tenth of the signature) are not
+tested."""
 
 
 @dataclass(frozen=True)

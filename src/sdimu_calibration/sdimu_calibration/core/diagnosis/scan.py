@@ -1,7 +1,7 @@
 """One pass over all candidates: score, testability, threshold, class.
 
-A candidate's score z is its estimate over its sigma when it is added to the model alone, all coefficients being estimated again.
-For linear Gaussian data z^2 is the fall of chi-square of a refit (score test = likelihood ratio).
+A candidate's score z is its estimate over its sigma when it is added to the model alone, all coefficients being
+estimated again. For linear Gaussian data z^2 is the fall of chi-square of a refit (score test = likelihood ratio).
 """
 
 from __future__ import annotations
@@ -80,8 +80,8 @@ def scan(full: Information, known: Ints, weight: Floats, scale: float = 1.0) -> 
 def threshold(scanned: Scan, alpha: float, seed: int = 1) -> float:
     """Size of the largest ``|z|`` that pure noise exceeds with probability `alpha`.
 
-    The scores of pure noise are jointly normal with the correlation of the signatures, so the whole scan is simulated by
-    drawing from it; correlated candidates cost less than Bonferroni would charge.
+    The scores of pure noise are jointly normal with the correlation of the signatures, so the whole scan is simulated
+    by drawing from it; correlated candidates cost less than Bonferroni would charge.
     """
     C = correlation(scanned)
     if not len(C):

@@ -36,7 +36,8 @@ def screen(recording: Recording, reduced: Reduced) -> tuple[Finding, ...]:
             same = np.flatnonzero(np.diff(x) != 0.0)
             longest = int(np.max(np.diff(np.concatenate([[-1], same, [len(x) - 1]]))))
             if longest * recording.interval_s > _STUCK:
-                out.append(Finding(f"{triad} {'xyz'[axis]} shows the same number for {longest * recording.interval_s:.0f} s", True))
+                seconds = longest * recording.interval_s
+                out.append(Finding(f"{triad} {'xyz'[axis]} shows the same number for {seconds:.0f} s", True))
             top = np.abs(x) >= np.abs(x).max() * (1.0 - 1e-12)
             if top.sum() > 20:
                 out.append(Finding(f"{triad} {'xyz'[axis]} is saturated in {int(top.sum())} samples", True))

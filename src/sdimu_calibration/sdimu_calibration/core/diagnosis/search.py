@@ -1,8 +1,9 @@
 """Step by step: add the best candidate, look again, until nothing stands out of the noise.
 
-Orthogonal matching pursuit on the signatures: each step conditions on everything chosen so far; a chosen effect is exchanged when another
-explains the same better once the others are in, and dropped when the others took its place. A step must beat the noise of the whole
-scan, be plausible in size (Bayes factor with the physical prior), and lower the error at stops that it has not seen.
+Orthogonal matching pursuit on the signatures: each step conditions on everything chosen so far; a chosen effect is
+exchanged when another explains the same better once the others are in, and dropped when the others took its place. A
+step must beat the noise of the whole scan, be plausible in size (Bayes factor with the physical prior), and lower the
+error at stops that it has not seen.
 """
 
 from __future__ import annotations
@@ -125,7 +126,7 @@ class _Problem:
         information = self.evidence.information
         estimate, _ = information.estimate(known, weight)
         residual = self.evidence.e - self.evidence.W[:, known] @ estimate
-        return float(np.sqrt(max(1.0, residual @ residual / max(1, len(residual) - len(known)))))
+        return float(np.sqrt(max(1.0, float(residual @ residual) / max(1, len(residual) - len(known)))))
 
     def scan(self, chosen: Sequence[int], scale: float) -> Scan:
         """Score the allowed columns given the chosen ones."""
@@ -188,7 +189,7 @@ def search(evidence: Evidence, allowed: Ints, alpha: float = FALSE_ALARM) -> Sea
 
 
 def _polish(problem: _Problem, chosen: list[int]) -> list[int]:
-    """Exchange each chosen column for the best one given the others, until nothing changes; drop what the others explain."""
+    """Exchange each chosen column for the best one given the others until nothing changes; drop what they explain."""
     for _ in range(4):
         changed = False
         for place in range(len(chosen)):
@@ -224,7 +225,8 @@ def _step(
         reason = "does not lower the error at stops that the fit has not seen"
     return Step(
         index=best, label=candidate.label, family=candidate.family,
-        unit=candidate.parameter.unit, display_unit=candidate.parameter.display_unit, z=float(scanned.z[best]), threshold=limit,
+        unit=candidate.parameter.unit, display_unit=candidate.parameter.display_unit,
+        z=float(scanned.z[best]), threshold=limit,
         estimate=float(scanned.estimate[best]), sigma=float(scanned.sigma[best]),
         log_likelihood_gain=0.5 * d * d / J, log_bayes_factor=bayes, held_out_before=before, held_out_after=after,
         held_out_gain=won, held_out_error=error, alike=tuple(evidence.names[i] for i in alike(scores, best)),
@@ -233,7 +235,7 @@ def _step(
 
 
 def _moved(problem: _Problem, chosen: Sequence[int], best: int, size: float) -> tuple[tuple[str, float], ...]:
-    """Coefficients that the effect moves most, in their own sigmas: what it did to the baseline while it was missing."""
+    """Coefficients that the effect moves most, in their own sigmas: the damage it did while it was missing."""
     known, weight, _ = problem.known(chosen)
     J = problem.evidence.information.J
     A = J[np.ix_(known, known)] + np.diag(weight)

@@ -1,15 +1,16 @@
 """How a sensor error shows in the innovations: Friedland's separate-bias recursion.
 
-The navigation filter runs with the coefficients known. A parameter that adds ``A(t)`` to the sensors then adds the column W
-to its whitened innovations, by the recursion
+The navigation filter runs with the coefficients known. A parameter that adds ``A(t)`` to the sensors then adds the
+column W to its whitened innovations, by the recursion
 
     U = Phi V + G_in,   S = H U + D,   W = L^-1 S,   V = U - K S,
 
-G_in the navigation's response over the epoch, D the direct term, Phi, H, L, K the filter's own. Given W for every parameter, known and
-suspected, everything that follows is linear least squares on the whitened innovations e: ``e = W theta + white noise``.
+G_in the navigation's response over the epoch, D the direct term, Phi, H, L, K the filter's own. Given W for every
+parameter, known and suspected, everything that follows is linear least squares on the whitened innovations e: ``e = W
+theta + white noise``.
 
-Sources: B. Friedland, "Treatment of bias in recursive filtering", IEEE Trans. Automatic Control 14 (1969); A. Willsky, H. Jones,
-"A generalized likelihood ratio approach ...", ibid. 21 (1976).
+Sources: B. Friedland, "Treatment of bias in recursive filtering", IEEE Trans. Automatic Control 14 (1969); A.
+Willsky, H. Jones, "A generalized likelihood ratio approach ...", ibid. 21 (1976).
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Sensor effects, one file per physical cause. Importing the package fills the registry."""
 
-from sdimu_calibration.core.effects import (  # noqa: I001 - the order is the order of the catalogue
+from sdimu_calibration.core.effects import (  # noqa: I001, F401 - the order is the order of the catalogue
     registry,
     bias,
     scale,

@@ -1,7 +1,7 @@
 """Nonlinearity of an accelerometer along its own input axis.
 
-Source: the model equation of IEEE Std 1293 (single-axis accelerometers): E/K1 = K0 + K0'/2 sgn(a) + (1 + K1'/2 sgn(a)) a +
-Koq a|a| + K2 a^2 + K3 a^3 + ..., a in g.
+Source: the model equation of IEEE Std 1293 (single-axis accelerometers): E/K1 = K0 + K0'/2 sgn(a) + (1 + K1'/2
+sgn(a)) a + Koq a|a| + K2 a^2 + K3 a^3 + ..., a in g.
 """
 
 from __future__ import annotations
@@ -17,7 +17,8 @@ QUADRATIC = register(
         "accel_quadratic", "accelerometer second-order nonlinearity K2", "df_i = K2_i a_i^2",
         per_axis_columns(ACCEL, lambda m: m.a**2), ("m/s^2/g^2", "ug/g^2"), (20, 100, 2000),
         typical="navigation 5-30, tactical 50-200, MEMS 500-5000 ug/g^2",
-        description="Output bends with the square of the force. At the stops it hides in the bias; the velocity jump after "
+        description="Output bends with the square of the force. At the stops it hides in the bias; the velocity jump "
+        "after "
         "turns that move the axis shows it.",
         confused_with=("accel_scale_asymmetry", "accel_bias"),
     )

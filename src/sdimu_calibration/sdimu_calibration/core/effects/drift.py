@@ -15,6 +15,7 @@ from sdimu_calibration.core.effects.effect import (
     TestTimes,
     family,
     per_axis_columns,
+    pick,
 )
 from sdimu_calibration.core.effects.mass_unbalance import GYRO_MASS_UNBALANCE, TERMS
 from sdimu_calibration.core.effects.registry import register
@@ -52,13 +53,17 @@ def warm_up(stem: str, tau: float) -> Effect:
     )  # fmt: skip
 
 
+def _times(factor: float, prior: tuple[float, float, float]) -> tuple[float, float, float]:
+    return factor * prior[0], factor * prior[1], factor * prior[2]
+
+
 def step(stem: str, t0: float) -> Effect:
     """Step of a bias at `t0` (s)."""
     triad, word, letter, units, prior = _TRIADS[stem]
     return family(
         f"{stem}_bias_step", f"{word} bias step", f"d{letter}_i = k_i (t > t0)",
         per_axis_columns(triad, lambda m: _columns(np.clip((m.t - t0) / m.dt, 0.0, 1.0))), units,
-        tuple(0.3 * v for v in prior),
+        _times(0.3, prior),
         typical="any size; after a shock, a power dip, a turn",
         description="Bias that changes at one moment. Scanned over the starts and ends of the turns.",
         confused_with=(f"{stem}_bias_ramp", f"{stem}_bias_temperature_rate"),
@@ -99,7 +104,7 @@ def _ramp(stem: str) -> Effect:
     return family(
         f"{stem}_bias_ramp", f"{word} bias ramp", f"d{letter}_i = k_i t",
         per_axis_columns(triad, lambda m: _columns(_time(m))), (f"{si}/s", f"{shown}/h"),
-        tuple(0.4 * v for v in prior),
+        _times(0.4, prior),
         typical="accelerometer 1-20 ug/h",
         description="Bias that runs away at a constant rate.",
         confused_with=(f"{stem}_bias_warm_up", f"{stem}_bias_temperature", f"{stem}_bias_random_walk"),
@@ -136,7 +141,7 @@ MASS_UNBALANCE_RAMP = register(
         family(
             "gyro_mass_unbalance_ramp", "gyro mass-unbalance drift", "dw = t (m'_d a_own + m'_q a_cross)",
             {
-                name: (GYRO[i // 2], lambda m, i=i: _time(m) * _UNBALANCE(m)[:, i])
+                name: (GYRO[i // 2], pick(lambda m: _columns(_time(m))[:, :1] * _UNBALANCE(m), i))
                 for i, name in enumerate(TERMS)
             },
             ("rad/s/g/s", "deg/h/g/h"), (0.1, 0.5, 5),

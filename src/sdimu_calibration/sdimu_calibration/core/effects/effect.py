@@ -192,9 +192,28 @@ def family(
     )
 
 
+def pick(of: Callable[[Motion], Floats], *place: int) -> Column:
+    """Column at index `place` of ``of(motion)``, shape (n, ...)."""
+    index: Any = (slice(None), *place)
+
+    def column(motion: Motion) -> Floats:
+        return np.asarray(of(motion)[index])
+
+    return column
+
+
+def product(of: Callable[[Motion], Floats], i: int, other: Callable[[Motion], Floats], j: int) -> Column:
+    """Column i of ``of(motion)`` times column j of ``other(motion)``."""
+
+    def column(motion: Motion) -> Floats:
+        return np.asarray(of(motion)[:, i] * other(motion)[:, j])
+
+    return column
+
+
 def per_axis_columns(triad: tuple[int, ...], of: Callable[[Motion], Floats]) -> dict[str, tuple[int, Column]]:
     """Columns x, y, z: each sensor sees its own column of ``of(motion)``, shape (n, 3)."""
-    return {axis: (triad[i], lambda m, i=i: of(m)[:, i]) for i, axis in enumerate(AXES)}
+    return {axis: (triad[i], pick(of, i)) for i, axis in enumerate(AXES)}
 
 
 def matrix_columns(
@@ -202,7 +221,7 @@ def matrix_columns(
 ) -> dict[str, tuple[int, Column]]:
     """Columns xx, xy ... zz: sensor i sees column j of ``of(motion)``, shape (n, 3)."""
     return {
-        AXES[i] + AXES[j]: (triad[i], lambda m, j=j: of(m)[:, j])
+        AXES[i] + AXES[j]: (triad[i], pick(of, j))
         for i in range(3)
         for j in range(3)
         if diagonal or i != j

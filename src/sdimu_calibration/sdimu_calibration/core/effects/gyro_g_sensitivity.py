@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
-from sdimu_calibration.core.effects.effect import AXES, GYRO, family, matrix_columns
+from sdimu_calibration.core.effects.effect import AXES, GYRO, family, matrix_columns, product
 from sdimu_calibration.core.effects.registry import register
+from sdimu_calibration.core.motion import Floats, Motion
 
 _PAIRS = ((0, 1), (0, 2), (1, 2))
+
+
+def _force(motion: Motion) -> Floats:
+    return motion.a
+
 
 G_SENSITIVITY = register(
     family(
         "gyro_g_sensitivity", "gyro g-sensitivity, full matrix", "dw_i = D_ij a_j",
         matrix_columns(GYRO, lambda m: m.a), ("rad/s/g", "deg/h/g"), (0.3, 1, 50),
         typical="DTG spin axis 0.05-0.5, optical below 0.1, tactical 0.1-1, MEMS 1-100 deg/h/g",
-        description="Drift in proportion to force along any axis. Six of nine are the mass unbalance of the baseline; those of the "
+        description="Drift in proportion to force along any axis. Six of nine are the mass unbalance of the "
+        "baseline; those of the "
         "spin axes (xz, yz, zx) are not.",
         confused_with=("gyro_mass_unbalance",),
     )
@@ -32,7 +39,7 @@ G_PRODUCT = register(
     family(
         "gyro_g_product", "gyro g-squared drift (anisoelastic), products", "dw_i = D_ijk a_j a_k",
         {
-            AXES[i] + AXES[j] + AXES[k]: (GYRO[i], lambda m, j=j, k=k: m.a[:, j] * m.a[:, k])
+            AXES[i] + AXES[j] + AXES[k]: (GYRO[i], product(_force, j, _force, k))
             for i in range(3) for j, k in _PAIRS
         },
         ("rad/s/g^2", "deg/h/g^2"), (0.03, 0.1, 3),
@@ -45,7 +52,7 @@ G_PRODUCT = register(
 G_DEPENDENT_SCALE = register(
     family(
         "gyro_g_dependent_scale", "gyro g-dependent scale factor", "dw_i = k_i a_i w_i",
-        {AXES[i]: (GYRO[i], lambda m, i=i: m.a[:, i] * m.w[:, i]) for i in range(3)},
+        {AXES[i]: (GYRO[i], product(_force, i, lambda m: m.w, i)) for i in range(3)},
         ("1/g", "ppm/g"), (10, 100, 1000),
         typical="small",
         description="Scale factor that changes with the force along the axis.",

@@ -4,15 +4,22 @@ from __future__ import annotations
 
 import numpy as np
 
-from sdimu_calibration.core.effects.effect import AXES, GYRO, family, matrix_columns, per_axis_columns
+from sdimu_calibration.core.effects.effect import AXES, GYRO, family, matrix_columns, per_axis_columns, product
 from sdimu_calibration.core.effects.registry import register
+from sdimu_calibration.core.motion import Floats, Motion
+
+
+def _rate(motion: Motion) -> Floats:
+    return motion.w
+
 
 SCALE_ASYMMETRY = register(
     family(
         "gyro_scale_asymmetry", "gyro scale-factor asymmetry", "dw_i = k_i |w_i|",
         per_axis_columns(GYRO, lambda m: np.abs(m.w)), ("1", "ppm"), (25, 100, 500),
         typical="DTG 5-50, FOG 1-20, tactical 20-200, MEMS 50-1000 ppm",
-        description="Different scale factors for both senses of turn. Needs turns of both signs; at one rate the same as the "
+        description="Different scale factors for both senses of turn. Needs turns of both signs; at one rate the "
+        "same as the "
         "quadratic term.",
         confused_with=("gyro_scale_quadratic",),
     )
@@ -51,7 +58,7 @@ MISALIGNMENT_ASYMMETRY = register(
 ANISOINERTIA = register(
     family(
         "gyro_anisoinertia", "gyro anisoinertia", "dw_i = k_i w_j w_k",
-        {AXES[i]: (GYRO[i], lambda m, i=i: m.w[:, (i + 1) % 3] * m.w[:, (i + 2) % 3]) for i in range(3)},
+        {AXES[i]: (GYRO[i], product(_rate, (i + 1) % 3, _rate, (i + 2) % 3)) for i in range(3)},
         ("s/rad", "s/rad"), (1e-3, 1e-3, 1e-2),
         typical="instrument dependent",
         description="Product of both cross-axis rates: needs turns about two axes at once.",

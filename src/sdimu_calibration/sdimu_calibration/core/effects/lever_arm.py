@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import numpy as np
 
-from sdimu_calibration.core.effects.effect import ACCEL, AXES, Effect, Parameter, Term, family
+from sdimu_calibration.core.effects.effect import ACCEL, AXES, Effect, Parameter, Term, family, pick
 from sdimu_calibration.core.effects.registry import register
 from sdimu_calibration.core.motion import Floats, Motion
 
 SIZE = register(
     family(
         "accel_size", "size effect (inner lever arm)", "df_i = [(alpha x + w x w x) r_i]_i",
-        {AXES[i] + AXES[j]: (ACCEL[i], lambda m, i=i, j=j: m.lever[:, i, j]) for i in range(3) for j in range(3)},
+        {AXES[i] + AXES[j]: (ACCEL[i], pick(lambda m: m.lever, i, j)) for i in range(3) for j in range(3)},
         ("m", "mm"), (20, 20, 20),
         typical="5-50 mm",
-        description="Each accelerometer has its own place. Grows with the square of the rate: fast turns show it. A common place "
+        description="Each accelerometer has its own place. Grows with the square of the rate: fast turns show it. A "
+        "common place "
         "of all three is a lever arm and moves only the position.",
         confused_with=("accel_bias_in_motion",),
     )
@@ -34,7 +35,8 @@ LEVER_ARM = register(
         terms=tuple(Term(ACCEL[i], j) for i in range(3) for j in range(3)),
         regressors=_lever,
         prior={"navigation": 0.1, "tactical": 0.1, "mems": 0.1},
-        description="The IMU really moves when the table turns. Not a sensor error; seen as an error because the filter holds "
+        description="The IMU really moves when the table turns. Not a sensor error; seen as an error because the "
+        "filter holds "
         "the IMU at one point.",
         typical="1-300 mm",
         confused_with=("accel_size",),

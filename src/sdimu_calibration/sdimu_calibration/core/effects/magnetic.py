@@ -20,7 +20,8 @@ ACCEL_MAGNETIC = register(
         "accel_magnetic", "accelerometer magnetic sensitivity", "df_i = m_ij B_j",
         matrix_columns(ACCEL, lambda m: m.field), ("m/s^2/T", "ug/G"), (20, 50, 500),
         typical="1-20 ug/G",
-        description="Error in proportion to the Earth's field. Along the own axis it is a misalignment or a scale factor.",
+        description="Error in proportion to the Earth's field. Along the own axis it is a misalignment or a scale "
+        "factor.",
         confused_with=("accel_scale", "accel_misalignment"),
     )
 )  # fmt: skip

@@ -23,7 +23,9 @@ GYRO_BIAS_IN_MOTION = register(
 
 ACCEL_BIAS_IN_MOTION = register(
     family(
-        "accel_bias_in_motion", "accelerometer bias in motion (vibration rectification)", "df_i = k_i while the table turns",
+        "accel_bias_in_motion", "accelerometer bias in motion (vibration rectification)",
+        "df_i = k_i while the "
+        "table turns",
         per_axis_columns(ACCEL, _moving), ("m/s^2", "ug"), (20, 100, 1000),
         typical="10-50 ug/g^2rms times the level",
         description="Vibration of the drive rectified by the nonlinearity of the accelerometer.",

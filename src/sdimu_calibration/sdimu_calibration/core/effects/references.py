@@ -1,7 +1,7 @@
 """Errors of what the test believes of its site; each equals a sensor error that turns with the attitude.
 
-A wrong Earth rate d in NED looks like a gyro error ``-C_bn d``, a wrong gravity d like an accelerometer error ``C_bn d``,
-in navigation as in Zw and Zf.
+A wrong Earth rate d in NED looks like a gyro error ``-C_bn d``, a wrong gravity d like an accelerometer error ``C_bn
+d``, in navigation as in Zw and Zf.
 """
 
 from __future__ import annotations
@@ -30,7 +30,8 @@ GRAVITY = register(
         regressors=lambda m: _along(m, 2),
         prior=dict.fromkeys(("navigation", "tactical", "mems"), 1e-3),
         typical="WGS-84 normal gravity: 10-50 ug; a survey: below 1 ug",
-        description="Cannot be told from a common scale factor of the accelerometers, whatever the plan: quote it as a floor of "
+        description="Cannot be told from a common scale factor of the accelerometers, whatever the plan: quote it as "
+        "a floor of "
         "the scale factor.",
         confused_with=("accel_scale",),
     )

@@ -1,7 +1,7 @@
 """Effects by the words that people write: a name, one of its parameters, with options in brackets.
 
-``accel_quadratic`` takes all three axes, ``accel_quadratic_x`` one, ``gyro_bias_warm_up_x(tau=300 s)`` one with its own time
-constant.
+``accel_quadratic`` takes all three axes, ``accel_quadratic_x`` one, ``gyro_bias_warm_up_x(tau=300 s)`` one with its
+own time constant.
 """
 
 from __future__ import annotations

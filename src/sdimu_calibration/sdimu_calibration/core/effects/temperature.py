@@ -25,7 +25,8 @@ def _triad(
             f"{stem}_bias_temperature", f"{word} bias temperature coefficient", f"d{letter}_i = k_i (T - T0)",
             per_axis_columns(triad, _change), (f"{si}/K", f"{shown}/degC"), bias, needs="temperature",
             typical="residual: gyro 0.002-0.1 deg/h/C, accelerometer 0.5-5 ug/C; raw 10-100 times more",
-            description="Slow; stops that repeat an orientation at another temperature decide. T0 is the temperature at the "
+            description="Slow; stops that repeat an orientation at another temperature decide. T0 is the temperature "
+            "at the "
             "start.",
             confused_with=(f"{stem}_bias_warm_up", f"{stem}_bias_ramp", f"{stem}_bias_random_walk"),
         )

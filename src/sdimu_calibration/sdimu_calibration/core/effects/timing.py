@@ -66,7 +66,8 @@ def lost_data(start: float, end: float, turn: int) -> Effect:
         regressors=missing,
         prior={"navigation": 0.02, "tactical": 0.02, "mems": 0.02},
         typical="one or a few samples; 10 ms at 2 deg/s are 72 arcsec",
-        description="Samples dropped before the stamps were given: the angle of one turn is too small. A fault of the recording, "
+        description="Samples dropped before the stamps were given: the angle of one turn is too small. A fault of "
+        "the recording, "
         "not of the sensor.",
         run_local=True,
         options={"turn": str(turn), "start": f"{start:g} s", "end": f"{end:g} s"},
