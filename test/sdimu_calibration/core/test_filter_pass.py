@@ -14,11 +14,12 @@ from sdimu_calibration.core.filter_pass import (
     NAV,
     SKIP,
     PassState,
+    _feed_back,
     new_output,
     run_pass,
 )
 from sdimu_calibration.core.passes import first_attitude, one_pass, pass_settings, reduce, set_up, start_state
-from sdimu_calibration.core.rotation import skew
+from sdimu_calibration.core.rotation import rotation_matrix, rotation_vector, skew
 
 PARTS = 10
 """White noise is taken as constant over this part of an epoch."""
@@ -164,3 +165,33 @@ def test_innovations_of_the_right_model_are_white(batch_and_filter):
     assert len(white) > 100
     assert abs(np.mean(white**2) - 1.0) < 3.3 * np.sqrt(2.0 / len(white))
     assert taken.output.normalised.shape[1] == MEASURED
+
+
+def test_the_reset_of_attitude_turns_the_frame_of_its_error(site, imu, model, general_attitude):
+    """Before: C_true = exp(err) C. After a correction e: C_true = exp(err') exp(e) C; P follows d err' / d err at e."""
+    setup = set_up(site, imu, model)
+    settings = pass_settings(setup, closed_loop=True)
+    p = len(setup.sensors.prior)
+    s = NAV + p + COPY
+    rng = np.random.default_rng(5)
+    A = rng.standard_normal((s, s))
+    x, P = np.zeros(s), A @ A.T
+    e = np.array([0.02, -0.03, 0.05])
+    x[6:9], x[NAV : NAV + p] = e, setup.sensors.prior
+    position = np.array([site.latitude_rad, 0.0, site.height_m])
+    state = PassState(x, P, general_attitude.copy(), np.zeros(3), position, np.zeros(p))
+    J = np.eye(s)
+    h = 1e-6
+    for j in range(3):
+        step = h * np.eye(3)[j]
+        after = [rotation_vector(rotation_matrix(e + d) @ rotation_matrix(e).T) for d in (step, -step)]
+        J[6:9, 6 + j] = (after[0] - after[1]) / (2 * h)
+    expected = J @ P @ J.T
+    _feed_back(settings, state, p)
+    np.testing.assert_allclose(state.C_nb, rotation_matrix(e) @ general_attitude, rtol=0, atol=1e-14)
+    np.testing.assert_array_equal(state.used, setup.sensors.prior)
+    np.testing.assert_array_equal(state.x[: NAV + p], 0.0)
+    sigma = np.sqrt(np.diag(expected))
+    # Second order of the correction, e^2 / 6; leaving the turn out, or its sign wrong, is of first order.
+    allowed = 2 * (e @ e) / 6
+    assert np.abs((state.P - expected) / np.outer(sigma, sigma)).max() < allowed < 0.1 * np.abs(e).max()

@@ -140,9 +140,9 @@ def test_gravity_keeps_its_size_and_direction_while_a_table_turns_it_through_the
     cycles = reduced(edges[1:], omega, force)
     _, v = dead_reckoned(general_attitude @ AXES.T, cycles)
     exact = general_attitude @ np.array([0.0, 0.0, -9.8]) * cycles.t[-1]
-    # Exact to second order in a cycle of angle a; the third leaves a^4 / 30. A force taken as constant in the body would
-    # leave a^3 / 24, seventy times more at 20 deg/s. Sculling is exact for a ramp between samples; the curvature of a
-    # turn leaves (w dt)^3 / 2. The first sample of all has no neighbour: (w dt)^2 / 12 of one sample.
+    # Exact to second order in a cycle of angle a; the third leaves a^4 / 30. A force taken as constant in the body
+    # would leave a^3 / 24, seventy times more at 20 deg/s. Sculling is exact for a ramp between samples; the
+    # curvature of a turn leaves (w dt)^3 / 2. The first sample of all has no neighbour: (w dt)^2 / 12 of one sample.
     angle, step = np.linalg.norm(cycles.alpha, axis=1).max(), w / rate_hz
     allowed = 1e-12 + angle**4 / 30 + step**3 / 2 + step**2 / 12 / len(omega)
     assert np.linalg.norm(v - exact) < allowed * np.linalg.norm(exact)
