@@ -58,7 +58,7 @@ def _client(scheduler: str | None, workers: int) -> Iterator[Any]:
         return
     with (
         LocalCluster(
-            n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=None, memory_limit=None,
+            n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=":0", memory_limit=None,
             silence_logs=logging.CRITICAL, env=_ENVIRONMENT,
         ) as local,
         Client(local) as client,

@@ -45,6 +45,7 @@ def monte_carlo(
     from sdimu_calibration.report.monte_carlo import checks_table, coefficients_table, write_page
     from sdimu_calibration.storage.config import load_imu, load_model, load_plan, load_site
     from sdimu_calibration.storage.json_file import write_json
+    from sdimu_sim.campaign.bound import plan_bound
     from sdimu_sim.campaign.campaign import run_campaign
     from sdimu_sim.campaign.run import CalibrationRun
     from sdimu_sim.campaign.summary import summarise
@@ -68,7 +69,8 @@ def monte_carlo(
     console = Console()
     with bar(console) as progress:
         rows = run_campaign(work, range(seed, seed + number), out, scheduler, progress, workers)
-    summary = summarise(rows, work.model, scenario.imu)
+    bound = plan_bound(work, range(seed, seed + number))
+    summary = summarise(rows, work.model, scenario.imu, bound, "batch least squares of this plan, IMU and mounts")
     write_json(out / "monte-carlo.json", summary)
     write_page(out / "monte-carlo.html", out / "monte-carlo.json")
     console.print(coefficients_table(summary), checks_table(summary), soft_wrap=True)

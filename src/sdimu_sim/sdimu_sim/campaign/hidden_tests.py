@@ -1,0 +1,134 @@
+"""Where hidden effects are drawn: plans, sites, and how small an effect a test there can see."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from sdimu_calibration.core.diagnosis.candidates import catalogue
+from sdimu_calibration.core.diagnosis.evidence import collect, test_times
+from sdimu_calibration.core.diagnosis.scan import scan
+from sdimu_calibration.core.passes import reduce, set_up, solve
+from sdimu_calibration.core.plan import Plan, Turn
+from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.specification import ImuSpecification, Model, Site
+from sdimu_calibration.storage.config import load_plan
+from sdimu_sim.campaign.hidden_outside import shapes
+from sdimu_sim.campaign.run import simulate
+from sdimu_sim.core.scenario import Scenario, imu_truth
+from sdimu_sim.core.temperature import TemperatureProfile
+
+PLANS = ("kim18", "kim18_signed", "recommended")
+"""Plans that are drawn."""
+LATITUDES_DEG = (20.0, 40.0, 60.0)
+"""Latitudes at which sizes are computed; between them the logarithm of a size is interpolated."""
+RATE_HZ = 20.0
+"""Sample rate of the campaign: navigation cycles are 0.1 s at any rate, so this costs no information."""
+WARM_UP = TemperatureProfile(25.0, 8.0, 1200.0, 0.3, 900.0)
+"""Temperature in every test, so that what depends on it can be tested."""
+_SEED = 900_001
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """One sigma of every candidate on a clean test.
+
+    Attributes
+    ----------
+    plan : str
+    latitude_deg : float
+    family, label : tuple of str
+    sigma : tuple of float
+        SI; inf where a plan cannot test it.
+    retention : tuple of float
+        Share of the signature that the model's coefficients leave.
+    prior : tuple of float
+        Physical one-sigma size for the IMU's grade (SI).
+    stops : tuple of (int, float, float)
+        Index, start and end (s) of every dwell.
+    """
+
+    plan: str
+    latitude_deg: float
+    family: tuple[str, ...]
+    label: tuple[str, ...]
+    sigma: tuple[float, ...]
+    retention: tuple[float, ...]
+    prior: tuple[float, ...]
+    stops: tuple[tuple[int, float, float], ...]
+
+
+def plan_named(name: str) -> Plan:
+    """Load a plan from the configuration, or make `kim18_signed` and `recommended` where it has none."""
+    try:
+        return load_plan(name)
+    except DataError:
+        if name not in PLANS:
+            raise
+    base = load_plan("kim18")
+    signed = replace(base, name="kim18_signed", turns=_signed(base.turns))
+    return signed if name == "kim18_signed" else _recommended(signed)
+
+
+def _signed(turns: Sequence[Turn]) -> tuple[Turn, ...]:
+    """Turn the second half turn of every pair back."""
+    half = [abs(abs(t.angle_rad) - math.pi) < 1e-9 for t in turns]
+    return tuple(
+        replace(t, angle_rad=-t.angle_rad) if half[i] and i and half[i - 1] and turns[i - 1].axis == t.axis else t
+        for i, t in enumerate(turns)
+    )
+
+
+def _recommended(signed: Plan) -> Plan:
+    """Two rates in turn, and the last nine quarter turns as eighth turns with dwells of 60 s."""
+    first, last = signed.turns[:9], signed.turns[9:]
+    turns = [*first, *(replace(t, angle_rad=t.angle_rad / 2.0) for t in last for _ in range(2))]
+    rates = (math.radians(2.0), math.radians(10.0))
+    return Plan(
+        "recommended",
+        (*signed.dwell_s[:10], *(60.0,) * (len(turns) - 9)),
+        tuple(replace(t, rate_rad_s=rates[i % 2]) for i, t in enumerate(turns)),
+        math.radians(5.0),
+    )
+
+
+def sizes(plan: str, latitude_deg: float, imu: ImuSpecification, model: Model) -> Sizes:
+    """Sigma of the whole catalogue, and of what is outside it, on a clean test of a plan at a latitude."""
+    site = Site(math.radians(latitude_deg), 0.0)
+    scenario = Scenario(
+        plan=plan_named(plan), imu=imu, site=site, rate_hz=RATE_HZ, seed=_SEED, temperature=WARM_UP, coefficients={}
+    )
+    setup = set_up(site, imu, model)
+    reduced = reduce(simulate(scenario, imu_truth(scenario)), setup)
+    solution = solve(setup, reduced, lambda _word, _share: None, keep=True)
+    times = test_times(reduced)
+    known = catalogue(times, set(setup.sensors.names), True)
+    evidence = collect(reduced, setup, solution.last, [*known, *(s.effect() for s in shapes(times))])
+    scanned = scan(evidence.information, evidence.model, evidence.weight)
+    p = len(evidence.weight)
+    return Sizes(
+        plan, latitude_deg, tuple(c.family for c in evidence.candidates), tuple(c.label for c in evidence.candidates),
+        tuple(scanned.sigma[p:].tolist()), tuple(scanned.retention[p:].tolist()), tuple(evidence.prior.tolist()),
+        times.stops,
+    )  # fmt: skip
+
+
+def between(tables: Sequence[Sizes], plan: str, latitude_deg: float) -> Sizes:
+    """Sizes of a plan at any latitude between those of `tables`."""
+    own = sorted((t for t in tables if t.plan == plan), key=lambda t: t.latitude_deg)
+    if not own:
+        raise DataError(f"plan '{plan}': no sizes were computed for it")
+    grid = np.array([t.latitude_deg for t in own])
+    high = int(np.clip(np.searchsorted(grid, latitude_deg), 1, max(len(grid) - 1, 1))) if len(own) > 1 else 0
+    if not high:
+        return own[0]
+    low = high - 1
+    share = (latitude_deg - grid[low]) / (grid[high] - grid[low])
+    a, b = np.array(own[low].sigma), np.array(own[high].sigma)
+    with np.errstate(invalid="ignore"):
+        sigma = np.where(np.isfinite(a) & np.isfinite(b), np.exp((1 - share) * np.log(a) + share * np.log(b)), np.inf)
+    retention = np.minimum(own[low].retention, own[high].retention)
+    return replace(own[low], latitude_deg=latitude_deg, sigma=tuple(sigma.tolist()), retention=tuple(retention.tolist()))
