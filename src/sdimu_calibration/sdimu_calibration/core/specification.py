@@ -80,8 +80,8 @@ class Model:
     """
 
     effects: tuple[str, ...]
-    velocity_sigma: float = 1e-4
-    position_sigma: float = 1e-2
+    velocity_sigma: float = 2e-5
+    position_sigma: float = 1e-3
     settle_s: float = 1.0
     body_frame: str = "accelerometer_triad"
     zero_velocity: str = "after_motion"
