@@ -15,6 +15,7 @@ from sdimu_calibration.core.filter_pass import (
     SKIP,
     PassState,
     _feed_back,
+    _measurement,
     new_output,
     run_pass,
 )
@@ -195,3 +196,33 @@ def test_the_reset_of_attitude_turns_the_frame_of_its_error(site, imu, model, ge
     # Second order of the correction, e^2 / 6; leaving the turn out, or its sign wrong, is of first order.
     allowed = 2 * (e @ e) / 6
     assert np.abs((state.P - expected) / np.outer(sigma, sigma)).max() < allowed < 0.1 * np.abs(e).max()
+
+
+def test_shared_noise_of_an_epoch_is_that_of_its_pieces(site, imu, model, general_attitude):
+    """M and R against the sum over pieces of white noise, each with its own lever on the end of the epoch."""
+    setup = set_up(site, imu, model)
+    settings = pass_settings(setup, closed_loop=False)
+    p, T, pieces = len(setup.sensors.prior), 1.3, 200
+    position = np.array([site.latitude_rad, 0.0, site.height_m])
+    s = NAV + p + COPY
+    state = PassState(np.zeros(s), np.eye(s), general_attitude.copy(), np.zeros(3), position, np.zeros(p))
+    _, _, R, M = _measurement(settings, state, np.zeros((6, p)), np.zeros(6), T, p)
+    f_cross = skew(np.array([0.0, 0.0, -earth.normal_gravity(site.latitude_rad, site.height_m)]))
+    left = T * (1.0 - (np.arange(pieces) + 0.5) / pieces)
+    C = general_attitude
+    # Piece i of the noise has variance psd / (T / pieces), acts for T / pieces, and makes 1 / pieces of the mean.
+    gyro, accel = settings.gyro_psd / pieces, settings.accel_psd / pieces
+    expected = np.zeros((NAV, MEASURED))
+    for tau in left:
+        expected[6:9, 6:9] -= gyro * C
+        expected[3:6, 6:9] -= gyro * tau * f_cross @ C
+        expected[0:3, 6:9] -= gyro * tau**2 / 2 * f_cross @ C
+        expected[3:6, 9:12] += accel * C
+        expected[0:3, 9:12] += accel * tau * C
+    for block in (slice(0, 3), slice(3, 6), slice(6, 9)):
+        for channel in (slice(0, 6), slice(6, 9), slice(9, 12)):
+            size = np.abs(expected[block, channel]).max()
+            # The midpoint rule over the pieces: 1 / (8 pieces^2) of tau^2.
+            np.testing.assert_allclose(M[block, channel], expected[block, channel], rtol=0, atol=1e-4 * size)
+    np.testing.assert_array_equal(M[NAV:], 0.0)
+    np.testing.assert_allclose(np.diag(R)[6:], [settings.gyro_psd / T] * 3 + [settings.accel_psd / T] * 3, rtol=1e-12)
