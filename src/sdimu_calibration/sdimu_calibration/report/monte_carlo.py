@@ -27,6 +27,7 @@ _INK, _WARN = "#0b5394", "#b45f06"
 _BAND = "rgba(0, 0, 0, 0.10)"
 
 _COLUMNS = ("coefficient", "bias", "+-", "RMS error", "sigma", "bound", "unit", "RMS / sigma", "RMS / bound")
+_CHECK_COLUMNS = ("check", "value", "interval", "passed")
 
 
 def cells(coefficient: Mapping[str, Any]) -> list[str]:
@@ -43,12 +44,7 @@ def cells(coefficient: Mapping[str, Any]) -> list[str]:
 def coefficients_table(content: Mapping[str, Any]) -> Table:
     """Lay the coefficients out for a terminal."""
     title = f"{content['runs']} runs; bound: {content['bound_from']}"
-    table = Table(title=title, title_justify="left", pad_edge=False, box=SIMPLE_HEAD)
-    for column in _COLUMNS:
-        table.add_column(column, justify="left" if column in {"coefficient", "unit"} else "right", no_wrap=True)
-    for coefficient in content["coefficients"]:
-        table.add_row(*cells(coefficient))
-    return table
+    return _laid(_COLUMNS, [cells(c) for c in content["coefficients"]], {0, 6}, title)
 
 
 def check_cells(check: Mapping[str, Any]) -> list[str]:
@@ -61,11 +57,17 @@ def check_cells(check: Mapping[str, Any]) -> list[str]:
 
 def checks_table(content: Mapping[str, Any]) -> Table:
     """Lay the checks out for a terminal."""
-    table = Table(pad_edge=False, box=SIMPLE_HEAD)
-    for column in ("check", "value", "interval", "passed"):
-        table.add_column(column, justify="left" if column == "check" else "right", no_wrap=True)
-    for check in content["checks"]:
-        table.add_row(*check_cells(check))
+    return _laid(_CHECK_COLUMNS, [check_cells(check) for check in content["checks"]], {0}, None)
+
+
+def _laid(columns: tuple[str, ...], lines: list[list[str]], text: set[int], title: str | None) -> Table:
+    table = Table(title=title, title_justify="left", pad_edge=False, box=SIMPLE_HEAD)
+    for k, column in enumerate(columns):
+        # A narrow terminal may wrap lines; it must not cut digits.
+        width = max(len(cell) for cell in (column, *(line[k] for line in lines)))
+        table.add_column(column, justify="left" if k in text else "right", min_width=width)
+    for line in lines:
+        table.add_row(*line)
     return table
 
 
@@ -95,7 +97,7 @@ def page(content: Mapping[str, Any]) -> str:
         f'<p class="quiet">body frame: {escape(str(content["body_frame"]).replace("_", " "))} · '
         f"{content['time']['cpu_s_per_run']:.2f} s of processor a run · {len(lost)} failed</p>",
         f"<p>{verdict} Intervals hold {100 * content['level']:.0f} % of what a right estimator gives.</p>",
-        _table(("check", "value", "interval", "passed"), [check_cells(c) for c in content["checks"]], {0}),
+        _table(_CHECK_COLUMNS, [check_cells(c) for c in content["checks"]], {0}),
         "<h2>Coefficients</h2>",
         _table(_COLUMNS, [cells(c) for c in content["coefficients"]], {0, 6}),
         f'<p class="quiet">RMS over the runs; bound: {escape(content["bound_from"])}.</p>',

@@ -5,20 +5,17 @@ from __future__ import annotations
 from collections.abc import Mapping
 from html import escape
 from pathlib import Path
+from typing import Any
 
+from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.results import Calibration
-from sdimu_calibration.report import table
+from sdimu_calibration.report import data, sections, table
+from sdimu_calibration.report.drawing import html
+from sdimu_calibration.report.export import as_csv, as_yaml
 from sdimu_calibration.report.figures import sigma_history
+from sdimu_calibration.report.style import SCRIPT, STYLE
 
-_STYLE = """
-body { font: 15px/1.5 system-ui, sans-serif; color: #222; max-width: 1100px; margin: 2em auto; padding: 0 1.5em; }
-h1 { font-size: 1.5em; margin-bottom: 0; } h2 { font-size: 1.15em; margin-top: 2em; }
-table { border-collapse: collapse; font-variant-numeric: tabular-nums; }
-th, td { padding: .15em .8em; text-align: right; border-bottom: 1px solid #e4e4e4; }
-th { border-bottom: 2px solid #222; } th.text, td.text { text-align: left; }
-tr.first td { border-top: 1px solid #888; }
-.quiet { color: #555; }
-"""
+_STYLE = STYLE
 
 _TEXT_COLUMNS = frozenset({"coefficient", "unit"})
 
@@ -30,6 +27,7 @@ def write_report(
     title: str = "Calibration",
     truth: Mapping[str, float] | None = None,
     reference: Mapping[str, float] | None = None,
+    diagnosis: Diagnosis | None = None,
 ) -> None:
     """Write report.html.
 
@@ -38,18 +36,32 @@ def write_report(
     path : Path
         File to make or replace; its folder is made too.
     calibration : Calibration
+        Whose coefficients are shown; with a diagnosis usually `diagnosis.after`.
     title : str
         Heading of the page.
     truth : mapping of str to float, optional
         True values (SI) by coefficient name, in the body frame of the calibration.
     reference : mapping of str to float, optional
         Published sigmas (SI) by effect name.
+    diagnosis : Diagnosis, optional
+        Adds the verdict, what is missing, where it fails, and how the error falls.
     """
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     temporary = path.with_name(f".{path.name}.part")
-    temporary.write_text(page(calibration, title, truth, reference), encoding="utf-8")
+    temporary.write_text(page(calibration, title, truth, reference, diagnosis), encoding="utf-8")
     temporary.replace(path)
+
+
+class _Drawing:
+    """Turns figures into parts of one page; the first brings the library along."""
+
+    def __init__(self) -> None:
+        self._count = 0
+
+    def __call__(self, figure: Any) -> str:
+        self._count += 1
+        return html(figure, self._count)
 
 
 def page(
@@ -57,34 +69,77 @@ def page(
     title: str,
     truth: Mapping[str, float] | None = None,
     reference: Mapping[str, float] | None = None,
+    diagnosis: Diagnosis | None = None,
 ) -> str:
     """Make the page as HTML text; parameters as in `write_report`."""
-    parts = [
+    draw = _Drawing()
+    parts = [] if diagnosis is None else _evidence(diagnosis, draw)
+    parts.append(_coefficients(calibration, truth, reference))
+    parts += [] if diagnosis is None else _residuals(diagnosis, draw)
+    if len(calibration.history.t):
+        remark = sections.quiet("Closed-loop pass. Grey: the table turns, no measurements.")
+        parts.append(
+            sections.section("Sigma of every coefficient against time", remark, draw(sigma_history(calibration)))
+        )
+        parts.append(sections.separation(calibration, draw))
+    head = [
         f"<h1>{escape(title)}</h1>",
         f'<p class="quiet">{_summary(calibration)}</p>',
-        "<h2>Does the model fit?</h2>",
+        sections.verdict(diagnosis) if diagnosis else "",
         f"<p>{_fit(calibration)}</p>",
         _notes(calibration),
-        "<h2>Coefficients</h2>",
-        _table(table.rows(calibration, truth, reference)),
-        f'<p class="quiet">One sigma; body frame: {escape(calibration.body_frame.replace("_", " "))}. '
-        "Fixed: zero by the choice of that frame.</p>",
     ]
-    if len(calibration.history.t):
-        figure = sigma_history(calibration).to_html(full_html=False, include_plotlyjs=True, config={"responsive": True})
-        parts += ["<h2>Sigma of every coefficient against time</h2>"]
-        parts += ['<p class="quiet">Closed-loop pass. Grey: the table turns, no measurements.</p>', figure]
     return (
-        f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><title>{escape(title)}</title>'
-        f"<style>{_STYLE}</style></head><body>\n" + "\n".join(parts) + "\n</body></html>\n"
+        '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">'
+        f"<title>{escape(title)}</title><style>{STYLE}</style></head><body>\n"
+        + "\n".join(part for part in head if part)
+        + "\n<main>\n" + "\n".join(parts) + f"\n</main>\n<script>{SCRIPT}</script></body></html>\n"
+    )  # fmt: skip
+
+
+def _evidence(diagnosis: Diagnosis, draw: sections.Draw) -> list[str]:
+    """Tell what is missing and where it shows."""
+    return [
+        sections.ladder(diagnosis, draw),
+        sections.missing(diagnosis, data.scored(diagnosis), draw),
+        sections.where(diagnosis, data.residuals(diagnosis), draw),
+    ]
+
+
+def _residuals(diagnosis: Diagnosis, draw: sections.Draw) -> list[str]:
+    """Show the data themselves, and tell what they could have shown."""
+    return [
+        sections.residuals(diagnosis, data.residuals(diagnosis), draw),
+        sections.smallest(data.scored(diagnosis)),
+    ]
+
+
+def _coefficients(
+    calibration: Calibration, truth: Mapping[str, float] | None, reference: Mapping[str, float] | None
+) -> str:
+    entries = table.rows(calibration, truth, reference)
+    copies = {"YAML": as_yaml(entries, calibration.body_frame), "CSV": as_csv(entries)}
+    buttons = "".join(f'<button data-copy="copy-{kind}">Copy as {kind}</button>' for kind in copies)
+    texts = "".join(
+        f'<textarea id="copy-{kind}" hidden readonly>{escape(text)}</textarea>' for kind, text in copies.items()
+    )
+    return sections.section(
+        "Coefficients",
+        f"<p>{buttons}{texts}</p>",
+        f'<div class="wide">{_table(entries)}</div>',
+        sections.quiet(
+            f"One sigma; body frame: {calibration.body_frame.replace('_', ' ')}. "
+            "Fixed: zero by the choice of that frame."
+        ),
     )
 
 
 def _summary(calibration: Calibration) -> str:
-    data = calibration.data
+    counts = calibration.data
     words = [
-        f"{data['duration_s'] / 60.0:.1f} min" if "duration_s" in data else "",
-        *(f"{data[key]:.0f} {key}" for key in ("stops", "samples", "lost", "rejected") if key in data),
+        f"{counts['duration_s'] / 60.0:.1f} min" if "duration_s" in counts else "",
+        *(f"{counts[key]:.0f} {key}" for key in ("stops", "samples", "lost", "rejected") if key in counts),
         f"{len(calibration.names)} coefficients of {len(calibration.model)} effects",
     ]
     return escape(" · ".join(word for word in words if word))
@@ -99,7 +154,7 @@ def _fit(calibration: Calibration) -> str:
         sentences.append(f"Squared innovations are {nis:.3f} times what the noise explains ({dof:.0f} in number).")
     if held_out is not None:
         sentences.append(f"Stops that the fit has not seen are predicted to {held_out:.2f} sigma (RMS); 1 is right.")
-    return escape(" ".join(sentences) or "Not computed.")
+    return escape(" ".join(sentences) or "Fit: not computed.")
 
 
 def _notes(calibration: Calibration) -> str:

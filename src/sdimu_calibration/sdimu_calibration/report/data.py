@@ -1,0 +1,300 @@
+"""Numbers behind the figures of a diagnosis: pure functions from `Diagnosis` to arrays. Figures only draw them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sdimu_calibration.core.diagnosis.consistency import CHANNEL_NAMES, Consistency
+from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
+from sdimu_calibration.core.diagnosis.scan import Scan, scan
+from sdimu_calibration.core.results import Calibration
+from sdimu_calibration.core.units import from_si
+from sdimu_calibration.report.groups import is_free
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+CHANNEL_UNITS = ("mm",) * 3 + ("mm/s",) * 3 + ("deg/h",) * 3 + ("ug",) * 3
+"""Customary unit of each measurement channel."""
+VARIABLES = (
+    ("a x", "g"), ("a y", "g"), ("a z", "g"), ("w x", "deg/h"), ("w y", "deg/h"), ("w z", "deg/h"),
+    ("time", "min"), ("temperature change", "degC"),
+)  # fmt: skip
+"""Physical variables against which residuals are shown: specific force, body rate at rest, time, temperature."""
+
+
+NOTABLE = 3.0
+"""Sigmas beyond which a single number is pointed out."""
+
+
+@dataclass(frozen=True)
+class Residuals:
+    """Innovations of the navigation filter with every coefficient at its final value.
+
+    Attributes
+    ----------
+    t : ndarray, shape (e,)
+        End of each epoch (s).
+    stop : ndarray of int, shape (e,)
+    sigma : ndarray, shape (e, 12)
+        Predicted one sigma (SI); NaN where not measured.
+    before, after : ndarray, shape (e, 12)
+        In sigmas, with the model as given and with what was found added; NaN where not measured.
+    """
+
+    t: Floats
+    stop: Ints
+    sigma: Floats
+    before: Floats
+    after: Floats
+
+
+def added(diagnosis: Diagnosis) -> tuple[Ints, Floats]:
+    """Columns of the model and of what was found, and the prior information of each."""
+    evidence, chosen = diagnosis.evidence, diagnosis.found.chosen
+    known = np.concatenate([evidence.model, chosen]).astype(np.int64)
+    return known, np.concatenate([evidence.weight, np.zeros(len(chosen))])
+
+
+def residuals(diagnosis: Diagnosis) -> Residuals:
+    """Innovations before and after what was found is added.
+
+    "After" is the linear refit on the whitened innovations; a nonlinear one differs by second order.
+    """
+    evidence = diagnosis.evidence
+    known, weight = added(diagnosis)
+    estimate, _ = evidence.information.estimate(known, weight)
+    left = evidence.e - evidence.W[:, known] @ estimate if len(diagnosis.found.chosen) else evidence.e
+    L = evidence.output.L
+    sigma = np.sqrt(np.einsum("eij,eij->ei", L, L))
+    measured = np.isfinite(evidence.output.normalised)
+    return Residuals(
+        evidence.reduced.epochs.end,
+        evidence.reduced.phases.stop,
+        np.where(measured, sigma, np.nan),
+        _coloured(evidence.e, diagnosis, sigma),
+        _coloured(left, diagnosis, sigma),
+    )
+
+
+def _coloured(white: Floats, diagnosis: Diagnosis, sigma: Floats) -> Floats:
+    """Undo the whitening: innovations in their own sigmas, (e, 12)."""
+    evidence = diagnosis.evidence
+    full = np.zeros(sigma.shape)
+    full[evidence.epoch, evidence.channel] = white
+    innovation = np.einsum("eij,ej->ei", evidence.output.L, full)
+    measured = np.isfinite(evidence.output.normalised)
+    return np.where(measured, innovation / np.where(sigma > 0.0, sigma, 1.0), np.nan)
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Normalised residual means: `value` (12, s) of every channel at every stop of `stops` (s,); NaN where none."""
+
+    stops: Ints
+    value: Floats
+
+
+def where(consistency: Consistency) -> Grid:
+    """Lay out the stop means of a consistency check."""
+    stops = np.unique([m.stop for m in consistency.where]).astype(np.int64)
+    value = np.full((len(CHANNEL_NAMES), len(stops)), np.nan)
+    for mean in consistency.where:
+        value[CHANNEL_NAMES.index(mean.channel), np.searchsorted(stops, mean.stop)] = mean.normalised_mean
+    return Grid(stops, value)
+
+
+def stop_grid(found: Residuals, after: bool) -> Grid:
+    """Sum over each stop of residuals in sigmas, over the root of their number: standard normal when white."""
+    y = found.after if after else found.before
+    stops = np.unique(found.stop[np.isfinite(y).any(axis=1)]).astype(np.int64)
+    value = np.full((y.shape[1], len(stops)), np.nan)
+    for k, stop in enumerate(stops):
+        rows = y[found.stop == stop]
+        count = np.isfinite(rows).sum(axis=0)
+        value[:, k] = np.where(count > 0, np.nansum(rows, axis=0) / np.sqrt(np.maximum(count, 1)), np.nan)
+    return Grid(stops, value)
+
+
+@dataclass(frozen=True)
+class Scored:
+    """A candidate with its evidence, numbers in `unit` (customary).
+
+    Attributes
+    ----------
+    label, family, unit : str
+    z, left : float
+        Score with the model as given, and with what was found added.
+    estimate, sigma : float
+    smallest, prior : float
+        Minimal detectable size, and the size that physics gives it (inf where unknown).
+    retention : float
+        Share of its signature that the model leaves.
+    chosen : bool
+    """
+
+    label: str
+    family: str
+    unit: str
+    z: float
+    left: float
+    estimate: float
+    sigma: float
+    smallest: float
+    prior: float
+    retention: float
+    chosen: bool
+
+
+def scored(diagnosis: Diagnosis) -> list[Scored]:
+    """Every candidate of catalogue and own equations that was tried, largest score first."""
+    evidence = diagnosis.evidence
+    p, free = len(evidence.weight), set(diagnosis.free.tolist())
+    first = scan(evidence.information, evidence.model, evidence.weight, diagnosis.found.scale)
+    last = first if not len(diagnosis.found.chosen) else scan(
+        evidence.information, *added(diagnosis), diagnosis.found.scale
+    )  # fmt: skip
+    rows = [_scored(diagnosis, i, first, last) for i in range(p, len(evidence.names)) if i not in free]
+    return sorted(rows, key=lambda row: -abs(row.z))
+
+
+def _scored(diagnosis: Diagnosis, index: int, first: Scan, last: Scan) -> Scored:
+    evidence = diagnosis.evidence
+    candidate = evidence.candidates[index - len(evidence.weight)]
+    unit = candidate.parameter.display_unit
+    factor = from_si(1.0, unit)
+    return Scored(
+        candidate.label, candidate.family, unit, float(first.z[index]), float(last.z[index]),
+        float(first.estimate[index]) * factor, float(first.sigma[index]) * factor,
+        float(first.smallest[index]) * factor, float(evidence.prior[index - len(evidence.weight)]) * factor,
+        float(first.retention[index]), index in diagnosis.found.chosen,
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class FreeInputs:
+    """Sensor error that every dwell and turn would need of its own (minimum norm), s segments.
+
+    Attributes
+    ----------
+    start, end : ndarray, shape (s,)
+        Seconds.
+    turn : ndarray of bool, shape (s,)
+    before, after : ndarray, shape (s, 6)
+        deg/h for the gyros, ug for the accelerometers.
+    z : ndarray, shape (s, 6)
+        Score of each alone, with the model as given.
+    """
+
+    start: Floats
+    end: Floats
+    turn: NDArray[np.bool_]
+    before: Floats
+    after: Floats
+    z: Floats
+
+
+def free_inputs(diagnosis: Diagnosis) -> FreeInputs:
+    """Lay the free-input remainders out in time."""
+    times = diagnosis.evidence.times
+    spans = np.array([[a, b] for _, a, b in (*times.stops, *times.turns)]).reshape(-1, 2)
+    turn = np.arange(len(spans)) >= len(times.stops)
+    factor = np.array([from_si(1.0, "deg/h")] * 3 + [from_si(1.0, "ug")] * 3)
+    order = np.argsort(spans[:, 0], kind="stable")
+    before, after, z = (
+        np.reshape(v, (-1, 6))[order]
+        for v in (diagnosis.remainder_before.estimate, diagnosis.remainder_after.estimate, diagnosis.remainder_before.z)
+    )
+    return FreeInputs(spans[order, 0], spans[order, 1], turn[order], before * factor, after * factor, z)
+
+
+def variables(diagnosis: Diagnosis) -> Floats:
+    """Physical variables of `VARIABLES`, means over each epoch, shape (e, 8)."""
+    evidence = diagnosis.evidence
+    seen, epochs = evidence.seen, evidence.reduced.epochs
+    columns = np.column_stack([
+        seen.a, seen.w * from_si(1.0, "deg/h"), (seen.t - 0.5 * seen.dt) * from_si(1.0, "min"), seen.temperature,
+    ])  # fmt: skip
+    length = np.add.reduceat(seen.dt, epochs.first)
+    return np.asarray(np.add.reduceat(columns * seen.dt[:, None], epochs.first) / length[:, None])
+
+
+def binned(x: Floats, y: Floats, bins: int) -> tuple[Floats, Floats, Floats]:
+    """Means of `y` and their standard errors in at most `bins` bins of equal counts of `x`, y of unit variance.
+
+    Equal values of x never fall into different bins, so that a stop is not torn apart.
+
+    Returns
+    -------
+    x, mean, error : ndarray, shape (b,)
+    """
+    good = np.isfinite(x) & np.isfinite(y)
+    x, y = x[good], y[good]
+    if not len(x):
+        return np.empty(0), np.empty(0), np.empty(0)
+    edges = np.unique(np.quantile(x, np.linspace(0.0, 1.0, bins + 1)))
+    place = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, max(len(edges) - 2, 0))
+    count = np.bincount(place).astype(float)
+    kept = count > 0
+    with np.errstate(divide="ignore", invalid="ignore"):
+        at, mean = np.bincount(place, x) / count, np.bincount(place, y) / count
+        error = 1.0 / np.sqrt(count)
+    return at[kept], mean[kept], error[kept]
+
+
+@dataclass(frozen=True)
+class Explained:
+    """What one of the found predicts against the misfit, all else estimated along (Frisch, Waugh, Lovell).
+
+    `predicted` and `misfit`, shape (N,), in sigmas of the whitened innovations; on the diagonal when it is right.
+    """
+
+    label: str
+    predicted: Floats
+    misfit: Floats
+
+
+def explained(diagnosis: Diagnosis) -> list[Explained]:
+    """Added-variable data of everything that was found."""
+    evidence = diagnosis.evidence
+    known, weight = added(diagnosis)
+    J = evidence.information.J
+    estimate, _ = evidence.information.estimate(known, weight)
+    left = evidence.e - evidence.W[:, known] @ estimate
+    p, out = len(evidence.weight), []
+    for place in range(p, len(known)):
+        others = np.delete(known, place)
+        A = J[np.ix_(others, others)] + np.diag(np.delete(weight, place))
+        unit = 1.0 / np.sqrt(np.diag(A))
+        share = unit * np.linalg.solve(A * np.outer(unit, unit), unit * J[others, known[place]])
+        predicted = (evidence.W[:, known[place]] - evidence.W[:, others] @ share) * estimate[place]
+        out.append(Explained(evidence.names[known[place]], predicted, left + predicted))
+    return out
+
+
+def envelope(x: Floats, y: Floats, most: int) -> tuple[Floats, Floats]:
+    """Thin a curve to about `most` points that keep the smallest and largest value of every stretch."""
+    good = np.flatnonzero(np.isfinite(y))
+    if len(good) <= most:
+        return x[good], y[good]
+    parts = np.array_split(good, most // 2)
+    kept = sorted({int(f) for part in parts for f in (part[np.argmin(y[part])], part[np.argmax(y[part])])})
+    return x[kept], y[kept]
+
+
+def correlation(calibration: Calibration) -> tuple[tuple[str, ...], Floats]:
+    """Names of the free coefficients and their correlation matrix."""
+    free = np.array([i for i in range(len(calibration.names)) if is_free(calibration, i)], dtype=np.int64)
+    C = calibration.covariance[np.ix_(free, free)]
+    scale = 1.0 / np.sqrt(np.diag(C))
+    return tuple(calibration.names[i] for i in free), C * np.outer(scale, scale)
+
+
+def hardest_pairs(names: tuple[str, ...], C: Floats, most: int = 6, least: float = 0.5) -> list[tuple[str, str, float]]:
+    """Pairs that are hardest to separate: at most `most` with a correlation beyond `least`, strongest first."""
+    i, j = np.triu_indices(len(names), 1)
+    order = np.argsort(-np.abs(C[i, j]))[:most]
+    return [(names[i[k]], names[j[k]], float(C[i[k], j[k]])) for k in order if abs(C[i[k], j[k]]) > least]

@@ -1,0 +1,164 @@
+"""Figures of the evidence: where the model fails, what is missing, how the error falls, what is hard to separate."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import plotly.graph_objects as go
+from numpy.typing import NDArray
+from plotly.subplots import make_subplots
+
+from sdimu_calibration.core.diagnosis.consistency import CHANNEL_NAMES
+from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
+from sdimu_calibration.report import data
+from sdimu_calibration.report.drawing import AFTER, BEFORE, DIVERGING, PALE, lay_out
+
+Floats = NDArray[np.float64]
+
+_FULL = 8.0
+"""Sigmas at which the colour of a heat map is full."""
+_MOST_NUMBERED = 40
+"""Stops up to which there is room for numbers in the cells."""
+_MOST_BARS = 24
+_BINS = 20
+
+
+def heat_map(grid: data.Grid) -> Any:
+    """Normalised residual means, channel by stop: number and sign in each cell, colour besides."""
+    numbered = len(grid.stops) <= _MOST_NUMBERED
+    text = [[_cell(v) for v in row] for row in grid.value]
+    figure = go.Figure(
+        go.Heatmap(
+            x=[str(s) for s in grid.stops],
+            y=[c.replace("_", " ") for c in CHANNEL_NAMES],
+            z=grid.value.astype(np.float32),
+            text=text if numbered else None,
+            texttemplate="%{text}" if numbered else None,
+            textfont={"size": 12},
+            zmin=-_FULL,
+            zmax=_FULL,
+            colorscale=DIVERGING,
+            xgap=2,
+            ygap=2,
+            colorbar={"title": {"text": "sigma", "side": "right"}, "thickness": 12},
+            hovertemplate="%{y} at stop %{x}: %{z:+.1f} sigma<extra></extra>",
+        )
+    )
+    figure.update_xaxes(title_text="stop", type="category", showgrid=False, ticks="")
+    figure.update_yaxes(autorange="reversed", ticks="", title_text="channel")
+    return lay_out(figure, 440, margin={"l": 120, "r": 20, "t": 20, "b": 55})
+
+
+def _cell(value: float) -> str:
+    """Write a cell: a typographic sign, and no decimals where they do not matter."""
+    if not np.isfinite(value):
+        return ""
+    shown = f"{value:+.0f}" if abs(value) >= 9.95 else f"{value:+.1f}"
+    return shown.replace("-", "\N{MINUS SIGN}")
+
+
+def ranking(entries: Sequence[data.Scored], threshold: float) -> Any:
+    """Bars of ``|z|``: what each candidate says alone, and what is left of it; the line is what noise reaches."""
+    shown = [entry for entry in entries if entry.z][:_MOST_BARS]
+    names = [("\N{BLACK RIGHT-POINTING TRIANGLE} " if s.chosen else "") + s.label for s in shown]
+    figure = go.Figure()
+    figure.add_bar(
+        y=names, x=[abs(s.z) for s in shown], orientation="h", name="model as given",
+        marker={"color": ["#555" if s.chosen else "#bbb" for s in shown], "line": {"color": "#222", "width": 1}},
+        text=[f"{s.estimate:.3g} \u00b1 {s.sigma:.2g} {s.unit}".replace("-", "\N{MINUS SIGN}") for s in shown],
+        textposition="outside", cliponaxis=False,
+        hovertemplate="%{y}<br>|z| = %{x:.1f}<br>%{text}<extra></extra>",
+    )  # fmt: skip
+    if any(s.chosen for s in shown):
+        figure.add_scatter(
+            y=names, x=[abs(s.left) for s in shown], mode="markers", name="left when what was found is added",
+            marker={"symbol": "diamond-open", "color": AFTER, "size": 9, "line": {"width": 2}},
+            hovertemplate="%{y}<br>left: |z| = %{x:.1f}<extra></extra>",
+        )  # fmt: skip
+    figure.add_vline(
+        x=threshold, line={"dash": "dash", "color": "#222"}, annotation_text=f"noise reaches {threshold:.1f}",
+        annotation_position="bottom right",
+    )  # fmt: skip
+    top = max([abs(s.z) for s in shown] + [threshold])
+    figure.update_xaxes(title_text="score |z| (sigma)", range=[0, 1.3 * top])
+    figure.update_yaxes(autorange="reversed", ticks="", automargin=True)
+    return lay_out(figure, 24 * len(shown) + 150, showlegend=True, margin={"l": 80, "r": 20, "t": 50, "b": 55})
+
+
+def ladder(diagnosis: Diagnosis) -> Any:
+    """Held-out RMS rung by rung; one is right."""
+    accepted = [step for step in diagnosis.found.steps if step.accepted]
+    if not diagnosis.found.steps:
+        return None
+    names = ["model as given", *(f"+ {step.label}" for step in accepted)]
+    values = [diagnosis.found.steps[0].held_out_before.rms, *(step.held_out_after.rms for step in accepted)]
+    figure = go.Figure(
+        go.Scatter(
+            x=names,
+            y=values,
+            mode="lines+markers+text",
+            text=[f"{v:.3f}" for v in values],
+            textposition="top right",
+            line={"color": AFTER},
+            marker={"size": 10},
+            cliponaxis=False,
+            hovertemplate="%{x}: %{y:.3f} sigma<extra></extra>",
+        )
+    )
+    figure.add_hline(y=1.0, line={"dash": "dash", "color": "#222"})
+    figure.update_yaxes(title_text="held-out RMS (sigma)", rangemode="tozero", range=[0, 1.2 * max(*values, 1.0)])
+    figure.update_xaxes(type="category", range=[-0.3, len(names) - 0.5])
+    return lay_out(figure, 300)
+
+
+def explained(parts: Sequence[data.Explained]) -> Any:
+    """Misfit against what each found effect predicts, binned means; on the diagonal when it is right."""
+    figure = make_subplots(
+        rows=1, cols=len(parts), subplot_titles=[part.label for part in parts], horizontal_spacing=0.1
+    )
+    for column, part in enumerate(parts, 1):
+        x, mean, error = data.binned(part.predicted, part.misfit, _BINS)
+        ends = [float(x.min()), float(x.max())] if len(x) else [0.0, 0.0]
+        figure.add_scatter(
+            x=ends, y=ends, mode="lines", line={"color": "#222", "dash": "dash", "width": 1}, hoverinfo="skip",
+            row=1, col=column,
+        )  # fmt: skip
+        figure.add_scatter(
+            x=x.astype(np.float32), y=mean.astype(np.float32), mode="markers",
+            error_y={"array": error.astype(np.float32), "color": BEFORE, "thickness": 1.5},
+            marker={"color": BEFORE, "size": 7},
+            hovertemplate="predicted %{x:.2f}, found %{y:.2f} sigma<extra></extra>", row=1, col=column,
+        )  # fmt: skip
+        figure.update_xaxes(title_text="effect predicts (sigma)", row=1, col=column)
+    figure.update_yaxes(title_text="misfit found (sigma)", col=1)
+    return lay_out(figure, 360)
+
+
+def correlation(names: Sequence[str], C: Floats) -> Any:
+    """Correlation of the coefficients; cells beyond one half carry their number."""
+    shown = [name.replace("_", " ") for name in names]
+    text = [[f"{v:+.1f}".replace("-", "\N{MINUS SIGN}") if abs(v) > 0.5 and i != j else "" for j, v in enumerate(row)]
+            for i, row in enumerate(C)]  # fmt: skip
+    figure = go.Figure(
+        go.Heatmap(
+            x=shown,
+            y=shown,
+            z=C.astype(np.float32),
+            text=text,
+            texttemplate="%{text}",
+            textfont={"size": 11},
+            zmin=-1,
+            zmax=1,
+            colorscale=DIVERGING,
+            xgap=1,
+            ygap=1,
+            colorbar={"title": {"text": "correlation", "side": "right"}, "thickness": 12},
+            hovertemplate="%{y} \u00b7 %{x}: %{z:.2f}<extra></extra>",
+        )
+    )
+    figure.update_xaxes(tickangle=-60, ticks="", automargin=True, showline=False, tickfont={"size": 11})
+    figure.update_yaxes(autorange="reversed", ticks="", automargin=True, showline=False, tickfont={"size": 11})
+    figure.add_hline(y=-0.5, line={"color": PALE, "width": 1})
+    return lay_out(figure, 20 * len(shown) + 260, margin={"l": 60, "r": 20, "t": 20, "b": 60})

@@ -1,0 +1,167 @@
+"""Figures of residuals: in time, against physical variables, and as what each stop and turn would need."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from plotly.subplots import make_subplots
+
+from sdimu_calibration.core.diagnosis.consistency import CHANNEL_NAMES
+from sdimu_calibration.core.effects.effect import CHANNELS
+from sdimu_calibration.core.units import from_si
+from sdimu_calibration.report import data
+from sdimu_calibration.report.drawing import AFTER, BAND, BEFORE, PALE, lay_out
+
+Floats = NDArray[np.float64]
+
+_MOST_POINTS = 500
+_BINS = 12
+_BAR = "rgba(0, 0, 0, 0.28)"
+
+
+def _layers(found: data.Residuals, two: bool) -> list[tuple[Floats, str, str, str]]:
+    """Residuals with the ink, mark and name of each model."""
+    given = (found.before, BEFORE, "triangle-up-open", "model as given")
+    return [given, (found.after, AFTER, "circle", "with what was found")] if two else [given]
+
+
+def innovations(found: data.Residuals, two: bool) -> Any:
+    """Innovations of the twelve channels in time with their 3-sigma bands.
+
+    Position and velocity are measured once after each turn; rate and force every second: there the pale line keeps the
+    smallest and largest of each stretch, the marks are means over stops.
+
+    Parameters
+    ----------
+    found : Residuals
+    two : bool
+        Draw both the model as given and with what was found.
+    """
+    titles = [
+        f"{name.replace('_', ' ')} ({unit})" for name, unit in zip(CHANNEL_NAMES, data.CHANNEL_UNITS, strict=True)
+    ]
+    figure = make_subplots(
+        rows=4, cols=3, subplot_titles=titles, vertical_spacing=0.075, horizontal_spacing=0.06, shared_xaxes=True
+    )
+    minutes = found.t / 60.0
+    for channel in range(12):
+        place = {"row": channel // 3 + 1, "col": channel % 3 + 1}
+        sigma = found.sigma[:, channel] * from_si(1.0, data.CHANNEL_UNITS[channel])
+        (_bars if channel < 6 else _band)(figure, minutes, sigma, place)
+        if channel >= 6:
+            _raw(figure, minutes, (found.after if two else found.before)[:, channel] * sigma, place)
+        for values, ink, symbol, name in _layers(found, two):
+            t, y = (
+                (minutes, values[:, channel] * sigma) if channel < 6 else _stop_means(found, values[:, channel] * sigma)
+            )
+            good = np.isfinite(y)
+            figure.add_scatter(
+                x=t[good].astype(np.float32), y=y[good].astype(np.float32), mode="markers", name=name, legendgroup=name,
+                showlegend=channel == 0, marker={"color": ink, "symbol": symbol, "size": 7},
+                hovertemplate=f"%{{x:.1f}} min: %{{y:.3g}} {data.CHANNEL_UNITS[channel]}<extra>{name}</extra>", **place,
+            )  # fmt: skip
+    figure.update_xaxes(title_text="time (min)", row=4)
+    figure.update_yaxes(zeroline=True, zerolinecolor="#999", zerolinewidth=1)
+    return lay_out(
+        figure,
+        900,
+        showlegend=True,
+        margin={"l": 60, "r": 20, "t": 80, "b": 55},
+        legend={"orientation": "h", "y": 1.06, "x": 0},
+    )
+
+
+def _bars(figure: Any, minutes: Floats, sigma: Floats, place: dict[str, int]) -> None:
+    good = np.isfinite(sigma)
+    figure.add_scatter(
+        x=minutes[good].astype(np.float32), y=np.zeros(int(good.sum()), dtype=np.float32), mode="markers",
+        marker={"size": 1, "color": PALE}, hoverinfo="skip", showlegend=False,
+        error_y={"array": (3.0 * sigma[good]).astype(np.float32), "color": _BAR, "thickness": 5, "width": 0}, **place,
+    )  # fmt: skip
+
+
+def _band(figure: Any, minutes: Floats, sigma: Floats, place: dict[str, int]) -> None:
+    t, s = data.envelope(minutes, 3.0 * sigma, 60)
+    figure.add_scatter(
+        x=np.concatenate([t, t[::-1]]).astype(np.float32), y=np.concatenate([s, -s[::-1]]).astype(np.float32),
+        fill="toself", fillcolor=BAND, line={"width": 0}, mode="lines", hoverinfo="skip", showlegend=False, **place,
+    )  # fmt: skip
+
+
+def _raw(figure: Any, minutes: Floats, y: Floats, place: dict[str, int]) -> None:
+    t, thin = data.envelope(minutes, y, _MOST_POINTS)
+    figure.add_scatter(
+        x=t.astype(np.float32), y=thin.astype(np.float32), mode="lines", line={"color": PALE, "width": 0.7},
+        hoverinfo="skip", showlegend=False, **place,
+    )  # fmt: skip
+
+
+def _stop_means(found: data.Residuals, y: Floats) -> tuple[Floats, Floats]:
+    """Middle (min) and mean of every stop."""
+    good = np.isfinite(y)
+    stops, place = np.unique(found.stop[good], return_inverse=True)
+    count = np.bincount(place, minlength=len(stops))
+    return np.bincount(place, found.t[good]) / count / 60.0, np.bincount(place, y[good]) / count
+
+
+def against_variables(found: data.Residuals, variables: Floats, two: bool) -> Any:
+    """Residuals at rest against each physical variable: binned means and their standard errors, sigmas of one second."""
+    used = [k for k in range(variables.shape[1]) if np.ptp(variables[np.isfinite(found.before[:, 8]), k]) > 0]
+    figure = make_subplots(
+        rows=6, cols=len(used), shared_xaxes=True, shared_yaxes=True, vertical_spacing=0.02, horizontal_spacing=0.012,
+    )  # fmt: skip
+    for row in range(6):
+        for column, k in enumerate(used, 1):
+            name, unit = data.VARIABLES[k]
+            for values, ink, symbol, of in _layers(found, two):
+                x, mean, error = data.binned(variables[:, k], values[:, 6 + row], _BINS)
+                figure.add_scatter(
+                    x=x.astype(np.float32), y=mean.astype(np.float32), mode="markers", name=of, legendgroup=of,
+                    showlegend=row == 0 and column == 1, marker={"color": ink, "symbol": symbol, "size": 6},
+                    error_y={"array": error.astype(np.float32), "color": ink, "thickness": 1, "width": 0},
+                    hovertemplate=f"{name} = %{{x:.3g}} {unit}: %{{y:+.2f}} sigma<extra>{of}</extra>",
+                    row=row + 1, col=column,
+                )  # fmt: skip
+        figure.update_yaxes(title_text=f"{CHANNELS[row].replace('_', ' ')}<br>(sigma)", row=row + 1, col=1)
+    for column, k in enumerate(used, 1):
+        figure.update_xaxes(title_text=f"{data.VARIABLES[k][0]} ({data.VARIABLES[k][1]})", row=6, col=column)
+    figure.update_yaxes(zeroline=True, zerolinecolor="#999", zerolinewidth=1, nticks=4)
+    figure.update_xaxes(nticks=5, tickangle=0)
+    return lay_out(figure, 860, showlegend=True, margin={"l": 80, "r": 20, "t": 40, "b": 60})
+
+
+def free_inputs(found: data.FreeInputs, two: bool) -> Any:
+    """Constant error that every dwell (plain) and turn (hatched) would need; a star marks a score beyond three."""
+    titles = [f"{c.replace('_', ' ')} ({'deg/h' if i < 3 else 'ug'})" for i, c in enumerate(CHANNELS)]
+    figure = make_subplots(
+        rows=2, cols=3, subplot_titles=titles, vertical_spacing=0.14, horizontal_spacing=0.06, shared_xaxes=True
+    )
+    middle, width = 0.5 * (found.start + found.end) / 60.0, (found.end - found.start) / 60.0
+    for channel in range(6):
+        place = {"row": channel // 3 + 1, "col": channel % 3 + 1}
+        unit = "deg/h" if channel < 3 else "ug"
+        far = np.abs(found.z[:, channel]) > data.NOTABLE
+        figure.add_bar(
+            x=middle.astype(np.float32), y=found.before[:, channel].astype(np.float32), width=width.astype(np.float32),
+            marker={
+                "color": "rgba(180, 95, 6, 0.55)", "line": {"color": BEFORE, "width": 0.5},
+                "pattern": {"shape": ["/" if turn else "" for turn in found.turn], "size": 4, "fgcolor": "#222"},
+            },
+            text=["\u2217" if f else "" for f in far], textposition="outside", cliponaxis=False, name="model as given",
+            legendgroup="before", showlegend=channel == 0, customdata=found.z[:, channel].astype(np.float32),
+            hovertemplate=f"%{{x:.1f}} min: %{{y:.3g}} {unit}, z = %{{customdata:.1f}}<extra></extra>", **place,
+        )  # fmt: skip
+        if two:
+            figure.add_scatter(
+                x=middle.astype(np.float32), y=found.after[:, channel].astype(np.float32), mode="markers",
+                marker={"color": AFTER, "symbol": "circle", "size": 5}, name="with what was found", legendgroup="after",
+                showlegend=channel == 0, hovertemplate=f"%{{x:.1f}} min: %{{y:.3g}} {unit}<extra></extra>", **place,
+            )  # fmt: skip
+    figure.update_xaxes(title_text="time (min)", row=2)
+    figure.update_yaxes(zeroline=True, zerolinecolor="#999", zerolinewidth=1)
+    return lay_out(
+        figure, 560, showlegend=True, bargap=0, barmode="overlay", margin={"l": 60, "r": 20, "t": 80, "b": 55},
+        legend={"orientation": "h", "y": 1.1, "x": 0},
+    )  # fmt: skip
