@@ -80,7 +80,7 @@ def solve(links: list[Link]) -> Solution:
                 np.hstack([here[:, :q], np.zeros((len(here), q)), here[:, q:]]),
                 np.hstack([link.step_own, link.step_next, link.step_common, -link.step_residual[:, None]]),
             ])  # fmt: skip
-        R = np.linalg.qr(block, mode="r")
+        R: Floats = np.asarray(np.linalg.qr(block, mode="r"))
         eliminated.append(R[:q])
         log_det += float(np.sum(np.log(np.abs(np.diag(R[:q, :q])))))
         # The last row of a factor that has one more row than unknowns is the residual that no unknown can take.

@@ -1,9 +1,9 @@
 """A coarse start from the whole test: where passes and least squares linearise when the first dwell alone misleads.
 
-Gyrocompassing in one dwell fails when the gyro bias exceeds Earth rate, and an azimuth from a site file may be wrong by any
-angle. All stops together know better. While the table rests, the mean rate is bias plus Earth rate; that mean taken out of
-the samples of a turn leaves the turn itself, good to the scale factors, hence the orientation of every stop in the body
-frame of the first one. In these orientations gravity and Earth rate are two constant vectors, the biases two
+Gyrocompassing in one dwell fails when the gyro bias exceeds Earth rate, and an azimuth from a site file may be wrong by
+any angle. All stops together know better. While the table rests, the mean rate is bias plus Earth rate; that mean taken
+out of the samples of a turn leaves the turn itself, good to the scale factors, hence the orientation of every stop in
+the body frame of the first one. In these orientations gravity and Earth rate are two constant vectors, the biases two
 others, and least squares tells them apart without any starting value.
 
 The idea is that of multi-position alignment (Groves, *Principles of GNSS, Inertial, and Multisensor Integrated
@@ -87,7 +87,8 @@ def coarse_start(reduced: Reduced, setup: Setup, start: Alignment) -> Coarse:
     down, bias_f = _constant(to_first, -mean[:, 3:], setup.gravity, accel_bias, np.zeros((len(time), 0)), 0.0, noise[1])
     g_sensitivity = sizes.get("gyro_mass_unbalance_dx", 0.0)
     a = -np.einsum("kji,j->ki", to_first, down) / setup.gravity
-    rate, bias_w = _constant(to_first, mean[:, :3], earth.RATE, sizes.get("gyro_bias_x", 0.0), a, g_sensitivity, noise[0])
+    gyro_bias = sizes.get("gyro_bias_x", 0.0)
+    rate, bias_w = _constant(to_first, mean[:, :3], earth.RATE, gyro_bias, a, g_sensitivity, noise[0])
     for stem, bias in (("gyro_bias", bias_w), ("accel_bias", -bias_f)):
         for axis, value in zip("xyz", bias, strict=True):
             if f"{stem}_{axis}" in names:

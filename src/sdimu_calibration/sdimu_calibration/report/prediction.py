@@ -24,7 +24,7 @@ _DEFINED = 1e-6
 
 def coefficient_rows(prediction: Prediction) -> list[tuple[str, ...]]:
     """Name, prior, sigma, bound, sigma over bound and unit of every coefficient, as text."""
-    rows = []
+    rows: list[tuple[str, ...]] = []
     for k, name in enumerate(prediction.names):
         unit = prediction.display_units[k]
         sigma, bound = prediction.sigma[k], prediction.bound[k]
@@ -169,11 +169,16 @@ def _unobservable(prediction: Prediction) -> str:
 
 
 def _html_table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    text = {0, len(columns) - 1}
-    cell = lambda tag, k, word: f'<{tag}{" class=text" if k in text else ""}>{escape(word)}</{tag}>'  # noqa: E731
-    head = "".join(cell("th", k, word) for k, word in enumerate(columns))
-    body = "".join("<tr>" + "".join(cell("td", k, word) for k, word in enumerate(row)) + "</tr>" for row in rows)
+    head = "".join(_cell("th", k, columns, word) for k, word in enumerate(columns))
+    lines = ("".join(_cell("td", k, columns, word) for k, word in enumerate(row)) for row in rows)
+    body = "".join(f"<tr>{line}</tr>" for line in lines)
     return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
+
+
+def _cell(tag: str, k: int, columns: Sequence[str], word: str) -> str:
+    """First and last column are words, the others numbers."""
+    kind = ' class="text"' if k in (0, len(columns) - 1) else ""
+    return f"<{tag}{kind}>{escape(word)}</{tag}>"
 
 
 def _short(value: float) -> str:
