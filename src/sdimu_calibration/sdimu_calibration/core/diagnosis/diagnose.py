@@ -14,16 +14,16 @@ from numpy.typing import NDArray
 from scipy.stats import norm
 
 from sdimu_calibration.core.calibrate import assemble
-from sdimu_calibration.core.diagnosis.candidates import Candidate, catalogue, equations, free_inputs, periodic, without
+from sdimu_calibration.core.diagnosis.candidates import Candidate
 from sdimu_calibration.core.diagnosis.consistency import Consistency, check
-from sdimu_calibration.core.diagnosis.evidence import Evidence, collect, test_times
-from sdimu_calibration.core.diagnosis.remainder import Remainder, remainder
+from sdimu_calibration.core.diagnosis.evidence import Evidence
+from sdimu_calibration.core.diagnosis.remainder import Remainder
+from sdimu_calibration.core.diagnosis.rounds import UNEXPLAINED_P, Look, settle
 from sdimu_calibration.core.diagnosis.screen import Finding, screen
-from sdimu_calibration.core.diagnosis.search import FALSE_ALARM, Search, search
+from sdimu_calibration.core.diagnosis.search import FALSE_ALARM, Search
 from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.filter_pass import SKIP
-from sdimu_calibration.core.imu_model import build
-from sdimu_calibration.core.passes import Progress, Reduced, Setup, Solution, reduce, set_up, solve
+from sdimu_calibration.core.passes import Progress, Reduced, Setup, reduce, set_up, solve
 from sdimu_calibration.core.recording import Recording
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.specification import ImuSpecification, Model, Site
@@ -31,8 +31,6 @@ from sdimu_calibration.core.specification import ImuSpecification, Model, Site
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-UNEXPLAINED_P = 1e-3
-"""A free-input remainder less probable than this is not noise."""
 NOISE_OFF = 0.05
 """Least deviation of the noise from its specification that is worth telling."""
 
@@ -108,7 +106,6 @@ def diagnose(
     extra: Sequence[Effect] = (),
     alpha: float = FALSE_ALARM,
     progress: Progress | None = None,
-    refit: bool = True,
 ) -> Diagnosis:
     """Find what the model is missing.
 
@@ -121,8 +118,6 @@ def diagnose(
     alpha : float
         False-alarm probability of a whole scan.
     progress : callable, optional
-    refit : bool
-        Calibrate again with what was found (costs a calibration).
 
     Raises
     ------
@@ -138,29 +133,19 @@ def diagnose(
     noise, setup, reduced = _mend_noise(consistency, setup, reduced)
     if noise:
         solution = solve(setup, reduced, tell, keep=True)
-    tell("candidates", 0.4)
-    evidence, groups = _first_evidence(solution, extra)
-    found = search(evidence, groups["catalogue"], alpha)
-    nothing = np.empty(0, dtype=np.int64)
-    before = _remainder(evidence, nothing, groups["free"], found.scale)
-    after = _remainder(evidence, found.chosen, groups["free"], found.scale)
-    own = False
-    if _suspect(found, after):
-        tell("equations", 0.6)
-        evidence, found, after, own = _try_equations(evidence, groups, found, after, setup, alpha)
-    unexplained = after.p_value < UNEXPLAINED_P
-    tell("refit", 0.8)
+    look = settle(solution, extra, alpha, tell)
+    tell("report", 0.9)
     base = assemble(recording, solution, held_out=True)
-    final = base
-    if refit and len(found.chosen) and not own:
-        final = _refit(recording, setup, reduced, evidence, found, tell)
-    p_value = _p_value(found, before, consistency, noise)
-    verdict = _verdict(found, own, unexplained, noise, findings, evidence)
+    final = assemble(recording, look.solution, held_out=True) if look.chosen else base
+    own = any(c.family == "own" for c in look.chosen)
+    unexplained = look.after.p_value < UNEXPLAINED_P
+    p_value = _p_value(look.found, look.before, consistency, noise)
+    verdict = _verdict(look, own, unexplained, noise, findings)
     adequate = verdict == "consistent"
     tell("done", 1.0)
     partial = Diagnosis(
-        verdict, "", adequate, p_value, findings, noise, consistency, base, final, found, evidence, before, after,
-        groups["free"], own, unexplained,
+        verdict, "", adequate, p_value, findings, noise, consistency, base, final, look.found, look.evidence,
+        look.before, look.after, look.free, own, unexplained,
     )  # fmt: skip
     return replace(partial, sentence=_sentence(partial))
 
@@ -195,68 +180,6 @@ _KURTOSIS = 4.0
 """Of the differences of neighbouring seconds; Gaussian noise in a test of an hour stays below 3.3."""
 
 
-def _first_evidence(solution: Solution, extra: Sequence[Effect]) -> tuple[Evidence, dict[str, Ints]]:
-    """Evidence of the catalogue, the user's own effects and the free inputs; and which columns are which."""
-    setup, reduced = solution.setup, solution.reduced
-    times = test_times(reduced)
-    in_model = set(setup.sensors.names)
-    own = [part for effect in extra for part in without(effect, in_model)]
-    known = [*own, *catalogue(times, in_model, reduced.temperature is not None)]
-    free = free_inputs(times)
-    evidence = collect(reduced, setup, solution.last, [*known, *free])
-    p = len(setup.sensors.prior)
-    border = p + sum(len(effect.parameters) for effect in known)
-    return evidence, {"catalogue": np.arange(p, border), "free": np.arange(border, len(evidence.names))}
-
-
-def _remainder(evidence: Evidence, chosen: Ints, free: Ints, scale: float) -> Remainder:
-    known = np.concatenate([evidence.model, chosen]).astype(np.int64)
-    weight = np.concatenate([evidence.weight, np.zeros(len(chosen))])
-    return remainder(evidence.information, known, weight, free, scale)
-
-
-def _suspect(found: Search, after: Remainder) -> bool:
-    """Whether the catalogue leaves something, or needs suspiciously many terms."""
-    return after.p_value < UNEXPLAINED_P or len(found.chosen) >= _MANY
-
-
-_MANY = 3
-
-
-def _try_equations(
-    evidence: Evidence, groups: dict[str, Ints], found: Search, after: Remainder, setup: Setup, alpha: float
-) -> tuple[Evidence, Search, Remainder, bool]:
-    """Search monomials and periods; prefer them when they leave less with no more terms."""
-    has_temperature = evidence.reduced.temperature is not None
-    more = [*equations(has_temperature), *periodic(evidence.times.duration)]
-    wide = evidence.with_effects(more, setup.imu.grade)
-    columns = np.arange(len(evidence.names), len(wide.names))
-    other = search(wide, columns, alpha)
-    if not len(other.chosen):
-        return evidence, found, after, False
-    left = _remainder(wide, other.chosen, groups["free"], other.scale)
-    simpler = len(other.chosen) <= max(1, len(found.chosen))
-    # Less is left by more than the free inputs differ by chance; or as little, with fewer terms.
-    chance = 3.0 * np.sqrt(2.0 * after.dof)
-    fewer = len(other.chosen) < len(found.chosen)
-    if simpler and (left.chi2 < after.chi2 - chance or (fewer and left.chi2 < after.chi2 + chance)):
-        return wide, other, left, True
-    return evidence, found, after, False
-
-
-def _refit(
-    recording: Recording, setup: Setup, reduced: Reduced, evidence: Evidence, found: Search, tell: Progress
-) -> Calibration:
-    """Calibrate with the effects that were found."""
-    p = len(evidence.weight)
-    added = [evidence.candidates[i - p].effect for i in found.chosen]
-    wide = replace(
-        setup,
-        sensors=build([*setup.sensors.effects, *added], setup.imu),
-    )
-    return assemble(recording, solve(wide, reduced, tell), held_out=True)
-
-
 def _p_value(found: Search, before: Remainder, consistency: Consistency, noise: tuple[str, ...]) -> float:
     """Bonferroni over the three tests that can call a model inadequate."""
     largest = float(np.max(np.abs(found.first.z), initial=0.0))
@@ -267,25 +190,23 @@ def _p_value(found: Search, before: Remainder, consistency: Consistency, noise: 
 
 
 def _verdict(
-    found: Search, own: bool, unexplained: bool, noise: tuple[str, ...], findings: tuple[Finding, ...],
-    evidence: Evidence,
+    look: Look, own: bool, unexplained: bool, noise: tuple[str, ...], findings: tuple[Finding, ...]
 ) -> str:
     if any(f.grave for f in findings):
         return "data fault"
     if unexplained:
         return "unexplained"
-    if len(found.chosen):
+    if look.chosen:
         if own:
             return "own equation"
-        if len(found.chosen) > 1:
+        if len(look.chosen) > 1:
             return "several effects"
-        p = len(evidence.weight)
-        if evidence.candidates[found.chosen[0] - p].effect.run_local:
+        if look.chosen[0].effect.run_local:
             return "data fault"
-        return "class of effects" if found.steps[0].alike else "one effect"
+        return "class of effects" if look.found.steps[0].alike else "one effect"
     if noise:
         return "noise model wrong"
-    if any(not s.accepted for s in found.steps):
+    if any(not s.accepted for s in look.found.steps):
         return "unexplained"
     return "consistent"
 

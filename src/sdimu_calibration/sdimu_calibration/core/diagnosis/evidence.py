@@ -78,6 +78,10 @@ class Evidence:
         d[: len(self.weight)] += self.weight * self.shift
         return Information(self.W.T @ self.W, d)
 
+    def tried_prior(self, index: int) -> float:
+        """One-sigma of the prior of a coefficient of the model."""
+        return float(1.0 / np.sqrt(self.weight[index]))
+
     def with_effects(self, effects: Sequence[Effect], grade: str) -> Evidence:
         """Return the evidence with the parameters of more effects behind the candidates it has."""
         more = [c for effect in effects for c in split(effect)]

@@ -28,6 +28,8 @@ LOG_BAYES = 3.0
 """Least log Bayes factor of an accepted step ("strong" on Jeffreys' scale)."""
 _WIDE = 3.0
 """Physical priors are taken this much wider: a sensor may be out of its class."""
+_OWN_ODDS = 6.0
+"""Log odds that a registered effect has before an equation of which physics says nothing."""
 _KEEP = 3.0
 """A chosen effect smaller than this many of its sigmas, with the others in, is dropped."""
 
@@ -105,7 +107,7 @@ class Search:
     scale: float
 
 
-class _Problem:
+class Problem:
     """Evidence with the bookkeeping of priors for any set of chosen columns."""
 
     def __init__(self, evidence: Evidence) -> None:
@@ -142,6 +144,7 @@ class _Problem:
         with np.errstate(divide="ignore", invalid="ignore"):
             occam = np.where(wide > 0.0, 0.5 * np.log1p(J / wide), 0.0)
             score = 0.5 * d**2 / (J + wide) - occam
+        score = score - np.array([_OWN_ODDS if c.family == "own" else 0.0 for c in self.evidence.candidates])
         return np.concatenate([np.full(p, -np.inf), np.where(np.isfinite(scanned.sigma[p:]), score, -np.inf)])
 
     def held_out(self, chosen: Sequence[int], scale: float) -> HeldOut:
@@ -161,7 +164,7 @@ def search(evidence: Evidence, allowed: Ints, alpha: float = FALSE_ALARM) -> Sea
     alpha : float
         False-alarm probability of a whole scan.
     """
-    problem = _Problem(evidence.only(allowed))
+    problem = Problem(evidence.only(allowed))
     chosen: list[int] = []
     steps: list[Step] = []
     scale = problem.scale(chosen)
@@ -188,7 +191,7 @@ def search(evidence: Evidence, allowed: Ints, alpha: float = FALSE_ALARM) -> Sea
     return Search(tuple(steps), back, first, scanned, first_limit, scale)
 
 
-def _polish(problem: _Problem, chosen: list[int]) -> list[int]:
+def _polish(problem: Problem, chosen: list[int]) -> list[int]:
     """Exchange each chosen column for the best one given the others until nothing changes; drop what they explain."""
     for _ in range(4):
         changed = False
@@ -210,7 +213,7 @@ def _polish(problem: _Problem, chosen: list[int]) -> list[int]:
 
 
 def _step(
-    problem: _Problem, scanned: Scan, scores: Floats, chosen: Sequence[int], best: int, limit: float,
+    problem: Problem, scanned: Scan, scores: Floats, chosen: Sequence[int], best: int, limit: float,
     before: HeldOut, after: HeldOut,
 ) -> Step:  # fmt: skip
     evidence, p = problem.evidence, problem.p
@@ -234,7 +237,7 @@ def _step(
     )  # fmt: skip
 
 
-def _moved(problem: _Problem, chosen: Sequence[int], best: int, size: float) -> tuple[tuple[str, float], ...]:
+def _moved(problem: Problem, chosen: Sequence[int], best: int, size: float) -> tuple[tuple[str, float], ...]:
     """Coefficients that the effect moves most, in their own sigmas: the damage it did while it was missing."""
     known, weight, _ = problem.known(chosen)
     J = problem.evidence.information.J

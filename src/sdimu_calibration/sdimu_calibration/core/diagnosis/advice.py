@@ -1,0 +1,154 @@
+"""What to do next, in words with minutes: about what was found, and about what this plan cannot show.
+
+The rules are those of observability on a rate table: an even function of the rate needs both senses of turn, its shape two rates,
+a product of forces stops between the axes, a change with time the same attitude twice.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
+from sdimu_calibration.core.diagnosis.found import Found, Reach
+from sdimu_calibration.core.diagnosis.plan_seen import PlanSeen
+
+_EVEN = frozenset({"gyro_scale_asymmetry", "gyro_scale_quadratic", "gyro_misalignment_asymmetry", "gyro_bias_in_motion"})
+"""Even in the rate: one sense of turn leaves them to scale factor and misalignment."""
+_SHAPE = frozenset({"gyro_scale_asymmetry", "gyro_scale_quadratic", "gyro_scale_cubic"})
+"""Functions of the rate that one rate cannot tell apart."""
+_OBLIQUE = frozenset({"gyro_g_product", "accel_cross_product", "accel_cross_coupling", "accel_cubic", "accel_odd_quadratic"})
+"""Products and powers of forces: seen between the cardinal attitudes."""
+_SLOW = frozenset(
+    f"{s}_{k}"
+    for s in ("gyro", "accel")
+    for k in ("bias_temperature", "bias_warm_up", "bias_ramp", "bias_random_walk", "bias_temperature_rate", "bias_step")
+)
+"""Functions of time."""
+_TWO_AXES = frozenset({"gyro_anisoinertia"})
+_EXACT = {
+    "reference_gravity": "a wrong gravity is a common scale factor of the accelerometers whatever the plan; survey gravity",
+    "reference_deflection_east": "a deflection to the East is an azimuth whatever the plan",
+}
+_SLOW_MINUTES = 20.0
+
+
+@dataclass(frozen=True)
+class Blind:
+    """Why a group of effects could not have been seen, and what would show it."""
+
+    reason: str
+    labels: tuple[str, ...]
+
+
+def blind(reached: tuple[Reach, ...], plan: PlanSeen) -> tuple[Blind, ...]:
+    """Sort what is not testable by the reason; the largest groups first."""
+    groups: dict[str, list[str]] = {}
+    for one in reached:
+        if not one.testable:
+            groups.setdefault(reason(one, plan), []).append(one.label)
+    ordered = sorted(groups.items(), key=lambda item: -len(item[1]))
+    return tuple(Blind(why, tuple(labels)) for why, labels in ordered)
+
+
+def reason(one: Reach, plan: PlanSeen) -> str:
+    """Say why a candidate is not testable with this plan."""
+    if one.family in _EXACT:
+        return _EXACT[one.family]
+    if one.family in _EVEN and plan.one_sided():
+        return f"{_senses(plan)}: drive some negative (the second turn of each 180 deg pair costs nothing)"
+    if one.family in _SHAPE and plan.one_rate():
+        return f"{_rates(plan)}: drive every other turn at another rate, such as 2 and 10 deg/s"
+    if one.family in _TWO_AXES:
+        return "every turn is about one body axis: needs turns about two at once"
+    if one.family in _OBLIQUE and not plan.oblique:
+        return "no stop lies between the body axes: split turns of 90 deg into halves of 45 deg"
+    if one.partners:
+        return f"the model takes it ({', '.join(one.partners)})"
+    return "the motion of this test does not excite it"
+
+
+def advice(d: Diagnosis, found: tuple[Found, ...], reached: tuple[Reach, ...], plan: PlanSeen) -> tuple[str, ...]:
+    """Advise in sentences, the most useful first."""
+    out = [*_about_data(d), *_about_found(d, found, plan), *_about_plan(reached, plan)]
+    return tuple(dict.fromkeys(out))
+
+
+def _about_data(d: Diagnosis) -> list[str]:
+    out = [f"Mend the recording first: {f.text}." for f in d.findings if f.grave]
+    if d.noise:
+        measured = d.consistency
+        out.append(
+            f"Correct the noise in the IMU's file: gyro times {measured.gyro.ratio:.2f}, "
+            f"accelerometer times {measured.accel.ratio:.2f}; look for outliers when the tails are heavy."
+        )
+    return out
+
+
+def _about_found(d: Diagnosis, found: tuple[Found, ...], plan: PlanSeen) -> list[str]:
+    out: list[str] = []
+    if d.verdict == "unexplained":
+        worst = d.consistency.where[0] if d.consistency.where else None
+        place = f", worst at stop {worst.stop} in {worst.channel}" if worst else ""
+        out.append(f"Do not use coefficients of this test beyond their scatter: something unknown acts{place}.")
+        out.append("Run the plan again in another order: what comes back at the same attitude belongs to the sensor, what comes "
+                   "back at the same time to warm-up, what does not come back to this run.")  # fmt: skip
+        if found:
+            out.append(f"Try an equation of your own (--try FILE); the best single variables here: "
+                       f"{', '.join(f.candidate.label for f in found)}.")  # fmt: skip
+        return out
+    for one in found:
+        family = one.candidate.family
+        if family != "own" and not one.candidate.effect.run_local:
+            out.append(f"Keep {one.candidate.label} in the model: --add '{one.candidate.label}'.")
+        if one.candidate.effect.run_local:
+            out.append(f"{one.candidate.label} is a fault of this recording: record again and do not carry it over.")
+        if one.alike:
+            out.append(separate(one, plan))
+    return out
+
+
+def separate(one: Found, plan: PlanSeen) -> str:
+    """Name the next turn or stop that would tell a class apart, with minutes."""
+    label, others = one.candidate.label, ", ".join(one.alike[:3])
+    dwell = max(plan.dwell_minutes, 1.0)
+    family = one.candidate.family
+    head = f"To tell {label} from {others}: "
+    if family in _SHAPE and plan.one_rate():
+        return head + f"add a turn of 180 deg and back about that axis, level, at 10 deg/s ({2 * (dwell + 0.3):.0f} min)."
+    if family in _EVEN and plan.one_sided():
+        return head + f"add a turn of 180 deg about that axis in the other sense ({dwell + 1.5:.0f} min)."
+    if family in _SLOW:
+        return head + (
+            f"stay at the last stop for {_SLOW_MINUTES:.0f} min more, then repeat the first stop ({dwell + 1.0:.0f} min)."
+        )
+    if family in _OBLIQUE or family.startswith(("accel_quadratic", "accel_scale_asymmetry", "accel_bias_asymmetry")):
+        return head + (
+            f"add two stops on the body diagonal, X +45 deg and Y -35.3 deg and back ({2 * (dwell + 0.6):.0f} min), "
+            "or run the plan 'recommended'."
+        )
+    return head + f"repeat the turn that shows it in the other sense and at 10 deg/s ({2 * (dwell + 0.5):.0f} min)."
+
+
+def _about_plan(reached: tuple[Reach, ...], plan: PlanSeen) -> list[str]:
+    out = []
+    hidden = {one.family for one in reached if not one.testable}
+    if hidden & _EVEN and plan.one_sided():
+        out.append(f"{_senses(plan)}, so scale-factor asymmetry of the gyros cannot be seen: drive the second turn of "
+                   "each 180 deg pair negative (0 min more; the plan 'kim18_signed').")  # fmt: skip
+    if "gyro_scale_cubic" in hidden and plan.one_rate():
+        out.append(f"{_rates(plan)}, so the shape of the scale factor cannot be seen: alternate 2 and 10 deg/s (shorter; "
+                   "the plan 'recommended').")  # fmt: skip
+    return out
+
+
+def _senses(plan: PlanSeen) -> str:
+    axes = plan.one_sided()
+    word = {1: "positive", -1: "negative"}
+    if len(axes) == 3 and len({sign for _, sign in axes}) == 1:
+        return f"all turns are {word[axes[0][1]]}"
+    return "all turns about " + ", ".join(f"{letter} are {word[sign]}" for letter, sign in axes)
+
+
+def _rates(plan: PlanSeen) -> str:
+    axes = plan.one_rate()
+    return "all turns have one rate" if len(axes) == 3 else f"all turns about {', '.join(axes)} have one rate"

@@ -1,0 +1,205 @@
+"""What was found, one effect at a time: size, score and share of the misfit of each, given those before it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import norm
+
+from sdimu_calibration.core.diagnosis.candidates import Candidate
+from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
+from sdimu_calibration.core.diagnosis.remainder import remainder
+from sdimu_calibration.core.diagnosis.scan import POWER_80, Scan, alike, scan
+from sdimu_calibration.core.diagnosis.search import Problem
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Found:
+    """One effect that was found.
+
+    Attributes
+    ----------
+    candidate : Candidate
+    value, sigma : float
+        SI; of the refit where the calibration was repeated with it, else with all others of the search in.
+    z : float
+        Score when those found before it are in the model and those after it are not.
+    log_likelihood_gain, log_bayes_factor : float
+        Likewise.
+    p_value_adjusted : float
+        Of `z`, times the number of candidates that were looked at.
+    explained : float
+        Share of the free-input misfit of the model as given that this effect removes.
+    held_out_before, held_out_after : float
+        RMS of the normalised prediction errors at stops left out.
+    alike : tuple of str
+        Candidates that the data cannot tell from it, all others found being in the model.
+    """
+
+    candidate: Candidate
+    value: float
+    sigma: float
+    z: float
+    log_likelihood_gain: float
+    log_bayes_factor: float
+    p_value_adjusted: float
+    explained: float
+    held_out_before: float
+    held_out_after: float
+    alike: tuple[str, ...]
+
+
+def found_effects(d: Diagnosis) -> tuple[Found, ...]:
+    """Take the search's result apart, in its order.
+
+    Parameters
+    ----------
+    d : Diagnosis
+
+    Returns
+    -------
+    tuple of Found
+        Empty when nothing was chosen. Also what was chosen on the way to ``unexplained``.
+    """
+    problem = Problem(d.evidence)
+    chosen = [int(i) for i in d.found.chosen]
+    misfit = _misfits(d, problem, chosen)
+    whole = max(misfit[0], 1e-9) if misfit else 1.0
+    values, sigmas = _estimates(d, problem, chosen)
+    allowed = looked_at(d)
+    out = []
+    for k, column in enumerate(chosen):
+        scanned = problem.scan(chosen[:k], d.found.scale)
+        scores = problem.scores(scanned, d.found.scale)
+        z = float(scanned.z[column])
+        count = int(np.isfinite(scanned.sigma[allowed]).sum())
+        out.append(
+            Found(
+                candidate=d.chosen[k],
+                value=float(values[k]),
+                sigma=float(sigmas[k]),
+                z=z,
+                log_likelihood_gain=0.5 * z * z,
+                log_bayes_factor=float(scores[column]),
+                p_value_adjusted=float(min(1.0, count * 2.0 * float(norm.sf(abs(z))))),
+                explained=float(np.clip((misfit[k] - misfit[k + 1]) / whole, 0.0, 1.0)),
+                held_out_before=problem.held_out(chosen[:k], 1.0).rms,
+                held_out_after=problem.held_out(chosen[: k + 1], 1.0).rms,
+                alike=_alike(d, problem, chosen, column, allowed),
+            )
+        )
+    return tuple(out)
+
+
+def looked_at(d: Diagnosis) -> Ints:
+    """Columns of the evidence that the search was allowed to choose: all candidates but the free inputs."""
+    return np.setdiff1d(np.arange(len(d.evidence.weight), len(d.evidence.names)), d.free)
+
+
+def catalogue_columns(d: Diagnosis) -> Ints:
+    """Columns of the evidence that are the catalogue's, and effects of the user's own."""
+    p = len(d.evidence.weight)
+    return np.array([i for i in looked_at(d) if d.evidence.candidates[i - p].family != "own"], dtype=np.int64)
+
+
+@dataclass(frozen=True)
+class Reach:
+    """What this test could have seen of one effect that the model does not have.
+
+    Attributes
+    ----------
+    label, family, unit, display_unit : str
+    smallest : float
+        Size found with 80 % power at a false-alarm rate of 0.001 (SI); inf when the model takes all of it.
+    retention : float
+        Share of its signature that the model's coefficients leave.
+    testable : bool
+    partners : tuple of str
+        Coefficients of the model that take the rest; given when it is not testable.
+    """
+
+    label: str
+    family: str
+    unit: str
+    display_unit: str
+    smallest: float
+    retention: float
+    testable: bool
+    partners: tuple[str, ...] = ()
+
+
+def reach(d: Diagnosis) -> tuple[Reach, ...]:
+    """Minimal detectable size of every candidate of the catalogue, given the model that was asked about."""
+    evidence = d.evidence.only(catalogue_columns(d))
+    p = len(evidence.weight)
+    full = evidence.information
+    scanned = scan(full, evidence.model, evidence.weight, d.found.scale)
+    J = np.diag(scanned.information.J)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        smallest = np.where(J > _ROUNDING * np.diag(full.J), POWER_80 * d.found.scale / np.sqrt(np.abs(J)), np.inf)
+    out = []
+    for k, candidate in enumerate(evidence.candidates, start=p):
+        testable = bool(np.isfinite(scanned.sigma[k]))
+        partners = () if testable else _partners(evidence.names, full.J, evidence.weight, k)
+        out.append(
+            Reach(
+                candidate.label, candidate.family, candidate.parameter.unit, candidate.parameter.display_unit,
+                float(smallest[k]), float(scanned.retention[k]), testable, partners,
+            )
+        )  # fmt: skip
+    return tuple(out)
+
+
+_ROUNDING = 1e-9
+"""Share of information below which what is left of a signature is rounding."""
+
+
+def _partners(names: tuple[str, ...], J: Floats, weight: Floats, column: int) -> tuple[str, ...]:
+    """Name the coefficients that take most of a signature, at most three."""
+    p = len(weight)
+    if J[column, column] <= 0.0:
+        return ()
+    unit = 1.0 / np.sqrt(np.diag(J)[:p] + weight)
+    A = (J[:p, :p] + np.diag(weight)) * np.outer(unit, unit)
+    share = np.linalg.solve(A, unit * J[:p, column]) * (unit * J[:p, column]) / J[column, column]
+    return tuple(names[i] for i in np.argsort(-share)[:3] if share[i] > 0.05)
+
+
+def _misfits(d: Diagnosis, problem: Problem, chosen: list[int]) -> list[float]:
+    """Free-input chi-square beyond its degrees of freedom with none, one, two ... of the chosen in the model."""
+    out = []
+    for k in range(len(chosen) + 1):
+        known = np.concatenate([problem.evidence.model, chosen[:k]]).astype(np.int64)
+        weight = np.concatenate([problem.evidence.weight, np.zeros(k)])
+        left = remainder(d.evidence.information, known, weight, d.free, d.found.scale)
+        out.append(max(left.chi2 - left.dof, 0.0))
+    return out
+
+
+def _estimates(d: Diagnosis, problem: Problem, chosen: list[int]) -> tuple[Floats, Floats]:
+    """Value and sigma of each, of the refit where there is one."""
+    known, weight, _ = problem.known(chosen)
+    estimate, covariance = d.evidence.information.estimate(known, weight)
+    p = len(d.evidence.weight)
+    values, sigmas = estimate[p:].copy(), d.found.scale * np.sqrt(np.diag(covariance))[p:]
+    refit = {name: k for k, name in enumerate(d.after.names)}
+    for k, candidate in enumerate(d.chosen):
+        at = refit.get(candidate.parameter.name)
+        if at is not None:
+            values[k], sigmas[k] = d.after.values[at], np.sqrt(d.after.covariance[at, at])
+    return values, sigmas
+
+
+def _alike(d: Diagnosis, problem: Problem, chosen: list[int], column: int, allowed: Ints) -> tuple[str, ...]:
+    others = [c for c in chosen if c != column]
+    scanned: Scan = problem.scan(others, d.found.scale)
+    scores = problem.scores(scanned, d.found.scale)
+    outside = np.ones(len(scores), dtype=bool)
+    outside[allowed] = False
+    scores[outside] = -np.inf
+    return tuple(d.evidence.names[i] for i in alike(scores, column))

@@ -1,0 +1,104 @@
+"""The plan as the motion shows it: turns with axis, sense and rate; stops and how they lean. Table angles are not read."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sdimu_calibration.core.diagnosis.evidence import Evidence
+from sdimu_calibration.core.effects.effect import AXES
+
+Floats = NDArray[np.float64]
+
+_SINGLE_AXIS = 0.9
+"""Least share of a turn about one body axis that makes it a turn about that axis."""
+_OBLIQUE = 0.35
+"""A stop with two components of gravity above this share leans: no axis is near the vertical or level plane."""
+_RATES_DIFFER = 1.5
+
+
+@dataclass(frozen=True)
+class TurnSeen:
+    """One turn.
+
+    Attributes
+    ----------
+    after_stop : int
+    axis : int or None
+        Body axis, 0-2; None when it turned about several.
+    angle, rate : float
+        Signed angle (rad); rate in the middle of the turn (rad/s).
+    minutes : float
+        Of the turn.
+    """
+
+    after_stop: int
+    axis: int | None
+    angle: float
+    rate: float
+    minutes: float
+
+
+@dataclass(frozen=True)
+class PlanSeen:
+    """What a test did.
+
+    Attributes
+    ----------
+    turns : tuple of TurnSeen
+    oblique : int
+        Stops at which gravity lies between the body axes.
+    dwell_minutes : float
+        Median length of a stop.
+    """
+
+    turns: tuple[TurnSeen, ...]
+    oblique: int
+    dwell_minutes: float
+
+    def one_sided(self) -> tuple[tuple[str, int], ...]:
+        """Axes about which all turns have one sense: letter and sign."""
+        out = []
+        for axis in range(3):
+            signs = {int(np.sign(t.angle)) for t in self.turns if t.axis == axis}
+            if len(signs) == 1:
+                out.append((AXES[axis], signs.pop()))
+        return tuple(out)
+
+    def one_rate(self) -> tuple[str, ...]:
+        """Axes about which all turns have one rate."""
+        out = []
+        for axis in range(3):
+            rates = [t.rate for t in self.turns if t.axis == axis]
+            if rates and max(rates) < _RATES_DIFFER * min(rates):
+                out.append(AXES[axis])
+        return tuple(out)
+
+
+def plan_seen(evidence: Evidence) -> PlanSeen:
+    """Read turns and stops from the predicted motion of a diagnosis."""
+    seen, times = evidence.seen, evidence.times
+    turns = []
+    for stop, start, end in times.turns:
+        rows = (seen.t > start) & (seen.t - seen.dt < end)
+        angle = np.sum(seen.w_table[rows] * seen.dt[rows, None], axis=0)
+        path = float(np.sum(np.linalg.norm(seen.w_table[rows], axis=1) * seen.dt[rows]))
+        axis = int(np.argmax(np.abs(angle)))
+        rate = np.linalg.norm(seen.w_table[rows], axis=1)
+        fast = rate > 0.5 * rate.max() if rows.any() and rate.max() > 0 else np.zeros(len(rate), dtype=bool)
+        single = path > 0.0 and abs(angle[axis]) > _SINGLE_AXIS * path
+        turns.append(
+            TurnSeen(
+                stop, axis if single else None, float(angle[axis]),
+                float(np.median(rate[fast])) if fast.any() else 0.0, (end - start) / 60.0,
+            )
+        )  # fmt: skip
+    oblique = 0
+    for _, start, end in times.stops:
+        rows = (seen.t > start) & (seen.t <= end)
+        share = np.sort(np.abs(seen.a[rows].mean(axis=0))) if rows.any() else np.zeros(3)
+        oblique += int(share[1] > _OBLIQUE)
+    dwell = float(np.median([b - a for _, a, b in times.stops])) / 60.0 if times.stops else 0.0
+    return PlanSeen(tuple(turns), oblique, dwell)
