@@ -22,6 +22,7 @@ setup(
             "run = sdimu_sim.cli.run:run",
             "monte-carlo = sdimu_sim.cli.monte_carlo:monte_carlo",
             "bench = sdimu_sim.cli.bench:bench",
+            "hidden-campaign = sdimu_sim.cli.hidden_campaign:hidden_campaign",
         ],
     },
 )

@@ -11,12 +11,12 @@ import numpy as np
 from sdimu_calibration.core.effects.selection import resolve
 from sdimu_calibration.core.units import from_si
 from sdimu_sim.campaign.hidden_outside import OUTSIDE
-from sdimu_sim.campaign.hidden_tests import PLANS, Sizes, between
+from sdimu_sim.campaign.hidden_sizes import PLANS, Sizes, between
 from sdimu_sim.core.hidden import effect_example, effect_names
 
 KINDS = ("weak", "strong", "pair", "clean", "outside", "noise")
 """One effect at 5 sigma; one at 8 to 30; two at 10 to 30 each; none; not in the catalogue at 15 to 40; wrong noise."""
-FAULTS = ("outliers", "gyro noise x1.3", "accel noise x1.3")
+FAULTS = ("outliers 0.1 %", "outliers 1 %", "gyro noise x1.3", "accel noise x1.3")
 TESTABLE = 0.05
 """Least share of the signature that the model must leave: less is as good as a coefficient of the model."""
 PLAUSIBLE = 3.0
@@ -141,11 +141,11 @@ def outside_kind(label: str) -> str:
 
 
 def _option(label: str) -> tuple[str, float] | None:
-    """What stands in brackets behind a name: ``("tau", 300.0)``."""
+    """Read what stands in brackets behind a name: ``("tau", 300.0)``."""
     _, bracket, inside = label.partition("(")
     if not bracket:
         return None
-    key, _, value = inside.rstrip(")").partition("=")
+    key, _, value = inside.rstrip(")").partition(",")[0].partition("=")
     return key, float(value.split()[0])
 
 

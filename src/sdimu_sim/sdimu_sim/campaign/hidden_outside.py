@@ -1,4 +1,4 @@
-"""Errors that no registered effect has, written twice: as a formula for the simulator and as a regressor for its size."""
+"""Errors that no registered effect has, written twice: a formula to simulate, a regressor to know its size."""
 
 from __future__ import annotations
 

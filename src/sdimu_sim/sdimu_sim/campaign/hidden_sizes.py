@@ -12,7 +12,6 @@ from sdimu_calibration.core.diagnosis.candidates import catalogue
 from sdimu_calibration.core.diagnosis.evidence import collect, test_times
 from sdimu_calibration.core.diagnosis.scan import scan
 from sdimu_calibration.core.passes import reduce, set_up, solve
-from sdimu_calibration.core.plan import Plan, Turn
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.specification import ImuSpecification, Model, Site
 from sdimu_calibration.storage.config import load_plan
@@ -61,45 +60,11 @@ class Sizes:
     stops: tuple[tuple[int, float, float], ...]
 
 
-def plan_named(name: str) -> Plan:
-    """Load a plan from the configuration, or make `kim18_signed` and `recommended` where it has none."""
-    try:
-        return load_plan(name)
-    except DataError:
-        if name not in PLANS:
-            raise
-    base = load_plan("kim18")
-    signed = replace(base, name="kim18_signed", turns=_signed(base.turns))
-    return signed if name == "kim18_signed" else _recommended(signed)
-
-
-def _signed(turns: Sequence[Turn]) -> tuple[Turn, ...]:
-    """Turn the second half turn of every pair back."""
-    half = [abs(abs(t.angle_rad) - math.pi) < 1e-9 for t in turns]
-    return tuple(
-        replace(t, angle_rad=-t.angle_rad) if half[i] and i and half[i - 1] and turns[i - 1].axis == t.axis else t
-        for i, t in enumerate(turns)
-    )
-
-
-def _recommended(signed: Plan) -> Plan:
-    """Two rates in turn, and the last nine quarter turns as eighth turns with dwells of 60 s."""
-    first, last = signed.turns[:9], signed.turns[9:]
-    turns = [*first, *(replace(t, angle_rad=t.angle_rad / 2.0) for t in last for _ in range(2))]
-    rates = (math.radians(2.0), math.radians(10.0))
-    return Plan(
-        "recommended",
-        (*signed.dwell_s[:10], *(60.0,) * (len(turns) - 9)),
-        tuple(replace(t, rate_rad_s=rates[i % 2]) for i, t in enumerate(turns)),
-        math.radians(5.0),
-    )
-
-
 def sizes(plan: str, latitude_deg: float, imu: ImuSpecification, model: Model) -> Sizes:
     """Sigma of the whole catalogue, and of what is outside it, on a clean test of a plan at a latitude."""
     site = Site(math.radians(latitude_deg), 0.0)
     scenario = Scenario(
-        plan=plan_named(plan), imu=imu, site=site, rate_hz=RATE_HZ, seed=_SEED, temperature=WARM_UP, coefficients={}
+        plan=load_plan(plan), imu=imu, site=site, rate_hz=RATE_HZ, seed=_SEED, temperature=WARM_UP, coefficients={}
     )
     setup = set_up(site, imu, model)
     reduced = reduce(simulate(scenario, imu_truth(scenario)), setup)
@@ -131,4 +96,6 @@ def between(tables: Sequence[Sizes], plan: str, latitude_deg: float) -> Sizes:
     with np.errstate(invalid="ignore"):
         sigma = np.where(np.isfinite(a) & np.isfinite(b), np.exp((1 - share) * np.log(a) + share * np.log(b)), np.inf)
     retention = np.minimum(own[low].retention, own[high].retention)
-    return replace(own[low], latitude_deg=latitude_deg, sigma=tuple(sigma.tolist()), retention=tuple(retention.tolist()))
+    return replace(
+        own[low], latitude_deg=latitude_deg, sigma=tuple(sigma.tolist()), retention=tuple(retention.tolist())
+    )
