@@ -23,9 +23,9 @@ from sdimu_sim.core.truth import ImuTruth, in_body_frame
 
 Floats = NDArray[np.float64]
 
-CHANNELS = tuple(f"{row}_{axis}" for row in ("position", "velocity") for axis in "NED") + tuple(
-    f"{row}_{axis}" for row in ("rate", "force") for axis in "xyz"
-)
+KINDS = ("position", "velocity", "rate", "force")
+"""Kinds of measurement, three rows each."""
+CHANNELS = tuple(f"{kind}_{axis}" for kind in KINDS for axis in ("NED" if kind in KINDS[:2] else "xyz"))
 """Rows of the filter's measurement. The whitening mixes a row with those before it."""
 
 _PINNED_SHARE = 1e-6
@@ -55,8 +55,8 @@ class CalibrationRun:
         dict
             ``names`` of the coefficients, then in this order and the reported frame ``estimate``, ``truth``,
             ``sigma`` (SI) and ``covariance`` (lower triangle by rows); ``free``: coefficients that the frame does not
-            make zero; ``nees`` over these; ``nis`` and ``nis_dof`` (sum and number); ``lag1`` and ``lag1_count`` by
-            `CHANNELS`; ``passes``.
+            make zero; ``nees`` over these; ``nis`` and ``nis_dof`` (sum and number) by `KINDS`; ``lag1`` and
+            ``lag1_count`` by `CHANNELS`; ``passes``.
 
         Raises
         ------
@@ -83,7 +83,7 @@ class CalibrationRun:
         return {
             "names": names, "estimate": estimate, "truth": truth, "sigma": sigma,
             "covariance": P[np.tril_indices(len(P))], "free": free, "nees": nees(estimate - truth, P, free),
-            "nis": float(np.nansum(nis)), "nis_dof": 3 * int(np.isfinite(nis).sum()),
+            "nis": np.nansum(nis, axis=0), "nis_dof": 3 * np.isfinite(nis).sum(axis=0),
             "lag1": products, "lag1_count": count, "passes": passes,
         }  # fmt: skip
 

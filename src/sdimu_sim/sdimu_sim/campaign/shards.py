@@ -7,6 +7,7 @@ be a mean of nothing.
 from __future__ import annotations
 
 import hashlib
+import inspect
 import json
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, is_dataclass
@@ -47,8 +48,10 @@ def settings_of(work: object) -> dict[str, Any]:
 
 
 def key_of(work: object) -> str:
-    """Digest of the settings of a piece of work and of the program."""
-    text = json.dumps(settings_of(work), sort_keys=True) + program_digest()
+    """Digest of the settings of a piece of work, of the file it is written in, and of the program."""
+    file = inspect.getsourcefile(type(work) if is_dataclass(work) else work)  # type: ignore[arg-type]
+    own = Path(file).read_text(encoding="utf-8") if file else ""
+    text = json.dumps(settings_of(work), sort_keys=True) + own + program_digest()
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 

@@ -11,7 +11,7 @@ from sdimu_calibration.core import imu_model
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.specification import ImuSpecification, Model
 from sdimu_sim.campaign import statistics
-from sdimu_sim.campaign.run import CHANNELS
+from sdimu_sim.campaign.run import CHANNELS, KINDS
 from sdimu_sim.campaign.shards import failed
 
 FORMAT = "sdimu-monte-carlo/1"
@@ -64,7 +64,7 @@ def summarise(
         *statistics.sigma_checks(found, n),
         statistics.bound_check(found),
         statistics.nees_check(nees, p),
-        statistics.nis_check(nis, dof),
+        statistics.nis_check(nis.sum(axis=1), dof.sum(axis=1)),
         statistics.lag_check(lag1, counts, CHANNELS),
     ]
     units = {q.name: (q.unit, q.display_unit) for q in imu_model.build(model.effects, imu).parameters}
@@ -90,7 +90,10 @@ def summarise(
             for k, name in enumerate(names)
         ],
         "nees": {"dof": p, "values": nees},
-        "nis": {"values": nis / dof, "dof": dof},
+        "nis": {
+            "values": nis.sum(axis=1) / dof.sum(axis=1), "dof": dof.sum(axis=1),
+            "by_kind": dict(zip(KINDS, _ratio(nis.sum(axis=0), dof.sum(axis=0)), strict=True)),
+        },
         "autocorrelation": [
             {"channel": channel, "value": value, "standard_errors": score, "pairs": int(pairs)}
             for channel, value, score, pairs in zip(
