@@ -42,6 +42,8 @@ Floats = NDArray[np.float64]
 Stamps = NDArray[np.int64]
 
 NIS_CHANNELS = ("position", "velocity", "rate", "force")
+_FAR = 5.0
+"""Standard deviations of chi-square beyond which a channel contradicts its sigma."""
 
 
 @dataclass(frozen=True)
@@ -67,6 +69,9 @@ class EpochEstimate:
     navigation_covariance : ndarray, shape (9, 9)
     nis : dict
         Mean squared normalised innovation per degree of freedom so far, by channel of `NIS_CHANNELS`.
+    verdict : str
+        ``consistent``, or which channels contradict their sigma at the present stop. A first pass is linearised about what
+        it did not know yet, so the first stops may complain about a wrong initial azimuth.
     counts : dict
         samples, late, lost, rejected, contradicted.
     """
@@ -89,6 +94,7 @@ class EpochEstimate:
     q_nb: Floats
     navigation_covariance: Floats
     nis: dict[str, float]
+    verdict: str
     counts: dict[str, int]
 
 
@@ -132,6 +138,7 @@ class LiveCalibration:
         self._J = body_frame.frame_jacobian(self.setup.sensors.names, model.body_frame)
         self._nis_sum = np.zeros(4)
         self._nis_count = np.zeros(4)
+        self._stop_nis = np.zeros((2, 4))  # sum and degrees of freedom at the present stop
 
     def add_samples(self, t: Floats, omega_ib_b: Floats, f_ib_b: Floats) -> None:
         """Take samples: end stamps (s after `start_ns`) shape (n,), rates and specific forces shape (n, 3).
@@ -304,6 +311,9 @@ class LiveCalibration:
         measured = np.isfinite(out.nis[0])
         self._nis_sum[measured] += out.nis[0][measured]
         self._nis_count[measured] += 3
+        if phases.first[k]:
+            self._stop_nis[:] = 0.0
+        self._stop_nis[:, measured] += np.array([out.nis[0][measured], np.full(int(measured.sum()), 3.0)])
         return self._report(epochs, phases, k, out.estimate[0])
 
     def _report(self, epochs: Epochs, phases: Phases, k: int, estimate: Floats) -> EpochEstimate:
@@ -332,9 +342,31 @@ class LiveCalibration:
             ]),
             velocity=state.velocity.copy(), q_nb=quaternion(state.C_nb),
             navigation_covariance=state.P[:NAV, :NAV].copy(),
+            verdict=stop_verdict(*self._stop_nis),
             nis={c: float(v) for c, v in zip(NIS_CHANNELS, nis, strict=True) if np.isfinite(v)},
             counts={
                 "samples": self._samples, "late": self._late, "lost": self._lost, "rejected": self._rejected,
                 "contradicted": self._contradicted,
             },
         )  # fmt: skip
+
+
+def stop_verdict(total: Floats, dof: Floats) -> str:
+    """Judge the squared normalised innovations of one stop, by channel of `NIS_CHANNELS`.
+
+    Parameters
+    ----------
+    total, dof : ndarray, shape (4,)
+        Sum of squares, and how many there are.
+
+    Returns
+    -------
+    str
+        ``consistent`` while every sum lies within five standard deviations of chi-square.
+    """
+    far = [
+        f"{channel} {t / d:.2f}"
+        for channel, t, d in zip(NIS_CHANNELS, total, dof, strict=True)
+        if d > 0 and abs(t - d) > _FAR * np.sqrt(2.0 * d)
+    ]
+    return "inconsistent: " + ", ".join(far) + " of 1" if far else "consistent"

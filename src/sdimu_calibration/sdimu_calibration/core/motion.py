@@ -11,6 +11,9 @@ from sdimu_calibration.core.units import STANDARD_GRAVITY
 
 Floats = NDArray[np.float64]
 
+_TURNING = np.radians(0.01)
+"""Slower than any turn of a table, faster than the bias of a gyro that is worth calibrating on one (rad/s)."""
+
 
 @dataclass(frozen=True)
 class Motion:
@@ -66,8 +69,12 @@ class Motion:
 
     @property
     def moving(self) -> Floats:
-        """1 while the table turns, 0 at rest, shape (n,)."""
-        return (~self.rest).astype(np.float64)
+        """1 while the table turns, 0 at rest, shape (n,).
+
+        The phase is known by the epoch only; within it the rate of the table says when a turn began.
+        """
+        turning = np.sum(self.w_table**2, axis=1) > _TURNING**2
+        return np.asarray((~self.rest & turning).astype(np.float64))
 
     @property
     def field(self) -> Floats:

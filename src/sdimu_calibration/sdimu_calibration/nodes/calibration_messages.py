@@ -66,6 +66,8 @@ def diagnostics(stamp_ns: int, estimate: EpochEstimate) -> DiagnosticArray:
     values = {"phase": phase, "stop": str(estimate.stop), "used": str(estimate.used).lower()}
     values |= {name: str(count) for name, count in estimate.counts.items()}
     values |= {f"nis_{channel}": f"{nis:.6g}" for channel, nis in estimate.nis.items()}
-    status = DiagnosticStatus(name="calibration", message=phase, hardware_id="imu")
+    values["verdict"] = estimate.verdict
+    level = DiagnosticStatus.OK if estimate.verdict == "consistent" else DiagnosticStatus.WARN
+    status = DiagnosticStatus(level=level, name="calibration", message=phase, hardware_id="imu")
     status.values = [KeyValue(key=key, value=value) for key, value in values.items()]
     return DiagnosticArray(header=header(stamp_ns), status=[status])

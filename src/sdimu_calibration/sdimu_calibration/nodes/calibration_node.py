@@ -1,7 +1,7 @@
 """Node that calibrates while the test runs.
 
-Parameters: site, imu, model (names or paths), out (folder for result.json), stay (do not leave at the end of the
-stream).
+Parameters: site, imu, model (names or paths), add (effects beyond the model's), out (folder for result.json), stay (do
+not leave at the end of the stream).
 Subscriptions (remap them at will): /imu/data_raw, /rate_table/status, /imu/temperature. Publications once a second of
 data: /calibration/coefficients, /calibration/covariance, /calibration/navigation, /diagnostics. Services: ~/save
 writes result.json from everything that has come, ~/reset forgets it.
@@ -13,6 +13,7 @@ once more as `sdimu calibrate` does it; the last coefficients and covariance are
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -53,7 +54,10 @@ class CalibrationNode:
         declare = self.node.declare_parameter
         self._site = load_site(str(declare("site", "daejeon").value))
         self._imu = load_imu(str(declare("imu", "dtg").value))
-        self._model = load_model(str(declare("model", "baseline").value))
+        model = load_model(str(declare("model", "baseline").value))
+        # An empty string keeps the parameter's type when nothing is added.
+        added = tuple(effect for effect in declare("add", [""]).value if effect)
+        self._model = replace(model, effects=(*model.effects, *added))
         self._out = Path(str(declare("out", ".").value))
         self._stay = bool(declare("stay", False).value)
         _warm_up(self._make(0))

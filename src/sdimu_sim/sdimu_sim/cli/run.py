@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -35,8 +36,7 @@ def run(
     """Run a whole simulated test over ROS 2: table, IMU, calibration and recorder, each its own process."""
     import time
 
-    from rich.console import Console
-
+    from sdimu_calibration.cli.console import console as make_console
     from sdimu_calibration.cli.processes import Children, own_domain
 
     options: dict[str, dict[str, Any]] = {
@@ -49,17 +49,17 @@ def run(
         "calibration": {"site": site, "imu": imu, "model": model, "out": str(out)},
     }  # fmt: skip
     duration = _check(options)
-    console = Console()
+    console = make_console()
     # Only the bag of an earlier run is replaced, never one that someone put here.
     replace = (out / "log" / "rate_table.yaml").is_file()
-    for stale in ("result.json", "report.html"):
+    for stale in ("result.json", "report.html", "diagnosis.json"):
         (out / stale).unlink(missing_ok=True)
     begun = time.monotonic()
     with own_domain(out / "log"), Children(out / "log") as children:
         _start(children, options, out / "bag", replace)
         streamed = _watch(console, children, duration, model)
     wall = time.monotonic() - begun
-    result = _report(console, out, model, plan)
+    result = _report(console, out, site, imu, model, plan)
     _say_measured(console, out, result, streamed, wall)
 
 
@@ -156,10 +156,10 @@ def _watch(console: Console, children: Children, duration: float, model: str) ->
 
 
 def _display_units(model: str) -> dict[str, str]:
-    from sdimu_calibration.core.effects import registry
+    from sdimu_calibration.core.effects import selection
     from sdimu_calibration.storage.config import load_model
 
-    return {q.name: q.display_unit for effect in load_model(model).effects for q in registry.get(effect).parameters}
+    return {q.name: q.display_unit for effect in load_model(model).effects for q in selection.resolve(effect).parameters}
 
 
 def _customary(value: float, unit: str) -> str:
@@ -168,17 +168,28 @@ def _customary(value: float, unit: str) -> str:
     return f"{from_si(value, unit or '1'):.2g} {unit}"
 
 
-def _report(console: Console, out: Path, model: str, plan: str) -> Calibration:
-    """Print the table with the truth and write the page."""
+def _report(console: Console, out: Path, site: str, imu: str, model: str, plan: str) -> Calibration:
+    """Diagnose the bag, print the table with the truth, write diagnosis and page."""
+    from sdimu_calibration.core.diagnosis.diagnose import diagnose
     from sdimu_calibration.report.page import write_report
     from sdimu_calibration.report.table import rich_table, rows
-    from sdimu_calibration.storage.reference_file import read_truth
+    from sdimu_calibration.storage.bag_reader import read_recording
+    from sdimu_calibration.storage.config import load_imu, load_model, load_site
+    from sdimu_calibration.storage.diagnosis_file import account, write_diagnosis
+    from sdimu_calibration.storage.reference_file import read_reference, read_truth
     from sdimu_calibration.storage.result_file import read_result
 
     result = read_result(out / "result.json")
     truth = read_truth(out / "truth.yaml", result.body_frame)
-    write_report(out / "report.html", result, title=f"Simulated test: plan {plan}, model {model}", truth=truth)
-    console.print(rich_table(rows(result, truth), f"body frame: {result.body_frame}"))
+    with console.status("diagnosing") if console.is_terminal else nullcontext():
+        diagnosis = diagnose(read_recording(out / "bag"), load_site(site), load_imu(imu), load_model(model))
+    write_diagnosis(out / "diagnosis.json", account(diagnosis))
+    title = f"Simulated test: plan {plan}, model {model}"
+    write_report(
+        out / "report.html", result, title=title, truth=truth, reference=read_reference(), diagnosis=diagnosis
+    )
+    console.print(rich_table(rows(result, truth, read_reference()), f"body frame: {result.body_frame}"))
+    console.print(diagnosis.sentence, soft_wrap=True, highlight=False)
     return result
 
 

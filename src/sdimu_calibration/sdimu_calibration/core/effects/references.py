@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from sdimu_calibration.core import earth
 from sdimu_calibration.core.effects.effect import ACCEL, GYRO, Effect, Parameter, Term
 from sdimu_calibration.core.effects.registry import register
 from sdimu_calibration.core.motion import Floats, Motion
@@ -18,6 +17,12 @@ from sdimu_calibration.core.units import STANDARD_GRAVITY
 def _along(motion: Motion, direction: int) -> Floats:
     """Direction N, E or D seen in b, shape (n, 3)."""
     return np.asarray(motion.C_nb[:, direction, :])
+
+
+def _latitude(motion: Motion) -> Floats:
+    """Change of Earth rate with latitude, ``-C_bn (-W sin, 0, -W cos)``: Earth rate turned about East."""
+    w_ie_n = np.einsum("kij,kj->ki", motion.C_nb, motion.w - motion.w_table)
+    return np.asarray(_along(motion, 2) * w_ie_n[:, :1] - _along(motion, 0) * w_ie_n[:, 2:])
 
 
 GRAVITY = register(
@@ -58,7 +63,7 @@ LATITUDE = register(
         equation="dw = -C_bn dw_ie/dlat dlat",
         parameters=(Parameter("reference_latitude", "rad", "arcsec"),),
         terms=tuple(Term(channel, 0) for channel in GYRO),
-        regressors=lambda m: earth.RATE * (_along(m, 0) + _along(m, 2)) / np.sqrt(2.0),
+        regressors=_latitude,
         prior=dict.fromkeys(("navigation", "tactical", "mems"), 1e-4),
         typical="a gross error of the site file only",
         description="A wrong Earth rate in the meridian plane. Visible from some minutes of arc on.",
