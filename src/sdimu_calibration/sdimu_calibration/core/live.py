@@ -70,8 +70,8 @@ class EpochEstimate:
     nis : dict
         Mean squared normalised innovation per degree of freedom so far, by channel of `NIS_CHANNELS`.
     verdict : str
-        ``consistent``, or which channels contradict their sigma at the present stop. A first pass is linearised about what
-        it did not know yet, so the first stops may complain about a wrong initial azimuth.
+        ``consistent``, or which channels contradict their sigma at the present stop. A first pass is linearised about
+        what it did not know yet, so the first stops may complain about a wrong initial azimuth.
     counts : dict
         samples, late, lost, rejected, contradicted.
     """

@@ -159,7 +159,8 @@ def _display_units(model: str) -> dict[str, str]:
     from sdimu_calibration.core.effects import selection
     from sdimu_calibration.storage.config import load_model
 
-    return {q.name: q.display_unit for effect in load_model(model).effects for q in selection.resolve(effect).parameters}
+    effects = [selection.resolve(name) for name in load_model(model).effects]
+    return {q.name: q.display_unit for effect in effects for q in effect.parameters}
 
 
 def _customary(value: float, unit: str) -> str:
