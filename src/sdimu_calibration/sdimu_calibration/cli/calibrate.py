@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
-
-if TYPE_CHECKING:
-    from sdimu_calibration.core.specification import Model
 
 
 def calibrate(
@@ -17,7 +14,11 @@ def calibrate(
     site: Annotated[str, typer.Option(help="Where the test was: name in config/site or path.")] = "daejeon",
     imu: Annotated[str, typer.Option(help="Specification of the IMU: name in config/imu or path.")] = "dtg",
     add: Annotated[
-        list[str] | None, typer.Option(metavar="EFFECT", help="Effect to estimate besides; may be repeated.")
+        list[str] | None,
+        typer.Option(
+            metavar="EFFECT",
+            help="Effect to estimate besides: a name, one of its coefficients, or a YAML file; may be repeated.",
+        ),
     ] = None,
     out: Annotated[Path | None, typer.Option(help="Folder of the results; BAG_calibration by default.")] = None,
     truth: Annotated[Path | None, typer.Option(help="Truth of a simulation, to show the errors.")] = None,
@@ -31,11 +32,12 @@ def calibrate(
     from sdimu_calibration.report.table import rich_table, rows
     from sdimu_calibration.storage.bag_reader import read_recording
     from sdimu_calibration.storage.config import load_imu, load_site
+    from sdimu_calibration.storage.effect_file import extended_model
     from sdimu_calibration.storage.reference_file import read_truth
     from sdimu_calibration.storage.result_file import write_result
 
     console = Console()
-    wanted = _model(model, add or [])
+    wanted = extended_model(model, add or [])
     where, specification = load_site(site), load_imu(imu)
     true = None if truth is None else read_truth(truth, wanted.body_frame)
     recording = read_recording(bag)
@@ -50,18 +52,7 @@ def calibrate(
     console.print(f"results in {folder}", soft_wrap=True)
 
 
-def default_folder(bag: Path) -> Path:
+def default_folder(bag: Path, what: str = "calibration") -> Path:
     """Folder of the results of a bag: beside it, its stem with ``_calibration``."""
     bag = bag.resolve()
-    return bag.with_name(f"{bag.stem if bag.is_file() else bag.name}_calibration")
-
-
-def _model(name: str, added: list[str]) -> Model:
-    from dataclasses import replace
-
-    from sdimu_calibration.core.effects import registry
-    from sdimu_calibration.storage.config import load_model
-
-    model = load_model(name)
-    effects = dict.fromkeys([*model.effects, *(registry.get(effect).name for effect in added)])
-    return replace(model, effects=tuple(effects))
+    return bag.with_name(f"{bag.stem if bag.is_file() else bag.name}_{what}")

@@ -23,6 +23,8 @@ ENTRY_POINTS = "sdimu_calibration.verbs"
 
 _VERBS = {
     "calibrate": "sdimu_calibration.cli.calibrate:calibrate",
+    "diagnose": "sdimu_calibration.cli.diagnose:diagnose",
+    "compare": "sdimu_calibration.cli.compare:compare",
     "effects": "sdimu_calibration.cli.effects:effects",
     "predict": "sdimu_calibration.cli.predict:predict",
     "replay": "sdimu_calibration.cli.replay:replay",

@@ -1,7 +1,7 @@
 """What to do next, in words with minutes: about what was found, and about what this plan cannot show.
 
-The rules are those of observability on a rate table: an even function of the rate needs both senses of turn, its shape two rates,
-a product of forces stops between the axes, a change with time the same attitude twice.
+The rules are those of observability on a rate table: an even function of the rate needs both senses of turn, its shape
+two rates, a product of forces stops between the axes, a change with time the same attitude twice.
 """
 
 from __future__ import annotations
@@ -12,21 +12,22 @@ from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.diagnosis.found import Found, Reach
 from sdimu_calibration.core.diagnosis.plan_seen import PlanSeen
 
-_EVEN = frozenset({"gyro_scale_asymmetry", "gyro_scale_quadratic", "gyro_misalignment_asymmetry", "gyro_bias_in_motion"})
+_EVEN = frozenset(
+    {"gyro_scale_asymmetry", "gyro_scale_quadratic", "gyro_misalignment_asymmetry", "gyro_bias_in_motion"}
+)
 """Even in the rate: one sense of turn leaves them to scale factor and misalignment."""
 _SHAPE = frozenset({"gyro_scale_asymmetry", "gyro_scale_quadratic", "gyro_scale_cubic"})
 """Functions of the rate that one rate cannot tell apart."""
-_OBLIQUE = frozenset({"gyro_g_product", "accel_cross_product", "accel_cross_coupling", "accel_cubic", "accel_odd_quadratic"})
-"""Products and powers of forces: seen between the cardinal attitudes."""
-_SLOW = frozenset(
-    f"{s}_{k}"
-    for s in ("gyro", "accel")
-    for k in ("bias_temperature", "bias_warm_up", "bias_ramp", "bias_random_walk", "bias_temperature_rate", "bias_step")
+_OBLIQUE = frozenset(
+    {"gyro_g_product", "accel_cross_product", "accel_cross_coupling", "accel_cubic", "accel_odd_quadratic"}
 )
+"""Products and powers of forces: seen between the cardinal attitudes."""
+_SLOW_BIAS = ("temperature", "warm_up", "ramp", "random_walk", "temperature_rate", "step")
+_SLOW = frozenset(f"{triad}_bias_{kind}" for triad in ("gyro", "accel") for kind in _SLOW_BIAS)
 """Functions of time."""
 _TWO_AXES = frozenset({"gyro_anisoinertia"})
 _EXACT = {
-    "reference_gravity": "a wrong gravity is a common scale factor of the accelerometers whatever the plan; survey gravity",
+    "reference_gravity": "a wrong gravity is a common scale factor of the accelerometers whatever the plan: survey it",
     "reference_deflection_east": "a deflection to the East is an azimuth whatever the plan",
 }
 _SLOW_MINUTES = 20.0
@@ -63,7 +64,7 @@ def reason(one: Reach, plan: PlanSeen) -> str:
     if one.family in _OBLIQUE and not plan.oblique:
         return "no stop lies between the body axes: split turns of 90 deg into halves of 45 deg"
     if one.partners:
-        return f"the model takes it ({', '.join(one.partners)})"
+        return "coefficients of the model take it"
     return "the motion of this test does not excite it"
 
 
@@ -90,11 +91,13 @@ def _about_found(d: Diagnosis, found: tuple[Found, ...], plan: PlanSeen) -> list
         worst = d.consistency.where[0] if d.consistency.where else None
         place = f", worst at stop {worst.stop} in {worst.channel}" if worst else ""
         out.append(f"Do not use coefficients of this test beyond their scatter: something unknown acts{place}.")
-        out.append("Run the plan again in another order: what comes back at the same attitude belongs to the sensor, what comes "
-                   "back at the same time to warm-up, what does not come back to this run.")  # fmt: skip
+        out.append(
+            "Run the plan again in another order: what comes back at the same attitude belongs to the sensor, what "
+            "comes back at the same time to warm-up, what does not come back to this run."
+        )
         if found:
-            out.append(f"Try an equation of your own (--try FILE); the best single variables here: "
-                       f"{', '.join(f.candidate.label for f in found)}.")  # fmt: skip
+            names = ", ".join(f.candidate.label for f in found)
+            out.append(f"Try an equation of your own (--try FILE); nearest in this test: {names}.")
         return out
     for one in found:
         family = one.candidate.family
@@ -114,12 +117,14 @@ def separate(one: Found, plan: PlanSeen) -> str:
     family = one.candidate.family
     head = f"To tell {label} from {others}: "
     if family in _SHAPE and plan.one_rate():
-        return head + f"add a turn of 180 deg and back about that axis, level, at 10 deg/s ({2 * (dwell + 0.3):.0f} min)."
+        minutes = 2 * (dwell + 0.3)
+        return head + f"add a turn of 180 deg and back about that axis, level, at 10 deg/s ({minutes:.0f} min)."
     if family in _EVEN and plan.one_sided():
         return head + f"add a turn of 180 deg about that axis in the other sense ({dwell + 1.5:.0f} min)."
     if family in _SLOW:
         return head + (
-            f"stay at the last stop for {_SLOW_MINUTES:.0f} min more, then repeat the first stop ({dwell + 1.0:.0f} min)."
+            f"stay at the last stop for {_SLOW_MINUTES:.0f} min more, then repeat the first stop "
+            f"({dwell + 1.0:.0f} min)."
         )
     if family in _OBLIQUE or family.startswith(("accel_quadratic", "accel_scale_asymmetry", "accel_bias_asymmetry")):
         return head + (
@@ -133,11 +138,15 @@ def _about_plan(reached: tuple[Reach, ...], plan: PlanSeen) -> list[str]:
     out = []
     hidden = {one.family for one in reached if not one.testable}
     if hidden & _EVEN and plan.one_sided():
-        out.append(f"{_senses(plan)}, so scale-factor asymmetry of the gyros cannot be seen: drive the second turn of "
-                   "each 180 deg pair negative (0 min more; the plan 'kim18_signed').")  # fmt: skip
+        out.append(
+            f"{_capital(_senses(plan))}, so scale-factor asymmetry of the gyros cannot be seen: drive the second turn "
+            "of each 180 deg pair negative (0 min more; the plan 'kim18_signed')."
+        )
     if "gyro_scale_cubic" in hidden and plan.one_rate():
-        out.append(f"{_rates(plan)}, so the shape of the scale factor cannot be seen: alternate 2 and 10 deg/s (shorter; "
-                   "the plan 'recommended').")  # fmt: skip
+        out.append(
+            f"{_capital(_rates(plan))}, so the shape of the scale factor cannot be seen: alternate 2 and 10 deg/s "
+            "(shorter; the plan 'recommended')."
+        )
     return out
 
 
@@ -152,3 +161,7 @@ def _senses(plan: PlanSeen) -> str:
 def _rates(plan: PlanSeen) -> str:
     axes = plan.one_rate()
     return "all turns have one rate" if len(axes) == 3 else f"all turns about {', '.join(axes)} have one rate"
+
+
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]

@@ -140,8 +140,9 @@ def reach(d: Diagnosis) -> tuple[Reach, ...]:
     full = evidence.information
     scanned = scan(full, evidence.model, evidence.weight, d.found.scale)
     J = np.diag(scanned.information.J)
+    left = np.greater(J, _ROUNDING * np.diag(full.J))
     with np.errstate(divide="ignore", invalid="ignore"):
-        smallest = np.where(J > _ROUNDING * np.diag(full.J), POWER_80 * d.found.scale / np.sqrt(np.abs(J)), np.inf)
+        smallest = np.where(left, POWER_80 * d.found.scale / np.sqrt(np.abs(J)), np.inf)
     out = []
     for k, candidate in enumerate(evidence.candidates, start=p):
         testable = bool(np.isfinite(scanned.sigma[k]))

@@ -1,4 +1,4 @@
-"""The plan as the motion shows it: turns with axis, sense and rate; stops and how they lean. Table angles are not read."""
+"""The plan as the motion shows it, table angles unread: turns with axis, sense and rate; stops and how they lean."""
 
 from __future__ import annotations
 

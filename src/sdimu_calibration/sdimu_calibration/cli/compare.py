@@ -1,0 +1,91 @@
+"""`sdimu compare`: the ladder of models from the folders of several runs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from sdimu_calibration.core.results import Calibration
+
+
+def compare(
+    folders: Annotated[list[Path], typer.Argument(metavar="DIR DIR ...", help="Folders with result.json.")],
+) -> None:
+    """Show how far the error fell with each model; folders of one recording, simplest model first."""
+    from rich.box import SIMPLE_HEAD
+    from rich.console import Console
+    from rich.table import Table
+
+    from sdimu_calibration.core.recording import DataError
+    from sdimu_calibration.storage.result_file import read_result
+
+    if len(folders) < 2:
+        raise DataError("compare: give at least two folders with a result.json each")
+    results = [read_result(folder) for folder in folders]
+    _same_data(folders, results)
+    table = Table(pad_edge=False, box=SIMPLE_HEAD)
+    for heading in ("folder", "model", "log-likelihood", "difference", "nis", "held-out"):
+        table.add_column(heading, no_wrap=True, overflow="ignore")
+    table.add_column("moved by more than 2 sigma")
+    for k, result in enumerate(results):
+        table.add_row(*_row(folders[k], result, results[k - 1] if k else None))
+    console = Console()
+    console.print(table, soft_wrap=True)
+    for folder in folders:
+        verdict = _verdict(folder)
+        if verdict:
+            console.print(f"{folder.name}: {verdict}", soft_wrap=True, markup=False, highlight=False)
+
+
+def _same_data(folders: list[Path], results: list[Calibration]) -> None:
+    """Refuse what cannot be compared: another recording, another body frame."""
+    from sdimu_calibration.core.recording import DataError
+
+    first = results[0]
+    for folder, result in zip(folders[1:], results[1:], strict=True):
+        if result.body_frame != first.body_frame:
+            raise DataError(
+                f"{folder}: body frame is {result.body_frame}, of {folders[0]} it is {first.body_frame} "
+                "(calibrate both with models of one body_frame)"
+            )
+        if any(result.data.get(key) != first.data.get(key) for key in ("samples", "duration_s")):
+            raise DataError(f"{folder}: is of another recording than {folders[0]} (compare models on one recording)")
+
+
+def _row(folder: Path, result: Calibration, before: Calibration | None) -> list[str]:
+    from sdimu_calibration.core.diagnosis.grow import moved_coefficients
+
+    if before is None:
+        model, difference, moved = f"{len(result.model)} effects", "", ""
+    else:
+        model = _change(before.model, result.model)
+        difference = f"{_value(result, 'log_likelihood') - _value(before, 'log_likelihood'):+.1f}"
+        moved = ", ".join(f"{name} {size:+.1f}" for name, size in moved_coefficients(before, result)[:6])
+    return [
+        folder.name, model.replace("[", r"\["), f"{_value(result, 'log_likelihood'):.1f}", difference,
+        f"{_value(result, 'nis_mean'):.3f}", f"{_value(result, 'held_out_rms'):.3f}", moved.replace("[", r"\["),
+    ]  # fmt: skip
+
+
+def _change(before: tuple[str, ...], after: tuple[str, ...]) -> str:
+    added = [f"+ {name}" for name in after if name not in before]
+    gone = [f"- {name}" for name in before if name not in after]
+    return ", ".join([*added, *gone]) or "same"
+
+
+def _value(result: Calibration, key: str) -> float:
+    value = result.fit.get(key)
+    return float("nan") if value is None else float(value)
+
+
+def _verdict(folder: Path) -> str:
+    """Sentence of the diagnosis in a folder; empty when there is none."""
+    from sdimu_calibration.storage.diagnosis_file import read_diagnosis
+
+    if not (folder / "diagnosis.json").is_file():
+        return ""
+    content: dict[str, Any] = read_diagnosis(folder)
+    return str(content.get("sentence", ""))

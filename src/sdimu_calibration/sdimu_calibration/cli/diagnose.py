@@ -1,0 +1,80 @@
+"""`sdimu diagnose`: is the model adequate, where does it fail, which effect is missing."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
+    from sdimu_calibration.core.diagnosis.grow import Rung
+
+
+def diagnose(
+    bag: Annotated[Path, typer.Argument(metavar="BAG", help="rosbag2 folder or .mcap file.")],
+    model: Annotated[str, typer.Option(help="Model to examine: name in config/model or path.")] = "baseline",
+    site: Annotated[str, typer.Option(help="Where the test was: name in config/site or path.")] = "daejeon",
+    imu: Annotated[str, typer.Option(help="Specification of the IMU: name in config/imu or path.")] = "dtg",
+    add: Annotated[
+        list[str] | None, typer.Option(metavar="EFFECT", help="Effect in the model besides: name or YAML file.")
+    ] = None,
+    attempt: Annotated[
+        list[str] | None,
+        typer.Option("--try", metavar="FILE", help="Effect of your own (YAML) to try with the catalogue."),
+    ] = None,
+    grow: Annotated[bool, typer.Option("--grow", help="Add effects one at a time by real refits.")] = False,
+    bootstrap: Annotated[
+        int, typer.Option(min=0, metavar="N", help="Repeat the search on N draws of pure noise: how often it errs.")
+    ] = 0,
+    out: Annotated[Path | None, typer.Option(help="Folder of the results; BAG_diagnosis by default.")] = None,
+) -> None:
+    """Find what the model is missing; leaves diagnosis.json and report.html, and result.json of the model found."""
+    from rich.console import Console
+
+    from sdimu_calibration.cli.calibrate import default_folder
+    from sdimu_calibration.cli.diagnosis_text import print_account, print_ladder
+    from sdimu_calibration.cli.progress import bar
+    from sdimu_calibration.core.diagnosis.bootstrap import bootstrap as draw
+    from sdimu_calibration.core.diagnosis.diagnose import diagnose as examine
+    from sdimu_calibration.core.diagnosis.grow import grow as climb
+    from sdimu_calibration.storage.bag_reader import read_recording
+    from sdimu_calibration.storage.config import load_imu, load_site
+    from sdimu_calibration.storage.diagnosis_file import account, write_diagnosis
+    from sdimu_calibration.storage.effect_file import extended_model, find_effects
+    from sdimu_calibration.storage.result_file import write_result
+
+    console = Console()
+    wanted = extended_model(model, add or [])
+    where, specification = load_site(site), load_imu(imu)
+    extra = [effect for text in attempt or [] for effect in find_effects(text)]
+    recording = read_recording(bag)
+    with bar(console) as progress:
+        found = examine(recording, where, specification, wanted, extra, progress=progress)
+    told = account(found)
+    print_account(console, told)
+    rungs: tuple[Rung, ...] = ()
+    if grow:
+        with bar(console) as progress:
+            growth = climb(recording, where, specification, wanted, extra, progress=progress, first=found)
+        rungs = growth.rungs
+        print_ladder(console, rungs)
+    null = None
+    if bootstrap:
+        with bar(console) as progress:
+            null = draw(found, bootstrap, progress=progress)
+        console.print(f"bootstrap: {null.sentence}", soft_wrap=True, markup=False, highlight=False)
+    folder = out or default_folder(bag, "diagnosis")
+    write_diagnosis(folder / "diagnosis.json", told, rungs, null)
+    write_result(folder / "result.json", found.after if told.candidates else found.before)
+    _report(folder, found, f"Diagnosis of {bag.name}")
+    for note in recording.notes:
+        console.print(f"note: {note}", soft_wrap=True, markup=False, highlight=False)
+    console.print(f"results in {folder}", soft_wrap=True)
+
+
+def _report(folder: Path, found: Diagnosis, title: str) -> None:
+    from sdimu_calibration.report.page import write_report
+
+    write_report(folder / "report.html", found.after, title=title, diagnosis=found)

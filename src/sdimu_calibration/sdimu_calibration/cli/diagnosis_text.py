@@ -1,0 +1,145 @@
+"""A diagnosis in the terminal: the verdict first, then where, what, how far the error fell, what was out of sight."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from sdimu_calibration.core.units import UnitError, from_si
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from sdimu_calibration.core.diagnosis.found import Reach
+    from sdimu_calibration.core.diagnosis.grow import Rung
+    from sdimu_calibration.storage.diagnosis_file import Account
+
+_TOP = 5
+
+
+def print_account(console: Console, told: Account) -> None:
+    """Print everything that a diagnosis has to say."""
+    d = told.diagnosis
+    _line(console, d.sentence)
+    for finding in d.findings:
+        _line(console, f"data: {finding.text}")
+    for text in d.noise:
+        _line(console, f"noise: {text}")
+    _line(console, f"p of the model as given: {d.p_value:.2g}")
+    _where(console, told)
+    _candidates(console, told)
+    _steps(console, told)
+    _out_of_sight(console, told)
+    for text in told.advice:
+        _line(console, f"advice: {text}")
+
+
+def amount(value: float, unit: str, digits: int = 3) -> str:
+    """Write an SI number in `unit`; the unit itself stays out."""
+    try:
+        return f"{from_si(value, unit):.{digits}g}"
+    except UnitError:
+        return f"{value:.{digits}g}"
+
+
+def _line(console: Console, text: str) -> None:
+    console.print(text, soft_wrap=True, markup=False, highlight=False)
+
+
+def _where(console: Console, told: Account) -> None:
+    top = told.diagnosis.consistency.where[:_TOP]
+    if told.diagnosis.adequate or not top:
+        return
+    places = ", ".join(f"{w.channel} at stop {w.stop} ({w.normalised_mean:+.1f} sigma)" for w in top)
+    _line(console, f"worst: {places}")
+
+
+def _candidates(console: Console, told: Account) -> None:
+    from rich.box import SIMPLE_HEAD
+    from rich.table import Table
+
+    shown = told.candidates or told.found
+    if not shown:
+        return
+    title = "found" if told.candidates else "tried, but not enough to explain the misfit"
+    table = Table(title=title, title_justify="left", pad_edge=False, box=SIMPLE_HEAD)
+    for heading in ("effect", "estimate", "+-", "unit", "z", "explains", "held-out error"):
+        # A narrow terminal wraps the line; it must not cut names or digits.
+        table.add_column(heading, no_wrap=True, overflow="ignore", justify="left" if heading == "effect" else "right")
+    table.add_column("looks the same here")
+    for f in shown:
+        unit = f.candidate.parameter.display_unit
+        table.add_row(
+            _plain(f.candidate.label), amount(f.value, unit, 4), amount(f.sigma, unit, 2), _plain(unit), f"{f.z:+.1f}",
+            f"{100 * f.explained:.0f} %", f"{f.held_out_before:.3f} -> {f.held_out_after:.3f}",
+            _plain(", ".join(f.alike[:4])),
+        )  # fmt: skip
+    console.print(table, soft_wrap=True)
+
+
+def _steps(console: Console, told: Account) -> None:
+    steps = told.diagnosis.found.steps
+    if not steps:
+        return
+    for number, s in enumerate(steps, start=1):
+        end = f"held-out error {s.held_out_before.rms:.3f} -> {s.held_out_after.rms:.3f}"
+        what = "added" if s.accepted else f"refused: {s.reason}"
+        _line(
+            console,
+            f"step {number}: {s.label} (z {s.z:+.1f}, threshold {s.threshold:.1f}, "
+            f"log Bayes factor {s.log_bayes_factor:.0f}; {end}) {what}",
+        )
+        if s.accepted and s.moved:
+            moved = ", ".join(f"{name} {size:+.1f} sigma" for name, size in s.moved if abs(size) > 1.0)
+            if moved:
+                _line(console, f"  without it these were wrong: {moved}")
+
+
+def _out_of_sight(console: Console, told: Account) -> None:
+    hidden = [r for r in told.reached if not r.testable]
+    if hidden:
+        _line(console, f"{len(hidden)} of {len(told.reached)} candidates could not have been seen with this plan:")
+    for group in told.blind:
+        names = ", ".join(group.labels[:3]) + (" ..." if len(group.labels) > 3 else "")
+        _line(console, f"  {group.reason}: {len(group.labels)} ({names})")
+    if told.diagnosis.adequate:
+        sizes = "; ".join(_size(r) for r in _typical(told.reached))
+        _line(console, f"smallest sizes that would have been found (80 %): {sizes}")
+
+
+def _typical(reached: tuple[Reach, ...]) -> list[Reach]:
+    """One candidate of each of the first families: enough to see the scale of things."""
+    chosen: dict[str, Reach] = {}
+    for r in reached:
+        if r.testable:
+            chosen.setdefault(r.family, r)
+    return list(chosen.values())[:6]
+
+
+def _size(r: Reach) -> str:
+    return f"{r.label} {amount(r.smallest, r.display_unit, 2)} {r.display_unit}"
+
+
+def print_ladder(console: Console, rungs: tuple[Rung, ...]) -> None:
+    """Print the ladder of real refits."""
+    from rich.box import SIMPLE_HEAD
+    from rich.table import Table
+
+    table = Table(title="ladder of refits", title_justify="left", pad_edge=False, box=SIMPLE_HEAD)
+    for heading in ("model", "log-likelihood", "log Bayes factor", "nis", "held-out", "jump after turns"):
+        table.add_column(heading, no_wrap=True, overflow="ignore", justify="left" if heading == "model" else "right")
+    table.add_column("moved by more than 2 sigma")
+    for r in rungs:
+        name = f"+ {r.added}" if r.added else "as given"
+        moved = ", ".join(f"{n} {s:+.1f}" for n, s in r.moved[:4])
+        if not r.accepted:
+            name, moved = f"{name} (refused)", r.reason
+        table.add_row(
+            _plain(name), f"{r.log_likelihood:.1f}", f"{r.log_bayes_factor:+.1f}" if r.added else "",
+            f"{r.nis_mean:.3f}", f"{r.held_out_rms:.3f}", f"{r.jump:.2f} sigma, {1e3 * r.jump_velocity:.2f} mm/s",
+            _plain(moved),
+        )  # fmt: skip
+    console.print(table, soft_wrap=True)
+
+
+def _plain(text: str) -> str:
+    return text.replace("[", r"\[")

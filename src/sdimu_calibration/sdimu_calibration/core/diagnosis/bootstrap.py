@@ -1,0 +1,87 @@
+"""How often does the whole search err? Repeat it on draws of pure noise.
+
+Under a right model the whitened innovations are standard normal, whatever the test: a draw of them in place of the
+recorded ones goes through scan, search with held-out score and free-input remainder as the recording did.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
+from sdimu_calibration.core.diagnosis.found import looked_at
+from sdimu_calibration.core.diagnosis.information import Information
+from sdimu_calibration.core.diagnosis.remainder import remainder
+from sdimu_calibration.core.diagnosis.search import FALSE_ALARM, search
+from sdimu_calibration.core.passes import Progress
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Null:
+    """What pure noise does.
+
+    Attributes
+    ----------
+    draws : int
+    false_finds : int
+        Draws in which the search accepted something.
+    largest : ndarray, shape (draws,)
+        Largest score of each draw.
+    threshold : float
+        That the search used.
+    rms_z : float
+        Of all scores: one when they are calibrated.
+    remainder_p : ndarray, shape (draws,)
+    """
+
+    draws: int
+    false_finds: int
+    largest: Floats
+    threshold: float
+    rms_z: float
+    remainder_p: Floats
+
+    @property
+    def sentence(self) -> str:
+        """The result in words."""
+        high = float(np.quantile(self.largest, 0.95))
+        return (
+            f"of {self.draws} draws of pure noise {self.false_finds} gave a find; rms z {self.rms_z:.3f}; 95 % of the "
+            f"largest scores are below {high:.2f} (threshold used {self.threshold:.2f})"
+        )
+
+
+def bootstrap(d: Diagnosis, draws: int, seed: int = 1, progress: Progress | None = None) -> Null:
+    """Repeat the search of a diagnosis on noise.
+
+    Parameters
+    ----------
+    d : Diagnosis
+    draws, seed : int
+    progress : callable, optional
+    """
+    columns = looked_at(d)
+    evidence = d.evidence
+    rng = np.random.default_rng(seed)
+    finds, largest, squares, tails = 0, [], [], []
+    J = evidence.information.J
+    for k in range(draws):
+        if progress:
+            progress("bootstrap", k / draws)
+        e = rng.standard_normal(len(evidence.e))
+        part = replace(evidence, e=e, shift=np.zeros(len(evidence.weight)))
+        part.__dict__["information"] = Information(J, evidence.W.T @ e)
+        found = search(part, columns, FALSE_ALARM)
+        finds += int(len(found.chosen) > 0)
+        z = found.first.z[np.isfinite(found.first.sigma)]
+        largest.append(float(np.max(np.abs(z), initial=0.0)))
+        squares.append(float(np.mean(z**2)))
+        tails.append(remainder(part.information, evidence.model, evidence.weight, d.free, found.scale).p_value)
+    return Null(
+        draws, finds, np.array(largest), d.found.threshold, float(np.sqrt(np.mean(squares))), np.array(tails)
+    )

@@ -1,0 +1,218 @@
+"""The result of a diagnosis as diagnosis.json (format ``sdimu-diagnosis/1``): SI numbers, names as everywhere."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sdimu_calibration.core.diagnosis.advice import Blind, advice, blind
+from sdimu_calibration.core.diagnosis.bootstrap import Null
+from sdimu_calibration.core.diagnosis.consistency import Noise
+from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
+from sdimu_calibration.core.diagnosis.found import Found, Reach, found_effects, reach
+from sdimu_calibration.core.diagnosis.grow import Rung
+from sdimu_calibration.core.diagnosis.plan_seen import PlanSeen, plan_seen
+from sdimu_calibration.core.diagnosis.search import Step
+from sdimu_calibration.core.results import Calibration
+from sdimu_calibration.storage.json_file import read_json, write_json
+
+FORMAT = "sdimu-diagnosis/1"
+
+
+@dataclass(frozen=True)
+class Account:
+    """What people and files read of a diagnosis.
+
+    Attributes
+    ----------
+    diagnosis : Diagnosis
+    found : tuple of Found
+        Chosen effects; when the verdict is ``unexplained`` they are what was tried, not what was found.
+    reached : tuple of Reach
+        Smallest detectable size of every candidate.
+    plan : PlanSeen
+    blind : tuple of Blind
+        What could not have been seen, by reason.
+    advice : tuple of str
+    """
+
+    diagnosis: Diagnosis
+    found: tuple[Found, ...]
+    reached: tuple[Reach, ...]
+    plan: PlanSeen
+    blind: tuple[Blind, ...]
+    advice: tuple[str, ...]
+
+    @property
+    def candidates(self) -> tuple[Found, ...]:
+        """What counts as found, best first."""
+        if self.diagnosis.verdict == "unexplained":
+            return ()
+        return tuple(sorted(self.found, key=lambda f: -f.log_likelihood_gain))
+
+
+def account(d: Diagnosis) -> Account:
+    """Work out what a diagnosis has to say."""
+    found, reached, plan = found_effects(d), reach(d), plan_seen(d.evidence)
+    return Account(d, found, reached, plan, blind(reached, plan), advice(d, found, reached, plan))
+
+
+def write_diagnosis(path: Path, told: Account, ladder: tuple[Rung, ...] = (), null: Null | None = None) -> None:
+    """Write diagnosis.json.
+
+    Parameters
+    ----------
+    path : Path
+        File to make or replace; its folder is made too.
+    told : Account
+    ladder : tuple of Rung
+        Of real refits, when the model was grown step by step.
+    null : Null, optional
+        Of a bootstrap.
+    """
+    write_json(path, content(told, ladder) | ({"bootstrap": _null(null)} if null else {}))
+
+
+def read_diagnosis(path: Path) -> dict[str, Any]:
+    """Read diagnosis.json, or the diagnosis.json in a folder.
+
+    Raises
+    ------
+    DataError
+        When it is not there or not of this format.
+    """
+    path = Path(path)
+    return read_json(path / "diagnosis.json" if path.is_dir() else path, FORMAT)
+
+
+def content(told: Account, ladder: tuple[Rung, ...] = ()) -> dict[str, Any]:
+    """Give the diagnosis as plain data."""
+    d = told.diagnosis
+    is_unexplained = d.verdict == "unexplained"
+    return {
+        "format": FORMAT,
+        "adequate": d.adequate,
+        "p_value": d.p_value,
+        "verdict": d.verdict,
+        "sentence": d.sentence,
+        "where": [
+            {"channel": w.channel, "stop": w.stop, "normalised_mean": w.normalised_mean} for w in d.consistency.where
+        ],
+        "candidates": [_candidate(f, d.own) for f in told.candidates],
+        "partial": [_candidate(f, d.own) for f in told.found] if is_unexplained else [],
+        "unexplained": {
+            "is": is_unexplained,
+            "fraction": _unexplained_fraction(d),
+            "best_variables": [f.candidate.label for f in told.found] if is_unexplained or d.own else [],
+        },
+        "advice": list(told.advice),
+        "findings": [{"text": f.text, "grave": f.grave} for f in d.findings],
+        "noise": {
+            "wrong": list(d.noise),
+            "gyro": _noise(d.consistency.gyro),
+            "accel": _noise(d.consistency.accel),
+        },
+        "consistency": {
+            "nis_mean": d.consistency.nis_mean,
+            "nis_p_value": d.consistency.nis_p_value,
+            "first_nis": d.consistency.first_nis,
+            "ljung_box_p": d.consistency.ljung_box_p,
+            "threshold": d.found.threshold,
+        },
+        "free_inputs": {
+            "before": {"chi2": d.remainder_before.chi2, "dof": d.remainder_before.dof, "p": d.remainder_before.p_value},
+            "after": {"chi2": d.remainder_after.chi2, "dof": d.remainder_after.dof, "p": d.remainder_after.p_value},
+        },
+        "fit": {"before": _fit(d.before), "after": _fit(d.after)},
+        "ladder": [_step(s) for s in d.found.steps],
+        "grown": [_rung(r) for r in ladder],
+        "plan": {
+            "turns": [
+                {"after_stop": t.after_stop, "axis": None if t.axis is None else "xyz"[t.axis],
+                 "angle": t.angle, "rate": t.rate}
+                for t in told.plan.turns
+            ],
+            "oblique_stops": told.plan.oblique,
+        },
+        "not_testable": [_reach(r) | {"reason": _reason(told, r)} for r in told.reached if not r.testable],
+        "smallest_detectable": [_reach(r) for r in told.reached if r.testable],
+    }  # fmt: skip
+
+
+def _candidate(f: Found, own: bool) -> dict[str, Any]:
+    parameter = f.candidate.parameter
+    return {
+        "effect": f.candidate.label if own else f.candidate.family,
+        "label": f.candidate.label,
+        "parameters": [
+            {"name": parameter.name, "value": f.value, "sigma": f.sigma, "unit": parameter.unit,
+             "display_unit": parameter.display_unit}
+        ],
+        "z": f.z,
+        "delta_log_likelihood": f.log_likelihood_gain,
+        "log_bayes_factor": f.log_bayes_factor,
+        "p_value_adjusted": f.p_value_adjusted,
+        "explained": f.explained,
+        "held_out_rms_before": f.held_out_before,
+        "held_out_rms_after": f.held_out_after,
+        "indistinguishable_from": list(f.alike),
+    }  # fmt: skip
+
+
+def _unexplained_fraction(d: Diagnosis) -> float:
+    """Share of the misfit that is left; none when there is no misfit to speak of."""
+    if d.verdict != "unexplained" and not len(d.found.chosen):
+        return 0.0
+    return float(np.clip(1.0 - d.explained, 0.0, 1.0))
+
+
+def _noise(noise: Noise) -> dict[str, Any]:
+    return {
+        "ratio": noise.ratio, "sigma": noise.sigma, "kurtosis": noise.kurtosis, "outliers": len(noise.outliers),
+    }  # fmt: skip
+
+
+def _fit(calibration: Calibration) -> dict[str, Any]:
+    return {"model": list(calibration.model), **dict(calibration.fit)}
+
+
+def _step(s: Step) -> dict[str, Any]:
+    return {
+        "label": s.label, "effect": s.family, "accepted": s.accepted, "reason": s.reason, "z": s.z,
+        "threshold": s.threshold, "estimate": s.estimate, "sigma": s.sigma, "unit": s.unit,
+        "log_likelihood_gain": s.log_likelihood_gain, "log_bayes_factor": s.log_bayes_factor,
+        "held_out_rms_before": s.held_out_before.rms, "held_out_rms_after": s.held_out_after.rms,
+        "held_out_gain": s.held_out_gain, "held_out_error": s.held_out_error,
+        "indistinguishable_from": list(s.alike),
+        "moved": [{"name": name, "sigmas": size} for name, size in s.moved],
+    }  # fmt: skip
+
+
+def _null(null: Null) -> dict[str, Any]:
+    return {
+        "draws": null.draws, "false_finds": null.false_finds, "threshold": null.threshold, "rms_z": null.rms_z,
+        "largest": null.largest, "remainder_p": null.remainder_p,
+    }  # fmt: skip
+
+
+def _rung(r: Rung) -> dict[str, Any]:
+    return {
+        "added": r.added, "accepted": r.accepted, "reason": r.reason, "log_likelihood": r.log_likelihood,
+        "log_bayes_factor": r.log_bayes_factor, "nis_mean": r.nis_mean, "held_out_rms": r.held_out_rms,
+        "jump": r.jump, "jump_velocity": r.jump_velocity,
+        "moved": [{"name": name, "sigmas": size} for name, size in r.moved],
+    }  # fmt: skip
+
+
+def _reach(r: Reach) -> dict[str, Any]:
+    return {
+        "label": r.label, "effect": r.family, "retention": r.retention, "smallest": r.smallest, "unit": r.unit,
+        "display_unit": r.display_unit, "taken_by": list(r.partners),
+    }  # fmt: skip
+
+
+def _reason(told: Account, r: Reach) -> str:
+    return next((b.reason for b in told.blind if r.label in b.labels), "")

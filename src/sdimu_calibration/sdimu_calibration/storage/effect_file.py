@@ -1,0 +1,293 @@
+"""Effects of one's own: YAML files (format ``sdimu-effect/1``) and plug-ins; and any effect by what people write.
+
+A file holds formulas by sensor, the parameters in which they are linear, and fixed quantities: doc/diagnosis.md.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from importlib.metadata import entry_points
+from pathlib import Path
+from typing import Any, Literal, cast
+
+import numpy as np
+from pydantic import Field
+
+from sdimu_calibration.core.diagnosis.candidates import without
+from sdimu_calibration.core.effects import registry, selection
+from sdimu_calibration.core.effects.effect import CHANNELS, Effect, Parameter, Term
+from sdimu_calibration.core.expression import (
+    TEMPERATURE_NAMES,
+    VARIABLES,
+    Expression,
+    dimension_of,
+    parse_expression,
+    written,
+)
+from sdimu_calibration.core.motion import Floats, Motion
+from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.specification import Model
+from sdimu_calibration.core.units import UnitError, parse_quantity, parse_unit
+from sdimu_calibration.storage.config import Schema, load_model, read_yaml
+
+FORMAT = "sdimu-effect/1"
+ENTRY_POINTS = "sdimu_calibration.effects"
+"""Group of entry points that name callables without arguments, each returning an `Effect`."""
+SUFFIXES = (".yaml", ".yml")
+_GRADES = ("navigation", "tactical", "mems")
+_SENSOR_UNIT = {"gyro": "rad/s", "accel": "m/s^2"}
+_NAME = r"^[A-Za-z][A-Za-z0-9_]*$"
+
+
+class _ParameterFile(Schema):
+    unit: str
+    display_unit: str | None = None
+    prior: str
+
+
+class _EffectFile(Schema):
+    format: Literal["sdimu-effect/1"]
+    name: str = Field(pattern=_NAME)
+    title: str | None = None
+    description: str = ""
+    expressions: dict[Literal["gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z"], str] = Field(min_length=1)
+    parameters: dict[str, _ParameterFile] = Field(min_length=1)
+    constants: dict[str, str | float] = Field(default_factory=dict)
+
+
+def load_effect(path: Path) -> tuple[Effect, ...]:
+    """Read an effect of one's own.
+
+    Parameters
+    ----------
+    path : Path
+        YAML file of format ``sdimu-effect/1``.
+
+    Returns
+    -------
+    tuple of Effect
+        One a parameter, all of one family: each has a prior of its own. Parameters are named ``NAME_PARAMETER``.
+
+    Raises
+    ------
+    DataError
+        One line with file and sensor: what cannot be read, is not linear in the parameters, or has the wrong unit.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise DataError(f"{path}: no such effect file")
+    file = read_yaml(path, _EffectFile)
+    try:
+        return _effects(file)
+    except (DataError, UnitError) as error:
+        raise DataError(f"{path}: {error}") from error
+
+
+def find_effects(text: str) -> tuple[Effect, ...]:
+    """Find effects by a registered name, a coefficient, one with options, or the path of a YAML file.
+
+    Raises
+    ------
+    DataError
+        When there is none.
+    """
+    if Path(text).suffix in SUFFIXES:
+        return load_effect(Path(text))
+    register_plugins()
+    return (selection.resolve(text),)
+
+
+def extended_model(name: str, added: Sequence[str]) -> Model:
+    """Read a model and add effects to it; what it has already is not added twice.
+
+    Parameters
+    ----------
+    name : str
+        Model by name or path; its effects may be paths of YAML files too.
+    added : sequence of str
+        As for `find_effects`.
+
+    Raises
+    ------
+    DataError
+        When the model or an effect is unknown or cannot be read.
+    """
+    model = load_model(name)
+    effects: list[Effect] = []
+    for text in (*model.effects, *added):
+        for effect in find_effects(text):
+            _append(effects, effect)
+    # A model names its effects; `imu_model.build` takes an effect itself as well.
+    return replace(model, effects=cast("tuple[str, ...]", tuple(effects)))
+
+
+def _append(effects: list[Effect], effect: Effect) -> None:
+    have = {p.name for e in effects for p in e.parameters}
+    for part in without(effect, have):
+        if len(part.parameters) in (1, len(effect.parameters)):
+            effects.append(part if len(part.parameters) < len(effect.parameters) else effect)
+        else:
+            # One by one, because a name of several joined could not be read back from a result.
+            effects += [effect.only((p.name,)) for p in part.parameters]
+
+
+def register_plugins() -> tuple[str, ...]:
+    """Register the effects that other packages offer; return the names that are new.
+
+    Raises
+    ------
+    DataError
+        When one does not load or is no effect.
+    """
+    new = []
+    for point in entry_points(group=ENTRY_POINTS):
+        if point.name in _LOADED:
+            continue
+        try:
+            effect = point.load()()
+        except Exception as error:
+            raise DataError(f"effect plug-in '{point.name}' ({point.value}) does not load: {error}") from error
+        if not isinstance(effect, Effect):
+            raise DataError(f"effect plug-in '{point.name}' ({point.value}) must return an Effect")
+        try:
+            registry.register(effect)
+        except ValueError as error:
+            raise DataError(f"effect plug-in '{point.name}' ({point.value}): {error}") from error
+        _LOADED.add(point.name)
+        new.append(effect.name)
+    return tuple(new)
+
+
+_LOADED: set[str] = set()
+
+
+def _effects(file: _EffectFile) -> tuple[Effect, ...]:
+    _check_names(file)
+    constants = {name: _constant(name, text) for name, text in file.constants.items()}
+    known = frozenset({*VARIABLES, *file.parameters, *constants})
+    formulas: dict[str, Expression] = {}
+    for sensor, text in file.expressions.items():
+        formulas[sensor] = _formula(file, sensor, text, known, constants)
+    return tuple(_one(file, name, formulas, constants) for name in file.parameters)
+
+
+def _formula(
+    file: _EffectFile, sensor: str, text: str, known: frozenset[str], constants: Mapping[str, float]
+) -> Expression:
+    """Read one formula and hold it to its unit and to linearity."""
+    try:
+        formula = parse_expression(text, known)
+        _check_unit(sensor, formula, file)
+        _check_linear(formula, tuple(file.parameters), constants)
+    except DataError as error:
+        raise DataError(f"expressions.{sensor}: {error}") from error
+    return formula
+
+
+def _check_names(file: _EffectFile) -> None:
+    if file.name in registry.names():
+        raise DataError(f"name: '{file.name}' is a registered effect (choose another)")
+    for group, names in (("parameters", file.parameters), ("constants", file.constants)):
+        for name in names:
+            if name in VARIABLES or (group == "constants" and name in file.parameters):
+                raise DataError(f"{group}.{name}: that name means something else (choose another)")
+    used = " ".join(file.expressions.values())
+    for name in file.parameters:
+        if name not in used:
+            raise DataError(f"parameters.{name}: no expression has it")
+
+
+def _constant(name: str, text: str | float) -> float:
+    unit = str(text).strip().partition(" ")[2] or "1"
+    try:
+        return parse_quantity(str(text), unit)
+    except UnitError as error:
+        raise DataError(f"constants.{name}: {error}") from error
+
+
+def _check_unit(sensor: str, formula: Expression, file: _EffectFile) -> None:
+    units = {name: dimension_of(variable.unit) for name, variable in VARIABLES.items()}
+    units |= {name: dimension_of(parameter.unit) for name, parameter in file.parameters.items()}
+    units |= {name: dimension_of(str(text).strip().partition(" ")[2] or "1") for name, text in file.constants.items()}
+    expected = _SENSOR_UNIT[sensor.partition("_")[0]]
+    found = formula.dimension(units)
+    if found != dimension_of(expected):
+        # An angle counts as a number, so rad/s is 1/s here.
+        raise DataError(f"'{formula.text}' comes to {written(found)}, but a {sensor[:-2]} error is in {expected}")
+
+
+def _check_linear(formula: Expression, parameters: tuple[str, ...], constants: Mapping[str, float]) -> None:
+    """Superposition at random values: f(a + b) = f(a) + f(b), f(3 a) = 3 f(a), so f(0) = 0."""
+    rng = np.random.default_rng(7)
+    at = {name: rng.uniform(0.5, 1.5, 16) for name in VARIABLES} | dict(constants)
+    a, b = ({name: rng.uniform(0.5, 1.5) for name in parameters} for _ in range(2))
+
+    def value(k: Mapping[str, float]) -> Floats:
+        return np.asarray(formula.evaluate({**at, **k})) * np.ones(16)
+
+    both = value({name: a[name] + b[name] for name in parameters})
+    thrice = value({name: 3.0 * a[name] for name in parameters})
+    fa, fb = value(a), value(b)
+    size = 1e-9 * (np.abs(fa) + np.abs(fb))
+    if not np.isfinite(both).all():
+        raise DataError(f"'{formula.text}' is not finite at ordinary values of its variables")
+    if np.any(np.abs(both - fa - fb) > size) or np.any(np.abs(thrice - 3.0 * fa) > 3.0 * size):
+        raise DataError(f"'{formula.text}' is not linear in {', '.join(parameters)} (fix what is not as a constant)")
+
+
+def _one(
+    file: _EffectFile, name: str, formulas: Mapping[str, Expression], constants: Mapping[str, float]
+) -> Effect:
+    """Effect of one parameter: the formulas with it at one and the others at nought."""
+    about = file.parameters[name]
+    shown = about.display_unit or about.unit
+    if dict(parse_unit(shown).dimension) != dict(parse_unit(about.unit).dimension):
+        raise DataError(f"parameters.{name}: display_unit '{shown}' is not of the kind of '{about.unit}'")
+    try:
+        prior = parse_quantity(about.prior, about.unit)
+    except UnitError as error:
+        raise DataError(f"parameters.{name}.prior: {error}") from error
+    if not prior > 0.0:
+        raise DataError(f"parameters.{name}.prior: expected more than nought")
+    sensors = [s for s in CHANNELS if s in formulas and name in formulas[s].names]
+    chosen = {p: float(p == name) for p in file.parameters}
+    own = f"{file.name}_{name}"
+    return Effect(
+        name=own,
+        family=file.name,
+        title=file.title or file.name.replace("_", " "),
+        equation="; ".join(f"d{s} = {formulas[s].text}" for s in sensors),
+        description=file.description,
+        parameters=(Parameter(own, si_unit(about.unit), shown),),
+        terms=tuple(Term(CHANNELS.index(s), 0) for s in sensors),
+        regressors=_regressors([formulas[s] for s in sensors], {**constants, **chosen}),
+        prior=dict.fromkeys(_GRADES, prior),
+        needs="temperature" if any(formulas[s].names & TEMPERATURE_NAMES for s in sensors) else "",
+    )
+
+
+def _regressors(formulas: Sequence[Expression], fixed: Mapping[str, float]) -> Callable[[Motion], Floats]:
+    def columns(motion: Motion) -> Floats:
+        n = len(motion.t)
+        out = np.empty((n, len(formulas)))
+        for k, formula in enumerate(formulas):
+            values: dict[str, Any] = {v: VARIABLES[v].value(motion) for v in formula.names if v in VARIABLES}
+            out[:, k] = formula.evaluate({**values, **fixed})
+        return out
+
+    return columns
+
+
+def si_unit(unit: str) -> str:
+    """Write the SI unit of the kind of `unit`, as it stands in files."""
+    parts = parse_unit(unit).dimension
+
+    def power(name: str, n: Any) -> str:
+        if n == 1:
+            return name
+        return f"sqrt({name})" if 2 * n == 1 else f"{name}^{n}"
+
+    above = [power(name, n) for name, n in parts if n > 0]
+    below = [power(name, -n) for name, n in parts if n < 0]
+    return "/".join(["*".join(above) or "1", *below])
