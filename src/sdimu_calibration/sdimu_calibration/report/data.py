@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,7 +22,7 @@ CHANNEL_UNITS = ("mm",) * 3 + ("mm/s",) * 3 + ("deg/h",) * 3 + ("ug",) * 3
 """Customary unit of each measurement channel."""
 VARIABLES = (
     ("a x", "g"), ("a y", "g"), ("a z", "g"), ("w x", "deg/h"), ("w y", "deg/h"), ("w z", "deg/h"),
-    ("time", "min"), ("temperature change", "degC"),
+    ("time", "min"), ("dT", "degC"),
 )  # fmt: skip
 """Physical variables against which residuals are shown: specific force, body rate at rest, time, temperature."""
 
@@ -153,12 +154,29 @@ def scored(diagnosis: Diagnosis) -> list[Scored]:
     """Every candidate of catalogue and own equations that was tried, largest score first."""
     evidence = diagnosis.evidence
     p, free = len(evidence.weight), set(diagnosis.free.tolist())
-    first = scan(evidence.information, evidence.model, evidence.weight, diagnosis.found.scale)
+    first = scan(evidence.information, evidence.model, evidence.weight, _first_scale(diagnosis.found.first))
     last = first if not len(diagnosis.found.chosen) else scan(
         evidence.information, *added(diagnosis), diagnosis.found.scale
     )  # fmt: skip
     rows = [_scored(diagnosis, i, first, last) for i in range(p, len(evidence.names)) if i not in free]
     return sorted(rows, key=lambda row: -abs(row.z))
+
+
+def best_variants(entries: Sequence[Scored]) -> list[Scored]:
+    """Those with a score, one a parameter: what was found, else the best of the onsets or time constants tried."""
+    best: dict[str, Scored] = {}
+    for entry in entries:
+        name = entry.label.partition("(")[0]
+        if entry.z and (entry.chosen or name not in best):
+            best[name] = entry
+    return sorted(best.values(), key=lambda row: -abs(row.z))
+
+
+def _first_scale(first: Scan) -> float:
+    """Noise over specification that the first scan took, misfit and all."""
+    ratio = first.sigma * np.sqrt(np.maximum(np.diag(first.information.J), 0.0))
+    ratio = ratio[np.isfinite(ratio)]
+    return float(ratio[0]) if len(ratio) else 1.0
 
 
 def _scored(diagnosis: Diagnosis, index: int, first: Scan, last: Scan) -> Scored:
@@ -283,6 +301,12 @@ def envelope(x: Floats, y: Floats, most: int) -> tuple[Floats, Floats]:
     parts = np.array_split(good, most // 2)
     kept = sorted({int(f) for part in parts for f in (part[np.argmin(y[part])], part[np.argmax(y[part])])})
     return x[kept], y[kept]
+
+
+def interrupted(x: Floats, y: Floats, gap: float) -> tuple[Floats, Floats]:
+    """Put NaN where neighbours are more than `gap` apart, so that no line is drawn over what was not measured."""
+    at = np.flatnonzero(np.diff(x) > gap) + 1
+    return np.insert(x, at, np.nan), np.insert(y, at, np.nan)
 
 
 def correlation(calibration: Calibration) -> tuple[tuple[str, ...], Floats]:

@@ -23,6 +23,7 @@ _MOST_NUMBERED = 40
 """Stops up to which there is room for numbers in the cells."""
 _MOST_BARS = 24
 _BINS = 20
+_LIMIT = {"dash": "dash", "color": "#222", "width": 1.5}
 
 
 def heat_map(grid: data.Grid) -> Any:
@@ -48,7 +49,7 @@ def heat_map(grid: data.Grid) -> Any:
     )
     figure.update_xaxes(title_text="stop", type="category", showgrid=False, ticks="")
     figure.update_yaxes(autorange="reversed", ticks="", title_text="channel")
-    return lay_out(figure, 440, margin={"l": 120, "r": 20, "t": 20, "b": 55})
+    return lay_out(figure, 440, margin={"l": 120, "r": 20, "t": 40, "b": 55})
 
 
 def _cell(value: float) -> str:
@@ -61,7 +62,7 @@ def _cell(value: float) -> str:
 
 def ranking(entries: Sequence[data.Scored], threshold: float) -> Any:
     """Bars of ``|z|``: what each candidate says alone, and what is left of it; the line is what noise reaches."""
-    shown = [entry for entry in entries if entry.z][:_MOST_BARS]
+    shown = data.best_variants(entries)[:_MOST_BARS]
     names = [("\N{BLACK RIGHT-POINTING TRIANGLE} " if s.chosen else "") + s.label for s in shown]
     figure = go.Figure()
     figure.add_bar(
@@ -78,7 +79,7 @@ def ranking(entries: Sequence[data.Scored], threshold: float) -> Any:
             hovertemplate="%{y}<br>left: |z| = %{x:.1f}<extra></extra>",
         )  # fmt: skip
     figure.add_vline(
-        x=threshold, line={"dash": "dash", "color": "#222"}, annotation_text=f"noise reaches {threshold:.1f}",
+        x=threshold, line=_LIMIT, opacity=1.0, annotation_text=f"noise reaches {threshold:.1f}",
         annotation_position="bottom right",
     )  # fmt: skip
     top = max([abs(s.z) for s in shown] + [threshold])
@@ -107,7 +108,7 @@ def ladder(diagnosis: Diagnosis) -> Any:
             hovertemplate="%{x}: %{y:.3f} sigma<extra></extra>",
         )
     )
-    figure.add_hline(y=1.0, line={"dash": "dash", "color": "#222"})
+    figure.add_hline(y=1.0, line=_LIMIT, opacity=1.0)
     figure.update_yaxes(title_text="held-out RMS (sigma)", rangemode="tozero", range=[0, 1.2 * max(*values, 1.0)])
     figure.update_xaxes(type="category", range=[-0.3, len(names) - 0.5])
     return lay_out(figure, 300)

@@ -13,8 +13,12 @@ _FRAME_SHARE = 1e-6
 
 
 def effect_of(name: str, model: Sequence[str]) -> str:
-    """Find the effect of a coefficient: the longest effect name that `name` begins with, or `name` itself."""
-    fits = [effect for effect in model if name == effect or name.startswith(f"{effect}_")]
+    """Find the effect of a coefficient: the longest effect name that `name` begins with, or `name` itself.
+
+    What stands in brackets behind an effect (a time constant) is no part of its coefficients' names.
+    """
+    stems = {effect: effect.partition("(")[0] for effect in model}
+    fits = [effect for effect, stem in stems.items() if name == stem or name.startswith(f"{stem}_")]
     return max(fits, key=len) if fits else name
 
 
@@ -28,7 +32,7 @@ def groups(names: Sequence[str], model: Sequence[str]) -> dict[str, list[int]]:
 
 def short_name(name: str, effect: str) -> str:
     """Cut the effect from a name: what tells it from others of the same effect, such as ``xy``."""
-    return name.removeprefix(effect).lstrip("_") or name
+    return name.removeprefix(effect.partition("(")[0]).lstrip("_") or name.rpartition("_")[2]
 
 
 def title(effect: str) -> str:

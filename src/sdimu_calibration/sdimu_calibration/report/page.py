@@ -86,7 +86,7 @@ def page(
         f"<h1>{escape(title)}</h1>",
         f'<p class="quiet">{_summary(calibration)}</p>',
         sections.verdict(diagnosis) if diagnosis else "",
-        f"<p>{_fit(calibration)}</p>",
+        f"<p>{_fit(calibration, diagnosis is not None)}</p>",
         _notes(calibration),
     ]
     return (
@@ -145,11 +145,11 @@ def _summary(calibration: Calibration) -> str:
     return escape(" · ".join(word for word in words if word))
 
 
-def _fit(calibration: Calibration) -> str:
+def _fit(calibration: Calibration, diagnosed: bool) -> str:
     """Say what the fit figures mean; no verdict without a diagnosis."""
     nis, dof = calibration.fit.get("nis_mean"), calibration.fit.get("nis_dof")
     held_out = calibration.fit.get("held_out_rms")
-    sentences = []
+    sentences = ["With the coefficients on this page:"] if diagnosed else []
     if nis is not None and dof:
         sentences.append(f"Squared innovations are {nis:.3f} times what the noise explains ({dof:.0f} in number).")
     if held_out is not None:

@@ -18,6 +18,8 @@ Floats = NDArray[np.float64]
 
 _MOST_POINTS = 500
 _BINS = 12
+_GAP_MIN = 0.5
+"""No line is drawn over a gap of more minutes than this: there the table turns."""
 _BAR = "rgba(0, 0, 0, 0.28)"
 
 
@@ -62,15 +64,25 @@ def innovations(found: data.Residuals, two: bool) -> Any:
                 showlegend=channel == 0, marker={"color": ink, "symbol": symbol, "size": 7},
                 hovertemplate=f"%{{x:.1f}} min: %{{y:.3g}} {data.CHANNEL_UNITS[channel]}<extra>{name}</extra>", **place,
             )  # fmt: skip
+        reach = _reach(np.concatenate([found.before[:, channel], found.after[:, channel]]), found.sigma[:, channel])
+        reach *= from_si(1.0, data.CHANNEL_UNITS[channel])
+        figure.update_yaxes(range=[-reach, reach], **place)
     figure.update_xaxes(title_text="time (min)", row=4)
     figure.update_yaxes(zeroline=True, zerolinecolor="#999", zerolinewidth=1)
     return lay_out(
         figure,
         900,
         showlegend=True,
-        margin={"l": 60, "r": 20, "t": 80, "b": 55},
-        legend={"orientation": "h", "y": 1.06, "x": 0},
+        margin={"l": 60, "r": 20, "t": 95, "b": 55},
+        legend={"orientation": "h", "yanchor": "bottom", "y": 1.045, "x": 0},
     )
+
+
+def _reach(normalised: Floats, sigma: Floats) -> float:
+    """Half the height of a panel: the first seconds, in which the attitude is not known yet, may leave it."""
+    usual = float(np.nanmedian(sigma))
+    found = float(np.nanquantile(np.abs(normalised), 0.995)) * usual
+    return 1.15 * max(4.0 * usual, found)
 
 
 def _bars(figure: Any, minutes: Floats, sigma: Floats, place: dict[str, int]) -> None:
@@ -91,7 +103,7 @@ def _band(figure: Any, minutes: Floats, sigma: Floats, place: dict[str, int]) ->
 
 
 def _raw(figure: Any, minutes: Floats, y: Floats, place: dict[str, int]) -> None:
-    t, thin = data.envelope(minutes, y, _MOST_POINTS)
+    t, thin = data.interrupted(*data.envelope(minutes, y, _MOST_POINTS), _GAP_MIN)
     figure.add_scatter(
         x=t.astype(np.float32), y=thin.astype(np.float32), mode="lines", line={"color": PALE, "width": 0.7},
         hoverinfo="skip", showlegend=False, **place,
@@ -107,7 +119,7 @@ def _stop_means(found: data.Residuals, y: Floats) -> tuple[Floats, Floats]:
 
 
 def against_variables(found: data.Residuals, variables: Floats, two: bool) -> Any:
-    """Residuals at rest against each physical variable: binned means and their standard errors, sigmas of one second."""
+    """Residuals at rest against each physical variable: binned means, standard errors, sigmas of one second."""
     used = [k for k in range(variables.shape[1]) if np.ptp(variables[np.isfinite(found.before[:, 8]), k]) > 0]
     figure = make_subplots(
         rows=6, cols=len(used), shared_xaxes=True, shared_yaxes=True, vertical_spacing=0.02, horizontal_spacing=0.012,
@@ -127,7 +139,7 @@ def against_variables(found: data.Residuals, variables: Floats, two: bool) -> An
         figure.update_yaxes(title_text=f"{CHANNELS[row].replace('_', ' ')}<br>(sigma)", row=row + 1, col=1)
     for column, k in enumerate(used, 1):
         figure.update_xaxes(title_text=f"{data.VARIABLES[k][0]} ({data.VARIABLES[k][1]})", row=6, col=column)
-    figure.update_yaxes(zeroline=True, zerolinecolor="#999", zerolinewidth=1, nticks=4)
+    figure.update_yaxes(zeroline=True, zerolinecolor="#999", zerolinewidth=1, nticks=5)
     figure.update_xaxes(nticks=5, tickangle=0)
     return lay_out(figure, 860, showlegend=True, margin={"l": 80, "r": 20, "t": 40, "b": 60})
 
@@ -162,6 +174,6 @@ def free_inputs(found: data.FreeInputs, two: bool) -> Any:
     figure.update_xaxes(title_text="time (min)", row=2)
     figure.update_yaxes(zeroline=True, zerolinecolor="#999", zerolinewidth=1)
     return lay_out(
-        figure, 560, showlegend=True, bargap=0, barmode="overlay", margin={"l": 60, "r": 20, "t": 80, "b": 55},
-        legend={"orientation": "h", "y": 1.1, "x": 0},
+        figure, 560, showlegend=True, bargap=0, barmode="overlay", margin={"l": 60, "r": 20, "t": 95, "b": 55},
+        legend={"orientation": "h", "yanchor": "bottom", "y": 1.09, "x": 0},
     )  # fmt: skip

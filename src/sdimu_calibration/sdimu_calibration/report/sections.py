@@ -42,7 +42,7 @@ def verdict(diagnosis: Diagnosis) -> str:
 def _numbers(d: Diagnosis) -> str:
     left, c = d.remainder_after, d.consistency
     words = [
-        f"p = {d.p_value:.2g} that a right model looks like this",
+        f"p {_probability(d.p_value)} that a right model looks like this",
         f"free inputs: chi-square {d.remainder_before.chi2:.0f}"
         + (f" -> {left.chi2:.0f}" if len(d.found.chosen) else "")
         + f" of {left.dof} degrees of freedom",
@@ -52,8 +52,12 @@ def _numbers(d: Diagnosis) -> str:
     return " \N{MIDDLE DOT} ".join(words) + "."
 
 
+def _probability(p: float) -> str:
+    return f"= {p:.2g}" if p > 1e-300 else "< 1e-300"
+
+
 _LADDER = (
-    "step", "estimate", "unit", "|z|", "noise reaches", "log-likelihood gain", "log Bayes factor", "held-out RMS",
+    "step", "estimate", "|z| (noise reaches)", "log-likelihood gain", "log Bayes factor", "held-out RMS",
     "held-out gain", "verdict",
 )  # fmt: skip
 
@@ -63,17 +67,18 @@ def ladder(diagnosis: Diagnosis, draw: Draw) -> str:
     steps = diagnosis.found.steps
     if not steps:
         return section("Ladder of models", "<p>No candidate stands out of the noise: the model stays as given.</p>")
-    first = ["model as given", "", "", "", "", "", "", f"{steps[0].held_out_before.rms:.3f}", "", ""]
+    first = ["model as given", "", "", "", "", f"{steps[0].held_out_before.rms:.3f}", "", ""]
     told = [item for step in steps for item in _told(step)]
     figure = evidence_figures.ladder(diagnosis)
     return section(
         "Ladder of models: how far the error falls",
         draw(figure),
-        grid(_LADDER, [first, *(_rung(step) for step in steps)], {0, 2, 9}),
+        grid(_LADDER, [first, *(_rung(step) for step in steps)], {0, 7}),
         "<ul>" + "".join(f"<li>{escape(text)}</li>" for text in told) + "</ul>",
         quiet(
             "Held-out: every stop predicted from the others, in sigmas; 1 is right. In-sample likelihood rises with "
-            "every parameter, this does not. Estimates are those of the step, with all before it."
+            "every parameter, this does not. The verdict's held-out error leaves out every third stop at once and is "
+            "larger. Estimates are those of the step, with all before it."
         ),
     )
 
@@ -81,9 +86,8 @@ def ladder(diagnosis: Diagnosis, draw: Draw) -> str:
 def _rung(step: Step) -> list[str]:
     factor = from_si(1.0, step.display_unit)
     return [
-        f"+ {step.label}", f"{step.estimate * factor:.4g} \u00b1 {step.sigma * factor:.2g}", step.display_unit,
-        f"{abs(step.z):.1f}", f"{step.threshold:.1f}", f"{step.log_likelihood_gain:.1f}",
-        f"{step.log_bayes_factor:.1f}",
+        f"+ {step.label}", f"{step.estimate * factor:.4g} \u00b1 {step.sigma * factor:.2g} {step.display_unit}",
+        f"{abs(step.z):.1f} ({step.threshold:.1f})", f"{step.log_likelihood_gain:.1f}", f"{step.log_bayes_factor:.1f}",
         f"{step.held_out_before.rms:.3f} \u2192 {step.held_out_after.rms:.3f}",
         f"{step.held_out_gain:.1f} \u00b1 {step.held_out_error:.1f}",
         "accepted" if step.accepted else f"refused: {step.reason}",
@@ -156,14 +160,17 @@ def residuals(diagnosis: Diagnosis, found: data.Residuals, draw: Draw) -> str:
         section(
             "Residuals against physical variables",
             draw(residual_figures.against_variables(found, data.variables(diagnosis), two)),
-            quiet(f"At rest: binned means with their standard errors, in sigmas of one second. a: specific force, w: body rate. {marks}"),
+            quiet(
+                "At rest: binned means with their standard errors, in sigmas of one second. "
+                f"a: specific force, w: body rate, dT: temperature since the start. {marks}"
+            ),
         ),
         section(
             "The sensor error that each stop and turn would need",
             draw(residual_figures.free_inputs(data.free_inputs(diagnosis), two)),
             quiet(
                 "A constant error of its own for every dwell (plain) and turn (hatched), the smallest that fits. "
-                f"A star: its score alone is beyond three sigma. {marks}"
+                "A star: its score alone is beyond three sigma. Dots: with what was found added."
             ),
         ),
     ])  # fmt: skip

@@ -7,6 +7,7 @@ body { font: 15px/1.5 system-ui, sans-serif; color: #222; max-width: 1180px; mar
 h1 { font-size: 1.5em; margin-bottom: 0; } h2 { font-size: 1.15em; margin-top: 2em; }
 table { border-collapse: collapse; font-variant-numeric: tabular-nums; }
 th, td { padding: .15em .8em; text-align: right; border-bottom: 1px solid #e4e4e4; }
+td { white-space: nowrap; } td.text:last-child { white-space: normal; }
 th { border-bottom: 2px solid #222; } th.text, td.text { text-align: left; }
 tr.first td { border-top: 1px solid #888; }
 .quiet { color: #555; }

@@ -1,0 +1,123 @@
+"""The page of a diagnosis says what the diagnosis says, brings everything along, and is legible without colour."""
+
+from __future__ import annotations
+
+import csv
+import io
+import os
+import re
+import shutil
+import subprocess
+from html import escape
+
+import pytest
+import yaml
+
+from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
+from sdimu_calibration.report import data, evidence_figures, residual_figures
+from sdimu_calibration.report.export import as_csv, as_yaml
+from sdimu_calibration.report.page import page, write_report
+from sdimu_calibration.report.table import rows
+
+
+@pytest.fixture(scope="module")
+def text(diagnosis: Diagnosis) -> str:
+    return page(diagnosis.after, "A test", diagnosis=diagnosis)
+
+
+def all_figures(diagnosis: Diagnosis) -> dict[str, object]:
+    found = data.residuals(diagnosis)
+    return {
+        "ladder": evidence_figures.ladder(diagnosis),
+        "ranking": evidence_figures.ranking(data.scored(diagnosis), diagnosis.found.threshold),
+        "heat map": evidence_figures.heat_map(data.where(diagnosis.consistency)),
+        "explained": evidence_figures.explained(data.explained(diagnosis)),
+        "innovations": residual_figures.innovations(found, two=True),
+        "variables": residual_figures.against_variables(found, data.variables(diagnosis), two=True),
+        "free inputs": residual_figures.free_inputs(data.free_inputs(diagnosis), two=True),
+    }
+
+
+def test_the_verdict_stands_first(text, diagnosis):
+    body = text.partition("<body>")[2]
+    assert body.index(escape(diagnosis.sentence)) < body.index("<h2>")
+
+
+def test_the_page_brings_its_library_once_and_asks_no_network(text):
+    assert text.count("plotly.js v") == 1
+    assert not re.search(r"<(script|link|img)[^>]+(src|href)=", text)
+    assert len(text.encode()) < 6e6
+
+
+def test_the_ladder_tells_the_fall_of_the_held_out_error(text, diagnosis):
+    (step,) = diagnosis.found.steps
+    assert f"{step.held_out_before.rms:.3f} \u2192 {step.held_out_after.rms:.3f}" in text
+    assert step.held_out_after.rms < step.held_out_before.rms
+
+
+def test_cells_of_the_heat_map_say_their_sign_without_colour(diagnosis):
+    grid = data.where(diagnosis.consistency)
+    cells = evidence_figures.heat_map(grid).data[0].text
+    for row, values in zip(cells, grid.value, strict=True):
+        for cell, value in zip(row, values, strict=True):
+            assert cell == "" or cell[0] == ("+" if value >= 0.0 or cell == "+0.0" else "\N{MINUS SIGN}")
+
+
+def test_before_and_after_differ_in_more_than_colour(diagnosis):
+    figure = all_figures(diagnosis)["innovations"]
+    symbols = {trace.name: trace.marker.symbol for trace in figure.data if trace.legendgroup}
+    assert len(symbols) == 2
+    assert len(set(symbols.values())) == 2
+
+
+@pytest.mark.parametrize("name", ["ladder", "ranking", "explained", "variables"])
+def test_axes_of_quantities_have_units(diagnosis, name):
+    figure = all_figures(diagnosis)[name]
+    titles = [axis.title.text for axis in (*figure.select_xaxes(), *figure.select_yaxes()) if axis.title.text]
+    assert titles
+    assert all(re.search(r"\(.+\)", title) for title in titles)
+
+
+def test_the_threshold_is_drawn(diagnosis):
+    figure = all_figures(diagnosis)["ranking"]
+    (line,) = figure.layout.shapes
+    assert line.x0 == line.x1 == diagnosis.found.threshold
+    assert line.line.width > 0
+
+
+def test_a_diagnosis_of_a_right_model_makes_a_page_too(diagnosis):
+    empty = type(diagnosis.found)(
+        (), diagnosis.found.chosen[:0], diagnosis.found.first, diagnosis.found.first, diagnosis.found.threshold, 1.0
+    )
+    quiet = type(diagnosis)(**{**vars(diagnosis), "found": empty, "adequate": True, "verdict": "consistent"})
+    text = page(diagnosis.before, "x", diagnosis=quiet)
+    assert "No candidate stands out" in text
+    assert 'class="verdict good"' in text
+
+
+def test_copies_read_back_as_the_table(diagnosis):
+    table = rows(diagnosis.after)
+    copied = yaml.safe_load(as_yaml(table, "accelerometer_triad"))["coefficients"]
+    listed = {line["name"]: line for line in csv.DictReader(io.StringIO(as_csv(table)))}
+    for row in table:
+        assert copied[row.name]["value"] == pytest.approx(row.value, rel=1e-8, abs=1e-12)
+        assert copied[row.name]["unit"] == listed[row.name]["unit"] == row.unit
+        assert float(listed[row.name]["sigma"]) == pytest.approx(row.sigma, rel=1e-3)
+
+
+def test_a_browser_opens_the_page_without_complaint(diagnosis, tmp_path):
+    browser = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+    if not browser:
+        pytest.skip("no Chromium here (package chromium)")
+    write_report(tmp_path / "report.html", diagnosis.after, diagnosis=diagnosis)
+    done = subprocess.run(
+        [browser, "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
+         "--disable-background-networking", "--disable-component-update", "--disable-sync", "--enable-logging=stderr",
+         f"--user-data-dir={tmp_path / 'profile'}", "--virtual-time-budget=8000", "--dump-dom",
+         (tmp_path / "report.html").as_uri()],
+        capture_output=True, text=True, check=False, timeout=120, env={**os.environ, "HOME": str(tmp_path)},
+    )  # fmt: skip
+    complaints = [line for line in done.stderr.splitlines() if "CONSOLE" in line]
+    assert complaints == []
+    # Every figure was drawn: plotly puts its drawing into each.
+    assert done.stdout.count('class="main-svg"') >= done.stdout.count('id="figure-')
