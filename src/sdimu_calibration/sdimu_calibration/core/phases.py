@@ -27,6 +27,10 @@ STALE_S = 2.5
 _SIGMAS = 6.0
 """The guard calls an IMU moving beyond this many sigma of what bias and noise can do at rest."""
 
+_LEAST_FORCE = 0.01 * STANDARD_GRAVITY
+"""An accelerometer may be this far off without the IMU being in motion: a force error that nobody specified must not
+throw away the stops that show it."""
+
 
 @dataclass(frozen=True)
 class RestLimits:
@@ -44,7 +48,7 @@ def rest_limits(imu: ImuSpecification) -> RestLimits:
     force = np.hypot(prior.get("accel_bias", 0.0), STANDARD_GRAVITY * prior.get("accel_scale", 0.0))
     return RestLimits(
         rate=earth.RATE + _SIGMAS * float(np.sqrt(3.0) * np.hypot(bias, noise)),
-        force=_SIGMAS * float(np.hypot(force, imu.accel_white_noise)),
+        force=max(_LEAST_FORCE, _SIGMAS * float(np.hypot(force, imu.accel_white_noise))),
     )
 
 

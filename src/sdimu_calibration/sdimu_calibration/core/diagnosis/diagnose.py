@@ -19,7 +19,7 @@ from sdimu_calibration.core.diagnosis.consistency import Consistency, check
 from sdimu_calibration.core.diagnosis.evidence import Evidence
 from sdimu_calibration.core.diagnosis.remainder import Remainder
 from sdimu_calibration.core.diagnosis.rounds import UNEXPLAINED_P, Look, settle
-from sdimu_calibration.core.diagnosis.screen import Finding, screen
+from sdimu_calibration.core.diagnosis.screen import Finding, beyond_specification, screen
 from sdimu_calibration.core.diagnosis.search import FALSE_ALARM, Search
 from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.filter_pass import SKIP
@@ -134,6 +134,7 @@ def diagnose(
     if noise:
         solution = solve(setup, reduced, tell, keep=True)
     look = settle(solution, extra, alpha, tell)
+    findings += beyond_specification(look.solution)
     tell("report", 0.9)
     base = assemble(recording, solution, held_out=True)
     final = assemble(recording, look.solution, held_out=True) if look.chosen else base
@@ -215,7 +216,8 @@ def _sentence(d: Diagnosis) -> str:
     """Put the verdict into one sentence."""
     names = " and ".join(c.label for c in d.chosen)
     if d.verdict == "consistent":
-        return "The model explains the recording: nothing stands out of the noise."
+        odd = "; ".join(f.text for f in d.findings)
+        return "The model explains the recording: nothing stands out of the noise" + (f"; but {odd}." if odd else ".")
     if d.verdict == "noise model wrong":
         return f"The noise model is wrong, the physics is not: {'; '.join(d.noise)}."
     if d.verdict == "data fault":

@@ -6,10 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sdimu_calibration.core.passes import Reduced
+from sdimu_calibration.core.passes import Reduced, Solution
 from sdimu_calibration.core.recording import Recording
 
 _STUCK = 5
+_OUTSIDE = 4.5
+"""Thirty coefficients of a sensor within its specification pass this once in 5000 tests."""
 
 
 @dataclass(frozen=True)
@@ -45,3 +47,14 @@ def screen(recording: Recording, reduced: Reduced) -> tuple[Finding, ...]:
     if contradicted > 5.0:
         out.append(Finding(f"the table said dwell for {contradicted:.0f} s in which the IMU moved", False))
     return tuple(out)
+
+
+def beyond_specification(solution: Solution) -> tuple[Finding, ...]:
+    """Coefficients far outside the prior: a wrong specification, or an effect that this plan cannot tell from them."""
+    sensors = solution.setup.sensors
+    size = np.abs(solution.last.estimate) / sensors.prior
+    return tuple(
+        Finding(f"{sensors.names[i]} is {size[i]:.1f} times the sigma of the specification", False)
+        for i in np.argsort(-size)
+        if size[i] > _OUTSIDE
+    )
