@@ -31,6 +31,8 @@ from sdimu_calibration.core.specification import ImuSpecification, Model, Site
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
+STILL_WRONG = 1.25
+"""Held-out error (1 is right) beyond which a model is not called explained, whatever it fits."""
 NOISE_OFF = 0.05
 """Least deviation of the noise from its specification that is worth telling."""
 
@@ -139,7 +141,8 @@ def diagnose(
     base = assemble(recording, solution, held_out=True)
     final = assemble(recording, look.solution, held_out=True) if look.chosen else base
     own = any(c.family == "own" for c in look.chosen)
-    unexplained = look.after.p_value < UNEXPLAINED_P
+    # What was added must also predict: an effect that only mimics the missing one fits here and fails elsewhere.
+    unexplained = look.after.p_value < UNEXPLAINED_P or _rms(final) > STILL_WRONG
     p_value = _p_value(look.found, look.before, consistency, noise)
     verdict = _verdict(look, own, unexplained, noise, findings)
     adequate = verdict == "consistent"
