@@ -15,10 +15,9 @@ def compare(
     folders: Annotated[list[Path], typer.Argument(metavar="DIR DIR ...", help="Folders with result.json.")],
 ) -> None:
     """Show how far the error fell with each model; folders of one recording, simplest model first."""
-    from rich.box import SIMPLE_HEAD
     from rich.console import Console
-    from rich.table import Table
 
+    from sdimu_calibration.cli.wide_table import print_table
     from sdimu_calibration.core.recording import DataError
     from sdimu_calibration.storage.result_file import read_result
 
@@ -26,14 +25,10 @@ def compare(
         raise DataError("compare: give at least two folders with a result.json each")
     results = [read_result(folder) for folder in folders]
     _same_data(folders, results)
-    table = Table(pad_edge=False, box=SIMPLE_HEAD)
-    for heading in ("folder", "model", "log-likelihood", "difference", "nis", "held-out"):
-        table.add_column(heading, no_wrap=True, overflow="ignore")
-    table.add_column("moved by more than 2 sigma")
-    for k, result in enumerate(results):
-        table.add_row(*_row(folders[k], result, results[k - 1] if k else None))
     console = Console()
-    console.print(table, soft_wrap=True)
+    headings = ("folder", "model", "log-likelihood", "difference", "nis", "held-out", "moved by more than 2 sigma")
+    lines = [_row(folders[k], result, results[k - 1] if k else None) for k, result in enumerate(results)]
+    print_table(console, headings, lines, left=2)
     for folder in folders:
         verdict = _verdict(folder)
         if verdict:
@@ -65,8 +60,8 @@ def _row(folder: Path, result: Calibration, before: Calibration | None) -> list[
         difference = f"{_value(result, 'log_likelihood') - _value(before, 'log_likelihood'):+.1f}"
         moved = ", ".join(f"{name} {size:+.1f}" for name, size in moved_coefficients(before, result)[:6])
     return [
-        folder.name, model.replace("[", r"\["), f"{_value(result, 'log_likelihood'):.1f}", difference,
-        f"{_value(result, 'nis_mean'):.3f}", f"{_value(result, 'held_out_rms'):.3f}", moved.replace("[", r"\["),
+        folder.name, model, f"{_value(result, 'log_likelihood'):.1f}", difference,
+        f"{_value(result, 'nis_mean'):.3f}", f"{_value(result, 'held_out_rms'):.3f}", moved,
     ]  # fmt: skip
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from sdimu_calibration.cli.wide_table import print_table
 from sdimu_calibration.core.units import UnitError, from_si
 
 if TYPE_CHECKING:
@@ -54,26 +55,22 @@ def _where(console: Console, told: Account) -> None:
 
 
 def _candidates(console: Console, told: Account) -> None:
-    from rich.box import SIMPLE_HEAD
-    from rich.table import Table
-
     shown = told.candidates or told.found
     if not shown:
         return
-    title = "found" if told.candidates else "tried, but not enough to explain the misfit"
-    table = Table(title=title, title_justify="left", pad_edge=False, box=SIMPLE_HEAD)
-    for heading in ("effect", "estimate", "+-", "unit", "z", "explains", "held-out error"):
-        # A narrow terminal wraps the line; it must not cut names or digits.
-        table.add_column(heading, no_wrap=True, overflow="ignore", justify="left" if heading == "effect" else "right")
-    table.add_column("looks the same here")
+    lines = []
     for f in shown:
         unit = f.candidate.parameter.display_unit
-        table.add_row(
-            _plain(f.candidate.label), amount(f.value, unit, 4), amount(f.sigma, unit, 2), _plain(unit), f"{f.z:+.1f}",
-            f"{100 * f.explained:.0f} %", f"{f.held_out_before:.3f} -> {f.held_out_after:.3f}",
-            _plain(", ".join(f.alike[:4])),
+        lines.append(
+            [
+                f.candidate.label, amount(f.value, unit, 4), amount(f.sigma, unit, 2), unit, f"{f.z:+.1f}",
+                f"{100 * f.explained:.0f} %", f"{f.held_out_before:.3f} -> {f.held_out_after:.3f}",
+                ", ".join(f.alike[:4]),
+            ]
         )  # fmt: skip
-    console.print(table, soft_wrap=True)
+    headings = ("effect", "estimate", "+-", "unit", "z", "explains", "held-out error", "looks the same here")
+    title = "found" if told.candidates else "tried, but not enough to explain the misfit"
+    print_table(console, headings, lines, title)
 
 
 def _steps(console: Console, told: Account) -> None:
@@ -121,25 +118,20 @@ def _size(r: Reach) -> str:
 
 def print_ladder(console: Console, rungs: tuple[Rung, ...]) -> None:
     """Print the ladder of real refits."""
-    from rich.box import SIMPLE_HEAD
-    from rich.table import Table
-
-    table = Table(title="ladder of refits", title_justify="left", pad_edge=False, box=SIMPLE_HEAD)
-    for heading in ("model", "log-likelihood", "log Bayes factor", "nis", "held-out", "jump after turns"):
-        table.add_column(heading, no_wrap=True, overflow="ignore", justify="left" if heading == "model" else "right")
-    table.add_column("moved by more than 2 sigma")
+    lines = []
     for r in rungs:
         name = f"+ {r.added}" if r.added else "as given"
         moved = ", ".join(f"{n} {s:+.1f}" for n, s in r.moved[:4])
         if not r.accepted:
             name, moved = f"{name} (refused)", r.reason
-        table.add_row(
-            _plain(name), f"{r.log_likelihood:.1f}", f"{r.log_bayes_factor:+.1f}" if r.added else "",
-            f"{r.nis_mean:.3f}", f"{r.held_out_rms:.3f}", f"{r.jump:.2f} sigma, {1e3 * r.jump_velocity:.2f} mm/s",
-            _plain(moved),
+        lines.append(
+            [
+                name, f"{r.log_likelihood:.1f}", f"{r.log_bayes_factor:+.1f}" if r.added else "", f"{r.nis_mean:.3f}",
+                f"{r.held_out_rms:.3f}", f"{r.jump:.2f} sigma, {1e3 * r.jump_velocity:.2f} mm/s", moved,
+            ]
         )  # fmt: skip
-    console.print(table, soft_wrap=True)
-
-
-def _plain(text: str) -> str:
-    return text.replace("[", r"\[")
+    headings = (
+        "model", "log-likelihood", "log Bayes factor", "nis", "held-out", "jump after turns",
+        "moved by more than 2 sigma",
+    )  # fmt: skip
+    print_table(console, headings, lines, "ladder of refits")
