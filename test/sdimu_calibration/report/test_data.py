@@ -14,12 +14,14 @@ HIDDEN = "accel_quadratic_x"
 def test_residuals_are_the_whitened_innovations_coloured_again(diagnosis):
     found = data.residuals(diagnosis)
     evidence = diagnosis.evidence
+    model, weight = evidence.model, evidence.weight
+    white = evidence.e - evidence.W[:, model] @ evidence.information.estimate(model, weight)[0]
     innovation = np.nan_to_num(found.before) * np.nan_to_num(found.sigma)
     for epoch in np.unique(evidence.epoch)[::50]:
         rows = evidence.epoch == epoch
         channels = evidence.channel[rows]
         L = evidence.output.L[epoch][np.ix_(channels, channels)]
-        assert np.linalg.solve(L, innovation[epoch, channels]) == pytest.approx(evidence.e[rows], abs=1e-9)
+        assert np.linalg.solve(L, innovation[epoch, channels]) == pytest.approx(white[rows], abs=1e-9)
 
 
 def test_what_is_not_measured_has_no_residual(diagnosis):

@@ -33,7 +33,7 @@ NOTABLE = 3.0
 
 @dataclass(frozen=True)
 class Residuals:
-    """Innovations of the navigation filter with every coefficient at its final value.
+    """Innovations of the navigation filter with every coefficient at its estimate.
 
     Attributes
     ----------
@@ -66,9 +66,8 @@ def residuals(diagnosis: Diagnosis) -> Residuals:
     "After" is the linear refit on the whitened innovations; a nonlinear one differs by second order.
     """
     evidence = diagnosis.evidence
-    known, weight = added(diagnosis)
-    estimate, _ = evidence.information.estimate(known, weight)
-    left = evidence.e - evidence.W[:, known] @ estimate if len(diagnosis.found.chosen) else evidence.e
+    given = _left(diagnosis, evidence.model, evidence.weight)
+    left = _left(diagnosis, *added(diagnosis)) if len(diagnosis.found.chosen) else given
     L = evidence.output.L
     sigma = np.sqrt(np.einsum("eij,eij->ei", L, L))
     measured = np.isfinite(evidence.output.normalised)
@@ -76,9 +75,16 @@ def residuals(diagnosis: Diagnosis) -> Residuals:
         evidence.reduced.epochs.end,
         evidence.reduced.phases.stop,
         np.where(measured, sigma, np.nan),
-        _coloured(evidence.e, diagnosis, sigma),
+        _coloured(given, diagnosis, sigma),
         _coloured(left, diagnosis, sigma),
     )
+
+
+def _left(diagnosis: Diagnosis, known: Ints, weight: Floats) -> Floats:
+    """Whitened innovations with the parameters at `known` estimated, wherever the evidence was linearised."""
+    evidence = diagnosis.evidence
+    estimate, _ = evidence.information.estimate(known, weight)
+    return np.asarray(evidence.e - evidence.W[:, known] @ estimate)
 
 
 def _coloured(white: Floats, diagnosis: Diagnosis, sigma: Floats) -> Floats:
@@ -174,9 +180,11 @@ def best_variants(entries: Sequence[Scored]) -> list[Scored]:
 
 def _first_scale(first: Scan) -> float:
     """Noise over specification that the first scan took, misfit and all."""
-    ratio = first.sigma * np.sqrt(np.maximum(np.diag(first.information.J), 0.0))
-    ratio = ratio[np.isfinite(ratio)]
-    return float(ratio[0]) if len(ratio) else 1.0
+    testable = np.flatnonzero(np.isfinite(first.sigma))
+    if not len(testable):
+        return 1.0
+    one = testable[0]
+    return float(first.sigma[one] * np.sqrt(first.information.J[one, one]))
 
 
 def _scored(diagnosis: Diagnosis, index: int, first: Scan, last: Scan) -> Scored:
@@ -281,7 +289,7 @@ def explained(diagnosis: Diagnosis) -> list[Explained]:
     known, weight = added(diagnosis)
     J = evidence.information.J
     estimate, _ = evidence.information.estimate(known, weight)
-    left = evidence.e - evidence.W[:, known] @ estimate
+    left = _left(diagnosis, known, weight)
     p, out = len(evidence.weight), []
     for place in range(p, len(known)):
         others = np.delete(known, place)
