@@ -32,6 +32,8 @@ class Noise:
         Measured over specified standard deviation, from the median of absolute differences (blind to outliers).
     sigma : float
         Standard error of `ratio`.
+    spread : float
+        Measured over specified standard deviation, outliers and all.
     kurtosis : float
         Of the differences; 3 is Gaussian.
     outliers : ndarray of int
@@ -40,6 +42,7 @@ class Noise:
 
     ratio: float
     sigma: float
+    spread: float
     kurtosis: float
     outliers: NDArray[np.int64]
 
@@ -135,7 +138,7 @@ def triad_noise(reduced: Reduced, means: Floats, density: float) -> Noise:
     good = reduced.phases.used
     pair = good[1:] & good[:-1] & (reduced.phases.stop[1:] == reduced.phases.stop[:-1])
     if pair.sum() < _LEAST_PAIRS:
-        return Noise(1.0, 1.0, 3.0, np.empty(0, dtype=np.int64))
+        return Noise(1.0, 1.0, 1.0, 3.0, np.empty(0, dtype=np.int64))
     length = epochs.end - epochs.start
     sigma = density * np.sqrt(1.0 / length[1:] + 1.0 / length[:-1])
     difference = ((means[1:] - means[:-1]) / sigma[:, None])[pair]
@@ -146,9 +149,10 @@ def triad_noise(reduced: Reduced, means: Floats, density: float) -> Noise:
     far = np.abs(difference) > _OUTLIER * ratio
     both = far[1:] & far[:-1] & (np.sign(difference[1:]) != np.sign(difference[:-1]))
     outliers = at[1:][follows & both.any(axis=1)]
+    spread = float(np.sqrt(np.mean(difference**2)))
     kurtosis = float(np.mean(difference**4) / np.mean(difference**2) ** 2)
     # The median absolute deviation has 37 % of the efficiency of the standard deviation; differences share epochs.
-    return Noise(ratio, 1.4 * ratio / np.sqrt(2 * 0.37 * difference.size), kurtosis, outliers)
+    return Noise(ratio, 1.4 * ratio / np.sqrt(2 * 0.37 * difference.size), spread, kurtosis, outliers)
 
 
 def stop_means(standard: Floats, reduced: Reduced) -> tuple[StopMean, ...]:

@@ -132,7 +132,7 @@ def diagnose(
     findings = screen(recording, reduced)
     solution = solve(setup, reduced, tell, keep=True)
     consistency = check(solution.last, reduced)
-    noise, setup, reduced = _mend_noise(consistency, setup, reduced)
+    noise, setup = _mend_noise(consistency, setup, reduced)
     if noise:
         solution = solve(setup, reduced, tell, keep=True)
     look = settle(solution, extra, alpha, tell)
@@ -154,30 +154,34 @@ def diagnose(
     return replace(partial, sentence=_sentence(partial))
 
 
-def _mend_noise(consistency: Consistency, setup: Setup, reduced: Reduced) -> tuple[tuple[str, ...], Setup, Reduced]:
-    """Put measured noise in place of a specification that is wrong, and leave outliers out."""
+def _mend_noise(consistency: Consistency, setup: Setup, reduced: Reduced) -> tuple[tuple[str, ...], Setup]:
+    """Put measured noise in place of a specification that is wrong.
+
+    Noise with heavy tails is taken at its standard deviation, outliers and all. To leave the outliers out of the
+    measurements instead would be wrong: the same samples drive the navigation, and it is the measurement that
+    tells the filter what they did to it.
+    """
     told: list[str] = []
-    scales = {}
-    kind = reduced.kind.copy()
+    scales = {"gyro": 1.0, "accel": 1.0}
     for triad, noise in (("gyro", consistency.gyro), ("accel", consistency.accel)):
-        scales[triad] = 1.0
         if abs(noise.ratio - 1.0) > max(NOISE_OFF, 4.0 * noise.sigma):
             scales[triad] = noise.ratio
             told.append(f"{triad} white noise is {noise.ratio:.2f} +- {noise.sigma:.2f} times the specification")
         if noise.kurtosis > _KURTOSIS:
+            scales[triad] = noise.spread
             told.append(
                 f"{triad} noise has heavy tails: kurtosis {noise.kurtosis:.1f} (3 is Gaussian), "
-                f"{100 * len(noise.outliers) / max(1, int((kind != SKIP).sum())):.1f} % of the seconds are outliers"
+                f"{100 * len(noise.outliers) / max(1, int((reduced.kind != SKIP).sum())):.1f} % of the seconds are "
+                f"outliers, with them it is {noise.spread:.2f} times the specification"
             )
-            kind[noise.outliers] = SKIP
     if not told:
-        return (), setup, reduced
+        return (), setup
     imu = replace(
         setup.imu,
         gyro_white_noise=setup.imu.gyro_white_noise * scales["gyro"],
         accel_white_noise=setup.imu.accel_white_noise * scales["accel"],
     )
-    return tuple(told), replace(setup, imu=imu), replace(reduced, kind=kind)
+    return tuple(told), replace(setup, imu=imu)
 
 
 _KURTOSIS = 4.0
