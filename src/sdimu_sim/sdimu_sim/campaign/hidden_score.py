@@ -8,6 +8,7 @@ import numpy as np
 
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.diagnosis.evidence import columns
+from sdimu_calibration.core.diagnosis.found import found_effects
 from sdimu_calibration.core.diagnosis.scan import Scan, scan
 from sdimu_calibration.core.results import Calibration
 from sdimu_sim.campaign.hidden_draw import Draw, Truth
@@ -38,16 +39,17 @@ def score(drawn: Draw, found: Diagnosis, sensor: ImuTruth) -> dict[str, Any]:
         (catalogue), ``threshold``.
     """
     scanned = scan(found.evidence.information, found.evidence.model, found.evidence.weight)
+    named = classes(found)
     accepted = [s for s in found.found.steps if s.accepted]
     catalogue = [
         k for k in range(len(found.evidence.weight), int(found.free[0])) if np.isfinite(scanned.sigma[k])
     ]  # fmt: skip
     return {
         "kind": drawn.kind, "plan": drawn.plan, "latitude_deg": drawn.latitude_deg, "fault": drawn.fault,
-        "truths": [_judge(t, found, scanned) for t in drawn.truths],
+        "truths": [_judge(t, found, scanned, named) for t in drawn.truths],
         "verdict": found.verdict, "sentence": found.sentence,
         "named": [c.label for c in found.chosen], "families": [c.family for c in found.chosen],
-        "classes": classes(found), "noise": list(found.noise), "own": found.own, "unexplained": found.unexplained,
+        "classes": named, "noise": list(found.noise), "own": found.own, "unexplained": found.unexplained,
         "steps": [
             {"label": s.label, "z": s.z, "accepted": s.accepted, "reason": s.reason, "log_bayes": s.log_bayes_factor,
              "gain": s.held_out_gain, "error": s.held_out_error} for s in found.found.steps
@@ -63,15 +65,8 @@ def score(drawn: Draw, found: Diagnosis, sensor: ImuTruth) -> dict[str, Any]:
 
 
 def classes(found: Diagnosis) -> list[list[str]]:
-    """Labels of every class that was named: what was chosen, and what the data cannot tell from it."""
-    out = []
-    for k, candidate in enumerate(found.chosen):
-        same = [s for s in found.found.steps if s.accepted and s.label == candidate.label]
-        other = [s for s in found.found.steps if s.accepted][k : k + 1]
-        steps = same or other
-        alike = [name for s in steps for name in (s.label, *s.alike)]
-        out.append(list(dict.fromkeys([candidate.label, *alike])))
-    return out
+    """Labels of every class that was named: what was found, and what the data cannot tell from it."""
+    return [[f.candidate.label, *f.alike] for f in found_effects(found)]
 
 
 def same_effect(label: str, truth: Truth, stops: tuple[tuple[int, float, float], ...]) -> bool:
@@ -93,14 +88,13 @@ def same_effect(label: str, truth: Truth, stops: tuple[tuple[int, float, float],
     return any(abs(labelled - e) <= 1.5 for e in next_to)
 
 
-def _judge(truth: Truth, found: Diagnosis, scanned: Scan) -> dict[str, Any]:
+def _judge(truth: Truth, found: Diagnosis, scanned: Scan, named: list[list[str]]) -> dict[str, Any]:
     """Say how one hidden effect was found.
 
     ``realised``: size in the sigma of this very test; ``in_class``, ``best``: named in a class, named first;
     ``share``: of its signature, beyond the model's coefficients, that what was found takes; ``error_sigmas``: error of
     its amplitude in the refit (of the scan, when another of its class was named), None with a scanned option.
     """
-    named = classes(found)
     stops = found.evidence.times.stops
     row: dict[str, Any] = {
         "name": truth.name, "family": truth.family, "option": truth.option, "value": truth.value,

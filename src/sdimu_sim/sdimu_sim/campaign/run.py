@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from rate_table_sim.core import TableMotion, TableSpecification, phase_changes, table_motion
 from sdimu_calibration.core import body_frame
-from sdimu_calibration.core.passes import first_attitude, one_pass, reduce, refine, set_up
+from sdimu_calibration.core.passes import reduce, set_up, solve
 from sdimu_calibration.core.plan import Plan
 from sdimu_calibration.core.recording import PhaseLog, Recording
 from sdimu_calibration.core.specification import Model
@@ -66,11 +66,8 @@ class CalibrationRun:
         scenario = replace(self.scenario, seed=seed)
         sensor = imu_truth(scenario)
         setup = set_up(scenario.site, scenario.imu, self.model)
-        reduced = reduce(simulate(scenario, sensor), setup)
-        start = first_attitude(reduced.epochs, reduced.phases, setup)
-        none = np.zeros(len(setup.sensors.prior))
-        first = one_pass(reduced, setup, start, start.C_nb, none, closed_loop=True, keep=False)
-        last, passes = refine(reduced, setup, start, first, lambda _word, _share: None, keep=False)
+        solution = solve(setup, reduce(simulate(scenario, sensor), setup), lambda _word, _share: None)
+        last = solution.last
         names, frame = setup.sensors.names, self.model.body_frame
         J = body_frame.frame_jacobian(names, frame)
         P = J @ last.covariance @ J.T
@@ -78,13 +75,13 @@ class CalibrationRun:
         truth = true_values(sensor, names, frame)
         sigma = np.sqrt(np.diag(P))
         free = sigma > _PINNED_SHARE * setup.sensors.prior
-        products, count = lag_one(last.output.normalised, reduced.phases.stop)
+        products, count = lag_one(last.output.normalised, solution.reduced.phases.stop)
         nis = last.output.nis
         return {
             "names": names, "estimate": estimate, "truth": truth, "sigma": sigma,
             "covariance": P[np.tril_indices(len(P))], "free": free, "nees": nees(estimate - truth, P, free),
             "nis": np.nansum(nis, axis=0), "nis_dof": 3 * np.isfinite(nis).sum(axis=0),
-            "lag1": products, "lag1_count": count, "passes": passes,
+            "lag1": products, "lag1_count": count, "passes": solution.passes,
         }  # fmt: skip
 
 
