@@ -21,6 +21,7 @@ setup(
             "simulate = sdimu_sim.cli.simulate:simulate",
             "run = sdimu_sim.cli.run:run",
             "monte-carlo = sdimu_sim.cli.monte_carlo:monte_carlo",
+            "study = sdimu_sim.cli.study:app",
             "bench = sdimu_sim.cli.bench:bench",
             "hidden-campaign = sdimu_sim.cli.hidden_campaign:hidden_campaign",
         ],

@@ -83,4 +83,5 @@ def step_rows(
 
 
 def nothing(p: int) -> tuple[Floats, Floats, Floats, Floats]:
+    """Make the rows from the last stop to none."""
     return np.zeros((0, PER_STOP)), np.zeros((0, PER_STOP)), np.zeros((0, p)), np.zeros(0)

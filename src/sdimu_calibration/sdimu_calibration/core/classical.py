@@ -1,8 +1,8 @@
 """The classical calibration: multi-position and rate test by least squares, with the table's angles as reference.
 
 What Kim, Song & Lyou argue against. The table angles are taken for the attitude of the IMU: its axes are those of the
-table, the table stands level and north. The mean of the samples over every stop, and over every turn, less what a perfect IMU
-would have given there, is linear in the coefficients. No navigation, no filter, no attitude to estimate.
+table, the table stands level and north. The mean of the samples over every stop, and over every turn, less what a
+perfect IMU would have given there, is linear in the coefficients. No navigation, no filter, no attitude to estimate.
 
 A mount misalignment m then passes for a misalignment of every sensor, and for a scale error 1 - cos(m): the
 coefficients are given in the body frame ``table``. They may be turned into the accelerometers' own frame afterwards,

@@ -1,0 +1,57 @@
+"""The verb `sdimu study`: questions to the method that need many simulated tests."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+app = typer.Typer(help="Put a claim of the method to the test, by simulation.", no_args_is_help=True)
+
+
+@app.callback()
+def _studies() -> None:
+    """Put a claim of the method to the test, by simulation."""
+
+
+@app.command()
+def mount(
+    out: Annotated[Path, typer.Option(help="Folder of mount.json and mount.html.")] = Path("out/study-mount"),
+    seeds: Annotated[int, typer.Option(min=1, help="IMUs a mount; seeds 1 to this.")] = 10,
+    largest: Annotated[int, typer.Option(min=0, max=45, help="Largest mount (deg), in steps of one.")] = 5,
+    plan: Annotated[str, typer.Option(help="Test plan: name in config/plan or path.")] = "kim18",
+    imu: Annotated[str, typer.Option(help="IMU specification: name in config/imu or path.")] = "dtg",
+    model: Annotated[str, typer.Option(help="Model to estimate.")] = "baseline",
+    site: Annotated[str, typer.Option(help="Site.")] = "daejeon",
+) -> None:
+    """Draw error against mount misalignment for the filter and the classical estimator."""
+    # Inside the function: the help of `sdimu` must not wait for numerical libraries.
+    from rich.box import SIMPLE
+    from rich.console import Console
+    from rich.table import Table
+
+    from sdimu_calibration.cli.progress import bar
+    from sdimu_calibration.core.imu_model import build
+    from sdimu_calibration.core.units import from_si
+    from sdimu_calibration.report.mount_study import write_page
+    from sdimu_calibration.storage.config import load_imu, load_model, load_plan, load_site
+    from sdimu_calibration.storage.json_file import write_json
+    from sdimu_sim.campaign.mount_study import mount_study
+    from sdimu_sim.core.scenario import Scenario
+
+    console = Console()
+    wanted, specification = load_model(model), load_imu(imu)
+    scenario = Scenario(load_plan(plan), specification, load_site(site))
+    mounts = [float(m) for m in range(largest + 1)]
+    with bar(console) as progress:
+        content = mount_study(scenario, wanted, mounts, range(1, seeds + 1), progress)
+    units = {e.name: e.parameters[0].display_unit for e in build(wanted.effects, specification).effects}
+    write_json(out / "mount.json", content)
+    write_page(out / "mount.html", content, units)
+    for estimator, by_effect in content["rms"].items():
+        table = Table("RMS error", *(f"{m:g} deg" for m in mounts), "unit", title=estimator, box=SIMPLE)
+        for effect, unit in units.items():
+            table.add_row(effect, *(f"{from_si(float(v), unit):.3g}" for v in by_effect[effect]), unit)
+        console.print(table)
+    console.print(f"results in {out}", soft_wrap=True)
