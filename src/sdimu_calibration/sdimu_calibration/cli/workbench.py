@@ -1,0 +1,41 @@
+"""`sdimu workbench`: look at a recording in the browser, add effects, watch the error fall."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+HOST = "127.0.0.1"
+
+
+def workbench(
+    bag: Annotated[Path, typer.Argument(metavar="BAG", help="rosbag2 folder or .mcap file.")],
+    port: Annotated[int, typer.Option(min=1, max=65535, help="Port on this machine.")] = 8050,
+    model: Annotated[str, typer.Option(help="Model to start from: name in config/model or path.")] = "baseline",
+    site: Annotated[str, typer.Option(help="Where the test was: name in config/site or path.")] = "daejeon",
+    imu: Annotated[str, typer.Option(help="Specification of the IMU: name in config/imu or path.")] = "dtg",
+    host: Annotated[str, typer.Option(help="Address to listen on; others than this machine only when asked.")] = HOST,
+) -> None:
+    """Open a recording in the browser; runs until it is stopped with Ctrl-C."""
+    import logging
+    import socket
+
+    from rich.console import Console
+
+    from sdimu_calibration.core.recording import DataError
+    from sdimu_calibration.report.workbench.app import build
+    from sdimu_calibration.report.workbench.fit import Bench
+    from sdimu_calibration.storage.bag_reader import read_recording
+    from sdimu_calibration.storage.config import load_imu, load_site
+    from sdimu_calibration.storage.effect_file import extended_model
+
+    with socket.socket() as probe:
+        if probe.connect_ex((host, port)) == 0:
+            raise DataError(f"port {port} is taken (choose another with --port)")
+    bench = Bench(read_recording(bag), load_site(site), load_imu(imu), extended_model(model, []))
+    bench.fit((), ())
+    Console().print(f"workbench of {bag.name} at http://{host}:{port} (Ctrl-C ends it)", soft_wrap=True)
+    logging.getLogger("werkzeug").setLevel(logging.ERROR)
+    build(bench, f"Workbench: {bag.name}").run(host=host, port=port, debug=False)

@@ -1,0 +1,1 @@
+"""The workbench: the loop "compare, see where it fails, add, watch the error fall" in a browser."""

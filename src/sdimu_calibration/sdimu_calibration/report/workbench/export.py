@@ -1,0 +1,47 @@
+"""What a page takes home: the model, the calibration and the report in one archive."""
+
+from __future__ import annotations
+
+import io
+import tempfile
+import zipfile
+from collections.abc import Sequence
+from pathlib import Path
+
+import yaml
+
+from sdimu_calibration.core.specification import Model
+from sdimu_calibration.report.page import write_report
+from sdimu_calibration.report.workbench.fit import Fitted
+from sdimu_calibration.storage.result_file import write_result
+
+
+def model_files(model: Model, added: Sequence[str]) -> dict[str, str]:
+    """Return model.yaml, and a file for each effect of one's own, by name."""
+    own = {f"effect-{k}.yaml": text for k, text in enumerate(added, 1) if "\n" in text.strip()}
+    by_text = {text: name for name, text in own.items()}
+    effects = [e if isinstance(e, str) else e.name for e in model.effects]
+    content = {
+        "format": "sdimu-model/1",
+        "effects": [*effects, *(by_text.get(text, text) for text in added)],
+        "velocity_sigma": f"{model.velocity_sigma!r} m/s",
+        "position_sigma": f"{model.position_sigma!r} m",
+        "settle": f"{model.settle_s!r} s",
+        "body_frame": model.body_frame,
+    }
+    return {"model.yaml": yaml.safe_dump(content, sort_keys=False), **own}
+
+
+def archive(model: Model, added: Sequence[str], fitted: Fitted, title: str) -> bytes:
+    """Return a zip with model.yaml, result.json and report.html."""
+    with tempfile.TemporaryDirectory() as folder:
+        root = Path(folder)
+        write_result(root / "result.json", fitted.diagnosis.after)
+        write_report(root / "report.html", fitted.diagnosis.after, title=title, diagnosis=fitted.diagnosis)
+        for name, text in model_files(model, added).items():
+            (root / name).write_text(text, encoding="utf-8")
+        kept = io.BytesIO()
+        with zipfile.ZipFile(kept, "w", zipfile.ZIP_DEFLATED) as out:
+            for path in sorted(root.iterdir()):
+                out.write(path, path.name)
+        return kept.getvalue()
