@@ -18,7 +18,7 @@ from rich.table import Table
 from scipy import stats
 
 from sdimu_calibration.core.units import from_si
-from sdimu_calibration.report.page import _STYLE
+from sdimu_calibration.report.style import STYLE
 from sdimu_calibration.storage.json_file import read_json
 
 FORMAT = "sdimu-monte-carlo/1"
@@ -108,7 +108,7 @@ def page(content: Mapping[str, Any]) -> str:
     ]
     return (
         f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><title>{heading}</title>'
-        f"<style>{_STYLE}</style></head><body>\n" + "\n".join(parts) + "\n</body></html>\n"
+        f"<style>{STYLE}</style></head><body>\n" + "\n".join(parts) + "\n</body></html>\n"
     )
 
 
