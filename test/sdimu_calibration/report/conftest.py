@@ -6,6 +6,7 @@ import pytest
 
 from rate_table_sim.core import TableSpecification
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis, diagnose
+from sdimu_calibration.core.recording import Recording
 from sdimu_calibration.storage.config import load_imu, load_model, load_plan, load_site
 from sdimu_sim.core.scenario import Scenario, generate
 
@@ -14,12 +15,15 @@ SEED = 5
 
 
 @pytest.fixture(scope="session")
-def diagnosis() -> Diagnosis:
-    """Of 40 ug/g^2, forty times what this plan sees at one sigma."""
-    imu, site = load_imu("dtg"), load_site("daejeon")
+def recording() -> Recording:
+    """With 40 ug/g^2, forty times what this plan sees at one sigma."""
     scenario = Scenario(
-        load_plan("kim18"), imu, site, TableSpecification(axes=None), rate_hz=20.0, seed=SEED,
-        effects=(f"{HIDDEN}=40 ug/g^2",),
+        load_plan("kim18"), load_imu("dtg"), load_site("daejeon"), TableSpecification(axes=None), rate_hz=20.0,
+        seed=SEED, effects=(f"{HIDDEN}=40 ug/g^2",),
     )  # fmt: skip
-    recording, _ = generate(scenario)
-    return diagnose(recording, site, imu, load_model("baseline"))
+    return generate(scenario)[0]
+
+
+@pytest.fixture(scope="session")
+def diagnosis(recording: Recording) -> Diagnosis:
+    return diagnose(recording, load_site("daejeon"), load_imu("dtg"), load_model("baseline"))

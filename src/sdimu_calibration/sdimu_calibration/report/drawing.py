@@ -25,6 +25,10 @@ def lay_out(figure: Any, height: int, **more: Any) -> Any:
     return figure
 
 
+CONFIG = {"responsive": True, "displaylogo": False, "modeBarButtonsToRemove": ["lasso2d", "select2d"]}
+"""Buttons of a figure."""
+
+
 def html(figure: Any, number: int) -> str:
     """Return a figure as a part of a page; number 1 brings the library along, so it has to be the first on it."""
     return str(
@@ -32,6 +36,6 @@ def html(figure: Any, number: int) -> str:
             full_html=False,
             include_plotlyjs=number == 1,
             div_id=f"figure-{number}",
-            config={"responsive": True, "displaylogo": False, "modeBarButtonsToRemove": ["lasso2d", "select2d"]},
+            config=CONFIG,
         )
     )

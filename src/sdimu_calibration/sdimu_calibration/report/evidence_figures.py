@@ -23,6 +23,7 @@ _MOST_NUMBERED = 40
 """Stops up to which there is room for numbers in the cells."""
 _MOST_BARS = 24
 _BINS = 20
+_LEGEND = {"orientation": "h", "xanchor": "right", "x": 1.0, "yanchor": "bottom", "y": 1.03}
 _LIMIT = {"dash": "dash", "color": "#222", "width": 1.5}
 
 
@@ -80,12 +81,13 @@ def ranking(entries: Sequence[data.Scored], threshold: float) -> Any:
         )  # fmt: skip
     figure.add_vline(
         x=threshold, line=_LIMIT, opacity=1.0, annotation_text=f"noise reaches {threshold:.1f}",
-        annotation_position="bottom right",
+        annotation_position="top",
     )  # fmt: skip
     top = max([abs(s.z) for s in shown] + [threshold])
     figure.update_xaxes(title_text="score |z| (sigma)", range=[0, 1.3 * top])
     figure.update_yaxes(autorange="reversed", ticks="", automargin=True)
-    return lay_out(figure, 24 * len(shown) + 150, showlegend=True, margin={"l": 80, "r": 20, "t": 50, "b": 55})
+    margin = {"l": 80, "r": 20, "t": 75, "b": 55}
+    return lay_out(figure, 24 * len(shown) + 150, showlegend=True, margin=margin, legend=_LEGEND)
 
 
 def ladder(diagnosis: Diagnosis) -> Any:

@@ -118,9 +118,13 @@ def _shown(bench: Bench, now: State) -> tuple[Any, ...]:
     )
 
 
+_SENSORS = 6
+"""Channels from here on are measured every second: there is more to see."""
+
+
 def _worst(grid: data.Grid) -> tuple[int, int]:
-    row, column = np.unravel_index(np.nanargmax(np.abs(grid.value)), grid.value.shape)
-    return int(row), int(grid.stops[column])
+    row, column = np.unravel_index(np.nanargmax(np.abs(grid.value[_SENSORS:])), grid.value[_SENSORS:].shape)
+    return int(row) + _SENSORS, int(grid.stops[column])
 
 
 def _named(text: str) -> str:

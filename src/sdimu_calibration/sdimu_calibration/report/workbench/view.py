@@ -12,6 +12,7 @@ from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.units import from_si
 from sdimu_calibration.report import data
+from sdimu_calibration.report.drawing import CONFIG
 
 TEMPLATE = """format: sdimu-effect/1
 name: my_effect
@@ -25,7 +26,7 @@ parameters:
 STYLE = """
 body { font: 15px/1.45 system-ui, sans-serif; color: #222; margin: 0; }
 main { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, 560px), 1fr)); gap: 0 2em; }
-main { padding: 0 1.5em; }
+main { padding: 0 1.5em; } section { min-width: 0; } .whole { grid-column: 1 / -1; }
 h1 { font-size: 1.3em; margin: .6em 1.15em 0; } h2 { font-size: 1.05em; margin: 1em 0 .3em; }
 .verdict { border: 2px solid #222; border-left-width: 12px; padding: .5em 1em; margin: .6em 1.5em; }
 .message { color: #7a1f00; font-weight: 600; margin: .3em 1.5em; min-height: 1.4em; }
@@ -49,12 +50,14 @@ def layout(title: str, stops: Sequence[int]) -> Any:
         html.Div(id="message", className="message", role="alert"),
         html.Main([
             html.Section([
-                html.H2("Where does it fail? Click a cell"), dcc.Graph(id="heat"), dcc.Graph(id="cell"),
-                html.H2("How far the error fell"), dcc.Graph(id="ladder"),
+                html.H2("Where does it fail? Click a cell"), _graph("heat"), _graph("cell"),
+            ], className="whole"),
+            html.Section([
+                html.H2("How far the error fell"), _graph("ladder"),
                 html.H2("Coefficients that moved against the model as given"), html.Div(id="moved"),
             ]),
             html.Section([
-                html.H2("Which effect is missing? Click a bar to add it"), dcc.Graph(id="ranking"),
+                html.H2("Which effect is missing? Click a bar to add it"), _graph("ranking"),
                 dcc.Dropdown(id="candidate", placeholder="or search the catalogue"),
                 html.Button("Add", id="add"), html.Button("Undo", id="undo"),
                 html.H2("In the model besides"),
@@ -70,6 +73,10 @@ def layout(title: str, stops: Sequence[int]) -> Any:
             ]),
         ]),
     ])  # fmt: skip
+
+
+def _graph(name: str) -> Any:
+    return dcc.Graph(id=name, config=CONFIG)
 
 
 def options(entries: Sequence[data.Scored]) -> list[dict[str, str]]:
