@@ -1,4 +1,4 @@
-# make setup | demo | test | check | colcon | bench | study : each does its own set-up and needs nothing before it.
+# make setup | demo | test | check | colcon | bench | study | docs | campaigns : each does its own set-up and needs nothing before it.
 PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
@@ -13,8 +13,8 @@ setup: $(STAMP)
 
 $(STAMP): requirements.lock src/sdimu_calibration/setup.py src/sdimu_sim/setup.py src/rate_table_sim/setup.py
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps -r requirements.lock
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --use-pep517 \
+	$(BIN)/python -m pip install -qq --disable-pip-version-check --no-deps -r requirements.lock
+	$(BIN)/python -m pip install -qq --disable-pip-version-check --no-deps --no-build-isolation --use-pep517 \
 	    -e src/sdimu_calibration -e src/rate_table_sim -e src/sdimu_sim
 	touch $@
 
@@ -48,4 +48,12 @@ bench: setup
 study: setup
 	$(BIN)/python -m pytest -n 2 -m slow --timeout 0
 
-.PHONY: setup demo check test colcon bench study
+# The pages that are made from code and runs. The campaigns take hours; they go on where they stood.
+docs: setup
+	$(BIN)/sdimu effects --markdown > doc/effects.md
+
+campaigns: setup
+	$(BIN)/sdimu monte-carlo -n 200 --out out/monte-carlo
+	$(BIN)/sdimu hidden-campaign -n 200 --out out/hidden-campaign
+
+.PHONY: setup demo check test colcon bench study docs campaigns
