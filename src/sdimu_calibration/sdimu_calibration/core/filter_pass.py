@@ -236,7 +236,9 @@ def _measurement(
     g_n = np.zeros(3)
     g_n[2] = earth.normal_gravity(settings.reference[0], height) + settings.gravity_excess
     z[0] = (state.position[0] - settings.reference[0]) * (r_n + height)
-    z[1] = (state.position[1] - settings.reference[1]) * (r_e + height) * np.cos(settings.reference[0])
+    # The same limit as in the navigation: without it the east error would read zero at the pole.
+    cos = np.cos(min(abs(settings.reference[0]), earth.POLE_LIMIT))
+    z[1] = (state.position[1] - settings.reference[1]) * (r_e + height) * cos
     z[2] = height - state.position[2]
     z[3:6] = state.velocity
     z[6:9] = sums[:3] / T - C_bn @ w_ie
