@@ -102,10 +102,13 @@ def _clean(rows: Sequence[Row]) -> list[dict[str, Any]]:
 
 
 def outside_passed(row: Row) -> bool:
-    """Whether something outside the catalogue ended as unexplained, or as an equation that is right."""
+    """Whether something outside the catalogue ended as unexplained, or as terms that are right.
+
+    Right is what takes nearly all of the signature: an equation, or two steps that make a pulse.
+    """
     if row["verdict"] == "unexplained":
         return True
-    return bool(row["own"] and (row["truths"][0]["share"] or 0.0) >= EXPLAINED)
+    return bool(row["named"]) and (row["truths"][0]["share"] or 0.0) >= EXPLAINED
 
 
 def _worse(row: Row) -> bool:
@@ -115,7 +118,7 @@ def _worse(row: Row) -> bool:
 def _outside(rows: Sequence[Row]) -> list[dict[str, Any]]:
     out = [r for r in rows if r["kind"] == "outside"]
     return [
-        share("outside the catalogue: unexplained or a right equation", [outside_passed(r) for r in out], 0.9),
+        share("outside the catalogue: unexplained or rightly explained", [outside_passed(r) for r in out], 0.9),
         share("... accepted although held-out stops were predicted worse", [_worse(r) for r in out], 0.0, most=True),
     ]
 
@@ -170,8 +173,9 @@ def _outside_table(rows: Sequence[Row]) -> list[dict[str, Any]]:
         if row["kind"] != "outside":
             continue
         word = row["verdict"]
-        if row["own"]:
-            word = "right equation" if outside_passed(row) else "other equation"
+        if row["named"] and word != "unexplained":
+            what = "equation" if row["own"] else "catalogue terms"
+            word = f"{'right' if outside_passed(row) else 'other'} {what}"
         table.setdefault(outside_kind(row["truths"][0]["name"]), Counter())[word] += 1
     return [{"shape": k, "ended": dict(v.most_common())} for k, v in sorted(table.items())]
 

@@ -190,7 +190,8 @@ def _estimates(d: Diagnosis, problem: Problem, chosen: list[int]) -> tuple[Float
     values, sigmas = estimate[p:].copy(), d.found.scale * np.sqrt(np.diag(covariance))[p:]
     refit = {name: k for k, name in enumerate(d.after.names)}
     for k, candidate in enumerate(d.chosen):
-        at = refit.get(candidate.parameter.name)
+        # The second of two variants of one parameter stands under its label.
+        at = refit.get(candidate.label, refit.get(candidate.parameter.name))
         if at is not None:
             values[k], sigmas[k] = d.after.values[at], np.sqrt(d.after.covariance[at, at])
     return values, sigmas

@@ -139,8 +139,23 @@ def prefer(wide: Look, look: Look) -> bool:
 def with_effects(base: Solution, added: Sequence[Candidate], progress: Progress) -> Solution:
     """Calibrate with more effects in the model."""
     setup = base.setup
-    sensors = build([*setup.sensors.effects, *(c.effect for c in added)], setup.imu)
+    sensors = build([*setup.sensors.effects, *told_apart(added)], setup.imu)
     return solve(replace(setup, sensors=sensors), base.reduced, progress, keep=True)
+
+
+def told_apart(added: Sequence[Candidate]) -> list[Effect]:
+    """Effects of candidates, each parameter under a name of its own.
+
+    Two variants of one effect, such as two steps of a bias, have the same parameter; the later one takes its label.
+    """
+    out: list[Effect] = []
+    seen: set[str] = set()
+    for candidate in added:
+        name = candidate.parameter.name
+        parameter = replace(candidate.parameter, name=candidate.label if name in seen else name)
+        out.append(replace(candidate.effect, parameters=(parameter,)))
+        seen.add(name)
+    return out
 
 
 def take(
