@@ -76,7 +76,8 @@ def layout(title: str, stops: Sequence[int]) -> Any:
 
 
 def _graph(name: str) -> Any:
-    return dcc.Graph(id=name, config=CONFIG)
+    # Plotly's own "responsive" would take the height of the container, which has none; the component follows the width.
+    return dcc.Graph(id=name, config={key: value for key, value in CONFIG.items() if key != "responsive"})
 
 
 def options(entries: Sequence[data.Scored]) -> list[dict[str, str]]:
