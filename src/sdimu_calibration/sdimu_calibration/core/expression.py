@@ -128,10 +128,13 @@ def parse_expression(text: str, known: frozenset[str]) -> Expression:
         raise DataError(f"expression is longer than {_LONGEST} characters")
     try:
         tree = ast.parse(text.strip(), mode="eval").body
-        names: set[str] = set()
-        _check(tree, text, known, names)
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
         raise DataError(f"cannot read '{text}' (expected a formula such as 'k1 * ax * wz')") from error
+    names: set[str] = set()
+    try:
+        _check(tree, text, known, names)
+    except RecursionError as error:
+        raise DataError("expression is nested too deeply") from error
     return Expression(text, tree, frozenset(names))
 
 

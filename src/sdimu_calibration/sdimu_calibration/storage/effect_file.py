@@ -169,6 +169,9 @@ def _effects(file: _EffectFile) -> tuple[Effect, ...]:
     formulas: dict[str, Expression] = {}
     for sensor, text in file.expressions.items():
         formulas[sensor] = _formula(file, sensor, text, known, constants)
+    for name in file.parameters:
+        if not any(name in formula.names for formula in formulas.values()):
+            raise DataError(f"parameters.{name}: no expression has it")
     return tuple(_one(file, name, formulas, constants) for name in file.parameters)
 
 
@@ -192,10 +195,6 @@ def _check_names(file: _EffectFile) -> None:
         for name in names:
             if name in VARIABLES or (group == "constants" and name in file.parameters):
                 raise DataError(f"{group}.{name}: that name means something else (choose another)")
-    used = " ".join(file.expressions.values())
-    for name in file.parameters:
-        if name not in used:
-            raise DataError(f"parameters.{name}: no expression has it")
 
 
 def _constant(name: str, text: str | float) -> float:
@@ -221,7 +220,8 @@ def _check_linear(formula: Expression, parameters: tuple[str, ...], constants: M
     """Superposition at random values: f(a + b) = f(a) + f(b), f(3 a) = 3 f(a), so f(0) = 0."""
     rng = np.random.default_rng(7)
     at = {name: rng.uniform(0.5, 1.5, 16) for name in VARIABLES} | dict(constants)
-    a, b = ({name: rng.uniform(0.5, 1.5) for name in parameters} for _ in range(2))
+    # Of both signs, or |k| would pass.
+    a, b = ({name: sign * rng.uniform(0.5, 1.5) for name in parameters} for sign in (1.0, -1.0))
 
     def value(k: Mapping[str, float]) -> Floats:
         return np.asarray(formula.evaluate({**at, **k})) * np.ones(16)

@@ -1,0 +1,105 @@
+"""`sdimu diagnose` end to end: the hidden effect is found, added, and the error falls; compare shows it."""
+
+from __future__ import annotations
+
+import json
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sdimu_calibration.cli import main as cli
+from sdimu_calibration.report.catalogue import page
+from sdimu_calibration.storage.bag_writer import write_recording
+from sdimu_calibration.storage.config import load_imu, load_plan, load_site
+from sdimu_sim.core.scenario import Scenario, generate
+
+ROOT = Path(__file__).resolve().parents[3]
+OWN = """\
+format: sdimu-effect/1
+name: bent
+expressions: {accel_y: k * ay**2}
+parameters:
+  k: {unit: ug/g^2, prior: 30 ug/g^2}
+"""
+
+
+@pytest.fixture
+def sdimu(monkeypatch, capsys):
+    """Run `sdimu` in this process; return exit status, stdout, stderr."""
+
+    def run(*arguments: object) -> tuple[int, str, str]:
+        monkeypatch.setattr(sys, "argv", ["sdimu", *map(str, arguments)])
+        monkeypatch.setenv("COLUMNS", "80")
+        with pytest.raises(SystemExit) as ending:
+            cli.main()
+        captured = capsys.readouterr()
+        return int(ending.value.code or 0), captured.out, captured.err
+
+    return run
+
+
+@pytest.fixture(scope="module")
+def hidden(tmp_path_factory):
+    """Bag of a short test with a quadratic term of the y accelerometer hidden in it."""
+    plan = replace(load_plan("kim18"), dwell_s=(30.0,) * 19)
+    scenario = Scenario(
+        plan, load_imu("dtg"), load_site("daejeon"), rate_hz=20.0, seed=401, effects=("accel_quadratic_y=200 ug/g^2",)
+    )
+    recording, _ = generate(scenario)
+    path = tmp_path_factory.mktemp("bags") / "hidden"
+    write_recording(
+        path,
+        start_ns=recording.start_ns,
+        imu_ns=np.round(recording.t * 1e9).astype(np.int64),
+        omega_ib_b=recording.omega_ib_b,
+        f_ib_b=recording.f_ib_b,
+        status=(np.round(recording.phase.t * 1e9).astype(np.int64), recording.phase.dwell, recording.phase.stop),
+    )
+    return path
+
+
+def test_the_loop_of_diagnosis_addition_and_comparison(sdimu, hidden, tmp_path):
+    status, out, err = sdimu("diagnose", hidden, "--out", tmp_path / "d")
+    assert (status, err) == (0, "")
+    assert out.splitlines()[0].startswith(("One effect is missing", "Several effects"))
+    assert "accel_quadratic_y" in out
+    assert "could not have been seen" in out
+    found = json.loads((tmp_path / "d" / "diagnosis.json").read_text())
+    label = found["candidates"][0]["label"]
+
+    assert sdimu("calibrate", hidden, "--out", tmp_path / "base")[0] == 0
+    assert sdimu("calibrate", hidden, "--add", label, "--out", tmp_path / "more")[0] == 0
+    fits = [json.loads((tmp_path / n / "result.json").read_text())["fit"] for n in ("base", "more")]
+    assert fits[1]["held_out_rms"] < fits[0]["held_out_rms"]
+    assert fits[1]["log_likelihood"] > fits[0]["log_likelihood"]
+
+    status, out, _ = sdimu("compare", tmp_path / "base", tmp_path / "more")
+    assert status == 0
+    assert f"+ {label}" in out
+    assert "accel_bias_y" in out  # what the missing term had bent
+
+
+def test_an_effect_by_file_is_added_like_any_other(sdimu, hidden, tmp_path):
+    (tmp_path / "own.yaml").write_text(OWN)
+    assert sdimu("calibrate", hidden, "--add", tmp_path / "own.yaml", "--out", tmp_path / "o")[0] == 0
+    result = json.loads((tmp_path / "o" / "result.json").read_text())
+    assert "bent_k" in {c["name"] for c in result["coefficients"]}
+
+
+def test_bad_input_is_one_line(sdimu, hidden, tmp_path):
+    (tmp_path / "bad.yaml").write_text(OWN.replace("ay**2", "ay"))
+    bad = tmp_path / "bad.yaml"
+    for option, value, word in (("--add", "accel_quadratik", "did you mean"), ("--try", bad, "bad.yaml")):
+        status, out, err = sdimu("diagnose", hidden, option, value, "--out", tmp_path / "x")
+        assert (status, out) == (1, "")
+        assert err.count("\n") == 1
+        assert word in err
+    assert not (tmp_path / "x").exists()
+
+
+def test_the_page_of_effects_is_what_the_registry_says():
+    # A change of the registry is followed by: sdimu effects --markdown > doc/effects.md
+    assert (ROOT / "doc" / "effects.md").read_text() == page()

@@ -1,0 +1,121 @@
+"""Quiet on right models, right on wrong ones, and never an effect where the noise is at fault."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sdimu_calibration.core.diagnosis.advice import blind
+from sdimu_calibration.core.diagnosis.bootstrap import bootstrap
+from sdimu_calibration.core.diagnosis.diagnose import diagnose
+from sdimu_calibration.core.diagnosis.found import found_effects, reach
+from sdimu_calibration.core.diagnosis.grow import jump, rung
+from sdimu_calibration.core.diagnosis.plan_seen import plan_seen
+from sdimu_calibration.core.units import to_si
+
+SEEDS = (101, 102, 103)
+_EFFECTIVE = 150
+"""Independent directions among the candidates of such a test (computed once from their correlation)."""
+_HIDDEN = ("accel_scale_asymmetry_z=60 ppm",)
+
+
+def _first_scores(diagnosis):
+    first = diagnosis.found.first
+    return first.z[np.isfinite(first.sigma)]
+
+
+def test_clean_data_give_scores_of_unit_size_and_no_find(bench):
+    squares, finds = [], 0
+    for seed in SEEDS:
+        diagnosis = bench.diagnosis(seed=seed)
+        squares.append(np.mean(_first_scores(diagnosis) ** 2))
+        finds += len(diagnosis.chosen) > 0
+    # Four standard errors of a mean square of as many independent normals.
+    assert abs(np.mean(squares) - 1.0) < 4.0 * np.sqrt(2.0 / (_EFFECTIVE * len(SEEDS)))
+    # A find in one scan has probability 0.02: two of three have 1e-3.
+    assert finds <= 1
+
+
+def test_a_hidden_effect_is_named_measured_and_lowers_the_held_out_error(bench):
+    diagnosis = bench.diagnosis(effects=_HIDDEN)
+    (one,) = found_effects(diagnosis)
+    assert not diagnosis.adequate
+    assert "accel_scale_asymmetry_z" in {one.candidate.label, *one.alike}
+    assert one.candidate.label == "accel_scale_asymmetry_z"
+    assert abs(one.value - to_si(60, "ppm")) < 3.5 * one.sigma
+    assert one.held_out_after < one.held_out_before
+    assert one.p_value_adjusted < 1e-6
+    assert one.explained > 0.8
+
+
+def test_the_free_input_shares_of_what_was_found_sum_to_what_was_explained(bench):
+    diagnosis = bench.diagnosis(effects=_HIDDEN)
+    shares = sum(one.explained for one in found_effects(diagnosis))
+    assert shares == pytest.approx(diagnosis.explained, abs=0.02)
+
+
+def test_velocity_jumps_after_turns_while_an_effect_is_missing(bench):
+    missing, none = jump(bench.diagnosis(effects=_HIDDEN))[0], jump(bench.diagnosis())[0]
+    # Standardised: 19 stops of three components scatter by a tenth about one.
+    assert none == pytest.approx(1.0, abs=0.4)
+    assert missing > 2.0 * none
+
+
+def test_a_rung_that_does_not_lower_the_held_out_error_is_refused(bench):
+    good, bad = bench.diagnosis(), bench.diagnosis(effects=_HIDDEN)
+    assert rung("any", bad, good).reason
+    assert rung("any", good, bad).accepted
+
+
+def test_outliers_end_as_a_wrong_noise_model_not_as_an_effect(bench):
+    clean = bench.recording(seed=104)
+    rng = np.random.default_rng(104)
+    n = len(clean.t)
+    # One sample in a hundred is wrong by twenty sigma of a sample, every axis at its own times.
+    sigma = bench.imu.gyro_white_noise * np.sqrt(20.0), bench.imu.accel_white_noise * np.sqrt(20.0)
+    wrong = [20.0 * s * rng.standard_normal((n, 3)) * (rng.random((n, 3)) < 0.01) for s in sigma]
+    dirty = replace(clean, omega_ib_b=clean.omega_ib_b + wrong[0], f_ib_b=clean.f_ib_b + wrong[1])
+    diagnosis = diagnose(dirty, bench.site, bench.imu, bench.model)
+    assert diagnosis.verdict == "noise model wrong"
+    assert not diagnosis.chosen
+
+
+def test_a_wrong_density_ends_as_a_wrong_noise_model_and_is_measured(bench):
+    told = replace(bench.imu, gyro_white_noise=bench.imu.gyro_white_noise / 1.3)
+    diagnosis = diagnose(bench.recording(seed=105), bench.site, told, bench.model)
+    assert diagnosis.verdict == "noise model wrong"
+    gyro = diagnosis.consistency.gyro
+    assert abs(gyro.ratio - 1.3) < 4.0 * gyro.sigma
+    assert abs(diagnosis.consistency.accel.ratio - 1.0) < 4.0 * diagnosis.consistency.accel.sigma
+
+
+def test_turns_of_one_sign_hide_scale_asymmetry_and_the_reason_is_said(bench):
+    one_sided = bench.diagnosis(plan="kim18")
+    hidden = {r.label for r in reach(one_sided) if not r.testable}
+    axes = {f"gyro_scale_asymmetry_{a}" for a in "xyz"}
+    assert axes <= hidden
+    told = blind(reach(one_sided), plan_seen(one_sided.evidence))
+    (group,) = [b for b in told if axes <= set(b.labels)]
+    assert "positive" in group.reason
+    both = bench.diagnosis()
+    assert not axes & {r.label for r in reach(both) if not r.testable}
+
+
+def test_the_plan_is_read_from_the_motion(bench):
+    seen = plan_seen(bench.diagnosis().evidence)
+    plan = bench.plan()
+    assert len(seen.turns) == len(plan.turns)
+    assert seen.oblique == 0
+    for turn, meant in zip(seen.turns, plan.turns, strict=True):
+        assert "xyz".index(meant.axis.lower()) == turn.axis
+        # Up to 3 deg of mount about every axis turn the body axes against the table's.
+        assert turn.angle == pytest.approx(meant.angle_rad, abs=np.radians(2.0))
+
+
+def test_the_search_stays_quiet_on_noise(bench):
+    null = bootstrap(bench.diagnosis(), draws=20, seed=3)
+    # Probability 0.02 each: four of twenty have 6e-4.
+    assert null.false_finds <= 3
+    assert null.rms_z == pytest.approx(1.0, abs=4.0 / np.sqrt(2.0 * _EFFECTIVE * null.draws))

@@ -1,0 +1,85 @@
+"""The signatures are the filter itself: what they say of the coefficients is what the filter says."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from sdimu_calibration.core.calibrate import fit_statistics
+from sdimu_calibration.core.diagnosis.evidence import collect
+from sdimu_calibration.core.diagnosis.scan import TESTABLE, scan
+from sdimu_calibration.core.effects import registry
+from sdimu_calibration.core.imu_model import build
+from sdimu_calibration.core.passes import solve
+
+
+def _silent(_what, _share):
+    return None
+
+
+def _evidence(bench, names, **options):
+    solution = bench.solution(**options)
+    return collect(solution.reduced, solution.setup, solution.last, [registry.get(n) for n in names])
+
+
+def _share_left(evidence, weights):
+    """Signature that the coefficients leave of a combination of candidates, against its members' own signatures."""
+    given = evidence.information.given(evidence.model, evidence.weight)
+    v = np.zeros(len(evidence.names))
+    for name, value in weights.items():
+        v[evidence.names.index(name)] = value
+    return float(np.sqrt(max(v @ given.J @ v, 0.0) / (v**2 @ np.diag(evidence.information.J))))
+
+
+def test_information_of_the_signatures_is_the_covariance_of_the_filter(bench):
+    solution = bench.solution()
+    evidence = _evidence(bench, [])
+    p = len(evidence.weight)
+    covariance = np.linalg.inv(evidence.information.J[:p, :p] + np.diag(evidence.weight))
+    unit = 1.0 / np.sqrt(np.diag(solution.last.covariance))
+    # Both describe one linear model; they differ by the coefficients' last step, thousandths of a sigma.
+    np.testing.assert_allclose(
+        covariance * np.outer(unit, unit), solution.last.covariance * np.outer(unit, unit), atol=1e-3
+    )
+
+
+def test_the_score_is_the_fall_of_chi_square_of_a_refit(bench):
+    hidden = ("accel_quadratic_x=60 ug/g^2",)
+    solution = bench.solution(effects=hidden)
+    evidence = _evidence(bench, ["accel_quadratic"], effects=hidden)
+    column = evidence.names.index("accel_quadratic_x")
+    scanned = scan(evidence.information, evidence.model, evidence.weight)
+    effect = registry.get("accel_quadratic").only(("accel_quadratic_x",))
+    wide = replace(solution.setup, sensors=build([*solution.setup.sensors.effects, effect], solution.setup.imu))
+    refit = solve(wide, solution.reduced, _silent)
+    gain = fit_statistics(refit.last)["log_likelihood"] - fit_statistics(solution.last)["log_likelihood"]
+    # The filter's likelihood is marginal over the prior: log N(d; 0, J + w) against the score d^2 / J.
+    J, d, w = scanned.information.J[column, column], scanned.information.d[column], effect.prior["navigation"] ** -2
+    assert abs(scanned.z[column]) > 8.0
+    expected = 0.5 * d**2 / (J + w) - 0.5 * np.log1p(J / w)
+    # Second order in an effect of this size is percents of its chi-square.
+    assert abs(gain / expected - 1.0) < 0.05
+
+
+def test_a_delay_common_to_all_six_sensors_cannot_be_seen(bench):
+    evidence = _evidence(bench, ["gyro_delay", "accel_delay"])
+    common = {f"{triad}_delay_{axis}": 1.0 for triad in ("gyro", "accel") for axis in "xyz"}
+    one = {"accel_delay_x": 1.0}
+    # All six late alike is a clock that is late. Cycles of 0.1 s blur ramps of 2 s: that share of it may stay.
+    assert _share_left(evidence, common) < 0.05
+    assert _share_left(evidence, one) > 0.5
+
+
+def test_gravity_is_a_common_scale_factor_of_the_accelerometers(bench):
+    evidence = _evidence(bench, ["reference_gravity", "reference_latitude"])
+    assert _share_left(evidence, {"reference_gravity": 1.0}) < TESTABLE
+    assert _share_left(evidence, {"reference_latitude": 1.0}) > TESTABLE
+
+
+def test_three_squares_of_force_sum_to_a_bias(bench):
+    evidence = _evidence(bench, ["gyro_g_squared"])
+    for sensor in "xyz":
+        squares = {f"gyro_g_squared_{sensor}{axis}": 1.0 for axis in "xyz"}
+        assert _share_left(evidence, squares) < TESTABLE
+        assert _share_left(evidence, {f"gyro_g_squared_{sensor}x": 1.0}) > TESTABLE

@@ -1,0 +1,186 @@
+"""An effect of one's own: read safely, held to its units, and as good as a built-in one."""
+
+from __future__ import annotations
+
+import importlib.metadata
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rate_table_sim.core.specification import TableSpecification
+from sdimu_calibration.core.calibrate import calibrate
+from sdimu_calibration.core.diagnosis.evidence import collect
+from sdimu_calibration.core.effects import registry
+from sdimu_calibration.core.passes import reduce, set_up, solve
+from sdimu_calibration.core.plan import Plan, Turn
+from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.specification import Site
+from sdimu_calibration.core.units import parse_unit
+from sdimu_calibration.storage import effect_file
+from sdimu_calibration.storage.config import load_imu, load_model
+from sdimu_calibration.storage.effect_file import extended_model, find_effects, load_effect, si_unit
+from sdimu_sim.core.scenario import Scenario, generate
+
+TWIN = """\
+format: sdimu-effect/1
+name: bent_force
+expressions:
+  accel_x: k * ax**2
+parameters:
+  k: {unit: ug/g^2, prior: 30 ug/g^2}
+"""
+SITE = Site(latitude_rad=float(np.radians(36.4)))
+
+
+@pytest.fixture
+def write(tmp_path):
+    def make(text: str):
+        path = tmp_path / "own.yaml"
+        path.write_text(text)
+        return path
+
+    return make
+
+
+@pytest.fixture(scope="module")
+def recording():
+    turns = tuple(Turn(a, np.radians(90.0), np.radians(15.0)) for a in "XYZXYZ")
+    plan = Plan("six turns", (20.0,) * 7, turns, np.radians(60.0))
+    table, hidden = TableSpecification(axes=None), ("accel_quadratic_x=200 ug/g^2",)
+    return generate(Scenario(plan, load_imu("dtg"), SITE, table=table, rate_hz=20.0, seed=5, effects=hidden))[0]
+
+
+def test_an_effect_by_file_gives_the_numbers_of_its_built_in_twin(write, recording):
+    imu = load_imu("dtg")
+    built_in = registry.get("accel_quadratic").only(("accel_quadratic_x",))
+    prior = {"accel_quadratic": built_in.prior["navigation"], "bent_force": built_in.prior["navigation"]}
+    imu = replace(imu, prior={**imu.prior, **prior})
+    baseline = load_model("baseline")
+    results = [
+        calibrate(recording, SITE, imu, replace(baseline, effects=(*baseline.effects, effect)), held_out=False)
+        for effect in (built_in, load_effect(write(TWIN))[0])
+    ]
+    sigma = np.sqrt(np.diag(results[0].covariance))
+    np.testing.assert_allclose((results[1].values - results[0].values)[sigma > 0] / sigma[sigma > 0], 0.0, atol=1e-9)
+    np.testing.assert_allclose(results[1].covariance, results[0].covariance, rtol=1e-9, atol=1e-30)
+
+
+def test_as_a_candidate_it_has_the_signature_of_its_twin(write, recording):
+    setup = set_up(SITE, load_imu("dtg"), load_model("baseline"))
+    solution = solve(setup, reduce(recording, setup), lambda _what, _share: None, keep=True)
+    pair = [registry.get("accel_quadratic").only(("accel_quadratic_x",)), *load_effect(write(TWIN))]
+    W = collect(solution.reduced, setup, solution.last, pair).W[:, -2:]
+    np.testing.assert_allclose(W[:, 1], W[:, 0], rtol=1e-9, atol=1e-9 * np.abs(W[:, 0]).max())
+
+
+def test_each_parameter_has_its_own_name_unit_and_prior(write):
+    text = TWIN.replace("k * ax**2", "k * ax**2 + m * ax * wtz").replace(
+        "prior: 30 ug/g^2}", "prior: 30 ug/g^2}\n  m: {unit: ug*s/deg/g, prior: 5 ug*s/deg/g}"
+    )
+    k, m = load_effect(write(text))
+    assert (k.parameters[0].name, m.parameters[0].name) == ("bent_force_k", "bent_force_m")
+    assert k.parameters[0].unit == "m/g^2/s^2"
+    assert m.prior["mems"] == pytest.approx(5e-6 * 9.80665 * 180.0 / np.pi)
+    assert k.family == m.family == "bent_force"
+
+
+@pytest.mark.parametrize("unit", ["deg/h/g", "ug/g^2", "ppm", "deg/h/sqrt(Hz)", "ms", "ug*s/deg", "deg/h/G"])
+def test_si_units_keep_the_kind_and_have_factor_one(unit):
+    si = parse_unit(si_unit(unit))
+    assert si.dimension == parse_unit(unit).dimension
+    assert si.factor == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (("k * ax**2", "k * ax"), ("expressions.accel_x", "comes to", "m/s^2")),
+        (("k * ax**2", "k * ax**2 + wz"), ("joins",)),
+        (("k * ax**2", "k * ax**2 * exp(-t)"), ("exp takes a number",)),
+        (("k * ax**2", "k * ax**2 * sin(k * 1e5)"), ("sin takes a number",)),
+        (("k * ax**2", "k * ax**2 + 1"), ("joins",)),
+        (("k * ax**2", "abs(k) * ax**2"), ("not linear in k",)),
+        (("k * ax**2", "k * ax**2 * speed"), ("unknown name 'speed'", "known:")),
+        (("k * ax**2", "k.__class__"), ("not allowed",)),
+        (("k * ax**2", "__import__('os').system('x')"), ("not allowed",)),
+        (("k * ax**2", "'[k][0] * ax**2'"), ("not allowed",)),
+        (("k * ax**2", "k * ax**"), ("cannot read",)),
+        (("k * ax**2", "k * ax**ay"), ("must be a",)),
+        (("accel_x:", "accel_q:"), ("own.yaml", "expressions")),
+        (("ug/g^2, prior", "furlong, prior"), ("furlong",)),
+        (("prior: 30 ug/g^2", "prior: 30 deg/h"), ("parameters.k.prior",)),
+        (("prior: 30 ug/g^2", "prior: 0 ug/g^2"), ("parameters.k.prior",)),
+        (("name: bent_force", "name: gyro_bias"), ("registered",)),
+        (("name: bent_force", "name: bent force"), ("name",)),
+        (("  k: {", "  m: {unit: ppm, prior: 1 ppm}\n  k: {"), ("parameters.m", "no expression")),
+        (("  k: {", "  t: {unit: s, prior: 1 s}\n  k: {"), ("parameters.t",)),
+        (("sdimu-effect/1", "sdimu-effect/2"), ("format",)),
+    ],
+)
+def test_every_mistake_in_a_file_is_one_clear_line(write, change, words):
+    old, new = change
+    assert old in TWIN
+    path = write(TWIN.replace(old, new))
+    with pytest.raises(DataError) as error:
+        load_effect(path)
+    text = str(error.value)
+    assert text.startswith(str(path))
+    assert "\n" not in text
+    for word in words:
+        assert word in text
+
+
+def test_constants_carry_units_into_a_formula(write):
+    text = TWIN.replace("ax**2", "exp(-t / tau)").replace("ug/g^2", "ug") + "constants: {tau: 300 s}\n"
+    (effect,) = load_effect(write(text))
+    assert effect.parameters[0].unit == "m/s^2"
+
+
+def test_an_absent_file_is_told_by_its_name(tmp_path):
+    with pytest.raises(DataError, match=r"nowhere\.yaml"):
+        find_effects(str(tmp_path / "nowhere.yaml"))
+
+
+def test_what_a_model_has_is_not_added_twice():
+    model = extended_model("baseline", ["accel_quadratic_x", "accel_quadratic", "gyro_bias"])
+    names = [p.name for e in model.effects for p in e.parameters]
+    assert len(names) == len(set(names)) == 33
+    # Every added effect has a name that `--add` reads back.
+    for effect in model.effects:
+        assert find_effects(effect.name)[0].parameters == effect.parameters
+
+
+class _Point:
+    """Stands for an entry point of another package."""
+
+    def __init__(self, name, answer):
+        self.name, self.value, self._answer = name, f"elsewhere:{name}", answer
+
+    def load(self):
+        if isinstance(self._answer, Exception):
+            raise self._answer
+        return lambda: self._answer
+
+
+def test_a_plug_in_becomes_part_of_the_catalogue(monkeypatch):
+    like = registry.get("gyro_scale_cubic")
+    parameters = tuple(replace(p, name=f"plugged_in_{k}") for k, p in enumerate(like.parameters))
+    effect = replace(like, name="plugged_in", parameters=parameters)
+    monkeypatch.setattr(registry, "_EFFECTS", dict(registry._EFFECTS))
+    monkeypatch.setattr(effect_file, "_LOADED", set())
+    monkeypatch.setattr(effect_file, "entry_points", lambda group: [_Point("p", effect)] if "effects" in group else [])
+    assert find_effects("plugged_in")[0].parameters == effect.parameters
+    assert "plugged_in" in registry.names()
+
+
+@pytest.mark.parametrize("answer", [ImportError("gone"), "no effect", registry.get("gyro_bias")])
+def test_a_bad_plug_in_is_one_line(monkeypatch, answer):
+    monkeypatch.setattr(effect_file, "_LOADED", set())
+    monkeypatch.setattr(effect_file, "entry_points", lambda group: [_Point("bad", answer)] if group else [])
+    with pytest.raises(DataError, match="plug-in 'bad'"):
+        find_effects("gyro_bias")
+
+
+def test_the_group_of_plug_ins_is_read_from_installed_packages():
+    assert effect_file.entry_points is importlib.metadata.entry_points
