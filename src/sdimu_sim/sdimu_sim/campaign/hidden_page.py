@@ -58,7 +58,7 @@ def _figures(summary: Mapping[str, Any]) -> str:
             value, interval = f"{f['count']} of {f['of']} = {f['value']:.1%}", f"{f['low']:.1%} to {f['high']:.1%}"
         else:
             value, interval = f"{f['value']:.3f} ({f['of']} runs)", f"{f['low']:.3f} to {f['high']:.3f}"
-        reached = "reached" if f["reached"] else "missed"
+        reached = {True: "reached", False: "missed", None: ""}[f["reached"]]
         rows.append(f"| {f['name']} | {value} | {interval} | {f['wanted']} | {reached} |")
     return "\n".join(rows) + "\n"
 

@@ -47,15 +47,20 @@ def summarise(rows: Sequence[Row]) -> dict[str, Any]:
     }
 
 
-def share(name: str, hits: Sequence[bool], wanted: float, most: bool = False) -> dict[str, Any]:
-    """Share of hits with its 95 % interval (Clopper & Pearson 1934); `most`: wanted is an upper limit."""
+def share(name: str, hits: Sequence[bool], wanted: float | None, most: bool = False) -> dict[str, Any]:
+    """Share of hits with its 95 % interval (Clopper & Pearson 1934).
+
+    `most`: wanted is an upper limit; None: nothing is asked.
+    """
     n, k = len(hits), int(sum(hits))
     low = float(beta.ppf(0.025, k, n - k + 1)) if k else 0.0
     high = float(beta.ppf(0.975, k + 1, n - k)) if k < n else 1.0
     value = k / n if n else None
+    figure = {"name": name, "count": k, "of": n, "value": value, "low": low, "high": high}
+    if wanted is None:
+        return figure | {"wanted": "", "reached": None}
     reached = value is not None and (value <= wanted if most else value >= wanted)
-    return {"name": name, "count": k, "of": n, "value": value, "low": low, "high": high,
-            "wanted": f"{'<=' if most else '>='} {wanted:.0%}", "reached": reached}  # fmt: skip
+    return figure | {"wanted": f"{'<=' if most else '>='} {wanted:.0%}", "reached": reached}
 
 
 def number(name: str, values: Sequence[float], low: float, high: float) -> dict[str, Any]:
@@ -85,7 +90,7 @@ def _named(rows: Sequence[Row]) -> list[dict[str, Any]]:
     sized = [t for t in strong if t["in_class"] and t["error_sigmas"] is not None]
     return [
         share("one effect of 8 to 30 sigma: in the first class named", [t["in_class"] for t in strong], 0.95),
-        share("... named first", [t["best"] for t in strong], 0.0),
+        share("... named first", [t["best"] for t in strong], None),
         share("... amplitude within 3 sigma, where named", [abs(t["error_sigmas"]) <= 3.0 for t in sized], 0.99),
         share("one effect of 5 sigma: in the first class named", [t["in_class"] for t in weak], 0.75),
         share("two effects of 10 to 30 sigma: both named", [_all_named(r) for r in pairs], 0.85),
