@@ -25,7 +25,9 @@ parameters:
 
 STYLE = """
 body { font: 15px/1.45 system-ui, sans-serif; color: #222; margin: 0; }
-main { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, 560px), 1fr)); gap: 0 2em; }
+main { display: grid; grid-template-columns: 1fr 1fr; gap: 0 2em; }
+@media (max-width: 1100px) { main { display: block; } }
+@media (min-width: 2400px) { body { font-size: 20px; } }
 main { padding: 0 1.5em; } section { min-width: 0; } .whole { grid-column: 1 / -1; }
 h1 { font-size: 1.3em; margin: .6em 1.15em 0; } h2 { font-size: 1.05em; margin: 1em 0 .3em; }
 .verdict { border: 2px solid #222; border-left-width: 12px; padding: .5em 1em; margin: .6em 1.5em; }
