@@ -28,6 +28,7 @@ _VERBS = {
     "effects": "sdimu_calibration.cli.effects:effects",
     "predict": "sdimu_calibration.cli.predict:predict",
     "replay": "sdimu_calibration.cli.replay:replay",
+    "workbench": "sdimu_calibration.cli.workbench:workbench",
     "bag": "sdimu_calibration.cli.bag:app",
 }
 
