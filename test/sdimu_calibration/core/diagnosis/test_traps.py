@@ -1,4 +1,4 @@
-"""Four mistakes that make discoveries of noise: put back, each shows in the scores of clean data."""
+"""Two mistakes that make discoveries of noise: put back, each shows in the scores of clean data."""
 
 from __future__ import annotations
 
@@ -55,5 +55,5 @@ def test_a_filter_that_forgets_shared_noise_inflates_the_scores_of_gyro_drifts(b
         right.append(_scores(_collect(solution, solution.setup, _DRIFTS)))
         wrong.append(_scores(_collect(forgetful, deaf, _DRIFTS)))
     ratio = np.sqrt(np.mean(np.square(np.concatenate(wrong))) / np.mean(np.square(np.concatenate(right))))
-    # Design study: 1.5 with measurements every second; a tenth would already be wrong.
+    # Design study: 1.5 with measurements every second. Seen here before the bound was set: 1.26 to 1.49 on four seeds.
     assert ratio > 1.1
