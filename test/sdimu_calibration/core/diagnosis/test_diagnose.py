@@ -17,7 +17,7 @@ from sdimu_calibration.core.units import to_si
 
 SEEDS = (101, 102, 103)
 _EFFECTIVE = 150
-"""Independent directions among the candidates, of the order that the design study gives (144 to 159); not computed here."""
+"""Independent directions among the candidates; the design study gives 144 to 159, it is not computed here."""
 _HIDDEN = ("accel_scale_asymmetry_z=60 ppm",)
 
 
