@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
@@ -44,14 +43,19 @@ def test_help_lists_the_verbs_of_all_packages(sdimu):
         assert verb in out
 
 
-def test_help_is_quick():
-    # Half a second is what a person takes for "at once"; the best of three leaves other load out.
-    seconds = []
-    for _ in range(3):
-        start = time.perf_counter()
-        subprocess.run([sys.executable, "-m", "sdimu_calibration.cli.main", "--help"], check=True, capture_output=True)
-        seconds.append(time.perf_counter() - start)
-    assert min(seconds) < 0.5
+def test_help_loads_nothing_heavy():
+    # What makes a command line slow is what it imports; this holds on a busy machine too.
+    code = (
+        "import sys\n"
+        "from sdimu_calibration.cli import main\n"
+        "sys.argv = ['sdimu', '--help']\n"
+        "try:\n    main.main()\nexcept SystemExit:\n    pass\n"
+        "heavy = {'numba', 'scipy', 'plotly', 'rclpy', 'dash', 'dask'} & set(sys.modules)\n"
+        "sys.exit(f'loaded {sorted(heavy)}' if heavy else 0)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "calibrate" in done.stdout
 
 
 def test_wrong_usage_exits_2(sdimu):
