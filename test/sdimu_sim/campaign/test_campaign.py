@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from rate_table_sim.core import TableSpecification
+from sdimu_calibration.core.passes import MOST_PASSES
 from sdimu_calibration.core.plan import Plan, Turn
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage.config import load_imu, load_model, load_site
@@ -162,6 +163,14 @@ def test_four_tests_calibrated_in_processes_are_those_calibrated_here(tmp_path):
     assert len(summary["coefficients"]) == summary["nees"]["dof"] == 27
     # Errors of an honest filter: no coefficient of four runs is six sigma off (1e-9 each, 108 of them).
     assert max(c["rms_z"] for c in summary["coefficients"]) < 6.0
+
+
+def test_a_run_that_took_all_passes_is_named():
+    work = CalibrationRun(SCENARIO, load_model("baseline"))
+    rows = [{**work(seed), "seed": seed, "wall_s": 1.0, "cpu_s": 1.0} for seed in (1, 2, 3)]
+    assert summarise(rows, work.model, SCENARIO.imu)["unconverged"] == []
+    rows[1]["passes"] = MOST_PASSES
+    assert summarise(rows, work.model, SCENARIO.imu)["unconverged"] == [2]
 
 
 def test_a_campaign_of_failures_says_why():

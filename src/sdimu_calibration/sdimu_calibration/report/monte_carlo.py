@@ -87,7 +87,7 @@ def write_page(path: Path, data: Path) -> None:
 
 def page(content: Mapping[str, Any]) -> str:
     """Make the page as HTML text."""
-    runs, lost = content["runs"], content["failed"]
+    runs, lost, slow = content["runs"], content["failed"], content.get("unconverged", [])
     bad = [c["name"] for c in content["checks"] if not c["passed"]]
     verdict = f"{len(bad)} of {len(content['checks'])} checks failed." if bad else "All checks passed."
     heading = f"Monte-Carlo campaign of {runs} runs"
@@ -103,6 +103,8 @@ def page(content: Mapping[str, Any]) -> str:
         f'<p class="quiet">RMS over the runs; bound: {escape(content["bound_from"])}.</p>',
         "<h2>Distributions</h2>",
         figure,
+        *(["<h2>Runs that took all passes and may not have converged</h2>"] if slow else []),
+        *([f"<p>seeds {', '.join(map(str, slow))}</p>"] if slow else []),
         *(["<h2>Failed runs</h2>"] if lost else []),
         *(f"<p>seed {run['seed']}: {escape(str(run['error']))}</p>" for run in lost),
     ]

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from sdimu_calibration.core import imu_model
+from sdimu_calibration.core.passes import MOST_PASSES
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.specification import ImuSpecification, Model
 from sdimu_sim.campaign import statistics
@@ -72,6 +73,7 @@ def summarise(
     return {
         "format": FORMAT,
         "runs": n,
+        "unconverged": [row["seed"] for row in good if row["passes"] >= MOST_PASSES],
         "failed": [{"seed": row["seed"], "error": row["error"]} for row in failed(rows)],
         "body_frame": model.body_frame,
         "model": list(model.effects),

@@ -76,6 +76,9 @@ def monte_carlo(
     console.print(coefficients_table(summary), checks_table(summary), soft_wrap=True)
     for run in summary["failed"]:
         console.print(f"seed {run['seed']} failed: {run['error']}", soft_wrap=True, markup=False, highlight=False)
+    if summary["unconverged"]:
+        seeds = ", ".join(map(str, summary["unconverged"]))
+        console.print(f"took all passes and may not have converged: seeds {seeds}", soft_wrap=True)
     console.print(f"results in {out}", soft_wrap=True)
 
 
