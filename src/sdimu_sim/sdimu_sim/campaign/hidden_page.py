@@ -41,6 +41,7 @@ def page(summary: Mapping[str, Any]) -> str:
     runs = ", ".join(f"{n} {kind}" for kind, n in summary["runs"].items())
     parts = [
         _HEAD, f"Runs: {runs}; seeds from {summary.get('first_seed', '?')}; {len(summary['failed'])} failed.\n",
+        *([f"{summary['note']}\n"] if summary.get("note") else []),
         "## Figures\n", _figures(summary), "## Families drawn against families named\n",
         "One effect, 5 sigma and 8 to 30 sigma together. `nothing`: the recording was called consistent.\n",
         _confusion(summary), "## Outside the catalogue\n", _outside(summary), "## Strong effects that were missed\n",
