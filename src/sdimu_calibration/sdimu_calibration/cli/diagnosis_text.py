@@ -68,7 +68,7 @@ def _candidates(console: Console, told: Account) -> None:
                 ", ".join(f.alike[:4]),
             ]
         )  # fmt: skip
-    headings = ("effect", "estimate", "+-", "unit", "z", "explains", "held-out error", "looks the same here")
+    headings = ("effect", "estimate", "+-", "unit", "z", "explains", "one stop held out", "looks the same here")
     title = "found" if told.candidates else "tried, but not enough to explain the misfit"
     print_table(console, headings, lines, title)
 
@@ -78,7 +78,7 @@ def _steps(console: Console, told: Account) -> None:
     if not steps:
         return
     for number, s in enumerate(steps, start=1):
-        end = f"held-out error {s.held_out_before.rms:.3f} -> {s.held_out_after.rms:.3f}"
+        end = f"error with one stop held out {s.held_out_before.rms:.3f} -> {s.held_out_after.rms:.3f}"
         what = "added" if s.accepted else f"refused: {s.reason}"
         _line(
             console,

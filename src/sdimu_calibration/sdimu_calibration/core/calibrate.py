@@ -20,12 +20,18 @@ from sdimu_calibration.core.passes import (
     set_up,
     solve,
 )
-from sdimu_calibration.core.recording import Recording
+from sdimu_calibration.core.recording import DataError, Recording
 from sdimu_calibration.core.results import Calibration, History
 from sdimu_calibration.core.specification import ImuSpecification, Model, Site
 
 Floats = NDArray[np.float64]
 
+NOT_CONVERGED = "the passes did not come to rest: the estimate is not trustworthy; check --imu and --site"
+_ABSURD = 1e3
+_MISFIT = 1.2
+"""NIS per degree of freedom, and held-out error, from which a user is told."""
+_OUTSIDE = 4.5
+"""Prior sigmas beyond which a coefficient is told."""
 HELD_OUT_FOLDS = 3
 """Every stop is held out once, in this many groups of stops."""
 
@@ -90,9 +96,36 @@ def assemble(recording: Recording, solution: Solution, held_out: bool) -> Calibr
         covariance=J @ last.covariance @ J.T,
         fit=fit,
         data=data_counts(recording, reduced),
-        notes=recording.notes,
+        notes=(*recording.notes, *_warnings(solution, fit)),
         history=history(reduced, setup, solution.first),
     )
+
+
+def _warnings(solution: Solution, fit: dict[str, float | None]) -> list[str]:
+    """Say what speaks against the estimate.
+
+    Raises
+    ------
+    DataError
+        When it is not one at all.
+    """
+    nis, held_out = fit["nis_mean"] or 0.0, fit["held_out_rms"]
+    lost = int(solution.reduced.cycles.lost.sum())
+    in_turn = f"; {lost} samples are missing by their stamps" if lost else ""
+    if nis > _ABSURD:
+        raise DataError(
+            f"the recording contradicts the model: squared innovations are {nis:.3g} times what the noise explains"
+            f"{in_turn}; check --imu, --site, units and axes"
+        )
+    out = [] if solution.converged else [NOT_CONVERGED]
+    if nis > _MISFIT or (held_out is not None and held_out > _MISFIT):
+        text = f"NIS {nis:.3f}" + ("" if held_out is None else f", held-out error {held_out:.3f}")
+        out.append(f"the model does not fit ({text}; 1 is right){in_turn}; run: sdimu diagnose")
+    size = np.abs(solution.last.estimate) / solution.setup.sensors.prior
+    worst = int(np.argmax(size))
+    if size[worst] > _OUTSIDE:
+        out.append(f"{solution.setup.sensors.names[worst]} is {size[worst]:.1f} times the sigma of the specification")
+    return out
 
 
 def fit_statistics(finished: Pass) -> dict[str, float | None]:

@@ -8,7 +8,7 @@ coefficients move by less than `CONVERGED` of their sigmas (Gauss-Newton on the 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,9 +40,18 @@ from sdimu_calibration.core.track import motion
 Floats = NDArray[np.float64]
 Progress = Callable[[str, float], None]
 
-CONVERGED = 5e-3
+CONVERGED = 0.02
 """Largest movement of a coefficient in its own sigma at which the passes end."""
-MOST_PASSES = 12
+MOST_PASSES = 16
+_LOOSE_VELOCITY = 1.0
+_LOOSE_POSITION = 100.0
+"""Sigmas of Zv (m/s) and Zp (m) while the passes find their place: too wide to say anything."""
+_FITS = 1.1
+"""Mean NIS of a first pass from which linearisation is not the trouble."""
+_NEAR = 0.2
+"""Movement in sigma at which an estimate that ran out of passes is still one."""
+_SETTLED = 0.1
+"""Movement in sigma at which position and velocity are taken in again."""
 SNAPSHOT_EPOCHS = 5
 """The covariance of the coefficients is kept every so many epochs."""
 ALIGN_S = 30.0
@@ -249,18 +258,40 @@ def smoothed_start(finished: Pass) -> Floats:
 
 def refine(
     reduced: Reduced, setup: Setup, start: Alignment, first: Pass, progress: Progress, keep: bool
-) -> tuple[Pass, int]:
-    """Repeat open-loop passes until the coefficients stand still; return the last and the number of all passes."""
+) -> tuple[Pass, int, bool]:
+    """Repeat open-loop passes until the coefficients stand still.
+
+    Position and velocity are known so well that the second order of a large error of the initial azimuth contradicts
+    them, and holding on to them pins the azimuth where it is. A first pass that did not fit is therefore followed
+    by passes that let them go, until the rest has found its place.
+
+    Returns
+    -------
+    last : Pass
+    passes : int
+        The number of all passes.
+    converged : bool
+    """
     last = first
+    loose = replace(setup, model=replace(setup.model, velocity_sigma=_LOOSE_VELOCITY, position_sigma=_LOOSE_POSITION))
+    nis = first.output.nis
+    settling = bool(np.nansum(nis) > _FITS * 3 * np.isfinite(nis).sum())
+    tight = 0
     for count in range(2, MOST_PASSES + 1):
-        progress("passes", min(0.95, 0.3 + 0.2 * (count - 1)))
+        progress("passes", min(0.95, 0.3 + 0.1 * (count - 1)))
         reference = last.estimate * (setup.sensors.decay_rate == 0.0)
-        new = one_pass(reduced, setup, start, smoothed_start(last), reference, closed_loop=False, keep=keep)
+        use = loose if settling else setup
+        new = one_pass(reduced, use, start, smoothed_start(last), reference, closed_loop=False, keep=keep)
         moved = np.max(np.abs(new.estimate - last.estimate) / np.sqrt(np.diag(new.covariance)))
         last = new
-        if count > 2 and moved < CONVERGED:
-            break
-    return last, count
+        if settling:
+            settling = not (moved < _SETTLED or count > MOST_PASSES // 2)
+            continue
+        tight += 1
+        if tight > 1 and moved < CONVERGED:
+            return last, count, True
+    # The passes contract by a third each where Earth rate says little of the azimuth: near enough is told from lost.
+    return last, MOST_PASSES, bool(moved < _NEAR)
 
 
 @dataclass(frozen=True)
@@ -274,6 +305,8 @@ class Solution:
         The closed-loop pass and the converged one.
     passes : int
         How many there were.
+    converged : bool
+        The coefficients stood still at the end.
     """
 
     setup: Setup
@@ -282,6 +315,7 @@ class Solution:
     first: Pass
     last: Pass
     passes: int
+    converged: bool
 
 
 def solve(setup: Setup, reduced: Reduced, progress: Progress, keep: bool = False) -> Solution:
@@ -303,5 +337,5 @@ def solve(setup: Setup, reduced: Reduced, progress: Progress, keep: bool = False
     progress("passes", 0.2)
     none = np.zeros(len(setup.sensors.prior))
     first = one_pass(reduced, setup, start, start.C_nb, none, closed_loop=True, keep=False)
-    last, passes = refine(reduced, setup, start, first, progress, keep=keep)
-    return Solution(setup, reduced, start, first, last, passes)
+    last, passes, converged = refine(reduced, setup, start, first, progress, keep=keep)
+    return Solution(setup, reduced, start, first, last, passes, converged)

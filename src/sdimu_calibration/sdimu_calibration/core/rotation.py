@@ -56,7 +56,7 @@ def rotation_matrix(phi: Floats) -> Floats:
 
 @compiled
 def quaternion(C: Floats) -> Floats:
-    """Unit quaternion (w, x, y, z), w >= 0, of a rotation matrix.
+    """Give the unit quaternion (w, x, y, z), w >= 0, of a rotation matrix.
 
     Divides by the largest of the four components, so no angle loses digits (Shepperd, J. Guidance and Control 1, 1978).
     """

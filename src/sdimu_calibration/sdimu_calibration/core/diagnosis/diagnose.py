@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import norm
 
-from sdimu_calibration.core.calibrate import assemble
+from sdimu_calibration.core.calibrate import NOT_CONVERGED, assemble
 from sdimu_calibration.core.diagnosis.candidates import Candidate
 from sdimu_calibration.core.diagnosis.consistency import Consistency, check
 from sdimu_calibration.core.diagnosis.evidence import Evidence
@@ -137,6 +137,8 @@ def diagnose(
         solution = solve(setup, reduced, tell, keep=True)
     look = settle(solution, extra, alpha, tell)
     findings += beyond_specification(look.solution)
+    if not look.solution.converged:
+        findings += (Finding(NOT_CONVERGED, True),)
     tell("report", 0.9)
     base = assemble(recording, solution, held_out=True)
     final = assemble(recording, look.solution, held_out=True) if look.chosen else base
@@ -211,12 +213,18 @@ def _verdict(
             return "several effects"
         if look.chosen[0].effect.run_local:
             return "data fault"
-        return "class of effects" if look.found.steps[0].alike else "one effect"
+        return "class of effects" if _alike(look.found, look.chosen[0].label) else "one effect"
     if noise:
         return "noise model wrong"
-    if any(not s.accepted for s in look.found.steps):
+    if look.found.steps:
+        # Something stood out of the noise and was refused or did not last.
         return "unexplained"
     return "consistent"
+
+
+def _alike(found: Search, label: str) -> tuple[str, ...]:
+    """Name what the data cannot tell from a chosen effect."""
+    return next((s.alike for s in found.steps if s.label == label), ())
 
 
 def _sentence(d: Diagnosis) -> str:
@@ -235,9 +243,9 @@ def _sentence(d: Diagnosis) -> str:
         return f"Something is missing that no effect of the catalogue explains{tail}."
     if d.verdict == "own equation":
         return f"Something is missing that is not in the catalogue; it follows {names}."
-    rest = f"held-out error {_rms(d.before):.3f} -> {_rms(d.after):.3f}"
+    rest = f"error at stops held out, a third at a time: {_rms(d.before):.3f} -> {_rms(d.after):.3f}"
     if d.verdict == "class of effects":
-        others = ", ".join(d.found.steps[0].alike[:4])
+        others = ", ".join(_alike(d.found, d.chosen[0].label)[:4])
         return f"One effect is missing: {names}, or what looks the same here ({others}); {rest}."
     return f"{'One effect is' if d.verdict == 'one effect' else 'Several effects are'} missing: {names}; {rest}."
 

@@ -111,13 +111,15 @@ def settle(base: Solution, extra: Sequence[Effect], alpha: float, progress: Prog
 
 
 def drop_companions(base: Solution, look: Look, progress: Progress) -> Look:
-    """Calibrate with what was chosen and drop what is then smaller than three of its sigmas."""
+    """Calibrate with what was chosen; drop the weakest below three of its sigmas, one at a time."""
     while True:
         chosen = look.chosen
         solution = with_effects(base, chosen, progress) if chosen else base
         last, p = solution.last, len(look.evidence.weight)
         size = np.abs(last.estimate[p:]) / np.sqrt(np.diag(last.covariance)[p:])
-        keep = size >= LEAST_SIGMAS
+        keep = np.ones(len(size), dtype=bool)
+        if len(size) and size.min() < LEAST_SIGMAS:
+            keep[int(np.argmin(size))] = False
         kept = look.found.chosen[keep]
         look = replace(look, solution=solution, found=replace(look.found, chosen=kept))
         if keep.all():

@@ -173,9 +173,10 @@ def search(evidence: Evidence, allowed: Ints, alpha: float = FALSE_ALARM) -> Sea
     before = problem.held_out(chosen, 1.0)
     scanned = first
     while len(steps) < MOST_STEPS:
-        scores = np.where(np.abs(scanned.z) > limit, problem.scores(scanned, scale), -np.inf)
-        best = int(np.argmax(scores))
-        if not np.isfinite(scores[best]):
+        scores = problem.scores(scanned, scale)
+        above = np.where(np.abs(scanned.z) > limit, scores, -np.inf)
+        best = int(np.argmax(above))
+        if not np.isfinite(above[best]):
             break
         trial = _polish(problem, [*chosen, best])
         after = problem.held_out(trial, 1.0)

@@ -167,13 +167,13 @@ def _onward(parent: Solution, setup: Setup) -> Solution:
     reference = np.array([known.get(name, 0.0) for name in setup.sensors.names]) * constant
     start = smoothed_start(parent.last)
     begun = one_pass(parent.reduced, setup, parent.alignment, start, reference, closed_loop=False, keep=False)
-    last, passes = refine(parent.reduced, setup, parent.alignment, begun, _silent, keep=True)
+    last, passes, converged = refine(parent.reduced, setup, parent.alignment, begun, _silent, keep=True)
     # The history of the closed loop is made anew: it has more coefficients now.
     none = np.zeros(len(setup.sensors.prior))
     first = one_pass(
         parent.reduced, setup, parent.alignment, parent.alignment.C_nb, none, closed_loop=True, keep=False
     )
-    return Solution(setup, parent.reduced, parent.alignment, first, last, passes + 1)
+    return Solution(setup, parent.reduced, parent.alignment, first, last, passes + 1, converged)
 
 
 def _look(recording: Recording, solution: Solution) -> Diagnosis:
