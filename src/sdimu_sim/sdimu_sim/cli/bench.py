@@ -20,12 +20,18 @@ def bench(
     from rich.console import Console
     from rich.table import Table
 
-    table = Table(pad_edge=False, box=SIMPLE_HEAD)
-    for column in ("what", "wall", "processor", "rate"):
-        table.add_column(column, justify="left" if column == "what" else "right", no_wrap=True)
     with TemporaryDirectory() as folder:
-        for what, wall, cpu, count, noun in measure(plan, rate, repeats, Path(folder)):
-            table.add_row(what, f"{wall:.3f} s", f"{cpu:.3f} s", f"{count / wall:,.0f} {noun}/s")
+        lines = [
+            (what, f"{wall:.3f} s", f"{cpu:.3f} s", f"{count / wall:,.{0 if count > wall * 100 else 2}f} {noun}/s")
+            for what, wall, cpu, count, noun in measure(plan, rate, repeats, Path(folder))
+        ]
+    table = Table(pad_edge=False, box=SIMPLE_HEAD)
+    for place, column in enumerate(("what", "wall", "processor", "rate")):
+        # A narrow terminal may wrap lines; it must not cut digits.
+        width = max(len(line[place]) for line in lines)
+        table.add_column(column, justify="left" if column == "what" else "right", min_width=width)
+    for line in lines:
+        table.add_row(*line)
     Console().print(table, soft_wrap=True)
 
 
