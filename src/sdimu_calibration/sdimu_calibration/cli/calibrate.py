@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
+
+if TYPE_CHECKING:
+    from sdimu_calibration.core.results import Calibration
 
 
 def calibrate(
@@ -22,12 +26,12 @@ def calibrate(
     ] = None,
     out: Annotated[Path | None, typer.Option(help="Folder of the results; BAG_calibration by default.")] = None,
     truth: Annotated[Path | None, typer.Option(help="Truth of a simulation, to show the errors.")] = None,
+    estimator: Annotated[str, typer.Option(help="filter, batch (least squares), classical (table angles).")] = "filter",
 ) -> None:
     """Estimate the coefficients from a recording; leaves result.json and report.html."""
     from rich.console import Console
 
     from sdimu_calibration.cli.progress import bar
-    from sdimu_calibration.core.calibrate import calibrate as estimate
     from sdimu_calibration.report.page import write_report
     from sdimu_calibration.report.table import rich_table, rows
     from sdimu_calibration.storage.bag_reader import read_recording
@@ -36,13 +40,14 @@ def calibrate(
     from sdimu_calibration.storage.reference_file import read_truth
     from sdimu_calibration.storage.result_file import write_result
 
+    estimate = _estimator(estimator)
     console = Console()
     wanted = extended_model(model, add or [])
     where, specification = load_site(site), load_imu(imu)
-    true = None if truth is None else read_truth(truth, wanted.body_frame)
     recording = read_recording(bag)
     with bar(console) as progress:
         result = estimate(recording, where, specification, wanted, progress=progress)
+    true = None if truth is None else read_truth(truth, result.body_frame)
     folder = out or default_folder(bag)
     write_result(folder / "result.json", result)
     write_report(folder / "report.html", result, title=f"Calibration of {bag.name}", truth=true)
@@ -50,6 +55,25 @@ def calibrate(
     for note in (*recording.notes, *(note for note in result.notes if note not in recording.notes)):
         console.print(f"note: {note}", soft_wrap=True, markup=False, highlight=False)
     console.print(f"results in {folder}", soft_wrap=True)
+
+
+def _estimator(name: str) -> Callable[..., Calibration]:
+    """Find an estimator by its name.
+
+    Raises
+    ------
+    DataError
+        When there is none of that name.
+    """
+    from sdimu_calibration.core.batch import batch_calibrate
+    from sdimu_calibration.core.calibrate import calibrate as filter_calibrate
+    from sdimu_calibration.core.classical import classical_calibrate
+    from sdimu_calibration.core.recording import DataError
+
+    known = {"filter": filter_calibrate, "batch": batch_calibrate, "classical": classical_calibrate}
+    if name not in known:
+        raise DataError(f"--estimator {name}: expected one of {', '.join(known)}")
+    return known[name]
 
 
 def default_folder(bag: Path, what: str = "calibration") -> Path:

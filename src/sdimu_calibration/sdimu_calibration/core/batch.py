@@ -55,6 +55,10 @@ Floats = NDArray[np.float64]
 CONVERGED = 1e-2
 """Largest step of a coefficient in its sigma at which Gauss-Newton ends."""
 MOST_STEPS = 40
+_NEAR = 1.0
+"""As `CONVERGED`, for the first stage."""
+_LOOSE = (1e-2, 1.0)
+"""Velocity and position sigma of the first stage (m/s, m)."""
 _ALIKE, _CREEPING, _LONGEST = 0.95, 0.5, 30.0
 """Steps creep when they point alike and shrink by less than half; they are stretched at most so far."""
 
@@ -155,6 +159,9 @@ def bound_covariance(reduced: Reduced, setup: Setup, start: Alignment) -> Floats
 def fit(reduced: Reduced, setup: Setup, start: Alignment, progress: Progress | None = None) -> Fit:
     """Gauss-Newton from the coarse start.
 
+    First with stops that need not stand quite still: far from the solution the second order of large errors is much
+    more than the sigma of a stop's velocity, and would be taken for knowledge.
+
     Raises
     ------
     DataError
@@ -162,31 +169,32 @@ def fit(reduced: Reduced, setup: Setup, start: Alignment, progress: Progress | N
     """
     coarse = coarse_start(reduced, setup, start)
     point, where = _begin(reduced, setup, coarse.C_nb, coarse.coefficients)
-    last = np.zeros(len(setup.sensors.prior))
-    for steps in range(1, MOST_STEPS + 1):
-        if progress is not None:
-            progress("least squares", min(0.95, 0.2 * steps))
-        links, log_weight = _links(reduced, setup, start, where, point)
-        solution = solve(links)
-        step, covariance = _scaled(solution, setup)
-        if not np.isfinite(step).all():
-            break
-        stretch = _stretch(step / setup.sensors.prior, last / setup.sensors.prior)
-        last = np.zeros_like(step) if stretch > 1.0 else step
-        before, point = point, _moved(point, stretch * step, stretch * solution.links)
-        if _movement(setup, before, point, covariance) < CONVERGED:
-            evidence = log_weight - 0.5 * solution.chi2 - 0.5 * solution.dof * np.log(2.0 * np.pi) - solution.log_det
-            return Fit(
-                point.coefficients, covariance, point.C_nb, solution.chi2, solution.dof, float(evidence), steps
-            )
-    raise DataError(
-        "batch least squares does not converge: the recording contradicts the IMU's specification; "
-        "check --imu and --site"
-    )
+    loose = replace(setup, model=replace(setup.model, velocity_sigma=_LOOSE[0], position_sigma=_LOOSE[1]))
+    taken = 0
+    for stage, near in ((loose, _NEAR), (setup, CONVERGED)):
+        last, moved = np.zeros(len(setup.sensors.prior)), np.inf
+        while moved > near:
+            taken += 1
+            if progress is not None:
+                progress("least squares", min(0.95, 0.1 * taken))
+            links, log_weight = _links(reduced, stage, start, where, point)
+            solution = solve(links)
+            step, covariance = _scaled(solution, stage)
+            if not np.isfinite(step).all() or taken > MOST_STEPS:
+                raise DataError(
+                    "batch least squares does not converge: the recording contradicts the IMU's specification; "
+                    "check --imu and --site"
+                )
+            stretch = _stretch(step / setup.sensors.prior, last / setup.sensors.prior)
+            last = np.zeros_like(step) if stretch > 1.0 else step
+            before, point = point, _moved(point, stretch * step, stretch * solution.links)
+            moved = _movement(setup, before, point, covariance)
+    evidence = log_weight - 0.5 * solution.chi2 - 0.5 * solution.dof * np.log(2.0 * np.pi) - solution.log_det
+    return Fit(point.coefficients, covariance, point.C_nb, solution.chi2, solution.dof, float(evidence), taken)
 
 
 def _begin(reduced: Reduced, setup: Setup, C_nb: Floats, coefficients: Floats) -> tuple[Point, Layout]:
-    """Begin at an initial attitude and coefficients, with the other attitudes by the gyros alone."""
+    """Begin at an initial attitude and coefficients; gyros lead from stop to stop, and every stop is levelled."""
     changing = (setup.sensors.decay_rate > 0) | (setup.sensors.drive > 0)
     if changing.any():
         name = setup.sensors.names[int(np.argmax(changing))]
@@ -196,9 +204,21 @@ def _begin(reduced: Reduced, setup: Setup, C_nb: Floats, coefficients: Floats) -
     point = Point(coefficients, np.repeat(C_nb[None], k, axis=0), np.zeros((k, 3)), np.zeros((k, 3)))
     seen = _seen(reduced, setup, where, point)
     values = setup.sensors.regressors(seen)
-    for i, gone in enumerate(_travels(reduced, setup, where, point, seen, values, chained=True)):
-        point.C_nb[i + 1] = gone.C_nb
+    rest = rest_means(reduced, where, setup.sensors, values)
+    force = (rest.mean - rest.design @ coefficients)[:, 3:]
+    for i in range(k - 1):
+        arrived = _travel(reduced, setup, where, point, seen, values, i).C_nb
+        point.C_nb[i + 1] = _levelled(arrived, force[where.block_stop == i + 1].mean(axis=0))
     return point, where
+
+
+def _levelled(C_nb: Floats, f_ib_b: Floats) -> Floats:
+    """Turn an attitude the shortest way to where the force at rest points up."""
+    f_n = C_nb @ f_ib_b
+    axis = np.array([-f_n[1], f_n[0], 0.0])
+    sine = float(np.hypot(f_n[0], f_n[1]))
+    angle = float(np.arctan2(sine, -f_n[2]))
+    return np.asarray(rotation_matrix(axis * (angle / max(sine, 1e-12))) @ C_nb)
 
 
 def _seen(reduced: Reduced, setup: Setup, where: Layout, point: Point) -> Motion:
@@ -227,22 +247,18 @@ def _seen(reduced: Reduced, setup: Setup, where: Layout, point: Point) -> Motion
     return replace(seen, C_nb=C_nb, w_table=w_table, w=w, f=f, rest=reduced.rest)
 
 
-def _travels(
-    reduced: Reduced, setup: Setup, where: Layout, point: Point, seen: Motion, values: Floats, chained: bool = False
-) -> list[Travel]:
-    """Integrate every motion, from the attitude of its stop or (`chained`) from where the last one ended."""
+def _travel(
+    reduced: Reduced, setup: Setup, where: Layout, point: Point, seen: Motion, values: Floats, k: int
+) -> Travel:
+    """Integrate the motion from stop k to the next."""
     site = setup.site
     excess = setup.gravity - float(earth.normal_gravity(site.latitude_rad, site.height_m))
-    out: list[Travel] = []
-    for k in range(len(where.stop_first) - 1):
-        C_nb = out[-1].C_nb if chained and out else point.C_nb[k]
-        rows = slice(int(where.stop_last[k]), int(where.stop_first[k + 1]))
-        slope = error_slope(setup.sensors, seen, rows, point.coefficients)
-        out.append(travel(
-            reduced, rows, setup.sensors, values, slope, point.coefficients, C_nb, site.latitude_rad,
-            site.height_m, excess, (setup.imu.gyro_white_noise**2, setup.imu.accel_white_noise**2),
-        ))  # fmt: skip
-    return out
+    rows = slice(int(where.stop_last[k]), int(where.stop_first[k + 1]))
+    slope = error_slope(setup.sensors, seen, rows, point.coefficients)
+    return travel(
+        reduced, rows, setup.sensors, values, slope, point.coefficients, point.C_nb[k], site.latitude_rad,
+        site.height_m, excess, (setup.imu.gyro_white_noise**2, setup.imu.accel_white_noise**2),
+    )  # fmt: skip
 
 
 def _links(
@@ -254,7 +270,8 @@ def _links(
     values = setup.sensors.regressors(seen)
     slope = error_slope(setup.sensors, seen, where.block_first, point.coefficients)
     rest = rest_means(reduced, where, setup.sensors, values)
-    travels = _travels(reduced, setup, where, point, seen, values)
+    last = len(where.stop_first) - 1
+    travels = [_travel(reduced, setup, where, point, seen, values, k) for k in range(last)]
     weights = rest_weights(setup, rest.seconds)
     dt = np.concatenate([[0.0], np.cumsum(reduced.cycles.dt)])
     links, log_weight = [], float(np.sum(np.log(weights))) - float(np.sum(np.log(prior)))

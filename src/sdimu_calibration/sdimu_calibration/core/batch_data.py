@@ -165,7 +165,7 @@ def _navigate(
     moved = np.empty(6)
     moved[:3] = velocity
     moved[3] = (position[0] - latitude) * (r_n + height)
-    moved[4] = position[1] * (r_e + height) * np.cos(latitude)
+    moved[4] = position[1] * (r_e + height) * np.cos(min(abs(latitude), earth.POLE_LIMIT))
     moved[5] = height - position[2]
     return track, moved
 

@@ -21,7 +21,7 @@ from sdimu_calibration.core import earth
 from sdimu_calibration.core.alignment import Alignment
 from sdimu_calibration.core.batch_data import layout, rest_means
 from sdimu_calibration.core.compiled import compiled
-from sdimu_calibration.core.passes import Reduced, Setup
+from sdimu_calibration.core.passes import Pass, Reduced, Setup, one_pass
 from sdimu_calibration.core.rotation import orthonormal, rotation_matrix
 
 Floats = NDArray[np.float64]
@@ -30,6 +30,9 @@ _FREE = 1e3
 """Sigma of what is wholly unknown, in its own size."""
 _MODEL_ERROR = 0.01
 """Misfit from what is left out (scale, misalignment, error of the orientations), as a share of the vector sought."""
+
+_STOPS = 20
+"""Stops used, from the first on: later ones add less than the gyros' errors in all the turns before them take away."""
 
 
 @dataclass(frozen=True)
@@ -80,6 +83,7 @@ def coarse_start(reduced: Reduced, setup: Setup, start: Alignment) -> Coarse:
     rest = rest_means(reduced, where, setup.sensors, none)
     time = np.bincount(where.block_stop, rest.seconds)
     mean = np.column_stack([np.bincount(where.block_stop, rest.seconds * v) / time for v in rest.mean.T])
+    time, mean = time[:_STOPS], mean[:_STOPS]
     to_first = _orientations(reduced, where.stop_last, where.stop_first, mean[:, :3])
     sizes = dict(zip(names, prior, strict=True))
     noise = np.array([setup.imu.gyro_white_noise, setup.imu.accel_white_noise]) / np.sqrt(np.mean(time))
@@ -94,6 +98,18 @@ def coarse_start(reduced: Reduced, setup: Setup, start: Alignment) -> Coarse:
             if f"{stem}_{axis}" in names:
                 coefficients[names.index(f"{stem}_{axis}")] = value
     return Coarse(_level_and_north(down, rate), coefficients)
+
+
+def coarse_pass(reduced: Reduced, setup: Setup, start: Alignment) -> Pass:
+    """Run a closed-loop pass from the coarse start: where `refine` begins when one dwell may have misled the first.
+
+    Raises
+    ------
+    DataError
+        When the filter diverges.
+    """
+    coarse = coarse_start(reduced, setup, start)
+    return one_pass(reduced, setup, start, coarse.C_nb, coarse.coefficients, closed_loop=True, keep=False)
 
 
 def _orientations(reduced: Reduced, last: NDArray[np.int64], first: NDArray[np.int64], rate: Floats) -> Floats:

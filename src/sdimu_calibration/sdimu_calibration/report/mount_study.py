@@ -56,7 +56,7 @@ def write_page(path: Path, content: Mapping[str, Any], units: Mapping[str, str])
     path.parent.mkdir(parents=True, exist_ok=True)
     drawn = figure(content, units).to_html(full_html=False, include_plotlyjs=True, config={"responsive": True})
     text = (
-        f"{len(content['seeds'])} IMUs, each tested at every mount (the same angle about all three axes). RMS over IMUs "
+        f"{len(content['seeds'])} IMUs, each tested at every mount (the same angle about all axes). RMS over IMUs "
         "and axes; bars: its standard error. The classical estimator takes table axes for IMU axes. Turned into the "
         "accelerometers' own frame afterwards it loses most of the mount again: on a table whose angles are perfect."
     )
