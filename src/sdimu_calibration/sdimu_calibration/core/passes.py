@@ -337,5 +337,14 @@ def solve(setup: Setup, reduced: Reduced, progress: Progress, keep: bool = False
     progress("passes", 0.2)
     none = np.zeros(len(setup.sensors.prior))
     first = one_pass(reduced, setup, start, start.C_nb, none, closed_loop=True, keep=False)
-    last, passes, converged = refine(reduced, setup, start, first, progress, keep=keep)
+    try:
+        last, passes, converged = refine(reduced, setup, start, first, progress, keep=keep)
+    except DataError:
+        converged = False
+    if not converged:
+        # The first dwell misled the first pass (an azimuth that may be anything): all stops together know better.
+        from sdimu_calibration.core.coarse import coarse_pass  # noqa: PLC0415 (built on the passes of this file)
+
+        begun = coarse_pass(reduced, setup, start)
+        last, passes, converged = refine(reduced, setup, start, begun, progress, keep=keep)
     return Solution(setup, reduced, start, first, last, passes, converged)
