@@ -110,6 +110,26 @@ def test_a_wrong_azimuth_at_the_start_changes_nothing_at_the_end(imu, model, sit
     assert np.max(np.abs(found.values - right.values)[k] / np.sqrt(np.diag(right.covariance))[k]) < 0.02
 
 
+@pytest.mark.parametrize("latitude_deg", [80.0, -80.0, 90.0, -90.0])
+def test_coefficients_are_honest_near_and_at_the_poles(imu, model, site, latitude_deg):
+    there = replace(site, latitude_rad=np.radians(latitude_deg), height_m=5000.0)
+    total, dof = 0.0, 0
+    for seed in range(1, 5):
+        recording, truth = generate(Scenario(KIM18, imu, there, seed=seed, rate_hz=20.0))
+        value, n = nees(batch_calibrate(recording, there, imu, model), truth)
+        total, dof = total + value, dof + n
+    assert chi2.ppf(5e-4, dof) < total < chi2.ppf(1.0 - 5e-4, dof)
+
+
+@pytest.mark.parametrize("latitude_deg", [90.0, -90.0])
+def test_the_filter_is_honest_at_the_poles(imu, model, site, latitude_deg):
+    # A cosine of latitude without its limit made Zp of the east read zero there, and the filter diverge.
+    there = replace(site, latitude_rad=np.radians(latitude_deg))
+    recording, truth = generate(Scenario(KIM18, imu, there, seed=2, rate_hz=20.0))
+    value, dof = nees(calibrate(recording, there, imu, model, held_out=False), truth)
+    assert chi2.ppf(5e-4, dof) < value < chi2.ppf(1.0 - 5e-4, dof)
+
+
 def test_an_effect_that_changes_at_random_is_refused(imu, model, site):
     bias = registry.get("gyro_bias")
     renamed = tuple(replace(p, name=f"wandering_{p.name}") for p in bias.parameters)
