@@ -70,14 +70,15 @@ def published_rows(
         for column, values in printed.items():
             here, there = found[column][effect], values[effect]
             worst = max(worst, abs(here / there - 1.0), key=abs)
-            cells.append(f"{_short(from_si(here, unit))} ({_short(from_si(there, unit))})")
+            cells.append(f"  {_short(from_si(here, unit))} ({_short(from_si(there, unit))})")
         rows.append((effect, *cells, f"{100.0 * worst:.0f} %", unit))
     return rows
 
 
 def published_table(rows: Sequence[Sequence[str]], columns: Sequence[str], title: str) -> Table:
     """Table beside published values for the terminal."""
-    table = Table("largest of the axes", *columns, "off by", "unit", pad_edge=False, title=title, box=SIMPLE)
+    table = Table("largest of the axes", *columns, "off by", "unit", pad_edge=False, title=title, box=SIMPLE, padding=0)
+    table.columns[0].overflow = "fold"
     for column in table.columns[1:]:
         column.justify, column.no_wrap = "right", True
     for row in rows:
