@@ -6,6 +6,8 @@ STAMP  := $(VENV)/.installed
 OUT    ?= out/demo
 PACKAGES := rate_table_sim sdimu_calibration sdimu_sim
 NUMBER   := $(words $(PACKAGES))
+# `make colcon COLCON_TEST="$(PACKAGES)"` repeats every test on what was installed; make test has run them already.
+COLCON_TEST ?= rate_table_sim
 
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 
@@ -38,6 +40,7 @@ colcon: setup
 	colcon --log-base $$work/log build --base-paths src --build-base $$work/build --install-base $$work/install && \
 	SDIMU_CONFIG=$(CURDIR)/config colcon --log-base $$work/log test --base-paths src --build-base $$work/build \
 	    --install-base $$work/install --python-testing pytest --return-code-on-test-failure \
+	    --packages-select $(COLCON_TEST) \
 	    --pytest-args -q -m "not slow and not bench and not ros"
 
 # How fast: samples a second, bags, start of the command line.
