@@ -27,6 +27,7 @@ _VERBS = {
     "compare": "sdimu_calibration.cli.compare:compare",
     "effects": "sdimu_calibration.cli.effects:effects",
     "predict": "sdimu_calibration.cli.predict:predict",
+    "import": "sdimu_calibration.cli.import_files:import_files",
     "replay": "sdimu_calibration.cli.replay:replay",
     "workbench": "sdimu_calibration.cli.workbench:workbench",
     "bag": "sdimu_calibration.cli.bag:app",

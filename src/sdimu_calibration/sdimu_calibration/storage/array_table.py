@@ -1,0 +1,122 @@
+"""A table in a file of arrays: MATLAB's MAT up to version 7, numpy's NPZ."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.io import loadmat
+from scipy.io.matlab import MatReadError
+
+from sdimu_calibration.core.recording import DataError, Floats
+
+_HDF5 = b"\x89HDF\r\n\x1a\n"
+_HDF5_AT = 512
+_REFERENCE = re.compile(r"([A-Za-z_]\w*(?:\.\w+)*)(?:\[(\d+)\])?")
+
+
+class ArrayTable:
+    """Columns of a file of arrays: ``name``, ``struct.name``, or ``name[2]`` for the second column of a matrix."""
+
+    def __init__(self, path: Path, arrays: Mapping[str, Any]) -> None:
+        self.path = path
+        self._arrays = {name: array for name, array in arrays.items() if not name.startswith("__")}
+
+    def floats(self, columns: Sequence[int | str]) -> Floats:
+        """Read columns as numbers, shape (n, k); one matrix may hold all of them, either way round.
+
+        Raises
+        ------
+        DataError
+            When one is not there, is not numbers, or has another length than the first.
+        """
+        parts = [self._array(column).astype(np.float64) for column in columns]
+        for column, part in zip(columns, parts, strict=True):
+            if len(part) != len(parts[0]):
+                raise DataError(
+                    f"{self.path}: variable {column} has {len(part)} rows, {columns[0]} has {len(parts[0])}"
+                )
+        return np.concatenate(parts, axis=1)
+
+    def numbers(self, column: int | str) -> NDArray[Any]:
+        """Read one column in the type it has, shape (n,), so that integer stamps stay exact."""
+        array = self._array(column)
+        if array.shape[1] != 1:
+            raise DataError(f"{self.path}: variable {column} has {array.shape[1]} columns, expected one")
+        return array[:, 0]
+
+    def line_of(self, row: int) -> str:
+        """Say where a row of data is."""
+        return f"row {row + 1}"
+
+    def _array(self, column: int | str) -> NDArray[Any]:
+        """Return a variable, or one column of it, as a matrix with samples in its rows."""
+        match = _REFERENCE.fullmatch(str(column))
+        value: Any = self._look_up(match.group(1)) if match else None
+        if match is None or value is None:
+            there = ", ".join(sorted(self._arrays)) or "none"
+            raise DataError(f"{self.path}: no variable '{column}' (there are: {there})")
+        array = np.asarray(value)
+        if array.dtype.kind not in "iuf" or array.ndim not in {1, 2} or not array.size:
+            raise DataError(f"{self.path}: variable {column} is not a list or matrix of numbers")
+        array = array[:, None] if array.ndim == 1 else array
+        array = array.T if array.shape[0] < array.shape[1] else array
+        if match.group(2) is None:
+            return array
+        place = int(match.group(2))
+        if not 1 <= place <= array.shape[1]:
+            raise DataError(f"{self.path}: variable {match.group(1)} has {array.shape[1]} columns, no column {place}")
+        return array[:, place - 1 : place]
+
+    def _look_up(self, name: str) -> Any:
+        first, *rest = name.split(".")
+        value = self._arrays.get(first)
+        for part in rest:
+            value = getattr(value, part, None)
+        return value
+
+
+def read_npz(path: Path) -> ArrayTable:
+    """Read a file of numpy.
+
+    Raises
+    ------
+    DataError
+        When it is none.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as content:
+            return ArrayTable(path, dict(content))
+    except (ValueError, OSError, EOFError, TypeError) as error:
+        raise DataError(f"{path}: not a file of numpy arrays (NPZ)") from error
+
+
+def read_mat(path: Path) -> ArrayTable | None:
+    """Read a MAT file of version 4 to 7; None when it is a matrix written as text.
+
+    Raises
+    ------
+    DataError
+        When it is of version 7.3, or damaged.
+    """
+    with path.open("rb") as stream:
+        head = stream.read(_HDF5_AT + len(_HDF5))
+    if not head:
+        raise DataError(f"{path}: the file is empty")
+    if head[_HDF5_AT:] == _HDF5 or head.startswith(_HDF5):
+        raise DataError(f"{path}: is a MAT file of version 7.3; save it in MATLAB with '-v7'")
+    if _is_text(head):
+        return None
+    try:
+        return ArrayTable(path, loadmat(path, squeeze_me=True, struct_as_record=False))
+    except (MatReadError, NotImplementedError, ValueError, TypeError, OSError, IndexError) as error:
+        raise DataError(f"{path}: not a MAT file that can be read ({error})") from error
+
+
+def _is_text(head: bytes) -> bool:
+    """Tell numbers in text: a MAT file of version 5 begins with words, one of version 4 with binary zeros."""
+    return not head.startswith(b"MATLAB") and b"\x00" not in head

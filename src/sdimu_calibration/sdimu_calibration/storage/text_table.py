@@ -1,0 +1,165 @@
+"""A table in a text file: CSV, columns between blanks or tabs, with headings or without."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sdimu_calibration.core.recording import DataError, Floats
+
+_COMMENT = ("#", "%")
+_DELIMITERS = (";", "\t", ",")
+_SHOWN = 12
+
+
+class TextTable:
+    """Columns of a text file, found by number (from 1) or by heading.
+
+    Parameters
+    ----------
+    path : Path
+    delimiter : str, optional
+        Recognised from the first line of data when left out.
+    decimal : str
+        ``.`` or ``,``.
+    skip_lines : int, optional
+        Lines before the data; recognised when left out: blank, comment, or mostly not numbers.
+
+    Raises
+    ------
+    DataError
+        When it is not text, or there are no data in it.
+    """
+
+    def __init__(
+        self, path: Path, delimiter: str | None = None, decimal: str = ".", skip_lines: int | None = None
+    ) -> None:
+        self.path = path
+        self._decimal = decimal
+        try:
+            self._lines = path.read_text(encoding="utf-8-sig").splitlines()
+        except UnicodeDecodeError as error:
+            raise DataError(f"{path}: is not text (expected CSV in UTF-8, MAT or NPZ)") from error
+        self._delimiter = delimiter
+        self._begin = self._first_line() if skip_lines is None else skip_lines
+        if self._begin >= len(self._lines):
+            raise DataError(f"{path}: no line of numbers in it")
+        self._delimiter = delimiter or self._guess(self._lines[self._begin])
+        self.headings = self._find_headings()
+        self._width = len(self._cells(self._lines[self._begin]))
+
+    def floats(self, columns: Sequence[int | str]) -> Floats:
+        """Read columns as numbers, shape (n, k); a cell ``nan`` is NaN.
+
+        Raises
+        ------
+        DataError
+            With line and column of the first cell that is not a number.
+        """
+        places = [self._place(column) for column in columns]
+        lines = self._lines[self._begin :]
+        if self._decimal == ",":
+            lines = [line.replace(",", ".") for line in lines]
+        try:
+            read = np.loadtxt(lines, usecols=places, ndmin=2, **self._options())
+        except (ValueError, IndexError) as error:
+            raise self._first_bad(columns, places) from error
+        return np.asarray(read, np.float64)
+
+    def texts(self, column: int | str) -> NDArray[np.str_]:
+        """Read a column as it is written, shape (n,)."""
+        place = self._place(column)
+        lines = self._lines[self._begin :]
+        try:
+            read = np.loadtxt(lines, usecols=[place], ndmin=1, dtype=str, **self._options())
+        except (ValueError, IndexError) as error:
+            raise self._first_bad([column], [place], numbers=False) from error
+        cells = np.char.strip(np.asarray(read, np.str_), " \"'")
+        return np.char.replace(cells, ",", ".") if self._decimal == "," else cells
+
+    def line_of(self, row: int) -> str:
+        """Say where a row of data is."""
+        count = -1
+        for number, line in enumerate(self._lines[self._begin :], start=self._begin + 1):
+            count += not _skipped(line)
+            if count == row:
+                return f"line {number}"
+        return f"row {row + 1}"
+
+    def _options(self) -> dict[str, Any]:
+        return {"delimiter": self._delimiter, "comments": _COMMENT}
+
+    def _place(self, column: int | str) -> int:
+        """Index of a column.
+
+        Raises
+        ------
+        DataError
+            When there is none, or several, of that name.
+        """
+        if isinstance(column, int):
+            if not 1 <= column <= self._width:
+                raise DataError(f"{self.path}: no column {column} (line {self._begin + 1} has {self._width})")
+            return column - 1
+        number = self.headings.count(column)
+        if number == 1:
+            return self.headings.index(column)
+        if number:
+            raise DataError(f"{self.path}: {number} columns are called '{column}'; use the column's number")
+        there = ", ".join(self.headings[:_SHOWN]) + (", ..." if len(self.headings) > _SHOWN else "")
+        told = f"there are: {there}" if there else "the file has no headings; use the column's number"
+        raise DataError(f"{self.path}: no column '{column}' ({told})")
+
+    def _first_line(self) -> int:
+        for number, line in enumerate(self._lines):
+            if _skipped(line):
+                continue
+            cells = self._cells(line, self._delimiter or self._guess(line))
+            if 2 * sum(_is_number(cell, self._decimal) for cell in cells) >= len(cells):
+                return number
+        return len(self._lines)
+
+    def _find_headings(self) -> list[str]:
+        """Read the headings off the last line with words before the data; none when the numbers do not match."""
+        width = len(self._cells(self._lines[self._begin]))
+        for line in reversed(self._lines[: self._begin]):
+            cells = self._cells(line.lstrip("#% "))
+            if len(cells) == width:
+                return cells
+        return []
+
+    def _guess(self, line: str) -> str | None:
+        known = (d for d in _DELIMITERS if d in line and d != self._decimal)
+        return next(known, None)
+
+    def _cells(self, line: str, delimiter: str | None = None) -> list[str]:
+        return [cell.strip(" \t\"'") for cell in line.split(delimiter or self._delimiter)]
+
+    def _first_bad(self, columns: Sequence[int | str], places: Sequence[int], numbers: bool = True) -> DataError:
+        """Find line and column of the first cell that cannot be read: slow, and only on the way out."""
+        for number, line in enumerate(self._lines[self._begin :], start=self._begin + 1):
+            if _skipped(line):
+                continue
+            cells = self._cells(line)
+            for column, place in zip(columns, places, strict=True):
+                if place >= len(cells):
+                    return DataError(f"{self.path}: line {number} has {len(cells)} columns, no column {column}")
+                if numbers and not _is_number(cells[place], self._decimal):
+                    return DataError(f"{self.path}: line {number}, column {column}: '{cells[place]}' is not a number")
+        return DataError(f"{self.path}: cannot be read as a table (state delimiter and skip_lines in the map)")
+
+
+def _skipped(line: str) -> bool:
+    return not line.strip() or line.lstrip().startswith(_COMMENT)
+
+
+def _is_number(cell: str, decimal: str) -> bool:
+    try:
+        float(cell.replace(decimal, "."))
+    except ValueError:
+        return False
+    return True
