@@ -19,6 +19,7 @@ setup(
         "console_scripts": [
             "sdimu = sdimu_calibration.cli.main:main",
             "calibration_node = sdimu_calibration.nodes.calibration_node:main",
+            "compensate_node = sdimu_calibration.nodes.compensate_node:main",
             "recorder_node = sdimu_calibration.nodes.recorder_node:main",
             "replay_node = sdimu_calibration.nodes.replay_node:main",
         ],

@@ -29,6 +29,8 @@ _VERBS = {
     "predict": "sdimu_calibration.cli.predict:predict",
     "import": "sdimu_calibration.cli.import_files:import_files",
     "replay": "sdimu_calibration.cli.replay:replay",
+    "compensate": "sdimu_calibration.cli.compensate:compensate",
+    "export": "sdimu_calibration.cli.export:export",
     "workbench": "sdimu_calibration.cli.workbench:workbench",
     "bag": "sdimu_calibration.cli.bag:app",
 }

@@ -174,7 +174,10 @@ def predict_stops(reduced: Reduced, setup: Setup, last: Pass, out: NDArray[np.bo
 def data_counts(recording: Recording, reduced: Reduced) -> dict[str, float]:
     """Count what the data section of a result says."""
     phases, epochs = reduced.phases, reduced.epochs
-    return {
+    log = recording.temperature
+    # Temperature effects count from the start of this recording; who uses the result needs to know from where.
+    start = {} if log is None or not len(log.t) else {"start_temperature_degc": float(log.value[0])}
+    return start | {
         "samples": float(len(recording.t)),
         "lost": float(reduced.cycles.lost.sum()),
         "rejected": float(recording.rejected),

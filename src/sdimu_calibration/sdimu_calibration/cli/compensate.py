@@ -1,0 +1,62 @@
+"""`sdimu compensate`: the result of a calibration applied to a recording."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def compensate(
+    bag: Annotated[Path, typer.Argument(metavar="BAG", help="rosbag2 folder or .mcap file.")],
+    result: Annotated[Path, typer.Option(help="result.json of a calibration, or its folder.")],
+    out: Annotated[Path, typer.Option(help="Bag (folder) to write: /imu/data and the other topics of BAG.")],
+    imu: Annotated[str, typer.Option(help="IMU whose white noise goes into the covariances: name or path.")] = "dtg",
+    effect: Annotated[
+        list[str] | None,
+        typer.Option(metavar="FILE", help="Effect of your own (YAML) that the result has; may be repeated."),
+    ] = None,
+    frame_id: Annotated[str | None, typer.Option(help="Frame of the samples; imu_ and the body frame.")] = None,
+    same_start: Annotated[
+        bool, typer.Option("--same-start", help="Switched on as the calibrated recording was: functions of time hold.")
+    ] = False,
+    start_temperature: Annotated[
+        float | None, typer.Option(metavar="DEGC", help="Temperature at the start of the calibrated recording.")
+    ] = None,
+    replace: Annotated[bool, typer.Option("--replace", help="Overwrite the bag if it exists.")] = False,
+) -> None:
+    """Take the errors out of a recording: /imu/data_raw to /imu/data with covariances."""
+    from rich.console import Console
+
+    from sdimu_calibration.cli.progress import bar
+    from sdimu_calibration.core.compensation import compensator
+    from sdimu_calibration.core.units import from_si
+    from sdimu_calibration.storage.bag_reader import read_recording
+    from sdimu_calibration.storage.compensated_bag import write_compensated
+    from sdimu_calibration.storage.compensated_imu import frame_of
+    from sdimu_calibration.storage.config import load_imu
+    from sdimu_calibration.storage.effect_file import find_effects
+    from sdimu_calibration.storage.result_file import read_result
+
+    console = Console()
+    calibration = read_result(result)
+    own = [found for text in effect or [] for found in find_effects(text)]
+    specification = load_imu(imu)
+    recording = read_recording(bag)
+    using = compensator(
+        calibration, specification, own=own, has_temperature=recording.temperature is not None,
+        same_start=same_start, start_temperature=start_temperature,
+    )  # fmt: skip
+    frame = frame_id or frame_of(calibration.body_frame)
+    with bar(console) as progress:
+        done = write_compensated(bag, recording, using, out, frame, replace=replace, progress=progress)
+    rate, force = from_si(done.largest_rate, "deg/h"), from_si(done.largest_force, "ug")
+    for note in recording.notes:
+        console.print(f"note: {note}", soft_wrap=True, markup=False, highlight=False)
+    for reason in using.left_out:
+        console.print(f"not compensated: {reason}", soft_wrap=True, markup=False, highlight=False)
+    console.print(
+        f"{out}: {done.samples} samples in frame {frame}; changed by up to {rate:.4g} deg/h and {force:.4g} ug",
+        soft_wrap=True, highlight=False,
+    )  # fmt: skip

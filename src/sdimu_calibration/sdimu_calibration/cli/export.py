@@ -1,0 +1,41 @@
+"""`sdimu export`: the result of a calibration in the forms that other programs read."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def export(
+    result: Annotated[Path, typer.Argument(metavar="RESULT", help="result.json of a calibration, or its folder.")],
+    form: Annotated[
+        str, typer.Option("--format", help="matrices, kalibr, imu_tk, c-header, yaml or csv.")
+    ] = "matrices",
+    out: Annotated[Path | None, typer.Option(help="File to write; beside the result by default.")] = None,
+    imu: Annotated[str, typer.Option(help="IMU whose white noise goes into the kalibr form: name or path.")] = "dtg",
+    rate: Annotated[float, typer.Option(help="Sample rate for the kalibr form (Hz).")] = 100.0,
+    effect: Annotated[
+        list[str] | None,
+        typer.Option(metavar="FILE", help="Effect of your own (YAML) that the result has; may be repeated."),
+    ] = None,
+) -> None:
+    """Write a result as matrices, Kalibr YAML, imu_tk files, a C header, YAML or CSV."""
+    from rich.console import Console
+
+    from sdimu_calibration.storage.config import load_imu
+    from sdimu_calibration.storage.effect_file import find_effects
+    from sdimu_calibration.storage.export import FORMS
+    from sdimu_calibration.storage.export import export as write
+    from sdimu_calibration.storage.result_file import read_result
+
+    calibration = read_result(result)
+    own = [found for text in effect or [] for found in find_effects(text)]
+    folder = result if result.is_dir() else result.parent
+    name = FORMS[form].file_name if form in FORMS else ""
+    done = write(form, out or folder / name, calibration, load_imu(imu), own, rate)
+    console = Console()
+    for text in done.missing:
+        console.print(f"not in the file: {text}", soft_wrap=True, markup=False, highlight=False)
+    console.print(f"body frame: {calibration.body_frame}; {' '.join(map(str, done.files))}", soft_wrap=True)

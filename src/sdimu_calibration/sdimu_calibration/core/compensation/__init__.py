@@ -1,0 +1,25 @@
+"""The result in use: errors taken out of samples, and the part of them that matrices can hold.
+
+A package of its own so that a change here compiles none of the loops of the estimator again.
+"""
+
+from sdimu_calibration.core.compensation.compensator import (
+    Compensated,
+    Compensator,
+    compensate,
+    compensator,
+    heat_since,
+    resolved,
+)
+from sdimu_calibration.core.compensation.linear import LinearModel, linear_model
+
+__all__ = [
+    "Compensated",
+    "Compensator",
+    "LinearModel",
+    "compensate",
+    "compensator",
+    "heat_since",
+    "linear_model",
+    "resolved",
+]

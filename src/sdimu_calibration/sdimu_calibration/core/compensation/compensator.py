@@ -1,0 +1,296 @@
+"""Sensor errors taken out of samples.
+
+A sensor shows ``m = x + E(x)``, x = (body rate, specific force) in the body frame of the coefficients, with the error E
+linear in the coefficients and, for most effects, in x. Solved for x by
+
+    x <- x + inv(A) (m - x - E(x)),    A = I + dE/dx at nought,
+
+which is exact after one step where E is affine in x (scale, misalignment, mass unbalance, bias: no first order in the
+errors is taken, so percents are as good as ppm) and gains a factor of the size of the rest of E a step where it is not.
+
+Covariance to first order: ``inv(A) (D P D' + N^2/dt) inv(A)'`` with the regressors D at x, the covariance P of the
+coefficients and the white noise N of the IMU. The first part is common to all samples, not independent from one to the
+next; a message has no place to say so.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sdimu_calibration.core import imu_model
+from sdimu_calibration.core.compensation.reads import reads, samples_motion
+from sdimu_calibration.core.effects import selection
+from sdimu_calibration.core.effects.effect import Effect
+from sdimu_calibration.core.imu_model import ImuModel
+from sdimu_calibration.core.motion import Motion
+from sdimu_calibration.core.recording import DataError, TemperatureLog
+from sdimu_calibration.core.results import Calibration
+from sdimu_calibration.core.specification import ImuSpecification
+from sdimu_calibration.core.track import temperatures
+
+Floats = NDArray[np.float64]
+
+START_TEMPERATURE = "start_temperature_degc"
+"""Key of a result's data section: the temperature from which temperature effects count (deg C)."""
+_ABSENT = {
+    "alpha": "needs the angular acceleration",
+    "w_table": "needs the rate against the Earth, which only the table test knows",
+    "rest": "needs to know when the table rests",
+    "C_nb": "needs the attitude",
+    "magnetic_n": "needs the magnetic field",
+    "turned": "needs the history of turns",
+    "leant": "needs the history of forces",
+}
+_CLOSE = 1e-13
+"""Largest step, against 1 rad/s and 10 m/s^2, at which the solution stands: a few units of rounding."""
+_MOST_STEPS = 80
+
+
+@dataclass(frozen=True)
+class Compensator:
+    """A result made ready for samples.
+
+    Attributes
+    ----------
+    model : ImuModel
+        Of the effects that samples can be freed of.
+    coefficients, covariance : ndarray, shape (p,) and (p, p)
+        SI, in `body_frame`.
+    inverse : ndarray, shape (6, 6)
+        ``inv(A)`` of the module's equation; rates first.
+    noise : ndarray, shape (6,)
+        White-noise power of each channel (SI^2/Hz).
+    body_frame : str
+    left_out : tuple of str
+        Effects that are not compensated, each with its reason.
+    start_temperature : float or None
+        Temperature from which the coefficients count (deg C); None where none of them asks for it.
+    """
+
+    model: ImuModel
+    coefficients: Floats
+    covariance: Floats
+    inverse: Floats
+    noise: Floats
+    body_frame: str
+    left_out: tuple[str, ...]
+    start_temperature: float | None = None
+
+
+@dataclass(frozen=True)
+class Compensated:
+    """Compensated samples, in the body frame of the coefficients.
+
+    Attributes
+    ----------
+    omega_ib_b, f_ib_b : ndarray, shape (n, 3)
+        rad/s, m/s^2.
+    omega_covariance, f_covariance : ndarray, shape (n, 3, 3)
+        Of one sample: coefficients and white noise.
+    """
+
+    omega_ib_b: Floats
+    f_ib_b: Floats
+    omega_covariance: Floats
+    f_covariance: Floats
+
+
+def resolved(calibration: Calibration, own: Sequence[Effect] = ()) -> tuple[Effect, ...]:
+    """Effects of a result, in its order.
+
+    Parameters
+    ----------
+    calibration : Calibration
+    own : sequence of Effect
+        Effects that are in no catalogue, such as those read from files.
+
+    Raises
+    ------
+    DataError
+        When an effect is unknown, or the coefficients are not those of the effects.
+    """
+    given = {effect.name: effect for effect in own}
+    try:
+        effects = tuple(given[name] if name in given else selection.resolve(name) for name in calibration.model)
+    except DataError as error:
+        raise DataError(f"the result has an effect of no catalogue: {error}; name its file (--effect)") from error
+    names = tuple(parameter.name for effect in effects for parameter in effect.parameters)
+    if names != calibration.names:
+        odd = sorted(set(names) ^ set(calibration.names)) or ["their order"]
+        raise DataError(f"the coefficients of the result are not those of its effects ({', '.join(odd[:3])})")
+    return effects
+
+
+def compensator(
+    calibration: Calibration,
+    imu: ImuSpecification,
+    *,
+    own: Sequence[Effect] = (),
+    has_temperature: bool = False,
+    same_start: bool = False,
+    start_temperature: float | None = None,
+) -> Compensator:
+    """Make a result ready for samples.
+
+    Parameters
+    ----------
+    calibration : Calibration
+    imu : ImuSpecification
+        Its white noise goes into the covariances.
+    own : sequence of Effect
+        Effects of the result that are in no catalogue.
+    has_temperature : bool
+        The temperature of the IMU is recorded with the samples.
+    same_start : bool
+        The time of the samples counts as in the calibrated recording (switched on alike), so functions of time hold.
+    start_temperature : float, optional
+        Temperature at the start of the calibrated recording (deg C), where the result does not say it.
+
+    Raises
+    ------
+    DataError
+        When the result does not fit its effects, or has a coefficient that is no number.
+    """
+    effects = resolved(calibration, own)
+    start = start_temperature if start_temperature is not None else calibration.data.get(START_TEMPERATURE)
+    left: list[str] = []
+    taken: list[Effect] = []
+    kept: list[int] = []
+    place = 0
+    for effect in effects:
+        reason = _reason(effect, has_temperature, start is not None, same_start)
+        if reason:
+            left.append(f"{effect.name} ({reason})")
+        else:
+            taken.append(effect)
+            kept += range(place, place + len(effect.parameters))
+        place += len(effect.parameters)
+    if not taken:
+        raise DataError(f"nothing of this result can be compensated: {'; '.join(left)}")
+    values = np.array(calibration.values[kept], dtype=float)
+    covariance = np.array(calibration.covariance[np.ix_(kept, kept)], dtype=float)
+    if not (np.isfinite(values).all() and np.isfinite(covariance).all()):
+        raise DataError("the result has a coefficient or covariance that is not a number")
+    model = imu_model.build(taken, imu)
+    power: Floats = np.repeat(np.array([imu.gyro_white_noise**2, imu.accel_white_noise**2]), 3)
+    inverse: Floats = np.asarray(np.linalg.inv(slope_at_nought(model, values)), dtype=np.float64)
+    return Compensator(
+        model, values, covariance, inverse, power, calibration.body_frame, tuple(left),
+        start if any("temperature" in reads(effect) for effect in taken) else None,
+    )  # fmt: skip
+
+
+def _reason(effect: Effect, has_temperature: bool, start_known: bool, same_start: bool) -> str:
+    """Say why samples cannot be freed of an effect; empty when they can."""
+    if effect.run_local:
+        return "a fault of the recording in which it was found"
+    if effect.options and "(" not in effect.name:
+        return f"the result does not say its {' and '.join(effect.options)}"
+    needed = reads(effect)
+    for name, reason in _ABSENT.items():
+        if name in needed:
+            return reason
+    if needed & {"temperature", "temperature_rate"} and not has_temperature:
+        return "needs the temperature of the IMU"
+    if "temperature" in needed and not start_known:
+        return "needs the temperature at the start of the calibrated recording, which the result does not say"
+    if "t" in needed and not same_start:
+        return "a function of time in the calibrated recording"
+    return ""
+
+
+def slope_at_nought(model: ImuModel, coefficients: Floats) -> Floats:
+    """Return ``I + dE/dx`` at x = 0, shape (6, 6), by central differences: exact where E is affine in x."""
+    steps = np.diag([1.0, 1.0, 1.0, 10.0, 10.0, 10.0])
+    ahead, behind = (_error(model, coefficients, sign * steps) for sign in (1.0, -1.0))
+    slope = (ahead - behind).T / (2.0 * np.diag(steps))
+    return np.asarray(np.eye(6) + slope)
+
+
+def _error(model: ImuModel, coefficients: Floats, x: Floats) -> Floats:
+    """Errors at x (n, 6), at the start and its temperature."""
+    zero = np.zeros(len(x))
+    return model.errors(model.regressors(samples_motion(zero, zero, x[:, :3], x[:, 3:], zero, zero)), coefficients)
+
+
+def heat_since(log: TemperatureLog | None, t: Floats, start_degc: float | None, causal: bool) -> tuple[Floats, Floats]:
+    """Temperature since `start_degc` (K) and its rate (K/s) at times `t` (n,), as the calibration takes them."""
+    heat, rate = temperatures(log, t, causal)
+    if log is not None and len(log.t) and start_degc is not None:
+        heat = heat + (float(log.value[0]) - start_degc)
+    return heat, rate
+
+
+def compensate(
+    using: Compensator,
+    t: Floats,
+    interval_s: float,
+    omega_ib_b: Floats,
+    f_ib_b: Floats,
+    heat: tuple[Floats, Floats] | None = None,
+) -> Compensated:
+    """Take the errors out of samples.
+
+    Parameters
+    ----------
+    using : Compensator
+    t : ndarray, shape (n,)
+        End of each sample's interval (s since the start of the recording).
+    interval_s : float
+        Length of a sample's interval.
+    omega_ib_b, f_ib_b : ndarray, shape (n, 3)
+        As measured (rad/s, m/s^2).
+    heat : (ndarray, ndarray), shape (n,) each, optional
+        `heat_since` at the middle of each sample.
+
+    Raises
+    ------
+    DataError
+        When the errors cannot be inverted at a sample.
+    """
+    n = len(t)
+    zero = np.zeros(n)
+    dt = np.full(n, interval_s)
+    warm, warming = heat if heat is not None else (zero, zero)
+    measured = np.hstack([omega_ib_b, f_ib_b])
+    x = measured @ using.inverse.T
+
+    def seen() -> Motion:
+        return samples_motion(t, dt, x[:, :3], x[:, 3:], warm, warming)
+
+    scaled = np.zeros((n, 6))
+    for _ in range(_MOST_STEPS):
+        # What runs away is told below, in words.
+        with np.errstate(over="ignore", invalid="ignore"):
+            values = using.model.regressors(seen())
+            step = (measured - x - using.model.errors(values, using.coefficients)) @ using.inverse.T
+            x = x + step
+            scaled = np.nan_to_num(np.abs(step) / (1.0 + np.abs(x)), nan=np.inf)
+        if not n or float(scaled.max()) < _CLOSE:
+            break
+    else:
+        worst = int(np.argmax(scaled.max(axis=1)))
+        raise DataError(
+            f"the error model cannot be inverted at {t[worst]:.3f} s (its errors change faster than what is measured); "
+            "check the result, or calibrate with fewer effects"
+        )
+    omega_covariance, f_covariance = _covariances(using, values, interval_s)
+    return Compensated(x[:, :3], x[:, 3:], omega_covariance, f_covariance)
+
+
+def _covariances(using: Compensator, values: Floats, interval_s: float) -> tuple[Floats, Floats]:
+    """Covariances (n, 3, 3) of rate and force from regressor columns (n, m)."""
+    D = np.zeros((len(values), 6, len(using.coefficients)))
+    for k, (channel, parameter) in enumerate(zip(using.model.channel, using.model.parameter, strict=True)):
+        D[:, channel, parameter] += values[:, k]
+    D = using.inverse @ D
+    white = using.inverse @ np.diag(using.noise / interval_s) @ using.inverse.T
+    blocks = []
+    for rows in (slice(0, 3), slice(3, 6)):
+        own = np.ascontiguousarray(D[:, rows])
+        blocks.append(own @ using.covariance @ own.transpose(0, 2, 1) + white[rows, rows])
+    return blocks[0], blocks[1]

@@ -1,0 +1,67 @@
+"""Which variables of the motion an effect reads: found by changing them one at a time, not by a list of names."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from sdimu_calibration.core.effects.effect import Effect
+from sdimu_calibration.core.motion import Floats, Motion
+
+FIELDS = (
+    "w", "f", "t", "temperature", "temperature_rate", "alpha", "w_table", "rest", "C_nb", "magnetic_n", "turned",
+    "leant",
+)  # fmt: skip
+_ROWS = 2000
+_SPAN_S = 20_000.0
+"""Longer than a test: a step or a transient lies within."""
+
+
+def reads(effect: Effect) -> frozenset[str]:
+    """Names of the fields of `Motion` on which the regressors of an effect depend."""
+    rng = np.random.default_rng(3)
+    one, other = _motion(rng), _motion(rng)
+    other = replace(other, t=0.6 * one.t + 7.0, rest=~one.rest)
+    before = effect.regressors(one)
+    return frozenset(
+        name for name in FIELDS if not np.array_equal(effect.regressors(_changed(one, other, name)), before)
+    )
+
+
+def _changed(one: Motion, other: Motion, name: str) -> Motion:
+    return replace(one, **{name: getattr(other, name)})
+
+
+def _motion(rng: np.random.Generator) -> Motion:
+    """Motion in which every variable goes its own way."""
+
+    def any_of(*shape: int) -> Floats:
+        return rng.normal(size=shape)
+
+    n = _ROWS
+    C_nb = np.linalg.qr(any_of(n, 3, 3))[0]
+    return Motion(
+        np.linspace(1.0, _SPAN_S, n), np.full(n, _SPAN_S / n), any_of(n, 3), 10.0 * any_of(n, 3), C_nb, any_of(n, 3),
+        any_of(n, 3), rng.random(n) < 0.5, 10.0 * any_of(n), 0.01 * any_of(n), np.sign(any_of(n, 3)),
+        np.sign(any_of(n, 3)), 1e-5 * any_of(3),
+    )  # fmt: skip
+
+
+def samples_motion(t: Floats, dt: Floats, w: Floats, f: Floats, heat: Floats, heat_rate: Floats) -> Motion:
+    """Motion as samples alone know it: what they do not show (attitude, table, acceleration) is left at nought.
+
+    Parameters
+    ----------
+    t, dt : ndarray, shape (n,)
+        End and length of each sample's interval (s).
+    w, f : ndarray, shape (n, 3)
+        Body rate (rad/s) and specific force (m/s^2).
+    heat, heat_rate : ndarray, shape (n,)
+        Temperature since the start of the calibrated recording (K) and its rate (K/s).
+    """
+    n = len(t)
+    none = np.broadcast_to(np.zeros(3), (n, 3))
+    C_nb = np.broadcast_to(np.eye(3), (n, 3, 3))
+    rest = np.zeros(n, dtype=np.bool_)
+    return Motion(t, dt, w, f, C_nb, none, none, rest, heat, heat_rate, none, none, np.zeros(3))

@@ -1,0 +1,190 @@
+"""Node that takes the errors out of samples: /imu/data_raw to /imu/data.
+
+Parameters: result (result.json or its folder), imu (name or path: its white noise goes into the covariances), effects
+(YAML files of effects of one's own that the result has), frame_id (imu_ and the body frame by default), same_start
+(functions of time hold because the IMU was switched on as in the calibration), start_temperature (deg C, where the
+result does not say it; NaN: as the result says), stay (do not leave at the end of the stream).
+Service ~/reload (std_srvs/Trigger) reads the result again, by the parameters as they are then; when it cannot be used
+the answer says why and the result in use stays.
+
+Every sample that comes goes out, with its stamp. The first waits for the second, which tells the sample interval.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from pathlib import Path
+
+import numpy as np
+from rclpy.node import Node
+from rclpy.task import Future
+from sensor_msgs.msg import Imu, Temperature
+from std_srvs.srv import Trigger
+
+from sdimu_calibration.core.compensation import Compensator, compensate, compensator, heat_since
+from sdimu_calibration.core.recording import NOMINAL_FROM, DataError, Floats, TemperatureLog
+from sdimu_calibration.nodes.convert import NS
+from sdimu_calibration.nodes.credits import Consumer, Producer, to_ns
+from sdimu_calibration.nodes.listening import Listener
+from sdimu_calibration.nodes.spinning import run_node
+from sdimu_calibration.nodes.ticking import Ticker
+from sdimu_calibration.storage.cdr import LayoutError, Stamps, decode_imu
+from sdimu_calibration.storage.compensated_imu import encode_compensated, frame_of
+from sdimu_calibration.storage.config import load_imu
+from sdimu_calibration.storage.effect_file import find_effects
+from sdimu_calibration.storage.result_file import read_result
+
+RAW, COMPENSATED, TEMPERATURE = "/imu/data_raw", "/imu/data", "/imu/temperature"
+FAREWELL_S = 10.0
+_REMEMBERED_S = 300.0
+"""Temperatures older than this no longer matter for value or rate."""
+
+
+class CompensateNode:
+    """Compensates live; see the module for its parameters."""
+
+    def __init__(self) -> None:
+        self.node = Node("compensate")
+        self.done = Future()
+        declare = self.node.declare_parameter
+        declare("result", "")
+        declare("imu", "dtg")
+        # An empty string keeps the parameter's type when nothing is listed.
+        declare("effects", [""])
+        declare("frame_id", "")
+        declare("same_start", False)
+        declare("start_temperature", math.nan)
+        self._stay = bool(declare("stay", False).value)
+        self._start_ns: int | None = None
+        self._stamps: list[int] = []
+        self._interval = 0.0
+        self._held: list[bytes] = []
+        self._heat: list[tuple[float, float]] = []
+        self._departed: float | None = None
+        self._using, self._frame = self._load()
+        ticker = Ticker(self.node)
+        self._out = Producer(self.node, ticker, Imu, COMPENSATED)
+        self._reload = self.node.create_service(Trigger, "~/reload", self._answer_reload)
+        self._stream = Consumer(self.node, ticker, RAW, on_end=self._take_end)
+        self._listeners = (
+            Listener(self.node, ticker, Temperature, TEMPERATURE, self._take_temperature),
+            Listener(self.node, ticker, Imu, RAW, self._take, raw=True),
+        )
+        ticker.every(0.1, self._leave)
+        self._stream.ready()
+
+    def close(self) -> None:
+        """Nothing to leave behind."""
+
+    def _load(self) -> tuple[Compensator, str]:
+        """Read the result that the parameters name.
+
+        Raises
+        ------
+        DataError
+            When it cannot be used.
+        """
+        parameter = self.node.get_parameter
+        path = str(parameter("result").value)
+        if not path:
+            raise DataError("compensate: parameter 'result' is empty (expected the path of a result.json)")
+        calibration = read_result(Path(path))
+        own = [found for text in parameter("effects").value if text for found in find_effects(text)]
+        start = float(parameter("start_temperature").value)
+        using = compensator(
+            calibration, load_imu(str(parameter("imu").value)), own=own, has_temperature=True,
+            same_start=bool(parameter("same_start").value), start_temperature=None if math.isnan(start) else start,
+        )  # fmt: skip
+        logger = self.node.get_logger()
+        for reason in using.left_out:
+            logger.warning(f"not compensated: {reason}")
+        return using, str(parameter("frame_id").value) or frame_of(calibration.body_frame)
+
+    def _answer_reload(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        try:
+            self._using, self._frame = self._load()
+            response.success, response.message = True, str(self.node.get_parameter("result").value)
+        except (DataError, OSError) as error:
+            response.success, response.message = False, f"{error}; the result in use stays"
+        return response
+
+    def _take_temperature(self, message: Temperature) -> None:
+        value = float(message.temperature)
+        if not math.isfinite(value):
+            return
+        now = to_ns(message.header.stamp) / NS
+        self._heat.append((now, value))
+        while self._heat[0][0] < now - _REMEMBERED_S:
+            del self._heat[0]
+
+    def _take(self, message: bytes) -> None:
+        self._held.append(message)
+        try:
+            stamps, omega, force = decode_imu(self._held)
+        except LayoutError as error:
+            self._held = []
+            self.node.get_logger().warning(f"{RAW}: a message cannot be read ({error}) and was dropped")
+            return
+        if not self._known_interval(int(stamps[-1])):
+            return
+        self._held = []
+        finite = np.isfinite(omega).all(axis=1) & np.isfinite(force).all(axis=1)
+        if not finite.all():
+            self.node.get_logger().warning(f"{RAW}: samples that are not finite are dropped", once=True)
+            stamps, omega, force = stamps[finite], omega[finite], force[finite]
+        self._send(stamps, omega, force)
+        # Counted as they come, so that a credit means: taken and sent on.
+        if len(stamps):
+            self._stream.reached(int(stamps[-1]), len(stamps))
+
+    def _known_interval(self, stamp: int) -> bool:
+        """Learn the nominal sample interval from the first stamps; False while there is only one."""
+        if len(self._stamps) <= NOMINAL_FROM:
+            self._stamps.append(stamp)
+            steps = np.diff(self._stamps)
+            if not (steps > 0).any():
+                return False
+            self._interval = float(np.median(steps[steps > 0])) / NS
+        if self._start_ns is None:
+            self._start_ns = self._stamps[0] - round(self._interval * NS)
+        return True
+
+    def _send(self, stamps: Stamps, omega: Floats, force: Floats) -> None:
+        assert self._start_ns is not None
+        t: Floats = (stamps - self._start_ns).astype(np.float64) * 1e-9
+        heat = None
+        if self._using.start_temperature is not None and not self._heat:
+            text = f"no {TEMPERATURE} yet: taken to be as at the start of the calibration"
+            self.node.get_logger().warning(text, once=True)
+        if self._heat:
+            log = TemperatureLog(*np.array(self._heat).T)
+            middle = stamps / NS - 0.5 * self._interval
+            heat = heat_since(log, middle, self._using.start_temperature, causal=True)
+        try:
+            done = compensate(self._using, t, self._interval, omega, force, heat)
+        except DataError as error:
+            self.node.get_logger().warning(f"sample dropped: {error}")
+            return
+        for stamp, message in zip(stamps.tolist(), encode_compensated(stamps, done, self._frame), strict=True):
+            self._out.publish(message, stamp)
+
+    def _take_end(self) -> None:
+        if self._departed is None:
+            self._departed = time.monotonic()
+            self._out.end(self._stream.reached_ns)
+
+    def _leave(self) -> None:
+        if self._departed is None or self._stay or self.done.done():
+            return
+        if self._out.acknowledged or time.monotonic() - self._departed > FAREWELL_S:
+            self.done.set_result(None)
+
+
+def main() -> None:
+    """Run the node."""
+    run_node(CompensateNode)
+
+
+if __name__ == "__main__":
+    main()

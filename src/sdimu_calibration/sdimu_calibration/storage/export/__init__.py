@@ -1,0 +1,83 @@
+"""A result in the forms that other programs read: one form a file, found by its name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from sdimu_calibration.core.compensation import LinearModel, linear_model
+from sdimu_calibration.core.effects.effect import Effect
+from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.results import Calibration
+from sdimu_calibration.core.specification import ImuSpecification
+from sdimu_calibration.storage.export import c_header, csv_table, imu_tk, kalibr, matrices, yaml_file
+from sdimu_calibration.storage.export.shared import Source
+
+
+class Form(NamedTuple):
+    """A form: default file name, and the texts of its files by what is added to the name."""
+
+    file_name: str
+    write: Callable[[Source], dict[str, str]]
+    cannot_hold: Callable[[LinearModel], list[str]]
+
+
+FORMS = {
+    "matrices": Form("compensation.txt", matrices.texts, matrices.cannot_hold),
+    "kalibr": Form("imu-kalibr.yaml", kalibr.texts, kalibr.cannot_hold),
+    "imu_tk": Form("imu_tk.calib", imu_tk.texts, imu_tk.cannot_hold),
+    "c-header": Form("sdimu_compensation.h", c_header.texts, c_header.cannot_hold),
+    "yaml": Form("compensation.yaml", yaml_file.texts, yaml_file.cannot_hold),
+    "csv": Form("coefficients.csv", csv_table.texts, csv_table.cannot_hold),
+}
+
+
+class Exported(NamedTuple):
+    """What was written: files, and what they cannot hold, one line each."""
+
+    files: tuple[Path, ...]
+    missing: tuple[str, ...]
+
+
+def export(
+    form: str,
+    path: Path,
+    calibration: Calibration,
+    imu: ImuSpecification,
+    own: Sequence[Effect] = (),
+    rate_hz: float = 100.0,
+) -> Exported:
+    """Write a result in a form.
+
+    Parameters
+    ----------
+    form : str
+        Key of `FORMS`.
+    path : Path
+        File to make; forms of two files put ``-accel`` and ``-gyro`` before its suffix.
+    calibration : Calibration
+    imu : ImuSpecification
+        White noise, where the form has a place for it.
+    own : sequence of Effect
+        Effects of the result that are in no catalogue.
+    rate_hz : float
+        Sample rate, where the form has a place for it.
+
+    Raises
+    ------
+    DataError
+        When there is no such form, or the result does not fit its effects.
+    """
+    if form not in FORMS:
+        raise DataError(f"--format {form}: expected one of {', '.join(FORMS)}")
+    linear = linear_model(calibration, own)
+    missing = FORMS[form].cannot_hold(linear)
+    source = Source(calibration, linear, imu, rate_hz, tuple(missing))
+    path.parent.mkdir(parents=True, exist_ok=True)
+    files = []
+    for addition, text in FORMS[form].write(source).items():
+        file = path.with_name(f"{path.stem}{addition}{path.suffix}")
+        file.write_text(text, encoding="utf-8")
+        files.append(file)
+    return Exported(tuple(files), tuple(missing))

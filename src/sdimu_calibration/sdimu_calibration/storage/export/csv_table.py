@@ -1,0 +1,22 @@
+"""Comma-separated coefficients: name, value, sigma, unit, in SI; everything is in it, the matrices are not."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sdimu_calibration.core.compensation import LinearModel
+from sdimu_calibration.storage.export.shared import Source, number
+
+
+def texts(source: Source) -> dict[str, str]:
+    """Return the text of the file."""
+    c = source.calibration
+    sigma = np.sqrt(np.diag(c.covariance))
+    lines = ["name,value,sigma,unit"]
+    lines += [f"{n},{number(c.values[k])},{number(sigma[k])},{c.units[k]}" for k, n in enumerate(c.names)]
+    return {"": "\n".join(lines) + "\n"}
+
+
+def cannot_hold(linear: LinearModel) -> list[str]:  # noqa: ARG001 (every form has one)
+    """Say what is left out: nothing of the coefficients, but their correlations."""
+    return ["correlations between coefficients (result.json has them)"]

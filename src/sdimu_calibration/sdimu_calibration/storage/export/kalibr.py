@@ -1,0 +1,86 @@
+"""Kalibr's YAML of an IMU, model ``scale-misalignment``.
+
+Kalibr (ETH Zurich, kalibr_imu_camera_calibration/IccSensors.py, IccScaledMisalignedImu) models
+
+    accelerometer = M f + b          M lower triangular
+    gyroscope     = M C_gyro_i w + A C_gyro_i f + b          M lower triangular, C_gyro_i a rotation
+
+which is our model in the frame that the accelerometers define: there M_a is lower triangular, and the gyros' matrix is
+factored into a lower triangular one and a rotation. Its files have no biases (they are estimated run by run); ours
+add them under names of their own.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sdimu_calibration.core.compensation import LinearModel
+from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.storage.export.shared import Source, bent, comments, flow, number
+
+Floats = NDArray[np.float64]
+
+_TRIANGULAR = 1e-12
+"""Largest number above the diagonal that is rounding."""
+
+
+def texts(source: Source) -> dict[str, str]:
+    """Return the text of the file.
+
+    Raises
+    ------
+    DataError
+        When the result is in another frame than the accelerometers'.
+    """
+    linear = source.linear
+    if np.abs(np.triu(linear.accel, 1)).max() > _TRIANGULAR:
+        raise DataError(
+            f"kalibr: the result is in body frame '{linear.body_frame}', Kalibr's model is that of the accelerometers "
+            "(calibrate with body_frame: accelerometer_triad)"
+        )
+    M, C = lower_and_rotation(linear.gyro)
+    # A acts on the force seen from the gyros: A C = G.
+    A = linear.by_force @ C.T
+    lines = comments(source, "#")
+    lines += [
+        "# Kalibr's names: accelerometers M = M_a; gyroscopes M C_gyro_i = M_g, A C_gyro_i = G. Its files have no",
+        "# biases: 'bias' is added. Random walks are not known from a calibration: set them before use in Kalibr.",
+        "imu0:",
+        "  model: scale-misalignment",
+        f"  accelerometer_noise_density: {number(source.imu.accel_white_noise)}  # m/s^2/sqrt(Hz)",
+        "  accelerometer_random_walk: 0.0  # m/s^3/sqrt(Hz), not known",
+        f"  gyroscope_noise_density: {number(source.imu.gyro_white_noise)}  # rad/s/sqrt(Hz)",
+        "  gyroscope_random_walk: 0.0  # rad/s^2/sqrt(Hz), not known",
+        "  rostopic: /imu/data_raw",
+        "  time_offset: 0.0",
+        f"  update_rate: {number(source.rate_hz)}",
+        *_block("  T_i_b", np.eye(4)),
+        "  accelerometers:",
+        *_block("    M", linear.accel),
+        f"    bias: {flow(linear.accel_bias)}  # m/s^2",
+        "  gyroscopes:",
+        *_block("    M", M),
+        *_block("    A", A),
+        *_block("    C_gyro_i", C),
+        f"    bias: {flow(linear.gyro_bias)}  # rad/s",
+    ]
+    return {"": "\n".join(lines) + "\n"}
+
+
+def lower_and_rotation(matrix: Floats) -> tuple[Floats, Floats]:
+    """Factor a matrix (3, 3) into a lower triangular one with a positive diagonal and a rotation: ``matrix = M C``."""
+    Q, U = np.linalg.qr(matrix.T)
+    sign = np.sign(np.diag(U))
+    M, C = (U * sign[:, None]).T, (Q * sign).T
+    return np.tril(M), C
+
+
+def cannot_hold(linear: LinearModel) -> list[str]:
+    """Say what is left out."""
+    return bent(linear)
+
+
+def _block(name: str, matrix: Floats) -> list[str]:
+    indent = " " * (len(name) - len(name.lstrip()))
+    return [f"{name}:", *(f"{indent}- {flow(values)}" for values in matrix)]

@@ -1,0 +1,62 @@
+"""What the forms share: their source, numbers without loss, and the words of the equation."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sdimu_calibration.core.compensation import LinearModel
+from sdimu_calibration.core.results import Calibration
+from sdimu_calibration.core.specification import ImuSpecification
+
+Floats = NDArray[np.float64]
+
+EQUATION = (
+    "rate measured  = M_g w + G f + b_g,   so   w = inv(M_g) (rate measured - G f - b_g)",
+    "force measured = M_a f + b_a,         so   f = inv(M_a) (force measured - b_a)",
+    "w: body rate (rad/s); f: specific force (m/s^2), at rest and level (0, 0, -9.8) for axes forward, right, down;",
+    "M: 1 + scale + misalignment; G: mass unbalance and g-sensitivity ((rad/s)/(m/s^2)); b: biases.",
+)
+
+
+class Source(NamedTuple):
+    """What a form is written from."""
+
+    calibration: Calibration
+    linear: LinearModel
+    imu: ImuSpecification
+    rate_hz: float
+    missing: tuple[str, ...]
+
+
+def number(value: float) -> str:
+    """Write a number so that reading it gives the same one."""
+    return repr(float(value))
+
+
+def row(values: Floats) -> str:
+    """Numbers of one row with blanks between them."""
+    return " ".join(number(v) for v in values)
+
+
+def flow(values: Floats) -> str:
+    """Numbers of one row as a YAML list."""
+    return "[" + ", ".join(number(v) for v in values) + "]"
+
+
+def comments(source: Source, mark: str) -> list[str]:
+    """Lines that say what the file is, as comments."""
+    lines = [
+        "Calibrated IMU: what turns its samples into body rate and specific force.",
+        f"Body frame: {source.linear.body_frame}.",
+        *EQUATION,
+    ]
+    lines += [f"NOT IN THIS FILE: {text}" for text in source.missing]
+    return [f"{mark} {line}" for line in lines]
+
+
+def bent(linear: LinearModel) -> list[str]:
+    """Say which coefficients matrices cannot hold."""
+    return [f"{name} (not a matrix; use sdimu compensate)" for name in linear.left]

@@ -1,0 +1,163 @@
+"""The compensate node, in a process of its own: raw samples in, compensated ones out, results exchanged on the way."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+import rclpy
+from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
+from rcl_interfaces.srv import SetParameters
+from rclpy.context import Context
+from rclpy.experimental import EventsExecutor
+from rclpy.node import Node
+from rclpy.task import Future
+from sensor_msgs.msg import Imu
+from std_srvs.srv import Trigger
+
+from sdimu_calibration.core.batch import no_history
+from sdimu_calibration.core.compensation import compensate, compensator
+from sdimu_calibration.core.effects import registry
+from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.results import Calibration
+from sdimu_calibration.nodes.convert import encode_imu
+from sdimu_calibration.nodes.credits import STREAM, to_ns
+from sdimu_calibration.storage.config import load_imu, load_model
+from sdimu_calibration.storage.result_file import write_result
+
+from .conftest import Bench
+
+pytestmark = pytest.mark.ros
+
+INTERVAL_NS = 10_000_000
+START_NS = 1_700_000_000 * 10**9
+PATIENCE_S = 60.0
+
+
+def drawn(seed: int) -> Calibration:
+    """Draw a result of the baseline from the specification of the default IMU."""
+    imu, rng = load_imu("dtg"), np.random.default_rng(seed)
+    effects = [registry.get(name) for name in load_model("baseline").effects]
+    parameters = [p for e in effects for p in e.parameters]
+    sigma = np.array([imu.prior[e.name] for e in effects for _ in e.parameters])
+    return Calibration(
+        "accelerometer_triad", tuple(e.name for e in effects), tuple(p.name for p in parameters),
+        tuple(p.unit for p in parameters), tuple(p.display_unit for p in parameters),
+        sigma * rng.standard_normal(30), np.diag((0.01 * sigma) ** 2), {}, {}, (), no_history(30),
+    )  # fmt: skip
+
+
+class Rig:
+    """A driver of an IMU and a reader of what the node makes of it."""
+
+    def __init__(self) -> None:
+        self.context = Context()
+        rclpy.init(context=self.context)
+        self.node = Node("rig", context=self.context)
+        self.executor = EventsExecutor(context=self.context)
+        self.executor.add_node(self.node)
+        self.out: dict[int, Imu] = {}
+        self.raw = self.node.create_publisher(Imu, "/imu/data_raw", STREAM)
+        self.listener = self.node.create_subscription(Imu, "/imu/data", self._take, STREAM)
+        self.reload = self.node.create_client(Trigger, "/compensate/reload")
+        self.set = self.node.create_client(SetParameters, "/compensate/set_parameters")
+
+    def _take(self, message: Imu) -> None:
+        self.out[to_ns(message.header.stamp)] = message
+
+    def spin_until(self, condition, what: str) -> None:
+        begun = time.monotonic()
+        while not condition():
+            assert time.monotonic() - begun < PATIENCE_S, what
+            self.executor.spin_until_future_complete(Future(), 0.02)
+
+    def call(self, client, request):
+        self.spin_until(client.service_is_ready, f"{client.srv_name} is there")
+        answer = client.call_async(request)
+        self.spin_until(answer.done, f"answer of {client.srv_name}")
+        return answer.result()
+
+    def use(self, path: Path):
+        value = ParameterValue(type=ParameterType.PARAMETER_STRING, string_value=str(path))
+        self.call(self.set, SetParameters.Request(parameters=[Parameter(name="result", value=value)]))
+        return self.call(self.reload, Trigger.Request())
+
+
+@pytest.fixture
+def rig(bench: Bench) -> Iterator[Rig]:  # noqa: ARG001 (for its domain)
+    rig = Rig()
+    yield rig
+    rig.executor.shutdown()
+    rig.node.destroy_node()
+    rig.context.try_shutdown()
+
+
+def test_the_node_compensates_as_the_core_does_and_keeps_a_good_result(bench: Bench, rig: Rig) -> None:
+    first, second = drawn(1), drawn(2)
+    for name, result in (("first", first), ("second", second)):
+        write_result(bench.folder / name / "result.json", result)
+    broken = bench.folder / "broken.json"
+    broken.write_text('{"format": "sdimu-result/1"}', encoding="utf-8")
+    bench.children.start(
+        "compensate", "sdimu_calibration.nodes.compensate_node", {"result": str(bench.folder / "first")}
+    )
+    rng = np.random.default_rng(3)
+    n = 90
+    omega, force = rng.standard_normal((n, 3)), 10.0 * rng.standard_normal((n, 3))
+    stamps = START_NS + INTERVAL_NS * np.arange(1, n + 1)
+    messages = encode_imu(stamps, omega, force, "imu_link", 0.0, 0.0)
+
+    def send(rows: range) -> None:
+        for k in rows:
+            rig.raw.publish(messages[k])
+        rig.spin_until(lambda: int(stamps[rows[-1]]) in rig.out, "samples come back")
+
+    rig.spin_until(lambda: rig.raw.get_subscription_count() > 0 and rig.listener is not None, "the node listens")
+    rig.spin_until(lambda: rig.node.count_publishers("/imu/data") > 0, "the node offers")
+    rig.executor.spin_until_future_complete(Future(), 1.0)  # both ends of a match are not made at once
+    send(range(30))
+    answer = rig.use(broken)
+    assert not answer.success
+    assert "broken.json" in answer.message
+    assert "stays" in answer.message
+    send(range(30, 60))
+    assert rig.use(bench.folder / "second").success
+    send(range(60, 90))
+
+    assert sorted(rig.out) == stamps.tolist(), "every sample, with its stamp"
+    imu, t = load_imu("dtg"), np.arange(1, n + 1) * 0.01
+    for result, rows in ((first, range(60)), (second, range(60, 90))):
+        expected = compensate(compensator(result, imu), t, 0.01, omega, force)
+        for k in rows:
+            found = rig.out[int(stamps[k])]
+            rate, acceleration = found.angular_velocity, found.linear_acceleration
+            np.testing.assert_allclose([rate.x, rate.y, rate.z], expected.omega_ib_b[k], rtol=1e-12)
+            np.testing.assert_allclose(
+                [acceleration.x, acceleration.y, acceleration.z], expected.f_ib_b[k], rtol=1e-12
+            )
+            np.testing.assert_allclose(
+                found.angular_velocity_covariance, expected.omega_covariance[k].ravel(), rtol=1e-9, atol=1e-25
+            )
+            np.testing.assert_allclose(
+                found.linear_acceleration_covariance, expected.f_covariance[k].ravel(), rtol=1e-9, atol=1e-20
+            )
+            assert found.header.frame_id == "imu_accelerometer_triad"
+            assert found.orientation_covariance[0] == -1.0
+
+
+def test_the_node_leaves_with_one_line_when_its_first_result_is_no_good(bench: Bench) -> None:
+    bench.children.start("compensate", "sdimu_calibration.nodes.compensate_node", {"result": "nowhere.json"})
+    said: list[str] = []
+
+    def failed() -> bool:
+        try:
+            return not bench.children.running()
+        except DataError as error:
+            said.append(str(error))
+            return True
+
+    bench.wait(failed, "failure")
+    assert "nowhere.json: no such file" in said[0]

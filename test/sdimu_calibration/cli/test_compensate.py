@@ -1,0 +1,60 @@
+"""`sdimu compensate`: a bag in, a bag out."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sdimu_calibration.cli.compensate import compensate
+from sdimu_calibration.core.batch import no_history
+from sdimu_calibration.core.compensation import compensate as in_core
+from sdimu_calibration.core.compensation import compensator
+from sdimu_calibration.core.effects import selection
+from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.results import Calibration
+from sdimu_calibration.storage.bag_file import raw_messages
+from sdimu_calibration.storage.bag_reader import read_recording
+from sdimu_calibration.storage.cdr import IMU, decode_doubles
+from sdimu_calibration.storage.config import load_imu
+from sdimu_calibration.storage.result_file import write_result
+from sdimu_calibration.storage.topics import Topics
+
+
+def result(*effects: str) -> Calibration:
+    found = [selection.resolve(name) for name in effects]
+    parameters = [p for e in found for p in e.parameters]
+    values = 1e-4 * np.random.default_rng(1).standard_normal(len(parameters))
+    return Calibration(
+        "accelerometer_triad", tuple(effects), tuple(p.name for p in parameters), tuple(p.unit for p in parameters),
+        tuple(p.display_unit for p in parameters), values, np.diag(np.full(len(values), 1e-14)), {},
+        {"start_temperature_degc": 20.0}, (), no_history(len(values)),
+    )  # fmt: skip
+
+
+def test_a_compensated_bag_has_every_sample_and_the_other_topics_as_they_were(bag: Path, tmp_path: Path) -> None:
+    made = result("gyro_bias", "gyro_scale", "accel_bias", "accel_scale", "accel_bias_temperature", "accel_quadratic")
+    write_result(tmp_path / "result.json", made)
+    compensate(bag, result=tmp_path / "result.json", out=tmp_path / "new")
+    raw = read_recording(bag)
+    new = read_recording(tmp_path / "new", Topics(imu="/imu/data"))
+    assert new.start_ns == raw.start_ns
+    np.testing.assert_array_equal(new.t, raw.t)
+    assert raw.phase is not None and new.phase is not None  # noqa: PT018
+    np.testing.assert_array_equal(new.phase.stop, raw.phase.stop)
+    assert raw.temperature is not None and new.temperature is not None  # noqa: PT018
+    np.testing.assert_array_equal(new.temperature.value, raw.temperature.value)
+    using = compensator(made, load_imu("dtg"), has_temperature=True)
+    heat = np.interp(raw.t - 0.005, raw.temperature.t, raw.temperature.value) - 20.0
+    expected = in_core(using, raw.t, 0.01, raw.omega_ib_b, raw.f_ib_b, (heat, 0 * heat))
+    np.testing.assert_allclose(new.omega_ib_b, expected.omega_ib_b, rtol=1e-12, atol=1e-15)
+    np.testing.assert_allclose(new.f_ib_b, expected.f_ib_b, rtol=1e-12, atol=1e-12)
+    _, doubles = decode_doubles(raw_messages(tmp_path / "new", {"/imu/data": IMU}, "/imu/data")["/imu/data"], 37)
+    np.testing.assert_allclose(doubles[:, 28:37], expected.f_covariance.reshape(-1, 9), rtol=1e-9, atol=1e-25)
+
+
+def test_a_result_that_is_none_is_one_line(bag: Path, tmp_path: Path) -> None:
+    (tmp_path / "result.json").write_text("{}", encoding="utf-8")
+    with pytest.raises(DataError, match=r"result\.json: format is None"):
+        compensate(bag, result=tmp_path / "result.json", out=tmp_path / "new")
