@@ -2,9 +2,8 @@
 
 imu_tk (A. Pretto; Tedaldi, Pretto & Menegatti, "A robust and easy to implement method for IMU calibration without
 external equipments", ICRA 2014)
-corrects a triad by ``T K (raw - B)``: misalignment T with ones on its diagonal, scale K
-a diagonal, bias B. Its reader takes the first 21 numbers of the file (T and K row by row, then B), so what else is to be
-said stands behind them.
+corrects a triad by ``T K (raw - B)``: misalignment T with ones on its diagonal, scale K a diagonal, bias B. Its reader
+takes the first 21 numbers of the file (T and K row by row, then B), so what else is to be said stands behind them.
 """
 
 from __future__ import annotations

@@ -57,7 +57,7 @@ def texts(source: Source) -> dict[str, str]:
         f"  update_rate: {number(source.rate_hz)}",
         *_block("  T_i_b", np.eye(4)),
         "  accelerometers:",
-        *_block("    M", linear.accel),
+        *_block("    M", np.tril(linear.accel)),
         f"    bias: {flow(linear.accel_bias)}  # m/s^2",
         "  gyroscopes:",
         *_block("    M", M),
