@@ -13,9 +13,7 @@ from rosbags.typesys import Stores, get_typestore
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage import cdr
 from sdimu_calibration.storage.bag_reader import read_recording
-from sdimu_calibration.storage.bag_writer import write_recording
 from sdimu_calibration.storage.mcap_bag import McapBag
-from sdimu_calibration.storage.topics import Topics
 
 START_NS = 1_700_000_000_000_000_000
 TYPES = get_typestore(Stores.ROS2_JAZZY)
@@ -196,20 +194,6 @@ def test_a_file_that_metadata_names_and_that_is_gone_is_named(bag):
     file = next(bag.glob("*.mcap"))
     file.unlink()
     assert str(file) in refusal(bag)
-
-
-def test_another_imu_topic_is_offered_and_can_be_asked_for(tmp_path, small_test):
-    elsewhere = Topics(imu="/xsens/imu")
-    write_recording(
-        tmp_path / "b",
-        start_ns=START_NS,
-        imu_ns=small_test.ns,
-        omega_ib_b=small_test.omega_ib_b,
-        f_ib_b=small_test.f_ib_b,
-        topics=elsewhere,
-    )
-    assert "/xsens/imu" in refusal(tmp_path / "b")
-    assert len(read_recording(tmp_path / "b", elsewhere).t) == len(small_test.ns)
 
 
 def test_a_topic_of_another_type_is_told(tmp_path):

@@ -1,18 +1,40 @@
-"""Raw messages of a bag, whatever holds them: rosbag2 folder, bare MCAP, SQLite."""
+"""Raw messages of a bag, whatever holds them: rosbag2 folder, bare MCAP, SQLite; compressed or not; ROS 1."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import yaml
+import zstandard
+from rosbags.convert.converter import convert
 from rosbags.rosbag2 import Reader
+from rosbags.typesys import Stores, get_typestore
 
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage.mcap_walk import MAGIC, DamagedError, McapWalk
 
-_SUFFIXES = (".mcap", ".db3")
+ROS1 = ".bag"
+_PACKED = ".zstd"
+_SUFFIXES = (".mcap", ".db3", _PACKED, ROS1)
+_ZSTD = "zstd"
+Unpack = Callable[[bytes], bytes]
+
+
+@dataclass
+class TopicContent:
+    """Type of a topic (such as ``sensor_msgs/msg/Imu``), and its messages (CDR bytes) in the order of the bag."""
+
+    type_name: str
+    raw: list[bytes] = field(default_factory=list)
+
+
+Takes = Callable[[str, str], bool]
+"""Whether the messages of a topic (name, type) are wanted."""
 
 
 def raw_messages(path: Path, wanted: Mapping[str, str], required: str) -> dict[str, list[bytes]]:
@@ -38,16 +60,103 @@ def raw_messages(path: Path, wanted: Mapping[str, str], required: str) -> dict[s
     DataError
         When the bag cannot be read, a topic has another type, or the required topic is not there.
     """
-    found: dict[str, list[bytes]] = {topic: [] for topic in wanted}
-    types: dict[str, str] = {}
-    for part in bag_parts(path):
-        read = _read_mcap if part.suffix == ".mcap" else _read_with_rosbags
-        read(part, wanted, types, found)
-    if required not in types:
-        raise DataError(_absent(path, types, required, wanted[required]))
-    if not found[required]:
-        raise DataError(f"{path}: topic {required} has no messages; record the bag while the IMU is running")
-    return {topic: messages for topic, messages in found.items() if topic in types}
+
+    def takes(topic: str, type_name: str) -> bool:
+        check_type(path, topic, type_name, wanted)
+        return topic in wanted
+
+    found = read_topics(path, takes)
+    if required not in found:
+        raise DataError(absent(path, {t: c.type_name for t, c in found.items()}, required, wanted[required]))
+    check_filled(path, required, found[required].raw)
+    return {topic: found[topic].raw for topic in wanted if topic in found}
+
+
+def check_filled(path: Path, topic: str, raw: list[bytes]) -> None:
+    """Raise DataError when a topic has no messages."""
+    if not raw:
+        raise DataError(f"{path}: topic {topic} has no messages; record the bag while the IMU is running")
+
+
+def read_topics(path: Path, takes: Takes) -> dict[str, TopicContent]:
+    """Read the messages of the topics that are wanted; the others come without messages.
+
+    Parameters
+    ----------
+    path : Path
+        rosbag2 folder, .mcap or .db3 file (packed by zstd or not), ROS 1 bag.
+    takes : callable
+        Asked with name and type of every topic.
+
+    Returns
+    -------
+    dict of str to TopicContent
+
+    Raises
+    ------
+    DataError
+        When the bag cannot be read.
+    """
+    content: dict[str, TopicContent] = {}
+    with _unpacked(path) as (parts, unpack):
+        for part in parts:
+            if part.suffix == ".mcap":
+                _read_mcap(part, path, takes, unpack, content)
+            else:
+                _read_with_rosbags(part, path, takes, content)
+    return content
+
+
+@contextmanager
+def _unpacked(path: Path) -> Iterator[tuple[list[Path], Unpack | None]]:
+    """Yield files that the readers below can open, and how each message is packed in them; None when not at all."""
+    parts = bag_parts(path)
+    information = _metadata(path) if path.is_dir() else {}
+    mode = _mode(information)
+    mcap = information.get("storage_identifier") == "mcap"
+    if mode and information.get("compression_format") != _ZSTD:
+        raise DataError(f"{path}: compressed by {information.get('compression_format')}, which cannot be read")
+    if mode and mcap:
+        named = _named(path, information)
+        parts = _present(named)
+    if mode == "message" and mcap:
+        yield parts, zstandard.ZstdDecompressor().decompress
+        return
+    if not any(part.suffix in {_PACKED, ROS1} for part in parts):
+        yield parts, None
+        return
+    with TemporaryDirectory(prefix="sdimu-") as folder:
+        yield [_opened(part, Path(folder)) for part in parts], None
+
+
+def _opened(part: Path, folder: Path) -> Path:
+    """Unpack a file into `folder`; another file stays where it is."""
+    if part.suffix == ROS1:
+        return _from_ros1(part, folder / part.stem)
+    if part.suffix != _PACKED:
+        return part
+    target = folder / part.stem
+    try:
+        with part.open("rb") as packed, target.open("wb") as plain:
+            zstandard.ZstdDecompressor().copy_stream(packed, plain)
+    except zstandard.ZstdError as error:
+        raise DataError(f"{part}: cannot be unpacked ({_line(error)})") from error
+    return target
+
+
+def _from_ros1(part: Path, target: Path) -> Path:
+    """Convert a bag of ROS 1 to one of ROS 2: the standard messages differ in nothing that is used here."""
+    typestore = get_typestore(Stores.ROS2_JAZZY)
+    kinds = ["sensor_msgs/msg/Imu", "sensor_msgs/msg/JointState", "sensor_msgs/msg/Temperature"]
+    kinds.append("diagnostic_msgs/msg/DiagnosticArray")
+    try:
+        convert([part], target, "sqlite3", 9, None, "", None, typestore, [], [], [], kinds)
+    except Exception as error:
+        # rosbags answers damage with errors of its own, of struct and of the decompressors.
+        raise DataError(f"{part}: the bag cannot be read ({_line(error)})") from error
+    if not target.is_dir():
+        raise DataError(f"{part}: no topic of sensor_msgs/Imu in the bag")
+    return target
 
 
 def bag_parts(path: Path) -> list[Path]:
@@ -68,16 +177,32 @@ def bag_parts(path: Path) -> list[Path]:
             raise DataError(f"{path}: not a bag (expected a rosbag2 folder or a .mcap file)")
         return [path]
     information = _metadata(path)
-    if information.get("compression_mode") or information.get("storage_identifier") == "sqlite3":
+    if _mode(information) or information.get("storage_identifier") == "sqlite3":
         return [path]
-    named = [path / Path(str(name)).name for name in information.get("relative_file_paths", [])]
+    named = _named(path, information)
     files = [file for file in named if file.is_file()] or sorted(path.glob("*.mcap"))
     if len(named) > len(files):
-        absent = next(file for file in named if not file.is_file())
-        raise DataError(f"{absent}: file is missing though the bag's metadata.yaml names it")
+        _present(named)
     if not files:
         raise DataError(f"{path}: not a bag (no metadata.yaml and no .mcap file in the folder)")
     return files
+
+
+def _mode(information: Mapping[str, Any]) -> str:
+    """How a bag is packed: ``file``, ``message``, or nothing; "none" and "" mean the same."""
+    mode = str(information.get("compression_mode") or "").lower()
+    return mode if mode in {"file", "message"} else ""
+
+
+def _named(folder: Path, information: Mapping[str, Any]) -> list[Path]:
+    return [folder / Path(str(name)).name for name in information.get("relative_file_paths", [])]
+
+
+def _present(named: list[Path]) -> list[Path]:
+    gone = next((file for file in named if not file.is_file()), None)
+    if gone is not None:
+        raise DataError(f"{gone}: file is missing though the bag's metadata.yaml names it")
+    return named
 
 
 def _metadata(folder: Path) -> Mapping[str, Any]:
@@ -90,25 +215,34 @@ def _metadata(folder: Path) -> Mapping[str, Any]:
     return information if isinstance(information, dict) else {}
 
 
-def _read_mcap(part: Path, wanted: Mapping[str, str], types: dict[str, str], found: dict[str, list[bytes]]) -> None:
+def _read_mcap(part: Path, bag: Path, takes: Takes, unpack: Unpack | None, content: dict[str, TopicContent]) -> None:
     check_magic(part)
     walk = McapWalk(part)
     targets: dict[int, list[bytes] | None] = {}
     try:
         for block in walk.blocks():
             for channel in walk.channels.keys() - targets.keys():
-                topic = walk.channels[channel].topic
-                _check_type(part, topic, walk.type_name(channel), wanted)
-                types[topic] = walk.type_name(channel)
-                targets[channel] = found.get(topic)
+                targets[channel] = _target(walk.channels[channel].topic, walk.type_name(channel), takes, content)
             for channel, _, raw in block:
                 target = targets[channel]
                 if target is not None:
-                    target.append(raw)
+                    target.append(raw if unpack is None else unpack(raw))
     except DamagedError as error:
+        if bag not in {part.parent, part}:
+            raise DataError(f"{bag}: a file in it is cut short or damaged") from error
         raise DataError(f"{part}: the file is cut short or damaged; run: sdimu bag recover {part}") from error
-    # Topics that never had a message are not in any chunk that has one.
-    types.update((channel.topic, walk.type_name(key)) for key, channel in walk.channels.items())
+    except zstandard.ZstdError as error:
+        raise DataError(f"{bag}: a message cannot be unpacked ({_line(error)})") from error
+    for key, channel in walk.channels.items():
+        # Topics that never had a message are not in any chunk that has one.
+        content.setdefault(channel.topic, TopicContent(walk.type_name(key)))
+
+
+def _target(topic: str, type_name: str, takes: Takes, content: dict[str, TopicContent]) -> list[bytes] | None:
+    """Where the messages of a topic go; None when they are not wanted."""
+    wanted = takes(topic, type_name)
+    entry = content.setdefault(topic, TopicContent(type_name))
+    return entry.raw if wanted else None
 
 
 def check_magic(part: Path) -> None:
@@ -121,30 +255,28 @@ def check_magic(part: Path) -> None:
         raise DataError(f"{part}: not an MCAP file")
 
 
-def _read_with_rosbags(
-    part: Path, wanted: Mapping[str, str], types: dict[str, str], found: dict[str, list[bytes]]
-) -> None:
+def _read_with_rosbags(part: Path, bag: Path, takes: Takes, content: dict[str, TopicContent]) -> None:
     try:
         with Reader(part) as reader:
-            types.update((connection.topic, connection.msgtype) for connection in reader.connections)
-            for topic, type_name in types.items():
-                _check_type(part, topic, type_name, wanted)
-            chosen = [connection for connection in reader.connections if connection.topic in wanted]
+            targets = {c.topic: _target(c.topic, c.msgtype, takes, content) for c in reader.connections}
+            chosen = [c for c in reader.connections if targets[c.topic] is not None]
             for connection, _, raw in reader.messages(chosen) if chosen else ():
-                found[connection.topic].append(raw)
+                content[connection.topic].raw.append(raw)
     except (DataError, PermissionError):
         raise
     except Exception as error:
         # rosbags answers damage with errors of its own, of sqlite, of zstd and of struct.
-        raise DataError(f"{part}: the bag cannot be read ({_line(error)})") from error
+        raise DataError(f"{bag}: the bag cannot be read ({_line(error)})") from error
 
 
-def _check_type(path: Path, topic: str, type_name: str, wanted: Mapping[str, str]) -> None:
+def check_type(path: Path, topic: str, type_name: str, wanted: Mapping[str, str]) -> None:
+    """Raise DataError when a topic that is wanted has another type."""
     if topic in wanted and type_name != wanted[topic]:
         raise DataError(f"{path}: topic {topic} is {type_name or 'of no type'}, expected {wanted[topic]}")
 
 
-def _absent(path: Path, types: Mapping[str, str], required: str, type_name: str) -> str:
+def absent(path: Path, types: Mapping[str, str], required: str, type_name: str) -> str:
+    """Say that a topic is not there, and what is."""
     others = sorted(topic for topic, other in types.items() if other == type_name)
     if not types:
         return f"{path}: the bag is empty; record it while the IMU is running"

@@ -13,14 +13,15 @@ from rosbags.typesys import Stores, get_typestore
 
 from sdimu_calibration.core.recording import DataError, Floats, PhaseLog, Recording, TableLog, TemperatureLog
 from sdimu_calibration.storage import cdr
-from sdimu_calibration.storage.bag_file import raw_messages
+from sdimu_calibration.storage.bag_file import raw_messages, read_topics
 from sdimu_calibration.storage.cdr import LayoutError, Stamps
+from sdimu_calibration.storage.topic_choice import KINDS, TopicChoice, choose
 from sdimu_calibration.storage.topics import Topics
 
 _MINIMUM_SAMPLES = 2
 
 
-def read_recording(path: Path, topics: Topics | None = None) -> Recording:
+def read_recording(path: Path, topics: Topics | TopicChoice | None = None) -> Recording:
     """Read a bag.
 
     Samples that are not finite and samples with a stamp that was there before are dropped and counted;
@@ -29,9 +30,9 @@ def read_recording(path: Path, topics: Topics | None = None) -> Recording:
     Parameters
     ----------
     path : Path
-        rosbag2 folder (MCAP or SQLite), or a bare .mcap or .db3 file.
-    topics : Topics, optional
-        Names of the topics; the project's own by default.
+        rosbag2 folder (MCAP or SQLite, compressed or not), a bare .mcap or .db3 file, or a bag of ROS 1.
+    topics : Topics or TopicChoice, optional
+        Names of the topics; those that are not named are chosen by name and type of what is there.
 
     Returns
     -------
@@ -44,15 +45,8 @@ def read_recording(path: Path, topics: Topics | None = None) -> Recording:
         When it is not a bag, has no IMU topic, or no usable sample; one line that says what to do.
     """
     path = Path(path)
-    topics = topics or Topics()
-    wanted = {
-        topics.imu: cdr.IMU,
-        topics.status: cdr.STATUS,
-        topics.joint_states: cdr.JOINT_STATE,
-        topics.temperature: cdr.TEMPERATURE,
-    }
-    raw = raw_messages(path, wanted, required=topics.imu)
     notes: list[str] = []
+    topics, raw = _messages(path, topics, notes)
     ns, omega_ib_b, f_ib_b = _imu(raw[topics.imu])
     total = len(ns)
     chosen = _usable(ns, omega_ib_b, f_ib_b, f"{path}: {topics.imu}", notes)
@@ -69,6 +63,30 @@ def read_recording(path: Path, topics: Topics | None = None) -> Recording:
         rejected=total - len(ns),
         notes=tuple(notes),
     )
+
+
+def _messages(
+    path: Path, topics: Topics | TopicChoice | None, notes: list[str]
+) -> tuple[Topics, dict[str, list[bytes]]]:
+    """Read the messages of the topics of the test."""
+    if isinstance(topics, Topics):
+        wanted = {getattr(topics, kind): type_name for kind, type_name in KINDS.items()}
+        return topics, raw_messages(path, wanted, required=topics.imu)
+    content = read_topics(path, lambda _, type_name: type_name in KINDS.values())
+    chosen = choose(path, content, topics or TopicChoice(), _is_phase, notes)
+    return chosen, {t: content[t].raw for t in vars(chosen).values() if t in content}
+
+
+def _is_phase(raw: bytes) -> bool:
+    return _phase_word(_message(raw, cdr.STATUS)) in {"dwell", "rotating"}
+
+
+def _phase_word(message: Any) -> str:
+    """Phase in a status, empty when there is none."""
+    if not message.status:
+        return ""
+    values = {entry.key: entry.value for entry in message.status[0].values}
+    return str(values.get("phase") or message.status[0].message).strip().lower()
 
 
 def _usable(ns: Stamps, omega_ib_b: Floats, f_ib_b: Floats, where: str, notes: list[str]) -> Stamps:
@@ -113,12 +131,10 @@ def _phase(raw: list[bytes], start_ns: int, topic: str, notes: list[str]) -> Pha
 def _status(raw: bytes) -> tuple[int, bool, int | None] | None:
     """Stamp (ns), True for dwell, stop; None without a phase. A phase of any other name is no dwell."""
     message = _message(raw, cdr.STATUS)
-    if not message.status:
-        return None
-    values = {entry.key: entry.value for entry in message.status[0].values}
-    phase = (values.get("phase") or message.status[0].message).strip().lower()
+    phase = _phase_word(message)
     if not phase:
         return None
+    values = {entry.key: entry.value for entry in message.status[0].values}
     stop = values.get("stop", "").strip()
     return _stamp(message), phase == "dwell", int(stop) if stop.isdecimal() else None
 
