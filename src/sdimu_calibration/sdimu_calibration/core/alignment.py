@@ -54,6 +54,15 @@ def azimuth_of(C_nb: Floats) -> float:
     return float(np.arctan2(axis[1], axis[0]))
 
 
+def levelled(C_nb: Floats, f_ib_b: Floats) -> Floats:
+    """Turn an attitude (3, 3) the shortest way to where the force at rest, shape (3,), points up."""
+    f_n = C_nb @ f_ib_b
+    axis = np.array([-f_n[1], f_n[0], 0.0])
+    sine = float(np.hypot(f_n[0], f_n[1]))
+    angle = float(np.arctan2(sine, -f_n[2]))
+    return np.asarray(rotation_matrix(axis * (angle / max(sine, 1e-12))) @ C_nb)
+
+
 def align(w_mean: Floats, f_mean: Floats, duration_s: float, site: Site, imu: ImuSpecification) -> Alignment:
     """Level and find north.
 

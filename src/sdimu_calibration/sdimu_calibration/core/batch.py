@@ -27,7 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sdimu_calibration.core import body_frame, earth
-from sdimu_calibration.core.alignment import Alignment
+from sdimu_calibration.core.alignment import Alignment, levelled
 from sdimu_calibration.core.batch_data import Layout, Travel, error_slope, layout, rest_means, travel
 from sdimu_calibration.core.batch_rows import (
     PER_STOP,
@@ -208,17 +208,8 @@ def _begin(reduced: Reduced, setup: Setup, C_nb: Floats, coefficients: Floats) -
     force = (rest.mean - rest.design @ coefficients)[:, 3:]
     for i in range(k - 1):
         arrived = _travel(reduced, setup, where, point, seen, values, i).C_nb
-        point.C_nb[i + 1] = _levelled(arrived, force[where.block_stop == i + 1].mean(axis=0))
+        point.C_nb[i + 1] = levelled(arrived, force[where.block_stop == i + 1].mean(axis=0))
     return point, where
-
-
-def _levelled(C_nb: Floats, f_ib_b: Floats) -> Floats:
-    """Turn an attitude the shortest way to where the force at rest points up."""
-    f_n = C_nb @ f_ib_b
-    axis = np.array([-f_n[1], f_n[0], 0.0])
-    sine = float(np.hypot(f_n[0], f_n[1]))
-    angle = float(np.arctan2(sine, -f_n[2]))
-    return np.asarray(rotation_matrix(axis * (angle / max(sine, 1e-12))) @ C_nb)
 
 
 def _seen(reduced: Reduced, setup: Setup, where: Layout, point: Point) -> Motion:
