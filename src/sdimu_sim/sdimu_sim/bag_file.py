@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from rate_table_sim.core import phase_changes
 from sdimu_calibration.storage.bag_writer import write_recording
-from sdimu_sim.core.scenario import Scenario, SimulatedTest, table_log_rows, temperature_log
+from sdimu_sim.core.generator import ImuSamples
+from sdimu_sim.core.scenario import DEFAULT_START_NS, Scenario, SimulatedTest, table_log_rows, temperature_log
 
 
 def write_test(path: Path, scenario: Scenario, test: SimulatedTest, *, replace: bool = False) -> None:
@@ -33,6 +34,24 @@ def write_test(path: Path, scenario: Scenario, test: SimulatedTest, *, replace: 
         status=(_nanoseconds(t), dwell, stop),
         joint_states=(_nanoseconds(motion.t[rows]), motion.names, motion.encoder_angle[rows], motion.rate[rows]),
         temperature=None if heat is None else (_nanoseconds(heat.t), heat.value),
+        replace=replace,
+    )
+
+
+def write_by_hand(path: Path, samples: ImuSamples, *, replace: bool = False) -> None:
+    """Write a run by hand to a rosbag2 folder: samples of the IMU and nothing else.
+
+    Raises
+    ------
+    DataError
+        When something is in the way of the folder.
+    """
+    write_recording(
+        path,
+        start_ns=DEFAULT_START_NS,
+        imu_ns=samples.ns,
+        omega_ib_b=samples.omega_ib_b,
+        f_ib_b=samples.f_ib_b,
         replace=replace,
     )
 

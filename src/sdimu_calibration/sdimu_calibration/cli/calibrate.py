@@ -9,13 +9,25 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
+    from sdimu_calibration.core.recording import Recording
     from sdimu_calibration.core.results import Calibration
+    from sdimu_calibration.core.specification import ImuSpecification
+
+ESTIMATORS = ("auto", "filter", "batch", "classical", "hand")
+HAND_CHOSEN = (
+    "by hand: in rests as short as these the gyros' noise hides the Earth's rate, so nothing is navigated "
+    "(--estimator filter to do it all the same)"
+)
 
 
 def calibrate(
     bag: Annotated[Path, typer.Argument(metavar="BAG", help="rosbag2 folder or .mcap file.")],
-    model: Annotated[str, typer.Option(help="Model to estimate: name in config/model or path.")] = "baseline",
-    site: Annotated[str, typer.Option(help="Where the test was: name in config/site or path.")] = "daejeon",
+    model: Annotated[
+        str | None, typer.Option(help="Model to estimate: name in config/model or path; baseline (by hand: hand).")
+    ] = None,
+    site: Annotated[
+        str | None, typer.Option(help="Where the test was: name in config/site or path; daejeon (by hand: none).")
+    ] = None,
     imu: Annotated[str, typer.Option(help="Specification of the IMU: name in config/imu or path.")] = "dtg",
     add: Annotated[
         list[str] | None,
@@ -26,7 +38,10 @@ def calibrate(
     ] = None,
     out: Annotated[Path | None, typer.Option(help="Folder of the results; BAG_calibration by default.")] = None,
     truth: Annotated[Path | None, typer.Option(help="Truth of a simulation, to show the errors.")] = None,
-    estimator: Annotated[str, typer.Option(help="filter, batch (least squares), classical (table angles).")] = "filter",
+    estimator: Annotated[
+        str, typer.Option(help="filter, batch (least squares), classical (table angles), hand; auto: filter or hand.")
+    ] = "auto",
+    hand: Annotated[bool, typer.Option("--hand", help="Moved by hand: the same as --estimator hand.")] = False,
 ) -> None:
     """Estimate the coefficients from a recording; leaves result.json and report.html."""
     from rich.console import Console
@@ -40,11 +55,17 @@ def calibrate(
     from sdimu_calibration.storage.reference_file import read_truth
     from sdimu_calibration.storage.result_file import write_result
 
-    estimate = _estimator(estimator)
+    check_estimator(estimator)
     console = Console()
-    wanted = extended_model(model, add or [])
-    where, specification = load_site(site), load_imu(imu)
+    specification = load_imu(imu)
     recording = read_recording(bag)
+    chosen = chosen_estimator("hand" if hand else estimator, recording, specification)
+    if chosen == "hand" and not (hand or estimator == "hand"):
+        console.print(HAND_CHOSEN, soft_wrap=True)
+    wanted = extended_model(model or ("hand" if chosen == "hand" else "baseline"), add or [])
+    # By hand nobody needs to say where: the result says what was taken for granted.
+    where = None if site is None and chosen == "hand" else load_site(site or "daejeon")
+    estimate = _estimators()[chosen]
     with bar(console) as progress:
         result = estimate(recording, where, specification, wanted, progress=progress)
     true = None if truth is None else read_truth(truth, result.body_frame)
@@ -57,23 +78,38 @@ def calibrate(
     console.print(f"results in {folder}", soft_wrap=True)
 
 
-def _estimator(name: str) -> Callable[..., Calibration]:
-    """Find an estimator by its name.
+def check_estimator(name: str) -> None:
+    """Refuse an estimator that does not exist, before anything is read.
 
     Raises
     ------
     DataError
-        When there is none of that name.
     """
+    from sdimu_calibration.core.recording import DataError
+
+    if name not in ESTIMATORS:
+        raise DataError(f"--estimator {name}: expected one of {', '.join(ESTIMATORS)}")
+
+
+def chosen_estimator(name: str, recording: Recording, imu: ImuSpecification) -> str:
+    """Decide between filter and hand when it is left open, by what the gyros see of the Earth's rate."""
+    from sdimu_calibration.core.hand import by_hand
+
+    if name != "auto":
+        return name
+    return "hand" if by_hand(recording, imu) else "filter"
+
+
+def _estimators() -> dict[str, Callable[..., Calibration]]:
+    """All estimators by name."""
     from sdimu_calibration.core.batch import batch_calibrate
     from sdimu_calibration.core.calibrate import calibrate as filter_calibrate
     from sdimu_calibration.core.classical import classical_calibrate
-    from sdimu_calibration.core.recording import DataError
+    from sdimu_calibration.core.hand import hand_calibrate
 
-    known = {"filter": filter_calibrate, "batch": batch_calibrate, "classical": classical_calibrate}
-    if name not in known:
-        raise DataError(f"--estimator {name}: expected one of {', '.join(known)}")
-    return known[name]
+    return {
+        "filter": filter_calibrate, "batch": batch_calibrate, "classical": classical_calibrate, "hand": hand_calibrate,
+    }  # fmt: skip
 
 
 def default_folder(bag: Path, what: str = "calibration") -> Path:

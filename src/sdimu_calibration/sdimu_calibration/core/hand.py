@@ -43,7 +43,7 @@ _SEEN = 3.0
 def by_hand(recording: Recording, imu: ImuSpecification) -> bool:
     """Decide whether navigation has nothing to hold on to because a rest does not show the Earth's rate.
 
-    It does not when the gyros' white noise over a rest of the usual length exceeds it.
+    It does not when the gyros' white noise, specified or learned from the rests, exceeds it in the usual rest.
     """
     if imu.gyro_white_noise < earth.RATE:  # seen within a second: no need to look at the samples
         return False
@@ -52,7 +52,7 @@ def by_hand(recording: Recording, imu: ImuSpecification) -> bool:
     except DataError:
         return False
     usual = float(np.median(rests.last - rests.first)) * recording.interval_s
-    return bool(imu.gyro_white_noise / np.sqrt(usual) > earth.RATE)
+    return bool(max(imu.gyro_white_noise, rests.gyro_white_noise) / np.sqrt(usual) > earth.RATE)
 
 
 def hand_calibrate(

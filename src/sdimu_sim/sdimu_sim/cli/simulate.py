@@ -16,7 +16,9 @@ _EFFECT = "Hide an effect, NAME=VALUE (accel_quadratic_x='20 ug/g^2') or SENSOR=
 def simulate(
     out: Annotated[Path, typer.Option(help="Bag (folder) to write.")],
     plan: Annotated[str, typer.Option(help="Test plan: name in config/plan or path.")] = "kim18",
-    imu: Annotated[str, typer.Option(help="IMU specification, from which the true errors are drawn.")] = "dtg",
+    imu: Annotated[
+        str | None, typer.Option(help="IMU that gives the true errors their size; dtg (by hand: mems_by_hand).")
+    ] = None,
     site: Annotated[str, typer.Option(help="Site.")] = "daejeon",
     table: Annotated[str, typer.Option(help="Rate table.")] = "ideal",
     rate: Annotated[float, typer.Option(help="Sample rate of the IMU (Hz), 10 to 1000.")] = 100.0,
@@ -26,6 +28,9 @@ def simulate(
     effect: Annotated[list[str] | None, typer.Option(help=_EFFECT)] = None,
     temperature: Annotated[str | None, typer.Option(help="Temperature profile: name or path.")] = None,
     truth: Annotated[Path | None, typer.Option(help="Truth file; default: OUT.truth.yaml beside the bag.")] = None,
+    by_hand: Annotated[
+        int | None, typer.Option(metavar="N", help="No table: a hand puts the IMU into N random attitudes.")
+    ] = None,
     replace: Annotated[bool, typer.Option("--replace", help="Overwrite the bag if it exists.")] = False,
 ) -> None:
     """Simulate a whole test into a bag, with the truth in a separate file."""
@@ -39,9 +44,21 @@ def simulate(
     from sdimu_sim.temperature_file import load_temperature
     from sdimu_sim.truth_file import write_truth
 
+    truth_path = truth or out.with_name(f"{out.name}.truth.yaml")
+    if by_hand is not None:
+        from sdimu_sim.bag_file import write_by_hand
+        from sdimu_sim.core.by_hand import ByHand, simulate_by_hand
+
+        run = ByHand(by_hand, load_imu(imu or "mems_by_hand"), load_site(site), seed, rate, effects=tuple(effect or ()))
+        samples, true = simulate_by_hand(run)
+        write_by_hand(out, samples, replace=replace)
+        write_truth(truth_path, true)
+        text = f"{out}: {len(samples.t)} samples, {samples.t[-1]:.0f} s by hand; truth in {truth_path}"
+        Console().print(text, soft_wrap=True)
+        return
     scenario = Scenario(
         plan=load_plan(plan),
-        imu=load_imu(imu),
+        imu=load_imu(imu or "dtg"),
         site=load_site(site),
         table=load_table(table),
         rate_hz=rate,
@@ -53,7 +70,6 @@ def simulate(
     )
     test = simulate_test(scenario)
     write_test(out, scenario, test, replace=replace)
-    truth_path = truth or out.with_name(f"{out.name}.truth.yaml")
     write_truth(truth_path, test.truth)
     count = len(test.samples.t)
     Console().print(f"{out}: {count} samples, {test.motion.t[-1]:.0f} s; truth in {truth_path}", soft_wrap=True)
