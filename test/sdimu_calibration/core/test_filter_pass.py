@@ -206,7 +206,7 @@ def test_shared_noise_of_an_epoch_is_that_of_its_pieces(site, imu, model, genera
     position = np.array([site.latitude_rad, 0.0, site.height_m])
     s = NAV + p + COPY
     state = PassState(np.zeros(s), np.eye(s), general_attitude.copy(), np.zeros(3), position, np.zeros(p))
-    _, _, R, M = _measurement(settings, state, np.zeros((6, p)), np.zeros(6), T, p)
+    _, _, R, M = _measurement(settings, state, np.zeros((6, p)), np.zeros(6), T, p, 1.0)
     f_cross = skew(np.array([0.0, 0.0, -earth.normal_gravity(site.latitude_rad, site.height_m)]))
     left = T * (1.0 - (np.arange(pieces) + 0.5) / pieces)
     C = general_attitude

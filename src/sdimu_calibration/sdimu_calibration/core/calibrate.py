@@ -23,6 +23,7 @@ from sdimu_calibration.core.passes import (
 from sdimu_calibration.core.recording import DataError, Recording
 from sdimu_calibration.core.results import Calibration, History
 from sdimu_calibration.core.specification import ImuSpecification, Model, Site
+from sdimu_calibration.core.stop_misfit import stop_misfit
 
 Floats = NDArray[np.float64]
 
@@ -86,6 +87,7 @@ def assemble(recording: Recording, solution: Solution, held_out: bool) -> Calibr
     fit["passes"] = float(solution.passes)
     fit["held_out_rms"] = held_out_rms(reduced, setup, last) if held_out else None
     J = body_frame.frame_jacobian(names, frame)
+    warnings = (*(f.text for f in reduced.faults if f.grave), *_warnings(solution, fit))
     return Calibration(
         body_frame=frame,
         model=tuple(e.name for e in setup.sensors.effects),
@@ -96,8 +98,10 @@ def assemble(recording: Recording, solution: Solution, held_out: bool) -> Calibr
         covariance=J @ last.covariance @ J.T,
         fit=fit,
         data=data_counts(recording, reduced),
-        notes=(*recording.notes, *_warnings(solution, fit)),
+        notes=(*recording.notes, *(f.text for f in reduced.faults if not f.grave), *warnings),
         history=history(reduced, setup, solution.first),
+        warnings=warnings,
+        faults=reduced.faults,
     )
 
 
@@ -121,6 +125,9 @@ def _warnings(solution: Solution, fit: dict[str, float | None]) -> list[str]:
     if nis > _MISFIT or (held_out is not None and held_out > _MISFIT):
         text = f"NIS {nis:.3f}" + ("" if held_out is None else f", held-out error {held_out:.3f}")
         out.append(f"the model does not fit ({text}; 1 is right){in_turn}; run: sdimu diagnose")
+    misfit = stop_misfit(solution.last, solution.reduced)
+    if misfit:
+        out.append(misfit)
     size = np.abs(solution.last.estimate) / solution.setup.sensors.prior
     worst = int(np.argmax(size))
     if size[worst] > _OUTSIDE:

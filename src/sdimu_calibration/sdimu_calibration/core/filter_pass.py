@@ -58,9 +58,11 @@ class PassInput(NamedTuple):
     upsilon: Floats  # (n, 3) m/s
     coning: Floats  # (n, 3) rad
     sculling: Floats  # (n, 3) m/s
-    gap_angle: Floats  # (n, 3) rad
     first: Ints  # (e,) first cycle
     last: Ints  # (e,) one after the last cycle
+    white: Floats  # (e,) variance of the white noise over that of a whole epoch
+    gap_angle: Floats  # (e,) rad: sigma that missing samples add, every axis
+    gap_velocity: Floats  # (e,) m/s
     kind: Ints  # (e,) SKIP ... HELD_ALL
     values: Floats  # (n, m) regressors
     channel: Ints  # (m,)
@@ -208,22 +210,12 @@ def _navigate_epoch(
 
 
 @compiled
-def _gap_noise(data: PassInput, e: int, Q: Floats) -> None:
-    """Add the attitude uncertainty of an angle that was bridged by interpolation (a tenth of it), in place."""
-    total = 0.0
-    for c in range(data.first[e], data.last[e]):
-        for i in range(3):
-            total += (0.1 * data.gap_angle[c, i]) ** 2
-    for i in range(3):
-        Q[6 + i, 6 + i] += total
-
-
-@compiled
 def _measurement(
-    settings: PassSettings, state: PassState, D: Floats, sums: Floats, T: float, p: int
+    settings: PassSettings, state: PassState, D: Floats, sums: Floats, T: float, p: int, white: float
 ) -> tuple[Floats, Floats, Floats, Floats]:
-    """Build z (12,), H (12, s), R (12, 12) and M (s, 12) of a dwell epoch."""
+    """Build z (12,), H (12, s), R (12, 12) and M (s, 12) of a dwell epoch; `white` as in `PassInput`."""
     s = NAV + p + COPY
+    gyro_psd, accel_psd = settings.gyro_psd * white, settings.accel_psd * white
     z = np.empty(MEASURED)
     H = np.zeros((MEASURED, s))
     R = np.zeros((MEASURED, MEASURED))
@@ -248,18 +240,18 @@ def _measurement(
         H[3 + i, 3 + i] = 1.0
         R[i, i] = settings.position_sigma**2
         R[3 + i, 3 + i] = settings.velocity_sigma**2
-        R[6 + i, 6 + i] = settings.gyro_psd / T + settings.extra_gyro
-        R[9 + i, 9 + i] = settings.accel_psd / T + settings.extra_accel
+        R[6 + i, 6 + i] = gyro_psd / T + settings.extra_gyro
+        R[9 + i, 9 + i] = accel_psd / T + settings.extra_accel
     H[6:9, 6:9] = C_bn @ skew(w_ie)
     H[9:12, 6:9] = C_bn @ skew(-g_n)
     H[6:12, NAV : NAV + p] = D / T
     if settings.shared_noise:
         fC = skew(-g_n) @ C
-        M[6:9, 6:9] = -settings.gyro_psd * C
-        M[3:6, 6:9] = -settings.gyro_psd * T / 2.0 * fC
-        M[0:3, 6:9] = -settings.gyro_psd * T**2 / 6.0 * fC
-        M[3:6, 9:12] = settings.accel_psd * C
-        M[0:3, 9:12] = settings.accel_psd * T / 2.0 * C
+        M[6:9, 6:9] = -gyro_psd * C
+        M[3:6, 6:9] = -gyro_psd * T / 2.0 * fC
+        M[0:3, 6:9] = -gyro_psd * T**2 / 6.0 * fC
+        M[3:6, 9:12] = accel_psd * C
+        M[0:3, 9:12] = accel_psd * T / 2.0 * C
     return z, H, R, M
 
 
@@ -306,8 +298,10 @@ def run_pass(data: PassInput, settings: PassSettings, state: PassState, out: Pas
         T = _navigate_epoch(data, e, settings, state, G[:, :p], D, sums)
         f_n = sums[6:] / T
         Phi = transition(navigation_error_matrix(position, velocity, f_n), T)
-        Q = process_noise(gyro, accel, f_n, T)
-        _gap_noise(data, e, Q)
+        Q = process_noise(gyro * data.white[e], accel * data.white[e], f_n, T)
+        for i in range(3):
+            Q[3 + i, 3 + i] += data.gap_velocity[e] ** 2
+            Q[6 + i, 6 + i] += data.gap_angle[e] ** 2
         for j in range(p):
             d = np.exp(-settings.decay_rate[j] * T)
             decay[j] = d
@@ -322,7 +316,7 @@ def run_pass(data: PassInput, settings: PassSettings, state: PassState, out: Pas
             out.G[e] = G[:, :p]
         if kind != SKIP:
             low = 0 if abs(kind) == ALL else 6
-            z, H, R, M = _measurement(settings, state, D, sums, T, p)
+            z, H, R, M = _measurement(settings, state, D, sums, T, p, data.white[e])
             Hl = np.ascontiguousarray(H[low:])
             Ml = np.ascontiguousarray(M[:, low:])
             Rl = np.ascontiguousarray(R[low:, low:])

@@ -9,9 +9,11 @@ from numpy.typing import NDArray
 
 from sdimu_calibration.core import body_frame
 from sdimu_calibration.core.alignment import Alignment
+from sdimu_calibration.core.arrival import arrange
 from sdimu_calibration.core.calibrate import calibrate
 from sdimu_calibration.core.epochs import Epochs, cut
 from sdimu_calibration.core.filter_pass import NAV, PassInput, PassState, new_output, run_pass
+from sdimu_calibration.core.gaps import bridges, largest_acceleration
 from sdimu_calibration.core.motion import Motion
 from sdimu_calibration.core.passes import (
     ALIGN_S,
@@ -116,9 +118,12 @@ class LiveCalibration:
     def __init__(self, site: Site, imu: ImuSpecification, model: Model, start_ns: int) -> None:
         self.setup = set_up(site, imu, model)
         self.start_ns = start_ns
+        # As they came, for the end; and what of them is new and finite, for the filter on the way.
+        self._arrived: list[tuple[Stamps, Floats, Floats]] = []
         self._ns: list[Stamps] = []
         self._omega: list[Floats] = []
         self._force: list[Floats] = []
+        self._acceleration = 0.0
         self._phase: list[tuple[int, bool, int]] = []
         self._temperature: list[tuple[int, float]] = []
         self._late = self._rejected = self._lost = self._contradicted = self._samples = 0
@@ -143,9 +148,11 @@ class LiveCalibration:
     def add_samples(self, t: Floats, omega_ib_b: Floats, f_ib_b: Floats) -> None:
         """Take samples: end stamps (s after `start_ns`) shape (n,), rates and specific forces shape (n, 3).
 
-        Samples that are not finite, or not later than the last one taken, are counted and dropped.
+        Samples that are not finite, or not later than the last one taken, are counted and do not reach the filter on
+        the way; the end of the test sorts them in as the reader of bags does.
         """
         ns = self.start_ns + np.rint(np.asarray(t) * 1e9).astype(np.int64)
+        self._arrived.append((ns, np.array(omega_ib_b, dtype=float), np.array(f_ib_b, dtype=float)))
         finite = np.isfinite(omega_ib_b).all(axis=1) & np.isfinite(f_ib_b).all(axis=1)
         newest = np.maximum.accumulate(np.concatenate([[self._last_ns], np.where(finite, ns, self._last_ns)]))
         later = ns > newest[:-1]
@@ -206,12 +213,14 @@ class LiveCalibration:
         """Everything taken so far."""
         if not self._ns or sum(map(len, self._ns)) < NOMINAL_FROM + 1:
             raise DataError("/imu/data_raw: too few samples have come to calibrate")
-        ns = np.concatenate(self._ns)
-        start = origin_ns(ns)
+        ns, omega, force = (np.concatenate(part) for part in zip(*self._arrived, strict=True))
+        done = arrange(ns, omega, force, "/imu/data_raw")
+        rows = done.rows
+        start = origin_ns(ns[rows])
         self._origin_ns = start
         return Recording(
-            start, seconds(ns, start), np.concatenate(self._omega), np.concatenate(self._force),
-            self._phase_log(), self._temperature_log(), rejected=self._rejected,
+            start, seconds(ns[rows], start), omega[rows], force[rows], self._phase_log(), self._temperature_log(),
+            rejected=len(ns) - len(rows), notes=done.notes,
         )  # fmt: skip
 
     def _begin(self) -> bool:
@@ -301,9 +310,16 @@ class LiveCalibration:
         self._before = seen
         one = Phases(*(getattr(phases, n)[k : k + 1] for n in Phases.__dataclass_fields__))
         kind = measurement_kinds(one, setup.model.zero_velocity == "every_epoch")
+        # The largest acceleration so far; a first gap in the first turn knows no more than that turn's beginning.
+        self._acceleration = max(self._acceleration, largest_acceleration(part))
+        alone = Epochs(
+            np.zeros(1, dtype=np.int64), np.full(1, len(part), dtype=np.int64),
+            *(getattr(epochs, n)[k : k + 1] for n in ("start", "end", "peak_rate", "f_mean", "w_mean")),
+        )  # fmt: skip
+        gap = bridges(part, alone, one.dwell, self._nominal_s, self._acceleration, setup.gravity)
         data = PassInput(
-            part.dt, part.alpha, part.upsilon, part.coning, part.sculling, part.gap_angle,
-            np.zeros(1, dtype=np.int64), np.full(1, len(part), dtype=np.int64), kind,
+            part.dt, part.alpha, part.upsilon, part.coning, part.sculling, alone.first, alone.last,
+            gap.white, gap.angle, gap.velocity, kind,
             sensors.regressors(seen), sensors.channel, sensors.parameter,
         )  # fmt: skip
         out = new_output(1, len(sensors.prior), False, 1)

@@ -29,10 +29,12 @@ from sdimu_calibration.core.filter_pass import (
     new_output,
     run_pass,
 )
+from sdimu_calibration.core.gaps import Bridges, bridges, judge, largest_acceleration
 from sdimu_calibration.core.imu_model import ImuModel
-from sdimu_calibration.core.phases import Phases, PhaseState, RestLimits, classify, rest_limits
-from sdimu_calibration.core.recording import NOMINAL_FROM, DataError, Recording, TemperatureLog
+from sdimu_calibration.core.phases import Phases, PhaseState, RestLimits, classify, contradictions, rest_limits
+from sdimu_calibration.core.recording import NOMINAL_FROM, DataError, DataFault, Recording, TemperatureLog
 from sdimu_calibration.core.rotation import rotation_matrix, rotation_vector
+from sdimu_calibration.core.soundness import sound
 from sdimu_calibration.core.specification import ImuSpecification, Model, Site
 from sdimu_calibration.core.strapdown import Cycles, Reducer
 from sdimu_calibration.core.track import motion
@@ -79,6 +81,8 @@ class Reduced:
     phases: Phases
     kind: NDArray[np.int64]
     temperature: TemperatureLog | None
+    bridges: Bridges
+    faults: tuple[DataFault, ...] = ()
 
     @property
     def rest(self) -> NDArray[np.bool_]:
@@ -135,8 +139,9 @@ def reduce(recording: Recording, setup: Setup) -> Reduced:
     Raises
     ------
     DataError
-        When there is too little of it.
+        When there is too little of it, or so much is missing that nobody knows the attitude after it.
     """
+    recording, unsound = sound(recording)
     if len(recording.t) < NOMINAL_FROM + 1:
         raise DataError(f"/imu/data_raw: {len(recording.t)} usable samples are too few to calibrate")
     nominal = nominal_interval(recording.t)
@@ -146,7 +151,12 @@ def reduce(recording: Recording, setup: Setup) -> Reduced:
         raise DataError("/imu/data_raw: the recording is shorter than one second")
     phases = classify(epochs, recording.phase, setup.limits, setup.gravity, setup.model.settle_s, PhaseState())
     kind = measurement_kinds(phases, setup.model.zero_velocity == "every_epoch")
-    return Reduced(cycles[: int(epochs.last[-1])], epochs, phases, kind, recording.temperature)
+    cycles = cycles[: int(epochs.last[-1])]
+    found = bridges(cycles, epochs, phases.dwell, nominal, largest_acceleration(cycles), setup.gravity)
+    noise = (setup.imu.gyro_white_noise, setup.imu.accel_white_noise)
+    lost = judge(cycles, epochs, phases, nominal, found, noise)
+    faults = (*unsound, *lost, *contradictions(epochs, phases, recording.phase))
+    return Reduced(cycles, epochs, phases, kind, recording.temperature, found, faults)
 
 
 def first_attitude(epochs: Epochs, phases: Phases, setup: Setup) -> Alignment:
@@ -158,6 +168,11 @@ def first_attitude(epochs: Epochs, phases: Phases, setup: Setup) -> Alignment:
         When the IMU is never at rest, or turns before its first rest.
     """
     if not phases.dwell.any():
+        if phases.denied.any():
+            raise DataError(
+                "/rate_table/status: says rotating all the time, although the IMU rests at times; correct the status, "
+                "or leave the topic out: the dwells are then found from the IMU"
+            )
         raise DataError(
             "/imu/data_raw: the IMU is never at rest (|f| near gravity and |w| near Earth rate within the IMU's "
             "specification); check its units, and that --imu and --site fit"
@@ -219,9 +234,9 @@ def start_state(setup: Setup, start: Alignment, C_nb: Floats, reference: Floats)
 
 def pass_input(reduced: Reduced, values: Floats, channel: NDArray[np.int64], parameter: NDArray[np.int64]) -> PassInput:
     """Put cycles, epochs and regressors together."""
-    c, e = reduced.cycles, reduced.epochs
+    c, e, b = reduced.cycles, reduced.epochs, reduced.bridges
     return PassInput(
-        c.dt, c.alpha, c.upsilon, c.coning, c.sculling, c.gap_angle, e.first, e.last, reduced.kind,
+        c.dt, c.alpha, c.upsilon, c.coning, c.sculling, e.first, e.last, b.white, b.angle, b.velocity, reduced.kind,
         values, channel, parameter,
     )  # fmt: skip
 

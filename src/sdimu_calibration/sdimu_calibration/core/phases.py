@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sdimu_calibration.core import earth
-from sdimu_calibration.core.epochs import Epochs
-from sdimu_calibration.core.recording import PhaseLog
+from sdimu_calibration.core.epochs import EPOCH_S, Epochs
+from sdimu_calibration.core.recording import DataFault, PhaseLog
 from sdimu_calibration.core.specification import ImuSpecification
 from sdimu_calibration.core.strapdown import CYCLE_S
 from sdimu_calibration.core.units import STANDARD_GRAVITY
@@ -26,6 +26,11 @@ STALE_S = 2.5
 """A status older than this says nothing any more (s); it is sent at every change and at 1 Hz."""
 _SIGMAS = 6.0
 """The guard calls an IMU moving beyond this many sigma of what bias and noise can do at rest."""
+
+_WHOLE_S = 1.5 * EPOCH_S
+"""A longer epoch has a gap in it: it is no measurement."""
+_DENIED = 0.1
+"""Share of the rest that a status may call rotating unnoticed: its tables settle."""
 
 _LEAST_FORCE = 0.01 * STANDARD_GRAVITY
 """An accelerometer may be this far off without the IMU being in motion: a force error that nobody specified must not
@@ -73,6 +78,7 @@ class Phases:
     first : the first measurement after motion
     stop : index of the stop
     contradicted : the table says dwell while the IMU moves
+    denied : the table says rotating while the IMU rests
     """
 
     dwell: Bools
@@ -80,6 +86,7 @@ class Phases:
     first: Bools
     stop: NDArray[np.int64]
     contradicted: Bools
+    denied: Bools
 
 
 def table_says(epochs: Epochs, log: PhaseLog | None) -> tuple[NDArray[np.int8], NDArray[np.int64]]:
@@ -95,7 +102,18 @@ def table_says(epochs: Epochs, log: PhaseLog | None) -> tuple[NDArray[np.int8], 
     rotating = rotating_before[i1 + 1] - rotating_before[np.maximum(i0, 0)] > 0
     said = np.where(rotating, 0, 1).astype(np.int8)
     said[~known] = -1
-    return said, np.where(known, log.stop[np.maximum(i1, 0)], -1)
+    # Numbers that change at rest, or do not change over a turn, would join what is apart: then dwells are counted.
+    stop = log.stop if numbers_make_sense(log) else np.full(len(log.t), -1, dtype=np.int64)
+    return said, np.where(known, stop[np.maximum(i1, 0)], -1)
+
+
+def numbers_make_sense(log: PhaseLog) -> bool:
+    """Whether the status gives every dwell a number of its own."""
+    dwell = np.flatnonzero(log.dwell)
+    begins = np.concatenate([[True], np.diff(dwell) > 1])[: len(dwell)]
+    number = log.stop[dwell]
+    changes = np.concatenate([[True], np.diff(number) != 0])[: len(dwell)]
+    return bool((begins == changes).all()) and len(np.unique(number[begins])) == int(begins.sum())
 
 
 def classify(
@@ -126,6 +144,7 @@ def classify(
     )
     m = len(epochs)
     dwell = still & (said != 0)
+    whole = epochs.end - epochs.start < _WHOLE_S
     used = np.zeros(m, dtype=bool)
     first = np.zeros(m, dtype=bool)
     stop = np.zeros(m, dtype=np.int64)
@@ -135,10 +154,30 @@ def classify(
         state.at_rest = bool(dwell[k])
         if not dwell[k]:
             state.motion_end, state.fresh = epochs.end[k], True
-        elif epochs.start[k] >= state.motion_end + settle_s - 1e-6:
+        elif whole[k] and epochs.start[k] >= state.motion_end + settle_s - 1e-6:
             used[k], first[k] = True, state.fresh
             state.fresh = False
         if said_stop[k] >= 0:
             state.stop = int(said_stop[k])
         stop[k] = state.stop
-    return Phases(dwell, used, first, stop, (said == 1) & ~still)
+    return Phases(dwell, used, first, stop, (said == 1) & ~still, (said == 0) & still)
+
+
+def contradictions(epochs: Epochs, phases: Phases, log: PhaseLog | None) -> tuple[DataFault, ...]:
+    """Say where the status and the IMU do not agree."""
+    length = epochs.end - epochs.start
+    out = []
+    for where, kind, text in (
+        (phases.contradicted, "motion at rest", "the IMU moved for {:.0f} s in which the table said dwell"),
+        (phases.denied, "status", "the table said rotating for {:.0f} s in which the IMU rested"),
+    ):
+        seconds = float(length[where].sum())
+        if seconds > (_DENIED * float(length[phases.dwell].sum()) if kind == "status" else 0.0):
+            t = epochs.start[where]
+            line = f"{text.format(seconds)} (first at {t[0]:.1f} s, stop {phases.stop[where][0]}); not used"
+            out.append(DataFault(kind, line, round(seconds), float(t[0]), float(epochs.end[where][-1])))
+    if log is not None and len(log.t) and epochs.end[-1] - log.t[-1] > STALE_S:
+        begin, end = float(log.t[-1]), float(epochs.end[-1])
+        line = f"the table says nothing from {begin:.1f} to {end:.1f} s, the end: the IMU alone tells rest from motion"
+        out.append(DataFault("status", line, round(end - begin), begin, end))
+    return tuple(out)

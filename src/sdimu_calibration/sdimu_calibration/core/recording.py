@@ -19,6 +19,32 @@ class DataError(ValueError):
 
 
 @dataclass(frozen=True)
+class DataFault:
+    """Something wrong with the data that is no physics of the sensor.
+
+    Attributes
+    ----------
+    kind : str
+        ``gap``, ``stuck``, ``saturated``, ``spike``, ``motion at rest``, ``status``, ...
+    text : str
+        One line for people.
+    count : int
+        Samples, or seconds of status, concerned.
+    start_s, end_s : float
+        First and last time (s); NaN where that has no meaning.
+    grave : bool
+        The estimate is not to be trusted until someone has looked at it.
+    """
+
+    kind: str
+    text: str
+    count: int = 0
+    start_s: float = float("nan")
+    end_s: float = float("nan")
+    grave: bool = False
+
+
+@dataclass(frozen=True)
 class PhaseLog:
     """What the rate table said about itself; each entry holds from its time on.
 

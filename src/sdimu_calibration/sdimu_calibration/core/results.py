@@ -8,6 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from sdimu_calibration.core.recording import DataFault
+
 Floats = NDArray[np.float64]
 
 
@@ -60,6 +62,10 @@ class Calibration:
         What the user should know, one line each.
     history : History
         Of the first, closed-loop pass.
+    warnings : tuple of str
+        Those of the notes that say that the estimate is not to be trusted as it stands.
+    faults : tuple of DataFault
+        What is wrong with the data and no physics of the sensor.
     """
 
     body_frame: str
@@ -73,3 +79,5 @@ class Calibration:
     data: Mapping[str, float]
     notes: tuple[str, ...]
     history: History
+    warnings: tuple[str, ...] = ()
+    faults: tuple[DataFault, ...] = ()

@@ -11,14 +11,20 @@ from typing import Any
 import numpy as np
 from rosbags.typesys import Stores, get_typestore
 
-from sdimu_calibration.core.recording import DataError, Floats, PhaseLog, Recording, TableLog, TemperatureLog
+from sdimu_calibration.core.arrival import arrange
+from sdimu_calibration.core.recording import (
+    Floats,
+    PhaseLog,
+    Recording,
+    TableLog,
+    TemperatureLog,
+    origin_ns,
+)
 from sdimu_calibration.storage import cdr
 from sdimu_calibration.storage.bag_file import raw_messages, read_topics
 from sdimu_calibration.storage.cdr import LayoutError, Stamps
 from sdimu_calibration.storage.topic_choice import KINDS, TopicChoice, choose
 from sdimu_calibration.storage.topics import Topics
-
-_MINIMUM_SAMPLES = 2
 
 
 def read_recording(path: Path, topics: Topics | TopicChoice | None = None) -> Recording:
@@ -49,9 +55,10 @@ def read_recording(path: Path, topics: Topics | TopicChoice | None = None) -> Re
     topics, raw = _messages(path, topics, notes)
     ns, omega_ib_b, f_ib_b = _imu(raw[topics.imu])
     total = len(ns)
-    chosen = _usable(ns, omega_ib_b, f_ib_b, f"{path}: {topics.imu}", notes)
-    ns, omega_ib_b, f_ib_b = ns[chosen], omega_ib_b[chosen], f_ib_b[chosen]
-    start_ns = int(ns[0]) - round(float(np.median(np.diff(ns))))
+    arranged = arrange(ns, omega_ib_b, f_ib_b, f"{path}: {topics.imu}")
+    notes.extend(arranged.notes)
+    ns, omega_ib_b, f_ib_b = ns[arranged.rows], omega_ib_b[arranged.rows], f_ib_b[arranged.rows]
+    start_ns = origin_ns(ns)
     return Recording(
         start_ns=start_ns,
         t=_seconds(ns, start_ns),
@@ -87,27 +94,6 @@ def _phase_word(message: Any) -> str:
         return ""
     values = {entry.key: entry.value for entry in message.status[0].values}
     return str(values.get("phase") or message.status[0].message).strip().lower()
-
-
-def _usable(ns: Stamps, omega_ib_b: Floats, f_ib_b: Floats, where: str, notes: list[str]) -> Stamps:
-    """Choose the samples to use: indices in the order of their stamps, every stamp once."""
-    finite = np.isfinite(omega_ib_b).all(axis=1) & np.isfinite(f_ib_b).all(axis=1)
-    if not finite.any():
-        raise DataError(f"{where}: all {len(ns)} samples are NaN or infinite; check the driver of the IMU")
-    chosen: Stamps = np.flatnonzero(finite)
-    if len(chosen) < len(ns):
-        notes.append(f"{len(ns) - len(chosen)} samples were not finite and were dropped")
-    late = int(np.count_nonzero(np.diff(ns[chosen]) < 0))
-    if late:
-        notes.append(f"{late} samples came out of order and were sorted by their stamps")
-        chosen = chosen[np.argsort(ns[chosen], kind="stable")]
-    new = np.concatenate([[True], np.diff(ns[chosen]) > 0])
-    if not new.all():
-        notes.append(f"{np.count_nonzero(~new)} samples repeated a stamp and were dropped")
-    chosen = chosen[new]
-    if len(chosen) < _MINIMUM_SAMPLES:
-        raise DataError(f"{where}: only one stamp in {len(ns)} samples; check header.stamp of the driver")
-    return chosen
 
 
 def _phase(raw: list[bytes], start_ns: int, topic: str, notes: list[str]) -> PhaseLog | None:

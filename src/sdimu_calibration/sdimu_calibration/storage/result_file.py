@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import fields
+from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from sdimu_calibration.core.recording import DataError, Floats
+from sdimu_calibration.core.recording import DataError, DataFault, Floats
 from sdimu_calibration.core.results import Calibration, History
 from sdimu_calibration.storage.json_file import read_json, write_json
 
@@ -42,8 +42,9 @@ def write_result(path: Path, calibration: Calibration) -> None:
         ],
         "covariance": calibration.covariance.tolist(),
         "fit": dict(calibration.fit),
-        "data": dict(calibration.data),
+        "data": {**calibration.data, "faults": [asdict(fault) for fault in calibration.faults]},
         "notes": list(calibration.notes),
+        "warnings": list(calibration.warnings),
         "history": {entry.name: getattr(calibration.history, entry.name).tolist() for entry in fields(History)},
     }
     write_json(path, content)
@@ -88,10 +89,17 @@ def _calibration(content: Mapping[str, Any]) -> Calibration:
         values=_array([c["value"] for c in coefficients], (number,)),
         covariance=_array(content["covariance"], (number, number)),
         fit=dict(content["fit"]),
-        data=dict(content["data"]),
+        data={key: value for key, value in content["data"].items() if key != "faults"},
         notes=tuple(content.get("notes", ())),
         history=_history(content.get("history") or {}, number),
+        warnings=tuple(content.get("warnings", ())),
+        faults=tuple(_fault(entry) for entry in content["data"].get("faults", ())),
     )
+
+
+def _fault(entry: Mapping[str, Any]) -> DataFault:
+    values: dict[str, Any] = {key: float("nan") if value is None else value for key, value in entry.items()}
+    return DataFault(**values)
 
 
 def _history(content: Mapping[str, Any], number: int) -> History:

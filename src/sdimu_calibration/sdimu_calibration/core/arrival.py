@@ -1,0 +1,111 @@
+"""From samples as they arrive to samples in the order of their stamps, every stamp once, every number finite.
+
+Reader and live node use this one function, so that a bag and the node that recorded it work on the same samples.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sdimu_calibration.core.recording import DataError
+
+Floats = NDArray[np.float64]
+Stamps = NDArray[np.int64]
+
+_MINIMUM_SAMPLES = 2
+_SAME_TIME = 0.5
+"""Two samples nearer than this many intervals are of the same time."""
+_OVERLAP = 3
+"""So many samples in a row that arrive late, and find their time taken by other readings, mean a clock set back."""
+
+
+@dataclass(frozen=True)
+class Arranged:
+    """Which samples to use, and what was wrong with the others.
+
+    Attributes
+    ----------
+    rows : ndarray of int
+        Indices in the order of their stamps.
+    counts : dict of str to int
+        ``not_finite``, ``out_of_order``, ``repeated`` (stamps that were there before).
+    notes : tuple of str
+        The same for people, one line each.
+    """
+
+    rows: Stamps
+    counts: dict[str, int]
+    notes: tuple[str, ...]
+
+
+def arrange(ns: Stamps, omega_ib_b: Floats, f_ib_b: Floats, where: str) -> Arranged:
+    """Choose and order samples.
+
+    Parameters
+    ----------
+    ns : ndarray of int, shape (n,)
+        Stamps (ns) in the order of arrival.
+    omega_ib_b, f_ib_b : ndarray, shape (n, 3)
+        rad/s, m/s^2.
+    where : str
+        Named in errors.
+
+    Raises
+    ------
+    DataError
+        When nothing can be used, or the clock of the stamps was set back: then one stamp means two times.
+    """
+    finite = np.isfinite(omega_ib_b).all(axis=1) & np.isfinite(f_ib_b).all(axis=1)
+    if not finite.any():
+        raise DataError(f"{where}: all {len(ns)} samples are NaN or infinite; check the driver of the IMU")
+    notes: list[str] = []
+    rows: Stamps = np.flatnonzero(finite)
+    bad = len(ns) - len(rows)
+    if bad:
+        notes.append(f"{bad} samples were not finite and were dropped")
+    late = int(np.count_nonzero(np.diff(ns[rows]) < 0))
+    if late:
+        _refuse_clock_set_back(ns[rows], omega_ib_b[rows], f_ib_b[rows], where)
+        notes.append(f"{late} samples came out of order and were sorted by their stamps")
+        rows = rows[np.argsort(ns[rows], kind="stable")]
+    new = np.concatenate([[True], np.diff(ns[rows]) > 0])
+    repeated = int(np.count_nonzero(~new))
+    if repeated:
+        notes.append(f"{repeated} samples repeated a stamp and were dropped")
+    rows = rows[new]
+    if len(rows) < _MINIMUM_SAMPLES:
+        raise DataError(f"{where}: only one stamp in {len(ns)} samples; check header.stamp of the driver")
+    return Arranged(rows, {"not_finite": bad, "out_of_order": late, "repeated": repeated}, tuple(notes))
+
+
+def _refuse_clock_set_back(ns: Stamps, omega_ib_b: Floats, f_ib_b: Floats, where: str) -> None:
+    """Tell samples that came late, and fill a hole, from samples whose times other samples already have."""
+    newest = np.maximum.accumulate(ns)
+    late = np.flatnonzero(ns < newest)
+    before = np.sort(ns)
+    interval = float(np.median(np.diff(np.unique(before))))
+    order = np.argsort(ns, kind="stable")
+    place = np.empty(len(ns), dtype=np.int64)
+    place[order] = np.arange(len(ns))
+    taken = np.zeros(len(late), dtype=bool)
+    for side in (-1, 1):
+        other = order[np.clip(place[late] + side, 0, len(ns) - 1)]
+        near = np.abs(ns[other] - ns[late]) < _SAME_TIME * interval
+        same = (omega_ib_b[other] == omega_ib_b[late]).all(axis=1) & (f_ib_b[other] == f_ib_b[late]).all(axis=1)
+        # A sample sent twice is no second reading; only what arrived before this one has taken its time.
+        taken |= near & ~same & (other < late)
+    late = late[taken]
+    if len(late) < _OVERLAP:
+        return
+    run = np.flatnonzero(late[_OVERLAP - 1 :] - late[: 1 - _OVERLAP] == _OVERLAP - 1)
+    if len(run):
+        first = int(late[run[0]])
+        back = (newest[first] - ns[first]) * 1e-9 + interval * 1e-9
+        raise DataError(
+            f"{where}: the clock of the stamps was set back by {back:.3g} s at sample {first} "
+            f"({(ns[first] - ns[0]) * 1e-9:.1f} s after the start), so stamps mean two times; cut the recording there, "
+            "or correct its stamps"
+        )

@@ -1,0 +1,134 @@
+"""Samples that are no measurement: a number that stands still, a reading at the stop of its range, a single spike.
+
+Such a sample is taken away, as if it had been lost: what the gap means is then decided in one place (`gaps`). Each test
+is a probability under continuous noise, learned from the channel itself, so that no IMU needs limits of its own:
+fewer than one sound test in a thousand loses a sample to it. Channels whose counts are coarser than their
+noise repeat numbers by nature; for them a run must be as long as their own repetitions make improbable.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sdimu_calibration.core.recording import DataFault, Recording
+
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+CHANNELS = tuple(f"{triad} {axis}" for triad in ("gyro", "accelerometer") for axis in "xyz")
+_FALSE_ALARM = 1e-3
+"""Sound tests with a false alarm, a channel."""
+_BLOCK = 500
+"""Samples over which the share of repeated numbers is counted."""
+_REPEATS = 0.5
+"""Share of repeated numbers from which a channel says nothing of being stuck: no noise, or far too coarse."""
+_LEAST_AT_END = 3
+"""So many readings at the very largest number are no chance in continuous noise."""
+_SPIKE = 8.0
+"""Second differences beyond so many sigma: 6.2 would do for a million Gaussian samples."""
+_ALONE = 0.25
+"""A spike stands out of its surroundings, the second differences nearby, by at least the inverse of this."""
+_AROUND = np.r_[-12:-2, 3:13]
+_GAUSS_MAD = 1.482602218505602
+
+
+def sound(recording: Recording) -> tuple[Recording, tuple[DataFault, ...]]:
+    """Take away the samples that are no measurement.
+
+    Parameters
+    ----------
+    recording : Recording
+        In the order of its stamps.
+
+    Returns
+    -------
+    recording : Recording
+        The same object when nothing is wrong.
+    faults : tuple of DataFault
+    """
+    bad = np.zeros(len(recording.t), dtype=bool)
+    faults: list[DataFault] = []
+    for name, x in zip(CHANNELS, (*recording.omega_ib_b.T, *recording.f_ib_b.T), strict=True):
+        for rows, kind, text in (_stuck(x), _saturated(x), _spikes(x)):
+            if len(rows):
+                t = recording.t[rows]
+                places = f"{t[0]:.1f} s" if t[-1] - t[0] < 1.0 else f"{t[0]:.1f} to {t[-1]:.1f} s"
+                line = f"{name} {text} in {len(rows)} samples ({places}); they count as missing"
+                faults.append(DataFault(kind, line, len(rows), float(t[0]), float(t[-1])))
+                bad[rows] = True
+    if not bad.any():
+        return recording, ()
+    keep = ~bad
+    mended = replace(
+        recording, t=recording.t[keep], omega_ib_b=recording.omega_ib_b[keep], f_ib_b=recording.f_ib_b[keep],
+        rejected=recording.rejected + int(bad.sum()),
+    )  # fmt: skip
+    return mended, tuple(faults)
+
+
+def _repetition(same: Bools) -> float:
+    """Share of samples that repeat the one before, blind to stretches that are stuck: a median over blocks."""
+    whole = len(same) // _BLOCK
+    if whole < 3:
+        return float(same.mean()) if len(same) else 1.0
+    return float(np.median(same[: whole * _BLOCK].reshape(whole, _BLOCK).mean(axis=1)))
+
+
+def _runs(same: Bools) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """First sample and length of every run of equal numbers of two samples or more."""
+    edge = np.diff(np.concatenate([[0], same.view(np.int8), [0]]))
+    first = np.flatnonzero(edge == 1)
+    return first, np.flatnonzero(edge == -1) - first + 1
+
+
+def _stuck(x: Floats) -> tuple[NDArray[np.int64], str, str]:
+    """Find runs of one number that are too long for the channel."""
+    kind, text = "stuck", "shows one number"
+    none = np.empty(0, dtype=np.int64)
+    n = len(x)
+    same = np.diff(x) == 0.0
+    if n < 3 or not same.any():
+        return none, kind, text
+    share = max(_repetition(same), 1.0 / n)
+    if share > _REPEATS:
+        return none, kind, text
+    # n chances to begin, each further repetition as probable as `share`.
+    improbable = 1 + math.ceil(math.log(_FALSE_ALARM / n) / math.log(share))
+    first, length = _runs(same)
+    long = length >= max(improbable, 3)
+    # The first number of a run is a measurement, the others repeat it.
+    rows = [np.arange(f + 1, f + k) for f, k in zip(first[long], length[long], strict=True)]
+    return (np.concatenate(rows) if rows else none), kind, text
+
+
+def _saturated(x: Floats) -> tuple[NDArray[np.int64], str, str]:
+    """Find readings that stand at the largest or smallest number of a channel that else repeats nothing."""
+    kind, text = "saturated", "stands at the end of its range"
+    none = np.empty(0, dtype=np.int64)
+    if len(x) < 3 or _repetition(np.diff(x) == 0.0) > 1.0 / _BLOCK:
+        return none, kind, text
+    ends = [np.flatnonzero(x == end) for end in (x.max(), x.min())]
+    rows = [at for at in ends if len(at) >= _LEAST_AT_END]
+    return (np.sort(np.concatenate(rows)) if rows else none), kind, text
+
+
+def _spikes(x: Floats) -> tuple[NDArray[np.int64], str, str]:
+    """Find single samples far from both neighbours, where these agree and nothing around is as rough."""
+    kind, text = "spike", "jumps away and back"
+    none = np.empty(0, dtype=np.int64)
+    if len(x) < 2 * _BLOCK:
+        return none, kind, text
+    second = np.zeros_like(x)
+    second[1:-1] = x[1:-1] - 0.5 * (x[:-2] + x[2:])
+    size = np.abs(second)
+    sigma = _GAUSS_MAD * float(np.median(size))
+    if sigma == 0.0:
+        return none, kind, text
+    at = np.flatnonzero(size > _SPIKE * sigma)
+    at = at[np.abs(x[at + 1] - x[at - 1]) < 0.5 * size[at]]
+    around = size[np.clip(at[:, None] + _AROUND, 0, len(x) - 1)].max(axis=1)
+    return at[around < _ALONE * size[at]], kind, text
