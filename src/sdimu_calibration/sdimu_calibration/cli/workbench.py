@@ -24,9 +24,11 @@ def workbench(
 
     from rich.console import Console
 
+    from sdimu_calibration.cli.progress import bar
     from sdimu_calibration.core.recording import DataError
     from sdimu_calibration.report.workbench.app import build
     from sdimu_calibration.report.workbench.fit import Bench
+    from sdimu_calibration.report.workbench.shelf import Shelf, neighbours
     from sdimu_calibration.storage.bag_reader import read_recording
     from sdimu_calibration.storage.config import load_imu, load_site
     from sdimu_calibration.storage.effect_file import extended_model
@@ -34,8 +36,14 @@ def workbench(
     with socket.socket() as probe:
         if probe.connect_ex((host, port)) == 0:
             raise DataError(f"port {port} is taken (choose another with --port)")
-    bench = Bench(read_recording(bag), load_site(site), load_imu(imu), extended_model(model, []))
-    bench.fit((), ())
-    Console().print(f"workbench of {bag.name} at http://{host}:{port} (Ctrl-C ends it)", soft_wrap=True)
+    options = (load_site(site), load_imu(imu), extended_model(model, []))
+    shelf = Shelf(neighbours(bag), lambda path: Bench(read_recording(path), *options))
+    console = Console()
+    with bar(Console(stderr=True)) as progress:
+        progress("reading", 0.0)
+        bench = shelf.bench()
+        bench.fit((), (), progress)
+        bench.missing((), (), progress)
+    console.print(f"workbench of {bag.name} at http://{host}:{port} (Ctrl-C ends it)", soft_wrap=True)
     logging.getLogger("werkzeug").setLevel(logging.ERROR)
-    build(bench, f"Workbench: {bag.name}").run(host=host, port=port, debug=False)
+    build(shelf).run(host=host, port=port, debug=False)

@@ -29,7 +29,7 @@ from sdimu_calibration.core.motion import Floats, Motion
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.specification import Model
 from sdimu_calibration.core.units import UnitError, parse_quantity, parse_unit
-from sdimu_calibration.storage.config import Schema, load_model, read_yaml
+from sdimu_calibration.storage.config import Schema, find_config, load_model, read_yaml
 
 FORMAT = "sdimu-effect/1"
 ENTRY_POINTS = "sdimu_calibration.effects"
@@ -104,7 +104,7 @@ def extended_model(name: str, added: Sequence[str]) -> Model:
     Parameters
     ----------
     name : str
-        Model by name or path; its effects may be paths of YAML files too.
+        Model by name or path; its effects may be paths of YAML files too, seen from the folder of the model.
     added : sequence of str
         As for `find_effects`.
 
@@ -114,12 +114,18 @@ def extended_model(name: str, added: Sequence[str]) -> Model:
         When the model or an effect is unknown or cannot be read.
     """
     model = load_model(name)
+    folder = find_config("model", name).parent
     effects: list[Effect] = []
-    for text in (*model.effects, *added):
+    for text in (*(_beside(folder, text) for text in model.effects), *added):
         for effect in find_effects(text):
             _append(effects, effect)
     # A model names its effects; `imu_model.build` takes an effect itself as well.
     return replace(model, effects=cast("tuple[str, ...]", tuple(effects)))
+
+
+def _beside(folder: Path, text: str) -> str:
+    """Path of an effect file that a model names, so that the two can be moved together; other names as they are."""
+    return str(folder / text) if Path(text).suffix in SUFFIXES and (folder / text).is_file() else text
 
 
 def _append(effects: list[Effect], effect: Effect) -> None:

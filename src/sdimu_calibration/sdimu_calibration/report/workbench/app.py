@@ -2,81 +2,146 @@
 
 from __future__ import annotations
 
+import base64
 from typing import Any
 
 import dash
 import numpy as np
-from dash import Dash, Input, Output, dcc, no_update
+from dash import Dash, Input, Output, dcc, html, no_update
 from dash import State as Kept
 
 from sdimu_calibration.core.diagnosis.consistency import CHANNEL_NAMES
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.units import UnitError
-from sdimu_calibration.report import data, evidence_figures
-from sdimu_calibration.report.workbench import figures, view
+from sdimu_calibration.report import data
+from sdimu_calibration.report.workbench import figures, tables, view
+from sdimu_calibration.report.workbench.doing import Doing
 from sdimu_calibration.report.workbench.export import archive
-from sdimu_calibration.report.workbench.fit import Bench, Fitted
+from sdimu_calibration.report.workbench.fit import Bench
+from sdimu_calibration.report.workbench.own_effect import named, read_effect
+from sdimu_calibration.report.workbench.shelf import Shelf
 from sdimu_calibration.report.workbench.state import State, from_json
 
 _PAGE = """<!doctype html><html lang="en"><head>{%metas%}<title>{%title%}</title>{%css%}<style>STYLE</style></head>
 <body>{%app_entry%}<footer>{%config%}{%scripts%}{%renderer%}</footer></body></html>"""
+_WORKING = [(Output("busy", "hidden"), False, True), (Output("tick", "disabled"), False, True)]
 _BUSY = [
-    (Output("busy", "hidden"), False, True),
-    *((Output(button, "disabled"), True, False) for button in ("add", "undo", "add-own", "hold", "drop")),
+    *_WORKING,
+    *((Output(button, "disabled"), True, False) for button in ("add", "undo", "add-own", "hold", "drop", "open")),
 ]
+_LOOKING = [*_WORKING, (Output("candidates", "className"), "stale", ""), (Output("verdict", "className"),
+            "verdict stale", "verdict")]  # fmt: skip
+_LARGE = "function(_) { return window.innerWidth >= 2400 ? 1.6 : 1; }"
+"""Figures count in pixels: on a screen of 4K they are drawn larger."""
+_ARROW = "\N{BLACK RIGHT-POINTING TRIANGLE} "
 
 
-def build(bench: Bench, title: str) -> Dash:
-    """Make the application of one recording."""
-    app = Dash("sdimu workbench", title=title, update_title="", serve_locally=True, assets_ignore=".*")
+def build(shelf: Shelf) -> Dash:
+    """Make the application of a shelf of recordings."""
+    app = Dash("sdimu workbench", title="sdimu workbench", update_title="", serve_locally=True, assets_ignore=".*")
     app.index_string = _PAGE.replace("STYLE", view.STYLE)
-    app.layout = view.layout(title, bench.stops)
+    app.layout = lambda: view.layout("Workbench", shelf.names)
+    doing = Doing()
+    app.clientside_callback(_LARGE, Output("scale", "data"), Input("page", "data"))
 
     @app.callback(
         Output("state", "data"), Output("message", "children"),
         Input("add", "n_clicks"), Input("add-own", "n_clicks"), Input("undo", "n_clicks"), Input("hold", "n_clicks"),
-        Input("drop", "n_clicks"), Input("ranking", "clickData"), Input("heat", "clickData"),
+        Input("drop", "n_clicks"), Input("open", "n_clicks"), Input("ranking", "clickData"), Input("heat", "clickData"),
         Kept("candidate", "value"), Kept("own", "value"), Kept("held", "value"), Kept("added", "value"),
-        Kept("state", "data"),
+        Kept("recording", "value"), Kept("state", "data"), Kept("page", "data"),
         running=_BUSY, prevent_initial_call=True,
     )  # fmt: skip
     def clicked(*values: Any) -> tuple[Any, Any]:
-        *_, bar, point, candidate, own, held, chosen, kept = values
-        now = from_json(kept)
-        what = dash.ctx.triggered_id
-        wanted = _step(now, what, bar, point, candidate, own, held, chosen)
-        if wanted == now:
-            return no_update, ""
+        *_, bar, point, candidate, own, held, chosen, recording, kept, page = values
+        tell = doing.teller(str(page))
         try:
-            bench.fit(wanted.added, wanted.held)
+            now = from_json(kept)
+            wanted = _step(now, dash.ctx.triggered_id, bar, point, candidate, own, held, chosen, recording)
+            if wanted == now:
+                return no_update, ""
+            tell("read", 0.0)
+            shelf.bench(wanted.recording).fit(wanted.added, wanted.held, tell)
         except (DataError, UnitError) as error:
-            return no_update, f"Not done: {error}"
+            return no_update, f"Not done: {_line(error)}"
         return wanted.as_json(), ""
 
     @app.callback(
-        Output("verdict", "children"), Output("heat", "figure"), Output("cell", "figure"), Output("ladder", "figure"),
-        Output("ranking", "figure"), Output("candidate", "options"), Output("added", "options"),
-        Output("held", "value"), Output("moved", "children"),
-        Input("state", "modified_timestamp"), Kept("state", "data"), running=_BUSY[:1],
+        Output("title", "children"), Output("numbers", "children"), Output("heat", "figure"),
+        Output("cell", "figure"), Output("ladder", "figure"), Output("added", "options"), Output("held", "options"),
+        Output("held", "value"), Output("moved", "children"), Output("models", "children"),
+        Output("recording", "value"), Output("shown", "data"), Output("message", "children", allow_duplicate=True),
+        Input("state", "modified_timestamp"), Input("scale", "data"), Kept("state", "data"), Kept("page", "data"),
+        running=_BUSY, prevent_initial_call="initial_duplicate",
     )  # fmt: skip
-    def show(_when: Any, kept: Any) -> tuple[Any, ...]:
-        return _shown(bench, from_json(kept))
+    def show(_when: Any, scale: Any, kept: Any, page: Any) -> tuple[Any, ...]:
+        now, told = from_json(kept), ""
+        tell = doing.teller(str(page))
+        try:
+            bench = shelf.bench(now.recording)
+            bench.fit(now.added, now.held, tell)
+        except (DataError, UnitError) as error:  # the server was started anew, with other files
+            now, told = State(), f"What this page held cannot be shown: {_line(error)}"
+            bench = shelf.bench()
+        return (*_shown(bench, now, now.recording or shelf.names[0], float(scale or 1), tell), now.as_json(), told)
 
     @app.callback(
-        Output("file", "data"), Input("export", "n_clicks"), Kept("state", "data"), running=_BUSY[:1],
+        Output("verdict", "children"), Output("ranking", "figure"), Output("candidate", "options"),
+        Input("shown", "data"), Kept("scale", "data"), Kept("page", "data"),
+        running=_LOOKING, prevent_initial_call=True,
+    )  # fmt: skip
+    def search(kept: Any, scale: Any, page: Any) -> tuple[Any, ...]:
+        now = from_json(kept)
+        missing = shelf.bench(now.recording).missing(now.added, now.held, doing.teller(str(page)))
+        picture = figures.enlarged(figures.ranking(missing.entries, missing.threshold), float(scale or 1))
+        return view.verdict(missing), picture, view.options(missing.entries)
+
+    @app.callback(
+        Output("own", "value"), Output("message", "children", allow_duplicate=True),
+        Input("upload", "contents"), Kept("upload", "filename"), prevent_initial_call=True,
+    )  # fmt: skip
+    def upload(contents: Any, name: Any) -> tuple[Any, str]:
+        try:
+            text = base64.b64decode(str(contents).partition(",")[2], validate=True).decode("utf-8")
+            if "\n" not in text.strip():
+                raise ValueError
+        except ValueError:  # not base64, not UTF-8, no lines
+            return no_update, f"Not read: {name} is no effect file (expected YAML, format: sdimu-effect/1)"
+        try:
+            read_effect(text)
+        except (DataError, UnitError) as error:
+            return text, f"{name}: {_line(error)}"
+        return text, ""
+
+    @app.callback(
+        Output("file", "data"), Output("message", "children", allow_duplicate=True),
+        Input("export", "n_clicks"), Kept("state", "data"), Kept("page", "data"), running=_BUSY,
         prevent_initial_call=True,
     )  # fmt: skip
-    def export(_clicks: Any, kept: Any) -> Any:
-        now = from_json(kept)
-        packed = archive(bench.model, now.added, bench.fit(now.added, now.held), title)
-        return dcc.send_bytes(packed, "calibration.zip")
+    def export(_clicks: Any, kept: Any, page: Any) -> tuple[Any, str]:
+        now, tell = from_json(kept), doing.teller(str(page))
+        bench = shelf.bench(now.recording)
+        try:
+            final = bench.final(now.added, now.held, tell)
+        except (DataError, UnitError) as error:
+            return no_update, f"Not done: {_line(error)}"
+        tell("report", 0.8)
+        packed = archive(bench.model, now.added, final, f"Workbench: {now.recording or shelf.names[0]}")
+        return dcc.send_bytes(packed, "calibration.zip"), ""
+
+    @app.callback(
+        Output("busy", "children"), Input("tick", "n_intervals"), Kept("page", "data"), prevent_initial_call=True
+    )
+    def progress(_count: Any, page: Any) -> Any:
+        word, share = doing.at(str(page))
+        return [f"{word} \u2026", html.Progress(value=f"{share:.2f}", max="1")]
 
     return app
 
 
 def _step(
-    now: State, what: Any, bar: Any, point: Any, candidate: Any, own: Any, held: Any, chosen: Any
-) -> State:  # fmt: skip
+    now: State, what: Any, bar: Any, point: Any, candidate: Any, own: Any, held: Any, chosen: Any, recording: Any
+) -> State:
     """Return the state that a click asks for; the same one when it asks for nothing."""
     if what == "undo":
         return now.undo()
@@ -84,37 +149,42 @@ def _step(
         return now.hold(tuple(held or ()))
     if what == "drop" and chosen:
         return now.drop(chosen)
+    if what == "open" and recording:
+        return now.open(str(recording))
     if what == "add-own" and own:
         return now.add(own)
     if what == "add" and candidate:
         return now.add(candidate)
     if what == "ranking" and bar:
-        return now.add(str(bar["points"][0]["y"]).removeprefix("\N{BLACK RIGHT-POINTING TRIANGLE} "))
+        return now.add(str(bar["points"][0]["y"]).removeprefix(_ARROW))
     if what == "heat" and point:
         first = point["points"][0]
         return now.look(CHANNEL_NAMES.index(str(first["y"]).replace(" ", "_")), int(first["x"]))
     return now
 
 
-def _shown(bench: Bench, now: State) -> tuple[Any, ...]:
-    """Everything that a state shows."""
-    rungs = [bench.fit(now.added[:k], now.held) for k in range(len(now.added) + 1)]
-    here: Fitted = rungs[-1]
-    diagnosis = here.diagnosis
-    entries = data.scored(diagnosis)
-    grid = data.where(diagnosis.consistency)
-    channel, stop = now.cell or _worst(grid)
-    names = ["model as given", *(f"+ {_named(text)}" for text in now.added)]
-    return (
-        view.verdict(diagnosis, here.held_out, here.at_held),
-        evidence_figures.heat_map(grid),
-        figures.cell(data.residuals(diagnosis), channel, stop),
+def _shown(bench: Bench, now: State, recording: str, scale: float, tell: Any) -> tuple[Any, ...]:
+    """Everything that a state shows but the candidates, which come later."""
+    rungs = [bench.fit(now.added[:k], now.held, tell) for k in range(len(now.added) + 1)]
+    here, given = rungs[-1], rungs[0]
+    cell = now.cell or _worst(here.grid)
+    names = ["model as given", *(f"+ {named(text)}" for text in now.added)]
+    keys = [(now.added[:k], now.held) for k in range(len(now.added) + 1)]
+    keys = [*now.seen, *(key for key in keys if key not in now.seen)]
+    pictures = (
+        figures.heat_map(here.grid, cell), figures.cell(here.residuals, *cell),
         figures.ladder(names, [r.held_out for r in rungs], [r.at_held for r in rungs]),
-        evidence_figures.ranking(entries, diagnosis.found.threshold),
-        view.options(entries),
-        [{"label": _named(text), "value": text} for text in now.added],
+    )  # fmt: skip
+    return (
+        f"Workbench: {recording}",
+        view.numbers(here, given),
+        *(figures.enlarged(picture, scale) for picture in pictures),
+        [{"label": named(text), "value": text} for text in now.added],
+        [{"label": f"stop {s}", "value": s} for s in bench.stops],
         list(now.held),
-        view.moved(rungs[0].diagnosis.after, diagnosis.after),
+        tables.moved(given.calibration, here.calibration),
+        tables.models(bench, keys, (now.added, now.held)),
+        recording,
     )
 
 
@@ -127,7 +197,5 @@ def _worst(grid: data.Grid) -> tuple[int, int]:
     return int(row) + _SENSORS, int(grid.stops[column])
 
 
-def _named(text: str) -> str:
-    """Name of an added effect; an own one says it on its line ``name:``."""
-    lines = [line.partition(":")[2].strip() for line in text.splitlines() if line.startswith("name:")]
-    return lines[0] if lines else text
+def _line(error: Exception) -> str:
+    return " ".join(str(error).split())

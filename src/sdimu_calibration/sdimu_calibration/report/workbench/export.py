@@ -10,9 +10,9 @@ from pathlib import Path
 
 import yaml
 
+from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.specification import Model
 from sdimu_calibration.report.page import write_report
-from sdimu_calibration.report.workbench.fit import Fitted
 from sdimu_calibration.storage.result_file import write_result
 
 
@@ -32,12 +32,12 @@ def model_files(model: Model, added: Sequence[str]) -> dict[str, str]:
     return {"model.yaml": yaml.safe_dump(content, sort_keys=False), **own}
 
 
-def archive(model: Model, added: Sequence[str], fitted: Fitted, title: str) -> bytes:
+def archive(model: Model, added: Sequence[str], final: Diagnosis, title: str) -> bytes:
     """Return a zip with model.yaml, result.json and report.html."""
     with tempfile.TemporaryDirectory() as folder:
         root = Path(folder)
-        write_result(root / "result.json", fitted.diagnosis.after)
-        write_report(root / "report.html", fitted.diagnosis.after, title=title, diagnosis=fitted.diagnosis)
+        write_result(root / "result.json", final.after)
+        write_report(root / "report.html", final.after, title=title, diagnosis=final)
         for name, text in model_files(model, added).items():
             (root / name).write_text(text, encoding="utf-8")
         kept = io.BytesIO()

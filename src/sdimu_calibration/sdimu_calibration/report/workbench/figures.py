@@ -1,4 +1,4 @@
-"""Figures that only the workbench has: one stop of one channel in time, and the ladder of fits."""
+"""Figures that only the workbench has: one stop of one channel in time, the ladder of fits; and their sizes."""
 
 from __future__ import annotations
 
@@ -9,8 +9,30 @@ import numpy as np
 import plotly.graph_objects as go
 
 from sdimu_calibration.core.diagnosis.consistency import CHANNEL_NAMES
-from sdimu_calibration.report import data
+from sdimu_calibration.report import data, evidence_figures
 from sdimu_calibration.report.drawing import AFTER, BAND, BEFORE, lay_out
+
+_FONT = 13
+
+
+def heat_map(grid: data.Grid, cell: tuple[int, int]) -> Any:
+    """Heat map of the report with a frame around the cell that is looked at."""
+    figure = evidence_figures.heat_map(grid)
+    figure.update_traces(colorbar={"title": {"text": "sigma", "side": "top"}})
+    row, column = cell[0], int(np.searchsorted(grid.stops, cell[1]))
+    figure.add_shape(
+        type="rect", x0=column - 0.5, x1=column + 0.5, y0=row - 0.5, y1=row + 0.5, fillcolor="rgba(0, 0, 0, 0)",
+        line={"color": "#111", "width": 3},
+    )  # fmt: skip
+    return figure
+
+
+def ranking(entries: Sequence[data.Scored], threshold: float) -> Any:
+    """Ranking of the report, with room for the numbers at the ends of the bars."""
+    figure = evidence_figures.ranking(entries, threshold)
+    top = max([abs(e.z) for e in entries] + [threshold])
+    figure.update_xaxes(range=[0, 1.75 * top])
+    return figure
 
 
 def cell(found: data.Residuals, channel: int, stop: int) -> Any:
@@ -20,13 +42,13 @@ def cell(found: data.Residuals, channel: int, stop: int) -> Any:
     figure = go.Figure()
     figure.add_hrect(y0=-3.0, y1=3.0, fillcolor=BAND, opacity=1.0, line_width=0, layer="below")
     marker = {"color": AFTER, "size": 5}
-    figure.add_scatter(x=t, y=y, mode="markers", marker=marker, hovertemplate="%{x:.0f} s: %{y:.2f}")
+    figure.add_scatter(x=t, y=y, mode="markers", marker=marker, hovertemplate="%{x:.0f} s: %{y:.2f}<extra></extra>")
     if len(y):
         figure.add_hline(y=float(y.mean()), line={"color": BEFORE, "width": 2, "dash": "dash"}, opacity=1.0)
     figure.update_xaxes(title_text="time (s)")
     figure.update_yaxes(title_text="innovation (sigma)", zeroline=True, zerolinecolor="#999")
-    mean = f"mean {y.mean():+.2f}" if len(y) else "not measured"
-    named = f"{CHANNEL_NAMES[channel].replace('_', ' ')} at stop {stop}: {mean}"
+    mean = f"mean {y.mean():+.2f} sigma (dashed)" if len(y) else "not measured"
+    named = f"{CHANNEL_NAMES[channel].replace('_', ' ')} at stop {stop}: {mean}".replace("-", "\N{MINUS SIGN}")
     return lay_out(figure, 280, title={"text": named, "font": {"size": 14}})
 
 
@@ -35,15 +57,32 @@ def ladder(names: Sequence[str], values: Sequence[float], at_held: Sequence[floa
     figure = go.Figure()
     figure.add_scatter(
         x=list(names), y=list(values), mode="lines+markers+text", text=[f"{v:.3f}" for v in values],
-        name="leave one out", textposition="top right", line={"color": AFTER}, marker={"size": 9}, cliponaxis=False,
+        name="leave one out", textposition="top center", line={"color": AFTER}, marker={"size": 9}, cliponaxis=False,
     )  # fmt: skip
     if any(v is not None for v in at_held):
         figure.add_scatter(
             x=list(names), y=list(at_held), mode="markers+lines", name="stops held out",
             line={"color": BEFORE, "dash": "dot"}, marker={"symbol": "square-open", "size": 9},
         )  # fmt: skip
-    figure.add_hline(y=1.0, line={"dash": "dash", "color": "#222", "width": 1.5}, opacity=1.0)
+    figure.add_hline(
+        y=1.0, line={"dash": "dash", "color": "#222", "width": 1.5}, opacity=1.0, annotation_text="1 is right",
+        annotation_position="bottom right",
+    )  # fmt: skip
     top = max([*values, *(v for v in at_held if v is not None), 1.0])
     figure.update_yaxes(title_text="held-out RMS (sigma)", range=[0, 1.25 * top])
-    figure.update_xaxes(type="category")
-    return lay_out(figure, 300, showlegend=True)
+    figure.update_xaxes(type="category", title_text="model, rung by rung")
+    return lay_out(figure, 320, showlegend=True)
+
+
+def enlarged(figure: Any, scale: float) -> Any:
+    """Make a figure larger, writing and all, for screens on which it would be too small to read."""
+    if scale == 1.0:
+        return figure
+    margin = {side: value * scale for side, value in figure.layout.margin.to_plotly_json().items() if side in "lrtb"}
+    figure.update_layout(height=figure.layout.height * scale, font={"size": _FONT * scale}, margin=margin)
+    if figure.layout.title.text:
+        figure.update_layout(title_font_size=14 * scale)
+    figure.update_traces(textfont_size=12 * scale, selector={"type": "heatmap"})
+    figure.update_traces(marker_size=8 * scale, selector={"type": "scatter"})
+    figure.update_annotations(font_size=_FONT * scale)
+    return figure

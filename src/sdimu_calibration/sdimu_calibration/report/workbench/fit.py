@@ -1,31 +1,33 @@
-"""Fits of the workbench: quick, because samples are reduced once and each fit starts where its parent ended."""
+"""Fits of the workbench, in two parts: the numbers, which are quick, and the candidates, which come after them.
+
+Samples are reduced once a recording, and each fit starts where the fit with one effect less ended. Kept is only what a
+page shows: the matrices of a fit, some 200 MB, stay for the last one alone, whose candidates are asked for next.
+"""
 
 from __future__ import annotations
 
-import tempfile
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from threading import Lock
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sdimu_calibration.core import imu_model
 from sdimu_calibration.core.calibrate import assemble, predict_stops
-from sdimu_calibration.core.diagnosis.candidates import catalogue, free_inputs, without
+from sdimu_calibration.core.diagnosis.candidates import catalogue, free_inputs
 from sdimu_calibration.core.diagnosis.consistency import check
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.diagnosis.evidence import Evidence, collect, test_times
-from sdimu_calibration.core.diagnosis.remainder import remainder
+from sdimu_calibration.core.diagnosis.remainder import Remainder, remainder
 from sdimu_calibration.core.diagnosis.scan import scan, threshold
 from sdimu_calibration.core.diagnosis.search import FALSE_ALARM, Problem, Search
-from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.filter_pass import SKIP
 from sdimu_calibration.core.passes import (
     Reduced,
     Setup,
     Solution,
+    first_attitude,
     one_pass,
     reduce,
     refine,
@@ -34,33 +36,73 @@ from sdimu_calibration.core.passes import (
     solve,
 )
 from sdimu_calibration.core.recording import DataError, Recording
+from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.specification import ImuSpecification, Model, Site
-from sdimu_calibration.storage.effect_file import find_effects, load_effect
+from sdimu_calibration.report import data
+from sdimu_calibration.report.workbench.own_effect import extended
 
+Floats = NDArray[np.float64]
 Key = tuple[tuple[str, ...], tuple[int, ...]]
-_MOST_KEPT = 12
-"""Fits that are kept: each holds some 100 MB of signatures."""
+Tell = Callable[[str, float], None]
+_MOST_KEPT = 200
+"""Fits that are kept: each holds some 2 MB."""
+_UNLIKELY = 1e-3
 
 
 @dataclass(frozen=True)
 class Fitted:
-    """One fit.
+    """The numbers of one fit.
 
     Attributes
     ----------
-    solution : Solution
-    diagnosis : Diagnosis
-        With nothing added to this model: what the figures of the report draw.
+    calibration : Calibration
+        Without the history of its first pass.
+    grid : Grid
+        Normalised means, channel by stop.
+    residuals : Residuals
     held_out : float
         Leave-one-stop-out RMS over the stops of the fit (sigma).
     at_held : float or None
         RMS of the prediction errors at the stops that are held out.
+    names : tuple of str
+        Of the coefficients.
+    estimate : ndarray, shape (p,)
+        Coefficients in the frame of the prior (SI): where a fit with one effect more begins.
+    C_start : ndarray, shape (3, 3)
+        Initial attitude as the whole test sees it.
     """
 
-    solution: Solution
-    diagnosis: Diagnosis
+    calibration: Calibration
+    grid: data.Grid
+    residuals: data.Residuals
     held_out: float
     at_held: float | None
+    names: tuple[str, ...]
+    estimate: Floats
+    C_start: Floats
+
+
+@dataclass(frozen=True)
+class Missing:
+    """What a fit does not explain.
+
+    Attributes
+    ----------
+    entries : tuple of Scored
+        All candidates, largest score first.
+    threshold : float
+        Size of the score that pure noise reaches.
+    adequate : bool
+    sentence : str
+    left : Remainder
+        Of the free inputs.
+    """
+
+    entries: tuple[data.Scored, ...]
+    threshold: float
+    adequate: bool
+    sentence: str
+    left: Remainder
 
 
 class Bench:
@@ -70,7 +112,9 @@ class Bench:
         self.recording, self.model = recording, model
         self.setup = set_up(site, imu, model)
         self.reduced = reduce(recording, self.setup)
-        self._kept: dict[Key, Fitted] = {}
+        self._fits: dict[Key, Fitted] = {}
+        self._missing: dict[Key, Missing] = {}
+        self._warm: tuple[Key, Solution] | None = None
         self._lock = Lock()
 
     @property
@@ -78,8 +122,12 @@ class Bench:
         """Stops with measurements."""
         return [int(s) for s in np.unique(self.reduced.phases.stop[self.reduced.kind > 0])]
 
-    def fit(self, added: tuple[str, ...], held: tuple[int, ...]) -> Fitted:
-        """Fit the model with the effects `added`, without the stops `held`.
+    def known(self, added: tuple[str, ...], held: tuple[int, ...]) -> Fitted | None:
+        """Return a fit that was made already."""
+        return self._fits.get((added, held))
+
+    def fit(self, added: tuple[str, ...], held: tuple[int, ...], tell: Tell | None = None) -> Fitted:
+        """Fit the model with the effects `added`, without the stops `held`; `tell` gets a word and the share done.
 
         Raises
         ------
@@ -88,58 +136,56 @@ class Bench:
         """
         with self._lock:
             key = (added, held)
-            if key not in self._kept:
-                while len(self._kept) >= _MOST_KEPT:
-                    self._kept.pop(next(iter(self._kept)))
-                self._kept[key] = self._fit(added, held)
-            return self._kept[key]
+            if key not in self._fits:
+                solution = self._solution(key, tell or _silent)
+                _keep(self._fits, key, self._numbers(key, solution))
+            return self._fits[key]
 
-    def _fit(self, added: tuple[str, ...], held: tuple[int, ...]) -> Fitted:
-        setup = extended(self.setup, added)
-        reduced = masked(self.reduced, held)
-        parent = self._kept.get((added[:-1], held))
-        solution = solve(setup, reduced, _silent, keep=True) if parent is None else _onward(parent.solution, setup)
-        diagnosis = _look(self.recording, solution)
+    def missing(self, added: tuple[str, ...], held: tuple[int, ...], tell: Tell | None = None) -> Missing:
+        """Score all candidates against a fit, without adding any."""
+        with self._lock:
+            key = (added, held)
+            if key not in self._missing:
+                solution = self._solution(key, tell or _silent)
+                (tell or _silent)("candidates", 0.5)
+                diagnosis = look(self.recording, solution)
+                found = Missing(
+                    tuple(data.scored(diagnosis)), diagnosis.found.threshold, diagnosis.adequate, diagnosis.sentence,
+                    diagnosis.remainder_after,
+                )  # fmt: skip
+                _keep(self._missing, key, found)
+            return self._missing[key]
+
+    def final(self, added: tuple[str, ...], held: tuple[int, ...], tell: Tell | None = None) -> Diagnosis:
+        """Fit once more from nothing, as `sdimu calibrate` does, so that it gives the same numbers."""
+        with self._lock:
+            solution = solve(extended(self.setup, added), masked(self.reduced, held), tell or _silent, keep=True)
+            final = assemble(self.recording, solution, held_out=True)
+            if held:
+                told = f"stops held out of the fit: {', '.join(map(str, held))}"
+                final = replace(final, notes=(*final.notes, told))
+            (tell or _silent)("candidates", 0.6)
+            return replace(look(self.recording, solution), before=final, after=final)
+
+    def _solution(self, key: Key, tell: Tell) -> Solution:
+        if self._warm is not None and self._warm[0] == key:
+            return self._warm[1]
+        self._warm = None
+        added, held = key
+        setup, reduced = extended(self.setup, added), masked(self.reduced, held)
+        parent = self._fits.get(key) or self._fits.get((added[:-1], held))
+        solution = _onward(parent, setup, reduced, tell) if parent else solve(setup, reduced, tell, keep=True)
+        self._warm = (key, solution)
+        return solution
+
+    def _numbers(self, key: Key, solution: Solution) -> Fitted:
+        diagnosis = look(self.recording, solution, candidates=False)
         everything = Problem(diagnosis.evidence.only(np.empty(0, dtype=np.int64)))
-        return Fitted(solution, diagnosis, everything.held_out([], 1.0).rms, _at_held(self.reduced, solution, held))
-
-
-def extended(setup: Setup, added: Sequence[str]) -> Setup:
-    """Add effects to a model: by name, or by the text of an effect file.
-
-    Raises
-    ------
-    DataError
-        When one cannot be read.
-    """
-    effects: list[Effect] = list(setup.sensors.effects)
-    for text in added:
-        have = {p.name for e in effects for p in e.parameters}
-        new = [part for effect in read_effect(text) for part in without(effect, have)]
-        if not new:
-            raise DataError(f"'{text.strip().splitlines()[0]}' is in the model already")
-        effects += new
-    sensors = imu_model.build(effects, setup.imu)
-    return replace(setup, sensors=sensors, model=replace(setup.model, effects=tuple(e.name for e in effects)))
-
-
-def read_effect(text: str) -> tuple[Effect, ...]:
-    """Read an effect by name or by the text of an effect file (several lines).
-
-    Raises
-    ------
-    DataError
-        One line without the name of the temporary file.
-    """
-    if "\n" not in text.strip():
-        return find_effects(text.strip())
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "effect.yaml"
-        path.write_text(text, encoding="utf-8")
-        try:
-            return load_effect(path)
-        except DataError as error:
-            raise DataError(str(error).replace(f"{path}: ", "")) from error
+        return Fitted(
+            diagnosis.after, data.where(diagnosis.consistency), data.residuals(diagnosis),
+            everything.held_out([], 1.0).rms, _at_held(self.reduced, solution, key[1]),
+            solution.setup.sensors.names, solution.last.estimate, smoothed_start(solution.last),
+        )  # fmt: skip
 
 
 def masked(reduced: Reduced, held: Sequence[int]) -> Reduced:
@@ -160,37 +206,39 @@ def masked(reduced: Reduced, held: Sequence[int]) -> Reduced:
     return replace(reduced, kind=np.where(out, SKIP, reduced.kind).astype(np.int64))
 
 
-def _onward(parent: Solution, setup: Setup) -> Solution:
+def _onward(parent: Fitted, setup: Setup, reduced: Reduced, tell: Tell) -> Solution:
     """Go on from a fit with fewer effects: its coefficients and attitude are where the passes start."""
-    known = dict(zip(parent.setup.sensors.names, parent.last.estimate, strict=True))
+    start = first_attitude(reduced.epochs, reduced.phases, setup)
+    known = dict(zip(parent.names, parent.estimate, strict=True))
     constant = setup.sensors.decay_rate == 0.0
     reference = np.array([known.get(name, 0.0) for name in setup.sensors.names]) * constant
-    start = smoothed_start(parent.last)
-    begun = one_pass(parent.reduced, setup, parent.alignment, start, reference, closed_loop=False, keep=False)
-    last, passes, converged = refine(parent.reduced, setup, parent.alignment, begun, _silent, keep=True)
-    # The history of the closed loop is made anew: it has more coefficients now.
-    none = np.zeros(len(setup.sensors.prior))
-    first = one_pass(
-        parent.reduced, setup, parent.alignment, parent.alignment.C_nb, none, closed_loop=True, keep=False
-    )
-    return Solution(setup, parent.reduced, parent.alignment, first, last, passes + 1, converged)
+
+    tell("passes", 0.2)
+    try:
+        begun = one_pass(reduced, setup, start, parent.C_start, reference, closed_loop=False, keep=False)
+        last, passes, converged = refine(reduced, setup, start, begun, tell, keep=True)
+    except DataError:
+        converged = False
+    if not converged:
+        return solve(setup, reduced, tell, keep=True)
+    return Solution(setup, reduced, start, begun, last, passes, converged)
 
 
-def _look(recording: Recording, solution: Solution) -> Diagnosis:
-    """Score all candidates against a fit, without adding any."""
+def look(recording: Recording, solution: Solution, candidates: bool = True) -> Diagnosis:
+    """Score all candidates, or none, against a fit, without adding any."""
     setup, reduced = solution.setup, solution.reduced
     times = test_times(reduced)
-    known = catalogue(times, set(setup.sensors.names), reduced.temperature is not None)
-    free = free_inputs(times)
+    known = catalogue(times, set(setup.sensors.names), reduced.temperature is not None) if candidates else []
+    free = free_inputs(times) if candidates else []
     evidence = collect(reduced, setup, solution.last, [*known, *free])
     p = len(setup.sensors.prior)
     border = p + sum(len(effect.parameters) for effect in known)
     free_columns = np.arange(border, len(evidence.names))
     found = _nothing_added(evidence, np.arange(p, border))
     left = remainder(evidence.information, evidence.model, evidence.weight, free_columns, found.scale)
-    fit = assemble(recording, solution, held_out=False)
+    fit = assemble(recording, _without_history(solution), held_out=False)
     standing = int(np.sum(np.abs(found.first.z) > found.threshold))
-    adequate = standing == 0 and left.p_value > _UNLIKELY
+    adequate = candidates and standing == 0 and left.p_value > _UNLIKELY
     best = evidence.names[int(np.argmax(np.abs(found.first.z)))]
     sentence = (
         "Nothing stands out of the noise." if adequate
@@ -203,7 +251,10 @@ def _look(recording: Recording, solution: Solution) -> Diagnosis:
     )  # fmt: skip
 
 
-_UNLIKELY = 1e-3
+def _without_history(solution: Solution) -> Solution:
+    # The history of the first pass costs as much as the fit, and only a report shows it.
+    short = replace(solution.first, output=solution.first.output._replace(stride=len(solution.reduced.epochs)))
+    return replace(solution, first=short)
 
 
 def _nothing_added(evidence: Evidence, columns: NDArray[np.int64]) -> Search:
@@ -220,6 +271,13 @@ def _at_held(reduced: Reduced, solution: Solution, held: Sequence[int]) -> float
     out = np.isin(reduced.phases.stop, held) & (reduced.kind > 0)
     white = predict_stops(reduced, solution.setup, solution.last, out).output.normalised[out]
     return float(np.sqrt(np.nanmean(white**2)))
+
+
+def _keep(kept: dict[Key, Any], key: Key, value: Any) -> None:
+    """Keep a fit; the oldest goes when there are too many."""
+    while len(kept) >= _MOST_KEPT:
+        kept.pop(next(iter(kept)))
+    kept[key] = value
 
 
 def _silent(_what: str, _fraction: float) -> None:

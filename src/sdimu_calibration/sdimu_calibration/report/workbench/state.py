@@ -21,19 +21,29 @@ class State:
         Stops held out of the fit, ascending.
     cell : tuple of (int, int) or None
         Channel and stop that are looked at.
+    past : tuple of (added, held)
+        What undo goes back to, the last one first to go.
+    seen : tuple of (added, held)
+        Every model that was fitted in this page, for comparison; an undo does not forget them.
+    recording : str
+        Name of the recording; empty is the one a fresh page shows.
     """
 
     added: tuple[str, ...] = ()
     held: tuple[int, ...] = ()
     cell: tuple[int, int] | None = None
     past: tuple[tuple[tuple[str, ...], tuple[int, ...]], ...] = field(default=())
+    seen: tuple[tuple[tuple[str, ...], tuple[int, ...]], ...] = field(default=(), compare=False)
+    recording: str = ""
 
     def as_json(self) -> dict[str, Any]:
         """Return it as the page keeps it."""
         return asdict(self)
 
     def _then(self, **change: Any) -> State:
-        return replace(self, past=(*self.past, (self.added, self.held)), **change)
+        here = (self.added, self.held)
+        seen = self.seen if here in self.seen else (*self.seen, here)
+        return replace(self, past=(*self.past, here), seen=seen, **change)
 
     def add(self, effect: str) -> State:
         """Add an effect; one that is there already changes nothing."""
@@ -53,21 +63,33 @@ class State:
         return replace(self, cell=(channel, stop))
 
     def undo(self) -> State:
-        """Go back one step."""
+        """Go back one step; the model that is left stays among those seen."""
         if not self.past:
             return self
-        added, held = self.past[-1]
-        return replace(self, added=added, held=held, past=self.past[:-1])
+        here, (added, held) = (self.added, self.held), self.past[-1]
+        seen = self.seen if here in self.seen else (*self.seen, here)
+        return replace(self, added=added, held=held, past=self.past[:-1], seen=seen)
+
+    def open(self, recording: str) -> State:
+        """Begin afresh with another recording."""
+        return self if recording == self.recording else State(recording=recording)
 
 
 def from_json(kept: Any) -> State:
     """Read what the page kept; anything else is a fresh page."""
-    if not isinstance(kept, dict):
+    try:
+        cell = kept.get("cell")
+        return State(
+            tuple(map(str, kept.get("added", ()))),
+            tuple(map(int, kept.get("held", ()))),
+            (int(cell[0]), int(cell[1])) if cell else None,
+            _steps(kept.get("past", ())),
+            _steps(kept.get("seen", ())),
+            str(kept.get("recording", "")),
+        )
+    except (AttributeError, TypeError, ValueError, IndexError):
         return State()
-    cell = kept.get("cell")
-    return State(
-        tuple(map(str, kept.get("added", ()))),
-        tuple(map(int, kept.get("held", ()))),
-        (int(cell[0]), int(cell[1])) if cell else None,
-        tuple((tuple(a), tuple(h)) for a, h in kept.get("past", ())),
-    )
+
+
+def _steps(kept: Any) -> tuple[tuple[tuple[str, ...], tuple[int, ...]], ...]:
+    return tuple((tuple(map(str, a)), tuple(map(int, h))) for a, h in kept)

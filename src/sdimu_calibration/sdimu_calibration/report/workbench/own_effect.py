@@ -1,0 +1,59 @@
+"""Effects that a page names or writes: from their text to a model that has them."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from sdimu_calibration.core import imu_model
+from sdimu_calibration.core.diagnosis.candidates import without
+from sdimu_calibration.core.effects.effect import Effect
+from sdimu_calibration.core.passes import Setup
+from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.storage.effect_file import find_effects, load_effect
+
+
+def extended(setup: Setup, added: Sequence[str]) -> Setup:
+    """Add effects to a model: by name, or by the text of an effect file.
+
+    Raises
+    ------
+    DataError
+        When one cannot be read.
+    """
+    effects: list[Effect] = list(setup.sensors.effects)
+    for text in added:
+        have = {p.name for e in effects for p in e.parameters}
+        new = [part for effect in read_effect(text) for part in without(effect, have)]
+        if not new:
+            raise DataError(f"'{text.strip().splitlines()[0]}' is in the model already")
+        effects += new
+    sensors = imu_model.build(effects, setup.imu)
+    return replace(setup, sensors=sensors, model=replace(setup.model, effects=tuple(e.name for e in effects)))
+
+
+def read_effect(text: str) -> tuple[Effect, ...]:
+    """Read an effect by name or by the text of an effect file (several lines).
+
+    Raises
+    ------
+    DataError
+        One line without the name of the temporary file.
+    """
+    if "\n" not in text.strip():
+        return find_effects(text.strip())
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "effect.yaml"
+        path.write_text(text, encoding="utf-8")
+        try:
+            return load_effect(path)
+        except DataError as error:
+            raise DataError(str(error).replace(f"{path}: ", "")) from error
+
+
+def named(text: str) -> str:
+    """Name of an added effect; an own one says it on its line ``name:``."""
+    lines = [line.partition(":")[2].strip() for line in text.splitlines() if line.startswith("name:")]
+    return lines[0] if lines else text

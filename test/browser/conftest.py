@@ -1,0 +1,119 @@
+"""A workbench as a person starts it, and Chromium in front of it; where there is none, skipped, and why is said."""
+
+from __future__ import annotations
+
+import os
+import select
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+START_S = 300.0  # a first run on a new machine compiles
+PLACES = ("chromium", "chromium-browser", "google-chrome")
+FLAGS = (
+    "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking",
+    "--disable-component-update", "--disable-sync",
+)  # fmt: skip
+HIDDEN = "accel_quadratic_x"
+SEED = 5
+SIZE = "40 ug/g^2"  # forty times what this plan sees at one sigma
+
+
+def sdimu(*arguments: object) -> list[str]:
+    return [sys.executable, "-m", "sdimu_calibration.cli.main", *map(str, arguments)]
+
+
+@dataclass
+class Workbench:
+    """A running workbench: its address and the folder of its recordings."""
+
+    url: str
+    folder: Path
+    bag: Path
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    chromium = next(filter(None, map(shutil.which, PLACES)), None)
+    if chromium is None:
+        pytest.skip("no Chromium on this machine (Debian: the package chromium)")
+    playwright = pytest.importorskip("playwright.sync_api", reason="no playwright in this environment (make setup)")
+    with playwright.sync_playwright() as driver:
+        shown = driver.chromium.launch(executable_path=chromium, headless=True, args=list(FLAGS))
+        yield shown
+        shown.close()
+
+
+@pytest.fixture(scope="module")
+def workbench(browser: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Workbench]:  # noqa: ARG001
+    """A recording with a hidden effect, and a broken one beside it."""
+    folder = tmp_path_factory.mktemp("recordings")
+    bag = folder / "hidden"
+    making = sdimu("simulate", "--rate", 20, "--seed", SEED, "--effect", f"{HIDDEN}={SIZE}", "--out", bag)
+    subprocess.run(making, check=True, capture_output=True, timeout=START_S)
+    (folder / "broken.mcap").write_bytes(b"this is no recording")
+    port = 20000 + os.getpid() % 20000
+    process = subprocess.Popen(
+        sdimu("workbench", bag, "--port", port), stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+    )
+    try:
+        _wait_until_it_says("http://", process)
+        yield Workbench(f"http://127.0.0.1:{port}/", folder, bag)
+    finally:
+        process.terminate()
+        process.wait(20)
+
+
+def _wait_until_it_says(word: str, process: subprocess.Popen[str]) -> None:
+    assert process.stdout is not None
+    said, deadline = "", time.monotonic() + START_S
+    while time.monotonic() < deadline and process.poll() is None:
+        if select.select([process.stdout], [], [], 0.5)[0]:
+            said += process.stdout.readline()
+            if word in said:
+                return
+    pytest.fail(f"the workbench did not start: {said}")
+
+
+@pytest.fixture
+def visit(browser: Any, workbench: Workbench) -> Iterator[Callable[[], Any]]:
+    """Open the workbench as another person, in a session of its own; a complaint of the console fails the test."""
+    complaints: list[str] = []
+    contexts: list[Any] = []
+
+    def another() -> Any:
+        context = browser.new_context(viewport={"width": 1280, "height": 720}, accept_downloads=True)
+        contexts.append(context)
+        page = context.new_page()
+        page.set_default_timeout(60_000)
+        page.on("console", lambda said: complaints.append(said.text) if said.type in {"error", "warning"} else None)
+        page.on("pageerror", lambda error: complaints.append(str(error)))
+        page.goto(workbench.url)
+        settle(page)
+        return page
+
+    yield another
+    for context in contexts:
+        context.close()
+    assert complaints == []
+
+
+def settle(page: Any) -> None:
+    """Wait until nothing is being worked on, verdict and candidates included."""
+    page.wait_for_function(
+        "document.querySelector('#verdict')?.textContent && document.querySelector('#busy').hidden"
+        " && !document.querySelector('#verdict').classList.contains('stale')"
+        " && document.querySelector('#ranking .main-svg')"
+    )
+    # One callback follows another: still the same after a moment means the last one is done.
+    page.wait_for_timeout(300)
+    page.wait_for_function(
+        "document.querySelector('#busy').hidden && !document.querySelector('#verdict').classList.contains('stale')"
+    )
