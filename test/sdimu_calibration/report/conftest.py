@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
 
 from rate_table_sim.core import TableSpecification
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis, diagnose
-from sdimu_calibration.core.recording import Recording
+from sdimu_calibration.core.recording import Recording, TableLog
+from sdimu_calibration.report.besides import Besides, besides
 from sdimu_calibration.storage.config import load_imu, load_model, load_plan, load_site
 from sdimu_sim.core.scenario import Scenario, generate
 
 HIDDEN = "accel_quadratic_x"
 SEED = 5
+ANGLES = np.radians([[0.0, -30.0], [720.0, 30.0]])
+"""Two turns of the outer axis in the whole test, a sixth of one of the inner (rad)."""
 
 
 @pytest.fixture(scope="session")
@@ -27,3 +33,10 @@ def recording() -> Recording:
 @pytest.fixture(scope="session")
 def diagnosis(recording: Recording) -> Diagnosis:
     return diagnose(recording, load_site("daejeon"), load_imu("dtg"), load_model("baseline"))
+
+
+@pytest.fixture(scope="session")
+def more(recording: Recording, diagnosis: Diagnosis) -> Besides:
+    """With the table's angles, as a bag has them."""
+    named = replace(recording, table=TableLog(np.array([0.0, recording.t[-1]]), ("outer", "inner"), ANGLES))
+    return besides(named, diagnosis, load_site("daejeon"), load_imu("dtg"), load_model("baseline"))

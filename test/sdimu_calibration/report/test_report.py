@@ -14,18 +14,20 @@ import pytest
 import yaml
 
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
-from sdimu_calibration.report import data, evidence_figures, residual_figures
+from sdimu_calibration.core.diagnosis.grow import Rung
+from sdimu_calibration.report import data, evidence_figures, measured, measured_figures, residual_figures, use_section
+from sdimu_calibration.report.besides import Besides
 from sdimu_calibration.report.export import as_csv, as_yaml
 from sdimu_calibration.report.page import page, write_report
 from sdimu_calibration.report.table import rows
 
 
 @pytest.fixture(scope="module")
-def text(diagnosis: Diagnosis) -> str:
-    return page(diagnosis.after, "A test", diagnosis=diagnosis)
+def text(diagnosis: Diagnosis, more: Besides) -> str:
+    return page(diagnosis.after, "A test", diagnosis=diagnosis, more=more)
 
 
-def all_figures(diagnosis: Diagnosis) -> dict[str, object]:
+def all_figures(diagnosis: Diagnosis, more: Besides) -> dict[str, object]:
     found = data.residuals(diagnosis)
     return {
         "ladder": evidence_figures.ladder(diagnosis),
@@ -33,7 +35,12 @@ def all_figures(diagnosis: Diagnosis) -> dict[str, object]:
         "heat map": evidence_figures.heat_map(data.where(diagnosis.consistency)),
         "explained": evidence_figures.explained(data.explained(diagnosis)),
         "innovations": residual_figures.innovations(found, two=True),
-        "variables": residual_figures.against_variables(found, data.variables(diagnosis), two=True),
+        "measured": measured_figures.overlay(measured.overlay(diagnosis, found)),
+        "variables": residual_figures.against_variables(
+            found, data.variables(diagnosis), data.VARIABLES, range(8), two=True
+        ),
+        "jumps": measured_figures.jumps(measured.jumps(diagnosis, found), two=True),
+        "in use": use_section.figure(more.trials),
         "free inputs": residual_figures.free_inputs(data.free_inputs(diagnosis), two=True),
     }
 
@@ -63,23 +70,66 @@ def test_cells_of_the_heat_map_say_their_sign_without_colour(diagnosis):
             assert cell == "" or cell[0] == ("+" if value >= 0.0 or cell == "+0.0" else "\N{MINUS SIGN}")
 
 
-def test_before_and_after_differ_in_more_than_colour(diagnosis):
-    figure = all_figures(diagnosis)["innovations"]
+def test_before_and_after_differ_in_more_than_colour(diagnosis, more):
+    figure = all_figures(diagnosis, more)["innovations"]
     symbols = {trace.name: trace.marker.symbol for trace in figure.data if trace.legendgroup}
     assert len(symbols) == 2
     assert len(set(symbols.values())) == 2
 
 
-@pytest.mark.parametrize("name", ["ladder", "ranking", "explained", "variables"])
-def test_axes_of_quantities_have_units(diagnosis, name):
-    figure = all_figures(diagnosis)[name]
-    titles = [axis.title.text for axis in (*figure.select_xaxes(), *figure.select_yaxes()) if axis.title.text]
-    assert titles
-    assert all(re.search(r"\(.+\)", title) for title in titles)
+CATEGORIES = {"stop", "channel", "candidate", "model", "coefficient"}
+UNITS = {*data.CHANNEL_UNITS, *measured.UNITS}
 
 
-def test_the_threshold_is_drawn(diagnosis):
-    figure = all_figures(diagnosis)["ranking"]
+def test_every_axis_says_its_quantity_and_unit(diagnosis, more):
+    """Axes that share the scale of another may leave the words to it, never both."""
+    for name, figure in all_figures(diagnosis, more).items():
+        for axes in (list(figure.select_xaxes()), list(figure.select_yaxes())):
+            said = {axis.plotly_name.removesuffix("axis"): axis.title.text for axis in axes}
+            for axis in axes:
+                title = axis.title.text
+                shared = axis.matches is not None or axis.showticklabels is False or _shares(axes, axis)
+                assert title or shared, (name, axis.plotly_name)
+                if title:
+                    bare = title.replace("<br>", " ")
+                    assert bare in CATEGORIES | UNITS or re.search(r"\(.+\)", bare), (name, title)
+            assert any(said.values()), name
+
+
+def _shares(axes, axis):
+    return any(other.matches == axis.plotly_name.replace("axis", "") for other in axes)
+
+
+def test_dashes_tell_compensations_apart(more):
+    dashes = {trace.name: trace.line.dash for trace in use_section.figure(more.trials).data}
+    drawn = {dashes[drift.name] for drift in more.trials[0].drifts}
+    assert len(drawn) == len(more.trials[0].drifts) == 3
+
+
+def test_the_page_says_what_it_means_in_use(text, more):
+    for trial in more.trials:
+        assert escape(use_section.told(trial)) in text
+        assert f"{trial.stretch.length_s / 60.0:.1f} min" in use_section.told(trial)
+
+
+def test_the_page_says_why_nothing_was_navigated(diagnosis):
+    text = page(diagnosis.after, "x", diagnosis=diagnosis, more=Besides(no_trial="too short"))
+    assert "Not tried: too short." in text
+
+
+def test_the_ladder_of_refits_tells_every_rung(diagnosis):
+    rungs = (
+        Rung("", True, "", -10.0, 0.0, 1.5, 2.4, 8.0, 0.01, ()),
+        Rung("some_effect", True, "", 20.0, 30.0, 1.01, 0.98, 1.0, 0.001, (("gyro_bias_x", 7.1),)),
+        Rung("other_effect", False, "does not lower it", 21.0, 1.0, 1.01, 0.99, 1.0, 0.001, ()),
+    )
+    text = page(diagnosis.after, "x", diagnosis=diagnosis, more=Besides(rungs=rungs))
+    for word in ("+ some_effect", "+30.0", "gyro_bias_x +7.1", "refused: does not lower it"):
+        assert word in text
+
+
+def test_the_threshold_is_drawn(diagnosis, more):
+    figure = all_figures(diagnosis, more)["ranking"]
     (line,) = figure.layout.shapes
     assert line.x0 == line.x1 == diagnosis.found.threshold
     assert line.line.width > 0
@@ -105,11 +155,11 @@ def test_copies_read_back_as_the_table(diagnosis):
         assert float(listed[row.name]["sigma"]) == pytest.approx(row.sigma, rel=1e-3)
 
 
-def test_a_browser_opens_the_page_without_complaint(diagnosis, tmp_path):
+def test_a_browser_opens_the_page_without_complaint(diagnosis, more, tmp_path):
     browser = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
     if not browser:
         pytest.skip("no Chromium here (package chromium)")
-    write_report(tmp_path / "report.html", diagnosis.after, diagnosis=diagnosis)
+    write_report(tmp_path / "report.html", diagnosis.after, diagnosis=diagnosis, more=more)
     done = subprocess.run(
         [browser, "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
          "--disable-background-networking", "--disable-component-update", "--disable-sync", "--enable-logging=stderr",

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
-    from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
     from sdimu_calibration.core.diagnosis.grow import Rung
 
 
@@ -39,6 +38,8 @@ def diagnose(
     from sdimu_calibration.core.diagnosis.bootstrap import bootstrap as draw
     from sdimu_calibration.core.diagnosis.diagnose import diagnose as examine
     from sdimu_calibration.core.diagnosis.grow import grow as climb
+    from sdimu_calibration.report.besides import besides
+    from sdimu_calibration.report.page import write_report
     from sdimu_calibration.storage.bag_reader import read_recording
     from sdimu_calibration.storage.config import load_imu, load_site
     from sdimu_calibration.storage.diagnosis_file import account, write_diagnosis
@@ -68,13 +69,11 @@ def diagnose(
     folder = out or default_folder(bag, "diagnosis")
     write_diagnosis(folder / "diagnosis.json", told, rungs, null)
     write_result(folder / "result.json", found.after if told.candidates else found.before)
-    _report(folder, found, f"Diagnosis of {bag.name}")
+    with bar(console) as progress:
+        progress("navigation without aid", 0.5)
+        more = besides(recording, found, where, specification, wanted, rungs)
+    title = f"Diagnosis of {bag.name}"
+    write_report(folder / "report.html", found.after, title=title, diagnosis=found, more=more)
     for note in recording.notes:
         console.print(f"note: {note}", soft_wrap=True, markup=False, highlight=False)
     console.print(f"results in {folder}", soft_wrap=True)
-
-
-def _report(folder: Path, found: Diagnosis, title: str) -> None:
-    from sdimu_calibration.report.page import write_report
-
-    write_report(folder / "report.html", found.after, title=title, diagnosis=found)

@@ -30,14 +30,14 @@ _LIMIT = {"dash": "dash", "color": "#222", "width": 1.5}
 def heat_map(grid: data.Grid) -> Any:
     """Normalised residual means, channel by stop: number and sign in each cell, colour besides."""
     numbered = len(grid.stops) <= _MOST_NUMBERED
-    text = [[_cell(v) for v in row] for row in grid.value]
+    text = [[_cell(v) if numbered else _sign(v) for v in row] for row in grid.value]
     figure = go.Figure(
         go.Heatmap(
             x=[str(s) for s in grid.stops],
             y=[c.replace("_", " ") for c in CHANNEL_NAMES],
             z=grid.value.astype(np.float32),
-            text=text if numbered else None,
-            texttemplate="%{text}" if numbered else None,
+            text=text,
+            texttemplate="%{text}",
             textfont={"size": 12},
             zmin=-_FULL,
             zmax=_FULL,
@@ -59,6 +59,13 @@ def _cell(value: float) -> str:
         return ""
     shown = f"{value:+.0f}" if abs(value) >= 9.95 else f"{value:+.1f}"
     return shown.replace("-", "\N{MINUS SIGN}")
+
+
+def _sign(value: float) -> str:
+    """Write a cell where there is room for one character: the sign of what stands out."""
+    if not abs(value) > data.NOTABLE:
+        return ""
+    return "+" if value > 0.0 else "\N{MINUS SIGN}"
 
 
 def ranking(entries: Sequence[data.Scored], threshold: float) -> Any:
@@ -85,7 +92,7 @@ def ranking(entries: Sequence[data.Scored], threshold: float) -> Any:
     )  # fmt: skip
     top = max([abs(s.z) for s in shown] + [threshold])
     figure.update_xaxes(title_text="score |z| (sigma)", range=[0, 1.3 * top])
-    figure.update_yaxes(autorange="reversed", ticks="", automargin=True)
+    figure.update_yaxes(autorange="reversed", ticks="", automargin=True, title_text="candidate")
     margin = {"l": 80, "r": 20, "t": 75, "b": 55}
     return lay_out(figure, 24 * len(shown) + 150, showlegend=True, margin=margin, legend=_LEGEND)
 
@@ -112,7 +119,7 @@ def ladder(diagnosis: Diagnosis) -> Any:
     )
     figure.add_hline(y=1.0, line=_LIMIT, opacity=1.0)
     figure.update_yaxes(title_text="held-out RMS (sigma)", rangemode="tozero", range=[0, 1.2 * max(*values, 1.0)])
-    figure.update_xaxes(type="category", range=[-0.3, len(names) - 0.5])
+    figure.update_xaxes(type="category", title_text="model", range=[-0.3, len(names) - 0.5])
     return lay_out(figure, 300)
 
 
@@ -161,7 +168,9 @@ def correlation(names: Sequence[str], C: Floats) -> Any:
             hovertemplate="%{y} \u00b7 %{x}: %{z:.2f}<extra></extra>",
         )
     )
-    figure.update_xaxes(tickangle=-60, ticks="", automargin=True, showline=False, tickfont={"size": 11})
-    figure.update_yaxes(autorange="reversed", ticks="", automargin=True, showline=False, tickfont={"size": 11})
+    figure.update_xaxes(tickangle=-60)
+    figure.update_yaxes(autorange="reversed")
+    for update in (figure.update_xaxes, figure.update_yaxes):
+        update(ticks="", automargin=True, showline=False, tickfont={"size": 11}, title_text="coefficient")
     figure.add_hline(y=-0.5, line={"color": PALE, "width": 1})
     return lay_out(figure, 20 * len(shown) + 260, margin={"l": 60, "r": 20, "t": 20, "b": 60})

@@ -22,7 +22,7 @@ _PANEL_HEIGHT = 260
 _GAP = 75
 _LABEL_GAP = 0.075
 """Least distance of two labels, as a share of a panel's height."""
-_MOST_POINTS = 1500
+_MOST_POINTS = 700
 
 
 def sigma_history(calibration: Calibration) -> Any:
@@ -57,10 +57,9 @@ def sigma_history(calibration: Calibration) -> Any:
         figure.update_yaxes(
             title_text=f"sigma ({unit})", type="log", dtick=1, exponentformat="power", row=row, col=column
         )
-        last = panel >= len(panels) - _COLUMNS
         figure.update_xaxes(
-            title_text="time (min)" if last else None,
-            title_standoff=6,
+            title_text="time (min)",
+            title_standoff=2,
             range=[0, float(history.t[-1]) / 60.0],
             row=row,
             col=column,

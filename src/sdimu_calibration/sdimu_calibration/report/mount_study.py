@@ -13,7 +13,7 @@ from plotly.subplots import make_subplots
 
 from sdimu_calibration.core.units import from_si
 from sdimu_calibration.report.groups import title
-from sdimu_calibration.report.page import _STYLE
+from sdimu_calibration.report.style import STYLE
 
 _DASHES = ("solid", "dash", "dot")
 _COLOURS = ("#0b5394", "#b45f06", "#38761d")
@@ -63,7 +63,7 @@ def write_page(path: Path, content: Mapping[str, Any], units: Mapping[str, str])
     heading = "Error against mount misalignment"
     page = (
         f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><title>{heading}</title>'
-        f'<style>{_STYLE}</style></head><body>\n<h1>{heading}</h1><p class="quiet">{escape(text)}</p>'
+        f'<style>{STYLE}</style></head><body>\n<h1>{heading}</h1><p class="quiet">{escape(text)}</p>'
         f"{drawn}\n</body></html>\n"
     )
     temporary = path.with_name(f".{path.name}.part")

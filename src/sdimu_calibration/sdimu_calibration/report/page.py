@@ -10,12 +10,13 @@ from typing import Any
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.report import data, sections, table
+from sdimu_calibration.report.besides import Besides
 from sdimu_calibration.report.drawing import html
 from sdimu_calibration.report.export import as_csv, as_yaml
 from sdimu_calibration.report.figures import sigma_history
+from sdimu_calibration.report.markup import Draw, quiet, section
 from sdimu_calibration.report.style import SCRIPT, STYLE
-
-_STYLE = STYLE
+from sdimu_calibration.report.use_section import in_use
 
 _TEXT_COLUMNS = frozenset({"coefficient", "unit"})
 
@@ -28,6 +29,7 @@ def write_report(
     truth: Mapping[str, float] | None = None,
     reference: Mapping[str, float] | None = None,
     diagnosis: Diagnosis | None = None,
+    more: Besides | None = None,
 ) -> None:
     """Write report.html.
 
@@ -45,11 +47,13 @@ def write_report(
         Published sigmas (SI) by effect name.
     diagnosis : Diagnosis, optional
         Adds the verdict, what is missing, where it fails, and how the error falls.
+    more : Besides, optional
+        What to show besides the diagnosis: table angles, drift in use, ladder of refits.
     """
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     temporary = path.with_name(f".{path.name}.part")
-    temporary.write_text(page(calibration, title, truth, reference, diagnosis), encoding="utf-8")
+    temporary.write_text(page(calibration, title, truth, reference, diagnosis, more), encoding="utf-8")
     temporary.replace(path)
 
 
@@ -70,17 +74,17 @@ def page(
     truth: Mapping[str, float] | None = None,
     reference: Mapping[str, float] | None = None,
     diagnosis: Diagnosis | None = None,
+    more: Besides | None = None,
 ) -> str:
     """Make the page as HTML text; parameters as in `write_report`."""
     draw = _Drawing()
-    parts = [] if diagnosis is None else _evidence(diagnosis, draw)
+    more = more or Besides()
+    parts = [] if diagnosis is None else _evidence(diagnosis, more, draw)
     parts.append(_coefficients(calibration, truth, reference))
-    parts += [] if diagnosis is None else _residuals(diagnosis, draw)
+    parts += [] if diagnosis is None else _residuals(diagnosis, more, draw)
     if len(calibration.history.t):
-        remark = sections.quiet("Closed-loop pass. Grey: the table turns, no measurements.")
-        parts.append(
-            sections.section("Sigma of every coefficient against time", remark, draw(sigma_history(calibration)))
-        )
+        remark = quiet("Closed-loop pass. Grey: the table turns, no measurements.")
+        parts.append(section("Sigma of every coefficient against time", remark, draw(sigma_history(calibration))))
         parts.append(sections.separation(calibration, draw))
     head = [
         f"<h1>{escape(title)}</h1>",
@@ -98,19 +102,21 @@ def page(
     )  # fmt: skip
 
 
-def _evidence(diagnosis: Diagnosis, draw: sections.Draw) -> list[str]:
+def _evidence(diagnosis: Diagnosis, more: Besides, draw: Draw) -> list[str]:
     """Tell what is missing and where it shows."""
     return [
         sections.ladder(diagnosis, draw),
+        sections.refits(more.rungs),
         sections.missing(diagnosis, data.scored(diagnosis), draw),
         sections.where(diagnosis, data.residuals(diagnosis), draw),
+        in_use(more, draw),
     ]
 
 
-def _residuals(diagnosis: Diagnosis, draw: sections.Draw) -> list[str]:
+def _residuals(diagnosis: Diagnosis, more: Besides, draw: Draw) -> list[str]:
     """Show the data themselves, and tell what they could have shown."""
     return [
-        sections.residuals(diagnosis, data.residuals(diagnosis), draw),
+        sections.residuals(diagnosis, data.residuals(diagnosis), more, draw),
         sections.smallest(data.scored(diagnosis)),
     ]
 
@@ -124,11 +130,11 @@ def _coefficients(
     texts = "".join(
         f'<textarea id="copy-{kind}" hidden readonly>{escape(text)}</textarea>' for kind, text in copies.items()
     )
-    return sections.section(
+    return section(
         "Coefficients",
         f"<p>{buttons}{texts}</p>",
         f'<div class="wide">{_table(entries)}</div>',
-        sections.quiet(
+        quiet(
             f"One sigma; body frame: {calibration.body_frame.replace('_', ' ')}. "
             "Fixed: zero by the choice of that frame."
         ),

@@ -16,7 +16,7 @@ from sdimu_calibration.core.results import Calibration, History
 from sdimu_calibration.core.units import from_si
 from sdimu_calibration.report.figures import sigma_history
 from sdimu_calibration.report.groups import effect_of, groups
-from sdimu_calibration.report.page import _STYLE
+from sdimu_calibration.report.style import STYLE
 
 _DEFINED = 1e-6
 """A sigma below this share of the prior is rounding: the body frame makes the coefficient zero."""
@@ -135,7 +135,7 @@ def page(
     parts += ["<h2>Not observable</h2>", _unobservable(prediction)]
     return (
         f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><title>{heading}</title>'
-        f"<style>{_STYLE}</style></head><body>\n" + "\n".join(parts) + "\n</body></html>\n"
+        f"<style>{STYLE}</style></head><body>\n" + "\n".join(parts) + "\n</body></html>\n"
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -41,11 +42,9 @@ def innovations(found: data.Residuals, two: bool) -> Any:
     two : bool
         Draw both the model as given and with what was found.
     """
-    titles = [
-        f"{name.replace('_', ' ')} ({unit})" for name, unit in zip(CHANNEL_NAMES, data.CHANNEL_UNITS, strict=True)
-    ]
+    titles = [name.replace("_", " ") for name in CHANNEL_NAMES]
     figure = make_subplots(
-        rows=4, cols=3, subplot_titles=titles, vertical_spacing=0.075, horizontal_spacing=0.06, shared_xaxes=True
+        rows=4, cols=3, subplot_titles=titles, vertical_spacing=0.075, horizontal_spacing=0.085, shared_xaxes=True
     )
     minutes = found.t / 60.0
     for channel in range(12):
@@ -64,25 +63,27 @@ def innovations(found: data.Residuals, two: bool) -> Any:
                 showlegend=channel == 0, marker={"color": ink, "symbol": symbol, "size": 7},
                 hovertemplate=f"%{{x:.1f}} min: %{{y:.3g}} {data.CHANNEL_UNITS[channel]}<extra>{name}</extra>", **place,
             )  # fmt: skip
-        reach = _reach(np.concatenate([found.before[:, channel], found.after[:, channel]]), found.sigma[:, channel])
+        reach = _reach([found.before[:, channel], found.after[:, channel]], found.sigma[:, channel], channel < 6)
         reach *= from_si(1.0, data.CHANNEL_UNITS[channel])
-        figure.update_yaxes(range=[-reach, reach], **place)
+        figure.update_yaxes(range=[-reach, reach], title_text=data.CHANNEL_UNITS[channel], title_standoff=2, **place)
     figure.update_xaxes(title_text="time (min)", row=4)
     figure.update_yaxes(zeroline=True, zerolinecolor="#999", zerolinewidth=1)
     return lay_out(
         figure,
         900,
         showlegend=True,
-        margin={"l": 60, "r": 20, "t": 95, "b": 55},
+        margin={"l": 65, "r": 20, "t": 95, "b": 55},
         legend={"orientation": "h", "yanchor": "bottom", "y": 1.045, "x": 0},
     )
 
 
-def _reach(normalised: Floats, sigma: Floats) -> float:
-    """Half the height of a panel: the first seconds, in which the attitude is not known yet, may leave it."""
-    usual = float(np.nanmedian(sigma))
-    found = float(np.nanquantile(np.abs(normalised), 0.995)) * usual
-    return 1.15 * max(4.0 * usual, found)
+def _reach(normalised: Sequence[Floats], sigma: Floats, all_of_it: bool) -> float:
+    """Half the height of a panel: everything, or all but the first seconds, whose attitude is not known yet."""
+    usual = 4.0 * float(np.nanmedian(sigma))
+    if all_of_it:
+        return 1.15 * max(usual, *(float(np.nanmax(np.abs(y * sigma))) for y in normalised))
+    far = float(np.nanquantile(np.abs(np.concatenate(normalised)), 0.995))
+    return 1.15 * max(usual, 0.25 * usual * far)
 
 
 def _bars(figure: Any, minutes: Floats, sigma: Floats, place: dict[str, int]) -> None:
@@ -118,15 +119,32 @@ def _stop_means(found: data.Residuals, y: Floats) -> tuple[Floats, Floats]:
     return np.bincount(place, found.t[good]) / count / 60.0, np.bincount(place, y[good]) / count
 
 
-def against_variables(found: data.Residuals, variables: Floats, two: bool) -> Any:
-    """Residuals at rest against each physical variable: binned means, standard errors, sigmas of one second."""
-    used = [k for k in range(variables.shape[1]) if np.ptp(variables[np.isfinite(found.before[:, 8]), k]) > 0]
+def against_variables(
+    found: data.Residuals, variables: Floats, names: Sequence[tuple[str, str]], columns: Sequence[int], two: bool
+) -> Any:
+    """Residuals at rest against physical variables: binned means, standard errors, sigmas of one second.
+
+    Parameters
+    ----------
+    found : Residuals
+    variables : ndarray, shape (e, v)
+    names : sequence of (str, str)
+        Name and unit of each variable.
+    columns : sequence of int
+        Those to draw; one that does not change is left out. None when none is left.
+    two : bool
+        Draw both the model as given and with what was found.
+    """
+    rest = np.isfinite(found.before[:, 8])
+    used = [k for k in columns if np.ptp(variables[rest, k]) > 0]
+    if not used:
+        return None
     figure = make_subplots(
         rows=6, cols=len(used), shared_xaxes=True, shared_yaxes=True, vertical_spacing=0.02, horizontal_spacing=0.012,
     )  # fmt: skip
     for row in range(6):
         for column, k in enumerate(used, 1):
-            name, unit = data.VARIABLES[k]
+            name, unit = names[k]
             for values, ink, symbol, of in _layers(found, two):
                 x, mean, error = data.binned(variables[:, k], values[:, 6 + row], _BINS)
                 figure.add_scatter(
@@ -138,17 +156,17 @@ def against_variables(found: data.Residuals, variables: Floats, two: bool) -> An
                 )  # fmt: skip
         figure.update_yaxes(title_text=f"{CHANNELS[row].replace('_', ' ')}<br>(sigma)", row=row + 1, col=1)
     for column, k in enumerate(used, 1):
-        figure.update_xaxes(title_text=f"{data.VARIABLES[k][0]} ({data.VARIABLES[k][1]})", row=6, col=column)
+        figure.update_xaxes(title_text=f"{names[k][0]} ({names[k][1]})", row=6, col=column)
     figure.update_yaxes(zeroline=True, zerolinecolor="#999", zerolinewidth=1, nticks=5)
     figure.update_xaxes(nticks=5, tickangle=0)
-    return lay_out(figure, 860, showlegend=True, margin={"l": 80, "r": 20, "t": 40, "b": 60})
+    return lay_out(figure, 760, showlegend=True, margin={"l": 80, "r": 20, "t": 40, "b": 60})
 
 
 def free_inputs(found: data.FreeInputs, two: bool) -> Any:
     """Constant error that every dwell (plain) and turn (hatched) would need; a star marks a score beyond three."""
-    titles = [f"{c.replace('_', ' ')} ({'deg/h' if i < 3 else 'ug'})" for i, c in enumerate(CHANNELS)]
+    titles = [c.replace("_", " ") for c in CHANNELS]
     figure = make_subplots(
-        rows=2, cols=3, subplot_titles=titles, vertical_spacing=0.14, horizontal_spacing=0.06, shared_xaxes=True
+        rows=2, cols=3, subplot_titles=titles, vertical_spacing=0.14, horizontal_spacing=0.085, shared_xaxes=True
     )
     middle, width = 0.5 * (found.start + found.end) / 60.0, (found.end - found.start) / 60.0
     for channel in range(6):
@@ -171,6 +189,7 @@ def free_inputs(found: data.FreeInputs, two: bool) -> Any:
                 marker={"color": AFTER, "symbol": "circle", "size": 5}, name="with what was found", legendgroup="after",
                 showlegend=channel == 0, hovertemplate=f"%{{x:.1f}} min: %{{y:.3g}} {unit}<extra></extra>", **place,
             )  # fmt: skip
+        figure.update_yaxes(title_text=unit, title_standoff=2, **place)
     figure.update_xaxes(title_text="time (min)", row=2)
     figure.update_yaxes(zeroline=True, zerolinecolor="#999", zerolinewidth=1)
     return lay_out(

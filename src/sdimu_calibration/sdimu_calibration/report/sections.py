@@ -2,30 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from html import escape
-from typing import Any
 
 import numpy as np
 
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
+from sdimu_calibration.core.diagnosis.grow import Rung
 from sdimu_calibration.core.diagnosis.search import Step
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.units import from_si
-from sdimu_calibration.report import data, evidence_figures, residual_figures
-
-Draw = Callable[[Any], str]
-"""Makes a part of the page of a figure."""
-
-
-def section(heading: str, *parts: str) -> str:
-    """Return a heading with what belongs to it."""
-    return f"<section><h2>{escape(heading)}</h2>\n" + "\n".join(part for part in parts if part) + "</section>"
-
-
-def quiet(text: str) -> str:
-    """Return a remark."""
-    return f'<p class="quiet">{escape(text)}</p>'
+from sdimu_calibration.report import data, evidence_figures, measured, measured_figures, residual_figures
+from sdimu_calibration.report.besides import Besides
+from sdimu_calibration.report.markup import Draw, grid, quiet, section
 
 
 def verdict(diagnosis: Diagnosis) -> str:
@@ -81,6 +70,36 @@ def ladder(diagnosis: Diagnosis, draw: Draw) -> str:
             "larger. Estimates are those of the step, with all before it."
         ),
     )
+
+
+_REFITS = (
+    "model", "log-likelihood", "log Bayes factor", "NIS", "held-out RMS", "velocity after turns", "moved most",
+    "verdict",
+)  # fmt: skip
+
+
+def refits(rungs: Sequence[Rung]) -> str:
+    """Return the ladder of real refits; nothing when the model was not grown."""
+    if not rungs:
+        return ""
+    return section(
+        "Ladder of refits: one effect at a time",
+        grid(_REFITS, [_refit(rung) for rung in rungs], {0, 6, 7}),
+        quiet(
+            "Every model calibrated anew on the whole recording. Held-out leaves out every third stop at once. NIS: "
+            "squared innovations a degree of freedom. Velocity after turns: RMS of the first second of each stop."
+        ),
+    )
+
+
+def _refit(r: Rung) -> list[str]:
+    moved = ", ".join(f"{name} {size:+.1f}" for name, size in r.moved[:3])
+    return [
+        f"+ {r.added}" if r.added else "model as given", f"{r.log_likelihood:.1f}",
+        f"{r.log_bayes_factor:+.1f}" if r.added else "", f"{r.nis_mean:.3f}", f"{r.held_out_rms:.3f}",
+        f"{r.jump:.2f} sigma, {1e3 * r.jump_velocity:.2f} mm/s", moved,
+        "accepted" if r.accepted else f"refused: {r.reason}",
+    ]  # fmt: skip
 
 
 def _rung(step: Step) -> list[str]:
@@ -140,31 +159,31 @@ def where(diagnosis: Diagnosis, found: data.Residuals, draw: Draw) -> str:
     return section("Where does it fail? Channel by stop", *parts)
 
 
-def residuals(diagnosis: Diagnosis, found: data.Residuals, draw: Draw) -> str:
-    """Return residuals in time, against physical variables, and as free inputs."""
+_MARKS = "Orange triangles: model as given. Blue dots: with what was found added."
+
+
+def residuals(diagnosis: Diagnosis, found: data.Residuals, more: Besides, draw: Draw) -> str:
+    """Return measured against predicted, residuals in time and against physical variables, and free inputs."""
     two = bool(len(diagnosis.found.chosen))
-    marks = (
-        "Orange triangles: model as given. Blue dots: with what was found added."
-        if two
-        else "Triangles: model as given."
-    )
+    marks = _MARKS if two else "Triangles: model as given."
     return "\n".join([
         section(
-            "Innovations in time", draw(residual_figures.innovations(found, two)),
+            "Measured against predicted",
+            draw(measured_figures.overlay(measured.overlay(diagnosis, found))),
+            quiet(
+                "Rate and force: means over each stop of what the sensors say, and what the model"
+                f"{' with what was found' if two else ''} says they should. Position and velocity: what navigation "
+                "with the model as given says after each turn, where the truth is rest, and what "
+                f"{'the found effects make of it' if two else 'the model expects'}."
+            ),
+            draw(residual_figures.innovations(found, two)),
             quiet(
                 f"Measured minus predicted, all coefficients at their final values. Grey: three sigma. {marks} "
                 "Position and velocity are measured in the first second after a turn; of rate and force, one "
-                "second each, the marks are means over stops."
+                "second each, the marks are means over stops and the thin line keeps the extremes."
             ),
         ),
-        section(
-            "Residuals against physical variables",
-            draw(residual_figures.against_variables(found, data.variables(diagnosis), two)),
-            quiet(
-                "At rest: binned means with their standard errors, in sigmas of one second. "
-                f"a: specific force, w: body rate, dT: temperature since the start. {marks}"
-            ),
-        ),
+        _variables(diagnosis, found, more, two, marks, draw),
         section(
             "The sensor error that each stop and turn would need",
             draw(residual_figures.free_inputs(data.free_inputs(diagnosis), two)),
@@ -174,6 +193,34 @@ def residuals(diagnosis: Diagnosis, found: data.Residuals, draw: Draw) -> str:
             ),
         ),
     ])  # fmt: skip
+
+
+def _variables(
+    diagnosis: Diagnosis, found: data.Residuals, more: Besides, two: bool, marks: str, draw: Draw
+) -> str:  # fmt: skip
+    """Residuals against what could cause them: motion, then time, temperature and table, then turns."""
+    values, names = data.variables(diagnosis), list(data.VARIABLES)
+    if more.table is not None:
+        epochs = diagnosis.evidence.reduced.epochs
+        values = np.column_stack([values, measured.table_angles(more.table, 0.5 * (epochs.start + epochs.end))])
+        names += [(name.replace("_", " "), "deg") for name in more.table.names]
+    parts = [
+        draw(figure)
+        for columns in (range(6), range(6, len(names)))
+        if (figure := residual_figures.against_variables(found, values, names, columns, two)) is not None
+    ]
+    turned = measured.jumps(diagnosis, found)
+    if len(turned.angle):
+        parts.append(draw(measured_figures.jumps(turned, two)))
+    return section(
+        "Residuals against physical variables",
+        *parts,
+        quiet(
+            "At rest: binned means with their standard errors, in sigmas of one second. a: specific force, w: body "
+            f"rate, dT: temperature since the start; angles of the table are shown and never used. {marks} After "
+            "turns: innovation of velocity in the first second, against the angle turned about each body axis."
+        ),
+    )
 
 
 def separation(calibration: Calibration, draw: Draw) -> str:
@@ -217,18 +264,3 @@ def _seen(entry: data.Scored) -> list[str]:
         answer = "yes" if entry.smallest <= entry.prior else "only when unusually large"
     usual = f"{entry.prior:.3g}" if np.isfinite(entry.prior) else ""
     return [entry.label, size, entry.unit, usual, f"{100 * entry.retention:.1f} %", answer]
-
-
-def grid(columns: Sequence[str], rows: Sequence[Sequence[str]], text: set[int]) -> str:
-    """Return an HTML table; the columns in `text` are flush left."""
-
-    def line(tag: str, words: Sequence[str]) -> str:
-        kinds = (' class="text"' if k in text else "" for k in range(len(words)))
-        return (
-            "<tr>"
-            + "".join(f"<{tag}{kind}>{escape(word)}</{tag}>" for word, kind in zip(words, kinds, strict=True))
-            + "</tr>"
-        )
-
-    body = "".join(line("td", row) for row in rows)
-    return f'<div class="wide"><table><thead>{line("th", columns)}</thead><tbody>{body}</tbody></table></div>'

@@ -172,6 +172,7 @@ def _customary(value: float, unit: str) -> str:
 def _report(console: Console, out: Path, site: str, imu: str, model: str, plan: str) -> Calibration:
     """Diagnose the bag, print the table with the truth, write diagnosis and page."""
     from sdimu_calibration.core.diagnosis.diagnose import diagnose
+    from sdimu_calibration.report.besides import besides
     from sdimu_calibration.report.page import write_report
     from sdimu_calibration.report.table import rich_table, rows
     from sdimu_calibration.storage.bag_reader import read_recording
@@ -183,12 +184,16 @@ def _report(console: Console, out: Path, site: str, imu: str, model: str, plan: 
     result = read_result(out / "result.json")
     truth = read_truth(out / "truth.yaml", result.body_frame)
     with console.status("diagnosing") if console.is_terminal else nullcontext():
-        diagnosis = diagnose(read_recording(out / "bag"), load_site(site), load_imu(imu), load_model(model))
+        recording = read_recording(out / "bag")
+        where, specification, wanted = load_site(site), load_imu(imu), load_model(model)
+        diagnosis = diagnose(recording, where, specification, wanted)
+        more = besides(recording, diagnosis, where, specification, wanted)
     write_diagnosis(out / "diagnosis.json", account(diagnosis))
     title = f"Simulated test: plan {plan}, model {model}"
     write_report(
-        out / "report.html", result, title=title, truth=truth, reference=read_reference(), diagnosis=diagnosis
-    )
+        out / "report.html", result, title=title, truth=truth, reference=read_reference(), diagnosis=diagnosis,
+        more=more,
+    )  # fmt: skip
     console.print(rich_table(rows(result, truth, read_reference()), f"body frame: {result.body_frame}"))
     console.print(diagnosis.sentence, soft_wrap=True, highlight=False)
     return result

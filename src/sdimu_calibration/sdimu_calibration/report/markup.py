@@ -1,0 +1,40 @@
+"""Pieces of HTML of which pages are made."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from html import escape
+from typing import Any
+
+Draw = Callable[[Any], str]
+"""Makes a part of the page of a figure."""
+
+
+def section(heading: str, *parts: str) -> str:
+    """Return a heading with what belongs to it."""
+    return f"<section><h2>{escape(heading)}</h2>\n" + "\n".join(part for part in parts if part) + "</section>"
+
+
+def quiet(text: str) -> str:
+    """Return a remark."""
+    return f'<p class="quiet">{escape(text)}</p>'
+
+
+def sentence(text: str) -> str:
+    """Return a paragraph."""
+    return f"<p>{escape(text)}</p>"
+
+
+def grid(columns: Sequence[str], rows: Sequence[Sequence[str]], text: set[int]) -> str:
+    """Return an HTML table; the columns in `text` are flush left."""
+
+    def line(tag: str, words: Sequence[str]) -> str:
+        kinds = (' class="text"' if k in text else "" for k in range(len(words)))
+        return (
+            "<tr>"
+            + "".join(f"<{tag}{kind}>{escape(word)}</{tag}>" for word, kind in zip(words, kinds, strict=True))
+            + "</tr>"
+        )
+
+    body = "".join(line("td", row) for row in rows)
+    return f'<div class="wide"><table><thead>{line("th", columns)}</thead><tbody>{body}</tbody></table></div>'

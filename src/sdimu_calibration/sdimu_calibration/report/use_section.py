@@ -1,0 +1,128 @@
+"""What the coefficients mean in use: how far a navigation without aid drifts, as figure, table and sentence."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from plotly.subplots import make_subplots
+
+from sdimu_calibration.core.free_inertial import Drift, Trial
+from sdimu_calibration.core.units import from_si
+from sdimu_calibration.core.unseen import WANTED_S
+from sdimu_calibration.report.besides import Besides
+from sdimu_calibration.report.drawing import AFTER, BEFORE, lay_out
+from sdimu_calibration.report.markup import Draw, grid, quiet, section, sentence
+
+Floats = NDArray[np.float64]
+
+_NAUTICAL_MILE = 1852.0
+_INK = (("#555", "dot"), (BEFORE, "dash"), (AFTER, "solid"))
+_PLACES = {"end": "end of the recording", "start": "start of the recording"}
+_SKIP_S = 30.0
+"""Logarithmic axes begin here: before there is nothing to see and much room for it."""
+_COLUMNS = (
+    "compensation", "stretch", "position error (m)", "rate (nmi/h)", "the fit promised (m, 1 sigma)",
+    "velocity error (m/s)", "heading drift (arcmin)",
+)  # fmt: skip
+
+
+def in_use(besides: Besides, draw: Draw) -> str:
+    """Return the section, or a line that says why there is none."""
+    heading = "What it means in use: navigation without aid"
+    if not besides.trials:
+        return section(heading, quiet(f"Not tried: {besides.no_trial}.")) if besides.no_trial else ""
+    rows = [_row(trial, drift) for trial in besides.trials for drift in trial.drifts]
+    short = min(trial.stretch.length_s for trial in besides.trials) < WANTED_S - 1.0
+    return section(
+        heading,
+        *(sentence(told(trial)) for trial in besides.trials),
+        draw(figure(besides.trials)),
+        grid(_COLUMNS, rows, {0, 1}),
+        quiet(
+            "Each stretch was kept from the fit that navigates it. At its first dwell the IMU levels by its own "
+            "compensated accelerometers and is given its azimuth; then it navigates freely through turns and stops, "
+            "height held. The table never leaves its place, so all of it is error. Heading is compared with a fit to "
+            "the whole recording. Promised: by the covariance of that fit; one stretch is one draw, so up to two or "
+            "three times the promise is chance, more is not."
+            + (" The recording is too short for 10 minutes: the longest stretches that leave half of it." if short
+               else "")
+        ),
+    )  # fmt: skip
+
+
+def told(trial: Trial) -> str:
+    """Say a trial in one sentence."""
+    stretch = trial.stretch
+    ends = "; ".join(
+        f"{drift.name} {_metres(drift.distance[-1])} ({_rate(drift):.2g} nmi/h{_promise(drift)})"
+        for drift in trial.drifts
+    )
+    return f"Off after {stretch.length_s / 60.0:.1f} min without aid at the {_PLACES[stretch.place]}: {ends}."
+
+
+def _promise(drift: Drift) -> str:
+    """Say what the fit expected; nothing for the drift of no fit."""
+    last = float(drift.promised[-1])
+    return f"; its fit promised {_metres(last)}" if np.isfinite(last) else ""
+
+
+def _row(trial: Trial, drift: Drift) -> list[str]:
+    promised = drift.promised[-1]
+    stretch = trial.stretch
+    span = f"{stretch.begin_s / 60.0:.1f} to {(stretch.begin_s + stretch.length_s) / 60.0:.1f} min"
+    return [
+        drift.name, f"{stretch.place}: {span}", f"{drift.distance[-1]:.4g}", f"{_rate(drift):.2g}",
+        f"{promised:.3g}" if np.isfinite(promised) else "", f"{drift.speed[-1]:.2g}",
+        f"{from_si(float(drift.heading[-1]), 'arcmin'):+.2g}",
+    ]  # fmt: skip
+
+
+def _rate(drift: Drift) -> float:
+    """Error of position over time (nautical miles an hour)."""
+    return float(drift.distance[-1] / _NAUTICAL_MILE / (drift.t[-1] / 3600.0))
+
+
+def _metres(value: float) -> str:
+    return f"{value / 1000.0:.2g} km" if value >= 1000.0 else f"{value:.0f} m"
+
+
+def figure(trials: Sequence[Trial]) -> Any:
+    """Errors of position, velocity and heading against time, a column a stretch, a dash a compensation."""
+    made = make_subplots(
+        rows=3, cols=len(trials), subplot_titles=[f"unseen {_PLACES[t.stretch.place]}" for t in trials],
+        shared_xaxes=True, shared_yaxes="rows", vertical_spacing=0.06, horizontal_spacing=0.04,
+    )  # fmt: skip
+    for column, trial in enumerate(trials, 1):
+        for (ink, dash), drift in zip(_INK, trial.drifts, strict=False):
+            rows = drift.t >= _SKIP_S
+            heading = from_si(1.0, "arcmin") * np.abs(drift.heading)
+            for row, (values, unit) in enumerate(
+                ((drift.distance, "m"), (drift.speed, "m/s"), (heading, "arcmin")), start=1
+            ):
+                _line(made, drift.t[rows], values[rows], f"{drift.name}|{unit}", ink, dash, row, column)
+            if np.isfinite(drift.promised).any():
+                _line(made, drift.t[rows], drift.promised[rows], f"{drift.name}, promised|m", ink, dash, 1, column, 0.9)
+    for row, title in enumerate(("position (m)", "velocity (m/s)", "heading (arcmin)"), start=1):
+        made.update_yaxes(type="log", title_text=title, dtick=1, exponentformat="power", row=row, col=1)
+        made.update_yaxes(type="log", dtick=1, exponentformat="power", row=row)
+    made.update_xaxes(title_text="time without aid (min)", row=3)
+    return lay_out(
+        made, 640, showlegend=True, margin={"l": 80, "r": 20, "t": 85, "b": 55},
+        legend={"orientation": "h", "yanchor": "bottom", "y": 1.05, "x": 0},
+    )  # fmt: skip
+
+
+def _line(
+    made: Any, t: Floats, y: Floats, name: str, ink: str, dash: str, row: int, column: int, width: float = 2.2
+) -> None:
+    said, _, unit = name.partition("|")
+    thin = width < 1.0
+    made.add_scatter(
+        x=(t[::5] / 60.0).astype(np.float32), y=np.where(y > 0.0, y, np.nan)[::5].astype(np.float32), mode="lines",
+        name=said, legendgroup=said, showlegend=row == 1 and column == 1,
+        line={"color": ink, "dash": "longdashdot" if thin else dash, "width": 1.2 if thin else width},
+        hovertemplate=f"%{{x:.1f}} min: %{{y:.3g}} {unit}<extra>{said}</extra>", row=row, col=column,
+    )  # fmt: skip
