@@ -1,4 +1,4 @@
-# make setup | demo | test | check | colcon | bench | study | docs | campaigns : each does its own set-up and needs nothing before it.
+# make setup | demo | test | check | colcon | bench | study | docs | pictures | campaigns : each does its own set-up and needs nothing before it.
 PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
@@ -55,8 +55,14 @@ study: setup
 docs: setup
 	$(BIN)/sdimu effects --markdown > doc/effects.md
 
+# The pictures of the README, from a run with a hidden effect.
+pictures: setup
+	$(BIN)/sdimu simulate --plan kim18_signed --seed 7 --effect "gyro_scale_asymmetry_y=40 ppm" --replace \
+	    --out out/pictures/bag
+	$(BIN)/sdimu pictures out/pictures/bag --out doc/pictures
+
 campaigns: setup
 	$(BIN)/sdimu monte-carlo -n 200 --out out/monte-carlo
 	$(BIN)/sdimu hidden-campaign -n 200 --out out/hidden-campaign
 
-.PHONY: setup demo check test colcon bench study docs campaigns
+.PHONY: setup demo check test colcon bench study docs pictures campaigns

@@ -32,6 +32,7 @@ _VERBS = {
     "compensate": "sdimu_calibration.cli.compensate:compensate",
     "export": "sdimu_calibration.cli.export:export",
     "workbench": "sdimu_calibration.cli.workbench:workbench",
+    "pictures": "sdimu_calibration.cli.pictures:pictures",
     "bag": "sdimu_calibration.cli.bag:app",
 }
 

@@ -30,7 +30,7 @@ _LIMIT = {"dash": "dash", "color": "#222", "width": 1.5}
 def heat_map(grid: data.Grid) -> Any:
     """Normalised residual means, channel by stop: number and sign in each cell, colour besides."""
     numbered = len(grid.stops) <= _MOST_NUMBERED
-    text = [[_cell(v) if numbered else _sign(v) for v in row] for row in grid.value]
+    text = [[cell(v) if numbered else _sign(v) for v in row] for row in grid.value]
     figure = go.Figure(
         go.Heatmap(
             x=[str(s) for s in grid.stops],
@@ -53,7 +53,7 @@ def heat_map(grid: data.Grid) -> Any:
     return lay_out(figure, 440, margin={"l": 120, "r": 20, "t": 40, "b": 55})
 
 
-def _cell(value: float) -> str:
+def cell(value: float) -> str:
     """Write a cell: a typographic sign, and no decimals where they do not matter."""
     if not np.isfinite(value):
         return ""

@@ -1,0 +1,38 @@
+"""`sdimu pictures`: a diagnosis as small PNG files, for a README or a talk."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def pictures(
+    bag: Annotated[Path, typer.Argument(metavar="BAG", help="rosbag2 folder or .mcap file.")],
+    model: Annotated[str, typer.Option(help="Model to examine: name in config/model or path.")] = "baseline",
+    site: Annotated[str, typer.Option(help="Where the test was: name in config/site or path.")] = "daejeon",
+    imu: Annotated[str, typer.Option(help="Specification of the IMU: name in config/imu or path.")] = "dtg",
+    out: Annotated[Path | None, typer.Option(help="Folder of the pictures; BAG_pictures by default.")] = None,
+) -> None:
+    """Draw a diagnosis as PNG files: heat map before and after, candidates, ladder, drift in use."""
+    from rich.console import Console
+
+    from sdimu_calibration.cli.calibrate import default_folder
+    from sdimu_calibration.cli.progress import bar
+    from sdimu_calibration.core.diagnosis.diagnose import diagnose
+    from sdimu_calibration.report.besides import besides
+    from sdimu_calibration.report.pictures import write_pictures
+    from sdimu_calibration.storage.bag_reader import read_recording
+    from sdimu_calibration.storage.config import load_imu, load_site
+    from sdimu_calibration.storage.effect_file import extended_model
+
+    console = Console()
+    where, specification, wanted = load_site(site), load_imu(imu), extended_model(model, [])
+    recording = read_recording(bag)
+    with bar(console) as progress:
+        found = diagnose(recording, where, specification, wanted, progress=progress)
+        progress("navigation without aid", 0.95)
+        more = besides(recording, found, where, specification, wanted)
+    for path in write_pictures(out or default_folder(bag, "pictures"), found, more.trials):
+        console.print(f"{path}: {path.stat().st_size / 1000:.0f} kB", soft_wrap=True, highlight=False)

@@ -1,0 +1,164 @@
+"""Pictures of a diagnosis as small PNG files for pages that take no HTML, such as the README.
+
+Drawn with matplotlib, because it needs no browser; its font comes with it, so that every machine draws the same.
+"""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.colors import LinearSegmentedColormap
+from matplotlib.figure import Figure
+from PIL import Image
+
+from sdimu_calibration.core.diagnosis.consistency import CHANNEL_NAMES
+from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
+from sdimu_calibration.core.free_inertial import Trial
+from sdimu_calibration.report import data
+from sdimu_calibration.report.drawing import AFTER, BEFORE, DIVERGING
+from sdimu_calibration.report.evidence_figures import cell
+from sdimu_calibration.report.house import house
+
+_STYLE = {
+    "font.family": "DejaVu Sans", "font.size": 9, "axes.spines.top": False, "axes.spines.right": False,
+    "axes.titlesize": 10, "axes.titlelocation": "left", "savefig.facecolor": "white",
+}  # fmt: skip
+_DPI = 110
+_COLOURS = 200
+_FULL = 8.0
+"""Sigmas at which the colour of a heat map is full."""
+_WHITE_FROM = 6.0
+_MOST_BARS = 8
+
+
+def write_pictures(folder: Path, diagnosis: Diagnosis, trials: Sequence[Trial] = ()) -> list[Path]:
+    """Write heat map before and after, candidates, ladder, drift in use and the architecture as PNG files.
+
+    Parameters
+    ----------
+    folder : Path
+        Made when it is not there; files of the same names are replaced.
+    diagnosis : Diagnosis
+        Best of a recording with something missing: else there is no "after", and no ladder.
+    trials : sequence of Trial
+        Free navigations; none leaves the picture of the drift out.
+
+    Returns
+    -------
+    list of Path
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    with mpl.rc_context(_STYLE):
+        figures = {"heat-map": heat_maps(diagnosis), "candidates": candidates(diagnosis), "architecture": house()}
+        if diagnosis.found.steps:
+            figures["ladder"] = ladder(diagnosis)
+        if trials:
+            figures["in-use"] = in_use(trials)
+        paths = []
+        for name, figure in figures.items():
+            paths.append(folder / f"{name}.png")
+            _save(figure, paths[-1])
+    return paths
+
+
+def _save(figure: Figure, path: Path) -> None:
+    """Write a PNG with few colours, which takes a third of the bytes, and neither version nor date inside."""
+    drawn = io.BytesIO()
+    figure.savefig(drawn, format="png", dpi=_DPI)
+    with Image.open(drawn) as picture:
+        picture.convert("RGB").quantize(_COLOURS, kmeans=2).save(path, optimize=True)
+
+
+def heat_maps(diagnosis: Diagnosis) -> Figure:
+    """Normalised residual means, channel by stop: the model as given, and with what was found."""
+    grids = [("Model as given", data.where(diagnosis.consistency))]
+    if len(diagnosis.found.chosen):
+        names = ", ".join(c.label for c in diagnosis.chosen)
+        grids.append((f"With {names}", data.stop_grid(data.residuals(diagnosis), after=True)))
+    figure = Figure(figsize=(8.6, 3.0 * len(grids)), layout="constrained")
+    for place, (title, grid) in enumerate(grids, 1):
+        axes = figure.add_subplot(len(grids), 1, place)
+        _heat_map(axes, grid)
+        axes.set_title(f"{title}: mean innovation over its sigma")
+    axes.set_xlabel("stop")
+    return figure
+
+
+def _heat_map(axes: Any, grid: data.Grid) -> None:
+    colours = LinearSegmentedColormap.from_list("signed", list(DIVERGING))
+    axes.imshow(grid.value, cmap=colours, vmin=-_FULL, vmax=_FULL, aspect="auto")
+    for (row, column), value in np.ndenumerate(grid.value):
+        ink = "white" if abs(value) > _WHITE_FROM else "#222"
+        axes.text(column, row, cell(float(value)), ha="center", va="center", fontsize=6.5, color=ink)
+    axes.set_yticks(range(len(CHANNEL_NAMES)), [name.replace("_", " ") for name in CHANNEL_NAMES], fontsize=7.5)
+    axes.set_xticks(range(len(grid.stops)), [str(stop) for stop in grid.stops], fontsize=7.5)
+    axes.tick_params(length=0)
+    axes.spines[:].set_visible(False)
+
+
+def candidates(diagnosis: Diagnosis) -> Figure:
+    """Scores of the best candidates, and what noise reaches."""
+    shown = data.best_variants(data.scored(diagnosis))[:_MOST_BARS]
+    figure = Figure(figsize=(8.6, 2.7), layout="constrained")
+    axes = figure.add_subplot()
+    at = np.arange(len(shown))
+    axes.barh(at, [abs(s.z) for s in shown], color=["#555" if s.chosen else "#ccc" for s in shown], edgecolor="#222",
+              linewidth=0.6, height=0.75, label="added alone")  # fmt: skip
+    axes.plot([abs(s.left) for s in shown], at, "D", mfc="white", mec=AFTER, ms=5, label="left with what was found")
+    axes.axvline(diagnosis.found.threshold, color="#222", ls="--", lw=1.2, label="what noise reaches")
+    for k, s in enumerate(shown):
+        size = f"{s.estimate:.3g} \N{PLUS-MINUS SIGN} {s.sigma:.2g} {s.unit}".replace("-", "\N{MINUS SIGN}")
+        axes.text(abs(s.z), k, f" {size}", va="center", fontsize=8)
+    axes.set_yticks(at, [("\N{BLACK RIGHT-POINTING TRIANGLE} " if s.chosen else "") + s.label for s in shown])
+    axes.invert_yaxis()
+    axes.set_xlim(0.0, 1.3 * max([abs(s.z) for s in shown] + [diagnosis.found.threshold]))
+    axes.set_xlabel("score |z| (sigma)")
+    axes.legend(loc="lower right", frameon=False, fontsize=8)
+    return figure
+
+
+def ladder(diagnosis: Diagnosis) -> Figure:
+    """Error at held-out stops, model by model: one stop at a time, and a third at a time."""
+    steps = [step for step in diagnosis.found.steps if step.accepted]
+    names = ["model as given", *(f"+ {step.label}" for step in steps)]
+    one = [diagnosis.found.steps[0].held_out_before.rms, *(step.held_out_after.rms for step in steps)]
+    third = [float(c.fit.get("held_out_rms") or np.nan) for c in (diagnosis.before, diagnosis.after)]
+    figure = Figure(figsize=(8.6, 2.3), layout="constrained")
+    axes = figure.add_subplot()
+    axes.plot(one, "o-", color=AFTER, label="one stop held out at a time")
+    texts = [(x, y, 5) for x, y in enumerate(one)]
+    if np.isfinite(third).all():
+        ends = [0, len(names) - 1]
+        axes.plot(ends, third, "^--", color=BEFORE, mfc="white", label="a third of the stops held out at a time")
+        texts += [(x, y, -12) for x, y in zip(ends, third, strict=True)]
+    for x, y, lift in texts:
+        axes.annotate(f"{y:.3f}", (x, y), (8, lift), textcoords="offset points", fontsize=8)
+    axes.axhline(1.0, color="#222", ls=":", lw=1.2, label="right")
+    axes.set_xticks(range(len(names)), names)
+    axes.set_xlim(-0.3, len(names) - 0.6)
+    axes.set_ylim(0.0, 1.25 * max(y for _, y, _ in texts))
+    axes.set_ylabel("held-out RMS (sigma)")
+    axes.legend(frameon=False, fontsize=8)
+    return figure
+
+
+def in_use(trials: Sequence[Trial]) -> Figure:
+    """Position error of navigation without aid on stretches that no fit has seen."""
+    figure = Figure(figsize=(8.6, 2.6), layout="constrained")
+    first = None
+    for place, trial in enumerate(trials, 1):
+        first = axes = figure.add_subplot(1, len(trials), place, sharey=first)
+        for (ink, dash), drift in zip((("#555", ":"), (BEFORE, "--"), (AFTER, "-")), trial.drifts, strict=False):
+            rows = drift.t >= 30.0
+            axes.semilogy(drift.t[rows] / 60.0, drift.distance[rows], dash, color=ink, lw=1.8, label=drift.name)
+        axes.set_title(f"Unseen {trial.stretch.place} of the recording")
+        axes.set_xlabel("time without aid (min)")
+        axes.set_ylabel("position error (m)" if place == 1 else "")
+        axes.grid(visible=True, axis="y", color="#ddd", lw=0.6)
+    figure.axes[0].legend(frameon=False, fontsize=8)
+    return figure
