@@ -1,0 +1,95 @@
+"""`sdimu noise`: Allan deviation of an IMU at rest, and the specification that it makes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from sdimu_calibration.core.recording import Recording
+    from sdimu_calibration.core.specification import ImuSpecification
+
+
+def noise(
+    bag: Annotated[Path, typer.Argument(metavar="BAG", help="rosbag2 folder or .mcap file.")],
+    imu: Annotated[str, typer.Option(help="IMU whose grade and priors go into the new file: name or path.")] = "dtg",
+    longest: Annotated[bool, typer.Option("--longest", help="The longest rest alone, not all of them.")] = False,
+    seed: Annotated[int, typer.Option(help="Of the draws behind the standard errors.")] = 1,
+    out: Annotated[Path | None, typer.Option(help="Folder of the results; BAG_noise by default.")] = None,
+) -> None:
+    """Find the noise terms from the rests of a recording; leaves noise.html and imu.yaml for --imu."""
+    import numpy as np
+    from rich.console import Console
+
+    from sdimu_calibration.cli.calibrate import default_folder
+    from sdimu_calibration.cli.progress import bar
+    from sdimu_calibration.core.noise import allan, fit_terms, rests, white_noise
+    from sdimu_calibration.report.noise import CHANNELS, table, write_page
+    from sdimu_calibration.storage.bag_reader import read_recording
+    from sdimu_calibration.storage.config import find_config
+    from sdimu_calibration.storage.imu_file import write_measured_imu
+
+    find_config("imu", imu)  # what is wrong with it is said before the work
+    recording = read_recording(bag)
+    rows = rests(recording)
+    if longest:
+        rows = (max(rows, key=lambda r: r.stop - r.start),)
+    data = np.hstack([recording.omega_ib_b, recording.f_ib_b])
+    rng = np.random.default_rng(seed)
+    console = Console()
+    deviations, terms = {}, {}
+    with bar(console) as progress:
+        for k, channel in enumerate(CHANNELS):
+            deviations[channel] = allan([data[r, k] for r in rows], recording.interval_s)
+            terms[channel] = fit_terms(deviations[channel], rng)
+            progress(channel, (k + 1) / 6)
+    measured = white_noise(recording, rows)
+    seconds = sum(r.stop - r.start for r in rows) * recording.interval_s
+    most = max(one.tau[-1] for one in deviations.values())
+    words = [
+        f"{len(rows)} rests, {seconds:.0f} s in all, averaging times up to {most:.0f} s.",
+        *recording.notes,
+    ]
+    folder = out or default_folder(bag, "noise")
+    write_page(folder / "noise.html", deviations, terms, f"Noise of {bag.name}", words)
+    write_measured_imu(folder / "imu.yaml", imu, measured, [f"Noise measured in {bag.name}: {words[0]}"])
+    console.print(table(terms))
+    for word in words:
+        console.print(f"note: {word}", soft_wrap=True, markup=False, highlight=False)
+    console.print(f"results in {folder}; use: --imu {folder / 'imu.yaml'}", soft_wrap=True, highlight=False)
+
+
+def with_noise(imu: ImuSpecification, recording: Recording, source: str | None) -> tuple[ImuSpecification, list[str]]:
+    """Return the IMU as ``--noise`` says: None as specified, ``estimated`` with the noise of the recording's rests.
+
+    Returns
+    -------
+    imu : ImuSpecification
+    notes : list of str
+        What was replaced.
+
+    Raises
+    ------
+    DataError
+        When the word is another, or the recording has no rest.
+    """
+    from sdimu_calibration.core.noise import measured_specification, white_noise
+    from sdimu_calibration.core.recording import DataError
+    from sdimu_calibration.core.units import from_si
+
+    if source is None:
+        return imu, []
+    if source != "estimated":
+        raise DataError(f"--noise {source}: expected 'estimated' (or leave it out: the noise of --imu)")
+    found = white_noise(recording)
+    parts = []
+    for word, here, sigma, told, unit in (
+        ("gyro", found.gyro, found.gyro_sigma, imu.gyro_white_noise, "deg/h/sqrt(Hz)"),
+        ("accelerometer", found.accel, found.accel_sigma, imu.accel_white_noise, "ug/sqrt(Hz)"),
+    ):
+        value, error, before = (from_si(v, unit) for v in (here, sigma, told))
+        parts.append(f"{word} {value:.4g} +- {error:.2g} {unit} ({before:.4g} as specified)")
+    note = f"noise as measured in {found.rest_s:.0f} s of rest: {'; '.join(parts)}"
+    return measured_specification(imu, found), [note]

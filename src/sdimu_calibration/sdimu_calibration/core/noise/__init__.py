@@ -1,0 +1,21 @@
+"""Noise of an IMU at rest: where it rests, its Allan deviation, the terms that explain it.
+
+A package of its own so that a change here compiles none of the loops of the estimator again.
+"""
+
+from sdimu_calibration.core.noise.allan import Allan, allan
+from sdimu_calibration.core.noise.rests import rests
+from sdimu_calibration.core.noise.terms import TERMS, Terms, fit_terms
+from sdimu_calibration.core.noise.white import WhiteNoise, measured_specification, white_noise
+
+__all__ = [
+    "TERMS",
+    "Allan",
+    "Terms",
+    "WhiteNoise",
+    "allan",
+    "fit_terms",
+    "measured_specification",
+    "rests",
+    "white_noise",
+]

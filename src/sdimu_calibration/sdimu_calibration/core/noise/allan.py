@@ -1,0 +1,100 @@
+"""Overlapping Allan deviation of rates or forces, pooled over stretches of rest, with allantools.
+
+Pooled: the overlapping Allan variance at an averaging time is a mean over differences, and each stretch adds its
+differences; what lies between stretches (turns, gaps) enters nowhere.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+_PER_OCTAVE = 2
+LEAST_FREEDOM = 3.0
+"""Averaging times with fewer degrees of freedom than this say nothing: their variance is off by its own size."""
+
+
+@dataclass(frozen=True)
+class Allan:
+    """Allan deviation of one channel.
+
+    Attributes
+    ----------
+    tau : ndarray, shape (k,)
+        Averaging times (s).
+    deviation : ndarray, shape (k,)
+        In the unit of the channel.
+    freedom : ndarray, shape (k,)
+        Equivalent degrees of freedom of the squares, for white noise.
+    interval_s : float
+    lengths : tuple of int
+        Samples of each stretch.
+    """
+
+    tau: Floats
+    deviation: Floats
+    freedom: Floats
+    interval_s: float
+    lengths: tuple[int, ...]
+
+    @property
+    def sigma(self) -> Floats:
+        """Standard error of the deviation."""
+        return np.asarray(self.deviation / np.sqrt(2.0 * self.freedom))
+
+
+def freedom_of(length: int, m: Floats) -> Floats:
+    """Equivalent degrees of freedom of the overlapping Allan variance of white noise.
+
+    Source: Riley, *Handbook of Frequency Stability Analysis*, NIST SP 1065 (2008), table 5, white FM.
+    """
+    n = float(length + 1)
+    out = (3.0 * (n - 1.0) / (2.0 * m) - 2.0 * (n - 2.0) / n) * 4.0 * m**2 / (4.0 * m**2 + 5.0)
+    return np.asarray(np.where(2.0 * m <= length, np.maximum(out, 0.0), 0.0))
+
+
+def factors(longest: int) -> NDArray[np.int64]:
+    """Averaging factors for stretches of at most `longest` samples: powers of two and between."""
+    steps = np.arange(0.0, _PER_OCTAVE * np.log2(max(longest / 2.0, 1.0)) + 1e-9)
+    return np.unique(np.rint(2.0 ** (steps / _PER_OCTAVE)).astype(np.int64))
+
+
+def allan(stretches: Sequence[Floats], interval_s: float) -> Allan:
+    """Allan deviation of a channel.
+
+    Parameters
+    ----------
+    stretches : sequence of ndarray, shape (n_i,)
+        Samples at rest, each stretch without gaps.
+    interval_s : float
+
+    Returns
+    -------
+    Allan
+    """
+    import allantools  # noqa: PLC0415 (it brings scipy.signal along, which no other part of the core needs)
+
+    m = factors(max(map(len, stretches)))
+    total, pairs, freedom = np.zeros(len(m)), np.zeros(len(m)), np.zeros(len(m))
+    for samples in stretches:
+        own = m[2 * m < len(samples)]
+        if not len(own):
+            continue
+        # In samples, so that no averaging time is lost to rounding.
+        tau, deviation, _, _ = allantools.oadev(
+            samples - samples.mean(), rate=1.0, data_type="freq", taus=own.astype(np.float64)
+        )
+        rows = np.searchsorted(m, np.rint(tau).astype(np.int64))
+        weight = len(samples) + 1.0 - 2.0 * tau
+        total[rows] += weight * deviation**2
+        pairs[rows] += weight
+        freedom[rows] += freedom_of(len(samples), tau)
+    keep = freedom > LEAST_FREEDOM
+    deviation: Floats = np.sqrt(total[keep] / pairs[keep])
+    tau: Floats = m[keep].astype(np.float64) * interval_s
+    return Allan(tau, deviation, freedom[keep], interval_s, tuple(map(len, stretches)))

@@ -1,0 +1,121 @@
+"""Noise terms that explain an Allan deviation.
+
+    variance(tau) = 3 Q^2 / tau^2 + N^2 / tau + (2 ln 2 / pi) B^2 + K^2 tau / 3
+
+with quantisation Q, white noise N (angle or velocity random walk), bias instability B (flicker) and random walk K of
+the bias. Source: IEEE Std 952-1997, annex C. Linear in the squares, so it is a least squares with squares not below
+nought, each variance weighed by its own standard error under the fit. Neighbouring averaging times share data; so the
+standard errors of the terms are not those of the fit but the scatter of the same fit on noise drawn from it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import nnls
+
+from sdimu_calibration.core.noise.allan import Allan, allan
+
+Floats = NDArray[np.float64]
+
+TERMS = ("quantisation", "white", "instability", "random_walk")
+_ROUNDS = 6
+_DRAWS = 24
+_SEEN = 2.0
+"""A term is called seen from this many sigma."""
+
+
+@dataclass(frozen=True)
+class Terms:
+    """Fitted terms of one channel, in the order of `TERMS`.
+
+    Attributes
+    ----------
+    value, sigma : ndarray, shape (4,)
+        Q (unit s), N (unit sqrt(s)), B (unit), K (unit/sqrt(s)), with the unit of the channel.
+    """
+
+    value: Floats
+    sigma: Floats
+
+    @property
+    def seen(self) -> NDArray[np.bool_]:
+        """Terms that stand out of their sigma; of the others only `upper` is known."""
+        seen: NDArray[np.bool_] = self.value > _SEEN * self.sigma
+        return seen
+
+    @property
+    def upper(self) -> Floats:
+        """Largest value that the data leave room for: two sigma above the fit."""
+        return np.asarray(self.value + _SEEN * self.sigma)
+
+    def deviation(self, tau: Floats) -> Floats:
+        """Allan deviation of the fit at averaging times (k,)."""
+        return np.asarray(np.sqrt(basis(tau) @ self.value**2))
+
+
+def basis(tau: Floats) -> Floats:
+    """Variance per square of each term, shape (k, 4)."""
+    one = np.ones(len(tau))
+    return np.column_stack([3.0 / tau**2, 1.0 / tau, 2.0 * np.log(2.0) / np.pi * one, tau / 3.0])
+
+
+def fit_terms(found: Allan, rng: np.random.Generator, draws: int = _DRAWS) -> Terms:
+    """Fit the terms.
+
+    Parameters
+    ----------
+    found : Allan
+    rng : numpy.random.Generator
+        For the draws that give the standard errors.
+    draws : int
+        The standard errors are known to ``1 / sqrt(2 draws)``.
+    """
+    value = np.sqrt(_squares(found))
+    again = np.empty((draws, len(TERMS)))
+    for k in range(draws):
+        stretches = [drawn(value, n, found.interval_s, rng) for n in found.lengths]
+        again[k] = np.sqrt(_squares(allan(stretches, found.interval_s)))
+    return Terms(value, np.sqrt(np.mean((again - value) ** 2, axis=0)))
+
+
+def _squares(found: Allan) -> Floats:
+    """Least squares for the squares of the terms."""
+    variance, columns = found.deviation**2, basis(found.tau)
+    if not np.any(variance):
+        return np.zeros(len(TERMS))
+    fitted = variance
+    out = np.zeros(len(TERMS))
+    for _ in range(_ROUNDS):
+        weight = np.sqrt(0.5 * found.freedom) / np.maximum(fitted, 1e-12 * variance.max())
+        rows = columns * weight[:, None]
+        scale = np.linalg.norm(rows, axis=0)
+        out = nnls(rows / scale, variance * weight)[0] / scale
+        fitted = columns @ out
+    return np.asarray(out)
+
+
+def drawn(value: Floats, n: int, interval_s: float, rng: np.random.Generator) -> Floats:
+    """Draw `n` samples (means over `interval_s`) of noise with the terms `value` (4,)."""
+    Q, N, B, K = value
+    edges = Q * rng.standard_normal(n + 1)
+    out = np.diff(edges) / interval_s
+    out += N / np.sqrt(interval_s) * rng.standard_normal(n)
+    out += K * np.sqrt(interval_s) * np.cumsum(rng.standard_normal(n))
+    if B:
+        out += B * _flicker(n, rng)
+    return np.asarray(out)
+
+
+def _flicker(n: int, rng: np.random.Generator) -> Floats:
+    """Flicker noise with the two-sided density ``1 / (2 pi f)`` of a unit B, the same at every sample rate."""
+    # Longer than asked for: the ends of a spectrum are joined.
+    length = 4 * n
+    f = np.fft.rfftfreq(length)
+    density = np.zeros(len(f))
+    density[1:] = 1.0 / (2.0 * np.pi * f[1:])
+    real, imaginary = rng.standard_normal((2, len(f)))
+    spectrum = np.sqrt(0.5 * density * length) * (real + 1j * imaginary)
+    return np.asarray(np.fft.irfft(spectrum, length)[:n])

@@ -1,0 +1,81 @@
+"""The white noise that the estimators need, from the recording itself.
+
+They take means over a second at rest, so what they must be told is the noise of such means: the Allan deviation at one
+second. Where the noise is white it is the density of the data sheet; where it is not, it is what acts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from sdimu_calibration.core.noise.allan import allan
+from sdimu_calibration.core.noise.rests import rests
+from sdimu_calibration.core.recording import DataError, Recording
+from sdimu_calibration.core.specification import ImuSpecification
+
+AT_S = 1.0
+
+
+@dataclass(frozen=True)
+class WhiteNoise:
+    """White noise of both triads.
+
+    Attributes
+    ----------
+    gyro, accel : float
+        Root mean square of the three axes (rad/s/sqrt(Hz), m/s^2/sqrt(Hz)).
+    gyro_sigma, accel_sigma : float
+        Standard errors.
+    channels : tuple of float, length 6
+        Of each sensor; gyros first.
+    rest_s : float
+        Time at rest that was used (s).
+    """
+
+    gyro: float
+    accel: float
+    gyro_sigma: float
+    accel_sigma: float
+    channels: tuple[float, ...]
+    rest_s: float
+
+
+def white_noise(recording: Recording, rows: Sequence[slice] | None = None) -> WhiteNoise:
+    """Measure the white noise in rests of a recording.
+
+    Parameters
+    ----------
+    recording : Recording
+    rows : sequence of slice, optional
+        The rests; all that `rests` finds by default.
+
+    Raises
+    ------
+    DataError
+        When there is no rest, or a sensor does not scatter at all.
+    """
+    rows = rests(recording) if rows is None else rows
+    interval = recording.interval_s
+    densities, freedom = [], 1.0
+    for data in (recording.omega_ib_b, recording.f_ib_b):
+        for axis in range(3):
+            found = allan([data[r, axis] for r in rows], interval)
+            k = int(np.argmin(np.abs(np.log(found.tau / AT_S))))
+            densities.append(float(found.deviation[k] * np.sqrt(found.tau[k])))
+            freedom = float(found.freedom[k])
+    for triad, own in (("gyro", densities[:3]), ("accelerometer", densities[3:])):
+        if not min(own) > 0.0:
+            axis = "xyz"[int(np.argmin(own))]
+            raise DataError(f"/imu/data_raw: {triad} {axis} does not scatter at rest; is it stuck?")
+    gyro, accel = (float(np.sqrt(np.mean(np.square(own)))) for own in (densities[:3], densities[3:]))
+    share = float(1.0 / np.sqrt(2.0 * 3.0 * freedom))
+    rest_s = sum(r.stop - r.start for r in rows) * interval
+    return WhiteNoise(gyro, accel, gyro * share, accel * share, tuple(densities), rest_s)
+
+
+def measured_specification(imu: ImuSpecification, measured: WhiteNoise) -> ImuSpecification:
+    """Return a specification with the white noise replaced by the measured one."""
+    return replace(imu, gyro_white_noise=measured.gyro, accel_white_noise=measured.accel)

@@ -1,0 +1,119 @@
+"""Table, figure and page of the Allan deviation."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from html import escape
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import plotly.graph_objects as go
+from plotly.subplots import make_subplots
+from rich.table import Table
+
+from sdimu_calibration.core.noise import TERMS, Allan, Terms
+from sdimu_calibration.core.units import from_si
+from sdimu_calibration.report.drawing import html, lay_out
+from sdimu_calibration.report.style import STYLE
+
+CHANNELS = ("gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z")
+UNITS = {
+    "gyro": {
+        "quantisation": "arcsec", "white": "deg/h/sqrt(Hz)", "instability": "deg/h", "random_walk": "deg/h/sqrt(h)",
+    },
+    "accel": {
+        "quantisation": "mm/s", "white": "ug/sqrt(Hz)", "instability": "ug", "random_walk": "ug/sqrt(h)",
+    },
+}  # fmt: skip
+WORDS = {
+    "quantisation": "quantisation", "white": "white noise",
+    "instability": "bias instability", "random_walk": "random walk of bias",
+}  # fmt: skip
+HEAD = ("channel", "term", "value", "sigma", "unit")
+_SHOWN = {"gyro": "deg/h", "accel": "ug"}
+_INK = ("#0b5394", "#b45f06", "#38761d")
+_DASH = ("solid", "dash", "dot")
+
+
+def rows(found: Mapping[str, Terms]) -> list[tuple[str, ...]]:
+    """Channel, term, value, sigma, unit, as text; a term that does not stand out is given as an upper limit."""
+    out: list[tuple[str, ...]] = []
+    for channel, terms in found.items():
+        units = UNITS[channel.partition("_")[0]]
+        for k, term in enumerate(TERMS):
+            unit = units[term]
+            if terms.seen[k]:
+                value, sigma = (f"{from_si(float(v[k]), unit):.3g}" for v in (terms.value, terms.sigma))
+            else:
+                value, sigma = f"< {from_si(float(terms.upper[k]), unit):.2g}", ""
+            out.append((channel, WORDS[term], value, sigma, unit))
+    return out
+
+
+def table(found: Mapping[str, Terms]) -> Table:
+    """Table of the terms for the terminal."""
+    made = Table(*HEAD, pad_edge=False, title="terms of the Allan deviation, one sigma")
+    made.columns[2].justify = made.columns[3].justify = "right"
+    listed = rows(found)
+    for k, row in enumerate(listed):
+        made.add_row(*row, end_section=k + 1 < len(listed) and listed[k + 1][0] != row[0])
+    return made
+
+
+def figure(deviations: Mapping[str, Allan], found: Mapping[str, Terms]) -> Any:
+    """Allan deviation of all channels with the fits, one panel a triad."""
+    made = make_subplots(rows=1, cols=2, subplot_titles=("Gyros", "Accelerometers"), horizontal_spacing=0.12)
+    for channel, one in deviations.items():
+        triad, axis = channel.split("_")
+        column, k, unit = 1 + (triad == "accel"), "xyz".index(axis), _SHOWN[triad]
+        factor = from_si(1.0, unit)
+        error = {"type": "data", "array": factor * one.sigma, "thickness": 1, "width": 2}
+        made.add_trace(
+            go.Scatter(
+                x=one.tau, y=factor * one.deviation, mode="markers", name=f"{channel} ({unit})", error_y=error,
+                marker={"color": _INK[k], "symbol": ("circle", "square", "diamond")[k], "size": 6},
+            ),
+            row=1, col=column,
+        )  # fmt: skip
+        fine = np.geomspace(one.tau[0], one.tau[-1], 100)
+        made.add_trace(
+            go.Scatter(
+                x=fine, y=factor * found[channel].deviation(fine), mode="lines", name=f"fit of {channel}",
+                line={"color": _INK[k], "dash": _DASH[k], "width": 1.5}, hoverinfo="skip",
+            ),
+            row=1, col=column,
+        )  # fmt: skip
+    made.update_xaxes(type="log", title_text="averaging time (s)", exponentformat="power")
+    for column, triad in ((1, "gyro"), (2, "accel")):
+        title = f"Allan deviation ({_SHOWN[triad]})"
+        made.update_yaxes(type="log", title_text=title, exponentformat="power", row=1, col=column)
+    return lay_out(made, 520)
+
+
+def write_page(
+    path: Path, deviations: Mapping[str, Allan], found: Mapping[str, Terms], title: str, words: Sequence[str]
+) -> None:
+    """Write the page: one file that needs no network; `words` are sentences for its head."""
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    head = "".join(f"<th>{escape(word)}</th>" for word in HEAD)
+    lines = "".join("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in rows(found))
+    body = [
+        f"<h1>{escape(title)}</h1>",
+        *(f'<p class="quiet">{escape(word)}</p>' for word in words),
+        "<h2>Allan deviation</h2>",
+        '<p class="quiet">Overlapping, pooled over the stretches; bars: one sigma; lines: the fitted terms.</p>',
+        html(figure(deviations, found), 1),
+        "<h2>Terms</h2>",
+        '<p class="quiet">Below two sigma only an upper limit is known. White noise is the angle or velocity random walk: '
+        '60 deg/h/sqrt(Hz) are 1 deg/sqrt(h). The random walk of the bias is the rate random walk.</p>',
+        f"<table><thead><tr>{head}</tr></thead><tbody>{lines}</tbody></table>",
+    ]
+    temporary = path.with_name(f".{path.name}.part")
+    temporary.write_text(
+        f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><title>{escape(title)}</title>'
+        f"<style>{STYLE}</style></head><body>\n" + "\n".join(body) + "\n</body></html>\n",
+        encoding="utf-8",
+    )
+    temporary.replace(path)
