@@ -36,6 +36,9 @@ def calibrate(
             help="Effect to estimate besides: a name, one of its coefficients, or a YAML file; may be repeated.",
         ),
     ] = None,
+    noise: Annotated[
+        str | None, typer.Option(help="estimated: white noise from the rests of the recording, not from --imu.")
+    ] = None,
     out: Annotated[Path | None, typer.Option(help="Folder of the results; BAG_calibration by default.")] = None,
     truth: Annotated[Path | None, typer.Option(help="Truth of a simulation, to show the errors.")] = None,
     estimator: Annotated[
@@ -44,8 +47,11 @@ def calibrate(
     hand: Annotated[bool, typer.Option("--hand", help="Moved by hand: the same as --estimator hand.")] = False,
 ) -> None:
     """Estimate the coefficients from a recording; leaves result.json and report.html."""
+    from dataclasses import replace
+
     from rich.console import Console
 
+    from sdimu_calibration.cli.noise import with_noise
     from sdimu_calibration.cli.progress import bar
     from sdimu_calibration.report.page import write_report
     from sdimu_calibration.report.table import rich_table, rows
@@ -59,6 +65,7 @@ def calibrate(
     console = Console()
     specification = load_imu(imu)
     recording = read_recording(bag)
+    specification, told = with_noise(specification, recording, noise)
     chosen = chosen_estimator("hand" if hand else estimator, recording, specification)
     if chosen == "hand" and not (hand or estimator == "hand"):
         console.print(HAND_CHOSEN, soft_wrap=True)
@@ -68,6 +75,7 @@ def calibrate(
     estimate = _estimators()[chosen]
     with bar(console) as progress:
         result = estimate(recording, where, specification, wanted, progress=progress)
+    result = replace(result, notes=(*result.notes, *told))
     true = None if truth is None else read_truth(truth, result.body_frame)
     folder = out or default_folder(bag)
     write_result(folder / "result.json", result)

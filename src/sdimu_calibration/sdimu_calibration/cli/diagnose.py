@@ -27,6 +27,9 @@ def diagnose(
     bootstrap: Annotated[
         int, typer.Option(min=0, metavar="N", help="Repeat the search on N draws of pure noise: how often it errs.")
     ] = 0,
+    noise: Annotated[
+        str | None, typer.Option(help="estimated: white noise from the rests of the recording, not from --imu.")
+    ] = None,
     out: Annotated[Path | None, typer.Option(help="Folder of the results; BAG_diagnosis by default.")] = None,
 ) -> None:
     """Find what the model is missing; leaves diagnosis.json and report.html, and result.json of the model found."""
@@ -34,6 +37,7 @@ def diagnose(
 
     from sdimu_calibration.cli.calibrate import default_folder
     from sdimu_calibration.cli.diagnosis_text import print_account, print_ladder
+    from sdimu_calibration.cli.noise import with_noise
     from sdimu_calibration.cli.progress import bar
     from sdimu_calibration.core.diagnosis.bootstrap import bootstrap as draw
     from sdimu_calibration.core.diagnosis.diagnose import diagnose as examine
@@ -51,6 +55,7 @@ def diagnose(
     where, specification = load_site(site), load_imu(imu)
     extra = [effect for text in attempt or [] for effect in find_effects(text)]
     recording = read_recording(bag)
+    specification, told_noise = with_noise(specification, recording, noise)
     with bar(console) as progress:
         found = examine(recording, where, specification, wanted, extra, progress=progress)
     told = account(found)
@@ -74,6 +79,6 @@ def diagnose(
         more = besides(recording, found, where, specification, wanted, rungs)
     title = f"Diagnosis of {bag.name}"
     write_report(folder / "report.html", found.after, title=title, diagnosis=found, more=more)
-    for note in recording.notes:
+    for note in (*recording.notes, *told_noise):
         console.print(f"note: {note}", soft_wrap=True, markup=False, highlight=False)
     console.print(f"results in {folder}", soft_wrap=True)

@@ -106,8 +106,8 @@ def write_page(
         '<p class="quiet">Overlapping, pooled over the stretches; bars: one sigma; lines: the fitted terms.</p>',
         html(figure(deviations, found), 1),
         "<h2>Terms</h2>",
-        '<p class="quiet">Below two sigma only an upper limit is known. White noise is the angle or velocity random walk: '
-        '60 deg/h/sqrt(Hz) are 1 deg/sqrt(h). The random walk of the bias is the rate random walk.</p>',
+        '<p class="quiet">Below three sigma only an upper limit is known. White noise is the angle or velocity random '
+        'walk: 60 deg/h/sqrt(Hz) are 1 deg/sqrt(h). The random walk of the bias is the rate random walk.</p>',
         f"<table><thead><tr>{head}</tr></thead><tbody>{lines}</tbody></table>",
     ]
     temporary = path.with_name(f".{path.name}.part")

@@ -95,6 +95,6 @@ def allan(stretches: Sequence[Floats], interval_s: float) -> Allan:
         pairs[rows] += weight
         freedom[rows] += freedom_of(len(samples), tau)
     keep = freedom > LEAST_FREEDOM
-    deviation: Floats = np.sqrt(total[keep] / pairs[keep])
-    tau: Floats = m[keep].astype(np.float64) * interval_s
-    return Allan(tau, deviation, freedom[keep], interval_s, tuple(map(len, stretches)))
+    pooled: Floats = np.sqrt(total[keep] / pairs[keep])
+    times: Floats = m[keep].astype(np.float64) * interval_s
+    return Allan(times, pooled, freedom[keep], interval_s, tuple(map(len, stretches)))

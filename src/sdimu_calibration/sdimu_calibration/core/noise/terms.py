@@ -5,7 +5,9 @@
 with quantisation Q, white noise N (angle or velocity random walk), bias instability B (flicker) and random walk K of
 the bias. Source: IEEE Std 952-1997, annex C. Linear in the squares, so it is a least squares with squares not below
 nought, each variance weighed by its own standard error under the fit. Neighbouring averaging times share data; so the
-standard errors of the terms are not those of the fit but the scatter of the same fit on noise drawn from it.
+standard errors of the terms are not those of the fit but the scatter of the same fit on noise drawn from it. A term
+that is not there would still take its share, because none may fall below nought; so the fit is repeated with those
+alone that stand out of their standard errors.
 """
 
 from __future__ import annotations
@@ -23,8 +25,8 @@ Floats = NDArray[np.float64]
 TERMS = ("quantisation", "white", "instability", "random_walk")
 _ROUNDS = 6
 _DRAWS = 24
-_SEEN = 2.0
-"""A term is called seen from this many sigma."""
+_SEEN, _ROOM = 3.0, 2.0
+"""A term is called seen from this many sigma; of one that is not, so many above the fit are the limit."""
 
 
 @dataclass(frozen=True)
@@ -49,11 +51,11 @@ class Terms:
     @property
     def upper(self) -> Floats:
         """Largest value that the data leave room for: two sigma above the fit."""
-        return np.asarray(self.value + _SEEN * self.sigma)
+        return np.asarray(self.value + _ROOM * self.sigma)
 
     def deviation(self, tau: Floats) -> Floats:
-        """Allan deviation of the fit at averaging times (k,)."""
-        return np.asarray(np.sqrt(basis(tau) @ self.value**2))
+        """Allan deviation of the terms that are seen, at averaging times (k,)."""
+        return np.asarray(np.sqrt(basis(tau) @ (self.value * self.seen) ** 2))
 
 
 def basis(tau: Floats) -> Floats:
@@ -74,16 +76,29 @@ def fit_terms(found: Allan, rng: np.random.Generator, draws: int = _DRAWS) -> Te
         The standard errors are known to ``1 / sqrt(2 draws)``.
     """
     value = np.sqrt(_squares(found))
-    again = np.empty((draws, len(TERMS)))
-    for k in range(draws):
-        stretches = [drawn(value, n, found.interval_s, rng) for n in found.lengths]
-        again[k] = np.sqrt(_squares(allan(stretches, found.interval_s)))
-    return Terms(value, np.sqrt(np.mean((again - value) ** 2, axis=0)))
+    again = [
+        allan([drawn(value, n, found.interval_s, rng) for n in found.lengths], found.interval_s) for _ in range(draws)
+    ]
+    sigma = _scatter(again, value, None)
+    seen = value > _SEEN * sigma
+    alone = np.sqrt(_squares(found, seen))
+    return Terms(np.where(seen, alone, value), np.where(seen, _scatter(again, value, seen), sigma))
 
 
-def _squares(found: Allan) -> Floats:
-    """Least squares for the squares of the terms."""
+def _scatter(again: list[Allan], value: Floats, among: NDArray[np.bool_] | None) -> Floats:
+    """Scatter of the fits on draws about the terms `value` (4,) that they were drawn with."""
+    fits = np.array([np.sqrt(_squares(one, among)) for one in again])
+    if among is None:
+        return np.asarray(np.sqrt(np.mean((fits - value) ** 2, axis=0)))
+    # Fits without the terms that are left out stand about another mean.
+    return np.asarray(fits.std(axis=0, ddof=1))
+
+
+def _squares(found: Allan, among: NDArray[np.bool_] | None = None) -> Floats:
+    """Least squares for the squares of the terms, the others nought."""
     variance, columns = found.deviation**2, basis(found.tau)
+    if among is not None:
+        columns = columns * among
     if not np.any(variance):
         return np.zeros(len(TERMS))
     fitted = variance
@@ -91,7 +106,7 @@ def _squares(found: Allan) -> Floats:
     for _ in range(_ROUNDS):
         weight = np.sqrt(0.5 * found.freedom) / np.maximum(fitted, 1e-12 * variance.max())
         rows = columns * weight[:, None]
-        scale = np.linalg.norm(rows, axis=0)
+        scale = np.maximum(np.linalg.norm(rows, axis=0), 1e-300)
         out = nnls(rows / scale, variance * weight)[0] / scale
         fitted = columns @ out
     return np.asarray(out)

@@ -68,8 +68,8 @@ def white_noise(recording: Recording, rows: Sequence[slice] | None = None) -> Wh
             freedom = float(found.freedom[k])
     for triad, own in (("gyro", densities[:3]), ("accelerometer", densities[3:])):
         if not min(own) > 0.0:
-            axis = "xyz"[int(np.argmin(own))]
-            raise DataError(f"/imu/data_raw: {triad} {axis} does not scatter at rest; is it stuck?")
+            stuck = "xyz"[int(np.argmin(own))]
+            raise DataError(f"/imu/data_raw: {triad} {stuck} does not scatter at rest; is it stuck?")
     gyro, accel = (float(np.sqrt(np.mean(np.square(own)))) for own in (densities[:3], densities[3:]))
     share = float(1.0 / np.sqrt(2.0 * 3.0 * freedom))
     rest_s = sum(r.stop - r.start for r in rows) * interval

@@ -1,0 +1,53 @@
+"""`sdimu noise` and ``--noise estimated``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sdimu_calibration.cli.noise import noise, with_noise
+from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.units import to_si
+from sdimu_calibration.storage.bag_reader import read_recording
+from sdimu_calibration.storage.bag_writer import write_recording
+from sdimu_calibration.storage.config import load_imu
+
+DT = 0.02
+GYRO, ACCEL = to_si(3.0, "deg/h/sqrt(Hz)"), to_si(50.0, "ug/sqrt(Hz)")
+
+
+@pytest.fixture
+def still(tmp_path: Path) -> Path:
+    """A bag of five minutes at rest with white noise."""
+    rng = np.random.default_rng(6)
+    n = round(300.0 / DT)
+    force = ACCEL / np.sqrt(DT) * rng.standard_normal((n, 3)) + np.array([0.0, 0.0, -9.8])
+    write_recording(
+        tmp_path / "still", start_ns=10**18, imu_ns=np.arange(1, n + 1) * round(DT * 1e9),
+        omega_ib_b=GYRO / np.sqrt(DT) * rng.standard_normal((n, 3)), f_ib_b=force,
+    )  # fmt: skip
+    return tmp_path / "still"
+
+
+def test_the_file_written_is_an_imu_with_the_noise_of_the_recording(still: Path, tmp_path: Path) -> None:
+    noise(still, out=tmp_path / "out")
+    found, base = load_imu(tmp_path / "out" / "imu.yaml"), load_imu("dtg")
+    # 298 s at 1 s of three axes: 1 / sqrt(2 * 3 * 298) = 2.4 %; four of them.
+    assert found.gyro_white_noise == pytest.approx(GYRO, rel=0.1)
+    assert found.accel_white_noise == pytest.approx(ACCEL, rel=0.1)
+    assert found.prior == base.prior
+    page = (tmp_path / "out" / "noise.html").read_text()
+    assert "white noise" in page
+    assert "plotly" in page
+
+
+def test_estimated_noise_replaces_that_of_the_specification_and_says_so(still: Path) -> None:
+    recording = read_recording(still)
+    imu, notes = with_noise(load_imu("dtg"), recording, "estimated")
+    assert imu.gyro_white_noise == pytest.approx(GYRO, rel=0.1)
+    assert "0.1 as specified" in notes[0]
+    assert with_noise(load_imu("dtg"), recording, None) == (load_imu("dtg"), [])
+    with pytest.raises(DataError, match="expected 'estimated'"):
+        with_noise(load_imu("dtg"), recording, "guessed")
