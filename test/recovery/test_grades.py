@@ -21,8 +21,8 @@ def test_a_plan_tells_something_of_every_grade_and_the_filter_reaches_the_bound(
     found = predict(PLAN, SITE, load_imu(grade), MODEL, bound=bound_covariance)
     free = found.sigma > 1e-6 * found.prior
     assert np.all(found.sigma[free] < 1.001 * found.prior[free])
-    # Two algorithms; they differ by the first second of a stop (a hundredth of it) and by what they make of the end of a
-    # turn. With gyros this quiet that is 2.2 % of two accelerometer biases; a plan is chosen by no less than 5 %.
+    # Two algorithms; they differ by the first second of a stop (a hundredth of it) and by what they make of the end of
+    # a turn. With gyros this quiet that is 2.2 % of two accelerometer biases; a plan is chosen by no less than 5 %.
     np.testing.assert_allclose(found.sigma[free], found.bound[free], rtol=0.05)
     seen = [k for k in np.flatnonzero(free) if not found.names[k].startswith("gyro_misalignment")]
     # All but what the data sheet knows already (mass unbalance of optical gyros) gets better by half at least.
