@@ -32,6 +32,7 @@ def replay(
     folder = out or bag.resolve().with_name(f"{bag.resolve().stem if bag.is_file() else bag.resolve().name}_replay")
     result = folder / "result.json"
     result.unlink(missing_ok=True)
+    (folder / "calibration.journal").unlink(missing_ok=True)
     console = Console()
     begun = time.monotonic()
     with (

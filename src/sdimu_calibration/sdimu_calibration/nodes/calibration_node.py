@@ -1,13 +1,16 @@
 """Node that calibrates while the test runs.
 
 Parameters: site, imu, model (names or paths), add (effects beyond the model's), out (folder for result.json), stay (do
-not leave at the end of the stream).
+not leave at the end of the stream), checkpoint (keep a journal in the folder of results; on by default).
 Subscriptions (remap them at will): /imu/data_raw, /rate_table/status, /imu/temperature. Publications once a second of
 data: /calibration/coefficients, /calibration/covariance, /calibration/navigation, /diagnostics. Services: ~/save
 writes result.json from everything that has come, ~/reset forgets it.
 
 A header stamp decides what happens, never the order of arrival. At the end of the stream the whole test is calibrated
 once more as `sdimu calibrate` does it; the last coefficients and covariance are that result.
+
+Samples, status and temperatures go into a journal before they are acknowledged. A node that is started in the folder of
+one that was killed goes on with its journal; what it missed in between is a gap, unless the producer kept it.
 """
 
 from __future__ import annotations
@@ -36,9 +39,11 @@ from sdimu_calibration.nodes.listening import Listener
 from sdimu_calibration.nodes.spinning import run_node
 from sdimu_calibration.nodes.ticking import Ticker
 from sdimu_calibration.storage.config import load_imu, load_model, load_site
+from sdimu_calibration.storage.journal import Journal, digest
 from sdimu_calibration.storage.result_file import write_result
 
 IMU, STATUS, TEMPERATURE = "/imu/data_raw", "/rate_table/status", "/imu/temperature"
+JOURNAL = "calibration.journal"
 BLOCK = 20
 SETTLE_S = 2.0
 FAREWELL_S = 10.0
@@ -61,7 +66,12 @@ class CalibrationNode:
         self._out = Path(str(declare("out", ".").value))
         self._stay = bool(declare("stay", False).value)
         _warm_up(self._make(0))
-        self._feed = Feed(self._make)
+        self._journal: Journal | None = None
+        if bool(declare("checkpoint", True).value):
+            options = digest(self._site, self._imu, self._model)
+            self._journal = Journal(self._out / JOURNAL, options)
+        self._feed = Feed(self._make, self._journal)
+        resumed = self._feed.resumed_ns
         self._ended: float | None = None
         self._departed: float | None = None
 
@@ -75,15 +85,25 @@ class CalibrationNode:
         self._reset = node.create_service(Trigger, "~/reset", self._answer_reset)
         self._stream = Consumer(node, ticker, IMU, every=BLOCK, on_end=self._take_end)
         self._listeners = (
-            Listener(node, ticker, DiagnosticArray, STATUS, self._take_status),
-            Listener(node, ticker, Temperature, TEMPERATURE, self._take_temperature),
-            Listener(node, ticker, Imu, IMU, self._take_imu, raw=True),
+            Listener(node, ticker, DiagnosticArray, STATUS, self._take_status, late=bool(resumed)),
+            Listener(node, ticker, Temperature, TEMPERATURE, self._take_temperature, late=bool(resumed)),
+            Listener(node, ticker, Imu, IMU, self._take_imu, raw=True, late=bool(resumed)),
         )
+        if resumed:
+            self._catch_up(resumed)
         ticker.every(0.05, self._tick)
         self._stream.ready()
 
     def close(self) -> None:
-        """Nothing to leave behind: result.json is written whole when it is written."""
+        """Leave the journal to a successor, unless the test is over; result.json is written whole anyway."""
+        if self._journal is not None:
+            self._journal.close()
+
+    def _catch_up(self, resumed_ns: int) -> None:
+        """Bring the filter to where its predecessor was; what that published is not published again."""
+        count = sum(1 for _ in self._feed.process(True, False))
+        self._stream.reached(resumed_ns, 0)
+        self.node.get_logger().info(f"goes on after {count} s from {self._out / JOURNAL}")
 
     def _make(self, start_ns: int) -> LiveCalibration:
         return LiveCalibration(self._site, self._imu, self._model, start_ns)
@@ -154,7 +174,9 @@ class CalibrationNode:
         self._departed = time.monotonic()
         try:
             result = self._write_result()
+            self._end_journal()
         except DataError as error:
+            self._end_journal()
             if not self.done.done():
                 self.done.set_exception(error)
             return
@@ -168,6 +190,12 @@ class CalibrationNode:
         write_result(self._out / "result.json", result)
         return result
 
+    def _end_journal(self) -> None:
+        """End the journal: what is complete, or cannot become better, is nothing to go on with."""
+        if self._journal is not None:
+            self._journal.remove()
+            self._journal = None
+
     def _answer_save(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         try:
             self._write_result()
@@ -177,7 +205,9 @@ class CalibrationNode:
         return response
 
     def _answer_reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        self._feed = Feed(self._make)
+        if self._journal is not None:
+            self._journal.restart()
+        self._feed = Feed(self._make, self._journal)
         self._ended = self._departed = None
         response.success = True
         return response

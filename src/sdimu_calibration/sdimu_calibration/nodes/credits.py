@@ -84,6 +84,8 @@ class Producer:
     on_credit : callable or None
         Called after each credit: time to send more.
     qos : QoSProfile
+    patience_s : float
+        A consumer that vanished is waited for so long: it may be started again and go on.
     """
 
     def __init__(
@@ -96,11 +98,14 @@ class Producer:
         window_ns: int = NO_LIMIT,
         on_credit: Callable[[], None] | None = None,
         qos: QoSProfile = STREAM,
+        patience_s: float = 0.0,
     ) -> None:
         self._node = node
         self._window_ns = window_ns
         self._on_credit = on_credit
+        self._patience_s = patience_s
         self._peers: dict[str, _Peer] = {}
+        self._missing: dict[str, float] = {}
         self._sent_ns: int | None = None
         self._end_ns: int | None = None
         self.publisher = node.create_publisher(message_type, topic, qos)
@@ -162,10 +167,12 @@ class Producer:
             return
         infos = self._node.get_publishers_info_by_topic(self._credit.topic_name)
         present = {f"{info.node_namespace.rstrip('/')}/{info.node_name}" for info in infos}
-        gone = [name for name in self._peers if name not in present]
+        now = time.monotonic()
+        self._missing = {name: self._missing.get(name, now) for name in self._peers if name not in present}
+        gone = [name for name, since in self._missing.items() if now - since >= self._patience_s]
         for name in gone:
             self._node.get_logger().warning(f"{name} has gone; no longer waiting for it")
-            del self._peers[name]
+            del self._peers[name], self._missing[name]
         if gone and self._on_credit is not None:
             self._on_credit()
 

@@ -1,4 +1,8 @@
-"""From topics to `LiveCalibration`: holds what has come and hands it over second by second, by stamps."""
+"""From topics to `LiveCalibration`: holds what has come and hands it over second by second, by stamps.
+
+With a journal, everything is written down before it is processed and acknowledged, and a feed that finds a journal goes
+on with it: what its predecessor took is taken again in the same order, and what comes a second time is left out.
+"""
 
 from __future__ import annotations
 
@@ -6,14 +10,20 @@ import time
 from collections.abc import Callable, Iterator
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sdimu_calibration.core.live import EpochEstimate, LiveCalibration
 from sdimu_calibration.core.recording import NOMINAL_FROM, DataError, Floats, origin_ns
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.nodes.gate import Companion
 from sdimu_calibration.storage.cdr import LayoutError, decode_imu
+from sdimu_calibration.storage.journal import Journal, Samples, Status
 
 NS = 1_000_000_000
+AWAY_S = 600.0
+"""Samples that come so long after those of the journal are of another test."""
+_STRANGERS = 10
+"""More samples than these of a time that the journal has otherwise mean another test, too."""
 
 
 class Feed:
@@ -26,11 +36,18 @@ class Feed:
     ----------
     make : callable
         Makes a `LiveCalibration` from the stamp (ns) from which times count.
+    journal : Journal, optional
+        Where everything is written; what is in it already comes first.
     """
 
-    def __init__(self, make: Callable[[int], LiveCalibration]) -> None:
+    def __init__(self, make: Callable[[int], LiveCalibration], journal: Journal | None = None) -> None:
         self._make = make
+        self._journal = journal
+        self._known: Samples | None = None
+        self._since: list[tuple[Callable[..., None], tuple[object, ...]]] = []
+        self.resumed_ns = 0
         self._raw: list[bytes] = []
+        self._statuses: set[tuple[int, bool, int]] = set()
         self._early: list[tuple[Callable[..., None], tuple[object, ...]]] = []
         self._blocks: list[tuple[Floats, Floats, Floats]] = []
         self._live: LiveCalibration | None = None
@@ -40,6 +57,55 @@ class Feed:
         self.imu_s = 0.0
         self.status = Companion()
         self.temperature = Companion()
+        if journal is not None and journal.before:
+            self._resume(journal)
+
+    def _resume(self, journal: Journal) -> None:
+        """Take what the journal holds."""
+        parts = [record for record in journal.before if isinstance(record, Samples)]
+        for record in journal.before:
+            if isinstance(record, Samples):
+                self._keep(record)
+            elif isinstance(record, Status):
+                self._note_status(record.ns, record.dwell, record.stop)
+            else:
+                self._note_temperature(record.ns, record.value)
+        if parts:
+            ns, omega, force = (
+                np.concatenate([getattr(part, name) for part in parts]) for name in Samples.__dataclass_fields__
+            )
+            order = np.argsort(ns, kind="stable")
+            self._known = Samples(ns[order], omega[order], force[order])
+            self.resumed_ns = int(ns.max())
+
+    def _forget(self) -> None:
+        """Begin anew: what comes is of another test than the journal; what came since counts."""
+        assert self._journal is not None
+        raw, since = self._raw, self._since
+        self._journal.restart()
+        Feed.__init__(self, self._make, self._journal)
+        self._raw = raw
+        for action, arguments in since:
+            action(*arguments)
+
+    def _is_another_test(self, samples: Samples) -> bool:
+        """Whether samples after a resumption contradict the journal."""
+        if self._known is None:
+            return False
+        if int(samples.ns.min()) - self.resumed_ns > AWAY_S * NS:
+            return True
+        return int(np.sum((samples.ns <= self.resumed_ns) & ~self._repeats(samples))) > _STRANGERS
+
+    def _repeats(self, samples: Samples) -> NDArray[np.bool_]:
+        """Which samples the journal has, number for number."""
+        if self._known is None:
+            return np.zeros(len(samples.ns), dtype=bool)
+        at = np.minimum(np.searchsorted(self._known.ns, samples.ns), len(self._known.ns) - 1)
+        return np.asarray(
+            (self._known.ns[at] == samples.ns)
+            & (self._known.omega_ib_b[at] == samples.omega_ib_b).all(axis=1)
+            & (self._known.f_ib_b[at] == samples.f_ib_b).all(axis=1)
+        )
 
     def take_imu(self, message: bytes) -> None:
         """Keep a raw sensor_msgs/Imu until `decode`."""
@@ -66,13 +132,27 @@ class Feed:
             ns, omega, force = decode_imu(self._raw)
         except LayoutError as error:
             raise DataError(f"the IMU topic carries something else than sensor_msgs/Imu ({error})") from error
+        samples = Samples(ns, omega, force)
+        if self._is_another_test(samples):
+            self._forget()
+            return self.decode()
         self._raw = []
-        if self._live is None:
-            self._begin(origin_ns(ns))
-        t: Floats = (ns - self.start_ns).astype(np.float64) * 1e-9
-        self._blocks.append((t, omega, force))
-        self.imu_s = max(self.imu_s, float(t.max()))
+        if self._known is not None:
+            new = ~self._repeats(samples)
+            samples = Samples(ns[new], omega[new], force[new])
+            if not new.any():
+                return self.start_ns + round(self.imu_s * NS)
+        if self._journal is not None:
+            self._journal.samples(samples.ns, samples.omega_ib_b, samples.f_ib_b)
+        self._keep(samples)
         return self.start_ns + round(self.imu_s * NS)
+
+    def _keep(self, samples: Samples) -> None:
+        if self._live is None:
+            self._begin(origin_ns(samples.ns))
+        t: Floats = (samples.ns - self.start_ns).astype(np.float64) * 1e-9
+        self._blocks.append((t, samples.omega_ib_b, samples.f_ib_b))
+        self.imu_s = max(self.imu_s, float(t.max()))
 
     def _begin(self, start_ns: int) -> None:
         self.start_ns = start_ns
@@ -83,17 +163,34 @@ class Feed:
 
     def take_status(self, stamp_ns: int, dwell: bool, stop: int) -> None:
         """Take a status that holds from `stamp_ns` on."""
+        if self._journal is not None:
+            self._journal.status(stamp_ns, dwell, stop)
+            if self._known is not None:
+                self._since.append((self.take_status, (stamp_ns, dwell, stop)))
+        self._note_status(stamp_ns, dwell, stop)
+
+    def _note_status(self, stamp_ns: int, dwell: bool, stop: int) -> None:
         if self._live is None:
-            self._early.append((self.take_status, (stamp_ns, dwell, stop)))
+            self._early.append((self._note_status, (stamp_ns, dwell, stop)))
             return
+        if (stamp_ns, dwell, stop) in self._statuses:
+            return
+        self._statuses.add((stamp_ns, dwell, stop))
         t = (stamp_ns - self.start_ns) * 1e-9
         self._live.add_phase(t, dwell, stop)
         self.status.take(t, time.monotonic())
 
     def take_temperature(self, stamp_ns: int, value: float) -> None:
         """Take a temperature (deg C)."""
+        if self._journal is not None:
+            self._journal.temperature(stamp_ns, value)
+            if self._known is not None:
+                self._since.append((self.take_temperature, (stamp_ns, value)))
+        self._note_temperature(stamp_ns, value)
+
+    def _note_temperature(self, stamp_ns: int, value: float) -> None:
         if self._live is None:
-            self._early.append((self.take_temperature, (stamp_ns, value)))
+            self._early.append((self._note_temperature, (stamp_ns, value)))
             return
         t = (stamp_ns - self.start_ns) * 1e-9
         self._live.add_temperature(t, value)

@@ -7,13 +7,20 @@ from typing import Any
 
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
-from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.subscription import Subscription
 
 from sdimu_calibration.nodes.credits import STREAM
 from sdimu_calibration.nodes.ticking import Ticker
 
 BEST_EFFORT = QoSProfile(history=HistoryPolicy.KEEP_LAST, depth=1000, reliability=ReliabilityPolicy.BEST_EFFORT)
+
+LATE = QoSProfile(
+    history=HistoryPolicy.KEEP_ALL,
+    reliability=ReliabilityPolicy.RELIABLE,
+    durability=DurabilityPolicy.TRANSIENT_LOCAL,
+)
+"""Also what was sent before, as far as the publisher keeps it."""
 
 
 class Listener:
@@ -32,6 +39,8 @@ class Listener:
     callback : callable
         Takes the message, as CDR bytes when `raw`.
     raw : bool
+    late : bool
+        Ask first for what was sent before this subscription (a node that goes on where it was killed).
     """
 
     def __init__(
@@ -43,12 +52,14 @@ class Listener:
         callback: Callable[[Any], None],
         *,
         raw: bool = False,
+        late: bool = False,
     ) -> None:
         self._node = node
         self._arguments = (message_type, topic, callback)
         self._raw = raw
         self._refused = False
-        self._subscription = self._subscribe(STREAM)
+        self._fall_to = [STREAM, BEST_EFFORT] if late else [BEST_EFFORT]
+        self._subscription = self._subscribe(LATE if late else STREAM)
         # Not from inside the event: the subscription must not vanish under its own callback.
         ticker.every(0.2, self._fall_back)
 
@@ -63,7 +74,10 @@ class Listener:
         if not self._refused:
             return
         self._refused = False
-        topic = self._subscription.topic_name
-        self._node.get_logger().warning(f"{topic} is offered as best effort only; what is lost will be counted")
-        old, self._subscription = self._subscription, self._subscribe(BEST_EFFORT)
+        if not self._fall_to:
+            return
+        topic, qos = self._subscription.topic_name, self._fall_to.pop(0)
+        if qos is BEST_EFFORT:
+            self._node.get_logger().warning(f"{topic} is offered as best effort only; what is lost will be counted")
+        old, self._subscription = self._subscription, self._subscribe(qos)
         self._node.destroy_subscription(old)

@@ -52,7 +52,7 @@ def run(
     console = make_console()
     # Only the bag of an earlier run is replaced, never one that someone put here.
     replace = (out / "log" / "rate_table.yaml").is_file()
-    for stale in ("result.json", "report.html", "diagnosis.json"):
+    for stale in ("result.json", "report.html", "diagnosis.json", "calibration.journal"):
         (out / stale).unlink(missing_ok=True)
     begun = time.monotonic()
     with own_domain(out / "log"), Children(out / "log") as children:

@@ -2,7 +2,8 @@
 
 Parameters: imu, site, plan (for the truth file only), temperature (names or paths), mount ("X,Y,Z" in deg; empty
 draws it up to mount_max_deg), seed, rate_hz, effects (list of NAME=VALUE), truth_file (written at the start), frame_id,
-consumers (how many must have granted a credit on the IMU before this node grants one to the table).
+consumers (how many must have granted a credit on the IMU before this node grants one to the table), patience_s (a
+consumer that was killed is waited for so long, and its successor gets the last `KEPT` samples again).
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from typing import Any
 
 import numpy as np
 from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.task import Future
 from sensor_msgs.msg import Imu, Temperature
 from std_msgs.msg import Float64MultiArray
@@ -34,6 +36,11 @@ from sdimu_sim.temperature_file import load_temperature
 from sdimu_sim.truth_file import write_truth
 
 WINDOW_SAMPLES = 200
+KEPT = 1000
+PATIENT = QoSProfile(
+    depth=KEPT, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
+)
+"""Keeps more than a window: a successor finds all that its predecessor had not acknowledged."""
 FAREWELL_S = 20.0
 TRUE_MOTION = "/rate_table/true_motion"
 
@@ -48,6 +55,8 @@ class SdimuNode:
         scenario = self._scenario()
         truth_file = str(declare("truth_file", "").value)
         self._needed = int(declare("consumers", 0).value)
+        patience_s = float(declare("patience_s", 0.0).value)
+        stream = PATIENT if patience_s > 0.0 else STREAM
         self._frame = str(declare("frame_id", "imu_link").value)
         self._profile = scenario.temperature
         self._rate_hz = scenario.rate_hz
@@ -66,10 +75,13 @@ class SdimuNode:
         self._departed: float | None = None
         ticker = Ticker(self.node)
         window = round(WINDOW_SAMPLES / self._rate_hz * NS)
-        self._imu = Producer(self.node, ticker, Imu, "/imu/data_raw", window_ns=window, on_credit=self._pump)
+        self._imu = Producer(
+            self.node, ticker, Imu, "/imu/data_raw", window_ns=window, on_credit=self._pump, qos=stream,
+            patience_s=patience_s,
+        )  # fmt: skip
         # Without a profile there must be no publisher: the calibrator would wait for it.
         if self._profile is not None:
-            self._temperature = self.node.create_publisher(Temperature, "/imu/temperature", STREAM)
+            self._temperature = self.node.create_publisher(Temperature, "/imu/temperature", stream)
         # A message of motion is a block: each one is acknowledged.
         self._motion = Consumer(
             self.node, ticker, TRUE_MOTION, every=1, busy=lambda: bool(self._ready), on_end=self._take_end

@@ -1,0 +1,116 @@
+"""A killed calibration goes on where it was, and ends with the same answer."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sdimu_calibration.core.calibrate import calibrate
+from sdimu_calibration.core.live import LiveCalibration
+from sdimu_calibration.nodes.feed import AWAY_S, NS, Feed
+from sdimu_calibration.storage.bag_reader import read_recording
+from sdimu_calibration.storage.cdr import encode_imu
+from sdimu_calibration.storage.config import load_imu, load_model, load_site
+from sdimu_calibration.storage.journal import Journal, digest
+from sdimu_calibration.storage.result_file import read_result
+
+from .conftest import Bench, imu_stamps, samples_of, write_plan
+
+SITE, IMU, MODEL = load_site("daejeon"), load_imu("dtg"), load_model("baseline")
+START = 1_700_000_000 * NS
+COUNT, BLOCK = 4000, 20
+
+
+def messages(seed: int = 1, start: int = START) -> list[bytes]:
+    """Forty seconds at rest as raw messages."""
+    rng = np.random.default_rng(seed)
+    ns = start + (1 + np.arange(COUNT, dtype=np.int64)) * (NS // 100)
+    omega = 4e-5 + 1e-6 * rng.standard_normal((COUNT, 3))
+    return list(encode_imu(ns, omega, [0.0, 0.0, -9.8] + 1e-3 * rng.standard_normal((COUNT, 3))))
+
+
+def feed_of(path: Path) -> Feed:
+    return Feed(lambda start: LiveCalibration(SITE, IMU, MODEL, start), Journal(path, digest("same")))
+
+
+def give(feed: Feed, raw: list[bytes]) -> None:
+    """Hand over messages in blocks, as the node does, with a status every second."""
+    for k in range(0, len(raw), BLOCK):
+        for message in raw[k : k + BLOCK]:
+            feed.take_imu(message)
+        reached = feed.decode()
+        if reached:
+            feed.take_status(reached - reached % NS, True, 0)
+        list(feed.process(True, False))
+
+
+@pytest.fixture(scope="module")
+def unbroken(tmp_path_factory):
+    feed = feed_of(tmp_path_factory.mktemp("whole") / "j")
+    give(feed, messages())
+    return feed.finish()
+
+
+@pytest.mark.parametrize("killed_at", [60, 1000, 3980])
+@pytest.mark.parametrize("again", [0, 40, 1000])
+def test_a_successor_ends_with_the_same_digits_however_much_comes_again(tmp_path, unbroken, killed_at, again):
+    raw = messages()
+    give(feed_of(tmp_path / "j"), raw[:killed_at])  # killed: nothing was closed
+    successor = feed_of(tmp_path / "j")
+    list(successor.process(True, False))
+    give(successor, raw[max(killed_at - again, 0) :])
+    result = successor.finish()
+    np.testing.assert_array_equal(result.values, unbroken.values)
+    np.testing.assert_array_equal(result.covariance, unbroken.covariance)
+    assert result.data == unbroken.data
+    assert result.fit == unbroken.fit
+
+
+def test_what_was_missed_is_a_gap_that_is_counted(tmp_path):
+    raw = messages()
+    give(feed_of(tmp_path / "j"), raw[:1500])
+    successor = feed_of(tmp_path / "j")
+    give(successor, raw[1800:])
+    result = successor.finish()
+    assert result.data["lost"] == 300
+    assert result.data["samples"] == COUNT - 300
+    assert any(fault.kind == "long gap" for fault in result.faults)
+
+
+@pytest.mark.parametrize("later_s", [0.0, AWAY_S + 60.0])
+def test_another_test_in_the_same_folder_begins_anew(tmp_path, later_s):
+    give(feed_of(tmp_path / "j"), messages()[:1500])
+    other = messages(seed=2, start=START + round(later_s * NS))
+    successor = feed_of(tmp_path / "j")
+    give(successor, other)
+    alone = feed_of(tmp_path / "k")
+    give(alone, other)
+    np.testing.assert_array_equal(successor.finish().values, alone.finish().values)
+    assert successor.finish().data == alone.finish().data
+
+
+@pytest.mark.ros
+def test_a_killed_calibration_goes_on_and_ends_with_the_same_answer(bench: Bench) -> None:
+    """The simulator waits by credits, so nothing is lost: not what was on its way, nor what came meanwhile."""
+    write_plan(bench.plan, 30.0)
+    bench.speed = 15.0
+    for name in ("recorder", "calibration", "rate_table"):
+        bench.start(name)
+    bench.start("sdimu", patience_s=120.0)
+    journal = bench.folder / "calibration.journal"
+    bench.wait(lambda: journal.is_file() and journal.stat().st_size > 150_000, "a good part of the data")
+    bench.children.kill("calibration")
+    bench.start("calibration")
+    bench.wait_for_end()
+    stamps = imu_stamps(bench.folder / "bag")
+    result = read_result(bench.folder)
+    assert len(stamps) == result.data["samples"] == samples_of(30.0)
+    recording = read_recording(bench.folder / "bag")
+    offline = calibrate(replace(recording, table=None), SITE, IMU, MODEL)
+    np.testing.assert_array_equal(result.values, offline.values)
+    np.testing.assert_array_equal(result.covariance, offline.covariance)
+    assert result.data == offline.data
+    assert not journal.exists()
