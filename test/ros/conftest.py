@@ -6,6 +6,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,7 @@ from sdimu_calibration.storage.bag_file import raw_messages
 from sdimu_calibration.storage.cdr import IMU, decode_imu
 
 RATE_HZ = 100
+DWELL_S = 40.0
 TURN_S = 3.0
 RECORDER = "sdimu_calibration.nodes.recorder_node"
 CALIBRATION = "sdimu_calibration.nodes.calibration_node"
@@ -87,3 +89,28 @@ def sdimu(*arguments: object) -> subprocess.Popen[str]:
     """Start a verb of `sdimu` as a person does."""
     command = [sys.executable, "-m", "sdimu_calibration.cli.main", *map(str, arguments)]
     return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+
+@dataclass
+class Twins:
+    """Two runs of the same test at the same time."""
+
+    folders: tuple[Path, Path]
+    outputs: tuple[str, str]
+
+
+@pytest.fixture(scope="session")
+def twins(tmp_path_factory: pytest.TempPathFactory) -> Twins:
+    root = tmp_path_factory.mktemp("twins")
+    plan = write_plan(root / "plan.yaml", DWELL_S)
+    folders = (root / "a", root / "b")
+    processes = [sdimu("run", "--plan", plan, "--seed", 5, "--out", folder) for folder in folders]
+    outputs = []
+    for process in processes:
+        try:
+            out, err = process.communicate(timeout=DEADLINE_S)
+        finally:
+            process.kill()
+        assert process.returncode == 0, err
+        outputs.append(out)
+    return Twins(folders, (outputs[0], outputs[1]))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -16,11 +15,10 @@ from sdimu_calibration.storage.bag_reader import read_recording
 from sdimu_calibration.storage.config import load_imu, load_model, load_site
 from sdimu_calibration.storage.result_file import read_result
 
-from .conftest import DEADLINE_S, RATE_HZ, imu_stamps, samples_of, sdimu, write_plan
+from .conftest import DEADLINE_S, DWELL_S, RATE_HZ, Twins, imu_stamps, samples_of, sdimu
 
 pytestmark = pytest.mark.ros
 
-DWELL_S = 40.0
 TYPES = {
     "/imu/data_raw": "sensor_msgs/msg/Imu",
     "/rate_table/status": "diagnostic_msgs/msg/DiagnosticArray",
@@ -30,31 +28,6 @@ TYPES = {
     "/calibration/navigation": "nav_msgs/msg/Odometry",
     "/diagnostics": "diagnostic_msgs/msg/DiagnosticArray",
 }
-
-
-@dataclass
-class Twins:
-    """Two runs of the same test at the same time."""
-
-    folders: tuple[Path, Path]
-    outputs: tuple[str, str]
-
-
-@pytest.fixture(scope="module")
-def twins(tmp_path_factory: pytest.TempPathFactory) -> Twins:
-    root = tmp_path_factory.mktemp("twins")
-    plan = write_plan(root / "plan.yaml", DWELL_S)
-    folders = (root / "a", root / "b")
-    processes = [sdimu("run", "--plan", plan, "--seed", 5, "--out", folder) for folder in folders]
-    outputs = []
-    for process in processes:
-        try:
-            out, err = process.communicate(timeout=DEADLINE_S)
-        finally:
-            process.kill()
-        assert process.returncode == 0, err
-        outputs.append(out)
-    return Twins(folders, (outputs[0], outputs[1]))
 
 
 def test_a_run_loses_nothing(twins: Twins) -> None:

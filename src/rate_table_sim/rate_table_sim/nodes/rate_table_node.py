@@ -1,4 +1,4 @@
-"""Node of the simulated rate table: plays a plan, publishes status, joint states and its true motion.
+"""Node of the simulated rate table: plays a plan, publishes status, joint states, frames and its true motion.
 
 Parameters: plan, table (names or paths), seed, speed (0 = as fast as credits allow, N = N times real time),
 start_ns (stamp of the start), joint_rate_hz, consumers (how many must have granted a credit on the true motion
@@ -18,6 +18,7 @@ from std_msgs.msg import Float64MultiArray
 
 from rate_table_sim.core import TableMotion, phase_changes, table_motion
 from rate_table_sim.nodes.motion_message import encode_motion
+from rate_table_sim.nodes.table_frames import TableFrames
 from rate_table_sim.table_file import load_table
 from sdimu_calibration.nodes.credits import HISTORY, NS, Producer, header
 from sdimu_calibration.nodes.spinning import run_node
@@ -66,6 +67,7 @@ class RateTableNode:
         )
         self._status = Producer(self.node, ticker, DiagnosticArray, "/rate_table/status", qos=HISTORY)
         self._joints = self.node.create_publisher(JointState, "/rate_table/joint_states", HISTORY)
+        self._frames = TableFrames(self.node, table, self._motion)
         self._timer = self.node.create_timer(TICK_S, self._pump)
 
     def close(self) -> None:
@@ -87,6 +89,7 @@ class RateTableNode:
             if not self._everyone_is_here():
                 return
             self._started = time.monotonic()
+            self._frames.begin(self._start_ns)
         t = self._motion.t
         # A few blocks a call: without any credits to wait for, the executor must still get its turn.
         for _ in range(8):
@@ -126,6 +129,7 @@ class RateTableNode:
         message = JointState(header=header(self._stamp(m.t[k])), name=self._names)
         message.position, message.velocity = m.encoder_angle[k].tolist(), m.rate[k].tolist()
         self._joints.publish(message)
+        self._frames.send(self._stamp(m.t[k]), k)
 
     def _stamp(self, t: float) -> int:
         return self._start_ns + round(t * NS)

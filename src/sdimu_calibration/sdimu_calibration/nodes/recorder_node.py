@@ -21,6 +21,9 @@ from sdimu_calibration.nodes.credits import Consumer
 from sdimu_calibration.nodes.listening import Listener
 from sdimu_calibration.nodes.spinning import run_node
 from sdimu_calibration.nodes.ticking import Ticker
+from sdimu_calibration.nodes.transform_type import TYPE_NAME as TRANSFORM_TYPE
+from sdimu_calibration.nodes.transform_type import transform_class
+from sdimu_calibration.nodes.transforms import STATIC, TRANSFORMS, stamp_of_first
 from sdimu_calibration.storage.mcap_bag import McapBag
 
 TOPICS = (
@@ -32,6 +35,8 @@ TOPICS = (
     "/calibration/covariance=std_msgs/msg/Float64MultiArray",
     "/calibration/navigation=nav_msgs/msg/Odometry",
     "/diagnostics=diagnostic_msgs/msg/DiagnosticArray",
+    f"{TRANSFORMS}={TRANSFORM_TYPE}",
+    f"{STATIC}={TRANSFORM_TYPE}",
 )
 STREAMS = ("/imu/data_raw", "/rate_table/status", "/calibration/coefficients")
 """Topics with an end; the first must end, the others must have ended or lost their publisher."""
@@ -69,11 +74,15 @@ class RecorderNode:
     def _record(self, name: str, type_name: str) -> None:
         self._bag.topic(name, type_name)
         take = self._writer(name, type_name)
-        self._listeners.append(Listener(self.node, self._ticker, message_class(type_name), name, take, raw=True))
+        # What is said once and kept for those who come later must be asked for as such.
+        kind, late = message_class(type_name), name == STATIC
+        self._listeners.append(Listener(self.node, self._ticker, kind, name, take, raw=True, late=late))
 
     def _writer(self, name: str, type_name: str) -> Callable[[bytes], None]:
         """Return the callback of a topic, with everything it needs bound: it runs for every message."""
         stamp = stamp_in_label if type_name.endswith("MultiArray") else stamp_of
+        if type_name == TRANSFORM_TYPE:
+            stamp = stamp_of_first
         write = self._bag.write
         consumer = self._consumers.get(name)
 
@@ -104,6 +113,8 @@ def message_class(type_name: str) -> type:
     """Return the class of a type name such as ``sensor_msgs/msg/Imu``; DataError when it is not installed."""
     package, _, rest = type_name.partition("/")
     try:
+        if type_name == TRANSFORM_TYPE:
+            return transform_class()
         module = import_module(f"{package}.msg")
         return getattr(module, rest.rpartition("/")[2])  # type: ignore[no-any-return]
     except (ImportError, AttributeError) as error:

@@ -24,6 +24,8 @@ _NUMBERS = frozenset(
 )
 _PRIMITIVES = _NUMBERS | {"bool", "byte", "char", "string", "wstring"}
 _SEPARATOR = "=" * 80
+_KNOWN = {("tf2_msgs", "TFMessage"): "geometry_msgs/TransformStamped[] transforms\n"}
+"""Types that are recorded although no wheel brings their definition."""
 
 
 @cache
@@ -78,6 +80,8 @@ def _split(type_name: str) -> tuple[str, str]:
 
 def _text(package: str, name: str) -> str:
     path = _file(package, name, ".msg")
+    if path is None and (package, name) in _KNOWN:
+        return _KNOWN[package, name]
     if path is None:
         raise DataError(f"no definition of {package}/msg/{name}: install the ROS package '{package}'")
     return path.read_text(encoding="utf-8")

@@ -23,9 +23,11 @@ from std_msgs.msg import Float64MultiArray
 
 from rate_table_sim.nodes.motion_message import decode_motion
 from sdimu_calibration.nodes.convert import encode_imu
-from sdimu_calibration.nodes.credits import NS, STREAM, Consumer, Producer, header, publish
+from sdimu_calibration.nodes.credits import LATCHED, NS, STREAM, Consumer, Producer, header, publish
 from sdimu_calibration.nodes.spinning import run_node
 from sdimu_calibration.nodes.ticking import Ticker
+from sdimu_calibration.nodes.transform_type import transform_class
+from sdimu_calibration.nodes.transforms import IDENTITY, PLATFORM, STATIC, TransformMessage
 from sdimu_calibration.storage.config import load_imu, load_plan, load_site
 from sdimu_sim.cli.simulate import mount_rad
 from sdimu_sim.core.generator import ImuGenerator
@@ -82,6 +84,7 @@ class SdimuNode:
         # Without a profile there must be no publisher: the calibrator would wait for it.
         if self._profile is not None:
             self._temperature = self.node.create_publisher(Temperature, "/imu/temperature", stream)
+        self._place = self._transforms()
         # A message of motion is a block: each one is acknowledged.
         self._motion = Consumer(
             self.node, ticker, TRUE_MOTION, every=1, busy=lambda: bool(self._ready), on_end=self._take_end
@@ -108,9 +111,19 @@ class SdimuNode:
             temperature=load_temperature(temperature) if temperature else None,
         )
 
+    def _transforms(self) -> Any:
+        """Offer where the IMU is on the table, for RViz; None where the type cannot be had."""
+        try:
+            return self.node.create_publisher(transform_class(), STATIC, LATCHED)
+        except ImportError as error:
+            self.node.get_logger().warning(f"no transform for RViz: {error}")
+            return None
+
     def _take_motion(self, message: Float64MultiArray) -> None:
         """Make the samples of a block of motion and queue them."""
         self._start_ns, t, q_nt, omega_nt_t = decode_motion(message)
+        if self._place is not None and not self._motion_ns:
+            self._place.publish(TransformMessage([(PLATFORM, self._frame)]).encode(self._start_ns, [IDENTITY]))
         samples = self._generator.advance(PlatformMotion(t, q_nt, omega_nt_t))
         stamps = self._start_ns + samples.ns
         encoded = encode_imu(stamps, samples.omega_ib_b, samples.f_ib_b, self._frame, *self._variance)

@@ -32,6 +32,7 @@ def ranking(entries: Sequence[data.Scored], threshold: float) -> Any:
     figure = evidence_figures.ranking(entries, threshold)
     top = max([abs(e.z) for e in entries] + [threshold])
     figure.update_xaxes(range=[0, 1.75 * top])
+    figure.update_layout(showlegend=False)
     return figure
 
 

@@ -16,24 +16,23 @@ from sdimu_calibration.report.workbench.own_effect import named
 
 _STANDS = 0.01
 """Sigmas below which a coefficient has not moved."""
-_HEADINGS = ("model", "log-likelihood", "against the first", "NIS", "held-out RMS", "at held-out stops", "moved most")
+_HEADINGS = (
+    "model", "log-likelihood", "against the model as given", "NIS", "held-out RMS", "at held-out stops", "moved most",
+)  # fmt: skip
 
 
 def models(bench: Bench, keys: Sequence[Key], here: Key) -> Any:
     """Compare the models of a page; a mark points at the one shown.
 
-    The log-likelihood is compared where the same stops were fitted.
+    A model is compared with the one as given, fitted to the same stops.
     """
     found = [(key, bench.known(*key)) for key in keys]
     rows: list[tuple[Key, Fitted]] = [(key, fitted) for key, fitted in found if fitted is not None]
-    first: dict[tuple[int, ...], Fitted] = {}
-    for key, fitted in rows:
-        first.setdefault(key[1], fitted)
     return html.Table([
         html.Thead(html.Tr([html.Th(word) for word in _HEADINGS])),
         html.Tbody([
             html.Tr(
-                [html.Td(text) for text in _model(key, fitted, first[key[1]], rows[0][1])],
+                [html.Td(text) for text in _model(key, fitted, bench.known((), key[1]))],
                 className="here" if key == here else "",
             )
             for key, fitted in rows
@@ -41,16 +40,19 @@ def models(bench: Bench, keys: Sequence[Key], here: Key) -> Any:
     ])  # fmt: skip
 
 
-def _model(key: Key, fitted: Fitted, same: Fitted, given: Fitted) -> list[str]:
+def _model(key: Key, fitted: Fitted, given: Fitted | None) -> list[str]:
     fit = fitted.calibration.fit
-    gained = (fit["log_likelihood"] or 0.0) - (same.calibration.fit["log_likelihood"] or 0.0)
-    moved = [f"{name} {size:+.1f}" for name, size in moved_coefficients(given.calibration, fitted.calibration)[:2]]
+    gained, most = "", ""
+    if given is not None and given is not fitted:
+        gained = f"{(fit['log_likelihood'] or 0.0) - (given.calibration.fit['log_likelihood'] or 0.0):+.1f}"
+        sizes = moved_coefficients(given.calibration, fitted.calibration)[:2]
+        most = ", ".join(f"{name} {size:+.1f} sigma" for name, size in sizes)
     out = f" without stops {', '.join(map(str, key[1]))}" if key[1] else ""
     return [
         (" ".join(f"+ {named(text)}" for text in key[0]) or "model as given") + out,
-        f"{fit['log_likelihood']:.1f}", f"{gained:+.1f}" if fitted is not same else "", f"{fit['nis_mean']:.3f}",
+        f"{fit['log_likelihood']:.1f}", gained, f"{fit['nis_mean']:.3f}",
         f"{fitted.held_out:.3f}", "" if fitted.at_held is None else f"{fitted.at_held:.3f}",
-        ", ".join(moved) + (" sigma" if moved else ""),
+        most,
     ]  # fmt: skip
 
 
