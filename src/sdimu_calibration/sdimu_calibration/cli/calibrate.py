@@ -2,13 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from sdimu_calibration.cli.source_options import (
+    AccelSign,
+    AccelUnit,
+    GyroSign,
+    GyroUnit,
+    ImuTopic,
+    JointTopic,
+    StatusTopic,
+    TemperatureTopic,
+    source,
+)
+
 if TYPE_CHECKING:
+    from rich.console import Console
+
     from sdimu_calibration.core.recording import Recording
     from sdimu_calibration.core.results import Calibration
     from sdimu_calibration.core.specification import ImuSpecification
@@ -45,6 +59,14 @@ def calibrate(
         str, typer.Option(help="filter, batch (least squares), classical (table angles), hand; auto: filter or hand.")
     ] = "auto",
     hand: Annotated[bool, typer.Option("--hand", help="Moved by hand: the same as --estimator hand.")] = False,
+    imu_topic: ImuTopic = None,
+    status_topic: StatusTopic = None,
+    joint_topic: JointTopic = None,
+    temperature_topic: TemperatureTopic = None,
+    accel_unit: AccelUnit = None,
+    gyro_unit: GyroUnit = None,
+    accel_sign: AccelSign = None,
+    gyro_sign: GyroSign = None,
 ) -> None:
     """Estimate the coefficients from a recording; leaves result.json and report.html."""
     from dataclasses import replace
@@ -55,23 +77,30 @@ def calibrate(
     from sdimu_calibration.cli.progress import bar
     from sdimu_calibration.report.page import write_report
     from sdimu_calibration.report.table import rich_table, rows
-    from sdimu_calibration.storage.bag_reader import read_recording
-    from sdimu_calibration.storage.config import load_imu, load_site
+    from sdimu_calibration.storage.config import load_imu
     from sdimu_calibration.storage.effect_file import extended_model
+    from sdimu_calibration.storage.opening import open_recording, place
     from sdimu_calibration.storage.reference_file import read_truth
     from sdimu_calibration.storage.result_file import write_result
 
     check_estimator(estimator)
     console = Console()
     specification = load_imu(imu)
-    recording = read_recording(bag)
+    check_options(model, add, site)
+    origin = source(
+        imu_topic, status_topic, joint_topic, temperature_topic, accel_unit, gyro_unit, accel_sign, gyro_sign
+    )
+    recording = open_recording(bag, origin)
     specification, told = with_noise(specification, recording, noise)
     chosen = chosen_estimator("hand" if hand else estimator, recording, specification)
     if chosen == "hand" and not (hand or estimator == "hand"):
         console.print(HAND_CHOSEN, soft_wrap=True)
     wanted = extended_model(model or ("hand" if chosen == "hand" else "baseline"), add or [])
     # By hand nobody needs to say where: the result says what was taken for granted.
-    where = None if site is None and chosen == "hand" else load_site(site or "daejeon")
+    where = None
+    if site is not None or chosen != "hand":
+        recording, where = place(recording, site, specification, origin)
+    tell(console, recording.notes)
     estimate = _estimators()[chosen]
     with bar(console) as progress:
         result = estimate(recording, where, specification, wanted, progress=progress)
@@ -81,9 +110,29 @@ def calibrate(
     write_result(folder / "result.json", result)
     write_report(folder / "report.html", result, title=f"Calibration of {bag.name}", truth=true)
     console.print(rich_table(rows(result, true), f"body frame: {result.body_frame}"), soft_wrap=True)
-    for note in (*recording.notes, *(note for note in result.notes if note not in recording.notes)):
-        console.print(f"note: {note}", soft_wrap=True, markup=False, highlight=False)
+    tell(console, [note for note in result.notes if note not in recording.notes])
     console.print(f"results in {folder}", soft_wrap=True)
+
+
+def tell(console: Console, notes: Iterable[str]) -> None:
+    """Print notes, one line each; those of the recording before the estimate, which may refuse what they explain."""
+    for note in notes:
+        console.print(f"note: {note}", soft_wrap=True, markup=False, highlight=False)
+
+
+def check_options(model: str | None, add: list[str] | None, site: str | None) -> None:
+    """Refuse names that do not exist before a long recording is read.
+
+    Raises
+    ------
+    DataError
+    """
+    from sdimu_calibration.storage.config import load_site
+    from sdimu_calibration.storage.effect_file import extended_model
+
+    extended_model(model or "baseline", add or [])
+    if site is not None:
+        load_site(site)
 
 
 def check_estimator(name: str) -> None:

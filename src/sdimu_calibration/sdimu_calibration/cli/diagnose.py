@@ -7,6 +7,18 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from sdimu_calibration.cli.source_options import (
+    AccelSign,
+    AccelUnit,
+    GyroSign,
+    GyroUnit,
+    ImuTopic,
+    JointTopic,
+    StatusTopic,
+    TemperatureTopic,
+    source,
+)
+
 if TYPE_CHECKING:
     from sdimu_calibration.core.diagnosis.grow import Rung
 
@@ -14,7 +26,9 @@ if TYPE_CHECKING:
 def diagnose(
     bag: Annotated[Path, typer.Argument(metavar="BAG", help="rosbag2 folder or .mcap file.")],
     model: Annotated[str, typer.Option(help="Model to examine: name in config/model or path.")] = "baseline",
-    site: Annotated[str, typer.Option(help="Where the test was: name in config/site or path.")] = "daejeon",
+    site: Annotated[
+        str | None, typer.Option(help="Where the test was: name in config/site or path; daejeon when left out.")
+    ] = None,
     imu: Annotated[str, typer.Option(help="Specification of the IMU: name in config/imu or path.")] = "dtg",
     add: Annotated[
         list[str] | None, typer.Option(metavar="EFFECT", help="Effect in the model besides: name or YAML file.")
@@ -31,11 +45,19 @@ def diagnose(
         str | None, typer.Option(help="estimated: white noise from the rests of the recording, not from --imu.")
     ] = None,
     out: Annotated[Path | None, typer.Option(help="Folder of the results; BAG_diagnosis by default.")] = None,
+    imu_topic: ImuTopic = None,
+    status_topic: StatusTopic = None,
+    joint_topic: JointTopic = None,
+    temperature_topic: TemperatureTopic = None,
+    accel_unit: AccelUnit = None,
+    gyro_unit: GyroUnit = None,
+    accel_sign: AccelSign = None,
+    gyro_sign: GyroSign = None,
 ) -> None:
     """Find what the model is missing; leaves diagnosis.json and report.html, and result.json of the model found."""
     from rich.console import Console
 
-    from sdimu_calibration.cli.calibrate import default_folder
+    from sdimu_calibration.cli.calibrate import check_options, default_folder, tell
     from sdimu_calibration.cli.diagnosis_text import print_account, print_ladder
     from sdimu_calibration.cli.noise import with_noise
     from sdimu_calibration.cli.progress import bar
@@ -44,18 +66,24 @@ def diagnose(
     from sdimu_calibration.core.diagnosis.grow import grow as climb
     from sdimu_calibration.report.besides import besides
     from sdimu_calibration.report.page import write_report
-    from sdimu_calibration.storage.bag_reader import read_recording
-    from sdimu_calibration.storage.config import load_imu, load_site
+    from sdimu_calibration.storage.config import load_imu
     from sdimu_calibration.storage.diagnosis_file import account, write_diagnosis
     from sdimu_calibration.storage.effect_file import extended_model, find_effects
+    from sdimu_calibration.storage.opening import open_recording, place
     from sdimu_calibration.storage.result_file import write_result
 
     console = Console()
+    check_options(model, add, site)
     wanted = extended_model(model, add or [])
-    where, specification = load_site(site), load_imu(imu)
+    specification = load_imu(imu)
     extra = [effect for text in attempt or [] for effect in find_effects(text)]
-    recording = read_recording(bag)
+    origin = source(
+        imu_topic, status_topic, joint_topic, temperature_topic, accel_unit, gyro_unit, accel_sign, gyro_sign
+    )
+    recording = open_recording(bag, origin)
     specification, told_noise = with_noise(specification, recording, noise)
+    recording, where = place(recording, site, specification, origin)
+    tell(console, (*recording.notes, *told_noise))
     with bar(console) as progress:
         found = examine(recording, where, specification, wanted, extra, progress=progress)
     told = account(found)
@@ -79,6 +107,4 @@ def diagnose(
         more = besides(recording, found, where, specification, wanted, rungs)
     title = f"Diagnosis of {bag.name}"
     write_report(folder / "report.html", found.after, title=title, diagnosis=found, more=more)
-    for note in (*recording.notes, *told_noise):
-        console.print(f"note: {note}", soft_wrap=True, markup=False, highlight=False)
     console.print(f"results in {folder}", soft_wrap=True)

@@ -7,6 +7,18 @@ from typing import Annotated
 
 import typer
 
+from sdimu_calibration.cli.source_options import (
+    AccelSign,
+    AccelUnit,
+    GyroSign,
+    GyroUnit,
+    ImuTopic,
+    JointTopic,
+    StatusTopic,
+    TemperatureTopic,
+    source,
+)
+
 HOST = "127.0.0.1"
 
 
@@ -14,9 +26,19 @@ def workbench(
     bag: Annotated[Path, typer.Argument(metavar="BAG", help="rosbag2 folder or .mcap file.")],
     port: Annotated[int, typer.Option(min=1, max=65535, help="Port on this machine.")] = 8050,
     model: Annotated[str, typer.Option(help="Model to start from: name in config/model or path.")] = "baseline",
-    site: Annotated[str, typer.Option(help="Where the test was: name in config/site or path.")] = "daejeon",
+    site: Annotated[
+        str | None, typer.Option(help="Where the test was: name in config/site or path; daejeon when left out.")
+    ] = None,
     imu: Annotated[str, typer.Option(help="Specification of the IMU: name in config/imu or path.")] = "dtg",
     host: Annotated[str, typer.Option(help="Address to listen on; others than this machine only when asked.")] = HOST,
+    imu_topic: ImuTopic = None,
+    status_topic: StatusTopic = None,
+    joint_topic: JointTopic = None,
+    temperature_topic: TemperatureTopic = None,
+    accel_unit: AccelUnit = None,
+    gyro_unit: GyroUnit = None,
+    accel_sign: AccelSign = None,
+    gyro_sign: GyroSign = None,
 ) -> None:
     """Open a recording in the browser; runs until it is stopped with Ctrl-C."""
     import logging
@@ -24,20 +46,30 @@ def workbench(
 
     from rich.console import Console
 
+    from sdimu_calibration.cli.calibrate import check_options
     from sdimu_calibration.cli.progress import bar
     from sdimu_calibration.core.recording import DataError
     from sdimu_calibration.report.workbench.app import build
     from sdimu_calibration.report.workbench.fit import Bench
     from sdimu_calibration.report.workbench.shelf import Shelf, neighbours
-    from sdimu_calibration.storage.bag_reader import read_recording
-    from sdimu_calibration.storage.config import load_imu, load_site
+    from sdimu_calibration.storage.config import load_imu
     from sdimu_calibration.storage.effect_file import extended_model
+    from sdimu_calibration.storage.opening import open_recording, place
 
     with socket.socket() as probe:
         if probe.connect_ex((host, port)) == 0:
             raise DataError(f"port {port} is taken (choose another with --port)")
-    options = (load_site(site), load_imu(imu), extended_model(model, []))
-    shelf = Shelf(neighbours(bag), lambda path: Bench(read_recording(path), *options))
+    check_options(model, None, site)
+    specification, wanted = load_imu(imu), extended_model(model, [])
+    origin = source(
+        imu_topic, status_topic, joint_topic, temperature_topic, accel_unit, gyro_unit, accel_sign, gyro_sign
+    )
+
+    def opened(path: Path) -> Bench:
+        recording, where = place(open_recording(path, origin), site, specification, origin)
+        return Bench(recording, where, specification, wanted)
+
+    shelf = Shelf(neighbours(bag), opened)
     console = Console()
     with bar(Console(stderr=True)) as progress:
         progress("reading", 0.0)

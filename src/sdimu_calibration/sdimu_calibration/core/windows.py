@@ -1,0 +1,173 @@
+"""A recording in windows: what the specific force points to, and how the gyros say it turned.
+
+Nothing but `Windows.still` needs to know units or signs: it is what they are recognised by.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sdimu_calibration.core import earth
+
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+WINDOW_S = 1.0
+"""Usual length: a hand turns by tens of degrees in it, and its tremor (10 Hz) averages out of a quarter of it."""
+_END = 8
+"""The direction at an edge is the mean over a window's length over this, before and after it."""
+_GAP = 1.2
+"""A window this many times as long as its samples has a gap in it."""
+
+_REST = 6.0
+"""At rest a reading differs from the usual one by less than so many sigma of the noise, learned from the windows."""
+_TURNING_EARTH = 3.0
+"""The Earth's rate changes a reading by at most twice itself from attitude to attitude; mass unbalance adds to it."""
+_MAD = 1.482602218505602
+"""From the median of |x| to the standard deviation of Gaussian noise."""
+
+
+@dataclass(frozen=True)
+class Windows:
+    """Windows without gaps, k of them, of m samples (a power of two).
+
+    Attributes
+    ----------
+    start, end : ndarray, shape (k,)
+        Seconds.
+    first : ndarray of int, shape (k,)
+        First sample of each.
+    length : int
+        Samples of a window.
+    interval_s : float
+        Of the samples.
+    up_first, up_last : ndarray, shape (k, 3)
+        Direction of the measured force at the edges, unit vectors.
+    w_mean, f_mean : ndarray, shape (k, 3)
+        Means, in the numbers of the recording.
+    """
+
+    start: Floats
+    end: Floats
+    first: NDArray[np.int64]
+    length: int
+    interval_s: float
+    up_first: Floats
+    up_last: Floats
+    w_mean: Floats
+    f_mean: Floats
+
+    def __len__(self) -> int:
+        """Return the number of windows."""
+        return len(self.first)
+
+    @property
+    def swing(self) -> Floats:
+        """Angle between the directions at the edges (rad), shape (k,)."""
+        return _angle(self.up_first, self.up_last)
+
+    @property
+    def quiet(self) -> Bools:
+        """The half of the windows in which the force turns least, shape (k,)."""
+        swing = self.swing
+        return np.asarray(swing <= np.median(swing)) if len(swing) else np.zeros(0, dtype=bool)
+
+    @property
+    def rate_offset(self) -> Floats:
+        """Reading of the gyros when nothing turns, shape (3,)."""
+        return np.asarray(np.median(self.w_mean[self.quiet], axis=0)) if len(self) else np.zeros(3)
+
+
+    @property
+    def still(self) -> Bools:
+        """Windows at rest: the gyros read what they usually do, but for noise and Earth; the force does not turn."""
+        if not len(self):
+            return np.zeros(0, dtype=bool)
+        quiet = self.quiet
+        steps = np.diff(self.w_mean, axis=0)[quiet[1:] & quiet[:-1]]
+        noise = _MAD * np.median(np.abs(steps), axis=0) / np.sqrt(2.0) if len(steps) else np.zeros(3)
+        usual = _MAD * float(np.median(self.swing[quiet]))
+        still = (np.abs(self.w_mean - self.rate_offset) < _TURNING_EARTH * earth.RATE + _REST * noise).all(axis=1)
+        earth_turn = self.length * self.interval_s * _TURNING_EARTH * earth.RATE
+        return np.asarray(still & (self.swing < _REST * usual + earth_turn))
+
+
+def cut_windows(t: Floats, w: Floats, f: Floats, length_s: float = WINDOW_S) -> Windows:
+    """Cut a recording into windows.
+
+    Parameters
+    ----------
+    t : ndarray, shape (n,)
+        Seconds, ascending.
+    w, f : ndarray, shape (n, 3)
+        Body rate and specific force in any unit and sign.
+    length_s : float
+        Of a window, to a factor of the root of two.
+    """
+    dt = float(np.median(np.diff(t)))
+    m = int(2 ** max(round(float(np.log2(length_s / dt))), 0))
+    q = max(m // _END, 1)
+    first = np.arange(m, len(t) - m - q + 1, m)
+    whole = t[np.minimum(first + m + q, len(t)) - 1] - t[first - q] < _GAP * (m + 2 * q) * dt
+    first = first[whole]
+    total_w, total_f = (np.vstack([np.zeros(3), np.cumsum(x - x.mean(axis=0), axis=0)]) for x in (w, f))
+
+    def mean(total: Floats, values: Floats, begin: NDArray[np.int64], end: NDArray[np.int64]) -> Floats:
+        return np.asarray((total[end] - total[begin]) / (end - begin)[:, None] + values.mean(axis=0))
+
+    return Windows(
+        start=t[first - 1], end=t[first + m - 1], first=first, length=m, interval_s=dt,
+        up_first=_unit(mean(total_f, f, first - q, first + q)),
+        up_last=_unit(mean(total_f, f, first + m - q, first + m + q)),
+        w_mean=mean(total_w, w, first, first + m), f_mean=mean(total_f, f, first, first + m),
+    )  # fmt: skip
+
+
+def turned(w: Floats, windows: Windows, chosen: NDArray[np.int64], factor: float) -> Floats:
+    """Rotation over windows as the gyros say it: C (k, 3, 3) from the axes at the end to those at the beginning.
+
+    Parameters
+    ----------
+    w : ndarray, shape (n, 3)
+        As in the recording; `Windows.rate_offset` is taken off.
+    windows : Windows
+    chosen : ndarray of int, shape (k,)
+    factor : float
+        rad/s of one unit of `w`, with its sign.
+    """
+    rows = windows.first[chosen][:, None] + np.arange(windows.length)
+    q = _quaternion((w[rows] - windows.rate_offset) * (factor * windows.interval_s))
+    while q.shape[1] > 1:
+        q = _product(q[:, 0::2], q[:, 1::2])
+    return _matrix(q[:, 0])
+
+
+def _quaternion(vector: Floats) -> Floats:
+    """Rotation vectors (..., 3) to quaternions (..., 4), scalar first."""
+    angle = np.linalg.norm(vector, axis=-1, keepdims=True)
+    return np.concatenate([np.cos(0.5 * angle), 0.5 * np.sinc(angle / (2.0 * np.pi)) * vector], axis=-1)
+
+
+def _product(p: Floats, q: Floats) -> Floats:
+    s, v, r, u = p[..., :1], p[..., 1:], q[..., :1], q[..., 1:]
+    scalar = s * r - np.sum(v * u, axis=-1, keepdims=True)
+    return np.concatenate([scalar, s * u + r * v + np.cross(v, u)], axis=-1)
+
+
+def _matrix(q: Floats) -> Floats:
+    s, v = q[:, 0, None, None], q[:, 1:]
+    skew = np.zeros((len(q), 3, 3))
+    skew[:, [2, 0, 1], [1, 2, 0]] = v
+    skew -= skew.transpose(0, 2, 1).copy()
+    return np.asarray(np.eye(3) + 2.0 * s * skew + 2.0 * skew @ skew)
+
+
+def _unit(vector: Floats) -> Floats:
+    return np.asarray(vector / np.maximum(np.linalg.norm(vector, axis=1, keepdims=True), 1e-300))
+
+
+def _angle(a: Floats, b: Floats) -> Floats:
+    return np.asarray(2.0 * np.arcsin(np.minimum(0.5 * np.linalg.norm(a - b, axis=1), 1.0)))
