@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -100,9 +101,8 @@ def calibrate(
     where = None
     if site is not None or chosen != "hand":
         recording, where = place(recording, site, specification, origin)
-    tell(console, recording.notes)
     estimate = _estimators()[chosen]
-    with bar(console) as progress:
+    with explained(console, recording.notes), bar(console) as progress:
         result = estimate(recording, where, specification, wanted, progress=progress)
     result = replace(result, notes=(*result.notes, *told))
     true = None if truth is None else read_truth(truth, result.body_frame)
@@ -110,14 +110,26 @@ def calibrate(
     write_result(folder / "result.json", result)
     write_report(folder / "report.html", result, title=f"Calibration of {bag.name}", truth=true)
     console.print(rich_table(rows(result, true), f"body frame: {result.body_frame}"), soft_wrap=True)
-    tell(console, [note for note in result.notes if note not in recording.notes])
+    tell(console, (*recording.notes, *(note for note in result.notes if note not in recording.notes)))
     console.print(f"results in {folder}", soft_wrap=True)
 
 
 def tell(console: Console, notes: Iterable[str]) -> None:
-    """Print notes, one line each; those of the recording before the estimate, which may refuse what they explain."""
+    """Print notes, one line each."""
     for note in notes:
         console.print(f"note: {note}", soft_wrap=True, markup=False, highlight=False)
+
+
+@contextmanager
+def explained(console: Console, notes: Iterable[str]) -> Iterator[None]:
+    """Print the notes of a recording when an estimate refuses it: they may say why."""
+    from sdimu_calibration.core.recording import DataError
+
+    try:
+        yield
+    except DataError:
+        tell(console, notes)
+        raise
 
 
 def check_options(model: str | None, add: list[str] | None, site: str | None) -> None:

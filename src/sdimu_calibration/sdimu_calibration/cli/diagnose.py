@@ -57,7 +57,7 @@ def diagnose(
     """Find what the model is missing; leaves diagnosis.json and report.html, and result.json of the model found."""
     from rich.console import Console
 
-    from sdimu_calibration.cli.calibrate import check_options, default_folder, tell
+    from sdimu_calibration.cli.calibrate import check_options, default_folder, explained, tell
     from sdimu_calibration.cli.diagnosis_text import print_account, print_ladder
     from sdimu_calibration.cli.noise import with_noise
     from sdimu_calibration.cli.progress import bar
@@ -83,8 +83,7 @@ def diagnose(
     recording = open_recording(bag, origin)
     specification, told_noise = with_noise(specification, recording, noise)
     recording, where = place(recording, site, specification, origin)
-    tell(console, (*recording.notes, *told_noise))
-    with bar(console) as progress:
+    with explained(console, recording.notes), bar(console) as progress:
         found = examine(recording, where, specification, wanted, extra, progress=progress)
     told = account(found)
     print_account(console, told)
@@ -107,4 +106,5 @@ def diagnose(
         more = besides(recording, found, where, specification, wanted, rungs)
     title = f"Diagnosis of {bag.name}"
     write_report(folder / "report.html", found.after, title=title, diagnosis=found, more=more)
+    tell(console, (*recording.notes, *told_noise))
     console.print(f"results in {folder}", soft_wrap=True)

@@ -27,12 +27,12 @@ def noise(
     from sdimu_calibration.cli.progress import bar
     from sdimu_calibration.core.noise import allan, fit_terms, rests, white_noise
     from sdimu_calibration.report.noise import CHANNELS, table, write_page
-    from sdimu_calibration.storage.bag_reader import read_recording
     from sdimu_calibration.storage.config import find_config
     from sdimu_calibration.storage.imu_file import write_measured_imu
+    from sdimu_calibration.storage.opening import open_recording
 
     find_config("imu", imu)  # what is wrong with it is said before the work
-    recording = read_recording(bag)
+    recording = open_recording(bag)
     rows = rests(recording)
     if longest:
         rows = (max(rows, key=lambda r: r.stop - r.start),)
