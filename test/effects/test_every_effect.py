@@ -56,7 +56,7 @@ STEP_AT, TURN = 27.0, 2
 def of(name):
     """The effect, with what is fixed in it set to values that mean something in a test of two minutes."""
     effect = registry.get(name)
-    values = {"tau": 40.0, "t0": STEP_AT, "span": 80.0, "turn": TURN, "start": 21.0, "end": 25.5}
+    values = {"tau": 40.0, "t0": STEP_AT, "span": 80.0, "turn": TURN, "at": 23.0}
     if effect.with_options is None:
         return effect
     return effect.with_options(**{key: values[key] for key in effect.options})
@@ -224,6 +224,20 @@ def test_regressors_are_the_derivative_of_the_simulated_sensor(name, perfect):
         assert np.linalg.norm(predicted[:, channel] - measured[:, channel]) < allowed * size, channel
     silent = sorted(set(range(6)) - {t.channel for t in effect.terms})
     assert np.abs(measured[:, silent]).max(initial=0.0) <= 1e-3 * np.abs(measured).max()
+
+
+def test_data_lost_in_a_turn_take_the_angle_of_that_turn_that_the_simulator_loses(perfect):
+    # Spread over the turn here, lost at a moment there: the same angle, to the step of the simulator's samples.
+    effect, tau = registry.get("gyro_lost_data").with_options(turn=1, at=15.0), 0.05
+    recording = simulated(effects=(f"gyro_lost_data={1e3 * tau} ms; turn=1",))
+    dt = np.diff(recording.t, prepend=0.0)[:, None]
+    angle = np.sum((recording.omega_ib_b - perfect.recording.omega_ib_b) * dt, axis=0)
+    found, setup = passed(perfect, effect)
+    predicted = setup.sensors.errors(found.data.values, np.array([tau]))[:, :3]
+    expected = np.sum(predicted * perfect.reduced.cycles.dt[:, None], axis=0)
+    # The turn is driven a little faster than planned, so that it lasts whole seconds.
+    assert 0.2 * tau < np.linalg.norm(angle) < 0.25 * tau
+    np.testing.assert_allclose(expected, angle, atol=1e-2 * np.linalg.norm(angle))
 
 
 # -- its way through navigation and filter -----------------------------------------------------------------------------

@@ -31,12 +31,13 @@ def _truth(name: str, option: tuple[str, float] | None = None) -> Truth:
         ("gyro_bias_warm_up_x(tau=600 s)", _truth("gyro_bias_warm_up_x", ("tau", 400.0)), True),
         ("gyro_bias_warm_up_x(tau=600 s)", _truth("gyro_bias_warm_up_x", ("tau", 250.0)), False),
         ("gyro_bias_warm_up_x(tau=300 s)", _truth("gyro_bias_warm_up_x", ("tau", 650.0)), False),
-        # Inside the dwell from 145 to 245 s: either end of it, no other.
+        # Inside the dwell from 145 to 245 s: anywhere in it, nowhere else.
+        ("accel_bias_step_z(t0=222.5 s)", _truth("accel_bias_step_z", ("t0", 200.0)), True),
         ("accel_bias_step_z(t0=145 s)", _truth("accel_bias_step_z", ("t0", 200.0)), True),
         ("accel_bias_step_z(t0=245 s)", _truth("accel_bias_step_z", ("t0", 200.0)), True),
         ("accel_bias_step_z(t0=290 s)", _truth("accel_bias_step_z", ("t0", 200.0)), False),
-        ("gyro_lost_data(turn=2, start=100 s, end=145 s)", _truth("gyro_lost_data", ("turn", 2.0)), True),
-        ("gyro_lost_data(turn=3, start=245 s, end=290 s)", _truth("gyro_lost_data", ("turn", 2.0)), False),
+        ("gyro_lost_data(turn=2, at=122 s)", _truth("gyro_lost_data", ("turn", 2.0)), True),
+        ("gyro_lost_data(turn=3, at=260 s)", _truth("gyro_lost_data", ("turn", 2.0)), False),
     ],
 )
 def test_a_label_names_an_effect_when_parameter_and_option_agree(label: str, truth: Truth, same: bool) -> None:

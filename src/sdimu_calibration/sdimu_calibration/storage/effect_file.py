@@ -5,6 +5,7 @@ A file holds formulas by sensor, the parameters in which they are linear, and fi
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from importlib.metadata import entry_points
@@ -14,7 +15,7 @@ from typing import Any, Literal, cast
 import numpy as np
 from pydantic import Field
 
-from sdimu_calibration.core.diagnosis.candidates import without
+from sdimu_calibration.core.diagnosis.candidates import own_equation, without
 from sdimu_calibration.core.effects import registry, selection
 from sdimu_calibration.core.effects.effect import CHANNELS, Effect, Parameter, Term
 from sdimu_calibration.core.expression import (
@@ -37,6 +38,8 @@ ENTRY_POINTS = "sdimu_calibration.effects"
 SUFFIXES = (".yaml", ".yml")
 _GRADES = ("navigation", "tactical", "mems")
 _SENSOR_UNIT = {"gyro": "rad/s", "accel": "m/s^2"}
+_JOINED = re.compile(r"(?<=[\w)])\s+(?=[A-Za-z(])")
+"""A blank between two factors stands for a product, as in the equations that a diagnosis proposes."""
 _NAME = r"^[A-Za-z][A-Za-z0-9_]*$"
 
 
@@ -85,7 +88,10 @@ def load_effect(path: Path) -> tuple[Effect, ...]:
 
 
 def find_effects(text: str) -> tuple[Effect, ...]:
-    """Find effects by a registered name, a coefficient, one with options, or the path of a YAML file.
+    """Find effects by a registered name, a coefficient, one with options, an equation, or the path of a YAML file.
+
+    An equation is ``SENSOR: FORMULA``, as a diagnosis proposes it (``gyro_x: ey^2``) or in the names of an effect
+    file (``accel_z: ax * wty``); its one parameter is the factor before it.
 
     Raises
     ------
@@ -94,8 +100,36 @@ def find_effects(text: str) -> tuple[Effect, ...]:
     """
     if Path(text).suffix in SUFFIXES:
         return load_effect(Path(text))
+    if text.partition(":")[0].strip() in CHANNELS:
+        return (_equation(text),)
     register_plugins()
     return (selection.resolve(text),)
+
+
+def _equation(text: str) -> Effect:
+    """Effect ``d(sensor) = k formula``; k as large as a bias may be where the formula comes to one."""
+    sensor, _, formula = (part.strip() for part in text.partition(":"))
+    proposed = own_equation(f"{sensor}: {formula}")
+    if proposed:
+        return proposed
+    shown = "deg/h" if sensor.startswith("gyro") else "ug"
+    try:
+        written_out = _JOINED.sub("*", formula.replace("^", "**"))
+        about = parse_expression(written_out, frozenset(VARIABLES))
+        dimension = about.dimension({name: dimension_of(variable.unit) for name, variable in VARIABLES.items()})
+        below = "".join(
+            ("/" if p > 0 else "*") + n + ("" if abs(p) == 1 else f"^{abs(p)}") for n, p in sorted(dimension.items())
+        )
+        prior = registry.get(f"{sensor[:-2]}_bias").prior
+        file = _EffectFile.model_validate({
+            "format": FORMAT, "name": "equation", "expressions": {sensor: f"k * ({about.text})"},
+            "parameters": {"k": {"unit": shown + below, "prior": f"1 {shown}{below}"}},
+        })  # fmt: skip
+        (effect,) = _effects(file)
+    except (DataError, UnitError) as error:
+        raise DataError(f"equation '{text}': {error}") from error
+    parameter = replace(effect.parameters[0], name=f"{sensor}: {formula}")
+    return replace(effect, name=parameter.name, family=parameter.name, parameters=(parameter,), prior=prior)
 
 
 def extended_model(name: str, added: Sequence[str]) -> Model:

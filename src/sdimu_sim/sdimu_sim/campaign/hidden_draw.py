@@ -12,7 +12,7 @@ from sdimu_calibration.core.effects.selection import resolve
 from sdimu_calibration.core.units import from_si
 from sdimu_sim.campaign.hidden_outside import OUTSIDE
 from sdimu_sim.campaign.hidden_sizes import PLANS, Sizes, between
-from sdimu_sim.core.hidden import LOST_AFTER_S, effect_example, effect_names
+from sdimu_sim.core.hidden import effect_example, effect_names
 
 KINDS = ("weak", "strong", "pair", "clean", "outside", "noise")
 """One effect at 5 sigma; one at 8 to 30; two at 10 to 30 each; none; not in the catalogue at 15 to 40; wrong noise."""
@@ -104,7 +104,7 @@ def _effect(rng: np.random.Generator, found: Sizes, size: float, hideable: froze
     pool: dict[str, dict[str, list[int]]] = {}
     for k, label in enumerate(found.label):
         name = label.partition("(")[0]
-        if name not in hideable or not found.retention[k] >= TESTABLE or _ends_too_soon(label):
+        if name not in hideable or not found.retention[k] >= TESTABLE:
             continue
         if size * found.sigma[k] <= PLAUSIBLE * found.prior[k]:
             pool.setdefault(found.family[k], {}).setdefault(name, []).append(k)
@@ -118,14 +118,6 @@ def _effect(rng: np.random.Generator, found: Sizes, size: float, hideable: froze
     if option and option[0] == "tau":
         option = ("tau", option[1] * float(rng.uniform(2.0**-0.5, 2.0**0.5)))
     return Truth(name, family, option, value, size, _text(name, value, option))
-
-
-def _ends_too_soon(label: str) -> bool:
-    """Whether a turn is over before the simulator loses data in it."""
-    at = dict(part.split("=") for part in label.partition("(")[2].rstrip(")").split(", ") if "=" in part)
-    if not {"start", "end"} <= set(at):
-        return False
-    return float(at["end"].split()[0]) - float(at["start"].split()[0]) < LOST_AFTER_S + 1.0
 
 
 def _outside(rng: np.random.Generator, found: Sizes, size: float) -> Truth:

@@ -82,10 +82,10 @@ def same_effect(label: str, truth: Truth, stops: tuple[tuple[int, float, float],
         return 1.0 / SAME_TAU <= labelled / value <= SAME_TAU
     if key != "t0":
         return labelled == value
-    # A step inside a dwell may be named by either end of it, one in a turn likewise; stamps are rounded to seconds.
+    # The same dwell or turn; stamps are rounded to seconds.
     edges = sorted({0.0, *(t for _, a, b in stops for t in (a, b))})
     next_to = [e for e in edges if e <= value + 1.0][-1:] + [e for e in edges if e >= value - 1.0][:1]
-    return any(abs(labelled - e) <= 1.5 for e in next_to)
+    return next_to[0] - 1.5 <= labelled <= next_to[-1] + 1.5
 
 
 def _judge(truth: Truth, found: Diagnosis, scanned: Scan, named: list[list[str]]) -> dict[str, Any]:

@@ -123,7 +123,7 @@ _DELAYS: dict[str, tuple[str, ...]] = {
     **{f"{sensor[:-2]}_delay_{sensor[-1]}": (sensor,) for sensor in SENSORS},
 }
 _LOST = "gyro_lost_data"
-LOST_AFTER_S = 5.0
+LOST_AFTER_S = 3.0
 """Data of a turn are lost from this long after its start."""
 
 

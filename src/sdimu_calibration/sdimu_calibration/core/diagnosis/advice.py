@@ -100,8 +100,7 @@ def _about_found(d: Diagnosis, found: tuple[Found, ...], plan: PlanSeen) -> list
             out.append(f"Try an equation of your own (--try FILE); nearest in this test: {names}.")
         return out
     for one in found:
-        family = one.candidate.family
-        if family != "own" and not one.candidate.effect.run_local:
+        if not one.candidate.effect.run_local:
             out.append(f"Keep {one.candidate.label} in the model: --add '{one.candidate.label}'.")
         if one.candidate.effect.run_local:
             out.append(f"{one.candidate.label} is a fault of this recording: record again and do not carry it over.")

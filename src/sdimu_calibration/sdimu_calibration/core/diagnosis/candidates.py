@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -11,6 +12,7 @@ from sdimu_calibration.core.effects import registry
 from sdimu_calibration.core.effects.effect import AXES, CHANNELS, Column, Effect, Parameter, Term, TestTimes, product
 from sdimu_calibration.core.motion import Floats, Motion
 
+_CYCLES = np.arange(1.0, 20.0, 0.5)
 OWN = "own equation"
 """Title of an equation that no registered effect has."""
 
@@ -126,14 +128,28 @@ def equations(has_temperature: bool) -> list[Effect]:
     return out
 
 
-def periodic(duration: float) -> list[Effect]:
+def periodic(duration: float, all_cycles: Floats = _CYCLES) -> list[Effect]:
     """Sine and cosine of time on every sensor, from one period a test to the Nyquist limit of the stops."""
     out: list[Effect] = []
-    for cycles in np.arange(1.0, 20.0, 0.5):
-        rate = 2.0 * np.pi * cycles / duration
+    for cycles in all_cycles:
+        # The label holds the period as it is used: what is found can be added by its label.
+        period = round(duration / cycles)
         for word, lead in (("sin", 0.0), ("cos", 0.5 * np.pi)):
-            out += _plain(f"{word}(2 pi t / {duration / cycles:.0f} s)", _wave(rate, lead))
+            out += _plain(f"{word}(2 pi t / {period} s)", _wave(2.0 * np.pi / period, lead))
     return out
+
+
+def own_equation(label: str) -> Effect | None:
+    """Equation of `equations` or `periodic` with this label, such as ``gyro_x: ex^2``; None when neither has it."""
+    wave = _WAVE.search(label)
+    known = periodic(float(wave.group(1)), np.ones(1)) if wave else equations(has_temperature=True)
+    for effect in known:
+        if label in {p.name for p in effect.parameters}:
+            return effect.only((label,))
+    return None
+
+
+_WAVE = re.compile(r"\(2 pi t / ([0-9.]+) s\)$")
 
 
 def _east(motion: Motion) -> Floats:

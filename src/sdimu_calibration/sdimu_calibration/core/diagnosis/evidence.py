@@ -44,6 +44,8 @@ class Evidence:
     candidates : tuple of Candidate, length q
     prior : ndarray, shape (q,)
         One-sigma that physics gives the candidates (inf where unknown).
+    grade : str
+        Of the IMU: gives candidates their prior.
     output : PassOutput
         Of the navigation filter.
     seen : Motion
@@ -61,6 +63,7 @@ class Evidence:
     shift: Floats
     candidates: tuple[Candidate, ...]
     prior: Floats
+    grade: str
     output: PassOutput
     seen: Motion
     times: TestTimes
@@ -82,15 +85,20 @@ class Evidence:
         """One-sigma of the prior of a coefficient of the model."""
         return float(1.0 / np.sqrt(self.weight[index]))
 
-    def with_effects(self, effects: Sequence[Effect], grade: str) -> Evidence:
+    def with_effects(self, effects: Sequence[Effect]) -> Evidence:
         """Return the evidence with the parameters of more effects behind the candidates it has."""
         more = [c for effect in effects for c in split(effect)]
         W = columns(self.reduced, self.output, self.seen, effects)
-        return replace(
+        wider = replace(
             self, W=np.hstack([self.W, W]), names=(*self.names, *(c.label for c in more)),
             candidates=(*self.candidates, *more),
-            prior=np.concatenate([self.prior, [c.effect.prior.get(grade, np.inf) for c in more]]),
+            prior=np.concatenate([self.prior, [c.effect.prior.get(self.grade, np.inf) for c in more]]),
         )  # fmt: skip
+        # Only what is new is multiplied: the old columns are many.
+        old, across = self.information, self.W.T @ W
+        J = np.block([[old.J, across], [across.T, W.T @ W]])
+        wider.__dict__["information"] = Information(J, np.concatenate([old.d, W.T @ self.e]))
+        return wider
 
     def only(self, columns: Ints) -> Evidence:
         """Return the evidence with the model and the candidates at `columns` alone."""
@@ -167,6 +175,7 @@ def collect(reduced: Reduced, setup: Setup, finished: Pass, effects: Sequence[Ef
         e=known.output.normalised[epoch, channel], W=W, epoch=epoch, channel=channel, stop=reduced.phases.stop[epoch],
         names=(*sensors.names, *(c.label for c in candidates)),
         weight=1.0 / sensors.prior**2, shift=-finished.estimate, candidates=tuple(candidates), prior=prior,
+        grade=setup.imu.grade,
         output=known.output, seen=seen, times=test_times(reduced), reduced=reduced,
     )  # fmt: skip
 

@@ -72,7 +72,7 @@ def predict(evidence: Evidence, chosen: Ints, weight: Floats, shift: Floats, sca
     return HeldOut(stops.astype(np.int64), score, float(np.sqrt(total / len(e))))
 
 
-def gain(before: HeldOut, after: HeldOut) -> tuple[float, float]:
-    """Gain of the log score and its standard error over stops (paired differences)."""
-    difference = after.log_score - before.log_score
+def gain(before: HeldOut, after: HeldOut, apart: int | None = None) -> tuple[float, float]:
+    """Gain of the log score and its standard error over stops (paired differences), the stop `apart` left out."""
+    difference = (after.log_score - before.log_score)[before.stop != (-1 if apart is None else apart)]
     return float(difference.sum()), float(np.std(difference, ddof=1) * np.sqrt(len(difference)))

@@ -177,6 +177,7 @@ def take(
     free_columns = np.arange(count, len(evidence.names))
     found = search(evidence, columns, alpha)
     nothing = np.empty(0, dtype=np.int64)
+    evidence = found.evidence
     return Look(
         solution, evidence, free_columns, found,
         left(evidence, nothing, free_columns, found.scale), left(evidence, found.chosen, free_columns, found.scale),

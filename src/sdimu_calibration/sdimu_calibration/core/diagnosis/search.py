@@ -2,7 +2,8 @@
 
 Orthogonal matching pursuit on the signatures: each step conditions on everything chosen so far; a chosen effect is
 exchanged when another explains the same better once the others are in, and dropped when the others took its place. A
-step must beat the noise of the whole scan, be plausible in size (Bayes factor with the physical prior), and lower the
+step must beat the noise of the whole scan (after which its time or time constant is looked for between those of the
+scan), be plausible in size (Bayes factor with the physical prior), and lower the
 error at stops that it has not seen.
 """
 
@@ -17,6 +18,7 @@ from numpy.typing import NDArray
 from sdimu_calibration.core.diagnosis.evidence import Evidence
 from sdimu_calibration.core.diagnosis.held_out import HeldOut, gain, predict
 from sdimu_calibration.core.diagnosis.scan import Scan, alike, scan, threshold
+from sdimu_calibration.core.effects.effect import Effect
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -30,6 +32,8 @@ _WIDE = 3.0
 """Physical priors are taken this much wider: a sensor may be out of its class."""
 _OWN_ODDS = 6.0
 """Log odds that a registered effect has before an equation of which physics says nothing."""
+_SHARPER = 1.0
+"""Gain of the log Bayes factor from which a time or time constant between those of the scan is worth its digits."""
 _KEEP = 3.0
 """A chosen effect smaller than this many of its sigmas, with the others in, is dropped."""
 
@@ -97,6 +101,8 @@ class Search:
         Of the first scan.
     scale : float
         Residual noise over specified noise at the end.
+    evidence : Evidence
+        With the finer variants that were chosen behind the candidates it had.
     """
 
     steps: tuple[Step, ...]
@@ -105,6 +111,7 @@ class Search:
     last: Scan
     threshold: float
     scale: float
+    evidence: Evidence
 
 
 class Problem:
@@ -130,7 +137,7 @@ class Problem:
         residual = self.evidence.e - self.evidence.W[:, known] @ estimate
         return float(np.sqrt(max(1.0, float(residual @ residual) / max(1, len(residual) - len(known)))))
 
-    def scan(self, chosen: Sequence[int], scale: float) -> Scan:
+    def scan(self, chosen: Sequence[int], scale: float = 1.0) -> Scan:
         """Score the allowed columns given the chosen ones."""
         known, weight, _ = self.known(chosen)
         return scan(self.evidence.information, known, weight, scale)
@@ -178,6 +185,14 @@ def search(evidence: Evidence, allowed: Ints, alpha: float = FALSE_ALARM) -> Sea
         best = int(np.argmax(above))
         if not np.isfinite(above[best]):
             break
+        finer = _sharpen(problem, chosen, best)
+        if finer:
+            evidence = evidence.with_effects([finer])
+            allowed = np.append(allowed, len(evidence.names) - 1)
+            problem = Problem(evidence.only(allowed))
+            best = problem.p + len(allowed) - 1
+            scanned = problem.scan(chosen, scale)
+            scores = problem.scores(scanned, scale)
         trial = _polish(problem, [*chosen, best])
         after = problem.held_out(trial, 1.0)
         step = _step(problem, scanned, scores, chosen, best, limit, before, after)
@@ -189,7 +204,26 @@ def search(evidence: Evidence, allowed: Ints, alpha: float = FALSE_ALARM) -> Sea
         scanned = problem.scan(chosen, scale)
         limit = threshold(scanned, alpha)
     back = np.array([allowed[c - problem.p] for c in chosen], dtype=np.int64)
-    return Search(tuple(steps), back, first, scanned, first_limit, scale)
+    return Search(tuple(steps), back, first, scanned, first_limit, scale, evidence)
+
+
+def _sharpen(problem: Problem, chosen: Sequence[int], best: int) -> Effect | None:
+    """Make the scan finer about the best candidate; None when that gains less than `_SHARPER`."""
+    p = problem.p
+    candidate = problem.evidence.candidates[best - p]
+    effect, name = candidate.effect, candidate.parameter.name
+    small = problem.evidence.only(np.array(chosen, dtype=np.int64))
+    others = list(range(p, p + len(chosen)))
+    first = score = -np.inf
+    while effect.nearer:
+        variants = [variant.only((name,)) for variant in effect.nearer()]
+        trial = Problem(small.with_effects(variants))
+        scores = trial.scores(trial.scan(others))[p + len(chosen) :]
+        # The middle one is the candidate itself.
+        first = max(first, scores[len(variants) // 2]) if np.isinf(first) else first
+        score = float(np.max(scores))
+        effect = variants[int(np.argmax(scores))]
+    return effect if score > first + _SHARPER else None
 
 
 def _polish(problem: Problem, chosen: list[int]) -> list[int]:
@@ -221,11 +255,13 @@ def _step(
     candidate = evidence.candidates[best - p]
     J, d = scanned.information.J[best, best], scanned.information.d[best]
     bayes = float(scores[best])
-    won, error = gain(before, after)
+    # A fault of one turn is nowhere to be seen once the stop after it is left out; all others must gain by it.
+    apart = int(candidate.effect.options["turn"]) if "turn" in candidate.effect.options else None
+    won, error = gain(before, after, apart)
     reason = ""
     if not bayes > LOG_BAYES:
         reason = "not plausible in size for this grade of IMU"
-    elif not won > (2.0 * error if candidate.family == "own" else 0.0) and not candidate.effect.run_local:
+    elif not won > (2.0 * error if candidate.family == "own" else 0.0):
         reason = "does not lower the error at stops that the fit has not seen"
     return Step(
         index=best, label=candidate.label, family=candidate.family,

@@ -38,8 +38,8 @@ def _time(motion: Motion) -> Floats:
     return motion.t - 0.5 * motion.dt
 
 
-def warm_up(stem: str, tau: float) -> Effect:
-    """Warm-up transient of a bias with time constant `tau` (s)."""
+def warm_up(stem: str, tau: float, ratio: float = 2.0) -> Effect:
+    """Warm-up transient of a bias with time constant `tau` (s), a factor `ratio` from the next ones that are tried."""
     triad, word, letter, units, prior = _TRIADS[stem]
     return family(
         f"{stem}_bias_warm_up", f"{word} warm-up transient", f"d{letter}_i = k_i exp(-t/tau)",
@@ -50,6 +50,9 @@ def warm_up(stem: str, tau: float) -> Effect:
         options={"tau": f"{tau:g} s"},
         with_options=lambda tau: warm_up(stem, tau),
         scan=lambda _times: tuple(warm_up(stem, tau) for tau in _SCAN_TAU_S),
+        nearer=(lambda: tuple(warm_up(stem, float(f"{tau * ratio**k:.3g}"), ratio**0.5) for k in (-0.5, 0.0, 0.5)))
+        if ratio > 1.1
+        else None,
     )  # fmt: skip
 
 
@@ -57,8 +60,8 @@ def _times(factor: float, prior: tuple[float, float, float]) -> tuple[float, flo
     return factor * prior[0], factor * prior[1], factor * prior[2]
 
 
-def step(stem: str, t0: float) -> Effect:
-    """Step of a bias at `t0` (s)."""
+def step(stem: str, t0: float, spacing: float = 60.0) -> Effect:
+    """Step of a bias at `t0` (s), `spacing` (s) from the next moments that are tried."""
     triad, word, letter, units, prior = _TRIADS[stem]
     return family(
         f"{stem}_bias_step", f"{word} bias step", f"d{letter}_i = k_i (t > t0)",
@@ -70,6 +73,9 @@ def step(stem: str, t0: float) -> Effect:
         options={"t0": f"{t0:g} s"},
         with_options=lambda t0: step(stem, t0),
         scan=lambda times: tuple(step(stem, round(start)) for _, start, _ in (*times.stops[1:], *times.turns[1:])),
+        nearer=(lambda: tuple(step(stem, round(t0 + side * spacing, 1), 0.5 * spacing) for side in (-0.5, 0.0, 0.5)))
+        if spacing > 2.0
+        else None,
     )  # fmt: skip
 
 

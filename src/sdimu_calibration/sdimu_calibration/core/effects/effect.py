@@ -92,6 +92,8 @@ class Effect:
         Options (SI, as keywords) to the effect with these options.
     scan : callable or None
         Times of a test to the variants worth trying on it.
+    nearer : callable or None
+        Three variants: nearer by half on one side than the last ones were, itself, nearer on the other side.
     """
 
     name: str
@@ -112,6 +114,7 @@ class Effect:
     options: Mapping[str, str] = field(default_factory=dict)
     with_options: Callable[..., Effect] | None = None
     scan: Callable[[TestTimes], tuple[Effect, ...]] | None = None
+    nearer: Callable[[], tuple[Effect, ...]] | None = None
 
     def only(self, names: tuple[str, ...]) -> Effect:
         """Return the effect with the named parameters alone."""

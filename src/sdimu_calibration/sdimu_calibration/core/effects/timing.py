@@ -50,17 +50,25 @@ ACCEL_TRIAD_DELAY = register(
 )
 
 
-def lost_data(start: float, end: float, turn: int) -> Effect:
-    """Gyro data lost somewhere in a turn that lasts from `start` to `end` (s)."""
+def lost_data(turn: int, at: float, spacing: float = 15.0) -> Effect:
+    """Gyro data lost about the moment `at` (s) of a turn, `spacing` (s) from the next moments that are tried.
+
+    An angle lost early in a turn bends the specific force for longer than one lost late, so the velocity after the turn
+    tells the moment.
+    """
 
     def missing(motion: Motion) -> Floats:
-        share = (motion.t > start) & (motion.t - motion.dt < end)
-        return np.asarray(-motion.w_table * (share / max(end - start, 1e-3))[:, None])
+        overlap = np.minimum(motion.t, at + 0.5 * _LOSS_S) - np.maximum(motion.t - motion.dt, at - 0.5 * _LOSS_S)
+        share = np.maximum(overlap, 0.0) / motion.dt
+        return -_full_rate(motion, at) * (share / _LOSS_S)[:, None]
+
+    def nearer() -> tuple[Effect, ...]:
+        return tuple(lost_data(turn, round(at + side * 0.5 * spacing, 1), 0.5 * spacing) for side in (-1.0, 0.0, 1.0))
 
     return Effect(
         name="gyro_lost_data",
         title="gyro data lost in a turn",
-        equation="dw = -w over a time that is missing in one turn",
+        equation="dw = -w of the full rate, over a time that is missing in one turn",
         parameters=(Parameter("gyro_lost_data", "s", "ms"),),
         terms=tuple(Term(channel, 0) for channel in GYRO),
         regressors=missing,
@@ -70,12 +78,40 @@ def lost_data(start: float, end: float, turn: int) -> Effect:
         "the recording, "
         "not of the sensor.",
         run_local=True,
-        options={"turn": str(turn), "start": f"{start:g} s", "end": f"{end:g} s"},
-        with_options=lambda turn, start, end: lost_data(start, end, int(turn)),
-        scan=lambda times: tuple(lost_data(t0, t1, stop + 1) for stop, t0, t1 in times.turns),
+        options={"turn": str(turn), "at": f"{at:g} s"},
+        with_options=lambda turn, at: lost_data(int(turn), at),
+        scan=lambda times: tuple(lost_data(stop + 1, at) for stop, t0, t1 in times.turns for at in _moments(t0, t1)),
+        nearer=nearer if spacing > 0.3 else None,
     )
 
 
-GYRO_LOST_DATA = register(lost_data(100.0, 145.0, 1))
+_LOSS_S = 0.2
+"""Length of the stretch over which a loss is spread: two cycles of navigation."""
+
+
+def _full_rate(motion: Motion, at: float) -> Floats:
+    """Full rate of the turn at a moment (s), shape (3,); nought when the table stands then.
+
+    The median of what is faster than half: a loss that is being mended lifts the cycles about it.
+    """
+    rate = np.linalg.norm(motion.w_table, axis=1)
+    here = min(int(np.searchsorted(motion.t, at)), len(rate) - 1)
+    still = np.flatnonzero(rate == 0.0)
+    place = int(np.searchsorted(still, here))
+    first = int(still[place - 1]) + 1 if place else 0
+    last = int(still[place]) if place < len(still) else len(rate)
+    if first >= last:
+        return np.zeros(3)
+    turn = slice(first, last)
+    return np.asarray(np.median(motion.w_table[turn][rate[turn] > 0.5 * rate[turn].max()], axis=0))
+
+
+def _moments(start: float, end: float) -> list[float]:
+    """Moments of a turn, evenly spread and at most 15 s apart."""
+    count = int(np.ceil((end - start) / 15.0))
+    return [round(start + (k + 0.5) * (end - start) / count, 1) for k in range(count)]
+
+
+GYRO_LOST_DATA = register(lost_data(1, 120.0))
 
 __all__ = ["AXES", "GYRO_LOST_DATA"]

@@ -261,7 +261,8 @@ def _nothing_added(evidence: Evidence, columns: NDArray[np.int64]) -> Search:
     problem = Problem(evidence.only(columns))
     scale = problem.scale([])
     first = scan(problem.evidence.information, problem.evidence.model, problem.evidence.weight, scale)
-    return Search((), np.empty(0, dtype=np.int64), first, first, threshold(first, FALSE_ALARM), scale)
+    none = np.empty(0, dtype=np.int64)
+    return Search((), none, first, first, threshold(first, FALSE_ALARM), scale, evidence)
 
 
 def _at_held(reduced: Reduced, solution: Solution, held: Sequence[int]) -> float | None:

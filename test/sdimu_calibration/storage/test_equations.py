@@ -1,0 +1,73 @@
+"""An equation is added by the words in which a diagnosis proposes it, or by a formula."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from rate_table_sim.core.specification import TableSpecification
+from sdimu_calibration.core.diagnosis.candidates import equations, periodic
+from sdimu_calibration.core.diagnosis.evidence import predicted_motion
+from sdimu_calibration.core.passes import reduce, set_up, solve
+from sdimu_calibration.core.plan import Plan, Turn
+from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.specification import Site
+from sdimu_calibration.storage.config import load_imu, load_model
+from sdimu_calibration.storage.effect_file import find_effects
+from sdimu_sim.core.scenario import Scenario, generate
+from sdimu_sim.core.temperature import TemperatureProfile
+
+SITE = Site(latitude_rad=float(np.radians(36.4)))
+
+
+@pytest.fixture(scope="module")
+def motion():
+    turns = tuple(Turn(a, np.radians(90.0), np.radians(15.0)) for a in "XYZX")
+    scenario = Scenario(
+        Plan("four turns", (20.0,) * 5, turns, np.radians(60.0)), load_imu("dtg"), SITE, rate_hz=20.0, seed=8,
+        table=TableSpecification(axes=None), temperature=TemperatureProfile(rise=5.0, tau_s=100.0),
+    )  # fmt: skip
+    setup = set_up(SITE, load_imu("dtg"), load_model("baseline"))
+    reduced = reduce(generate(scenario)[0], setup)
+    return predicted_motion(reduced, setup, solve(setup, reduced, lambda _a, _b: None).last)
+
+
+def test_every_equation_that_a_diagnosis_can_propose_is_found_by_its_label(motion):
+    for proposed in (*equations(has_temperature=True), *periodic(2980.0)):
+        for k, parameter in enumerate(proposed.parameters):
+            (found,) = find_effects(parameter.name)
+            assert found.parameters == (parameter,)
+            term = next(t for t in proposed.terms if t.parameter == k)
+            assert [t.channel for t in found.terms] == [term.channel]
+            np.testing.assert_array_equal(
+                found.regressors(motion)[:, 0], proposed.regressors(motion)[:, proposed.terms.index(term)]
+            )
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("gyro_x: ax * wty", lambda m: m.a[:, 0] * m.w_table[:, 1]),
+        ("accel_z: ax^2 ay T", lambda m: m.a[:, 0] ** 2 * m.a[:, 1] * m.temperature),
+        ("gyro_z: exp(-t / t) * (nx + ex)", lambda m: np.exp(-1.0) * (m.C_nb[:, 0, 0] + m.C_nb[:, 1, 0])),
+    ],
+)
+def test_a_formula_of_ones_own_is_what_it_says(motion, text, value):
+    (effect,) = find_effects(text)
+    np.testing.assert_allclose(effect.regressors(motion)[:, 0], value(motion), rtol=1e-12, atol=1e-300)
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("gyro_x: foo", "unknown name 'foo'"),
+        ("gyro_x: ax + t", "not alike"),
+        ("gyro_x:", "cannot read"),
+        ("accel_y: __import__('os')", "not allowed"),
+    ],
+)
+def test_a_formula_that_cannot_be_read_is_refused_with_its_text(text, reason):
+    with pytest.raises(DataError, match="equation") as error:
+        find_effects(text)
+    assert reason in str(error.value)
+    assert "\n" not in str(error.value)
