@@ -99,7 +99,7 @@ def _judge(truth: Truth, found: Diagnosis, scanned: Scan, named: list[list[str]]
     row: dict[str, Any] = {
         "name": truth.name, "family": truth.family, "option": truth.option, "value": truth.value,
         "sigmas": truth.sigmas, "text": truth.text,
-        "in_class": any(same_effect(x, truth, stops) for c in named for x in c),
+        "in_class": any(same_effect(x, truth, stops) for c in named for x in c) or _seen_in_samples(truth, found),
         "best": any(same_effect(c.label, truth, stops) for c in found.chosen), "share": None, "realised": None,
         "z": None, "error_sigmas": None,
     }  # fmt: skip
@@ -111,9 +111,17 @@ def _judge(truth: Truth, found: Diagnosis, scanned: Scan, named: list[list[str]]
         return row
     k = max(near, key=lambda i: abs(scanned.z[i]))
     row |= {"realised": abs(truth.value) / scanned.sigma[k], "z": scanned.z[k]}
-    if truth.option is None or truth.option[0] == "turn":
+    if truth.option is None or (truth.option[0] == "turn" and not _seen_in_samples(truth, found)):
         row["error_sigmas"] = _amplitude_error(truth, found, scanned, k)
     return row
+
+
+def _seen_in_samples(truth: Truth, found: Diagnosis) -> bool:
+    """Whether data lost in a turn were found earlier: the screen took the sample away, as what it is, in that turn."""
+    if truth.option is None or truth.option[0] != "turn":
+        return False
+    turns = [(a, b) for stop, a, b in found.evidence.times.turns if stop + 1 == truth.option[1]]
+    return any(f.kind == "spike" and a <= f.start_s and f.end_s <= b for f in found.findings for a, b in turns)
 
 
 def _amplitude_error(truth: Truth, found: Diagnosis, scanned: Scan, k: int) -> float:

@@ -117,7 +117,9 @@ def outside_passed(row: Row) -> bool:
 
 
 def _worse(row: Row) -> bool:
-    return bool(row["named"]) and row["stops_after"] is not None and row["stops_after"] > row["stops_before"]
+    # What was tried on the way to "unexplained" is not accepted.
+    accepted = bool(row["named"]) and row["verdict"] != "unexplained"
+    return accepted and row["stops_after"] is not None and row["stops_after"] > row["stops_before"]
 
 
 def _outside(rows: Sequence[Row]) -> list[dict[str, Any]]:

@@ -17,15 +17,33 @@ _OUTSIDE = 4.5
 
 @dataclass(frozen=True)
 class Finding:
-    """A fault: what, and whether results can still be trusted without mending it."""
+    """A fault of the data.
+
+    Attributes
+    ----------
+    text : str
+        What it is.
+    grave : bool
+        Results cannot be trusted unless it is mended.
+    kind : str
+        As in `DataFault`; empty for what is no fault of samples.
+    start_s, end_s : float
+        Time of the first and the last sample (s).
+    """
 
     text: str
     grave: bool
+    kind: str = ""
+    start_s: float = float("nan")
+    end_s: float = float("nan")
 
 
 def screen(recording: Recording, reduced: Reduced) -> tuple[Finding, ...]:
     """Say what the reduction found wrong with the data: gaps, stuck sensors, saturation, contradictions."""
-    out = [Finding(fault.text, fault.grave or fault.kind in _MISLEADING) for fault in reduced.faults]
+    out = [
+        Finding(fault.text, fault.grave or fault.kind in _MISLEADING, fault.kind, fault.start_s, fault.end_s)
+        for fault in reduced.faults
+    ]
     if recording.rejected:
         out.append(Finding(f"{recording.rejected} samples were rejected (not finite or repeated stamps)", False))
     return tuple(out)

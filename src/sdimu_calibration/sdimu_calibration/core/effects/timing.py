@@ -60,7 +60,7 @@ def lost_data(turn: int, at: float, spacing: float = 15.0) -> Effect:
     def missing(motion: Motion) -> Floats:
         overlap = np.minimum(motion.t, at + 0.5 * _LOSS_S) - np.maximum(motion.t - motion.dt, at - 0.5 * _LOSS_S)
         share = np.maximum(overlap, 0.0) / motion.dt
-        return -_full_rate(motion, at) * (share / _LOSS_S)[:, None]
+        return np.asarray(-_full_rate(motion, at) * (share / _LOSS_S)[:, None])
 
     def nearer() -> tuple[Effect, ...]:
         return tuple(lost_data(turn, round(at + side * 0.5 * spacing, 1), 0.5 * spacing) for side in (-1.0, 0.0, 1.0))
