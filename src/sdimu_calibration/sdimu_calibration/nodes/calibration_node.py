@@ -38,6 +38,7 @@ from sdimu_calibration.nodes.feed import NS, Feed
 from sdimu_calibration.nodes.listening import Listener
 from sdimu_calibration.nodes.spinning import run_node
 from sdimu_calibration.nodes.ticking import Ticker
+from sdimu_calibration.report.progress_text import falling, light, sigma_words
 from sdimu_calibration.storage.config import load_imu, load_model, load_site
 from sdimu_calibration.storage.journal import Journal, digest
 from sdimu_calibration.storage.result_file import write_result
@@ -74,6 +75,8 @@ class CalibrationNode:
         resumed = self._feed.resumed_ns
         self._ended: float | None = None
         self._departed: float | None = None
+        self._first: dict[str, float] = {}
+        self._last = ""
 
         ticker = Ticker(self.node)
         node = self.node
@@ -147,6 +150,20 @@ class CalibrationNode:
         self._publish_coefficients(stamp, e.body_frame, e.names, e.coefficients, e.covariance)
         publish(self._navigation, messages.navigation(stamp, e))
         publish(self._diagnostics, messages.diagnostics(stamp, e))
+        self._tell(e)
+
+    def _tell(self, e: EpochEstimate) -> None:
+        """Log one line at the end of each stop: how far the sigmas have fallen, and the innovations."""
+        sigmas = dict(zip(e.names, np.sqrt(np.diag(e.covariance)).tolist(), strict=True))
+        self._first = self._first or sigmas
+        if e.used:
+            units = dict(zip(e.names, e.display_units, strict=True))
+            effects = [effect if isinstance(effect, str) else effect.name for effect in self._model.effects]
+            words = sigma_words(falling(self._first, sigmas, units, effects))
+            self._last = f"stop {e.stop} after {e.t:.0f} s; {words}; {light(e.nis, e.verdict)}"
+        elif self._last and not e.dwell:
+            self.node.get_logger().info(self._last)
+            self._last = ""
 
     def _publish_coefficients(self, stamp: int, frame: str, names: tuple[str, ...], values: Any, P: Any) -> None:
         # Covariance first: the end of the coefficients is the end of everything.
@@ -209,6 +226,7 @@ class CalibrationNode:
             self._journal.restart()
         self._feed = Feed(self._make, self._journal)
         self._ended = self._departed = None
+        self._first, self._last = {}, ""
         response.success = True
         return response
 

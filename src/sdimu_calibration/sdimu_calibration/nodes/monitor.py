@@ -34,6 +34,10 @@ class Progress:
         Sigma (SI) by coefficient, as last published.
     first : dict of str to float
         The first sigma published.
+    nis : dict of str to float
+        Mean squared innovation per degree of freedom so far, by channel.
+    verdict : str
+        Of the present stop.
     """
 
     stop: int = 0
@@ -42,12 +46,8 @@ class Progress:
     filter_s: float = 0.0
     sigmas: dict[str, float] = field(default_factory=dict)
     first: dict[str, float] = field(default_factory=dict)
-
-    @property
-    def least_improved(self) -> str | None:
-        """Coefficient whose sigma has fallen least since the start."""
-        ratios = {name: sigma / self.first[name] for name, sigma in self.sigmas.items() if self.first.get(name, 0) > 0}
-        return max(ratios, key=lambda name: ratios[name]) if ratios else None
+    nis: dict[str, float] = field(default_factory=dict)
+    verdict: str = ""
 
 
 class Monitor:
@@ -62,6 +62,7 @@ class Monitor:
         self._node = Node("monitor", context=self._context)
         self._node.create_subscription(DiagnosticArray, "/rate_table/status", self._take_status, GLANCE)
         self._node.create_subscription(JointState, "/calibration/coefficients", self._take_coefficients, GLANCE)
+        self._node.create_subscription(DiagnosticArray, "/diagnostics", self._take_diagnostics, GLANCE)
         self._executor = EventsExecutor(context=self._context)
         self._executor.add_node(self._node)
         self._never = Future()
@@ -92,3 +93,14 @@ class Monitor:
         self.progress.sigmas = dict(zip(message.name, message.effort, strict=True))
         if not self.progress.first:
             self.progress.first = dict(self.progress.sigmas)
+
+    def _take_diagnostics(self, message: DiagnosticArray) -> None:
+        for status in message.status:
+            values = {entry.key: entry.value for entry in status.values}
+            if status.name == "calibration" and "verdict" in values:
+                self.progress.verdict = values["verdict"]
+                nis = {key: value for key, value in values.items() if key.startswith(_NIS)}
+                self.progress.nis = {key.removeprefix(_NIS): float(value) for key, value in nis.items()}
+
+
+_NIS = "nis_"

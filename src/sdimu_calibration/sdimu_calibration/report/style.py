@@ -22,11 +22,13 @@ section { min-width: 0; }
   main { display: grid; grid-template-columns: 1fr 1fr; gap: 0 3em; align-items: start; }
 }
 @media print {
-  @page { size: A4 landscape; margin: 12mm; }
+  @page { size: A4 portrait; margin: 12mm; }
   body { max-width: none; margin: 0; padding: 0; font-size: 11px; }
   main { display: block; }
   button, .modebar-container { display: none !important; }
-  [id^="figure-"], tr { break-inside: avoid; } h2 { break-after: avoid; }
+  [id^="figure-"] { zoom: .68; }
+  [id^="figure-"], tr, .quiet, .verdict { break-inside: avoid; } h2 { break-after: avoid; }
+  p.quiet { break-before: avoid; }
   .verdict, [id^="figure-"] { print-color-adjust: exact; -webkit-print-color-adjust: exact; }
 }
 """

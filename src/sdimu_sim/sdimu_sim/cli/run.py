@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from sdimu_calibration.cli.processes import Children
+    from sdimu_calibration.cli.watch import Outline
     from sdimu_calibration.core.results import Calibration
 
 STALL_S = 180.0
@@ -57,7 +58,7 @@ def run(
     begun = time.monotonic()
     with own_domain(out / "log"), Children(out / "log") as children:
         _start(children, options, out / "bag", replace)
-        streamed = _watch(console, children, duration, model)
+        streamed = _watch(console, children, _test(plan, model, duration))
     wall = time.monotonic() - begun
     result = _report(console, out, site, imu, model, plan)
     _say_measured(console, out, result, streamed, wall)
@@ -105,7 +106,7 @@ def _start(children: Children, options: dict[str, dict[str, Any]], bag: Path, re
     children.start("rate_table", "rate_table_sim.nodes.rate_table_node", table)
 
 
-def _watch(console: Console, children: Children, duration: float, model: str) -> float:
+def _watch(console: Console, children: Children, test: Outline) -> float:
     """Show the progress until every node has left; wall time (s) that the data took.
 
     Raises
@@ -115,21 +116,17 @@ def _watch(console: Console, children: Children, duration: float, model: str) ->
     """
     import time
 
-    from rich.progress import BarColumn, Progress, TextColumn
-
+    from sdimu_calibration.cli.watch import Watch
     from sdimu_calibration.core.recording import DataError
     from sdimu_calibration.nodes.monitor import Monitor
 
-    units = _display_units(model)
     monitor = Monitor()
-    columns = (TextColumn("{task.description}"), BarColumn(bar_width=20), TextColumn("{task.fields[facts]}"))
-    begun = moved = time.monotonic()
+    moved = time.monotonic()
     first: float | None = None
     streamed = 0.0
     mark: tuple[Any, ...] = ()
     try:
-        with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as shown:
-            task = shown.add_task("starting", total=duration, facts="")
+        with Watch(console, test) as watch:
             while running := children.running():
                 now_at = monitor.listen(0.1)
                 now = time.monotonic()
@@ -142,31 +139,21 @@ def _watch(console: Console, children: Children, duration: float, model: str) ->
                     mark, moved = seen, now
                 if now - moved > STALL_S:
                     raise DataError(f"nothing has moved for {STALL_S:.0f} s ({', '.join(running)} still running)")
-                stage = f"stop {now_at.stop} {now_at.phase}" if "sdimu" in running else "last calibration"
-                facts = f"{now_at.table_s:.0f} of {duration:.0f} s in {now - begun:.0f} s"
-                if streamed > 1.0:
-                    facts += f", {now_at.table_s / streamed:.0f} x"
-                worst = now_at.least_improved
-                if worst is not None:
-                    facts += f", {_customary(now_at.sigmas[worst], units.get(worst, ''))} left in {worst}"
-                shown.update(task, completed=now_at.table_s, description=stage, facts=facts)
+                watch.show(now_at, "sdimu" in running, streamed)
     finally:
         monitor.close()
     return streamed
 
 
-def _display_units(model: str) -> dict[str, str]:
+def _test(plan: str, model: str, duration: float) -> Outline:
+    """Collect what is known of the test before it runs."""
+    from sdimu_calibration.cli.watch import Outline
     from sdimu_calibration.core.effects import selection
-    from sdimu_calibration.storage.config import load_model
+    from sdimu_calibration.storage.config import load_model, load_plan
 
-    effects = [selection.resolve(name) for name in load_model(model).effects]
-    return {q.name: q.display_unit for effect in effects for q in effect.parameters}
-
-
-def _customary(value: float, unit: str) -> str:
-    from sdimu_calibration.core.units import from_si
-
-    return f"{from_si(value, unit or '1'):.2g} {unit}"
+    effects = [selection.resolve(e) if isinstance(e, str) else e for e in load_model(model).effects]
+    units = {q.name: q.display_unit for effect in effects for q in effect.parameters}
+    return Outline(duration, len(load_plan(plan).dwell_s), [effect.name for effect in effects], units)
 
 
 def _report(console: Console, out: Path, site: str, imu: str, model: str, plan: str) -> Calibration:

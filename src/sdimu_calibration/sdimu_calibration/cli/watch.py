@@ -1,0 +1,140 @@
+"""A running test in the terminal: stop, phase, time left, sigmas that fall, the light of the innovations.
+
+In a terminal a picture that changes in place; elsewhere, in a file or a pipe, one plain line a stop.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from types import TracebackType
+from typing import TYPE_CHECKING, Protocol
+
+from sdimu_calibration.report.progress_text import Falling, falling, light, short, sigma_words
+
+if TYPE_CHECKING:
+    from rich.console import Console, RenderableType
+
+
+class Seen(Protocol):
+    """What is watched: `nodes.monitor.Progress`, of which this layer must not know."""
+
+    stop: int
+    phase: str
+    table_s: float
+    sigmas: dict[str, float]
+    first: dict[str, float]
+    nis: dict[str, float]
+    verdict: str
+
+
+@dataclass(frozen=True)
+class Outline:
+    """What is known of a test before it runs.
+
+    Attributes
+    ----------
+    duration_s : float
+    stops : int
+    effects : sequence of str
+    units : mapping of str to str
+        Customary unit by coefficient.
+    """
+
+    duration_s: float
+    stops: int
+    effects: Sequence[str]
+    units: Mapping[str, str]
+
+
+class Watch:
+    """Shows a running test; a context manager."""
+
+    def __init__(self, console: Console, test: Outline) -> None:
+        from rich.live import Live
+
+        self._console, self._test = console, test
+        self._live = Live(console=console, transient=True, auto_refresh=False) if console.is_terminal else None
+        self._told = -1
+
+    def __enter__(self) -> Watch:
+        if self._live:
+            self._live.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._live:
+            self._live.stop()
+
+    def show(self, seen: Seen, streaming: bool, wall_s: float) -> None:
+        """Show where the test is.
+
+        Parameters
+        ----------
+        seen : Seen
+        streaming : bool
+            Samples still come; False while the whole test is calibrated once more.
+        wall_s : float
+            Time since the first sample.
+        """
+        if self._live:
+            self._live.update(self.picture(seen, streaming, wall_s), refresh=True)
+        elif streaming and seen.sigmas and seen.stop > self._told:
+            self._told = seen.stop
+            self._console.print(self.line(seen, wall_s), soft_wrap=True, markup=False, highlight=False)
+
+    def line(self, seen: Seen, wall_s: float) -> str:
+        """Return the whole of it in one line."""
+        parts = [
+            f"stop {seen.stop} of {self._test.stops - 1} {seen.phase}",
+            f"{seen.table_s:.0f} of {self._test.duration_s:.0f} s, {self.left(seen, wall_s)}",
+            sigma_words(self._falling(seen)), light(seen.nis, seen.verdict),
+        ]  # fmt: skip
+        return "; ".join(part for part in parts if part)
+
+    def left(self, seen: Seen, wall_s: float) -> str:
+        """Say how long it will take at the pace so far."""
+        if wall_s < 1.0 or seen.table_s <= 0.0:
+            return "time left unknown"
+        pace = seen.table_s / wall_s
+        rest = max(0.0, self._test.duration_s - seen.table_s) / pace
+        words = f"{rest:.0f} s" if rest < 100.0 else f"{rest / 60.0:.0f} min"
+        return f"{words} left at {pace:.3g} times real time"
+
+    def picture(self, seen: Seen, streaming: bool, wall_s: float) -> RenderableType:
+        """Return what the terminal shows."""
+        from rich.console import Group
+        from rich.progress_bar import ProgressBar
+        from rich.table import Table
+        from rich.text import Text
+
+        fine = seen.verdict.startswith("consistent") or not seen.nis
+        stage = f"stop {seen.stop} of {self._test.stops - 1} {seen.phase}" if streaming else "last calibration"
+        head = Table.grid(padding=(0, 1))
+        head.add_row(
+            Text(stage, style="bold"), ProgressBar(self._test.duration_s, seen.table_s, width=30),
+            f"{seen.table_s:.0f} of {self._test.duration_s:.0f} s, {self.left(seen, wall_s)}",
+        )  # fmt: skip
+        sigmas = Table.grid(padding=(0, 2))
+        for f in self._falling(seen):
+            sigmas.add_row(f.effect, f"{short(f.sigma)} {f.unit}", _gauge(f), f"{short(100.0 * f.share)} %")
+        lamp = Text(light(seen.nis, seen.verdict), style="green" if fine else "bold yellow")
+        return Group(head, lamp, sigmas)
+
+    def _falling(self, seen: Seen) -> list[Falling]:
+        return falling(seen.first, seen.sigmas, self._test.units, self._test.effects)
+
+
+_DECADES = 4.0
+_GAUGE = 20
+
+
+def _gauge(f: Falling) -> str:
+    """Draw what is left of a sigma on a logarithmic scale: full at the start, empty at a ten-thousandth."""
+    from math import log10
+
+    left = 1.0 + log10(min(max(f.share, 10.0**-_DECADES), 1.0)) / _DECADES
+    full = round(_GAUGE * left)
+    return "\N{FULL BLOCK}" * full + "\N{LIGHT SHADE}" * (_GAUGE - full)

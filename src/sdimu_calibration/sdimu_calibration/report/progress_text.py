@@ -1,0 +1,69 @@
+"""A running calibration in words: how far the sigmas have fallen, and whether innovations are as large as promised."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from sdimu_calibration.core.units import from_si
+from sdimu_calibration.report.groups import groups, title
+
+_FINE, _ALARM = "\N{BLACK CIRCLE}", "\N{BLACK UP-POINTING TRIANGLE}"
+"""Shapes, not only colours, tell the light's states apart."""
+
+
+@dataclass(frozen=True)
+class Falling:
+    """Largest sigma of one effect's coefficients now, in `unit`, and its share of the largest at the start."""
+
+    effect: str
+    sigma: float
+    unit: str
+    share: float
+
+
+def falling(
+    first: Mapping[str, float], now: Mapping[str, float], units: Mapping[str, str], effects: Sequence[str]
+) -> list[Falling]:
+    """Sum the sigmas up by effect, those that have fallen least first.
+
+    Parameters
+    ----------
+    first, now : mapping of str to float
+        Sigma (SI) by coefficient at the start and now.
+    units : mapping of str to str
+        Customary unit by coefficient.
+    effects : sequence of str
+        Of the model.
+    """
+    names = [name for name in now if first.get(name, 0.0) > 0.0]
+    out = []
+    for effect, members in groups(names, effects).items():
+        largest = max(now[names[k]] for k in members)
+        start = max(first[names[k]] for k in members)
+        unit = units.get(names[members[0]], "1")
+        out.append(Falling(effect, from_si(largest, unit), unit, largest / start))
+    return sorted(out, key=lambda f: -f.share)
+
+
+def light(nis: Mapping[str, float], verdict: str) -> str:
+    """Say whether the innovations are as large as promised: mean squares by channel, 1 is right, and the verdict.
+
+    The numbers are of the whole test so far, the verdict of the present stop.
+    """
+    if not nis:
+        return "innovations: none yet"
+    mark = _FINE if verdict.startswith("consistent") else _ALARM
+    return f"{mark} NIS so far " + " ".join(f"{channel} {value:.2f}" for channel, value in nis.items()) + f": {verdict}"
+
+
+def sigma_words(fallen: Sequence[Falling], most: int = 2) -> str:
+    """Name the effects that are known least, with what is left of their sigma."""
+    return ", ".join(
+        f"{title(f.effect)} {short(f.sigma)} {f.unit} ({short(100.0 * f.share)} %)" for f in list(fallen)[:most]
+    )
+
+
+def short(value: float) -> str:
+    """Write a number with two digits, or whole."""
+    return f"{value:.0f}" if value >= 99.5 else f"{value:.2g}"
