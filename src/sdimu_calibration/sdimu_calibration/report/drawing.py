@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import json
 from typing import Any
+
+from plotly.offline import get_plotlyjs
 
 BEFORE, AFTER = "#b45f06", "#0b5394"
 """Ink of "model as given" and of "with what was found"."""
@@ -29,13 +32,30 @@ CONFIG = {"responsive": True, "displaylogo": False, "modeBarButtonsToRemove": ["
 """Buttons of a figure."""
 
 
+_QUEUE = """
+(function () {
+  var waiting = [];
+  function next() { if (waiting.length) { waiting.shift()(); setTimeout(next, 0); } }
+  window.drawLater = function (id, figure, config) {
+    waiting.push(function () {
+      if (window.innerWidth >= 2400) { figure.layout.font.size = 16; }
+      Plotly.newPlot(id, figure.data, figure.layout, config);
+    });
+  };
+  document.addEventListener('DOMContentLoaded', function () { setTimeout(next, 0); });
+  window.addEventListener('beforeprint', function () { while (waiting.length) { waiting.shift()(); } });
+})();
+"""
+
+
 def html(figure: Any, number: int) -> str:
-    """Return a figure as a part of a page; number 1 brings the library along, so it has to be the first on it."""
-    return str(
-        figure.to_html(
-            full_html=False,
-            include_plotlyjs=number == 1,
-            div_id=f"figure-{number}",
-            config=CONFIG,
-        )
-    )
+    """Return a figure as a part of a page; number 1 brings the library along, so it has to be the first on it.
+
+    Figures are drawn one after another once the page is read, so that it opens before the last one is drawn.
+    """
+    library = f"<script>{get_plotlyjs()}</script><script>{_QUEUE}</script>" if number == 1 else ""
+    # "</" would end the script wherever it stands.
+    content = str(figure.to_json()).replace("</", "<\\/")
+    name, config = f"figure-{number}", json.dumps(CONFIG)
+    place = f'<div id="{name}" class="plotly-graph-div" style="height:{figure.layout.height}px; width:100%;"></div>'
+    return f'{library}<div>{place}<script>drawLater("{name}", {content}, {config});</script></div>'
