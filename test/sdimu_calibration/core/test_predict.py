@@ -86,3 +86,10 @@ def test_measurement_noise_below_the_process_noise_is_refused(imu, model):
     noise = NoiseSet("odd", 1e-6, 1e-3, 5e-7, 1e-2, 1e-3, 1e-2, "every_epoch", False, 1e-3, 2e-2)
     with pytest.raises(DataError, match="rate_sigma"):
         apply(noise, imu, model)
+
+
+def test_a_plan_of_short_stops_is_no_recording_of_stuck_sensors(imu, model, site):
+    # A perfect IMU shows one number all through a stop; where most of the time is turning that looks like a fault.
+    found = predict(replace(KIM18, dwell_s=(20.0,) * 19), site, imu, model)
+    assert found.duration_s == pytest.approx(KIM18.duration_s - 19 * 80.0, abs=1.0)
+    assert np.all(np.isfinite(found.sigma))

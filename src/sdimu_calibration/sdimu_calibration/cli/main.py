@@ -30,6 +30,7 @@ _VERBS = {
     "import": "sdimu_calibration.cli.import_files:import_files",
     "replay": "sdimu_calibration.cli.replay:replay",
     "compensate": "sdimu_calibration.cli.compensate:compensate",
+    "plan": "sdimu_calibration.cli.plan:plan",
     "noise": "sdimu_calibration.cli.noise:noise",
     "export": "sdimu_calibration.cli.export:export",
     "workbench": "sdimu_calibration.cli.workbench:workbench",

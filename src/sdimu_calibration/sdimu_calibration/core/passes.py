@@ -133,15 +133,22 @@ def measurement_kinds(phases: Phases, every_epoch: bool) -> NDArray[np.int64]:
     return kind
 
 
-def reduce(recording: Recording, setup: Setup) -> Reduced:
+def reduce(recording: Recording, setup: Setup, screened: bool = True) -> Reduced:
     """Reduce a recording to cycles and epochs and decide the phases.
+
+    Parameters
+    ----------
+    recording : Recording
+    setup : Setup
+    screened : bool
+        Take away samples that are no measurement; not for the perfect ones of `nominal`, which stand still at rest.
 
     Raises
     ------
     DataError
         When there is too little of it, or so much is missing that nobody knows the attitude after it.
     """
-    recording, unsound = sound(recording)
+    recording, unsound = sound(recording) if screened else (recording, ())
     if len(recording.t) < NOMINAL_FROM + 1:
         raise DataError(f"/imu/data_raw: {len(recording.t)} usable samples are too few to calibrate")
     nominal = nominal_interval(recording.t)

@@ -94,7 +94,7 @@ def prepare(
     told, weighed = (imu, model) if noise is None else apply(noise, imu, model)
     setup = set_up(site, told, weighed)
     recording = nominal_recording(plan, site, mount_rad)
-    reduced = reduce(recording, setup)
+    reduced = reduce(recording, setup, screened=False)
     start = first_attitude(reduced.epochs, reduced.phases, setup)
     C_nb = rotation_matrix(np.zeros(3) if mount_rad is None else np.asarray(mount_rad, dtype=float))
     sigma = start.filter_sigma

@@ -1,0 +1,80 @@
+"""What a plan will tell: sigma of every coefficient at the bound that the data hold, about a perfect IMU."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sdimu_calibration.core import body_frame
+from sdimu_calibration.core.batch import bound_covariance
+from sdimu_calibration.core.plan import Plan
+from sdimu_calibration.core.predict import prepare
+from sdimu_calibration.core.specification import ImuSpecification, Model, Site
+
+Floats = NDArray[np.float64]
+
+_FIXED = 1e-6
+"""A sigma below this share of its prior is one that the body frame makes nought."""
+
+
+@dataclass(frozen=True)
+class Question:
+    """For whom a plan is made: IMU, site, and the model with the effects that shall be seen."""
+
+    site: Site
+    imu: ImuSpecification
+    model: Model
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """What a plan tells.
+
+    Attributes
+    ----------
+    names, units : tuple of str, length p
+        Coefficients and their display units.
+    effect : tuple of str, length p
+        Effect of each coefficient.
+    covariance : ndarray, shape (p, p)
+        Frame of the prior.
+    sigma : ndarray, shape (p,)
+        In the reported body frame; SI.
+    prior : ndarray, shape (p,)
+    """
+
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    effect: tuple[str, ...]
+    covariance: Floats
+    sigma: Floats
+    prior: Floats
+
+    def largest(self) -> dict[str, float]:
+        """Largest sigma of each effect's coefficients (SI); those that the body frame fixes do not count."""
+        out: dict[str, float] = {}
+        for effect, sigma, prior in zip(self.effect, self.sigma, self.prior, strict=True):
+            if sigma > _FIXED * prior:
+                out[effect] = max(out.get(effect, 0.0), float(sigma))
+        return out
+
+
+def bounds(plan: Plan, asked: Question) -> Bounds:
+    """Say what a plan tells.
+
+    Raises
+    ------
+    DataError
+        When a turn needs more acceleration than the plan allows, or an effect changes at random.
+    """
+    nominal = prepare(plan, asked.site, asked.imu, asked.model, None, None)
+    sensors = nominal.setup.sensors
+    covariance = bound_covariance(nominal.reduced, nominal.setup, nominal.start)
+    J = body_frame.frame_jacobian(sensors.names, asked.model.body_frame)
+    effects = [e.family or e.name for e in sensors.effects for _ in e.parameters]
+    return Bounds(
+        sensors.names, tuple(p.display_unit for p in sensors.parameters), tuple(effects), covariance,
+        np.sqrt(np.diag(J @ covariance @ J.T)), sensors.prior,
+    )  # fmt: skip

@@ -1,0 +1,152 @@
+"""The extra turn that tells effects apart which look alike so far.
+
+The information of plan and extra turn together on the parameters of the class, everything else estimated along with
+them, is J. The part of parameter i that parameter j cannot take over shows with ``theta_i^2 (J_ii - J_ij^2 / J_jj)``
+in squares of sigma; the worst pair counts, and of extra turns the one that gains most a minute is named
+(T-optimality: Atkinson & Fedorov, *Biometrika* 62 (1975)).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import permutations
+from typing import cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sdimu_calibration.core.effects import selection
+from sdimu_calibration.core.effects.effect import Effect
+from sdimu_calibration.core.plan import Plan, Turn
+from sdimu_calibration.core.plan_search.bound import Bounds, Question, bounds
+from sdimu_calibration.core.recording import DataError
+
+Floats = NDArray[np.float64]
+
+RATES_RAD_S = (math.radians(2.0), math.radians(10.0))
+_ANGLES_RAD = tuple(math.radians(a) for a in (90.0, -90.0, 180.0, -180.0))
+_ACCELERATION_RAD_S2 = math.radians(20.0)
+
+
+@dataclass(frozen=True)
+class NextTurn:
+    """An extra turn, or two there and back, at the end of a plan.
+
+    Attributes
+    ----------
+    turns : tuple of Turn
+    minutes : float
+        Turns and the stops after them.
+    before, after : float
+        Sigmas by which the pair that is worst to tell apart differs, without and with it.
+    """
+
+    turns: tuple[Turn, ...]
+    minutes: float
+    before: float
+    after: float
+
+    @property
+    def gain(self) -> float:
+        """Gain in squared sigmas a minute."""
+        return (self.after**2 - self.before**2) / self.minutes
+
+    @property
+    def text(self) -> str:
+        """In words."""
+        degrees = [(t.axis, math.degrees(t.angle_rad), math.degrees(t.rate_rad_s)) for t in self.turns]
+        words = [f"{axis} {angle:+.0f} deg at {rate:g} deg/s" for axis, angle, rate in degrees]
+        apart = f"apart by {self.after:.1f} sigma instead of {self.before:.1f}"
+        return f"turn {' and '.join(words)} ({self.minutes:.1f} min): {apart}"
+
+
+def next_turn(
+    plan: Plan,
+    asked: Question,
+    alike: Sequence[str | Effect],
+    sizes: Mapping[str, float] | None = None,
+    rates_rad_s: Sequence[float] = RATES_RAD_S,
+    progress: Callable[[str, float], None] | None = None,
+) -> tuple[NextTurn, ...]:
+    """Rank the extra turns that tell effects apart.
+
+    Parameters
+    ----------
+    plan : Plan
+        The test so far.
+    asked : Question
+        With the model that is estimated in any case.
+    alike : sequence of str or Effect
+        The class: coefficients such as ``gyro_scale_asymmetry_y``, with options in brackets, or effects.
+    sizes : mapping of str to float, optional
+        Size (SI) of coefficients, such as the estimate; one sigma of the prior by default.
+    rates_rad_s : sequence of float
+        Rates the table can do.
+    progress : callable, optional
+
+    Returns
+    -------
+    tuple of NextTurn
+        Best first: by gain a minute.
+
+    Raises
+    ------
+    DataError
+        When there are fewer than two parameters to tell apart, or an effect is unknown.
+    """
+    effects = [selection.resolve(e) if isinstance(e, str) else e for e in alike]
+    names = tuple(p.name for e in effects for p in e.parameters)
+    if len(names) < 2:
+        raise DataError("nothing to tell apart: name two coefficients or more")
+    have = {p for name in asked.model.effects for p in _parameters(name)}
+    more = [e for e in effects if not {p.name for p in e.parameters} <= have]
+    # A model names its effects; `imu_model.build` takes an effect itself as well.
+    model = replace(asked.model, effects=cast("tuple[str, ...]", (*asked.model.effects, *more)))
+    with_class = replace(asked, model=model)
+    # Fast turns need this acceleration; before and after are compared with one, which shapes the turns there are too.
+    plan = replace(plan, acceleration_rad_s2=max(plan.acceleration_rad_s2, _ACCELERATION_RAD_S2))
+    before = _apart(bounds(plan, with_class), names, sizes)
+    dwell = float(np.median(plan.dwell_s))
+    extras = _extras(rates_rad_s)
+    out = []
+    for count, turns in enumerate(extras, start=1):
+        longer = Plan(
+            plan.name, (*plan.dwell_s, *(dwell for _ in turns)), (*plan.turns, *turns),
+            plan.acceleration_rad_s2,
+        )  # fmt: skip
+        after = _apart(bounds(longer, with_class), names, sizes)
+        minutes = (longer.duration_s - plan.duration_s) / 60.0
+        out.append(NextTurn(turns, minutes, before, after))
+        if progress is not None:
+            progress("next turn", count / len(extras))
+    return tuple(sorted(out, key=lambda one: -one.gain))
+
+
+def _parameters(effect: str | Effect) -> tuple[str, ...]:
+    found = selection.resolve(effect) if isinstance(effect, str) else effect
+    return tuple(p.name for p in found.parameters)
+
+
+def _extras(rates: Sequence[float]) -> list[tuple[Turn, ...]]:
+    """Single turns about every axis, and half turns there and back."""
+    singles = [(Turn(axis, angle, rate),) for axis in "XYZ" for angle in _ANGLES_RAD for rate in rates]
+    fast = max(rates)
+    pairs = [(Turn(axis, math.pi, fast), Turn(axis, -math.pi, fast)) for axis in "XYZ"]
+    return [*singles, *pairs]
+
+
+def _apart(told: Bounds, names: Sequence[str], sizes: Mapping[str, float] | None) -> float:
+    """Sigmas by which the two parameters differ that are worst to tell apart."""
+    rows = [told.names.index(name) for name in names]
+    prior = told.prior[rows]
+    # In units of the priors: coefficients of ppm and of rad/s stand in one matrix.
+    covariance = told.covariance[np.ix_(rows, rows)] / np.outer(prior, prior)
+    J = np.linalg.inv(covariance) - np.eye(len(rows))
+    size = np.array([1.0 if sizes is None else sizes.get(n, p) / p for n, p in zip(names, prior, strict=True)])
+    worst = min(
+        size[i] ** 2 * (J[i, i] - (J[i, j] ** 2 / J[j, j] if J[j, j] > 0.0 else 0.0))
+        for i, j in permutations(range(len(rows)), 2)
+    )
+    return float(np.sqrt(max(worst, 0.0)))

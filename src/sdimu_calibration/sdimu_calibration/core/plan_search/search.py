@@ -1,0 +1,154 @@
+"""Greedy search: changes of the whole plan first, then of one stop or turn at a time, as long as they serve the goal.
+
+Greedy: what it ends with is better than where it began, not the best there is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+
+from sdimu_calibration.core.plan import Plan
+from sdimu_calibration.core.plan_search.bound import Bounds, Question, bounds
+from sdimu_calibration.core.plan_search.moves import Abilities, single, whole
+from sdimu_calibration.core.recording import DataError
+
+_SLACK = 1e-6
+_WORTH_MIN = 0.05
+_WORTH_SHARE = 0.003
+"""A change must save three seconds, or three thousandths of the worst ratio: less is not worth another round."""
+
+
+@dataclass(frozen=True)
+class Goal:
+    """What is asked for.
+
+    Attributes
+    ----------
+    limits : mapping of str to float
+        Largest sigma allowed by effect (SI).
+    minutes : float or None
+        Time there is: then the worst ratio of sigma to limit is made small; without, the time is.
+    """
+
+    limits: Mapping[str, float]
+    minutes: float | None = None
+
+
+@dataclass(frozen=True)
+class Found:
+    """A plan, what it tells, its worst ratio of sigma to limit, and how many plans were tried for it."""
+
+    plan: Plan
+    bounds: Bounds
+    worst: float
+    tried: int
+
+    @property
+    def minutes(self) -> float:
+        """Length of the plan."""
+        return self.plan.duration_s / 60.0
+
+
+def search(
+    start: Plan,
+    asked: Question,
+    able: Abilities,
+    goal: Goal,
+    tries: int = 150,
+    progress: Callable[[str, float], None] | None = None,
+) -> Found:
+    """Search for a plan.
+
+    Parameters
+    ----------
+    start : Plan
+        Every change keeps the attitudes of its stops.
+    asked : Question
+    able : Abilities
+    goal : Goal
+    tries : int
+        Most plans to evaluate (about half a second each).
+    progress : callable, optional
+
+    Returns
+    -------
+    Found
+        The start itself when nothing serves the goal better.
+
+    Raises
+    ------
+    DataError
+        When the start cannot be evaluated, or a limit names an effect that is not in the model.
+    """
+    first = bounds(start, asked)
+    unknown = sorted(goal.limits.keys() - first.largest().keys())
+    if unknown:
+        there = ", ".join(first.largest())
+        raise DataError(f"limit for '{unknown[0]}': not an effect of the model (there are: {there})")
+    best = Found(start, first, _worst(first, goal), 1)
+    tried = 1
+    seen = {_key(start)}
+
+    def consider(plan: Plan) -> bool:
+        """Evaluate a plan; True when it is the best so far."""
+        nonlocal best, tried
+        if _key(plan) in seen or not _may_win(plan, best, goal):
+            return False
+        seen.add(_key(plan))
+        tried += 1
+        try:
+            told = bounds(plan, asked)
+        except DataError:
+            return False  # a turn too fast for the acceleration
+        if progress is not None:
+            progress(f"{best.minutes:.1f} min, worst {best.worst:.2f} of its limit", min(1.0, tried / tries))
+        new = Found(plan, told, _worst(told, goal), tried)
+        if _better(new, best, goal):
+            best = new
+            return True
+        return False
+
+    for plans in whole(start, able):
+        # Shorter stops tell less: when one length does not do, the shorter ones will not.
+        for plan in plans:
+            if tried < tries and _may_win(plan, best, goal) and not consider(plan):
+                break
+    going = True
+    while going and tried < tries:
+        going = False
+        for plan in single(best.plan, able):
+            if tried >= tries:
+                break
+            if consider(plan):
+                going = True
+                break
+    return replace(best, tried=tried)
+
+
+def _worst(told: Bounds, goal: Goal) -> float:
+    largest = told.largest()
+    return max(largest[effect] / limit for effect, limit in goal.limits.items())
+
+
+def _may_win(plan: Plan, best: Found, goal: Goal) -> bool:
+    """Whether a plan could be better, by its length alone."""
+    minutes = plan.duration_s / 60.0
+    if goal.minutes is not None:
+        return minutes <= max(goal.minutes, best.minutes) + _SLACK
+    return best.worst > 1.0 + _SLACK or minutes < best.minutes - _WORTH_MIN
+
+
+def _better(new: Found, old: Found, goal: Goal) -> bool:
+    if goal.minutes is not None:
+        over_new, over_old = (max(0.0, f.minutes - goal.minutes) for f in (new, old))
+        if over_new > _SLACK or over_old > _SLACK:
+            return over_new < over_old - _SLACK
+        return new.worst < old.worst * (1.0 - _WORTH_SHARE)
+    if new.worst > 1.0 + _SLACK or old.worst > 1.0 + _SLACK:
+        return new.worst < max(1.0, old.worst * (1.0 - _WORTH_SHARE)) + _SLACK
+    return new.minutes < old.minutes - _WORTH_MIN
+
+
+def _key(plan: Plan) -> tuple[object, ...]:
+    return (plan.dwell_s, plan.turns, plan.acceleration_rad_s2)
