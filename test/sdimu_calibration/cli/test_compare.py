@@ -17,7 +17,7 @@ _NONE = np.empty(0)
 FIRST = Calibration(
     body_frame="prior", model=("accel_bias",), names=("accel_bias_x", "accel_bias_y"), units=("m/s^2",) * 2,
     display_units=("ug",) * 2, values=np.array([1e-4, 2e-4]), covariance=np.diag([1e-12, 4e-12]),
-    fit={"log_likelihood": 100.0, "nis_mean": 1.5, "held_out_rms": 2.0}, data={"samples": 10, "duration_s": 1.0},
+    fit={"log_likelihood": 100.0, "nis_mean": 1.5, "held_out_rms": 2.0}, data={"samples": 10, "duration_s": 1.0, "checksum": 5.0, "conditions": 7.0},
     notes=(),
     history=History(_NONE, np.empty((0, 2)), np.empty((0, 2)), np.empty((0, 3)), _NONE.astype(int), _NONE.astype(bool),
                     _NONE.astype(bool), np.empty((0, 4))),
@@ -67,6 +67,7 @@ def test_movement_counts_in_sigmas_of_the_model_before():
     [
         (replace(SECOND, body_frame="accelerometer_triad"), "body frame"),
         (replace(SECOND, data={"samples": 11, "duration_s": 1.0}), "another recording"),
+        (replace(SECOND, data={**FIRST.data, "checksum": 6.0}), "another recording"),
     ],
 )
 def test_what_cannot_be_compared_is_refused_in_one_line(run, other, word):
@@ -74,6 +75,13 @@ def test_what_cannot_be_compared_is_refused_in_one_line(run, other, word):
     assert (status, out) == (1, "")
     assert err.count("\n") == 1
     assert word in err
+
+
+def test_another_site_or_noise_is_told_because_likelihoods_change_with_it(run):
+    assert "site" not in run(FIRST, SECOND)[1]
+    status, out, _ = run(FIRST, replace(SECOND, data={**FIRST.data, "conditions": 8.0}))
+    assert status == 0
+    assert "not with one site" in out
 
 
 def test_one_folder_is_not_enough(run):

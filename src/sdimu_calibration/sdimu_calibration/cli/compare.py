@@ -26,6 +26,8 @@ def compare(
     results = [read_result(folder) for folder in folders]
     _same_data(folders, results)
     console = Console()
+    if any(_differ(result, results[0], "conditions") for result in results[1:]):
+        console.print("not with one site and one noise specification: log-likelihoods and NIS are of different scales")
     headings = ("folder", "model", "log-likelihood", "difference", "nis", "held-out", "moved by more than 2 sigma")
     lines = [_row(folders[k], result, results[k - 1] if k else None) for k, result in enumerate(results)]
     print_table(console, headings, lines, left=2)
@@ -46,8 +48,13 @@ def _same_data(folders: list[Path], results: list[Calibration]) -> None:
                 f"{folder}: body frame is {result.body_frame}, of {folders[0]} it is {first.body_frame} "
                 "(calibrate both with models of one body_frame)"
             )
-        if any(result.data.get(key) != first.data.get(key) for key in ("samples", "duration_s")):
+        if any(_differ(result, first, key) for key in ("samples", "duration_s", "checksum")):
             raise DataError(f"{folder}: is of another recording than {folders[0]} (compare models on one recording)")
+
+
+def _differ(a: Calibration, b: Calibration, key: str) -> bool:
+    """Whether two results say different things of their data; one that says nothing does not differ."""
+    return key in a.data and key in b.data and a.data[key] != b.data[key]
 
 
 def _row(folder: Path, result: Calibration, before: Calibration | None) -> list[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from zlib import crc32
 
 import numpy as np
 from numpy.typing import NDArray
@@ -97,7 +98,7 @@ def assemble(recording: Recording, solution: Solution, held_out: bool) -> Calibr
         values=body_frame.values_in_frame(names, last.estimate, frame),
         covariance=J @ last.covariance @ J.T,
         fit=fit,
-        data=data_counts(recording, reduced),
+        data=data_counts(recording, reduced) | {"conditions": conditions(setup)},
         notes=(*recording.notes, *(f.text for f in reduced.faults if not f.grave), *warnings),
         history=history(reduced, setup, solution.first),
         warnings=warnings,
@@ -186,12 +187,28 @@ def data_counts(recording: Recording, reduced: Reduced) -> dict[str, float]:
     start = {} if log is None or not len(log.t) else {"start_temperature_degc": float(log.value[0])}
     return start | {
         "samples": float(len(recording.t)),
+        "checksum": checksum(recording.t, recording.omega_ib_b, recording.f_ib_b),
         "lost": float(reduced.cycles.lost.sum()),
         "rejected": float(recording.rejected),
         "contradicted_s": float((epochs.end - epochs.start)[phases.contradicted].sum()),
         "duration_s": float(recording.t[-1]),
         "stops": float(len(np.unique(phases.stop[phases.used]))),
     }
+
+
+def checksum(*arrays: Floats) -> float:
+    """Give a number that other samples do not have: the same recording is known again by it."""
+    value = 0
+    for array in arrays:
+        value = crc32(np.ascontiguousarray(array).tobytes(), value)
+    return float(value)
+
+
+def conditions(setup: Setup) -> float:
+    """Give a number that another site or other noise densities do not have: they change what a likelihood means."""
+    site, imu = setup.site, setup.imu
+    place = (site.latitude_rad, site.height_m, setup.gravity)
+    return checksum(np.array([*place, imu.gyro_white_noise, imu.accel_white_noise]))
 
 
 def history(reduced: Reduced, setup: Setup, first: Pass) -> History:
