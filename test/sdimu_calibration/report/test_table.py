@@ -135,3 +135,7 @@ def test_labels_are_pushed_apart_no_further_than_needed():
     assert np.diff(np.sort(apart)).min() >= 1.0 - 1e-12
     assert apart[2] == 5.0
     assert apart[[0, 1, 3]].mean() == pytest.approx(heights[[0, 1, 3]].mean(), abs=1e-12)
+
+
+def test_a_page_without_diagnosis_says_where_the_verdict_is(calibration):
+    assert "sdimu diagnose" in page(calibration, "x")

@@ -160,7 +160,11 @@ def _fit(calibration: Calibration, diagnosed: bool) -> str:
         sentences.append(f"Squared innovations are {nis:.3f} times what the noise explains ({dof:.0f} in number).")
     if held_out is not None:
         sentences.append(f"Stops that the fit has not seen are predicted to {held_out:.2f} sigma (RMS); 1 is right.")
-    return escape(" ".join(sentences) or "Fit: not computed.")
+    if not sentences:
+        return "Fit: not computed."
+    if not diagnosed:
+        sentences.append("Whether something is missing in the model, and what: sdimu diagnose.")
+    return escape(" ".join(sentences))
 
 
 def _notes(calibration: Calibration) -> str:
