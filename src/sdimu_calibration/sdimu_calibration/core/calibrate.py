@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sdimu_calibration.core import body_frame
+from sdimu_calibration.core.azimuth_known import azimuth_warning
 from sdimu_calibration.core.filter_pass import ALL, HELD_ALL, HELD_SENSORS, SENSORS, PassState, new_output, run_pass
 from sdimu_calibration.core.passes import (
     Pass,
@@ -126,9 +127,8 @@ def _warnings(solution: Solution, fit: dict[str, float | None]) -> list[str]:
     if nis > _MISFIT or (held_out is not None and held_out > _MISFIT):
         text = f"NIS {nis:.3f}" + ("" if held_out is None else f", held-out error {held_out:.3f}")
         out.append(f"the model does not fit ({text}; 1 is right){in_turn}; run: sdimu diagnose")
-    misfit = stop_misfit(solution.last, solution.reduced)
-    if misfit:
-        out.append(misfit)
+    more = (stop_misfit(solution.last, solution.reduced), azimuth_warning(solution))
+    out += [text for text in more if text]
     size = np.abs(solution.last.estimate) / solution.setup.sensors.prior
     worst = int(np.argmax(size))
     if size[worst] > _OUTSIDE:

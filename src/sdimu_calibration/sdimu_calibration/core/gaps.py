@@ -111,6 +111,16 @@ def bridges(cycles: Cycles, epochs: Epochs, dwell: NDArray[np.bool_], nominal_s:
     return Bridges(white, angle, velocity)
 
 
+def weighed(found: Bridges, epochs: Epochs, t: Floats, excess: Floats) -> Bridges:
+    """Add noise beyond the usual at times `t` (k,) s, as `soundness.wild` gives it, to the epochs it falls into."""
+    if not len(t):
+        return found
+    at = np.searchsorted(epochs.end, t)
+    at, excess = at[at < len(epochs)], excess[at < len(epochs)]
+    more = np.bincount(at, excess, len(epochs)) / (epochs.end - epochs.start)
+    return Bridges(found.white + more, found.angle, found.velocity)
+
+
 def _rests(dwell: NDArray[np.bool_], epoch: NDArray[np.int64]) -> NDArray[np.bool_]:
     """Whether the IMU rests in an epoch and in those beside it."""
     last = len(dwell) - 1
@@ -118,8 +128,9 @@ def _rests(dwell: NDArray[np.bool_], epoch: NDArray[np.int64]) -> NDArray[np.boo
 
 
 def judge(
-    cycles: Cycles, epochs: Epochs, phases: Phases, nominal_s: float, found: Bridges, noise: tuple[float, float]
-) -> tuple[DataFault, ...]:
+    cycles: Cycles, epochs: Epochs, phases: Phases, nominal_s: float, found: Bridges, noise: tuple[float, float],
+    unsound: tuple[DataFault, ...] = (),
+) -> tuple[DataFault, ...]:  # fmt: skip
     """Say what is missing, and refuse what cannot be bridged.
 
     Parameters
@@ -129,6 +140,8 @@ def judge(
     found : Bridges
     noise : tuple of float
         White noise densities of gyro (rad/s/sqrt(Hz)) and accelerometer (m/s^2/sqrt(Hz)).
+    unsound : tuple of DataFault
+        Why samples were taken away; said with a refusal.
 
     Raises
     ------
@@ -136,18 +149,18 @@ def judge(
         When an angle is missing that nobody knows, or readings differ across a gap at rest.
     """
     at = np.flatnonzero(cycles.lost > 0)
-    if not len(at):
-        return ()
     length = epochs.end - epochs.start
     drift = np.hypot(found.angle, noise[0] * np.sqrt(np.maximum(found.white - 1.0, 0.0) * length))
     worst = int(np.argmax(drift))
     if drift[worst] > LINEAR_RAD:
         missing = cycles.lost[epochs.first[worst] : epochs.last[worst]].sum() * nominal_s
+        because = f" ({'; '.join(fault.text for fault in unsound)})" if unsound else ""
         where = "at rest" if phases.dwell[worst] else "while the IMU turned"
+        what = f"{missing:.2f} s of samples are missing" if missing else "readings are wild"
         raise DataError(
-            f"/imu/data_raw: {missing:.2f} s of samples are missing {where} at {epochs.start[worst]:.1f} s (stop "
+            f"/imu/data_raw: {what} {where} at {epochs.start[worst]:.1f} s (stop "
             f"{phases.stop[worst]}): the attitude after them is known only to {np.degrees(drift[worst]) * 60.0:.3g} "
-            "arcmin; repeat the test, or cut the recording before or after"
+            f"arcmin; repeat the test, or cut the recording before or after{because}"
         )
     epoch = np.minimum(np.searchsorted(epochs.last, at, side="right"), len(epochs) - 1)
     resting = _rests(phases.dwell, epoch)

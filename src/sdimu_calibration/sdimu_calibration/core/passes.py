@@ -29,12 +29,12 @@ from sdimu_calibration.core.filter_pass import (
     new_output,
     run_pass,
 )
-from sdimu_calibration.core.gaps import Bridges, bridges, judge, largest_acceleration
+from sdimu_calibration.core.gaps import Bridges, bridges, judge, largest_acceleration, weighed
 from sdimu_calibration.core.imu_model import ImuModel
 from sdimu_calibration.core.phases import Phases, PhaseState, RestLimits, classify, contradictions, rest_limits
 from sdimu_calibration.core.recording import NOMINAL_FROM, DataError, DataFault, Recording, TemperatureLog
 from sdimu_calibration.core.rotation import rotation_matrix, rotation_vector
-from sdimu_calibration.core.soundness import sound
+from sdimu_calibration.core.soundness import sound, wild
 from sdimu_calibration.core.specification import ImuSpecification, Model, Site
 from sdimu_calibration.core.strapdown import Cycles, Reducer
 from sdimu_calibration.core.track import motion
@@ -160,8 +160,11 @@ def reduce(recording: Recording, setup: Setup, screened: bool = True) -> Reduced
     kind = measurement_kinds(phases, setup.model.zero_velocity == "every_epoch")
     cycles = cycles[: int(epochs.last[-1])]
     found = bridges(cycles, epochs, phases.dwell, nominal, largest_acceleration(cycles), setup.gravity)
+    at, excess, rough = wild(recording)
+    found = weighed(found, epochs, at, excess)
+    unsound = (*unsound, *rough)
     noise = (setup.imu.gyro_white_noise, setup.imu.accel_white_noise)
-    lost = judge(cycles, epochs, phases, nominal, found, noise)
+    lost = judge(cycles, epochs, phases, nominal, found, noise, unsound)
     faults = (*unsound, *lost, *contradictions(epochs, phases, recording.phase))
     return Reduced(cycles, epochs, phases, kind, recording.temperature, found, faults)
 
@@ -266,7 +269,7 @@ def one_pass(
     output = new_output(len(reduced.epochs), len(sensors.prior), keep, SNAPSHOT_EPOCHS)
     settings = pass_settings(setup, closed_loop)
     run_pass(data, settings, state, output)
-    if not (np.isfinite(state.x).all() and np.isfinite(state.P).all()):
+    if not (np.isfinite(state.x).all() and np.isfinite(state.P).all() and (np.diag(state.P) >= 0.0).all()):
         raise DataError(
             "the filter diverged: the recording contradicts the IMU's specification; check --imu and --site"
         )

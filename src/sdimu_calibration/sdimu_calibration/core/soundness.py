@@ -35,6 +35,12 @@ _SPIKE = 8.0
 _ALONE = 0.25
 """A spike stands out of its surroundings, the second differences nearby, by at least the inverse of this."""
 _AROUND = np.r_[-12:-2, 3:13]
+_WINDOW = 20
+"""Samples over which the roughness of a channel is taken, by the median: a corner of the motion is one sample."""
+_WILD = 4.0
+"""Times the usual roughness; medians of twenty reach 2.2 in an hour of white noise."""
+_RARE = 0.02
+"""A larger share of rough windows is how this recording is (a table that shakes in turns), and no fault."""
 _GAUSS_MAD = 1.482602218505602
 
 
@@ -144,3 +150,45 @@ def _spikes(x: Floats) -> tuple[NDArray[np.int64], str, str]:
     at = at[np.abs(x[at + 1] - x[at - 1]) < 0.5 * size[at]]
     around = size[np.clip(at[:, None] + _AROUND, 0, len(x) - 1)].max(axis=1)
     return at[around < _ALONE * size[at]], kind, text
+
+
+def wild(recording: Recording) -> tuple[Floats, Floats, tuple[DataFault, ...]]:
+    """Find stretches in which a channel is much rougher than it is else: a loose contact, a disturbed line.
+
+    Their samples stay, because nobody knows that they are wrong, and weigh as much less as they are rougher.
+
+    Parameters
+    ----------
+    recording : Recording
+        Without spikes.
+
+    Returns
+    -------
+    t : ndarray, shape (k,)
+        Middle of each wild window (s).
+    excess : ndarray, shape (k,)
+        Variance of its noise beyond the usual one, over the usual one, times its length (s).
+    faults : tuple of DataFault
+    """
+    windows = len(recording.t) // _WINDOW
+    largest = np.ones(windows)
+    faults = []
+    middle = recording.t[_WINDOW // 2 :: _WINDOW][:windows]
+    for name, x in zip(CHANNELS, (*recording.omega_ib_b.T, *recording.f_ib_b.T), strict=True):
+        second = np.zeros_like(x)
+        second[1:-1] = x[1:-1] - 0.5 * (x[:-2] + x[2:])
+        rough = np.median(np.abs(second[: windows * _WINDOW]).reshape(windows, _WINDOW), axis=1)
+        usual = float(np.median(rough)) if windows else 0.0
+        at = rough > _WILD * usual
+        if usual == 0.0 or not at.any() or at.mean() > _RARE:
+            continue
+        ratio = rough / usual
+        largest[at] = np.maximum(largest[at], ratio[at])
+        t = middle[at]
+        text = f"{name} is up to {ratio[at].max():.0f} times rougher than usual at {t[0]:.1f} s"
+        more = f" and {np.count_nonzero(np.diff(t) > 1.0)} times more" if np.any(np.diff(t) > 1.0) else ""
+        line = f"{text}{more}; it weighs less there"
+        faults.append(DataFault("wild", line, int(at.sum()) * _WINDOW, float(t[0]), float(t[-1])))
+    rows = largest > 1.0
+    excess = (largest[rows] ** 2 - 1.0) * _WINDOW * recording.interval_s
+    return middle[rows], excess, tuple(faults)

@@ -55,3 +55,53 @@ def mount(
             table.add_row(effect, *(f"{from_si(float(v), unit):.3g}" for v in by_effect[effect]), unit)
         console.print(table)
     console.print(f"results in {out}", soft_wrap=True)
+
+
+@app.command()
+def faults(
+    out: Annotated[Path, typer.Option(help="Folder of faults.json and faults.md.")] = Path("out/study-faults"),
+    seeds: Annotated[int, typer.Option(min=1, help="Tests a fault and size; seeds 1 to this.")] = 3,
+    only: Annotated[list[str] | None, typer.Option(help="Kind of fault; repeatable. All by default.")] = None,
+    plan: Annotated[str, typer.Option(help="Test plan, done in a hurry: name or path.")] = "kim18_signed",
+    imu: Annotated[str, typer.Option(help="IMU specification: name in config/imu or path.")] = "dtg",
+    model: Annotated[str, typer.Option(help="Model to estimate.")] = "baseline",
+    site: Annotated[str, typer.Option(help="Site.")] = "daejeon",
+) -> None:
+    """Spoil tests with every kind of fault at five sizes: none may end silently wrong. Exit status 1 if one does."""
+    from rich.box import SIMPLE
+    from rich.console import Console
+    from rich.table import Table
+
+    from sdimu_calibration.cli.progress import bar
+    from sdimu_calibration.core.recording import DataError
+    from sdimu_calibration.storage.config import load_imu, load_model, load_plan, load_site
+    from sdimu_calibration.storage.json_file import write_json
+    from sdimu_sim.campaign.fault_page import page
+    from sdimu_sim.campaign.fault_run import TRACEBACK, WRONG
+    from sdimu_sim.campaign.fault_study import content, fault_study, hurried, table, totals
+    from sdimu_sim.core.faults import FAULTS
+    from sdimu_sim.core.scenario import Scenario
+
+    known = {fault.name: fault for fault in FAULTS}
+    unknown = sorted(set(only or ()) - set(known))
+    if unknown:
+        raise DataError(f"--only {unknown[0]}: expected one of {', '.join(known)}")
+    console = Console()
+    scenario = Scenario(hurried(load_plan(plan)), load_imu(imu), load_site(site))
+    chosen = [known[name] for name in only] if only else list(FAULTS)
+    with bar(console) as progress:
+        outcomes = fault_study(scenario, load_model(model), range(1, seeds + 1), chosen, progress)
+    write_json(out / "faults.json", content(outcomes))
+    (out / "faults.md").write_text(page(outcomes), encoding="utf-8")
+    shown = Table("fault", "1", "2", "3", "4", "5", box=SIMPLE)
+    for name, _, cells in table(outcomes):
+        shown.add_row(name, *cells)
+    console.print(shown)
+    ended = totals(outcomes)
+    console.print(", ".join(f"{n} {verdict}" for verdict, n in ended.items()), highlight=False)
+    for o in outcomes:
+        if o.verdict in {WRONG, TRACEBACK}:
+            console.print(f"{o.fault} {o.size:g}, seed {o.seed}: {o.verdict} {o.worst:.2f} {o.said}", soft_wrap=True)
+    console.print(f"results in {out}", soft_wrap=True)
+    if {WRONG, TRACEBACK} & set(ended):
+        raise typer.Exit(1)

@@ -72,9 +72,7 @@ def _place(recording: Recording, dwell: bool, length: float, rng: Rng) -> float:
 
 
 def _keep(recording: Recording, rows: NDArray[np.bool_] | Ints) -> Recording:
-    return replace(
-        recording, t=recording.t[rows], omega_ib_b=recording.omega_ib_b[rows], f_ib_b=recording.f_ib_b[rows]
-    )
+    return replace(recording, t=recording.t[rows], omega_ib_b=recording.omega_ib_b[rows], f_ib_b=recording.f_ib_b[rows])
 
 
 def _without(recording: Recording, begin: float, length: float) -> Recording:
@@ -286,39 +284,49 @@ def _table_stops(m: PlatformMotion, _r: Recording, size: float, _rng: Rng) -> Pl
     return PlatformMotion(m.t, q, omega)
 
 
-# ruff: noqa: E501
+_SHARES = (1e-4, 1e-3, 0.01, 0.1, 0.5)
+_CLIPS = (0.9999, 0.9995, 0.999, 0.99, 0.5)
+_DENIED = (0.01, 0.1, 0.3, 0.7, 1.0)
+_OTHER = (0.003, 0.03, 0.1, 0.3, 1.0)
+_STUCK_S = (0.03, 0.3, 3.0, 30.0, 200.0)
+_SPIKES = (10, 100, 1e3, 1e4, 1e6)
+_BURSTS = (3, 10, 100, 1e3, 1e5)
+_SIGN_S = (0.05, 0.5, 5.0, 50.0, 1e9)
+_FORWARD_S = (0.004, 0.1, 1.0, 10.0, 3600.0)
+_BACK_S = (0.004, 0.1, 1.0, 10.0, 100.0)
+
 FAULTS: tuple[Fault, ...] = (
     Fault("gap_at_rest", "samples missing in a dwell", "s", (0.01, 0.1, 0.5, 3.0, 12.0), _gap(True)),
     Fault("gap_in_turn", "samples missing in a turn", "s", (0.01, 0.05, 0.2, 1.0, 6.0), _gap(False)),
     Fault("turns_lost", "whole turns missing", "turns", (1, 2, 3, 5, 9), _lost_turns),
-    Fault("dropouts", "single samples missing everywhere", "share", (1e-4, 1e-3, 0.01, 0.1, 0.5), _dropouts),
-    Fault("duplicates", "samples sent twice", "share", (1e-4, 1e-3, 0.01, 0.1, 0.5), _duplicates),
+    Fault("dropouts", "single samples missing everywhere", "share", _SHARES, _dropouts),
+    Fault("duplicates", "samples sent twice", "share", _SHARES, _duplicates),
     Fault("out_of_order", "1 % of the samples come late", "samples", (1, 2, 5, 20, 100), _out_of_order),
-    Fault("repeated_stamps", "samples with the stamp of the one before", "share", (1e-4, 1e-3, 0.01, 0.1, 0.4), _repeated),
-    Fault("nan", "a reading is NaN", "share", (1e-4, 1e-3, 0.01, 0.1, 0.5), _replaced(np.nan)),
-    Fault("infinite", "a reading is infinite", "share", (1e-4, 1e-3, 0.01, 0.1, 0.5), _replaced(np.inf)),
-    Fault("gyro_saturated", "gyro axis clipped", "of peak", (0.9999, 0.999, 0.99, 0.9, 0.5), _change("gyro", _saturated)),
-    Fault("accel_saturated", "accelerometer axis clipped", "of peak", (0.9999, 0.9995, 0.999, 0.99, 0.5), _change("accel", _saturated)),
-    Fault("gyro_stuck", "gyro axis shows one number", "s", (0.03, 0.3, 3.0, 30.0, 200.0), _change("gyro", _stuck)),
-    Fault("accel_stuck", "accelerometer axis shows one number", "s", (0.03, 0.3, 3.0, 30.0, 200.0), _change("accel", _stuck)),
-    Fault("gyro_spikes", "ten wrong gyro samples", "sigma", (10, 100, 1e3, 1e4, 1e6), _change("gyro", _spikes)),
-    Fault("accel_spikes", "ten wrong accelerometer samples", "sigma", (10, 100, 1e3, 1e4, 1e6), _change("accel", _spikes)),
-    Fault("gyro_bursts", "half seconds of wild gyro", "sigma", (3, 10, 100, 1e3, 1e5), _change("gyro", _bursts)),
-    Fault("accel_bursts", "half seconds of wild accelerometer", "sigma", (3, 10, 100, 1e3, 1e5), _change("accel", _bursts)),
-    Fault("gyro_sign", "gyro axis without its sign", "s", (0.05, 0.5, 5.0, 50.0, 1e9), _change("gyro", _sign)),
-    Fault("accel_sign", "accelerometer axis without its sign", "s", (0.05, 0.5, 5.0, 50.0, 1e9), _change("accel", _sign)),
-    Fault("clock_forward_rest", "clock set forward in a dwell", "s", (0.004, 0.1, 1.0, 10.0, 3600.0), _clock(1.0, True)),
-    Fault("clock_forward_turn", "clock set forward in a turn", "s", (0.004, 0.1, 1.0, 10.0, 3600.0), _clock(1.0, False)),
-    Fault("clock_back_rest", "clock set back in a dwell", "s", (0.004, 0.1, 1.0, 10.0, 100.0), _clock(-1.0, True)),
-    Fault("clock_back_turn", "clock set back in a turn", "s", (0.004, 0.1, 1.0, 10.0, 100.0), _clock(-1.0, False)),
+    Fault("repeated_stamps", "stamp of the sample before", "share", (1e-4, 1e-3, 0.01, 0.1, 0.4), _repeated),
+    Fault("nan", "a reading is NaN", "share", _SHARES, _replaced(np.nan)),
+    Fault("infinite", "a reading is infinite", "share", _SHARES, _replaced(np.inf)),
+    Fault("gyro_saturated", "gyro axis clipped", "of peak", _CLIPS, _change("gyro", _saturated)),
+    Fault("accel_saturated", "accelerometer axis clipped", "of peak", _CLIPS, _change("accel", _saturated)),
+    Fault("gyro_stuck", "gyro axis shows one number", "s", _STUCK_S, _change("gyro", _stuck)),
+    Fault("accel_stuck", "accelerometer axis shows one number", "s", _STUCK_S, _change("accel", _stuck)),
+    Fault("gyro_spikes", "ten wrong gyro samples", "sigma", _SPIKES, _change("gyro", _spikes)),
+    Fault("accel_spikes", "ten wrong accelerometer samples", "sigma", _SPIKES, _change("accel", _spikes)),
+    Fault("gyro_bursts", "half seconds of wild gyro", "sigma", _BURSTS, _change("gyro", _bursts)),
+    Fault("accel_bursts", "half seconds of wild accelerometer", "sigma", _BURSTS, _change("accel", _bursts)),
+    Fault("gyro_sign", "gyro axis without its sign", "s", _SIGN_S, _change("gyro", _sign)),
+    Fault("accel_sign", "accelerometer axis without its sign", "s", _SIGN_S, _change("accel", _sign)),
+    Fault("clock_forward_rest", "clock set forward in a dwell", "s", _FORWARD_S, _clock(1.0, True)),
+    Fault("clock_forward_turn", "clock set forward in a turn", "s", _FORWARD_S, _clock(1.0, False)),
+    Fault("clock_back_rest", "clock set back in a dwell", "s", _BACK_S, _clock(-1.0, True)),
+    Fault("clock_back_turn", "clock set back in a turn", "s", _BACK_S, _clock(-1.0, False)),
     Fault("status_says_dwell", "status says dwell in turns", "turns", (1, 2, 5, 10, 18), _says_dwell),
-    Fault("status_says_rotating", "status says rotating at random", "share", (0.01, 0.1, 0.3, 0.7, 1.0), _says_rotating),
+    Fault("status_says_rotating", "status says rotating here and there", "share", _DENIED, _says_rotating),
     Fault("status_late", "status late by", "s", (0.3, 1.0, 3.0, 6.0, 10.0), _status_shifted),
     Fault("status_early", "status early by", "s", (-0.3, -1.0, -3.0, -6.0, -10.0), _status_shifted),
     Fault("status_wrong_stop", "stops numbered wrongly", "stops", (1, 2, 5, 10, 19), _wrong_stop),
     Fault("status_stops", "status falls silent after", "of test", (0.9, 0.7, 0.5, 0.2, 0.02), _status_stops),
     Fault("recording_ends", "the recording ends after", "of test", (0.9, 0.7, 0.4, 0.15, 0.03), _cut_short),
-    Fault("power_cycle", "off for 10 s in a dwell, other biases after", "of prior", (0.003, 0.03, 0.1, 0.3, 1.0), _power_cycle),
+    Fault("power_cycle", "off for 10 s at rest, other biases after", "of prior", _OTHER, _power_cycle),
     Fault("bump", "the IMU tips in 0.2 s of a dwell", "arcmin", (0.03, 0.3, 3.0, 30.0, 300.0), motion=_tilted(0.2)),
     Fault("creep", "the base tilts all through a dwell", "arcmin", (0.003, 0.03, 0.3, 3.0, 30.0), motion=_tilted(1e9)),
     Fault("table_stops", "the table stands still after", "of test", (0.95, 0.7, 0.4, 0.15, 0.03), motion=_table_stops),
