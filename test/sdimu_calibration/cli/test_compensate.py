@@ -16,6 +16,7 @@ from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.storage.bag_file import raw_messages
 from sdimu_calibration.storage.bag_reader import read_recording
+from sdimu_calibration.storage.bag_writer import write_recording
 from sdimu_calibration.storage.cdr import IMU, decode_doubles
 from sdimu_calibration.storage.config import load_imu
 from sdimu_calibration.storage.result_file import write_result
@@ -58,3 +59,17 @@ def test_a_result_that_is_none_is_one_line(bag: Path, tmp_path: Path) -> None:
     (tmp_path / "result.json").write_text("{}", encoding="utf-8")
     with pytest.raises(DataError, match=r"result\.json: format is None"):
         compensate(bag, result=tmp_path / "result.json", out=tmp_path / "new")
+
+
+def test_a_bag_with_topics_of_other_names_is_compensated_too(tmp_path: Path, small_test) -> None:
+    write_recording(
+        tmp_path / "other", start_ns=10**18, imu_ns=small_test.ns, omega_ib_b=small_test.omega_ib_b,
+        f_ib_b=small_test.f_ib_b, temperature=(small_test.slow_ns, small_test.temperature),
+        topics=Topics(imu="/xsens/imu", temperature="/xsens/warmth"),
+    )  # fmt: skip
+    write_result(tmp_path / "result.json", result("gyro_bias", "accel_bias"))
+    compensate(tmp_path / "other", result=tmp_path / "result.json", out=tmp_path / "new")
+    new = read_recording(tmp_path / "new", Topics(imu="/imu/data", temperature="/xsens/warmth"))
+    assert len(new.t) == len(small_test.ns)
+    assert new.temperature is not None
+    np.testing.assert_array_equal(new.temperature.value, small_test.temperature)

@@ -12,12 +12,12 @@ import numpy as np
 from sdimu_calibration.core.compensation import Compensator, compensate, heat_since
 from sdimu_calibration.core.recording import Recording
 from sdimu_calibration.storage import cdr
-from sdimu_calibration.storage.bag_file import raw_messages
+from sdimu_calibration.storage.bag_file import read_topics
 from sdimu_calibration.storage.compensated_imu import encode_compensated
 from sdimu_calibration.storage.mcap_bag import McapBag
-from sdimu_calibration.storage.topics import Topics
 
 COMPENSATED = "/imu/data"
+_COPIED = (cdr.STATUS, cdr.JOINT_STATE, cdr.TEMPERATURE)
 _BLOCK = 20_000
 """Samples worked on at once: bounds the memory of long recordings."""
 
@@ -39,7 +39,6 @@ def write_compensated(
     frame_id: str,
     *,
     replace: bool = False,
-    topics: Topics | None = None,
     progress: Callable[[str, float], None] | None = None,
 ) -> Written:
     """Write a bag with the compensated samples of a recording, and its other topics as they are.
@@ -56,7 +55,6 @@ def write_compensated(
         Of the compensated samples.
     replace : bool
         Delete a bag that is already there.
-    topics : Topics, optional
     progress : callable, optional
 
     Raises
@@ -64,21 +62,19 @@ def write_compensated(
     DataError
         When something is in the way of the folder, or the errors cannot be inverted.
     """
-    topics = topics or Topics()
-    others = {topics.status: cdr.STATUS, topics.joint_states: cdr.JOINT_STATE, topics.temperature: cdr.TEMPERATURE}
-    raw = raw_messages(source, {topics.imu: cdr.IMU, **others}, required=topics.imu)
+    # By type: the topics may have any name, and keep it.
+    others = {t: c for t, c in read_topics(source, lambda _, kind: kind in _COPIED).items() if c.raw}
     stamps = recording.start_ns + np.rint(recording.t * 1e9).astype(np.int64)
     interval = recording.interval_s
     heat = heat_since(recording.temperature, recording.t - 0.5 * interval, using.start_temperature, causal=False)
     largest = np.zeros(6)
-    copied = [(_stamp(m), topic, m) for topic in others for m in raw.get(topic, [])]
+    copied = [(_stamp(m), topic, m) for topic, content in others.items() for m in content.raw]
     copied.sort(key=lambda entry: entry[0])
     next_copy = 0
     with McapBag(target, replace=replace) as bag:
         bag.topic(COMPENSATED, cdr.IMU)
-        for topic, kind in others.items():
-            if raw.get(topic):
-                bag.topic(topic, kind)
+        for topic, content in others.items():
+            bag.topic(topic, content.type_name)
         for first in range(0, len(stamps), _BLOCK):
             rows = slice(first, first + _BLOCK)
             done = compensate(
