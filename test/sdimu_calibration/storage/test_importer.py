@@ -261,6 +261,23 @@ def test_files_that_are_not_what_they_are_called_are_told(tmp_path):
     assert "no such file" in refusal([tmp_path / "absent.csv"], chart(tmp_path))
 
 
+def test_the_example_of_the_documentation_works(tmp_path):
+    page = (Path(__file__).parents[3] / "doc" / "recordings.md").read_text()
+    blocks = [
+        "\n".join(line[4:] for line in block.splitlines())
+        for block in page.split("\n\n")
+        if block.startswith("    ")
+    ]
+    (map_text,) = [block for block in blocks if block.startswith("format: sdimu-import/1")]
+    (csv,) = [block for block in blocks if block.startswith("t_us,")]
+    (tmp_path / "map.yaml").write_text(map_text)
+    (tmp_path / "a.csv").write_text(csv)
+    found = read_files([tmp_path / "a.csv"], load_import_map(tmp_path / "map.yaml"))
+    assert np.allclose(found.f_ib_b, np.array([[12.1, -3.0, 1001.2]]) * 1e-3 * G)
+    assert np.allclose(found.omega_ib_b, np.radians([[22.0 / 131.0, 20.0 / 131.0, -33.0 / 131.0]]))
+    assert found.temperature[1].tolist() == [24.5]
+
+
 def test_the_map_of_the_xsens_recording_reads_it_whole(recorded):
     files = [recorded(f"xsens/xsens_{kind}.mat") for kind in ("acc", "gyro")]
     found = read_files(files, load_import_map("xsens"))

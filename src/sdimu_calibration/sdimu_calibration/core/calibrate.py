@@ -23,6 +23,7 @@ from sdimu_calibration.core.passes import (
     solve,
 )
 from sdimu_calibration.core.recording import DataError, Recording
+from sdimu_calibration.core.rest_found import stops_line
 from sdimu_calibration.core.results import Calibration, History
 from sdimu_calibration.core.specification import ImuSpecification, Model, Site
 from sdimu_calibration.core.stop_misfit import stop_misfit
@@ -90,6 +91,7 @@ def assemble(recording: Recording, solution: Solution, held_out: bool) -> Calibr
     fit["held_out_rms"] = held_out_rms(reduced, setup, last) if held_out else None
     J = body_frame.frame_jacobian(names, frame)
     warnings = (*(f.text for f in reduced.faults if f.grave), *_warnings(solution, fit))
+    told = (*recording.notes, *stops_line(recording, reduced))
     return Calibration(
         body_frame=frame,
         model=tuple(e.name for e in setup.sensors.effects),
@@ -100,7 +102,7 @@ def assemble(recording: Recording, solution: Solution, held_out: bool) -> Calibr
         covariance=J @ last.covariance @ J.T,
         fit=fit,
         data=data_counts(recording, reduced) | {"conditions": conditions(setup)},
-        notes=(*recording.notes, *(f.text for f in reduced.faults if not f.grave), *warnings),
+        notes=(*told, *(f.text for f in reduced.faults if not f.grave), *warnings),
         history=history(reduced, setup, solution.first),
         warnings=warnings,
         faults=reduced.faults,

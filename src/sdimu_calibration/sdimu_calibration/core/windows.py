@@ -26,6 +26,8 @@ _REST = 6.0
 """At rest a reading differs from the usual one by less than so many sigma of the noise, learned from the windows."""
 _TURNING_EARTH = 3.0
 """The Earth's rate changes a reading by at most twice itself from attitude to attitude; mass unbalance adds to it."""
+_MOVING = np.radians(1.0)
+"""No sensor is so noisy: what scatters more (rad/s) moves, and an IMU that always moves has no rests."""
 _MAD = 1.482602218505602
 """From the median of |x| to the standard deviation of Gaussian noise."""
 
@@ -90,7 +92,8 @@ class Windows:
         steps = np.diff(self.w_mean, axis=0)[quiet[1:] & quiet[:-1]]
         noise = _MAD * np.median(np.abs(steps), axis=0) / np.sqrt(2.0) if len(steps) else np.zeros(3)
         usual = _MAD * float(np.median(self.swing[quiet]))
-        still = (np.abs(self.w_mean - self.rate_offset) < _TURNING_EARTH * earth.RATE + _REST * noise).all(axis=1)
+        limit = np.minimum(_TURNING_EARTH * earth.RATE + _REST * noise, _MOVING)
+        still = (np.abs(self.w_mean - self.rate_offset) < limit).all(axis=1)
         earth_turn = self.length * self.interval_s * _TURNING_EARTH * earth.RATE
         return np.asarray(still & (self.swing < _REST * usual + earth_turn))
 

@@ -12,7 +12,9 @@ import numpy as np
 
 from sdimu_calibration.core.axes_and_units import Stated, recognise
 from sdimu_calibration.core.earth_seen import EarthSeen, contradictions, reversed_force, see_earth
+from sdimu_calibration.core.even_stamps import evened
 from sdimu_calibration.core.recording import DataError, Recording
+from sdimu_calibration.core.rest_found import with_rests
 from sdimu_calibration.core.specification import ImuSpecification, Site
 from sdimu_calibration.core.status_clock import aligned
 from sdimu_calibration.core.units import UnitError, parse_unit
@@ -106,7 +108,7 @@ def open_recording(path: Path, source: Source | None = None) -> Recording:
             recording, omega_ib_b=recording.omega_ib_b * reading.gyro, f_ib_b=recording.f_ib_b * reading.accel
         )
     recording = replace(recording, notes=(*recording.notes, *reading.notes))
-    return _with_temperature(aligned(recording))
+    return _with_temperature(aligned(evened(recording)))
 
 
 def _with_temperature(recording: Recording) -> Recording:
@@ -121,7 +123,7 @@ def _with_temperature(recording: Recording) -> Recording:
 def place(
     recording: Recording, site: str | None, imu: ImuSpecification, source: Source | None = None
 ) -> tuple[Recording, Site]:
-    """Load the place of a test and compare it with what the data show of the Earth.
+    """Load the place of a test and compare it with what the data show of the Earth; find rests that nobody states.
 
     Parameters
     ----------
@@ -145,6 +147,7 @@ def place(
         When there is no such site.
     """
     where = load_site(site or DEFAULT_SITE)
+    recording = with_rests(recording, imu) if len(recording.t) >= _FEWEST else recording
     seen = see_earth(recording.t, recording.omega_ib_b, recording.f_ib_b, imu) if len(recording.t) >= _FEWEST else None
     notes = [] if site is not None else [_assumed(where, seen)]
     if seen is not None:
