@@ -264,9 +264,7 @@ def test_files_that_are_not_what_they_are_called_are_told(tmp_path):
 def test_the_example_of_the_documentation_works(tmp_path):
     page = (Path(__file__).parents[3] / "doc" / "recordings.md").read_text()
     blocks = [
-        "\n".join(line[4:] for line in block.splitlines())
-        for block in page.split("\n\n")
-        if block.startswith("    ")
+        "\n".join(line[4:] for line in block.splitlines()) for block in page.split("\n\n") if block.startswith("    ")
     ]
     (map_text,) = [block for block in blocks if block.startswith("format: sdimu-import/1")]
     (csv,) = [block for block in blocks if block.startswith("t_us,")]
