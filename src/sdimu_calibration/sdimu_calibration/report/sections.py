@@ -73,8 +73,8 @@ def ladder(diagnosis: Diagnosis, draw: Draw) -> str:
 
 
 _REFITS = (
-    "model", "log-likelihood", "log Bayes factor", "NIS", "held-out RMS", "velocity after turns", "moved most",
-    "verdict",
+    "model", "log-likelihood", "log Bayes factor", "NIS", "held-out RMS", "velocity after turns", "verdict",
+    "moved most (sigma)",
 )  # fmt: skip
 
 
@@ -97,8 +97,8 @@ def _refit(r: Rung) -> list[str]:
     return [
         f"+ {r.added}" if r.added else "model as given", f"{r.log_likelihood:.1f}",
         f"{r.log_bayes_factor:+.1f}" if r.added else "", f"{r.nis_mean:.3f}", f"{r.held_out_rms:.3f}",
-        f"{r.jump:.2f} sigma, {1e3 * r.jump_velocity:.2f} mm/s", moved,
-        "accepted" if r.accepted else f"refused: {r.reason}",
+        f"{r.jump:.2f} sigma, {1e3 * r.jump_velocity:.2f} mm/s",
+        "accepted" if r.accepted else f"refused: {r.reason}", moved,
     ]  # fmt: skip
 
 
