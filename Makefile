@@ -55,6 +55,10 @@ study: setup
 docs: setup
 	$(BIN)/sdimu effects --markdown > doc/effects.md
 
+# Minutes: every kind of fault in the data at five sizes.
+faults: setup
+	$(BIN)/sdimu study faults --out out/study-faults && cp out/study-faults/faults.md doc/faults.md
+
 # The pictures of the README, from a run with a hidden effect.
 pictures: setup
 	$(BIN)/sdimu simulate --plan kim18_signed --seed 7 --effect "gyro_scale_asymmetry_y=40 ppm" --replace \
@@ -65,4 +69,4 @@ campaigns: setup
 	$(BIN)/sdimu monte-carlo -n 200 --out out/monte-carlo
 	$(BIN)/sdimu hidden-campaign -n 200 --out out/hidden-campaign
 
-.PHONY: setup demo check test colcon bench study docs pictures campaigns
+.PHONY: setup demo check test colcon bench study docs faults pictures campaigns

@@ -175,6 +175,8 @@ def wild(recording: Recording) -> tuple[Floats, Floats, tuple[DataFault, ...]]:
     faults = []
     middle = recording.t[_WINDOW // 2 :: _WINDOW][:windows]
     for name, x in zip(CHANNELS, (*recording.omega_ib_b.T, *recording.f_ib_b.T), strict=True):
+        if _noiseless(x):
+            continue
         second = np.zeros_like(x)
         second[1:-1] = x[1:-1] - 0.5 * (x[:-2] + x[2:])
         rough = np.median(np.abs(second[: windows * _WINDOW]).reshape(windows, _WINDOW), axis=1)
