@@ -126,3 +126,14 @@ def test_a_clock_set_back_is_refused_wherever_it_falls_on_the_raster():
         t = np.where(np.arange(len(recording.t)) > 20_000, recording.t - back, recording.t)
         with pytest.raises(DataError, match="set back"):
             as_read(replace(recording, t=t))
+
+
+def test_stamps_that_many_readings_share_are_no_times():
+    n = 400
+    values = np.random.default_rng(1).standard_normal((n, 3))
+    pairs = np.repeat(np.arange(1, n // 2 + 1, dtype=np.int64), 2) * 20_000_000
+    with pytest.raises(DataError, match="no sample times"):
+        arrange(pairs, values, values, "here")
+    # Every sample sent twice is another thing: nothing about its time is wrong.
+    twice = np.repeat(values[: n // 2], 2, axis=0)
+    assert len(arrange(pairs, twice, twice, "here").rows) == n // 2

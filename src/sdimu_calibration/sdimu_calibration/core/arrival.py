@@ -21,6 +21,9 @@ _SAME_TIME = 0.5
 _OVERLAP = 3
 """So many samples in a row that arrive late, and find their time taken by other readings, mean a clock set back."""
 
+_WRONG_STAMPS = 0.2
+"""Share of samples with the stamp of another reading from which the other stamps are no times of samples either."""
+
 
 @dataclass(frozen=True)
 class Arranged:
@@ -74,6 +77,13 @@ def arrange(ns: Stamps, omega_ib_b: Floats, f_ib_b: Floats, where: str) -> Arran
     new = np.concatenate([[True], np.diff(ns[rows]) > 0])
     repeated = int(np.count_nonzero(~new))
     if repeated:
+        again, before = rows[~new], rows[np.flatnonzero(~new) - 1]
+        same = (omega_ib_b[again] == omega_ib_b[before]).all(axis=1) & (f_ib_b[again] == f_ib_b[before]).all(axis=1)
+        if np.count_nonzero(~same) > _WRONG_STAMPS * len(rows):
+            raise DataError(
+                f"{where}: {np.count_nonzero(~same)} of {len(rows)} samples have the stamp of another reading: stamps are "
+                "no sample times; check header.stamp of the driver"
+            )
         notes.append(f"{repeated} samples repeated a stamp and were dropped")
     rows = rows[new]
     if len(rows) < _MINIMUM_SAMPLES:
