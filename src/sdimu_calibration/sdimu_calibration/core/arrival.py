@@ -81,8 +81,8 @@ def arrange(ns: Stamps, omega_ib_b: Floats, f_ib_b: Floats, where: str) -> Arran
         same = (omega_ib_b[again] == omega_ib_b[before]).all(axis=1) & (f_ib_b[again] == f_ib_b[before]).all(axis=1)
         if np.count_nonzero(~same) > _WRONG_STAMPS * len(rows):
             raise DataError(
-                f"{where}: {np.count_nonzero(~same)} of {len(rows)} samples have the stamp of another reading: stamps are "
-                "no sample times; check header.stamp of the driver"
+                f"{where}: {np.count_nonzero(~same)} of {len(rows)} samples have the stamp of another reading: stamps "
+                "are no sample times; check header.stamp of the driver"
             )
         notes.append(f"{repeated} samples repeated a stamp and were dropped")
     rows = rows[new]
