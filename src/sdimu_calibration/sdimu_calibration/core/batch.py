@@ -49,6 +49,7 @@ from sdimu_calibration.core.results import Calibration, History
 from sdimu_calibration.core.rotation import rotation_matrix
 from sdimu_calibration.core.specification import ImuSpecification, Model, Site
 from sdimu_calibration.core.track import motion
+from sdimu_calibration.core.triad import FRAME, large_errors, triad_model
 
 Floats = NDArray[np.float64]
 
@@ -116,19 +117,26 @@ def batch_calibrate(
         When the recording or the options cannot be used, or an effect changes at random by itself.
     """
     setup = set_up(site, imu, model)
-    reduced = reduce(recording, setup)
-    start = first_attitude(reduced.epochs, reduced.phases, setup)
-    found = fit(reduced, setup, start, progress=progress)
-    names, frame = setup.sensors.names, model.body_frame
-    J = body_frame.jacobian_at(names, found.coefficients, frame)
+    turned = triad_model(setup.sensors, imu) if large_errors(setup.sensors) else None
+    inner = setup if turned is None else replace(setup, sensors=turned.inner)
+    reduced = reduce(recording, inner)
+    start = first_attitude(reduced.epochs, reduced.phases, inner)
+    found = fit(reduced, inner, start, progress=progress)
+    names = setup.sensors.names
+    if turned is None:
+        frame = model.body_frame
+        J = body_frame.jacobian_at(names, found.coefficients, frame)
+        values, covariance = body_frame.values_in_frame(names, found.coefficients, frame), J @ found.covariance @ J.T
+    else:
+        frame, values, covariance = FRAME, turned.values(found.coefficients), turned.covariance(found.covariance)
     return Calibration(
         body_frame=frame,
         model=tuple(e.name for e in setup.sensors.effects),
         names=names,
         units=tuple(p.unit for p in setup.sensors.parameters),
         display_units=tuple(p.display_unit for p in setup.sensors.parameters),
-        values=body_frame.values_in_frame(names, found.coefficients, frame),
-        covariance=J @ found.covariance @ J.T,
+        values=values,
+        covariance=covariance,
         fit={
             "log_likelihood": found.log_evidence,
             "nis_mean": found.chi2 / max(found.dof, 1),

@@ -27,6 +27,7 @@ from sdimu_calibration.core.rest_found import stops_line
 from sdimu_calibration.core.results import Calibration, History
 from sdimu_calibration.core.specification import ImuSpecification, Model, Site
 from sdimu_calibration.core.stop_misfit import stop_misfit
+from sdimu_calibration.core.triad import large_errors, triad_model
 
 Floats = NDArray[np.float64]
 
@@ -76,6 +77,11 @@ def calibrate(
     setup = set_up(site, imu, model)
     tell("reduce", 0.0)
     reduced = reduce(recording, setup)
+    turned = triad_model(setup.sensors, imu) if large_errors(setup.sensors) else None
+    if turned is not None:
+        from sdimu_calibration.core.large_result import large_calibrate  # noqa: PLC0415 (built on this file)
+
+        return large_calibrate(recording, replace(setup, sensors=turned.inner), reduced, turned, tell, held_out)
     solution = solve(setup, reduced, tell)
     result = assemble(recording, solution, held_out)
     tell("done", 1.0)

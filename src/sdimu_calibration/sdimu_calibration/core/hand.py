@@ -43,16 +43,16 @@ _SEEN = 3.0
 def by_hand(recording: Recording, imu: ImuSpecification) -> bool:
     """Decide whether navigation has nothing to hold on to because a rest does not show the Earth's rate.
 
-    It does not when the gyros' white noise, specified or learned from the rests, exceeds it in the usual rest.
+    It does not when the gyros' white noise in the usual rest, specified or learned, exceeds a third of it.
     """
-    if imu.gyro_white_noise < earth.RATE:  # seen within a second: no need to look at the samples
+    if _SEEN * imu.gyro_white_noise < earth.RATE:  # seen within a second: no need to look at the samples
         return False
     try:
         rests = find_rests(recording)
     except DataError:
         return False
     usual = float(np.median(rests.last - rests.first)) * recording.interval_s
-    return bool(max(imu.gyro_white_noise, rests.gyro_white_noise) / np.sqrt(usual) > earth.RATE)
+    return bool(_SEEN * max(imu.gyro_white_noise, rests.gyro_white_noise) / np.sqrt(usual) > earth.RATE)
 
 
 def hand_calibrate(

@@ -44,6 +44,11 @@ def _attitudes(C_nb: Floats, alpha: Floats, coning: Floats, dt: Floats, latitude
     return out
 
 
+def integrate(C_nb: Floats, cycles: Cycles, latitude: float) -> Floats:
+    """Attitude at the middle of each cycle, (n, 3, 3), by the gyros; `C_nb` (3, 3) is moved to the end, in place."""
+    return np.asarray(_attitudes(C_nb, np.ascontiguousarray(cycles.alpha), cycles.coning, cycles.dt, latitude))
+
+
 def temperatures(log: TemperatureLog | None, t: Floats, causal: bool) -> tuple[Floats, Floats]:
     """Temperature since the start (K) and its rate (K/s) at times `t`.
 
