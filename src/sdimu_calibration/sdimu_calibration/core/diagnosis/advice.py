@@ -105,7 +105,7 @@ def _about_found(d: Diagnosis, found: tuple[Found, ...], plan: PlanSeen) -> list
         if one.candidate.effect.run_local:
             out.append(f"{one.candidate.label} is a fault of this recording: record again and do not carry it over.")
         if one.alike:
-            out.append(separate(one, plan))
+            out.append(separate(one, plan) + _calculated(one))
     return out
 
 
@@ -131,6 +131,14 @@ def separate(one: Found, plan: PlanSeen) -> str:
             "or run the plan 'recommended'."
         )
     return head + f"repeat the turn that shows it in the other sense and at 10 deg/s ({2 * (dwell + 0.5):.0f} min)."
+
+
+def _calculated(one: Found) -> str:
+    """Name the command that ranks all turns by what they tell, where it knows both effects."""
+    names = (one.candidate.label, one.alike[0])
+    if any(":" in name for name in names):
+        return ""
+    return " Ranked by calculation: sdimu plan --plan YOURS " + " ".join(f"--tell '{name}'" for name in names) + "."
 
 
 def _about_plan(reached: tuple[Reach, ...], plan: PlanSeen) -> list[str]:
