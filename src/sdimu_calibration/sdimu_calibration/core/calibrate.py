@@ -100,7 +100,7 @@ def assemble(recording: Recording, solution: Solution, held_out: bool) -> Calibr
     told = (*recording.notes, *stops_line(recording, reduced))
     return Calibration(
         body_frame=frame,
-        model=tuple(e.name for e in setup.sensors.effects),
+        model=tuple(e.name if e.name.endswith(e.variant) else e.name + e.variant for e in setup.sensors.effects),
         names=names,
         units=tuple(p.unit for p in setup.sensors.parameters),
         display_units=tuple(p.display_unit for p in setup.sensors.parameters),

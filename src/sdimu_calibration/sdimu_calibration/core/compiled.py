@@ -19,8 +19,10 @@ _CORE = Path(__file__).parent
 @cache
 def _sources_digest(folder: Path) -> str:
     digest = hashlib.sha256()
-    for file in sorted({*_CORE.glob("*.py"), *folder.glob("*.py")}):
-        digest.update(file.read_bytes())
+    for file in sorted({*_CORE.rglob("*.py"), *folder.glob("*.py")}):
+        source = file.read_bytes()
+        if b"@compiled" in source:
+            digest.update(source)
     return digest.hexdigest()[:16]
 
 
@@ -30,7 +32,8 @@ def compiled(function: F) -> F:
     Not `fastmath`: NaN must stay NaN, and the same data must give the same digits in every process.
 
     Numba's cache notices a change of the function's own file only, while functions of other files are compiled into it.
-    So the cache's folder is named by the sources of the function's folder and of the core.
+    So the cache's folder is named by all sources of the core, and of the function's folder, that have compiled
+    functions. Constants that such a function takes from elsewhere must live in one of them too (there is a test).
     """
     folder = Path(function.__code__.co_filename).parent
     place = folder / "__pycache__"

@@ -1,0 +1,48 @@
+"""Compiled functions are compiled anew when anything that is compiled into them changes."""
+
+from __future__ import annotations
+
+import ast
+from pathlib import Path
+
+import sdimu_calibration.core
+
+CORE = Path(sdimu_calibration.core.__file__).parent
+PACKAGE = "sdimu_calibration.core"
+
+
+def compiled_files():
+    return [f for f in sorted(CORE.rglob("*.py")) if "@compiled" in f.read_text(encoding="utf-8")]
+
+
+def names_of_compiled_functions(tree):
+    """Names that the compiled functions of a module use."""
+    used = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.FunctionDef) and any(
+            isinstance(d, ast.Name) and d.id == "compiled" for d in node.decorator_list
+        ):
+            used |= {n.id for n in ast.walk(node) if isinstance(n, ast.Name)}
+    return used
+
+
+def imported_from_core(tree):
+    """Name to the file of the core that it is imported from; None for a whole module."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ImportFrom) and node.module and node.module.startswith(PACKAGE):
+            place = CORE.joinpath(*node.module.split(".")[2:])
+            for alias in node.names:
+                module = place / f"{alias.name}.py"
+                file = module if module.is_file() else place.with_suffix(".py")
+                yield alias.asname or alias.name, file
+
+
+def test_whatever_compiled_functions_take_from_the_core_is_part_of_the_key_of_their_cache():
+    files = compiled_files()
+    assert len(files) > 5
+    for file in files:
+        tree = ast.parse(file.read_text(encoding="utf-8"))
+        used = names_of_compiled_functions(tree)
+        for name, origin in imported_from_core(tree):
+            if name in used:
+                assert origin in files, f"{file.name} compiles {name} of {origin.name} into its functions"
