@@ -123,10 +123,10 @@ def build(shelf: Shelf) -> Dash:
         bench = shelf.bench(now.recording)
         try:
             final = bench.final(now.added, now.held, tell)
+            tell("report", 0.8)
+            packed = archive(bench.model, now.added, final, f"Workbench: {now.recording or shelf.names[0]}")
         except (DataError, UnitError) as error:
             return no_update, f"Not done: {_line(error)}"
-        tell("report", 0.8)
-        packed = archive(bench.model, now.added, final, f"Workbench: {now.recording or shelf.names[0]}")
         return dcc.send_bytes(packed, "calibration.zip"), ""
 
     @app.callback(

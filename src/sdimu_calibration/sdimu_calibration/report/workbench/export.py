@@ -11,16 +11,26 @@ from pathlib import Path
 import yaml
 
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
+from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.specification import Model
 from sdimu_calibration.report.page import write_report
+from sdimu_calibration.storage.effect_file import find_effects
 from sdimu_calibration.storage.result_file import write_result
 
 
 def model_files(model: Model, added: Sequence[str]) -> dict[str, str]:
-    """Return model.yaml, and a file for each effect of one's own, by name."""
+    """Return model.yaml, and a file for each effect of one's own, by name.
+
+    Raises
+    ------
+    DataError
+        When the model to start from has effects that only a file of its own can say.
+    """
     own = {f"effect-{k}.yaml": text for k, text in enumerate(added, 1) if "\n" in text.strip()}
     by_text = {text: name for name, text in own.items()}
     effects = [e if isinstance(e, str) else e.name for e in model.effects]
+    for name in effects:
+        _check_named(name)
     content = {
         "format": "sdimu-model/1",
         "effects": [*effects, *(by_text.get(text, text) for text in added)],
@@ -30,6 +40,15 @@ def model_files(model: Model, added: Sequence[str]) -> dict[str, str]:
         "body_frame": model.body_frame,
     }
     return {"model.yaml": yaml.safe_dump(content, sort_keys=False), **own}
+
+
+def _check_named(name: str) -> None:
+    try:
+        find_effects(name)
+    except DataError as error:
+        raise DataError(
+            f"the model to start from has an effect of your own, {name}: start from one without, and add it in the page"
+        ) from error
 
 
 def archive(model: Model, added: Sequence[str], final: Diagnosis, title: str) -> bytes:

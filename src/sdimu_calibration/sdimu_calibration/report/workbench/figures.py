@@ -18,7 +18,7 @@ _FONT = 13
 def heat_map(grid: data.Grid, cell: tuple[int, int]) -> Any:
     """Heat map of the report with a frame around the cell that is looked at."""
     figure = evidence_figures.heat_map(grid)
-    figure.update_traces(colorbar={"title": {"text": "sigma", "side": "top"}})
+    figure.update_traces(colorbar={"title": {"text": "sigma<br> ", "side": "top"}})
     row, column = cell[0], int(np.searchsorted(grid.stops, cell[1]))
     figure.add_shape(
         type="rect", x0=column - 0.5, x1=column + 0.5, y0=row - 0.5, y1=row + 0.5, fillcolor="rgba(0, 0, 0, 0)",
