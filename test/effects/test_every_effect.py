@@ -16,8 +16,8 @@ import sdimu_calibration.core.effects  # noqa: F401  (fills the registry)
 from rate_table_sim.core.specification import TableSpecification
 from sdimu_calibration.core import earth
 from sdimu_calibration.core.effects import registry
-from sdimu_calibration.core.filter_pass import HELD_ALL, NAV, SKIP, PassState, new_output, run_pass
-from sdimu_calibration.core.passes import first_attitude, one_pass, pass_settings, reduce, set_up
+from sdimu_calibration.core.filter.filter_pass import HELD_ALL, NAV, SKIP, PassState, new_output, run_pass
+from sdimu_calibration.core.filter.passes import first_attitude, one_pass, pass_settings, reduce, set_up
 from sdimu_calibration.core.plan import Plan, Turn
 from sdimu_calibration.core.rotation import rotation_vector
 from sdimu_calibration.core.specification import ImuSpecification, Model, Site

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from sdimu_calibration.core.batch import batch_calibrate
+from sdimu_calibration.core.batch.batch import batch_calibrate
 from sdimu_calibration.core.calibrate import calibrate
 from sdimu_calibration.core.plan import Plan
 from sdimu_calibration.storage.config import load_imu, load_model, load_plan, load_site

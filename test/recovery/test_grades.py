@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from sdimu_calibration.core.batch import batch_calibrate, bound_covariance
-from sdimu_calibration.core.predict import predict
+from sdimu_calibration.core.batch.batch import batch_calibrate, bound_covariance
+from sdimu_calibration.core.planning.predict import predict
 from sdimu_calibration.storage.config import config_folder, load_imu, load_model, load_plan, load_site
 from sdimu_sim.core.scenario import Scenario, generate
 from sdimu_sim.core.truth import in_body_frame

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import scipy.linalg
 
-from sdimu_calibration.core.hand import hand_calibrate
-from sdimu_calibration.core.quiet import find_rests
+from sdimu_calibration.core.data.quiet import find_rests
+from sdimu_calibration.core.hand.hand import hand_calibrate
 from sdimu_calibration.core.recording import Recording
 from sdimu_calibration.storage.config import load_imu, load_model
 

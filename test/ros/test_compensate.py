@@ -18,7 +18,7 @@ from rclpy.task import Future
 from sensor_msgs.msg import Imu
 from std_srvs.srv import Trigger
 
-from sdimu_calibration.core.batch import no_history
+from sdimu_calibration.core.batch.batch import no_history
 from sdimu_calibration.core.compensation import compensate, compensator
 from sdimu_calibration.core.effects import registry
 from sdimu_calibration.core.recording import DataError

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from sdimu_calibration.cli.compensate import compensate
-from sdimu_calibration.core.batch import no_history
+from sdimu_calibration.core.batch.batch import no_history
 from sdimu_calibration.core.compensation import compensate as in_core
 from sdimu_calibration.core.compensation import compensator
 from sdimu_calibration.core.effects import selection

@@ -5,8 +5,8 @@ import pytest
 from scipy.optimize import minimize_scalar
 
 from sdimu_calibration.core import earth
+from sdimu_calibration.core.navigation.strapdown import CYCLE_S, navigate_cycle, velocity_increment
 from sdimu_calibration.core.rotation import rotation_matrix, rotation_vector
-from sdimu_calibration.core.strapdown import CYCLE_S, navigate_cycle, velocity_increment
 
 HOUR = 3600.0
 

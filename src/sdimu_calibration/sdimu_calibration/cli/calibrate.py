@@ -162,7 +162,7 @@ def check_estimator(name: str) -> None:
 
 def chosen_estimator(name: str, recording: Recording, imu: ImuSpecification) -> str:
     """Decide between filter and hand when it is left open, by what the gyros see of the Earth's rate."""
-    from sdimu_calibration.core.hand import by_hand
+    from sdimu_calibration.core.hand.hand import by_hand
 
     if name != "auto":
         return name
@@ -171,10 +171,10 @@ def chosen_estimator(name: str, recording: Recording, imu: ImuSpecification) -> 
 
 def _estimators() -> dict[str, Callable[..., Calibration]]:
     """All estimators by name."""
-    from sdimu_calibration.core.batch import batch_calibrate
+    from sdimu_calibration.core.batch.batch import batch_calibrate
+    from sdimu_calibration.core.batch.classical import classical_calibrate
     from sdimu_calibration.core.calibrate import calibrate as filter_calibrate
-    from sdimu_calibration.core.classical import classical_calibrate
-    from sdimu_calibration.core.hand import hand_calibrate
+    from sdimu_calibration.core.hand.hand import hand_calibrate
 
     return {
         "filter": filter_calibrate, "batch": batch_calibrate, "classical": classical_calibrate, "hand": hand_calibrate,

@@ -12,9 +12,9 @@ import typer
 from sdimu_calibration.core.recording import DataError
 
 if TYPE_CHECKING:
-    from sdimu_calibration.core.noise_set import NoiseSet
     from sdimu_calibration.core.plan import Plan
-    from sdimu_calibration.core.predict import Prediction
+    from sdimu_calibration.core.planning.noise_set import NoiseSet
+    from sdimu_calibration.core.planning.predict import Prediction
     from sdimu_calibration.core.specification import ImuSpecification, Model, Site
 
 _MOUNT = "Rotation of the IMU on the table: degrees about every axis, or 'X,Y,Z'."
@@ -33,8 +33,8 @@ def predict(
     """Simulate the covariance of a test; leaves prediction.json and prediction.html."""
     from rich.console import Console
 
-    from sdimu_calibration.core.batch import bound_covariance
-    from sdimu_calibration.core.predict import predict as simulate
+    from sdimu_calibration.core.batch.batch import bound_covariance
+    from sdimu_calibration.core.planning.predict import predict as simulate
     from sdimu_calibration.report.prediction import coefficient_table, published_table, write_page
     from sdimu_calibration.storage.config import load_imu, load_model, load_plan, load_site
     from sdimu_calibration.storage.noise_file import load_noise
@@ -77,8 +77,8 @@ def _beside(
     prediction: Prediction,
 ) -> list[tuple[str, ...]]:
     """Rows of the published table beside our own numbers."""
-    from sdimu_calibration.core.predict import largest_by_effect
-    from sdimu_calibration.core.predict import predict as simulate
+    from sdimu_calibration.core.planning.predict import largest_by_effect
+    from sdimu_calibration.core.planning.predict import predict as simulate
     from sdimu_calibration.report.prediction import display_units, published_rows
 
     found = {

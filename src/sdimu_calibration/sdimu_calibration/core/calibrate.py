@@ -8,10 +8,18 @@ from zlib import crc32
 import numpy as np
 from numpy.typing import NDArray
 
-from sdimu_calibration.core import body_frame
-from sdimu_calibration.core.azimuth_known import azimuth_warning
-from sdimu_calibration.core.filter_pass import ALL, HELD_ALL, HELD_SENSORS, SENSORS, PassState, new_output, run_pass
-from sdimu_calibration.core.passes import (
+from sdimu_calibration.core.filter import body_frame
+from sdimu_calibration.core.filter.azimuth_known import azimuth_warning
+from sdimu_calibration.core.filter.filter_pass import (
+    ALL,
+    HELD_ALL,
+    HELD_SENSORS,
+    SENSORS,
+    PassState,
+    new_output,
+    run_pass,
+)
+from sdimu_calibration.core.filter.passes import (
     Pass,
     Progress,
     Reduced,
@@ -22,12 +30,12 @@ from sdimu_calibration.core.passes import (
     set_up,
     solve,
 )
+from sdimu_calibration.core.filter.rest_found import stops_line
+from sdimu_calibration.core.filter.stop_misfit import stop_misfit
+from sdimu_calibration.core.large.triad import large_errors, triad_model
 from sdimu_calibration.core.recording import DataError, Recording
-from sdimu_calibration.core.rest_found import stops_line
 from sdimu_calibration.core.results import Calibration, History
 from sdimu_calibration.core.specification import ImuSpecification, Model, Site
-from sdimu_calibration.core.stop_misfit import stop_misfit
-from sdimu_calibration.core.triad import large_errors, triad_model
 
 Floats = NDArray[np.float64]
 
@@ -79,7 +87,7 @@ def calibrate(
     reduced = reduce(recording, setup)
     turned = triad_model(setup.sensors, imu) if large_errors(setup.sensors) else None
     if turned is not None:
-        from sdimu_calibration.core.large_result import large_calibrate  # noqa: PLC0415 (built on this file)
+        from sdimu_calibration.core.large.large_result import large_calibrate  # noqa: PLC0415 (built on this file)
 
         return large_calibrate(recording, replace(setup, sensors=turned.inner), reduced, turned, tell, held_out)
     solution = solve(setup, reduced, tell)

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sdimu_calibration.core.motion import Motion
+from sdimu_calibration.core.effects.motion import Motion
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.units import parse_unit
 

@@ -7,15 +7,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sdimu_calibration.core import body_frame
-from sdimu_calibration.core.alignment import Alignment
-from sdimu_calibration.core.arrival import arrange
 from sdimu_calibration.core.calibrate import calibrate
-from sdimu_calibration.core.epochs import Epochs, cut
-from sdimu_calibration.core.filter_pass import NAV, PassInput, PassState, new_output, run_pass
-from sdimu_calibration.core.gaps import bridges, largest_acceleration
-from sdimu_calibration.core.motion import Motion
-from sdimu_calibration.core.passes import (
+from sdimu_calibration.core.data.arrival import arrange
+from sdimu_calibration.core.data.epochs import Epochs, cut
+from sdimu_calibration.core.data.gaps import bridges, largest_acceleration
+from sdimu_calibration.core.data.phases import Phases, PhaseState, classify
+from sdimu_calibration.core.effects.motion import Motion
+from sdimu_calibration.core.filter import body_frame
+from sdimu_calibration.core.filter.filter_pass import NAV, PassInput, PassState, new_output, run_pass
+from sdimu_calibration.core.filter.passes import (
     ALIGN_S,
     first_attitude,
     measurement_kinds,
@@ -23,7 +23,9 @@ from sdimu_calibration.core.passes import (
     set_up,
     start_state,
 )
-from sdimu_calibration.core.phases import Phases, PhaseState, classify
+from sdimu_calibration.core.navigation.alignment import Alignment
+from sdimu_calibration.core.navigation.strapdown import Cycles, Reducer
+from sdimu_calibration.core.navigation.track import motion
 from sdimu_calibration.core.recording import (
     NOMINAL_FROM,
     DataError,
@@ -37,8 +39,6 @@ from sdimu_calibration.core.recording import (
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.rotation import quaternion
 from sdimu_calibration.core.specification import ImuSpecification, Model, Site
-from sdimu_calibration.core.strapdown import Cycles, Reducer
-from sdimu_calibration.core.track import motion
 
 Floats = NDArray[np.float64]
 Stamps = NDArray[np.int64]

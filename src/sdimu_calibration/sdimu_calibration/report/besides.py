@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.diagnosis.grow import Rung
 from sdimu_calibration.core.diagnosis.in_use import in_use
-from sdimu_calibration.core.free_inertial import Trial
+from sdimu_calibration.core.filter.free_inertial import Trial
 from sdimu_calibration.core.recording import DataError, Recording, TableLog
 from sdimu_calibration.core.specification import ImuSpecification, Model, Site
 

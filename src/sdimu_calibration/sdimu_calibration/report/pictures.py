@@ -18,7 +18,7 @@ from PIL import Image
 
 from sdimu_calibration.core.diagnosis.consistency import CHANNEL_NAMES
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
-from sdimu_calibration.core.free_inertial import Trial
+from sdimu_calibration.core.filter.free_inertial import Trial
 from sdimu_calibration.report import data
 from sdimu_calibration.report.drawing import AFTER, BEFORE, DIVERGING
 from sdimu_calibration.report.evidence_figures import cell

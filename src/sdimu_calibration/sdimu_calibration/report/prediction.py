@@ -11,7 +11,7 @@ import numpy as np
 from rich.box import SIMPLE
 from rich.table import Table
 
-from sdimu_calibration.core.predict import Prediction
+from sdimu_calibration.core.planning.predict import Prediction
 from sdimu_calibration.core.results import Calibration, History
 from sdimu_calibration.core.units import from_si
 from sdimu_calibration.report.figures import sigma_history

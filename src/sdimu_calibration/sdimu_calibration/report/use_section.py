@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from plotly.subplots import make_subplots
 
-from sdimu_calibration.core.free_inertial import Drift, Trial
+from sdimu_calibration.core.filter.free_inertial import Drift, Trial
+from sdimu_calibration.core.filter.unseen import WANTED_S
 from sdimu_calibration.core.units import from_si
-from sdimu_calibration.core.unseen import WANTED_S
 from sdimu_calibration.report.besides import Besides
 from sdimu_calibration.report.drawing import AFTER, BEFORE, lay_out
 from sdimu_calibration.report.markup import Draw, grid, quiet, section, sentence

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from rosbags.typesys import Stores, get_typestore
 
-from sdimu_calibration.core.arrival import arrange
+from sdimu_calibration.core.data.arrival import arrange
 from sdimu_calibration.core.recording import (
     Floats,
     PhaseLog,

@@ -18,6 +18,7 @@ from pydantic import Field
 from sdimu_calibration.core.diagnosis.candidates import own_equation, without
 from sdimu_calibration.core.effects import registry, selection
 from sdimu_calibration.core.effects.effect import CHANNELS, Effect, Parameter, Term
+from sdimu_calibration.core.effects.motion import Floats, Motion
 from sdimu_calibration.core.expression import (
     TEMPERATURE_NAMES,
     VARIABLES,
@@ -26,7 +27,6 @@ from sdimu_calibration.core.expression import (
     parse_expression,
     written,
 )
-from sdimu_calibration.core.motion import Floats, Motion
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.specification import Model
 from sdimu_calibration.core.units import UnitError, parse_quantity, parse_unit

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from sdimu_calibration.core.noise_set import NoiseSet
+from sdimu_calibration.core.planning.noise_set import NoiseSet
 from sdimu_calibration.storage.config import Schema, find_config, quantity, read_yaml
 
 

@@ -10,13 +10,13 @@ from pathlib import Path
 
 import numpy as np
 
-from sdimu_calibration.core.axes_and_units import Stated, recognise
-from sdimu_calibration.core.earth_seen import EarthSeen, contradictions, reversed_force, see_earth
-from sdimu_calibration.core.even_stamps import evened
+from sdimu_calibration.core.data.axes_and_units import Stated, recognise
+from sdimu_calibration.core.data.earth_seen import EarthSeen, contradictions, reversed_force, see_earth
+from sdimu_calibration.core.data.even_stamps import evened
+from sdimu_calibration.core.data.status_clock import aligned
+from sdimu_calibration.core.filter.rest_found import with_rests
 from sdimu_calibration.core.recording import DataError, Recording
-from sdimu_calibration.core.rest_found import with_rests
 from sdimu_calibration.core.specification import ImuSpecification, Site
-from sdimu_calibration.core.status_clock import aligned
 from sdimu_calibration.core.units import UnitError, parse_unit
 from sdimu_calibration.storage.bag_reader import read_recording
 from sdimu_calibration.storage.config import load_site

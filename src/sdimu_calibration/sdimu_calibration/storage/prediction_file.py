@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from sdimu_calibration.core.predict import Prediction
+from sdimu_calibration.core.planning.predict import Prediction
 from sdimu_calibration.storage.json_file import write_json
 
 FORMAT = "sdimu-prediction/1"

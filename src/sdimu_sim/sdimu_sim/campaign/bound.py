@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from sdimu_calibration.core.batch import bound_covariance
-from sdimu_calibration.core.predict import predict
+from sdimu_calibration.core.batch.batch import bound_covariance
+from sdimu_calibration.core.planning.predict import predict
 from sdimu_sim.campaign.run import CalibrationRun
 from sdimu_sim.core.scenario import imu_truth
 

@@ -20,21 +20,21 @@ Drivers, clocks, tables and people spoil data in ways that no sensor model knows
 
 ## How a fault is met
 
-- **Order of arrival** (`core/arrival`): numbers that are not finite and stamps that were there before are dropped and
-  counted; late samples are sorted in. Late samples whose time other readings have already are no late samples: the
-  clock was set back, and the run is refused.
-- **No measurement** (`core/soundness`): a number that stands still, a reading at the end of its range, a
-  single spike. Each is a probability under the channel's own noise; such samples count as missing.
-- **Missing samples** (`core/gaps`): the noise of the two samples that bridge a gap is counted as often as they stand in
-  for others. In a turn the rate inside is known only as far as the largest angular acceleration in the recording
-  allows, +-(a^2 T^2 - D^2) / (4 a) of angle; force and velocity follow. At rest nothing is added, but
+- **Order of arrival** (`core/data/arrival`): numbers that are not finite and stamps that were there before are
+  dropped and counted; late samples are sorted in. Late samples whose time other readings have already are no late
+  samples: the clock was set back, and the run is refused.
+- **No measurement** (`core/data/soundness`): a number that stands still, a reading at the end of its range, a single
+  spike. Each is a probability under the channel's own noise; such samples count as missing.
+- **Missing samples** (`core/data/gaps`): the noise of the two samples that bridge a gap is counted as often as they
+  stand in for others. In a turn the rate inside is known only as far as the largest angular acceleration in the
+  recording allows, +-(a^2 T^2 - D^2) / (4 a) of angle; force and velocity follow. At rest nothing is added, but
   readings before and after must agree, or the IMU was moved or switched off. Where the attitude is left open by more
   than {linear:g} mrad the linear filter would be wrong by more than its noise: refused.
-- **Status** (`core/phases`): rest must be said by the table *and* felt by the IMU. A silent status leaves the IMU to
-  decide; numbers of stops that make no sense are replaced by counting.
-- **What does not fit** (`core/stop_misfit`): the whitened innovations of every stop are summed; one stop that is beyond
-  chance (1e-4 a test) is named, where a mean over the whole test would hide it. An azimuth that too few attitudes leave
-  open bends the estimate (`core/azimuth_known`): warned.
+- **Status** (`core/data/phases`): rest must be said by the table *and* felt by the IMU. A silent status leaves the
+  IMU to decide; numbers of stops that make no sense are replaced by counting.
+- **What does not fit** (`core/filter/stop_misfit`): the whitened innovations of every stop are summed; one stop that
+  is beyond chance (1e-4 a test) is named, where a mean over the whole test would hide it. An azimuth that too few
+  attitudes leave open bends the estimate (`core/filter/azimuth_known`): warned.
 
 What no data can tell: a gap at rest in which the IMU was switched off and came back with biases that differ by
 less than the noise of the stops shows nowhere; every gap at rest from 2 s on is therefore a warning.
@@ -54,7 +54,7 @@ written there before it is acknowledged) and ends with the same digits; what was
 
 def page(outcomes: list[Outcome]) -> str:
     """Make doc/faults.md from the outcomes of a study."""
-    from sdimu_calibration.core.gaps import LINEAR_RAD  # noqa: PLC0415 (the campaign joins both sides)
+    from sdimu_calibration.core.data.gaps import LINEAR_RAD  # noqa: PLC0415 (the campaign joins both sides)
 
     seeds = sorted({o.seed for o in outcomes})
     head = _HEAD.format(

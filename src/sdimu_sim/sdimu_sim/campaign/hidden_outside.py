@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sdimu_calibration.core.effects.effect import CHANNELS, Effect, Parameter, Term, TestTimes
-from sdimu_calibration.core.motion import Floats, Motion
+from sdimu_calibration.core.effects.motion import Floats, Motion
 
 OUTSIDE = "outside"
 """Prefix of the labels of shapes."""

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sdimu_calibration.core.batch.classical import TABLE_FRAME, classical_calibrate
 from sdimu_calibration.core.calibrate import calibrate
-from sdimu_calibration.core.classical import TABLE_FRAME, classical_calibrate
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.specification import Model
 from sdimu_sim.core.scenario import Scenario, generate

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rate_table_sim.core import TableMotion, TableSpecification, phase_changes, table_motion
-from sdimu_calibration.core import body_frame
-from sdimu_calibration.core.passes import reduce, set_up, solve
+from sdimu_calibration.core.filter import body_frame
+from sdimu_calibration.core.filter.passes import reduce, set_up, solve
 from sdimu_calibration.core.plan import Plan
 from sdimu_calibration.core.recording import PhaseLog, Recording
 from sdimu_calibration.core.specification import Model

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from sdimu_calibration.core import imu_model
-from sdimu_calibration.core.passes import MOST_PASSES
+from sdimu_calibration.core.effects import imu_model
+from sdimu_calibration.core.filter.passes import MOST_PASSES
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.specification import ImuSpecification, Model
 from sdimu_sim.campaign import statistics

@@ -32,7 +32,7 @@ def mount(
     from rich.table import Table
 
     from sdimu_calibration.cli.progress import bar
-    from sdimu_calibration.core.imu_model import build
+    from sdimu_calibration.core.effects.imu_model import build
     from sdimu_calibration.core.units import from_si
     from sdimu_calibration.report.mount_study import write_page
     from sdimu_calibration.storage.config import load_imu, load_model, load_plan, load_site

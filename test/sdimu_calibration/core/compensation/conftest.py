@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import pytest
 
-from sdimu_calibration.core.batch import no_history
+from sdimu_calibration.core.batch.batch import no_history
 from sdimu_calibration.core.effects import selection
 from sdimu_calibration.core.results import Calibration
 

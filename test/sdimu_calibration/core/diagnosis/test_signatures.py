@@ -10,8 +10,8 @@ from sdimu_calibration.core.calibrate import fit_statistics
 from sdimu_calibration.core.diagnosis.evidence import collect
 from sdimu_calibration.core.diagnosis.scan import TESTABLE, scan
 from sdimu_calibration.core.effects import registry
-from sdimu_calibration.core.imu_model import build
-from sdimu_calibration.core.passes import solve
+from sdimu_calibration.core.effects.imu_model import build
+from sdimu_calibration.core.filter.passes import solve
 
 
 def _silent(_what, _share):

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from sdimu_calibration.core.diagnosis.candidates import split
 from sdimu_calibration.core.diagnosis.rounds import told_apart
+from sdimu_calibration.core.effects.imu_model import build
 from sdimu_calibration.core.effects.selection import resolve
-from sdimu_calibration.core.imu_model import build
 from sdimu_calibration.storage.config import load_imu
 
 

@@ -9,8 +9,8 @@ import numpy as np
 from sdimu_calibration.core.diagnosis.evidence import collect, columns
 from sdimu_calibration.core.diagnosis.scan import scan
 from sdimu_calibration.core.effects import registry
-from sdimu_calibration.core.passes import set_up, solve
-from sdimu_calibration.core.track import motion
+from sdimu_calibration.core.filter.passes import set_up, solve
+from sdimu_calibration.core.navigation.track import motion
 
 SEEDS = (101, 102, 103)
 _DRIFTS = ("gyro_bias_ramp", "gyro_g_squared", "gyro_g_sensitivity", "gyro_magnetic")

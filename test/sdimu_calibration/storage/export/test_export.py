@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import yaml
 
-from sdimu_calibration.core.batch import no_history
+from sdimu_calibration.core.batch.batch import no_history
 from sdimu_calibration.core.compensation import compensate, compensator, linear_model
 from sdimu_calibration.core.effects import selection
 from sdimu_calibration.core.recording import DataError

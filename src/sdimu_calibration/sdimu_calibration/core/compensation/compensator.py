@@ -21,16 +21,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sdimu_calibration.core import imu_model
 from sdimu_calibration.core.compensation.reads import reads, samples_motion
-from sdimu_calibration.core.effects import selection
+from sdimu_calibration.core.effects import imu_model, selection
 from sdimu_calibration.core.effects.effect import Effect
-from sdimu_calibration.core.imu_model import ImuModel
-from sdimu_calibration.core.motion import Motion
+from sdimu_calibration.core.effects.imu_model import ImuModel
+from sdimu_calibration.core.effects.motion import Motion
+from sdimu_calibration.core.navigation.track import temperatures
 from sdimu_calibration.core.recording import DataError, TemperatureLog
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.specification import ImuSpecification
-from sdimu_calibration.core.track import temperatures
 
 Floats = NDArray[np.float64]
 

@@ -16,7 +16,7 @@ from sdimu_calibration.core.diagnosis.found import looked_at
 from sdimu_calibration.core.diagnosis.information import Information
 from sdimu_calibration.core.diagnosis.remainder import remainder
 from sdimu_calibration.core.diagnosis.search import FALSE_ALARM, search
-from sdimu_calibration.core.passes import Progress
+from sdimu_calibration.core.filter.passes import Progress
 
 Floats = NDArray[np.float64]
 

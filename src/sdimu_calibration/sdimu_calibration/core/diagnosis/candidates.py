@@ -10,7 +10,7 @@ import numpy as np
 
 from sdimu_calibration.core.effects import registry
 from sdimu_calibration.core.effects.effect import AXES, CHANNELS, Column, Effect, Parameter, Term, TestTimes, product
-from sdimu_calibration.core.motion import Floats, Motion
+from sdimu_calibration.core.effects.motion import Floats, Motion
 
 _CYCLES = np.arange(1.0, 20.0, 0.5)
 OWN = "own equation"

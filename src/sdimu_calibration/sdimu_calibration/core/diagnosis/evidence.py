@@ -14,10 +14,10 @@ from sdimu_calibration.core.diagnosis.candidates import Candidate, split
 from sdimu_calibration.core.diagnosis.information import Information
 from sdimu_calibration.core.diagnosis.signatures import measured_rows, signatures
 from sdimu_calibration.core.effects.effect import Effect, TestTimes
-from sdimu_calibration.core.filter_pass import NAV, PassOutput, PassState, new_output, run_pass
-from sdimu_calibration.core.motion import Motion
-from sdimu_calibration.core.passes import Pass, Reduced, Setup, pass_settings
-from sdimu_calibration.core.track import motion
+from sdimu_calibration.core.effects.motion import Motion
+from sdimu_calibration.core.filter.filter_pass import NAV, PassOutput, PassState, new_output, run_pass
+from sdimu_calibration.core.filter.passes import Pass, Reduced, Setup, pass_settings
+from sdimu_calibration.core.navigation.track import motion
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

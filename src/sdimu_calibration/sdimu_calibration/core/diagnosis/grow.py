@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis, diagnose
 from sdimu_calibration.core.effects.effect import Effect
-from sdimu_calibration.core.passes import Progress
+from sdimu_calibration.core.filter.passes import Progress
 from sdimu_calibration.core.recording import Recording
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.specification import ImuSpecification, Model, Site

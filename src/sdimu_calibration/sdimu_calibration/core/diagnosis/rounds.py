@@ -25,8 +25,8 @@ from sdimu_calibration.core.diagnosis.evidence import Evidence, collect, test_ti
 from sdimu_calibration.core.diagnosis.remainder import Remainder, remainder
 from sdimu_calibration.core.diagnosis.search import Search, search
 from sdimu_calibration.core.effects.effect import Effect
-from sdimu_calibration.core.imu_model import build
-from sdimu_calibration.core.passes import Progress, Solution, solve
+from sdimu_calibration.core.effects.imu_model import build
+from sdimu_calibration.core.filter.passes import Progress, Solution, solve
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sdimu_calibration.core.passes import Reduced, Solution
+from sdimu_calibration.core.filter.passes import Reduced, Solution
 from sdimu_calibration.core.recording import Recording
 
 _MISLEADING = frozenset({"stuck", "saturated"})

@@ -19,9 +19,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sdimu_calibration.core.compiled import compiled
-from sdimu_calibration.core.filter_pass import MEASURED, NAV, PassOutput
-from sdimu_calibration.core.kalman import whiten
-from sdimu_calibration.core.motion import Motion
+from sdimu_calibration.core.effects.motion import Motion
+from sdimu_calibration.core.filter.filter_pass import MEASURED, NAV, PassOutput
+from sdimu_calibration.core.filter.kalman import whiten
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from sdimu_calibration.core.effects.effect import ACCEL, AXES, Column, family, matrix_columns
+from sdimu_calibration.core.effects.motion import Floats, Motion
 from sdimu_calibration.core.effects.registry import register
-from sdimu_calibration.core.motion import Floats, Motion
 
 
 def _coupling(i: int, j: int) -> Column:

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sdimu_calibration.core.effects.effect import ACCEL, GYRO, Effect, own_axis, per_axis
+from sdimu_calibration.core.effects.motion import Motion
 from sdimu_calibration.core.effects.registry import register
-from sdimu_calibration.core.motion import Motion
 from sdimu_calibration.core.units import to_si
 
 

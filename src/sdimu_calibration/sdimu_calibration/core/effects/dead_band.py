@@ -6,8 +6,8 @@ import numpy as np
 
 from sdimu_calibration.core import earth
 from sdimu_calibration.core.effects.effect import GYRO, family, per_axis_columns
+from sdimu_calibration.core.effects.motion import Floats, Motion
 from sdimu_calibration.core.effects.registry import register
-from sdimu_calibration.core.motion import Floats, Motion
 
 # sgn(w) at a rate of a few per cent of Earth rate is decided by noise: the step is as wide as that.
 _WIDTH = 0.01 * earth.RATE

@@ -18,8 +18,8 @@ from sdimu_calibration.core.effects.effect import (
     pick,
 )
 from sdimu_calibration.core.effects.mass_unbalance import GYRO_MASS_UNBALANCE, TERMS
+from sdimu_calibration.core.effects.motion import Floats, Motion
 from sdimu_calibration.core.effects.registry import register
-from sdimu_calibration.core.motion import Floats, Motion
 
 _TRIADS = {
     "gyro": (GYRO, "gyro", "w", ("rad/s", "deg/h"), (0.5, 3, 50)),

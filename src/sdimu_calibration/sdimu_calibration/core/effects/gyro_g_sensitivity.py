@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from sdimu_calibration.core.effects.effect import AXES, GYRO, family, matrix_columns, product
+from sdimu_calibration.core.effects.motion import Floats, Motion
 from sdimu_calibration.core.effects.registry import register
-from sdimu_calibration.core.motion import Floats, Motion
 
 _PAIRS = ((0, 1), (0, 2), (1, 2))
 

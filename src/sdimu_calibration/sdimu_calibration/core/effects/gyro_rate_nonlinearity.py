@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from sdimu_calibration.core.effects.effect import AXES, GYRO, family, matrix_columns, per_axis_columns, product
+from sdimu_calibration.core.effects.motion import Floats, Motion
 from sdimu_calibration.core.effects.registry import register
-from sdimu_calibration.core.motion import Floats, Motion
 
 
 def _rate(motion: Motion) -> Floats:

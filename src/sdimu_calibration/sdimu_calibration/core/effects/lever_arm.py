@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from sdimu_calibration.core.effects.effect import ACCEL, AXES, Effect, Parameter, Term, family, pick
+from sdimu_calibration.core.effects.motion import Floats, Motion
 from sdimu_calibration.core.effects.registry import register
-from sdimu_calibration.core.motion import Floats, Motion
 
 SIZE = register(
     family(

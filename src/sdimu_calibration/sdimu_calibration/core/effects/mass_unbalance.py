@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sdimu_calibration.core.effects.effect import GYRO, Effect, Parameter, Term
+from sdimu_calibration.core.effects.motion import Motion
 from sdimu_calibration.core.effects.registry import register
-from sdimu_calibration.core.motion import Motion
 from sdimu_calibration.core.units import to_si
 
 TERMS = ("dx", "qx", "dy", "qy", "dz", "qz")

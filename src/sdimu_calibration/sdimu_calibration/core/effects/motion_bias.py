@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from sdimu_calibration.core.effects.effect import ACCEL, GYRO, family, per_axis_columns
+from sdimu_calibration.core.effects.motion import Floats, Motion
 from sdimu_calibration.core.effects.registry import register
-from sdimu_calibration.core.motion import Floats, Motion
 
 
 def _moving(motion: Motion) -> Floats:

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sdimu_calibration.core import body_frame
-from sdimu_calibration.core.batch import bound_covariance
+from sdimu_calibration.core.batch.batch import bound_covariance
+from sdimu_calibration.core.filter import body_frame
 from sdimu_calibration.core.plan import Plan
-from sdimu_calibration.core.predict import prepare
+from sdimu_calibration.core.planning.predict import prepare
 from sdimu_calibration.core.specification import ImuSpecification, Model, Site
 
 Floats = NDArray[np.float64]

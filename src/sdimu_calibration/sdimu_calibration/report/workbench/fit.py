@@ -22,8 +22,8 @@ from sdimu_calibration.core.diagnosis.evidence import Evidence, collect, test_ti
 from sdimu_calibration.core.diagnosis.remainder import Remainder, remainder
 from sdimu_calibration.core.diagnosis.scan import scan, threshold
 from sdimu_calibration.core.diagnosis.search import FALSE_ALARM, Problem, Search
-from sdimu_calibration.core.filter_pass import SKIP
-from sdimu_calibration.core.passes import (
+from sdimu_calibration.core.filter.filter_pass import SKIP
+from sdimu_calibration.core.filter.passes import (
     Reduced,
     Setup,
     Solution,

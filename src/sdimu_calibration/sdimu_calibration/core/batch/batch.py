@@ -1,0 +1,339 @@
+"""The second estimator: least squares over the whole recording at once. The yardstick of the filter.
+
+While the table rests, the attitude is one unknown rotation and the means of the samples say all they can. Between two
+rests the IMU integrates a rotation, a velocity and a position, which must lead from one rest to the next. So
+the unknowns are
+
+    attitude of every stop (3), velocity and position that the stop really has (3 + 3, nearly zero), coefficients (p)
+
+and the equations, all whitened,
+
+    mean rate  - C_bn w_ie - D c = noise        one row a block of rest
+    mean force + C_bn g    - D c = noise
+    (attitude, velocity, position) after a motion - those integrated through it = 9 x 9 noise of the motion
+    velocity and position of a stop = 0 +- the model's sigmas; priors of coefficients and initial attitude.
+
+The noise of each rotation is thereby estimated with the rest. Nothing goes step by step here: no Kalman filter, no
+error dynamics, no shared noise to model. Gauss-Newton until the coefficients stand still.
+
+Shared with the filter: geometry (rotation, Earth, strapdown integration) and the regressors of the effects.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sdimu_calibration.core import earth
+from sdimu_calibration.core.batch.batch_data import Layout, Travel, error_slope, layout, rest_means, travel
+from sdimu_calibration.core.batch.batch_rows import (
+    PER_STOP,
+    Point,
+    initial,
+    nothing,
+    rest_residual,
+    rest_weights,
+    step_rows,
+    still,
+)
+from sdimu_calibration.core.batch.chain import Link, Solution, solve
+from sdimu_calibration.core.batch.coarse import coarse_start
+from sdimu_calibration.core.calibrate import data_counts
+from sdimu_calibration.core.effects.motion import Motion
+from sdimu_calibration.core.filter import body_frame
+from sdimu_calibration.core.filter.passes import Progress, Reduced, Setup, first_attitude, reduce, set_up
+from sdimu_calibration.core.large.triad import FRAME, large_errors, triad_model
+from sdimu_calibration.core.navigation.alignment import Alignment, levelled
+from sdimu_calibration.core.navigation.track import motion
+from sdimu_calibration.core.recording import DataError, Recording
+from sdimu_calibration.core.results import Calibration, History
+from sdimu_calibration.core.rotation import rotation_matrix
+from sdimu_calibration.core.specification import ImuSpecification, Model, Site
+
+Floats = NDArray[np.float64]
+
+CONVERGED = 1e-2
+"""Largest step of a coefficient in its sigma at which Gauss-Newton ends."""
+MOST_STEPS = 40
+_NEAR = 1.0
+"""As `CONVERGED`, for the first stage."""
+_LOOSE = (1e-2, 1.0)
+"""Velocity and position sigma of the first stage (m/s, m)."""
+_ALIKE, _CREEPING, _LONGEST = 0.95, 0.5, 30.0
+"""Steps creep when they point alike and shrink by less than half; they are stretched at most so far."""
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Where Gauss-Newton ended.
+
+    Attributes
+    ----------
+    coefficients : ndarray, shape (p,)
+        Frame of the prior.
+    covariance : ndarray, shape (p, p)
+    C_nb : ndarray, shape (k, 3, 3)
+        Attitude of every stop.
+    chi2 : float
+        Sum of squares of all whitened rows, priors too.
+    dof : int
+    log_evidence : float
+        Logarithm of the probability density of the data.
+    steps : int
+    """
+
+    coefficients: Floats
+    covariance: Floats
+    C_nb: Floats
+    chi2: float
+    dof: int
+    log_evidence: float
+    steps: int
+
+
+def batch_calibrate(
+    recording: Recording, site: Site, imu: ImuSpecification, model: Model, progress: Progress | None = None
+) -> Calibration:
+    """Calibrate an IMU from one recording by batch least squares.
+
+    Parameters
+    ----------
+    recording : Recording
+    site : Site
+    imu : ImuSpecification
+    model : Model
+    progress : callable, optional
+        Called with a word and the fraction done.
+
+    Returns
+    -------
+    Calibration
+        Without history; ``nis_mean`` is chi-square per degree of freedom of the whole fit.
+
+    Raises
+    ------
+    DataError
+        When the recording or the options cannot be used, or an effect changes at random by itself.
+    """
+    setup = set_up(site, imu, model)
+    turned = triad_model(setup.sensors, imu) if large_errors(setup.sensors) else None
+    inner = setup if turned is None else replace(setup, sensors=turned.inner)
+    reduced = reduce(recording, inner)
+    start = first_attitude(reduced.epochs, reduced.phases, inner)
+    found = fit(reduced, inner, start, progress=progress)
+    names = setup.sensors.names
+    if turned is None:
+        frame = model.body_frame
+        J = body_frame.jacobian_at(names, found.coefficients, frame)
+        values, covariance = body_frame.values_in_frame(names, found.coefficients, frame), J @ found.covariance @ J.T
+    else:
+        frame, values, covariance = FRAME, turned.values(found.coefficients), turned.covariance(found.covariance)
+    return Calibration(
+        body_frame=frame,
+        model=tuple(e.name for e in setup.sensors.effects),
+        names=names,
+        units=tuple(p.unit for p in setup.sensors.parameters),
+        display_units=tuple(p.display_unit for p in setup.sensors.parameters),
+        values=values,
+        covariance=covariance,
+        fit={
+            "log_likelihood": found.log_evidence,
+            "nis_mean": found.chi2 / max(found.dof, 1),
+            "nis_dof": float(found.dof),
+            "held_out_rms": None,
+            "passes": float(found.steps),
+        },
+        data=data_counts(recording, reduced),
+        notes=recording.notes,
+        history=no_history(len(names)),
+    )
+
+
+def no_history(p: int) -> History:
+    """History of an estimator that has none: no rows of `p` coefficients."""
+    none = np.zeros(0)
+    flags = np.zeros(0, dtype=bool)
+    rows = np.zeros((0, p))
+    return History(none, rows, rows, np.zeros((0, 3)), np.zeros(0, dtype=np.int64), flags, flags, np.zeros((0, 4)))
+
+
+def bound_covariance(reduced: Reduced, setup: Setup, start: Alignment) -> Floats:
+    """Covariance (p, p), frame of the prior, that the data of a perfect recording hold."""
+    point, where = _begin(reduced, setup, start.C_nb, np.zeros(len(setup.sensors.prior)))
+    return _scaled(solve(_links(reduced, setup, start, where, point)[0]), setup)[1]
+
+
+def fit(reduced: Reduced, setup: Setup, start: Alignment, progress: Progress | None = None) -> Fit:
+    """Gauss-Newton from the coarse start.
+
+    First with stops that need not stand quite still: far from the solution the second order of large errors is much
+    more than the sigma of a stop's velocity, and would be taken for knowledge.
+
+    Raises
+    ------
+    DataError
+        When an effect of the model changes at random by itself, or the steps do not end.
+    """
+    coarse = coarse_start(reduced, setup, start)
+    point, where = _begin(reduced, setup, coarse.C_nb, coarse.coefficients)
+    loose = replace(setup, model=replace(setup.model, velocity_sigma=_LOOSE[0], position_sigma=_LOOSE[1]))
+    taken = 0
+    for stage, near in ((loose, _NEAR), (setup, CONVERGED)):
+        last, moved = np.zeros(len(setup.sensors.prior)), np.inf
+        while moved > near:
+            taken += 1
+            if progress is not None:
+                progress("least squares", min(0.95, 0.1 * taken))
+            links, log_weight = _links(reduced, stage, start, where, point)
+            solution = solve(links)
+            step, covariance = _scaled(solution, stage)
+            if not np.isfinite(step).all() or taken > MOST_STEPS:
+                raise DataError(
+                    "batch least squares does not converge: the recording contradicts the IMU's specification; "
+                    "check --imu and --site"
+                )
+            stretch = _stretch(step / setup.sensors.prior, last / setup.sensors.prior)
+            last = np.zeros_like(step) if stretch > 1.0 else step
+            before, point = point, _moved(point, stretch * step, stretch * solution.links)
+            moved = _movement(setup, before, point, covariance)
+    evidence = log_weight - 0.5 * solution.chi2 - 0.5 * solution.dof * np.log(2.0 * np.pi) - solution.log_det
+    return Fit(point.coefficients, covariance, point.C_nb, solution.chi2, solution.dof, float(evidence), taken)
+
+
+def _begin(reduced: Reduced, setup: Setup, C_nb: Floats, coefficients: Floats) -> tuple[Point, Layout]:
+    """Begin at an initial attitude and coefficients; gyros lead from stop to stop, and every stop is levelled."""
+    changing = (setup.sensors.decay_rate > 0) | (setup.sensors.drive > 0)
+    if changing.any():
+        name = setup.sensors.names[int(np.argmax(changing))]
+        raise DataError(f"the batch estimator takes constants only, and '{name}' changes at random; use the filter")
+    where = layout(reduced)
+    k = len(where.stop_first)
+    point = Point(coefficients, np.repeat(C_nb[None], k, axis=0), np.zeros((k, 3)), np.zeros((k, 3)))
+    seen = _seen(reduced, setup, where, point)
+    values = setup.sensors.regressors(seen)
+    rest = rest_means(reduced, where, setup.sensors, values)
+    force = (rest.mean - rest.design @ coefficients)[:, 3:]
+    for i in range(k - 1):
+        arrived = _travel(reduced, setup, where, point, seen, values, i).C_nb
+        point.C_nb[i + 1] = levelled(arrived, force[where.block_stop == i + 1].mean(axis=0))
+    return point, where
+
+
+def _seen(reduced: Reduced, setup: Setup, where: Layout, point: Point) -> Motion:
+    """Motion that the attitudes of the stops predict.
+
+    Gyros integrated over the whole test drift; so every turn starts from the attitude of its stop, and at rest the
+    table stands as the stop does.
+    """
+    latitude = setup.site.latitude_rad
+    cycle = np.arange(len(reduced.cycles))
+    stop = np.maximum(np.searchsorted(where.stop_first, cycle, side="right") - 1, 0)
+    at_stop = (cycle >= where.stop_first[stop]) & (cycle < where.stop_last[stop])
+    # Rest that is part of a travel (settling) counts as motion here: what is seen must follow the samples there, as
+    # their derivatives do.
+    seen = motion(
+        reduced.cycles, at_stop, setup.sensors, point.coefficients, point.C_nb[0].copy(), latitude, setup.gravity,
+        reduced.temperature, predicted=True,
+    )  # fmt: skip
+    drift = point.C_nb @ np.transpose(seen.C_nb[where.stop_last - 1], (0, 2, 1))
+    C_nb = np.where(at_stop[:, None, None], point.C_nb[stop], drift[stop] @ seen.C_nb)
+    w_earth = np.einsum("kij,i->kj", C_nb, earth.earth_rate(latitude))
+    moving = ~at_stop[:, None]
+    w_table = np.where(reduced.rest[:, None], 0.0, seen.w - w_earth)
+    w = np.where(moving, seen.w, w_earth)
+    f = np.where(moving, seen.f, -setup.gravity * C_nb[:, 2, :])
+    return replace(seen, C_nb=C_nb, w_table=w_table, w=w, f=f, rest=reduced.rest)
+
+
+def _travel(
+    reduced: Reduced, setup: Setup, where: Layout, point: Point, seen: Motion, values: Floats, k: int
+) -> Travel:
+    """Integrate the motion from stop k to the next."""
+    site = setup.site
+    excess = setup.gravity - float(earth.normal_gravity(site.latitude_rad, site.height_m))
+    rows = slice(int(where.stop_last[k]), int(where.stop_first[k + 1]))
+    slope = error_slope(setup.sensors, seen, rows, point.coefficients)
+    return travel(
+        reduced, rows, setup.sensors, values, slope, point.coefficients, point.C_nb[k], site.latitude_rad,
+        site.height_m, excess, (setup.imu.gyro_white_noise**2, setup.imu.accel_white_noise**2),
+    )  # fmt: skip
+
+
+def _links(
+    reduced: Reduced, setup: Setup, start: Alignment, where: Layout, point: Point
+) -> tuple[list[Link], float]:
+    """Whitened rows of all stops at a point, coefficients in units of their priors; the log of all weights."""
+    prior, p = setup.sensors.prior, len(setup.sensors.prior)
+    seen = _seen(reduced, setup, where, point)
+    values = setup.sensors.regressors(seen)
+    slope = error_slope(setup.sensors, seen, where.block_first, point.coefficients)
+    rest = rest_means(reduced, where, setup.sensors, values)
+    last = len(where.stop_first) - 1
+    travels = [_travel(reduced, setup, where, point, seen, values, k) for k in range(last)]
+    weights = rest_weights(setup, rest.seconds)
+    dt = np.concatenate([[0.0], np.cumsum(reduced.cycles.dt)])
+    links, log_weight = [], float(np.sum(np.log(weights))) - float(np.sum(np.log(prior)))
+    for k in range(len(where.stop_first)):
+        rows = where.block_stop == k
+        residual, by_attitude = rest_residual(setup, rest.mean[rows], slope[rows], point.C_nb[k])
+        residual = residual - rest.design[rows] @ point.coefficients
+        w = weights[rows]
+        own = np.zeros((6 * len(w), PER_STOP))
+        own[:, :3] = (w[:, :, None] * by_attitude).reshape(-1, 3)
+        parts = [(own, -(w[:, :, None] * rest.design[rows] * prior).reshape(-1, p), (w * residual).ravel())]
+        parts.append(still(setup, point.velocity[k], point.position[k], p))
+        log_weight -= 3.0 * float(np.log(setup.model.velocity_sigma) + np.log(setup.model.position_sigma))
+        if k == 0:
+            parts.append(initial(start, point.C_nb[0], p))
+            parts.append((np.zeros((p, PER_STOP)), np.eye(p), point.coefficients / prior))
+            log_weight -= float(np.sum(np.log(start.filter_sigma)))
+        step = nothing(p)
+        if k < len(travels):
+            resting = dt[where.stop_last[k]] - dt[where.stop_first[k]]
+            step, weight = step_rows(travels[k], point, k, resting, prior)
+            log_weight += weight
+        a, b, c = (np.concatenate(column) for column in zip(*parts, strict=True))
+        links.append(Link(a, b, c, *step))
+    return links, log_weight
+
+
+def _scaled(solution: Solution, setup: Setup) -> tuple[Floats, Floats]:
+    """Step and covariance of the coefficients in SI."""
+    prior = setup.sensors.prior
+    return solution.common * prior, solution.covariance * np.outer(prior, prior)
+
+
+def _stretch(step: Floats, last: Floats) -> float:
+    """Factor that takes a creeping step to where the geometric series of such steps ends (Aitken).
+
+    With errors of percents the turn of the prior's body frame creeps: nothing but second order of the model holds it.
+    """
+    product, before = float(step @ last), float(last @ last)
+    if not before or product < _ALIKE * np.sqrt(before * float(step @ step)):
+        return 1.0
+    ratio = product / before
+    return float(1.0 / (1.0 - ratio)) if _CREEPING < ratio < 1.0 - 1.0 / _LONGEST else 1.0
+
+
+def _movement(setup: Setup, before: Point, after: Point, covariance: Floats) -> float:
+    """Largest movement of a coefficient in its own sigma, in the frame that the accelerometers define.
+
+    In the frame of the prior three rotations of the body are held by priors alone; they go on turning for long, and no
+    reported number feels it.
+    """
+    names, frame = setup.sensors.names, "accelerometer_triad"
+    J = body_frame.jacobian_at(names, after.coefficients, frame)
+    sigma = np.sqrt(np.diag(J @ covariance @ J.T))
+    old, new = (body_frame.values_in_frame(names, at.coefficients, frame) for at in (before, after))
+    free = sigma > 1e-9 * setup.sensors.prior
+    return float(np.max(np.abs(new - old)[free] / sigma[free]))
+
+
+def _moved(point: Point, step: Floats, links: Floats) -> Point:
+    turns = np.ascontiguousarray(links[:, :3])
+    C_nb = np.array([rotation_matrix(turn) @ C for turn, C in zip(turns, point.C_nb, strict=True)])
+    return Point(
+        point.coefficients + step, C_nb, point.velocity + links[:, 3:6], point.position + links[:, 6:9]
+    )

@@ -1,0 +1,253 @@
+"""What the batch estimator takes of a recording: means over rest, and what was integrated over motion."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sdimu_calibration.core import earth
+from sdimu_calibration.core.compiled import compiled
+from sdimu_calibration.core.effects.imu_model import ImuModel
+from sdimu_calibration.core.effects.motion import Motion
+from sdimu_calibration.core.filter.passes import Reduced
+from sdimu_calibration.core.navigation.strapdown import navigate_cycle, velocity_increment
+from sdimu_calibration.core.rotation import rotation_matrix, skew
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+BLOCK_EPOCHS = 20
+"""A stop is cut into means of at most this many epochs, so that slow changes of a regressor are not lost."""
+GAP_SHARE = 0.1
+"""Uncertainty of an angle that was bridged by interpolation, as a share of it."""
+
+_STEP = (1e-9, 1e-6)
+"""Steps of rate (rad/s) and force (m/s^2) for derivatives: below every threshold of an effect."""
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Where the stops are; cycles are half-open ranges.
+
+    Attributes
+    ----------
+    stop_first, stop_last : ndarray of int, shape (k,)
+        Cycles of each stop: consecutive epochs that the phases call used.
+    block_first, block_last, block_stop : ndarray of int, shape (b,)
+        Blocks of rest, and the stop of each.
+    """
+
+    stop_first: Ints
+    stop_last: Ints
+    block_first: Ints
+    block_last: Ints
+    block_stop: Ints
+
+
+def layout(reduced: Reduced) -> Layout:
+    """Cut the used epochs into stops and blocks."""
+    used = np.flatnonzero(reduced.phases.used)
+    starts = np.flatnonzero(np.diff(used, prepend=-2) != 1)
+    ends = np.append(starts[1:], len(used))
+    first, last = reduced.epochs.first, reduced.epochs.last
+    blocks = [
+        (k, used[i], used[min(i + BLOCK_EPOCHS, b) - 1])
+        for k, (a, b) in enumerate(zip(starts, ends, strict=True))
+        for i in range(a, b, BLOCK_EPOCHS)
+    ]
+    stop, begin, end = (np.array(column, dtype=np.int64) for column in zip(*blocks, strict=True))
+    return Layout(first[used[starts]], last[used[ends - 1]], first[begin], last[end], stop)
+
+
+@dataclass(frozen=True)
+class Rest:
+    """Means over the blocks of rest.
+
+    Attributes
+    ----------
+    seconds : ndarray, shape (b,)
+    mean : ndarray, shape (b, 6)
+        Rate (rad/s) and force (m/s^2) as measured.
+    design : ndarray, shape (b, 6, p)
+        Change of the means per unit of each coefficient.
+    """
+
+    seconds: Floats
+    mean: Floats
+    design: Floats
+
+
+def rest_means(reduced: Reduced, where: Layout, model: ImuModel, values: Floats) -> Rest:
+    """Take means over the blocks; `values` (n, m) are the regressors of every cycle."""
+    c = reduced.cycles
+    integrals = np.hstack([c.dt[:, None], c.alpha, c.upsilon, values * c.dt[:, None]])
+    total = np.vstack([np.zeros(integrals.shape[1]), np.cumsum(integrals, axis=0)])
+    block = total[where.block_last] - total[where.block_first]
+    seconds = block[:, 0]
+    design = np.zeros((len(seconds), 6, len(model.prior)))
+    for column, (channel, parameter) in enumerate(zip(model.channel, model.parameter, strict=True)):
+        design[:, channel, parameter] += block[:, 7 + column] / seconds
+    return Rest(seconds, block[:, 1:7] / seconds[:, None], design)
+
+
+@dataclass(frozen=True)
+class Travel:
+    """What the IMU integrates over one motion from rest to rest, starting at attitude C with velocity zero.
+
+    Attributes
+    ----------
+    C_nb : ndarray, shape (3, 3)
+        At the end.
+    moved : ndarray, shape (6,)
+        Velocity (m/s) and change of position (m), N, E, D.
+    seconds : float
+    by_attitude : ndarray, shape (9, 3)
+        Change of attitude, velocity, position at the end per small turn (in n) at the start.
+    by_coefficient : ndarray, shape (9, p)
+        Per unit of each coefficient taken out of the samples.
+    noise : ndarray, shape (9, 9)
+        Covariance that white sensor noise leaves in attitude, velocity and position.
+    """
+
+    C_nb: Floats
+    moved: Floats
+    seconds: float
+    by_attitude: Floats
+    by_coefficient: Floats
+    noise: Floats
+
+
+def error_slope(model: ImuModel, seen: Motion, rows: slice | Ints, coefficients: Floats) -> Floats:
+    """Change of the sensor errors per change of what the sensors see, shape (rows, 6, 6).
+
+    With errors of percents it is percents too, and Gauss-Newton needs it: the three rotations of the body frame, which
+    only priors hold, feel every inconsistency between the derivatives.
+    """
+    at = _at(seen, rows)
+    before = model.errors(model.regressors(at), coefficients)
+    slope = np.empty((len(before), 6, 6))
+    moving = np.where(at.rest, 0.0, 1.0)[:, None]
+    for i in range(6):
+        step = np.zeros(6)
+        step[i] = _STEP[i // 3]
+        moved = replace(at, w=at.w + step[:3], f=at.f + step[3:], w_table=at.w_table + moving * step[:3])
+        slope[:, :, i] = (model.errors(model.regressors(moved), coefficients) - before) / step[i]
+    return slope
+
+
+def _at(seen: Motion, rows: slice | Ints) -> Motion:
+    """Rows of a motion."""
+    n = len(seen.t)
+    columns = {f.name: getattr(seen, f.name) for f in fields(seen)}
+    return Motion(**{name: v[rows] if len(v) == n else v for name, v in columns.items()})
+
+
+@compiled
+def _navigate(
+    C_nb: Floats, dt: Floats, alpha: Floats, upsilon: Floats, coning: Floats, sculling: Floats,
+    latitude: float, height: float, gravity_excess: float,
+) -> tuple[Floats, Floats]:  # fmt: skip
+    """Attitude before each cycle and after the last (n + 1, 3, 3); velocity and displacement at the end (6,)."""
+    n = dt.shape[0]
+    track = np.empty((n + 1, 3, 3))
+    velocity = np.zeros(3)
+    position = np.zeros(3)
+    position[0], position[2] = latitude, height
+    for k in range(n):
+        track[k] = C_nb
+        dv = velocity_increment(alpha[k], upsilon[k], sculling[k])
+        gravity = earth.normal_gravity(position[0], position[2]) + gravity_excess
+        navigate_cycle(C_nb, velocity, position, alpha[k] + coning[k], dv, dt[k], gravity)
+    track[n] = C_nb
+    r_n, r_e = earth.radii(latitude)
+    moved = np.empty(6)
+    moved[:3] = velocity
+    moved[3] = (position[0] - latitude) * (r_n + height)
+    moved[4] = position[1] * (r_e + height) * np.cos(min(abs(latitude), earth.POLE_LIMIT))
+    moved[5] = height - position[2]
+    return track, moved
+
+
+def travel(
+    reduced: Reduced, rows: slice, model: ImuModel, values: Floats, slope: Floats, coefficients: Floats, C_nb: Floats,
+    latitude: float, height: float, gravity_excess: float, densities: tuple[float, float],
+) -> Travel:  # fmt: skip
+    """Integrate one motion and linearise it.
+
+    The linear responses are taken in the frame that does not turn and meets n at the end of the motion, where
+    attitude errors stand still and velocity errors grow by their product with the force only. Left out: the gravity
+    gradient and the turn of n in the velocity, both below 1e-2 of the response for minutes.
+
+    Parameters
+    ----------
+    reduced : Reduced
+    rows : slice
+        Cycles of the motion.
+    model : ImuModel
+    values : ndarray, shape (n, m)
+        Regressors of all cycles.
+    slope : ndarray, shape (rows, 6, 6)
+        `error_slope` of the cycles of the motion.
+    coefficients : ndarray, shape (p,)
+        Taken out of the samples.
+    C_nb : ndarray, shape (3, 3)
+        Attitude at the start.
+    latitude, height, gravity_excess : float
+        Site (rad, m), gravity beyond normal (m/s^2).
+    densities : tuple of float
+        White noise of gyros and accelerometers (power).
+    """
+    c = reduced.cycles[rows]
+    own = values[rows]
+    error = model.errors(own, coefficients) * c.dt[:, None]
+    alpha, upsilon = c.alpha - error[:, :3], c.upsilon - error[:, 3:]
+    track, moved = _navigate(C_nb.copy(), c.dt, alpha, upsilon, c.coning, c.sculling, latitude, height, gravity_excess)
+    left = np.cumsum(c.dt[::-1])[::-1] - 0.5 * c.dt
+    still = _not_turning(0.5 * (track[:-1] + track[1:]), left, latitude)
+    dv = np.einsum("kij,kj->ki", still, upsilon)
+    # What is still to come after each cycle: velocity, and its integral.
+    velocity = np.cumsum(dv[::-1], axis=0)[::-1] - 0.5 * dv
+    position = np.cumsum((velocity * c.dt[:, None])[::-1], axis=0)[::-1] - 0.5 * velocity * c.dt[:, None]
+    by_angle, by_push = _transfers(velocity, position, left)
+    # A sample is (1 + slope) times the truth and more, so what is taken out of it weighs 1 / (1 + slope).
+    in_n = np.zeros((len(own), 6, 6))
+    in_n[:, :3, :3] = in_n[:, 3:, 3:] = still
+    weight = np.concatenate([by_angle, by_push], axis=2) @ in_n @ np.linalg.inv(np.eye(6) + slope)
+    coefficient = np.zeros((9, len(model.prior)))
+    for column, (channel, parameter) in enumerate(zip(model.channel, model.parameter, strict=True)):
+        coefficient[:, parameter] -= (own[:, column] * c.dt) @ weight[:, :, channel]
+    noise = densities[0] * np.einsum("kij,klj,k->il", by_angle, by_angle, c.dt)
+    noise += densities[1] * np.einsum("kij,klj,k->il", by_push, by_push, c.dt)
+    noise[range(3), range(3)] += np.sum((GAP_SHARE * c.gap_angle) ** 2)
+    seconds = float(c.dt.sum())
+    turn = rotation_matrix(-seconds * earth.earth_rate(latitude))
+    whole = np.vstack([np.eye(3), -skew(dv.sum(axis=0)), -skew((dv * left[:, None]).sum(axis=0))])
+    return Travel(track[-1], moved, seconds, whole @ turn, coefficient, noise)
+
+
+def _not_turning(C_nb: Floats, left: Floats, latitude: float) -> Floats:
+    """Attitudes (n, 3, 3) in the frame that does not turn and meets n after `left` (n,) seconds.
+
+    To first order in Earth rate times time, which is 1e-2 for minutes.
+    """
+    w = earth.earth_rate(latitude)
+    return np.asarray(C_nb - left[:, None, None] * (skew(w) @ C_nb))
+
+
+def _transfers(velocity: Floats, position: Floats, left: Floats) -> tuple[Floats, Floats]:
+    """Attitude, velocity and position at the end per small turn and per push in each cycle, (n, 9, 3) each.
+
+    `velocity`, `position` (n, 3): increments that the force makes after the cycle; `left` (n,): time after it.
+    """
+    n = len(left)
+    by_angle, by_push = np.zeros((n, 9, 3)), np.zeros((n, 9, 3))
+    by_angle[:, 0:3], by_push[:, 3:6] = np.eye(3), np.eye(3)
+    by_push[:, 6:9] = left[:, None, None] * np.eye(3)
+    for row, first in ((velocity, 3), (position, 6)):
+        for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+            # psi x s = -[s x] psi
+            by_angle[:, first + i, j] = row[:, k]
+            by_angle[:, first + i, k] = -row[:, j]
+    return by_angle, by_push

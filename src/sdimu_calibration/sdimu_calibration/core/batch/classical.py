@@ -1,0 +1,182 @@
+"""The classical calibration: multi-position and rate test by least squares, with the table's angles as reference.
+
+What Kim, Song & Lyou argue against. The table angles are taken for the attitude of the IMU: its axes are those of the
+table, the table stands level and north. The mean of the samples over every stop, and over every turn, less what a
+perfect IMU would have given there, is linear in the coefficients. No navigation, no filter, no attitude to estimate.
+
+A mount misalignment m then passes for a misalignment of every sensor, and for a scale error 1 - cos(m): the
+coefficients are given in the body frame ``table``. They may be turned into the accelerometers' own frame afterwards,
+which takes the mount out again, as far as the model holds what the turn mixes.
+
+Source: Titterton & Weston, *Strapdown Inertial Navigation Technology*, 2nd ed., sections 8.3-8.5 (multi-position and
+rate-table testing).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sdimu_calibration.core import earth
+from sdimu_calibration.core.batch.batch import no_history
+from sdimu_calibration.core.batch.batch_data import layout
+from sdimu_calibration.core.calibrate import data_counts
+from sdimu_calibration.core.effects.motion import Motion
+from sdimu_calibration.core.filter import body_frame
+from sdimu_calibration.core.filter.passes import Progress, Reduced, Setup, reduce, set_up
+from sdimu_calibration.core.navigation.track import MAGNETIC_FIELD, temperatures
+from sdimu_calibration.core.recording import DataError, Recording, TableLog
+from sdimu_calibration.core.results import Calibration
+from sdimu_calibration.core.specification import ImuSpecification, Model, Site
+
+Floats = NDArray[np.float64]
+
+GIMBALS = ("Y", "Z", "X")
+"""IMU axes about which outer, middle and inner table axis turn when all angles are zero."""
+TABLE_FRAME = "table"
+
+
+def classical_calibrate(
+    recording: Recording,
+    site: Site,
+    imu: ImuSpecification,
+    model: Model,
+    progress: Progress | None = None,
+    gimbals: tuple[str, str, str] = GIMBALS,
+    frame: str = TABLE_FRAME,
+) -> Calibration:
+    """Calibrate an IMU against the angles of the table.
+
+    Parameters
+    ----------
+    recording : Recording
+        With the table's angles.
+    site : Site
+    imu : ImuSpecification
+        Its noise weighs the means; its priors are not used.
+    model : Model
+        Effects to estimate.
+    progress : callable, optional
+        Called with a word and the fraction done.
+    gimbals : tuple of str
+        Axis letters of outer, middle and inner axis.
+    frame : str
+        ``table``, or a body frame into which the result is turned afterwards.
+
+    Returns
+    -------
+    Calibration
+        Without history.
+
+    Raises
+    ------
+    DataError
+        When the table's angles are missing or of a table without gimbals, or the test does not show all coefficients.
+    """
+    if progress is not None:
+        progress("least squares", 0.2)
+    log = _gimbal_log(recording.table)
+    setup = set_up(site, imu, model)
+    reduced = reduce(recording, setup)
+    values, covariance, chi2, dof = _fit(reduced, setup, reference_motion(reduced, setup, log, gimbals))
+    names = setup.sensors.names
+    if frame != TABLE_FRAME:
+        J = body_frame.jacobian_at(names, values, frame)
+        values, covariance = body_frame.values_in_frame(names, values, frame), J @ covariance @ J.T
+    return Calibration(
+        body_frame=frame,
+        model=tuple(e.name for e in setup.sensors.effects),
+        names=names,
+        units=tuple(p.unit for p in setup.sensors.parameters),
+        display_units=tuple(p.display_unit for p in setup.sensors.parameters),
+        values=values,
+        covariance=covariance,
+        fit={
+            "log_likelihood": -0.5 * chi2, "nis_mean": chi2 / max(dof, 1), "nis_dof": float(dof),
+            "held_out_rms": None, "passes": 1.0,
+        },
+        data=data_counts(recording, reduced),
+        notes=recording.notes,
+        history=no_history(len(names)),
+    )  # fmt: skip
+
+
+def _gimbal_log(log: TableLog | None) -> TableLog:
+    if log is None or not len(log.t):
+        raise DataError("/rate_table/joint_states: missing; the classical estimator takes its references from them")
+    if set(log.names) != {"outer", "middle", "inner"}:
+        raise DataError(
+            f"/rate_table/joint_states: axes {', '.join(log.names)}; the classical estimator needs outer, middle, inner"
+        )
+    return log
+
+
+def table_attitude(log: TableLog, t: Floats, gimbals: tuple[str, str, str]) -> Floats:
+    """Attitude of the platform at times `t` (n,), shape (n, 3, 3): outer, then middle, then inner turn."""
+    C = np.broadcast_to(np.eye(3), (len(t), 3, 3))
+    for name, letter in zip(("outer", "middle", "inner"), gimbals, strict=True):
+        angle = np.interp(t, log.t, log.angle[:, log.names.index(name)])
+        C = C @ _about(letter, angle)
+    return np.asarray(C)
+
+
+def _about(letter: str, angle: Floats) -> Floats:
+    """Rotation matrices (n, 3, 3) about an axis by angles (n,)."""
+    i = "XYZ".index(letter)
+    j, k = (i + 1) % 3, (i + 2) % 3
+    C = np.zeros((len(angle), 3, 3))
+    C[:, i, i] = 1.0
+    C[:, j, j] = C[:, k, k] = np.cos(angle)
+    C[:, j, k], C[:, k, j] = -np.sin(angle), np.sin(angle)
+    return C
+
+
+def reference_motion(reduced: Reduced, setup: Setup, log: TableLog, gimbals: tuple[str, str, str]) -> Motion:
+    """Make the motion that a perfect IMU along the table's axes would have seen."""
+    c = reduced.cycles
+    edges = np.append(c.t[0] - c.dt[0], c.t)
+    C = table_attitude(log, edges, gimbals)
+    middle = 0.5 * (C[:-1] + C[1:])
+    # Half of C' dC - its transpose is the sine of the small turn in a cycle.
+    turn = np.transpose(C[:-1], (0, 2, 1)) @ C[1:]
+    odd = 0.5 * (turn - np.transpose(turn, (0, 2, 1)))
+    sine = np.column_stack([odd[:, 2, 1], odd[:, 0, 2], odd[:, 1, 0]])
+    size = np.maximum(np.linalg.norm(sine, axis=1, keepdims=True), 1e-12)
+    w_table = sine * (np.arcsin(np.minimum(size, 1.0)) / size) / c.dt[:, None]
+    w = w_table + np.einsum("kij,i->kj", middle, earth.earth_rate(setup.site.latitude_rad))
+    f = -setup.gravity * middle[:, 2, :]
+    heat, heat_rate = temperatures(reduced.temperature, c.t - 0.5 * c.dt, causal=False)
+    none = np.zeros_like(w)
+    alpha = np.gradient(w_table, c.t - 0.5 * c.dt, axis=0)
+    return Motion(c.t, c.dt, w, f, middle, w_table, alpha, reduced.rest, heat, heat_rate, none, none, MAGNETIC_FIELD)
+
+
+def _fit(reduced: Reduced, setup: Setup, seen: Motion) -> tuple[Floats, Floats, float, int]:
+    """Weighted least squares over the means of stops and turns: coefficients, covariance, chi-square, its degrees."""
+    model, c = setup.sensors, reduced.cycles
+    where = layout(reduced)
+    inner = np.column_stack([where.stop_first, where.stop_last]).ravel()
+    first, last = inner[:-1], inner[1:]
+    sums = np.hstack([
+        c.dt[:, None], c.alpha - seen.w * c.dt[:, None], c.upsilon - seen.f * c.dt[:, None],
+        model.regressors(seen) * c.dt[:, None],
+    ])  # fmt: skip
+    total = np.vstack([np.zeros(sums.shape[1]), np.cumsum(sums, axis=0)])
+    block = total[last] - total[first]
+    seconds = block[:, 0]
+    design = np.zeros((len(seconds), 6, len(model.prior)))
+    for column, (channel, parameter) in enumerate(zip(model.channel, model.parameter, strict=True)):
+        design[:, channel, parameter] += block[:, 7 + column] / seconds
+    density = np.repeat([setup.imu.gyro_white_noise, setup.imu.accel_white_noise], 3)
+    weight = np.sqrt(seconds)[:, None] / density
+    rows = (weight[:, :, None] * design * model.prior).reshape(-1, len(model.prior))
+    rhs = (weight * block[:, 1:7] / seconds[:, None]).ravel()
+    R = np.linalg.qr(rows, mode="r")
+    if np.min(np.abs(np.diag(R))) < 1e-6 * np.max(np.abs(np.diag(R))):
+        name = model.names[int(np.argmin(np.abs(np.diag(R))))]
+        raise DataError(f"this test does not show '{name}' to the classical estimator; leave its effect out")
+    x = np.linalg.lstsq(rows, rhs, rcond=None)[0]
+    inverse = np.linalg.inv(R)
+    chi2 = float(np.sum((rows @ x - rhs) ** 2))
+    scale = np.outer(model.prior, model.prior)
+    return x * model.prior, (inverse @ inverse.T) * scale, chi2, len(rhs) - len(x)

@@ -1,0 +1,286 @@
+"""Units and signs of a recording, recognised by what physics allows.
+
+- **Unit of the force**: at rest its size is that of gravity, so a median near 9.8 is m/s^2 and one near 1 is g.
+- **Unit and sense of the rate**: at rest before and after a turn the force points up; turned back by what the gyros say
+  in between, both directions must agree. Radians and degrees differ by a factor of 57, and a wrong sense turns the
+  wrong way, so no error of a sensor imitates either. Right-handed axes of any orientation (NED or ENU, forward-right-
+  down or forward-left-up) all pass: they are rotations of each other. Left-handed axes turn the wrong way, as gyros
+  of the wrong sign do.
+- **Sign of the force**: turns do not tell it, because a vector and its negative turn alike. The Earth does: its rate
+  has the component Omega sin(latitude) along the upward force (`earth_seen`). Where the Earth's rate is not seen the
+  sign changes nothing but the signs of the accelerometers' biases and of coefficients per g.
+
+Sources: the attitude kinematics of a fixed vector, du/dt = -omega x u (Groves, *Principles of GNSS, Inertial, and
+Multisensor Integrated Navigation Systems*, 2nd ed., section 2.3); Earth rate in local-level axes, section 2.4.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import permutations, product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sdimu_calibration.core.data.windows import Windows, cut_windows, turned
+from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.units import STANDARD_GRAVITY
+
+Floats = NDArray[np.float64]
+
+DEGREE = float(np.pi / 180.0)
+_NEAR_GRAVITY = 0.3
+"""The median of |f| may differ from gravity by this share: nominal scale and bias of raw counts err so much."""
+_NO_GRAVITY = 0.2
+"""A median of |f| below this, in any unit, is that of a driver that has taken gravity away."""
+_LENGTHS_S = (1.0, 4.0, 16.0, 64.0)
+"""Windows are as long as it takes to turn far enough: a hand turns in a second what a table turns in a minute."""
+_FAR = np.radians(20.0)
+"""Far enough: well beyond what accelerations, misalignment and bias do to a direction."""
+_LEAST_SWING = np.radians(5.0)
+"""Turns by less, in the longest windows, say nothing."""
+_OTHERS = 2
+"""A swing counts when so many others are as large: a single bump is no turn."""
+_LARGE = 0.25
+"""Windows whose swing is more than this share of the largest are turns."""
+_NEARLY_ALL = 0.9
+"""Share of the turns that must fit the axes: an IMU may turn about one of them in every tenth turn only."""
+_MOST = 200_000
+"""At most so many samples are looked at."""
+_FITS, _FAILS = 0.4, 2.0
+"""The right reading leaves less than this share of the swing, every other one more than so many times as much."""
+
+
+@dataclass(frozen=True)
+class Stated:
+    """What the user says of the numbers; None is to be recognised.
+
+    Attributes
+    ----------
+    accel, gyro : float or None
+        m/s^2 and rad/s of one unit, positive.
+    accel_sign, gyro_sign : int or None
+        1 or -1.
+    """
+
+    accel: float | None = None
+    gyro: float | None = None
+    accel_sign: int | None = None
+    gyro_sign: int | None = None
+
+
+@dataclass(frozen=True)
+class Reading:
+    """How the numbers are to be read: SI = factor * number.
+
+    Attributes
+    ----------
+    accel, gyro : float
+        Factors, with sign.
+    notes : tuple of str
+        What was recognised and is not what the message says, one line each; empty for SI of the usual sense.
+    """
+
+    accel: float
+    gyro: float
+    notes: tuple[str, ...]
+
+
+def recognise(t: Floats, w: Floats, f: Floats, stated: Stated) -> Reading:
+    """Recognise units and senses.
+
+    Parameters
+    ----------
+    t : ndarray, shape (n,)
+        Seconds, ascending.
+    w, f : ndarray, shape (n, 3)
+        Body rate and specific force, as recorded.
+    stated : Stated
+
+    Returns
+    -------
+    Reading
+
+    Raises
+    ------
+    DataError
+        When physics contradicts what was stated, or does not decide.
+    """
+    accel, notes = _accel_unit(f, stated)
+    gyro, more = _gyro_reading(t, w, f, stated)
+    return Reading(accel * (stated.accel_sign or 1), gyro, (*notes, *more))
+
+
+def _accel_unit(f: Floats, stated: Stated) -> tuple[float, tuple[str, ...]]:
+    size = float(np.median(np.linalg.norm(f, axis=1)))
+    if stated.accel is not None:
+        if not _is_gravity(size * stated.accel):
+            raise DataError(
+                f"linear_acceleration: with --accel-unit the median of |f| is {size * stated.accel:.4g} m/s^2, which "
+                "is not gravity; check --accel-unit"
+            )
+        return stated.accel, ()
+    if _is_gravity(size):
+        return 1.0, ()
+    if _is_gravity(size * STANDARD_GRAVITY):
+        return STANDARD_GRAVITY, (f"specific force is read in g: the median of |f| is {size:.4g}",)
+    if size < _NO_GRAVITY:
+        raise DataError(
+            f"linear_acceleration: the median of |f| is {size:.3g}: there is no gravity in it; record the IMU's raw "
+            "specific force"
+        )
+    raise DataError(
+        f"linear_acceleration: the median of |f| is {size:.4g}, neither near 9.8 (m/s^2) nor near 1 (g); state its "
+        "unit, such as --accel-unit mg"
+    )
+
+
+def _is_gravity(size: float) -> bool:
+    return abs(size / STANDARD_GRAVITY - 1.0) < _NEAR_GRAVITY
+
+
+def _gyro_reading(t: Floats, w: Floats, f: Floats, stated: Stated) -> tuple[float, tuple[str, ...]]:
+    """Recognise the factor of the gyros from the turns."""
+    units = (1.0, DEGREE) if stated.gyro is None else (stated.gyro,)
+    signs = (1.0, -1.0) if stated.gyro_sign is None else (float(stated.gyro_sign),)
+    readings = [unit * sign for unit in units for sign in signs]
+    seen: Turns | None = None
+    for length_s in _LENGTHS_S:
+        windows = cut_windows(t, w, f, length_s)
+        turns = _turning(windows, _FAR if length_s < _LENGTHS_S[-1] else _LEAST_SWING)
+        if not len(turns):
+            continue
+        # A table at an even rate may turn a wrong unit by whole turns more: windows of another length tell.
+        now = Turns(windows, turns, {reading: turned(w, windows, turns, reading) for reading in readings})
+        best = now.best()
+        if best is not None:
+            now.check_axes(best)
+            return best, _told(best, stated)
+        seen = seen or now
+    if seen is None:
+        return readings[0], ("no turn changes the direction of gravity: unit and sense of the gyros are not checked",)
+    raise DataError(seen.undecided(stated))
+
+
+def _largest(windows: Windows) -> float:
+    return float(np.sort(windows.swing)[-1 - _OTHERS]) if len(windows) > _OTHERS else 0.0
+
+
+def _turning(windows: Windows, enough: float) -> NDArray[np.int64]:
+    """Windows in which the direction of gravity changes most; none when it never changes by `enough` (rad)."""
+    largest = _largest(windows)
+    if largest < enough:
+        return np.empty(0, dtype=np.int64)
+    chosen = np.flatnonzero(windows.swing > _LARGE * largest)
+    return np.asarray(chosen[:: max(-(-len(chosen) * windows.length // _MOST), 1)])
+
+
+@dataclass(frozen=True)
+class Turns:
+    """Windows in which the IMU turned, and the rotation in each by every reading of the gyros.
+
+    Attributes
+    ----------
+    windows : Windows
+    chosen : ndarray of int, shape (k,)
+    C : dict of float to ndarray, shape (k, 3, 3)
+        By factor.
+    """
+
+    windows: Windows
+    chosen: NDArray[np.int64]
+    C: dict[float, Floats]
+
+    def misfit(self, reading: float, axes: Floats | None = None, share: float = 0.5) -> float:
+        """Return what a reading leaves of the change of direction, as a share of it.
+
+        Parameters
+        ----------
+        reading : float
+            Factor of the gyros.
+        axes : ndarray, shape (3, 3), optional
+            From the axes of the gyros to those of the accelerometers, a rotation.
+        share : float
+            The misfit that so many of the windows stay below; by default the median, so that bumps do not count.
+        """
+        before, after = self.windows.up_first[self.chosen], self.windows.up_last[self.chosen]
+        P = np.eye(3) if axes is None else axes
+        predicted = np.einsum("ij,kmj,ml,kl->ki", P, self.C[reading], P.T, before, optimize=True)
+        missed = np.linalg.norm(after - predicted, axis=1)
+        return float(np.quantile(missed, share) / np.median(np.linalg.norm(after - before, axis=1)))
+
+    def best(self) -> float | None:
+        """Return the reading that fits where no other does; None when the turns do not decide."""
+        left = {reading: self.misfit(reading) for reading in self.C}
+        best, *others = sorted(left, key=lambda reading: left[reading])
+        decided = left[best] < _FITS and all(left[other] > _FAILS * left[best] for other in others)
+        return best if decided else None
+
+    def check_axes(self, reading: float) -> None:
+        """Refuse axes of which one disagrees: the median does not see it when the IMU seldom turns about it.
+
+        Raises
+        ------
+        DataError
+            When the turns fit axes that are exchanged or of opposite sense, and not those of the recording.
+        """
+        if self.misfit(reading, share=_NEARLY_ALL) < _FITS:
+            return
+        best, sense, axes = self._other_axes(_NEARLY_ALL)
+        if best < _FITS and self.misfit(reading, share=_NEARLY_ALL) > _FAILS * best:
+            raise DataError(_wrong_axes(axes * np.sign(sense)))
+
+    def undecided(self, stated: Stated) -> str:
+        """Say why the turns do not decide, and which axes would fit."""
+        best, reading, axes = self._other_axes(_NEARLY_ALL)
+        least = min(map(self.misfit, self.C))
+        if best < _FITS and least > _FAILS * best:
+            return _wrong_axes(axes * np.sign(reading))
+        options = "" if stated.gyro is not None else "; state the unit, such as --gyro-unit deg/s"
+        return (
+            f"angular_velocity: the turns do not agree with the change of gravity's direction ({least:.0%} of it is "
+            f"left){options}; check that rate and force are of one rigid IMU and no axis is wrong"
+        )
+
+    def _other_axes(self, share: float) -> tuple[float, float, Floats]:
+        found = ((self.misfit(r, P, share), r, P) for r in self.C for P in _ROTATIONS)
+        return min(found, key=lambda entry: entry[0])
+
+
+def _wrong_axes(axes: Floats) -> str:
+    return (
+        "the turns contradict the axes: the gyros fit the accelerometers only when their axes are read as "
+        f"({_named(axes)}); correct the driver, or import the data with the right signs"
+    )
+
+
+def _told(reading: float, stated: Stated) -> tuple[str, ...]:
+    notes = []
+    if stated.gyro is None and abs(reading) != 1.0:
+        notes.append("body rate is read in deg/s: so the turns agree with the change of gravity's direction")
+    if stated.gyro_sign is None and reading < 0.0:
+        notes.append(
+            "body rate is read with the opposite sign: as it stands the turns go the wrong way (gyros of the wrong "
+            "sense, or left-handed axes)"
+        )
+    return tuple(notes)
+
+
+def _signed_permutations() -> tuple[Floats, ...]:
+    """Return the 24 rotations that exchange axes."""
+    out = []
+    for order, signs in product(permutations(range(3)), product((1.0, -1.0), repeat=3)):
+        P = np.zeros((3, 3))
+        P[range(3), order] = signs
+        if np.linalg.det(P) > 0.0:
+            out.append(P)
+    return tuple(out)
+
+
+_ROTATIONS = _signed_permutations()
+
+
+def _named(P: Floats) -> str:
+    return ", ".join(f"{'-' if row[k] < 0 else ''}{'xyz'[k]}" for row in P for k in np.flatnonzero(row))
+
+

@@ -1,0 +1,215 @@
+"""Missing samples: what stands in their place, how far it is known, and when it is not known well enough.
+
+**White noise.** A gap of m samples is bridged by the mean of its two neighbours (`strapdown`), whose noise then counts
+1 + m/2 times instead of once. Against m + 2 samples of their own the variance of the integral grows from m + 2 to
+2 (1 + m/2)^2, by m + m^2/2 samples. An epoch that holds n intervals has 1 + (m + m^2/2) / n times the variance, in
+the navigation and in Zw and Zf alike, because both take the same bridged samples.
+
+**Motion.** In a turn the rate between the two neighbours is not known. With an angular acceleration of at most a
+(the largest in the recording) and rates that differ by D over the gap T, the missing angle lies within
++-(a^2 T^2 - D^2) / (4 a) of the straight line: the area between it and the steepest way up and down. The sigma is that
+bound over the root of three. The force turns with the body: a straight line between two directions an angle A apart is
+too short by up to g A^2 / 12 in the mean, and wrong by g times what the angle is wrong.
+
+**At rest** nothing is added: an IMU that rests before and after, with the same force and rate, did not move; where
+these differ it moved or was switched off, and no covariance is honest. Source: own derivation.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sdimu_calibration.core.data.epochs import Epochs
+from sdimu_calibration.core.data.phases import Phases
+from sdimu_calibration.core.navigation.strapdown import Cycles
+from sdimu_calibration.core.recording import DataError, DataFault
+
+Floats = NDArray[np.float64]
+
+LINEAR_RAD = 1e-3
+"""Attitude error (sigma) from which the linearised filter errs by more than its noise: g d^2 / 2 is 0.5 ug."""
+_LONG_S = 2.0
+"""From here on people must know of a gap at rest: long enough to switch an IMU off and on."""
+_COMPARED_S = 20.0
+_DIFFERENT = 6.0
+"""Sigmas by which readings before and after a gap at rest must differ to be called different."""
+_LEAST_COMPARED_S = 3.0
+_STILL_RAD_S2 = 1e-4
+"""Least angular acceleration reckoned with."""
+
+
+@dataclass(frozen=True)
+class Bridges:
+    """What missing samples leave uncertain.
+
+    Attributes
+    ----------
+    white : ndarray, shape (e,)
+        Variance of the white noise of each epoch over that of a whole one.
+    angle, velocity : ndarray, shape (e,)
+        Sigma of the attitude (rad) and velocity (m/s) that each epoch adds, about every axis.
+    """
+
+    white: Floats
+    angle: Floats
+    velocity: Floats
+
+
+def largest_acceleration(cycles: Cycles) -> float:
+    """Largest angular acceleration between neighbouring whole cycles (rad/s^2)."""
+    whole = (cycles.lost[1:] == 0) & (cycles.lost[:-1] == 0)
+    if not whole.any():
+        return _STILL_RAD_S2
+    rate = cycles.alpha / cycles.dt[:, None]
+    step = np.sqrt(np.sum(np.diff(rate, axis=0) ** 2, axis=1)) * 2.0 / (cycles.dt[1:] + cycles.dt[:-1])
+    return max(float(step[whole].max()), _STILL_RAD_S2)
+
+
+def bridges(cycles: Cycles, epochs: Epochs, dwell: NDArray[np.bool_], nominal_s: float, acceleration: float,
+            gravity: float) -> Bridges:  # fmt: skip
+    """Uncertainty that missing samples leave in each epoch.
+
+    Parameters
+    ----------
+    cycles, epochs : Cycles, Epochs
+    dwell : ndarray of bool, shape (e,)
+    nominal_s : float
+        Sample interval (s).
+    acceleration : float
+        Largest angular acceleration to reckon with (rad/s^2).
+    gravity : float
+        m/s^2.
+    """
+    e = len(epochs)
+    at = np.flatnonzero(cycles.lost > 0)
+    white, angle, velocity = np.ones(e), np.zeros(e), np.zeros(e)
+    if not len(at):
+        return Bridges(white, angle, velocity)
+    m = cycles.lost[at].astype(np.float64)
+    epoch = np.searchsorted(epochs.last, at, side="right")
+    inside = epoch < e
+    at, m, epoch = at[inside], m[inside], epoch[inside]
+    intervals = np.maximum((epochs.end - epochs.start) / nominal_s, 1.0)
+    white += np.bincount(epoch, m + 0.5 * m**2, e) / intervals
+    moving = ~_rests(dwell, epoch)
+    at, m, epoch = at[moving], m[moving], epoch[moving]
+    T = m * nominal_s
+    rate = cycles.alpha / cycles.dt[:, None]
+    before, after = rate[np.maximum(at - 1, 0)], rate[np.minimum(at + 1, len(rate) - 1)]
+    D = np.sqrt(np.sum((after - before) ** 2, axis=1))
+    # Neighbouring cycles are up to a cycle further apart than the gap: D may exceed what a allows in T.
+    steepest = np.maximum(acceleration, D / T)
+    bound = np.maximum((steepest * T) ** 2 - D**2, 0.0) / (4.0 * steepest)
+    error = bound / np.sqrt(3.0)
+    turned = np.sqrt(np.sum((0.5 * (before + after)) ** 2, axis=1)) * T + error
+    force = gravity * T * np.hypot(turned**2 / 12.0, error)
+    angle[:] = np.sqrt(np.bincount(epoch, error**2, e))
+    velocity[:] = np.sqrt(np.bincount(epoch, force**2, e))
+    return Bridges(white, angle, velocity)
+
+
+def weighed(found: Bridges, epochs: Epochs, t: Floats, excess: Floats) -> Bridges:
+    """Add noise beyond the usual at times `t` (k,) s, as `soundness.wild` gives it, to the epochs it falls into."""
+    if not len(t):
+        return found
+    at = np.searchsorted(epochs.end, t)
+    at, excess = at[at < len(epochs)], excess[at < len(epochs)]
+    more = np.bincount(at, excess, len(epochs)) / (epochs.end - epochs.start)
+    return Bridges(found.white + more, found.angle, found.velocity)
+
+
+def _rests(dwell: NDArray[np.bool_], epoch: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Whether the IMU rests in an epoch and in those beside it."""
+    last = len(dwell) - 1
+    return np.asarray(dwell[epoch] & dwell[np.maximum(epoch - 1, 0)] & dwell[np.minimum(epoch + 1, last)])
+
+
+def judge(
+    cycles: Cycles, epochs: Epochs, phases: Phases, nominal_s: float, found: Bridges, noise: tuple[float, float],
+    unsound: tuple[DataFault, ...] = (),
+) -> tuple[DataFault, ...]:  # fmt: skip
+    """Say what is missing, and refuse what cannot be bridged.
+
+    Parameters
+    ----------
+    cycles, epochs, phases : Cycles, Epochs, Phases
+    nominal_s : float
+    found : Bridges
+    noise : tuple of float
+        White noise densities of gyro (rad/s/sqrt(Hz)) and accelerometer (m/s^2/sqrt(Hz)).
+    unsound : tuple of DataFault
+        Why samples were taken away; said with a refusal.
+
+    Raises
+    ------
+    DataError
+        When an angle is missing that nobody knows, or readings differ across a gap at rest.
+    """
+    at = np.flatnonzero(cycles.lost > 0)
+    length = epochs.end - epochs.start
+    drift = np.hypot(found.angle, noise[0] * np.sqrt(np.maximum(found.white - 1.0, 0.0) * length))
+    worst = int(np.argmax(drift))
+    if drift[worst] > LINEAR_RAD:
+        missing = cycles.lost[epochs.first[worst] : epochs.last[worst]].sum() * nominal_s
+        because = f" ({'; '.join(fault.text for fault in unsound)})" if unsound else ""
+        where = "at rest" if phases.dwell[worst] else "while the IMU turned"
+        what = f"{missing:.2f} s of samples are missing" if missing else "readings are wild"
+        raise DataError(
+            f"/imu/data_raw: {what} {where} at {epochs.start[worst]:.1f} s (stop "
+            f"{phases.stop[worst]}): the attitude after them is known only to {np.degrees(drift[worst]) * 60.0:.3g} "
+            f"arcmin; repeat the test, or cut the recording before or after{because}"
+        )
+    epoch = np.minimum(np.searchsorted(epochs.last, at, side="right"), len(epochs) - 1)
+    resting = _rests(phases.dwell, epoch)
+    long = cycles.lost[at] * nominal_s >= _LONG_S
+    faults = [_long_gap(cycles, epochs, phases, int(k), int(e), nominal_s, noise)
+              for k, e in zip(at[resting & long], epoch[resting & long], strict=True)]  # fmt: skip
+    for rows, where in ((at[resting], "at rest"), (at[~resting], "while the IMU turned")):
+        if len(rows):
+            lost = int(cycles.lost[rows].sum())
+            t = cycles.t[rows]
+            text = f"{lost} samples are missing by their stamps {where}, {len(rows)} gaps, bridged"
+            faults.append(DataFault("gap", text, lost, float(t[0]), float(t[-1])))
+    return tuple(faults)
+
+
+def _long_gap(
+    cycles: Cycles, epochs: Epochs, phases: Phases, cycle: int, epoch: int, nominal_s: float,
+    noise: tuple[float, float],
+) -> DataFault:  # fmt: skip
+    """Compare what is before a long gap at rest with what is after it."""
+    seconds = float(cycles.lost[cycle]) * nominal_s
+    at = float(cycles.t[cycle]) - seconds
+    text = f"{seconds:.1f} s of samples are missing at rest at {at:.1f} s (stop {phases.stop[epoch]})"
+    sides = [_beside(phases.dwell, epoch, step) for step in (-1, 1)]
+    length = epochs.end - epochs.start
+    total = [float(length[rows].sum()) for rows in sides]
+    if min(total) >= _LEAST_COMPARED_S:
+        for triad, mean, density in (("gyro", epochs.w_mean, noise[0]), ("accelerometer", epochs.f_mean, noise[1])):
+            a, b = ((mean[rows] * length[rows, None]).sum(axis=0) / s for rows, s in zip(sides, total, strict=True))
+            sigma = density * np.sqrt(1.0 / total[0] + 1.0 / total[1])
+            z = np.abs(b - a) / max(sigma, 1e-30)
+            if z.max() > _DIFFERENT:
+                worst = f"{triad} {'xyz'[int(np.argmax(z))]}"
+                raise DataError(
+                    f"/imu/data_raw: {text}, and {worst} differs by {z.max():.0f} sigma after "
+                    "them: the IMU was moved or switched off; cut the recording there, or repeat the test"
+                )
+    return DataFault(
+        "long gap",
+        f"{text}: if the IMU was switched off, its biases are others since, and the estimate is not to be trusted",
+        int(cycles.lost[cycle]), at, float(cycles.t[cycle]), grave=True,
+    )  # fmt: skip
+
+
+def _beside(dwell: NDArray[np.bool_], epoch: int, step: int) -> NDArray[np.int64]:
+    """Epochs of the same rest on one side of an epoch, at most `_COMPARED_S`."""
+    out: list[int] = []
+    k = epoch + step
+    while 0 <= k < len(dwell) and dwell[k] and len(out) < _COMPARED_S:
+        out.append(k)
+        k += step
+    return np.array(out, dtype=np.int64)

@@ -1,0 +1,183 @@
+"""Dwell or not: what the table says, checked against what the IMU feels.
+
+An epoch is used for measurements when the table says dwell all through it, the IMU agrees, and the settling time
+after the last motion is over. Where the table says nothing (no status topic, or none for `STALE_S`), the
+IMU decides alone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sdimu_calibration.core import earth
+from sdimu_calibration.core.data.epochs import EPOCH_S, Epochs
+from sdimu_calibration.core.navigation.strapdown import CYCLE_S
+from sdimu_calibration.core.recording import DataFault, PhaseLog
+from sdimu_calibration.core.specification import ImuSpecification
+from sdimu_calibration.core.units import STANDARD_GRAVITY
+
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+STALE_S = 2.5
+"""A status older than this says nothing any more (s); it is sent at every change and at 1 Hz."""
+_SIGMAS = 6.0
+"""The guard calls an IMU moving beyond this many sigma of what bias and noise can do at rest."""
+
+_WHOLE_S = 1.5 * EPOCH_S
+"""A longer epoch has a gap in it: it is no measurement."""
+_DENIED = 0.1
+"""Share of the rest that a status may call rotating unnoticed: its tables settle."""
+
+_LEAST_FORCE = 0.01 * STANDARD_GRAVITY
+"""An accelerometer may be this far off without the IMU being in motion: a force error that nobody specified must not
+throw away the stops that show it."""
+
+
+@dataclass(frozen=True)
+class RestLimits:
+    """What an IMU at rest can show at most: body rate (rad/s), deviation of |f| from gravity (m/s^2)."""
+
+    rate: float
+    force: float
+
+
+def rest_limits(imu: ImuSpecification) -> RestLimits:
+    """Limits of rest from an IMU's specification."""
+    prior = imu.prior
+    bias = np.hypot(prior.get("gyro_bias", 0.0), prior.get("gyro_mass_unbalance", 0.0))
+    noise = imu.gyro_white_noise / np.sqrt(CYCLE_S)
+    force = np.hypot(prior.get("accel_bias", 0.0), STANDARD_GRAVITY * prior.get("accel_scale", 0.0))
+    return RestLimits(
+        rate=earth.RATE + _SIGMAS * float(np.sqrt(3.0) * np.hypot(bias, noise)),
+        force=max(_LEAST_FORCE, _SIGMAS * float(np.hypot(force, imu.accel_white_noise))),
+    )
+
+
+@dataclass
+class PhaseState:
+    """What the classification of one block hands to the next."""
+
+    motion_end: float = -np.inf
+    at_rest: bool = True
+    fresh: bool = False
+    stop: int = 0
+
+
+@dataclass(frozen=True)
+class Phases:
+    """Phase of each epoch, arrays of length m.
+
+    Attributes
+    ----------
+    dwell : table (or the IMU, where the table is silent) says rest and the IMU agrees
+    used : a measurement is taken
+    first : the first measurement after motion
+    stop : index of the stop
+    contradicted : the table says dwell while the IMU moves
+    denied : the table says rotating while the IMU rests
+    """
+
+    dwell: Bools
+    used: Bools
+    first: Bools
+    stop: NDArray[np.int64]
+    contradicted: Bools
+    denied: Bools
+
+
+def table_says(epochs: Epochs, log: PhaseLog | None) -> tuple[NDArray[np.int8], NDArray[np.int64]]:
+    """Say what the status holds of each epoch: 1 dwell all through, 0 rotating in some, -1 nothing; and the stop."""
+    m = len(epochs)
+    if log is None or not len(log.t):
+        return np.full(m, -1, dtype=np.int8), np.full(m, -1, dtype=np.int64)
+    eps = 1e-6
+    i0 = np.searchsorted(log.t, epochs.start + eps, side="right") - 1
+    i1 = np.searchsorted(log.t, epochs.end - eps, side="right") - 1
+    known = (i0 >= 0) & (epochs.end - log.t[np.maximum(i1, 0)] <= STALE_S)
+    rotating_before = np.concatenate([[0], np.cumsum(~log.dwell)])
+    rotating = rotating_before[i1 + 1] - rotating_before[np.maximum(i0, 0)] > 0
+    said = np.where(rotating, 0, 1).astype(np.int8)
+    said[~known] = -1
+    # Numbers that change at rest, or do not change over a turn, would join what is apart: then dwells are counted.
+    stop = log.stop if numbers_make_sense(log) else np.full(len(log.t), -1, dtype=np.int64)
+    return said, np.where(known, stop[np.maximum(i1, 0)], -1)
+
+
+def numbers_make_sense(log: PhaseLog) -> bool:
+    """Whether the status gives every dwell a number of its own."""
+    dwell = np.flatnonzero(log.dwell)
+    begins = np.concatenate([[True], np.diff(dwell) > 1])[: len(dwell)]
+    number = log.stop[dwell]
+    changes = np.concatenate([[True], np.diff(number) != 0])[: len(dwell)]
+    return bool((begins == changes).all()) and len(np.unique(number[begins])) == int(begins.sum())
+
+
+def classify(
+    epochs: Epochs,
+    log: PhaseLog | None,
+    limits: RestLimits,
+    gravity: float,
+    settle_s: float,
+    state: PhaseState,
+) -> Phases:
+    """Decide the phase of each epoch.
+
+    Parameters
+    ----------
+    epochs : Epochs
+    log : PhaseLog or None
+    limits : RestLimits
+    gravity : float
+        At the site (m/s^2).
+    settle_s : float
+        No measurement for this long after motion (s).
+    state : PhaseState
+        Carried from block to block, changed in place.
+    """
+    said, said_stop = table_says(epochs, log)
+    still = (epochs.peak_rate < limits.rate) & (
+        np.abs(np.sqrt(np.sum(epochs.f_mean**2, axis=1)) - gravity) < limits.force
+    )
+    m = len(epochs)
+    dwell = still & (said != 0)
+    whole = epochs.end - epochs.start < _WHOLE_S
+    used = np.zeros(m, dtype=bool)
+    first = np.zeros(m, dtype=bool)
+    stop = np.zeros(m, dtype=np.int64)
+    for k in range(m):
+        if dwell[k] and not state.at_rest:
+            state.stop += 1
+        state.at_rest = bool(dwell[k])
+        if not dwell[k]:
+            state.motion_end, state.fresh = epochs.end[k], True
+        elif whole[k] and epochs.start[k] >= state.motion_end + settle_s - 1e-6:
+            used[k], first[k] = True, state.fresh
+            state.fresh = False
+        if said_stop[k] >= 0:
+            state.stop = int(said_stop[k])
+        stop[k] = state.stop
+    return Phases(dwell, used, first, stop, (said == 1) & ~still, (said == 0) & still)
+
+
+def contradictions(epochs: Epochs, phases: Phases, log: PhaseLog | None) -> tuple[DataFault, ...]:
+    """Say where the status and the IMU do not agree."""
+    length = epochs.end - epochs.start
+    out = []
+    for where, kind, text in (
+        (phases.contradicted, "motion at rest", "the IMU moved for {:.0f} s in which the table said dwell"),
+        (phases.denied, "status", "the table said rotating for {:.0f} s in which the IMU rested"),
+    ):
+        seconds = float(length[where].sum())
+        if seconds > (_DENIED * float(length[phases.dwell].sum()) if kind == "status" else 0.0):
+            t = epochs.start[where]
+            line = f"{text.format(seconds)} (first at {t[0]:.1f} s, stop {phases.stop[where][0]}); not used"
+            out.append(DataFault(kind, line, round(seconds), float(t[0]), float(epochs.end[where][-1])))
+    if log is not None and len(log.t) and epochs.end[-1] - log.t[-1] > STALE_S:
+        begin, end = float(log.t[-1]), float(epochs.end[-1])
+        line = f"the table says nothing from {begin:.1f} to {end:.1f} s, the end: the IMU alone tells rest from motion"
+        out.append(DataFault("status", line, round(end - begin), begin, end))
+    return tuple(out)

@@ -1,0 +1,104 @@
+"""A set of effects as one error model: layout of the state, prior, regressors, sensor error."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sdimu_calibration.core.effects import selection
+from sdimu_calibration.core.effects.effect import Effect, Parameter
+from sdimu_calibration.core.effects.motion import Motion
+from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.specification import ImuSpecification
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class ImuModel:
+    """The sensor error model that a filter estimates; it shows the filter numbers only.
+
+    Attributes
+    ----------
+    effects : tuple of Effect
+    parameters : tuple of Parameter, length p
+    channel, parameter : ndarray of int, shape (m,)
+        Sensor axis (0-2 gyro, 3-5 accelerometer) and state of each regressor column.
+    prior : ndarray, shape (p,)
+        One-sigma (SI).
+    decay_rate : ndarray, shape (p,)
+        1/s; zero for constants and random walks.
+    drive : ndarray, shape (p,)
+        Variance added per second.
+    """
+
+    effects: tuple[Effect, ...]
+    parameters: tuple[Parameter, ...]
+    channel: NDArray[np.int64]
+    parameter: NDArray[np.int64]
+    prior: Floats
+    decay_rate: Floats
+    drive: Floats
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Coefficient names in the order of the state."""
+        return tuple(p.name for p in self.parameters)
+
+    def regressors(self, motion: Motion) -> Floats:
+        """Regressor columns of all effects; shape (n, m), SI."""
+        return np.ascontiguousarray(np.hstack([e.regressors(motion) for e in self.effects]))
+
+    def errors(self, values: Floats, coefficients: Floats) -> Floats:
+        """Sensor errors of regressors `values` (n, m) at `coefficients` (p,): rad/s and m/s^2, shape (n, 6)."""
+        columns = values * coefficients[self.parameter]
+        out = np.zeros((len(values), 6))
+        for channel in range(6):
+            out[:, channel] = columns[:, self.channel == channel].sum(axis=1)
+        return out
+
+
+def build(effects: Sequence[str | Effect], imu: ImuSpecification) -> ImuModel:
+    """Put effects together.
+
+    Parameters
+    ----------
+    effects : sequence of str or Effect
+        Registered names, or effects of one's own.
+    imu : ImuSpecification
+        Gives the priors: by effect name, else the effect's own for the IMU's grade.
+
+    Raises
+    ------
+    DataError
+        When a name is unknown, stands twice, or has no prior.
+    """
+    chosen = tuple(selection.resolve(e) if isinstance(e, str) else e for e in effects)
+    seen: set[str] = set()
+    channel: list[int] = []
+    parameter: list[int] = []
+    parameters: list[Parameter] = []
+    prior: list[float] = []
+    decay: list[float] = []
+    drive: list[float] = []
+    for effect in chosen:
+        for p in effect.parameters:
+            if p.name in seen:
+                raise DataError(f"'{p.name}' of effect '{effect.name}' stands twice in the model")
+            seen.add(p.name)
+        channel += [t.channel for t in effect.terms]
+        parameter += [len(parameters) + t.parameter for t in effect.terms]
+        parameters += effect.parameters
+        size = imu.prior.get(effect.family or effect.name, effect.prior.get(imu.grade))
+        if size is None or not size > 0:
+            raise DataError(f"IMU '{imu.name}' gives no prior for effect '{effect.name}': add it under prior:")
+        prior += [size] * len(effect.parameters)
+        decay += [1.0 / effect.decay_s if effect.decay_s else 0.0] * len(effect.parameters)
+        drive += [effect.random_walk.get(imu.grade, 0.0) ** 2] * len(effect.parameters)
+    return ImuModel(
+        chosen, tuple(parameters), np.array(channel, dtype=np.int64), np.array(parameter, dtype=np.int64),
+        np.array(prior), np.array(decay), np.array(drive),
+    )  # fmt: skip

@@ -1,0 +1,1 @@
+"""The Kalman filter: one compiled pass over a recording, passes until nothing moves."""

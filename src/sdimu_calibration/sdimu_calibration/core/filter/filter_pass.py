@@ -1,0 +1,351 @@
+"""One pass of navigation and Kalman filter over epochs; the compiled heart.
+
+State: nine navigation errors (ins_errors), p coefficient deviations (true minus the value used in the sensor
+compensation), three copies of the initial attitude error, which let later passes start from the smoothed attitude.
+
+A dwell epoch of length T ends with, in this order,
+
+    Zp = computed minus known position          = position error
+    Zv = computed velocity minus zero           = velocity error
+    Zw = w_mean - C_bn w_ie = C_bn [w_ie x] attitude + D_w dx + n_g mean
+    Zf = f_mean + C_bn g    = C_bn [f x] attitude    + D_f dx + n_a mean
+
+with C_nb at the end of the epoch and D the mean regressors. The same noise n drives the navigation, hence with gyro
+and accelerometer noise densities q_g, q_a (power)
+
+    E[attitude Zw'] = -C q_g,      E[velocity Zf'] = C q_a,       E[position Zf'] = C q_a T / 2,
+    E[velocity Zw'] = -[f x] C q_g T / 2,                         E[position Zw'] = -[f x] C q_g T^2 / 6.
+
+While the table rests, Zv and Zp are the sums of what Zf has already said, so they are taken once after each
+motion; taking them at every epoch would only be news if they had noise of their own. Derivation:
+doc/shared-noise.md.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sdimu_calibration.core import earth
+from sdimu_calibration.core.compiled import compiled
+from sdimu_calibration.core.filter.kalman import cholesky, propagate, update, whiten
+from sdimu_calibration.core.matrix3 import applied, elements
+from sdimu_calibration.core.navigation.ins_errors import navigation_error_matrix, process_noise, transition
+from sdimu_calibration.core.navigation.strapdown import navigate_cycle, velocity_increment
+from sdimu_calibration.core.rotation import orthonormal, rotation_matrix, skew
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+NAV = 9
+"""Navigation error states."""
+COPY = 3
+"""Copies of the initial attitude error."""
+MEASURED = 12
+"""Rows of a full measurement: Zp, Zv, Zw, Zf."""
+
+SKIP, SENSORS, ALL, HELD_SENSORS, HELD_ALL = 0, 1, 2, -1, -2
+"""What an epoch measures: nothing; Zw and Zf; all four. Held out: predicted and scored, not taken."""
+
+
+class PassInput(NamedTuple):
+    """Data of a pass: cycles, epochs, regressors. Shapes: n cycles, e epochs, m regressor columns."""
+
+    dt: Floats  # (n,) s
+    alpha: Floats  # (n, 3) rad
+    upsilon: Floats  # (n, 3) m/s
+    coning: Floats  # (n, 3) rad
+    sculling: Floats  # (n, 3) m/s
+    first: Ints  # (e,) first cycle
+    last: Ints  # (e,) one after the last cycle
+    white: Floats  # (e,) variance of the white noise over that of a whole epoch
+    gap_angle: Floats  # (e,) rad: sigma that missing samples add, every axis
+    gap_velocity: Floats  # (e,) m/s
+    kind: Ints  # (e,) SKIP ... HELD_ALL
+    values: Floats  # (n, m) regressors
+    channel: Ints  # (m,)
+    parameter: Ints  # (m,)
+
+
+class PassSettings(NamedTuple):
+    """Constants of a pass."""
+
+    reference: Floats  # (3,) latitude (rad), longitude (rad), height (m) of the known point
+    gravity_excess: float  # site gravity minus normal gravity (m/s^2)
+    gyro_psd: float  # (rad/s)^2/Hz
+    accel_psd: float  # (m/s^2)^2/Hz
+    extra_gyro: float  # variance of Zw beyond white noise (rad/s)^2
+    extra_accel: float  # variance of Zf beyond white noise (m/s^2)^2
+    velocity_sigma: float  # m/s
+    position_sigma: float  # m
+    decay_rate: Floats  # (p,) 1/s
+    drive: Floats  # (p,) variance per second
+    closed_loop: bool  # feed attitude and coefficients back too, not only position and velocity
+    shared_noise: bool  # model M
+
+
+class PassState(NamedTuple):
+    """Where a pass stands; changed in place. Size of the state: s = 9 + p + 3."""
+
+    x: Floats  # (s,)
+    P: Floats  # (s, s)
+    C_nb: Floats  # (3, 3)
+    velocity: Floats  # (3,) m/s
+    position: Floats  # (3,) rad, rad, m
+    used: Floats  # (p,) coefficients in the compensation
+
+
+class PassOutput(NamedTuple):
+    """What a pass leaves, one row an epoch; `keep` rows hold the matrices (0 when not wanted)."""
+
+    estimate: Floats  # (e, p) coefficients
+    sigma: Floats  # (e, s)
+    innovation: Floats  # (e, 12); NaN where not measured
+    normalised: Floats  # (e, 12) L^-1 innovation
+    log_likelihood: Floats  # (e,)
+    nis: Floats  # (e, 4) squared normalised innovation of position, velocity, rate, force
+    C_nb: Floats  # (e, 3, 3) at the end of the epoch
+    stride: int  # epochs between snapshots
+    covariance: Floats  # (e / stride, p, p) of the coefficients
+    Phi: Floats  # (keep, 9, 9)
+    G: Floats  # (keep, 9, p)
+    H: Floats  # (keep, 12, s)
+    L: Floats  # (keep, 12, 12)
+    K: Floats  # (keep, s, 12)
+
+
+def new_output(epochs: int, parameters: int, keep: bool, stride: int) -> PassOutput:
+    """Allocate the output of a pass; `keep` the matrices of every epoch, the covariance every `stride`."""
+    e, p, s = epochs, parameters, NAV + parameters + COPY
+    k = e if keep else 0
+    nan = np.nan
+    return PassOutput(
+        np.zeros((e, p)), np.zeros((e, s)), np.full((e, MEASURED), nan), np.full((e, MEASURED), nan),
+        np.zeros(e), np.full((e, 4), nan), np.zeros((e, 3, 3)), stride, np.zeros((-(-e // stride), p, p)),
+        np.zeros((k, NAV, NAV)), np.zeros((k, NAV, p)), np.zeros((k, MEASURED, s)), np.zeros((k, MEASURED, MEASURED)),
+        np.zeros((k, s, MEASURED)),
+    )  # fmt: skip
+
+
+@compiled
+def _add_response(G: Floats, att: Floats, vel: Floats, f_n: Floats, dt: float) -> None:
+    """Add one cycle to the integrated response of the navigation to each coefficient, G (9, p), in place."""
+    for j in range(G.shape[1]):
+        a0, a1, a2 = G[6, j] + 0.5 * att[0, j], G[7, j] + 0.5 * att[1, j], G[8, j] + 0.5 * att[2, j]
+        v0 = vel[0, j] + (f_n[1] * a2 - f_n[2] * a1) * dt
+        v1 = vel[1, j] + (f_n[2] * a0 - f_n[0] * a2) * dt
+        v2 = vel[2, j] + (f_n[0] * a1 - f_n[1] * a0) * dt
+        G[0, j] += (G[3, j] + 0.5 * v0) * dt
+        G[1, j] += (G[4, j] + 0.5 * v1) * dt
+        G[2, j] += (G[5, j] + 0.5 * v2) * dt
+        G[3, j] += v0
+        G[4, j] += v1
+        G[5, j] += v2
+        G[6, j] += att[0, j]
+        G[7, j] += att[1, j]
+        G[8, j] += att[2, j]
+
+
+@compiled
+def _navigate_epoch(
+    data: PassInput, e: int, settings: PassSettings, state: PassState, G: Floats, D: Floats, sums: Floats
+) -> float:
+    """Navigate through an epoch, in place; return its length (s).
+
+    Filled: G (9, p), D (6, p), and sums (9,) of angle and velocity increment in b and of velocity increment in n.
+    """
+    p = D.shape[1]
+    att = np.zeros((3, p))
+    vel = np.zeros((3, p))
+    error = np.zeros(6)
+    phi = np.empty(3)
+    alpha = np.empty(3)
+    upsilon = np.empty(3)
+    f_n = np.empty(3)
+    C_mid = np.empty((3, 3))
+    G[:, :] = 0.0
+    D[:, :] = 0.0
+    sums[:] = 0.0
+    T = 0.0
+    for c in range(data.first[e], data.last[e]):
+        dt = data.dt[c]
+        T += dt
+        error[:] = 0.0
+        for j in range(data.channel.shape[0]):
+            error[data.channel[j]] += data.values[c, j] * state.used[data.parameter[j]]
+        for i in range(3):
+            alpha[i] = data.alpha[c, i] - error[i] * dt
+            upsilon[i] = data.upsilon[c, i] - error[3 + i] * dt
+            phi[i] = alpha[i] + data.coning[c, i]
+            sums[i] += alpha[i]
+            sums[3 + i] += upsilon[i]
+        gravity = earth.normal_gravity(state.position[0], state.position[2]) + settings.gravity_excess
+        C_mid[:, :] = state.C_nb
+        dv = velocity_increment(alpha, upsilon, data.sculling[c])
+        # Not the mean attitude times the mean force: that leans off the vertical in a turn, and a filter
+        # that sees it takes it for knowledge of azimuth.
+        f_n[0], f_n[1], f_n[2] = applied(elements(state.C_nb), dv[0] / dt, dv[1] / dt, dv[2] / dt)
+        for i in range(3):
+            sums[6 + i] += f_n[i] * dt
+        navigate_cycle(state.C_nb, state.velocity, state.position, phi, dv, dt, gravity)
+        for i in range(3):
+            for j in range(3):
+                C_mid[i, j] = 0.5 * (C_mid[i, j] + state.C_nb[i, j])
+        att[:, :] = 0.0
+        vel[:, :] = 0.0
+        for j in range(data.channel.shape[0]):
+            channel, k = data.channel[j], data.parameter[j]
+            v = data.values[c, j] * dt
+            D[channel, k] += v
+            if channel < 3:
+                for i in range(3):
+                    att[i, k] -= C_mid[i, channel] * v
+            else:
+                for i in range(3):
+                    vel[i, k] += C_mid[i, channel - 3] * v
+        _add_response(G, att, vel, f_n, dt)
+    return T
+
+
+@compiled
+def _measurement(
+    settings: PassSettings, state: PassState, D: Floats, sums: Floats, T: float, p: int, white: float
+) -> tuple[Floats, Floats, Floats, Floats]:
+    """Build z (12,), H (12, s), R (12, 12) and M (s, 12) of a dwell epoch; `white` as in `PassInput`."""
+    s = NAV + p + COPY
+    gyro_psd, accel_psd = settings.gyro_psd * white, settings.accel_psd * white
+    z = np.empty(MEASURED)
+    H = np.zeros((MEASURED, s))
+    R = np.zeros((MEASURED, MEASURED))
+    M = np.zeros((s, MEASURED))
+    C = state.C_nb
+    C_bn = np.ascontiguousarray(C.T)
+    r_n, r_e = earth.radii(settings.reference[0])
+    height = settings.reference[2]
+    w_ie = earth.earth_rate(settings.reference[0])
+    g_n = np.zeros(3)
+    g_n[2] = earth.normal_gravity(settings.reference[0], height) + settings.gravity_excess
+    z[0] = (state.position[0] - settings.reference[0]) * (r_n + height)
+    # The same limit as in the navigation: without it the east error would read zero at the pole.
+    cos = np.cos(min(abs(settings.reference[0]), earth.POLE_LIMIT))
+    z[1] = (state.position[1] - settings.reference[1]) * (r_e + height) * cos
+    z[2] = height - state.position[2]
+    z[3:6] = state.velocity
+    z[6:9] = sums[:3] / T - C_bn @ w_ie
+    z[9:12] = sums[3:6] / T + C_bn @ g_n
+    for i in range(3):
+        H[i, i] = 1.0
+        H[3 + i, 3 + i] = 1.0
+        R[i, i] = settings.position_sigma**2
+        R[3 + i, 3 + i] = settings.velocity_sigma**2
+        R[6 + i, 6 + i] = gyro_psd / T + settings.extra_gyro
+        R[9 + i, 9 + i] = accel_psd / T + settings.extra_accel
+    H[6:9, 6:9] = C_bn @ skew(w_ie)
+    H[9:12, 6:9] = C_bn @ skew(-g_n)
+    H[6:12, NAV : NAV + p] = D / T
+    if settings.shared_noise:
+        fC = skew(-g_n) @ C
+        M[6:9, 6:9] = -gyro_psd * C
+        M[3:6, 6:9] = -gyro_psd * T / 2.0 * fC
+        M[0:3, 6:9] = -gyro_psd * T**2 / 6.0 * fC
+        M[3:6, 9:12] = accel_psd * C
+        M[0:3, 9:12] = accel_psd * T / 2.0 * C
+    return z, H, R, M
+
+
+@compiled
+def _feed_back(settings: PassSettings, state: PassState, p: int) -> None:
+    """Move the mean of the fed-back states into navigation and compensation, in place.
+
+    The attitude reset turns the error frame: with the correction e, the new error is (old - e) + e x old / 2,
+    so the covariance turns by I + [e x] / 2 (the first order of Baker-Campbell-Hausdorff).
+    """
+    x, P = state.x, state.P
+    r_n, r_e = earth.radii(settings.reference[0])
+    cos = np.cos(min(abs(settings.reference[0]), earth.POLE_LIMIT))
+    state.position[0] -= x[0] / (r_n + settings.reference[2])
+    state.position[1] -= x[1] / ((r_e + settings.reference[2]) * cos)
+    state.position[2] += x[2]
+    state.velocity[:] -= x[3:6]
+    x[:6] = 0.0
+    if not settings.closed_loop:
+        return
+    e = x[6:9].copy()
+    state.C_nb[:, :] = orthonormal(rotation_matrix(e) @ state.C_nb)
+    if e[0] ** 2 + e[1] ** 2 + e[2] ** 2 > 1e-14:
+        J = np.eye(3) + 0.5 * skew(e)
+        P[6:9, :] = J @ np.ascontiguousarray(P[6:9, :])
+        P[:, 6:9] = np.ascontiguousarray(P[:, 6:9]) @ J.T
+    state.used[:] += x[NAV : NAV + p]
+    x[6 : NAV + p] = 0.0
+
+
+@compiled
+def run_pass(data: PassInput, settings: PassSettings, state: PassState, out: PassOutput) -> None:
+    """Navigate, propagate and measure, epoch by epoch; `state` and `out` are filled in place."""
+    p = state.used.shape[0]
+    G = np.zeros((NAV, p + COPY))
+    D = np.zeros((6, p))
+    sums = np.zeros(9)
+    decay = np.ones(p + COPY)
+    drive = np.zeros(p + COPY)
+    gyro = np.eye(3) * settings.gyro_psd
+    accel = np.eye(3) * settings.accel_psd
+    for e in range(data.first.shape[0]):
+        position, velocity = state.position.copy(), state.velocity.copy()
+        T = _navigate_epoch(data, e, settings, state, G[:, :p], D, sums)
+        f_n = sums[6:] / T
+        Phi = transition(navigation_error_matrix(position, velocity, f_n), T)
+        Q = process_noise(gyro * data.white[e], accel * data.white[e], f_n, T)
+        for i in range(3):
+            Q[3 + i, 3 + i] += data.gap_velocity[e] ** 2
+            Q[6 + i, 6 + i] += data.gap_angle[e] ** 2
+        for j in range(p):
+            d = np.exp(-settings.decay_rate[j] * T)
+            decay[j] = d
+            drive[j] = settings.drive[j] * T
+            if d != 1.0:
+                state.used[j] *= d
+        propagate(state.x, state.P, Phi, G, Q, decay, drive)
+        kind = data.kind[e]
+        keep = out.Phi.shape[0] > 0
+        if keep:
+            out.Phi[e] = Phi
+            out.G[e] = G[:, :p]
+        if kind != SKIP:
+            low = 0 if abs(kind) == ALL else 6
+            z, H, R, M = _measurement(settings, state, D, sums, T, p, data.white[e])
+            Hl = np.ascontiguousarray(H[low:])
+            Ml = np.ascontiguousarray(M[:, low:])
+            Rl = np.ascontiguousarray(R[low:, low:])
+            if kind > 0:
+                innovation, L, K = update(state.x, state.P, z[low:], Hl, Rl, Ml)
+                if keep:
+                    out.K[e, :, low:] = K
+            else:
+                HM = Hl @ Ml
+                L = cholesky(Hl @ state.P @ Hl.T + HM + HM.T + Rl)
+                innovation = z[low:] - Hl @ state.x
+            white = whiten(L, innovation.reshape(-1, 1))[:, 0]
+            out.innovation[e, low:] = innovation
+            out.normalised[e, low:] = white
+            log = -0.5 * (MEASURED - low) * np.log(2.0 * np.pi)
+            for i in range(MEASURED - low):
+                log -= 0.5 * white[i] ** 2 + np.log(L[i, i])
+            out.log_likelihood[e] = log
+            for group in range(low // 3, 4):
+                first = 3 * group - low
+                out.nis[e, group] = white[first] ** 2 + white[first + 1] ** 2 + white[first + 2] ** 2
+            if keep:
+                out.H[e, low:] = Hl
+                out.L[e, low:, low:] = L
+            if kind > 0:
+                _feed_back(settings, state, p)
+        out.estimate[e] = state.used + state.x[NAV : NAV + p]
+        for i in range(state.x.shape[0]):
+            out.sigma[e, i] = np.sqrt(state.P[i, i])
+        out.C_nb[e] = state.C_nb
+        if e % out.stride == 0:
+            out.covariance[e // out.stride] = state.P[NAV : NAV + p, NAV : NAV + p]

@@ -1,0 +1,376 @@
+"""Passes over a recording: from samples to the converged estimate.
+
+Pass 1 is closed loop. Each later pass is linearised about the coefficients and the smoothed initial attitude of the
+pass before, keeps them fixed, and estimates the deviation from them with the original prior; the passes end when the
+coefficients move by less than `CONVERGED` of their sigmas (Gauss-Newton on the whole test).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sdimu_calibration.core import earth
+from sdimu_calibration.core.data.epochs import Epochs, cut
+from sdimu_calibration.core.data.gaps import Bridges, bridges, judge, largest_acceleration, weighed
+from sdimu_calibration.core.data.phases import Phases, PhaseState, RestLimits, classify, contradictions, rest_limits
+from sdimu_calibration.core.data.soundness import sound, wild
+from sdimu_calibration.core.effects import imu_model
+from sdimu_calibration.core.effects.imu_model import ImuModel
+from sdimu_calibration.core.filter.filter_pass import (
+    ALL,
+    COPY,
+    NAV,
+    SENSORS,
+    SKIP,
+    PassInput,
+    PassOutput,
+    PassSettings,
+    PassState,
+    new_output,
+    run_pass,
+)
+from sdimu_calibration.core.navigation.alignment import Alignment, align
+from sdimu_calibration.core.navigation.strapdown import Cycles, Reducer
+from sdimu_calibration.core.navigation.track import motion
+from sdimu_calibration.core.recording import NOMINAL_FROM, DataError, DataFault, Recording, TemperatureLog
+from sdimu_calibration.core.rotation import rotation_matrix, rotation_vector
+from sdimu_calibration.core.specification import ImuSpecification, Model, Site
+
+Floats = NDArray[np.float64]
+Progress = Callable[[str, float], None]
+
+CONVERGED = 0.02
+"""Largest movement of a coefficient in its own sigma at which the passes end."""
+MOST_PASSES = 16
+_LOOSE_VELOCITY = 1.0
+_LOOSE_POSITION = 100.0
+"""Sigmas of Zv (m/s) and Zp (m) while the passes find their place: too wide to say anything."""
+_FITS = 1.1
+"""Mean NIS of a first pass from which linearisation is not the trouble."""
+_NEAR = 0.2
+"""Movement in sigma at which an estimate that ran out of passes is still one."""
+_SETTLED = 0.1
+"""Movement in sigma at which position and velocity are taken in again."""
+SNAPSHOT_EPOCHS = 5
+"""The covariance of the coefficients is kept every so many epochs."""
+ALIGN_S = 30.0
+"""At most this much of the first dwell levels and gyrocompasses (s)."""
+
+
+@dataclass(frozen=True)
+class Setup:
+    """Everything a pass needs that is not data."""
+
+    site: Site
+    imu: ImuSpecification
+    model: Model
+    sensors: ImuModel
+    limits: RestLimits
+    gravity: float
+
+
+@dataclass(frozen=True)
+class Reduced:
+    """A recording after reduction: cycles, epochs and their phases."""
+
+    cycles: Cycles
+    epochs: Epochs
+    phases: Phases
+    kind: NDArray[np.int64]
+    temperature: TemperatureLog | None
+    bridges: Bridges
+    faults: tuple[DataFault, ...] = ()
+
+    @property
+    def rest(self) -> NDArray[np.bool_]:
+        """Cycles in dwell, shape (n,)."""
+        return np.repeat(self.phases.dwell, self.epochs.last - self.epochs.first)
+
+
+@dataclass(frozen=True)
+class Pass:
+    """A finished pass: where it was linearised, where it ended."""
+
+    C_start: Floats
+    start: PassState
+    state: PassState
+    output: PassOutput
+    data: PassInput
+    settings: PassSettings
+
+    @property
+    def estimate(self) -> Floats:
+        """Coefficients at the end, frame of the prior, shape (p,)."""
+        p = len(self.state.used)
+        return np.asarray(self.state.used + self.state.x[NAV : NAV + p])
+
+    @property
+    def covariance(self) -> Floats:
+        """Their covariance, shape (p, p)."""
+        p = len(self.state.used)
+        return np.asarray(self.state.P[NAV : NAV + p, NAV : NAV + p])
+
+
+def set_up(site: Site, imu: ImuSpecification, model: Model) -> Setup:
+    """Check the options against each other and prepare what all passes share."""
+    sensors = imu_model.build(model.effects, imu)
+    gravity = site.gravity_m_s2 or float(earth.normal_gravity(site.latitude_rad, site.height_m))
+    return Setup(site, imu, model, sensors, rest_limits(imu), gravity)
+
+
+def nominal_interval(t: Floats) -> float:
+    """Nominal sample interval (s) from the first stamps; live and offline use the same ones."""
+    return float(np.median(np.diff(t[: NOMINAL_FROM + 1])))
+
+
+def measurement_kinds(phases: Phases, every_epoch: bool) -> NDArray[np.int64]:
+    """Say what each epoch measures: Zw and Zf in every used one, Zp and Zv after motion (or always)."""
+    kind = np.where(phases.used, SENSORS, SKIP).astype(np.int64)
+    kind[phases.used if every_epoch else phases.first] = ALL
+    return kind
+
+
+def reduce(recording: Recording, setup: Setup, screened: bool = True) -> Reduced:
+    """Reduce a recording to cycles and epochs and decide the phases.
+
+    Parameters
+    ----------
+    recording : Recording
+    setup : Setup
+    screened : bool
+        Take away samples that are no measurement; not for the perfect ones of `nominal`, which stand still at rest.
+
+    Raises
+    ------
+    DataError
+        When there is too little of it, or so much is missing that nobody knows the attitude after it.
+    """
+    recording, unsound = sound(recording) if screened else (recording, ())
+    if len(recording.t) < NOMINAL_FROM + 1:
+        raise DataError(f"/imu/data_raw: {len(recording.t)} usable samples are too few to calibrate")
+    nominal = nominal_interval(recording.t)
+    cycles = Reducer(nominal).add(recording.t, recording.omega_ib_b, recording.f_ib_b)
+    epochs = cut(cycles, nominal)
+    if not len(epochs):
+        raise DataError("/imu/data_raw: the recording is shorter than one second")
+    phases = classify(epochs, recording.phase, setup.limits, setup.gravity, setup.model.settle_s, PhaseState())
+    kind = measurement_kinds(phases, setup.model.zero_velocity == "every_epoch")
+    cycles = cycles[: int(epochs.last[-1])]
+    found = bridges(cycles, epochs, phases.dwell, nominal, largest_acceleration(cycles), setup.gravity)
+    at, excess, rough = wild(recording)
+    found = weighed(found, epochs, at, excess)
+    unsound = (*unsound, *rough)
+    noise = (setup.imu.gyro_white_noise, setup.imu.accel_white_noise)
+    lost = judge(cycles, epochs, phases, nominal, found, noise, unsound)
+    faults = (*unsound, *lost, *contradictions(epochs, phases, recording.phase))
+    return Reduced(cycles, epochs, phases, kind, recording.temperature, found, faults)
+
+
+def first_attitude(epochs: Epochs, phases: Phases, setup: Setup) -> Alignment:
+    """Coarse alignment from the first dwell.
+
+    Raises
+    ------
+    DataError
+        When the IMU is never at rest, or turns before its first rest.
+    """
+    if not phases.dwell.any():
+        if phases.denied.any():
+            raise DataError(
+                "/rate_table/status: says rotating all the time, although the IMU rests at times; correct the status, "
+                "or leave the topic out: the dwells are then found from the IMU"
+            )
+        raise DataError(
+            "/imu/data_raw: the IMU is never at rest (|f| near gravity and |w| near Earth rate within the IMU's "
+            "specification); check its units, and that --imu and --site fit"
+        )
+    start = int(np.argmax(phases.dwell))
+    if start:
+        raise DataError(
+            f"/imu/data_raw: the recording starts in motion (first rest at {epochs.start[start]:.0f} s); "
+            "start it at rest, or cut it"
+        )
+    moving = np.flatnonzero(~phases.dwell)
+    end = int(moving[0]) if len(moving) else len(phases.dwell)
+    rows = slice(0, max(1, min(end, int(ALIGN_S))))
+    weight = (epochs.end - epochs.start)[rows]
+    w_mean, f_mean = (
+        (v[rows] * weight[:, None]).sum(axis=0) / weight.sum() for v in (epochs.w_mean, epochs.f_mean)
+    )
+    return align(w_mean, f_mean, float(weight.sum()), setup.site, setup.imu)
+
+
+def pass_settings(setup: Setup, closed_loop: bool) -> PassSettings:
+    """Constants of a pass."""
+    site, imu, model = setup.site, setup.imu, setup.model
+    return PassSettings(
+        reference=np.array([site.latitude_rad, 0.0, site.height_m]),
+        gravity_excess=setup.gravity - float(earth.normal_gravity(site.latitude_rad, site.height_m)),
+        gyro_psd=imu.gyro_white_noise**2,
+        accel_psd=imu.accel_white_noise**2,
+        extra_gyro=model.extra_rate_sigma**2,
+        extra_accel=model.extra_force_sigma**2,
+        velocity_sigma=model.velocity_sigma,
+        position_sigma=model.position_sigma,
+        decay_rate=setup.sensors.decay_rate,
+        drive=setup.sensors.drive,
+        closed_loop=closed_loop,
+        shared_noise=model.shared_noise,
+    )
+
+
+def start_state(setup: Setup, start: Alignment, C_nb: Floats, reference: Floats) -> PassState:
+    """State at the first sample, linearised at attitude `C_nb` and coefficients `reference` (p,)."""
+    p = len(setup.sensors.prior)
+    s = NAV + p + COPY
+    model = setup.model
+    x, P = np.zeros(s), np.zeros((s, s))
+    P[range(3), range(3)] = model.position_sigma**2
+    P[range(3, 6), range(3, 6)] = model.velocity_sigma**2
+    for i in range(3):
+        for a in (6 + i, NAV + p + i):
+            for b in (6 + i, NAV + p + i):
+                P[a, b] = start.filter_sigma[i] ** 2
+    P[range(NAV, NAV + p), range(NAV, NAV + p)] = setup.sensors.prior**2
+    shift = rotation_vector(C_nb @ start.C_nb.T)
+    x[6:9] = x[NAV + p :] = -shift
+    x[NAV : NAV + p] = -reference
+    position = np.array([setup.site.latitude_rad, 0.0, setup.site.height_m])
+    return PassState(x, P, C_nb.copy(), np.zeros(3), position, reference.copy())
+
+
+def pass_input(reduced: Reduced, values: Floats, channel: NDArray[np.int64], parameter: NDArray[np.int64]) -> PassInput:
+    """Put cycles, epochs and regressors together."""
+    c, e, b = reduced.cycles, reduced.epochs, reduced.bridges
+    return PassInput(
+        c.dt, c.alpha, c.upsilon, c.coning, c.sculling, e.first, e.last, b.white, b.angle, b.velocity, reduced.kind,
+        values, channel, parameter,
+    )  # fmt: skip
+
+
+def one_pass(
+    reduced: Reduced, setup: Setup, start: Alignment, C_nb: Floats, reference: Floats, closed_loop: bool, keep: bool
+) -> Pass:
+    """Run one pass linearised at initial attitude `C_nb` and coefficients `reference`."""
+    sensors = setup.sensors
+    seen = motion(
+        reduced.cycles, reduced.rest, sensors, reference, C_nb.copy(), setup.site.latitude_rad, setup.gravity,
+        reduced.temperature, predicted=not closed_loop,
+    )  # fmt: skip
+    values = sensors.regressors(seen)
+    if not np.isfinite(values).all():
+        raise DataError("a sensor effect of the model is not finite on this recording: check its expression")
+    data = pass_input(reduced, values, sensors.channel, sensors.parameter)
+    begin = start_state(setup, start, C_nb, reference)
+    state = PassState(*(v.copy() for v in begin))
+    output = new_output(len(reduced.epochs), len(sensors.prior), keep, SNAPSHOT_EPOCHS)
+    settings = pass_settings(setup, closed_loop)
+    run_pass(data, settings, state, output)
+    if not (np.isfinite(state.x).all() and np.isfinite(state.P).all() and (np.diag(state.P) >= 0.0).all()):
+        raise DataError(
+            "the filter diverged: the recording contradicts the IMU's specification; check --imu and --site"
+        )
+    return Pass(C_nb, begin, state, output, data, settings)
+
+
+def smoothed_start(finished: Pass) -> Floats:
+    """Give the initial attitude as the whole test sees it, shape (3, 3)."""
+    return np.asarray(rotation_matrix(finished.state.x[-COPY:].copy()) @ finished.C_start)
+
+
+def refine(
+    reduced: Reduced, setup: Setup, start: Alignment, first: Pass, progress: Progress, keep: bool
+) -> tuple[Pass, int, bool]:
+    """Repeat open-loop passes until the coefficients stand still.
+
+    Position and velocity are known so well that the second order of a large error of the initial azimuth contradicts
+    them, and holding on to them pins the azimuth where it is. A first pass that did not fit is therefore followed
+    by passes that let them go, until the rest has found its place.
+
+    Returns
+    -------
+    last : Pass
+    passes : int
+        The number of all passes.
+    converged : bool
+    """
+    last = first
+    loose = replace(setup, model=replace(setup.model, velocity_sigma=_LOOSE_VELOCITY, position_sigma=_LOOSE_POSITION))
+    nis = first.output.nis
+    settling = bool(np.nansum(nis) > _FITS * 3 * np.isfinite(nis).sum())
+    tight = 0
+    for count in range(2, MOST_PASSES + 1):
+        progress("passes", min(0.95, 0.3 + 0.1 * (count - 1)))
+        reference = last.estimate * (setup.sensors.decay_rate == 0.0)
+        use = loose if settling else setup
+        new = one_pass(reduced, use, start, smoothed_start(last), reference, closed_loop=False, keep=keep)
+        moved = np.max(np.abs(new.estimate - last.estimate) / np.sqrt(np.diag(new.covariance)))
+        last = new
+        if settling:
+            settling = not (moved < _SETTLED or count > MOST_PASSES // 2)
+            continue
+        tight += 1
+        if tight > 1 and moved < CONVERGED:
+            return last, count, True
+    # The passes contract by a third each where Earth rate says little of the azimuth: near enough is told from lost.
+    return last, MOST_PASSES, bool(moved < _NEAR)
+
+
+@dataclass(frozen=True)
+class Solution:
+    """A converged calibration with everything that led to it.
+
+    Attributes
+    ----------
+    setup, reduced, alignment : Setup, Reduced, Alignment
+    first, last : Pass
+        The closed-loop pass and the converged one.
+    passes : int
+        How many there were.
+    converged : bool
+        The coefficients stood still at the end.
+    """
+
+    setup: Setup
+    reduced: Reduced
+    alignment: Alignment
+    first: Pass
+    last: Pass
+    passes: int
+    converged: bool
+
+
+def solve(setup: Setup, reduced: Reduced, progress: Progress, keep: bool = False) -> Solution:
+    """Align, run the closed loop, refine.
+
+    Parameters
+    ----------
+    setup, reduced : Setup, Reduced
+    progress : callable
+    keep : bool
+        Keep the matrices of the later passes.
+
+    Raises
+    ------
+    DataError
+        When the recording cannot be aligned, or contradicts the specification.
+    """
+    start = first_attitude(reduced.epochs, reduced.phases, setup)
+    progress("passes", 0.2)
+    none = np.zeros(len(setup.sensors.prior))
+    first = one_pass(reduced, setup, start, start.C_nb, none, closed_loop=True, keep=False)
+    try:
+        last, passes, converged = refine(reduced, setup, start, first, progress, keep=keep)
+    except DataError:
+        converged = False
+    if not converged:
+        # The first dwell misled the first pass (an azimuth that may be anything): all stops together know better.
+        from sdimu_calibration.core.batch.coarse import coarse_pass  # noqa: PLC0415 (built on the passes of this file)
+
+        begun = coarse_pass(reduced, setup, start)
+        last, passes, converged = refine(reduced, setup, start, begun, progress, keep=keep)
+    return Solution(setup, reduced, start, first, last, passes, converged)

@@ -1,0 +1,1 @@
+"""Calibration by hand: many attitudes, no table, no place."""

@@ -1,0 +1,1 @@
+"""Strapdown navigation: reduction of samples, attitude, velocity and position, their errors, alignment."""

@@ -1,0 +1,1 @@
+"""A plan before it is run: perfect data, covariance simulation, bound, observability."""

@@ -1,0 +1,187 @@
+"""Covariance simulation: what a plan will tell, before it is run.
+
+The filter itself runs on the recording of a perfect IMU (`nominal`), so its covariance is the one that a real test
+would end with, to first order. No noise is drawn and nothing is estimated.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sdimu_calibration.core.filter import body_frame
+from sdimu_calibration.core.filter.filter_pass import NAV
+from sdimu_calibration.core.filter.passes import Reduced, Setup, first_attitude, one_pass, reduce, set_up
+from sdimu_calibration.core.navigation.alignment import Alignment
+from sdimu_calibration.core.plan import Plan
+from sdimu_calibration.core.planning.noise_set import NoiseSet, apply
+from sdimu_calibration.core.planning.nominal import nominal_recording
+from sdimu_calibration.core.planning.observability import Combination, unobservable
+from sdimu_calibration.core.rotation import rotation_matrix
+from sdimu_calibration.core.specification import ImuSpecification, Model, Site
+
+Floats = NDArray[np.float64]
+Bound = Callable[[Reduced, Setup, Alignment], Floats]
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """What a plan tells about an IMU.
+
+    Attributes
+    ----------
+    body_frame : str
+    duration_s : float
+    model : tuple of str
+        Effects.
+    names, units, display_units : tuple of str, length p
+    sigma : ndarray, shape (p,)
+        At the end of the test, SI, in `body_frame`.
+    bound : ndarray, shape (p,)
+        Sigma that a batch of all data would reach.
+    prior : ndarray, shape (p,)
+    covariance : ndarray, shape (p, p)
+    t : ndarray, shape (m,)
+        Times (s) of the history.
+    history : ndarray, shape (m, p)
+        Sigma against time.
+    attitude : ndarray, shape (m, 3)
+        Attitude sigma N, E, D against time (rad).
+    dwell : ndarray of bool, shape (m,)
+    unobservable : tuple of Combination
+    """
+
+    body_frame: str
+    duration_s: float
+    model: tuple[str, ...]
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    display_units: tuple[str, ...]
+    sigma: Floats
+    bound: Floats
+    prior: Floats
+    covariance: Floats
+    t: Floats
+    history: Floats
+    attitude: Floats
+    dwell: NDArray[np.bool_]
+    unobservable: tuple[Combination, ...]
+
+
+@dataclass(frozen=True)
+class Nominal:
+    """A plan reduced for one set-up: what is shared by every covariance simulation of it."""
+
+    reduced: Reduced
+    setup: Setup
+    start: Alignment
+    duration_s: float
+
+
+def prepare(
+    plan: Plan, site: Site, imu: ImuSpecification, model: Model, mount_rad: Floats | None, noise: NoiseSet | None
+) -> Nominal:
+    """Record, reduce and align a plan with a perfect IMU.
+
+    Raises
+    ------
+    DataError
+        When plan, IMU, model or noise set do not fit together.
+    """
+    told, weighed = (imu, model) if noise is None else apply(noise, imu, model)
+    setup = set_up(site, told, weighed)
+    recording = nominal_recording(plan, site, mount_rad)
+    reduced = reduce(recording, setup, screened=False)
+    start = first_attitude(reduced.epochs, reduced.phases, setup)
+    C_nb = rotation_matrix(np.zeros(3) if mount_rad is None else np.asarray(mount_rad, dtype=float))
+    sigma = start.filter_sigma
+    if noise is not None:
+        sigma = np.array([noise.level_sigma, noise.level_sigma, noise.azimuth_sigma])
+    return Nominal(reduced, setup, replace(start, C_nb=C_nb, filter_sigma=sigma), float(recording.t[-1]))
+
+
+def predict(
+    plan: Plan,
+    site: Site,
+    imu: ImuSpecification,
+    model: Model,
+    mount_rad: Floats | None = None,
+    noise: NoiseSet | None = None,
+    bound: Bound | None = None,
+) -> Prediction:
+    """Simulate the covariance of a test.
+
+    Parameters
+    ----------
+    plan : Plan
+    site : Site
+    imu : ImuSpecification
+        Noise and priors.
+    model : Model
+        Effects and weights; the sigmas are given in its body frame.
+    mount_rad : ndarray, shape (3,), optional
+        Rotation vector of the IMU on the table.
+    noise : NoiseSet, optional
+        Replaces the noise of IMU and model and the initial attitude.
+    bound : callable, optional
+        Gives the covariance (p, p), frame of the prior, that the data hold (`batch.bound_covariance`); NaN without.
+
+    Returns
+    -------
+    Prediction
+
+    Raises
+    ------
+    DataError
+        When plan, IMU, model or noise set do not fit together.
+    """
+    nominal = prepare(plan, site, imu, model, mount_rad, noise)
+    setup = nominal.setup
+    sensors, frame = setup.sensors, setup.model.body_frame
+    done = one_pass(
+        nominal.reduced, setup, nominal.start, nominal.start.C_nb, np.zeros(len(sensors.prior)),
+        closed_loop=False, keep=False,
+    )  # fmt: skip
+    J = body_frame.frame_jacobian(sensors.names, frame)
+    output, epochs = done.output, nominal.reduced.epochs
+    rows = np.arange(0, len(epochs), output.stride)
+    variance = np.einsum("ij,kjl,il->ki", J, output.covariance[: len(rows)], J)
+    covariance = J @ done.covariance @ J.T
+    sigma = np.sqrt(np.diag(covariance))
+    limit = np.full(len(sigma), np.nan)
+    if bound is not None:
+        # The bound is what the data of this IMU hold, whatever the filter is told about them.
+        own = prepare(plan, site, imu, model, mount_rad, None)
+        limit = np.sqrt(np.diag(J @ bound(own.reduced, own.setup, own.start) @ J.T))
+    attitude = np.sqrt(np.diag(done.state.P)[-3:])
+    return Prediction(
+        body_frame=frame,
+        duration_s=nominal.duration_s,
+        model=tuple(e.name for e in sensors.effects),
+        names=sensors.names,
+        units=tuple(p.unit for p in sensors.parameters),
+        display_units=tuple(p.display_unit for p in sensors.parameters),
+        sigma=sigma,
+        bound=limit,
+        prior=sensors.prior,
+        covariance=covariance,
+        t=np.append(epochs.end[rows], epochs.end[-1]),
+        history=np.vstack([np.sqrt(variance), sigma]),
+        attitude=np.vstack([output.sigma[rows, 6:NAV], output.sigma[-1:, 6:NAV]]),
+        dwell=np.append(nominal.reduced.phases.dwell[rows], nominal.reduced.phases.dwell[-1]),
+        unobservable=unobservable(
+            sensors.names, sensors.prior, done.covariance, nominal.start.filter_sigma, attitude, nominal.start.C_nb
+        ),
+    )
+
+
+def largest_by_effect(prediction: Prediction) -> dict[str, float]:
+    """Largest final sigma of each effect's parameters (SI): a row of Table 3.3 of Kim, Song & Lyou."""
+    out: dict[str, float] = {}
+    for effect in prediction.model:
+        own = [s for n, s in zip(prediction.names, prediction.sigma, strict=True) if n.startswith(f"{effect}_")]
+        out[effect] = float(max(own))
+    return out

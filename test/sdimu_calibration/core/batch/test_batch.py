@@ -1,0 +1,180 @@
+"""The batch and the filter are different algorithms and give the same numbers; both are honest."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.stats import chi2
+
+from sdimu_calibration.core.batch.batch import batch_calibrate
+from sdimu_calibration.core.batch.batch_data import error_slope, travel
+from sdimu_calibration.core.calibrate import calibrate
+from sdimu_calibration.core.effects import registry
+from sdimu_calibration.core.filter.passes import reduce, set_up
+from sdimu_calibration.core.navigation.track import motion
+from sdimu_calibration.core.plan import Plan
+from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.rotation import rotation_matrix, rotation_vector
+from sdimu_calibration.core.specification import ImuSpecification
+from sdimu_calibration.core.units import to_si
+from sdimu_calibration.storage.config import load_plan
+from sdimu_sim.core.scenario import Scenario, generate
+from sdimu_sim.core.truth import in_body_frame
+
+KIM18 = load_plan("kim18")
+SHORT = Plan(
+    "kim18 in a hurry", (20.0,) * 19,
+    tuple(replace(turn, rate_rad_s=np.radians(9.0)) for turn in KIM18.turns), np.radians(9.0),
+)  # fmt: skip
+"""The same orientations in ten minutes."""
+
+PERCENTS = ImuSpecification(
+    "percents",
+    gyro_white_noise=to_si(15, "deg/h/sqrt(Hz)"),
+    accel_white_noise=to_si(100, "ug/sqrt(Hz)"),
+    prior={
+        "gyro_bias": to_si(1, "deg/s"),
+        "gyro_scale": 0.02,
+        "gyro_misalignment": to_si(2, "deg"),
+        "gyro_mass_unbalance": to_si(50, "deg/h/g"),
+        "accel_bias": to_si(20, "mg"),
+        "accel_scale": 0.02,
+        "accel_misalignment": to_si(2, "deg"),
+    },
+    grade="mems",
+)
+"""A MEMS IMU as it comes from the factory."""
+
+
+def nees(found, truth):
+    """Normalised squared error and its degrees of freedom, in the reported frame."""
+    true = in_body_frame(truth.imu.coefficients, found.body_frame)
+    sigma = np.sqrt(np.diag(found.covariance))
+    k = np.array([i for i, name in enumerate(found.names) if name not in PINNED])
+    z = np.array([found.values[i] - true[found.names[i]] for i in k]) / sigma[k]
+    correlation = found.covariance[np.ix_(k, k)] / np.outer(sigma[k], sigma[k])
+    return float(z @ np.linalg.solve(correlation, z)), len(k)
+
+
+PINNED = ("accel_misalignment_xy", "accel_misalignment_xz", "accel_misalignment_yx")
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3, 4])
+def test_batch_and_filter_agree_in_covariance_and_in_estimate(imu, model, site, seed):
+    recording, _ = generate(Scenario(KIM18, imu, site, seed=seed))
+    filtered = calibrate(recording, site, imu, model, held_out=False)
+    batch = batch_calibrate(recording, site, imu, model)
+    k = [i for i, name in enumerate(batch.names) if name not in PINNED]
+    sigma = np.sqrt(np.diag(batch.covariance))[k]
+    np.testing.assert_allclose(np.sqrt(np.diag(filtered.covariance))[k], sigma, rtol=0.03)
+    # Both see the same samples, so their difference is that of two computations, not of two draws.
+    assert np.max(np.abs(filtered.values - batch.values)[k] / sigma) < 0.1
+
+
+def test_errors_of_the_batch_are_as_large_as_it_says(imu, model, site):
+    total, dof = 0.0, 0
+    for seed in range(1, 9):
+        recording, truth = generate(Scenario(SHORT, imu, site, seed=seed, rate_hz=50.0))
+        value, n = nees(batch_calibrate(recording, site, imu, model), truth)
+        total, dof = total + value, dof + n
+    assert chi2.ppf(5e-4, dof) < total < chi2.ppf(1.0 - 5e-4, dof)
+
+
+def test_misfit_of_the_batch_is_that_of_the_noise(imu, model, site):
+    total, dof = 0.0, 0.0
+    for seed in range(1, 9):
+        recording, _ = generate(Scenario(SHORT, imu, site, seed=seed, rate_hz=50.0))
+        fit = batch_calibrate(recording, site, imu, model).fit
+        total, dof = total + fit["nis_mean"] * fit["nis_dof"], dof + fit["nis_dof"]
+    # The simulated table stands perfectly still: six of the rows of a stop have less noise than the model says.
+    assert chi2.ppf(5e-4, dof * 0.8) < total < chi2.ppf(1.0 - 5e-4, dof)
+
+
+def test_errors_of_percents_are_found_with_honest_sigmas(model, site):
+    total, dof = 0.0, 0
+    for seed in range(1, 7):
+        recording, truth = generate(Scenario(KIM18, PERCENTS, site, seed=seed, rate_hz=50.0))
+        found = batch_calibrate(recording, site, PERCENTS, model)
+        value, n = nees(found, truth)
+        total, dof = total + value, dof + n
+    assert chi2.ppf(5e-4, dof) < total < chi2.ppf(1.0 - 5e-4, dof)
+
+
+@pytest.mark.parametrize("azimuth_deg", [0.0, 90.0, 180.0])
+def test_a_wrong_azimuth_at_the_start_changes_nothing_at_the_end(imu, model, site, azimuth_deg):
+    recording, _ = generate(Scenario(SHORT, imu, site, seed=5, rate_hz=50.0))
+    right = batch_calibrate(recording, site, imu, model)
+    told = replace(site, initial_azimuth_rad=np.radians(azimuth_deg), initial_azimuth_sigma_rad=np.radians(104.0))
+    found = batch_calibrate(recording, told, imu, model)
+    k = [i for i, name in enumerate(right.names) if name not in PINNED]
+    assert np.max(np.abs(found.values - right.values)[k] / np.sqrt(np.diag(right.covariance))[k]) < 0.02
+
+
+@pytest.mark.parametrize("latitude_deg", [80.0, -80.0, 90.0, -90.0])
+def test_coefficients_are_honest_near_and_at_the_poles(imu, model, site, latitude_deg):
+    there = replace(site, latitude_rad=np.radians(latitude_deg), height_m=5000.0)
+    total, dof = 0.0, 0
+    for seed in range(1, 5):
+        recording, truth = generate(Scenario(KIM18, imu, there, seed=seed, rate_hz=20.0))
+        value, n = nees(batch_calibrate(recording, there, imu, model), truth)
+        total, dof = total + value, dof + n
+    assert chi2.ppf(5e-4, dof) < total < chi2.ppf(1.0 - 5e-4, dof)
+
+
+@pytest.mark.parametrize("latitude_deg", [90.0, -90.0])
+def test_the_filter_is_honest_at_the_poles(imu, model, site, latitude_deg):
+    # A cosine of latitude without its limit made Zp of the east read zero there, and the filter diverge.
+    there = replace(site, latitude_rad=np.radians(latitude_deg))
+    recording, truth = generate(Scenario(KIM18, imu, there, seed=2, rate_hz=20.0))
+    value, dof = nees(calibrate(recording, there, imu, model, held_out=False), truth)
+    assert chi2.ppf(5e-4, dof) < value < chi2.ppf(1.0 - 5e-4, dof)
+
+
+def test_an_effect_that_changes_at_random_is_refused(imu, model, site):
+    bias = registry.get("gyro_bias")
+    renamed = tuple(replace(p, name=f"wandering_{p.name}") for p in bias.parameters)
+    drifting = replace(bias, name="wandering_bias", parameters=renamed, decay_s=1000.0)
+    recording, _ = generate(Scenario(SHORT, imu, site, seed=5, rate_hz=20.0))
+    with pytest.raises(DataError, match="changes at random"):
+        batch_calibrate(recording, site, imu, replace(model, effects=(*model.effects, drifting)))
+
+
+@pytest.mark.parametrize("share", [0.0, 0.3])
+def test_responses_of_a_motion_are_its_derivatives(imu, model, site, share):
+    coefficients = np.array(list(PERCENTS.prior.values())).repeat([3, 3, 6, 6, 3, 3, 6]) * share
+    recording, _ = generate(Scenario(SHORT, imu, site, seed=6, rate_hz=50.0))
+    setup = set_up(site, imu, model)
+    reduced = reduce(recording, setup)
+    C_nb = rotation_matrix(np.array([0.7, -1.1, 1.9]))
+    rows = slice(200, 350)
+    at_rest = np.zeros(len(reduced.cycles), dtype=bool)
+
+    def go(C: np.ndarray, c: np.ndarray):
+        seen = motion(
+            reduced.cycles, at_rest, setup.sensors, c, C_nb.copy(), site.latitude_rad, setup.gravity, None, True
+        )
+        values, slope = setup.sensors.regressors(seen), error_slope(setup.sensors, seen, rows, c)
+        return travel(
+            reduced, rows, setup.sensors, values, slope, c, C, site.latitude_rad, site.height_m, 0.0, (1e-12, 1e-8)
+        )
+
+    def difference(ahead, behind) -> np.ndarray:
+        return np.concatenate([rotation_vector(ahead.C_nb @ behind.C_nb.T), ahead.moved - behind.moved])
+
+    here = go(C_nb, coefficients)
+    scale = np.repeat([1.0, 9.8 * here.seconds, 9.8 * here.seconds**2], 3)
+    for i in range(3):
+        turn = rotation_matrix(1e-5 * np.eye(3)[i])
+        numerical = difference(go(turn @ C_nb, coefficients), go(turn.T @ C_nb, coefficients)) / 2e-5
+        # Left out: Earth's turn in the velocity, 1e-3 in these 15 s.
+        np.testing.assert_allclose(here.by_attitude[:, i] / scale, numerical / scale, atol=3e-3)
+    for j, size in enumerate(setup.sensors.prior):
+        step = np.zeros(len(coefficients))
+        step[j] = 1e-2 * size
+        numerical = difference(go(C_nb, coefficients + step), go(C_nb, coefficients - step)) / (2e-2 * size)
+        largest = np.max(np.abs(numerical / scale))
+        # Left out besides: what errors of percents do to corrections of percents, 0.02 at most.
+        tolerance = (2e-3 + 0.02 * (share > 0)) * largest
+        np.testing.assert_allclose(
+            here.by_coefficient[:, j] / scale, numerical / scale, atol=tolerance, err_msg=setup.sensors.names[j]
+        )

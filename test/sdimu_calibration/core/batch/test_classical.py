@@ -1,0 +1,67 @@
+"""The classical estimator is right when IMU axes are table axes, and wrong by the mount when they are not."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.stats import chi2
+
+from sdimu_calibration.core.batch.classical import classical_calibrate
+from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.units import to_si
+from sdimu_calibration.storage.config import load_plan
+from sdimu_sim.core.scenario import Scenario, generate
+from sdimu_sim.core.truth import in_body_frame
+
+KIM18 = load_plan("kim18")
+
+
+def test_without_mount_the_errors_are_those_of_the_noise(imu, model, site):
+    total, dof = 0.0, 0
+    for seed in (1, 2, 3):
+        recording, truth = generate(Scenario(KIM18, imu, site, seed=seed, mount_rad=(0.0, 0.0, 0.0), rate_hz=50.0))
+        found = classical_calibrate(recording, site, imu, model)
+        true = in_body_frame(truth.imu.coefficients, "prior")
+        z = (found.values - np.array([true[n] for n in found.names])) / np.sqrt(np.diag(found.covariance))
+        total, dof = total + float(z @ z), dof + len(z)
+    # z are correlated; 2.5 times the mean is what uncorrelated ones would reach once in a million, and the reference
+    # of a turn is interpolated between angles at 10 Hz, which is not in the sigma.
+    assert total / dof < 2.5
+    assert total > chi2.ppf(1e-6, dof)
+
+
+@pytest.mark.parametrize("mount_deg", [1.0, 3.0])
+def test_a_mount_passes_for_misalignment_and_scale(imu, model, site, mount_deg):
+    angle = np.radians(mount_deg)
+    perfect = dict.fromkeys((), 0.0)
+    scenario = Scenario(KIM18, imu, site, seed=2, mount_rad=(0.0, 0.0, angle), coefficients=perfect, rate_hz=50.0)
+    found = classical_calibrate(generate(scenario)[0], site, imu, model)
+    value = dict(zip(found.names, found.values, strict=True))
+    for triad in ("gyro", "accel"):
+        # Turned about z, x and y both see sin(m) of the other and cos(m) of their own.
+        assert abs(value[f"{triad}_misalignment_xz"] - np.sin(angle)) < to_si(0.05, "arcmin")
+        assert abs(value[f"{triad}_misalignment_yz"] - np.sin(angle)) < to_si(0.05, "arcmin")
+        for axis in "xy":
+            assert abs(value[f"{triad}_scale_{axis}"] - (np.cos(angle) - 1.0)) < to_si(10, "ppm")
+        assert abs(value[f"{triad}_scale_z"]) < to_si(10, "ppm")
+
+
+def test_turned_into_the_accelerometers_frame_the_mount_is_gone(imu, model, site):
+    recording, truth = generate(Scenario(KIM18, imu, site, seed=2, mount_rad=(0.05, 0.04, -0.05), rate_hz=50.0))
+    found = classical_calibrate(recording, site, imu, model, frame="accelerometer_triad")
+    true = in_body_frame(truth.imu.coefficients, "accelerometer_triad")
+    for name in ("gyro_scale_x", "accel_scale_y", "gyro_scale_z"):
+        assert abs(found.values[found.names.index(name)] - true[name]) < to_si(10, "ppm"), name
+
+
+def test_missing_table_angles_are_named(imu, model, site):
+    recording, _ = generate(Scenario(KIM18, imu, site, seed=2, rate_hz=20.0))
+    with pytest.raises(DataError, match="/rate_table/joint_states"):
+        classical_calibrate(replace(recording, table=None), site, imu, model)
+
+
+def test_angles_of_a_table_without_gimbals_are_refused(imu, model, site):
+    recording, _ = generate(Scenario(KIM18, imu, site, seed=2, rate_hz=20.0))
+    free = replace(recording.table, names=("x", "y", "z"))
+    with pytest.raises(DataError, match="outer, middle, inner"):
+        classical_calibrate(replace(recording, table=free), site, imu, model)
