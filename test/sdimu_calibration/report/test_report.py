@@ -137,7 +137,8 @@ def test_the_threshold_is_drawn(diagnosis, more):
 
 def test_a_diagnosis_of_a_right_model_makes_a_page_too(diagnosis):
     empty = type(diagnosis.found)(
-        (), diagnosis.found.chosen[:0], diagnosis.found.first, diagnosis.found.first, diagnosis.found.threshold, 1.0
+        (), diagnosis.found.chosen[:0], diagnosis.found.first, diagnosis.found.first, diagnosis.found.threshold, 1.0,
+        diagnosis.evidence,
     )
     quiet = type(diagnosis)(**{**vars(diagnosis), "found": empty, "adequate": True, "verdict": "consistent"})
     text = page(diagnosis.before, "x", diagnosis=quiet)

@@ -13,6 +13,7 @@ from sdimu_calibration.core.rotation import rotation_matrix
 from sdimu_calibration.core.specification import Site
 from sdimu_sim.core import ImuGenerator, ImuTruth, PlatformMotion, TemperatureProfile, simulate_imu
 from sdimu_sim.core.generator import gravity_of
+from sdimu_sim.core.hidden import LOST_AFTER_S
 from sdimu_sim.core.samples import SampleClock
 
 SITE = Site(np.radians(36.4), 120.0)
@@ -113,8 +114,8 @@ def test_lost_data_take_their_angle_out_of_that_turn_only(motion):
     now = simulated(motion, ImuTruth(mount_rad=MOUNT))
     lost = simulated(motion, ImuTruth(mount_rad=MOUNT, effects=("gyro_lost_data=25 ms; turn=2",)))
     missing = (lost.omega_ib_b - now.omega_ib_b) * 0.01
-    # Turn 2 starts after dwell, turn 1 (7.85 s) and dwell; 5 s later the rate is the constant one.
-    start = 4.0 + round(np.radians(90) / 0.2 * 100) / 100 + 3.0 + 5.0
+    # Turn 2 starts after dwell, turn 1 (7.85 s) and dwell; 3 s later the rate is the constant one.
+    start = 4.0 + round(np.radians(90) / 0.2 * 100) / 100 + 3.0 + LOST_AFTER_S
     at = np.flatnonzero(missing.any(axis=1))
     assert now.t[at[0]] > start
     assert now.t[at[-1]] < start + 0.025 + 0.01 + 1e-9
