@@ -122,7 +122,7 @@ def motion(
             f_seen = np.where(rest[:, None], -gravity * C_nb[:, 2, :], f)
         else:
             w_seen, f_seen = w, f
-        alpha = _acceleration(w_table, cycles, before, causal=not predicted)
+        alpha = _acceleration(w_table, rest, cycles, before, causal=not predicted)
         turned = _last_sign(w_table, None if before is None else before.turned[-1])
         leant = _last_sign(-np.cross(w_table, f_seen) / gravity, None if before is None else before.leant[-1])
         seen = Motion(
@@ -135,12 +135,22 @@ def motion(
     return seen
 
 
-def _acceleration(w_table: Floats, cycles: Cycles, before: Motion | None, causal: bool) -> Floats:
-    """Angular acceleration (rad/s^2), shape (n, 3): central differences, or causal ones for a live filter."""
-    if not causal and len(w_table) > 1:
-        return np.asarray(np.gradient(w_table, cycles.t - 0.5 * cycles.dt, axis=0))
-    earlier = np.vstack([before.w_table[-1:] if before is not None else w_table[:1], w_table[:-1]])
-    return np.asarray((w_table - earlier) / cycles.dt[:, None])
+def _acceleration(
+    w_table: Floats, rest: NDArray[np.bool_], cycles: Cycles, before: Motion | None, causal: bool
+) -> Floats:
+    """Angular acceleration (rad/s^2), shape (n, 3): mean over each cycle, or by causal differences for a live filter.
+
+    The mean is the difference of the rates at the ends of the cycle, so that it sums up to the change of the rate.
+    Between rest and turn the rate is nought: what of a jerk is put into a dwell would there be measured as a rate.
+    """
+    dt = cycles.dt[:, None]
+    if causal or len(w_table) < 2:
+        earlier = np.vstack([before.w_table[-1:] if before is not None else w_table[:1], w_table[:-1]])
+        return np.asarray((w_table - earlier) / dt)
+    between = (dt[1:] * w_table[:-1] + dt[:-1] * w_table[1:]) / (dt[1:] + dt[:-1])
+    between[rest[1:] | rest[:-1]] = 0.0
+    ends = np.vstack([w_table[:1], between, w_table[-1:]])
+    return np.asarray(np.diff(ends, axis=0) / dt)
 
 
 def _last_sign(rate: Floats, before: Floats | None) -> Floats:
