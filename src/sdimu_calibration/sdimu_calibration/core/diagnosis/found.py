@@ -115,7 +115,7 @@ class Reach:
     ----------
     label, family, unit, display_unit : str
     smallest : float
-        Size found with 80 % power at a false-alarm rate of 0.001 (SI); inf when the model takes all of it.
+        Size found with 80 % power at the threshold of a whole scan (SI); inf when the model takes all of it.
     retention : float
         Share of its signature that the model's coefficients leave.
     testable : bool
