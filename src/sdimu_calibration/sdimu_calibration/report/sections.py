@@ -250,8 +250,8 @@ def smallest(entries: Sequence[data.Scored]) -> str:
         f"<p>Of {len(rows)} effects, {blind} could not have been seen on every axis at their usual size.</p>",
         f"<details><summary>Table of minimal detectable sizes</summary>{grid(_SMALLEST, rows, {0, 2, 5})}</details>",
         quiet(
-            "Worst axis of each effect. Found with 80 % power at the threshold of a whole scan; usual: one sigma of this "
-            "grade of IMU."
+            "Worst axis of each effect. Found with 80 % power at the threshold of a whole scan; usual: one sigma of "
+            "this grade of IMU."
         ),
     )
 
