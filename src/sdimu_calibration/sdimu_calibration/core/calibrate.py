@@ -8,6 +8,7 @@ from zlib import crc32
 import numpy as np
 from numpy.typing import NDArray
 
+from sdimu_calibration.core.effects.imu_model import ImuModel
 from sdimu_calibration.core.filter import body_frame
 from sdimu_calibration.core.filter.azimuth_known import azimuth_warning
 from sdimu_calibration.core.filter.filter_pass import (
@@ -32,7 +33,7 @@ from sdimu_calibration.core.filter.passes import (
 )
 from sdimu_calibration.core.filter.rest_found import stops_line
 from sdimu_calibration.core.filter.stop_misfit import stop_misfit
-from sdimu_calibration.core.large.triad import large_errors, triad_model
+from sdimu_calibration.core.large.triad import FRAME, drifting, large_errors, triad_model
 from sdimu_calibration.core.recording import DataError, Recording
 from sdimu_calibration.core.results import Calibration, History
 from sdimu_calibration.core.specification import ImuSpecification, Model, Site
@@ -85,7 +86,7 @@ def calibrate(
     setup = set_up(site, imu, model)
     tell("reduce", 0.0)
     reduced = reduce(recording, setup)
-    turned = triad_model(setup.sensors, imu) if large_errors(setup.sensors) else None
+    turned = triad_model(setup.sensors, imu) if _large(setup, float(recording.t[-1])) else None
     if turned is not None:
         from sdimu_calibration.core.large.large_result import large_calibrate  # noqa: PLC0415 (built on this file)
 
@@ -94,6 +95,12 @@ def calibrate(
     result = assemble(recording, solution, held_out)
     tell("done", 1.0)
     return result
+
+
+def _large(setup: Setup, duration: float) -> bool:
+    """Tell whether squares count: of the errors, or of the attitude that the gyros lose over the test (s)."""
+    turns = setup.model.body_frame == FRAME
+    return large_errors(setup.sensors) or (turns and drifting(setup.sensors, setup.imu, setup.gravity, duration))
 
 
 def assemble(recording: Recording, solution: Solution, held_out: bool) -> Calibration:
@@ -124,32 +131,47 @@ def assemble(recording: Recording, solution: Solution, held_out: bool) -> Calibr
 
 
 def _warnings(solution: Solution, fit: dict[str, float | None]) -> list[str]:
-    """Say what speaks against the estimate.
+    """Say what speaks against the estimate."""
+    last, sensors = solution.last, solution.setup.sensors
+    azimuth = azimuth_warning(solution)
+    return [
+        *poor_fit(fit, solution.converged, solution.reduced, last.output.normalised),
+        *([azimuth] if azimuth else []),
+        *outside(sensors, last.estimate),
+    ]
+
+
+def poor_fit(fit: dict[str, float | None], converged: bool, reduced: Reduced, normalised: Floats) -> list[str]:
+    """Say in what the data do not fit the model; `normalised` are the whitened innovations of all epochs.
 
     Raises
     ------
     DataError
-        When it is not one at all.
+        When there is no fit at all.
     """
     nis, held_out = fit["nis_mean"] or 0.0, fit["held_out_rms"]
-    lost = int(solution.reduced.cycles.lost.sum())
+    lost = int(reduced.cycles.lost.sum())
     in_turn = f"; {lost} samples are missing by their stamps" if lost else ""
     if nis > _ABSURD:
         raise DataError(
             f"the recording contradicts the model: squared innovations are {nis:.3g} times what the noise explains"
             f"{in_turn}; check --imu, --site, units and axes"
         )
-    out = [] if solution.converged else [NOT_CONVERGED]
+    out = [] if converged else [NOT_CONVERGED]
     if nis > _MISFIT or (held_out is not None and held_out > _MISFIT):
         text = f"NIS {nis:.3f}" + ("" if held_out is None else f", held-out error {held_out:.3f}")
         out.append(f"the model does not fit ({text}; 1 is right){in_turn}; run: sdimu diagnose")
-    more = (stop_misfit(solution.last, solution.reduced), azimuth_warning(solution))
-    out += [text for text in more if text]
-    size = np.abs(solution.last.estimate) / solution.setup.sensors.prior
+    worst = stop_misfit(normalised, reduced)
+    return [*out, worst] if worst else out
+
+
+def outside(sensors: ImuModel, estimate: Floats) -> list[str]:
+    """Name the coefficient, of `estimate` (p,), that is furthest from what the specification allows, if it is."""
+    size = np.abs(estimate) / sensors.prior
     worst = int(np.argmax(size))
-    if size[worst] > _OUTSIDE:
-        out.append(f"{solution.setup.sensors.names[worst]} is {size[worst]:.1f} times the sigma of the specification")
-    return out
+    if size[worst] <= _OUTSIDE:
+        return []
+    return [f"{sensors.names[worst]} is {size[worst]:.1f} times the sigma of the specification"]
 
 
 def fit_statistics(finished: Pass) -> dict[str, float | None]:

@@ -10,12 +10,12 @@ from sdimu_calibration.core.batch.batch import batch_calibrate
 from sdimu_calibration.core.calibrate import calibrate
 from sdimu_calibration.core.effects import imu_model
 from sdimu_calibration.core.filter.passes import reduce, set_up
-from sdimu_calibration.core.large.triad import large_errors, triad_model
+from sdimu_calibration.core.large.triad import drifting, large_errors, triad_model
 from sdimu_calibration.core.large.undo import spread, undo
 from sdimu_calibration.core.navigation.track import motion
 from sdimu_calibration.core.specification import ImuSpecification
 from sdimu_calibration.core.units import to_si
-from sdimu_calibration.storage.config import load_plan
+from sdimu_calibration.storage.config import load_imu, load_plan
 from sdimu_sim.core.scenario import Scenario, generate
 from sdimu_sim.core.truth import in_body_frame
 
@@ -138,3 +138,31 @@ def test_only_errors_of_percents_leave_the_normal_path(imu, model):
 def test_a_model_without_all_misalignments_keeps_its_frame(model):
     some = imu_model.build((*model.effects[:-1], "accel_misalignment_xy"), PERCENTS)
     assert triad_model(some, PERCENTS) is None
+
+
+def test_gyros_that_lose_the_attitude_over_the_test_take_the_same_path(imu, model, site):
+    fog = load_imu("fog_tactical")
+    sensors = imu_model.build(model.effects, fog)
+    assert drifting(sensors, fog, 9.8, 2980.0)
+    assert not drifting(sensors, fog, 9.8, 300.0)
+    assert not drifting(imu_model.build(model.effects, imu), imu, 9.8, 86400.0)
+    # Seed 5: the ordinary passes do not come to rest, and end with a normalised square of 60.
+    recording, truth = generate(Scenario(KIM18, fog, site, seed=5, rate_hz=20.0))
+    found = calibrate(recording, site, fog, model, held_out=False)
+    _, square = normalised(found, truth)
+    assert chi2.ppf(5e-4, 27) < square < chi2.ppf(1.0 - 5e-4, 27)
+    assert not found.warnings
+
+
+def test_what_speaks_against_a_result_is_in_it(model, site):
+    recording, _ = generate(Scenario(KIM18, PERCENTS, site, seed=201, rate_hz=20.0))
+    kept = np.ones(len(recording.t), dtype=bool)
+    kept[1000] = False
+    gap = replace(
+        recording, t=recording.t[kept], omega_ib_b=recording.omega_ib_b[kept], f_ib_b=recording.f_ib_b[kept]
+    )
+    found = calibrate(gap, site, PERCENTS, model, held_out=False)
+    assert found.faults
+    assert found.data["lost"] == 1.0
+    quiet = replace(PERCENTS, accel_white_noise=0.2 * PERCENTS.accel_white_noise)
+    assert any("does not fit" in text for text in calibrate(recording, site, quiet, model, held_out=False).warnings)

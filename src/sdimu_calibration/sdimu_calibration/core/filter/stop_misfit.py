@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.stats import norm
 
-from sdimu_calibration.core.filter.passes import Pass, Reduced
+from sdimu_calibration.core.filter.passes import Reduced
+
+Floats = NDArray[np.float64]
 
 _KINDS = ("position", "velocity", "gyro", "accelerometer")
 _FALSE_ALARM = 1e-4
 """Share of sound tests with a false alarm."""
 
 
-def stop_misfit(last: Pass, reduced: Reduced) -> str | None:
+def stop_misfit(normalised: Floats, reduced: Reduced) -> str | None:
     """Name the stop and kind of measurement that fits worst, if it is no chance.
 
     The whitened innovations of a right model are independent standard normals, so their sum over a stop divided by
@@ -20,7 +23,8 @@ def stop_misfit(last: Pass, reduced: Reduced) -> str | None:
 
     Parameters
     ----------
-    last : Pass
+    normalised : ndarray, shape (e, 12)
+        Whitened innovations of every epoch, NaN where nothing was measured.
     reduced : Reduced
 
     Returns
@@ -28,7 +32,7 @@ def stop_misfit(last: Pass, reduced: Reduced) -> str | None:
     str or None
         One line for people.
     """
-    white, stop = last.output.normalised, reduced.phases.stop
+    white, stop = normalised, reduced.phases.stop
     measured = np.isfinite(white)
     numbers, place = np.unique(stop, return_inverse=True)
     total = np.zeros((len(numbers), white.shape[1]))

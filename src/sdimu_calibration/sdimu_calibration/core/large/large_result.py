@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from sdimu_calibration.core.batch.batch_data import layout
-from sdimu_calibration.core.calibrate import HELD_OUT_FOLDS, NOT_CONVERGED, data_counts
+from sdimu_calibration.core.calibrate import HELD_OUT_FOLDS, conditions, data_counts, outside, poor_fit
 from sdimu_calibration.core.filter.filter_pass import ALL, HELD_ALL, HELD_SENSORS, SENSORS
 from sdimu_calibration.core.filter.passes import Progress, Reduced, Setup, first_attitude
+from sdimu_calibration.core.filter.rest_found import stops_line
 from sdimu_calibration.core.large.large_errors import LargePass, firm_setup, run_stops, solve_large
 from sdimu_calibration.core.large.triad import FRAME, TriadModel
 from sdimu_calibration.core.recording import Recording
@@ -40,9 +41,24 @@ def large_calibrate(
     last, asked = passes[-1], turned.asked
     nis = last.output.nis
     dof = 3 * int(np.isfinite(nis).sum())
-    notes = [f"errors of percents: {len(passes)} passes about exactly corrected samples, in the accelerometers' frame"]
-    if not converged:
-        notes.append(NOT_CONVERGED)
+    fit = {
+        "log_likelihood": float(last.output.log_likelihood.sum()),
+        "nis_mean": float(np.nansum(nis) / max(dof, 1)),
+        "nis_dof": float(dof),
+        "passes": float(len(passes)),
+        "held_out_rms": _held_out(reduced, inner, last) if held_out else None,
+    }
+    warnings = (
+        *(f.text for f in reduced.faults if f.grave),
+        *poor_fit(fit, converged, reduced, last.output.normalised),
+        *outside(inner.sensors, last.estimate),
+    )
+    told = (
+        *recording.notes,
+        *stops_line(recording, reduced),
+        f"second order counts: {len(passes)} passes about exactly corrected samples, in the accelerometers' frame",
+        *(f.text for f in reduced.faults if not f.grave),
+    )
     progress("done", 1.0)
     return Calibration(
         body_frame=FRAME,
@@ -52,16 +68,12 @@ def large_calibrate(
         display_units=tuple(p.display_unit for p in asked.parameters),
         values=turned.values(last.estimate),
         covariance=turned.covariance(last.covariance),
-        fit={
-            "log_likelihood": float(last.output.log_likelihood.sum()),
-            "nis_mean": float(np.nansum(nis) / max(dof, 1)),
-            "nis_dof": float(dof),
-            "passes": float(len(passes)),
-            "held_out_rms": _held_out(reduced, inner, last) if held_out else None,
-        },
-        data=data_counts(recording, reduced),
-        notes=(*recording.notes, *notes),
+        fit=fit,
+        data=data_counts(recording, reduced) | {"conditions": conditions(inner)},
+        notes=(*told, *warnings),
         history=_history(reduced, last, turned),
+        warnings=warnings,
+        faults=reduced.faults,
     )
 
 

@@ -64,6 +64,19 @@ def large_errors(sensors: ImuModel) -> bool:
     return bool(linear) and float(np.max(sensors.prior[linear])) > LARGE
 
 
+def drifting(sensors: ImuModel, imu: ImuSpecification, gravity: float, duration: float) -> bool:
+    """Tell whether the gyros lose the attitude so far over the test that the square of that counts.
+
+    An attitude wrong by a shows gravity too small by g a^2 / 2. It counts when this, at three sigma of the gyros' white
+    noise over `duration` (s), exceeds three sigma of the mean force. Effects that change at random are left to the
+    ordinary passes: samples are corrected at constants here.
+    """
+    if ((sensors.decay_rate > 0) | (sensors.drive > 0)).any():
+        return False
+    attitude = 3.0 * imu.gyro_white_noise * float(np.sqrt(duration))
+    return bool(0.5 * gravity * attitude**2 > 3.0 * imu.accel_white_noise / float(np.sqrt(duration)))
+
+
 def triad_model(asked: ImuModel, imu: ImuSpecification) -> TriadModel | None:
     """Put a model into the accelerometers' frame; None where it cannot turn because not all misalignments are in it."""
     pinned = {f"accel_misalignment_{pair}" for pair in ("xy", "xz", "yx")}
@@ -74,7 +87,7 @@ def triad_model(asked: ImuModel, imu: ImuSpecification) -> TriadModel | None:
         left = tuple(p.name for p in effect.parameters if p.name not in pinned)
         if left:
             effects.append(effect if len(left) == len(effect.parameters) else effect.only(left))
-    unbalance = [i for i, n in enumerate(asked.names) if n.startswith("gyro_mass_unbalance_d") and n[-2:-1] == "d"]
+    unbalance = [i for i, n in enumerate(asked.names) if n.startswith("gyro_mass_unbalance_d")]
     outside = bool(unbalance) and not set(_OUTSIDE) & set(asked.names)
     if outside:
         effects.append(registry.get("gyro_g_sensitivity").only(_OUTSIDE))
