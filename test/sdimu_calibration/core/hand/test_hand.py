@@ -113,6 +113,14 @@ def test_a_coefficient_that_no_turn_shows_is_named(site):
     assert any(note.startswith("not determined") and "gyro_g_squared" in note for note in found.notes)
 
 
+def test_a_coefficient_that_was_known_before_changes_no_likelihood(site):
+    recording, _ = by_hand_recording(ByHand(12, MEMS, site, seed=1))
+    known = replace(MEMS, prior={**MEMS.prior, "gyro_g_sensitivity": 1e-12})
+    without = hand_calibrate(recording, None, MEMS, MODEL)
+    more = hand_calibrate(recording, None, known, Model((*MODEL.effects, "gyro_g_sensitivity")))
+    assert more.fit["log_likelihood"] == pytest.approx(without.fit["log_likelihood"], abs=0.05)
+
+
 def test_few_rests_are_refused(site):
     recording, _ = by_hand_recording(ByHand(3, MEMS, site, seed=8))
     with pytest.raises(DataError, match="3 rests"):

@@ -294,7 +294,9 @@ def _finish(run: HandRun, scene: Scene, point: Point, steps: int) -> HandFit:
     covariance = inverse @ inverse.T
     measured = kind >= 0
     log = -float(np.sum(np.log(sigma[measured]))) - 0.5 * int(measured.sum()) * np.log(2.0 * np.pi)
-    log -= float(np.sum(np.log(np.abs(np.diag(R)))))
+    # The determinant of the priors too: without it a coefficient more would count by its unit.
+    log += float(np.sum(np.log(np.diag(np.linalg.inv(np.linalg.cholesky(scene.prior))))))
+    log -= float(np.sum(np.log(scene.earth_sigma))) + float(np.sum(np.log(np.abs(np.diag(R)))))
     free = 1.0 - np.sum(Q**2, axis=1)
     return HandFit(
         point=point,
