@@ -6,8 +6,12 @@ import yaml
 
 from rate_table_sim.core import TableSpecification
 from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.units import STANDARD_GRAVITY
 from sdimu_calibration.storage.config import load_imu, load_plan, load_site
+from sdimu_calibration.storage.reference_file import read_truth as read_reference_truth
 from sdimu_sim.core import ImuTruth, Scenario, in_body_frame
+from sdimu_sim.core.by_hand import against_gravity
+from sdimu_sim.core.generator import gravity_of
 from sdimu_sim.core.scenario import imu_truth
 from sdimu_sim.core.truth import Truth
 from sdimu_sim.truth_file import read_truth, write_truth
@@ -43,6 +47,17 @@ def test_the_file_gives_coefficients_by_name_in_both_frames_as_numbers(tmp_path,
         expected = in_body_frame(truth.imu.coefficients, frame)
         assert {n: content[key][n] for n in expected} == expected
         assert content[key]["accel_quadratic_x"] == pytest.approx(20e-6 * 9.80665)
+
+
+@pytest.mark.parametrize("frame", ["prior", "accelerometer_triad"])
+def test_the_calibrator_restates_it_for_another_gravity_as_the_simulator_does(tmp_path, frame):
+    sensor = ImuTruth({"accel_scale_x": 0.02, "accel_misalignment_zx": 0.04, "gyro_misalignment_xy": 0.03})
+    truth = Truth(sensor, load_site("daejeon"), 1, 100.0, "by hand")
+    write_truth(tmp_path / "t.yaml", truth)
+    stated = against_gravity(truth, STANDARD_GRAVITY, gravity_of(truth.site)).imu.coefficients
+    found = read_reference_truth(tmp_path / "t.yaml", frame, STANDARD_GRAVITY)
+    for name, value in in_body_frame(stated, frame).items():
+        assert found[name] == pytest.approx(value, abs=1e-15)
 
 
 def test_numbers_without_a_point_in_python_stay_numbers(tmp_path):

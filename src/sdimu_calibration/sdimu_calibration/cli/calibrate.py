@@ -76,6 +76,7 @@ def calibrate(
 
     from sdimu_calibration.cli.noise import with_noise
     from sdimu_calibration.cli.progress import bar
+    from sdimu_calibration.core.units import STANDARD_GRAVITY
     from sdimu_calibration.report.page import write_report
     from sdimu_calibration.report.table import rich_table, rows
     from sdimu_calibration.storage.config import load_imu
@@ -105,7 +106,9 @@ def calibrate(
     with explained(console, recording.notes), bar(console) as progress:
         result = estimate(recording, where, specification, wanted, progress=progress)
     result = replace(result, notes=(*result.notes, *told))
-    true = None if truth is None else read_truth(truth, result.body_frame)
+    # Without a place gravity is a convention, and the truth is compared at it.
+    taken = STANDARD_GRAVITY if where is None else None
+    true = None if truth is None else read_truth(truth, result.body_frame, taken)
     folder = out or default_folder(bag)
     write_result(folder / "result.json", result)
     write_report(folder / "report.html", result, title=f"Calibration of {bag.name}", truth=true)

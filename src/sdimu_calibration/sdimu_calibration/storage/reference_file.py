@@ -6,6 +6,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from sdimu_calibration.core import earth
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.units import parse_quantity
 from sdimu_calibration.storage.config import find_config, read_mapping
@@ -71,7 +74,7 @@ def _columns(path: Path) -> Mapping[str, Any]:
     return columns
 
 
-def read_truth(path: Path, body_frame: str) -> dict[str, float]:
+def read_truth(path: Path, body_frame: str, gravity: float | None = None) -> dict[str, float]:
     """Read the true coefficients of a simulation, as they are in a body frame.
 
     Parameters
@@ -80,6 +83,8 @@ def read_truth(path: Path, body_frame: str) -> dict[str, float]:
         File that the simulator wrote beside the bag.
     body_frame : str
         ``accelerometer_triad`` or ``prior``.
+    gravity : float, optional
+        Gravity that a result took by convention (m/s^2): the truth is stated as it is for one who takes that.
 
     Returns
     -------
@@ -101,7 +106,30 @@ def read_truth(path: Path, body_frame: str) -> dict[str, float]:
     values = content.get(key)
     if not isinstance(values, Mapping):
         raise DataError(f"{path}: no '{key}': the truth is not given in the body frame '{body_frame}'")
-    return {str(name): _number(path, str(name), value) for name, value in values.items()}
+    true = {str(name): _number(path, str(name), value) for name, value in values.items()}
+    return true if gravity is None else _restated(true, _gravity(path, content) / gravity)
+
+
+def _gravity(path: Path, content: Mapping[str, Any]) -> float:
+    """Gravity at the place of a truth (m/s^2)."""
+    site = content.get("site")
+    if not isinstance(site, Mapping) or "latitude_deg" not in site:
+        raise DataError(f"{path}: no 'site' with 'latitude_deg': needed, as the result took gravity by convention")
+    if site.get("gravity_m_s2") is not None:
+        return _number(path, "gravity_m_s2", site["gravity_m_s2"])
+    latitude = np.radians(_number(path, "latitude_deg", site["latitude_deg"]))
+    return float(earth.normal_gravity(latitude, _number(path, "height_m", site.get("height_m", 0.0))))
+
+
+def _restated(true: dict[str, float], share: float) -> dict[str, float]:
+    """Multiply every response to force by `share`: less force, more response, the same reading."""
+    out = dict(true)
+    for name, value in true.items():
+        if name.startswith("accel_scale_") and name[12:] in ("x", "y", "z"):
+            out[name] = (1.0 + value) * share - 1.0
+        elif name.startswith(("accel_misalignment_", "gyro_mass_unbalance_", "gyro_g_sensitivity_")):
+            out[name] = value * share
+    return out
 
 
 def _number(path: Path, name: str, value: Any) -> float:

@@ -67,6 +67,7 @@ def test_a_place_far_away_is_contradicted_by_rate_and_gravity(seed):
 def test_the_negative_of_the_force_is_told_by_the_sense_of_the_earth(latitude, seed):
     site = Site(np.radians(latitude))
     assert reversed_force(seen(latitude, seed, -1.0), site)
+    assert any("--accel-sign -1" in line for line in contradictions(seen(latitude, seed, -1.0), site))
     assert not reversed_force(seen(latitude, seed), site)
 
 

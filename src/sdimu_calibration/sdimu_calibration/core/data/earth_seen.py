@@ -99,6 +99,7 @@ def contradictions(seen: EarthSeen, site: Site) -> tuple[str, ...]:
         lines.append(
             f"the Earth's rate in the data is that of latitude {latitude:.1f} +- {sigma:.1f} deg, the site is at "
             f"{np.degrees(site.latitude_rad):.1f} deg: check --site"
+            + (", or the sign of the force (--accel-sign -1 would fit)" if reversed_force(seen, site) else "")
         )
     gravity = site.gravity_m_s2 or float(earth.normal_gravity(site.latitude_rad, site.height_m))
     if abs(seen.gravity - gravity) > _SIGMAS * seen.gravity_sigma:
