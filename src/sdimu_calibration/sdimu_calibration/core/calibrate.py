@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from sdimu_calibration.core.effects.imu_model import ImuModel
 from sdimu_calibration.core.filter import body_frame
-from sdimu_calibration.core.filter.azimuth_known import azimuth_warning
+from sdimu_calibration.core.filter.azimuth_known import azimuth_note, azimuth_warning
 from sdimu_calibration.core.filter.filter_pass import (
     ALL,
     HELD_ALL,
@@ -112,7 +112,8 @@ def assemble(recording: Recording, solution: Solution, held_out: bool) -> Calibr
     fit["held_out_rms"] = held_out_rms(reduced, setup, last) if held_out else None
     J = body_frame.frame_jacobian(names, frame)
     warnings = (*(f.text for f in reduced.faults if f.grave), *_warnings(solution, fit))
-    told = (*recording.notes, *stops_line(recording, reduced))
+    heading = azimuth_note(solution)
+    told = (*recording.notes, *stops_line(recording, reduced), *([heading] if heading else []))
     return Calibration(
         body_frame=frame,
         model=tuple(e.name if e.name.endswith(e.variant) else e.name + e.variant for e in setup.sensors.effects),

@@ -16,6 +16,8 @@ from sdimu_calibration.core.filter.passes import Solution
 
 _SIGMAS = 3.0
 _LEAST_ATTITUDES = 3
+_NO_HEADING_RAD = np.radians(1.0)
+"""An azimuth that is known no better is called not observable."""
 _SAME = np.cos(np.radians(10.0))
 """Cosine of the rotation up to which two attitudes are one."""
 
@@ -45,6 +47,32 @@ def azimuth_warning(solution: Solution) -> str | None:
         f"the azimuth is known only to {np.degrees(azimuth):.2g} deg: gyro biases may be wrong by "
         f"{np.degrees(bent) * 3600.0:.2g} deg/h beyond their sigma; use a plan with more attitudes"
     )
+
+
+def azimuth_note(solution: Solution) -> str | None:
+    """Say so where the Earth turns about the vertical so nearly that no heading can come from it.
+
+    What a gyro bias leaves open of the horizontal Earth rate is an azimuth. The filter's own sigma does not show it:
+    the second order of an azimuth that may be anything is taken for knowledge. An azimuth that the site states is known.
+    """
+    site = solution.setup.site
+    p = len(solution.setup.sensors.prior)
+    biases = [k for k, name in enumerate(solution.setup.sensors.names) if name.startswith("gyro_bias")]
+    if site.initial_azimuth_rad is not None or not biases:
+        return None
+    bias = float(np.sqrt(min(np.diag(solution.last.state.P[NAV : NAV + p, NAV : NAV + p])[biases])))
+    horizontal = earth.RATE * abs(float(np.cos(site.latitude_rad)))
+    if bias <= _NO_HEADING_RAD * horizontal:
+        return None
+    return (
+        f"the azimuth is not observable: at latitude {np.degrees(site.latitude_rad):.4g} deg the horizontal Earth rate "
+        f"is {_deg_h(horizontal):.2g} deg/h, and the best gyro bias is known to {_deg_h(bias):.2g} deg/h; "
+        "the coefficients do not need it, headings of this test mean nothing"
+    )
+
+
+def _deg_h(rate: float) -> float:
+    return float(np.degrees(rate) * 3600.0)
 
 
 def _attitudes(solution: Solution) -> int:
