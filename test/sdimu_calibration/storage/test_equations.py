@@ -8,6 +8,7 @@ import pytest
 from rate_table_sim.core.specification import TableSpecification
 from sdimu_calibration.core.diagnosis.candidates import equations, periodic
 from sdimu_calibration.core.diagnosis.evidence import predicted_motion
+from sdimu_calibration.core.effects import registry
 from sdimu_calibration.core.filter.passes import reduce, set_up, solve
 from sdimu_calibration.core.plan import Plan, Turn
 from sdimu_calibration.core.recording import DataError
@@ -71,3 +72,10 @@ def test_a_formula_that_cannot_be_read_is_refused_with_its_text(text, reason):
         find_effects(text)
     assert reason in str(error.value)
     assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("text", ["accel_x: az wty", "accel_x: az*wty"])
+def test_an_equation_in_the_rate_may_be_as_large_in_a_turn_as_a_bias_is(text):
+    (effect,) = find_effects(text)
+    for grade, bias in registry.get("accel_bias").prior.items():
+        assert effect.prior[grade] * np.radians(2.0) == pytest.approx(bias)

@@ -45,6 +45,7 @@ def workbench(
     import socket
 
     from rich.console import Console
+    from werkzeug.serving import make_server
 
     from sdimu_calibration.cli.calibrate import check_options
     from sdimu_calibration.cli.progress import bar
@@ -76,6 +77,8 @@ def workbench(
         bench = shelf.bench()
         bench.fit((), (), progress)
         bench.missing((), (), progress)
-    console.print(f"workbench of {bag.name} at http://{host}:{port} (Ctrl-C ends it)", soft_wrap=True)
     logging.getLogger("werkzeug").setLevel(logging.ERROR)
-    build(shelf).run(host=host, port=port, debug=False)
+    # The address is told once the port listens: who follows it at once is not refused.
+    server = make_server(host, port, build(shelf).server, threaded=True)
+    console.print(f"workbench of {bag.name} at http://{host}:{port} (Ctrl-C ends it)", soft_wrap=True)
+    server.serve_forever()

@@ -15,7 +15,7 @@ from typing import Any, Literal, cast
 import numpy as np
 from pydantic import Field
 
-from sdimu_calibration.core.diagnosis.candidates import own_equation, without
+from sdimu_calibration.core.diagnosis.candidates import USUAL_TURN, own_equation, without
 from sdimu_calibration.core.effects import registry, selection
 from sdimu_calibration.core.effects.effect import CHANNELS, Effect, Parameter, Term
 from sdimu_calibration.core.effects.motion import Floats, Motion
@@ -107,7 +107,7 @@ def find_effects(text: str) -> tuple[Effect, ...]:
 
 
 def _equation(text: str) -> Effect:
-    """Effect ``d(sensor) = k formula``; k as large as a bias may be where the formula comes to one."""
+    """Effect ``d(sensor) = k formula``; k as large as a bias may be where the formula comes to its usual size."""
     sensor, _, formula = (part.strip() for part in text.partition(":"))
     proposed = own_equation(f"{sensor}: {formula}")
     if proposed:
@@ -120,7 +120,8 @@ def _equation(text: str) -> Effect:
         below = "".join(
             ("/" if p > 0 else "*") + n + ("" if abs(p) == 1 else f"^{abs(p)}") for n, p in sorted(dimension.items())
         )
-        prior = registry.get(f"{sensor[:-2]}_bias").prior
+        usual = USUAL_TURN ** max(0, -int(dimension.get("s", 0))) if "m" not in dimension else 1.0
+        prior = {grade: size / usual for grade, size in registry.get(f"{sensor[:-2]}_bias").prior.items()}
         file = _EffectFile.model_validate({
             "format": FORMAT, "name": "equation", "expressions": {sensor: f"k * ({about.text})"},
             "parameters": {"k": {"unit": shown + below, "prior": f"1 {shown}{below}"}},

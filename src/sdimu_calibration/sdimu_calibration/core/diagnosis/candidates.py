@@ -162,7 +162,9 @@ def _wave(rate: float, lead: float) -> Column:
     return lambda motion: np.asarray(np.sin(rate * (motion.t - 0.5 * motion.dt) + lead))
 
 
-# A term whose variable is of the order of one is not larger than the bias is.
+USUAL_TURN = float(np.deg2rad(2.0))
+"""Rate of an ordinary turn (rad/s): what a rate in an equation is of the order of."""
+# A term whose variable is of its usual order is not larger than the bias is.
 _OWN_GYRO, _OWN_ACCEL = registry.get("gyro_bias"), registry.get("accel_bias")
 
 
@@ -171,8 +173,11 @@ def _plain(text: str, value: Callable[[Motion], Floats]) -> list[Effect]:
     return _own(text, "", "", value)
 
 
-def _own(text: str, unit: str, shown: str, value: Callable[[Motion], Floats]) -> list[Effect]:
-    """Own equation ``d(sensor) = k text``, gyros and accelerometers; units are appended to those of the sensor."""
+def _own(text: str, unit: str, shown: str, value: Callable[[Motion], Floats], usual: float = 1.0) -> list[Effect]:
+    """Own equation ``d(sensor) = k text``, gyros and accelerometers; units are appended to those of the sensor.
+
+    `usual` is the order of size of `value` (SI): the prior of the bias over it is that of k.
+    """
 
     def triad(word: str, base: tuple[str, str], like: Effect) -> Effect:
         first = CHANNELS.index(f"{word}_x")
@@ -180,7 +185,8 @@ def _own(text: str, unit: str, shown: str, value: Callable[[Motion], Floats]) ->
             name=f"{word}: {text}", title=OWN, equation=f"d{word}_i = k_i {text}",
             parameters=tuple(Parameter(f"{word}_{a}: {text}", base[0] + unit, base[1] + shown) for a in AXES),
             terms=tuple(Term(first + i, i) for i in range(3)),
-            regressors=lambda m: np.repeat(value(m)[:, None], 3, axis=1), prior=like.prior,
+            regressors=lambda m: np.repeat(value(m)[:, None], 3, axis=1),
+            prior={grade: sigma / usual for grade, sigma in like.prior.items()},
         )  # fmt: skip
 
     return [triad("gyro", ("rad/s", "deg/h"), _OWN_GYRO), triad("accel", ("m/s^2", "ug"), _OWN_ACCEL)]
@@ -218,4 +224,4 @@ def _monomial(pa: tuple[int, ...], pw: tuple[int, ...], factor: str) -> list[Eff
     unit += ("/g" + (f"^{order_a}" if order_a > 1 else "")) if order_a else ""
     unit += _TIME_UNIT[factor]
     si = unit.replace("deg", "rad").replace("/h", "/s").replace("radC", "K")
-    return _own(text, si, unit, value)
+    return _own(text, si, unit, value, USUAL_TURN**order_w)

@@ -240,6 +240,8 @@ def _sentence(d: Diagnosis) -> str:
         return f"The data have a fault: {'; '.join(faults)}."
     if d.verdict == "unexplained":
         tail = f"; {names} would take {100 * d.explained:.0f} % of it" if names else ""
+        if names and _rms(d.after) > STILL_WRONG:
+            tail += f", but the error at stops held out is then still {_rms(d.after):.2f} (1 is right)"
         return f"Something is missing that no effect of the catalogue explains{tail}."
     if d.verdict == "own equation":
         return f"Something is missing that is not in the catalogue; it follows {names}."

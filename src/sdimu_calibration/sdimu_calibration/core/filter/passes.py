@@ -192,7 +192,7 @@ def first_attitude(epochs: Epochs, phases: Phases, setup: Setup) -> Alignment:
     if start:
         raise DataError(
             f"/imu/data_raw: the recording starts in motion (first rest at {epochs.start[start]:.0f} s); "
-            "start it at rest, or cut it"
+            "start it at rest, or cut it; noise beyond the IMU's specification looks the same: check --imu"
         )
     moving = np.flatnonzero(~phases.dwell)
     end = int(moving[0]) if len(moving) else len(phases.dwell)
