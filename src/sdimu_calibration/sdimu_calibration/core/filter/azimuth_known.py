@@ -53,7 +53,7 @@ def azimuth_note(solution: Solution) -> str | None:
     """Say so where the Earth turns about the vertical so nearly that no heading can come from it.
 
     What a gyro bias leaves open of the horizontal Earth rate is an azimuth. The filter's own sigma does not show it:
-    the second order of an azimuth that may be anything is taken for knowledge. An azimuth that the site states is known.
+    the second order of an azimuth that may be anything is taken for knowledge. An azimuth that a site states is known.
     """
     site = solution.setup.site
     p = len(solution.setup.sensors.prior)
