@@ -18,8 +18,8 @@ Ints = NDArray[np.int64]
 
 TESTABLE = 0.02
 """Share of a signature's length that must be left after the model's coefficients have taken theirs."""
-POWER_80 = 4.95
-"""Size of an effect, in its sigma, found with 80 % power: 0.84 above the usual threshold of a whole scan, 4.1."""
+POWER_80 = 4.84
+"""Size of an effect, in its sigma, found with 80 % power: 0.84 above the usual threshold of a whole scan, 4.0."""
 INDISTINGUISHABLE = 3.0
 """A log Bayes factor within this of the best (odds of 20 to 1) does not tell two candidates apart."""
 _DRAWS = 4000
