@@ -24,8 +24,8 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 FALSE_ALARM = 0.02
-"""Probability that pure noise puts one of all candidates over the threshold: what is bearable (5 %) with room for what is
-not pure noise; at 0.01 effects of 5 sigma were found in 73 % of 49 tests instead of three quarters."""
+"""Probability that pure noise puts one of all candidates over the threshold: what is bearable (5 %) with room for what
+is not pure noise; at 0.01 effects of 5 sigma were found in 73 % of 49 tests instead of three quarters."""
 MOST_STEPS = 8
 LOG_BAYES = 3.0
 """Least log Bayes factor of an accepted step ("strong" on Jeffreys' scale)."""
