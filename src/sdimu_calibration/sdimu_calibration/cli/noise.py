@@ -58,6 +58,7 @@ def noise(
     console.print(table(terms))
     for word in words:
         console.print(f"note: {word}", soft_wrap=True, markup=False, highlight=False)
+    console.print(f"note: grade and priors in imu.yaml are those of '{imu}' (--imu)", soft_wrap=True, highlight=False)
     console.print(f"results in {folder}; use: --imu {folder / 'imu.yaml'}", soft_wrap=True, highlight=False)
 
 
