@@ -25,7 +25,7 @@ def print_account(console: Console, told: Account) -> None:
         _line(console, f"data: {finding.text}")
     for text in d.noise:
         _line(console, f"noise: {text}")
-    _line(console, f"p of the model as given: {d.p_value:.2g}")
+    _line(console, f"p of the model as given: {f'{d.p_value:.2g}' if d.p_value > 1e-300 else 'below 1e-300'}")
     _where(console, told)
     _candidates(console, told)
     _steps(console, told)

@@ -172,7 +172,7 @@ def _shown(bench: Bench, now: State, recording: str, scale: float, tell: Any) ->
     keys = [(now.added[:k], now.held) for k in range(len(now.added) + 1)]
     keys = [*now.seen, *(key for key in keys if key not in now.seen)]
     pictures = (
-        figures.heat_map(here.grid, cell), figures.cell(here.residuals, *cell),
+        figures.heat_map(here.grid, cell), figures.cell(here.residuals, here.grid, *cell),
         figures.ladder(names, [r.held_out for r in rungs], [r.at_held for r in rungs]),
     )  # fmt: skip
     return (

@@ -36,8 +36,11 @@ def ranking(entries: Sequence[data.Scored], threshold: float) -> Any:
     return figure
 
 
-def cell(found: data.Residuals, channel: int, stop: int) -> Any:
-    """Innovations of a channel at a stop against time, with three sigma and their mean."""
+def cell(found: data.Residuals, grid: data.Grid, channel: int, stop: int) -> Any:
+    """Innovations of a channel at a stop against time, with three sigma and their mean.
+
+    They are those of the final coefficients; the heat map has those that the filter met on its way, which knew less.
+    """
     rows = (found.stop == stop) & np.isfinite(found.before[:, channel])
     t, y = found.t[rows], found.before[rows, channel]
     figure = go.Figure()
@@ -48,7 +51,9 @@ def cell(found: data.Residuals, channel: int, stop: int) -> Any:
         figure.add_hline(y=float(y.mean()), line={"color": BEFORE, "width": 2, "dash": "dash"}, opacity=1.0)
     figure.update_xaxes(title_text="time (s)")
     figure.update_yaxes(title_text="innovation (sigma)", zeroline=True, zerolinecolor="#999")
-    mean = f"mean {y.mean():+.2f} sigma (dashed)" if len(y) else "not measured"
+    met = grid.value[channel, grid.stops == stop]
+    told = f"{met[0]:+.1f} sigma on the way (above); " if np.isfinite(met).any() else ""
+    mean = f"{told}with the final coefficients mean {y.mean():+.2f} sigma (dashed)" if len(y) else "not measured"
     named = f"{CHANNEL_NAMES[channel].replace('_', ' ')} at stop {stop}: {mean}".replace("-", "\N{MINUS SIGN}")
     return lay_out(figure, 280, title={"text": named, "font": {"size": 14}})
 
