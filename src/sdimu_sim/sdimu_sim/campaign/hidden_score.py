@@ -33,7 +33,8 @@ def score(drawn: Draw, found: Diagnosis, sensor: ImuTruth) -> dict[str, Any]:
     -------
     dict
         ``kind``, ``plan``, ``latitude_deg``, ``fault``, ``truths`` (see `_judge`), ``verdict``, ``sentence``,
-        ``named`` (labels of what was found), ``classes`` (labels of each class), ``families``, ``noise``, ``own``,
+        ``named`` (labels of what was found), ``classes`` (labels of each class), ``families``, ``noise``, ``data``
+        (kinds of what was found in the samples), ``own``,
         ``steps``, ``rms_z_before`` and ``_after`` (baseline coefficients), ``held_out_before`` and ``_after``,
         ``stops_before`` and ``_after`` (leave one stop out), ``remainder_p``, ``scan_z2`` and ``scan_count``
         (catalogue), ``threshold``.
@@ -49,7 +50,8 @@ def score(drawn: Draw, found: Diagnosis, sensor: ImuTruth) -> dict[str, Any]:
         "truths": [_judge(t, found, scanned, named) for t in drawn.truths],
         "verdict": found.verdict, "sentence": found.sentence,
         "named": [c.label for c in found.chosen], "families": [c.family for c in found.chosen],
-        "classes": named, "noise": list(found.noise), "own": found.own, "unexplained": found.unexplained,
+        "classes": named, "noise": list(found.noise), "data": [f.kind for f in found.findings],
+        "own": found.own, "unexplained": found.unexplained,
         "steps": [
             {"label": s.label, "z": s.z, "accepted": s.accepted, "reason": s.reason, "log_bayes": s.log_bayes_factor,
              "gain": s.held_out_gain, "error": s.held_out_error} for s in found.found.steps
@@ -138,7 +140,7 @@ def _signature_left(truth: Truth, found: Diagnosis) -> tuple[float, float]:
     shape = next((s for s in shapes(evidence.times) if s.label == truth.name), None)
     if shape is None:
         return 0.0, 0.0
-    w = columns(evidence.reduced, evidence.output, evidence.seen, [shape.effect()])[:, 0]
+    w = columns(evidence.reduced, evidence.output, evidence.seen, evidence.latitude, [shape.effect()])[:, 0]
     none = np.empty(0, dtype=np.int64)
     left = []
     for chosen in (none, found.found.chosen):

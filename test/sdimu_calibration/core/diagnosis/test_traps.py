@@ -37,7 +37,7 @@ def test_regressors_of_measured_motion_make_a_dead_band_of_noise(bench):
             solution.last.C_start.copy(), setup.site.latitude_rad, setup.gravity, None, predicted=False,
         )  # fmt: skip
         p = len(evidence.weight)
-        noisy = columns(solution.reduced, evidence.output, measured, [effect])
+        noisy = columns(solution.reduced, evidence.output, measured, evidence.latitude, [effect])
         right.append(_scores(evidence))
         wrong.append(_scores(replace(evidence, W=np.hstack([evidence.W[:, :p], noisy]))))
     # Nine normal scores have a root mean square below 2 but for a chance of 1e-4.

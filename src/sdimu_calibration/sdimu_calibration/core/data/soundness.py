@@ -35,6 +35,9 @@ _SPIKE = 8.0
 _ALONE = 0.25
 """A spike stands out of its surroundings, the second differences nearby, by at least the inverse of this."""
 _AROUND = np.r_[-12:-2, 3:13]
+_OF_ANOTHER = 3
+"""Second differences that another spike nearby makes large; a shock or a shaking table makes more of them so."""
+_ROUNDS = 4
 _WINDOW = 20
 """Samples over which the roughness of a channel is taken, by the median: a corner of the motion is one sample."""
 _WILD = 4.0
@@ -59,17 +62,16 @@ def sound(recording: Recording) -> tuple[Recording, tuple[DataFault, ...]]:
     faults : tuple of DataFault
     """
     bad = np.zeros(len(recording.t), dtype=bool)
-    faults: list[DataFault] = []
+    found: dict[str, list[tuple[str, NDArray[np.int64]]]] = {}
     for name, x in zip(CHANNELS, (*recording.omega_ib_b.T, *recording.f_ib_b.T), strict=True):
         if _noiseless(x):
             continue
-        for rows, kind, text in (_stuck(x), _saturated(x), _spikes(x)):
+        for kind, test in _TESTS.items():
+            rows = test(x)
             if len(rows):
-                t = recording.t[rows]
-                places = f"{t[0]:.1f} s" if t[-1] - t[0] < 1.0 else f"{t[0]:.1f} to {t[-1]:.1f} s"
-                line = f"{name} {text} in {len(rows)} samples ({places}); they count as missing"
-                faults.append(DataFault(kind, line, len(rows), float(t[0]), float(t[-1])))
+                found.setdefault(kind, []).append((name, rows))
                 bad[rows] = True
+    faults = tuple(_told(kind, where, recording.t) for kind, where in found.items())
     if not bad.any():
         return recording, ()
     keep = ~bad
@@ -77,7 +79,25 @@ def sound(recording: Recording) -> tuple[Recording, tuple[DataFault, ...]]:
         recording, t=recording.t[keep], omega_ib_b=recording.omega_ib_b[keep], f_ib_b=recording.f_ib_b[keep],
         rejected=recording.rejected + int(bad.sum()),
     )  # fmt: skip
-    return mended, tuple(faults)
+    return mended, faults
+
+
+_TEXT = {
+    "stuck": ("shows one number", "show one number"),
+    "saturated": ("stands at the end of its range", "stand at the end of their range"),
+    "spike": ("jumps away and back", "jump away and back"),
+}
+
+
+def _told(kind: str, where: list[tuple[str, NDArray[np.int64]]], t: Floats) -> DataFault:
+    """One line for a fault of any number of channels."""
+    rows = np.unique(np.concatenate([at for _name, at in where]))
+    first, last = float(t[rows[0]]), float(t[rows[-1]])
+    places = f"{first:.1f} s" if last - first < 1.0 else f"{first:.1f} to {last:.1f} s"
+    names = [name for name, _at in where]
+    who = " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
+    line = f"{who} {_TEXT[kind][len(names) > 1]} in {len(rows)} samples ({places}); they count as missing"
+    return DataFault(kind, line, len(rows), first, last)
 
 
 def _repetition(same: Bools) -> float:
@@ -95,35 +115,33 @@ def _runs(same: Bools) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     return first, np.flatnonzero(edge == -1) - first + 1
 
 
-def _stuck(x: Floats) -> tuple[NDArray[np.int64], str, str]:
+def _stuck(x: Floats) -> NDArray[np.int64]:
     """Find runs of one number that are too long for the channel."""
-    kind, text = "stuck", "shows one number"
     none = np.empty(0, dtype=np.int64)
     n = len(x)
     same = np.diff(x) == 0.0
     if n < 3 or not same.any():
-        return none, kind, text
+        return none
     share = max(_repetition(same), 1.0 / n)
     if share > _REPEATS:
-        return none, kind, text
+        return none
     # n chances to begin, each further repetition as probable as `share`.
     improbable = 1 + math.ceil(math.log(_FALSE_ALARM / n) / math.log(share))
     first, length = _runs(same)
     long = length >= max(improbable, 3)
     # The first number of a run is a measurement, the others repeat it.
     rows = [np.arange(f + 1, f + k) for f, k in zip(first[long], length[long], strict=True)]
-    return (np.concatenate(rows) if rows else none), kind, text
+    return np.concatenate(rows) if rows else none
 
 
-def _saturated(x: Floats) -> tuple[NDArray[np.int64], str, str]:
+def _saturated(x: Floats) -> NDArray[np.int64]:
     """Find readings that stand at the largest or smallest number of a channel that else repeats nothing."""
-    kind, text = "saturated", "stands at the end of its range"
     none = np.empty(0, dtype=np.int64)
     if len(x) < 3 or _repetition(np.diff(x) == 0.0) > 1.0 / _BLOCK:
-        return none, kind, text
+        return none
     ends = [np.flatnonzero(x == end) for end in (x.max(), x.min())]
     rows = [at for at in ends if len(at) >= _LEAST_AT_END]
-    return (np.sort(np.concatenate(rows)) if rows else none), kind, text
+    return np.sort(np.concatenate(rows)) if rows else none
 
 
 def _noiseless(x: Floats) -> bool:
@@ -134,22 +152,34 @@ def _noiseless(x: Floats) -> bool:
     return float(np.median(second)) < _PERFECT * float(np.abs(x).max())
 
 
-def _spikes(x: Floats) -> tuple[NDArray[np.int64], str, str]:
-    """Find single samples far from both neighbours, where these agree and nothing around is as rough."""
-    kind, text = "spike", "jumps away and back"
-    none = np.empty(0, dtype=np.int64)
+def _spikes(x: Floats) -> NDArray[np.int64]:
+    """Find single samples far from both neighbours, where these agree and little around is as rough."""
+    rows = np.arange(len(x))
     if len(x) < 2 * _BLOCK:
-        return none, kind, text
+        return rows[:0]
+    # One spike may hide another beside it: what is left is looked through again.
+    for _round in range(_ROUNDS):
+        at = _stand_out(x[rows])
+        if not len(at):
+            break
+        rows = np.delete(rows, at)
+    return np.setdiff1d(np.arange(len(x)), rows, assume_unique=True)
+
+
+def _stand_out(x: Floats) -> NDArray[np.int64]:
     second = np.zeros_like(x)
     second[1:-1] = x[1:-1] - 0.5 * (x[:-2] + x[2:])
     size = np.abs(second)
     sigma = _GAUSS_MAD * float(np.median(size))
     if sigma == 0.0:
-        return none, kind, text
+        return np.empty(0, dtype=np.int64)
     at = np.flatnonzero(size > _SPIKE * sigma)
     at = at[np.abs(x[at + 1] - x[at - 1]) < 0.5 * size[at]]
-    around = size[np.clip(at[:, None] + _AROUND, 0, len(x) - 1)].max(axis=1)
-    return at[around < _ALONE * size[at]], kind, text
+    around = np.sort(size[np.clip(at[:, None] + _AROUND, 0, len(x) - 1)], axis=1)[:, -1 - _OF_ANOTHER]
+    return np.asarray(at[around < _ALONE * size[at]])
+
+
+_TESTS = {"stuck": _stuck, "saturated": _saturated, "spike": _spikes}
 
 
 def wild(recording: Recording) -> tuple[Floats, Floats, tuple[DataFault, ...]]:

@@ -51,6 +51,8 @@ class Evidence:
     seen : Motion
     times : TestTimes
     reduced : Reduced
+    latitude : float
+        Of the site (rad).
     """
 
     e: Floats
@@ -68,6 +70,7 @@ class Evidence:
     seen: Motion
     times: TestTimes
     reduced: Reduced
+    latitude: float
 
     @property
     def model(self) -> Ints:
@@ -88,7 +91,7 @@ class Evidence:
     def with_effects(self, effects: Sequence[Effect]) -> Evidence:
         """Return the evidence with the parameters of more effects behind the candidates it has."""
         more = [c for effect in effects for c in split(effect)]
-        W = columns(self.reduced, self.output, self.seen, effects)
+        W = columns(self.reduced, self.output, self.seen, self.latitude, effects)
         wider = replace(
             self, W=np.hstack([self.W, W]), names=(*self.names, *(c.label for c in more)),
             candidates=(*self.candidates, *more),
@@ -168,7 +171,7 @@ def collect(reduced: Reduced, setup: Setup, finished: Pass, effects: Sequence[Ef
     seen = predicted_motion(reduced, setup, finished)
     sensors = setup.sensors
     candidates = [c for effect in effects for c in split(effect)]
-    W = columns(reduced, known.output, seen, [*sensors.effects, *effects])
+    W = columns(reduced, known.output, seen, setup.site.latitude_rad, [*sensors.effects, *effects])
     epoch, channel = measured_rows(known.output)
     prior = np.array([c.effect.prior.get(setup.imu.grade, np.inf) for c in candidates])
     return Evidence(
@@ -176,7 +179,7 @@ def collect(reduced: Reduced, setup: Setup, finished: Pass, effects: Sequence[Ef
         names=(*sensors.names, *(c.label for c in candidates)),
         weight=1.0 / sensors.prior**2, shift=-finished.estimate, candidates=tuple(candidates), prior=prior,
         grade=setup.imu.grade,
-        output=known.output, seen=seen, times=test_times(reduced), reduced=reduced,
+        output=known.output, seen=seen, times=test_times(reduced), reduced=reduced, latitude=setup.site.latitude_rad,
     )  # fmt: skip
 
 
@@ -184,8 +187,10 @@ _BLOCK = 24
 """Effects whose regressors are in memory at a time."""
 
 
-def columns(reduced: Reduced, output: PassOutput, seen: Motion, effects: Sequence[Effect]) -> Floats:
-    """Signatures of all parameters of `effects`, shape (N, parameters)."""
+def columns(
+    reduced: Reduced, output: PassOutput, seen: Motion, latitude: float, effects: Sequence[Effect]
+) -> Floats:
+    """Signatures of all parameters of `effects` at a latitude (rad), shape (N, parameters)."""
     epochs = reduced.epochs
     parts = []
     for start in range(0, len(effects), _BLOCK):
@@ -199,7 +204,7 @@ def columns(reduced: Reduced, output: PassOutput, seen: Motion, effects: Sequenc
         parts.append(
             signatures(
                 seen, epochs.first, epochs.last, reduced.kind, output, np.hstack(values),
-                np.array(channel, dtype=np.int64), np.array(parameter, dtype=np.int64), count,
+                np.array(channel, dtype=np.int64), np.array(parameter, dtype=np.int64), count, latitude,
             )
         )  # fmt: skip
     return np.hstack(parts)

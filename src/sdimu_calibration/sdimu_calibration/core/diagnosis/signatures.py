@@ -18,10 +18,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from sdimu_calibration.core import earth
 from sdimu_calibration.core.compiled import compiled
 from sdimu_calibration.core.effects.motion import Motion
 from sdimu_calibration.core.filter.filter_pass import MEASURED, NAV, PassOutput
 from sdimu_calibration.core.filter.kalman import whiten
+from sdimu_calibration.core.navigation.ins_errors import add_response
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -30,18 +32,18 @@ Ints = NDArray[np.int64]
 @compiled
 def _epoch_response(
     C_nb: Floats, f_b: Floats, dt: Floats, first: int, last: int, values: Floats, channel: Ints, parameter: Ints,
-    G: Floats, D: Floats, att: Floats, vel: Floats,
+    w_ie: Floats, G: Floats, D: Floats, att: Floats, vel: Floats,
 ) -> float:  # fmt: skip
     """Fill G (9, q) and D (6, q) with the response over an epoch; return its length (s)."""
     G[:, :] = 0.0
     D[:, :] = 0.0
     T = 0.0
+    f_n = np.empty(3)
     for c in range(first, last):
         h = dt[c]
         T += h
-        f0 = C_nb[c, 0, 0] * f_b[c, 0] + C_nb[c, 0, 1] * f_b[c, 1] + C_nb[c, 0, 2] * f_b[c, 2]
-        f1 = C_nb[c, 1, 0] * f_b[c, 0] + C_nb[c, 1, 1] * f_b[c, 1] + C_nb[c, 1, 2] * f_b[c, 2]
-        f2 = C_nb[c, 2, 0] * f_b[c, 0] + C_nb[c, 2, 1] * f_b[c, 1] + C_nb[c, 2, 2] * f_b[c, 2]
+        for i in range(3):
+            f_n[i] = C_nb[c, i, 0] * f_b[c, 0] + C_nb[c, i, 1] * f_b[c, 1] + C_nb[c, i, 2] * f_b[c, 2]
         att[:, :] = 0.0
         vel[:, :] = 0.0
         for j in range(channel.shape[0]):
@@ -56,27 +58,14 @@ def _epoch_response(
                 vel[0, k] += C_nb[c, 0, ch - 3] * v
                 vel[1, k] += C_nb[c, 1, ch - 3] * v
                 vel[2, k] += C_nb[c, 2, ch - 3] * v
-        for k in range(G.shape[1]):
-            a0, a1, a2 = G[6, k] + 0.5 * att[0, k], G[7, k] + 0.5 * att[1, k], G[8, k] + 0.5 * att[2, k]
-            v0 = vel[0, k] + (f1 * a2 - f2 * a1) * h
-            v1 = vel[1, k] + (f2 * a0 - f0 * a2) * h
-            v2 = vel[2, k] + (f0 * a1 - f1 * a0) * h
-            G[0, k] += (G[3, k] + 0.5 * v0) * h
-            G[1, k] += (G[4, k] + 0.5 * v1) * h
-            G[2, k] += (G[5, k] + 0.5 * v2) * h
-            G[3, k] += v0
-            G[4, k] += v1
-            G[5, k] += v2
-            G[6, k] += att[0, k]
-            G[7, k] += att[1, k]
-            G[8, k] += att[2, k]
+        add_response(G, att, vel, f_n, w_ie, h)
     return T
 
 
 @compiled
 def _signatures(
     C_nb: Floats, f_b: Floats, dt: Floats, first: Ints, last: Ints, kind: Ints,
-    values: Floats, channel: Ints, parameter: Ints, q: int,
+    values: Floats, channel: Ints, parameter: Ints, q: int, w_ie: Floats,
     Phi: Floats, H: Floats, L: Floats, K: Floats, W: Floats,
 ) -> None:  # fmt: skip
     """Fill W (rows, q), one row a measured scalar, in the order of epochs and channels."""
@@ -87,7 +76,7 @@ def _signatures(
     vel = np.zeros((3, q))
     row = 0
     for e in range(first.shape[0]):
-        T = _epoch_response(C_nb, f_b, dt, first[e], last[e], values, channel, parameter, G, D, att, vel)
+        T = _epoch_response(C_nb, f_b, dt, first[e], last[e], values, channel, parameter, w_ie, G, D, att, vel)
         V[:, :] = Phi[e] @ V + G
         if kind[e] == 0:
             continue
@@ -102,7 +91,7 @@ def _signatures(
 
 def signatures(
     seen: Motion, first: Ints, last: Ints, kind: Ints, output: PassOutput,
-    values: Floats, channel: Ints, parameter: Ints, count: int,
+    values: Floats, channel: Ints, parameter: Ints, count: int, latitude: float,
 ) -> Floats:  # fmt: skip
     """Signatures of `count` parameters in the whitened innovations of a navigation filter.
 
@@ -120,6 +109,8 @@ def signatures(
         Sensor axis and parameter of each column.
     count : int
         Number of parameters q.
+    latitude : float
+        Of the site (rad).
 
     Returns
     -------
@@ -129,7 +120,8 @@ def signatures(
     W = np.zeros((int(np.isfinite(output.normalised).sum()), count))
     _signatures(
         np.ascontiguousarray(seen.C_nb), np.ascontiguousarray(seen.f), seen.dt, first, last, kind,
-        np.ascontiguousarray(values), channel, parameter, count, output.Phi, output.H, output.L, output.K, W,
+        np.ascontiguousarray(values), channel, parameter, count, earth.earth_rate(latitude),
+        output.Phi, output.H, output.L, output.K, W,
     )  # fmt: skip
     return W
 

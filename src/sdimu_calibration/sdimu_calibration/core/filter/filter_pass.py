@@ -32,7 +32,12 @@ from sdimu_calibration.core import earth
 from sdimu_calibration.core.compiled import compiled
 from sdimu_calibration.core.filter.kalman import cholesky, propagate, update, whiten
 from sdimu_calibration.core.matrix3 import applied, elements
-from sdimu_calibration.core.navigation.ins_errors import navigation_error_matrix, process_noise, transition
+from sdimu_calibration.core.navigation.ins_errors import (
+    add_response,
+    navigation_error_matrix,
+    process_noise,
+    transition,
+)
 from sdimu_calibration.core.navigation.strapdown import navigate_cycle, velocity_increment
 from sdimu_calibration.core.rotation import orthonormal, rotation_matrix, skew
 
@@ -130,30 +135,6 @@ def new_output(epochs: int, parameters: int, keep: bool, stride: int) -> PassOut
 
 
 @compiled
-def _add_response(G: Floats, att: Floats, vel: Floats, f_n: Floats, w_ie: Floats, dt: float) -> None:
-    """Add one cycle to the integrated response of the navigation to each coefficient, G (9, p), in place.
-
-    With the Coriolis force on the velocity gained since the epoch began: a lever arm moves by decimetres a second.
-    """
-    c0, c2 = -2.0 * w_ie[0] * dt, -2.0 * w_ie[2] * dt
-    for j in range(G.shape[1]):
-        a0, a1, a2 = G[6, j] + 0.5 * att[0, j], G[7, j] + 0.5 * att[1, j], G[8, j] + 0.5 * att[2, j]
-        u0, u1, u2 = G[3, j] + 0.5 * vel[0, j], G[4, j] + 0.5 * vel[1, j], G[5, j] + 0.5 * vel[2, j]
-        v0 = vel[0, j] + (f_n[1] * a2 - f_n[2] * a1) * dt - c2 * u1
-        v1 = vel[1, j] + (f_n[2] * a0 - f_n[0] * a2) * dt + c2 * u0 - c0 * u2
-        v2 = vel[2, j] + (f_n[0] * a1 - f_n[1] * a0) * dt + c0 * u1
-        G[0, j] += (G[3, j] + 0.5 * v0) * dt
-        G[1, j] += (G[4, j] + 0.5 * v1) * dt
-        G[2, j] += (G[5, j] + 0.5 * v2) * dt
-        G[3, j] += v0
-        G[4, j] += v1
-        G[5, j] += v2
-        G[6, j] += att[0, j]
-        G[7, j] += att[1, j]
-        G[8, j] += att[2, j]
-
-
-@compiled
 def _mean_attitude(C_nb: Floats, phi: Floats, out: Floats) -> None:
     """Put the mean of `C_nb` over a cycle that turns by `phi` into `out`: ``C_nb (1 + [phi x] / 2 + [phi x]^2 / 6)``.
 
@@ -223,7 +204,7 @@ def _navigate_epoch(
             else:
                 for i in range(3):
                     vel[i, k] += C_mean[i, channel - 3] * v
-        _add_response(G, att, vel, f_n, w_ie, dt)
+        add_response(G, att, vel, f_n, w_ie, dt)
     return T
 
 

@@ -131,3 +131,27 @@ def process_noise(C_qg: Floats, C_qa: Floats, f_n: Floats, dt: float) -> Floats:
     Q[6:9, 0:3] = Q[0:3, 6:9].T
     Q[3:6, 0:3] = Q[0:3, 3:6].T
     return Q
+
+
+@compiled
+def add_response(G: Floats, att: Floats, vel: Floats, f_n: Floats, w_ie: Floats, dt: float) -> None:
+    """Add one cycle to the integrated response of the navigation to each coefficient, G (9, p), in place.
+
+    With the Coriolis force on the velocity gained since the epoch began: a lever arm moves by decimetres a second.
+    """
+    c0, c2 = -2.0 * w_ie[0] * dt, -2.0 * w_ie[2] * dt
+    for j in range(G.shape[1]):
+        a0, a1, a2 = G[6, j] + 0.5 * att[0, j], G[7, j] + 0.5 * att[1, j], G[8, j] + 0.5 * att[2, j]
+        u0, u1, u2 = G[3, j] + 0.5 * vel[0, j], G[4, j] + 0.5 * vel[1, j], G[5, j] + 0.5 * vel[2, j]
+        v0 = vel[0, j] + (f_n[1] * a2 - f_n[2] * a1) * dt - c2 * u1
+        v1 = vel[1, j] + (f_n[2] * a0 - f_n[0] * a2) * dt + c2 * u0 - c0 * u2
+        v2 = vel[2, j] + (f_n[0] * a1 - f_n[1] * a0) * dt + c0 * u1
+        G[0, j] += (G[3, j] + 0.5 * v0) * dt
+        G[1, j] += (G[4, j] + 0.5 * v1) * dt
+        G[2, j] += (G[5, j] + 0.5 * v2) * dt
+        G[3, j] += v0
+        G[4, j] += v1
+        G[5, j] += v2
+        G[6, j] += att[0, j]
+        G[7, j] += att[1, j]
+        G[8, j] += att[2, j]
