@@ -5,11 +5,12 @@
 2 (1 + m/2)^2, by m + m^2/2 samples. An epoch that holds n intervals has 1 + (m + m^2/2) / n times the variance, in
 the navigation and in Zw and Zf alike, because both take the same bridged samples.
 
-**Motion.** In a turn the rate between the two neighbours is not known. With an angular acceleration of at most a
-(the largest in the recording) and rates that differ by D over the gap T, the missing angle lies within
-+-(a^2 T^2 - D^2) / (4 a) of the straight line: the area between it and the steepest way up and down. The sigma is that
-bound over the root of three. The force turns with the body: a straight line between two directions an angle A apart is
-too short by up to g A^2 / 12 in the mean, and wrong by g times what the angle is wrong.
+**Motion.** In a turn the rate within the gap is not known. With an angular acceleration of at most a (the largest
+within half a second of a short gap, or in the recording) the missing angle lies within +- a T^2 / 4 of the straight
+line between the two neighbours: the area of the steepest way up and down again. The sigma is that bound over the root
+of three. Rates that differ at the two ends leave less room, but only if they are known at the very ends: a corner of
+the motion beside the gap tells otherwise. The force turns with the body: a straight line between two directions an
+angle A apart is too short by up to g A^2 / 12 in the mean, and wrong by g times what the angle is wrong.
 
 **At rest** nothing is added: an IMU that rests before and after, with the same force and rate, did not move; where
 these differ it moved or was switched off, and no covariance is honest. Source: own derivation.
@@ -17,10 +18,12 @@ these differ it moved or was switched off, and no covariance is honest. Source: 
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter1d
 
 from sdimu_calibration.core.data.epochs import Epochs
 from sdimu_calibration.core.data.phases import Phases
@@ -39,6 +42,9 @@ _DIFFERENT = 6.0
 _LEAST_COMPARED_S = 3.0
 _STILL_RAD_S2 = 1e-4
 """Least angular acceleration reckoned with."""
+_NEAR_S = 0.5
+_SHORT_S = 0.25
+"""A turn that runs steady for half a second before and after so short a gap runs steady in it."""
 
 
 @dataclass(frozen=True)
@@ -63,13 +69,28 @@ def largest_acceleration(cycles: Cycles) -> float:
     whole = (cycles.lost[1:] == 0) & (cycles.lost[:-1] == 0)
     if not whole.any():
         return _STILL_RAD_S2
+    return max(float(_steps(cycles)[whole].max()), _STILL_RAD_S2)
+
+
+def _steps(cycles: Cycles) -> Floats:
+    """Angular acceleration between neighbouring cycles (rad/s^2), shape (n - 1,)."""
     rate = cycles.alpha / cycles.dt[:, None]
-    step = np.sqrt(np.sum(np.diff(rate, axis=0) ** 2, axis=1)) * 2.0 / (cycles.dt[1:] + cycles.dt[:-1])
-    return max(float(step[whole].max()), _STILL_RAD_S2)
+    step = np.sqrt(np.sum(np.diff(rate, axis=0) ** 2, axis=1))
+    return np.asarray(step * 2.0 / (cycles.dt[1:] + cycles.dt[:-1]))
 
 
-def bridges(cycles: Cycles, epochs: Epochs, dwell: NDArray[np.bool_], nominal_s: float, acceleration: float,
-            gravity: float) -> Bridges:  # fmt: skip
+def _nearby(cycles: Cycles) -> Floats:
+    """Largest angular acceleration within `_NEAR_S` of each cycle (rad/s^2), shape (n,)."""
+    step = _steps(cycles)
+    beside = np.maximum(np.append(step, 0.0), np.insert(step, 0, 0.0))
+    width = 2 * math.ceil(_NEAR_S / float(np.median(cycles.dt))) + 1
+    return np.asarray(np.maximum(maximum_filter1d(beside, width, mode="nearest"), _STILL_RAD_S2))
+
+
+def bridges(
+    cycles: Cycles, epochs: Epochs, dwell: NDArray[np.bool_], nominal_s: float, acceleration: float,
+    gravity: float,
+) -> Bridges:  # fmt: skip
     """Uncertainty that missing samples leave in each epoch.
 
     Parameters
@@ -79,7 +100,7 @@ def bridges(cycles: Cycles, epochs: Epochs, dwell: NDArray[np.bool_], nominal_s:
     nominal_s : float
         Sample interval (s).
     acceleration : float
-        Largest angular acceleration to reckon with (rad/s^2).
+        Largest angular acceleration to reckon with in a gap of any length (rad/s^2).
     gravity : float
         m/s^2.
     """
@@ -99,10 +120,9 @@ def bridges(cycles: Cycles, epochs: Epochs, dwell: NDArray[np.bool_], nominal_s:
     T = m * nominal_s
     rate = cycles.alpha / cycles.dt[:, None]
     before, after = rate[np.maximum(at - 1, 0)], rate[np.minimum(at + 1, len(rate) - 1)]
-    D = np.sqrt(np.sum((after - before) ** 2, axis=1))
-    # Neighbouring cycles are up to a cycle further apart than the gap: D may exceed what a allows in T.
-    steepest = np.maximum(acceleration, D / T)
-    bound = np.maximum((steepest * T) ** 2 - D**2, 0.0) / (4.0 * steepest)
+    # The rates beside the gap are means over a sample each: they are half a sample further apart than its ends.
+    steepest = np.where(T <= _SHORT_S, _nearby(cycles)[at], acceleration)
+    bound = 0.25 * steepest * (T + 0.5 * nominal_s) ** 2
     error = bound / np.sqrt(3.0)
     turned = np.sqrt(np.sum((0.5 * (before + after)) ** 2, axis=1)) * T + error
     force = gravity * T * np.hypot(turned**2 / 12.0, error)

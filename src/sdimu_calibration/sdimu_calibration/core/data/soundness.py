@@ -153,33 +153,51 @@ def _noiseless(x: Floats) -> bool:
 
 
 def _spikes(x: Floats) -> NDArray[np.int64]:
-    """Find single samples far from both neighbours, where these agree and little around is as rough."""
+    """Find one sample or two far from both neighbours, where these agree and little around is as rough."""
     rows = np.arange(len(x))
     if len(x) < 2 * _BLOCK:
         return rows[:0]
     # One spike may hide another beside it: what is left is looked through again.
     for _round in range(_ROUNDS):
-        at = _stand_out(x[rows])
+        at = np.union1d(_stand_out(x[rows], 1), _stand_out(x[rows], 2))
         if not len(at):
             break
         rows = np.delete(rows, at)
     return np.setdiff1d(np.arange(len(x)), rows, assume_unique=True)
 
 
-def _stand_out(x: Floats) -> NDArray[np.int64]:
+def _stand_out(x: Floats, width: int) -> NDArray[np.int64]:
+    """Find `width` neighbouring samples that all stand off the line between the samples before and after them."""
     second = np.zeros_like(x)
     second[1:-1] = x[1:-1] - 0.5 * (x[:-2] + x[2:])
     size = np.abs(second)
     sigma = _GAUSS_MAD * float(np.median(size))
     if sigma == 0.0:
         return np.empty(0, dtype=np.int64)
-    at = np.flatnonzero(size > _SPIKE * sigma)
-    at = at[np.abs(x[at + 1] - x[at - 1]) < 0.5 * size[at]]
-    around = np.sort(size[np.clip(at[:, None] + _AROUND, 0, len(x) - 1)], axis=1)[:, -1 - _OF_ANOTHER]
-    return np.asarray(at[around < _ALONE * size[at]])
+    last = len(x) - width - 1
+    before, after = x[:last], x[width + 1 : width + 1 + last]
+    share = np.arange(1, width + 1) / (width + 1)
+    off = np.abs([x[j : j + last] - ((1.0 - s) * before + s * after) for j, s in enumerate(share, start=1)]).min(axis=0)
+    at = np.flatnonzero((off > _SPIKE * sigma) & (np.abs(after - before) < 0.5 * off))
+    beside = np.r_[_AROUND[_AROUND < 0], _AROUND[_AROUND > 0] + width - 1]
+    around = np.sort(size[np.clip(at[:, None] + 1 + beside, 0, len(x) - 1)], axis=1)[:, -1 - _OF_ANOTHER]
+    # The peak of a turn that never runs steady stands off as far as its flanks climb in a sample.
+    climb = np.abs(np.diff(x, prepend=x[0]))
+    slope = np.median(climb[np.clip(at[:, None] + 1 + beside, 0, len(x) - 1)], axis=1)
+    first = at[np.maximum(around, slope) * width < _ALONE * off[at]] + 1
+    return np.unique(first[:, None] + np.arange(width))
 
 
 _TESTS = {"stuck": _stuck, "saturated": _saturated, "spike": _spikes}
+
+
+def _medians(rows: Floats) -> Floats:
+    """Median of each row without what is not a number; 0 where that is most of it."""
+    known = np.isfinite(rows)
+    enough = known.sum(axis=1) >= rows.shape[1] // 2
+    out = np.zeros(len(rows))
+    out[enough] = np.nanmedian(rows[enough], axis=1)
+    return out
 
 
 def wild(recording: Recording) -> tuple[Floats, Floats, tuple[DataFault, ...]]:
@@ -203,14 +221,19 @@ def wild(recording: Recording) -> tuple[Floats, Floats, tuple[DataFault, ...]]:
     windows = len(recording.t) // _WINDOW
     largest = np.ones(windows)
     faults = []
+    # Across missing samples a difference of four is none.
+    uneven = np.ones(len(recording.t), dtype=bool)
+    uneven[2:-2] = np.abs(recording.t[4:] - recording.t[:-4] - 4.0 * recording.interval_s) > recording.interval_s / 2
     middle = recording.t[_WINDOW // 2 :: _WINDOW][:windows]
     for name, x in zip(CHANNELS, (*recording.omega_ib_b.T, *recording.f_ib_b.T), strict=True):
         if _noiseless(x):
             continue
-        second = np.zeros_like(x)
-        second[1:-1] = x[1:-1] - 0.5 * (x[:-2] + x[2:])
-        rough = np.median(np.abs(second[: windows * _WINDOW]).reshape(windows, _WINDOW), axis=1)
-        usual = float(np.median(rough)) if windows else 0.0
+        # Gravity turns through a body in motion: its fourth difference is nothing beside noise, its second is not.
+        fourth = np.zeros_like(x)
+        fourth[2:-2] = x[:-4] - 4.0 * x[1:-3] + 6.0 * x[2:-2] - 4.0 * x[3:-1] + x[4:]
+        fourth[uneven] = np.nan
+        rough = _medians(np.abs(fourth[: windows * _WINDOW]).reshape(windows, _WINDOW))
+        usual = float(np.median(rough[rough > 0.0])) if rough.any() else 0.0
         at = rough > _WILD * usual
         if usual == 0.0 or not at.any() or at.mean() > _RARE:
             continue
