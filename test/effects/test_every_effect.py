@@ -17,7 +17,8 @@ from rate_table_sim.core.specification import TableSpecification
 from sdimu_calibration.core import earth
 from sdimu_calibration.core.effects import registry
 from sdimu_calibration.core.filter.filter_pass import HELD_ALL, NAV, SKIP, PassState, new_output, run_pass
-from sdimu_calibration.core.filter.passes import first_attitude, one_pass, pass_settings, reduce, set_up
+from sdimu_calibration.core.filter.passes import one_pass, pass_settings
+from sdimu_calibration.core.filter.reduced import first_attitude, reduce, set_up
 from sdimu_calibration.core.plan import Plan, Turn
 from sdimu_calibration.core.rotation import rotation_vector
 from sdimu_calibration.core.specification import ImuSpecification, Model, Site

@@ -20,17 +20,8 @@ from sdimu_calibration.core.filter.filter_pass import (
     new_output,
     run_pass,
 )
-from sdimu_calibration.core.filter.passes import (
-    Pass,
-    Progress,
-    Reduced,
-    Setup,
-    Solution,
-    pass_settings,
-    reduce,
-    set_up,
-    solve,
-)
+from sdimu_calibration.core.filter.passes import Pass, Progress, Solution, pass_settings, solve
+from sdimu_calibration.core.filter.reduced import Reduced, Setup, reduce, set_up
 from sdimu_calibration.core.filter.rest_found import stops_line
 from sdimu_calibration.core.filter.stop_misfit import stop_misfit
 from sdimu_calibration.core.large.triad import FRAME, drifting, large_errors, triad_model

@@ -15,14 +15,8 @@ from sdimu_calibration.core.data.phases import Phases, PhaseState, classify
 from sdimu_calibration.core.effects.motion import Motion
 from sdimu_calibration.core.filter import body_frame
 from sdimu_calibration.core.filter.filter_pass import NAV, PassInput, PassState, new_output, run_pass
-from sdimu_calibration.core.filter.passes import (
-    ALIGN_S,
-    first_attitude,
-    measurement_kinds,
-    pass_settings,
-    set_up,
-    start_state,
-)
+from sdimu_calibration.core.filter.passes import pass_settings, start_state
+from sdimu_calibration.core.filter.reduced import ALIGN_S, first_attitude, measurement_kinds, set_up
 from sdimu_calibration.core.navigation.alignment import Alignment
 from sdimu_calibration.core.navigation.strapdown import Cycles, Reducer
 from sdimu_calibration.core.navigation.track import motion

@@ -11,7 +11,8 @@ import numpy as np
 from sdimu_calibration.core.diagnosis.candidates import catalogue
 from sdimu_calibration.core.diagnosis.evidence import collect, test_times
 from sdimu_calibration.core.diagnosis.scan import scan
-from sdimu_calibration.core.filter.passes import reduce, set_up, solve
+from sdimu_calibration.core.filter.passes import solve
+from sdimu_calibration.core.filter.reduced import reduce, set_up
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.specification import ImuSpecification, Model, Site
 from sdimu_calibration.storage.config import load_plan

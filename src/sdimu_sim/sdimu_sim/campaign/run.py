@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from rate_table_sim.core import TableMotion, TableSpecification, phase_changes, table_motion
 from sdimu_calibration.core.filter import body_frame
-from sdimu_calibration.core.filter.passes import reduce, set_up, solve
+from sdimu_calibration.core.filter.passes import solve
+from sdimu_calibration.core.filter.reduced import reduce, set_up
 from sdimu_calibration.core.plan import Plan
 from sdimu_calibration.core.recording import PhaseLog, Recording
 from sdimu_calibration.core.specification import Model

@@ -60,7 +60,8 @@ def measure(plan: str, rate: float, repeats: int, folder: Path) -> list[tuple[st
     """
     from rate_table_sim.table_file import load_table
     from sdimu_calibration.core.calibrate import calibrate
-    from sdimu_calibration.core.filter.passes import first_attitude, one_pass, reduce, set_up
+    from sdimu_calibration.core.filter.passes import one_pass
+    from sdimu_calibration.core.filter.reduced import first_attitude, reduce, set_up
     from sdimu_calibration.storage.bag_reader import read_recording
     from sdimu_calibration.storage.config import load_imu, load_model, load_plan, load_site
     from sdimu_calibration.storage.result_file import write_result

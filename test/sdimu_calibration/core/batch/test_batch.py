@@ -10,7 +10,7 @@ from sdimu_calibration.core.batch.batch import batch_calibrate
 from sdimu_calibration.core.batch.batch_data import error_slope, travel
 from sdimu_calibration.core.calibrate import calibrate
 from sdimu_calibration.core.effects import registry
-from sdimu_calibration.core.filter.passes import reduce, set_up
+from sdimu_calibration.core.filter.reduced import reduce, set_up
 from sdimu_calibration.core.navigation.track import motion
 from sdimu_calibration.core.plan import Plan
 from sdimu_calibration.core.recording import DataError

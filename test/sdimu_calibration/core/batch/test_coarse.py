@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sdimu_calibration.core.batch.coarse import coarse_start
-from sdimu_calibration.core.filter.passes import first_attitude, reduce, set_up
+from sdimu_calibration.core.filter.reduced import first_attitude, reduce, set_up
 from sdimu_calibration.core.plan import Plan
 from sdimu_calibration.core.rotation import rotation_matrix, rotation_vector
 from sdimu_calibration.core.units import to_si

@@ -11,7 +11,7 @@ from sdimu_calibration.core import earth
 from sdimu_calibration.core.calibrate import calibrate
 from sdimu_calibration.core.data.epochs import Epochs
 from sdimu_calibration.core.data.phases import STALE_S, PhaseState, classify, rest_limits, table_says
-from sdimu_calibration.core.filter.passes import reduce, set_up
+from sdimu_calibration.core.filter.reduced import reduce, set_up
 from sdimu_calibration.core.plan import Plan, Turn
 from sdimu_calibration.core.recording import DataError, PhaseLog
 

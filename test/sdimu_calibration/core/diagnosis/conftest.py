@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis, diagnose
-from sdimu_calibration.core.filter.passes import Reduced, Setup, Solution, reduce, set_up, solve
+from sdimu_calibration.core.filter.passes import Solution, solve
+from sdimu_calibration.core.filter.reduced import Reduced, Setup, reduce, set_up
 from sdimu_calibration.core.plan import Plan
 from sdimu_calibration.core.recording import Recording
 from sdimu_calibration.core.specification import ImuSpecification, Model, Site

@@ -9,7 +9,8 @@ import numpy as np
 from sdimu_calibration.core.diagnosis.evidence import collect, columns
 from sdimu_calibration.core.diagnosis.scan import scan
 from sdimu_calibration.core.effects import registry
-from sdimu_calibration.core.filter.passes import set_up, solve
+from sdimu_calibration.core.filter.passes import solve
+from sdimu_calibration.core.filter.reduced import set_up
 from sdimu_calibration.core.navigation.track import motion
 
 SEEDS = (101, 102, 103)

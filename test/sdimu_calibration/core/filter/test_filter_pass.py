@@ -19,7 +19,8 @@ from sdimu_calibration.core.filter.filter_pass import (
     new_output,
     run_pass,
 )
-from sdimu_calibration.core.filter.passes import first_attitude, one_pass, pass_settings, reduce, set_up, start_state
+from sdimu_calibration.core.filter.passes import one_pass, pass_settings, start_state
+from sdimu_calibration.core.filter.reduced import first_attitude, reduce, set_up
 from sdimu_calibration.core.rotation import rotation_matrix, rotation_vector, skew
 
 PARTS = 10

@@ -9,7 +9,8 @@ import pytest
 
 from sdimu_calibration.core import earth
 from sdimu_calibration.core.filter.free_inertial import NOTHING, in_use
-from sdimu_calibration.core.filter.passes import reduce, set_up, solve
+from sdimu_calibration.core.filter.passes import solve
+from sdimu_calibration.core.filter.reduced import reduce, set_up
 from sdimu_calibration.core.filter.unseen import LEAST_S, WANTED_S, part, unseen_stretches
 from sdimu_calibration.core.plan import Plan, Turn
 from sdimu_calibration.core.planning.nominal import nominal_recording

@@ -9,7 +9,7 @@ from scipy.stats import chi2
 from sdimu_calibration.core.batch.batch import batch_calibrate
 from sdimu_calibration.core.calibrate import calibrate
 from sdimu_calibration.core.effects import imu_model
-from sdimu_calibration.core.filter.passes import reduce, set_up
+from sdimu_calibration.core.filter.reduced import reduce, set_up
 from sdimu_calibration.core.large.triad import drifting, large_errors, triad_model
 from sdimu_calibration.core.large.undo import spread, undo
 from sdimu_calibration.core.navigation.track import motion

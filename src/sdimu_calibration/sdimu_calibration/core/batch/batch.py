@@ -43,7 +43,8 @@ from sdimu_calibration.core.batch.coarse import coarse_start
 from sdimu_calibration.core.calibrate import data_counts
 from sdimu_calibration.core.effects.motion import Motion
 from sdimu_calibration.core.filter import body_frame
-from sdimu_calibration.core.filter.passes import Progress, Reduced, Setup, first_attitude, reduce, set_up
+from sdimu_calibration.core.filter.passes import Progress
+from sdimu_calibration.core.filter.reduced import Reduced, Setup, first_attitude, reduce, set_up
 from sdimu_calibration.core.large.triad import FRAME, large_errors, triad_model
 from sdimu_calibration.core.navigation.alignment import Alignment, levelled
 from sdimu_calibration.core.navigation.track import motion

@@ -11,7 +11,7 @@ from sdimu_calibration.core import earth
 from sdimu_calibration.core.compiled import compiled
 from sdimu_calibration.core.effects.imu_model import ImuModel
 from sdimu_calibration.core.effects.motion import Motion
-from sdimu_calibration.core.filter.passes import Reduced
+from sdimu_calibration.core.filter.reduced import Reduced
 from sdimu_calibration.core.navigation.strapdown import navigate_cycle, velocity_increment
 from sdimu_calibration.core.rotation import rotation_matrix, skew
 

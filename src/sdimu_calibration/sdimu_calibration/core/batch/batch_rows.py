@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from sdimu_calibration.core import earth
 from sdimu_calibration.core.batch.batch_data import Travel
-from sdimu_calibration.core.filter.passes import Setup
+from sdimu_calibration.core.filter.reduced import Setup
 from sdimu_calibration.core.navigation.alignment import Alignment
 from sdimu_calibration.core.rotation import rotation_vector, skew
 

@@ -23,7 +23,8 @@ from sdimu_calibration.core.batch.batch_data import layout
 from sdimu_calibration.core.calibrate import data_counts
 from sdimu_calibration.core.effects.motion import Motion
 from sdimu_calibration.core.filter import body_frame
-from sdimu_calibration.core.filter.passes import Progress, Reduced, Setup, reduce, set_up
+from sdimu_calibration.core.filter.passes import Progress
+from sdimu_calibration.core.filter.reduced import Reduced, Setup, reduce, set_up
 from sdimu_calibration.core.navigation.track import MAGNETIC_FIELD, temperatures
 from sdimu_calibration.core.recording import DataError, Recording, TableLog
 from sdimu_calibration.core.results import Calibration

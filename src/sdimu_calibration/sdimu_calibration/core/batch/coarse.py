@@ -20,7 +20,8 @@ from numpy.typing import NDArray
 from sdimu_calibration.core import earth
 from sdimu_calibration.core.batch.batch_data import layout, rest_means
 from sdimu_calibration.core.compiled import compiled
-from sdimu_calibration.core.filter.passes import Pass, Reduced, Setup, one_pass
+from sdimu_calibration.core.filter.passes import Pass, one_pass
+from sdimu_calibration.core.filter.reduced import Reduced, Setup
 from sdimu_calibration.core.navigation.alignment import Alignment
 from sdimu_calibration.core.rotation import orthonormal, rotation_matrix
 

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from sdimu_calibration.core.filter.passes import Pass, Reduced
+from sdimu_calibration.core.filter.passes import Pass
+from sdimu_calibration.core.filter.reduced import Reduced
 
 Floats = NDArray[np.float64]
 

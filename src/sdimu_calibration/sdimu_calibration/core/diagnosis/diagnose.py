@@ -23,7 +23,8 @@ from sdimu_calibration.core.diagnosis.screen import Finding, beyond_specificatio
 from sdimu_calibration.core.diagnosis.search import FALSE_ALARM, Search
 from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.filter.filter_pass import SKIP
-from sdimu_calibration.core.filter.passes import Progress, Reduced, Setup, reduce, set_up, solve
+from sdimu_calibration.core.filter.passes import Progress, solve
+from sdimu_calibration.core.filter.reduced import Reduced, Setup, reduce, set_up
 from sdimu_calibration.core.recording import Recording
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.specification import ImuSpecification, Model, Site

@@ -16,7 +16,8 @@ from sdimu_calibration.core.diagnosis.signatures import measured_rows, signature
 from sdimu_calibration.core.effects.effect import Effect, TestTimes
 from sdimu_calibration.core.effects.motion import Motion
 from sdimu_calibration.core.filter.filter_pass import NAV, PassOutput, PassState, new_output, run_pass
-from sdimu_calibration.core.filter.passes import Pass, Reduced, Setup, pass_settings
+from sdimu_calibration.core.filter.passes import Pass, pass_settings
+from sdimu_calibration.core.filter.reduced import Reduced, Setup
 from sdimu_calibration.core.navigation.track import motion
 
 Floats = NDArray[np.float64]

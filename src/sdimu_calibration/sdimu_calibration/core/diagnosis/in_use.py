@@ -9,7 +9,7 @@ from sdimu_calibration.core.diagnosis.rounds import told_apart
 from sdimu_calibration.core.effects.imu_model import build
 from sdimu_calibration.core.filter import free_inertial
 from sdimu_calibration.core.filter.free_inertial import Trial
-from sdimu_calibration.core.filter.passes import Setup, set_up
+from sdimu_calibration.core.filter.reduced import Setup, set_up
 from sdimu_calibration.core.specification import ImuSpecification, Model, Site
 
 AS_GIVEN, WITH_FOUND = "model as given", "with what was found"

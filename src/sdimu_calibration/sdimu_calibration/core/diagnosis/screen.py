@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sdimu_calibration.core.filter.passes import Reduced, Solution
+from sdimu_calibration.core.filter.passes import Solution
+from sdimu_calibration.core.filter.reduced import Reduced
 from sdimu_calibration.core.recording import Recording
 
 _MISLEADING = frozenset({"stuck", "saturated"})

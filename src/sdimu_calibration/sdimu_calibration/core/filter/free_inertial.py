@@ -26,7 +26,8 @@ from sdimu_calibration.core.filter.filter_pass import (
     new_output,
     run_pass,
 )
-from sdimu_calibration.core.filter.passes import Pass, Reduced, Setup, pass_input, pass_settings, solve
+from sdimu_calibration.core.filter.passes import Pass, pass_input, pass_settings, solve
+from sdimu_calibration.core.filter.reduced import Reduced, Setup
 from sdimu_calibration.core.filter.unseen import WANTED_S, Stretch, part, unseen_stretches
 from sdimu_calibration.core.navigation.alignment import align, azimuth_of
 from sdimu_calibration.core.navigation.strapdown import Cycles, navigate_cycle, velocity_increment

@@ -14,7 +14,7 @@ import numpy as np
 
 from sdimu_calibration.core.data.phases import rest_limits
 from sdimu_calibration.core.data.windows import cut_windows
-from sdimu_calibration.core.filter.passes import Reduced
+from sdimu_calibration.core.filter.reduced import Reduced
 from sdimu_calibration.core.recording import PhaseLog, Recording
 from sdimu_calibration.core.specification import ImuSpecification
 

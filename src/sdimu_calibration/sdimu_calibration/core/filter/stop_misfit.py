@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import norm
 
-from sdimu_calibration.core.filter.passes import Reduced
+from sdimu_calibration.core.filter.reduced import Reduced
 
 Floats = NDArray[np.float64]
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from sdimu_calibration.core.data.epochs import Epochs
 from sdimu_calibration.core.data.gaps import Bridges
 from sdimu_calibration.core.data.phases import Phases
-from sdimu_calibration.core.filter.passes import Reduced
+from sdimu_calibration.core.filter.reduced import Reduced
 from sdimu_calibration.core.recording import DataError
 
 Floats = NDArray[np.float64]

@@ -17,7 +17,7 @@ from sdimu_calibration.core.compiled import compiled
 from sdimu_calibration.core.data.quiet import Rests
 from sdimu_calibration.core.effects.imu_model import ImuModel
 from sdimu_calibration.core.effects.motion import Motion
-from sdimu_calibration.core.filter.passes import nominal_interval
+from sdimu_calibration.core.filter.reduced import nominal_interval
 from sdimu_calibration.core.large.undo import undo
 from sdimu_calibration.core.matrix3 import elements, multiplied, orthonormal3, rotation3, store
 from sdimu_calibration.core.navigation.strapdown import Cycles, Reducer

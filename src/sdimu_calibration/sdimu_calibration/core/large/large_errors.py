@@ -27,14 +27,8 @@ from sdimu_calibration.core.batch.batch_data import Layout, layout
 from sdimu_calibration.core.batch.coarse import coarse_start
 from sdimu_calibration.core.effects.motion import Motion
 from sdimu_calibration.core.filter.filter_pass import COPY, NAV, PassInput, PassOutput, PassState, new_output, run_pass
-from sdimu_calibration.core.filter.passes import (
-    Progress,
-    Reduced,
-    Setup,
-    pass_input,
-    pass_settings,
-    start_state,
-)
+from sdimu_calibration.core.filter.passes import Progress, pass_input, pass_settings, start_state
+from sdimu_calibration.core.filter.reduced import Reduced, Setup
 from sdimu_calibration.core.large.undo import Undone, spread, undo
 from sdimu_calibration.core.navigation.alignment import Alignment, levelled
 from sdimu_calibration.core.navigation.strapdown import Cycles

@@ -7,7 +7,8 @@ import numpy as np
 from sdimu_calibration.core.batch.batch_data import layout
 from sdimu_calibration.core.calibrate import HELD_OUT_FOLDS, conditions, data_counts, outside, poor_fit
 from sdimu_calibration.core.filter.filter_pass import ALL, HELD_ALL, HELD_SENSORS, SENSORS
-from sdimu_calibration.core.filter.passes import Progress, Reduced, Setup, first_attitude
+from sdimu_calibration.core.filter.passes import Progress
+from sdimu_calibration.core.filter.reduced import Reduced, Setup, first_attitude
 from sdimu_calibration.core.filter.rest_found import stops_line
 from sdimu_calibration.core.large.large_errors import LargePass, firm_setup, run_stops, solve_large
 from sdimu_calibration.core.large.triad import FRAME, TriadModel

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from sdimu_calibration.core.filter import body_frame
 from sdimu_calibration.core.filter.filter_pass import NAV
-from sdimu_calibration.core.filter.passes import Reduced, Setup, first_attitude, one_pass, reduce, set_up
+from sdimu_calibration.core.filter.passes import one_pass
+from sdimu_calibration.core.filter.reduced import Reduced, Setup, first_attitude, reduce, set_up
 from sdimu_calibration.core.navigation.alignment import Alignment
 from sdimu_calibration.core.plan import Plan
 from sdimu_calibration.core.planning.noise_set import NoiseSet, apply

@@ -23,18 +23,8 @@ from sdimu_calibration.core.diagnosis.remainder import Remainder, remainder
 from sdimu_calibration.core.diagnosis.scan import scan, threshold
 from sdimu_calibration.core.diagnosis.search import FALSE_ALARM, Problem, Search
 from sdimu_calibration.core.filter.filter_pass import SKIP
-from sdimu_calibration.core.filter.passes import (
-    Reduced,
-    Setup,
-    Solution,
-    first_attitude,
-    one_pass,
-    reduce,
-    refine,
-    set_up,
-    smoothed_start,
-    solve,
-)
+from sdimu_calibration.core.filter.passes import Solution, one_pass, refine, smoothed_start, solve
+from sdimu_calibration.core.filter.reduced import Reduced, Setup, first_attitude, reduce, set_up
 from sdimu_calibration.core.recording import DataError, Recording
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.specification import ImuSpecification, Model, Site

@@ -10,7 +10,7 @@ from pathlib import Path
 from sdimu_calibration.core.diagnosis.candidates import without
 from sdimu_calibration.core.effects import imu_model
 from sdimu_calibration.core.effects.effect import Effect
-from sdimu_calibration.core.filter.passes import Setup
+from sdimu_calibration.core.filter.reduced import Setup
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage.effect_file import find_effects, load_effect
 
