@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-app = typer.Typer(help="Look into a recording, or mend one that was cut.", no_args_is_help=True)
+app = typer.Typer(
+    help="Look into a recording, take a part of it, or mend one that was cut short.", no_args_is_help=True
+)
 
 Bag = Annotated[Path, typer.Argument(metavar="BAG", help="rosbag2 folder or .mcap file.")]
 
@@ -30,6 +33,27 @@ def info(bag: Bag) -> None:
     console.print(f"{(content.last_ns - content.first_ns) * 1e-9:.1f} s from {content.first_ns * 1e-9:.3f} s")
     for part in content.damaged:
         console.print(f"{part} is cut short or damaged; run: sdimu bag recover {bag}", soft_wrap=True)
+
+
+@app.command()
+def cut(
+    bag: Bag,
+    out: Annotated[Path, typer.Option(help="Bag to write.")],
+    first: Annotated[float, typer.Option("--from", help="Seconds since the first sample.")] = 0.0,
+    last: Annotated[float, typer.Option("--to", help="Seconds since the first sample; the end without it.")] = math.inf,
+    replace: Annotated[bool, typer.Option(help="Delete what is there.")] = False,
+) -> None:
+    """Take a part of a recording: what comes before a power cycle, or after somebody leant on the table."""
+    from rich.console import Console
+
+    from sdimu_calibration.storage.cut_bag import cut_bag
+
+    part = cut_bag(bag, out, first, last, replace=replace)
+    kept = ", ".join(f"{topic} {count}" for topic, count in sorted(part.counts.items()))
+    end = "the end" if math.isinf(last) else f"{last:g} s"
+    console = Console()
+    console.print(f"{out}: {first:g} s to {end} of {part.whole_s:.1f} s", soft_wrap=True)
+    console.print(f"  {kept}", soft_wrap=True)
 
 
 @app.command()

@@ -8,7 +8,7 @@ counted from the end of the encapsulation.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -107,6 +107,24 @@ class Layout:
 def as_bytes(messages: NDArray[Any]) -> list[bytes]:
     """Cut a structured array of messages into the bytes of each."""
     return list(messages.view(f"V{messages.dtype.itemsize}").tolist())
+
+
+def stamp_of(message: bytes) -> int:
+    """Stamp (ns) of the header with which a message begins, in the byte order that it names."""
+    order = _order(message)
+    sec = int.from_bytes(message[4:8], order, signed=True)
+    return sec * 1_000_000_000 + int.from_bytes(message[8:12], order)
+
+
+def stamped(message: bytes, stamp_ns: int) -> bytes:
+    """Return the message with another stamp (ns) in its header."""
+    order = _order(message)
+    sec, nanosec = divmod(stamp_ns, 1_000_000_000)
+    return message[:4] + sec.to_bytes(4, order, signed=True) + nanosec.to_bytes(4, order) + message[12:]
+
+
+def _order(message: bytes) -> Literal["little", "big"]:
+    return "little" if message[1] & 1 else "big"
 
 
 def encode_imu(stamp_ns: Stamps, omega_ib_b: Floats, f_ib_b: Floats, frame_id: str = "imu_link") -> list[bytes]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 
@@ -68,7 +67,7 @@ def write_compensated(
     interval = recording.interval_s
     heat = heat_since(recording.temperature, recording.t - 0.5 * interval, using.start_temperature, causal=False)
     largest = np.zeros(6)
-    copied = [(_stamp(m), topic, m) for topic, content in others.items() for m in content.raw]
+    copied = [(cdr.stamp_of(m), topic, m) for topic, content in others.items() for m in content.raw]
     copied.sort(key=lambda entry: entry[0])
     next_copy = 0
     with McapBag(target, replace=replace) as bag:
@@ -95,10 +94,3 @@ def write_compensated(
         for stamp, topic, message in copied[next_copy:]:
             bag.write(topic, message, stamp)
     return Written(len(stamps), float(largest[:3].max()), float(largest[3:].max()))
-
-
-def _stamp(message: bytes) -> int:
-    """Stamp (ns) of the header with which a CDR message begins, in the byte order that it names."""
-    order: Literal["little", "big"] = "little" if message[1] & 1 else "big"
-    sec = int.from_bytes(message[4:8], order, signed=True)
-    return sec * 1_000_000_000 + int.from_bytes(message[8:12], order)

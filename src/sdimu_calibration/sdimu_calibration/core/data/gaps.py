@@ -180,7 +180,7 @@ def judge(
         raise DataError(
             f"/imu/data_raw: {what} {where} at {epochs.start[worst]:.1f} s (stop "
             f"{phases.stop[worst]}): the attitude after them is known only to {np.degrees(drift[worst]) * 60.0:.3g} "
-            f"arcmin; repeat the test, or cut the recording before or after{because}"
+            f"arcmin; repeat the test, or cut the recording before or after (sdimu bag cut){because}"
         )
     epoch = np.minimum(np.searchsorted(epochs.last, at, side="right"), len(epochs) - 1)
     resting = _rests(phases.dwell, epoch)
@@ -216,7 +216,7 @@ def _long_gap(
                 worst = f"{triad} {'xyz'[int(np.argmax(z))]}"
                 raise DataError(
                     f"/imu/data_raw: {text}, and {worst} differs by {z.max():.0f} sigma after "
-                    "them: the IMU was moved or switched off; cut the recording there, or repeat the test"
+                    "them: the IMU was moved or switched off; cut the recording there (sdimu bag cut), or repeat it"
                 )
     return DataFault(
         "long gap",

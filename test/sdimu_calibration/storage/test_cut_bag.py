@@ -1,0 +1,52 @@
+"""A part of a bag reads as the same part of its recording."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.storage.bag_reader import read_recording
+from sdimu_calibration.storage.bag_writer import write_recording
+from sdimu_calibration.storage.cut_bag import cut_bag
+
+START = 1_700_000_000_000_000_000
+N = 1000
+
+
+@pytest.fixture
+def bag(tmp_path):
+    rng = np.random.default_rng(1)
+    ns = 10_000_000 * np.arange(1, N + 1)
+    status = (np.array([0, 3_000_000_000, 6_000_000_000]), np.array([True, False, True]), np.array([0, 0, 1]))
+    write_recording(
+        tmp_path / "bag", start_ns=START, imu_ns=ns, omega_ib_b=rng.normal(size=(N, 3)), f_ib_b=rng.normal(size=(N, 3)),
+        status=status, temperature=(np.array([0, 5_000_000_000]), np.array([20.0, 21.0])),
+    )  # fmt: skip
+    return tmp_path / "bag"
+
+
+def test_the_samples_between_two_times_are_kept_as_they_were(bag, tmp_path):
+    part = cut_bag(bag, tmp_path / "part", 4.0, 8.0)
+    whole, cut = read_recording(bag), read_recording(tmp_path / "part")
+    # Seconds count from the first sample, which is at 0.01 s; both ends are kept.
+    rows = slice(400, 801)
+    np.testing.assert_array_equal(cut.omega_ib_b, whole.omega_ib_b[rows])
+    np.testing.assert_array_equal(cut.f_ib_b, whole.f_ib_b[rows])
+    assert part.counts["/imu/data_raw"] == len(cut.t) == 401
+    assert part.whole_s == pytest.approx(9.99)
+
+
+def test_the_phase_at_the_cut_is_the_one_that_was_said_last(bag, tmp_path):
+    cut_bag(bag, tmp_path / "part", 4.0, np.inf)
+    phase = read_recording(tmp_path / "part").phase
+    assert phase.dwell.tolist() == [False, True]
+    assert phase.t[1] - phase.t[0] == pytest.approx(6.0 - 4.01)
+
+
+def test_times_that_hold_nothing_are_refused_with_the_length(bag, tmp_path):
+    with pytest.raises(DataError, match=r"10\.0 s long"):
+        cut_bag(bag, tmp_path / "part", 50.0, 60.0)
+    with pytest.raises(DataError, match="nothing lies between"):
+        cut_bag(bag, tmp_path / "part", 8.0, 4.0)
+    assert not (tmp_path / "part").exists()
