@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sdimu_calibration.core.diagnosis.advice import blind
+from sdimu_calibration.core.diagnosis.advice import advice, blind
 from sdimu_calibration.core.diagnosis.bootstrap import bootstrap
 from sdimu_calibration.core.diagnosis.diagnose import diagnose
 from sdimu_calibration.core.diagnosis.found import found_effects, reach
@@ -93,6 +93,18 @@ def test_a_wrong_density_ends_as_a_wrong_noise_model_and_is_measured(bench):
     gyro = diagnosis.consistency.gyro
     assert abs(gyro.ratio - 1.3) < 4.0 * gyro.sigma
     assert abs(diagnosis.consistency.accel.ratio - 1.0) < 4.0 * diagnosis.consistency.accel.sigma
+
+
+def test_a_wrong_latitude_is_measured_and_sent_back_to_the_site_file(bench):
+    wrong = replace(bench.site, latitude_rad=bench.site.latitude_rad + np.radians(0.4))
+    diagnosis = diagnose(bench.recording(seed=101), wrong, bench.imu, bench.model)
+    (one,) = found = found_effects(diagnosis)
+    assert one.candidate.label == "reference_latitude"
+    assert not diagnosis.unexplained
+    assert abs(one.value - np.radians(0.4)) < 3.5 * one.sigma
+    told = advice(diagnosis, found, reach(diagnosis), plan_seen(diagnosis.evidence))
+    assert any("latitude" in line and "too far North" in line for line in told)
+    assert not any("--add" in line for line in told)
 
 
 def test_turns_of_one_sign_hide_scale_asymmetry_and_the_reason_is_said(bench):

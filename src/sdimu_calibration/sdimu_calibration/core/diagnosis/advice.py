@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.diagnosis.found import Found, Reach
 from sdimu_calibration.core.diagnosis.plan_seen import PlanSeen
@@ -100,13 +102,25 @@ def _about_found(d: Diagnosis, found: tuple[Found, ...], plan: PlanSeen) -> list
             out.append(f"Try an equation of your own (--try FILE); nearest in this test: {names}.")
         return out
     for one in found:
-        if not one.candidate.effect.run_local:
+        if one.candidate.family == "reference_latitude":
+            out.append(_about_latitude(one))
+        elif not one.candidate.effect.run_local:
             out.append(f"Keep {one.candidate.label} in the model: --add '{one.candidate.label}'.")
         if one.candidate.effect.run_local:
             out.append(f"{one.candidate.label} is a fault of this recording: record again and do not carry it over.")
         if one.alike:
             out.append(separate(one, plan) + _calculated(one))
     return out
+
+
+def _about_latitude(one: Found) -> str:
+    """Send a wrong site back to its file: the effect is what the site's latitude has too much."""
+    off, sigma = (np.degrees(v) for v in (one.value, one.sigma))
+    sense = "North" if off > 0.0 else "South"
+    return (
+        f"Look at the site: its latitude is {abs(off):.2f} +- {sigma:.2f} deg too far {sense}; correct it there (--site) "
+        "rather than add the effect."
+    )
 
 
 def separate(one: Found, plan: PlanSeen) -> str:

@@ -64,7 +64,7 @@ LATITUDE = register(
         parameters=(Parameter("reference_latitude", "rad", "arcsec"),),
         terms=tuple(Term(channel, 0) for channel in GYRO),
         regressors=_latitude,
-        prior=dict.fromkeys(("navigation", "tactical", "mems"), 1e-4),
+        prior=dict.fromkeys(("navigation", "tactical", "mems"), 5e-3),
         typical="a gross error of the site file only",
         description="A wrong Earth rate in the meridian plane. Visible from some minutes of arc on.",
     )
