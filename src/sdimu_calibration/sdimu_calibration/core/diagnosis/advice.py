@@ -118,8 +118,8 @@ def _about_latitude(one: Found) -> str:
     off, sigma = (np.degrees(v) for v in (one.value, one.sigma))
     sense = "North" if off > 0.0 else "South"
     return (
-        f"Look at the site: its latitude is {abs(off):.2f} +- {sigma:.2f} deg too far {sense}; correct it there (--site) "
-        "rather than add the effect."
+        f"Look at the site: its latitude is {abs(off):.2f} +- {sigma:.2f} deg too far {sense}; correct it there "
+        "(--site) rather than add the effect."
     )
 
 
