@@ -4,6 +4,7 @@ import math
 
 import pytest
 
+from sdimu_calibration.core.effects.imu_model import build
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage.config import config_folder, find_config, load_imu, load_model, load_plan, load_site
 
@@ -82,17 +83,22 @@ def test_a_site_without_format_or_azimuth_is_enough(tmp_path):
         ("plan", "angle: 90 deg", "angle: 0 deg", "turn 1: angle is zero"),
         ("plan", "rate: 2 deg/s", "rate: -2 deg/s", "rate: .*greater than 0"),
         ("plan", "acceleration: 1 deg/s^2", "", "acceleration: missing key"),
+        ("plan", "dwell: 100 s", "dwel: 100 s", "dwel: unknown key"),
+        ("plan", "dwell: 100 s", "dwell: 100 day", "unknown unit 'day'"),
+        ("plan", "dwell: 100 s", "dwell: 1e6 s", "more than 168 h"),
         ("plan", "dwell: 100 s", "dwell: 100 s\ndwell: 1 s", "key 'dwell' is there twice"),
         ("plan", "sdimu-plan/1", "sdimu-plan/9", "format: .*'sdimu-plan/1'"),
         ("plan", "turns:", "turns: [", "line .*not valid YAML"),
         ("imu", "gyro: 0.1 deg/h/sqrt(Hz)", "gyro: 0.1 deg/h", "noise.gyro: .*wrong unit"),
         ("imu", "1 deg/h,", "1 dog/h,", "prior.gyro_bias: unknown unit 'dog'"),
+        ("imu", "1 deg/h,", "-1 deg/h,", "prior.gyro_bias: .*below zero"),
         ("imu", "prior:", "priors:", r"priors: unknown key \(known keys: .*prior"),
         ("model", "velocity_sigma: 1 mm/s", "velocity_sigma: 1 mm", "velocity_sigma: .*wrong unit"),
         ("model", "[gyro_bias, accel_bias]", "[]", "effects: .*at least 1"),
         ("model", "accel_bias]", "gyro_bias]", "'gyro_bias' is there twice"),
         ("site", "36.4", "136.4", "latitude_deg: .*less than or equal to 90"),
         ("site", "height_m: 0", "", "height_m: missing key"),
+        ("site", "height_m: 0", "height_m: -7e6", "height_m: .*greater than or equal to -5000"),
         ("site", "36.4", ".nan", "latitude_deg: "),
         ("site", SITE, "", "found nothing"),
     ],
@@ -105,6 +111,19 @@ def test_a_wrong_file_gives_one_line_with_file_and_key(tmp_path, kind, old, new,
         load(path)
     assert str(caught.value).startswith(f"{path}:")
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("1 deg/h,", "150 ppm,", r"prior\.gyro_bias: 'ppm' is a wrong unit .*deg/h"),
+        ("gyro_bias", "gyro_bais", r"prior\.gyro_bais: no effect of this name \(did you mean gyro_bias\?"),
+    ],
+)
+def test_a_prior_that_no_effect_reads_is_refused_by_the_model(tmp_path, old, new, message):
+    build(["gyro_bias", "accel_scale"], load_imu(written(tmp_path, IMU)))
+    with pytest.raises(DataError, match=message):
+        build(["gyro_bias", "accel_scale"], load_imu(written(tmp_path, IMU.replace(old, new))))
 
 
 def test_an_unknown_name_lists_the_names_there_are():

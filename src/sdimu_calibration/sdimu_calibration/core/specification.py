@@ -47,6 +47,8 @@ class ImuSpecification:
         One-sigma size of every parameter of an effect, by effect name, SI.
     grade : str
         ``navigation``, ``tactical`` or ``mems``: which default priors hold for effects not named.
+    prior_units : mapping of str to str
+        Unit in which a prior was written, where it was: tells a wrong one.
     """
 
     name: str
@@ -54,6 +56,7 @@ class ImuSpecification:
     accel_white_noise: float
     prior: Mapping[str, float] = field(default_factory=dict)
     grade: str = "navigation"
+    prior_units: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

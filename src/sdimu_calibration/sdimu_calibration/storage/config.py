@@ -25,6 +25,9 @@ from sdimu_calibration.core.units import parse_quantity
 CONFIG_VARIABLE = "SDIMU_CONFIG"
 """Environment variable that names the config folder."""
 
+LONGEST_PLAN_S = 7.0 * 86400.0
+"""A plan beyond a week is one with a wrong unit; its samples would not fit into the memory."""
+
 _SUFFIXES = (".yaml", ".yml", ".json")
 
 
@@ -48,11 +51,14 @@ def _as_text(value: Any, expected: str) -> str:
     return str(value)
 
 
-def _quantity_of_any_unit(value: Any) -> float:
+def _quantity_of_any_unit(value: Any) -> tuple[float, str]:
     # The effect that owns a prior knows its dimension; the file reader does not know effects.
     text = _as_text(value, "ppm")
     unit = re.sub(r"^\s*[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?\s*", "", text)
-    return parse_quantity(text, unit or "1")
+    size = parse_quantity(text, unit or "1")
+    if size < 0.0:
+        raise ValueError(f"'{text}' is below zero (expected a sigma)")
+    return size, unit or "1"
 
 
 def config_folder() -> Path:
@@ -151,7 +157,8 @@ def check(data: Mapping[str, Any], schema: type[S], source: str) -> S:
     try:
         return schema.model_validate(data)
     except ValidationError as error:
-        first = error.errors()[0]
+        # A misspelt key is unknown and leaves the right one missing: the first of the two says what to mend.
+        first = min(error.errors(), key=lambda e: e["type"] != "extra_forbidden")
         key = ".".join(str(part) for part in first["loc"])
         raise DataError(
             f"{source}: {key}: {_message(first, schema)}" if key else f"{source}: {first['msg']}"
@@ -206,7 +213,7 @@ class _ImuFile(Schema):
     name: str | None = None
     grade: Literal["navigation", "tactical", "mems"] = "navigation"
     noise: _NoiseFile
-    prior: dict[str, Annotated[float, BeforeValidator(_quantity_of_any_unit), Field(ge=0)]] = {}
+    prior: dict[str, Annotated[tuple[float, str], BeforeValidator(_quantity_of_any_unit)]] = {}
 
 
 class _ModelFile(Schema):
@@ -223,7 +230,7 @@ class _SiteFile(Schema):
     format: Literal["sdimu-site/1"] = "sdimu-site/1"
     name: str | None = None
     latitude_deg: float = Field(ge=-90.0, le=90.0)
-    height_m: float
+    height_m: float = Field(ge=-5000.0, le=20000.0)
     gravity_m_s2: float | None = Field(default=None, gt=9.5, lt=10.0)
     initial_azimuth_deg: float | None = None
     initial_azimuth_sigma_deg: float = Field(default=math.degrees(Site.initial_azimuth_sigma_rad), gt=0.0)
@@ -238,30 +245,37 @@ def load_plan(name_or_path: str | Path) -> Plan:
     Raises
     ------
     DataError
-        When the file is missing or wrong, or a turn has no angle.
+        When the file is missing or wrong, a turn has no angle, or the whole lasts longer than `LONGEST_PLAN_S`.
     """
     path = find_config("plan", name_or_path)
     file = read_yaml(path, _PlanFile)
     for number, turn in enumerate(file.turns, start=1):
         if turn.angle == 0.0:
             raise DataError(f"{path}: turn {number}: angle is zero (expected a signed angle such as '90 deg')")
-    return Plan(
+    plan = Plan(
         name=file.name or path.stem,
         dwell_s=(file.first_dwell or file.dwell, *(t.dwell or file.dwell for t in file.turns)),
         turns=tuple(Turn(t.axis, t.angle, t.rate or file.rate) for t in file.turns),
         acceleration_rad_s2=file.acceleration,
     )
+    if plan.duration_s > LONGEST_PLAN_S:
+        raise DataError(
+            f"{path}: lasts {plan.duration_s / 3600.0:.4g} h, more than {LONGEST_PLAN_S / 3600.0:g} h "
+            "(check the units of dwell, rate and angle)"
+        )
+    return plan
 
 
 def load_imu(name_or_path: str | Path) -> ImuSpecification:
-    """Read an IMU's specification; priors come in SI, their dimensions are the registry's to check."""
+    """Read an IMU's specification; priors come in SI, with their units for `imu_model.build` to check."""
     path = find_config("imu", name_or_path)
     file = read_yaml(path, _ImuFile)
     return ImuSpecification(
         name=file.name or path.stem,
         gyro_white_noise=file.noise.gyro,
         accel_white_noise=file.noise.accel,
-        prior=file.prior,
+        prior={name: size for name, (size, _) in file.prior.items()},
+        prior_units={name: unit for name, (_, unit) in file.prior.items()},
         grade=file.grade,
     )
 

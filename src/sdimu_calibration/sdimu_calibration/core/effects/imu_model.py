@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -11,8 +12,11 @@ from numpy.typing import NDArray
 from sdimu_calibration.core.effects import selection
 from sdimu_calibration.core.effects.effect import Effect, Parameter
 from sdimu_calibration.core.effects.motion import Motion
+from sdimu_calibration.core.effects.registry import get
+from sdimu_calibration.core.effects.registry import names as registered
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.specification import ImuSpecification
+from sdimu_calibration.core.units import parse_unit
 
 Floats = NDArray[np.float64]
 
@@ -74,9 +78,10 @@ def build(effects: Sequence[str | Effect], imu: ImuSpecification) -> ImuModel:
     Raises
     ------
     DataError
-        When a name is unknown, stands twice, or has no prior.
+        When a name is unknown, stands twice, or has no prior, or a prior is of no effect or in a wrong unit.
     """
     chosen = tuple(selection.resolve(e) if isinstance(e, str) else e for e in effects)
+    _check_priors(chosen, imu)
     seen: set[str] = set()
     channel: list[int] = []
     parameter: list[int] = []
@@ -102,3 +107,17 @@ def build(effects: Sequence[str | Effect], imu: ImuSpecification) -> ImuModel:
         chosen, tuple(parameters), np.array(channel, dtype=np.int64), np.array(parameter, dtype=np.int64),
         np.array(prior), np.array(decay), np.array(drive),
     )  # fmt: skip
+
+
+def _check_priors(chosen: Sequence[Effect], imu: ImuSpecification) -> None:
+    """Refuse a prior that no effect would read, and one in a unit that is not its effect's."""
+    units = {e.family or e.name: e.parameters[0].display_unit for e in (*map(get, registered()), *chosen)}
+    for name, unit in imu.prior_units.items():
+        if name not in units:
+            near = difflib.get_close_matches(name, units, n=1)
+            hint = f"did you mean {near[0]}?" if near else "the prior of an effect of your own stands in its own file"
+            raise DataError(f"IMU '{imu.name}': prior.{name}: no effect of this name ({hint})")
+        if parse_unit(unit).dimension != parse_unit(units[name]).dimension:
+            raise DataError(
+                f"IMU '{imu.name}': prior.{name}: '{unit}' is a wrong unit (expected something like '1 {units[name]}')"
+            )
