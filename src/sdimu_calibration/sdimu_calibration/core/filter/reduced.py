@@ -59,6 +59,9 @@ class Reduced:
 def set_up(site: Site, imu: ImuSpecification, model: Model) -> Setup:
     """Check the options against each other and prepare what all passes share."""
     sensors = imu_model.build(model.effects, imu)
+    for what, noise in (("gyro", imu.gyro_white_noise), ("accel", imu.accel_white_noise)):
+        if not noise > 0.0:
+            raise DataError(f"IMU '{imu.name}': noise.{what} is zero, and measurements are weighed by it: give it")
     gravity = site.gravity_m_s2 or float(earth.normal_gravity(site.latitude_rad, site.height_m))
     return Setup(site, imu, model, sensors, rest_limits(imu), gravity)
 
