@@ -254,7 +254,7 @@ def _check_unit(sensor: str, formula: Expression, file: _EffectFile) -> None:
     found = formula.dimension(units)
     if found != dimension_of(expected):
         # An angle counts as a number, so rad/s is 1/s here.
-        raise DataError(f"'{formula.text}' comes to {written(found)}, but a {sensor[:-2]} error is in {expected}")
+        raise DataError(f"'{formula.text}' comes to {written(found)}, but an error of {sensor} is in {expected}")
 
 
 def _check_linear(formula: Expression, parameters: tuple[str, ...], constants: Mapping[str, float]) -> None:

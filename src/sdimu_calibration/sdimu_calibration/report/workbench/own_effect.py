@@ -28,7 +28,7 @@ def extended(setup: Setup, added: Sequence[str]) -> Setup:
         have = {p.name for e in effects for p in e.parameters}
         new = [part for effect in read_effect(text) for part in without(effect, have)]
         if not new:
-            raise DataError(f"'{text.strip().splitlines()[0]}' is in the model already")
+            raise DataError(f"'{named(text)}' is in the model already")
         effects += new
     sensors = imu_model.build(effects, setup.imu)
     return replace(setup, sensors=sensors, model=replace(setup.model, effects=tuple(e.name for e in effects)))
