@@ -8,6 +8,7 @@ import os
 import re
 import shutil
 import subprocess
+from dataclasses import replace
 from html import escape
 
 import pytest
@@ -15,9 +16,18 @@ import yaml
 
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.diagnosis.grow import Rung
-from sdimu_calibration.report import data, evidence_figures, measured, measured_figures, residual_figures, use_section
+from sdimu_calibration.report import (
+    data,
+    evidence_figures,
+    measured,
+    measured_figures,
+    residual_figures,
+    sections,
+    use_section,
+)
 from sdimu_calibration.report.besides import Besides
 from sdimu_calibration.report.export import as_csv, as_yaml
+from sdimu_calibration.report.markup import prose
 from sdimu_calibration.report.page import page, write_report
 from sdimu_calibration.report.table import rows
 
@@ -47,7 +57,7 @@ def all_figures(diagnosis: Diagnosis, more: Besides) -> dict[str, object]:
 
 def test_the_verdict_stands_first(text, diagnosis):
     body = text.partition("<body>")[2]
-    assert body.index(escape(diagnosis.sentence)) < body.index("<h2>")
+    assert body.index(prose(diagnosis.sentence)) < body.index("<h2>")
 
 
 def test_the_page_brings_its_library_once_and_asks_no_network(text):
@@ -67,7 +77,8 @@ def test_cells_of_the_heat_map_say_their_sign_without_colour(diagnosis):
     cells = evidence_figures.heat_map(grid).data[0].text
     for row, values in zip(cells, grid.value, strict=True):
         for cell, value in zip(row, values, strict=True):
-            assert cell == "" or cell[0] == ("+" if value >= 0.0 or cell == "+0.0" else "\N{MINUS SIGN}")
+            sign = "+" if value >= 0.0 else "\N{MINUS SIGN}"
+            assert cell == "" or cell[0] == sign or (cell == "0.0" and abs(value) < 0.05)
 
 
 def test_before_and_after_differ_in_more_than_colour(diagnosis, more):
@@ -135,6 +146,12 @@ def test_the_threshold_is_drawn(diagnosis, more):
     assert line.line.width > 0
 
 
+def test_no_size_of_a_candidate_is_written_over_the_line_of_the_noise(diagnosis, more):
+    figure = all_figures(diagnosis, more)["ranking"]
+    (sizes,) = (trace for trace in figure.data if trace.type == "scatter" and trace.mode == "text")
+    assert min(sizes.x) >= diagnosis.found.threshold
+
+
 def test_a_diagnosis_of_a_right_model_makes_a_page_too(diagnosis):
     empty = type(diagnosis.found)(
         (), diagnosis.found.chosen[:0], diagnosis.found.first, diagnosis.found.first, diagnosis.found.threshold, 1.0,
@@ -144,6 +161,13 @@ def test_a_diagnosis_of_a_right_model_makes_a_page_too(diagnosis):
     text = page(diagnosis.before, "x", diagnosis=quiet)
     assert "No candidate stands out" in text
     assert 'class="verdict good"' in text
+
+
+def test_a_ladder_without_steps_does_not_deny_the_candidates_that_stand_out(diagnosis):
+    empty = replace(diagnosis.found, steps=(), chosen=diagnosis.found.chosen[:0])
+    text = sections.ladder(replace(diagnosis, found=empty, adequate=False), str)
+    assert "No candidate" not in text
+    assert "stand out of the noise" in text
 
 
 def test_copies_read_back_as_the_table(diagnosis):

@@ -15,7 +15,7 @@ from sdimu_calibration.core.units import to_si
 from sdimu_calibration.report.figures import rotations, sigma_history, spread
 from sdimu_calibration.report.groups import groups, short_name
 from sdimu_calibration.report.page import page
-from sdimu_calibration.report.table import cells, headings, rich_table, rows
+from sdimu_calibration.report.table import cells, headings, rich_table, rows, with_sigma
 
 
 @pytest.fixture
@@ -139,3 +139,17 @@ def test_labels_are_pushed_apart_no_further_than_needed():
 
 def test_a_page_without_diagnosis_says_where_the_verdict_is(calibration):
     assert "sdimu diagnose" in page(calibration, "x")
+
+
+@pytest.mark.parametrize(
+    ("value", "sigma", "written"),
+    [
+        (39.98, 0.96, "39.98 \u00b1 0.96 ppm"),
+        (40.04, 1.0, "40.0 \u00b1 1.0 ppm"),
+        (-253.4, 42.3, "\u2212253 \u00b1 42 ppm"),
+        (0.0995, 0.00571, "0.0995 \u00b1 0.0057 ppm"),
+        (1.0, np.inf, "1 \u00b1 inf ppm"),
+    ],
+)
+def test_a_size_goes_as_far_as_two_digits_of_its_sigma(value, sigma, written):
+    assert with_sigma(value, sigma, "ppm") == written

@@ -34,11 +34,27 @@ CONFIG = {"responsive": True, "displaylogo": False, "modeBarButtonsToRemove": ["
 
 _QUEUE = """
 (function () {
-  var waiting = [];
+  var waiting = [], LARGE = 1.5;
   function next() { if (waiting.length) { waiting.shift()(); setTimeout(next, 0); } }
+  // Figures count in pixels: on a screen of 4K all that is written, and the room for it, is made larger.
+  function enlarge(part, by) {
+    Object.keys(part).forEach(function (key) {
+      var value = part[key];
+      if (!value || typeof value !== 'object' || key === 'template' || typeof value[0] === 'number') { return; }
+      if (/font$|^marker$/.test(key) && typeof value.size === 'number') { value.size *= by; }
+      enlarge(value, by);
+    });
+  }
+  function forLargeScreen(id, figure) {
+    enlarge(figure, LARGE);
+    var margin = figure.layout.margin;
+    Object.keys(margin).forEach(function (side) { margin[side] *= LARGE; });
+    figure.layout.height *= LARGE;
+    document.getElementById(id).style.height = figure.layout.height + 'px';
+  }
   window.drawLater = function (id, figure, config) {
     waiting.push(function () {
-      if (window.innerWidth >= 2400) { figure.layout.font.size = 16; }
+      if (window.innerWidth >= 2400) { forLargeScreen(id, figure); }
       Plotly.newPlot(id, figure.data, figure.layout, config);
     });
   };
@@ -47,13 +63,36 @@ _QUEUE = """
 })();
 """
 
+PRINT = """
+(function () {
+  function figures() { return document.querySelectorAll('.js-plotly-plot'); }
+  window.addEventListener('beforeprint', function () {
+    figures().forEach(function (f) {
+      // The sheet shows figures at 68 %, so that the tallest fits on a page; at less what a large screen has larger.
+      var share = 0.68 * 13 / f._fullLayout.font.size;
+      Plotly.relayout(f, {width: 680 / share, autosize: false});
+      f.parentNode.style.height = share * f._fullLayout.height + 'px';
+      f.querySelector('.plot-container').style.zoom = share;
+    });
+  });
+  window.addEventListener('afterprint', function () {
+    figures().forEach(function (f) {
+      f.parentNode.style.height = '';
+      f.querySelector('.plot-container').style.zoom = '';
+      Plotly.relayout(f, {width: null, autosize: true});
+    });
+  });
+})();
+"""
+"""Fits the figures of a page to the sheet while it is printed."""
+
 
 def html(figure: Any, number: int) -> str:
     """Return a figure as a part of a page; number 1 brings the library along, so it has to be the first on it.
 
     Figures are drawn one after another once the page is read, so that it opens before the last one is drawn.
     """
-    library = f"<script>{get_plotlyjs()}</script><script>{_QUEUE}</script>" if number == 1 else ""
+    library = f"<script>{get_plotlyjs()}</script><script>{_QUEUE}{PRINT}</script>" if number == 1 else ""
     # "</" would end the script wherever it stands.
     content = str(figure.to_json()).replace("</", "<\\/")
     name, config = f"figure-{number}", json.dumps(CONFIG)

@@ -14,6 +14,7 @@ from sdimu_calibration.core.diagnosis.consistency import CHANNEL_NAMES
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.report import data
 from sdimu_calibration.report.drawing import AFTER, BEFORE, DIVERGING, PALE, lay_out
+from sdimu_calibration.report.table import with_sigma
 
 Floats = NDArray[np.float64]
 
@@ -24,6 +25,8 @@ _MOST_NUMBERED = 40
 _MOST_BARS = 24
 _BINS = 20
 _LEGEND = {"orientation": "h", "xanchor": "right", "x": 1.0, "yanchor": "bottom", "y": 1.03}
+_ABOVE = "{}<br>\N{NO-BREAK SPACE}<br>\N{NO-BREAK SPACE}"
+"""Title of a colour bar that does not touch its uppermost number."""
 _LIMIT = {"dash": "dash", "color": "#222", "width": 1.5}
 
 
@@ -44,7 +47,7 @@ def heat_map(grid: data.Grid) -> Any:
             colorscale=DIVERGING,
             xgap=2,
             ygap=2,
-            colorbar={"title": {"text": "sigma", "side": "right"}, "thickness": 12},
+            colorbar={"title": {"text": _ABOVE.format("sigma"), "side": "top"}, "thickness": 12},
             hovertemplate="%{y} at stop %{x}: %{z:+.1f} sigma<extra></extra>",
         )
     )
@@ -57,6 +60,8 @@ def cell(value: float) -> str:
     """Write a cell: a typographic sign, and no decimals where they do not matter."""
     if not np.isfinite(value):
         return ""
+    if abs(value) < 0.05:
+        return "0.0"
     shown = f"{value:+.0f}" if abs(value) >= 9.95 else f"{value:+.1f}"
     return shown.replace("-", "\N{MINUS SIGN}")
 
@@ -72,13 +77,18 @@ def ranking(entries: Sequence[data.Scored], threshold: float) -> Any:
     """Bars of ``|z|``: what each candidate says alone, and what is left of it; the line is what noise reaches."""
     shown = data.best_variants(entries)[:_MOST_BARS]
     names = [("\N{BLACK RIGHT-POINTING TRIANGLE} " if s.chosen else "") + s.label for s in shown]
+    sizes = [with_sigma(s.estimate, s.sigma, s.unit) for s in shown]
     figure = go.Figure()
     figure.add_bar(
         y=names, x=[abs(s.z) for s in shown], orientation="h", name="model as given",
         marker={"color": ["#555" if s.chosen else "#bbb" for s in shown], "line": {"color": "#222", "width": 1}},
-        text=[f"{s.estimate:.3g} \u00b1 {s.sigma:.2g} {s.unit}".replace("-", "\N{MINUS SIGN}") for s in shown],
-        textposition="outside", cliponaxis=False,
-        hovertemplate="%{y}<br>|z| = %{x:.1f}<br>%{text}<extra></extra>",
+        customdata=sizes, hovertemplate="%{y}<br>|z| = %{x:.1f}<br>%{customdata}<extra></extra>",
+    )  # fmt: skip
+    # Beside the bar, but never under the line of the noise.
+    figure.add_scatter(
+        y=names, x=[max(abs(s.z), threshold) for s in shown], mode="text",
+        text=[f"\N{NO-BREAK SPACE}{size}" for size in sizes], textposition="middle right", cliponaxis=False,
+        hoverinfo="skip", showlegend=False,
     )  # fmt: skip
     if any(s.chosen for s in shown):
         figure.add_scatter(
@@ -92,7 +102,7 @@ def ranking(entries: Sequence[data.Scored], threshold: float) -> Any:
     )  # fmt: skip
     top = max([abs(s.z) for s in shown] + [threshold])
     figure.update_xaxes(title_text="score |z| (sigma)", range=[0, 1.3 * top])
-    figure.update_yaxes(autorange="reversed", ticks="", automargin=True, title_text="candidate")
+    figure.update_yaxes(range=[len(shown) - 0.5, -0.5], ticks="", automargin=True, title_text="candidate")
     margin = {"l": 80, "r": 20, "t": 75, "b": 55}
     return lay_out(figure, 24 * len(shown) + 150, showlegend=True, margin=margin, legend=_LEGEND)
 
@@ -164,7 +174,7 @@ def correlation(names: Sequence[str], C: Floats) -> Any:
             colorscale=DIVERGING,
             xgap=1,
             ygap=1,
-            colorbar={"title": {"text": "correlation", "side": "right"}, "thickness": 12},
+            colorbar={"title": {"text": _ABOVE.format("correlation"), "side": "top"}, "thickness": 12},
             hovertemplate="%{y} \u00b7 %{x}: %{z:.2f}<extra></extra>",
         )
     )

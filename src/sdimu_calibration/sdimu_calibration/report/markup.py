@@ -15,14 +15,19 @@ def section(heading: str, *parts: str) -> str:
     return f"<section><h2>{escape(heading)}</h2>\n" + "\n".join(part for part in parts if part) + "</section>"
 
 
+def prose(text: str) -> str:
+    """Return text for a page; what a terminal writes with two characters gets its own sign."""
+    return escape(text.replace(" -> ", " \N{RIGHTWARDS ARROW} ").replace(" +- ", " \N{PLUS-MINUS SIGN} "))
+
+
 def quiet(text: str) -> str:
     """Return a remark."""
-    return f'<p class="quiet">{escape(text)}</p>'
+    return f'<p class="quiet">{prose(text)}</p>'
 
 
 def sentence(text: str) -> str:
     """Return a paragraph."""
-    return f"<p>{escape(text)}</p>"
+    return f"<p>{prose(text)}</p>"
 
 
 def grid(columns: Sequence[str], rows: Sequence[Sequence[str]], text: set[int]) -> str:

@@ -60,7 +60,7 @@ def jumps(values: Jumps, two: bool) -> Any:
                     marker={"color": ink, "symbol": symbol, "size": 8}, row=channel + 1, col=axis + 1,
                     hovertemplate=f"stop %{{text}}, %{{x:.0f}} deg: %{{y:+.1f}} sigma<extra>{name}</extra>",
                 )  # fmt: skip
-    for channel, letter in enumerate("NED"):
+    for channel, letter in enumerate("ned"):
         figure.update_yaxes(title_text=f"velocity {letter}<br>(sigma)", row=channel + 1, col=1)
     figure.update_xaxes(title_text="angle turned (deg)", row=3)
     figure.update_yaxes(zeroline=True, zerolinecolor="#999", zerolinewidth=1)

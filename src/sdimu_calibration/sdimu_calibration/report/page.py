@@ -14,7 +14,7 @@ from sdimu_calibration.report.besides import Besides
 from sdimu_calibration.report.drawing import html
 from sdimu_calibration.report.export import as_csv, as_yaml
 from sdimu_calibration.report.figures import sigma_history
-from sdimu_calibration.report.markup import Draw, quiet, section
+from sdimu_calibration.report.markup import Draw, prose, quiet, section
 from sdimu_calibration.report.style import SCRIPT, STYLE
 from sdimu_calibration.report.use_section import in_use
 
@@ -170,7 +170,7 @@ def _fit(calibration: Calibration, diagnosed: bool) -> str:
 def _notes(calibration: Calibration) -> str:
     if not calibration.notes:
         return ""
-    return "<ul>" + "".join(f"<li>{escape(note)}</li>" for note in calibration.notes) + "</ul>"
+    return "<ul>" + "".join(f"<li>{prose(note)}</li>" for note in calibration.notes) + "</ul>"
 
 
 def _table(entries: list[table.Row]) -> str:

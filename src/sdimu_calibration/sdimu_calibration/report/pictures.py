@@ -23,6 +23,7 @@ from sdimu_calibration.report import data
 from sdimu_calibration.report.drawing import AFTER, BEFORE, DIVERGING
 from sdimu_calibration.report.evidence_figures import cell
 from sdimu_calibration.report.house import house
+from sdimu_calibration.report.table import with_sigma
 
 _STYLE = {
     "font.family": "DejaVu Sans", "font.size": 9, "axes.spines.top": False, "axes.spines.right": False,
@@ -112,8 +113,8 @@ def candidates(diagnosis: Diagnosis) -> Figure:
     axes.plot([abs(s.left) for s in shown], at, "D", mfc="white", mec=AFTER, ms=5, label="left with what was found")
     axes.axvline(diagnosis.found.threshold, color="#222", ls="--", lw=1.2, label="what noise reaches")
     for k, s in enumerate(shown):
-        size = f"{s.estimate:.3g} \N{PLUS-MINUS SIGN} {s.sigma:.2g} {s.unit}".replace("-", "\N{MINUS SIGN}")
-        axes.text(abs(s.z), k, f" {size}", va="center", fontsize=8)
+        size = with_sigma(s.estimate, s.sigma, s.unit)
+        axes.text(max(abs(s.z), diagnosis.found.threshold), k, f" {size}", va="center", fontsize=8)
     axes.set_yticks(at, [("\N{BLACK RIGHT-POINTING TRIANGLE} " if s.chosen else "") + s.label for s in shown])
     axes.invert_yaxis()
     axes.set_xlim(0.0, 1.3 * max([abs(s.z) for s in shown] + [diagnosis.found.threshold]))

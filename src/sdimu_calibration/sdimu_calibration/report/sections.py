@@ -14,7 +14,8 @@ from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.units import from_si
 from sdimu_calibration.report import data, evidence_figures, measured, measured_figures, residual_figures
 from sdimu_calibration.report.besides import Besides
-from sdimu_calibration.report.markup import Draw, grid, quiet, section
+from sdimu_calibration.report.markup import Draw, grid, prose, quiet, section, sentence
+from sdimu_calibration.report.table import with_sigma
 
 
 def verdict(diagnosis: Diagnosis) -> str:
@@ -22,9 +23,9 @@ def verdict(diagnosis: Diagnosis) -> str:
     mark = "\N{CHECK MARK}" if diagnosis.adequate else "\N{HEAVY BALLOT X}"
     kind = "good" if diagnosis.adequate else "bad"
     told = [*(f.text for f in diagnosis.findings), *diagnosis.noise]
-    word, sentence = escape(diagnosis.verdict), escape(diagnosis.sentence)
-    box = f'<p class="verdict {kind}"><strong>{mark} {word}.</strong> {sentence}</p>'
-    listed = "<ul>" + "".join(f"<li>{escape(text)}</li>" for text in told) + "</ul>" if told else ""
+    word, said = escape(diagnosis.verdict), prose(diagnosis.sentence)
+    box = f'<p class="verdict {kind}"><strong>{mark} {word}.</strong> {said}</p>'
+    listed = "<ul>" + "".join(f"<li>{prose(text)}</li>" for text in told) + "</ul>" if told else ""
     return box + listed + quiet(_numbers(diagnosis))
 
 
@@ -55,7 +56,7 @@ def ladder(diagnosis: Diagnosis, draw: Draw) -> str:
     """Return the ladder of models: what each step gains, which coefficients it moves, why the last was refused."""
     steps = diagnosis.found.steps
     if not steps:
-        return section("Ladder of models", "<p>No candidate stands out of the noise: the model stays as given.</p>")
+        return section("Ladder of models", sentence(_no_step(diagnosis)))
     first = ["model as given", "", "", "", "", f"{steps[0].held_out_before.rms:.3f}", "", ""]
     told = [item for step in steps for item in _told(step)]
     figure = evidence_figures.ladder(diagnosis)
@@ -63,13 +64,21 @@ def ladder(diagnosis: Diagnosis, draw: Draw) -> str:
         "Ladder of models: how far the error falls",
         draw(figure),
         grid(_LADDER, [first, *(_rung(step) for step in steps)], {0, 7}),
-        "<ul>" + "".join(f"<li>{escape(text)}</li>" for text in told) + "</ul>",
+        "<ul>" + "".join(f"<li>{prose(text)}</li>" for text in told) + "</ul>",
         quiet(
             "Held-out: every stop predicted from the others, in sigmas; 1 is right. In-sample likelihood rises with "
-            "every parameter, this does not. The verdict's held-out error leaves out every third stop at once and is "
-            "larger. Estimates are those of the step, with all before it."
+            "every parameter, this does not. The verdict's held-out error leaves out every third stop at once: "
+            "larger when the model is wrong. Estimates are those of the step, with all before it."
         ),
     )
+
+
+def _no_step(diagnosis: Diagnosis) -> str:
+    """Say why there is no ladder: nothing to add, or nothing was asked to be added (the workbench scores only)."""
+    standing = int(np.sum(np.abs(diagnosis.found.first.z) > diagnosis.found.threshold))
+    if standing and not diagnosis.adequate:
+        return f"Nothing was added to this model; {standing} of the candidates below stand out of the noise."
+    return "No candidate stands out of the noise: the model stays as it is."
 
 
 _REFITS = (
@@ -105,7 +114,7 @@ def _refit(r: Rung) -> list[str]:
 def _rung(step: Step) -> list[str]:
     factor = from_si(1.0, step.display_unit)
     return [
-        f"+ {step.label}", f"{step.estimate * factor:.4g} \u00b1 {step.sigma * factor:.2g} {step.display_unit}",
+        f"+ {step.label}", with_sigma(step.estimate * factor, step.sigma * factor, step.display_unit),
         f"{abs(step.z):.1f} ({step.threshold:.1f})", f"{step.log_likelihood_gain:.1f}", f"{step.log_bayes_factor:.1f}",
         f"{step.held_out_before.rms:.3f} \u2192 {step.held_out_after.rms:.3f}",
         f"{step.held_out_gain:.1f} \u00b1 {step.held_out_error:.1f}",

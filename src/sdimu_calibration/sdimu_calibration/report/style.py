@@ -26,10 +26,10 @@ section { min-width: 0; }
   body { max-width: none; margin: 0; padding: 0; font-size: 11px; }
   main { display: block; }
   button, .modebar-container { display: none !important; }
-  [id^="figure-"] > .plot-container { zoom: .68; }
   .wide { overflow: visible; } table { font-size: 9px; } th, td { padding: .1em .5em; }
   td.text:last-child { min-width: 14em; }
-  :has(> [id^="figure-"]), tr, .quiet, .verdict { break-inside: avoid; } h2 { break-after: avoid; }
+  :has(> [id^="figure-"]), tr, .quiet, .verdict { break-inside: avoid; } p { break-inside: avoid; }
+  h2, h2 + p, h2 + p + p, summary { break-after: avoid; }
   p.quiet { break-before: avoid; }
   .verdict, [id^="figure-"] { print-color-adjust: exact; -webkit-print-color-adjust: exact; }
 }
@@ -47,22 +47,8 @@ document.querySelectorAll('button[data-copy]').forEach(function (button) {
   });
 });
 (function () {
-  var figures = document.querySelectorAll('[id^="figure-"]');
   var folded = document.querySelectorAll('details:not([open])');
-  window.addEventListener('beforeprint', function () {
-    folded.forEach(function (d) { d.open = true; });
-    figures.forEach(function (f) {
-      Plotly.relayout(f, {width: 1000, autosize: false});
-      // The sheet shows figures at 68 %, so that the tallest fits on a page.
-      f.parentNode.style.height = 0.68 * f._fullLayout.height + 'px';
-    });
-  });
-  window.addEventListener('afterprint', function () {
-    folded.forEach(function (d) { d.open = false; });
-    figures.forEach(function (f) {
-      f.parentNode.style.height = '';
-      Plotly.relayout(f, {width: null, autosize: true});
-    });
-  });
+  window.addEventListener('beforeprint', function () { folded.forEach(function (d) { d.open = true; }); });
+  window.addEventListener('afterprint', function () { folded.forEach(function (d) { d.open = false; }); });
 })();
 """

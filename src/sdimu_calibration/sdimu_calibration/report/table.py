@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -129,6 +129,25 @@ def rich_table(table: list[Row], title: str | None = None) -> Table:
     for row, line, following in zip(table, texts, [*table[1:], None], strict=True):
         laid.add_row(*line, end_section=following is not None and following.effect != row.effect)
     return laid
+
+
+def with_sigma(value: float, sigma: float, unit: str) -> str:
+    """Write a value as far as its sigma resolves, two digits of it, as in ``39.7 +- 1.0 ppm``."""
+    if not (math.isfinite(sigma) and sigma >= _SMALLEST_WRITTEN):
+        shown, beside = f"{value:.3g}", f"{sigma:.2g}"
+    else:
+        shown, beside = as_far((value, sigma), sigma)
+    return f"{shown.replace('-', _MINUS)} \N{PLUS-MINUS SIGN} {beside} {unit}"
+
+
+def as_far(values: Sequence[float], sigma: float) -> list[str]:
+    """Write numbers as far as a sigma resolves, two digits of it."""
+    return [f"{value:.{_decimals(sigma)}f}" for value in values]
+
+
+_MINUS = "\N{MINUS SIGN}"
+_SMALLEST_WRITTEN = 1e-6
+"""Below this, decimals are more zeros than number."""
 
 
 def _decimals(sigma: float) -> int:

@@ -14,6 +14,7 @@ from sdimu_calibration.core.diagnosis.consistency import CHANNEL_NAMES
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.units import UnitError
 from sdimu_calibration.report import data
+from sdimu_calibration.report.drawing import PRINT
 from sdimu_calibration.report.workbench import figures, tables, view
 from sdimu_calibration.report.workbench.doing import Doing
 from sdimu_calibration.report.workbench.export import archive
@@ -23,7 +24,7 @@ from sdimu_calibration.report.workbench.shelf import Shelf
 from sdimu_calibration.report.workbench.state import State, from_json
 
 _PAGE = """<!doctype html><html lang="en"><head>{%metas%}<title>{%title%}</title>{%css%}<style>STYLE</style></head>
-<body>{%app_entry%}<footer>{%config%}{%scripts%}{%renderer%}</footer></body></html>"""
+<body>{%app_entry%}<footer>{%config%}{%scripts%}{%renderer%}<script>PRINT</script></footer></body></html>"""
 _WORKING = [(Output("busy", "hidden"), False, True), (Output("tick", "disabled"), False, True)]
 _BUSY = [
     *_WORKING,
@@ -33,13 +34,22 @@ _LOOKING = [*_WORKING, (Output("candidates", "className"), "stale", ""), (Output
             "verdict stale", "verdict")]  # fmt: skip
 _LARGE = "function(_) { return window.innerWidth >= 2400 ? 1.6 : 1; }"
 """Figures count in pixels: on a screen of 4K they are drawn larger."""
+_NOTHING = {
+    "undo": "Nothing to undo.",
+    "add": "Nothing added: choose an effect that is not in the model.",
+    "add-own": "Nothing added: write an effect that is not in the model.",
+    "drop": "Nothing taken out: choose an effect that was added.",
+    "hold": "Nothing changed: these are the stops that are held out now.",
+    "ranking": "Nothing added: it is in the model already.",
+}
+"""What a click that asks for nothing is told."""
 _ARROW = "\N{BLACK RIGHT-POINTING TRIANGLE} "
 
 
 def build(shelf: Shelf) -> Dash:
     """Make the application of a shelf of recordings."""
     app = Dash("sdimu workbench", title="sdimu workbench", update_title="", serve_locally=True, assets_ignore=".*")
-    app.index_string = _PAGE.replace("STYLE", view.STYLE)
+    app.index_string = _PAGE.replace("STYLE", view.STYLE).replace("PRINT", PRINT)
     app.layout = lambda: view.layout("Workbench", shelf.names)
     doing = Doing()
     app.clientside_callback(_LARGE, Output("scale", "data"), Input("page", "data"))
@@ -59,7 +69,7 @@ def build(shelf: Shelf) -> Dash:
             now = from_json(kept)
             wanted = _step(now, dash.ctx.triggered_id, bar, point, candidate, own, held, chosen, recording)
             if wanted == now:
-                return no_update, ""
+                return no_update, _NOTHING.get(str(dash.ctx.triggered_id), "")
             tell("read", 0.0)
             shelf.bench(wanted.recording).fit(wanted.added, wanted.held, tell)
         except (DataError, UnitError) as error:

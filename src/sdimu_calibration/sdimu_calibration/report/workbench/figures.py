@@ -18,7 +18,6 @@ _FONT = 13
 def heat_map(grid: data.Grid, cell: tuple[int, int]) -> Any:
     """Heat map of the report with a frame around the cell that is looked at."""
     figure = evidence_figures.heat_map(grid)
-    figure.update_traces(colorbar={"title": {"text": "sigma<br> ", "side": "top"}})
     row, column = cell[0], int(np.searchsorted(grid.stops, cell[1]))
     figure.add_shape(
         type="rect", x0=column - 0.5, x1=column + 0.5, y0=row - 0.5, y1=row + 0.5, fillcolor="rgba(0, 0, 0, 0)",
@@ -31,7 +30,7 @@ def ranking(entries: Sequence[data.Scored], threshold: float) -> Any:
     """Ranking of the report, with room for the numbers at the ends of the bars."""
     figure = evidence_figures.ranking(entries, threshold)
     top = max([abs(e.z) for e in entries] + [threshold])
-    figure.update_xaxes(range=[0, 1.75 * top])
+    figure.update_xaxes(range=[0, 1.85 * top])
     figure.update_layout(showlegend=False)
     return figure
 
@@ -86,6 +85,7 @@ def enlarged(figure: Any, scale: float) -> Any:
         return figure
     margin = {side: value * scale for side, value in figure.layout.margin.to_plotly_json().items() if side in "lrtb"}
     figure.update_layout(height=figure.layout.height * scale, font={"size": _FONT * scale}, margin=margin)
+    figure.update_layout(hoverlabel_font_size=_FONT * scale)
     if figure.layout.title.text:
         figure.update_layout(title_font_size=14 * scale)
     figure.update_traces(textfont_size=12 * scale, selector={"type": "heatmap"})

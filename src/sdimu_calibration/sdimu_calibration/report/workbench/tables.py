@@ -11,6 +11,7 @@ from dash import html
 from sdimu_calibration.core.diagnosis.grow import moved_coefficients
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.units import from_si
+from sdimu_calibration.report.table import as_far
 from sdimu_calibration.report.workbench.fit import Bench, Fitted, Key
 from sdimu_calibration.report.workbench.own_effect import named
 
@@ -70,9 +71,9 @@ def moved(first: Calibration, now: Calibration, most: int = 8) -> Any:
         if size < _STANDS:
             break
         unit = now.display_units[i]
-        numbers = (first.values[k], now.values[i], sigma[i])
+        numbers = [from_si(float(v), unit) for v in (first.values[k], now.values[i], sigma[i])]
         cells.append(html.Tr([
-            html.Td(now.names[i]), *(html.Td(f"{from_si(float(v), unit):.4g}") for v in numbers), html.Td(unit),
+            html.Td(now.names[i]), *map(html.Td, as_far(numbers, numbers[-1])), html.Td(unit),
             html.Td(f"{size:.1f}"),
         ]))  # fmt: skip
     return html.Table(cells) if len(cells) > 1 else "none"

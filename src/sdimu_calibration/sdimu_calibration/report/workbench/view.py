@@ -11,6 +11,7 @@ from dash import dcc, html
 
 from sdimu_calibration.report import data
 from sdimu_calibration.report.drawing import CONFIG
+from sdimu_calibration.report.table import with_sigma
 from sdimu_calibration.report.workbench.fit import Fitted, Missing
 
 TEMPLATE = """format: sdimu-effect/1
@@ -45,7 +46,13 @@ table { border-collapse: collapse; font-variant-numeric: tabular-nums; font-size
 th, td { padding: .1em .7em; text-align: right; border-bottom: 1px solid #ddd; }
 th:first-child, td:first-child { text-align: left; }
 tr.here td { font-weight: 700; } tr.here td:first-child::before { content: "\\25B6\\00A0"; }
-@media print { button, .upload, .busy, textarea { display: none; } header { position: static; } }
+@media print {
+  @page { size: A4 portrait; margin: 12mm; }
+  body { font-size: 11px; } main { display: block; } main, header { padding-left: 0; padding-right: 0; }
+  button, .busy, .control, .modebar-container { display: none !important; } header { position: static; }
+  :has(> .js-plotly-plot), tr { break-inside: avoid; } h2 { break-after: avoid; }
+  .verdict, .dash-graph { print-color-adjust: exact; -webkit-print-color-adjust: exact; }
+}
 """
 
 
@@ -70,26 +77,31 @@ def layout(title: str, recordings: Sequence[str]) -> Any:
             html.Section([
                 html.H2("How far the error fell"), _graph("ladder"),
                 html.H2("Coefficients that moved against the model as given"), html.Div(id="moved"),
-                html.H2("Stops held out of the fit"),
-                dcc.Dropdown(id="held", options=[], multi=True, placeholder="none"),
-                html.Button("Hold out", id="hold"),
-                html.H2("Take home"), html.Button("Model, calibration and report", id="export"),
-                dcc.Download(id="file"),
-                html.H2("Another recording of this folder"),
-                dcc.Dropdown(id="recording", options=list(recordings), clearable=False), html.Button("Open", id="open"),
+                html.Div([
+                    html.H2("Stops held out of the fit"),
+                    dcc.Dropdown(id="held", options=[], multi=True, placeholder="none"),
+                    html.Button("Hold out", id="hold"),
+                    html.H2("Take home"), html.Button("Model, calibration and report", id="export"),
+                    dcc.Download(id="file"),
+                    html.H2("Another recording of this folder"),
+                    dcc.Dropdown(id="recording", options=list(recordings), clearable=False),
+                    html.Button("Open", id="open"),
+                ], className="control"),
             ]),
             html.Section([
                 html.H2("Which effect is missing? Click a bar to add it"), html.Div(_graph("ranking"), id="candidates"),
-                dcc.Dropdown(id="candidate", placeholder="or search the catalogue"),
-                html.Button("Add", id="add"),
-                html.H2("In the model besides"),
-                dcc.Dropdown(id="added", placeholder="nothing yet"), html.Button("Take out", id="drop"),
-                html.H2("An effect of your own, as an expression"),
-                dcc.Textarea(id="own", value=TEMPLATE, rows=8, persistence=True, persistence_type="session"),
                 html.Div([
-                    html.Button("Add this", id="add-own"),
-                    dcc.Upload(html.Button("Read a file"), id="upload", accept=".yaml,.yml", className="upload"),
-                ], className="line"),
+                    dcc.Dropdown(id="candidate", placeholder="or search the catalogue"),
+                    html.Button("Add", id="add"),
+                    html.H2("Added to the model"),
+                    dcc.Dropdown(id="added", placeholder="nothing yet"), html.Button("Take out", id="drop"),
+                    html.H2("An effect of your own, as an expression"),
+                    dcc.Textarea(id="own", value=TEMPLATE, rows=8, persistence=True, persistence_type="session"),
+                    html.Div([
+                        html.Button("Add this", id="add-own"),
+                        dcc.Upload(html.Button("Read a file"), id="upload", accept=".yaml,.yml"),
+                    ], className="line"),
+                ], className="control"),
             ]),
             html.Section([html.H2("Models of this page side by side"), html.Div(id="models")], className="whole"),
         ]),
@@ -105,7 +117,7 @@ def options(entries: Sequence[data.Scored]) -> list[dict[str, str]]:
     """Candidates for the search field, with their evidence."""
     return [
         {
-            "label": f"{e.label}   |z| {abs(e.z):.1f}   {e.estimate:.3g} \u00b1 {e.sigma:.2g} {e.unit}",
+            "label": f"{e.label}   |z| {abs(e.z):.1f}   {with_sigma(e.estimate, e.sigma, e.unit)}",
             "value": e.label,
         }
         for e in entries
