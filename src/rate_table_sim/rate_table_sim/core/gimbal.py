@@ -68,7 +68,7 @@ def assign_turns(plan: Plan, axes: tuple[str, str, str]) -> tuple[tuple[int, flo
                 turn = plan.turns[furthest]
                 raise DataError(
                     f"turn {furthest + 1} of plan {plan.name}: no gimbal axis is along {turn.axis} there "
-                    f"(the table turns {', '.join(axes)}; use axes: free)"
+                    f"(the table turns {', '.join(axes)}; use --table free, or axes: free in the table's file)"
                 )
             untried.pop()
             angles.pop()

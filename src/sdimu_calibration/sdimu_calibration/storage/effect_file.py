@@ -164,7 +164,7 @@ def _beside(folder: Path, text: str) -> str:
 
 
 def _append(effects: list[Effect], effect: Effect) -> None:
-    have = {p.name for e in effects for p in e.parameters}
+    have = {label for e in effects for label in e.labels}
     for part in without(effect, have):
         if len(part.parameters) in (1, len(effect.parameters)):
             effects.append(part if len(part.parameters) < len(effect.parameters) else effect)

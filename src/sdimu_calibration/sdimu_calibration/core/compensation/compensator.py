@@ -114,7 +114,9 @@ def resolved(calibration: Calibration, own: Sequence[Effect] = ()) -> tuple[Effe
     """
     given = {effect.name: effect for effect in own}
     try:
-        effects = tuple(given[name] if name in given else selection.resolve(name) for name in calibration.model)
+        effects = imu_model.told_apart(
+            [given[name] if name in given else selection.resolve(name) for name in calibration.model]
+        )
     except DataError as error:
         raise DataError(f"the result has an effect of no catalogue: {error}; name its file (--effect)") from error
     names = tuple(parameter.name for effect in effects for parameter in effect.parameters)

@@ -44,9 +44,8 @@ class Candidate:
 def split(effect: Effect) -> list[Candidate]:
     """One candidate for each parameter of an effect."""
     out = []
-    for parameter in effect.parameters:
+    for parameter, label in zip(effect.parameters, effect.labels, strict=True):
         one = effect.only((parameter.name,))
-        label = parameter.name + effect.variant
         family = "own" if effect.title == OWN else effect.family or effect.name
         out.append(Candidate(one, family, label))
     return out
@@ -66,8 +65,9 @@ def catalogue(times: TestTimes, in_model: set[str], has_temperature: bool) -> li
 
 
 def without(effect: Effect, in_model: set[str]) -> list[Effect]:
-    """Return the effect without the parameters that the model has: a list of one or none."""
-    missing = tuple(p.name for p in effect.parameters if p.name not in in_model)
+    """Return the effect without the parameters (by label) that the model has: a list of one or none."""
+    named = zip(effect.parameters, effect.labels, strict=True)
+    missing = tuple(p.name for p, label in named if label not in in_model)
     return [effect.only(missing)] if missing else []
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
-from sdimu_calibration.core.diagnosis.rounds import told_apart
 from sdimu_calibration.core.effects.imu_model import build
 from sdimu_calibration.core.filter import free_inertial
 from sdimu_calibration.core.filter.free_inertial import Trial
@@ -32,7 +31,7 @@ def in_use(diagnosis: Diagnosis, site: Site, imu: ImuSpecification, model: Model
     setup = set_up(site, imu, model)
     setups: list[tuple[str, Setup]] = [(AS_GIVEN, setup)]
     if diagnosis.chosen:
-        sensors = build([*setup.sensors.effects, *told_apart(diagnosis.chosen)], imu)
+        sensors = build([*setup.sensors.effects, *(c.effect for c in diagnosis.chosen)], imu)
         setups.append((WITH_FOUND, replace(setup, sensors=sensors)))
     evidence = diagnosis.evidence
     return free_inertial.in_use(evidence.reduced, setups, evidence.output)

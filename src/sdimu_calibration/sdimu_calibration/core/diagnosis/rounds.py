@@ -141,23 +141,8 @@ def prefer(wide: Look, look: Look) -> bool:
 def with_effects(base: Solution, added: Sequence[Candidate], progress: Progress) -> Solution:
     """Calibrate with more effects in the model."""
     setup = base.setup
-    sensors = build([*setup.sensors.effects, *told_apart(added)], setup.imu)
+    sensors = build([*setup.sensors.effects, *(c.effect for c in added)], setup.imu)
     return solve(replace(setup, sensors=sensors), base.reduced, progress, keep=True)
-
-
-def told_apart(added: Sequence[Candidate]) -> list[Effect]:
-    """Effects of candidates, each parameter under a name of its own.
-
-    Two variants of one effect, such as two steps of a bias, have the same parameter; the later one takes its label.
-    """
-    out: list[Effect] = []
-    seen: set[str] = set()
-    for candidate in added:
-        name = candidate.parameter.name
-        parameter = replace(candidate.parameter, name=candidate.label if name in seen else name)
-        out.append(replace(candidate.effect, parameters=(parameter,)))
-        seen.add(name)
-    return out
 
 
 def take(
@@ -165,7 +150,7 @@ def take(
 ) -> Look:
     """Collect the evidence about a solution, with what it tried as candidates, and search it."""
     times = test_times(base.reduced)
-    in_model = set(base.setup.sensors.names)
+    in_model = {label for effect in base.setup.sensors.effects for label in effect.labels}
     has_temperature = base.reduced.temperature is not None
     known = _untried([*extra, *catalogue(times, in_model, has_temperature)], tried, in_model)
     more = _untried([*equations(has_temperature), *periodic(times.duration)], tried, in_model) if own else []
@@ -215,7 +200,7 @@ def _untried(effects: Sequence[Effect], tried: Sequence[Candidate], in_model: se
     out = []
     for effect in effects:
         names = tuple(
-            c.parameter.name for c in split(effect) if c.label not in labels and c.parameter.name not in in_model
+            c.parameter.name for c in split(effect) if c.label not in labels and c.label not in in_model
         )
         if names:
             out.append(effect.only(names) if len(names) < len(effect.parameters) else effect)

@@ -132,6 +132,12 @@ class Effect:
         )
 
     @property
+    def labels(self) -> tuple[str, ...]:
+        """Name of each parameter with the variant behind it: what tells it from that of another variant."""
+        variant = self.variant
+        return tuple(p.name if p.name.endswith(variant) else p.name + variant for p in self.parameters)
+
+    @property
     def variant(self) -> str:
         """What stands behind the name in brackets, e.g. ``(tau=1200 s)``; empty without options."""
         return "(" + ", ".join(f"{k}={v}" for k, v in self.options.items()) + ")" if self.options else ""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -80,7 +80,7 @@ def build(effects: Sequence[str | Effect], imu: ImuSpecification) -> ImuModel:
     DataError
         When a name is unknown, stands twice, or has no prior, or a prior is of no effect or in a wrong unit.
     """
-    chosen = tuple(selection.resolve(e) if isinstance(e, str) else e for e in effects)
+    chosen = told_apart([selection.resolve(e) if isinstance(e, str) else e for e in effects])
     _check_priors(chosen, imu)
     seen: set[str] = set()
     channel: list[int] = []
@@ -121,3 +121,23 @@ def _check_priors(chosen: Sequence[Effect], imu: ImuSpecification) -> None:
             raise DataError(
                 f"IMU '{imu.name}': prior.{name}: '{unit}' is a wrong unit (expected something like '1 {units[name]}')"
             )
+
+
+def told_apart(effects: Sequence[Effect]) -> tuple[Effect, ...]:
+    """Give parameters a name of their own where two variants of one effect have the same.
+
+    Of two steps of one bias, say: the later one takes the name with the variant behind it.
+    """
+    out: list[Effect] = []
+    names: set[str] = set()
+    labels: set[str] = set()
+    for effect in effects:
+        # The same variant once more keeps its name, for `build` to refuse.
+        parameters = tuple(
+            replace(p, name=label) if p.name in names and label not in labels else p
+            for p, label in zip(effect.parameters, effect.labels, strict=True)
+        )
+        names |= {p.name for p in parameters}
+        labels |= set(effect.labels)
+        out.append(replace(effect, parameters=parameters))
+    return tuple(out)

@@ -25,7 +25,7 @@ def extended(setup: Setup, added: Sequence[str]) -> Setup:
     """
     effects: list[Effect] = list(setup.sensors.effects)
     for text in added:
-        have = {p.name for e in effects for p in e.parameters}
+        have = {label for e in effects for label in e.labels}
         new = [part for effect in read_effect(text) for part in without(effect, have)]
         if not new:
             raise DataError(f"'{named(text)}' is in the model already")
