@@ -50,7 +50,7 @@ def replay(
             time.sleep(0.05)
     calibration = read_result(result)
     wall = time.monotonic() - begun
-    console.print(rich_table(rows(calibration), f"body frame: {calibration.body_frame}"))
+    console.print(rich_table(rows(calibration), f"body frame: {calibration.body_frame}"), soft_wrap=True)
     duration, lost = calibration.data["duration_s"], calibration.data["lost"]
     console.print(
         f"{duration:.0f} s in {wall:.1f} s: {duration / wall:.0f} times real time; {lost:.0f} samples lost",

@@ -112,10 +112,11 @@ class Watch:
 
         fine = seen.verdict.startswith("consistent") or not seen.nis
         stage = f"stop {seen.stop} of {self._test.stops - 1} {seen.phase}" if streaming else "last calibration"
+        left = self.left(seen, wall_s) if streaming else "no more to come"
         head = Table.grid(padding=(0, 1))
         head.add_row(
             Text(stage, style="bold"), ProgressBar(self._test.duration_s, seen.table_s, width=30),
-            f"{seen.table_s:.0f} of {self._test.duration_s:.0f} s, {self.left(seen, wall_s)}",
+            f"{seen.table_s:.0f} of {self._test.duration_s:.0f} s, {left}",
         )  # fmt: skip
         sigmas = Table.grid(padding=(0, 2))
         for f in self._falling(seen):

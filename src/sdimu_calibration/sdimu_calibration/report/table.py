@@ -121,11 +121,12 @@ def rich_table(table: list[Row], title: str | None = None) -> Table:
     """Lay the rows out for a terminal, a line between effects."""
     columns = headings(table)
     texts = [cells(row, columns) for row in table]
-    laid = Table(title=title, title_justify="left", pad_edge=False, box=SIMPLE_HEAD)
-    for place, column in enumerate(columns):
+    heads = [column.replace("/", "/\n").replace(" ", "\n") for column in columns]
+    laid = Table(title=title, title_justify="left", pad_edge=False, padding=(0, 1, 0, 0), box=SIMPLE_HEAD)
+    for place, (column, head) in enumerate(zip(columns, heads, strict=True)):
         # A narrow terminal may wrap lines; it must not cut digits.
-        width = max(len(text) for text in (column, *(line[place] for line in texts)))
-        laid.add_column(column, justify="left" if column in {"coefficient", "unit"} else "right", min_width=width)
+        width = max(len(text) for text in (*head.split("\n"), *(line[place] for line in texts)))
+        laid.add_column(head, justify="left" if column in {"coefficient", "unit"} else "right", min_width=width)
     for row, line, following in zip(table, texts, [*table[1:], None], strict=True):
         laid.add_row(*line, end_section=following is not None and following.effect != row.effect)
     return laid

@@ -181,7 +181,8 @@ def _report(console: Console, out: Path, site: str, imu: str, model: str, plan: 
         out / "report.html", result, title=title, truth=truth, reference=read_reference(), diagnosis=diagnosis,
         more=more,
     )  # fmt: skip
-    console.print(rich_table(rows(result, truth, read_reference()), f"body frame: {result.body_frame}"))
+    shown = rich_table(rows(result, truth, read_reference()), f"body frame: {result.body_frame}")
+    console.print(shown, soft_wrap=True)
     console.print(diagnosis.sentence, soft_wrap=True, highlight=False)
     return result
 
