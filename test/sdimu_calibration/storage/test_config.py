@@ -144,3 +144,8 @@ def test_the_environment_names_another_config_folder(tmp_path, monkeypatch):
     monkeypatch.setenv("SDIMU_CONFIG", str(tmp_path / "none"))
     with pytest.raises(DataError, match="SDIMU_CONFIG"):
         find_config("plan", "short")
+
+
+def test_of_a_file_of_another_kind_the_format_is_told_and_not_its_keys(tmp_path):
+    with pytest.raises(DataError, match=r"mine.yaml: format: .*'sdimu-effect/1'"):
+        load_plan(written(tmp_path, "format: sdimu-effect/1\nname: bent\nexpressions: {}\n"))

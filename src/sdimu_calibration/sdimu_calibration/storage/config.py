@@ -157,12 +157,21 @@ def check(data: Mapping[str, Any], schema: type[S], source: str) -> S:
     try:
         return schema.model_validate(data)
     except ValidationError as error:
-        # A misspelt key is unknown and leaves the right one missing: the first of the two says what to mend.
-        first = min(error.errors(), key=lambda e: e["type"] != "extra_forbidden")
+        first = min(error.errors(), key=_rank)
         key = ".".join(str(part) for part in first["loc"])
         raise DataError(
             f"{source}: {key}: {_message(first, schema)}" if key else f"{source}: {first['msg']}"
         ) from error
+
+
+def _rank(error: Any) -> int:
+    """Order errors by what says best what to mend.
+
+    A file of another kind has hardly a key that is right. A misspelt key is unknown and leaves the right one missing.
+    """
+    if error["loc"] == ("format",) and error["type"] != "missing":
+        return 0
+    return 1 if error["type"] == "extra_forbidden" else 2
 
 
 def _message(error: Any, schema: type[BaseModel]) -> str:
