@@ -1,7 +1,8 @@
 """Node that calibrates while the test runs.
 
-Parameters: site, imu, model (names or paths), add (effects beyond the model's), out (folder for result.json), stay (do
-not leave at the end of the stream), checkpoint (keep a journal in the folder of results; on by default).
+Parameters: site, imu, model (names or paths), add (effects beyond the model's: names, equations or files, as for
+`sdimu calibrate --add`), out (folder for result.json), stay (do not leave at the end of the stream), checkpoint (keep a
+journal in the folder of results; on by default).
 Subscriptions (remap them at will): /imu/data_raw, /rate_table/status, /imu/temperature. Publications once a second of
 data: /calibration/coefficients, /calibration/covariance, /calibration/navigation, /diagnostics. Services: ~/save
 writes result.json from everything that has come, ~/reset forgets it.
@@ -16,7 +17,6 @@ one that was killed goes on with its journal; what it missed in between is a gap
 from __future__ import annotations
 
 import time
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -40,6 +40,7 @@ from sdimu_calibration.nodes.spinning import run_node
 from sdimu_calibration.nodes.ticking import Ticker
 from sdimu_calibration.report.progress_text import falling, light, sigma_words
 from sdimu_calibration.storage.config import load_imu, load_model, load_site
+from sdimu_calibration.storage.effect_file import SUFFIXES, extended_model
 from sdimu_calibration.storage.journal import Journal, digest
 from sdimu_calibration.storage.result_file import write_result
 
@@ -60,16 +61,18 @@ class CalibrationNode:
         declare = self.node.declare_parameter
         self._site = load_site(str(declare("site", "daejeon").value))
         self._imu = load_imu(str(declare("imu", "dtg").value))
-        model = load_model(str(declare("model", "baseline").value))
+        model = str(declare("model", "baseline").value)
         # An empty string keeps the parameter's type when nothing is added.
-        added = tuple(effect for effect in declare("add", [""]).value if effect)
-        self._model = replace(model, effects=(*model.effects, *added))
+        added = [str(effect) for effect in declare("add", [""]).value if effect]
+        self._model = extended_model(model, added)
         self._out = Path(str(declare("out", ".").value))
         self._stay = bool(declare("stay", False).value)
         _warm_up(self._make(0))
         self._journal: Journal | None = None
         if bool(declare("checkpoint", True).value):
-            options = digest(self._site, self._imu, self._model)
+            # The text of an effect file too: its name says little of what it computes.
+            texts = [path.read_text() for path in map(Path, added) if path.suffix in SUFFIXES]
+            options = digest(self._site, self._imu, load_model(model), added, texts)
             self._journal = Journal(self._out / JOURNAL, options)
         self._feed = Feed(self._make, self._journal)
         resumed = self._feed.resumed_ns

@@ -69,7 +69,8 @@ def _check(options: dict[str, dict[str, Any]]) -> float:
     from rate_table_sim.core import table_motion
     from rate_table_sim.table_file import load_table
     from sdimu_calibration.core.recording import DataError
-    from sdimu_calibration.storage.config import load_imu, load_model, load_plan, load_site
+    from sdimu_calibration.storage.config import load_imu, load_plan, load_site
+    from sdimu_calibration.storage.effect_file import extended_model
     from sdimu_sim.cli.simulate import mount_rad
     from sdimu_sim.core.hidden import parse_effects
     from sdimu_sim.temperature_file import load_temperature
@@ -79,7 +80,7 @@ def _check(options: dict[str, dict[str, Any]]) -> float:
     motion = table_motion(plan, load_table(table["table"]), table["seed"])
     load_imu(imu["imu"])
     load_site(imu["site"])
-    load_model(calibration["model"])
+    extended_model(calibration["model"], ())
     parse_effects(tuple(imu["effects"]))
     if imu["mount"]:
         mount_rad(imu["mount"])
@@ -149,9 +150,10 @@ def _test(plan: str, model: str, duration: float) -> Outline:
     """Collect what is known of the test before it runs."""
     from sdimu_calibration.cli.watch import Outline
     from sdimu_calibration.core.effects import selection
-    from sdimu_calibration.storage.config import load_model, load_plan
+    from sdimu_calibration.storage.config import load_plan
+    from sdimu_calibration.storage.effect_file import extended_model
 
-    effects = [selection.resolve(e) if isinstance(e, str) else e for e in load_model(model).effects]
+    effects = [selection.resolve(e) if isinstance(e, str) else e for e in extended_model(model, ()).effects]
     units = {q.name: q.display_unit for effect in effects for q in effect.parameters}
     return Outline(duration, len(load_plan(plan).dwell_s), [effect.name for effect in effects], units)
 
@@ -163,8 +165,9 @@ def _report(console: Console, out: Path, site: str, imu: str, model: str, plan: 
     from sdimu_calibration.report.page import write_report
     from sdimu_calibration.report.table import rich_table, rows
     from sdimu_calibration.storage.bag_reader import read_recording
-    from sdimu_calibration.storage.config import load_imu, load_model, load_site
+    from sdimu_calibration.storage.config import load_imu, load_site
     from sdimu_calibration.storage.diagnosis_file import account, write_diagnosis
+    from sdimu_calibration.storage.effect_file import extended_model
     from sdimu_calibration.storage.reference_file import read_reference, read_truth
     from sdimu_calibration.storage.result_file import read_result
 
@@ -172,7 +175,7 @@ def _report(console: Console, out: Path, site: str, imu: str, model: str, plan: 
     truth = read_truth(out / "truth.yaml", result.body_frame)
     with console.status("diagnosing") if console.is_terminal else nullcontext():
         recording = read_recording(out / "bag")
-        where, specification, wanted = load_site(site), load_imu(imu), load_model(model)
+        where, specification, wanted = load_site(site), load_imu(imu), extended_model(model, ())
         diagnosis = diagnose(recording, where, specification, wanted)
         more = besides(recording, diagnosis, where, specification, wanted)
     write_diagnosis(out / "diagnosis.json", account(diagnosis))
