@@ -185,3 +185,8 @@ def test_a_bad_plug_in_is_one_line(monkeypatch, answer):
 
 def test_the_group_of_plug_ins_is_read_from_installed_packages():
     assert effect_file.entry_points is importlib.metadata.entry_points
+
+
+def test_an_equation_of_no_sensor_names_the_sensors():
+    with pytest.raises(DataError, match=r"no such sensor.*accel_z"):
+        find_effects("gyro_q: ey^2")

@@ -102,6 +102,8 @@ def find_effects(text: str) -> tuple[Effect, ...]:
         return load_effect(Path(text))
     if text.partition(":")[0].strip() in CHANNELS:
         return (_equation(text),)
+    if ":" in text:
+        raise DataError(f"equation '{text}': no such sensor (expected {', '.join(CHANNELS)}, then ': FORMULA')")
     register_plugins()
     return (selection.resolve(text),)
 

@@ -80,7 +80,8 @@ def parse_expression(text: str, known: Collection[str]) -> Expression:
         tree = ast.parse(text.strip(), mode="eval").body
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
         raise DataError(
-            f"cannot read expression '{text}' (expected something like '1e-6*ax*ay + 1e-7*sin(t/400)')"
+            f"cannot read expression '{text}' (expected SI numbers, powers as **, such as "
+            "'1e-6*ax*ay**2 + 1e-7*sin(t/400)')"
         ) from error
     names: set[str] = set()
     _check(tree, text, known, names)
