@@ -23,9 +23,10 @@ from sdimu_calibration.core.effects.imu_model import ImuModel
 from sdimu_calibration.core.filter import body_frame
 from sdimu_calibration.core.filter.passes import Progress
 from sdimu_calibration.core.hand.hand_data import HandRun, reduce_run, turns
+from sdimu_calibration.core.hand.hand_faults import data_faults, without_impossible
 from sdimu_calibration.core.hand.hand_fit import FORCE, RATE, TURN, HandFit, Point, Scene, fit_run
 from sdimu_calibration.core.navigation.alignment import levelled
-from sdimu_calibration.core.recording import DataError, Recording
+from sdimu_calibration.core.recording import DataError, DataFault, Recording
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.specification import ImuSpecification, Model, Site
 from sdimu_calibration.core.units import STANDARD_GRAVITY, from_si
@@ -88,6 +89,7 @@ def hand_calibrate(
     if progress is not None:
         progress("rests", 0.1)
     sensors = imu_model.build(model.effects, imu)
+    recording, impossible = without_impossible(recording)
     rests = find_rests(recording)
     if len(rests) < FEWEST_RESTS:
         raise DataError(
@@ -99,7 +101,8 @@ def hand_calibrate(
     if progress is not None:
         progress("least squares", 0.3)
     found = fit_run(run, scene, first_point(run, sensors, scene.gravity))
-    return _assemble(recording, run, scene, found, site, model)
+    faults = (*impossible, *data_faults(recording, run, found))
+    return _assemble(recording, run, scene, found, site, model, faults)
 
 
 def make_scene(sensors: ImuModel, imu: ImuSpecification, site: Site | None, rests: Rests) -> Scene:
@@ -147,8 +150,9 @@ def first_point(run: HandRun, sensors: ImuModel, gravity: float) -> Point:
 
 
 def _assemble(
-    recording: Recording, run: HandRun, scene: Scene, found: HandFit, site: Site | None, model: Model
-) -> Calibration:
+    recording: Recording, run: HandRun, scene: Scene, found: HandFit, site: Site | None, model: Model,
+    faults: tuple[DataFault, ...],
+) -> Calibration:  # fmt: skip
     sensors, p = scene.model, len(scene.model.prior)
     covariance = np.zeros((p, p))
     covariance[np.ix_(scene.kept, scene.kept)] = found.covariance
@@ -176,8 +180,10 @@ def _assemble(
             "duration_s": float(recording.t[-1]),
             "stops": float(len(run.t)),
         },
-        notes=(*recording.notes, *_notes(run, scene, found, site)),
+        notes=(*recording.notes, *(f.text for f in faults), *_notes(run, scene, found, site)),
         history=no_history(p),
+        warnings=tuple(f.text for f in faults if f.grave),
+        faults=faults,
     )
 
 
@@ -194,9 +200,7 @@ def _notes(run: HandRun, scene: Scene, found: HandFit, site: Site | None) -> lis
     ]
     sigma = np.sqrt(np.diag(found.covariance))
     names = [scene.model.names[i] for i in scene.kept]
-    unknown = [
-        n for n, s, q in zip(names, sigma, np.sqrt(np.diag(scene.prior)), strict=True) if s > _UNKNOWN * q
-    ]
+    unknown = [n for n, s, q in zip(names, sigma, np.sqrt(np.diag(scene.prior)), strict=True) if s > _UNKNOWN * q]
     if unknown:
         out.append(f"not determined by this recording: {', '.join(unknown)}")
     return out
