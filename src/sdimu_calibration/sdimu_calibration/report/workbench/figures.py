@@ -71,7 +71,7 @@ def ladder(names: Sequence[str], values: Sequence[float], at_held: Sequence[floa
         )  # fmt: skip
     figure.add_hline(
         y=1.0, line={"dash": "dash", "color": "#222", "width": 1.5}, opacity=1.0, annotation_text="1 is right",
-        annotation_position="bottom right",
+        annotation_position="bottom left",
     )  # fmt: skip
     top = max([*values, *(v for v in at_held if v is not None), 1.0])
     figure.update_yaxes(title_text="held-out RMS (sigma)", range=[0, 1.25 * top])

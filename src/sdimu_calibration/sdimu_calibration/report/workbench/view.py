@@ -94,7 +94,7 @@ def layout(title: str, recordings: Sequence[str]) -> Any:
                     dcc.Dropdown(id="candidate", placeholder="or search the catalogue"),
                     html.Button("Add", id="add"),
                     html.H2("Added to the model"),
-                    dcc.Dropdown(id="added", placeholder="nothing yet"), html.Button("Take out", id="drop"),
+                    dcc.Dropdown(id="added", placeholder="choose one to take out"), html.Button("Take out", id="drop"),
                     html.H2("An effect of your own, as an expression"),
                     dcc.Textarea(id="own", value=TEMPLATE, rows=8, persistence=True, persistence_type="session"),
                     html.Div([
