@@ -20,7 +20,7 @@ from sdimu_calibration.core.specification import Site
 from sdimu_calibration.core.units import parse_unit
 from sdimu_calibration.storage import effect_file
 from sdimu_calibration.storage.config import load_imu, load_model
-from sdimu_calibration.storage.effect_file import extended_model, find_effects, load_effect, si_unit
+from sdimu_calibration.storage.effect_file import effects_of_result, extended_model, find_effects, load_effect, si_unit
 from sdimu_sim.core.scenario import Scenario, generate
 
 TWIN = """\
@@ -190,3 +190,10 @@ def test_the_group_of_plug_ins_is_read_from_installed_packages():
 def test_an_equation_of_no_sensor_names_the_sensors():
     with pytest.raises(DataError, match=r"no such sensor.*accel_z"):
         find_effects("gyro_q: ey^2")
+
+
+def test_a_result_states_its_equations_itself():
+    (found,) = effects_of_result(("gyro_bias", "gyro_x: ey^2"), ())
+    assert found.name == "gyro_x: ey^2"
+    assert effects_of_result(("gyro_x: ey^2",), ("gyro_x: ey^2",))[0].name == found.name
+    assert len(effects_of_result(("gyro_x: ey^2",), ("gyro_x: ey^2",))) == 1

@@ -36,12 +36,12 @@ def compensate(
     from sdimu_calibration.storage.compensated_bag import write_compensated
     from sdimu_calibration.storage.compensated_imu import frame_of
     from sdimu_calibration.storage.config import load_imu
-    from sdimu_calibration.storage.effect_file import find_effects
+    from sdimu_calibration.storage.effect_file import effects_of_result
     from sdimu_calibration.storage.result_file import read_result
 
     console = Console()
     calibration = read_result(result)
-    own = [found for text in effect or [] for found in find_effects(text)]
+    own = effects_of_result(calibration.model, effect or [])
     specification = load_imu(imu)
     recording = read_recording(bag)
     using = compensator(

@@ -25,13 +25,13 @@ def export(
     from rich.console import Console
 
     from sdimu_calibration.storage.config import load_imu
-    from sdimu_calibration.storage.effect_file import find_effects
+    from sdimu_calibration.storage.effect_file import effects_of_result
     from sdimu_calibration.storage.export import FORMS
     from sdimu_calibration.storage.export import export as write
     from sdimu_calibration.storage.result_file import read_result
 
     calibration = read_result(result)
-    own = [found for text in effect or [] for found in find_effects(text)]
+    own = effects_of_result(calibration.model, effect or [])
     folder = result if result.is_dir() else result.parent
     name = FORMS[form].file_name if form in FORMS else ""
     done = write(form, out or folder / name, calibration, load_imu(imu), own, rate)

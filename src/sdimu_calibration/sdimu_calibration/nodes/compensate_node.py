@@ -32,7 +32,7 @@ from sdimu_calibration.nodes.ticking import Ticker
 from sdimu_calibration.storage.cdr import LayoutError, Stamps, decode_imu
 from sdimu_calibration.storage.compensated_imu import encode_compensated, frame_of
 from sdimu_calibration.storage.config import load_imu
-from sdimu_calibration.storage.effect_file import find_effects
+from sdimu_calibration.storage.effect_file import effects_of_result
 from sdimu_calibration.storage.result_file import read_result
 
 RAW, COMPENSATED, TEMPERATURE = "/imu/data_raw", "/imu/data", "/imu/temperature"
@@ -90,7 +90,7 @@ class CompensateNode:
         if not path:
             raise DataError("compensate: parameter 'result' is empty (expected the path of a result.json)")
         calibration = read_result(Path(path))
-        own = [found for text in parameter("effects").value if text for found in find_effects(text)]
+        own = effects_of_result(calibration.model, [text for text in parameter("effects").value if text])
         start = float(parameter("start_temperature").value)
         using = compensator(
             calibration, load_imu(str(parameter("imu").value)), own=own, has_temperature=True,

@@ -108,6 +108,13 @@ def find_effects(text: str) -> tuple[Effect, ...]:
     return (selection.resolve(text),)
 
 
+def effects_of_result(model: Sequence[str], named: Sequence[str]) -> tuple[Effect, ...]:
+    """Effects of a result (their names: `model`) that are in no catalogue: those `named`, and equations it states."""
+    register_plugins()
+    equations = [text for text in model if text.partition(":")[0] in CHANNELS and text not in named]
+    return tuple(effect for text in (*named, *equations) for effect in find_effects(text))
+
+
 def _equation(text: str) -> Effect:
     """Effect ``d(sensor) = k formula``; k as large as a bias may be where the formula comes to its usual size."""
     sensor, _, formula = (part.strip() for part in text.partition(":"))
