@@ -35,8 +35,9 @@ def test_predicted_sigma_is_the_sigma_after_the_test(imu, model, site):
 def test_sigma_reaches_the_bound_of_all_data(imu, model, site):
     found = predict(KIM18, site, imu, model, bound=bound_covariance)
     k = free(found)
-    # The bound is another algorithm; what differs is the first second of a stop and second order of the responses.
-    np.testing.assert_allclose(found.sigma[k], found.bound[k], rtol=0.02)
+    # The bound is another algorithm; what differs is second order in Earth rate times the length of a turn, 5e-5 of the
+    # responses, against velocities and positions known to 1e-2 of what noise makes of them.
+    np.testing.assert_allclose(found.sigma[k], found.bound[k], rtol=2e-3)
 
 
 def test_sigma_never_rises_and_stands_still_while_the_table_turns(imu, model, site):

@@ -177,8 +177,7 @@ def travel(
     """Integrate one motion and linearise it.
 
     The linear responses are taken in the frame that does not turn and meets n at the end of the motion, where
-    attitude errors stand still and velocity errors grow by their product with the force only. Left out: the gravity
-    gradient and the turn of n in the velocity, both below 1e-2 of the response for minutes.
+    attitude errors stand still and velocity errors grow by their product with the force and by the gradient of gravity.
 
     Parameters
     ----------
@@ -207,10 +206,17 @@ def travel(
     left = np.cumsum(c.dt[::-1])[::-1] - 0.5 * c.dt
     still = _not_turning(0.5 * (track[:-1] + track[1:]), left, latitude)
     dv = np.einsum("kij,kj->ki", still, upsilon)
-    # What is still to come after each cycle: velocity, and its integral.
+    # What is still to come after each cycle: velocity, and the displacement that it makes.
     velocity = np.cumsum(dv[::-1], axis=0)[::-1] - 0.5 * dv
-    position = np.cumsum((velocity * c.dt[:, None])[::-1], axis=0)[::-1] - 0.5 * velocity * c.dt[:, None]
+    # An increment displaces by the time after itself, not by the time since the cycle: they differ as n turns.
+    part = dv * left[:, None]
+    position = np.cumsum(part[::-1], axis=0)[::-1] - 0.5 * part
     by_angle, by_push = _transfers(velocity, position, left)
+    turn = rotation_matrix(-float(c.dt.sum()) * earth.earth_rate(latitude))
+    whole = np.vstack([np.eye(3), -skew(dv.sum(axis=0)), -skew(part.sum(axis=0))])
+    _pulled(by_angle, by_push, whole, dv, left, latitude, height)
+    for response in (by_angle, by_push, whole):
+        _over_the_earth(response, latitude, height)
     # A sample is (1 + slope) times the truth and more, so what is taken out of it weighs 1 / (1 + slope).
     in_n = np.zeros((len(own), 6, 6))
     in_n[:, :3, :3] = in_n[:, 3:, 3:] = still
@@ -222,9 +228,48 @@ def travel(
     noise += densities[1] * np.einsum("kij,klj,k->il", by_push, by_push, c.dt)
     noise[range(3), range(3)] += np.sum((GAP_SHARE * c.gap_angle) ** 2)
     seconds = float(c.dt.sum())
-    turn = rotation_matrix(-seconds * earth.earth_rate(latitude))
-    whole = np.vstack([np.eye(3), -skew(dv.sum(axis=0)), -skew((dv * left[:, None]).sum(axis=0))])
     return Travel(track[-1], moved, seconds, whole @ turn, coefficient, noise)
+
+
+def _pulled(
+    by_angle: Floats, by_push: Floats, whole: Floats, dv: Floats, left: Floats, latitude: float, height: float
+) -> None:
+    """Add to the responses, in place, that gravity changes with the displacement: to first order in its gradient.
+
+    A push displaces by the time after it, so gravity adds its gradient times left^2 / 2 to the velocity and left^3 / 6
+    to the position; what a small turn makes of later increments `dv` (n, 3) goes the same way.
+    """
+    r_n, r_e = earth.radii(latitude)
+    stiffness = earth.normal_gravity(latitude, height) / (np.sqrt(r_n * r_e) + height)
+    gradient = np.diag([-stiffness, -stiffness, 2.0 * stiffness])
+    for row, power in ((3, left**2 / 2.0), (6, left**3 / 6.0)):
+        part = dv * power[:, None]
+        after = np.cumsum(part[::-1], axis=0)[::-1] - 0.5 * part
+        by_push[:, row : row + 3] += power[:, None, None] * gradient
+        by_angle[:, row : row + 3] -= gradient @ _crosses(after)
+        whole[row : row + 3] -= gradient @ skew(part.sum(axis=0))
+
+
+def _crosses(v: Floats) -> Floats:
+    """Cross product matrices of vectors (n, 3), shape (n, 3, 3)."""
+    out = np.zeros((len(v), 3, 3))
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        out[:, i, j], out[:, i, k] = -v[:, k], v[:, j]
+    return out
+
+
+def _over_the_earth(response: Floats, latitude: float, height: float) -> None:
+    """Take responses (..., 9, 3) at the end of a motion from the frame that does not turn to n, in place.
+
+    Velocity over the Earth is less by what the Earth carries along; and n is that of the place navigated to, so that a
+    displacement tilts it.
+    """
+    at = min(max(latitude, -earth.POLE_LIMIT), earth.POLE_LIMIT)
+    r_n, r_e = earth.radii(at)
+    tilt = np.zeros((3, 3))
+    tilt[0, 1], tilt[1, 0], tilt[2, 1] = 1.0 / (r_e + height), -1.0 / (r_n + height), -np.tan(at) / (r_e + height)
+    response[..., 3:6, :] -= skew(earth.earth_rate(latitude)) @ response[..., 6:9, :]
+    response[..., 0:3, :] -= tilt @ response[..., 6:9, :]
 
 
 def _not_turning(C_nb: Floats, left: Floats, latitude: float) -> Floats:
@@ -239,7 +284,7 @@ def _not_turning(C_nb: Floats, left: Floats, latitude: float) -> Floats:
 def _transfers(velocity: Floats, position: Floats, left: Floats) -> tuple[Floats, Floats]:
     """Attitude, velocity and position at the end per small turn and per push in each cycle, (n, 9, 3) each.
 
-    `velocity`, `position` (n, 3): increments that the force makes after the cycle; `left` (n,): time after it.
+    `velocity`, `position` (n, 3): what the force makes after the cycle; `left` (n,): time after it.
     """
     n = len(left)
     by_angle, by_push = np.zeros((n, 9, 3)), np.zeros((n, 9, 3))
