@@ -82,6 +82,11 @@ def test_stated_units_are_taken_and_wrong_ones_refused(tmp_path):
         open_recording(path, Source(accel_sign=2))
 
 
+def test_a_dead_axis_is_named(tmp_path):
+    with pytest.raises(DataError, match=r"angular_velocity\.y is 0 in all .* samples: the axis is dead"):
+        open_recording(write(tmp_path / "b", w=np.array([1.0, 0.0, 1.0])))
+
+
 def test_the_topic_that_was_asked_for_is_read(tmp_path):
     path = write(tmp_path / "b", topics=Topics(imu="/x/imu"))
     assert len(open_recording(path, Source(TopicChoice(imu="/x/imu"))).t) == len(simulated().t)

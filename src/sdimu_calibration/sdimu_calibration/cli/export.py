@@ -38,4 +38,6 @@ def export(
     console = Console()
     for text in done.missing:
         console.print(f"not in the file: {text}", soft_wrap=True, markup=False, highlight=False)
+    if form == "kalibr":
+        console.print(f"noise densities are those of '{imu}' (--imu)", soft_wrap=True, markup=False, highlight=False)
     console.print(f"body frame: {calibration.body_frame}; {' '.join(map(str, done.files))}", soft_wrap=True)

@@ -99,6 +99,9 @@ def open_recording(path: Path, source: Source | None = None) -> Recording:
     recording = read_recording(path, source.topics)
     if len(recording.t) < _FEWEST:
         return recording
+    dead = _dead(recording)
+    if dead is not None:
+        raise DataError(f"{path}: {dead}")
     try:
         reading = recognise(recording.t, recording.omega_ib_b, recording.f_ib_b, stated)
     except DataError as error:
@@ -109,6 +112,17 @@ def open_recording(path: Path, source: Source | None = None) -> Recording:
         )
     recording = replace(recording, notes=(*recording.notes, *reading.notes))
     return _with_temperature(aligned(evened(recording)))
+
+
+def _dead(recording: Recording) -> str | None:
+    """Name an axis that shows one number all the time, although the IMU is not a perfect one at rest."""
+    if not np.ptp(recording.f_ib_b, axis=0).any():
+        return None
+    for kind, values in (("angular_velocity", recording.omega_ib_b), ("linear_acceleration", recording.f_ib_b)):
+        for axis, x in zip("xyz", values.T, strict=True):
+            if x.min() == x.max():
+                return f"{kind}.{axis} is {x[0] + 0.0:.4g} in all {len(x)} samples: the axis is dead; check the driver"
+    return None
 
 
 def _with_temperature(recording: Recording) -> Recording:
