@@ -95,6 +95,11 @@ def calibrate(
     recording = open_recording(bag, origin)
     specification, told = with_noise(specification, recording, noise)
     chosen = chosen_estimator("hand" if hand else estimator, recording, specification)
+    if truth is not None and chosen == "classical":
+        raise typer.BadParameter(
+            "the classical estimator answers in the table's axes, in which no truth is kept: leave it out, or see "
+            "sdimu study mount", param_hint="--truth",
+        )  # fmt: skip
     if chosen == "hand" and not (hand or estimator == "hand"):
         console.print(HAND_CHOSEN, soft_wrap=True)
     wanted = extended_model(model or ("hand" if chosen == "hand" else "baseline"), add or [])

@@ -60,3 +60,4 @@ def compensate(
         f"{out}: {done.samples} samples in frame {frame}; changed by up to {rate:.4g} deg/h and {force:.4g} ug",
         soft_wrap=True, highlight=False,
     )  # fmt: skip
+    console.print(f"noise in the covariances is that of '{imu}' (--imu)", soft_wrap=True, markup=False, highlight=False)

@@ -86,3 +86,9 @@ def test_plan_without_turns_is_one_rest(site):
     recording = nominal_recording(Plan("rest", (30.0,), (), 1.0), site)
     assert recording.t[-1] == pytest.approx(30.0)
     assert np.ptp(recording.f_ib_b, axis=0).max() == 0.0
+
+
+def test_a_first_stop_too_short_to_level_at_is_named(site):
+    plan = load_plan("kim18")
+    with pytest.raises(DataError, match=r"first stop of 0\.5 s"):
+        nominal_recording(replace(plan, dwell_s=(0.5,) * len(plan.dwell_s)), site)

@@ -116,7 +116,8 @@ def table_attitude(log: TableLog, t: Floats, gimbals: tuple[str, str, str]) -> F
     """Attitude of the platform at times `t` (n,), shape (n, 3, 3): outer, then middle, then inner turn."""
     C = np.broadcast_to(np.eye(3), (len(t), 3, 3))
     for name, letter in zip(("outer", "middle", "inner"), gimbals, strict=True):
-        angle = np.interp(t, log.t, log.angle[:, log.names.index(name)])
+        # An encoder may count from -180 to 180 deg: between two readings it did not turn back by almost a whole turn.
+        angle = np.interp(t, log.t, np.unwrap(log.angle[:, log.names.index(name)]))
         C = C @ _about(letter, angle)
     return np.asarray(C)
 

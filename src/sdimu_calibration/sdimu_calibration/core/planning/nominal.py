@@ -63,6 +63,10 @@ def turned(t: Floats, turn: Turn, ramp_s: float) -> tuple[Floats, Floats]:
     return np.where(2.0 * at <= length, part, turn.angle_rad - part), peak * ramp / ramp_s
 
 
+_LEAST_DWELL_S = 2.0
+"""A whole epoch of a second at rest, wherever it begins."""
+
+
 def nominal_recording(plan: Plan, site: Site, mount_rad: Floats | None = None, rate_hz: float = RATE_HZ) -> Recording:
     """Record a plan with a perfect IMU.
 
@@ -83,8 +87,13 @@ def nominal_recording(plan: Plan, site: Site, mount_rad: Floats | None = None, r
     Raises
     ------
     DataError
-        When a turn needs more acceleration than the plan allows.
+        When a turn needs more acceleration than the plan allows, or the first stop is too short to level at.
     """
+    if plan.dwell_s[0] < _LEAST_DWELL_S:
+        raise DataError(
+            f"plan {plan.name}: its first stop of {plan.dwell_s[0]:g} s is shorter than the {_LEAST_DWELL_S:g} s "
+            "in which an epoch at rest can be told from motion; dwell longer"
+        )
     gravity = site.gravity_m_s2 or float(earth.normal_gravity(site.latitude_rad, site.height_m))
     C_tb = rotation_matrix(np.zeros(3) if mount_rad is None else np.asarray(mount_rad, dtype=float))
     begin, end, ramps = _schedule(plan)
