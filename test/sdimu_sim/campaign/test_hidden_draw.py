@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from sdimu_calibration.core.diagnosis.candidates import catalogue, split
-from sdimu_calibration.core.effects.effect import CHANNELS, TestTimes
+from sdimu_calibration.core.effects.effect import CHANNELS, Timetable
 from sdimu_calibration.core.effects.motion import Motion
 from sdimu_calibration.core.recording import DataError, Recording
 from sdimu_calibration.storage.config import load_imu
@@ -21,7 +21,7 @@ from sdimu_sim.core.hidden import CONSTANTS, VARIABLES, parse_effects
 
 STOPS = tuple((k, 150.0 * k, 150.0 * k + 100.0) for k in range(8))
 TURNS = tuple((k, 150.0 * k + 100.0, 150.0 * k + 150.0) for k in range(7))
-TIMES = TestTimes(1150.0, STOPS, TURNS)
+TIMES = Timetable(1150.0, STOPS, TURNS)
 SEEDS = range(60)
 
 

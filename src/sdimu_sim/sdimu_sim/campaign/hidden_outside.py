@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sdimu_calibration.core.effects.effect import CHANNELS, Effect, Parameter, Term, TestTimes
+from sdimu_calibration.core.effects.effect import CHANNELS, Effect, Parameter, Term, Timetable
 from sdimu_calibration.core.effects.motion import Floats, Motion
 
 OUTSIDE = "outside"
@@ -44,7 +44,7 @@ class Shape:
         )  # fmt: skip
 
 
-def shapes(times: TestTimes) -> list[Shape]:
+def shapes(times: Timetable) -> list[Shape]:
     """Every shape on every sensor that is drawn."""
     out: list[Shape] = []
     for sensor in CHANNELS:

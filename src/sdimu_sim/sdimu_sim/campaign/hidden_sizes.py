@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sdimu_calibration.core.diagnosis.candidates import catalogue
-from sdimu_calibration.core.diagnosis.evidence import collect, test_times
+from sdimu_calibration.core.diagnosis.evidence import collect, timetable
 from sdimu_calibration.core.diagnosis.scan import scan
 from sdimu_calibration.core.filter.passes import solve
 from sdimu_calibration.core.filter.reduced import reduce, set_up
@@ -73,7 +73,7 @@ def sizes(plan: str, latitude_deg: float, imu: ImuSpecification, model: Model) -
     setup = set_up(site, imu, model)
     reduced = reduce(simulate(scenario, imu_truth(scenario)), setup)
     solution = solve(setup, reduced, lambda _word, _share: None, keep=True)
-    times = test_times(reduced)
+    times = timetable(reduced)
     known = catalogue(times, set(setup.sensors.names), True)
     evidence = collect(reduced, setup, solution.last, [*known, *(s.effect() for s in shapes(times))])
     scanned = scan(evidence.information, evidence.model, evidence.weight)

@@ -37,7 +37,7 @@ def test_both_steps_that_are_added_are_in_the_model_and_the_same_one_is_there_on
 
 def test_a_step_in_the_model_leaves_other_steps_to_be_found() -> None:
     stops = tuple((k, 200.0 * k, 200.0 * k + 100.0) for k in range(5))
-    times = kinds.TestTimes(900.0, stops, tuple((k, e, e + 100.0) for k, _, e in stops[:-1]))
+    times = kinds.Timetable(900.0, stops, tuple((k, e, e + 100.0) for k, _, e in stops[:-1]))
     every = {label for e in catalogue(times, set(), False) for label in e.labels if "gyro_bias_step_y" in label}
     (taken, *_) = sorted(every)
     left = {label for e in catalogue(times, {taken}, False) for label in e.labels if "gyro_bias_step_y" in label}

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sdimu_calibration.core.effects import registry
-from sdimu_calibration.core.effects.effect import AXES, CHANNELS, Column, Effect, Parameter, Term, TestTimes, product
+from sdimu_calibration.core.effects.effect import AXES, CHANNELS, Column, Effect, Parameter, Term, Timetable, product
 from sdimu_calibration.core.effects.motion import Floats, Motion
 
 _CYCLES = np.arange(1.0, 20.0, 0.5)
@@ -51,7 +51,7 @@ def split(effect: Effect) -> list[Candidate]:
     return out
 
 
-def catalogue(times: TestTimes, in_model: set[str], has_temperature: bool) -> list[Effect]:
+def catalogue(times: Timetable, in_model: set[str], has_temperature: bool) -> list[Effect]:
     """Every effect of the catalogue with the parameters that the model lacks, scans spread out over the test."""
     out: list[Effect] = []
     for name in registry.names():
@@ -71,7 +71,7 @@ def without(effect: Effect, in_model: set[str]) -> list[Effect]:
     return [effect.only(missing)] if missing else []
 
 
-def free_inputs(times: TestTimes) -> list[Effect]:
+def free_inputs(times: Timetable) -> list[Effect]:
     """Give every sensor a constant error of its own in every dwell and every turn; one effect a segment."""
 
     def segment(label: str, start: float, end: float) -> Effect:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from sdimu_calibration.core.diagnosis.candidates import Candidate, split
 from sdimu_calibration.core.diagnosis.information import Information
 from sdimu_calibration.core.diagnosis.signatures import measured_rows, signatures
-from sdimu_calibration.core.effects.effect import Effect, TestTimes
+from sdimu_calibration.core.effects.effect import Effect, Timetable
 from sdimu_calibration.core.effects.motion import Motion
 from sdimu_calibration.core.filter.filter_pass import NAV, PassOutput, PassState, new_output, run_pass
 from sdimu_calibration.core.filter.passes import Pass, pass_settings
@@ -50,7 +50,7 @@ class Evidence:
     output : PassOutput
         Of the navigation filter.
     seen : Motion
-    times : TestTimes
+    times : Timetable
     reduced : Reduced
     latitude : float
         Of the site (rad).
@@ -69,7 +69,7 @@ class Evidence:
     grade: str
     output: PassOutput
     seen: Motion
-    times: TestTimes
+    times: Timetable
     reduced: Reduced
     latitude: float
 
@@ -117,8 +117,8 @@ class Evidence:
         return part
 
 
-def test_times(reduced: Reduced) -> TestTimes:
-    """When the test stood and turned, from the phases of the epochs."""
+def timetable(reduced: Reduced) -> Timetable:
+    """When the recording stood and turned, from the phases of the epochs."""
     phases, epochs = reduced.phases, reduced.epochs
     edges = np.flatnonzero(np.diff(np.concatenate([[0], phases.dwell.astype(int), [0]])))
     dwells = [
@@ -127,10 +127,7 @@ def test_times(reduced: Reduced) -> TestTimes:
     ]
     dwells = [d for d in dwells if d[2] - d[1] >= 3.0]
     turns = [(a[0], a[2], b[1]) for a, b in pairwise(dwells)]
-    return TestTimes(float(epochs.end[-1]), tuple(dwells), tuple(turns))
-
-
-test_times.__test__ = False  # type: ignore[attr-defined]
+    return Timetable(float(epochs.end[-1]), tuple(dwells), tuple(turns))
 
 
 def navigation_pass(reduced: Reduced, setup: Setup, finished: Pass) -> Pass:
@@ -180,7 +177,7 @@ def collect(reduced: Reduced, setup: Setup, finished: Pass, effects: Sequence[Ef
         names=(*sensors.names, *(c.label for c in candidates)),
         weight=1.0 / sensors.prior**2, shift=-finished.estimate, candidates=tuple(candidates), prior=prior,
         grade=setup.imu.grade,
-        output=known.output, seen=seen, times=test_times(reduced), reduced=reduced, latitude=setup.site.latitude_rad,
+        output=known.output, seen=seen, times=timetable(reduced), reduced=reduced, latitude=setup.site.latitude_rad,
     )  # fmt: skip
 
 

@@ -21,7 +21,7 @@ from sdimu_calibration.core.diagnosis.candidates import (
     periodic,
     split,
 )
-from sdimu_calibration.core.diagnosis.evidence import Evidence, collect, test_times
+from sdimu_calibration.core.diagnosis.evidence import Evidence, collect, timetable
 from sdimu_calibration.core.diagnosis.remainder import Remainder, remainder
 from sdimu_calibration.core.diagnosis.search import Search, search
 from sdimu_calibration.core.effects.effect import Effect
@@ -149,7 +149,7 @@ def take(
     base: Solution, solution: Solution, tried: Sequence[Candidate], extra: Sequence[Effect], alpha: float, own: bool
 ) -> Look:
     """Collect the evidence about a solution, with what it tried as candidates, and search it."""
-    times = test_times(base.reduced)
+    times = timetable(base.reduced)
     in_model = {label for effect in base.setup.sensors.effects for label in effect.labels}
     has_temperature = base.reduced.temperature is not None
     known = _untried([*extra, *catalogue(times, in_model, has_temperature)], tried, in_model)

@@ -12,7 +12,7 @@ from sdimu_calibration.core.effects.effect import (
     GYRO,
     Column,
     Effect,
-    TestTimes,
+    Timetable,
     family,
     per_axis_columns,
     pick,
@@ -158,4 +158,4 @@ MASS_UNBALANCE_RAMP = register(
     )
 )  # fmt: skip
 
-__all__ = ["MASS_UNBALANCE_RAMP", "TestTimes", "random_walk", "step", "warm_up"]
+__all__ = ["MASS_UNBALANCE_RAMP", "Timetable", "random_walk", "step", "warm_up"]

@@ -113,7 +113,7 @@ class Effect:
     family: str = ""
     options: Mapping[str, str] = field(default_factory=dict)
     with_options: Callable[..., Effect] | None = None
-    scan: Callable[[TestTimes], tuple[Effect, ...]] | None = None
+    scan: Callable[[Timetable], tuple[Effect, ...]] | None = None
     nearer: Callable[[], tuple[Effect, ...]] | None = None
 
     def only(self, names: tuple[str, ...]) -> Effect:
@@ -144,8 +144,8 @@ class Effect:
 
 
 @dataclass(frozen=True)
-class TestTimes:
-    """When a test stands and turns.
+class Timetable:
+    """When a recording stands and turns.
 
     Attributes
     ----------

@@ -18,7 +18,7 @@ from sdimu_calibration.core.calibrate import assemble, predict_stops
 from sdimu_calibration.core.diagnosis.candidates import catalogue, free_inputs
 from sdimu_calibration.core.diagnosis.consistency import check
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
-from sdimu_calibration.core.diagnosis.evidence import Evidence, collect, test_times
+from sdimu_calibration.core.diagnosis.evidence import Evidence, collect, timetable
 from sdimu_calibration.core.diagnosis.remainder import Remainder, remainder
 from sdimu_calibration.core.diagnosis.scan import scan, threshold
 from sdimu_calibration.core.diagnosis.search import FALSE_ALARM, Problem, Search
@@ -217,7 +217,7 @@ def _onward(parent: Fitted, setup: Setup, reduced: Reduced, tell: Tell) -> Solut
 def look(recording: Recording, solution: Solution, candidates: bool = True) -> Diagnosis:
     """Score all candidates, or none, against a fit, without adding any."""
     setup, reduced = solution.setup, solution.reduced
-    times = test_times(reduced)
+    times = timetable(reduced)
     known = catalogue(times, set(setup.sensors.names), reduced.temperature is not None) if candidates else []
     free = free_inputs(times) if candidates else []
     evidence = collect(reduced, setup, solution.last, [*known, *free])
