@@ -79,13 +79,12 @@ def _steps(console: Console, told: Account) -> None:
         return
     for number, s in enumerate(steps, start=1):
         end = f"error with one stop held out {s.held_out_before.rms:.3f} -> {s.held_out_after.rms:.3f}"
-        what = "added" if s.accepted else f"refused: {s.reason}"
         _line(
             console,
             f"step {number}: {s.label} (z {s.z:+.1f}, threshold {s.threshold:.1f}, "
-            f"log Bayes factor {s.log_bayes_factor:.0f}; {end}) {what}",
+            f"log Bayes factor {s.log_bayes_factor:.0f}; {end}) {s.fate}",
         )
-        if s.accepted and s.moved:
+        if s.accepted and not s.taken_out and s.moved:
             moved = ", ".join(f"{name} {size:+.1f} sigma" for name, size in s.moved if abs(size) > 1.0)
             if moved:
                 _line(console, f"  without it these were wrong: {moved}")

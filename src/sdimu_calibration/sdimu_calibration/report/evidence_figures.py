@@ -109,7 +109,7 @@ def ranking(entries: Sequence[data.Scored], threshold: float) -> Any:
 
 def ladder(diagnosis: Diagnosis) -> Any:
     """Held-out RMS rung by rung; one is right."""
-    accepted = [step for step in diagnosis.found.steps if step.accepted]
+    accepted = [step for step in diagnosis.found.steps if step.accepted and not step.taken_out]
     if not diagnosis.found.steps:
         return None
     names = ["model as given", *(f"+ {step.label}" for step in accepted)]

@@ -125,7 +125,7 @@ def candidates(diagnosis: Diagnosis) -> Figure:
 
 def ladder(diagnosis: Diagnosis) -> Figure:
     """Error at held-out stops, model by model: one stop at a time, and a third at a time."""
-    steps = [step for step in diagnosis.found.steps if step.accepted]
+    steps = [step for step in diagnosis.found.steps if step.accepted and not step.taken_out]
     names = ["model as given", *(f"+ {step.label}" for step in steps)]
     one = [diagnosis.found.steps[0].held_out_before.rms, *(step.held_out_after.rms for step in steps)]
     third = [float(c.fit.get("held_out_rms") or np.nan) for c in (diagnosis.before, diagnosis.after)]

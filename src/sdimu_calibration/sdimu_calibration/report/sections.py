@@ -118,13 +118,13 @@ def _rung(step: Step) -> list[str]:
         f"{abs(step.z):.1f} ({step.threshold:.1f})", f"{step.log_likelihood_gain:.1f}", f"{step.log_bayes_factor:.1f}",
         f"{step.held_out_before.rms:.3f} \u2192 {step.held_out_after.rms:.3f}",
         f"{step.held_out_gain:.1f} \u00b1 {step.held_out_error:.1f}",
-        "accepted" if step.accepted else f"refused: {step.reason}",
+        step.fate,
     ]  # fmt: skip
 
 
 def _told(step: Step) -> list[str]:
     moved = ", ".join(f"{name} by {size:+.1f} sigma" for name, size in step.moved if abs(size) >= 0.5)
-    out = [f"{step.label}, while missing, pulled {moved}."] if moved and step.accepted else []
+    out = [f"{step.label}, while missing, pulled {moved}."] if moved and step.accepted and not step.taken_out else []
     if step.alike:
         out.append(f"Nothing in these data tells {step.label} from {', '.join(step.alike[:6])}.")
     return out

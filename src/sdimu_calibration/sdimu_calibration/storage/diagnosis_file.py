@@ -181,7 +181,8 @@ def _fit(calibration: Calibration) -> dict[str, Any]:
 
 def _step(s: Step) -> dict[str, Any]:
     return {
-        "label": s.label, "effect": s.family, "accepted": s.accepted, "reason": s.reason, "z": s.z,
+        "label": s.label, "effect": s.family, "accepted": s.accepted, "reason": s.reason,
+        "taken_out": s.taken_out, "z": s.z,
         "threshold": s.threshold, "estimate": s.estimate, "sigma": s.sigma, "unit": s.unit,
         "log_likelihood_gain": s.log_likelihood_gain, "log_bayes_factor": s.log_bayes_factor,
         "held_out_rms_before": s.held_out_before.rms, "held_out_rms_after": s.held_out_after.rms,

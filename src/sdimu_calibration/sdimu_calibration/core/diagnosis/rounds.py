@@ -23,7 +23,7 @@ from sdimu_calibration.core.diagnosis.candidates import (
 )
 from sdimu_calibration.core.diagnosis.evidence import Evidence, collect, timetable
 from sdimu_calibration.core.diagnosis.remainder import Remainder, remainder
-from sdimu_calibration.core.diagnosis.search import Search, search
+from sdimu_calibration.core.diagnosis.search import Search, Step, search
 from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.effects.imu_model import build
 from sdimu_calibration.core.filter.passes import Progress, Solution, solve
@@ -112,6 +112,7 @@ def settle(base: Solution, extra: Sequence[Effect], alpha: float, progress: Prog
 
 def drop_companions(base: Solution, look: Look, progress: Progress) -> Look:
     """Calibrate with what was chosen; drop the weakest below three of its sigmas, one at a time."""
+    small: set[str] = set()
     while True:
         chosen = look.chosen
         solution = with_effects(base, chosen, progress) if chosen else base
@@ -119,11 +120,25 @@ def drop_companions(base: Solution, look: Look, progress: Progress) -> Look:
         size = np.abs(last.estimate[p:]) / np.sqrt(np.diag(last.covariance)[p:])
         keep = np.ones(len(size), dtype=bool)
         if len(size) and size.min() < LEAST_SIGMAS:
-            keep[int(np.argmin(size))] = False
+            weakest = int(np.argmin(size))
+            keep[weakest] = False
+            small.add(chosen[weakest].label)
         kept = look.found.chosen[keep]
         look = replace(look, solution=solution, found=replace(look.found, chosen=kept))
         if keep.all():
-            return replace(look, after=left(look.evidence, kept, look.free, look.found.scale))
+            found = replace(look.found, steps=_fates(look, small))
+            return replace(look, found=found, after=left(look.evidence, kept, look.free, look.found.scale))
+
+
+def _fates(look: Look, small: set[str]) -> tuple[Step, ...]:
+    """Mark the steps that are not among what was found with why."""
+    kept = {c.label for c in look.chosen}
+    weak = f"calibrated with it, it is below {LEAST_SIGMAS:.0f} of its sigmas"
+    gone = "what else was added explains the same better"
+    return tuple(
+        s if not s.accepted or s.label in kept else replace(s, taken_out=weak if s.label in small else gone)
+        for s in look.found.steps
+    )
 
 
 def prefer(wide: Look, look: Look) -> bool:

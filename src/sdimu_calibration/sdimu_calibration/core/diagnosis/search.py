@@ -63,6 +63,8 @@ class Step:
         Why it was refused; empty when accepted.
     moved : tuple of (str, float)
         Coefficients of the model that it moves most, in their own sigmas.
+    taken_out : str
+        Why an accepted step is not among what was found in the end; empty when it is.
     """
 
     index: int
@@ -84,6 +86,14 @@ class Step:
     accepted: bool
     reason: str
     moved: tuple[tuple[str, float], ...] = field(default=())
+    taken_out: str = ""
+
+    @property
+    def fate(self) -> str:
+        """What became of it, in words."""
+        if not self.accepted:
+            return f"refused: {self.reason}"
+        return f"added, then taken out: {self.taken_out}" if self.taken_out else "added"
 
 
 @dataclass(frozen=True)
