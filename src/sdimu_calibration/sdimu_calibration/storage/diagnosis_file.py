@@ -159,6 +159,9 @@ def _candidate(f: Found, own: bool) -> dict[str, Any]:
         "held_out_rms_before": f.held_out_before,
         "held_out_rms_after": f.held_out_after,
         "indistinguishable_from": list(f.alike),
+        "depends_on_choice": [
+            {"instead": s.other, "coefficient": s.coefficient, "sigmas": s.sigmas} for s in f.stakes
+        ],
     }  # fmt: skip
 
 

@@ -13,6 +13,7 @@ import numpy as np
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.diagnosis.found import Found, Reach
 from sdimu_calibration.core.diagnosis.plan_seen import PlanSeen
+from sdimu_calibration.core.diagnosis.stakes import Stake
 
 _EVEN = frozenset(
     {"gyro_scale_asymmetry", "gyro_scale_quadratic", "gyro_misalignment_asymmetry", "gyro_bias_in_motion"}
@@ -33,6 +34,7 @@ _EXACT = {
     "reference_deflection_east": "a deflection to the East is an azimuth whatever the plan",
 }
 _SLOW_MINUTES = 20.0
+_MOST_STAKES = 3
 
 
 @dataclass(frozen=True)
@@ -110,7 +112,21 @@ def _about_found(d: Diagnosis, found: tuple[Found, ...], plan: PlanSeen) -> list
             out.append(f"{one.candidate.label} is a fault of this recording: record again and do not carry it over.")
         if one.alike:
             out.append(separate(one, plan) + _calculated(one))
+        if one.stakes:
+            out.append(_at_stake(one))
     return out
+
+
+def _at_stake(one: Found) -> str:
+    """Say which coefficients are right only if the named member of a class is the right one."""
+    largest: dict[str, Stake] = {}
+    for stake in sorted(one.stakes, key=lambda s: -abs(s.sigmas)):
+        largest.setdefault(stake.coefficient, stake)
+    parts = [
+        f"with {s.other} instead, {s.coefficient} moves by {s.sigmas:+.0f} of its sigmas"
+        for s in list(largest.values())[:_MOST_STAKES]
+    ]
+    return f"Which it is matters: {one.candidate.label} is taken; {'; '.join(parts)}."
 
 
 def _about_latitude(one: Found) -> str:

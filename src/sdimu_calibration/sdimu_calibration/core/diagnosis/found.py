@@ -13,6 +13,7 @@ from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.diagnosis.remainder import remainder
 from sdimu_calibration.core.diagnosis.scan import POWER_80, Scan, alike, scan
 from sdimu_calibration.core.diagnosis.search import Problem
+from sdimu_calibration.core.diagnosis.stakes import Stake, stakes
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -39,6 +40,8 @@ class Found:
         RMS of the normalised prediction errors at stops left out.
     alike : tuple of str
         Candidates that the data cannot tell from it, all others found being in the model.
+    stakes : tuple of Stake
+        Coefficients of the model that hang on which of these it is.
     """
 
     candidate: Candidate
@@ -52,6 +55,7 @@ class Found:
     held_out_before: float
     held_out_after: float
     alike: tuple[str, ...]
+    stakes: tuple[Stake, ...]
 
 
 def found_effects(d: Diagnosis) -> tuple[Found, ...]:
@@ -78,6 +82,7 @@ def found_effects(d: Diagnosis) -> tuple[Found, ...]:
         scores = problem.scores(scanned, d.found.scale)
         z = float(scanned.z[column])
         count = int(np.isfinite(scanned.sigma[allowed]).sum())
+        others = _alike(d, problem, chosen, column, allowed)
         out.append(
             Found(
                 candidate=d.chosen[k],
@@ -90,7 +95,8 @@ def found_effects(d: Diagnosis) -> tuple[Found, ...]:
                 explained=float(np.clip((misfit[k] - misfit[k + 1]) / whole, 0.0, 1.0)),
                 held_out_before=problem.held_out(chosen[:k], 1.0).rms,
                 held_out_after=problem.held_out(chosen[: k + 1], 1.0).rms,
-                alike=_alike(d, problem, chosen, column, allowed),
+                alike=tuple(d.evidence.names[i] for i in others),
+                stakes=stakes(problem, chosen, column, others, d.found.scale),
             )
         )
     return tuple(out)
@@ -197,11 +203,12 @@ def _estimates(d: Diagnosis, problem: Problem, chosen: list[int]) -> tuple[Float
     return values, sigmas
 
 
-def _alike(d: Diagnosis, problem: Problem, chosen: list[int], column: int, allowed: Ints) -> tuple[str, ...]:
+def _alike(d: Diagnosis, problem: Problem, chosen: list[int], column: int, allowed: Ints) -> list[int]:
+    """Columns that the data cannot tell from a chosen one, all others chosen being in the model."""
     others = [c for c in chosen if c != column]
     scanned: Scan = problem.scan(others, d.found.scale)
     scores = problem.scores(scanned, d.found.scale)
     outside = np.ones(len(scores), dtype=bool)
     outside[allowed] = False
     scores[outside] = -np.inf
-    return tuple(d.evidence.names[i] for i in alike(scores, column))
+    return alike(scores, column)
