@@ -10,7 +10,14 @@ import pytest
 from sdimu_calibration.core import earth
 from sdimu_calibration.core.calibrate import calibrate
 from sdimu_calibration.core.data.epochs import Epochs
-from sdimu_calibration.core.data.phases import STALE_S, PhaseState, classify, rest_limits, table_says
+from sdimu_calibration.core.data.phases import (
+    STALE_S,
+    PhaseState,
+    classify,
+    rest_limits,
+    table_says,
+    without_early_motion,
+)
 from sdimu_calibration.core.filter.reduced import reduce, set_up
 from sdimu_calibration.core.plan import Plan, Turn
 from sdimu_calibration.core.recording import DataError, PhaseLog
@@ -184,3 +191,41 @@ def test_force_in_g_is_refused_with_a_word_on_units(recorded_test, three_stops, 
     recording = recorded_test(three_stops, seed=5)
     with pytest.raises(DataError, match="units"):
         calibrate(replace(recording, f_ib_b=recording.f_ib_b / 9.80665), site, imu, model)
+
+
+def with_a_gentle_start(imu, rng):
+    """Forty seconds of rest, a turn, forty of rest; the turn begins within the last second before it is noticed."""
+    moving = np.zeros(100, dtype=bool)
+    moving[40:60] = True
+    epochs = epochs_of(moving)
+    rate = rng.normal(0.0, imu.gyro_white_noise, (100, 3))
+    rate[40:60, 1] += TURN_RATE
+    rate[39, 1] += 100.0 * imu.gyro_white_noise
+    return replace(epochs, w_mean=rate)
+
+
+def test_a_turn_that_begins_gently_is_not_taken_for_rest_where_no_table_speaks(imu):
+    epochs = with_a_gentle_start(imu, np.random.default_rng(1))
+    phases = phases_of(epochs, None, imu)
+    assert phases.used[39]
+    mended = without_early_motion(epochs, None, phases, imu.gyro_white_noise)
+    np.testing.assert_array_equal(np.flatnonzero(phases.used & ~mended.used), [39])
+    assert not mended.dwell[39]
+    np.testing.assert_array_equal(mended.stop, phases.stop)
+
+
+def test_what_the_table_calls_a_dwell_stays_one(imu):
+    epochs = with_a_gentle_start(imu, np.random.default_rng(2))
+    log = at_one_hertz([True] * 40 + [False] * 20 + [True] * 40)
+    phases = phases_of(epochs, log, imu)
+    mended = without_early_motion(epochs, log, phases, imu.gyro_white_noise)
+    np.testing.assert_array_equal(mended.used, phases.used)
+
+
+def test_a_rate_that_lasts_after_a_turn_is_left_for_the_diagnosis(imu):
+    """A sensor may be off after a turn, never before one."""
+    epochs = with_a_gentle_start(imu, np.random.default_rng(3))
+    epochs.w_mean[60:63, 0] += 100.0 * imu.gyro_white_noise
+    phases = phases_of(epochs, None, imu)
+    mended = without_early_motion(epochs, None, phases, imu.gyro_white_noise)
+    assert mended.used[60:].all()

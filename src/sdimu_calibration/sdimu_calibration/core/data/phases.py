@@ -7,7 +7,7 @@ IMU decides alone.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -161,6 +161,48 @@ def classify(
             state.stop = int(said_stop[k])
         stop[k] = state.stop
     return Phases(dwell, used, first, stop, (said == 1) & ~still, (said == 0) & still)
+
+
+def without_early_motion(epochs: Epochs, log: PhaseLog | None, phases: Phases, gyro_white_noise: float) -> Phases:
+    """Take the last seconds of a dwell away in which a turn began gently, where the table is silent.
+
+    `RestLimits.rate` has room for bias and Earth rate. A turn that starts without a jerk of its acceleration stays below
+    it for a second, at a hundred sigma of the noise. Only seconds before a turn are judged, by the mean rate of their
+    own dwell: no sensor error comes before its cause, whereas what follows a turn may be one.
+
+    Parameters
+    ----------
+    epochs : Epochs
+    log : PhaseLog or None
+    phases : Phases
+    gyro_white_noise : float
+        Of the specification (rad/s/sqrt(Hz)); the recording's own is taken where it is larger.
+    """
+    silent = table_says(epochs, log)[0] < 0
+    dwell = phases.dwell.copy()
+    ends = np.flatnonzero(dwell[:-1] & silent[:-1] & ~dwell[1:])
+    if not len(ends):
+        return phases
+    pairs = dwell[1:] & dwell[:-1]
+    steps = np.abs(np.diff(epochs.w_mean, axis=0)[pairs])
+    measured = _GAUSS_MAD / np.sqrt(2.0) * float(np.median(steps)) if len(steps) else 0.0
+    limit = _EARLY_SIGMAS * max(gyro_white_noise / np.sqrt(EPOCH_S), measured)
+    moving = np.concatenate([[-1], np.flatnonzero(~dwell)])
+    for end in ends:
+        start = int(moving[np.searchsorted(moving, end) - 1]) + 1
+        middle = np.median(epochs.w_mean[start : end + 1], axis=0)
+        away = np.max(np.abs(epochs.w_mean[start : end + 1] - middle), axis=1) > limit
+        # The first half of a dwell is what the rest is compared with.
+        k = end
+        while k > (start + end) // 2 and away[k - start]:
+            dwell[k] = False
+            k -= 1
+    return replace(phases, dwell=dwell, used=phases.used & dwell, first=phases.first & dwell)
+
+
+_GAUSS_MAD = 1.482602218505602
+_EARLY_SIGMAS = 5.0
+"""Deviation from the mean rate of its dwell at which the last second before a turn belongs to the turn."""
 
 
 def contradictions(epochs: Epochs, phases: Phases, log: PhaseLog | None) -> tuple[DataFault, ...]:

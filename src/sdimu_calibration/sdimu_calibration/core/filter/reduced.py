@@ -10,7 +10,15 @@ from numpy.typing import NDArray
 from sdimu_calibration.core import earth
 from sdimu_calibration.core.data.epochs import Epochs, cut
 from sdimu_calibration.core.data.gaps import Bridges, bridges, judge, largest_acceleration, weighed
-from sdimu_calibration.core.data.phases import Phases, PhaseState, RestLimits, classify, contradictions, rest_limits
+from sdimu_calibration.core.data.phases import (
+    Phases,
+    PhaseState,
+    RestLimits,
+    classify,
+    contradictions,
+    rest_limits,
+    without_early_motion,
+)
 from sdimu_calibration.core.data.soundness import sound, wild
 from sdimu_calibration.core.effects import imu_model
 from sdimu_calibration.core.effects.imu_model import ImuModel
@@ -102,6 +110,7 @@ def reduce(recording: Recording, setup: Setup, screened: bool = True) -> Reduced
     if not len(epochs):
         raise DataError("/imu/data_raw: the recording is shorter than one second")
     phases = classify(epochs, recording.phase, setup.limits, setup.gravity, setup.model.settle_s, PhaseState())
+    phases = without_early_motion(epochs, recording.phase, phases, setup.imu.gyro_white_noise)
     kind = measurement_kinds(phases, setup.model.zero_velocity == "every_epoch")
     cycles = cycles[: int(epochs.last[-1])]
     found = bridges(cycles, epochs, phases.dwell, nominal, largest_acceleration(cycles), setup.gravity)
