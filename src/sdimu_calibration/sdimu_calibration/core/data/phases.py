@@ -166,9 +166,9 @@ def classify(
 def without_early_motion(epochs: Epochs, log: PhaseLog | None, phases: Phases, gyro_white_noise: float) -> Phases:
     """Take the last seconds of a dwell away in which a turn began gently, where the table is silent.
 
-    `RestLimits.rate` has room for bias and Earth rate. A turn that starts without a jerk of its acceleration stays below
-    it for a second, at a hundred sigma of the noise. Only seconds before a turn are judged, by the mean rate of their
-    own dwell: no sensor error comes before its cause, whereas what follows a turn may be one.
+    `RestLimits.rate` has room for bias and Earth rate. A turn that starts without a jump of its acceleration stays
+    below it for a second, at a hundred sigma of the noise. Only seconds before a turn are judged, by the mean rate of
+    their own dwell: no sensor error comes before its cause, whereas what follows a turn may be one.
 
     Parameters
     ----------
