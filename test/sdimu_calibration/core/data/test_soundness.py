@@ -61,3 +61,13 @@ def test_a_shock_that_rings_stays():
     mended, _faults = sound(given)
     # A shock at nearly half the sampling rate alternates as a spike does; one in ten may lose a sample.
     assert len(given.t) - len(mended.t) <= 6
+
+
+def test_a_counter_that_repeats_a_number_while_its_remainder_grows_is_not_stuck():
+    """Pulses coarser than the noise: at one stop hardly any number repeats, at another hundreds do."""
+    rng = np.random.default_rng(7)
+    rate = np.repeat([0.5, 0.5, 0.5, 0.995], N // 4) + 0.001 * rng.standard_normal(N)
+    pulses = np.diff(np.floor(np.cumsum(rate)), prepend=0.0)
+    given = recording(rng, np.zeros((N, 6)))
+    counted = np.column_stack([3e-7 * pulses, given.omega_ib_b[:, 1:]])
+    assert len(sound(Recording(0, given.t, counted, given.f_ib_b))[0].t) == N

@@ -123,7 +123,7 @@ def _stuck(x: Floats) -> NDArray[np.int64]:
     if n < 3 or not same.any():
         return none
     share = max(_repetition(same), 1.0 / n)
-    if share > _REPEATS:
+    if share > _REPEATS or _counts(x):
         return none
     # n chances to begin, each further repetition as probable as `share`.
     improbable = 1 + math.ceil(math.log(_FALSE_ALARM / n) / math.log(share))
@@ -134,10 +134,24 @@ def _stuck(x: Floats) -> NDArray[np.int64]:
     return np.concatenate(rows) if rows else none
 
 
+def _counts(x: Floats) -> bool:
+    """Whether a channel counts pulses that are coarser than its noise.
+
+    A counter repeats a number for as long as its remainder takes to make one more pulse: its runs are no chance.
+    """
+    steps = np.abs(np.diff(x))
+    # Multiples of a pulse in floating point differ by rounding.
+    steps = steps[steps > _ROUNDING * float(np.abs(x).max())]
+    return bool(len(steps)) and float(np.mean(steps < 1.5 * steps.min())) > _REPEATS
+
+
+_ROUNDING = 1e-9
+
+
 def _saturated(x: Floats) -> NDArray[np.int64]:
     """Find readings that stand at the largest or smallest number of a channel that else repeats nothing."""
     none = np.empty(0, dtype=np.int64)
-    if len(x) < 3 or _repetition(np.diff(x) == 0.0) > 1.0 / _BLOCK:
+    if len(x) < 3 or _repetition(np.diff(x) == 0.0) > 1.0 / _BLOCK or _counts(x):
         return none
     ends = [np.flatnonzero(x == end) for end in (x.max(), x.min())]
     rows = [at for at in ends if len(at) >= _LEAST_AT_END]
