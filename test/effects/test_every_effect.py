@@ -144,7 +144,7 @@ def hidden_text(parameter, value):
     name = parameter.name
     factor = parse_unit(parameter.display_unit).factor
     text = f"{name}={float(value / factor)!r} {parameter.display_unit}"
-    if "_warm_up_" in name:
+    if "_warm_up_" in name or "_settling_" in name:
         text += "; tau=40 s"
     if "_bias_step_" in name:
         text += f"; t0={STEP_AT} s"

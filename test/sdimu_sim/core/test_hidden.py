@@ -33,6 +33,11 @@ CLAIMS = [
     ("gyro_bias_temperature_x=0.1 deg/h/degC", "gyro_x", 0.1 * DEGPH * VALUES["dT"]),
     ("accel_bias_temperature_rate_x=7 ug*min/degC", "accel_x", 7 * UG * 60 * VALUES["dTdt"]),
     ("gyro_bias_warm_up_z=0.3 deg/h; tau=20 min", "gyro_z", 0.3 * DEGPH * np.exp(-VALUES["t"] / 1200)),
+    (
+        "gyro_bias_settling_z=0.3 deg/h; tau=20 s",
+        "gyro_z",
+        0.3 * DEGPH * (1.0 - VALUES["moving"]) * np.exp(-VALUES["since"] / 20.0),
+    ),
     ("gyro_bias_ramp_z=0.3 deg/h/h", "gyro_z", 0.3 * DEGPH * VALUES["t"] / 3600),
     ("accel_bias_step_x=5 ug; t0=1000 s", "accel_x", 0.0),
     ("accel_bias_step_x=5 ug; t0=0.5 s", "accel_x", 5 * UG),

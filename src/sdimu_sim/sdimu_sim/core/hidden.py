@@ -32,11 +32,13 @@ VARIABLES: tuple[str, ...] = (
     "dT",
     "dTdt",
     "moving",
+    "since",
 )
 """True means over the sample: body rate w (rad/s), specific force a (f/g), angular acceleration alpha (rad/s^2),
 rate of the table wt (rad/s), magnetic field B (T), lever-arm tensor L (1/s^2), sign of the last turn about and of
 the last change of a along an axis (turned, leant), time t (s), temperature T (deg C), its change since the start dT
-(K) and rate dTdt (K/s), moving (1 while the table turns)."""
+(K) and rate dTdt (K/s), moving (1 while the table turns), since (s after
+the last turn ended, 0 in turns, very long before the first)."""
 
 CONSTANTS: dict[str, float] = {
     "g": STANDARD_GRAVITY,
@@ -98,6 +100,7 @@ _ROWS: tuple[_Row, ...] = (
             _Row(f"{triad}_bias_ramp_{{i}}", f"{unit}/h", "k*t"),
             _Row(f"{triad}_bias_step_{{i}}", unit, "k*(1 + sign(t - t0))/2", (("t0", "s"),)),
             _Row(f"{triad}_bias_in_motion_{{i}}", unit, "k*moving"),
+            _Row(f"{triad}_bias_settling_{{i}}", unit, "k*(1 - moving)*exp(-since/tau)", (("tau", "s"),)),
             _Row(f"{triad}_scale_temperature_{{i}}", "ppm/degC", f"k*dT*{signal}"),
             _Row(f"{triad}_scale_ramp_{{i}}", "ppm/h", f"k*t*{signal}"),
         )

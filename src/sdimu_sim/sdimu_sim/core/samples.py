@@ -17,6 +17,8 @@ _XYZ = "xyz"
 
 STILL_RAD_S = 1e-9
 """Below this mean rate the table stands: far above rounding (1e-14), far below any turn."""
+NEVER_S = 1e9
+"""Time since the last turn where there was none."""
 TURNED_RAD_S = np.radians(0.5)
 """Turning about an axis counts for hysteresis from here: more than 3 deg of mount leaks from a turn at 2 deg/s."""
 LEANT_PER_S = np.radians(0.5)
@@ -107,6 +109,7 @@ class Variables:
         self._temperature = temperature
         self._turned = np.zeros(3)
         self._leant = np.zeros(3)
+        self._stood = -np.inf
 
     def of(self, true: TrueSamples, middle: Floats) -> dict[str, Floats | float]:
         """Variables of a block by the names of `sdimu_sim.core.hidden.VARIABLES`; `middle` (m,) mid-sample times."""
@@ -121,6 +124,11 @@ class Variables:
         values |= {f"L{i}{j}": true.lever[k, n] for k, i in enumerate(_XYZ) for n, j in enumerate(_XYZ)}
         values["t"] = middle
         values["moving"] = (np.abs(wt).max(axis=0) > STILL_RAD_S).astype(np.float64)
+        # The turn ends with its last sample, half a sample after the middle of that.
+        half = 0.5 * (middle[1] - middle[0]) if len(middle) > 1 else 0.0
+        end = np.maximum.accumulate(np.where(values["moving"] > 0.0, middle + half, self._stood))
+        self._stood = float(end[-1]) if len(end) else self._stood
+        values["since"] = np.minimum(np.where(values["moving"] > 0.0, 0.0, middle - end), NEVER_S)
         if self._temperature:
             values["T"] = self._temperature.value(middle)
             values["dT"] = values["T"] - self._temperature.value(np.zeros(1))

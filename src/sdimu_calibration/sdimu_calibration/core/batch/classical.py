@@ -150,7 +150,10 @@ def reference_motion(reduced: Reduced, setup: Setup, log: TableLog, gimbals: tup
     heat, heat_rate = temperatures(reduced.temperature, c.t - 0.5 * c.dt, causal=False)
     none = np.zeros_like(w)
     alpha = np.gradient(w_table, c.t - 0.5 * c.dt, axis=0)
-    return Motion(c.t, c.dt, w, f, middle, w_table, alpha, reduced.rest, heat, heat_rate, none, none, MAGNETIC_FIELD)
+    never = np.full(len(w), np.inf)
+    return Motion(
+        c.t, c.dt, w, f, middle, w_table, alpha, reduced.rest, heat, heat_rate, none, none, never, MAGNETIC_FIELD
+    )
 
 
 def _fit(reduced: Reduced, setup: Setup, seen: Motion) -> tuple[Floats, Floats, float, int]:

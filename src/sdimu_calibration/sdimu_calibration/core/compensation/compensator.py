@@ -43,6 +43,7 @@ _ABSENT = {
     "magnetic_n": "needs the magnetic field",
     "turned": "needs the history of turns",
     "leant": "needs the history of forces",
+    "since_turn": "needs the history of turns",
 }
 _CLOSE = 1e-13
 """Largest step, against 1 rad/s and 10 m/s^2, at which the solution stands: a few units of rounding."""

@@ -11,7 +11,7 @@ from sdimu_calibration.core.effects.motion import Floats, Motion
 
 FIELDS = (
     "w", "f", "t", "temperature", "temperature_rate", "alpha", "w_table", "rest", "C_nb", "magnetic_n", "turned",
-    "leant",
+    "leant", "since_turn",
 )  # fmt: skip
 _ROWS = 2000
 _SPAN_S = 20_000.0
@@ -44,7 +44,7 @@ def _motion(rng: np.random.Generator) -> Motion:
     return Motion(
         np.linspace(1.0, _SPAN_S, n), np.full(n, _SPAN_S / n), any_of(n, 3), 10.0 * any_of(n, 3), C_nb, any_of(n, 3),
         any_of(n, 3), rng.random(n) < 0.5, 10.0 * any_of(n), 0.01 * any_of(n), np.sign(any_of(n, 3)),
-        np.sign(any_of(n, 3)), 1e-5 * any_of(3),
+        np.sign(any_of(n, 3)), 100.0 * rng.random(n), 1e-5 * any_of(3),
     )  # fmt: skip
 
 
@@ -64,4 +64,5 @@ def samples_motion(t: Floats, dt: Floats, w: Floats, f: Floats, heat: Floats, he
     none = np.broadcast_to(np.zeros(3), (n, 3))
     C_nb = np.broadcast_to(np.eye(3), (n, 3, 3))
     rest = np.zeros(n, dtype=np.bool_)
-    return Motion(t, dt, w, f, C_nb, none, none, rest, heat, heat_rate, none, none, np.zeros(3))
+    never = np.full(n, np.inf)
+    return Motion(t, dt, w, f, C_nb, none, none, rest, heat, heat_rate, none, none, never, np.zeros(3))

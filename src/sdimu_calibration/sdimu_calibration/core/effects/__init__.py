@@ -13,6 +13,7 @@ from sdimu_calibration.core.effects import (  # noqa: I001, F401 - the order is 
     temperature,
     drift,
     motion_bias,
+    settling,
     hysteresis,
     dead_band,
     magnetic,

@@ -39,6 +39,8 @@ class Motion:
         Change since the start (K) and rate (K/s); zero where no temperature is recorded.
     turned, leant : ndarray, shape (n, 3)
         Sign of the last turn about each axis, and of the last change of specific force along it; 0 before the first.
+    since_turn : ndarray, shape (n,)
+        Time since the last turn ended (s); 0 in turns, infinite before the first.
     magnetic_n : ndarray, shape (3,)
         Magnetic field of the site in NED (T).
     """
@@ -55,6 +57,7 @@ class Motion:
     temperature_rate: Floats
     turned: Floats
     leant: Floats
+    since_turn: Floats
     magnetic_n: Floats
 
     @property

@@ -98,7 +98,7 @@ def seen_at_rest(run: HandRun, C_nb: Floats, rate_n: Floats, gravity: float) -> 
     w = np.einsum("kij,i->kj", C_nb, rate_n)
     return Motion(
         run.t, run.seconds, w, -gravity * C_nb[:, 2, :], C_nb, none, none, np.ones(k, dtype=bool), heat, heat_rate,
-        none, none, MAGNETIC_FIELD,
+        none, none, np.full(k, np.inf), MAGNETIC_FIELD,
     )  # fmt: skip
 
 

@@ -19,6 +19,8 @@ _COMPENSATIONS = 3
 """Rounds of "error at the compensated motion": each gains a factor of the size of the errors."""
 MAGNETIC_FIELD = np.array([30.0e-6, -4.5e-6, 40.0e-6])
 """Field in NED (T) where the site gives none: size and dip of mid-northern latitudes."""
+_STANDING = np.radians(0.01)
+"""Rate below which a table that comes to rest stands: above the bias of a gyro worth a table (rad/s)."""
 _TURNING = np.radians(0.5)
 """A body rate about an axis that counts as a turn about it (rad/s); a force that changes so fast (1/s) as leaning."""
 _TEMPERATURE_WINDOW_S = 60.0
@@ -125,9 +127,11 @@ def motion(
         alpha = _acceleration(w_table, rest, cycles, before, causal=not predicted)
         turned = _last_sign(w_table, None if before is None else before.turned[-1])
         leant = _last_sign(-np.cross(w_table, f_seen) / gravity, None if before is None else before.leant[-1])
+        since_turn = _since_turn(w_table, cycles.t, dt, before)
         seen = Motion(
-            cycles.t, dt, w_seen, f_seen, C_nb, w_table, alpha, rest, heat, heat_rate, turned, leant, magnetic_n
-        )
+            cycles.t, dt, w_seen, f_seen, C_nb, w_table, alpha, rest, heat, heat_rate, turned, leant,
+            since_turn, magnetic_n,
+        )  # fmt: skip
         if done < rounds:
             error = model.errors(model.regressors(seen), coefficients)
             w, f = w_measured - error[:, :3], f_measured - error[:, 3:]
@@ -160,3 +164,11 @@ def _last_sign(rate: Floats, before: Floats | None) -> Floats:
     last = np.maximum.accumulate(rows, axis=0)
     start = np.zeros(3) if before is None else before
     return np.where(last > 0, np.take_along_axis(sign, np.maximum(last - 1, 0), axis=0), start)
+
+
+def _since_turn(w_table: Floats, t: Floats, dt: Floats, before: Motion | None) -> Floats:
+    """Time from the end of the last cycle in which the table turned to the middle of each cycle, shape (n,)."""
+    turning = np.sum(w_table**2, axis=1) > _STANDING**2
+    start = -np.inf if before is None else float(before.t[-1] - 0.5 * before.dt[-1] - before.since_turn[-1])
+    end = np.maximum.accumulate(np.where(turning, t, start))
+    return np.where(turning, 0.0, t - 0.5 * dt - end)
