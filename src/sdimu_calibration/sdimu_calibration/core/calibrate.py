@@ -159,7 +159,7 @@ def poor_fit(fit: dict[str, float | None], converged: bool, reduced: Reduced, no
 
 def outside(sensors: ImuModel, estimate: Floats) -> list[str]:
     """Name the coefficient, of `estimate` (p,), that is furthest from what the specification allows, if it is."""
-    size = np.abs(estimate) / sensors.prior
+    size = np.abs(estimate) / sensors.stated
     worst = int(np.argmax(size))
     if size[worst] <= _OUTSIDE:
         return []
@@ -262,4 +262,3 @@ def history(reduced: Reduced, setup: Setup, first: Pass) -> History:
 
 def _silent(_what: str, _fraction: float) -> None:
     return None
-

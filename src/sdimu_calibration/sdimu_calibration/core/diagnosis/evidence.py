@@ -42,6 +42,8 @@ class Evidence:
         Prior information of the coefficients (1/sigma^2).
     shift : ndarray, shape (p,)
         Prior mean minus the calibration's values.
+    stated : ndarray, shape (p,)
+        One-sigma of the coefficients by the specification, whatever the calibration had to widen it to.
     candidates : tuple of Candidate, length q
     prior : ndarray, shape (q,)
         One-sigma that physics gives the candidates (inf where unknown).
@@ -64,6 +66,7 @@ class Evidence:
     names: tuple[str, ...]
     weight: Floats
     shift: Floats
+    stated: Floats
     candidates: tuple[Candidate, ...]
     prior: Floats
     grade: str
@@ -84,10 +87,6 @@ class Evidence:
         d = self.W.T @ self.e
         d[: len(self.weight)] += self.weight * self.shift
         return Information(self.W.T @ self.W, d)
-
-    def tried_prior(self, index: int) -> float:
-        """One-sigma of the prior of a coefficient of the model."""
-        return float(1.0 / np.sqrt(self.weight[index]))
 
     def with_effects(self, effects: Sequence[Effect]) -> Evidence:
         """Return the evidence with the parameters of more effects behind the candidates it has."""
@@ -175,7 +174,8 @@ def collect(reduced: Reduced, setup: Setup, finished: Pass, effects: Sequence[Ef
     return Evidence(
         e=known.output.normalised[epoch, channel], W=W, epoch=epoch, channel=channel, stop=reduced.phases.stop[epoch],
         names=(*sensors.names, *(c.label for c in candidates)),
-        weight=1.0 / sensors.prior**2, shift=-finished.estimate, candidates=tuple(candidates), prior=prior,
+        weight=1.0 / sensors.prior**2, shift=-finished.estimate, stated=sensors.stated, candidates=tuple(candidates),
+        prior=prior,
         grade=setup.imu.grade,
         output=known.output, seen=seen, times=timetable(reduced), reduced=reduced, latitude=setup.site.latitude_rad,
     )  # fmt: skip

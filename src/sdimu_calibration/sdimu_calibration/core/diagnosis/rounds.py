@@ -194,11 +194,13 @@ def forget(about: Evidence, p: int, tried: Sequence[Candidate]) -> Evidence:
     if q == p:
         return about
     estimate = -about.shift[p:]
-    grade = [about.tried_prior(i) for i in range(p, q)]
+    # Not the prior that the calibration had: it was widened where the data contradicted it.
+    stated = about.stated[p:q]
     return replace(
         about, e=about.e + about.W[:, p:q] @ estimate, weight=about.weight[:p], shift=about.shift[:p],
+        stated=about.stated[:p],
         names=(*about.names[:p], *(c.label for c in tried), *about.names[q:]),
-        candidates=(*tried, *about.candidates), prior=np.concatenate([grade, about.prior]),
+        candidates=(*tried, *about.candidates), prior=np.concatenate([stated, about.prior]),
     )  # fmt: skip
 
 

@@ -53,7 +53,7 @@ def screen(recording: Recording, reduced: Reduced) -> tuple[Finding, ...]:
 def beyond_specification(solution: Solution) -> tuple[Finding, ...]:
     """Coefficients far outside the prior: a wrong specification, or an effect that this plan cannot tell from them."""
     sensors = solution.setup.sensors
-    size = np.abs(solution.last.estimate) / sensors.prior
+    size = np.abs(solution.last.estimate) / sensors.stated
     return tuple(
         Finding(f"{sensors.names[i]} is {size[i]:.1f} times the sigma of the specification", False)
         for i in np.argsort(-size)

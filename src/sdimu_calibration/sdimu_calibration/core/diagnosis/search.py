@@ -31,6 +31,9 @@ LOG_BAYES = 3.0
 """Least log Bayes factor of an accepted step ("strong" on Jeffreys' scale)."""
 _WIDE = 3.0
 """Physical priors are taken this much wider: a sensor may be out of its class."""
+_PROVEN = 30.0
+"""Of a chosen effect much wider still: its size is the data's to say, and what a prior holds back of it looks like
+companions."""
 _OWN_ODDS = 6.0
 """Log odds that a registered effect has before an equation of which physics says nothing."""
 _SHARPER = 1.0
@@ -136,7 +139,7 @@ class Problem:
         """Model and chosen columns, their prior information and prior mean about the calibration."""
         evidence = self.evidence
         prior = evidence.prior[np.array(chosen, dtype=int) - self.p] if len(chosen) else np.empty(0)
-        weight = np.concatenate([evidence.weight, 1.0 / (_WIDE * prior) ** 2])
+        weight = np.concatenate([evidence.weight, 1.0 / (_PROVEN * prior) ** 2])
         shift = np.concatenate([evidence.shift, np.zeros(len(chosen))])
         return np.concatenate([evidence.model, np.array(chosen, dtype=np.int64)]).astype(np.int64), weight, shift
 
@@ -227,7 +230,7 @@ def _sharpen(problem: Problem, chosen: Sequence[int], best: int) -> Effect | Non
     others = list(range(p, p + len(chosen)))
     first = score = -np.inf
     while effect.nearer:
-        variants = [variant.only((name,)) for variant in effect.nearer()]
+        variants = [variant.only((_of_the_sensor(variant, name),)) for variant in effect.nearer()]
         trial = Problem(small.with_effects(variants))
         scores = trial.scores(trial.scan(others))[p + len(chosen) :]
         # The middle one is the candidate itself.
@@ -235,6 +238,13 @@ def _sharpen(problem: Problem, chosen: Sequence[int], best: int) -> Effect | Non
         score = float(np.max(scores))
         effect = variants[int(np.argmax(scores))]
     return effect if score > first + _SHARPER else None
+
+
+def _of_the_sensor(variant: Effect, name: str) -> str:
+    """Name of the variant's parameter for the sensor of `name`: that of an equation holds its numbers too."""
+    names = [p.name for p in variant.parameters]
+    sensor, _, _ = name.partition(":")
+    return name if name in names else next(n for n in names if n.startswith(sensor + ":"))
 
 
 def _polish(problem: Problem, chosen: list[int]) -> list[int]:

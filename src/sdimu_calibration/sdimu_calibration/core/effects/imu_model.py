@@ -32,7 +32,9 @@ class ImuModel:
     channel, parameter : ndarray of int, shape (m,)
         Sensor axis (0-2 gyro, 3-5 accelerometer) and state of each regressor column.
     prior : ndarray, shape (p,)
-        One-sigma (SI).
+        One-sigma (SI) that the filter starts from.
+    stated : ndarray, shape (p,)
+        One-sigma (SI) of the specification; `prior` where it was not found too narrow.
     decay_rate : ndarray, shape (p,)
         1/s; zero for constants and random walks.
     drive : ndarray, shape (p,)
@@ -44,6 +46,7 @@ class ImuModel:
     channel: NDArray[np.int64]
     parameter: NDArray[np.int64]
     prior: Floats
+    stated: Floats
     decay_rate: Floats
     drive: Floats
 
@@ -105,7 +108,7 @@ def build(effects: Sequence[str | Effect], imu: ImuSpecification) -> ImuModel:
         drive += [effect.random_walk.get(imu.grade, 0.0) ** 2] * len(effect.parameters)
     return ImuModel(
         chosen, tuple(parameters), np.array(channel, dtype=np.int64), np.array(parameter, dtype=np.int64),
-        np.array(prior), np.array(decay), np.array(drive),
+        np.array(prior), np.array(prior), np.array(decay), np.array(drive),
     )  # fmt: skip
 
 

@@ -213,6 +213,34 @@ class Solution:
     converged: bool
 
 
+def with_room(setup: Setup, finished: Pass) -> Setup:
+    """Widen the prior of an effect that is far beyond it and that it holds back; the same object when none is.
+
+    A prior is a statement about the class of the sensor. Where the data contradict it, a size between the two is
+    wrong, and what is missing of the effect goes into the other coefficients. Misalignments keep theirs: nothing
+    else holds their common part, the frame of the prior.
+    """
+    sensors = setup.sensors
+    sigma = np.sqrt(np.diag(finished.covariance))
+    size = np.abs(finished.estimate)
+    pull = size * sigma / sensors.prior**2
+    effect = np.array([e.family or e.name for e in sensors.effects for _ in e.parameters])
+    held = (size > _BEYOND * sensors.prior) & (pull > _PULL) & ~np.isin(effect, _IN_THE_FRAME)
+    if not held.any():
+        return setup
+    return replace(setup, sensors=replace(sensors, prior=np.where(held, _ROOM * size, sensors.prior)))
+
+
+_BEYOND = 3.0
+"""Prior sigmas beyond which an estimate contradicts its prior."""
+_PULL = 0.1
+"""Shift of an estimate by its prior, in its own sigma, that is worth repeating the passes."""
+_ROOM = 10.0
+"""A prior that was too narrow becomes so many times the estimate: it then says nothing."""
+_MOST_WIDENINGS = 3
+_IN_THE_FRAME = ("gyro_misalignment", "accel_misalignment")
+
+
 def solve(setup: Setup, reduced: Reduced, progress: Progress, keep: bool = False) -> Solution:
     """Align, run the closed loop, refine.
 
@@ -242,4 +270,11 @@ def solve(setup: Setup, reduced: Reduced, progress: Progress, keep: bool = False
 
         begun = coarse_pass(reduced, setup, start)
         last, passes, converged = refine(reduced, setup, start, begun, progress, keep=keep)
+    for _ in range(_MOST_WIDENINGS):
+        room = with_room(setup, last)
+        if room is setup:
+            break
+        setup = room
+        last, more, converged = refine(reduced, setup, start, last, progress, keep=keep)
+        passes += more - 1
     return Solution(setup, reduced, start, first, last, passes, converged)
