@@ -9,6 +9,7 @@ import pytest
 
 from sdimu_calibration.core.diagnosis.advice import advice, blind
 from sdimu_calibration.core.diagnosis.bootstrap import bootstrap
+from sdimu_calibration.core.diagnosis.candidates import own_equation
 from sdimu_calibration.core.diagnosis.diagnose import diagnose
 from sdimu_calibration.core.diagnosis.found import found_effects, reach
 from sdimu_calibration.core.diagnosis.grow import jump, rung
@@ -135,3 +136,43 @@ def test_the_search_stays_quiet_on_noise(bench):
     # Probability 0.02 each: four of twenty have 6e-4.
     assert null.false_finds <= 3
     assert null.rms_z == pytest.approx(1.0, abs=4.0 / np.sqrt(2.0 * _EFFECTIVE * null.draws))
+
+
+def test_an_effect_far_beyond_its_class_is_measured_at_its_size_without_companions(bench):
+    diagnosis = bench.diagnosis(effects=("gyro_g_product_zxz=2 deg/h/g^2",))
+    (one,) = found_effects(diagnosis)
+    assert one.candidate.label == "gyro_g_product_zxz"
+    assert abs(one.value - to_si(2, "deg/h/g^2")) < 3.5 * one.sigma
+    assert any("gyro_g_product_zxz is" in f.text for f in diagnosis.findings)
+
+
+def test_a_sine_of_any_phase_and_period_is_one_equation(bench):
+    diagnosis = bench.diagnosis(effects=("accel_z=15*ug*sin(2*pi*t/500 + 0.7)",))
+    assert diagnosis.verdict == "own equation"
+    (one,) = found_effects(diagnosis)
+    # Period and phase are fitted too: what they cost is not in the sigma.
+    assert abs(abs(one.value) - to_si(15, "ug")) < 5.0 * one.sigma
+    assert own_equation(one.candidate.label) is not None
+    assert diagnosis.after.fit["held_out_rms"] < 1.1
+
+
+def test_a_bias_that_settles_after_each_turn_is_named_and_its_time_constant_found(bench):
+    diagnosis = bench.diagnosis(effects=("gyro_bias_settling_y=0.3 deg/h; tau=12 s",))
+    (one,) = found_effects(diagnosis)
+    assert one.candidate.family == "gyro_bias_settling"
+    tau = float(one.candidate.effect.options["tau"].split()[0])
+    assert 6.0 < tau < 24.0
+
+
+def test_what_only_the_nis_shows_is_not_called_explained(bench):
+    """Two periods and a half a minute: the mean of a dwell sees nothing of it, and no candidate is so fast."""
+    diagnosis = bench.diagnosis(effects=("gyro_y=0.2*deg/h*sin(2*pi*t/24)",))
+    assert diagnosis.verdict == "unexplained"
+
+
+def test_a_drift_that_takes_many_steps_is_not_called_several_effects(bench):
+    jumps = " + ".join(
+        f"{k}*sign(t - {t})" for k, t in zip((2, -3, 3, -2, 3), (400, 700, 1000, 1400, 1700), strict=True)
+    )
+    diagnosis = bench.diagnosis(effects=(f"accel_x=2*ug*({jumps})",))
+    assert diagnosis.verdict == "unexplained"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -133,23 +133,57 @@ def periodic(duration: float, all_cycles: Floats = _CYCLES) -> list[Effect]:
     out: list[Effect] = []
     for cycles in all_cycles:
         # The label holds the period as it is used: what is found can be added by its label.
-        period = round(duration / cycles)
-        for word, lead in (("sin", 0.0), ("cos", 0.5 * np.pi)):
-            out += _plain(f"{word}(2 pi t / {period} s)", _wave(2.0 * np.pi / period, lead))
+        period = float(round(duration / cycles))
+        for lead in (0.0, 90.0):
+            out += wave(period, lead, (0.5 / duration, 90.0))
     return out
+
+
+def wave(period: float, lead: float, spacing: tuple[float, float] = (0.0, 0.0)) -> list[Effect]:
+    """Sine of time on every sensor.
+
+    Parameters
+    ----------
+    period : float
+        s.
+    lead : float
+        Phase at the start (deg).
+    spacing : (float, float)
+        Frequency (1/s) and phase (deg) from the next ones that are tried.
+    """
+    rate, phase = 0.5 * spacing[0], 0.5 * spacing[1]
+    ahead = f"sin(2 pi t / {period:g} s {'-' if lead < 0.0 else '+'} {abs(lead):g} deg)"
+    text = {0.0: f"sin(2 pi t / {period:g} s)", 90.0: f"cos(2 pi t / {period:g} s)"}.get(lead, ahead)
+
+    def nearer(triad: int) -> Callable[[], tuple[Effect, ...]]:
+        return lambda: tuple(
+            wave(float(f"{1.0 / (1.0 / period + i * rate):.5g}"), round(lead + k * phase, 1), (rate, phase))[triad]
+            for i in (-1, 0, 1)
+            for k in (-1, 0, 1)
+        )
+
+    both = _plain(text, _wave(2.0 * np.pi / period, np.radians(lead)))
+    return [replace(e, nearer=nearer(k) if phase > _LEAST_PHASE else None) for k, e in enumerate(both)]
+
+
+_LEAST_PHASE = 3.0
+"""Steps of the phase (deg) finer than this change less of an amplitude of twenty sigma than its noise."""
 
 
 def own_equation(label: str) -> Effect | None:
     """Equation of `equations` or `periodic` with this label, such as ``gyro_x: ex^2``; None when neither has it."""
-    wave = _WAVE.search(label)
-    known = periodic(float(wave.group(1)), np.ones(1)) if wave else equations(has_temperature=True)
+    found = _WAVE.search(label)
+    known = equations(has_temperature=True)
+    if found:
+        word, period, sign, lead = found.groups()
+        known = wave(float(period), 90.0 if word == "cos" else float(f"{sign or ''}{lead or 0}"))
     for effect in known:
         if label in {p.name for p in effect.parameters}:
             return effect.only((label,))
     return None
 
 
-_WAVE = re.compile(r"\(2 pi t / ([0-9.]+) s\)$")
+_WAVE = re.compile(r"(sin|cos)\(2 pi t / ([0-9.]+) s(?: ([+-]) ([0-9.]+) deg)?\)$")
 
 
 def _east(motion: Motion) -> Floats:

@@ -20,7 +20,7 @@ from sdimu_calibration.core.diagnosis.evidence import Evidence
 from sdimu_calibration.core.diagnosis.remainder import Remainder
 from sdimu_calibration.core.diagnosis.rounds import UNEXPLAINED_P, Look, settle
 from sdimu_calibration.core.diagnosis.screen import Finding, beyond_specification, screen
-from sdimu_calibration.core.diagnosis.search import FALSE_ALARM, Search
+from sdimu_calibration.core.diagnosis.search import FALSE_ALARM, MOST_STEPS, Search
 from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.filter.filter_pass import SKIP
 from sdimu_calibration.core.filter.passes import Progress, solve
@@ -145,7 +145,13 @@ def diagnose(
     final = assemble(recording, look.solution, held_out=True) if look.chosen else base
     own = any(c.family == "own" for c in look.chosen)
     # What was added must also predict: an effect that only mimics the missing one fits here and fails elsewhere.
-    unexplained = look.after.p_value < UNEXPLAINED_P or _rms(final) > STILL_WRONG
+    # The free inputs are constant in a dwell and in a turn; what changes within one shows in the NIS alone.
+    unexplained = (
+        look.after.p_value < UNEXPLAINED_P
+        or _rms(final) > STILL_WRONG
+        or misfit(final, consistency, imu, setup.imu) > _MISFIT
+        or patched(look)
+    )
     p_value = _p_value(look.found, look.before, consistency, noise)
     verdict = _verdict(look, own, unexplained, noise, findings)
     adequate = verdict == "consistent"
@@ -155,6 +161,40 @@ def diagnose(
         look.before, look.after, look.free, own, unexplained,
     )  # fmt: skip
     return replace(partial, sentence=_sentence(partial))
+
+
+def misfit(final: Calibration, consistency: Consistency, stated: ImuSpecification, mended: ImuSpecification) -> float:
+    """Excess of the NIS over what the noise of the recording itself explains, outliers and all.
+
+    Differences of neighbouring seconds say what that noise is, whatever is slow.
+    """
+    gyro = consistency.gyro.spread * stated.gyro_white_noise / mended.gyro_white_noise
+    accel = consistency.accel.spread * stated.accel_white_noise / mended.accel_white_noise
+    return float((final.fit["nis_mean"] or 0.0) / (0.5 * (gyro**2 + accel**2)) - 1.0)
+
+
+_MISFIT = 0.05
+"""Six sigma of a test of fifty minutes."""
+
+
+def patched(look: Look) -> bool:
+    """Whether the choice is a patchwork: the search ran out of steps, or one bias drifts by three effects at once.
+
+    Steps and transients in a row can follow any drift, and say nothing of its cause.
+    """
+    steps = look.found.steps
+    drifts = {(c.family, c.label if not c.family.endswith("random_walk") else "", _sensor(c)) for c in look.chosen}
+    of_sensor = [sensor for family, _, sensor in drifts if family.endswith(_DRIFTS)]
+    many = any(of_sensor.count(sensor) >= _PATCHES for sensor in of_sensor)
+    return many or (len(steps) == MOST_STEPS and steps[-1].accepted)
+
+
+def _sensor(candidate: Candidate) -> int:
+    return candidate.effect.terms[0].channel
+
+
+_DRIFTS = ("bias_ramp", "bias_step", "bias_warm_up", "bias_random_walk")
+_PATCHES = 3
 
 
 def _mend_noise(consistency: Consistency, setup: Setup, reduced: Reduced) -> tuple[tuple[str, ...], Setup]:
@@ -260,4 +300,3 @@ def _rms(calibration: Calibration) -> float:
 
 def _silent(_what: str, _fraction: float) -> None:
     return None
-
