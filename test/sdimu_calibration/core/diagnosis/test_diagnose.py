@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from sdimu_calibration.core.diagnosis.advice import advice, blind
 from sdimu_calibration.core.diagnosis.bootstrap import bootstrap
@@ -168,6 +169,23 @@ def test_what_only_the_nis_shows_is_not_called_explained(bench):
     """Two periods and a half a minute: the mean of a dwell sees nothing of it, and no candidate is so fast."""
     diagnosis = bench.diagnosis(effects=("gyro_y=0.2*deg/h*sin(2*pi*t/24)",))
     assert diagnosis.verdict == "unexplained"
+    assert diagnosis.p_value < 1e-6
+
+
+def test_noise_with_a_memory_is_told_beside_what_stays_unexplained(bench):
+    clean = bench.recording(seed=105)
+    rng = np.random.default_rng(105)
+    sigma, tau = to_si(12, "ug"), 30.0
+    keep = np.exp(-0.05 / tau)
+    drive = sigma * np.sqrt(1.0 - keep**2) * rng.standard_normal((len(clean.t), 3))
+    wander = lfilter([1.0], [1.0, -keep], drive, axis=0)
+    diagnosis = diagnose(replace(clean, f_ib_b=clean.f_ib_b + wander), bench.site, bench.imu, bench.model)
+    assert diagnosis.verdict == "unexplained"
+    assert "coloured noise would do it: accel scatters" in diagnosis.sentence
+    white = bench.diagnosis(seed=SEEDS[0]).consistency
+    # 19 stops of six means: 285 differences that share their means.
+    assert white.gyro.slow == pytest.approx(1.0, abs=0.2)
+    assert white.accel.slow == pytest.approx(1.0, abs=0.2)
 
 
 def test_a_drift_that_takes_many_steps_is_not_called_several_effects(bench):

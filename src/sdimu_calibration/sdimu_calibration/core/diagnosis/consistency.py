@@ -21,6 +21,8 @@ _GAUSS_MAD = 1.482602218505602
 _LAGS = 20
 _OUTLIER = 4.0
 _LEAST_PAIRS = 50
+SLOW_S = 10
+"""Seconds in a mean by which coloured noise is told from white."""
 
 
 @dataclass(frozen=True)
@@ -37,6 +39,9 @@ class Noise:
         Measured over specified standard deviation, outliers and all.
     kurtosis : float
         Of the differences; 3 is Gaussian.
+    slow : float
+        Scatter of neighbouring means over `SLOW_S` against that of seconds, 1 when the noise is white; NaN where the
+        stops are too short to tell.
     outliers : ndarray of int
         Epochs that differ from both neighbours by more than four sigma of the difference.
     """
@@ -46,6 +51,7 @@ class Noise:
     spread: float
     kurtosis: float
     outliers: NDArray[np.int64]
+    slow: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -153,7 +159,21 @@ def triad_noise(reduced: Reduced, means: Floats, density: float) -> Noise:
     spread = float(np.sqrt(np.mean(difference**2)))
     kurtosis = float(np.mean(difference**4) / np.mean(difference**2) ** 2)
     # The median absolute deviation has 37 % of the efficiency of the standard deviation; differences share epochs.
-    return Noise(ratio, 1.4 * ratio / np.sqrt(2 * 0.37 * difference.size), spread, kurtosis, outliers)
+    error = 1.4 * ratio / np.sqrt(2 * 0.37 * difference.size)
+    slow = _slow(reduced, means) / (spread * density * np.sqrt(2.0 / SLOW_S))
+    return Noise(ratio, error, spread, kurtosis, outliers, slow)
+
+
+def _slow(reduced: Reduced, means: Floats) -> float:
+    """Scatter (rms) of the differences of neighbouring means over `SLOW_S` seconds of one stop (Allan deviation)."""
+    phases = reduced.phases
+    steps = []
+    for stop in np.unique(phases.stop[phases.used]):
+        rows = means[phases.used & (phases.stop == stop)]
+        whole = len(rows) // SLOW_S
+        steps.append(np.diff(rows[: whole * SLOW_S].reshape(whole, SLOW_S, 3).mean(axis=1), axis=0))
+    found = np.concatenate(steps)
+    return float(np.sqrt(np.mean(found**2))) if len(found) >= _LEAST_PAIRS else float("nan")
 
 
 def stop_means(standard: Floats, reduced: Reduced) -> tuple[StopMean, ...]:

@@ -15,7 +15,7 @@ from scipy.stats import norm
 
 from sdimu_calibration.core.calibrate import NOT_CONVERGED, assemble
 from sdimu_calibration.core.diagnosis.candidates import Candidate
-from sdimu_calibration.core.diagnosis.consistency import Consistency, check
+from sdimu_calibration.core.diagnosis.consistency import SLOW_S, Consistency, check
 from sdimu_calibration.core.diagnosis.evidence import Evidence
 from sdimu_calibration.core.diagnosis.remainder import Remainder
 from sdimu_calibration.core.diagnosis.rounds import UNEXPLAINED_P, Look, settle
@@ -146,13 +146,9 @@ def diagnose(
     own = any(c.family == "own" for c in look.chosen)
     # What was added must also predict: an effect that only mimics the missing one fits here and fails elsewhere.
     # The free inputs are constant in a dwell and in a turn; what changes within one shows in the NIS alone.
-    unexplained = (
-        look.after.p_value < UNEXPLAINED_P
-        or _rms(final) > STILL_WRONG
-        or misfit(final, consistency, imu, setup.imu) > _MISFIT
-        or patched(look)
-    )
-    p_value = _p_value(look.found, look.before, consistency, noise)
+    loud = misfit(final, consistency, imu, setup.imu) > _MISFIT
+    unexplained = look.after.p_value < UNEXPLAINED_P or _rms(final) > STILL_WRONG or loud or patched(look)
+    p_value = _p_value(look.found, look.before, consistency, bool(noise) or loud)
     verdict = _verdict(look, own, unexplained, noise, findings)
     adequate = verdict == "consistent"
     tell("done", 1.0)
@@ -231,7 +227,7 @@ _KURTOSIS = 4.0
 """Of the differences of neighbouring seconds; Gaussian noise in a test of an hour stays below 3.3."""
 
 
-def _p_value(found: Search, before: Remainder, consistency: Consistency, noise: tuple[str, ...]) -> float:
+def _p_value(found: Search, before: Remainder, consistency: Consistency, noise: bool) -> float:
     """Bonferroni over the three tests that can call a model inadequate."""
     largest = float(np.max(np.abs(found.first.z), initial=0.0))
     count = int(np.isfinite(found.first.sigma).sum())
@@ -283,7 +279,7 @@ def _sentence(d: Diagnosis) -> str:
         tail = f"; {names} would take {100 * d.explained:.0f} % of it" if names else ""
         if names and _rms(d.after) > STILL_WRONG:
             tail += f", but the error at stops held out is then still {_rms(d.after):.2f} (1 is right)"
-        return f"Something is missing that no effect of the catalogue explains{tail}."
+        return f"Something is missing that no effect of the catalogue explains{tail}{_coloured(d.consistency)}."
     if d.verdict == "own equation":
         return f"Something is missing that is not in the catalogue; it follows {names}."
     rest = f"error at stops held out, a third at a time: {_rms(d.before):.3f} -> {_rms(d.after):.3f}"
@@ -291,6 +287,20 @@ def _sentence(d: Diagnosis) -> str:
         others = ", ".join(_alike(d.found, d.chosen[0].label)[:4])
         return f"One effect is missing: {names}, or what looks the same here ({others}); {rest}."
     return f"{'One effect is' if d.verdict == 'one effect' else 'Several effects are'} missing: {names}; {rest}."
+
+
+def _coloured(consistency: Consistency) -> str:
+    """Say whose noise is not white: it passes for drifts that no effect has."""
+    told = [
+        f"{triad} scatters {noise.slow:.1f} times more over {SLOW_S} s than white noise of its seconds would"
+        for triad, noise in (("gyro", consistency.gyro), ("accel", consistency.accel))
+        if noise.slow > _COLOURED
+    ]
+    return f"; coloured noise would do it: {' and '.join(told)}" if told else ""
+
+
+_COLOURED = 1.2
+"""Five sigma of a test of fifty minutes."""
 
 
 def _rms(calibration: Calibration) -> float:
