@@ -29,6 +29,8 @@ if TYPE_CHECKING:
     from sdimu_calibration.core.specification import ImuSpecification
 
 ESTIMATORS = ("auto", "filter", "batch", "classical", "hand")
+DIAGNOSED = ("auto", "filter", "hand")
+"""Those whose residuals a diagnosis can read."""
 HAND_CHOSEN = (
     "by hand: in rests as short as these the gyros' noise hides the Earth's rate, so nothing is navigated "
     "(--estimator filter to do it all the same)"
@@ -155,7 +157,7 @@ def check_options(model: str | None, add: list[str] | None, site: str | None) ->
         load_site(site)
 
 
-def check_estimator(name: str) -> None:
+def check_estimator(name: str, known: tuple[str, ...] = ESTIMATORS) -> None:
     """Refuse an estimator that does not exist, before anything is read.
 
     Raises
@@ -164,8 +166,8 @@ def check_estimator(name: str) -> None:
     """
     from sdimu_calibration.core.recording import DataError
 
-    if name not in ESTIMATORS:
-        raise DataError(f"--estimator {name}: expected one of {', '.join(ESTIMATORS)}")
+    if name not in known:
+        raise DataError(f"--estimator {name}: expected one of {', '.join(known)}")
 
 
 def chosen_estimator(name: str, recording: Recording, imu: ImuSpecification) -> str:

@@ -25,9 +25,11 @@ if TYPE_CHECKING:
 
 def diagnose(
     bag: Annotated[Path, typer.Argument(metavar="BAG", help="rosbag2 folder or .mcap file.")],
-    model: Annotated[str, typer.Option(help="Model to examine: name in config/model or path.")] = "baseline",
+    model: Annotated[
+        str | None, typer.Option(help="Model to examine: name in config/model or path; baseline (by hand: hand).")
+    ] = None,
     site: Annotated[
-        str | None, typer.Option(help="Where the test was: name in config/site or path; daejeon when left out.")
+        str | None, typer.Option(help="Where the test was: name in config/site or path; daejeon (by hand: none).")
     ] = None,
     imu: Annotated[str, typer.Option(help="Specification of the IMU: name in config/imu or path.")] = "dtg",
     add: Annotated[
@@ -44,6 +46,8 @@ def diagnose(
     noise: Annotated[
         str | None, typer.Option(help="estimated: white noise from the rests of the recording, not from --imu.")
     ] = None,
+    estimator: Annotated[str, typer.Option(help="filter, hand; auto: filter or hand.")] = "auto",
+    hand: Annotated[bool, typer.Option("--hand", help="Moved by hand: the same as --estimator hand.")] = False,
     out: Annotated[Path | None, typer.Option(help="Folder of the results; BAG_diagnosis by default.")] = None,
     imu_topic: ImuTopic = None,
     status_topic: StatusTopic = None,
@@ -57,13 +61,24 @@ def diagnose(
     """Find what the model is missing; leaves diagnosis.json and report.html, and result.json of the model found."""
     from rich.console import Console
 
-    from sdimu_calibration.cli.calibrate import check_options, default_folder, explained, tell
+    from sdimu_calibration.cli.calibrate import (
+        DIAGNOSED,
+        HAND_CHOSEN,
+        check_estimator,
+        check_options,
+        chosen_estimator,
+        default_folder,
+        explained,
+        tell,
+    )
+    from sdimu_calibration.cli.diagnose_hand import diagnose_hand
     from sdimu_calibration.cli.diagnosis_text import print_account, print_ladder
     from sdimu_calibration.cli.noise import with_noise
     from sdimu_calibration.cli.progress import bar
     from sdimu_calibration.core.diagnosis.bootstrap import bootstrap as draw
     from sdimu_calibration.core.diagnosis.diagnose import diagnose as examine
     from sdimu_calibration.core.diagnosis.grow import grow as climb
+    from sdimu_calibration.core.recording import DataError
     from sdimu_calibration.report.besides import besides
     from sdimu_calibration.report.page import write_report
     from sdimu_calibration.storage.config import load_imu
@@ -73,8 +88,8 @@ def diagnose(
     from sdimu_calibration.storage.result_file import write_result
 
     console = Console()
+    check_estimator(estimator, DIAGNOSED)
     check_options(model, add, site)
-    wanted = extended_model(model, add or [])
     specification = load_imu(imu)
     extra = [effect for text in attempt or [] for effect in find_effects(text)]
     origin = source(
@@ -82,6 +97,19 @@ def diagnose(
     )
     recording = open_recording(bag, origin)
     specification, told_noise = with_noise(specification, recording, noise)
+    folder, title = out or default_folder(bag, "diagnosis"), f"Diagnosis of {bag.name}"
+    by_hand = chosen_estimator("hand" if hand else estimator, recording, specification) == "hand"
+    wanted = extended_model(model or ("hand" if by_hand else "baseline"), add or [])
+    if by_hand:
+        if not (hand or estimator == "hand"):
+            console.print(HAND_CHOSEN, soft_wrap=True)
+        if bootstrap:
+            raise DataError("--bootstrap: a run by hand learns its scatter, so there is no noise to draw; leave it out")
+        where = None
+        if site is not None:
+            recording, where = place(recording, site, specification, origin)
+        diagnose_hand(console, recording, where, specification, wanted, extra, folder, title, told_noise)
+        return
     recording, where = place(recording, site, specification, origin)
     with explained(console, recording.notes), bar(console) as progress:
         found = examine(recording, where, specification, wanted, extra, progress=progress)
@@ -98,13 +126,11 @@ def diagnose(
         with bar(console) as progress:
             null = draw(found, bootstrap, progress=progress)
         console.print(f"bootstrap: {null.sentence}", soft_wrap=True, markup=False, highlight=False)
-    folder = out or default_folder(bag, "diagnosis")
     write_diagnosis(folder / "diagnosis.json", told, rungs, null)
     write_result(folder / "result.json", found.after if told.candidates else found.before)
     with bar(console) as progress:
         progress("navigation without aid", 0.5)
         more = besides(recording, found, where, specification, wanted, rungs)
-    title = f"Diagnosis of {bag.name}"
     write_report(folder / "report.html", found.after, title=title, diagnosis=found, more=more)
     tell(console, (*recording.notes, *told_noise))
     console.print(f"results in {folder}", soft_wrap=True)

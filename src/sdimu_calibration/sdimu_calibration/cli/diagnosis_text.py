@@ -20,18 +20,18 @@ _TOP = 5
 def print_account(console: Console, told: Account) -> None:
     """Print everything that a diagnosis has to say."""
     d = told.diagnosis
-    _line(console, d.sentence)
+    line(console, d.sentence)
     for finding in d.findings:
-        _line(console, f"data: {finding.text}")
+        line(console, f"data: {finding.text}")
     for text in d.noise:
-        _line(console, f"noise: {text}")
-    _line(console, f"p of the model as given: {f'{d.p_value:.2g}' if d.p_value > 1e-300 else 'below 1e-300'}")
+        line(console, f"noise: {text}")
+    line(console, f"p of the model as given: {f'{d.p_value:.2g}' if d.p_value > 1e-300 else 'below 1e-300'}")
     _where(console, told)
     _candidates(console, told)
     _steps(console, told)
     _out_of_sight(console, told)
     for text in told.advice:
-        _line(console, f"advice: {text}")
+        line(console, f"advice: {text}")
 
 
 def amount(value: float, unit: str, digits: int = 3) -> str:
@@ -42,7 +42,8 @@ def amount(value: float, unit: str, digits: int = 3) -> str:
         return f"{value:.{digits}g}"
 
 
-def _line(console: Console, text: str) -> None:
+def line(console: Console, text: str) -> None:
+    """Print a line as it is: no markup, no wrapping."""
     console.print(text, soft_wrap=True, markup=False, highlight=False)
 
 
@@ -51,7 +52,7 @@ def _where(console: Console, told: Account) -> None:
     if told.diagnosis.adequate or not top:
         return
     places = ", ".join(f"{w.channel} at stop {w.stop} ({w.normalised_mean:+.1f} sigma)" for w in top)
-    _line(console, f"worst: {places}")
+    line(console, f"worst: {places}")
 
 
 def _candidates(console: Console, told: Account) -> None:
@@ -79,7 +80,7 @@ def _steps(console: Console, told: Account) -> None:
         return
     for number, s in enumerate(steps, start=1):
         end = f"error with one stop held out {s.held_out_before.rms:.3f} -> {s.held_out_after.rms:.3f}"
-        _line(
+        line(
             console,
             f"step {number}: {s.label} (z {s.z:+.1f}, threshold {s.threshold:.1f}, "
             f"log Bayes factor {s.log_bayes_factor:.0f}; {end}) {s.fate}",
@@ -87,19 +88,23 @@ def _steps(console: Console, told: Account) -> None:
         if s.accepted and not s.taken_out and s.moved:
             moved = ", ".join(f"{name} {size:+.1f} sigma" for name, size in s.moved if abs(size) > 1.0)
             if moved:
-                _line(console, f"  without it these were wrong: {moved}")
+                line(console, f"  without it these were wrong: {moved}")
 
 
 def _out_of_sight(console: Console, told: Account) -> None:
     hidden = [r for r in told.reached if not r.testable]
     if hidden:
-        _line(console, f"{len(hidden)} of {len(told.reached)} candidates could not have been seen with this plan:")
+        line(console, f"{len(hidden)} of {len(told.reached)} candidates could not have been seen with this plan:")
     for group in told.blind:
         names = ", ".join(group.labels[:3]) + (" ..." if len(group.labels) > 3 else "")
-        _line(console, f"  {group.reason}: {len(group.labels)} ({names})")
+        line(console, f"  {group.reason}: {len(group.labels)} ({names})")
     if told.diagnosis.adequate:
-        sizes = "; ".join(_size(r) for r in _typical(told.reached))
-        _line(console, f"smallest sizes that would have been found (80 %): {sizes}")
+        line(console, f"smallest sizes that would have been found (80 %): {smallest(told.reached)}")
+
+
+def smallest(reached: tuple[Reach, ...]) -> str:
+    """Say the smallest sizes of a few typical effects."""
+    return "; ".join(_size(r) for r in _typical(reached))
 
 
 def _typical(reached: tuple[Reach, ...]) -> list[Reach]:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from sdimu_calibration.core.diagnosis.consistency import CHANNEL_NAMES, Consistency
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
+from sdimu_calibration.core.diagnosis.linear import LinearEvidence
 from sdimu_calibration.core.diagnosis.scan import Scan, scan
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.units import from_si
@@ -164,7 +165,15 @@ def scored(diagnosis: Diagnosis) -> list[Scored]:
     last = first if not len(diagnosis.found.chosen) else scan(
         evidence.information, *added(diagnosis), diagnosis.found.scale
     )  # fmt: skip
-    rows = [_scored(diagnosis, i, first, last) for i in range(p, len(evidence.names)) if i not in free]
+    looked_at = [i for i in range(p, len(evidence.names)) if i not in free]
+    return scores(evidence, first, last, looked_at, diagnosis.found.chosen)
+
+
+def scores(
+    evidence: LinearEvidence, first: Scan, last: Scan, columns: Sequence[int], chosen: Ints
+) -> list[Scored]:
+    """Candidates at some columns, largest score first, from the scans without and with what was chosen."""
+    rows = [_scored(evidence, i, first, last, i in chosen) for i in columns]
     return sorted(rows, key=lambda row: -abs(row.z))
 
 
@@ -187,8 +196,7 @@ def _first_scale(first: Scan) -> float:
     return float(first.sigma[one] * np.sqrt(first.information.J[one, one]))
 
 
-def _scored(diagnosis: Diagnosis, index: int, first: Scan, last: Scan) -> Scored:
-    evidence = diagnosis.evidence
+def _scored(evidence: LinearEvidence, index: int, first: Scan, last: Scan, chosen: bool) -> Scored:
     candidate = evidence.candidates[index - len(evidence.weight)]
     unit = candidate.parameter.display_unit
     factor = from_si(1.0, unit)
@@ -196,7 +204,7 @@ def _scored(diagnosis: Diagnosis, index: int, first: Scan, last: Scan) -> Scored
         candidate.label, candidate.family, unit, float(first.z[index]), float(last.z[index]),
         float(first.estimate[index]) * factor, float(first.sigma[index]) * factor,
         float(first.smallest[index]) * factor, float(evidence.prior[index - len(evidence.weight)]) * factor,
-        float(first.retention[index]), index in diagnosis.found.chosen,
+        float(first.retention[index]), chosen,
     )  # fmt: skip
 
 

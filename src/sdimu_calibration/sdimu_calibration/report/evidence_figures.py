@@ -30,14 +30,14 @@ _ABOVE = "{}<br>\N{NO-BREAK SPACE}<br>\N{NO-BREAK SPACE}"
 _LIMIT = {"dash": "dash", "color": "#222", "width": 1.5}
 
 
-def heat_map(grid: data.Grid) -> Any:
+def heat_map(grid: data.Grid, channels: Sequence[str] = CHANNEL_NAMES) -> Any:
     """Normalised residual means, channel by stop: number and sign in each cell, colour besides."""
     numbered = len(grid.stops) <= _MOST_NUMBERED
     text = [[cell(v) if numbered else _sign(v) for v in row] for row in grid.value]
     figure = go.Figure(
         go.Heatmap(
             x=[str(s) for s in grid.stops],
-            y=[c.replace("_", " ") for c in CHANNEL_NAMES],
+            y=[c.replace("_", " ") for c in channels],
             z=grid.value.astype(np.float32),
             text=text,
             texttemplate="%{text}",
@@ -114,6 +114,11 @@ def ladder(diagnosis: Diagnosis) -> Any:
         return None
     names = ["model as given", *(f"+ {step.label}" for step in accepted)]
     values = [diagnosis.found.steps[0].held_out_before.rms, *(step.held_out_after.rms for step in accepted)]
+    return rungs(names, values)
+
+
+def rungs(names: Sequence[str], values: Sequence[float]) -> Any:
+    """Draw the held-out RMS of one model after the other."""
     figure = go.Figure(
         go.Scatter(
             x=names,

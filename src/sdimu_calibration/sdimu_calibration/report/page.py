@@ -8,8 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
+from sdimu_calibration.core.diagnosis.hand_account import HandAccount
 from sdimu_calibration.core.results import Calibration
-from sdimu_calibration.report import data, sections, table
+from sdimu_calibration.report import data, hand_sections, sections, table
 from sdimu_calibration.report.besides import Besides
 from sdimu_calibration.report.drawing import html
 from sdimu_calibration.report.export import as_csv, as_yaml
@@ -30,6 +31,7 @@ def write_report(
     reference: Mapping[str, float] | None = None,
     diagnosis: Diagnosis | None = None,
     more: Besides | None = None,
+    by_hand: HandAccount | None = None,
 ) -> None:
     """Write report.html.
 
@@ -49,11 +51,13 @@ def write_report(
         Adds the verdict, what is missing, where it fails, and how the error falls.
     more : Besides, optional
         What to show besides the diagnosis: table angles, drift in use, ladder of refits.
+    by_hand : HandAccount, optional
+        The diagnosis of a hand-held run, in place of `diagnosis`.
     """
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     temporary = path.with_name(f".{path.name}.part")
-    temporary.write_text(page(calibration, title, truth, reference, diagnosis, more), encoding="utf-8")
+    temporary.write_text(page(calibration, title, truth, reference, diagnosis, more, by_hand), encoding="utf-8")
     temporary.replace(path)
 
 
@@ -75,11 +79,13 @@ def page(
     reference: Mapping[str, float] | None = None,
     diagnosis: Diagnosis | None = None,
     more: Besides | None = None,
+    by_hand: HandAccount | None = None,
 ) -> str:
     """Make the page as HTML text; parameters as in `write_report`."""
     draw = _Drawing()
     more = more or Besides()
     parts = [] if diagnosis is None else _evidence(diagnosis, more, draw)
+    parts += [] if by_hand is None else hand_sections.evidence(by_hand, draw)
     parts.append(_coefficients(calibration, truth, reference))
     parts += [] if diagnosis is None else _residuals(diagnosis, more, draw)
     if len(calibration.history.t):
@@ -90,7 +96,8 @@ def page(
         f"<h1>{escape(title)}</h1>",
         f'<p class="quiet">{_summary(calibration)}</p>',
         sections.verdict(diagnosis) if diagnosis else "",
-        f"<p>{_fit(calibration, diagnosis is not None)}</p>",
+        hand_sections.verdict(by_hand) if by_hand else "",
+        f"<p>{_fit(calibration, bool(diagnosis or by_hand))}</p>",
         _notes(calibration),
     ]
     return (

@@ -20,13 +20,17 @@ from sdimu_calibration.report.table import with_sigma
 
 def verdict(diagnosis: Diagnosis) -> str:
     """Return the verdict in one sentence, what is wrong with data and noise, and the numbers behind it."""
-    mark = "\N{CHECK MARK}" if diagnosis.adequate else "\N{HEAVY BALLOT X}"
-    kind = "good" if diagnosis.adequate else "bad"
     told = [*(f.text for f in diagnosis.findings), *diagnosis.noise]
-    word, said = escape(diagnosis.verdict), prose(diagnosis.sentence)
-    box = f'<p class="verdict {kind}"><strong>{mark} {word}.</strong> {said}</p>'
+    box = verdict_box(diagnosis.adequate, diagnosis.verdict, diagnosis.sentence)
     listed = "<ul>" + "".join(f"<li>{prose(text)}</li>" for text in told) + "</ul>" if told else ""
     return box + listed + quiet(_numbers(diagnosis))
+
+
+def verdict_box(adequate: bool, word: str, said: str) -> str:
+    """Return a verdict in its box."""
+    mark = "\N{CHECK MARK}" if adequate else "\N{HEAVY BALLOT X}"
+    kind = "good" if adequate else "bad"
+    return f'<p class="verdict {kind}"><strong>{mark} {escape(word)}.</strong> {prose(said)}</p>'
 
 
 def _numbers(d: Diagnosis) -> str:
@@ -46,7 +50,7 @@ def _probability(p: float) -> str:
     return f"= {p:.2g}" if p > 1e-300 else "< 1e-300"
 
 
-_LADDER = (
+STEP_COLUMNS = (
     "step", "estimate", "|z| (noise reaches)", "log-likelihood gain", "log Bayes factor", "held-out RMS",
     "held-out gain", "verdict",
 )  # fmt: skip
@@ -63,7 +67,7 @@ def ladder(diagnosis: Diagnosis, draw: Draw) -> str:
     return section(
         "Ladder of models: how far the error falls",
         draw(figure),
-        grid(_LADDER, [first, *(_rung(step) for step in steps)], {0, 7}),
+        grid(STEP_COLUMNS, [first, *(step_row(step) for step in steps)], {0, 7}),
         "<ul>" + "".join(f"<li>{prose(text)}</li>" for text in told) + "</ul>",
         quiet(
             "Held-out: every stop predicted from the others, in sigmas; 1 is right. In-sample likelihood rises with "
@@ -111,7 +115,8 @@ def _refit(r: Rung) -> list[str]:
     ]  # fmt: skip
 
 
-def _rung(step: Step) -> list[str]:
+def step_row(step: Step) -> list[str]:
+    """Return a step of the search as a row of `STEP_COLUMNS`."""
     factor = from_si(1.0, step.display_unit)
     return [
         f"+ {step.label}", with_sigma(step.estimate * factor, step.sigma * factor, step.display_unit),

@@ -101,8 +101,8 @@ def content(told: Account, ladder: tuple[Rung, ...] = ()) -> dict[str, Any]:
         "where": [
             {"channel": w.channel, "stop": w.stop, "normalised_mean": w.normalised_mean} for w in d.consistency.where
         ],
-        "candidates": [_candidate(f, d.own) for f in told.candidates],
-        "partial": [_candidate(f, d.own) for f in told.found] if is_unexplained else [],
+        "candidates": [candidate(f, d.own) for f in told.candidates],
+        "partial": [candidate(f, d.own) for f in told.found] if is_unexplained else [],
         "unexplained": {
             "is": is_unexplained,
             "fraction": _unexplained_fraction(d),
@@ -126,8 +126,8 @@ def content(told: Account, ladder: tuple[Rung, ...] = ()) -> dict[str, Any]:
             "before": {"chi2": d.remainder_before.chi2, "dof": d.remainder_before.dof, "p": d.remainder_before.p_value},
             "after": {"chi2": d.remainder_after.chi2, "dof": d.remainder_after.dof, "p": d.remainder_after.p_value},
         },
-        "fit": {"before": _fit(d.before), "after": _fit(d.after)},
-        "ladder": [_step(s) for s in d.found.steps],
+        "fit": {"before": fit_of(d.before), "after": fit_of(d.after)},
+        "ladder": [step_of(s) for s in d.found.steps],
         "grown": [_rung(r) for r in ladder],
         "plan": {
             "turns": [
@@ -137,12 +137,13 @@ def content(told: Account, ladder: tuple[Rung, ...] = ()) -> dict[str, Any]:
             ],
             "oblique_stops": told.plan.oblique,
         },
-        "not_testable": [_reach(r) | {"reason": _reason(told, r)} for r in told.reached if not r.testable],
-        "smallest_detectable": [_reach(r) for r in told.reached if r.testable],
+        "not_testable": [reach_of(r) | {"reason": _reason(told, r)} for r in told.reached if not r.testable],
+        "smallest_detectable": [reach_of(r) for r in told.reached if r.testable],
     }  # fmt: skip
 
 
-def _candidate(f: Found, own: bool) -> dict[str, Any]:
+def candidate(f: Found, own: bool) -> dict[str, Any]:
+    """Give an effect that was found as plain data."""
     parameter = f.candidate.parameter
     return {
         "effect": f.candidate.label if own else f.candidate.family,
@@ -178,11 +179,13 @@ def _noise(noise: Noise) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _fit(calibration: Calibration) -> dict[str, Any]:
+def fit_of(calibration: Calibration) -> dict[str, Any]:
+    """Give model and fit of a calibration as plain data."""
     return {"model": list(calibration.model), **dict(calibration.fit)}
 
 
-def _step(s: Step) -> dict[str, Any]:
+def step_of(s: Step) -> dict[str, Any]:
+    """Give a step of the search as plain data."""
     return {
         "label": s.label, "effect": s.family, "accepted": s.accepted, "reason": s.reason,
         "taken_out": s.taken_out, "z": s.z,
@@ -211,7 +214,8 @@ def _rung(r: Rung) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _reach(r: Reach) -> dict[str, Any]:
+def reach_of(r: Reach) -> dict[str, Any]:
+    """Give what could have been seen of one effect as plain data."""
     return {
         "label": r.label, "effect": r.family, "retention": r.retention, "smallest": r.smallest, "unit": r.unit,
         "display_unit": r.display_unit, "taken_by": list(r.partners),

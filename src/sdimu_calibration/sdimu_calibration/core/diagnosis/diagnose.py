@@ -79,7 +79,7 @@ class Diagnosis:
     consistency: Consistency
     before: Calibration
     after: Calibration
-    found: Search
+    found: Search[Evidence]
     evidence: Evidence
     remainder_before: Remainder
     remainder_after: Remainder
@@ -146,7 +146,7 @@ def diagnose(
     own = any(c.family == "own" for c in look.chosen)
     # What was added must also predict: an effect that only mimics the missing one fits here and fails elsewhere.
     # The free inputs are constant in a dwell and in a turn; what changes within one shows in the NIS alone.
-    loud = misfit(final, consistency, imu, setup.imu) > _MISFIT
+    loud = misfit(final, consistency, imu, setup.imu) > largest_misfit(float(final.fit["nis_dof"] or 1.0))
     unexplained = look.after.p_value < UNEXPLAINED_P or _rms(final) > STILL_WRONG or loud or patched(look)
     p_value = _p_value(look.found, look.before, consistency, bool(noise) or loud)
     verdict = _verdict(look, own, unexplained, noise, findings)
@@ -169,8 +169,18 @@ def misfit(final: Calibration, consistency: Consistency, stated: ImuSpecificatio
     return float((final.fit["nis_mean"] or 0.0) / (0.5 * (gyro**2 + accel**2)) - 1.0)
 
 
+def largest_misfit(dof: float) -> float:
+    """Excess of the NIS that a right model stays below.
+
+    The NIS and the differences of neighbours are two estimates of one variance, the second with an efficiency of 2/3
+    (Rice, Ann. Stat. 12, 1984): their ratio scatters by ``1/sqrt(dof)``.
+    """
+    return max(_MISFIT, _MISFIT_SIGMAS / float(np.sqrt(dof)))
+
+
 _MISFIT = 0.05
-"""Six sigma of a test of fifty minutes."""
+"""What is smaller matters to no sigma."""
+_MISFIT_SIGMAS = 5.0
 
 
 def patched(look: Look) -> bool:
@@ -227,7 +237,7 @@ _KURTOSIS = 4.0
 """Of the differences of neighbouring seconds; Gaussian noise in a test of an hour stays below 3.3."""
 
 
-def _p_value(found: Search, before: Remainder, consistency: Consistency, noise: bool) -> float:
+def _p_value(found: Search[Evidence], before: Remainder, consistency: Consistency, noise: bool) -> float:
     """Bonferroni over the three tests that can call a model inadequate."""
     largest = float(np.max(np.abs(found.first.z), initial=0.0))
     count = int(np.isfinite(found.first.sigma).sum())
@@ -259,7 +269,7 @@ def _verdict(
     return "consistent"
 
 
-def _alike(found: Search, label: str) -> tuple[str, ...]:
+def _alike(found: Search[Evidence], label: str) -> tuple[str, ...]:
     """Name what the data cannot tell from a chosen effect."""
     return next((s.alike for s in found.steps if s.label == label), ())
 

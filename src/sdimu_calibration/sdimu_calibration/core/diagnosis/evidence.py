@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sdimu_calibration.core.diagnosis.candidates import Candidate, split
-from sdimu_calibration.core.diagnosis.information import Information
+from sdimu_calibration.core.diagnosis.candidates import split
+from sdimu_calibration.core.diagnosis.linear import LinearEvidence
 from sdimu_calibration.core.diagnosis.signatures import measured_rows, signatures
 from sdimu_calibration.core.effects.effect import Effect, Timetable
 from sdimu_calibration.core.effects.motion import Motion
@@ -25,30 +24,13 @@ Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
-class Evidence:
-    """Linear model of one recording about a converged calibration.
+class Evidence(LinearEvidence):
+    """Innovations of the navigation filter about a converged calibration; every parameter of the model a coefficient.
 
     Attributes
     ----------
-    e : ndarray, shape (N,)
-        Whitened innovations of the navigation filter with all coefficients at the calibration's values.
-    W : ndarray, shape (N, p + q)
-        Signatures: p coefficients of the model, then q candidates.
-    epoch, channel, stop : ndarray of int, shape (N,)
+    epoch, channel : ndarray of int, shape (N,)
         Of each row; channels 0-11 are position, velocity, rate, force, three each.
-    names : tuple of str
-        Of the p + q parameters.
-    weight : ndarray, shape (p,)
-        Prior information of the coefficients (1/sigma^2).
-    shift : ndarray, shape (p,)
-        Prior mean minus the calibration's values.
-    stated : ndarray, shape (p,)
-        One-sigma of the coefficients by the specification, whatever the calibration had to widen it to.
-    candidates : tuple of Candidate, length q
-    prior : ndarray, shape (q,)
-        One-sigma that physics gives the candidates (inf where unknown).
-    grade : str
-        Of the IMU: gives candidates their prior.
     output : PassOutput
         Of the navigation filter.
     seen : Motion
@@ -58,62 +40,17 @@ class Evidence:
         Of the site (rad).
     """
 
-    e: Floats
-    W: Floats
     epoch: Ints
     channel: Ints
-    stop: Ints
-    names: tuple[str, ...]
-    weight: Floats
-    shift: Floats
-    stated: Floats
-    candidates: tuple[Candidate, ...]
-    prior: Floats
-    grade: str
     output: PassOutput
     seen: Motion
     times: Timetable
     reduced: Reduced
     latitude: float
 
-    @property
-    def model(self) -> Ints:
-        """Indices of the model's own coefficients."""
-        return np.arange(len(self.weight))
-
-    @cached_property
-    def information(self) -> Information:
-        """Information on all parameters, the prior's pull on the coefficients in d."""
-        d = self.W.T @ self.e
-        d[: len(self.weight)] += self.weight * self.shift
-        return Information(self.W.T @ self.W, d)
-
-    def with_effects(self, effects: Sequence[Effect]) -> Evidence:
-        """Return the evidence with the parameters of more effects behind the candidates it has."""
-        more = [c for effect in effects for c in split(effect)]
-        W = columns(self.reduced, self.output, self.seen, self.latitude, effects)
-        wider = replace(
-            self, W=np.hstack([self.W, W]), names=(*self.names, *(c.label for c in more)),
-            candidates=(*self.candidates, *more),
-            prior=np.concatenate([self.prior, [c.effect.prior.get(self.grade, np.inf) for c in more]]),
-        )  # fmt: skip
-        # Only what is new is multiplied: the old columns are many.
-        old, across = self.information, self.W.T @ W
-        J = np.block([[old.J, across], [across.T, W.T @ W]])
-        wider.__dict__["information"] = Information(J, np.concatenate([old.d, W.T @ self.e]))
-        return wider
-
-    def only(self, columns: Ints) -> Evidence:
-        """Return the evidence with the model and the candidates at `columns` alone."""
-        p = len(self.weight)
-        keep = np.concatenate([self.model, columns]).astype(np.int64)
-        part = replace(
-            self, W=np.ascontiguousarray(self.W[:, keep]), names=tuple(self.names[i] for i in keep),
-            candidates=tuple(self.candidates[i - p] for i in columns), prior=self.prior[columns - p],
-        )  # fmt: skip
-        full = self.information
-        part.__dict__["information"] = Information(full.J[np.ix_(keep, keep)], full.d[keep])
-        return part
+    def signature(self, effects: Sequence[Effect]) -> Floats:
+        """Columns of all parameters of `effects`, shape (N, parameters)."""
+        return columns(self.reduced, self.output, self.seen, self.latitude, effects)
 
 
 def timetable(reduced: Reduced) -> Timetable:

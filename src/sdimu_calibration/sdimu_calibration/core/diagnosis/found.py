@@ -10,6 +10,7 @@ from scipy.stats import norm
 
 from sdimu_calibration.core.diagnosis.candidates import Candidate
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
+from sdimu_calibration.core.diagnosis.evidence import Evidence
 from sdimu_calibration.core.diagnosis.remainder import remainder
 from sdimu_calibration.core.diagnosis.scan import POWER_80, Scan, alike, scan
 from sdimu_calibration.core.diagnosis.search import Problem
@@ -177,7 +178,7 @@ def _partners(names: tuple[str, ...], J: Floats, weight: Floats, column: int) ->
     return tuple(names[i] for i in np.argsort(-share)[:3] if share[i] > 0.05)
 
 
-def _misfits(d: Diagnosis, problem: Problem, chosen: list[int]) -> list[float]:
+def _misfits(d: Diagnosis, problem: Problem[Evidence], chosen: list[int]) -> list[float]:
     """Free-input chi-square beyond its degrees of freedom with none, one, two ... of the chosen in the model."""
     out = []
     for k in range(len(chosen) + 1):
@@ -188,7 +189,7 @@ def _misfits(d: Diagnosis, problem: Problem, chosen: list[int]) -> list[float]:
     return out
 
 
-def _estimates(d: Diagnosis, problem: Problem, chosen: list[int]) -> tuple[Floats, Floats]:
+def _estimates(d: Diagnosis, problem: Problem[Evidence], chosen: list[int]) -> tuple[Floats, Floats]:
     """Value and sigma of each, of the refit where there is one."""
     known, weight, _ = problem.known(chosen)
     estimate, covariance = d.evidence.information.estimate(known, weight)
@@ -203,7 +204,7 @@ def _estimates(d: Diagnosis, problem: Problem, chosen: list[int]) -> tuple[Float
     return values, sigmas
 
 
-def _alike(d: Diagnosis, problem: Problem, chosen: list[int], column: int, allowed: Ints) -> list[int]:
+def _alike(d: Diagnosis, problem: Problem[Evidence], chosen: list[int], column: int, allowed: Ints) -> list[int]:
     """Columns that the data cannot tell from a chosen one, all others chosen being in the model."""
     others = [c for c in chosen if c != column]
     scanned: Scan = problem.scan(others, d.found.scale)

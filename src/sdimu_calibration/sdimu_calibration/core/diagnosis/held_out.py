@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sdimu_calibration.core.diagnosis.evidence import Evidence
+from sdimu_calibration.core.diagnosis.linear import LinearEvidence
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -35,12 +35,12 @@ class HeldOut:
     rms: float
 
 
-def predict(evidence: Evidence, chosen: Ints, weight: Floats, shift: Floats, scale: float = 1.0) -> HeldOut:
+def predict(evidence: LinearEvidence, chosen: Ints, weight: Floats, shift: Floats, scale: float = 1.0) -> HeldOut:
     """Leave one stop out.
 
     Parameters
     ----------
-    evidence : Evidence
+    evidence : LinearEvidence
     chosen : ndarray of int, shape (k,)
         Parameters of the model under test.
     weight, shift : ndarray, shape (k,)

@@ -59,7 +59,7 @@ class Look:
     solution: Solution
     evidence: Evidence
     free: Ints
-    found: Search
+    found: Search[Evidence]
     before: Remainder
     after: Remainder
 

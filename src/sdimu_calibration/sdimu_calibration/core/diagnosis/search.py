@@ -11,12 +11,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Generic
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sdimu_calibration.core.diagnosis.evidence import Evidence
 from sdimu_calibration.core.diagnosis.held_out import HeldOut, gain, predict
+from sdimu_calibration.core.diagnosis.linear import E
 from sdimu_calibration.core.diagnosis.scan import Scan, alike, scan, threshold
 from sdimu_calibration.core.effects.effect import Effect
 
@@ -100,7 +101,7 @@ class Step:
 
 
 @dataclass(frozen=True)
-class Search:
+class Search(Generic[E]):
     """How far the search came.
 
     Attributes
@@ -125,13 +126,13 @@ class Search:
     last: Scan
     threshold: float
     scale: float
-    evidence: Evidence
+    evidence: E
 
 
-class Problem:
+class Problem(Generic[E]):
     """Evidence with the bookkeeping of priors for any set of chosen columns."""
 
-    def __init__(self, evidence: Evidence) -> None:
+    def __init__(self, evidence: E) -> None:
         self.evidence = evidence
         self.p = len(evidence.weight)
 
@@ -174,12 +175,12 @@ class Problem:
         return predict(self.evidence, known, weight, shift, scale)
 
 
-def search(evidence: Evidence, allowed: Ints, alpha: float = FALSE_ALARM) -> Search:
+def search(evidence: E, allowed: Ints, alpha: float = FALSE_ALARM) -> Search[E]:
     """Grow the model from the allowed candidates.
 
     Parameters
     ----------
-    evidence : Evidence
+    evidence : LinearEvidence
     allowed : ndarray of int
         Columns that may be chosen.
     alpha : float
@@ -221,7 +222,7 @@ def search(evidence: Evidence, allowed: Ints, alpha: float = FALSE_ALARM) -> Sea
     return Search(tuple(steps), back, first, scanned, first_limit, scale, evidence)
 
 
-def _sharpen(problem: Problem, chosen: Sequence[int], best: int) -> Effect | None:
+def _sharpen(problem: Problem[E], chosen: Sequence[int], best: int) -> Effect | None:
     """Make the scan finer about the best candidate; None when that gains less than `_SHARPER`."""
     p = problem.p
     candidate = problem.evidence.candidates[best - p]
@@ -247,7 +248,7 @@ def _of_the_sensor(variant: Effect, name: str) -> str:
     return name if name in names else next(n for n in names if n.startswith(sensor + ":"))
 
 
-def _polish(problem: Problem, chosen: list[int]) -> list[int]:
+def _polish(problem: Problem[E], chosen: list[int]) -> list[int]:
     """Exchange each chosen column for the best one given the others until nothing changes; drop what they explain."""
     for _ in range(4):
         changed = False
@@ -269,7 +270,7 @@ def _polish(problem: Problem, chosen: list[int]) -> list[int]:
 
 
 def _step(
-    problem: Problem, scanned: Scan, scores: Floats, chosen: Sequence[int], best: int, limit: float,
+    problem: Problem[E], scanned: Scan, scores: Floats, chosen: Sequence[int], best: int, limit: float,
     before: HeldOut, after: HeldOut,
 ) -> Step:  # fmt: skip
     evidence, p = problem.evidence, problem.p
@@ -295,7 +296,7 @@ def _step(
     )  # fmt: skip
 
 
-def _moved(problem: Problem, chosen: Sequence[int], best: int, size: float) -> tuple[tuple[str, float], ...]:
+def _moved(problem: Problem[E], chosen: Sequence[int], best: int, size: float) -> tuple[tuple[str, float], ...]:
     """Coefficients that the effect moves most, in their own sigmas: the damage it did while it was missing."""
     known, weight, _ = problem.known(chosen)
     J = problem.evidence.information.J
@@ -303,5 +304,7 @@ def _moved(problem: Problem, chosen: Sequence[int], best: int, size: float) -> t
     unit = 1.0 / np.sqrt(np.diag(A))
     inverse = np.linalg.inv(A * np.outer(unit, unit)) * np.outer(unit, unit)
     change = -inverse @ J[known, best] * size / np.sqrt(np.diag(inverse))
-    order = np.argsort(-np.abs(change))[:4]
+    # Neither attitudes nor the like, which only serve: coefficients of the model, and what was chosen before.
+    told = [*range(problem.evidence.coefficients), *range(problem.p, len(known))]
+    order = sorted(told, key=lambda i: -abs(change[i]))[:4]
     return tuple((problem.evidence.names[known[i]], float(change[i])) for i in order)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sdimu_calibration.core.diagnosis.linear import E
 from sdimu_calibration.core.diagnosis.search import Problem
 
 _MATTERS = 3.0
@@ -32,7 +33,7 @@ class Stake:
 
 
 def stakes(
-    problem: Problem, chosen: Sequence[int], column: int, others: Sequence[int], scale: float
+    problem: Problem[E], chosen: Sequence[int], column: int, others: Sequence[int], scale: float
 ) -> tuple[Stake, ...]:
     """Exchange a chosen effect for every other member of its class and see what moves.
 
@@ -55,7 +56,7 @@ def stakes(
     tuple of Stake
         One for each member that moves a coefficient of the model by more than three of its sigmas.
     """
-    p = problem.p
+    p = problem.evidence.coefficients
     names = problem.evidence.names
     known, weight, _ = problem.known(chosen)
     named, covariance = problem.evidence.information.estimate(known, weight)

@@ -12,6 +12,8 @@ its size. The body frame is that of the accelerometers.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -89,6 +91,41 @@ def hand_calibrate(
     if progress is not None:
         progress("rests", 0.1)
     sensors = imu_model.build(model.effects, imu)
+    ready = prepare(recording)
+    scene = make_scene(sensors, imu, site, ready.rests)
+    if progress is not None:
+        progress("least squares", 0.3)
+    found = fit_run(ready.run, scene, first_point(ready.run, sensors, scene.gravity))
+    return assemble(ready, scene, found, site, model)
+
+
+@dataclass(frozen=True)
+class HandReady:
+    """A hand-held recording, made ready: without impossible samples, its rests found, reduced.
+
+    Attributes
+    ----------
+    recording : Recording
+    rests : Rests
+    run : HandRun
+    impossible : tuple of DataFault
+        What was taken out.
+    """
+
+    recording: Recording
+    rests: Rests
+    run: HandRun
+    impossible: tuple[DataFault, ...]
+
+
+def prepare(recording: Recording) -> HandReady:
+    """Find the rests and reduce the recording to them and the turns between.
+
+    Raises
+    ------
+    DataError
+        When there are too few rests.
+    """
     recording, impossible = without_impossible(recording)
     rests = find_rests(recording)
     if len(rests) < FEWEST_RESTS:
@@ -96,13 +133,7 @@ def hand_calibrate(
             f"/imu/data_raw: {len(rests)} rests; a hand-held calibration needs {FEWEST_RESTS} and more, "
             "in different attitudes"
         )
-    run = reduce_run(recording, rests)
-    scene = make_scene(sensors, imu, site, rests)
-    if progress is not None:
-        progress("least squares", 0.3)
-    found = fit_run(run, scene, first_point(run, sensors, scene.gravity))
-    faults = (*impossible, *data_faults(recording, run, found))
-    return _assemble(recording, run, scene, found, site, model, faults)
+    return HandReady(recording, rests, reduce_run(recording, rests), impossible)
 
 
 def make_scene(sensors: ImuModel, imu: ImuSpecification, site: Site | None, rests: Rests) -> Scene:
@@ -149,10 +180,10 @@ def first_point(run: HandRun, sensors: ImuModel, gravity: float) -> Point:
     return Point(coefficients, np.array(C_nb), np.zeros(3), np.zeros(3))
 
 
-def _assemble(
-    recording: Recording, run: HandRun, scene: Scene, found: HandFit, site: Site | None, model: Model,
-    faults: tuple[DataFault, ...],
-) -> Calibration:  # fmt: skip
+def assemble(ready: HandReady, scene: Scene, found: HandFit, site: Site | None, model: Model) -> Calibration:
+    """Put a finished fit into the form of a calibration."""
+    recording, run = ready.recording, ready.run
+    faults = (*ready.impossible, *data_faults(recording, run, found))
     sensors, p = scene.model, len(scene.model.prior)
     covariance = np.zeros((p, p))
     covariance[np.ix_(scene.kept, scene.kept)] = found.covariance

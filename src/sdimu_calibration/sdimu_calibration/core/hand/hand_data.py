@@ -7,7 +7,8 @@ slope of the errors: with errors of percents both are needed.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -112,10 +113,26 @@ class Turns:
         Attitude at the end of each turn, by the gyros, against a frame that does not turn.
     by_coefficient : ndarray, shape (k - 1, 3, p)
         Change of that attitude (small turn in n) per unit of each coefficient taken out of the samples.
+    seen : Motion
+        What a perfect IMU saw in every cycle of the recording.
+    weight : ndarray, shape (n, 3, 6)
+        Small turn in n per measured rate (rad/s) and force (m/s^2) of every cycle.
     """
 
     C_nb: Floats
     by_coefficient: Floats
+    seen: Motion
+    weight: Floats
+
+    def by_parameter(self, run: HandRun, values: Floats, terms: Sequence[tuple[int, int]], count: int) -> Floats:
+        """Change of the attitudes per unit of `count` parameters, shape (k - 1, 3, count).
+
+        `values` are the regressors of `seen`; `terms` gives sensor axis and parameter of each of their columns.
+        """
+        out = np.zeros((len(run.first), 3, count))
+        for column, (channel, parameter) in enumerate(terms):
+            out[:, :, parameter] -= _sums(self.weight[:, :, channel] * values[:, column, None], run.first, run.last)
+        return out
 
 
 def turns(run: HandRun, model: ImuModel, coefficients: Floats, C_nb: Floats, gravity: float) -> Turns:
@@ -130,11 +147,10 @@ def turns(run: HandRun, model: ImuModel, coefficients: Floats, C_nb: Floats, gra
     phi = clean.cycles.alpha + clean.cycles.coning
     middle, end = _integrate(np.ascontiguousarray(C_nb), run.first, run.last, np.ascontiguousarray(phi))
     weight = middle @ clean.weight[:, :3, :] * cycles.dt[:, None, None]
-    values = model.regressors(clean.seen)
-    by_coefficient = np.zeros((len(run.first), 3, len(model.prior)))
-    for column, (channel, parameter) in enumerate(zip(model.channel, model.parameter, strict=True)):
-        by_coefficient[:, :, parameter] -= _sums(weight[:, :, channel] * values[:, column, None], run.first, run.last)
-    return Turns(end, by_coefficient)
+    found = Turns(end, np.zeros(0), clean.seen, weight)
+    terms = list(zip(model.channel.tolist(), model.parameter.tolist(), strict=True))
+    known = found.by_parameter(run, model.regressors(clean.seen), terms, len(model.prior))
+    return replace(found, by_coefficient=known)
 
 
 @compiled

@@ -128,8 +128,8 @@ def fit_run(run: HandRun, scene: Scene, start: Point) -> HandFit:
         )
     point = start
     for steps in range(1, MOST_STEPS + 1):
-        rows, residual, kind = _equations(run, scene, point)
-        Q, R, white = _solve(rows, residual, _sigma(run, scene, kind, point.extra))
+        rows, residual, kind = equations(run, scene, point)
+        Q, R, white = _solve(rows, residual, row_sigmas(run, scene, kind, point.extra))
         step = np.asarray(-np.linalg.solve(R, Q.T @ white))
         extra = _learn(run, scene, kind, point.extra, rows, residual, step)
         moved = float(np.max(np.abs(R[-len(scene.kept) - 3 : -3] @ step)))
@@ -157,10 +157,11 @@ def _moved(point: Point, step: Floats, scene: Scene) -> Point:
     return replace(point, coefficients=coefficients, C_nb=C_nb, earth=point.earth + step[-3:])
 
 
-def _equations(run: HandRun, scene: Scene, point: Point) -> tuple[Floats, Floats, NDArray[np.int64]]:
+def equations(run: HandRun, scene: Scene, point: Point) -> tuple[Floats, Floats, NDArray[np.int64]]:
     """Rows, residuals and kinds (-1 for priors, which come whitened).
 
-    Unknowns in this order: turns of the rests, coefficients, Earth rate.
+    Unknowns in this order: turns of the rests, coefficients, Earth rate. Equations in this order: six of each rest,
+    three of each turn, priors.
     """
     k, q = len(run.t), len(scene.kept)
     model = scene.model
@@ -209,7 +210,7 @@ def _priors(scene: Scene, point: Point, width: int) -> tuple[Floats, Floats]:
     return rows, residual
 
 
-def _sigma(run: HandRun, scene: Scene, kind: NDArray[np.int64], extra: Floats) -> Floats:
+def row_sigmas(run: HandRun, scene: Scene, kind: NDArray[np.int64], extra: Floats) -> Floats:
     """Sigma of every row."""
     white, more = _variances(run, scene, extra)
     return np.asarray(np.sqrt(_spread(run, kind, white + more)))
@@ -253,7 +254,7 @@ def _learn(
     Each is searched with the redundancies of the present weights; Gauss-Newton repeats it until both stand.
     """
     left = residual + rows @ step
-    sigma = _sigma(run, scene, kind, extra)
+    sigma = row_sigmas(run, scene, kind, extra)
     Q = np.linalg.qr(rows / sigma[:, None])[0]
     free = 1.0 - np.sum(Q**2, axis=1)
     out = extra.copy()
@@ -265,7 +266,7 @@ def _learn(
         ) -> float:
             trial = out.copy()
             trial[which] = value
-            return float(np.sum((left[mine] / _sigma(run, scene, kind, trial)[mine]) ** 2)) - target
+            return float(np.sum((left[mine] / row_sigmas(run, scene, kind, trial)[mine]) ** 2)) - target
 
         out[which] = _root(excess, float(np.sqrt(np.mean(left[mine] ** 2))))
     return out
@@ -286,8 +287,8 @@ def _root(excess: Callable[[float], float], scale: float) -> float:
 
 def _finish(run: HandRun, scene: Scene, point: Point, steps: int) -> HandFit:
     """Put the statistics together."""
-    rows, residual, kind = _equations(run, scene, point)
-    sigma = _sigma(run, scene, kind, point.extra)
+    rows, residual, kind = equations(run, scene, point)
+    sigma = row_sigmas(run, scene, kind, point.extra)
     Q, R, white = _solve(rows, residual, sigma)
     k, q = len(run.t), len(scene.kept)
     inverse = np.linalg.inv(R)

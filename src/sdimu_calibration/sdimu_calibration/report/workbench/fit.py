@@ -247,7 +247,7 @@ def _without_history(solution: Solution) -> Solution:
     return replace(solution, first=short)
 
 
-def _nothing_added(evidence: Evidence, columns: NDArray[np.int64]) -> Search:
+def _nothing_added(evidence: Evidence, columns: NDArray[np.int64]) -> Search[Evidence]:
     problem = Problem(evidence.only(columns))
     scale = problem.scale([])
     first = scan(problem.evidence.information, problem.evidence.model, problem.evidence.weight, scale)
