@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import socket
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -103,3 +104,38 @@ def test_bad_input_is_one_line(sdimu, hidden, tmp_path):
 def test_the_page_of_effects_is_what_the_registry_says():
     # A change of the registry is followed by: sdimu effects --markdown > doc/effects.md
     assert (ROOT / "doc" / "effects.md").read_text() == page()
+
+
+def _free_port() -> int:
+    with socket.socket() as one:
+        one.bind(("127.0.0.1", 0))
+        return int(one.getsockname()[1])
+
+
+def test_a_run_by_hand_is_diagnosed_by_its_own_fit(sdimu, tmp_path):
+    bag = tmp_path / "hand"
+    effect = "accel_quadratic_x=4000 ug/g^2"
+    making = ("simulate", "--by-hand", 20, "--imu", "mems_by_hand", "--seed", 7, "--effect", effect, "--out", bag)
+    assert sdimu(*making)[0] == 0
+    status, out, err = sdimu("diagnose", bag, "--imu", "mems_by_hand", "--out", tmp_path / "d")
+    assert (status, err) == (0, "")
+    assert "nothing is navigated" in out
+    assert "One effect is missing" in out
+    found = json.loads((tmp_path / "d" / "diagnosis.json").read_text())
+    (one,) = found["candidates"]
+    assert "accel_quadratic_x" in {one["label"], *one["indistinguishable_from"]}
+    page = (tmp_path / "d" / "report.html").read_text()
+    for words in ("Which effect is missing?", "Where does it fail? Channel by rest", "Ladder of models"):
+        assert words in page
+    more = ("calibrate", bag, "--imu", "mems_by_hand", "--add", one["label"], "--out", tmp_path / "c")
+    assert sdimu(*more)[0] == 0
+    again = json.loads((tmp_path / "c" / "result.json").read_text())
+    (there,) = (c for c in again["coefficients"] if c["name"] == one["parameters"][0]["name"])
+    assert there["value"] == pytest.approx(one["parameters"][0]["value"], abs=0.02 * there["sigma"])
+
+    status, out, err = sdimu("diagnose", bag, "--imu", "mems_by_hand", "--bootstrap", 5, "--out", tmp_path / "x")
+    assert (status, err.count("\n")) == (1, 1)
+    assert "--bootstrap" in err
+    status, out, err = sdimu("workbench", bag, "--imu", "mems_by_hand", "--port", _free_port())
+    assert (status, err.count("\n")) == (1, 1)
+    assert "sdimu diagnose" in err

@@ -49,6 +49,7 @@ def workbench(
 
     from sdimu_calibration.cli.calibrate import check_options
     from sdimu_calibration.cli.progress import bar
+    from sdimu_calibration.core.hand.hand import by_hand
     from sdimu_calibration.core.recording import DataError
     from sdimu_calibration.report.workbench.app import build
     from sdimu_calibration.report.workbench.fit import Bench
@@ -67,7 +68,13 @@ def workbench(
     )
 
     def opened(path: Path) -> Bench:
-        recording, where = place(open_recording(path, origin), site, specification, origin)
+        recording = open_recording(path, origin)
+        if by_hand(recording, specification):
+            raise DataError(
+                f"{path.name}: a run by hand, in which nothing is navigated: use sdimu diagnose {path.name} (its "
+                "report has the same figures), or --imu when the gyros are better than it says"
+            )
+        recording, where = place(recording, site, specification, origin)
         return Bench(recording, where, specification, wanted)
 
     shelf = Shelf(neighbours(bag), opened)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from sdimu_calibration.core.diagnosis.hand_account import HandAccount, Place
+from sdimu_calibration.core.diagnosis.hand_account import HandAccount, Place, shown
 from sdimu_calibration.core.diagnosis.hand_evidence import CHANNELS
 from sdimu_calibration.core.hand.hand_fit import FORCE, RATE, TURN
 from sdimu_calibration.core.units import from_si
@@ -43,8 +43,8 @@ def _ladder(told: HandAccount, draw: Draw) -> str:
     sizes = ["", *(_size(f.value, f.sigma, f.candidate.parameter.display_unit) for f in told.found)]
     rows = [
         [
-            name, size, f"{r.held_out:.3f}", f"{from_si(float(r.extra[FORCE]), 'ug'):.3g}",
-            f"{np.degrees(r.extra[RATE]):.2g}", f"{100.0 * r.extra[TURN]:.2g}", f"{r.log_likelihood:.1f}",
+            name, size, f"{r.held_out:.3f}", shown(from_si(float(r.extra[FORCE]), "ug")),
+            shown(float(np.degrees(r.extra[RATE]))), shown(100.0 * float(r.extra[TURN])), f"{r.log_likelihood:.1f}",
         ]
         for name, size, r in zip(names, sizes, d.rungs, strict=True)
     ]  # fmt: skip
@@ -86,7 +86,7 @@ def _missing(told: HandAccount, draw: Draw) -> str:
 
 def _where(told: HandAccount, draw: Draw) -> str:
     parts = [
-        draw(evidence_figures.heat_map(_grid(told.where), CHANNELS)),
+        draw(evidence_figures.heat_map(*_grid(told.where))),
         quiet(
             "Residual of every rate and force at rest, and of the way to it, over its own sigma, model as given, in "
             "sigmas of the last model."
@@ -94,15 +94,17 @@ def _where(told: HandAccount, draw: Draw) -> str:
     ]
     if told.found:
         parts += [
-            draw(evidence_figures.heat_map(_grid(told.after), CHANNELS)),
+            draw(evidence_figures.heat_map(*_grid(told.after))),
             quiet("The same with what was found added."),
         ]
     return section("Where does it fail? Channel by rest", *parts)
 
 
-def _grid(places: Sequence[Place]) -> data.Grid:
+def _grid(places: Sequence[Place]) -> tuple[data.Grid, list[str]]:
+    """Lay out residuals; channels that nothing checks, as the heading by which a turn ends, are left out."""
     stops = np.unique([p.stop for p in places]).astype(np.int64)
-    value = np.full((len(CHANNELS), len(stops)), np.nan)
+    channels = [c for c in CHANNELS if any(p.channel == c for p in places)]
+    value = np.full((len(channels), len(stops)), np.nan)
     for place in places:
-        value[CHANNELS.index(place.channel), np.searchsorted(stops, place.stop)] = place.normalised
-    return data.Grid(stops, value)
+        value[channels.index(place.channel), np.searchsorted(stops, place.stop)] = place.normalised
+    return data.Grid(stops, value), channels

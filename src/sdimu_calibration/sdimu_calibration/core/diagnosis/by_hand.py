@@ -16,7 +16,7 @@ from scipy.stats import norm
 
 from sdimu_calibration.core.diagnosis.candidates import Candidate, catalogue, equations
 from sdimu_calibration.core.diagnosis.hand_evidence import HandEvidence, collect, forget, timetable
-from sdimu_calibration.core.diagnosis.scan import Scan
+from sdimu_calibration.core.diagnosis.scan import Scan, alike
 from sdimu_calibration.core.diagnosis.search import FALSE_ALARM, Problem, Search, Step, search
 from sdimu_calibration.core.effects import imu_model
 from sdimu_calibration.core.effects.effect import Effect, Timetable
@@ -222,7 +222,8 @@ class _Climber:
         before = assemble(self.ready, self.fits[0].scene, self.fits[0].fit, self.site, self.model)
         after = assemble(self.ready, last.scene, last.fit, self.site, self.model) if m else before
         first = self.looks[0]
-        verdict = _verdict(last.added, self.steps, after)
+        twins = alike(problem.scores(problem.scan([])), int(chosen[0])) if m == 1 else []
+        verdict = _verdict(last.added, bool(self.steps), bool(twins), after)
         return HandDiagnosis(
             verdict, verdict == "consistent", _p_value(first.first), before, after, tuple(self.steps), rungs, evidence,
             chosen, first.first, first.threshold, own,
@@ -260,15 +261,14 @@ def _p_value(first: Scan) -> float:
     return float(min(1.0, count * 2.0 * float(norm.sf(np.max(np.abs(first.z), initial=0.0)))))
 
 
-def _verdict(added: tuple[Candidate, ...], steps: Sequence[Step], after: Calibration) -> str:
+def _verdict(added: tuple[Candidate, ...], tried: bool, twins: bool, after: Calibration) -> str:
     if after.warnings:
         return "data fault"
     if not added:
         # Something stood out and was refused or did not last.
-        return "unexplained" if steps else "consistent"
+        return "unexplained" if tried else "consistent"
     if any(c.family == "own" for c in added):
         return "own equation"
     if len(added) > 1:
         return "several effects"
-    alike = next((s.alike for s in steps if s.label == added[0].label), ())
-    return "class of effects" if alike else "one effect"
+    return "class of effects" if twins else "one effect"

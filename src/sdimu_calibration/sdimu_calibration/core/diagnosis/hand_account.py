@@ -73,10 +73,16 @@ def account_by_hand(d: HandDiagnosis) -> HandAccount:
 
 def beyond(extra: Floats) -> str:
     """Say what is left beyond white noise."""
-    return (
-        f"force {from_si(float(extra[FORCE]), 'ug'):.3g} ug, rate {np.degrees(extra[RATE]):.2g} deg/s, "
-        f"turns {100.0 * extra[TURN]:.2g} % of the way"
-    )
+    force, rate, turn = from_si(float(extra[FORCE]), "ug"), float(np.degrees(extra[RATE])), 100.0 * float(extra[TURN])
+    return f"force {shown(force)} ug, rate {shown(rate)} deg/s, turns {shown(turn)} % of the way"
+
+
+def shown(value: float) -> str:
+    """Write a learned sigma in its customary unit; what only rounding made is nought."""
+    return f"{value:.3g}" if value > _ROUNDING else "0"
+
+
+_ROUNDING = 1e-6
 
 
 def places(evidence: HandEvidence, chosen: list[int]) -> tuple[Place, ...]:
@@ -159,7 +165,7 @@ def _sentence(d: HandDiagnosis, found: tuple[Found, ...]) -> str:
     if d.verdict == "own equation":
         return f"Something is missing that is not in the catalogue; it follows {names}; {rest}"
     if d.verdict == "class of effects":
-        others = ", ".join(found[0].alike[:4]) or ", ".join(d.steps[0].alike[:4])
+        others = ", ".join(found[0].alike[:4])
         return f"One effect is missing: {names}, or what looks the same here ({others}); {rest}"
     return f"{'One effect is' if d.verdict == 'one effect' else 'Several effects are'} missing: {names}; {rest}"
 

@@ -26,6 +26,8 @@ CHANNELS = (
     "gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z", "turn_north", "turn_east", "turn_down",
 )  # fmt: skip
 """What is measured: rate and force at each rest, and the way to it (the heading of north is arbitrary)."""
+_LARGEST = 30.0
+"""So many times what physics gives it an effect is never."""
 _ANY_ATTITUDE = 1.0
 """Sigma of the prior of an attitude (rad): none, but an attitude whose rows are left out stays finite."""
 
@@ -60,12 +62,21 @@ class HandEvidence(LinearEvidence):
         """How many of the model's parameters are coefficients."""
         return self.known
 
+    @property
+    def unpredictable(self) -> float:
+        """Without the way to a rest nothing says where it heads, and the last rest has no attitude at all."""
+        return 1e4
+
     def signature(self, effects: Sequence[Effect]) -> Floats:
         """Columns of all parameters of `effects`, shape (N, parameters)."""
         if not effects:
             return np.zeros((len(self.e), 0))
         parts = [_signature(self.run, self.rests, self.gone, effect) for effect in effects]
-        return np.asarray(np.hstack(parts) / self.sigma[:, None])
+        W = np.hstack(parts) / self.sigma[:, None]
+        prior = np.concatenate([np.full(len(e.parameters), e.prior.get(self.grade, np.inf)) for e in effects])
+        # What only shows by the gyros' answer to a force that is wrong in a turn is not seen: no sensor is so bad.
+        seen = _LARGEST * prior * np.linalg.norm(W, axis=0) > 1.0
+        return np.where(seen, W, 0.0)
 
 
 def collect(run: HandRun, scene: Scene, point: Point, effects: Sequence[Effect], grade: str) -> HandEvidence:

@@ -27,7 +27,7 @@ class HeldOut:
     log_score : ndarray, shape (s,)
         Log predictive density of each stop.
     rms : float
-        Of the normalised prediction errors of all stops.
+        Of the normalised prediction errors of all stops; of rows that can be predicted at all.
     """
 
     stop: Ints
@@ -53,7 +53,7 @@ def predict(evidence: LinearEvidence, chosen: Ints, weight: Floats, shift: Float
     unit = 1.0 / np.sqrt(np.diag(J) + weight)
     stops = np.unique(evidence.stop)
     score = np.zeros(len(stops))
-    total = 0.0
+    total, count = 0.0, 0
     for k, stop in enumerate(stops):
         rows = evidence.stop == stop
         Ws, es = W[rows], e[rows]
@@ -68,8 +68,11 @@ def predict(evidence: LinearEvidence, chosen: Ints, weight: Floats, shift: Float
         y = X.T @ error
         chi2 = (error @ error - y @ np.linalg.solve(M, y)) / scale**2
         score[k] = -0.5 * (chi2 + np.linalg.slogdet(M)[1] + 2.0 * len(es) * np.log(scale))
-        total += float(np.sum(error**2 / (1.0 + np.sum(X**2, axis=1)))) / scale**2
-    return HeldOut(stops.astype(np.int64), score, float(np.sqrt(total / len(e))))
+        spread = 1.0 + np.sum(X**2, axis=1)
+        told = spread < evidence.unpredictable
+        total += float(np.sum(error[told] ** 2 / spread[told])) / scale**2
+        count += int(told.sum())
+    return HeldOut(stops.astype(np.int64), score, float(np.sqrt(total / max(count, 1))))
 
 
 def gain(before: HeldOut, after: HeldOut, apart: int | None = None) -> tuple[float, float]:

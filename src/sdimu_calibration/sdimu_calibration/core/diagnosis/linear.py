@@ -76,6 +76,11 @@ class LinearEvidence(ABC):
         """How many of the model's parameters, the first ones, are sensor coefficients."""
         return len(self.weight)
 
+    @property
+    def unpredictable(self) -> float:
+        """Variance of a prediction, over that of the measurement, from which a row left out is not counted."""
+        return float("inf")
+
     @cached_property
     def information(self) -> Information:
         """Information on all parameters, the prior's pull on the model's in d."""

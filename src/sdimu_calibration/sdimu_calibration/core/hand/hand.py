@@ -41,6 +41,9 @@ _UNKNOWN = 0.5
 """A coefficient whose sigma stays above this share of its prior is not determined by the recording."""
 _LEAST_NOISE = 0.01
 """Learned noise is not believed below this share of the specification's."""
+_ROOM = 30.0
+"""What the IMU's file gives no prior for is taken so many times larger than its class has it: held back by a prior, an
+effect that was added would be learned as scatter."""
 _SEEN = 3.0
 """Sigmas at which the Earth's rate is seen."""
 
@@ -150,8 +153,9 @@ def make_scene(sensors: ImuModel, imu: ImuSpecification, site: Site | None, rest
         raise DataError(f"a hand-held run takes constants only, and '{name}' changes at random: leave it out")
     # The prior holds in a frame of its own; the three turns that lead to the accelerometers' frame go with it.
     J = body_frame.frame_jacobian(sensors.names, "accelerometer_triad")
-    prior = J @ np.diag(sensors.prior**2) @ J.T
-    kept = np.flatnonzero(np.diag(prior) > 1e-12 * sensors.prior**2)
+    size = sensors.prior * np.where(_stated(sensors, imu), 1.0, _ROOM)
+    prior = J @ np.diag(size**2) @ J.T
+    kept = np.flatnonzero(np.diag(prior) > 1e-12 * size**2)
     gravity, mean, sigma = STANDARD_GRAVITY, np.zeros(3), np.full(3, earth.RATE / np.sqrt(3.0))
     if site is not None:
         gravity = site.gravity_m_s2 or float(earth.normal_gravity(site.latitude_rad, site.height_m))
@@ -164,6 +168,11 @@ def make_scene(sensors: ImuModel, imu: ImuSpecification, site: Site | None, rest
         max(rests.gyro_white_noise, _LEAST_NOISE * imu.gyro_white_noise),
         max(rests.accel_white_noise, _LEAST_NOISE * imu.accel_white_noise),
     )  # fmt: skip
+
+
+def _stated(sensors: ImuModel, imu: ImuSpecification) -> NDArray[np.bool_]:
+    """Which coefficients have a prior in the IMU's own file."""
+    return np.array([(e.family or e.name) in imu.prior for e in sensors.effects for _ in e.parameters])
 
 
 def first_point(run: HandRun, sensors: ImuModel, gravity: float) -> Point:

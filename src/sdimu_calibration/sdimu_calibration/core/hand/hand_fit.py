@@ -33,8 +33,10 @@ Floats = NDArray[np.float64]
 CONVERGED = 1e-3
 """Largest step of a coefficient in its sigma at which Gauss-Newton ends."""
 MOST_STEPS = 120
-_DAMPED = 8
-"""Steps after which the learned sigmas move by half."""
+_FREE = 8
+"""Steps after which the learned sigmas no longer go where they were learned, but at a pace of their own."""
+_SLOWEST, _FASTEST, _FASTER = 0.5, 64.0, 1.5
+"""Pace of the learned sigmas: half where they swing, faster and faster where two of them trade along a ridge."""
 MOST_RESTS = 400
 """The least squares is dense: a thousand unknowns take a second a step."""
 _HEADING = 1e-6
@@ -127,6 +129,7 @@ def fit_run(run: HandRun, scene: Scene, start: Point) -> HandFit:
             f"/imu/data_raw: {len(run.t)} rests; a hand-held run may have {MOST_RESTS}: cut the recording in parts"
         )
     point = start
+    change, pace = np.zeros(3), 1.0
     for steps in range(1, MOST_STEPS + 1):
         rows, residual, kind = equations(run, scene, point)
         Q, R, white = _solve(rows, residual, row_sigmas(run, scene, kind, point.extra))
@@ -135,7 +138,9 @@ def fit_run(run: HandRun, scene: Scene, start: Point) -> HandFit:
         moved = float(np.max(np.abs(R[-len(scene.kept) - 3 : -3] @ step)))
         # A hundredth of a sigma that is known to a tenth; half steps, as weights and residuals chase each other.
         settled = bool(np.all(np.abs(extra - point.extra) <= 1e-2 * extra + 1e-12))
-        extra = 0.5 * (extra + point.extra) if steps > _DAMPED else extra
+        change, before = extra - point.extra, change
+        pace = _pace(pace, change, before) if steps > _FREE else 1.0
+        extra = np.maximum(point.extra + pace * change, 0.0)
         point = _moved(replace(point, extra=extra), step, scene)
         if not np.isfinite(step).all():
             break
@@ -145,6 +150,14 @@ def fit_run(run: HandRun, scene: Scene, start: Point) -> HandFit:
         "the hand-held run does not fit any IMU of the specification: check the units, and that --imu is as wide as "
         "the sensor's errors"
     )
+
+
+def _pace(pace: float, change: Floats, before: Floats) -> float:
+    """Speed up what goes on in one direction, slow down what turns."""
+    along = float(change @ before)
+    if along > 0.5 * float(np.linalg.norm(change) * np.linalg.norm(before)):
+        return min(pace * _FASTER, _FASTEST)
+    return _SLOWEST
 
 
 def _moved(point: Point, step: Floats, scene: Scene) -> Point:
