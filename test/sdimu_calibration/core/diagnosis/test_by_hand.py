@@ -60,6 +60,26 @@ def test_a_turn_shows_what_acts_only_in_turns():
     assert "gyro_scale_asymmetry_z" in {one.candidate.label, *one.alike}
 
 
+def test_two_that_stood_for_one_in_the_scatter_give_way_to_it():
+    found = _diagnosis(201, ("gyro_scale_asymmetry_y=10000 ppm",))
+    (one,) = account_by_hand(found).found
+    assert one.candidate.label == "gyro_scale_asymmetry_y"
+    assert all(step.taken_out for step in found.steps if step.label != one.candidate.label)
+
+
+def test_a_swing_in_time_is_told_with_its_period():
+    still = _recording(201)
+    swing = 5e-3 * 9.8 * np.sin(2.0 * np.pi * still.t / 37.0)
+    force = still.f_ib_b + np.outer(swing, [1.0, 0.0, 0.0])
+    (one, *_) = account_by_hand(diagnose_by_hand(replace(still, f_ib_b=force), None, IMU, MODEL)).found
+    channel, _, period = one.candidate.label.partition(": sin(2 pi t / ")
+    assert channel == "accel_x"
+    # A tenth of a cycle over the run.
+    assert abs(1.0 / float(period.split()[0]) - 1.0 / 37.0) < 0.1 / still.t[-1]
+    # Its size bears the scale of the axis, 2 % (one sigma).
+    assert one.value == pytest.approx(5e-3 * 9.8, rel=0.06, abs=4.0 * one.sigma)
+
+
 def test_a_right_model_is_left_alone():
     finds = [len(_diagnosis(seed).steps) for seed in SEEDS]
     # A find has probability 0.02 a run: two of three have 1e-3.

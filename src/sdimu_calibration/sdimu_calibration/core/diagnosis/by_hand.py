@@ -14,8 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import norm
 
-from sdimu_calibration.core.diagnosis.candidates import Candidate, catalogue, equations
+from sdimu_calibration.core.diagnosis.candidates import Candidate, catalogue, equations, periodic
 from sdimu_calibration.core.diagnosis.hand_evidence import HandEvidence, collect, forget, timetable
+from sdimu_calibration.core.diagnosis.rounds import LEAST_SIGMAS, fates
 from sdimu_calibration.core.diagnosis.scan import Scan, alike
 from sdimu_calibration.core.diagnosis.search import FALSE_ALARM, Problem, Search, Step, search
 from sdimu_calibration.core.effects import imu_model
@@ -31,8 +32,6 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 MOST_EFFECTS = 6
-LEAST_SIGMAS = 3.0
-"""What is smaller than this many of its sigmas once it is in the fit is taken out."""
 _NOT_BY_HAND = ("reference", "gyro_lost_data", "gyro_delay", "accel_delay")
 """There is no reference but gravity; a turn by hand may miss anyhow, by a sigma that is learned."""
 
@@ -74,7 +73,7 @@ class HandDiagnosis:
     before, after : Calibration
         With the model as given, and with what was found added (the same object when nothing was).
     steps : tuple of Step
-        What was tried, in order, in sigmas of the fit that it was tried on.
+        What was tried, in order, in sigmas of the fit that it was tried on; those taken out later say why.
     rungs : tuple of HandRung
         The model as given, then one for each effect that was found.
     evidence : HandEvidence
@@ -157,26 +156,68 @@ class _Climber:
         self.extra, self.alpha, self.tell = extra, alpha, tell
         self.steps: list[Step] = []
         self.looks: list[Search[HandEvidence]] = []
+        self.weak: set[str] = set()
         tell("least squares", 0.1)
         self.fits = [self._fit((), None)]
 
     def climb(self) -> None:
         """Go on until nothing stands out, something is refused, or what is added does not last."""
+        seen = {frozenset[str]()}
         while len(self.fits) <= MOST_EFFECTS:
             here = self.fits[-1]
-            self.tell("candidates", 0.2 + 0.1 * len(self.steps))
+            self.tell("candidates", min(0.8, 0.2 + 0.1 * len(self.steps)))
             step, candidate = self._look(here)
             if step is None:
                 return
             self.steps.append(step)
             if candidate is None:
                 return
-            self.tell("least squares", 0.25 + 0.1 * len(self.steps))
-            there = self._fit((*here.added, candidate), here)
-            if _sizes(there)[-1] < LEAST_SIGMAS:
-                self.steps[-1] = replace(step, taken_out=f"fitted, it is below {LEAST_SIGMAS:.0f} of its sigmas")
+            self.tell("least squares", min(0.85, 0.25 + 0.1 * len(self.steps)))
+            self.fits.append(self._fit((*here.added, candidate), here))
+            self._choose_anew()
+            self._drop_weak()
+            chosen = frozenset(c.label for c in self.fits[-1].added)
+            if chosen in seen:
                 return
-            self.fits.append(there)
+            seen.add(chosen)
+
+    def _choose_anew(self) -> None:
+        """Search in the sigmas of the last fit as if nothing had been added: it sees what the scatter hid before.
+
+        What was added first was chosen in a scatter that it made itself, and two or three effects may stand for one.
+        Another choice of as many or fewer is taken when its fit is the more likely.
+        """
+        last = self.fits[-1]
+        own = any(c.family == "own" for c in last.added)
+        evidence = forget(self._evidence(last, own), len(last.added), last.added)
+        found = search(evidence, np.arange(len(evidence.weight), len(evidence.names)), self.alpha)
+        chosen = [found.evidence.candidates[c - len(evidence.weight)] for c in found.chosen]
+        if not 0 < len(chosen) <= len(last.added) or {c.label for c in chosen} == {c.label for c in last.added}:
+            return
+        fits = self._ladder(chosen)
+        if fits[-1].fit.log_likelihood > last.fit.log_likelihood:
+            self.fits = fits
+            known = {step.label for step in self.steps}
+            new = {c.label for c in chosen} - known
+            self.steps += [step for step in found.steps if step.accepted and step.label in new]
+
+    def _drop_weak(self) -> None:
+        """Drop the weakest of what was added below three of its sigmas, one at a time."""
+        while self.fits[-1].added:
+            sizes = _sizes(self.fits[-1])
+            weakest = int(np.argmin(sizes))
+            if sizes[weakest] >= LEAST_SIGMAS:
+                return
+            added = self.fits[-1].added
+            self.weak.add(added[weakest].label)
+            self.fits = self._ladder([*added[:weakest], *added[weakest + 1 :]])
+
+    def _ladder(self, added: Sequence[Candidate]) -> list[_Fitted]:
+        """Fit the model as given with the first, the first two, ... of what is added."""
+        fits = self.fits[:1]
+        for k in range(len(added)):
+            fits = [*fits, self._fit(tuple(added[: k + 1]), fits[-1])]
+        return fits
 
     def _fit(self, added: tuple[Candidate, ...], parent: _Fitted | None) -> _Fitted:
         """Fit the model with more effects, from where the one before ended."""
@@ -221,11 +262,11 @@ class _Climber:
         )  # fmt: skip
         before = assemble(self.ready, self.fits[0].scene, self.fits[0].fit, self.site, self.model)
         after = assemble(self.ready, last.scene, last.fit, self.site, self.model) if m else before
-        first = self.looks[0]
+        first, steps = self.looks[0], fates(self.steps, {c.label for c in last.added}, self.weak)
         twins = alike(problem.scores(problem.scan([])), int(chosen[0])) if m == 1 else []
         verdict = _verdict(last.added, bool(self.steps), bool(twins), after)
         return HandDiagnosis(
-            verdict, verdict == "consistent", _p_value(first.first), before, after, tuple(self.steps), rungs, evidence,
+            verdict, verdict == "consistent", _p_value(first.first), before, after, steps, rungs, evidence,
             chosen, first.first, first.threshold, own,
         )  # fmt: skip
 
@@ -234,7 +275,8 @@ def candidates(
     times: Timetable, in_model: set[str], has_temperature: bool, extra: Sequence[Effect], own: bool
 ) -> list[Effect]:
     """Effects that a hand-held run may show: constants, and none of the table's and of the place's."""
-    known = [*extra, *catalogue(times, in_model, has_temperature), *(equations(has_temperature) if own else [])]
+    more = [*equations(has_temperature), *periodic(times.duration)] if own else []
+    known = [*extra, *catalogue(times, in_model, has_temperature), *more]
     return [
         effect for effect in known
         if not (effect.family or effect.name).startswith(_NOT_BY_HAND)

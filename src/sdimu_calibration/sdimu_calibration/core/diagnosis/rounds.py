@@ -126,18 +126,18 @@ def drop_companions(base: Solution, look: Look, progress: Progress) -> Look:
         kept = look.found.chosen[keep]
         look = replace(look, solution=solution, found=replace(look.found, chosen=kept))
         if keep.all():
-            found = replace(look.found, steps=_fates(look, small))
+            steps = fates(look.found.steps, {c.label for c in look.chosen}, small)
+            found = replace(look.found, steps=steps)
             return replace(look, found=found, after=left(look.evidence, kept, look.free, look.found.scale))
 
 
-def _fates(look: Look, small: set[str]) -> tuple[Step, ...]:
-    """Mark the steps that are not among what was found with why."""
-    kept = {c.label for c in look.chosen}
+def fates(steps: Sequence[Step], kept: set[str], small: set[str]) -> tuple[Step, ...]:
+    """Mark the steps that are not among what was found, by their labels, with why; `small` were too small once in."""
     weak = f"calibrated with it, it is below {LEAST_SIGMAS:.0f} of its sigmas"
     gone = "what else was added explains the same better"
     return tuple(
         s if not s.accepted or s.label in kept else replace(s, taken_out=weak if s.label in small else gone)
-        for s in look.found.steps
+        for s in steps
     )
 
 
