@@ -97,7 +97,8 @@ def page(
         f'<p class="quiet">{_summary(calibration)}</p>',
         sections.verdict(diagnosis) if diagnosis else "",
         hand_sections.verdict(by_hand) if by_hand else "",
-        f"<p>{_fit(calibration, bool(diagnosis or by_hand))}</p>",
+        # By hand the ladder says it, in sigmas that models can be compared by.
+        "" if by_hand else f"<p>{_fit(calibration, diagnosis is not None)}</p>",
         _notes(calibration),
     ]
     return (
