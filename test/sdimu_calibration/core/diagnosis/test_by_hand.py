@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import replace
 from functools import cache
 
@@ -11,15 +12,21 @@ import pytest
 from sdimu_calibration.core.diagnosis.by_hand import candidates, diagnose_by_hand
 from sdimu_calibration.core.diagnosis.hand_account import account_by_hand
 from sdimu_calibration.core.diagnosis.hand_evidence import collect, timetable
+from sdimu_calibration.core.diagnosis.scan import POWER_80
 from sdimu_calibration.core.effects import imu_model
 from sdimu_calibration.core.hand.hand import first_point, make_scene, prepare
 from sdimu_calibration.core.hand.hand_fit import FORCE, equations, fit_run
-from sdimu_calibration.core.units import to_si
+from sdimu_calibration.core.units import from_si, to_si
 from sdimu_calibration.storage.config import load_imu, load_model
 from sdimu_calibration.storage.hand_diagnosis_file import hand_content
 from sdimu_sim.core.by_hand import ByHand, by_hand_recording
 
 IMU, MODEL = load_imu("mems_by_hand"), load_model("hand")
+HIDDEN = (
+    "gyro_scale_asymmetry", "gyro_scale_quadratic", "gyro_scale_cubic", "gyro_misalignment_asymmetry", "gyro_g_squared",
+    "gyro_g_product", "accel_bias_asymmetry", "accel_quadratic", "accel_scale_asymmetry", "accel_cubic",
+    "accel_odd_quadratic", "accel_cross_coupling", "accel_cross_product", "accel_cross_square",
+)  # fmt: skip
 SEEDS = (201, 202, 203)
 SHOWN = ("gyro_scale_asymmetry_x", "gyro_scale_cubic_z", "accel_quadratic_y", "accel_cross_coupling_xz",
          "gyro_g_squared_xy", "accel_bias_ramp_z", "gyro_bias_ramp_y")  # fmt: skip
@@ -146,3 +153,41 @@ def test_the_file_has_the_keys_of_every_diagnosis():
     assert content["where"][0]["normalised_mean"] == told.where[0].normalised
     assert content["unexplained"] == {"is": False, "fraction": 0.0, "best_variables": []}
     assert content["beyond_white_noise"][1]["force_m_s2"] < content["beyond_white_noise"][0]["force_m_s2"]
+
+
+@pytest.mark.slow
+def test_forty_runs_name_what_is_hidden_and_forty_others_nothing(capsys):
+    finds, named, sizes, drawn = 0, 0, [], 0
+    for seed in range(3001, 3041):
+        clean = account_by_hand(_diagnosis(seed))
+        finds += bool(clean.found)
+        hidden = _draw(clean, np.random.default_rng(seed))
+        if hidden is None:
+            continue
+        drawn += 1
+        label, size, unit = hidden
+        told = account_by_hand(_diagnosis(seed, (f"{label}={from_si(size, unit):.8g} {unit}",)))
+        named += any(label in {f.candidate.label, *f.alike} for f in told.found)
+        sizes += [(f.value - size) / f.sigma for f in told.found if f.candidate.label == label]
+    spread = float(np.sqrt(np.mean(np.square(sizes))))
+    with capsys.disabled():
+        sys.stdout.write(f"\n{finds} false finds of 40; named {named} of {drawn}; RMS z of the size {spread:.2f}\n")
+    # Of 40 runs with a false find in fifty, more than four have a probability of 1e-3.
+    assert finds <= 4
+    assert named >= 0.9 * drawn
+    assert np.max(np.abs(sizes)) < 4.0
+
+
+def _draw(clean, rng):
+    """Draw an effect that acts alike at any time: 8 to 30 of its sigmas, at most three times what physics gives it."""
+    evidence = clean.diagnosis.evidence
+    able = [
+        (r, size)
+        for r, prior in zip(clean.reached, evidence.prior, strict=True)
+        if r.testable and r.retention > 0.1 and r.family in HIDDEN
+        and (size := rng.uniform(8.0, 30.0) * r.smallest / POWER_80) < 3.0 * prior
+    ]  # fmt: skip
+    if not able:
+        return None
+    r, size = able[rng.integers(len(able))]
+    return r.label, float(size * rng.choice([-1.0, 1.0])), r.display_unit
