@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -18,9 +18,6 @@ from sdimu_calibration.cli.source_options import (
     TemperatureTopic,
     source,
 )
-
-if TYPE_CHECKING:
-    from sdimu_calibration.core.diagnosis.grow import Rung
 
 
 def diagnose(
@@ -68,24 +65,13 @@ def diagnose(
         check_options,
         chosen_estimator,
         default_folder,
-        explained,
-        tell,
     )
-    from sdimu_calibration.cli.diagnose_hand import diagnose_hand
-    from sdimu_calibration.cli.diagnosis_text import print_account, print_ladder
+    from sdimu_calibration.cli.diagnose_with import Asked, diagnose_hand, diagnose_navigated
     from sdimu_calibration.cli.noise import with_noise
-    from sdimu_calibration.cli.progress import bar
-    from sdimu_calibration.core.diagnosis.bootstrap import bootstrap as draw
-    from sdimu_calibration.core.diagnosis.diagnose import diagnose as examine
-    from sdimu_calibration.core.diagnosis.grow import grow as climb
     from sdimu_calibration.core.recording import DataError
-    from sdimu_calibration.report.besides import besides
-    from sdimu_calibration.report.page import write_report
     from sdimu_calibration.storage.config import load_imu
-    from sdimu_calibration.storage.diagnosis_file import account, write_diagnosis
     from sdimu_calibration.storage.effect_file import extended_model, find_effects
     from sdimu_calibration.storage.opening import open_recording, place
-    from sdimu_calibration.storage.result_file import write_result
 
     console = Console()
     check_estimator(estimator, DIAGNOSED)
@@ -108,29 +94,10 @@ def diagnose(
         where = None
         if site is not None:
             recording, where = place(recording, site, specification, origin)
-        diagnose_hand(console, recording, where, specification, wanted, extra, folder, title, told_noise)
-        return
-    recording, where = place(recording, site, specification, origin)
-    with explained(console, recording.notes), bar(console) as progress:
-        found = examine(recording, where, specification, wanted, extra, progress=progress)
-    told = account(found)
-    print_account(console, told)
-    rungs: tuple[Rung, ...] = ()
-    if grow:
-        with bar(console) as progress:
-            growth = climb(recording, where, specification, wanted, extra, progress=progress, first=found)
-        rungs = growth.rungs
-        print_ladder(console, rungs)
-    null = None
-    if bootstrap:
-        with bar(console) as progress:
-            null = draw(found, bootstrap, progress=progress)
-        console.print(f"bootstrap: {null.sentence}", soft_wrap=True, markup=False, highlight=False)
-    write_diagnosis(folder / "diagnosis.json", told, rungs, null)
-    write_result(folder / "result.json", found.after if told.candidates else found.before)
-    with bar(console) as progress:
-        progress("navigation without aid", 0.5)
-        more = besides(recording, found, where, specification, wanted, rungs)
-    write_report(folder / "report.html", found.after, title=title, diagnosis=found, more=more)
-    tell(console, (*recording.notes, *told_noise))
+        asked = Asked(recording, where, specification, wanted, extra, folder, title, told_noise)
+        diagnose_hand(console, asked)
+    else:
+        recording, where = place(recording, site, specification, origin)
+        asked = Asked(recording, where, specification, wanted, extra, folder, title, told_noise)
+        diagnose_navigated(console, asked, grow, bootstrap)
     console.print(f"results in {folder}", soft_wrap=True)

@@ -37,8 +37,8 @@ VARIABLES: tuple[str, ...] = (
 """True means over the sample: body rate w (rad/s), specific force a (f/g), angular acceleration alpha (rad/s^2),
 rate of the table wt (rad/s), magnetic field B (T), lever-arm tensor L (1/s^2), sign of the last turn about and of
 the last change of a along an axis (turned, leant), time t (s), temperature T (deg C), its change since the start dT
-(K) and rate dTdt (K/s), moving (1 while the table turns), since (s after
-the last turn ended, 0 in turns, very long before the first)."""
+(K) and rate dTdt (K/s), moving (1 while the table turns), time since the last turn ended (since; s, 0 in turns, very
+long before the first)."""
 
 CONSTANTS: dict[str, float] = {
     "g": STANDARD_GRAVITY,

@@ -137,8 +137,6 @@ def _signature(run: HandRun, rests: Motion, gone: Turns, effect: Effect) -> Floa
     return np.vstack([at_rest.reshape(-1, count), way.reshape(-1, count)])
 
 
-
-
 def forget(about: HandEvidence, count: int, tried: Sequence[Candidate]) -> HandEvidence:
     """Make candidates of the last `count` coefficients: as if the fit had not known them.
 
@@ -151,11 +149,13 @@ def forget(about: HandEvidence, count: int, tried: Sequence[Candidate]) -> HandE
     gone, stays = np.arange(q - count, q), np.concatenate([np.arange(q - count), np.arange(q, p)])
     estimate = -about.shift[gone]
     order = np.concatenate([stays, gone, np.arange(p, len(about.names))])
+    # As every other candidate has it: the fit took what was added much wider.
+    prior = [c.effect.prior.get(about.grade, np.inf) for c in tried]
     return replace(
         about, e=about.e + about.W[:, gone] @ estimate, W=np.ascontiguousarray(about.W[:, order]),
         names=(*(about.names[i] for i in stays), *(c.label for c in tried), *about.names[p:]),
         weight=about.weight[stays], shift=about.shift[stays], stated=about.stated[stays],
-        candidates=(*tried, *about.candidates), prior=np.concatenate([about.stated[gone], about.prior]),
+        candidates=(*tried, *about.candidates), prior=np.concatenate([prior, about.prior]),
         known=q - count,
     )  # fmt: skip
 
