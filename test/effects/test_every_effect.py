@@ -15,10 +15,10 @@ import pytest
 import sdimu_calibration.core.effects  # noqa: F401  (fills the registry)
 from rate_table_sim.core.specification import TableSpecification
 from sdimu_calibration.core import earth
+from sdimu_calibration.core.alignment.prepared import HELD_ALL, SKIP, first_attitude, reduce, set_up
 from sdimu_calibration.core.effects import registry
-from sdimu_calibration.core.filter.filter_pass import HELD_ALL, NAV, SKIP, PassState, new_output, run_pass
+from sdimu_calibration.core.filter.filter_pass import NAV, PassState, new_output, run_pass
 from sdimu_calibration.core.filter.passes import one_pass, pass_settings
-from sdimu_calibration.core.filter.reduced import first_attitude, reduce, set_up
 from sdimu_calibration.core.plan import Plan, Turn
 from sdimu_calibration.core.rotation import rotation_vector
 from sdimu_calibration.core.specification import ImuSpecification, Model, Site
@@ -76,7 +76,7 @@ class Prepared(NamedTuple):
     """A perfect sensor's test, reduced once for all effects."""
 
     recording: object
-    reduced: object
+    prepared: object
 
 
 @pytest.fixture(scope="module")
@@ -89,9 +89,9 @@ def perfect():
 def passed(perfect, effect):
     """Open-loop pass over the perfect test with this effect alone, linearised at zero."""
     setup = set_up(SITE, IMU, Model((effect,)))
-    start = first_attitude(perfect.reduced.epochs, perfect.reduced.phases, setup)
+    start = first_attitude(perfect.prepared.epochs, perfect.prepared.phases, setup)
     none = np.zeros(len(setup.sensors.prior))
-    return one_pass(perfect.reduced, setup, start, start.C_nb, none, closed_loop=False, keep=True), setup
+    return one_pass(perfect.prepared, setup, start, start.C_nb, none, closed_loop=False, keep=True), setup
 
 
 # -- what an effect says of itself ------------------------------------------------------------------------------------
@@ -203,7 +203,7 @@ def test_regressors_are_the_derivative_of_the_simulated_sensor(name, perfect):
         pytest.skip("the simulator has no sensor of this kind")
     np.testing.assert_array_equal(recording.t, perfect.recording.t)
     dt = np.diff(recording.t, prepend=0.0)[:, None]
-    cycles = perfect.reduced.cycles
+    cycles = perfect.prepared.cycles
     ends = np.searchsorted(recording.t, cycles.t + 1e-6)
 
     def per_cycle(error):
@@ -235,7 +235,7 @@ def test_data_lost_in_a_turn_take_the_angle_of_that_turn_that_the_simulator_lose
     angle = np.sum((recording.omega_ib_b - perfect.recording.omega_ib_b) * dt, axis=0)
     found, setup = passed(perfect, effect)
     predicted = setup.sensors.errors(found.data.values, np.array([tau]))[:, :3]
-    expected = np.sum(predicted * perfect.reduced.cycles.dt[:, None], axis=0)
+    expected = np.sum(predicted * perfect.prepared.cycles.dt[:, None], axis=0)
     # The turn is driven a little faster than planned, so that it lasts whole seconds.
     assert 0.2 * tau < np.linalg.norm(angle) < 0.25 * tau
     np.testing.assert_allclose(expected, angle, atol=1e-2 * np.linalg.norm(angle))
@@ -279,7 +279,7 @@ def test_filter_matrices_are_the_derivative_of_compensation_and_navigation(name,
     found, setup = passed(perfect, effect)
     settings = pass_settings(setup, closed_loop=False)
     settings = settings._replace(decay_rate=np.zeros_like(settings.decay_rate), drive=np.zeros_like(settings.drive))
-    kind = np.where(perfect.reduced.phases.used, HELD_ALL, SKIP).astype(np.int64)
+    kind = np.where(perfect.prepared.phases.used, HELD_ALL, SKIP).astype(np.int64)
     free = replace(found, output=new_output(len(kind), len(setup.sensors.prior), True, 1))
     state = PassState(*(v.copy() for v in found.start))
     run_pass(found.data._replace(kind=kind), settings, state, free.output)

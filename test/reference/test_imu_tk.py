@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import scipy.linalg
 
-from sdimu_calibration.core.data.quiet import find_rests
-from sdimu_calibration.core.hand.hand import hand_calibrate
+from sdimu_calibration.core.data.static_detection import detect_static
+from sdimu_calibration.core.handheld.handheld import handheld_calibrate
 from sdimu_calibration.core.recording import Recording
 from sdimu_calibration.storage.config import load_imu, load_model
 
@@ -29,7 +29,7 @@ def xsens():
     accel, gyro = (np.loadtxt(folder / f"xsens_{name}.mat") for name in ("acc", "gyro"))
     t = accel[:, 0] - accel[0, 0] + 0.01
     recording = Recording(0, t, (gyro[:, 1:] - MIDDLE) / COUNTS[1], (accel[:, 1:] - MIDDLE) / COUNTS[0])
-    found = hand_calibrate(recording, None, load_imu("mems_by_hand"), load_model("hand"))
+    found = handheld_calibrate(recording, None, load_imu("mems_by_hand"), load_model("hand"))
     value = dict(zip(found.names, found.values, strict=True))
     pairs = zip(("accel", "gyro"), COUNTS, strict=True)
     accel_matrix, gyro_matrix = (matrix(value, triad) * counts for triad, counts in pairs)
@@ -74,7 +74,7 @@ def test_gyro_scale_is_the_published_one_to_half_a_percent(xsens):
 
 def test_force_at_rest_is_gravity_at_least_as_well_as_published(xsens):
     recording, _, value, accel, _ = xsens
-    rests = find_rests(recording)
+    rests = detect_static(recording)
     mean = np.array([recording.f_ib_b[a:b].mean(axis=0) for a, b in zip(rests.first, rests.last, strict=True)])
     long = rests.last - rests.first >= 100
     bias = np.array([value[f"accel_bias_{axis}"] for axis in "xyz"])

@@ -41,7 +41,7 @@ def samples_of(dwell_s: float) -> int:
     return round((3 * dwell_s + 2 * TURN_S) * RATE_HZ)
 
 
-class Bench:
+class FitSession:
     """The nodes of a test, to be started, killed and waited for one by one."""
 
     def __init__(self, folder: Path, children: Children) -> None:
@@ -75,9 +75,9 @@ class Bench:
 
 
 @pytest.fixture
-def bench(tmp_path: Path) -> Iterator[Bench]:
+def bench(tmp_path: Path) -> Iterator[FitSession]:
     with own_domain(tmp_path / "log"), Children(tmp_path / "log") as children:
-        yield Bench(tmp_path, children)
+        yield FitSession(tmp_path, children)
 
 
 def imu_stamps(bag: Path) -> np.ndarray:

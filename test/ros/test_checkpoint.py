@@ -17,7 +17,7 @@ from sdimu_calibration.storage.config import load_imu, load_model, load_site
 from sdimu_calibration.storage.journal import Journal, digest
 from sdimu_calibration.storage.result_file import read_result
 
-from .conftest import Bench, imu_stamps, samples_of, write_plan
+from .conftest import FitSession, imu_stamps, samples_of, write_plan
 
 SITE, IMU, MODEL = load_site("daejeon"), load_imu("dtg"), load_model("baseline")
 START = 1_700_000_000 * NS
@@ -93,7 +93,7 @@ def test_another_test_in_the_same_folder_begins_anew(tmp_path, later_s):
 
 
 @pytest.mark.ros
-def test_a_killed_calibration_goes_on_and_ends_with_the_same_answer(bench: Bench) -> None:
+def test_a_killed_calibration_goes_on_and_ends_with_the_same_answer(bench: FitSession) -> None:
     """The simulator waits by credits, so nothing is lost: not what was on its way, nor what came meanwhile."""
     write_plan(bench.plan, 30.0)
     bench.speed = 15.0

@@ -18,17 +18,16 @@ from rclpy.task import Future
 from sensor_msgs.msg import Imu
 from std_srvs.srv import Trigger
 
-from sdimu_calibration.core.batch.batch import no_history
 from sdimu_calibration.core.compensation import compensate, compensator
 from sdimu_calibration.core.effects import registry
 from sdimu_calibration.core.recording import DataError
-from sdimu_calibration.core.results import Calibration
+from sdimu_calibration.core.results import Calibration, no_history
 from sdimu_calibration.nodes.convert import encode_imu
 from sdimu_calibration.nodes.credits import STREAM, to_ns
 from sdimu_calibration.storage.config import load_imu, load_model
 from sdimu_calibration.storage.result_file import write_result
 
-from .conftest import Bench
+from .conftest import FitSession
 
 pytestmark = pytest.mark.ros
 
@@ -87,7 +86,7 @@ class Rig:
 
 
 @pytest.fixture
-def rig(bench: Bench) -> Iterator[Rig]:  # noqa: ARG001 (for its domain)
+def rig(bench: FitSession) -> Iterator[Rig]:  # noqa: ARG001 (for its domain)
     rig = Rig()
     yield rig
     rig.executor.shutdown()
@@ -95,7 +94,7 @@ def rig(bench: Bench) -> Iterator[Rig]:  # noqa: ARG001 (for its domain)
     rig.context.try_shutdown()
 
 
-def test_the_node_compensates_as_the_core_does_and_keeps_a_good_result(bench: Bench, rig: Rig) -> None:
+def test_the_node_compensates_as_the_core_does_and_keeps_a_good_result(bench: FitSession, rig: Rig) -> None:
     first, second = drawn(1), drawn(2)
     for name, result in (("first", first), ("second", second)):
         write_result(bench.folder / name / "result.json", result)
@@ -148,7 +147,7 @@ def test_the_node_compensates_as_the_core_does_and_keeps_a_good_result(bench: Be
             assert found.orientation_covariance[0] == -1.0
 
 
-def test_the_node_leaves_with_one_line_when_its_first_result_is_no_good(bench: Bench) -> None:
+def test_the_node_leaves_with_one_line_when_its_first_result_is_no_good(bench: FitSession) -> None:
     bench.children.start("compensate", "sdimu_calibration.nodes.compensate_node", {"result": "nowhere.json"})
     said: list[str] = []
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from sdimu_calibration.storage.result_file import read_result
 
-from .conftest import Bench, write_plan
+from .conftest import FitSession, write_plan
 
 FILE = """format: sdimu-effect/1
 name: coupling
@@ -15,7 +15,7 @@ parameters:
 """
 
 
-def test_the_live_node_takes_a_name_an_equation_and_a_file_in_one_parameter(bench: Bench) -> None:
+def test_the_live_node_takes_a_name_an_equation_and_a_file_in_one_parameter(bench: FitSession) -> None:
     write_plan(bench.plan, 12.0)
     own = bench.folder / "coupling.yaml"
     own.write_text(FILE, encoding="utf-8")

@@ -20,7 +20,7 @@ from sdimu_calibration.nodes.credits import STREAM
 from sdimu_calibration.nodes.listening import Listener
 from sdimu_calibration.nodes.ticking import Ticker
 
-from .conftest import Bench
+from .conftest import FitSession
 
 pytestmark = pytest.mark.ros
 
@@ -40,7 +40,7 @@ class Pair:
 
 
 @pytest.fixture
-def pair(bench: Bench) -> Iterator[Pair]:  # noqa: ARG001 (for its domain)
+def pair(bench: FitSession) -> Iterator[Pair]:  # noqa: ARG001 (for its domain)
     pair = Pair()
     yield pair
     pair.executor.shutdown()

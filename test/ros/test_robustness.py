@@ -15,7 +15,7 @@ from sdimu_calibration.storage.bag_reader import read_recording
 from sdimu_calibration.storage.recover import recover
 from sdimu_calibration.storage.result_file import read_result
 
-from .conftest import RATE_HZ, Bench, imu_stamps, samples_of, write_plan
+from .conftest import RATE_HZ, FitSession, imu_stamps, samples_of, write_plan
 
 pytestmark = pytest.mark.ros
 
@@ -25,7 +25,7 @@ INTERVAL_NS = 10**9 // RATE_HZ
 
 
 @pytest.mark.parametrize("late", NODES)
-def test_a_node_may_come_late_and_nothing_is_lost(bench: Bench, late: str) -> None:
+def test_a_node_may_come_late_and_nothing_is_lost(bench: FitSession, late: str) -> None:
     dwell_s = 12.0
     write_plan(bench.plan, dwell_s)
     for name in NODES:
@@ -40,7 +40,7 @@ def test_a_node_may_come_late_and_nothing_is_lost(bench: Bench, late: str) -> No
     assert read_result(bench.folder).data["samples"] == samples_of(dwell_s)
 
 
-def test_a_killed_calibration_is_not_waited_for_and_its_successor_goes_on(bench: Bench) -> None:
+def test_a_killed_calibration_is_not_waited_for_and_its_successor_goes_on(bench: FitSession) -> None:
     write_plan(bench.plan, 60.0)
     bench.speed = 15.0
     for name in NODES:
@@ -55,7 +55,7 @@ def test_a_killed_calibration_is_not_waited_for_and_its_successor_goes_on(bench:
     assert samples_of(60.0) / 4 < taken < samples_of(60.0)
 
 
-def test_a_killed_recorder_loses_at_most_a_second_and_stalls_nobody(bench: Bench) -> None:
+def test_a_killed_recorder_loses_at_most_a_second_and_stalls_nobody(bench: FitSession) -> None:
     write_plan(bench.plan, 60.0)
     bench.speed = 20.0
     for name in NODES:
@@ -82,7 +82,7 @@ def test_a_killed_recorder_loses_at_most_a_second_and_stalls_nobody(bench: Bench
 
 
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM])
-def test_a_stopped_recorder_closes_its_bag(bench: Bench, how: signal.Signals) -> None:
+def test_a_stopped_recorder_closes_its_bag(bench: FitSession, how: signal.Signals) -> None:
     write_plan(bench.plan, 60.0)
     bench.speed = 20.0
     for name in NODES:
@@ -95,7 +95,7 @@ def test_a_stopped_recorder_closes_its_bag(bench: Bench, how: signal.Signals) ->
         assert bench.children.stop(name, how) == 0
 
 
-def test_a_node_that_fails_is_reported_in_one_line(bench: Bench) -> None:
+def test_a_node_that_fails_is_reported_in_one_line(bench: FitSession) -> None:
     complaints: list[str] = []
     bench.start("rate_table", plan="nowhere")
 

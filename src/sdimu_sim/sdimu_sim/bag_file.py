@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rate_table_sim.core import phase_changes
+from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.storage.bag_writer import write_recording
 from sdimu_sim.core.generator import ImuSamples
 from sdimu_sim.core.scenario import DEFAULT_START_NS, Scenario, SimulatedTest, table_log_rows, temperature_log
@@ -56,5 +56,5 @@ def write_by_hand(path: Path, samples: ImuSamples, *, replace: bool = False) -> 
     )
 
 
-def _nanoseconds(t: NDArray[np.float64]) -> NDArray[np.int64]:
+def _nanoseconds(t: Floats) -> Ints:
     return np.rint(t * 1e9).astype(np.int64)

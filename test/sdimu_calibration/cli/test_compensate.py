@@ -8,12 +8,11 @@ import numpy as np
 import pytest
 
 from sdimu_calibration.cli.compensate import compensate
-from sdimu_calibration.core.batch.batch import no_history
 from sdimu_calibration.core.compensation import compensate as in_core
 from sdimu_calibration.core.compensation import compensator
 from sdimu_calibration.core.effects import selection
 from sdimu_calibration.core.recording import DataError
-from sdimu_calibration.core.results import Calibration
+from sdimu_calibration.core.results import Calibration, no_history
 from sdimu_calibration.storage.bag_file import raw_messages
 from sdimu_calibration.storage.bag_reader import read_recording
 from sdimu_calibration.storage.bag_writer import write_recording

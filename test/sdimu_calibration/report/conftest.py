@@ -10,7 +10,7 @@ import pytest
 from rate_table_sim.core import TableSpecification
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis, diagnose
 from sdimu_calibration.core.recording import Recording, TableLog
-from sdimu_calibration.report.besides import Besides, besides
+from sdimu_calibration.report.report_extras import ReportExtras, report_extras
 from sdimu_calibration.storage.config import load_imu, load_model, load_plan, load_site
 from sdimu_sim.core.scenario import Scenario, generate
 
@@ -36,7 +36,7 @@ def diagnosis(recording: Recording) -> Diagnosis:
 
 
 @pytest.fixture(scope="session")
-def more(recording: Recording, diagnosis: Diagnosis) -> Besides:
+def more(recording: Recording, diagnosis: Diagnosis) -> ReportExtras:
     """With the table's angles, as a bag has them."""
     named = replace(recording, table=TableLog(np.array([0.0, recording.t[-1]]), ("outer", "inner"), ANGLES))
-    return besides(named, diagnosis, load_site("daejeon"), load_imu("dtg"), load_model("baseline"))
+    return report_extras(named, diagnosis, load_site("daejeon"), load_imu("dtg"), load_model("baseline"))

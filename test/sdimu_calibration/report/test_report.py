@@ -25,19 +25,19 @@ from sdimu_calibration.report import (
     sections,
     use_section,
 )
-from sdimu_calibration.report.besides import Besides
 from sdimu_calibration.report.export import as_csv, as_yaml
 from sdimu_calibration.report.markup import prose
 from sdimu_calibration.report.page import page, write_report
+from sdimu_calibration.report.report_extras import ReportExtras
 from sdimu_calibration.report.table import rows
 
 
 @pytest.fixture(scope="module")
-def text(diagnosis: Diagnosis, more: Besides) -> str:
+def text(diagnosis: Diagnosis, more: ReportExtras) -> str:
     return page(diagnosis.after, "A test", diagnosis=diagnosis, more=more)
 
 
-def all_figures(diagnosis: Diagnosis, more: Besides) -> dict[str, object]:
+def all_figures(diagnosis: Diagnosis, more: ReportExtras) -> dict[str, object]:
     found = data.residuals(diagnosis)
     return {
         "ladder": evidence_figures.ladder(diagnosis),
@@ -124,7 +124,7 @@ def test_the_page_says_what_it_means_in_use(text, more):
 
 
 def test_the_page_says_why_nothing_was_navigated(diagnosis):
-    text = page(diagnosis.after, "x", diagnosis=diagnosis, more=Besides(no_trial="too short"))
+    text = page(diagnosis.after, "x", diagnosis=diagnosis, more=ReportExtras(no_trial="too short"))
     assert "Not tried: too short." in text
 
 
@@ -134,7 +134,7 @@ def test_the_ladder_of_refits_tells_every_rung(diagnosis):
         Rung("some_effect", True, "", 20.0, 30.0, 1.01, 0.98, 1.0, 0.001, (("gyro_bias_x", 7.1),)),
         Rung("other_effect", False, "does not lower it", 21.0, 1.0, 1.01, 0.99, 1.0, 0.001, ()),
     )
-    text = page(diagnosis.after, "x", diagnosis=diagnosis, more=Besides(rungs=rungs))
+    text = page(diagnosis.after, "x", diagnosis=diagnosis, more=ReportExtras(rungs=rungs))
     for word in ("+ some_effect", "+30.0", "gyro_bias_x +7.1", "refused: does not lower it"):
         assert word in text
 

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from rate_table_sim.core.specification import TableSpecification
+from sdimu_calibration.core.alignment.prepared import reduce, set_up
 from sdimu_calibration.core.calibrate import calibrate
 from sdimu_calibration.core.diagnosis.evidence import collect
 from sdimu_calibration.core.effects import registry
 from sdimu_calibration.core.filter.passes import solve
-from sdimu_calibration.core.filter.reduced import reduce, set_up
 from sdimu_calibration.core.plan import Plan, Turn
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.specification import Site
@@ -71,7 +71,7 @@ def test_as_a_candidate_it_has_the_signature_of_its_twin(write, recording):
     setup = set_up(SITE, load_imu("dtg"), load_model("baseline"))
     solution = solve(setup, reduce(recording, setup), lambda _what, _share: None, keep=True)
     pair = [registry.get("accel_quadratic").only(("accel_quadratic_x",)), *load_effect(write(TWIN))]
-    W = collect(solution.reduced, setup, solution.last, pair).W[:, -2:]
+    W = collect(solution.prepared, setup, solution.last, pair).W[:, -2:]
     np.testing.assert_allclose(W[:, 1], W[:, 0], rtol=1e-9, atol=1e-9 * np.abs(W[:, 0]).max())
 
 

@@ -172,7 +172,7 @@ def check_estimator(name: str, known: tuple[str, ...] = ESTIMATORS) -> None:
 
 def chosen_estimator(name: str, recording: Recording, imu: ImuSpecification) -> str:
     """Decide between filter and hand when it is left open, by what the gyros see of the Earth's rate."""
-    from sdimu_calibration.core.hand.hand import by_hand
+    from sdimu_calibration.core.handheld.handheld import by_hand
 
     if name != "auto":
         return name
@@ -184,10 +184,11 @@ def _estimators() -> dict[str, Callable[..., Calibration]]:
     from sdimu_calibration.core.batch.batch import batch_calibrate
     from sdimu_calibration.core.batch.classical import classical_calibrate
     from sdimu_calibration.core.calibrate import calibrate as filter_calibrate
-    from sdimu_calibration.core.hand.hand import hand_calibrate
+    from sdimu_calibration.core.handheld.handheld import handheld_calibrate
 
     return {
-        "filter": filter_calibrate, "batch": batch_calibrate, "classical": classical_calibrate, "hand": hand_calibrate,
+        "filter": filter_calibrate, "batch": batch_calibrate, "classical": classical_calibrate,
+        "hand": handheld_calibrate,
     }  # fmt: skip
 
 

@@ -66,7 +66,7 @@ def diagnose(
         chosen_estimator,
         default_folder,
     )
-    from sdimu_calibration.cli.diagnose_with import Asked, diagnose_hand, diagnose_navigated
+    from sdimu_calibration.cli.diagnose_with import Asked, diagnose_handheld_run, diagnose_navigated
     from sdimu_calibration.cli.noise import with_noise
     from sdimu_calibration.core.recording import DataError
     from sdimu_calibration.storage.config import load_imu
@@ -95,7 +95,7 @@ def diagnose(
         if site is not None:
             recording, where = place(recording, site, specification, origin)
         asked = Asked(recording, where, specification, wanted, extra, folder, title, told_noise)
-        diagnose_hand(console, asked)
+        diagnose_handheld_run(console, asked)
     else:
         recording, where = place(recording, site, specification, origin)
         asked = Asked(recording, where, specification, wanted, extra, folder, title, told_noise)

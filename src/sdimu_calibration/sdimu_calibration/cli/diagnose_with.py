@@ -53,8 +53,8 @@ def diagnose_navigated(console: Console, asked: Asked, grow: bool, draws: int) -
     from sdimu_calibration.core.diagnosis.bootstrap import bootstrap
     from sdimu_calibration.core.diagnosis.diagnose import diagnose
     from sdimu_calibration.core.diagnosis.grow import grow as climb
-    from sdimu_calibration.report.besides import besides
     from sdimu_calibration.report.page import write_report
+    from sdimu_calibration.report.report_extras import report_extras
     from sdimu_calibration.storage.diagnosis_file import account, write_diagnosis
     from sdimu_calibration.storage.result_file import write_result
 
@@ -78,30 +78,30 @@ def diagnose_navigated(console: Console, asked: Asked, grow: bool, draws: int) -
     write_result(asked.folder / "result.json", found.after if told.candidates else found.before)
     with bar(console) as progress:
         progress("navigation without aid", 0.5)
-        more = besides(asked.recording, found, *data[1:], rungs)
+        more = report_extras(asked.recording, found, *data[1:], rungs)
     write_report(asked.folder / "report.html", found.after, title=asked.title, diagnosis=found, more=more)
     tell(console, (*asked.recording.notes, *asked.told))
 
 
-def diagnose_hand(console: Console, asked: Asked) -> None:
+def diagnose_handheld_run(console: Console, asked: Asked) -> None:
     """Diagnose a hand-held run by its least squares."""
     from sdimu_calibration.cli.calibrate import explained, tell
-    from sdimu_calibration.cli.hand_text import print_hand_account
+    from sdimu_calibration.cli.handheld_text import print_handheld_summary
     from sdimu_calibration.cli.progress import bar
-    from sdimu_calibration.core.diagnosis.by_hand import diagnose_by_hand
-    from sdimu_calibration.core.diagnosis.hand_account import account_by_hand
+    from sdimu_calibration.core.diagnosis.handheld_diagnosis import diagnose_handheld
+    from sdimu_calibration.core.diagnosis.handheld_summary import summarise_handheld
     from sdimu_calibration.report.page import write_report
-    from sdimu_calibration.storage.hand_diagnosis_file import write_hand_diagnosis
+    from sdimu_calibration.storage.handheld_diagnosis_file import write_handheld_diagnosis
     from sdimu_calibration.storage.result_file import write_result
 
     known = asked.recording.notes
     with explained(console, known), bar(console) as progress:
-        found = diagnose_by_hand(
+        found = diagnose_handheld(
             asked.recording, asked.site, asked.imu, asked.model, asked.extra, progress=progress
         )  # fmt: skip
-    told = account_by_hand(found)
-    print_hand_account(console, told)
-    write_hand_diagnosis(asked.folder / "diagnosis.json", told)
+    told = summarise_handheld(found)
+    print_handheld_summary(console, told)
+    write_handheld_diagnosis(asked.folder / "diagnosis.json", told)
     write_result(asked.folder / "result.json", found.after)
     write_report(asked.folder / "report.html", found.after, title=asked.title, by_hand=told)
     tell(console, (*known, *(note for note in (*found.after.notes, *asked.told) if note not in known)))

@@ -10,7 +10,7 @@ from sdimu_calibration.core.units import UnitError, from_si
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from sdimu_calibration.core.diagnosis.found import Reach
+    from sdimu_calibration.core.diagnosis.found import DetectableSize
     from sdimu_calibration.core.diagnosis.grow import Rung
     from sdimu_calibration.storage.diagnosis_file import Account
 
@@ -95,28 +95,28 @@ def _out_of_sight(console: Console, told: Account) -> None:
     hidden = [r for r in told.reached if not r.testable]
     if hidden:
         line(console, f"{len(hidden)} of {len(told.reached)} candidates could not have been seen with this plan:")
-    for group in told.blind:
+    for group in told.untestable:
         names = ", ".join(group.labels[:3]) + (" ..." if len(group.labels) > 3 else "")
         line(console, f"  {group.reason}: {len(group.labels)} ({names})")
     if told.diagnosis.adequate:
         line(console, f"smallest sizes that would have been found (80 %): {smallest(told.reached)}")
 
 
-def smallest(reached: tuple[Reach, ...]) -> str:
+def smallest(reached: tuple[DetectableSize, ...]) -> str:
     """Say the smallest sizes of a few typical effects."""
     return "; ".join(_size(r) for r in _typical(reached))
 
 
-def _typical(reached: tuple[Reach, ...]) -> list[Reach]:
+def _typical(reached: tuple[DetectableSize, ...]) -> list[DetectableSize]:
     """One candidate of each of the first families: enough to see the scale of things."""
-    chosen: dict[str, Reach] = {}
+    chosen: dict[str, DetectableSize] = {}
     for r in reached:
         if r.testable:
             chosen.setdefault(r.family, r)
     return list(chosen.values())[:6]
 
 
-def _size(r: Reach) -> str:
+def _size(r: DetectableSize) -> str:
     return f"{r.label} {amount(r.smallest, r.display_unit, 2)} {r.display_unit}"
 
 

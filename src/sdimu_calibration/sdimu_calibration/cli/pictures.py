@@ -21,8 +21,8 @@ def pictures(
     from sdimu_calibration.cli.calibrate import default_folder
     from sdimu_calibration.cli.progress import bar
     from sdimu_calibration.core.diagnosis.diagnose import diagnose
-    from sdimu_calibration.report.besides import besides
     from sdimu_calibration.report.pictures import write_pictures
+    from sdimu_calibration.report.report_extras import report_extras
     from sdimu_calibration.storage.bag_reader import read_recording
     from sdimu_calibration.storage.config import load_imu, load_site
     from sdimu_calibration.storage.effect_file import extended_model
@@ -33,6 +33,6 @@ def pictures(
     with bar(console) as progress:
         found = diagnose(recording, where, specification, wanted, progress=progress)
         progress("navigation without aid", 0.95)
-        more = besides(recording, found, where, specification, wanted)
+        more = report_extras(recording, found, where, specification, wanted)
     for path in write_pictures(out or default_folder(bag, "pictures"), found, more.trials):
         console.print(f"{path}: {path.stat().st_size / 1000:.0f} kB", soft_wrap=True, highlight=False)

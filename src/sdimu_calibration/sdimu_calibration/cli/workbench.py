@@ -49,11 +49,11 @@ def workbench(
 
     from sdimu_calibration.cli.calibrate import check_options
     from sdimu_calibration.cli.progress import bar
-    from sdimu_calibration.core.hand.hand import by_hand
+    from sdimu_calibration.core.handheld.handheld import by_hand
     from sdimu_calibration.core.recording import DataError
     from sdimu_calibration.report.workbench.app import build
-    from sdimu_calibration.report.workbench.fit import Bench
-    from sdimu_calibration.report.workbench.shelf import Shelf, neighbours
+    from sdimu_calibration.report.workbench.fit import FitSession
+    from sdimu_calibration.report.workbench.recording_cache import RecordingCache, neighbours
     from sdimu_calibration.storage.config import load_imu
     from sdimu_calibration.storage.effect_file import extended_model
     from sdimu_calibration.storage.opening import open_recording, place
@@ -67,7 +67,7 @@ def workbench(
         imu_topic, status_topic, joint_topic, temperature_topic, accel_unit, gyro_unit, accel_sign, gyro_sign
     )
 
-    def opened(path: Path) -> Bench:
+    def opened(path: Path) -> FitSession:
         recording = open_recording(path, origin)
         if by_hand(recording, specification):
             raise DataError(
@@ -75,9 +75,9 @@ def workbench(
                 "report has the same figures), or --imu when the gyros are better than it says"
             )
         recording, where = place(recording, site, specification, origin)
-        return Bench(recording, where, specification, wanted)
+        return FitSession(recording, where, specification, wanted)
 
-    shelf = Shelf(neighbours(bag), opened)
+    shelf = RecordingCache(neighbours(bag), opened)
     console = Console()
     with bar(Console(stderr=True)) as progress:
         progress("reading", 0.0)

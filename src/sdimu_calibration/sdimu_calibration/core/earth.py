@@ -7,11 +7,9 @@ Multisensor Integrated Navigation Systems*, 2nd ed., ch. 2.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.compiled import compiled
-
-Floats = NDArray[np.float64]
 
 RATE = 7.292115e-5
 """Earth rate against inertial space (rad/s)."""

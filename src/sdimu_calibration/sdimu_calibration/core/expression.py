@@ -14,13 +14,12 @@ from fractions import Fraction
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.effects.motion import Motion
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.units import parse_unit
 
-Floats = NDArray[np.float64]
 Dimension = dict[str, Fraction]
 """Powers of the base units; zero powers and ``rad`` left out."""
 

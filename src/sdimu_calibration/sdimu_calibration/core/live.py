@@ -5,19 +5,19 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sdimu_calibration.core.alignment.alignment import Alignment
+from sdimu_calibration.core.alignment.prepared import ALIGN_S, first_attitude, measurement_kinds, set_up
+from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.calibrate import calibrate
 from sdimu_calibration.core.data.arrival import arrange
 from sdimu_calibration.core.data.epochs import Epochs, cut
 from sdimu_calibration.core.data.gaps import bridges, largest_acceleration
 from sdimu_calibration.core.data.phases import Phases, PhaseState, classify
+from sdimu_calibration.core.effects import body_frame
 from sdimu_calibration.core.effects.motion import Motion
-from sdimu_calibration.core.filter import body_frame
 from sdimu_calibration.core.filter.filter_pass import NAV, PassInput, PassState, new_output, run_pass
 from sdimu_calibration.core.filter.passes import pass_settings, start_state
-from sdimu_calibration.core.filter.reduced import ALIGN_S, first_attitude, measurement_kinds, set_up
-from sdimu_calibration.core.navigation.alignment import Alignment
 from sdimu_calibration.core.navigation.strapdown import Cycles, Reducer
 from sdimu_calibration.core.navigation.track import motion
 from sdimu_calibration.core.recording import (
@@ -34,8 +34,7 @@ from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.rotation import quaternion
 from sdimu_calibration.core.specification import ImuSpecification, Model, Site
 
-Floats = NDArray[np.float64]
-Stamps = NDArray[np.int64]
+Stamps = Ints
 
 NIS_CHANNELS = ("position", "velocity", "rate", "force")
 _FAR = 5.0

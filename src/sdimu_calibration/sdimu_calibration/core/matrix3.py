@@ -6,11 +6,10 @@ A call of BLAS for a 3x3 product costs more than the product.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.compiled import compiled
 
-Floats = NDArray[np.float64]
 Matrix3 = tuple[float, float, float, float, float, float, float, float, float]
 
 

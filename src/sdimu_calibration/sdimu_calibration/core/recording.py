@@ -5,10 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-
+from sdimu_calibration.core.arrays import Bools, Floats, Ints
 
 NOMINAL_FROM = 50
 """Sample intervals that give the nominal one: the first ones, so that live and offline agree."""
@@ -59,8 +57,8 @@ class PhaseLog:
     """
 
     t: Floats
-    dwell: NDArray[np.bool_]
-    stop: NDArray[np.int64]
+    dwell: Bools
+    stop: Ints
 
 
 @dataclass(frozen=True)
@@ -119,16 +117,16 @@ class Recording:
         return float(np.median(np.diff(self.t)))
 
 
-def nominal_interval_ns(stamps_ns: NDArray[np.int64]) -> int:
+def nominal_interval_ns(stamps_ns: Ints) -> int:
     """Nominal sample interval (ns) of ascending stamps, shape (n,): the median of the first `NOMINAL_FROM`."""
     return round(float(np.median(np.diff(stamps_ns[: NOMINAL_FROM + 1]))))
 
 
-def origin_ns(stamps_ns: NDArray[np.int64]) -> int:
+def origin_ns(stamps_ns: Ints) -> int:
     """Stamp from which a recording counts its times: one nominal interval before the first sample."""
     return int(stamps_ns[0]) - nominal_interval_ns(stamps_ns)
 
 
-def seconds(stamps_ns: NDArray[np.int64], start_ns: int) -> Floats:
+def seconds(stamps_ns: Ints, start_ns: int) -> Floats:
     """Stamps (ns) as seconds after `start_ns`."""
     return np.asarray((stamps_ns - start_ns) * 1e-9, dtype=np.float64)

@@ -6,11 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sdimu_calibration.core.arrays import Bools, Floats, Ints
 from sdimu_calibration.core.recording import DataFault
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -35,10 +33,18 @@ class History:
     value: Floats
     sigma: Floats
     attitude_sigma: Floats
-    stop: NDArray[np.int64]
-    dwell: NDArray[np.bool_]
-    used: NDArray[np.bool_]
+    stop: Ints
+    dwell: Bools
+    used: Bools
     nis: Floats
+
+
+def no_history(p: int) -> History:
+    """History of an estimator that has none: no rows of `p` coefficients."""
+    none = np.zeros(0)
+    flags = np.zeros(0, dtype=bool)
+    rows = np.zeros((0, p))
+    return History(none, rows, rows, np.zeros((0, 3)), np.zeros(0, dtype=np.int64), flags, flags, np.zeros((0, 4)))
 
 
 @dataclass(frozen=True)

@@ -7,12 +7,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.compiled import compiled
 from sdimu_calibration.core.matrix3 import elements, orthonormal3, rotation3, store
-
-Floats = NDArray[np.float64]
 
 
 @compiled

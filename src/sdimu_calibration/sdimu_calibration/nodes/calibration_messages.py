@@ -11,8 +11,8 @@ from nav_msgs.msg import Odometry
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray, MultiArrayDimension, MultiArrayLayout
 
+from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.live import EpochEstimate
-from sdimu_calibration.core.recording import Floats
 from sdimu_calibration.nodes.credits import header
 
 

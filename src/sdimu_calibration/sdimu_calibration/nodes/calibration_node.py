@@ -29,8 +29,9 @@ from sensor_msgs.msg import Imu, JointState, Temperature
 from std_msgs.msg import Float64MultiArray
 from std_srvs.srv import Trigger
 
+from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.live import EpochEstimate, LiveCalibration
-from sdimu_calibration.core.recording import DataError, Floats
+from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.nodes import calibration_messages as messages
 from sdimu_calibration.nodes.credits import STREAM, Consumer, Producer, publish, to_ns

@@ -22,8 +22,9 @@ from rclpy.task import Future
 from sensor_msgs.msg import Imu, Temperature
 from std_srvs.srv import Trigger
 
+from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.compensation import Compensator, compensate, compensator, heat_since
-from sdimu_calibration.core.recording import NOMINAL_FROM, DataError, Floats, TemperatureLog
+from sdimu_calibration.core.recording import NOMINAL_FROM, DataError, TemperatureLog
 from sdimu_calibration.nodes.convert import NS
 from sdimu_calibration.nodes.credits import Consumer, Producer, to_ns
 from sdimu_calibration.nodes.listening import Listener

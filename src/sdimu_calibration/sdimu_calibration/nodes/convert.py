@@ -4,10 +4,7 @@ from __future__ import annotations
 
 import re
 
-import numpy as np
-from numpy.typing import NDArray
-
-from sdimu_calibration.core.recording import Floats
+from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.storage.cdr import Layout, as_bytes
 
 NS = 1_000_000_000
@@ -17,7 +14,7 @@ _RATE, _FORCE = 13, 25  # places among the 37 doubles of an Imu message; a covar
 
 
 def encode_imu(
-    stamp_ns: NDArray[np.int64],
+    stamp_ns: Ints,
     omega_ib_b: Floats,
     f_ib_b: Floats,
     frame_id: str,

@@ -10,10 +10,10 @@ import time
 from collections.abc import Callable, Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sdimu_calibration.core.arrays import Bools, Floats
 from sdimu_calibration.core.live import EpochEstimate, LiveCalibration
-from sdimu_calibration.core.recording import NOMINAL_FROM, DataError, Floats, origin_ns
+from sdimu_calibration.core.recording import NOMINAL_FROM, DataError, origin_ns
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.nodes.gate import Companion
 from sdimu_calibration.storage.cdr import LayoutError, decode_imu
@@ -96,7 +96,7 @@ class Feed:
             return True
         return int(np.sum((samples.ns <= self.resumed_ns) & ~self._repeats(samples))) > _STRANGERS
 
-    def _repeats(self, samples: Samples) -> NDArray[np.bool_]:
+    def _repeats(self, samples: Samples) -> Bools:
         """Which samples the journal has, number for number."""
         if self._known is None:
             return np.zeros(len(samples.ns), dtype=bool)

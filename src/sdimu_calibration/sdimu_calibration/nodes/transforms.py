@@ -16,7 +16,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from sdimu_calibration.core.recording import Floats
+from sdimu_calibration.core.arrays import Floats
 
 TRANSFORMS, STATIC = "/tf", "/tf_static"
 SITE, NED, BASE, PLATFORM, IMU = "site", "ned", "table_base", "table_platform", "imu_link"

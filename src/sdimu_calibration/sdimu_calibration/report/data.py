@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sdimu_calibration.core.arrays import Bools, Floats, Ints
 from sdimu_calibration.core.diagnosis.consistency import CHANNEL_NAMES, Consistency
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.diagnosis.linear import LinearEvidence
@@ -15,9 +15,6 @@ from sdimu_calibration.core.diagnosis.scan import Scan, scan
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.units import from_si
 from sdimu_calibration.report.groups import is_free
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 CHANNEL_UNITS = ("mm",) * 3 + ("mm/s",) * 3 + ("deg/h",) * 3 + ("ug",) * 3
 """Customary unit of each measurement channel."""
@@ -73,8 +70,8 @@ def residuals(diagnosis: Diagnosis) -> Residuals:
     sigma = np.sqrt(np.einsum("eij,eij->ei", L, L))
     measured = np.isfinite(evidence.output.normalised)
     return Residuals(
-        evidence.reduced.epochs.end,
-        evidence.reduced.phases.stop,
+        evidence.prepared.epochs.end,
+        evidence.prepared.phases.stop,
         np.where(measured, sigma, np.nan),
         _coloured(given, diagnosis, sigma),
         _coloured(left, diagnosis, sigma),
@@ -225,7 +222,7 @@ class FreeInputs:
 
     start: Floats
     end: Floats
-    turn: NDArray[np.bool_]
+    turn: Bools
     before: Floats
     after: Floats
     z: Floats
@@ -240,7 +237,11 @@ def free_inputs(diagnosis: Diagnosis) -> FreeInputs:
     order = np.argsort(spans[:, 0], kind="stable")
     before, after, z = (
         np.reshape(v, (-1, 6))[order]
-        for v in (diagnosis.remainder_before.estimate, diagnosis.remainder_after.estimate, diagnosis.remainder_before.z)
+        for v in (
+            diagnosis.free_inputs_before.estimate,
+            diagnosis.free_inputs_after.estimate,
+            diagnosis.free_inputs_before.z,
+        )
     )
     return FreeInputs(spans[order, 0], spans[order, 1], turn[order], before * factor, after * factor, z)
 
@@ -248,7 +249,7 @@ def free_inputs(diagnosis: Diagnosis) -> FreeInputs:
 def variables(diagnosis: Diagnosis) -> Floats:
     """Physical variables of `VARIABLES`, means over each epoch, shape (e, 8)."""
     evidence = diagnosis.evidence
-    seen, epochs = evidence.seen, evidence.reduced.epochs
+    seen, epochs = evidence.seen, evidence.prepared.epochs
     columns = np.column_stack([
         seen.a, seen.w * from_si(1.0, "deg/h"), (seen.t - 0.5 * seen.dt) * from_si(1.0, "min"), seen.temperature,
     ])  # fmt: skip

@@ -7,16 +7,14 @@ from typing import Any
 
 import numpy as np
 import plotly.graph_objects as go
-from numpy.typing import NDArray
 from plotly.subplots import make_subplots
 
+from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.diagnosis.consistency import CHANNEL_NAMES
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.report import data
 from sdimu_calibration.report.drawing import AFTER, BEFORE, DIVERGING, PALE, lay_out
 from sdimu_calibration.report.table import with_sigma
-
-Floats = NDArray[np.float64]
 
 _FULL = 8.0
 """Sigmas at which the colour of a heat map is full."""

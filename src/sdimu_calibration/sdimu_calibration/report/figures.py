@@ -6,10 +6,9 @@ from typing import Any
 
 import numpy as np
 import plotly.graph_objects as go
-from numpy.typing import NDArray
 from plotly.subplots import make_subplots
 
-from sdimu_calibration.core.recording import Floats
+from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.results import Calibration, History
 from sdimu_calibration.core.units import from_si
 from sdimu_calibration.report.groups import groups, is_free, short_name, title
@@ -81,7 +80,7 @@ def _draw(
     calibration: Calibration,
     effect: str,
     indices: list[int],
-    kept: NDArray[np.int64],
+    kept: Ints,
     place: tuple[int, int],
 ) -> dict[str, float]:
     """Draw the lines of one panel; return the last sigma by label."""
@@ -185,7 +184,7 @@ def _bands(figure: Any, history: History, panels: int) -> None:
     figure.update_layout(shapes=shapes)
 
 
-def _thin(history: History) -> NDArray[np.int64]:
+def _thin(history: History) -> Ints:
     """Choose the rows to draw: evenly, with the last, so that the page stays small."""
     m = len(history.t)
     return np.unique(np.linspace(0, m - 1, min(m, _MOST_POINTS)).astype(np.int64))

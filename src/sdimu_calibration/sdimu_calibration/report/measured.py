@@ -5,15 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.diagnosis.plan_seen import plan_seen
 from sdimu_calibration.core.recording import TableLog
 from sdimu_calibration.core.units import from_si
 from sdimu_calibration.report.data import Residuals
-
-Floats = NDArray[np.float64]
 
 UNITS = ("mm",) * 3 + ("mm/s",) * 3 + ("deg/h",) * 3 + ("g",) * 3
 """Unit of each channel in `Overlay`."""
@@ -40,7 +38,7 @@ class Overlay:
 
 def overlay(diagnosis: Diagnosis, found: Residuals) -> Overlay:
     """Lay measured and predicted values out by stop."""
-    epochs = diagnosis.evidence.reduced.epochs
+    epochs = diagnosis.evidence.prepared.epochs
     factor = np.array([from_si(1.0, unit) for unit in (*UNITS[:9], "ug", "ug", "ug")])
     factor[9:] *= 1e-6
     before, after = found.before * found.sigma * factor, found.after * found.sigma * factor
@@ -84,9 +82,9 @@ class Jumps:
         Velocity innovation N, E, D in sigmas, with the model as given and with what was found.
     """
 
-    axis: NDArray[np.int64]
+    axis: Ints
     angle: Floats
-    stop: NDArray[np.int64]
+    stop: Ints
     before: Floats
     after: Floats
 

@@ -8,14 +8,14 @@ from pathlib import Path
 from typing import Any
 
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
-from sdimu_calibration.core.diagnosis.hand_account import HandAccount
+from sdimu_calibration.core.diagnosis.handheld_summary import HandheldSummary
 from sdimu_calibration.core.results import Calibration
-from sdimu_calibration.report import data, hand_sections, sections, table
-from sdimu_calibration.report.besides import Besides
+from sdimu_calibration.report import data, handheld_sections, sections, table
 from sdimu_calibration.report.drawing import html
 from sdimu_calibration.report.export import as_csv, as_yaml
 from sdimu_calibration.report.figures import sigma_history
 from sdimu_calibration.report.markup import Draw, prose, quiet, section
+from sdimu_calibration.report.report_extras import ReportExtras
 from sdimu_calibration.report.style import SCRIPT, STYLE
 from sdimu_calibration.report.use_section import in_use
 
@@ -30,8 +30,8 @@ def write_report(
     truth: Mapping[str, float] | None = None,
     reference: Mapping[str, float] | None = None,
     diagnosis: Diagnosis | None = None,
-    more: Besides | None = None,
-    by_hand: HandAccount | None = None,
+    more: ReportExtras | None = None,
+    by_hand: HandheldSummary | None = None,
 ) -> None:
     """Write report.html.
 
@@ -49,9 +49,9 @@ def write_report(
         Published sigmas (SI) by effect name.
     diagnosis : Diagnosis, optional
         Adds the verdict, what is missing, where it fails, and how the error falls.
-    more : Besides, optional
+    more : ReportExtras, optional
         What to show besides the diagnosis: table angles, drift in use, ladder of refits.
-    by_hand : HandAccount, optional
+    by_hand : HandheldSummary, optional
         The diagnosis of a hand-held run, in place of `diagnosis`.
     """
     path = Path(path)
@@ -78,14 +78,14 @@ def page(
     truth: Mapping[str, float] | None = None,
     reference: Mapping[str, float] | None = None,
     diagnosis: Diagnosis | None = None,
-    more: Besides | None = None,
-    by_hand: HandAccount | None = None,
+    more: ReportExtras | None = None,
+    by_hand: HandheldSummary | None = None,
 ) -> str:
     """Make the page as HTML text; parameters as in `write_report`."""
     draw = _Drawing()
-    more = more or Besides()
+    more = more or ReportExtras()
     parts = [] if diagnosis is None else _evidence(diagnosis, more, draw)
-    parts += [] if by_hand is None else hand_sections.evidence(by_hand, draw)
+    parts += [] if by_hand is None else handheld_sections.evidence(by_hand, draw)
     parts.append(_coefficients(calibration, truth, reference))
     parts += [] if diagnosis is None else _residuals(diagnosis, more, draw)
     if len(calibration.history.t):
@@ -96,7 +96,7 @@ def page(
         f"<h1>{escape(title)}</h1>",
         f'<p class="quiet">{_summary(calibration)}</p>',
         sections.verdict(diagnosis) if diagnosis else "",
-        hand_sections.verdict(by_hand) if by_hand else "",
+        handheld_sections.verdict(by_hand) if by_hand else "",
         # By hand the ladder says it, in sigmas that models can be compared by.
         "" if by_hand else f"<p>{_fit(calibration, diagnosis is not None)}</p>",
         _notes(calibration),
@@ -110,7 +110,7 @@ def page(
     )  # fmt: skip
 
 
-def _evidence(diagnosis: Diagnosis, more: Besides, draw: Draw) -> list[str]:
+def _evidence(diagnosis: Diagnosis, more: ReportExtras, draw: Draw) -> list[str]:
     """Tell what is missing and where it shows."""
     return [
         sections.ladder(diagnosis, draw),
@@ -121,7 +121,7 @@ def _evidence(diagnosis: Diagnosis, more: Besides, draw: Draw) -> list[str]:
     ]
 
 
-def _residuals(diagnosis: Diagnosis, more: Besides, draw: Draw) -> list[str]:
+def _residuals(diagnosis: Diagnosis, more: ReportExtras, draw: Draw) -> list[str]:
     """Show the data themselves, and tell what they could have shown."""
     return [
         sections.residuals(diagnosis, data.residuals(diagnosis), more, draw),

@@ -18,11 +18,11 @@ from PIL import Image
 
 from sdimu_calibration.core.diagnosis.consistency import CHANNEL_NAMES
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
-from sdimu_calibration.core.filter.free_inertial import Trial
+from sdimu_calibration.core.filter.free_inertial import FreeInertialRun
 from sdimu_calibration.report import data
+from sdimu_calibration.report.architecture_figure import house
 from sdimu_calibration.report.drawing import AFTER, BEFORE, DIVERGING
 from sdimu_calibration.report.evidence_figures import cell
-from sdimu_calibration.report.house import house
 from sdimu_calibration.report.table import with_sigma
 
 _STYLE = {
@@ -37,7 +37,7 @@ _WHITE_FROM = 6.0
 _MOST_BARS = 8
 
 
-def write_pictures(folder: Path, diagnosis: Diagnosis, trials: Sequence[Trial] = ()) -> list[Path]:
+def write_pictures(folder: Path, diagnosis: Diagnosis, trials: Sequence[FreeInertialRun] = ()) -> list[Path]:
     """Write heat map before and after, candidates, ladder, drift in use and the architecture as PNG files.
 
     Parameters
@@ -46,7 +46,7 @@ def write_pictures(folder: Path, diagnosis: Diagnosis, trials: Sequence[Trial] =
         Made when it is not there; files of the same names are replaced.
     diagnosis : Diagnosis
         Best of a recording with something missing: else there is no "after", and no ladder.
-    trials : sequence of Trial
+    trials : sequence of FreeInertialRun
         Free navigations; none leaves the picture of the drift out.
 
     Returns
@@ -148,7 +148,7 @@ def ladder(diagnosis: Diagnosis) -> Figure:
     return figure
 
 
-def in_use(trials: Sequence[Trial]) -> Figure:
+def in_use(trials: Sequence[FreeInertialRun]) -> Figure:
     """Position error of navigation without aid on stretches that no fit has seen."""
     figure = Figure(figsize=(8.6, 2.6), layout="constrained")
     first = None

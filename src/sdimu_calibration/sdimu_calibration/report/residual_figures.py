@@ -6,16 +6,14 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from plotly.subplots import make_subplots
 
+from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.diagnosis.consistency import CHANNEL_NAMES
 from sdimu_calibration.core.effects.effect import CHANNELS
 from sdimu_calibration.core.units import from_si
 from sdimu_calibration.report import data
 from sdimu_calibration.report.drawing import AFTER, BAND, BEFORE, PALE, lay_out
-
-Floats = NDArray[np.float64]
 
 _MOST_POINTS = 500
 _BINS = 12

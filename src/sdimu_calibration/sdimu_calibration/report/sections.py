@@ -13,8 +13,8 @@ from sdimu_calibration.core.diagnosis.search import Step
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.units import from_si
 from sdimu_calibration.report import data, evidence_figures, measured, measured_figures, residual_figures
-from sdimu_calibration.report.besides import Besides
 from sdimu_calibration.report.markup import Draw, grid, prose, quiet, section, sentence
+from sdimu_calibration.report.report_extras import ReportExtras
 from sdimu_calibration.report.table import with_sigma
 
 
@@ -34,10 +34,10 @@ def verdict_box(adequate: bool, word: str, said: str) -> str:
 
 
 def _numbers(d: Diagnosis) -> str:
-    left, c = d.remainder_after, d.consistency
+    left, c = d.free_inputs_after, d.consistency
     words = [
         f"p {_probability(d.p_value)} that a right model looks like this",
-        f"free inputs: chi-square {d.remainder_before.chi2:.0f}"
+        f"free inputs: chi-square {d.free_inputs_before.chi2:.0f}"
         + (f" -> {left.chi2:.0f}" if len(d.found.chosen) else "")
         + f" of {left.dof} degrees of freedom",
         f"squared innovations {c.nis_mean:.3f} a degree of freedom, {c.first_nis:.2f} in the first second after turns",
@@ -176,7 +176,7 @@ def where(diagnosis: Diagnosis, found: data.Residuals, draw: Draw) -> str:
 _MARKS = "Orange triangles: model as given. Blue dots: with what was found added."
 
 
-def residuals(diagnosis: Diagnosis, found: data.Residuals, more: Besides, draw: Draw) -> str:
+def residuals(diagnosis: Diagnosis, found: data.Residuals, more: ReportExtras, draw: Draw) -> str:
     """Return measured against predicted, residuals in time and against physical variables, and free inputs."""
     two = bool(len(diagnosis.found.chosen))
     marks = _MARKS if two else "Triangles: model as given."
@@ -210,12 +210,12 @@ def residuals(diagnosis: Diagnosis, found: data.Residuals, more: Besides, draw: 
 
 
 def _variables(
-    diagnosis: Diagnosis, found: data.Residuals, more: Besides, two: bool, marks: str, draw: Draw
+    diagnosis: Diagnosis, found: data.Residuals, more: ReportExtras, two: bool, marks: str, draw: Draw
 ) -> str:  # fmt: skip
     """Residuals against what could cause them: motion, then time, temperature and table, then turns."""
     values, names = data.variables(diagnosis), list(data.VARIABLES)
     if more.table is not None:
-        epochs = diagnosis.evidence.reduced.epochs
+        epochs = diagnosis.evidence.prepared.epochs
         values = np.column_stack([values, measured.table_angles(more.table, 0.5 * (epochs.start + epochs.end))])
         names += [(name.replace("_", " "), "deg") for name in more.table.names]
     parts = [
@@ -258,10 +258,10 @@ def smallest(entries: Sequence[data.Scored]) -> str:
             worst[entry.family] = entry
     order = sorted(worst.values(), key=lambda e: (np.isfinite(e.smallest), -e.smallest / e.prior))
     rows = [_seen(entry) for entry in order]
-    blind = sum(row[-1] != "yes" for row in rows)
+    untestable = sum(row[-1] != "yes" for row in rows)
     return section(
         "What could have been seen",
-        f"<p>Of {len(rows)} effects, {blind} could not have been seen on every axis at their usual size.</p>",
+        f"<p>Of {len(rows)} effects, {untestable} could not have been seen on every axis at their usual size.</p>",
         f"<details><summary>Table of minimal detectable sizes</summary>{grid(_SMALLEST, rows, {0, 2, 5})}</details>",
         quiet(
             "Worst axis of each effect. Found with 80 % power at the threshold of a whole scan; usual: one sigma of "

@@ -6,17 +6,15 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from plotly.subplots import make_subplots
 
-from sdimu_calibration.core.filter.free_inertial import Drift, Trial
-from sdimu_calibration.core.filter.unseen import WANTED_S
+from sdimu_calibration.core.arrays import Floats
+from sdimu_calibration.core.filter.free_inertial import Drift, FreeInertialRun
+from sdimu_calibration.core.filter.holdout import WANTED_S
 from sdimu_calibration.core.units import from_si
-from sdimu_calibration.report.besides import Besides
 from sdimu_calibration.report.drawing import AFTER, BEFORE, lay_out
 from sdimu_calibration.report.markup import Draw, grid, quiet, section, sentence
-
-Floats = NDArray[np.float64]
+from sdimu_calibration.report.report_extras import ReportExtras
 
 _NAUTICAL_MILE = 1852.0
 _INK = (("#555", "dot"), (BEFORE, "dash"), (AFTER, "solid"))
@@ -29,17 +27,17 @@ _COLUMNS = (
 )  # fmt: skip
 
 
-def in_use(besides: Besides, draw: Draw) -> str:
+def in_use(report_extras: ReportExtras, draw: Draw) -> str:
     """Return the section, or a line that says why there is none."""
     heading = "What it means in use: navigation without aid"
-    if not besides.trials:
-        return section(heading, quiet(f"Not tried: {besides.no_trial}.")) if besides.no_trial else ""
-    rows = [_row(trial, drift) for trial in besides.trials for drift in trial.drifts]
-    short = min(trial.stretch.length_s for trial in besides.trials) < WANTED_S - 1.0
+    if not report_extras.trials:
+        return section(heading, quiet(f"Not tried: {report_extras.no_trial}.")) if report_extras.no_trial else ""
+    rows = [_row(trial, drift) for trial in report_extras.trials for drift in trial.drifts]
+    short = min(trial.stretch.length_s for trial in report_extras.trials) < WANTED_S - 1.0
     return section(
         heading,
-        *(sentence(told(trial)) for trial in besides.trials),
-        draw(figure(besides.trials)),
+        *(sentence(told(trial)) for trial in report_extras.trials),
+        draw(figure(report_extras.trials)),
         grid(_COLUMNS, rows, {0, 1}),
         quiet(
             "Each stretch was kept from the fit that navigates it. At its first dwell the IMU levels by its own "
@@ -53,7 +51,7 @@ def in_use(besides: Besides, draw: Draw) -> str:
     )  # fmt: skip
 
 
-def told(trial: Trial) -> str:
+def told(trial: FreeInertialRun) -> str:
     """Say a trial in one sentence."""
     stretch = trial.stretch
     ends = "; ".join(
@@ -69,7 +67,7 @@ def _promise(drift: Drift) -> str:
     return f"; its fit promised {_metres(last)}" if np.isfinite(last) else ""
 
 
-def _row(trial: Trial, drift: Drift) -> list[str]:
+def _row(trial: FreeInertialRun, drift: Drift) -> list[str]:
     promised = drift.promised[-1]
     stretch = trial.stretch
     span = f"{stretch.begin_s / 60.0:.1f} to {(stretch.begin_s + stretch.length_s) / 60.0:.1f} min"
@@ -89,7 +87,7 @@ def _metres(value: float) -> str:
     return f"{value / 1000.0:.2g} km" if value >= 1000.0 else f"{value:.0f} m"
 
 
-def figure(trials: Sequence[Trial]) -> Any:
+def figure(trials: Sequence[FreeInertialRun]) -> Any:
     """Errors of position, velocity and heading against time, a column a stretch, a dash a compensation."""
     made = make_subplots(
         rows=3, cols=len(trials), subplot_titles=[f"unseen {_PLACES[t.stretch.place]}" for t in trials],

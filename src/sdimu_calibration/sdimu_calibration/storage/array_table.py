@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from scipy.io import loadmat
 from scipy.io.matlab import MatReadError
 
-from sdimu_calibration.core.recording import DataError, Floats
+from sdimu_calibration.core.arrays import Floats
+from sdimu_calibration.core.recording import DataError
 
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 _HDF5_AT = 512

@@ -11,15 +11,9 @@ from typing import Any
 import numpy as np
 from rosbags.typesys import Stores, get_typestore
 
+from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.data.arrival import arrange
-from sdimu_calibration.core.recording import (
-    Floats,
-    PhaseLog,
-    Recording,
-    TableLog,
-    TemperatureLog,
-    origin_ns,
-)
+from sdimu_calibration.core.recording import PhaseLog, Recording, TableLog, TemperatureLog, origin_ns
 from sdimu_calibration.storage import cdr
 from sdimu_calibration.storage.bag_file import raw_messages, read_topics
 from sdimu_calibration.storage.cdr import LayoutError, Stamps

@@ -5,14 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from sdimu_calibration.core.recording import Floats
+from sdimu_calibration.core.arrays import Bools, Floats, Ints
 from sdimu_calibration.storage import cdr
 from sdimu_calibration.storage.mcap_bag import McapBag
 from sdimu_calibration.storage.topics import Topics
 
-Stamps = NDArray[np.int64]
+Stamps = Ints
 
 
 def write_recording(
@@ -22,7 +21,7 @@ def write_recording(
     imu_ns: Stamps,
     omega_ib_b: Floats,
     f_ib_b: Floats,
-    status: tuple[Stamps, NDArray[np.bool_], NDArray[np.int64]] | None = None,
+    status: tuple[Stamps, Bools, Ints] | None = None,
     joint_states: tuple[Stamps, tuple[str, ...], Floats, Floats] | None = None,
     temperature: tuple[Stamps, Floats] | None = None,
     topics: Topics | None = None,

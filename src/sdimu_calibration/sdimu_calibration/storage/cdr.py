@@ -13,9 +13,9 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from sdimu_calibration.core.recording import Floats
+from sdimu_calibration.core.arrays import Bools, Floats, Ints
 
-Stamps = NDArray[np.int64]
+Stamps = Ints
 Rows = NDArray[np.uint8]
 
 IMU = "sensor_msgs/msg/Imu"
@@ -187,7 +187,7 @@ def encode_joint_states(
 
 
 def encode_status(
-    stamp_ns: Stamps, dwell: NDArray[np.bool_], stop: NDArray[np.int64], frame_id: str = "rate_table"
+    stamp_ns: Stamps, dwell: Bools, stop: Ints, frame_id: str = "rate_table"
 ) -> list[bytes]:
     """Encode the table's status as diagnostic_msgs/DiagnosticArray, shapes (n,); list of n messages."""
     encoded = np.empty(len(stamp_ns), dtype=object)

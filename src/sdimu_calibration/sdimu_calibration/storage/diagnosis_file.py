@@ -8,11 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from sdimu_calibration.core.diagnosis.advice import Blind, advice, blind
+from sdimu_calibration.core.diagnosis.advice import Untestable, advice, untestable_reasons
 from sdimu_calibration.core.diagnosis.bootstrap import Null
 from sdimu_calibration.core.diagnosis.consistency import Noise
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
-from sdimu_calibration.core.diagnosis.found import Found, Reach, found_effects, reach
+from sdimu_calibration.core.diagnosis.found import DetectableSize, Found, found_effects, reach
+from sdimu_calibration.core.diagnosis.free_input_test import FreeInputTest
 from sdimu_calibration.core.diagnosis.grow import Rung
 from sdimu_calibration.core.diagnosis.plan_seen import PlanSeen, plan_seen
 from sdimu_calibration.core.diagnosis.search import Step
@@ -31,19 +32,19 @@ class Account:
     diagnosis : Diagnosis
     found : tuple of Found
         Chosen effects; when the verdict is ``unexplained`` they are what was tried, not what was found.
-    reached : tuple of Reach
+    reached : tuple of DetectableSize
         Smallest detectable size of every candidate.
     plan : PlanSeen
-    blind : tuple of Blind
+    untestable : tuple of Untestable
         What could not have been seen, by reason.
     advice : tuple of str
     """
 
     diagnosis: Diagnosis
     found: tuple[Found, ...]
-    reached: tuple[Reach, ...]
+    reached: tuple[DetectableSize, ...]
     plan: PlanSeen
-    blind: tuple[Blind, ...]
+    untestable: tuple[Untestable, ...]
     advice: tuple[str, ...]
 
     @property
@@ -57,7 +58,7 @@ class Account:
 def account(d: Diagnosis) -> Account:
     """Work out what a diagnosis has to say."""
     found, reached, plan = found_effects(d), reach(d), plan_seen(d.evidence)
-    return Account(d, found, reached, plan, blind(reached, plan), advice(d, found, reached, plan))
+    return Account(d, found, reached, plan, untestable_reasons(reached, plan), advice(d, found, reached, plan))
 
 
 def write_diagnosis(path: Path, told: Account, ladder: tuple[Rung, ...] = (), null: Null | None = None) -> None:
@@ -123,8 +124,8 @@ def content(told: Account, ladder: tuple[Rung, ...] = ()) -> dict[str, Any]:
             "threshold": d.found.threshold,
         },
         "free_inputs": {
-            "before": {"chi2": d.remainder_before.chi2, "dof": d.remainder_before.dof, "p": d.remainder_before.p_value},
-            "after": {"chi2": d.remainder_after.chi2, "dof": d.remainder_after.dof, "p": d.remainder_after.p_value},
+            "before": _free_inputs(d.free_inputs_before),
+            "after": _free_inputs(d.free_inputs_after),
         },
         "fit": {"before": fit_of(d.before), "after": fit_of(d.after)},
         "ladder": [step_of(s) for s in d.found.steps],
@@ -161,7 +162,7 @@ def candidate(f: Found, own: bool) -> dict[str, Any]:
         "held_out_rms_after": f.held_out_after,
         "indistinguishable_from": list(f.alike),
         "depends_on_choice": [
-            {"instead": s.other, "coefficient": s.coefficient, "sigmas": s.sigmas} for s in f.stakes
+            {"instead": s.other, "coefficient": s.coefficient, "sigmas": s.sigmas} for s in f.coefficient_shifts
         ],
     }  # fmt: skip
 
@@ -201,7 +202,7 @@ def step_of(s: Step) -> dict[str, Any]:
 def _null(null: Null) -> dict[str, Any]:
     return {
         "draws": null.draws, "false_finds": null.false_finds, "threshold": null.threshold, "rms_z": null.rms_z,
-        "largest": null.largest, "remainder_p": null.remainder_p,
+        "largest": null.largest, "remainder_p": null.free_input_p,
     }  # fmt: skip
 
 
@@ -214,7 +215,7 @@ def _rung(r: Rung) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def reach_of(r: Reach) -> dict[str, Any]:
+def reach_of(r: DetectableSize) -> dict[str, Any]:
     """Give what could have been seen of one effect as plain data."""
     return {
         "label": r.label, "effect": r.family, "retention": r.retention, "smallest": r.smallest, "unit": r.unit,
@@ -222,5 +223,9 @@ def reach_of(r: Reach) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _reason(told: Account, r: Reach) -> str:
-    return next((b.reason for b in told.blind if r.label in b.labels), "")
+def _reason(told: Account, r: DetectableSize) -> str:
+    return next((b.reason for b in told.untestable if r.label in b.labels), "")
+
+
+def _free_inputs(test: FreeInputTest) -> dict[str, Any]:
+    return {"chi2": test.chi2, "dof": test.dof, "p": test.p_value}

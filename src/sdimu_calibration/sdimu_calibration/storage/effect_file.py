@@ -15,10 +15,11 @@ from typing import Any, Literal, cast
 import numpy as np
 from pydantic import Field
 
+from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.diagnosis.candidates import USUAL_TURN, own_equation, without
 from sdimu_calibration.core.effects import registry, selection
 from sdimu_calibration.core.effects.effect import CHANNELS, Effect, Parameter, Term
-from sdimu_calibration.core.effects.motion import Floats, Motion
+from sdimu_calibration.core.effects.motion import Motion
 from sdimu_calibration.core.expression import (
     TEMPERATURE_NAMES,
     VARIABLES,

@@ -9,13 +9,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sdimu_calibration.core.recording import DataError, Floats
+from sdimu_calibration.core.arrays import Floats, Ints
+from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.units import parse_unit
 from sdimu_calibration.storage.array_table import ArrayTable
 from sdimu_calibration.storage.import_map import ISO, NANOSECONDS, TimeMap
 from sdimu_calibration.storage.text_table import TextTable
 
-Stamps = NDArray[np.int64]
+Stamps = Ints
 Table = TextTable | ArrayTable
 
 _DIGITS = {"s": 9, "ms": 6, "us": 3, "ns": 0}

@@ -9,8 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
+from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.data.resample import mean_over, same_stamps
-from sdimu_calibration.core.recording import DataError, Floats
+from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage.array_table import read_mat, read_npz
 from sdimu_calibration.storage.bag_writer import write_recording
 from sdimu_calibration.storage.import_map import ImportMap, SensorMap, TemperatureMap

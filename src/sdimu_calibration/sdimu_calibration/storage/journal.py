@@ -15,10 +15,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Stamps = NDArray[np.int64]
+from sdimu_calibration.core.arrays import Floats, Ints
+
+Stamps = Ints
 
 FORMAT = "sdimu-journal/1"
 _HEAD = struct.Struct("<cI")

@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 
 from sdimu_calibration.core.data.axes_and_units import Stated, recognise
-from sdimu_calibration.core.data.earth_seen import EarthSeen, contradictions, reversed_force, see_earth
-from sdimu_calibration.core.data.even_stamps import evened
+from sdimu_calibration.core.data.dejitter import dejittered
+from sdimu_calibration.core.data.dwell_detection import with_detected_dwells
+from sdimu_calibration.core.data.latitude_check import EarthRate, contradictions, observe_earth_rate, reversed_force
 from sdimu_calibration.core.data.status_clock import aligned
-from sdimu_calibration.core.filter.rest_found import with_rests
 from sdimu_calibration.core.recording import DataError, Recording
 from sdimu_calibration.core.specification import ImuSpecification, Site
 from sdimu_calibration.core.units import UnitError, parse_unit
@@ -111,7 +111,7 @@ def open_recording(path: Path, source: Source | None = None) -> Recording:
             recording, omega_ib_b=recording.omega_ib_b * reading.gyro, f_ib_b=recording.f_ib_b * reading.accel
         )
     recording = replace(recording, notes=(*recording.notes, *reading.notes))
-    return _with_temperature(aligned(evened(recording)))
+    return _with_temperature(aligned(dejittered(recording)))
 
 
 def _dead(recording: Recording) -> str | None:
@@ -161,8 +161,12 @@ def place(
         When there is no such site.
     """
     where = load_site(site or DEFAULT_SITE)
-    recording = with_rests(recording, imu) if len(recording.t) >= _FEWEST else recording
-    seen = see_earth(recording.t, recording.omega_ib_b, recording.f_ib_b, imu) if len(recording.t) >= _FEWEST else None
+    recording = with_detected_dwells(recording, imu) if len(recording.t) >= _FEWEST else recording
+    seen = (
+        observe_earth_rate(recording.t, recording.omega_ib_b, recording.f_ib_b, imu)
+        if len(recording.t) >= _FEWEST
+        else None
+    )
     notes = [] if site is not None else [_assumed(where, seen)]
     if seen is not None:
         may_turn = site is not None and (source is None or source.accel_sign is None)
@@ -177,7 +181,7 @@ def place(
     return replace(recording, notes=(*recording.notes, *notes)), where
 
 
-def _assumed(where: Site, seen: EarthSeen | None) -> str:
+def _assumed(where: Site, seen: EarthRate | None) -> str:
     text = (
         f"no --site: {DEFAULT_SITE} is assumed (latitude {np.degrees(where.latitude_rad):.1f} deg, height "
         f"{where.height_m:.0f} m)"

@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from sdimu_calibration.core.recording import DataError, DataFault, Floats
+from sdimu_calibration.core.arrays import Floats
+from sdimu_calibration.core.recording import DataError, DataFault
 from sdimu_calibration.core.results import Calibration, History
 from sdimu_calibration.storage.json_file import read_json, write_json
 

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sdimu_calibration.core.recording import DataError, Floats
+from sdimu_calibration.core.arrays import Floats
+from sdimu_calibration.core.recording import DataError
 
 _COMMENT = ("#", "%")
 _DELIMITERS = (";", "\t", ",")

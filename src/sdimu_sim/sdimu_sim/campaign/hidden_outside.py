@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.effects.effect import CHANNELS, Effect, Parameter, Term, Timetable
-from sdimu_calibration.core.effects.motion import Floats, Motion
+from sdimu_calibration.core.effects.motion import Motion
 
 OUTSIDE = "outside"
 """Prefix of the labels of shapes."""

@@ -60,7 +60,7 @@ def score(drawn: Draw, found: Diagnosis, sensor: ImuTruth) -> dict[str, Any]:
         "held_out_before": found.before.fit["held_out_rms"], "held_out_after": found.after.fit["held_out_rms"],
         "stops_before": accepted[0].held_out_before.rms if accepted else None,
         "stops_after": accepted[-1].held_out_after.rms if accepted else None,
-        "remainder_p": found.remainder_after.p_value, "remainder_p_before": found.remainder_before.p_value,
+        "remainder_p": found.free_inputs_after.p_value, "remainder_p_before": found.free_inputs_before.p_value,
         "scan_z2": float(np.sum(scanned.z[catalogue] ** 2)), "scan_count": len(catalogue),
         "threshold": found.found.threshold, "explained": found.explained,
     }  # fmt: skip
@@ -140,7 +140,7 @@ def _signature_left(truth: Truth, found: Diagnosis) -> tuple[float, float]:
     shape = next((s for s in shapes(evidence.times) if s.label == truth.name), None)
     if shape is None:
         return 0.0, 0.0
-    w = columns(evidence.reduced, evidence.output, evidence.seen, evidence.latitude, [shape.effect()])[:, 0]
+    w = columns(evidence.prepared, evidence.output, evidence.seen, evidence.latitude, [shape.effect()])[:, 0]
     none = np.empty(0, dtype=np.int64)
     left = []
     for chosen in (none, found.found.chosen):

@@ -8,11 +8,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from sdimu_calibration.core.alignment.prepared import reduce, set_up
 from sdimu_calibration.core.diagnosis.candidates import catalogue
 from sdimu_calibration.core.diagnosis.evidence import collect, timetable
 from sdimu_calibration.core.diagnosis.scan import scan
 from sdimu_calibration.core.filter.passes import solve
-from sdimu_calibration.core.filter.reduced import reduce, set_up
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.specification import ImuSpecification, Model, Site
 from sdimu_calibration.storage.config import load_plan
@@ -71,11 +71,11 @@ def sizes(plan: str, latitude_deg: float, imu: ImuSpecification, model: Model) -
         temperature=WARM_UP, coefficients={},
     )
     setup = set_up(site, imu, model)
-    reduced = reduce(simulate(scenario, imu_truth(scenario)), setup)
-    solution = solve(setup, reduced, lambda _word, _share: None, keep=True)
-    times = timetable(reduced)
+    prepared = reduce(simulate(scenario, imu_truth(scenario)), setup)
+    solution = solve(setup, prepared, lambda _word, _share: None, keep=True)
+    times = timetable(prepared)
     known = catalogue(times, set(setup.sensors.names), True)
-    evidence = collect(reduced, setup, solution.last, [*known, *(s.effect() for s in shapes(times))])
+    evidence = collect(prepared, setup, solution.last, [*known, *(s.effect() for s in shapes(times))])
     scanned = scan(evidence.information, evidence.model, evidence.weight)
     p = len(evidence.weight)
     return Sizes(

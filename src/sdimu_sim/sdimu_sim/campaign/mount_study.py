@@ -10,8 +10,8 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.batch.classical import TABLE_FRAME, classical_calibrate
 from sdimu_calibration.core.calibrate import calibrate
 from sdimu_calibration.core.results import Calibration
@@ -19,7 +19,6 @@ from sdimu_calibration.core.specification import Model
 from sdimu_sim.core.scenario import Scenario, generate
 from sdimu_sim.core.truth import Truth, in_body_frame
 
-Floats = NDArray[np.float64]
 Progress = Callable[[str, float], None]
 
 FORMAT = "sdimu-mount-study/1"

@@ -7,12 +7,12 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rate_table_sim.core import TableMotion, TableSpecification, phase_changes, table_motion
-from sdimu_calibration.core.filter import body_frame
+from sdimu_calibration.core.alignment.prepared import reduce, set_up
+from sdimu_calibration.core.arrays import Bools, Floats, Ints
+from sdimu_calibration.core.effects import body_frame
 from sdimu_calibration.core.filter.passes import solve
-from sdimu_calibration.core.filter.reduced import reduce, set_up
 from sdimu_calibration.core.plan import Plan
 from sdimu_calibration.core.recording import PhaseLog, Recording
 from sdimu_calibration.core.specification import Model
@@ -21,8 +21,6 @@ from sdimu_sim.core.hidden import parse_effects
 from sdimu_sim.core.platform import PlatformMotion
 from sdimu_sim.core.scenario import Scenario, imu_truth, temperature_log
 from sdimu_sim.core.truth import ImuTruth, in_body_frame
-
-Floats = NDArray[np.float64]
 
 KINDS = ("position", "velocity", "rate", "force")
 """Kinds of measurement, three rows each."""
@@ -76,7 +74,7 @@ class CalibrationRun:
         truth = true_values(sensor, names, frame)
         sigma = np.sqrt(np.diag(P))
         free = sigma > _PINNED_SHARE * setup.sensors.prior
-        products, count = lag_one(last.output.normalised, solution.reduced.phases.stop)
+        products, count = lag_one(last.output.normalised, solution.prepared.phases.stop)
         nis = last.output.nis
         return {
             "names": names, "estimate": estimate, "truth": truth, "sigma": sigma,
@@ -113,7 +111,7 @@ def true_values(sensor: ImuTruth, names: tuple[str, ...], frame: str) -> Floats:
     return np.array([truth.get(name, 0.0) for name in names])
 
 
-def nees(error: Floats, P: Floats, free: NDArray[np.bool_]) -> float:
+def nees(error: Floats, P: Floats, free: Bools) -> float:
     """Normalised estimation error squared of the coefficients `free` (p,): ``e' P^-1 e``."""
     e, part = error[free], P[np.ix_(free, free)]
     # Scaled by sigma first: the units differ by many orders of magnitude.
@@ -121,7 +119,7 @@ def nees(error: Floats, P: Floats, free: NDArray[np.bool_]) -> float:
     return float((e / s) @ np.linalg.solve(part / np.outer(s, s), e / s))
 
 
-def lag_one(normalised: Floats, stop: NDArray[np.int64]) -> tuple[Floats, NDArray[np.int64]]:
+def lag_one(normalised: Floats, stop: Ints) -> tuple[Floats, Ints]:
     """Sum of products of normalised innovations with those of the epoch before at the same stop.
 
     Parameters

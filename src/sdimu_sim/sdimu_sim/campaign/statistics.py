@@ -14,12 +14,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import stats
 
+from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.recording import DataError
-
-Floats = NDArray[np.float64]
 
 LEVEL = 0.99
 """Probability with which a right filter passes each check."""

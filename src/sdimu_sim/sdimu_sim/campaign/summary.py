@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.effects import imu_model
 from sdimu_calibration.core.filter.passes import MOST_PASSES
 from sdimu_calibration.core.recording import DataError
@@ -111,5 +112,5 @@ def summarise(
     }  # fmt: skip
 
 
-def _ratio(top: statistics.Floats, below: statistics.Floats) -> list[float]:
+def _ratio(top: Floats, below: Floats) -> list[float]:
     return [float(t / b) if b else float("nan") for t, b in zip(top, below, strict=True)]

@@ -59,9 +59,9 @@ def measure(plan: str, rate: float, repeats: int, folder: Path) -> list[tuple[st
         When the plan or the rate cannot be used.
     """
     from rate_table_sim.table_file import load_table
+    from sdimu_calibration.core.alignment.prepared import first_attitude, reduce, set_up
     from sdimu_calibration.core.calibrate import calibrate
     from sdimu_calibration.core.filter.passes import one_pass
-    from sdimu_calibration.core.filter.reduced import first_attitude, reduce, set_up
     from sdimu_calibration.storage.bag_reader import read_recording
     from sdimu_calibration.storage.config import load_imu, load_model, load_plan, load_site
     from sdimu_calibration.storage.result_file import write_result
@@ -75,13 +75,13 @@ def measure(plan: str, rate: float, repeats: int, folder: Path) -> list[tuple[st
     write_test(bag, scenario, simulate_test(scenario))
     recording = read_recording(bag)
     setup = set_up(site, imu, model)
-    reduced = reduce(recording, setup)
-    start = first_attitude(reduced.epochs, reduced.phases, setup)
+    prepared = reduce(recording, setup)
+    start = first_attitude(prepared.epochs, prepared.phases, setup)
     found = calibrate(recording, site, imu, model)
     n = len(recording.t)
 
     def one() -> None:
-        one_pass(reduced, setup, start, start.C_nb, found.values, closed_loop=False, keep=False)
+        one_pass(prepared, setup, start, start.C_nb, found.values, closed_loop=False, keep=False)
 
     def whole() -> None:
         write_result(folder / "result.json", calibrate(read_recording(bag), site, imu, model))

@@ -90,7 +90,7 @@ def check_options(work: CalibrationRun, number: int, seed: int) -> None:
     DataError
         When the number of runs, the seed, the rate, an effect or the model cannot be used.
     """
-    from sdimu_calibration.core.filter.reduced import set_up
+    from sdimu_calibration.core.alignment.prepared import set_up
     from sdimu_sim.core.hidden import parse_effects
 
     if number < 2:

@@ -161,8 +161,8 @@ def _test(plan: str, model: str, duration: float) -> Outline:
 def _report(console: Console, out: Path, site: str, imu: str, model: str, plan: str) -> Calibration:
     """Diagnose the bag, print the table with the truth, write diagnosis and page."""
     from sdimu_calibration.core.diagnosis.diagnose import diagnose
-    from sdimu_calibration.report.besides import besides
     from sdimu_calibration.report.page import write_report
+    from sdimu_calibration.report.report_extras import report_extras
     from sdimu_calibration.report.table import rich_table, rows
     from sdimu_calibration.storage.bag_reader import read_recording
     from sdimu_calibration.storage.config import load_imu, load_site
@@ -177,7 +177,7 @@ def _report(console: Console, out: Path, site: str, imu: str, model: str, plan: 
         recording = read_recording(out / "bag")
         where, specification, wanted = load_site(site), load_imu(imu), extended_model(model, ())
         diagnosis = diagnose(recording, where, specification, wanted)
-        more = besides(recording, diagnosis, where, specification, wanted)
+        more = report_extras(recording, diagnosis, where, specification, wanted)
     write_diagnosis(out / "diagnosis.json", account(diagnosis))
     title = f"Simulated test: plan {plan}, model {model}"
     write_report(

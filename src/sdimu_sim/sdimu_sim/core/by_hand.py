@@ -10,8 +10,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.recording import DataError, Recording
 from sdimu_calibration.core.rotation import quaternion_matrix, rotation_vector
 from sdimu_calibration.core.specification import ImuSpecification, Site
@@ -19,8 +19,6 @@ from sdimu_sim.core.generator import ImuSamples, simulate_imu
 from sdimu_sim.core.platform import PlatformMotion
 from sdimu_sim.core.scenario import DEFAULT_START_NS
 from sdimu_sim.core.truth import ImuTruth, Truth, child_rng, draw_coefficients
-
-Floats = NDArray[np.float64]
 
 _MOTION_HZ = 200.0
 """Samples of the motion: twenty a swing of the tremor."""

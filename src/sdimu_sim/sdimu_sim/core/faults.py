@@ -11,13 +11,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sdimu_calibration.core.arrays import Bools, Floats, Ints
 from sdimu_calibration.core.recording import Recording
 from sdimu_sim.core.platform import PlatformMotion
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 Rng = np.random.Generator
 
 _ARCMIN = np.pi / 180.0 / 60.0
@@ -71,7 +69,7 @@ def _place(recording: Recording, dwell: bool, length: float, rng: Rng) -> float:
     return float(rng.uniform(begin, max(end - length, begin + 1e-3)))
 
 
-def _keep(recording: Recording, rows: NDArray[np.bool_] | Ints) -> Recording:
+def _keep(recording: Recording, rows: Bools | Ints) -> Recording:
     return replace(recording, t=recording.t[rows], omega_ib_b=recording.omega_ib_b[rows], f_ib_b=recording.f_ib_b[rows])
 
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sdimu_calibration.core import earth
+from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.rotation import rotation_matrix
 from sdimu_calibration.core.specification import Site
@@ -17,8 +17,6 @@ from sdimu_sim.core.platform import PlatformMotion, mean_motion
 from sdimu_sim.core.samples import SampleClock, TrueSamples, Variables, in_body
 from sdimu_sim.core.temperature import TemperatureProfile
 from sdimu_sim.core.truth import ImuTruth
-
-Floats = NDArray[np.float64]
 
 _BLOCK = 20_000
 """Motion samples worked on at once: bounds the memory of long tests at high rates."""
@@ -38,7 +36,7 @@ class ImuSamples:
         rad/s, m/s^2, as measured.
     """
 
-    ns: NDArray[np.int64]
+    ns: Ints
     t: Floats
     omega_ib_b: Floats
     f_ib_b: Floats

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.compiled import compiled
 from sdimu_calibration.core.units import STANDARD_GRAVITY
 from sdimu_sim.core.samples import TrueSamples
 from sdimu_sim.core.truth import ImuTruth, biases, child_rng, input_axes, unbalance_matrix
-
-Floats = NDArray[np.float64]
 
 
 def response(truth: ImuTruth, true: TrueSamples) -> Floats:
@@ -60,12 +58,12 @@ class Electronics:
 
 
 @compiled
-def _count_pulses(values: Floats, step: float, remainder: Floats) -> Floats:
-    """Whole pulses per sample; what is left over stays in the integrator (`remainder` (3,), in place)."""
+def _count_pulses(values: Floats, step: float, free_input_test: Floats) -> Floats:
+    """Whole pulses per sample; what is left over stays in the integrator (`free_input_test` (3,), in place)."""
     out = np.empty_like(values)
     for k in range(values.shape[0]):
         for i in range(3):
-            total = values[k, i] + remainder[i]
+            total = values[k, i] + free_input_test[i]
             out[k, i] = step * np.round(total / step)
-            remainder[i] = total - out[k, i]
+            free_input_test[i] = total - out[k, i]
     return out

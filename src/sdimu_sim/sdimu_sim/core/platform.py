@@ -5,11 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.compiled import compiled
 
-Floats = NDArray[np.float64]
 Vector = tuple[float, float, float]
 
 QUANTITIES = 24

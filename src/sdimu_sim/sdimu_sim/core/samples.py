@@ -6,13 +6,12 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.units import STANDARD_GRAVITY
 from sdimu_sim.core.temperature import TemperatureProfile
 
-Floats = NDArray[np.float64]
 _XYZ = "xyz"
 
 STILL_RAD_S = 1e-9
@@ -42,12 +41,12 @@ class SampleClock:
         """Stamps of samples `first` ... `last` (s)."""
         return np.arange(first, last + 1) * self._rate.denominator / self._rate.numerator
 
-    def nanoseconds(self, first: int, last: int) -> NDArray[np.int64]:
+    def nanoseconds(self, first: int, last: int) -> Ints:
         """Stamps of samples `first` ... `last` (ns), to the nearest."""
         p, q = self._rate.numerator, self._rate.denominator
         whole, part = np.divmod(np.arange(first, last + 1, dtype=np.int64) * q, p)
         # Whole seconds apart: k * q * 10^9 would leave 64 bits for awkward rates.
-        stamps: NDArray[np.int64] = whole * 10**9 + (part * 10**9 + p // 2) // p
+        stamps: Ints = whole * 10**9 + (part * 10**9 + p // 2) // p
         return stamps
 
     def count(self, until_s: float) -> int:

@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rate_table_sim.core import TableMotion, TableSpecification, phase_changes, table_motion
 from sdimu_calibration.core.plan import Plan
@@ -16,8 +15,6 @@ from sdimu_sim.core.generator import ImuSamples, simulate_imu
 from sdimu_sim.core.platform import PlatformMotion
 from sdimu_sim.core.temperature import TemperatureProfile
 from sdimu_sim.core.truth import ImuTruth, Truth, draw_coefficients, draw_mount
-
-Floats = NDArray[np.float64]
 
 DEFAULT_START_NS = 1_700_000_000 * 10**9
 TABLE_LOG_HZ = 10.0

@@ -7,13 +7,11 @@ from dataclasses import dataclass, field
 from zlib import crc32
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.rotation import rotation_matrix
 from sdimu_calibration.core.specification import ImuSpecification, Site
-
-Floats = NDArray[np.float64]
 
 _XYZ = "xyz"
 _PAIRS = ("xy", "xz", "yx", "yz", "zx", "zy")

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
+from sdimu_calibration.core.alignment.prepared import reduce, set_up
 from sdimu_calibration.core.batch.batch import batch_calibrate
-from sdimu_calibration.core.batch.batch_data import error_slope, travel
+from sdimu_calibration.core.batch.preintegration import preintegrate
 from sdimu_calibration.core.calibrate import calibrate
 from sdimu_calibration.core.effects import registry
-from sdimu_calibration.core.filter.reduced import reduce, set_up
+from sdimu_calibration.core.effects.error_slope import error_slope
 from sdimu_calibration.core.navigation.track import motion
 from sdimu_calibration.core.plan import Plan
 from sdimu_calibration.core.recording import DataError
@@ -144,18 +145,18 @@ def test_responses_of_a_motion_are_its_derivatives(imu, model, site, share):
     coefficients = np.array(list(PERCENTS.prior.values())).repeat([3, 3, 6, 6, 3, 3, 6]) * share
     recording, _ = generate(Scenario(SHORT, imu, site, seed=6, rate_hz=50.0))
     setup = set_up(site, imu, model)
-    reduced = reduce(recording, setup)
+    prepared = reduce(recording, setup)
     C_nb = rotation_matrix(np.array([0.7, -1.1, 1.9]))
     rows = slice(200, 350)
-    at_rest = np.zeros(len(reduced.cycles), dtype=bool)
+    at_rest = np.zeros(len(prepared.cycles), dtype=bool)
 
     def go(C: np.ndarray, c: np.ndarray):
         seen = motion(
-            reduced.cycles, at_rest, setup.sensors, c, C_nb.copy(), site.latitude_rad, setup.gravity, None, True
+            prepared.cycles, at_rest, setup.sensors, c, C_nb.copy(), site.latitude_rad, setup.gravity, None, True
         )
         values, slope = setup.sensors.regressors(seen), error_slope(setup.sensors, seen, rows, c)
-        return travel(
-            reduced, rows, setup.sensors, values, slope, c, C, site.latitude_rad, site.height_m, 0.0, (1e-12, 1e-8)
+        return preintegrate(
+            prepared, rows, setup.sensors, values, slope, c, C, site.latitude_rad, site.height_m, 0.0, (1e-12, 1e-8)
         )
 
     def difference(ahead, behind) -> np.ndarray:

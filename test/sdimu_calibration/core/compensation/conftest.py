@@ -7,9 +7,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import pytest
 
-from sdimu_calibration.core.batch.batch import no_history
 from sdimu_calibration.core.effects import selection
-from sdimu_calibration.core.results import Calibration
+from sdimu_calibration.core.results import Calibration, no_history
 
 BASELINE = (
     "gyro_bias", "gyro_scale", "gyro_misalignment", "gyro_mass_unbalance", "accel_bias", "accel_scale",

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from sdimu_calibration.core import earth
+from sdimu_calibration.core.alignment.prepared import reduce, set_up
 from sdimu_calibration.core.calibrate import calibrate
 from sdimu_calibration.core.data.epochs import Epochs
 from sdimu_calibration.core.data.phases import (
@@ -18,7 +19,6 @@ from sdimu_calibration.core.data.phases import (
     table_says,
     without_early_motion,
 )
-from sdimu_calibration.core.filter.reduced import reduce, set_up
 from sdimu_calibration.core.plan import Plan, Turn
 from sdimu_calibration.core.recording import DataError, PhaseLog
 
@@ -149,10 +149,10 @@ def test_a_lying_table_changes_nothing_but_the_count(recorded_test, three_stops,
 
 def test_used_epochs_of_a_simulated_test_are_at_rest(recorded_test, three_stops, site, imu, model):
     recording = recorded_test(three_stops, seed=5)
-    reduced = reduce(recording, set_up(site, imu, model))
-    phases = reduced.phases
+    prepared = reduce(recording, set_up(site, imu, model))
+    phases = prepared.phases
     assert len(np.unique(phases.stop[phases.used])) == 3
-    assert reduced.epochs.peak_rate[phases.used].max() < np.radians(0.02)
+    assert prepared.epochs.peak_rate[phases.used].max() < np.radians(0.02)
     assert phases.used.sum() >= 3 * 10 - 6
 
 

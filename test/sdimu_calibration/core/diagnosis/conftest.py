@@ -8,9 +8,9 @@ from functools import cache
 import numpy as np
 import pytest
 
+from sdimu_calibration.core.alignment.prepared import PreparedData, TestSetup, reduce, set_up
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis, diagnose
 from sdimu_calibration.core.filter.passes import Solution, solve
-from sdimu_calibration.core.filter.reduced import Reduced, Setup, reduce, set_up
 from sdimu_calibration.core.plan import Plan
 from sdimu_calibration.core.recording import Recording
 from sdimu_calibration.core.specification import ImuSpecification, Model, Site
@@ -22,7 +22,7 @@ SEEDS = (101, 102, 103)
 
 
 @dataclass(frozen=True)
-class Bench:
+class FitSession:
     """Simulate, solve and diagnose, each once."""
 
     site: Site
@@ -43,7 +43,7 @@ class Bench:
         return _diagnosis(seed, effects, plan)
 
 
-BENCH = Bench(SITE, load_imu("dtg"), load_model("baseline"))
+BENCH = FitSession(SITE, load_imu("dtg"), load_model("baseline"))
 
 
 @cache
@@ -54,9 +54,9 @@ def _recording(seed: int, effects: tuple[str, ...], plan: str) -> Recording:
 
 @cache
 def _solution(seed: int, effects: tuple[str, ...], plan: str) -> Solution:
-    setup: Setup = set_up(BENCH.site, BENCH.imu, BENCH.model)
-    reduced: Reduced = reduce(_recording(seed, effects, plan), setup)
-    return solve(setup, reduced, lambda _what, _share: None, keep=True)
+    setup: TestSetup = set_up(BENCH.site, BENCH.imu, BENCH.model)
+    prepared: PreparedData = reduce(_recording(seed, effects, plan), setup)
+    return solve(setup, prepared, lambda _what, _share: None, keep=True)
 
 
 @cache
@@ -65,5 +65,5 @@ def _diagnosis(seed: int, effects: tuple[str, ...], plan: str) -> Diagnosis:
 
 
 @pytest.fixture(scope="session")
-def bench() -> Bench:
+def bench() -> FitSession:
     return BENCH

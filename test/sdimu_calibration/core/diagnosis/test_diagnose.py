@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from sdimu_calibration.core.diagnosis.advice import advice, blind
+from sdimu_calibration.core.diagnosis.advice import advice, untestable_reasons
 from sdimu_calibration.core.diagnosis.bootstrap import bootstrap
 from sdimu_calibration.core.diagnosis.candidates import own_equation
 from sdimu_calibration.core.diagnosis.diagnose import diagnose
@@ -114,7 +114,7 @@ def test_turns_of_one_sign_hide_scale_asymmetry_and_the_reason_is_said(bench):
     hidden = {r.label for r in reach(one_sided) if not r.testable}
     axes = {f"gyro_scale_asymmetry_{a}" for a in "xyz"}
     assert axes <= hidden
-    told = blind(reach(one_sided), plan_seen(one_sided.evidence))
+    told = untestable_reasons(reach(one_sided), plan_seen(one_sided.evidence))
     (group,) = [b for b in told if axes <= set(b.labels)]
     assert "positive" in group.reason
     both = bench.diagnosis()

@@ -20,7 +20,7 @@ def _silent(_what, _share):
 
 def _evidence(bench, names, **options):
     solution = bench.solution(**options)
-    return collect(solution.reduced, solution.setup, solution.last, [registry.get(n) for n in names])
+    return collect(solution.prepared, solution.setup, solution.last, [registry.get(n) for n in names])
 
 
 def _share_left(evidence, weights):
@@ -52,7 +52,7 @@ def test_the_score_is_the_fall_of_chi_square_of_a_refit(bench):
     scanned = scan(evidence.information, evidence.model, evidence.weight)
     effect = registry.get("accel_quadratic").only(("accel_quadratic_x",))
     wide = replace(solution.setup, sensors=build([*solution.setup.sensors.effects, effect], solution.setup.imu))
-    refit = solve(wide, solution.reduced, _silent)
+    refit = solve(wide, solution.prepared, _silent)
     gain = fit_statistics(refit.last)["log_likelihood"] - fit_statistics(solution.last)["log_likelihood"]
     # The filter's likelihood is marginal over the prior: log N(d; 0, J + w) against the score d^2 / J.
     J, d, w = scanned.information.J[column, column], scanned.information.d[column], effect.prior["navigation"] ** -2

@@ -8,15 +8,12 @@ import numpy as np
 
 from sdimu_calibration.core.diagnosis.rounds import drop_companions, settle
 from sdimu_calibration.core.diagnosis.search import FALSE_ALARM
-
-
-def _silent(_what: str, _fraction: float) -> None:
-    return None
+from sdimu_calibration.core.progress import silent
 
 
 def test_a_companion_that_is_noise_once_calibrated_is_taken_out_and_says_so(bench):
     base = bench.solution(effects=("accel_scale_asymmetry_z=60 ppm",))
-    look = settle(base, (), FALSE_ALARM, _silent)
+    look = settle(base, (), FALSE_ALARM, silent)
     (step,) = look.found.steps
     assert step.fate == "added"
     column = look.evidence.names.index("accel_cubic_x")
@@ -24,7 +21,7 @@ def test_a_companion_that_is_noise_once_calibrated_is_taken_out_and_says_so(benc
     companion = replace(step, label="accel_cubic_x")
     exchanged = replace(step, label="accel_cubic_y")
     found = replace(look.found, chosen=joined, steps=(step, companion, exchanged))
-    settled = drop_companions(base, replace(look, found=found), _silent)
+    settled = drop_companions(base, replace(look, found=found), silent)
     assert [c.label for c in settled.chosen] == ["accel_scale_asymmetry_z"]
     kept, small, other = settled.found.steps
     assert kept.fate == "added"

@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from sdimu_calibration.core.alignment.prepared import set_up
 from sdimu_calibration.core.diagnosis.evidence import collect, columns
 from sdimu_calibration.core.diagnosis.scan import scan
 from sdimu_calibration.core.effects import registry
 from sdimu_calibration.core.filter.passes import solve
-from sdimu_calibration.core.filter.reduced import set_up
 from sdimu_calibration.core.navigation.track import motion
 
 SEEDS = (101, 102, 103)
@@ -23,7 +23,7 @@ def _scores(evidence):
 
 
 def _collect(solution, setup, names):
-    return collect(solution.reduced, setup, solution.last, [registry.get(name) for name in names])
+    return collect(solution.prepared, setup, solution.last, [registry.get(name) for name in names])
 
 
 def test_regressors_of_measured_motion_make_a_dead_band_of_noise(bench):
@@ -34,11 +34,11 @@ def test_regressors_of_measured_motion_make_a_dead_band_of_noise(bench):
         setup, effect = solution.setup, registry.get("gyro_dead_band")
         evidence = _collect(solution, setup, ["gyro_dead_band"])
         measured = motion(
-            solution.reduced.cycles, solution.reduced.rest, setup.sensors, solution.last.estimate,
+            solution.prepared.cycles, solution.prepared.rest, setup.sensors, solution.last.estimate,
             solution.last.C_start.copy(), setup.site.latitude_rad, setup.gravity, None, predicted=False,
         )  # fmt: skip
         p = len(evidence.weight)
-        noisy = columns(solution.reduced, evidence.output, measured, evidence.latitude, [effect])
+        noisy = columns(solution.prepared, evidence.output, measured, evidence.latitude, [effect])
         right.append(_scores(evidence))
         wrong.append(_scores(replace(evidence, W=np.hstack([evidence.W[:, :p], noisy]))))
     # Nine normal scores have a root mean square below 2 but for a chance of 1e-4.
@@ -52,7 +52,7 @@ def test_a_filter_that_forgets_shared_noise_inflates_the_scores_of_gyro_drifts(b
     for seed in SEEDS:
         solution = bench.solution(seed=seed)
         deaf = set_up(bench.site, bench.imu, replace(bench.model, shared_noise=False))
-        forgetful = solve(deaf, solution.reduced, lambda _what, _share: None, keep=True)
+        forgetful = solve(deaf, solution.prepared, lambda _what, _share: None, keep=True)
         right.append(_scores(_collect(solution, solution.setup, _DRIFTS)))
         wrong.append(_scores(_collect(forgetful, deaf, _DRIFTS)))
     ratio = np.sqrt(np.mean(np.square(np.concatenate(wrong))) / np.mean(np.square(np.concatenate(right))))

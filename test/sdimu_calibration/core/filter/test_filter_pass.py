@@ -6,13 +6,11 @@ import numpy as np
 import pytest
 
 from sdimu_calibration.core import earth
+from sdimu_calibration.core.alignment.prepared import HELD_ALL, HELD_SENSORS, SKIP, first_attitude, reduce, set_up
 from sdimu_calibration.core.filter.filter_pass import (
     COPY,
-    HELD_ALL,
-    HELD_SENSORS,
     MEASURED,
     NAV,
-    SKIP,
     PassState,
     _feed_back,
     _measurement,
@@ -20,7 +18,6 @@ from sdimu_calibration.core.filter.filter_pass import (
     run_pass,
 )
 from sdimu_calibration.core.filter.passes import one_pass, pass_settings, start_state
-from sdimu_calibration.core.filter.reduced import first_attitude, reduce, set_up
 from sdimu_calibration.core.rotation import rotation_matrix, rotation_vector, skew
 
 PARTS = 10
@@ -31,16 +28,16 @@ def copied(state):
     return PassState(*(v.copy() for v in state))
 
 
-def prepared(recording, site, imu, model):
+def prepare_pass(recording, site, imu, model):
     """Reduced test, its settings, and an open-loop pass linearised at zero coefficients."""
     setup = set_up(site, imu, model)
-    reduced = reduce(recording, setup)
-    start = first_attitude(reduced.epochs, reduced.phases, setup)
+    prepared = reduce(recording, setup)
+    start = first_attitude(prepared.epochs, prepared.phases, setup)
     none = np.zeros(len(setup.sensors.prior))
     # A small start so that the first order is all there is: the alignment's own sigma, not the widened one.
     start = replace(start, filter_sigma=np.array([2e-4, 2e-4, 1e-3]))
     begin = start_state(setup, start, start.C_nb, none)
-    return setup, reduced, start, begin
+    return setup, prepared, start, begin
 
 
 class Batch:
@@ -106,14 +103,14 @@ class Batch:
 @pytest.fixture
 def batch_and_filter(recorded_test, three_stops, site, imu, model):
     recording = recorded_test(three_stops, seed=11)
-    setup, reduced, start, begin = prepared(recording, site, imu, model)
+    setup, prepared, start, begin = prepare_pass(recording, site, imu, model)
     none = np.zeros(len(setup.sensors.prior))
-    taken = one_pass(reduced, setup, start, start.C_nb, none, closed_loop=False, keep=True)
-    kind = np.where(reduced.kind == 2, HELD_ALL, np.where(reduced.kind == 1, HELD_SENSORS, SKIP))
+    taken = one_pass(prepared, setup, start, start.C_nb, none, closed_loop=False, keep=True)
+    kind = np.where(prepared.kind == 2, HELD_ALL, np.where(prepared.kind == 1, HELD_SENSORS, SKIP))
     free = new_output(len(kind), len(none), True, 1)
     settings = pass_settings(setup, closed_loop=False)
     run_pass(taken.data._replace(kind=kind), settings, copied(begin), free)
-    lengths = reduced.epochs.end - reduced.epochs.start
+    lengths = prepared.epochs.end - prepared.epochs.start
     return Batch(free, kind, lengths, begin, setup), taken, setup
 
 
@@ -141,9 +138,9 @@ def test_without_shared_noise_the_filter_is_not_that_least_squares(
     """M is seen: a filter that takes the same noise for two claims other sigmas, ten tolerances off in a short test."""
     batch, _, _ = batch_and_filter
     other = replace(model, shared_noise=False)
-    setup, reduced, start, _ = prepared(recorded_test(three_stops, seed=11), site, imu, other)
+    setup, prepared, start, _ = prepare_pass(recorded_test(three_stops, seed=11), site, imu, other)
     none = np.zeros(len(setup.sensors.prior))
-    taken = one_pass(reduced, setup, start, start.C_nb, none, closed_loop=False, keep=False)
+    taken = one_pass(prepared, setup, start, start.C_nb, none, closed_loop=False, keep=False)
     ratio = np.sqrt(np.diag(taken.covariance) / np.diag(batch.covariance)[NAV : NAV + len(none)])
     assert np.abs(ratio - 1.0).max() > 10 * 1e-3
 

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from sdimu_calibration.core import earth
+from sdimu_calibration.core.alignment.prepared import reduce, set_up
 from sdimu_calibration.core.filter.free_inertial import NOTHING, in_use
+from sdimu_calibration.core.filter.holdout import LEAST_S, WANTED_S, holdout_segments, part
 from sdimu_calibration.core.filter.passes import solve
-from sdimu_calibration.core.filter.reduced import reduce, set_up
-from sdimu_calibration.core.filter.unseen import LEAST_S, WANTED_S, part, unseen_stretches
 from sdimu_calibration.core.plan import Plan, Turn
 from sdimu_calibration.core.planning.nominal import nominal_recording
 from sdimu_calibration.core.recording import DataError
@@ -34,9 +34,9 @@ def silent(_what: str, _fraction: float) -> None:
 
 
 def trials_of(recording, setup):
-    reduced = reduce(recording, setup)
-    reference = solve(setup, reduced, silent).last.output
-    return in_use(reduced, [("model", setup)], reference)
+    prepared = reduce(recording, setup)
+    reference = solve(setup, prepared, silent).last.output
+    return in_use(prepared, [("model", setup)], reference)
 
 
 @pytest.fixture
@@ -86,33 +86,33 @@ def test_a_compensation_drifts_as_its_fit_promises_and_far_less_than_none(setup,
 
 
 def test_a_stretch_and_its_fit_share_no_sample(setup, site):
-    reduced = reduce(nominal_recording(plan_of(150.0), site), setup)
-    stretches = unseen_stretches(reduced)
+    prepared = reduce(nominal_recording(plan_of(150.0), site), setup)
+    stretches = holdout_segments(prepared)
     assert [s.place for s in stretches] == ["end", "start"]
     for stretch in stretches:
-        seen = part(reduced, *stretch.seen).cycles
-        kept = part(reduced, stretch.first, stretch.last).cycles
+        seen = part(prepared, *stretch.seen).cycles
+        kept = part(prepared, stretch.first, stretch.last).cycles
         assert not set(seen.t) & set(kept.t)
         if stretch.place == "end":
             # What comes after a stretch would tell of it too: there is none.
             assert seen.t[-1] <= kept.t[0] - kept.dt[0] + 1e-9
         else:
             assert seen.t[0] - seen.dt[0] >= kept.t[-1] - 1e-9
-        rest = reduced.phases.used[stretch.first : stretch.start]
+        rest = prepared.phases.used[stretch.first : stretch.start]
         assert rest.all()
 
 
 def test_half_of_a_short_recording_is_left_to_the_fit(setup, site):
-    reduced = reduce(nominal_recording(plan_of(60.0), site), setup)
-    total = reduced.epochs.end[-1]
+    prepared = reduce(nominal_recording(plan_of(60.0), site), setup)
+    total = prepared.epochs.end[-1]
     assert total < 2.0 * WANTED_S
-    for stretch in unseen_stretches(reduced):
+    for stretch in holdout_segments(prepared):
         assert LEAST_S <= stretch.length_s < WANTED_S
         first, last = stretch.seen
-        assert reduced.epochs.end[last - 1] - reduced.epochs.start[first] >= 0.5 * total - 1e-6
+        assert prepared.epochs.end[last - 1] - prepared.epochs.start[first] >= 0.5 * total - 1e-6
 
 
 def test_a_recording_of_minutes_has_nothing_to_spare(setup, site):
-    reduced = reduce(nominal_recording(plan_of(30.0, TURNS[:1]), site), setup)
+    prepared = reduce(nominal_recording(plan_of(30.0, TURNS[:1]), site), setup)
     with pytest.raises(DataError, match="too short"):
-        unseen_stretches(reduced)
+        holdout_segments(prepared)

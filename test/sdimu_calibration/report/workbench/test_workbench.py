@@ -15,8 +15,8 @@ import pytest
 from sdimu_calibration.core.calibrate import calibrate
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.report.workbench.app import build
-from sdimu_calibration.report.workbench.fit import Bench
-from sdimu_calibration.report.workbench.shelf import Shelf, neighbours
+from sdimu_calibration.report.workbench.fit import FitSession
+from sdimu_calibration.report.workbench.recording_cache import RecordingCache, neighbours
 from sdimu_calibration.storage.config import load_imu, load_model, load_site
 from sdimu_calibration.storage.effect_file import extended_model
 
@@ -30,28 +30,28 @@ parameters:
 """
 
 
-def new_bench(recording: Any) -> Bench:
-    return Bench(recording, load_site("daejeon"), load_imu("dtg"), load_model("baseline"))
+def new_bench(recording: Any) -> FitSession:
+    return FitSession(recording, load_site("daejeon"), load_imu("dtg"), load_model("baseline"))
 
 
 @pytest.fixture(scope="module")
-def bench(recording: Any) -> Bench:
+def bench(recording: Any) -> FitSession:
     return new_bench(recording)
 
 
-def shelf(bench: Bench) -> Shelf:
+def shelf(bench: FitSession) -> RecordingCache:
     """A shelf with one recording that reads, and one that does not."""
 
-    def make(path: Path) -> Bench:
+    def make(path: Path) -> FitSession:
         if path.name == "bad":
             raise DataError("bad: is no recording")
         return bench
 
-    return Shelf({"good": Path("good"), "bad": Path("bad")}, make)
+    return RecordingCache({"good": Path("good"), "bad": Path("bad")}, make)
 
 
 @pytest.fixture(scope="module")
-def app(bench: Bench) -> Any:
+def app(bench: FitSession) -> Any:
     return build(shelf(bench))
 
 

@@ -13,11 +13,10 @@ import numpy as np
 import pytest
 import yaml
 
-from sdimu_calibration.core.batch.batch import no_history
 from sdimu_calibration.core.compensation import compensate, compensator, linear_model
 from sdimu_calibration.core.effects import selection
 from sdimu_calibration.core.recording import DataError
-from sdimu_calibration.core.results import Calibration
+from sdimu_calibration.core.results import Calibration, no_history
 from sdimu_calibration.core.specification import ImuSpecification
 from sdimu_calibration.storage.export import FORMS, export
 

@@ -24,13 +24,16 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sdimu_calibration.core import earth
-from sdimu_calibration.core.batch.batch_data import Layout, Travel, error_slope, layout, rest_means, travel
+from sdimu_calibration.core.alignment.alignment import Alignment, levelled
+from sdimu_calibration.core.alignment.coarse_alignment import coarse_start
+from sdimu_calibration.core.alignment.prepared import PreparedData, TestSetup, first_attitude, reduce, set_up
+from sdimu_calibration.core.alignment.rest_means import Layout, layout, rest_means
+from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.batch.batch_rows import (
     PER_STOP,
-    Point,
+    LinearisationPoint,
     initial,
     nothing,
     rest_residual,
@@ -39,21 +42,18 @@ from sdimu_calibration.core.batch.batch_rows import (
     still,
 )
 from sdimu_calibration.core.batch.chain import Link, Solution, solve
-from sdimu_calibration.core.batch.coarse import coarse_start
+from sdimu_calibration.core.batch.preintegration import Preintegration, preintegrate
 from sdimu_calibration.core.calibrate import data_counts
+from sdimu_calibration.core.effects import body_frame
+from sdimu_calibration.core.effects.accelerometer_frame import FRAME, accelerometer_frame_model, squares_count
+from sdimu_calibration.core.effects.error_slope import error_slope
 from sdimu_calibration.core.effects.motion import Motion
-from sdimu_calibration.core.filter import body_frame
-from sdimu_calibration.core.filter.passes import Progress
-from sdimu_calibration.core.filter.reduced import Reduced, Setup, first_attitude, reduce, set_up
-from sdimu_calibration.core.large.triad import FRAME, large_errors, triad_model
-from sdimu_calibration.core.navigation.alignment import Alignment, levelled
 from sdimu_calibration.core.navigation.track import motion
+from sdimu_calibration.core.progress import Progress
 from sdimu_calibration.core.recording import DataError, Recording
-from sdimu_calibration.core.results import Calibration, History
+from sdimu_calibration.core.results import Calibration, no_history
 from sdimu_calibration.core.rotation import rotation_matrix
 from sdimu_calibration.core.specification import ImuSpecification, Model, Site
-
-Floats = NDArray[np.float64]
 
 CONVERGED = 1e-2
 """Largest step of a coefficient in its sigma at which Gauss-Newton ends."""
@@ -119,11 +119,11 @@ def batch_calibrate(
         When the recording or the options cannot be used, or an effect changes at random by itself.
     """
     setup = set_up(site, imu, model)
-    turned = triad_model(setup.sensors, imu) if large_errors(setup.sensors) else None
+    turned = accelerometer_frame_model(setup.sensors, imu) if squares_count(setup.sensors) else None
     inner = setup if turned is None else replace(setup, sensors=turned.inner)
-    reduced = reduce(recording, inner)
-    start = first_attitude(reduced.epochs, reduced.phases, inner)
-    found = fit(reduced, inner, start, progress=progress)
+    prepared = reduce(recording, inner)
+    start = first_attitude(prepared.epochs, prepared.phases, inner)
+    found = fit(prepared, inner, start, progress=progress)
     names = setup.sensors.names
     if turned is None:
         frame = model.body_frame
@@ -146,27 +146,22 @@ def batch_calibrate(
             "held_out_rms": None,
             "passes": float(found.steps),
         },
-        data=data_counts(recording, reduced),
+        data=data_counts(recording, prepared),
         notes=recording.notes,
         history=no_history(len(names)),
     )
 
 
-def no_history(p: int) -> History:
-    """History of an estimator that has none: no rows of `p` coefficients."""
-    none = np.zeros(0)
-    flags = np.zeros(0, dtype=bool)
-    rows = np.zeros((0, p))
-    return History(none, rows, rows, np.zeros((0, 3)), np.zeros(0, dtype=np.int64), flags, flags, np.zeros((0, 4)))
 
 
-def bound_covariance(reduced: Reduced, setup: Setup, start: Alignment) -> Floats:
+
+def bound_covariance(prepared: PreparedData, setup: TestSetup, start: Alignment) -> Floats:
     """Covariance (p, p), frame of the prior, that the data of a perfect recording hold."""
-    point, where = _begin(reduced, setup, start.C_nb, np.zeros(len(setup.sensors.prior)))
-    return _scaled(solve(_links(reduced, setup, start, where, point)[0]), setup)[1]
+    point, where = _begin(prepared, setup, start.C_nb, np.zeros(len(setup.sensors.prior)))
+    return _scaled(solve(_links(prepared, setup, start, where, point)[0]), setup)[1]
 
 
-def fit(reduced: Reduced, setup: Setup, start: Alignment, progress: Progress | None = None) -> Fit:
+def fit(prepared: PreparedData, setup: TestSetup, start: Alignment, progress: Progress | None = None) -> Fit:
     """Gauss-Newton from the coarse start.
 
     First with stops that need not stand quite still: far from the solution the second order of large errors is much
@@ -177,8 +172,8 @@ def fit(reduced: Reduced, setup: Setup, start: Alignment, progress: Progress | N
     DataError
         When an effect of the model changes at random by itself, or the steps do not end.
     """
-    coarse = coarse_start(reduced, setup, start)
-    point, where = _begin(reduced, setup, coarse.C_nb, coarse.coefficients)
+    coarse = coarse_start(prepared, setup, start)
+    point, where = _begin(prepared, setup, coarse.C_nb, coarse.coefficients)
     loose = replace(setup, model=replace(setup.model, velocity_sigma=_LOOSE[0], position_sigma=_LOOSE[1]))
     taken = 0
     for stage, near in ((loose, _NEAR), (setup, CONVERGED)):
@@ -187,7 +182,7 @@ def fit(reduced: Reduced, setup: Setup, start: Alignment, progress: Progress | N
             taken += 1
             if progress is not None:
                 progress("least squares", min(0.95, 0.1 * taken))
-            links, log_weight = _links(reduced, stage, start, where, point)
+            links, log_weight = _links(prepared, stage, start, where, point)
             solution = solve(links)
             step, covariance = _scaled(solution, stage)
             if not np.isfinite(step).all() or taken > MOST_STEPS:
@@ -203,78 +198,86 @@ def fit(reduced: Reduced, setup: Setup, start: Alignment, progress: Progress | N
     return Fit(point.coefficients, covariance, point.C_nb, solution.chi2, solution.dof, float(evidence), taken)
 
 
-def _begin(reduced: Reduced, setup: Setup, C_nb: Floats, coefficients: Floats) -> tuple[Point, Layout]:
+def _begin(
+    prepared: PreparedData, setup: TestSetup, C_nb: Floats, coefficients: Floats
+) -> tuple[LinearisationPoint, Layout]:
     """Begin at an initial attitude and coefficients; gyros lead from stop to stop, and every stop is levelled."""
     changing = (setup.sensors.decay_rate > 0) | (setup.sensors.drive > 0)
     if changing.any():
         name = setup.sensors.names[int(np.argmax(changing))]
         raise DataError(f"the batch estimator takes constants only, and '{name}' changes at random; use the filter")
-    where = layout(reduced)
+    where = layout(prepared)
     k = len(where.stop_first)
-    point = Point(coefficients, np.repeat(C_nb[None], k, axis=0), np.zeros((k, 3)), np.zeros((k, 3)))
-    seen = _seen(reduced, setup, where, point)
+    point = LinearisationPoint(coefficients, np.repeat(C_nb[None], k, axis=0), np.zeros((k, 3)), np.zeros((k, 3)))
+    seen = _seen(prepared, setup, where, point)
     values = setup.sensors.regressors(seen)
-    rest = rest_means(reduced, where, setup.sensors, values)
+    rest = rest_means(prepared, where, setup.sensors, values)
     force = (rest.mean - rest.design @ coefficients)[:, 3:]
     for i in range(k - 1):
-        arrived = _travel(reduced, setup, where, point, seen, values, i).C_nb
+        arrived = _travel(prepared, setup, where, point, seen, values, i).C_nb
         point.C_nb[i + 1] = levelled(arrived, force[where.block_stop == i + 1].mean(axis=0))
     return point, where
 
 
-def _seen(reduced: Reduced, setup: Setup, where: Layout, point: Point) -> Motion:
+def _seen(prepared: PreparedData, setup: TestSetup, where: Layout, point: LinearisationPoint) -> Motion:
     """Motion that the attitudes of the stops predict.
 
     Gyros integrated over the whole test drift; so every turn starts from the attitude of its stop, and at rest the
     table stands as the stop does.
     """
     latitude = setup.site.latitude_rad
-    cycle = np.arange(len(reduced.cycles))
+    cycle = np.arange(len(prepared.cycles))
     stop = np.maximum(np.searchsorted(where.stop_first, cycle, side="right") - 1, 0)
     at_stop = (cycle >= where.stop_first[stop]) & (cycle < where.stop_last[stop])
     # Rest that is part of a travel (settling) counts as motion here: what is seen must follow the samples there, as
     # their derivatives do.
     seen = motion(
-        reduced.cycles, at_stop, setup.sensors, point.coefficients, point.C_nb[0].copy(), latitude, setup.gravity,
-        reduced.temperature, predicted=True,
+        prepared.cycles, at_stop, setup.sensors, point.coefficients, point.C_nb[0].copy(), latitude, setup.gravity,
+        prepared.temperature, predicted=True,
     )  # fmt: skip
     drift = point.C_nb @ np.transpose(seen.C_nb[where.stop_last - 1], (0, 2, 1))
     C_nb = np.where(at_stop[:, None, None], point.C_nb[stop], drift[stop] @ seen.C_nb)
     w_earth = np.einsum("kij,i->kj", C_nb, earth.earth_rate(latitude))
     moving = ~at_stop[:, None]
-    w_table = np.where(reduced.rest[:, None], 0.0, seen.w - w_earth)
+    w_table = np.where(prepared.rest[:, None], 0.0, seen.w - w_earth)
     w = np.where(moving, seen.w, w_earth)
     f = np.where(moving, seen.f, -setup.gravity * C_nb[:, 2, :])
-    return replace(seen, C_nb=C_nb, w_table=w_table, w=w, f=f, rest=reduced.rest)
+    return replace(seen, C_nb=C_nb, w_table=w_table, w=w, f=f, rest=prepared.rest)
 
 
 def _travel(
-    reduced: Reduced, setup: Setup, where: Layout, point: Point, seen: Motion, values: Floats, k: int
-) -> Travel:
+    prepared: PreparedData,
+    setup: TestSetup,
+    where: Layout,
+    point: LinearisationPoint,
+    seen: Motion,
+    values: Floats,
+    k: int,
+) -> Preintegration:
     """Integrate the motion from stop k to the next."""
     site = setup.site
     excess = setup.gravity - float(earth.normal_gravity(site.latitude_rad, site.height_m))
     rows = slice(int(where.stop_last[k]), int(where.stop_first[k + 1]))
     slope = error_slope(setup.sensors, seen, rows, point.coefficients)
-    return travel(
-        reduced, rows, setup.sensors, values, slope, point.coefficients, point.C_nb[k], site.latitude_rad,
+    return preintegrate(
+        prepared, rows, setup.sensors, values, slope, point.coefficients, point.C_nb[k], site.latitude_rad,
         site.height_m, excess, (setup.imu.gyro_white_noise**2, setup.imu.accel_white_noise**2),
     )  # fmt: skip
 
 
 def _links(
-    reduced: Reduced, setup: Setup, start: Alignment, where: Layout, point: Point
+    prepared: PreparedData, setup: TestSetup, start: Alignment, where: Layout, point: LinearisationPoint
 ) -> tuple[list[Link], float]:
     """Whitened rows of all stops at a point, coefficients in units of their priors; the log of all weights."""
     prior, p = setup.sensors.prior, len(setup.sensors.prior)
-    seen = _seen(reduced, setup, where, point)
+    seen = _seen(prepared, setup, where, point)
     values = setup.sensors.regressors(seen)
     slope = error_slope(setup.sensors, seen, where.block_first, point.coefficients)
-    rest = rest_means(reduced, where, setup.sensors, values)
+    rest = rest_means(prepared, where, setup.sensors, values)
     last = len(where.stop_first) - 1
-    travels = [_travel(reduced, setup, where, point, seen, values, k) for k in range(last)]
+    travels = [_travel(prepared, setup, where, point, seen, values, k) for k in range(last)]
     weights = rest_weights(setup, rest.seconds)
-    dt = np.concatenate([[0.0], np.cumsum(reduced.cycles.dt)])
+    dt = np.concatenate([[0.0], np.cumsum(prepared.cycles.dt)])
     links, log_weight = [], float(np.sum(np.log(weights))) - float(np.sum(np.log(prior)))
     for k in range(len(where.stop_first)):
         rows = where.block_stop == k
@@ -300,7 +303,7 @@ def _links(
     return links, log_weight
 
 
-def _scaled(solution: Solution, setup: Setup) -> tuple[Floats, Floats]:
+def _scaled(solution: Solution, setup: TestSetup) -> tuple[Floats, Floats]:
     """Step and covariance of the coefficients in SI."""
     prior = setup.sensors.prior
     return solution.common * prior, solution.covariance * np.outer(prior, prior)
@@ -318,7 +321,7 @@ def _stretch(step: Floats, last: Floats) -> float:
     return float(1.0 / (1.0 - ratio)) if _CREEPING < ratio < 1.0 - 1.0 / _LONGEST else 1.0
 
 
-def _movement(setup: Setup, before: Point, after: Point, covariance: Floats) -> float:
+def _movement(setup: TestSetup, before: LinearisationPoint, after: LinearisationPoint, covariance: Floats) -> float:
     """Largest movement of a coefficient in its own sigma, in the frame that the accelerometers define.
 
     In the frame of the prior three rotations of the body are held by priors alone; they go on turning for long, and no
@@ -332,9 +335,9 @@ def _movement(setup: Setup, before: Point, after: Point, covariance: Floats) -> 
     return float(np.max(np.abs(new - old)[free] / sigma[free]))
 
 
-def _moved(point: Point, step: Floats, links: Floats) -> Point:
+def _moved(point: LinearisationPoint, step: Floats, links: Floats) -> LinearisationPoint:
     turns = np.ascontiguousarray(links[:, :3])
     C_nb = np.array([rotation_matrix(turn) @ C for turn, C in zip(turns, point.C_nb, strict=True)])
-    return Point(
+    return LinearisationPoint(
         point.coefficients + step, C_nb, point.velocity + links[:, 3:6], point.position + links[:, 6:9]
     )

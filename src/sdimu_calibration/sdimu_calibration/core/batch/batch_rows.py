@@ -5,22 +5,20 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sdimu_calibration.core import earth
-from sdimu_calibration.core.batch.batch_data import Travel
-from sdimu_calibration.core.filter.reduced import Setup
-from sdimu_calibration.core.navigation.alignment import Alignment
+from sdimu_calibration.core.alignment.alignment import Alignment
+from sdimu_calibration.core.alignment.prepared import TestSetup
+from sdimu_calibration.core.arrays import Floats
+from sdimu_calibration.core.batch.preintegration import Preintegration
 from sdimu_calibration.core.rotation import rotation_vector, skew
-
-Floats = NDArray[np.float64]
 
 PER_STOP = 9
 """Unknowns of a stop: attitude, velocity, position."""
 
 
 @dataclass(frozen=True)
-class Point:
+class LinearisationPoint:
     """Where the equations are linearised: coefficients (p,) and, for k stops, attitude, velocity and position."""
 
     coefficients: Floats
@@ -29,14 +27,14 @@ class Point:
     position: Floats
 
 
-def rest_weights(setup: Setup, seconds: Floats) -> Floats:
+def rest_weights(setup: TestSetup, seconds: Floats) -> Floats:
     """One over sigma of the means of each block, shape (b, 6)."""
     rate = (setup.imu.gyro_white_noise**2 + setup.model.extra_rate_sigma**2) / seconds
     force = (setup.imu.accel_white_noise**2 + setup.model.extra_force_sigma**2) / seconds
     return 1.0 / np.sqrt(np.repeat(np.column_stack([rate, force]), 3, axis=1))
 
 
-def rest_residual(setup: Setup, mean: Floats, slope: Floats, C_nb: Floats) -> tuple[Floats, Floats]:
+def rest_residual(setup: TestSetup, mean: Floats, slope: Floats, C_nb: Floats) -> tuple[Floats, Floats]:
     """Measured minus predicted means (b, 6) of a perfect IMU, and their change per small turn in n (b, 6, 3).
 
     With C turned by a: C_bn v becomes C_bn (v - a x v); `slope` (b, 6, 6) of the errors goes with it.
@@ -47,7 +45,7 @@ def rest_residual(setup: Setup, mean: Floats, slope: Floats, C_nb: Floats) -> tu
     return residual, change + slope @ change
 
 
-def still(setup: Setup, velocity: Floats, position: Floats, p: int) -> tuple[Floats, Floats, Floats]:
+def still(setup: TestSetup, velocity: Floats, position: Floats, p: int) -> tuple[Floats, Floats, Floats]:
     """Say that a stop stands still at the known point."""
     sigma = np.repeat([setup.model.velocity_sigma, setup.model.position_sigma], 3)
     own = np.zeros((6, PER_STOP))
@@ -63,7 +61,7 @@ def initial(start: Alignment, C_nb: Floats, p: int) -> tuple[Floats, Floats, Flo
 
 
 def step_rows(
-    gone: Travel, point: Point, k: int, resting: float, prior: Floats
+    gone: Preintegration, point: LinearisationPoint, k: int, resting: float, prior: Floats
 ) -> tuple[tuple[Floats, Floats, Floats, Floats], float]:
     """Whitened rows from stop k to the next, and the log of their weight."""
     L = np.linalg.cholesky(gone.noise)

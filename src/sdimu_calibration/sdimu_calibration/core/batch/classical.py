@@ -15,22 +15,19 @@ rate-table testing).
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sdimu_calibration.core import earth
-from sdimu_calibration.core.batch.batch import no_history
-from sdimu_calibration.core.batch.batch_data import layout
+from sdimu_calibration.core.alignment.prepared import PreparedData, TestSetup, reduce, set_up
+from sdimu_calibration.core.alignment.rest_means import layout
+from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.calibrate import data_counts
+from sdimu_calibration.core.effects import body_frame
 from sdimu_calibration.core.effects.motion import Motion
-from sdimu_calibration.core.filter import body_frame
-from sdimu_calibration.core.filter.passes import Progress
-from sdimu_calibration.core.filter.reduced import Reduced, Setup, reduce, set_up
 from sdimu_calibration.core.navigation.track import MAGNETIC_FIELD, temperatures
+from sdimu_calibration.core.progress import Progress
 from sdimu_calibration.core.recording import DataError, Recording, TableLog
-from sdimu_calibration.core.results import Calibration
+from sdimu_calibration.core.results import Calibration, no_history
 from sdimu_calibration.core.specification import ImuSpecification, Model, Site
-
-Floats = NDArray[np.float64]
 
 GIMBALS = ("Y", "Z", "X")
 """IMU axes about which outer, middle and inner table axis turn when all angles are zero."""
@@ -78,8 +75,8 @@ def classical_calibrate(
         progress("least squares", 0.2)
     log = _gimbal_log(recording.table)
     setup = set_up(site, imu, model)
-    reduced = reduce(recording, setup)
-    values, covariance, chi2, dof = _fit(reduced, setup, reference_motion(reduced, setup, log, gimbals))
+    prepared = reduce(recording, setup)
+    values, covariance, chi2, dof = _fit(prepared, setup, reference_motion(prepared, setup, log, gimbals))
     names = setup.sensors.names
     if frame != TABLE_FRAME:
         J = body_frame.jacobian_at(names, values, frame)
@@ -96,7 +93,7 @@ def classical_calibrate(
             "log_likelihood": -0.5 * chi2, "nis_mean": chi2 / max(dof, 1), "nis_dof": float(dof),
             "held_out_rms": None, "passes": 1.0,
         },
-        data=data_counts(recording, reduced),
+        data=data_counts(recording, prepared),
         notes=recording.notes,
         history=no_history(len(names)),
     )  # fmt: skip
@@ -133,9 +130,9 @@ def _about(letter: str, angle: Floats) -> Floats:
     return C
 
 
-def reference_motion(reduced: Reduced, setup: Setup, log: TableLog, gimbals: tuple[str, str, str]) -> Motion:
+def reference_motion(prepared: PreparedData, setup: TestSetup, log: TableLog, gimbals: tuple[str, str, str]) -> Motion:
     """Make the motion that a perfect IMU along the table's axes would have seen."""
-    c = reduced.cycles
+    c = prepared.cycles
     edges = np.append(c.t[0] - c.dt[0], c.t)
     C = table_attitude(log, edges, gimbals)
     middle = 0.5 * (C[:-1] + C[1:])
@@ -147,19 +144,19 @@ def reference_motion(reduced: Reduced, setup: Setup, log: TableLog, gimbals: tup
     w_table = sine * (np.arcsin(np.minimum(size, 1.0)) / size) / c.dt[:, None]
     w = w_table + np.einsum("kij,i->kj", middle, earth.earth_rate(setup.site.latitude_rad))
     f = -setup.gravity * middle[:, 2, :]
-    heat, heat_rate = temperatures(reduced.temperature, c.t - 0.5 * c.dt, causal=False)
+    heat, heat_rate = temperatures(prepared.temperature, c.t - 0.5 * c.dt, causal=False)
     none = np.zeros_like(w)
     alpha = np.gradient(w_table, c.t - 0.5 * c.dt, axis=0)
     never = np.full(len(w), np.inf)
     return Motion(
-        c.t, c.dt, w, f, middle, w_table, alpha, reduced.rest, heat, heat_rate, none, none, never, MAGNETIC_FIELD
+        c.t, c.dt, w, f, middle, w_table, alpha, prepared.rest, heat, heat_rate, none, none, never, MAGNETIC_FIELD
     )
 
 
-def _fit(reduced: Reduced, setup: Setup, seen: Motion) -> tuple[Floats, Floats, float, int]:
+def _fit(prepared: PreparedData, setup: TestSetup, seen: Motion) -> tuple[Floats, Floats, float, int]:
     """Weighted least squares over the means of stops and turns: coefficients, covariance, chi-square, its degrees."""
-    model, c = setup.sensors, reduced.cycles
-    where = layout(reduced)
+    model, c = setup.sensors, prepared.cycles
+    where = layout(prepared)
     inner = np.column_stack([where.stop_first, where.stop_last]).ravel()
     first, last = inner[:-1], inner[1:]
     sums = np.hstack([

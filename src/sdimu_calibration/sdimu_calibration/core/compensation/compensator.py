@@ -19,8 +19,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.compensation.reads import reads, samples_motion
 from sdimu_calibration.core.effects import imu_model, selection
 from sdimu_calibration.core.effects.effect import Effect
@@ -30,8 +30,6 @@ from sdimu_calibration.core.navigation.track import temperatures
 from sdimu_calibration.core.recording import DataError, TemperatureLog
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.specification import ImuSpecification
-
-Floats = NDArray[np.float64]
 
 START_TEMPERATURE = "start_temperature_degc"
 """Key of a result's data section: the temperature from which temperature effects count (deg C)."""

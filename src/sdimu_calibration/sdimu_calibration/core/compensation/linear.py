@@ -6,14 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.compensation.compensator import resolved
 from sdimu_calibration.core.compensation.reads import reads, samples_motion
 from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.results import Calibration
-
-Floats = NDArray[np.float64]
 
 _AFFINE = 1e-10
 """Deviation from a straight line, against the size of a regressor, that is rounding."""

@@ -6,8 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.effects.effect import Effect
-from sdimu_calibration.core.effects.motion import Floats, Motion
+from sdimu_calibration.core.effects.motion import Motion
 
 FIELDS = (
     "w", "f", "t", "temperature", "temperature_rate", "alpha", "w_table", "rest", "C_nb", "magnetic_n", "turned",

@@ -8,12 +8,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.recording import DataError
 
-Floats = NDArray[np.float64]
-Stamps = NDArray[np.int64]
+Stamps = Ints
 
 _MINIMUM_SAMPLES = 2
 _SAME_TIME = 0.5

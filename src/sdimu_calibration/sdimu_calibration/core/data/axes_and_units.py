@@ -20,13 +20,11 @@ from dataclasses import dataclass
 from itertools import permutations, product
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.data.windows import Windows, cut_windows, turned
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.units import STANDARD_GRAVITY
-
-Floats = NDArray[np.float64]
 
 DEGREE = float(np.pi / 180.0)
 _NEAR_GRAVITY = 0.3
@@ -166,7 +164,7 @@ def _largest(windows: Windows) -> float:
     return float(np.sort(windows.swing)[-1 - _OTHERS]) if len(windows) > _OTHERS else 0.0
 
 
-def _turning(windows: Windows, enough: float) -> NDArray[np.int64]:
+def _turning(windows: Windows, enough: float) -> Ints:
     """Windows in which the direction of gravity changes most; none when it never changes by `enough` (rad)."""
     largest = _largest(windows)
     if largest < enough:
@@ -188,7 +186,7 @@ class Turns:
     """
 
     windows: Windows
-    chosen: NDArray[np.int64]
+    chosen: Ints
     C: dict[float, Floats]
 
     def misfit(self, reading: float, axes: Floats | None = None, share: float = 0.5) -> float:

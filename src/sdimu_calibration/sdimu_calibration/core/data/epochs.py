@@ -5,12 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.compiled import compiled
 from sdimu_calibration.core.navigation.strapdown import Cycles
-
-Floats = NDArray[np.float64]
 
 EPOCH_S = 1.0
 """Nominal length (s): the paper's measurement rate is 1 Hz."""
@@ -34,8 +32,8 @@ class Epochs:
         Mean body rate as measured (rad/s).
     """
 
-    first: NDArray[np.int64]
-    last: NDArray[np.int64]
+    first: Ints
+    last: Ints
     start: Floats
     end: Floats
     peak_rate: Floats
@@ -48,7 +46,7 @@ class Epochs:
 
 
 @compiled
-def _ends(t: Floats, dt: Floats, nominal: float) -> NDArray[np.int64]:
+def _ends(t: Floats, dt: Floats, nominal: float) -> Ints:
     """Return the index after the last cycle of each whole epoch."""
     ends = np.empty(t.shape[0], dtype=np.int64)
     count = 0

@@ -22,16 +22,16 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d
 
+from sdimu_calibration.core.arrays import Bools, Floats, Ints
 from sdimu_calibration.core.data.epochs import Epochs
 from sdimu_calibration.core.data.phases import Phases
 from sdimu_calibration.core.navigation.strapdown import Cycles
 from sdimu_calibration.core.recording import DataError, DataFault
 
-Floats = NDArray[np.float64]
-
+GAP_SHARE = 0.1
+"""Uncertainty of an angle that was bridged by interpolation, as a share of it."""
 LINEAR_RAD = 1e-3
 """Attitude error (sigma) from which the linearised filter errs by more than its noise: g d^2 / 2 is 0.5 ug."""
 _LONG_S = 2.0
@@ -88,7 +88,7 @@ def _nearby(cycles: Cycles) -> Floats:
 
 
 def bridges(
-    cycles: Cycles, epochs: Epochs, dwell: NDArray[np.bool_], nominal_s: float, acceleration: float,
+    cycles: Cycles, epochs: Epochs, dwell: Bools, nominal_s: float, acceleration: float,
     gravity: float,
 ) -> Bridges:  # fmt: skip
     """Uncertainty that missing samples leave in each epoch.
@@ -141,7 +141,7 @@ def weighed(found: Bridges, epochs: Epochs, t: Floats, excess: Floats) -> Bridge
     return Bridges(found.white + more, found.angle, found.velocity)
 
 
-def _rests(dwell: NDArray[np.bool_], epoch: NDArray[np.int64]) -> NDArray[np.bool_]:
+def _rests(dwell: Bools, epoch: Ints) -> Bools:
     """Whether the IMU rests in an epoch and in those beside it."""
     last = len(dwell) - 1
     return np.asarray(dwell[epoch] & dwell[np.maximum(epoch - 1, 0)] & dwell[np.minimum(epoch + 1, last)])
@@ -225,7 +225,7 @@ def _long_gap(
     )  # fmt: skip
 
 
-def _beside(dwell: NDArray[np.bool_], epoch: int, step: int) -> NDArray[np.int64]:
+def _beside(dwell: Bools, epoch: int, step: int) -> Ints:
     """Epochs of the same rest on one side of an epoch, at most `_COMPARED_S`."""
     out: list[int] = []
     k = epoch + step

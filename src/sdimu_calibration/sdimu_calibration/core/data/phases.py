@@ -13,14 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sdimu_calibration.core import earth
+from sdimu_calibration.core.arrays import Bools, Ints
 from sdimu_calibration.core.data.epochs import EPOCH_S, Epochs
 from sdimu_calibration.core.navigation.strapdown import CYCLE_S
 from sdimu_calibration.core.recording import DataFault, PhaseLog
 from sdimu_calibration.core.specification import ImuSpecification
 from sdimu_calibration.core.units import STANDARD_GRAVITY
-
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 
 STALE_S = 2.5
 """A status older than this says nothing any more (s); it is sent at every change and at 1 Hz."""
@@ -84,12 +82,12 @@ class Phases:
     dwell: Bools
     used: Bools
     first: Bools
-    stop: NDArray[np.int64]
+    stop: Ints
     contradicted: Bools
     denied: Bools
 
 
-def table_says(epochs: Epochs, log: PhaseLog | None) -> tuple[NDArray[np.int8], NDArray[np.int64]]:
+def table_says(epochs: Epochs, log: PhaseLog | None) -> tuple[NDArray[np.int8], Ints]:
     """Say what the status holds of each epoch: 1 dwell all through, 0 rotating in some, -1 nothing; and the stop."""
     m = len(epochs)
     if log is None or not len(log.t):

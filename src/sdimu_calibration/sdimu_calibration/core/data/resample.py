@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Stamps = NDArray[np.int64]
+from sdimu_calibration.core.arrays import Bools, Floats, Ints
+
+Stamps = Ints
 
 _SAME = 0.1
 """Stamps that differ by less than this share of the interval are the same: jitter of whoever wrote them."""
@@ -22,7 +22,7 @@ def same_stamps(a: Stamps, b: Stamps) -> bool:
     return bool((np.abs(a - b) <= _SAME * max(interval, 0.0)).all())
 
 
-def mean_over(wanted_ns: Stamps, ns: Stamps, value: Floats) -> tuple[NDArray[np.bool_], Floats]:
+def mean_over(wanted_ns: Stamps, ns: Stamps, value: Floats) -> tuple[Bools, Floats]:
     """Average samples over other intervals.
 
     Samples are means over the interval that ends at their stamp, so their running sum is known at the stamps; between

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sdimu_calibration.core.arrays import Bools, Floats
 from sdimu_calibration.core.data.windows import cut_windows
-from sdimu_calibration.core.recording import Floats, PhaseLog, Recording
+from sdimu_calibration.core.recording import PhaseLog, Recording
 
 _STEP_S = 0.25
 """Grid on which motion is compared."""
@@ -63,7 +63,7 @@ def _without_common_time(recording: Recording, log: PhaseLog) -> Recording:
     return replace(recording, phase=None, notes=(*recording.notes, note))
 
 
-def _on_grid(t: Floats, flag: NDArray[np.bool_], step: float) -> tuple[Floats, float]:
+def _on_grid(t: Floats, flag: Bools, step: float) -> tuple[Floats, float]:
     """Put flags on the grid as 1, 0 and, where nobody knows, the mean; also return the time of the first."""
     place = np.rint((t - t[0]) / step).astype(np.int64)
     out = np.full(int(place[-1]) + 1, float(flag.mean()))
@@ -91,7 +91,7 @@ def _best_shift(moving: Floats, begin: float, status: Floats, status_begin: floa
     return float(r[np.argmin(np.abs(shift))]), float(r[best]), float(shift[best])
 
 
-def _refinement(t: Floats, moving: NDArray[np.bool_], log: PhaseLog, shift: float) -> float:
+def _refinement(t: Floats, moving: Bools, log: PhaseLog, shift: float) -> float:
     """Median distance (s) of the changes of motion from those of the shifted status."""
     felt = t[1:][moving[1:] != moving[:-1]]
     said = log.t[1:][log.dwell[1:] != log.dwell[:-1]] + shift

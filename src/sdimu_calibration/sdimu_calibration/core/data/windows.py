@@ -8,12 +8,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sdimu_calibration.core import earth
-
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
+from sdimu_calibration.core.arrays import Bools, Floats, Ints
 
 WINDOW_S = 1.0
 """Usual length: a hand turns by tens of degrees in it, and its tremor (10 Hz) averages out of a quarter of it."""
@@ -54,7 +51,7 @@ class Windows:
 
     start: Floats
     end: Floats
-    first: NDArray[np.int64]
+    first: Ints
     length: int
     interval_s: float
     up_first: Floats
@@ -118,7 +115,7 @@ def cut_windows(t: Floats, w: Floats, f: Floats, length_s: float = WINDOW_S) -> 
     first = first[whole]
     total_w, total_f = (np.vstack([np.zeros(3), np.cumsum(x - x.mean(axis=0), axis=0)]) for x in (w, f))
 
-    def mean(total: Floats, values: Floats, begin: NDArray[np.int64], end: NDArray[np.int64]) -> Floats:
+    def mean(total: Floats, values: Floats, begin: Ints, end: Ints) -> Floats:
         return np.asarray((total[end] - total[begin]) / (end - begin)[:, None] + values.mean(axis=0))
 
     return Windows(
@@ -129,7 +126,7 @@ def cut_windows(t: Floats, w: Floats, f: Floats, length_s: float = WINDOW_S) -> 
     )  # fmt: skip
 
 
-def turned(w: Floats, windows: Windows, chosen: NDArray[np.int64], factor: float) -> Floats:
+def turned(w: Floats, windows: Windows, chosen: Ints, factor: float) -> Floats:
     """Rotation over windows as the gyros say it: C (k, 3, 3) from the axes at the end to those at the beginning.
 
     Parameters

@@ -10,10 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sdimu_calibration.core.diagnosis.coefficient_shifts import CoefficientShift
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
-from sdimu_calibration.core.diagnosis.found import Found, Reach
+from sdimu_calibration.core.diagnosis.found import DetectableSize, Found
 from sdimu_calibration.core.diagnosis.plan_seen import PlanSeen
-from sdimu_calibration.core.diagnosis.stakes import Stake
 
 _EVEN = frozenset(
     {"gyro_scale_asymmetry", "gyro_scale_quadratic", "gyro_misalignment_asymmetry", "gyro_bias_in_motion"}
@@ -38,24 +38,24 @@ _MOST_STAKES = 3
 
 
 @dataclass(frozen=True)
-class Blind:
+class Untestable:
     """Why a group of effects could not have been seen, and what would show it."""
 
     reason: str
     labels: tuple[str, ...]
 
 
-def blind(reached: tuple[Reach, ...], plan: PlanSeen) -> tuple[Blind, ...]:
+def untestable_reasons(reached: tuple[DetectableSize, ...], plan: PlanSeen) -> tuple[Untestable, ...]:
     """Sort what is not testable by the reason; the largest groups first."""
     groups: dict[str, list[str]] = {}
     for one in reached:
         if not one.testable:
             groups.setdefault(reason(one, plan), []).append(one.label)
     ordered = sorted(groups.items(), key=lambda item: -len(item[1]))
-    return tuple(Blind(why, tuple(labels)) for why, labels in ordered)
+    return tuple(Untestable(why, tuple(labels)) for why, labels in ordered)
 
 
-def reason(one: Reach, plan: PlanSeen) -> str:
+def reason(one: DetectableSize, plan: PlanSeen) -> str:
     """Say why a candidate is not testable with this plan."""
     if one.family in _EXACT:
         return _EXACT[one.family]
@@ -72,7 +72,9 @@ def reason(one: Reach, plan: PlanSeen) -> str:
     return "the motion of this test does not excite it"
 
 
-def advice(d: Diagnosis, found: tuple[Found, ...], reached: tuple[Reach, ...], plan: PlanSeen) -> tuple[str, ...]:
+def advice(
+    d: Diagnosis, found: tuple[Found, ...], reached: tuple[DetectableSize, ...], plan: PlanSeen
+) -> tuple[str, ...]:
     """Advise in sentences, the most useful first."""
     out = [*_about_data(d), *_about_found(d, found, plan), *_about_plan(reached, plan)]
     return tuple(dict.fromkeys(out))
@@ -112,15 +114,15 @@ def _about_found(d: Diagnosis, found: tuple[Found, ...], plan: PlanSeen) -> list
             out.append(f"{one.candidate.label} is a fault of this recording: record again and do not carry it over.")
         if one.alike:
             out.append(separate(one, plan) + _calculated(one))
-        if one.stakes:
+        if one.coefficient_shifts:
             out.append(_at_stake(one))
     return out
 
 
 def _at_stake(one: Found) -> str:
     """Say which coefficients are right only if the named member of a class is the right one."""
-    largest: dict[str, Stake] = {}
-    for stake in sorted(one.stakes, key=lambda s: -abs(s.sigmas)):
+    largest: dict[str, CoefficientShift] = {}
+    for stake in sorted(one.coefficient_shifts, key=lambda s: -abs(s.sigmas)):
         largest.setdefault(stake.coefficient, stake)
     parts = [
         f"with {s.other} instead, {s.coefficient} moves by {s.sigmas:+.0f} of its sigmas"
@@ -171,7 +173,7 @@ def _calculated(one: Found) -> str:
     return " Ranked by calculation: sdimu plan --plan YOURS " + " ".join(f"--tell '{name}'" for name in names) + "."
 
 
-def _about_plan(reached: tuple[Reach, ...], plan: PlanSeen) -> list[str]:
+def _about_plan(reached: tuple[DetectableSize, ...], plan: PlanSeen) -> list[str]:
     out = []
     hidden = {one.family for one in reached if not one.testable}
     if hidden & _EVEN and plan.one_sided():

@@ -9,16 +9,14 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.diagnosis.found import looked_at
+from sdimu_calibration.core.diagnosis.free_input_test import free_input_test
 from sdimu_calibration.core.diagnosis.information import Information
-from sdimu_calibration.core.diagnosis.remainder import remainder
 from sdimu_calibration.core.diagnosis.search import FALSE_ALARM, search
-from sdimu_calibration.core.filter.passes import Progress
-
-Floats = NDArray[np.float64]
+from sdimu_calibration.core.progress import Progress
 
 
 @dataclass(frozen=True)
@@ -44,7 +42,7 @@ class Null:
     largest: Floats
     threshold: float
     rms_z: float
-    remainder_p: Floats
+    free_input_p: Floats
 
     @property
     def sentence(self) -> str:
@@ -81,7 +79,7 @@ def bootstrap(d: Diagnosis, draws: int, seed: int = 1, progress: Progress | None
         z = found.first.z[np.isfinite(found.first.sigma)]
         largest.append(float(np.max(np.abs(z), initial=0.0)))
         squares.append(float(np.mean(z**2)))
-        tails.append(remainder(part.information, evidence.model, evidence.weight, d.free, found.scale).p_value)
+        tails.append(free_input_test(part.information, evidence.model, evidence.weight, d.free, found.scale).p_value)
     return Null(
         draws, finds, np.array(largest), d.found.threshold, float(np.sqrt(np.mean(squares))), np.array(tails)
     )

@@ -8,9 +8,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.effects import registry
 from sdimu_calibration.core.effects.effect import AXES, CHANNELS, Column, Effect, Parameter, Term, Timetable, product
-from sdimu_calibration.core.effects.motion import Floats, Motion
+from sdimu_calibration.core.effects.motion import Motion
 
 _CYCLES = np.arange(1.0, 20.0, 0.5)
 OWN = "own equation"

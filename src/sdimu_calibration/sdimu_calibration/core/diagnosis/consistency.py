@@ -5,13 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import chi2
 
+from sdimu_calibration.core.alignment.prepared import PreparedData
+from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.filter.passes import Pass
-from sdimu_calibration.core.filter.reduced import Reduced
-
-Floats = NDArray[np.float64]
 
 CHANNEL_NAMES = (
     "position_n", "position_e", "position_d", "velocity_n", "velocity_e", "velocity_d",
@@ -50,7 +48,7 @@ class Noise:
     sigma: float
     spread: float
     kurtosis: float
-    outliers: NDArray[np.int64]
+    outliers: Ints
     slow: float = 1.0
 
 
@@ -88,22 +86,22 @@ class Consistency:
     where: tuple[StopMean, ...]
 
 
-def check(finished: Pass, reduced: Reduced) -> Consistency:
+def check(finished: Pass, prepared: PreparedData) -> Consistency:
     """Test the innovations of a finished pass."""
     out = finished.output
     total, dof = float(np.nansum(out.nis)), 3 * int(np.isfinite(out.nis).sum())
-    first = reduced.phases.first & (reduced.kind > 0)
+    first = prepared.phases.first & (prepared.kind > 0)
     at_first = out.nis[first]
     standard = standardised(out.innovation, out.normalised, finished)
-    sensors = standard[reduced.kind > 0][:, 6:]
+    sensors = standard[prepared.kind > 0][:, 6:]
     return Consistency(
         nis_mean=total / max(dof, 1),
         nis_p_value=float(2.0 * min(chi2.sf(total, dof), chi2.cdf(total, dof))),
         first_nis=float(np.nanmean(at_first) / 3.0) if at_first.size else float("nan"),
         ljung_box_p=ljung_box(sensors),
-        gyro=triad_noise(reduced, reduced.epochs.w_mean, finished.settings.gyro_psd**0.5),
-        accel=triad_noise(reduced, reduced.epochs.f_mean, finished.settings.accel_psd**0.5),
-        where=stop_means(standard, reduced),
+        gyro=triad_noise(prepared, prepared.epochs.w_mean, finished.settings.gyro_psd**0.5),
+        accel=triad_noise(prepared, prepared.epochs.f_mean, finished.settings.accel_psd**0.5),
+        where=stop_means(standard, prepared),
     )
 
 
@@ -130,20 +128,20 @@ def ljung_box(series: Floats) -> float:
     return float(min(1.0, worst * count))
 
 
-def triad_noise(reduced: Reduced, means: Floats, density: float) -> Noise:
+def triad_noise(prepared: PreparedData, means: Floats, density: float) -> Noise:
     """Noise of a triad from its epoch means at rest, neighbours of the same stop subtracted.
 
     Parameters
     ----------
-    reduced : Reduced
+    prepared : PreparedData
     means : ndarray, shape (e, 3)
         Mean rate or force of each epoch, as measured; biases and slow effects cancel in the differences.
     density : float
         Specified white noise (SI/sqrt(Hz)).
     """
-    epochs = reduced.epochs
-    good = reduced.phases.used
-    pair = good[1:] & good[:-1] & (reduced.phases.stop[1:] == reduced.phases.stop[:-1])
+    epochs = prepared.epochs
+    good = prepared.phases.used
+    pair = good[1:] & good[:-1] & (prepared.phases.stop[1:] == prepared.phases.stop[:-1])
     if pair.sum() < _LEAST_PAIRS:
         return Noise(1.0, 1.0, 1.0, 3.0, np.empty(0, dtype=np.int64))
     length = epochs.end - epochs.start
@@ -160,13 +158,13 @@ def triad_noise(reduced: Reduced, means: Floats, density: float) -> Noise:
     kurtosis = float(np.mean(difference**4) / np.mean(difference**2) ** 2)
     # The median absolute deviation has 37 % of the efficiency of the standard deviation; differences share epochs.
     error = 1.4 * ratio / np.sqrt(2 * 0.37 * difference.size)
-    slow = _slow(reduced, means) / (spread * density * np.sqrt(2.0 / SLOW_S))
+    slow = _slow(prepared, means) / (spread * density * np.sqrt(2.0 / SLOW_S))
     return Noise(ratio, error, spread, kurtosis, outliers, slow)
 
 
-def _slow(reduced: Reduced, means: Floats) -> float:
+def _slow(prepared: PreparedData, means: Floats) -> float:
     """Scatter (rms) of the differences of neighbouring means over `SLOW_S` seconds of one stop (Allan deviation)."""
-    phases = reduced.phases
+    phases = prepared.phases
     steps = []
     for stop in np.unique(phases.stop[phases.used]):
         rows = means[phases.used & (phases.stop == stop)]
@@ -176,11 +174,11 @@ def _slow(reduced: Reduced, means: Floats) -> float:
     return float(np.sqrt(np.mean(found**2))) if len(found) >= _LEAST_PAIRS else float("nan")
 
 
-def stop_means(standard: Floats, reduced: Reduced) -> tuple[StopMean, ...]:
+def stop_means(standard: Floats, prepared: PreparedData) -> tuple[StopMean, ...]:
     """Mean over each stop times the root of its length, every channel; largest first."""
     out = []
-    for stop in np.unique(reduced.phases.stop[reduced.kind > 0]):
-        rows = (reduced.phases.stop == stop) & (reduced.kind > 0)
+    for stop in np.unique(prepared.phases.stop[prepared.kind > 0]):
+        rows = (prepared.phases.stop == stop) & (prepared.kind > 0)
         for channel in range(12):
             values = standard[rows, channel]
             values = values[np.isfinite(values)]

@@ -10,27 +10,24 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import norm
 
+from sdimu_calibration.core.alignment.prepared import SKIP, PreparedData, TestSetup, reduce, set_up
+from sdimu_calibration.core.arrays import Ints
 from sdimu_calibration.core.calibrate import NOT_CONVERGED, assemble
 from sdimu_calibration.core.diagnosis.candidates import Candidate
 from sdimu_calibration.core.diagnosis.consistency import SLOW_S, Consistency, check
 from sdimu_calibration.core.diagnosis.evidence import Evidence
-from sdimu_calibration.core.diagnosis.remainder import Remainder
-from sdimu_calibration.core.diagnosis.rounds import UNEXPLAINED_P, Look, settle
+from sdimu_calibration.core.diagnosis.free_input_test import FreeInputTest
+from sdimu_calibration.core.diagnosis.rounds import UNEXPLAINED_P, Round, settle
 from sdimu_calibration.core.diagnosis.screen import Finding, beyond_specification, screen
 from sdimu_calibration.core.diagnosis.search import FALSE_ALARM, MOST_STEPS, Search
 from sdimu_calibration.core.effects.effect import Effect
-from sdimu_calibration.core.filter.filter_pass import SKIP
-from sdimu_calibration.core.filter.passes import Progress, solve
-from sdimu_calibration.core.filter.reduced import Reduced, Setup, reduce, set_up
+from sdimu_calibration.core.filter.passes import solve
+from sdimu_calibration.core.progress import Progress, silent
 from sdimu_calibration.core.recording import Recording
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.specification import ImuSpecification, Model, Site
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 STILL_WRONG = 1.25
 """Held-out error (1 is right) beyond which a model is not called explained, whatever it fits."""
@@ -62,7 +59,7 @@ class Diagnosis:
     found : Search
         Of the catalogue, or of own equations where those explain it.
     evidence : Evidence
-    remainder_before, remainder_after : Remainder
+    free_inputs_before, remainder_after : FreeInputTest
     free : ndarray of int
         Columns of the free inputs in `evidence`.
     own : bool
@@ -81,8 +78,8 @@ class Diagnosis:
     after: Calibration
     found: Search[Evidence]
     evidence: Evidence
-    remainder_before: Remainder
-    remainder_after: Remainder
+    free_inputs_before: FreeInputTest
+    free_inputs_after: FreeInputTest
     free: Ints
     own: bool
     unexplained: bool
@@ -96,8 +93,8 @@ class Diagnosis:
     @property
     def explained(self) -> float:
         """Share of the misfit that what was found removes."""
-        before = max(self.remainder_before.chi2 - self.remainder_before.dof, 1e-9)
-        after = max(self.remainder_after.chi2 - self.remainder_after.dof, 0.0)
+        before = max(self.free_inputs_before.chi2 - self.free_inputs_before.dof, 1e-9)
+        after = max(self.free_inputs_after.chi2 - self.free_inputs_after.dof, 0.0)
         return float(np.clip(1.0 - after / before, 0.0, 1.0))
 
 
@@ -127,15 +124,15 @@ def diagnose(
     DataError
         When the recording or the options cannot be used.
     """
-    tell = progress or _silent
+    tell = progress or silent
     setup = set_up(site, imu, model)
-    reduced = reduce(recording, setup)
-    findings = screen(recording, reduced)
-    solution = solve(setup, reduced, tell, keep=True)
-    consistency = check(solution.last, reduced)
-    noise, setup = _mend_noise(consistency, setup, reduced)
+    prepared = reduce(recording, setup)
+    findings = screen(recording, prepared)
+    solution = solve(setup, prepared, tell, keep=True)
+    consistency = check(solution.last, prepared)
+    noise, setup = _mend_noise(consistency, setup, prepared)
     if noise:
-        solution = solve(setup, reduced, tell, keep=True)
+        solution = solve(setup, prepared, tell, keep=True)
     look = settle(solution, extra, alpha, tell)
     findings += beyond_specification(look.solution)
     if not look.solution.converged:
@@ -183,7 +180,7 @@ _MISFIT = 0.05
 _MISFIT_SIGMAS = 5.0
 
 
-def patched(look: Look) -> bool:
+def patched(look: Round) -> bool:
     """Whether the choice is a patchwork: the search ran out of steps, or one bias drifts by three effects at once.
 
     Steps and transients in a row can follow any drift, and say nothing of its cause.
@@ -203,7 +200,9 @@ _DRIFTS = ("bias_ramp", "bias_step", "bias_warm_up", "bias_random_walk")
 _PATCHES = 3
 
 
-def _mend_noise(consistency: Consistency, setup: Setup, reduced: Reduced) -> tuple[tuple[str, ...], Setup]:
+def _mend_noise(
+    consistency: Consistency, setup: TestSetup, prepared: PreparedData
+) -> tuple[tuple[str, ...], TestSetup]:
     """Put measured noise in place of a specification that is wrong.
 
     Noise with heavy tails is taken at its standard deviation, outliers and all. To leave the outliers out of the
@@ -220,7 +219,7 @@ def _mend_noise(consistency: Consistency, setup: Setup, reduced: Reduced) -> tup
             scales[triad] = noise.spread
             told.append(
                 f"{triad} noise has heavy tails: kurtosis {noise.kurtosis:.1f} (3 is Gaussian), "
-                f"{100 * len(noise.outliers) / max(1, int((reduced.kind != SKIP).sum())):.1f} % of the seconds are "
+                f"{100 * len(noise.outliers) / max(1, int((prepared.kind != SKIP).sum())):.1f} % of the seconds are "
                 f"outliers, with them it is {noise.spread:.2f} times the specification"
             )
     if not told:
@@ -237,7 +236,7 @@ _KURTOSIS = 4.0
 """Of the differences of neighbouring seconds; Gaussian noise in a test of an hour stays below 3.3."""
 
 
-def _p_value(found: Search[Evidence], before: Remainder, consistency: Consistency, noise: bool) -> float:
+def _p_value(found: Search[Evidence], before: FreeInputTest, consistency: Consistency, noise: bool) -> float:
     """Bonferroni over the three tests that can call a model inadequate."""
     largest = float(np.max(np.abs(found.first.z), initial=0.0))
     count = int(np.isfinite(found.first.sigma).sum())
@@ -247,7 +246,7 @@ def _p_value(found: Search[Evidence], before: Remainder, consistency: Consistenc
 
 
 def _verdict(
-    look: Look, own: bool, unexplained: bool, noise: tuple[str, ...], findings: tuple[Finding, ...]
+    look: Round, own: bool, unexplained: bool, noise: tuple[str, ...], findings: tuple[Finding, ...]
 ) -> str:
     if any(f.grave for f in findings):
         return "data fault"
@@ -316,7 +315,3 @@ _COLOURED = 1.2
 def _rms(calibration: Calibration) -> float:
     value = calibration.fit.get("held_out_rms")
     return float("nan") if value is None else float(value)
-
-
-def _silent(_what: str, _fraction: float) -> None:
-    return None

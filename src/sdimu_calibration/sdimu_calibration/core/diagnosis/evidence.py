@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sdimu_calibration.core.alignment.prepared import PreparedData, TestSetup
+from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.diagnosis.candidates import split
 from sdimu_calibration.core.diagnosis.linear import LinearEvidence
 from sdimu_calibration.core.diagnosis.signatures import measured_rows, signatures
@@ -16,11 +17,7 @@ from sdimu_calibration.core.effects.effect import Effect, Timetable
 from sdimu_calibration.core.effects.motion import Motion
 from sdimu_calibration.core.filter.filter_pass import NAV, PassOutput, PassState, new_output, run_pass
 from sdimu_calibration.core.filter.passes import Pass, pass_settings
-from sdimu_calibration.core.filter.reduced import Reduced, Setup
 from sdimu_calibration.core.navigation.track import motion
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -35,7 +32,7 @@ class Evidence(LinearEvidence):
         Of the navigation filter.
     seen : Motion
     times : Timetable
-    reduced : Reduced
+    prepared : PreparedData
     latitude : float
         Of the site (rad).
     """
@@ -45,17 +42,17 @@ class Evidence(LinearEvidence):
     output: PassOutput
     seen: Motion
     times: Timetable
-    reduced: Reduced
+    prepared: PreparedData
     latitude: float
 
     def signature(self, effects: Sequence[Effect]) -> Floats:
         """Columns of all parameters of `effects`, shape (N, parameters)."""
-        return columns(self.reduced, self.output, self.seen, self.latitude, effects)
+        return columns(self.prepared, self.output, self.seen, self.latitude, effects)
 
 
-def timetable(reduced: Reduced) -> Timetable:
+def timetable(prepared: PreparedData) -> Timetable:
     """When the recording stood and turned, from the phases of the epochs."""
-    phases, epochs = reduced.phases, reduced.epochs
+    phases, epochs = prepared.phases, prepared.epochs
     edges = np.flatnonzero(np.diff(np.concatenate([[0], phases.dwell.astype(int), [0]])))
     dwells = [
         (int(phases.stop[a]), float(epochs.start[a]), float(epochs.end[b - 1]))
@@ -66,7 +63,7 @@ def timetable(reduced: Reduced) -> Timetable:
     return Timetable(float(epochs.end[-1]), tuple(dwells), tuple(turns))
 
 
-def navigation_pass(reduced: Reduced, setup: Setup, finished: Pass) -> Pass:
+def navigation_pass(prepared: PreparedData, setup: TestSetup, finished: Pass) -> Pass:
     """Repeat the last pass with the coefficients known at their final values: only navigation errors are estimated."""
     p = len(setup.sensors.prior)
     start = finished.start
@@ -75,46 +72,46 @@ def navigation_pass(reduced: Reduced, setup: Setup, finished: Pass) -> Pass:
     x[NAV : NAV + p] = 0.0
     P[NAV : NAV + p, :] = P[:, NAV : NAV + p] = 0.0
     state = PassState(x, P, start.C_nb.copy(), start.velocity.copy(), start.position.copy(), finished.estimate.copy())
-    output = new_output(len(reduced.epochs), p, True, len(reduced.epochs))
+    output = new_output(len(prepared.epochs), p, True, len(prepared.epochs))
     begin = PassState(*(v.copy() for v in state))
     settings = pass_settings(setup, closed_loop=False)
-    run_pass(finished.data._replace(kind=reduced.kind), settings, state, output)
+    run_pass(finished.data._replace(kind=prepared.kind), settings, state, output)
     return Pass(finished.C_start, begin, state, output, finished.data, settings)
 
 
-def predicted_motion(reduced: Reduced, setup: Setup, finished: Pass) -> Motion:
+def predicted_motion(prepared: PreparedData, setup: TestSetup, finished: Pass) -> Motion:
     """Motion that the finished calibration predicts."""
     return motion(
-        reduced.cycles, reduced.rest, setup.sensors, finished.estimate, finished.C_start.copy(),
-        setup.site.latitude_rad, setup.gravity, reduced.temperature, predicted=True,
+        prepared.cycles, prepared.rest, setup.sensors, finished.estimate, finished.C_start.copy(),
+        setup.site.latitude_rad, setup.gravity, prepared.temperature, predicted=True,
     )  # fmt: skip
 
 
-def collect(reduced: Reduced, setup: Setup, finished: Pass, effects: Sequence[Effect]) -> Evidence:
+def collect(prepared: PreparedData, setup: TestSetup, finished: Pass, effects: Sequence[Effect]) -> Evidence:
     """Run the navigation filter and the signature recursion.
 
     Parameters
     ----------
-    reduced, setup : Reduced, Setup
+    prepared, setup : PreparedData, TestSetup
     finished : Pass
         The last pass of a converged calibration.
     effects : sequence of Effect
         Each of their parameters becomes a candidate.
     """
-    known = navigation_pass(reduced, setup, finished)
-    seen = predicted_motion(reduced, setup, finished)
+    known = navigation_pass(prepared, setup, finished)
+    seen = predicted_motion(prepared, setup, finished)
     sensors = setup.sensors
     candidates = [c for effect in effects for c in split(effect)]
-    W = columns(reduced, known.output, seen, setup.site.latitude_rad, [*sensors.effects, *effects])
+    W = columns(prepared, known.output, seen, setup.site.latitude_rad, [*sensors.effects, *effects])
     epoch, channel = measured_rows(known.output)
     prior = np.array([c.effect.prior.get(setup.imu.grade, np.inf) for c in candidates])
     return Evidence(
-        e=known.output.normalised[epoch, channel], W=W, epoch=epoch, channel=channel, stop=reduced.phases.stop[epoch],
+        e=known.output.normalised[epoch, channel], W=W, epoch=epoch, channel=channel, stop=prepared.phases.stop[epoch],
         names=(*sensors.names, *(c.label for c in candidates)),
         weight=1.0 / sensors.prior**2, shift=-finished.estimate, stated=sensors.stated, candidates=tuple(candidates),
         prior=prior,
         grade=setup.imu.grade,
-        output=known.output, seen=seen, times=timetable(reduced), reduced=reduced, latitude=setup.site.latitude_rad,
+        output=known.output, seen=seen, times=timetable(prepared), prepared=prepared, latitude=setup.site.latitude_rad,
     )  # fmt: skip
 
 
@@ -123,10 +120,10 @@ _BLOCK = 24
 
 
 def columns(
-    reduced: Reduced, output: PassOutput, seen: Motion, latitude: float, effects: Sequence[Effect]
+    prepared: PreparedData, output: PassOutput, seen: Motion, latitude: float, effects: Sequence[Effect]
 ) -> Floats:
     """Signatures of all parameters of `effects` at a latitude (rad), shape (N, parameters)."""
-    epochs = reduced.epochs
+    epochs = prepared.epochs
     parts = []
     for start in range(0, len(effects), _BLOCK):
         block = effects[start : start + _BLOCK]
@@ -138,7 +135,7 @@ def columns(
             count += len(effect.parameters)
         parts.append(
             signatures(
-                seen, epochs.first, epochs.last, reduced.kind, output, np.hstack(values),
+                seen, epochs.first, epochs.last, prepared.kind, output, np.hstack(values),
                 np.array(channel, dtype=np.int64), np.array(parameter, dtype=np.int64), count, latitude,
             )
         )  # fmt: skip

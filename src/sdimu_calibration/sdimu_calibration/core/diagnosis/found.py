@@ -5,19 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import norm
 
+from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.diagnosis.candidates import Candidate
+from sdimu_calibration.core.diagnosis.coefficient_shifts import CoefficientShift, coefficient_shifts
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.diagnosis.evidence import Evidence
-from sdimu_calibration.core.diagnosis.remainder import remainder
+from sdimu_calibration.core.diagnosis.free_input_test import free_input_test
 from sdimu_calibration.core.diagnosis.scan import POWER_80, Scan, alike, scan
 from sdimu_calibration.core.diagnosis.search import Problem
-from sdimu_calibration.core.diagnosis.stakes import Stake, stakes
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -41,7 +38,7 @@ class Found:
         RMS of the normalised prediction errors at stops left out.
     alike : tuple of str
         Candidates that the data cannot tell from it, all others found being in the model.
-    stakes : tuple of Stake
+    stakes : tuple of CoefficientShift
         Coefficients of the model that hang on which of these it is.
     """
 
@@ -56,7 +53,7 @@ class Found:
     held_out_before: float
     held_out_after: float
     alike: tuple[str, ...]
-    stakes: tuple[Stake, ...]
+    coefficient_shifts: tuple[CoefficientShift, ...]
 
 
 def found_effects(d: Diagnosis) -> tuple[Found, ...]:
@@ -97,7 +94,7 @@ def found_effects(d: Diagnosis) -> tuple[Found, ...]:
                 held_out_before=problem.held_out(chosen[:k], 1.0).rms,
                 held_out_after=problem.held_out(chosen[: k + 1], 1.0).rms,
                 alike=tuple(d.evidence.names[i] for i in others),
-                stakes=stakes(problem, chosen, column, others, d.found.scale),
+                coefficient_shifts=coefficient_shifts(problem, chosen, column, others, d.found.scale),
             )
         )
     return tuple(out)
@@ -115,7 +112,7 @@ def catalogue_columns(d: Diagnosis) -> Ints:
 
 
 @dataclass(frozen=True)
-class Reach:
+class DetectableSize:
     """What this test could have seen of one effect that the model does not have.
 
     Attributes
@@ -140,7 +137,7 @@ class Reach:
     partners: tuple[str, ...] = ()
 
 
-def reach(d: Diagnosis) -> tuple[Reach, ...]:
+def reach(d: Diagnosis) -> tuple[DetectableSize, ...]:
     """Minimal detectable size of every candidate of the catalogue, given the model that was asked about."""
     evidence = d.evidence.only(catalogue_columns(d))
     p = len(evidence.weight)
@@ -155,7 +152,7 @@ def reach(d: Diagnosis) -> tuple[Reach, ...]:
         testable = bool(np.isfinite(scanned.sigma[k]))
         partners = () if testable else _partners(evidence.names, full.J, evidence.weight, k)
         out.append(
-            Reach(
+            DetectableSize(
                 candidate.label, candidate.family, candidate.parameter.unit, candidate.parameter.display_unit,
                 float(smallest[k]), float(scanned.retention[k]), testable, partners,
             )
@@ -184,7 +181,7 @@ def _misfits(d: Diagnosis, problem: Problem[Evidence], chosen: list[int]) -> lis
     for k in range(len(chosen) + 1):
         known = np.concatenate([problem.evidence.model, chosen[:k]]).astype(np.int64)
         weight = np.concatenate([problem.evidence.weight, np.zeros(k)])
-        left = remainder(d.evidence.information, known, weight, d.free, d.found.scale)
+        left = free_input_test(d.evidence.information, known, weight, d.free, d.found.scale)
         out.append(max(left.chi2 - left.dof, 0.0))
     return out
 

@@ -11,16 +11,13 @@ from dataclasses import dataclass, replace
 from typing import cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis, diagnose
 from sdimu_calibration.core.effects.effect import Effect
-from sdimu_calibration.core.filter.passes import Progress
+from sdimu_calibration.core.progress import Progress
 from sdimu_calibration.core.recording import Recording
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.specification import ImuSpecification, Model, Site
-
-Floats = NDArray[np.float64]
 
 MOST_RUNGS = 6
 MOVED = 2.0
@@ -148,7 +145,7 @@ def rung(added: str, here: Diagnosis, before: Diagnosis | None) -> Rung:
 def jump(d: Diagnosis) -> tuple[float, float]:
     """RMS of the velocity innovation at the first epoch of each stop: over its sigma, and in m/s."""
     evidence = d.evidence
-    phases = evidence.reduced.phases
+    phases = evidence.prepared.phases
     whitened = np.zeros((len(phases.first), 12))
     whitened[evidence.epoch, evidence.channel] = evidence.e
     measured = np.zeros(whitened.shape, dtype=bool)

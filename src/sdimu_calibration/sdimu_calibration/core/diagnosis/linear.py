@@ -13,14 +13,12 @@ from functools import cached_property
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.diagnosis.candidates import Candidate, split
 from sdimu_calibration.core.diagnosis.information import Information
 from sdimu_calibration.core.effects.effect import Effect
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 E = TypeVar("E", bound="LinearEvidence")
 
 

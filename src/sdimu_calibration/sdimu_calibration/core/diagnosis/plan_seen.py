@@ -5,12 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sdimu_calibration.core.diagnosis.evidence import Evidence
 from sdimu_calibration.core.effects.effect import AXES
-
-Floats = NDArray[np.float64]
 
 _SINGLE_AXIS = 0.9
 """Least share of a turn about one body axis that makes it a turn about that axis."""

@@ -1,4 +1,4 @@
-"""Look, choose, linearise again about what was chosen, look again, until the choice stands.
+"""Round, choose, linearise again about what was chosen, look again, until the choice stands.
 
 A large effect that is not in the model bends the trajectory about which everything is linear, and the error of that
 looks like small companions of the effect. So each round calibrates with what the last one chose, takes the evidence
@@ -11,8 +11,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sdimu_calibration.core.arrays import Ints
 from sdimu_calibration.core.diagnosis.candidates import (
     Candidate,
     catalogue,
@@ -22,14 +22,12 @@ from sdimu_calibration.core.diagnosis.candidates import (
     split,
 )
 from sdimu_calibration.core.diagnosis.evidence import Evidence, collect, timetable
-from sdimu_calibration.core.diagnosis.remainder import Remainder, remainder
+from sdimu_calibration.core.diagnosis.free_input_test import FreeInputTest, free_input_test
 from sdimu_calibration.core.diagnosis.search import Search, Step, search
 from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.effects.imu_model import build
-from sdimu_calibration.core.filter.passes import Progress, Solution, solve
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from sdimu_calibration.core.filter.passes import Solution, solve
+from sdimu_calibration.core.progress import Progress
 
 UNEXPLAINED_P = 1e-3
 """A free-input remainder less probable than this is not noise."""
@@ -41,7 +39,7 @@ _MANY = 3
 
 
 @dataclass(frozen=True)
-class Look:
+class Round:
     """One round.
 
     Attributes
@@ -52,7 +50,7 @@ class Look:
     free : ndarray of int
         Columns of the free inputs in `evidence`.
     found : Search
-    before, after : Remainder
+    before, after : FreeInputTest
         With nothing added, with `found` added.
     """
 
@@ -60,8 +58,8 @@ class Look:
     evidence: Evidence
     free: Ints
     found: Search[Evidence]
-    before: Remainder
-    after: Remainder
+    before: FreeInputTest
+    after: FreeInputTest
 
     @property
     def chosen(self) -> tuple[Candidate, ...]:
@@ -75,7 +73,7 @@ class Look:
         return self.after.p_value < UNEXPLAINED_P or len(self.found.chosen) >= _MANY
 
 
-def settle(base: Solution, extra: Sequence[Effect], alpha: float, progress: Progress) -> Look:
+def settle(base: Solution, extra: Sequence[Effect], alpha: float, progress: Progress) -> Round:
     """Repeat looks until the choice stands.
 
     Parameters
@@ -90,7 +88,7 @@ def settle(base: Solution, extra: Sequence[Effect], alpha: float, progress: Prog
 
     Returns
     -------
-    Look
+    Round
         The last one; its solution holds what it chose.
     """
     tried: tuple[Candidate, ...] = ()
@@ -110,7 +108,7 @@ def settle(base: Solution, extra: Sequence[Effect], alpha: float, progress: Prog
     return drop_companions(base, look, progress)
 
 
-def drop_companions(base: Solution, look: Look, progress: Progress) -> Look:
+def drop_companions(base: Solution, look: Round, progress: Progress) -> Round:
     """Calibrate with what was chosen; drop the weakest below three of its sigmas, one at a time."""
     small: set[str] = set()
     while True:
@@ -126,12 +124,12 @@ def drop_companions(base: Solution, look: Look, progress: Progress) -> Look:
         kept = look.found.chosen[keep]
         look = replace(look, solution=solution, found=replace(look.found, chosen=kept))
         if keep.all():
-            steps = fates(look.found.steps, {c.label for c in look.chosen}, small)
+            steps = mark_dropped(look.found.steps, {c.label for c in look.chosen}, small)
             found = replace(look.found, steps=steps)
             return replace(look, found=found, after=left(look.evidence, kept, look.free, look.found.scale))
 
 
-def fates(steps: Sequence[Step], kept: set[str], small: set[str]) -> tuple[Step, ...]:
+def mark_dropped(steps: Sequence[Step], kept: set[str], small: set[str]) -> tuple[Step, ...]:
     """Mark the steps that are not among what was found, by their labels, with why; `small` were too small once in."""
     weak = f"calibrated with it, it is below {LEAST_SIGMAS:.0f} of its sigmas"
     gone = "what else was added explains the same better"
@@ -141,7 +139,7 @@ def fates(steps: Sequence[Step], kept: set[str], small: set[str]) -> tuple[Step,
     )
 
 
-def prefer(wide: Look, look: Look) -> bool:
+def prefer(wide: Round, look: Round) -> bool:
     """Whether equations tell more than the catalogue.
 
     They do when they leave less by more than chance, or as little with fewer terms.
@@ -157,20 +155,20 @@ def with_effects(base: Solution, added: Sequence[Candidate], progress: Progress)
     """Calibrate with more effects in the model."""
     setup = base.setup
     sensors = build([*setup.sensors.effects, *(c.effect for c in added)], setup.imu)
-    return solve(replace(setup, sensors=sensors), base.reduced, progress, keep=True)
+    return solve(replace(setup, sensors=sensors), base.prepared, progress, keep=True)
 
 
 def take(
     base: Solution, solution: Solution, tried: Sequence[Candidate], extra: Sequence[Effect], alpha: float, own: bool
-) -> Look:
+) -> Round:
     """Collect the evidence about a solution, with what it tried as candidates, and search it."""
-    times = timetable(base.reduced)
+    times = timetable(base.prepared)
     in_model = {label for effect in base.setup.sensors.effects for label in effect.labels}
-    has_temperature = base.reduced.temperature is not None
+    has_temperature = base.prepared.temperature is not None
     known = _untried([*extra, *catalogue(times, in_model, has_temperature)], tried, in_model)
     more = _untried([*equations(has_temperature), *periodic(times.duration)], tried, in_model) if own else []
     free = free_inputs(times)
-    about = collect(base.reduced, solution.setup, solution.last, [*known, *more, *free])
+    about = collect(base.prepared, solution.setup, solution.last, [*known, *more, *free])
     evidence = forget(about, len(in_model), tried)
     count = len(evidence.names) - sum(len(effect.parameters) for effect in free)
     columns = np.arange(len(evidence.weight), count)
@@ -178,7 +176,7 @@ def take(
     found = search(evidence, columns, alpha)
     nothing = np.empty(0, dtype=np.int64)
     evidence = found.evidence
-    return Look(
+    return Round(
         solution, evidence, free_columns, found,
         left(evidence, nothing, free_columns, found.scale), left(evidence, found.chosen, free_columns, found.scale),
     )  # fmt: skip
@@ -204,11 +202,11 @@ def forget(about: Evidence, p: int, tried: Sequence[Candidate]) -> Evidence:
     )  # fmt: skip
 
 
-def left(evidence: Evidence, chosen: Ints, free: Ints, scale: float) -> Remainder:
+def left(evidence: Evidence, chosen: Ints, free: Ints, scale: float) -> FreeInputTest:
     """Free-input remainder with the chosen columns in the model."""
     known = np.concatenate([evidence.model, chosen]).astype(np.int64)
     weight = np.concatenate([evidence.weight, np.zeros(len(chosen))])
-    return remainder(evidence.information, known, weight, free, scale)
+    return free_input_test(evidence.information, known, weight, free, scale)
 
 
 def _untried(effects: Sequence[Effect], tried: Sequence[Candidate], in_model: set[str]) -> list[Effect]:

@@ -9,12 +9,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.diagnosis.information import Information
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 TESTABLE = 0.02
 """Share of a signature's length that must be left after the model's coefficients have taken theirs."""

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sdimu_calibration.core.alignment.prepared import PreparedData
 from sdimu_calibration.core.filter.passes import Solution
-from sdimu_calibration.core.filter.reduced import Reduced
 from sdimu_calibration.core.recording import Recording
 
 _MISLEADING = frozenset({"stuck", "saturated"})
@@ -39,11 +39,11 @@ class Finding:
     end_s: float = float("nan")
 
 
-def screen(recording: Recording, reduced: Reduced) -> tuple[Finding, ...]:
+def screen(recording: Recording, prepared: PreparedData) -> tuple[Finding, ...]:
     """Say what the reduction found wrong with the data: gaps, stuck sensors, saturation, contradictions."""
     out = [
         Finding(fault.text, fault.grave or fault.kind in _MISLEADING, fault.kind, fault.start_s, fault.end_s)
-        for fault in reduced.faults
+        for fault in prepared.faults
     ]
     if recording.rejected:
         out.append(Finding(f"{recording.rejected} samples were rejected (not finite or repeated stamps)", False))

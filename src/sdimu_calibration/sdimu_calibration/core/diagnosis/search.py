@@ -14,15 +14,12 @@ from dataclasses import dataclass, field
 from typing import Generic
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.diagnosis.held_out import HeldOut, gain, predict
 from sdimu_calibration.core.diagnosis.linear import E
 from sdimu_calibration.core.diagnosis.scan import Scan, alike, scan, threshold
 from sdimu_calibration.core.effects.effect import Effect
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 FALSE_ALARM = 0.02
 """Probability that pure noise puts one of all candidates over the threshold: what is bearable (5 %) with room for what

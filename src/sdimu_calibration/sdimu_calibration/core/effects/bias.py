@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.effects.effect import ACCEL, GYRO, Effect, own_axis, per_axis
 from sdimu_calibration.core.effects.motion import Motion
 from sdimu_calibration.core.effects.registry import register
 from sdimu_calibration.core.units import to_si
 
 
-def _ones(motion: Motion) -> NDArray[np.float64]:
+def _ones(motion: Motion) -> Floats:
     return np.ones((len(motion.t), 3))
 
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from sdimu_calibration.core import earth
+from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.effects.effect import GYRO, family, per_axis_columns
-from sdimu_calibration.core.effects.motion import Floats, Motion
+from sdimu_calibration.core.effects.motion import Motion
 from sdimu_calibration.core.effects.registry import register
 
 # sgn(w) at a rate of a few per cent of Earth rate is decided by noise: the step is as wide as that.

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.effects.effect import (
     ACCEL,
     AXES,
@@ -18,7 +19,7 @@ from sdimu_calibration.core.effects.effect import (
     pick,
 )
 from sdimu_calibration.core.effects.mass_unbalance import GYRO_MASS_UNBALANCE, TERMS
-from sdimu_calibration.core.effects.motion import Floats, Motion
+from sdimu_calibration.core.effects.motion import Motion
 from sdimu_calibration.core.effects.registry import register
 
 _TRIADS = {

@@ -12,12 +12,10 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.effects.motion import Motion
 from sdimu_calibration.core.units import to_si
-
-Floats = NDArray[np.float64]
 
 GYRO = (0, 1, 2)
 """Channels of gyro x, y, z."""

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.effects import selection
 from sdimu_calibration.core.effects.effect import Effect, Parameter
 from sdimu_calibration.core.effects.motion import Motion
@@ -17,8 +17,6 @@ from sdimu_calibration.core.effects.registry import names as registered
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.specification import ImuSpecification
 from sdimu_calibration.core.units import parse_unit
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -43,8 +41,8 @@ class ImuModel:
 
     effects: tuple[Effect, ...]
     parameters: tuple[Parameter, ...]
-    channel: NDArray[np.int64]
-    parameter: NDArray[np.int64]
+    channel: Ints
+    parameter: Ints
     prior: Floats
     stated: Floats
     decay_rate: Floats

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.effects.effect import ACCEL, AXES, Effect, Parameter, Term, family, pick
-from sdimu_calibration.core.effects.motion import Floats, Motion
+from sdimu_calibration.core.effects.motion import Motion
 from sdimu_calibration.core.effects.registry import register
 
 SIZE = register(

@@ -6,8 +6,8 @@ Source: Kim, Song & Lyou, the sensor error model; direct (d) along the term name
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.effects.effect import GYRO, Effect, Parameter, Term
 from sdimu_calibration.core.effects.motion import Motion
 from sdimu_calibration.core.effects.registry import register
@@ -16,7 +16,7 @@ from sdimu_calibration.core.units import to_si
 TERMS = ("dx", "qx", "dy", "qy", "dz", "qz")
 
 
-def _regressors(motion: Motion) -> NDArray[np.float64]:
+def _regressors(motion: Motion) -> Floats:
     x, y, z = motion.a.T
     return np.column_stack([x, y, y, x, z, y])
 

@@ -7,8 +7,8 @@ vector; the equations of Kim, Song & Lyou follow, x: e_x + (p_xz) e_y - (p_xy) e
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.effects.effect import ACCEL, GYRO, Effect, Parameter, Term
 from sdimu_calibration.core.effects.motion import Motion
 from sdimu_calibration.core.effects.registry import register
@@ -19,17 +19,17 @@ PAIRS = ("xy", "xz", "yx", "yz", "zx", "zy")
 _PRIOR = {"navigation": to_si(1, "arcmin"), "tactical": to_si(5, "arcmin"), "mems": to_si(2, "deg")}
 
 
-def _regressors(v: NDArray[np.float64]) -> NDArray[np.float64]:
+def _regressors(v: Floats) -> Floats:
     """Columns in the order of `PAIRS` for a vector that the triad senses, (n, 3) -> (n, 6)."""
     x, y, z = v.T
     return np.column_stack([-z, y, z, -x, -y, x])
 
 
-def _of_rate(motion: Motion) -> NDArray[np.float64]:
+def _of_rate(motion: Motion) -> Floats:
     return _regressors(motion.w)
 
 
-def _of_force(motion: Motion) -> NDArray[np.float64]:
+def _of_force(motion: Motion) -> Floats:
     return _regressors(motion.f)
 
 

@@ -5,11 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sdimu_calibration.core.arrays import Bools, Floats
 from sdimu_calibration.core.units import STANDARD_GRAVITY
-
-Floats = NDArray[np.float64]
 
 _TURNING = np.radians(0.01)
 """Slower than any turn of a table, faster than the bias of a gyro that is worth calibrating on one (rad/s)."""
@@ -52,7 +50,7 @@ class Motion:
     C_nb: Floats
     w_table: Floats
     alpha: Floats
-    rest: NDArray[np.bool_]
+    rest: Bools
     temperature: Floats
     temperature_rate: Floats
     turned: Floats

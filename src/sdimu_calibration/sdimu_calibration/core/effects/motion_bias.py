@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.effects.effect import ACCEL, GYRO, family, per_axis_columns
-from sdimu_calibration.core.effects.motion import Floats, Motion
+from sdimu_calibration.core.effects.motion import Motion
 from sdimu_calibration.core.effects.registry import register
 
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.effects.effect import ACCEL, AXES, GYRO, Effect, Parameter, Term, family, per_axis_columns
-from sdimu_calibration.core.effects.motion import Floats, Motion
+from sdimu_calibration.core.effects.motion import Motion
 from sdimu_calibration.core.effects.registry import register
 from sdimu_calibration.core.units import STANDARD_GRAVITY
 

@@ -77,7 +77,7 @@ def _deg_h(rate: float) -> float:
 
 def _attitudes(solution: Solution) -> int:
     """Count attitudes in which measurements were taken, up to the least that is enough."""
-    C = solution.last.output.C_nb[solution.reduced.phases.used]
+    C = solution.last.output.C_nb[solution.prepared.phases.used]
     count = 0
     while len(C) and count < _LEAST_ATTITUDES:
         count += 1

@@ -26,9 +26,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sdimu_calibration.core import earth
+from sdimu_calibration.core.alignment.prepared import ALL, SKIP
+from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.compiled import compiled
 from sdimu_calibration.core.filter.kalman import cholesky, propagate, update, whiten
 from sdimu_calibration.core.matrix3 import applied, elements
@@ -41,9 +42,6 @@ from sdimu_calibration.core.navigation.ins_errors import (
 from sdimu_calibration.core.navigation.strapdown import navigate_cycle, velocity_increment
 from sdimu_calibration.core.rotation import orthonormal, rotation_matrix, skew
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-
 NAV = 9
 """Navigation error states."""
 COPY = 3
@@ -51,8 +49,6 @@ COPY = 3
 MEASURED = 12
 """Rows of a full measurement: Zp, Zv, Zw, Zf."""
 
-SKIP, SENSORS, ALL, HELD_SENSORS, HELD_ALL = 0, 1, 2, -1, -2
-"""What an epoch measures: nothing; Zw and Zf; all four. Held out: predicted and scored, not taken."""
 
 
 class PassInput(NamedTuple):

@@ -12,30 +12,19 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sdimu_calibration.core import earth
+from sdimu_calibration.core.alignment.alignment import align, azimuth_of
+from sdimu_calibration.core.alignment.prepared import SENSORS, SKIP, PreparedData, TestSetup
+from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.compiled import compiled
-from sdimu_calibration.core.filter.filter_pass import (
-    NAV,
-    SENSORS,
-    SKIP,
-    PassInput,
-    PassOutput,
-    PassState,
-    new_output,
-    run_pass,
-)
+from sdimu_calibration.core.filter.filter_pass import NAV, PassInput, PassOutput, PassState, new_output, run_pass
+from sdimu_calibration.core.filter.holdout import WANTED_S, Segment, holdout_segments, part
 from sdimu_calibration.core.filter.passes import Pass, pass_input, pass_settings, solve
-from sdimu_calibration.core.filter.reduced import Reduced, Setup
-from sdimu_calibration.core.filter.unseen import WANTED_S, Stretch, part, unseen_stretches
-from sdimu_calibration.core.navigation.alignment import align, azimuth_of
 from sdimu_calibration.core.navigation.strapdown import Cycles, navigate_cycle, velocity_increment
 from sdimu_calibration.core.navigation.track import motion
+from sdimu_calibration.core.progress import silent
 from sdimu_calibration.core.rotation import rotation_vector
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 NOTHING = "no compensation"
 _WIDE_LEVEL = 1e-2
@@ -81,22 +70,22 @@ class Drift:
 
 
 @dataclass(frozen=True)
-class Trial:
+class FreeInertialRun:
     """Free navigations of one stretch: without compensation, then with each model."""
 
-    stretch: Stretch
+    stretch: Segment
     drifts: tuple[Drift, ...]
 
 
 def in_use(
-    reduced: Reduced, setups: Sequence[tuple[str, Setup]], reference: PassOutput, wanted_s: float = WANTED_S
-) -> tuple[Trial, ...]:
+    prepared: PreparedData, setups: Sequence[tuple[str, TestSetup]], reference: PassOutput, wanted_s: float = WANTED_S
+) -> tuple[FreeInertialRun, ...]:
     """Navigate unseen stretches uncompensated and with each model, fitted to the rest of the recording.
 
     Parameters
     ----------
-    reduced : Reduced
-    setups : sequence of (str, Setup)
+    prepared : PreparedData
+    setups : sequence of (str, TestSetup)
         Names and models.
     reference : PassOutput
         Of a fit to the whole recording: azimuth at the start, and what heading is compared with.
@@ -108,30 +97,32 @@ def in_use(
     DataError
         When there is no such stretch, or the rest of the recording cannot be calibrated.
     """
-    return tuple(_trial(reduced, setups, reference, stretch) for stretch in unseen_stretches(reduced, wanted_s))
+    return tuple(_trial(prepared, setups, reference, stretch) for stretch in holdout_segments(prepared, wanted_s))
 
 
-def _trial(reduced: Reduced, setups: Sequence[tuple[str, Setup]], reference: PassOutput, stretch: Stretch) -> Trial:
-    seen = part(reduced, *stretch.seen)
-    fits = [(name, setup, solve(setup, seen, _silent).last) for name, setup in setups]
-    drifts = [free_navigation(NOTHING, reduced, *fits[0][1:], stretch, reference, compensated=False)]
-    drifts += [free_navigation(name, reduced, setup, fit, stretch, reference) for name, setup, fit in fits]
-    return Trial(stretch, tuple(drifts))
+def _trial(
+    prepared: PreparedData, setups: Sequence[tuple[str, TestSetup]], reference: PassOutput, stretch: Segment
+) -> FreeInertialRun:
+    seen = part(prepared, *stretch.seen)
+    fits = [(name, setup, solve(setup, seen, silent).last) for name, setup in setups]
+    drifts = [free_navigation(NOTHING, prepared, *fits[0][1:], stretch, reference, compensated=False)]
+    drifts += [free_navigation(name, prepared, setup, fit, stretch, reference) for name, setup, fit in fits]
+    return FreeInertialRun(stretch, tuple(drifts))
 
 
 def free_navigation(
     name: str,
-    reduced: Reduced,
-    setup: Setup,
+    prepared: PreparedData,
+    setup: TestSetup,
     fitted: Pass,
-    stretch: Stretch,
+    stretch: Segment,
     reference: PassOutput,
     compensated: bool = True,
 ) -> Drift:
     """Navigate the stretch with the coefficients of `fitted`, or with none."""
     estimate = fitted.estimate if compensated else np.zeros_like(fitted.estimate)
-    errors, values = _sensor_errors(reduced, setup, estimate, stretch, reference.C_nb[0])
-    epochs = part(reduced, stretch.first, stretch.last)
+    errors, values = _sensor_errors(prepared, setup, estimate, stretch, reference.C_nb[0])
+    epochs = part(prepared, stretch.first, stretch.last)
     levelling = stretch.start - stretch.first
     border = int(epochs.epochs.last[levelling - 1])
     clean = _compensated(epochs.cycles, errors)
@@ -140,7 +131,7 @@ def free_navigation(
     rows = slice(stretch.start, stretch.last)
     azimuth = [rotation_vector(C @ R.T)[2] for C, R in zip(C_nb, reference.C_nb[rows], strict=True)]
     at_start = rotation_vector(C_start @ reference.C_nb[stretch.start - 1].T)[2]
-    t = reduced.epochs.end[rows] - reduced.epochs.end[stretch.start - 1]
+    t = prepared.epochs.end[rows] - prepared.epochs.end[stretch.start - 1]
     promised = np.full(len(t), np.nan)
     if compensated:
         sigma_azimuth = float(reference.sigma[stretch.start - 1, 8])
@@ -149,7 +140,7 @@ def free_navigation(
 
 
 def _sensor_errors(
-    reduced: Reduced, setup: Setup, estimate: Floats, stretch: Stretch, C_start: Floats
+    prepared: PreparedData, setup: TestSetup, estimate: Floats, stretch: Segment, C_start: Floats
 ) -> tuple[Floats, Floats]:
     """Sensor errors (n, 6) and regressors of the cycles of the stretch.
 
@@ -158,13 +149,13 @@ def _sensor_errors(
     """
     sensors = setup.sensors
     seen = motion(
-        reduced.cycles, reduced.rest, sensors, estimate, C_start.copy(), setup.site.latitude_rad, setup.gravity,
-        reduced.temperature, predicted=False,
+        prepared.cycles, prepared.rest, sensors, estimate, C_start.copy(), setup.site.latitude_rad, setup.gravity,
+        prepared.temperature, predicted=False,
     )  # fmt: skip
-    begin, end = int(reduced.epochs.first[stretch.first]), int(reduced.epochs.last[stretch.last - 1])
+    begin, end = int(prepared.epochs.first[stretch.first]), int(prepared.epochs.last[stretch.last - 1])
     values = sensors.regressors(seen)[begin:end]
     # What fades is known where the fit ended, and fades away from there.
-    since = np.abs(seen.t[begin:end] - float(reduced.epochs.end[stretch.seen[1] - 1]))
+    since = np.abs(seen.t[begin:end] - float(prepared.epochs.end[stretch.seen[1] - 1]))
     fading = np.exp(-np.outer(since, sensors.decay_rate[sensors.parameter]))
     return sensors.errors(values * fading, estimate), np.ascontiguousarray(values)
 
@@ -174,7 +165,7 @@ def _compensated(cycles: Cycles, errors: Floats) -> Cycles:
     return replace(cycles, alpha=cycles.alpha - errors[:, :3] * dt, upsilon=cycles.upsilon - errors[:, 3:] * dt)
 
 
-def _aligned(cycles: Cycles, border: int, setup: Setup, C_reference: Floats) -> Floats:
+def _aligned(cycles: Cycles, border: int, setup: TestSetup, C_reference: Floats) -> Floats:
     """Attitude (3, 3) at rest in the cycles before `border`: own level, azimuth of the reference."""
     length = float(cycles.dt[:border].sum())
     w_mean, f_mean = (v[:border].sum(axis=0) / length for v in (cycles.alpha, cycles.upsilon))
@@ -182,7 +173,9 @@ def _aligned(cycles: Cycles, border: int, setup: Setup, C_reference: Floats) -> 
     return align(w_mean, f_mean, length, site, setup.imu).C_nb
 
 
-def _navigated(cycles: Cycles, border: int, last: Ints, setup: Setup, C_start: Floats) -> tuple[Floats, Floats, Floats]:
+def _navigated(
+    cycles: Cycles, border: int, last: Ints, setup: TestSetup, C_start: Floats
+) -> tuple[Floats, Floats, Floats]:
     """Navigate from cycle `border` on; errors of position and velocity (k, 2) and attitudes at the cycles `last`."""
     site = setup.site
     free = cycles[border:]
@@ -228,8 +221,8 @@ def _navigate(
 
 
 def _promised(
-    stretch: Reduced,
-    setup: Setup,
+    stretch: PreparedData,
+    setup: TestSetup,
     fitted: Pass,
     values: Floats,
     levelling: int,
@@ -260,11 +253,7 @@ def _promised(
     return np.asarray(np.hypot(out.sigma[:, 0], out.sigma[:, 1]))
 
 
-def _input(stretch: Reduced, kind: int, setup: Setup, values: Floats) -> PassInput:
+def _input(stretch: PreparedData, kind: int, setup: TestSetup, values: Floats) -> PassInput:
     """Every epoch measures the same `kind`."""
     same = replace(stretch, kind=np.full(len(stretch.epochs), kind, dtype=np.int64))
     return pass_input(same, np.ascontiguousarray(values), setup.sensors.channel, setup.sensors.parameter)
-
-
-def _silent(_what: str, _fraction: float) -> None:
-    return None

@@ -13,11 +13,9 @@ rounding in K counts only squared, and as ``P - K F - F' K'`` with ``F = B - S K
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.compiled import compiled
-
-Floats = NDArray[np.float64]
 
 
 @compiled

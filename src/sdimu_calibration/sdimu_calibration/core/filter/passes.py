@@ -7,13 +7,15 @@ coefficients move by less than `CONVERGED` of their sigmas (Gauss-Newton on the 
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sdimu_calibration.core import earth
+from sdimu_calibration.core.alignment.alignment import Alignment
+from sdimu_calibration.core.alignment.coarse_alignment import coarse_start
+from sdimu_calibration.core.alignment.prepared import PreparedData, TestSetup, first_attitude
+from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.filter.filter_pass import (
     COPY,
     NAV,
@@ -24,14 +26,10 @@ from sdimu_calibration.core.filter.filter_pass import (
     new_output,
     run_pass,
 )
-from sdimu_calibration.core.filter.reduced import Reduced, Setup, first_attitude
-from sdimu_calibration.core.navigation.alignment import Alignment
 from sdimu_calibration.core.navigation.track import motion
+from sdimu_calibration.core.progress import Progress
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.rotation import rotation_matrix, rotation_vector
-
-Floats = NDArray[np.float64]
-Progress = Callable[[str, float], None]
 
 CONVERGED = 0.02
 """Largest movement of a coefficient in its own sigma at which the passes end."""
@@ -73,7 +71,7 @@ class Pass:
         return np.asarray(self.state.P[NAV : NAV + p, NAV : NAV + p])
 
 
-def pass_settings(setup: Setup, closed_loop: bool) -> PassSettings:
+def pass_settings(setup: TestSetup, closed_loop: bool) -> PassSettings:
     """Constants of a pass."""
     site, imu, model = setup.site, setup.imu, setup.model
     return PassSettings(
@@ -92,7 +90,7 @@ def pass_settings(setup: Setup, closed_loop: bool) -> PassSettings:
     )
 
 
-def start_state(setup: Setup, start: Alignment, C_nb: Floats, reference: Floats) -> PassState:
+def start_state(setup: TestSetup, start: Alignment, C_nb: Floats, reference: Floats) -> PassState:
     """State at the first sample, linearised at attitude `C_nb` and coefficients `reference` (p,)."""
     p = len(setup.sensors.prior)
     s = NAV + p + COPY
@@ -112,31 +110,39 @@ def start_state(setup: Setup, start: Alignment, C_nb: Floats, reference: Floats)
     return PassState(x, P, C_nb.copy(), np.zeros(3), position, reference.copy())
 
 
-def pass_input(reduced: Reduced, values: Floats, channel: NDArray[np.int64], parameter: NDArray[np.int64]) -> PassInput:
+def pass_input(
+    prepared: PreparedData, values: Floats, channel: Ints, parameter: Ints
+) -> PassInput:
     """Put cycles, epochs and regressors together."""
-    c, e, b = reduced.cycles, reduced.epochs, reduced.bridges
+    c, e, b = prepared.cycles, prepared.epochs, prepared.bridges
     return PassInput(
-        c.dt, c.alpha, c.upsilon, c.coning, c.sculling, e.first, e.last, b.white, b.angle, b.velocity, reduced.kind,
+        c.dt, c.alpha, c.upsilon, c.coning, c.sculling, e.first, e.last, b.white, b.angle, b.velocity, prepared.kind,
         values, channel, parameter,
     )  # fmt: skip
 
 
 def one_pass(
-    reduced: Reduced, setup: Setup, start: Alignment, C_nb: Floats, reference: Floats, closed_loop: bool, keep: bool
+    prepared: PreparedData,
+    setup: TestSetup,
+    start: Alignment,
+    C_nb: Floats,
+    reference: Floats,
+    closed_loop: bool,
+    keep: bool,
 ) -> Pass:
     """Run one pass linearised at initial attitude `C_nb` and coefficients `reference`."""
     sensors = setup.sensors
     seen = motion(
-        reduced.cycles, reduced.rest, sensors, reference, C_nb.copy(), setup.site.latitude_rad, setup.gravity,
-        reduced.temperature, predicted=not closed_loop,
+        prepared.cycles, prepared.rest, sensors, reference, C_nb.copy(), setup.site.latitude_rad, setup.gravity,
+        prepared.temperature, predicted=not closed_loop,
     )  # fmt: skip
     values = sensors.regressors(seen)
     if not np.isfinite(values).all():
         raise DataError("a sensor effect of the model is not finite on this recording: check its expression")
-    data = pass_input(reduced, values, sensors.channel, sensors.parameter)
+    data = pass_input(prepared, values, sensors.channel, sensors.parameter)
     begin = start_state(setup, start, C_nb, reference)
     state = PassState(*(v.copy() for v in begin))
-    output = new_output(len(reduced.epochs), len(sensors.prior), keep, SNAPSHOT_EPOCHS)
+    output = new_output(len(prepared.epochs), len(sensors.prior), keep, SNAPSHOT_EPOCHS)
     settings = pass_settings(setup, closed_loop)
     run_pass(data, settings, state, output)
     if not (np.isfinite(state.x).all() and np.isfinite(state.P).all() and (np.diag(state.P) >= 0.0).all()):
@@ -152,7 +158,7 @@ def smoothed_start(finished: Pass) -> Floats:
 
 
 def refine(
-    reduced: Reduced, setup: Setup, start: Alignment, first: Pass, progress: Progress, keep: bool
+    prepared: PreparedData, setup: TestSetup, start: Alignment, first: Pass, progress: Progress, keep: bool
 ) -> tuple[Pass, int, bool]:
     """Repeat open-loop passes until the coefficients stand still.
 
@@ -176,7 +182,7 @@ def refine(
         progress("passes", min(0.95, 0.3 + 0.1 * (count - 1)))
         reference = last.estimate * (setup.sensors.decay_rate == 0.0)
         use = loose if settling else setup
-        new = one_pass(reduced, use, start, smoothed_start(last), reference, closed_loop=False, keep=keep)
+        new = one_pass(prepared, use, start, smoothed_start(last), reference, closed_loop=False, keep=keep)
         moved = np.max(np.abs(new.estimate - last.estimate) / np.sqrt(np.diag(new.covariance)))
         last = new
         if settling:
@@ -189,13 +195,25 @@ def refine(
     return last, MOST_PASSES, bool(moved < _NEAR)
 
 
+def coarse_pass(prepared: PreparedData, setup: TestSetup, start: Alignment) -> Pass:
+    """Run a closed-loop pass from the coarse start: where `refine` begins when one dwell may have misled the first.
+
+    Raises
+    ------
+    DataError
+        When the filter diverges.
+    """
+    coarse = coarse_start(prepared, setup, start)
+    return one_pass(prepared, setup, start, coarse.C_nb, coarse.coefficients, closed_loop=True, keep=False)
+
+
 @dataclass(frozen=True)
 class Solution:
     """A converged calibration with everything that led to it.
 
     Attributes
     ----------
-    setup, reduced, alignment : Setup, Reduced, Alignment
+    setup, prepared, alignment : TestSetup, PreparedData, Alignment
     first, last : Pass
         The closed-loop pass and the converged one.
     passes : int
@@ -204,8 +222,8 @@ class Solution:
         The coefficients stood still at the end.
     """
 
-    setup: Setup
-    reduced: Reduced
+    setup: TestSetup
+    prepared: PreparedData
     alignment: Alignment
     first: Pass
     last: Pass
@@ -213,7 +231,7 @@ class Solution:
     converged: bool
 
 
-def with_room(setup: Setup, finished: Pass) -> Setup:
+def widen_contradicted_priors(setup: TestSetup, finished: Pass) -> TestSetup:
     """Widen the prior of an effect that is far beyond it and that it holds back; the same object when none is.
 
     A prior is a statement about the class of the sensor. Where the data contradict it, a size between the two is
@@ -241,12 +259,12 @@ _MOST_WIDENINGS = 3
 _IN_THE_FRAME = ("gyro_misalignment", "accel_misalignment")
 
 
-def solve(setup: Setup, reduced: Reduced, progress: Progress, keep: bool = False) -> Solution:
+def solve(setup: TestSetup, prepared: PreparedData, progress: Progress, keep: bool = False) -> Solution:
     """Align, run the closed loop, refine.
 
     Parameters
     ----------
-    setup, reduced : Setup, Reduced
+    setup, prepared : TestSetup, PreparedData
     progress : callable
     keep : bool
         Keep the matrices of the later passes.
@@ -256,25 +274,23 @@ def solve(setup: Setup, reduced: Reduced, progress: Progress, keep: bool = False
     DataError
         When the recording cannot be aligned, or contradicts the specification.
     """
-    start = first_attitude(reduced.epochs, reduced.phases, setup)
+    start = first_attitude(prepared.epochs, prepared.phases, setup)
     progress("passes", 0.2)
     none = np.zeros(len(setup.sensors.prior))
-    first = one_pass(reduced, setup, start, start.C_nb, none, closed_loop=True, keep=False)
+    first = one_pass(prepared, setup, start, start.C_nb, none, closed_loop=True, keep=False)
     try:
-        last, passes, converged = refine(reduced, setup, start, first, progress, keep=keep)
+        last, passes, converged = refine(prepared, setup, start, first, progress, keep=keep)
     except DataError:
         converged = False
     if not converged:
         # The first dwell misled the first pass (an azimuth that may be anything): all stops together know better.
-        from sdimu_calibration.core.batch.coarse import coarse_pass  # noqa: PLC0415 (built on the passes of this file)
-
-        begun = coarse_pass(reduced, setup, start)
-        last, passes, converged = refine(reduced, setup, start, begun, progress, keep=keep)
+        begun = coarse_pass(prepared, setup, start)
+        last, passes, converged = refine(prepared, setup, start, begun, progress, keep=keep)
     for _ in range(_MOST_WIDENINGS):
-        room = with_room(setup, last)
+        room = widen_contradicted_priors(setup, last)
         if room is setup:
             break
         setup = room
-        last, more, converged = refine(reduced, setup, start, last, progress, keep=keep)
+        last, more, converged = refine(prepared, setup, start, last, progress, keep=keep)
         passes += more - 1
-    return Solution(setup, reduced, start, first, last, passes, converged)
+    return Solution(setup, prepared, start, first, last, passes, converged)

@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import norm
 
-from sdimu_calibration.core.filter.reduced import Reduced
-
-Floats = NDArray[np.float64]
+from sdimu_calibration.core.alignment.prepared import PreparedData
+from sdimu_calibration.core.arrays import Floats
 
 _KINDS = ("position", "velocity", "gyro", "accelerometer")
 _FALSE_ALARM = 1e-4
 """Share of sound tests with a false alarm."""
 
 
-def stop_misfit(normalised: Floats, reduced: Reduced) -> str | None:
+def stop_misfit(normalised: Floats, prepared: PreparedData) -> str | None:
     """Name the stop and kind of measurement that fits worst, if it is no chance.
 
     The whitened innovations of a right model are independent standard normals, so their sum over a stop divided by
@@ -25,14 +23,14 @@ def stop_misfit(normalised: Floats, reduced: Reduced) -> str | None:
     ----------
     normalised : ndarray, shape (e, 12)
         Whitened innovations of every epoch, NaN where nothing was measured.
-    reduced : Reduced
+    prepared : PreparedData
 
     Returns
     -------
     str or None
         One line for people.
     """
-    white, stop = normalised, reduced.phases.stop
+    white, stop = normalised, prepared.phases.stop
     measured = np.isfinite(white)
     numbers, place = np.unique(stop, return_inverse=True)
     total = np.zeros((len(numbers), white.shape[1]))

@@ -11,12 +11,10 @@ by the radii stands in the transport rate instead.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sdimu_calibration.core import earth
+from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.compiled import compiled
-
-Floats = NDArray[np.float64]
 
 
 @compiled

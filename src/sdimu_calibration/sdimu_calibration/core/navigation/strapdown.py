@@ -14,13 +14,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sdimu_calibration.core import earth
+from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.compiled import compiled
 from sdimu_calibration.core.matrix3 import applied, elements, multiplied, orthonormal3, rotation3, store
-
-Floats = NDArray[np.float64]
 
 CYCLE_S = 0.1
 """Longest navigation cycle (s)."""
@@ -55,8 +53,8 @@ class Cycles:
     upsilon: Floats
     coning: Floats
     sculling: Floats
-    samples: NDArray[np.int64]
-    lost: NDArray[np.int64]
+    samples: Ints
+    lost: Ints
     gap_angle: Floats
 
     def __len__(self) -> int:

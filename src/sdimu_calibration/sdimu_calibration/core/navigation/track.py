@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sdimu_calibration.core import earth
+from sdimu_calibration.core.arrays import Bools, Floats
 from sdimu_calibration.core.compiled import compiled
 from sdimu_calibration.core.effects.imu_model import ImuModel
 from sdimu_calibration.core.effects.motion import Motion
 from sdimu_calibration.core.matrix3 import elements, multiplied, orthonormal3, rotation3, store
 from sdimu_calibration.core.navigation.strapdown import Cycles
 from sdimu_calibration.core.recording import TemperatureLog
-
-Floats = NDArray[np.float64]
 
 _COMPENSATIONS = 3
 """Rounds of "error at the compensated motion": each gains a factor of the size of the errors."""
@@ -77,7 +75,7 @@ def temperatures(log: TemperatureLog | None, t: Floats, causal: bool) -> tuple[F
 
 def motion(
     cycles: Cycles,
-    rest: NDArray[np.bool_],
+    rest: Bools,
     model: ImuModel,
     coefficients: Floats,
     C_start: Floats,
@@ -140,7 +138,7 @@ def motion(
 
 
 def _acceleration(
-    w_table: Floats, rest: NDArray[np.bool_], cycles: Cycles, before: Motion | None, causal: bool
+    w_table: Floats, rest: Bools, cycles: Cycles, before: Motion | None, causal: bool
 ) -> Floats:
     """Angular acceleration (rad/s^2), shape (n, 3): mean over each cycle, or by causal differences for a live filter.
 

@@ -10,9 +10,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from sdimu_calibration.core.arrays import Floats, Ints
 
 _PER_OCTAVE = 2
 LEAST_FREEDOM = 3.0
@@ -58,7 +57,7 @@ def freedom_of(length: int, m: Floats) -> Floats:
     return np.asarray(np.where(2.0 * m <= length, np.maximum(out, 0.0), 0.0))
 
 
-def factors(longest: int) -> NDArray[np.int64]:
+def factors(longest: int) -> Ints:
     """Averaging factors for stretches of at most `longest` samples: powers of two and between."""
     steps = np.arange(0.0, _PER_OCTAVE * np.log2(max(longest / 2.0, 1.0)) + 1e-9)
     return np.unique(np.rint(2.0 ** (steps / _PER_OCTAVE)).astype(np.int64))

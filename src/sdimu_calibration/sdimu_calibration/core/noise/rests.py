@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sdimu_calibration.core.arrays import Bools, Floats
 from sdimu_calibration.core.recording import DataError, PhaseLog, Recording
-
-Floats = NDArray[np.float64]
 
 WINDOW_S = 1.0
 _FEWEST = 10
@@ -70,19 +68,19 @@ def rests(recording: Recording) -> tuple[slice, ...]:
     return found
 
 
-def _whole(t: Floats, size: int, count: int, interval: float) -> NDArray[np.bool_]:
+def _whole(t: Floats, size: int, count: int, interval: float) -> Bools:
     """Windows without a missing sample, counted from the last sample of the window before."""
     edges = np.concatenate([[t[0] - interval], t[size - 1 : count * size : size]])
-    whole: NDArray[np.bool_] = np.abs(np.diff(edges) - size * interval) < 0.5 * interval
+    whole: Bools = np.abs(np.diff(edges) - size * interval) < 0.5 * interval
     return whole
 
 
-def _dwells(log: PhaseLog | None, t: Floats, interval: float) -> NDArray[np.bool_]:
+def _dwells(log: PhaseLog | None, t: Floats, interval: float) -> Bools:
     """Windows in which the table dwells from begin to end, or says nothing; `t` (count, size)."""
     if log is None or not len(log.t):
         return np.ones(len(t), dtype=bool)
     first = np.maximum(np.searchsorted(log.t, t[:, 0] - interval + 1e-6, side="right") - 1, 0)
     last = np.maximum(np.searchsorted(log.t, t[:, -1] - 1e-6, side="right") - 1, 0)
     turning = np.concatenate([[0], np.cumsum(~log.dwell)])
-    same: NDArray[np.bool_] = (turning[last + 1] == turning[first]) & (log.stop[first] == log.stop[last])
+    same: Bools = (turning[last + 1] == turning[first]) & (log.stop[first] == log.stop[last])
     return same

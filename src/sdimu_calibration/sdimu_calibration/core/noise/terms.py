@@ -15,12 +15,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import nnls
 
+from sdimu_calibration.core.arrays import Bools, Floats
 from sdimu_calibration.core.noise.allan import Allan, allan
-
-Floats = NDArray[np.float64]
 
 TERMS = ("quantisation", "white", "instability", "random_walk")
 _ROUNDS = 6
@@ -43,9 +41,9 @@ class Terms:
     sigma: Floats
 
     @property
-    def seen(self) -> NDArray[np.bool_]:
+    def seen(self) -> Bools:
         """Terms that stand out of their sigma; of the others only `upper` is known."""
-        seen: NDArray[np.bool_] = self.value > _SEEN * self.sigma
+        seen: Bools = self.value > _SEEN * self.sigma
         return seen
 
     @property
@@ -85,7 +83,7 @@ def fit_terms(found: Allan, rng: np.random.Generator, draws: int = _DRAWS) -> Te
     return Terms(np.where(seen, alone, value), np.where(seen, _scatter(again, value, seen), sigma))
 
 
-def _scatter(again: list[Allan], value: Floats, among: NDArray[np.bool_] | None) -> Floats:
+def _scatter(again: list[Allan], value: Floats, among: Bools | None) -> Floats:
     """Scatter of the fits on draws about the terms `value` (4,) that they were drawn with."""
     fits = np.array([np.sqrt(_squares(one, among)) for one in again])
     if among is None:
@@ -94,7 +92,7 @@ def _scatter(again: list[Allan], value: Floats, among: NDArray[np.bool_] | None)
     return np.asarray(fits.std(axis=0, ddof=1))
 
 
-def _squares(found: Allan, among: NDArray[np.bool_] | None = None) -> Floats:
+def _squares(found: Allan, among: Bools | None = None) -> Floats:
     """Least squares for the squares of the terms, the others nought."""
     variance, columns = found.deviation**2, basis(found.tau)
     if among is not None:

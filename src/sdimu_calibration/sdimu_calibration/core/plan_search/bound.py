@@ -5,15 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.batch.batch import bound_covariance
-from sdimu_calibration.core.filter import body_frame
+from sdimu_calibration.core.effects import body_frame
 from sdimu_calibration.core.plan import Plan
 from sdimu_calibration.core.planning.predict import prepare
 from sdimu_calibration.core.specification import ImuSpecification, Model, Site
-
-Floats = NDArray[np.float64]
 
 _FIXED = 1e-6
 """A sigma below this share of its prior is one that the body frame makes nought."""
@@ -71,7 +69,7 @@ def bounds(plan: Plan, asked: Question) -> Bounds:
     """
     nominal = prepare(plan, asked.site, asked.imu, asked.model, None, None)
     sensors = nominal.setup.sensors
-    covariance = bound_covariance(nominal.reduced, nominal.setup, nominal.start)
+    covariance = bound_covariance(nominal.prepared, nominal.setup, nominal.start)
     J = body_frame.frame_jacobian(sensors.names, asked.model.body_frame)
     effects = [e.family or e.name for e in sensors.effects for _ in e.parameters]
     return Bounds(

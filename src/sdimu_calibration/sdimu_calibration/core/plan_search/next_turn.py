@@ -15,15 +15,12 @@ from itertools import permutations
 from typing import cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sdimu_calibration.core.effects import selection
 from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.plan import Plan, Turn
 from sdimu_calibration.core.plan_search.bound import Bounds, Question, bounds
 from sdimu_calibration.core.recording import DataError
-
-Floats = NDArray[np.float64]
 
 RATES_RAD_S = (math.radians(2.0), math.radians(10.0))
 _ANGLES_RAD = tuple(math.radians(a) for a in (90.0, -90.0, 180.0, -180.0))

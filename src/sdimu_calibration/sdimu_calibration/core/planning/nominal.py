@@ -14,15 +14,13 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sdimu_calibration.core import earth
+from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.plan import Plan, Turn
 from sdimu_calibration.core.recording import DataError, PhaseLog, Recording
 from sdimu_calibration.core.rotation import rotation_matrix
 from sdimu_calibration.core.specification import Site
-
-Floats = NDArray[np.float64]
 
 RATE_HZ = 20.0
 """Sample rate: two samples a navigation cycle."""

@@ -13,9 +13,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from sdimu_calibration.core.arrays import Floats
 
 UNSEEN = 0.5
 """Share of the prior variance that is left: above it the data say less than the prior did."""

@@ -10,13 +10,13 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from sdimu_calibration.core.filter import body_frame
+from sdimu_calibration.core.alignment.alignment import Alignment
+from sdimu_calibration.core.alignment.prepared import PreparedData, TestSetup, first_attitude, reduce, set_up
+from sdimu_calibration.core.arrays import Bools, Floats
+from sdimu_calibration.core.effects import body_frame
 from sdimu_calibration.core.filter.filter_pass import NAV
 from sdimu_calibration.core.filter.passes import one_pass
-from sdimu_calibration.core.filter.reduced import Reduced, Setup, first_attitude, reduce, set_up
-from sdimu_calibration.core.navigation.alignment import Alignment
 from sdimu_calibration.core.plan import Plan
 from sdimu_calibration.core.planning.noise_set import NoiseSet, apply
 from sdimu_calibration.core.planning.nominal import nominal_recording
@@ -24,8 +24,7 @@ from sdimu_calibration.core.planning.observability import Combination, unobserva
 from sdimu_calibration.core.rotation import rotation_matrix
 from sdimu_calibration.core.specification import ImuSpecification, Model, Site
 
-Floats = NDArray[np.float64]
-Bound = Callable[[Reduced, Setup, Alignment], Floats]
+Bound = Callable[[PreparedData, TestSetup, Alignment], Floats]
 
 
 @dataclass(frozen=True)
@@ -68,7 +67,7 @@ class Prediction:
     t: Floats
     history: Floats
     attitude: Floats
-    dwell: NDArray[np.bool_]
+    dwell: Bools
     unobservable: tuple[Combination, ...]
 
 
@@ -76,8 +75,8 @@ class Prediction:
 class Nominal:
     """A plan reduced for one set-up: what is shared by every covariance simulation of it."""
 
-    reduced: Reduced
-    setup: Setup
+    prepared: PreparedData
+    setup: TestSetup
     start: Alignment
     duration_s: float
 
@@ -95,13 +94,13 @@ def prepare(
     told, weighed = (imu, model) if noise is None else apply(noise, imu, model)
     setup = set_up(site, told, weighed)
     recording = nominal_recording(plan, site, mount_rad)
-    reduced = reduce(recording, setup, screened=False)
-    start = first_attitude(reduced.epochs, reduced.phases, setup)
+    prepared = reduce(recording, setup, screened=False)
+    start = first_attitude(prepared.epochs, prepared.phases, setup)
     C_nb = rotation_matrix(np.zeros(3) if mount_rad is None else np.asarray(mount_rad, dtype=float))
     sigma = start.filter_sigma
     if noise is not None:
         sigma = np.array([noise.level_sigma, noise.level_sigma, noise.azimuth_sigma])
-    return Nominal(reduced, setup, replace(start, C_nb=C_nb, filter_sigma=sigma), float(recording.t[-1]))
+    return Nominal(prepared, setup, replace(start, C_nb=C_nb, filter_sigma=sigma), float(recording.t[-1]))
 
 
 def predict(
@@ -143,11 +142,11 @@ def predict(
     setup = nominal.setup
     sensors, frame = setup.sensors, setup.model.body_frame
     done = one_pass(
-        nominal.reduced, setup, nominal.start, nominal.start.C_nb, np.zeros(len(sensors.prior)),
+        nominal.prepared, setup, nominal.start, nominal.start.C_nb, np.zeros(len(sensors.prior)),
         closed_loop=False, keep=False,
     )  # fmt: skip
     J = body_frame.frame_jacobian(sensors.names, frame)
-    output, epochs = done.output, nominal.reduced.epochs
+    output, epochs = done.output, nominal.prepared.epochs
     rows = np.arange(0, len(epochs), output.stride)
     variance = np.einsum("ij,kjl,il->ki", J, output.covariance[: len(rows)], J)
     covariance = J @ done.covariance @ J.T
@@ -156,7 +155,7 @@ def predict(
     if bound is not None:
         # The bound is what the data of this IMU hold, whatever the filter is told about them.
         own = prepare(plan, site, imu, model, mount_rad, None)
-        limit = np.sqrt(np.diag(J @ bound(own.reduced, own.setup, own.start) @ J.T))
+        limit = np.sqrt(np.diag(J @ bound(own.prepared, own.setup, own.start) @ J.T))
     attitude = np.sqrt(np.diag(done.state.P)[-3:])
     return Prediction(
         body_frame=frame,
@@ -172,7 +171,7 @@ def predict(
         t=np.append(epochs.end[rows], epochs.end[-1]),
         history=np.vstack([np.sqrt(variance), sigma]),
         attitude=np.vstack([output.sigma[rows, 6:NAV], output.sigma[-1:, 6:NAV]]),
-        dwell=np.append(nominal.reduced.phases.dwell[rows], nominal.reduced.phases.dwell[-1]),
+        dwell=np.append(nominal.prepared.phases.dwell[rows], nominal.prepared.phases.dwell[-1]),
         unobservable=unobservable(
             sensors.names, sensors.prior, done.covariance, nominal.start.filter_sigma, attitude, nominal.start.C_nb
         ),

@@ -16,12 +16,12 @@ from sdimu_calibration.core.units import UnitError
 from sdimu_calibration.report import data
 from sdimu_calibration.report.drawing import PRINT
 from sdimu_calibration.report.workbench import figures, tables, view
-from sdimu_calibration.report.workbench.doing import Doing
 from sdimu_calibration.report.workbench.export import archive
-from sdimu_calibration.report.workbench.fit import Bench
+from sdimu_calibration.report.workbench.fit import FitSession
 from sdimu_calibration.report.workbench.own_effect import named, read_effect
-from sdimu_calibration.report.workbench.shelf import Shelf
+from sdimu_calibration.report.workbench.recording_cache import RecordingCache
 from sdimu_calibration.report.workbench.state import State, from_json
+from sdimu_calibration.report.workbench.task_progress import TaskProgress
 
 _PAGE = """<!doctype html><html lang="en"><head>{%metas%}<title>{%title%}</title>{%css%}<style>STYLE</style></head>
 <body>{%app_entry%}<footer>{%config%}{%scripts%}{%renderer%}<script>PRINT</script></footer></body></html>"""
@@ -46,12 +46,12 @@ _NOTHING = {
 _ARROW = "\N{BLACK RIGHT-POINTING TRIANGLE} "
 
 
-def build(shelf: Shelf) -> Dash:
+def build(shelf: RecordingCache) -> Dash:
     """Make the application of a shelf of recordings."""
     app = Dash("sdimu workbench", title="sdimu workbench", update_title="", serve_locally=True, assets_ignore=".*")
     app.index_string = _PAGE.replace("STYLE", view.STYLE).replace("PRINT", PRINT)
     app.layout = lambda: view.layout("Workbench", shelf.names)
-    doing = Doing()
+    doing = TaskProgress()
     app.clientside_callback(_LARGE, Output("scale", "data"), Input("page", "data"))
 
     @app.callback(
@@ -173,7 +173,7 @@ def _step(
     return now
 
 
-def _shown(bench: Bench, now: State, recording: str, scale: float, tell: Any) -> tuple[Any, ...]:
+def _shown(bench: FitSession, now: State, recording: str, scale: float, tell: Any) -> tuple[Any, ...]:
     """Everything that a state shows but the candidates, which come later."""
     rungs = [bench.fit(now.added[:k], now.held, tell) for k in range(len(now.added) + 1)]
     here, given = rungs[-1], rungs[0]

@@ -7,15 +7,15 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from sdimu_calibration.core.alignment.prepared import TestSetup
 from sdimu_calibration.core.diagnosis.candidates import without
 from sdimu_calibration.core.effects import imu_model
 from sdimu_calibration.core.effects.effect import Effect
-from sdimu_calibration.core.filter.reduced import Setup
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage.effect_file import find_effects, load_effect
 
 
-def extended(setup: Setup, added: Sequence[str]) -> Setup:
+def extended(setup: TestSetup, added: Sequence[str]) -> TestSetup:
     """Add effects to a model: by name, or by the text of an effect file.
 
     Raises

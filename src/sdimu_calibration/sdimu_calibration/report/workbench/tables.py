@@ -12,7 +12,7 @@ from sdimu_calibration.core.diagnosis.grow import moved_coefficients
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.units import from_si
 from sdimu_calibration.report.table import as_far
-from sdimu_calibration.report.workbench.fit import Bench, Fitted, Key
+from sdimu_calibration.report.workbench.fit import FitSession, Fitted, Key
 from sdimu_calibration.report.workbench.own_effect import named
 
 _STANDS = 0.01
@@ -22,7 +22,7 @@ _HEADINGS = (
 )  # fmt: skip
 
 
-def models(bench: Bench, keys: Sequence[Key], here: Key) -> Any:
+def models(bench: FitSession, keys: Sequence[Key], here: Key) -> Any:
     """Compare the models of a page; a mark points at the one shown.
 
     A model is compared with the one as given, fitted to the same stops.

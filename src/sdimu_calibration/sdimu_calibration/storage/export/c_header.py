@@ -7,10 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.compensation import LinearModel
 from sdimu_calibration.storage.export.shared import Source, bent, comments, number
-
-Floats = NDArray[np.float64]
 
 _FUNCTION = """
 /* Body rate (rad/s) and specific force (m/s^2) in the body frame named above, from samples in SI. */

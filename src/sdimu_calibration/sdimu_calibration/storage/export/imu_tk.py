@@ -9,12 +9,10 @@ takes the first 21 numbers of the file (T and K row by row, then B), so what els
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.compensation import LinearModel
 from sdimu_calibration.storage.export.shared import Source, bent, comments, row
-
-Floats = NDArray[np.float64]
 
 
 def texts(source: Source) -> dict[str, str]:

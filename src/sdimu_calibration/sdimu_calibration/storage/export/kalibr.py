@@ -13,13 +13,11 @@ add them under names of their own.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.compensation import LinearModel
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage.export.shared import Source, bent, comments, flow, number
-
-Floats = NDArray[np.float64]
 
 _TRIANGULAR = 1e-12
 """Largest number above the diagonal that is rounding."""

@@ -4,14 +4,10 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
+from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.compensation import LinearModel
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.specification import ImuSpecification
-
-Floats = NDArray[np.float64]
 
 EQUATION = (
     "rate measured  = M_g w + G f + b_g,   so   w = inv(M_g) (rate measured - G f - b_g)",

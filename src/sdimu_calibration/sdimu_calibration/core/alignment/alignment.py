@@ -1,0 +1,112 @@
+"""Coarse alignment: level from specific force, azimuth from Earth rate, for any orientation of the axes.
+
+Its answer is where the filter linearises. The filter starts with much wider sigmas than these and takes the same
+samples as its first measurements, which gives attitude and biases their right correlation at once.
+
+Source: Groves, *Principles of GNSS, Inertial, and Multisensor Integrated Navigation Systems*, 2nd ed., section 5.6
+(TRIAD on gravity and Earth rate).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from sdimu_calibration.core import earth
+from sdimu_calibration.core.arrays import Floats
+from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.rotation import rotation_matrix
+from sdimu_calibration.core.specification import ImuSpecification, Site
+
+UNKNOWN_AZIMUTH = np.pi / np.sqrt(3.0)
+"""Sigma of an azimuth that may be anything (rad): that of a uniform distribution over the circle."""
+_WIDEN = 10.0
+"""The filter's initial sigmas are this many times the alignment's."""
+
+
+@dataclass(frozen=True)
+class Alignment:
+    """Initial attitude.
+
+    Attributes
+    ----------
+    C_nb : ndarray, shape (3, 3)
+    sigma : ndarray, shape (3,)
+        Honest one-sigma of the attitude error about N, E, D (rad).
+    filter_sigma : ndarray, shape (3,)
+        What the filter starts with (rad).
+    azimuth_from : str
+        ``earth rate``, ``site file`` or ``nothing``.
+    """
+
+    C_nb: Floats
+    sigma: Floats
+    filter_sigma: Floats
+    azimuth_from: str
+
+
+def azimuth_of(C_nb: Floats) -> float:
+    """Azimuth of body X (of body Y, when X is within 45 deg of the vertical), rad."""
+    axis = C_nb[:, 0] if abs(C_nb[2, 0]) < np.sqrt(0.5) else C_nb[:, 1]
+    return float(np.arctan2(axis[1], axis[0]))
+
+
+def levelled(C_nb: Floats, f_ib_b: Floats) -> Floats:
+    """Turn an attitude (3, 3) the shortest way to where the force at rest, shape (3,), points up."""
+    f_n = C_nb @ f_ib_b
+    axis = np.array([-f_n[1], f_n[0], 0.0])
+    sine = float(np.hypot(f_n[0], f_n[1]))
+    angle = float(np.arctan2(sine, -f_n[2]))
+    return np.asarray(rotation_matrix(axis * (angle / max(sine, 1e-12))) @ C_nb)
+
+
+def align(w_mean: Floats, f_mean: Floats, duration_s: float, site: Site, imu: ImuSpecification) -> Alignment:
+    """Level and find north.
+
+    Parameters
+    ----------
+    w_mean, f_mean : ndarray, shape (3,)
+        Mean body rate (rad/s) and specific force (m/s^2) at rest, in b.
+    duration_s : float
+        Length of the mean.
+    site : Site
+        An azimuth given there replaces gyrocompassing.
+    imu : ImuSpecification
+        Its priors give the sigmas.
+
+    Raises
+    ------
+    DataError
+        When there is no specific force to level by.
+    """
+    norm = float(np.linalg.norm(f_mean))
+    if not norm > 1.0:
+        raise DataError("/imu/data_raw: no specific force at rest; is linear_acceleration in m/s^2 with gravity in it?")
+    down = -f_mean / norm
+    east = np.cross(down, w_mean)
+    horizontal = float(np.linalg.norm(east))
+    if horizontal < 1e-12:
+        east = np.cross(down, np.eye(3)[int(np.argmin(np.abs(down)))])
+    east = east / np.linalg.norm(east)
+    C_nb = np.vstack([np.cross(east, down), east, down])
+
+    prior = imu.prior
+    accel = np.hypot(prior.get("accel_bias", 0.0), imu.accel_white_noise / np.sqrt(duration_s))
+    level = float(np.hypot(accel / norm, prior.get("accel_misalignment", 0.0)))
+    gyro = np.sqrt(
+        prior.get("gyro_bias", 0.0) ** 2
+        + prior.get("gyro_mass_unbalance", 0.0) ** 2
+        + imu.gyro_white_noise**2 / duration_s
+    )
+    rate = max(earth.RATE * np.cos(site.latitude_rad), 1e-12)
+    azimuth = min(float(np.hypot(gyro / rate, level)), UNKNOWN_AZIMUTH)
+    source = "earth rate" if azimuth < UNKNOWN_AZIMUTH else "nothing"
+    start = min(_WIDEN * azimuth, UNKNOWN_AZIMUTH)
+    if site.initial_azimuth_rad is not None:
+        turn = site.initial_azimuth_rad - azimuth_of(C_nb)
+        C_nb = rotation_matrix(np.array([0.0, 0.0, turn])) @ C_nb
+        azimuth = start = site.initial_azimuth_sigma_rad
+        source = "site file"
+    wide = min(_WIDEN * level, 0.5)
+    return Alignment(C_nb, np.array([level, level, azimuth]), np.array([wide, wide, start]), source)

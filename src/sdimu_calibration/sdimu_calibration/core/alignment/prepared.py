@@ -1,0 +1,172 @@
+"""What every pass begins with: options checked against each other, samples brought to cycles, epochs and phases."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from sdimu_calibration.core import earth
+from sdimu_calibration.core.alignment.alignment import Alignment, align
+from sdimu_calibration.core.arrays import Bools, Floats, Ints
+from sdimu_calibration.core.data.epochs import Epochs, cut
+from sdimu_calibration.core.data.gaps import Bridges, bridges, judge, largest_acceleration, weighed
+from sdimu_calibration.core.data.phases import (
+    Phases,
+    PhaseState,
+    RestLimits,
+    classify,
+    contradictions,
+    rest_limits,
+    without_early_motion,
+)
+from sdimu_calibration.core.data.sample_screening import sound, wild
+from sdimu_calibration.core.effects import imu_model
+from sdimu_calibration.core.effects.imu_model import ImuModel
+from sdimu_calibration.core.navigation.strapdown import Cycles, Reducer
+from sdimu_calibration.core.recording import NOMINAL_FROM, DataError, DataFault, Recording, TemperatureLog
+from sdimu_calibration.core.specification import ImuSpecification, Model, Site
+
+SKIP, SENSORS, ALL, HELD_SENSORS, HELD_ALL = 0, 1, 2, -1, -2
+"""What an epoch measures: nothing; Zw and Zf; all four. Held out: predicted and scored, not taken."""
+_LISTED = 40
+"""So many stops are listed one by one."""
+ALIGN_S = 30.0
+"""At most this much of the first dwell levels and gyrocompasses (s)."""
+
+
+@dataclass(frozen=True)
+class TestSetup:
+    """Everything a pass needs that is not data."""
+
+    site: Site
+    imu: ImuSpecification
+    model: Model
+    sensors: ImuModel
+    limits: RestLimits
+    gravity: float
+
+
+@dataclass(frozen=True)
+class PreparedData:
+    """A recording after reduction: cycles, epochs and their phases."""
+
+    cycles: Cycles
+    epochs: Epochs
+    phases: Phases
+    kind: Ints
+    temperature: TemperatureLog | None
+    bridges: Bridges
+    faults: tuple[DataFault, ...] = ()
+
+    @property
+    def rest(self) -> Bools:
+        """Cycles in dwell, shape (n,)."""
+        return np.repeat(self.phases.dwell, self.epochs.last - self.epochs.first)
+
+
+def set_up(site: Site, imu: ImuSpecification, model: Model) -> TestSetup:
+    """Check the options against each other and prepare what all passes share."""
+    sensors = imu_model.build(model.effects, imu)
+    for what, noise in (("gyro", imu.gyro_white_noise), ("accel", imu.accel_white_noise)):
+        if not noise > 0.0:
+            raise DataError(f"IMU '{imu.name}': noise.{what} is zero, and measurements are weighed by it: give it")
+    gravity = site.gravity_m_s2 or float(earth.normal_gravity(site.latitude_rad, site.height_m))
+    return TestSetup(site, imu, model, sensors, rest_limits(imu), gravity)
+
+
+def nominal_interval(t: Floats) -> float:
+    """Nominal sample interval (s) from the first stamps; live and offline use the same ones."""
+    return float(np.median(np.diff(t[: NOMINAL_FROM + 1])))
+
+
+def measurement_kinds(phases: Phases, every_epoch: bool) -> Ints:
+    """Say what each epoch measures: Zw and Zf in every used one, Zp and Zv after motion (or always)."""
+    kind = np.where(phases.used, SENSORS, SKIP).astype(np.int64)
+    kind[phases.used if every_epoch else phases.first] = ALL
+    return kind
+
+
+def reduce(recording: Recording, setup: TestSetup, screened: bool = True) -> PreparedData:
+    """Reduce a recording to cycles and epochs and decide the phases.
+
+    Parameters
+    ----------
+    recording : Recording
+    setup : TestSetup
+    screened : bool
+        Take away samples that are no measurement; not for the perfect ones of `nominal`, which stand still at rest.
+
+    Raises
+    ------
+    DataError
+        When there is too little of it, or so much is missing that nobody knows the attitude after it.
+    """
+    recording, unsound = sound(recording) if screened else (recording, ())
+    if len(recording.t) < NOMINAL_FROM + 1:
+        raise DataError(f"/imu/data_raw: {len(recording.t)} usable samples are too few to calibrate")
+    nominal = nominal_interval(recording.t)
+    cycles = Reducer(nominal).add(recording.t, recording.omega_ib_b, recording.f_ib_b)
+    epochs = cut(cycles, nominal)
+    if not len(epochs):
+        raise DataError("/imu/data_raw: the recording is shorter than one second")
+    phases = classify(epochs, recording.phase, setup.limits, setup.gravity, setup.model.settle_s, PhaseState())
+    phases = without_early_motion(epochs, recording.phase, phases, setup.imu.gyro_white_noise)
+    kind = measurement_kinds(phases, setup.model.zero_velocity == "every_epoch")
+    cycles = cycles[: int(epochs.last[-1])]
+    found = bridges(cycles, epochs, phases.dwell, nominal, largest_acceleration(cycles), setup.gravity)
+    at, excess, rough = wild(recording)
+    found = weighed(found, epochs, at, excess)
+    unsound = (*unsound, *rough)
+    noise = (setup.imu.gyro_white_noise, setup.imu.accel_white_noise)
+    lost = judge(cycles, epochs, phases, nominal, found, noise, unsound)
+    faults = (*unsound, *lost, *contradictions(epochs, phases, recording.phase))
+    return PreparedData(cycles, epochs, phases, kind, recording.temperature, found, faults)
+
+
+def first_attitude(epochs: Epochs, phases: Phases, setup: TestSetup) -> Alignment:
+    """Coarse alignment from the first dwell.
+
+    Raises
+    ------
+    DataError
+        When the IMU is never at rest, or turns before its first rest.
+    """
+    if not phases.dwell.any():
+        if phases.denied.any():
+            raise DataError(
+                "/rate_table/status: says rotating all the time, although the IMU rests at times; correct the status, "
+                "or leave the topic out: the dwells are then found from the IMU"
+            )
+        raise DataError(
+            "/imu/data_raw: the IMU is never at rest (|f| near gravity and |w| near Earth rate within the IMU's "
+            "specification); check its units, and that --imu and --site fit"
+        )
+    start = int(np.argmax(phases.dwell))
+    if start:
+        raise DataError(
+            f"/imu/data_raw: the recording starts in motion (first rest at {epochs.start[start]:.0f} s); "
+            "start it at rest, or cut it; noise beyond the IMU's specification looks the same: check --imu"
+        )
+    moving = np.flatnonzero(~phases.dwell)
+    end = int(moving[0]) if len(moving) else len(phases.dwell)
+    rows = slice(0, max(1, min(end, int(ALIGN_S))))
+    weight = (epochs.end - epochs.start)[rows]
+    w_mean, f_mean = (
+        (v[rows] * weight[:, None]).sum(axis=0) / weight.sum() for v in (epochs.w_mean, epochs.f_mean)
+    )
+    return align(w_mean, f_mean, float(weight.sum()), setup.site, setup.imu)
+
+
+def stops_line(recording: Recording, prepared: PreparedData) -> tuple[str, ...]:
+    """Say which stops were found where no status says them."""
+    if recording.phase is not None:
+        return ()
+    phases, epochs = prepared.phases, prepared.epochs
+    used = np.unique(phases.stop[phases.used])
+    spans = [
+        (epochs.start[rows][0], epochs.end[rows][-1]) for rows in (phases.dwell & (phases.stop == k) for k in used)
+    ]
+    listed = ", ".join(f"{a:.0f}-{b:.0f}" for a, b in spans[:_LISTED]) + (", ..." if len(spans) > _LISTED else "")
+    return (f"no status: {len(spans)} stops were found from the IMU, at (s) {listed}",)
+

@@ -1,0 +1,79 @@
+"""Stops of a recording, and means of its samples over blocks of rest."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from sdimu_calibration.core.alignment.prepared import PreparedData
+from sdimu_calibration.core.arrays import Floats, Ints
+from sdimu_calibration.core.effects.imu_model import ImuModel
+
+BLOCK_EPOCHS = 20
+"""Epochs in a mean at most: a slow change of a regressor is not lost in it."""
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Where the stops are; cycles are half-open ranges.
+
+    Attributes
+    ----------
+    stop_first, stop_last : ndarray of int, shape (k,)
+        Cycles of each stop: consecutive epochs that the phases call used.
+    block_first, block_last, block_stop : ndarray of int, shape (b,)
+        Blocks of rest, and the stop of each.
+    """
+
+    stop_first: Ints
+    stop_last: Ints
+    block_first: Ints
+    block_last: Ints
+    block_stop: Ints
+
+
+def layout(prepared: PreparedData) -> Layout:
+    """Cut the used epochs into stops and blocks."""
+    used = np.flatnonzero(prepared.phases.used)
+    starts = np.flatnonzero(np.diff(used, prepend=-2) != 1)
+    ends = np.append(starts[1:], len(used))
+    first, last = prepared.epochs.first, prepared.epochs.last
+    blocks = [
+        (k, used[i], used[min(i + BLOCK_EPOCHS, b) - 1])
+        for k, (a, b) in enumerate(zip(starts, ends, strict=True))
+        for i in range(a, b, BLOCK_EPOCHS)
+    ]
+    stop, begin, end = (np.array(column, dtype=np.int64) for column in zip(*blocks, strict=True))
+    return Layout(first[used[starts]], last[used[ends - 1]], first[begin], last[end], stop)
+
+
+@dataclass(frozen=True)
+class Rest:
+    """Means over the blocks of rest.
+
+    Attributes
+    ----------
+    seconds : ndarray, shape (b,)
+    mean : ndarray, shape (b, 6)
+        Rate (rad/s) and force (m/s^2) as measured.
+    design : ndarray, shape (b, 6, p)
+        Change of the means per unit of each coefficient.
+    """
+
+    seconds: Floats
+    mean: Floats
+    design: Floats
+
+
+def rest_means(prepared: PreparedData, where: Layout, model: ImuModel, values: Floats) -> Rest:
+    """Take means over the blocks; `values` (n, m) are the regressors of every cycle."""
+    c = prepared.cycles
+    integrals = np.hstack([c.dt[:, None], c.alpha, c.upsilon, values * c.dt[:, None]])
+    total = np.vstack([np.zeros(integrals.shape[1]), np.cumsum(integrals, axis=0)])
+    block = total[where.block_last] - total[where.block_first]
+    seconds = block[:, 0]
+    design = np.zeros((len(seconds), 6, len(model.prior)))
+    for column, (channel, parameter) in enumerate(zip(model.channel, model.parameter, strict=True)):
+        design[:, channel, parameter] += block[:, 7 + column] / seconds
+    return Rest(seconds, block[:, 1:7] / seconds[:, None], design)

@@ -1,0 +1,198 @@
+"""What the batch estimator integrates over a motion from rest to rest, and its linear response (preintegration)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from sdimu_calibration.core import earth
+from sdimu_calibration.core.alignment.prepared import PreparedData
+from sdimu_calibration.core.arrays import Floats
+from sdimu_calibration.core.compiled import compiled
+from sdimu_calibration.core.data.gaps import GAP_SHARE
+from sdimu_calibration.core.effects.imu_model import ImuModel
+from sdimu_calibration.core.navigation.strapdown import navigate_cycle, velocity_increment
+from sdimu_calibration.core.rotation import rotation_matrix, skew
+
+
+@dataclass(frozen=True)
+class Preintegration:
+    """What the IMU integrates over one motion from rest to rest, starting at attitude C with velocity zero.
+
+    Attributes
+    ----------
+    C_nb : ndarray, shape (3, 3)
+        At the end.
+    moved : ndarray, shape (6,)
+        Velocity (m/s) and change of position (m), N, E, D.
+    seconds : float
+    by_attitude : ndarray, shape (9, 3)
+        Change of attitude, velocity, position at the end per small turn (in n) at the start.
+    by_coefficient : ndarray, shape (9, p)
+        Per unit of each coefficient taken out of the samples.
+    noise : ndarray, shape (9, 9)
+        Covariance that white sensor noise leaves in attitude, velocity and position.
+    """
+
+    C_nb: Floats
+    moved: Floats
+    seconds: float
+    by_attitude: Floats
+    by_coefficient: Floats
+    noise: Floats
+
+
+@compiled
+def _navigate(
+    C_nb: Floats, dt: Floats, alpha: Floats, upsilon: Floats, coning: Floats, sculling: Floats,
+    latitude: float, height: float, gravity_excess: float,
+) -> tuple[Floats, Floats]:  # fmt: skip
+    """Attitude before each cycle and after the last (n + 1, 3, 3); velocity and displacement at the end (6,)."""
+    n = dt.shape[0]
+    track = np.empty((n + 1, 3, 3))
+    velocity = np.zeros(3)
+    position = np.zeros(3)
+    position[0], position[2] = latitude, height
+    for k in range(n):
+        track[k] = C_nb
+        dv = velocity_increment(alpha[k], upsilon[k], sculling[k])
+        gravity = earth.normal_gravity(position[0], position[2]) + gravity_excess
+        navigate_cycle(C_nb, velocity, position, alpha[k] + coning[k], dv, dt[k], gravity)
+    track[n] = C_nb
+    r_n, r_e = earth.radii(latitude)
+    moved = np.empty(6)
+    moved[:3] = velocity
+    moved[3] = (position[0] - latitude) * (r_n + height)
+    moved[4] = position[1] * (r_e + height) * np.cos(min(abs(latitude), earth.POLE_LIMIT))
+    moved[5] = height - position[2]
+    return track, moved
+
+
+def preintegrate(
+    prepared: PreparedData, rows: slice, model: ImuModel, values: Floats, slope: Floats,
+    coefficients: Floats, C_nb: Floats,
+    latitude: float, height: float, gravity_excess: float, densities: tuple[float, float],
+) -> Preintegration:  # fmt: skip
+    """Integrate one motion and linearise it.
+
+    The linear responses are taken in the frame that does not turn and meets n at the end of the motion, where
+    attitude errors stand still and velocity errors grow by their product with the force and by the gradient of gravity.
+
+    Parameters
+    ----------
+    prepared : PreparedData
+    rows : slice
+        Cycles of the motion.
+    model : ImuModel
+    values : ndarray, shape (n, m)
+        Regressors of all cycles.
+    slope : ndarray, shape (rows, 6, 6)
+        `error_slope` of the cycles of the motion.
+    coefficients : ndarray, shape (p,)
+        Taken out of the samples.
+    C_nb : ndarray, shape (3, 3)
+        Attitude at the start.
+    latitude, height, gravity_excess : float
+        Site (rad, m), gravity beyond normal (m/s^2).
+    densities : tuple of float
+        White noise of gyros and accelerometers (power).
+    """
+    c = prepared.cycles[rows]
+    own = values[rows]
+    error = model.errors(own, coefficients) * c.dt[:, None]
+    alpha, upsilon = c.alpha - error[:, :3], c.upsilon - error[:, 3:]
+    track, moved = _navigate(C_nb.copy(), c.dt, alpha, upsilon, c.coning, c.sculling, latitude, height, gravity_excess)
+    left = np.cumsum(c.dt[::-1])[::-1] - 0.5 * c.dt
+    still = _not_turning(0.5 * (track[:-1] + track[1:]), left, latitude)
+    dv = np.einsum("kij,kj->ki", still, upsilon)
+    # What is still to come after each cycle: velocity, and the displacement that it makes.
+    velocity = np.cumsum(dv[::-1], axis=0)[::-1] - 0.5 * dv
+    # An increment displaces by the time after itself, not by the time since the cycle: they differ as n turns.
+    part = dv * left[:, None]
+    position = np.cumsum(part[::-1], axis=0)[::-1] - 0.5 * part
+    by_angle, by_push = _transfers(velocity, position, left)
+    turn = rotation_matrix(-float(c.dt.sum()) * earth.earth_rate(latitude))
+    whole = np.vstack([np.eye(3), -skew(dv.sum(axis=0)), -skew(part.sum(axis=0))])
+    _pulled(by_angle, by_push, whole, dv, left, latitude, height)
+    for response in (by_angle, by_push, whole):
+        _over_the_earth(response, latitude, height)
+    # A sample is (1 + slope) times the truth and more, so what is taken out of it weighs 1 / (1 + slope).
+    in_n = np.zeros((len(own), 6, 6))
+    in_n[:, :3, :3] = in_n[:, 3:, 3:] = still
+    weight = np.concatenate([by_angle, by_push], axis=2) @ in_n @ np.linalg.inv(np.eye(6) + slope)
+    coefficient = np.zeros((9, len(model.prior)))
+    for column, (channel, parameter) in enumerate(zip(model.channel, model.parameter, strict=True)):
+        coefficient[:, parameter] -= (own[:, column] * c.dt) @ weight[:, :, channel]
+    noise = densities[0] * np.einsum("kij,klj,k->il", by_angle, by_angle, c.dt)
+    noise += densities[1] * np.einsum("kij,klj,k->il", by_push, by_push, c.dt)
+    noise[range(3), range(3)] += np.sum((GAP_SHARE * c.gap_angle) ** 2)
+    seconds = float(c.dt.sum())
+    return Preintegration(track[-1], moved, seconds, whole @ turn, coefficient, noise)
+
+
+def _pulled(
+    by_angle: Floats, by_push: Floats, whole: Floats, dv: Floats, left: Floats, latitude: float, height: float
+) -> None:
+    """Add to the responses, in place, that gravity changes with the displacement: to first order in its gradient.
+
+    A push displaces by the time after it, so gravity adds its gradient times left^2 / 2 to the velocity and left^3 / 6
+    to the position; what a small turn makes of later increments `dv` (n, 3) goes the same way.
+    """
+    r_n, r_e = earth.radii(latitude)
+    stiffness = earth.normal_gravity(latitude, height) / (np.sqrt(r_n * r_e) + height)
+    gradient = np.diag([-stiffness, -stiffness, 2.0 * stiffness])
+    for row, power in ((3, left**2 / 2.0), (6, left**3 / 6.0)):
+        part = dv * power[:, None]
+        after = np.cumsum(part[::-1], axis=0)[::-1] - 0.5 * part
+        by_push[:, row : row + 3] += power[:, None, None] * gradient
+        by_angle[:, row : row + 3] -= gradient @ _crosses(after)
+        whole[row : row + 3] -= gradient @ skew(part.sum(axis=0))
+
+
+def _crosses(v: Floats) -> Floats:
+    """Cross product matrices of vectors (n, 3), shape (n, 3, 3)."""
+    out = np.zeros((len(v), 3, 3))
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        out[:, i, j], out[:, i, k] = -v[:, k], v[:, j]
+    return out
+
+
+def _over_the_earth(response: Floats, latitude: float, height: float) -> None:
+    """Take responses (..., 9, 3) at the end of a motion from the frame that does not turn to n, in place.
+
+    Velocity over the Earth is less by what the Earth carries along; and n is that of the place navigated to, so that a
+    displacement tilts it.
+    """
+    at = min(max(latitude, -earth.POLE_LIMIT), earth.POLE_LIMIT)
+    r_n, r_e = earth.radii(at)
+    tilt = np.zeros((3, 3))
+    tilt[0, 1], tilt[1, 0], tilt[2, 1] = 1.0 / (r_e + height), -1.0 / (r_n + height), -np.tan(at) / (r_e + height)
+    response[..., 3:6, :] -= skew(earth.earth_rate(latitude)) @ response[..., 6:9, :]
+    response[..., 0:3, :] -= tilt @ response[..., 6:9, :]
+
+
+def _not_turning(C_nb: Floats, left: Floats, latitude: float) -> Floats:
+    """Attitudes (n, 3, 3) in the frame that does not turn and meets n after `left` (n,) seconds.
+
+    To first order in Earth rate times time, which is 1e-2 for minutes.
+    """
+    w = earth.earth_rate(latitude)
+    return np.asarray(C_nb - left[:, None, None] * (skew(w) @ C_nb))
+
+
+def _transfers(velocity: Floats, position: Floats, left: Floats) -> tuple[Floats, Floats]:
+    """Attitude, velocity and position at the end per small turn and per push in each cycle, (n, 9, 3) each.
+
+    `velocity`, `position` (n, 3): what the force makes after the cycle; `left` (n,): time after it.
+    """
+    n = len(left)
+    by_angle, by_push = np.zeros((n, 9, 3)), np.zeros((n, 9, 3))
+    by_angle[:, 0:3], by_push[:, 3:6] = np.eye(3), np.eye(3)
+    by_push[:, 6:9] = left[:, None, None] * np.eye(3)
+    for row, first in ((velocity, 3), (position, 6)):
+        for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+            # psi x s = -[s x] psi
+            by_angle[:, first + i, j] = row[:, k]
+            by_angle[:, first + i, k] = -row[:, j]
+    return by_angle, by_push

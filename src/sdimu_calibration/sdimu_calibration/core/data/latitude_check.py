@@ -1,0 +1,144 @@
+"""The place as the data see it: the Earth's rate along the vertical gives the latitude, the force its gravity.
+
+At rest a gyro triad with bias b shows omega = b + C_bn omega_ie, and the accelerometers the upward direction u in the
+same axes. So u . omega = u . b + Omega sin(latitude): one line a stop in four unknowns, whatever the attitudes, which
+must not all lie on one cone. No azimuth is needed, and scale factors of percents change nothing that matters.
+
+Source: Groves, *Principles of GNSS, Inertial, and Multisensor Integrated Navigation Systems*, 2nd ed., section 2.4.1.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from sdimu_calibration.core import earth
+from sdimu_calibration.core.arrays import Floats, Ints
+from sdimu_calibration.core.data.windows import Windows, cut_windows
+from sdimu_calibration.core.specification import ImuSpecification, Site
+from sdimu_calibration.core.units import STANDARD_GRAVITY
+
+_FEWEST_STOPS = 6
+"""Four unknowns, and two stops more to see how well they fit."""
+_SEEN = 0.15
+"""The Earth's rate is seen when its vertical part is known to this share of it."""
+_SIGMAS = 4.0
+"""A place contradicts the data beyond so many sigma."""
+@dataclass(frozen=True)
+class EarthRate:
+    """What the rests say of the place.
+
+    Attributes
+    ----------
+    up_rate, up_sigma : float
+        Earth's rate along the measured upward force, and its one sigma (rad/s); NaN and inf when it is not seen.
+    gravity, gravity_sigma : float
+        Median of |f| at rest and what bias and scale factor may do to it (m/s^2).
+    stops : int
+        Rests that were used.
+    """
+
+    up_rate: float
+    up_sigma: float
+    gravity: float
+    gravity_sigma: float
+    stops: int
+
+    @property
+    def seen(self) -> bool:
+        """Whether the Earth's rate stands out."""
+        return self.up_sigma < _SEEN * earth.RATE
+
+    @property
+    def latitude(self) -> tuple[float, float]:
+        """Latitude and its one sigma (rad), when the force points up."""
+        sine = float(np.clip(self.up_rate / earth.RATE, -1.0, 1.0))
+        # Near the poles the sine says little: never claim more than its sigma allows at its far end.
+        cosine = float(np.sqrt(max(1.0 - sine**2, 2.0 * self.up_sigma / earth.RATE)))
+        return float(np.arcsin(sine)), self.up_sigma / earth.RATE / cosine
+
+
+def observe_earth_rate(t: Floats, omega_ib_b: Floats, f_ib_b: Floats, imu: ImuSpecification) -> EarthRate | None:
+    """Look for the Earth's rate and gravity in the rests.
+
+    Parameters
+    ----------
+    t : ndarray, shape (n,)
+        Seconds, ascending.
+    omega_ib_b, f_ib_b : ndarray, shape (n, 3)
+        rad/s, m/s^2.
+    imu : ImuSpecification
+        Its priors say what else than the Earth may be in the numbers.
+
+    Returns
+    -------
+    EarthRate or None
+        None when there are no rests.
+    """
+    windows = cut_windows(t, omega_ib_b, f_ib_b)
+    rests = _rests(windows)
+    if not rests:
+        return None
+    mean = np.array([[*windows.w_mean[r].mean(axis=0), *windows.f_mean[r].mean(axis=0)] for r in rests])
+    prior = imu.prior
+    force = np.linalg.norm(mean[:, 3:], axis=1)
+    gravity_sigma = np.hypot(prior.get("accel_bias", 0.0), STANDARD_GRAVITY * prior.get("accel_scale", 0.0))
+    up_rate, up_sigma = _vertical_rate(mean[:, :3], mean[:, 3:] / force[:, None], prior.get("gyro_mass_unbalance", 0.0))
+    return EarthRate(up_rate, up_sigma, float(np.median(force)), float(gravity_sigma), len(rests))
+
+
+def contradictions(seen: EarthRate, site: Site) -> tuple[str, ...]:
+    """Say in what a stated place is not where the data were taken, one line each."""
+    lines = []
+    expected = earth.RATE * np.sin(site.latitude_rad)
+    if seen.seen and abs(seen.up_rate - expected) > _SIGMAS * seen.up_sigma:
+        latitude, sigma = np.degrees(seen.latitude)
+        lines.append(
+            f"the Earth's rate in the data is that of latitude {latitude:.1f} +- {sigma:.1f} deg, the site is at "
+            f"{np.degrees(site.latitude_rad):.1f} deg: check --site"
+            + (", or the sign of the force (--accel-sign -1 would fit)" if reversed_force(seen, site) else "")
+        )
+    gravity = site.gravity_m_s2 or float(earth.normal_gravity(site.latitude_rad, site.height_m))
+    if abs(seen.gravity - gravity) > _SIGMAS * seen.gravity_sigma:
+        lines.append(
+            f"|f| at rest is {seen.gravity:.4f} m/s^2, gravity at the site {gravity:.4f}: more apart than the IMU's "
+            "specification allows; check --site (latitude, height) and --imu"
+        )
+    return tuple(lines)
+
+
+def reversed_force(seen: EarthRate, site: Site) -> bool:
+    """Whether the Earth turns the other way about the measured force: its negative was recorded.
+
+    Decided only where the latitude that was stated fits then, and does not as it stands.
+    """
+    expected = earth.RATE * float(np.sin(site.latitude_rad))
+    as_is, other = (abs(sign * seen.up_rate - expected) / seen.up_sigma for sign in (1.0, -1.0))
+    return bool(seen.seen and as_is > _SIGMAS and other < _SIGMAS)
+
+
+def _rests(windows: Windows) -> list[Ints]:
+    """Windows of each rest: three or more in a row, without the first and the last, where motion may begin or end."""
+    still = windows.still
+    joined = np.concatenate([[True], np.diff(windows.first) > windows.length])[: len(still)]
+    number = np.cumsum(joined | np.concatenate([[True], np.diff(still.astype(np.int64)) != 0])[: len(still)])
+    runs = [np.flatnonzero(still & (number == k)) for k in np.unique(number[still])]
+    return [run[1:-1] for run in runs if len(run) > 2]
+
+
+def _vertical_rate(w: Floats, up: Floats, unbalance: float) -> tuple[float, float]:
+    """Least squares of u . omega = u . b + c: c and its sigma; NaN and inf when the stops cannot tell.
+
+    Mass unbalance along the input axes adds the mean of three of its coefficients to c: it is no noise.
+    """
+    if len(w) < _FEWEST_STOPS:
+        return float("nan"), float("inf")
+    design = np.column_stack([up, np.ones(len(up))])
+    y = np.sum(w * up, axis=1)
+    if np.linalg.matrix_rank(design, tol=1e-2) < 4:
+        return float("nan"), float("inf")
+    x, *_ = np.linalg.lstsq(design, y)
+    scatter = float(np.sum((y - design @ x) ** 2)) / (len(y) - 4)
+    variance = scatter * float(np.linalg.inv(design.T @ design)[3, 3]) + unbalance**2 / 3.0
+    return float(x[3]), float(np.sqrt(variance))

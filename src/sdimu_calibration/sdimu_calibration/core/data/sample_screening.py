@@ -1,0 +1,260 @@
+"""Samples that are no measurement: a number that stands still, a reading at the stop of its range, a single spike.
+
+Such a sample is taken away, as if it had been lost: what the gap means is then decided in one place (`gaps`). Each test
+is a probability under continuous noise, learned from the channel itself, so that no IMU needs limits of its own:
+fewer than one sound test in a thousand loses a sample to it. Channels whose counts are coarser than their
+noise repeat numbers by nature; for them a run must be as long as their own repetitions make improbable.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from sdimu_calibration.core.arrays import Bools, Floats, Ints
+from sdimu_calibration.core.recording import DataFault, Recording
+
+CHANNELS = tuple(f"{triad} {axis}" for triad in ("gyro", "accelerometer") for axis in "xyz")
+_FALSE_ALARM = 1e-3
+"""Sound tests with a false alarm, a channel."""
+_BLOCK = 500
+"""Samples over which the share of repeated numbers is counted."""
+_REPEATS = 0.5
+"""Share of repeated numbers from which a channel says nothing of being stuck: no noise, or far too coarse."""
+_LEAST_AT_END = 3
+"""So many readings at the very largest number are no chance in continuous noise."""
+_PERFECT = 1e-7
+"""Noise against the largest reading; a navigation-grade gyro on a table has 5e-6."""
+_SPIKE = 8.0
+"""Second differences beyond so many sigma: 6.2 would do for a million Gaussian samples."""
+_ALONE = 0.25
+"""A spike stands out of its surroundings, the second differences nearby, by at least the inverse of this."""
+_AROUND = np.r_[-12:-2, 3:13]
+_OF_ANOTHER = 3
+"""Second differences that another spike nearby makes large; a shock or a shaking table makes more of them so."""
+_ROUNDS = 4
+_WINDOW = 20
+"""Samples over which the roughness of a channel is taken, by the median: a corner of the motion is one sample."""
+_WILD = 4.0
+"""Times the usual roughness; medians of twenty reach 2.2 in an hour of white noise."""
+_RARE = 0.02
+"""A larger share of rough windows is how this recording is (a table that shakes in turns), and no fault."""
+_GAUSS_MAD = 1.482602218505602
+
+
+def sound(recording: Recording) -> tuple[Recording, tuple[DataFault, ...]]:
+    """Take away the samples that are no measurement.
+
+    Parameters
+    ----------
+    recording : Recording
+        In the order of its stamps.
+
+    Returns
+    -------
+    recording : Recording
+        The same object when nothing is wrong.
+    faults : tuple of DataFault
+    """
+    bad = np.zeros(len(recording.t), dtype=bool)
+    found: dict[str, list[tuple[str, Ints]]] = {}
+    for name, x in zip(CHANNELS, (*recording.omega_ib_b.T, *recording.f_ib_b.T), strict=True):
+        if _noiseless(x):
+            continue
+        for kind, test in _TESTS.items():
+            rows = test(x)
+            if len(rows):
+                found.setdefault(kind, []).append((name, rows))
+                bad[rows] = True
+    faults = tuple(_told(kind, where, recording.t) for kind, where in found.items())
+    if not bad.any():
+        return recording, ()
+    keep = ~bad
+    mended = replace(
+        recording, t=recording.t[keep], omega_ib_b=recording.omega_ib_b[keep], f_ib_b=recording.f_ib_b[keep],
+        rejected=recording.rejected + int(bad.sum()),
+    )  # fmt: skip
+    return mended, faults
+
+
+_TEXT = {
+    "stuck": ("shows one number", "show one number"),
+    "saturated": ("stands at the end of its range", "stand at the end of their range"),
+    "spike": ("jumps away and back", "jump away and back"),
+}
+
+
+def _told(kind: str, where: list[tuple[str, Ints]], t: Floats) -> DataFault:
+    """One line for a fault of any number of channels."""
+    rows = np.unique(np.concatenate([at for _name, at in where]))
+    first, last = float(t[rows[0]]), float(t[rows[-1]])
+    places = f"{first:.1f} s" if last - first < 1.0 else f"{first:.1f} to {last:.1f} s"
+    names = [name for name, _at in where]
+    who = " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
+    line = f"{who} {_TEXT[kind][len(names) > 1]} in {len(rows)} samples ({places}); they count as missing"
+    return DataFault(kind, line, len(rows), first, last)
+
+
+def _repetition(same: Bools) -> float:
+    """Share of samples that repeat the one before, blind to stretches that are stuck: a median over blocks."""
+    whole = len(same) // _BLOCK
+    if whole < 3:
+        return float(same.mean()) if len(same) else 1.0
+    return float(np.median(same[: whole * _BLOCK].reshape(whole, _BLOCK).mean(axis=1)))
+
+
+def _runs(same: Bools) -> tuple[Ints, Ints]:
+    """First sample and length of every run of equal numbers of two samples or more."""
+    edge = np.diff(np.concatenate([[0], same.view(np.int8), [0]]))
+    first = np.flatnonzero(edge == 1)
+    return first, np.flatnonzero(edge == -1) - first + 1
+
+
+def _stuck(x: Floats) -> Ints:
+    """Find runs of one number that are too long for the channel."""
+    none = np.empty(0, dtype=np.int64)
+    n = len(x)
+    same = np.diff(x) == 0.0
+    if n < 3 or not same.any():
+        return none
+    share = max(_repetition(same), 1.0 / n)
+    if share > _REPEATS or _counts(x):
+        return none
+    # n chances to begin, each further repetition as probable as `share`.
+    improbable = 1 + math.ceil(math.log(_FALSE_ALARM / n) / math.log(share))
+    first, length = _runs(same)
+    long = length >= max(improbable, 3)
+    # The first number of a run is a measurement, the others repeat it.
+    rows = [np.arange(f + 1, f + k) for f, k in zip(first[long], length[long], strict=True)]
+    return np.concatenate(rows) if rows else none
+
+
+def _counts(x: Floats) -> bool:
+    """Whether a channel counts pulses that are coarser than its noise.
+
+    A counter repeats a number for as long as its remainder takes to make one more pulse: its runs are no chance.
+    """
+    steps = np.abs(np.diff(x))
+    # Multiples of a pulse in floating point differ by rounding.
+    steps = steps[steps > _ROUNDING * float(np.abs(x).max())]
+    return bool(len(steps)) and float(np.mean(steps < 1.5 * steps.min())) > _REPEATS
+
+
+_ROUNDING = 1e-9
+
+
+def _saturated(x: Floats) -> Ints:
+    """Find readings that stand at the largest or smallest number of a channel that else repeats nothing."""
+    none = np.empty(0, dtype=np.int64)
+    if len(x) < 3 or _repetition(np.diff(x) == 0.0) > 1.0 / _BLOCK or _counts(x):
+        return none
+    ends = [np.flatnonzero(x == end) for end in (x.max(), x.min())]
+    rows = [at for at in ends if len(at) >= _LEAST_AT_END]
+    return np.sort(np.concatenate(rows)) if rows else none
+
+
+def _noiseless(x: Floats) -> bool:
+    """Whether a channel has no noise to speak of, as a perfect simulation: what repeats in it is no fault."""
+    if len(x) < 3:
+        return True
+    second = np.abs(x[1:-1] - 0.5 * (x[:-2] + x[2:]))
+    return float(np.median(second)) < _PERFECT * float(np.abs(x).max())
+
+
+def _spikes(x: Floats) -> Ints:
+    """Find one sample or two far from both neighbours, where these agree and little around is as rough."""
+    rows = np.arange(len(x))
+    if len(x) < 2 * _BLOCK:
+        return rows[:0]
+    # One spike may hide another beside it: what is left is looked through again.
+    for _round in range(_ROUNDS):
+        at = np.union1d(_stand_out(x[rows], 1), _stand_out(x[rows], 2))
+        if not len(at):
+            break
+        rows = np.delete(rows, at)
+    return np.setdiff1d(np.arange(len(x)), rows, assume_unique=True)
+
+
+def _stand_out(x: Floats, width: int) -> Ints:
+    """Find `width` neighbouring samples that all stand off the line between the samples before and after them."""
+    second = np.zeros_like(x)
+    second[1:-1] = x[1:-1] - 0.5 * (x[:-2] + x[2:])
+    size = np.abs(second)
+    sigma = _GAUSS_MAD * float(np.median(size))
+    if sigma == 0.0:
+        return np.empty(0, dtype=np.int64)
+    last = len(x) - width - 1
+    before, after = x[:last], x[width + 1 : width + 1 + last]
+    share = np.arange(1, width + 1) / (width + 1)
+    off = np.abs([x[j : j + last] - ((1.0 - s) * before + s * after) for j, s in enumerate(share, start=1)]).min(axis=0)
+    at = np.flatnonzero((off > _SPIKE * sigma) & (np.abs(after - before) < 0.5 * off))
+    beside = np.r_[_AROUND[_AROUND < 0], _AROUND[_AROUND > 0] + width - 1]
+    around = np.sort(size[np.clip(at[:, None] + 1 + beside, 0, len(x) - 1)], axis=1)[:, -1 - _OF_ANOTHER]
+    # The peak of a turn that never runs steady stands off as far as its flanks climb in a sample.
+    climb = np.abs(np.diff(x, prepend=x[0]))
+    slope = np.median(climb[np.clip(at[:, None] + 1 + beside, 0, len(x) - 1)], axis=1)
+    first = at[np.maximum(around, slope) * width < _ALONE * off[at]] + 1
+    return np.unique(first[:, None] + np.arange(width))
+
+
+_TESTS = {"stuck": _stuck, "saturated": _saturated, "spike": _spikes}
+
+
+def _medians(rows: Floats) -> Floats:
+    """Median of each row without what is not a number; 0 where that is most of it."""
+    known = np.isfinite(rows)
+    enough = known.sum(axis=1) >= rows.shape[1] // 2
+    out = np.zeros(len(rows))
+    out[enough] = np.nanmedian(rows[enough], axis=1)
+    return out
+
+
+def wild(recording: Recording) -> tuple[Floats, Floats, tuple[DataFault, ...]]:
+    """Find stretches in which a channel is much rougher than it is else: a loose contact, a disturbed line.
+
+    Their samples stay, because nobody knows that they are wrong, and weigh as much less as they are rougher.
+
+    Parameters
+    ----------
+    recording : Recording
+        Without spikes.
+
+    Returns
+    -------
+    t : ndarray, shape (k,)
+        Middle of each wild window (s).
+    excess : ndarray, shape (k,)
+        Variance of its noise beyond the usual one, over the usual one, times its length (s).
+    faults : tuple of DataFault
+    """
+    windows = len(recording.t) // _WINDOW
+    largest = np.ones(windows)
+    faults = []
+    # Across missing samples a difference of four is none.
+    uneven = np.ones(len(recording.t), dtype=bool)
+    uneven[2:-2] = np.abs(recording.t[4:] - recording.t[:-4] - 4.0 * recording.interval_s) > recording.interval_s / 2
+    middle = recording.t[_WINDOW // 2 :: _WINDOW][:windows]
+    for name, x in zip(CHANNELS, (*recording.omega_ib_b.T, *recording.f_ib_b.T), strict=True):
+        if _noiseless(x):
+            continue
+        # Gravity turns through a body in motion: its fourth difference is nothing beside noise, its second is not.
+        fourth = np.zeros_like(x)
+        fourth[2:-2] = x[:-4] - 4.0 * x[1:-3] + 6.0 * x[2:-2] - 4.0 * x[3:-1] + x[4:]
+        fourth[uneven] = np.nan
+        rough = _medians(np.abs(fourth[: windows * _WINDOW]).reshape(windows, _WINDOW))
+        usual = float(np.median(rough[rough > 0.0])) if rough.any() else 0.0
+        at = rough > _WILD * usual
+        if usual == 0.0 or not at.any() or at.mean() > _RARE:
+            continue
+        ratio = rough / usual
+        largest[at] = np.maximum(largest[at], ratio[at])
+        t = middle[at]
+        text = f"{name} is up to {ratio[at].max():.0f} times rougher than usual at {t[0]:.1f} s"
+        more = f" and {np.count_nonzero(np.diff(t) > 1.0)} times more" if np.any(np.diff(t) > 1.0) else ""
+        line = f"{text}{more}; it weighs less there"
+        faults.append(DataFault("wild", line, int(at.sum()) * _WINDOW, float(t[0]), float(t[-1])))
+    rows = largest > 1.0
+    excess = (largest[rows] ** 2 - 1.0) * _WINDOW * recording.interval_s
+    return middle[rows], excess, tuple(faults)

@@ -1,0 +1,126 @@
+"""Rests of an IMU that a hand moved: found from the samples alone, however short, with the noise learned from them.
+
+`phases` decides by the second and by what a table says; a hand rests for a second or five, nobody says when, and the
+specification of a cheap sensor is no measure of what its samples do. Here the quietest windows of the recording say
+what the noise is; a window is rest when its scatter is that noise and its mean rate is that of the other quiet windows.
+
+Source of the idea: Tedaldi, Pretto & Menegatti, "A robust and easy to implement method for IMU calibration without
+external equipments", ICRA 2014 (variance of the accelerometers against that of the first rest). Here both triads
+decide, no first rest is needed, and the mean rate is looked at, which a slow even turn does not hide.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from sdimu_calibration.core.arrays import Bools, Floats, Ints
+from sdimu_calibration.core.recording import DataError, Recording
+
+WINDOW_S = 0.3
+"""Length of a window (s): shorter than any rest worth having, longer than a swing of a trembling hand (0.1 s)."""
+SHORTEST_S = 0.4
+"""Shortest rest that is used (s), after half a window has been left out at both ends."""
+_QUIETEST = 0.1
+"""Share of all windows that is taken for rest when the noise is learned."""
+_SCATTER = 4.0
+"""Scatter (variance) of rest, as a multiple of that of the quietest windows."""
+_DRIFT = np.radians(1.0)
+"""Mean rates at rest may differ by so much (rad/s): what gravity and warmth do to the bias of a cheap gyro."""
+_BLOCK_S = 0.5
+"""Noise is learned from the differences of means over so much (s): slow enough for what a filter in the sensor does."""
+
+
+@dataclass(frozen=True)
+class StaticIntervals:
+    """Rests of a recording.
+
+    Attributes
+    ----------
+    first, last : ndarray of int, shape (k,)
+        Samples ``first:last`` of each.
+    gyro_white_noise, accel_white_noise : float
+        Densities learned at rest (rad/s/sqrt(Hz), m/s^2/sqrt(Hz)).
+    """
+
+    first: Ints
+    last: Ints
+    gyro_white_noise: float
+    accel_white_noise: float
+
+    def __len__(self) -> int:
+        """Return the number of rests."""
+        return len(self.first)
+
+
+def detect_static(recording: Recording) -> StaticIntervals:
+    """Find where the IMU rests.
+
+    Raises
+    ------
+    DataError
+        When the recording is shorter than a few windows, or never at rest.
+    """
+    dt = recording.interval_s
+    width = max(round(WINDOW_S / dt), 4)
+    if len(recording.t) < 10 * width:
+        raise DataError(f"/imu/data_raw: {recording.t[-1]:.1f} s are too short to find rests in")
+    mean, rate_scatter = _moving(recording.omega_ib_b, width)
+    _, force_scatter = _moving(recording.f_ib_b, width)
+    still = _like_the_quietest(rate_scatter, recording.omega_ib_b) & _like_the_quietest(force_scatter, recording.f_ib_b)
+    if still.any():
+        still &= np.max(np.abs(mean - np.median(mean[still], axis=0)), axis=1) < _DRIFT
+    # A hole in the samples is no rest: nobody saw what happened in it.
+    holes = np.convolve(np.diff(recording.t, prepend=0.0) > 3.0 * dt, np.ones(width), mode="same")[: len(still)] > 0
+    first, last = _runs(still & ~holes)
+    long = last - first >= max(round(SHORTEST_S / dt), 3)
+    if not long.any():
+        raise DataError("/imu/data_raw: no rest of half a second was found: put the IMU down between the turns")
+    first, last = first[long], last[long]
+    return StaticIntervals(
+        first, last, _density(recording.omega_ib_b, first, last, dt), _density(recording.f_ib_b, first, last, dt)
+    )
+
+
+def _moving(values: Floats, width: int) -> tuple[Floats, Floats]:
+    """Mean (n, 3) and summed variance (n,) over the window about each sample; infinite scatter near the ends."""
+    centred = values - np.median(values, axis=0)
+    total = np.vstack([np.zeros((1, 6)), np.cumsum(np.hstack([centred, centred**2]), axis=0)])
+    window = (total[width:] - total[:-width]) / width
+    mean = np.zeros_like(values)
+    scatter = np.full(len(values), np.inf)
+    at = slice(width // 2, width // 2 + len(window))
+    mean[at] = window[:, :3] + np.median(values, axis=0)
+    scatter[at] = np.sum(window[:, 3:] - window[:, :3] ** 2, axis=1)
+    return mean, scatter
+
+
+def _like_the_quietest(scatter: Floats, values: Floats) -> Bools:
+    """Windows that scatter as the quietest do, or less than the resolution of the sensor."""
+    steps = np.abs(np.diff(values, axis=0))
+    resolution = np.array([np.min(s[s > 0.0], initial=np.inf) for s in steps.T])
+    floor = float(np.sum(np.where(np.isfinite(resolution), resolution, 0.0) ** 2) / 12.0)
+    return np.asarray(scatter <= max(_SCATTER * float(np.quantile(scatter, _QUIETEST)), floor))
+
+
+def _runs(flags: Bools) -> tuple[Ints, Ints]:
+    """First of each run of True, and one after its last."""
+    edges = np.diff(np.concatenate([[0], flags.astype(np.int64), [0]]))
+    return np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
+
+
+def _density(values: Floats, first: Ints, last: Ints, dt: float) -> float:
+    """White-noise density of a triad from successive block means of the rests (two-sample variance)."""
+    width = max(round(_BLOCK_S / dt), 1)
+    squares, count = 0.0, 0
+    for a, b in zip(first, last, strict=True):
+        blocks = (b - a) // width
+        if blocks > 1:
+            means = values[a : a + blocks * width].reshape(blocks, width, 3).mean(axis=1)
+            squares += float(np.sum(np.diff(means, axis=0) ** 2))
+            count += 3 * (blocks - 1)
+    if count >= 30:
+        return float(np.sqrt(0.5 * squares / count * width * dt))
+    within = [np.var(values[a:b], axis=0, ddof=1) for a, b in zip(first, last, strict=True)]
+    return float(np.sqrt(np.mean(within) * dt))

@@ -1,0 +1,72 @@
+"""What hangs on a choice that the data cannot make: coefficients that differ between the members of a class."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from sdimu_calibration.core.diagnosis.linear import E
+from sdimu_calibration.core.diagnosis.search import Problem
+
+_MATTERS = 3.0
+"""A coefficient that differs by less than this many of its sigmas is right enough whichever member it is."""
+
+
+@dataclass(frozen=True)
+class CoefficientShift:
+    """The coefficient that differs most when another member of the class takes the place of the one that was named.
+
+    Attributes
+    ----------
+    other : str
+        Label of the other member.
+    coefficient : str
+    sigmas : float
+        Estimate with the other less estimate with the one that was named, in sigmas of the latter.
+    """
+
+    other: str
+    coefficient: str
+    sigmas: float
+
+
+def coefficient_shifts(
+    problem: Problem[E], chosen: Sequence[int], column: int, others: Sequence[int], scale: float
+) -> tuple[CoefficientShift, ...]:
+    """Exchange a chosen effect for every other member of its class and see what moves.
+
+    Both are least-squares estimates of the linear model about the calibration, priors included.
+
+    Parameters
+    ----------
+    problem : Problem
+    chosen : sequence of int
+        Columns of everything that was found.
+    column : int
+        The one of them that is exchanged.
+    others : sequence of int
+        Columns that the data cannot tell from it.
+    scale : float
+        Residual noise over specified noise.
+
+    Returns
+    -------
+    tuple of CoefficientShift
+        One for each member that moves a coefficient of the model by more than three of its sigmas.
+    """
+    p = problem.evidence.coefficients
+    names = problem.evidence.names
+    known, weight, _ = problem.known(chosen)
+    named, covariance = problem.evidence.information.estimate(known, weight)
+    sigma = scale * np.sqrt(np.diag(covariance)[:p])
+    out = []
+    for other in others:
+        known, weight, _ = problem.known([other if c == column else c for c in chosen])
+        estimate, _ = problem.evidence.information.estimate(known, weight)
+        moved = (estimate - named)[:p] / sigma
+        most = int(np.argmax(np.abs(moved)))
+        if abs(moved[most]) > _MATTERS:
+            out.append(CoefficientShift(names[other], names[known[most]], float(moved[most])))
+    return tuple(out)

@@ -1,0 +1,55 @@
+"""Is anything left that no candidate explains? Every dwell and every turn gets a sensor error of its own."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import chi2
+
+from sdimu_calibration.core.arrays import Floats, Ints
+from sdimu_calibration.core.diagnosis.information import Information
+
+_TESTABLE = 1e-2
+"""Directions of which the model leaves less than this share of the information (a tenth of the signature) are not
+tested."""
+
+
+@dataclass(frozen=True)
+class FreeInputTest:
+    """Free-input test.
+
+    Attributes
+    ----------
+    chi2 : float
+        Fall of chi-square when every segment has its own constant sensor error.
+    dof : int
+    p_value : float
+    estimate : ndarray, shape (f,)
+        The missing sensor error of each segment and sensor that fits best (minimum norm), SI.
+    z : ndarray, shape (f,)
+        Score of each alone.
+    """
+
+    chi2: float
+    dof: int
+    p_value: float
+    estimate: Floats
+    z: Floats
+
+
+def free_input_test(full: Information, known: Ints, weight: Floats, free: Ints, scale: float) -> FreeInputTest:
+    """Test the free inputs at `free` (f,) given the parameters at `known` (k,)."""
+    given = full.given(known, weight)
+    J, d = given.J[np.ix_(free, free)], given.d[free]
+    unit = 1.0 / np.sqrt(np.maximum(np.diag(full.J)[free], 1e-300))
+    values, vectors = np.linalg.eigh(J * np.outer(unit, unit))
+    keep = values > _TESTABLE
+    y = vectors[:, keep].T @ (unit * d)
+    fall = float(np.sum(y**2 / values[keep])) / scale**2
+    estimate = unit * (vectors[:, keep] @ (y / values[keep]))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        own = np.diag(J)
+        z = np.where(own > (0.02 / unit) ** 2, d / np.sqrt(own) / scale, 0.0)
+    dof = int(keep.sum())
+    return FreeInputTest(fall, dof, float(chi2.sf(fall, dof)), estimate, np.nan_to_num(z))

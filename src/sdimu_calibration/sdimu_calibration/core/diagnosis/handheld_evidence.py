@@ -1,0 +1,175 @@
+"""The linear model of a hand-held run about its fit: residuals of rests and turns, and how a missing effect would show.
+
+The rows are those of `handheld_fit`, whitened with the sigmas that it learned. Attitudes of the rests and the Earth's
+rate are parameters of the model like the coefficients, so that a candidate is scored with all of them estimated again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from sdimu_calibration.core.arrays import Floats, Ints
+from sdimu_calibration.core.diagnosis.candidates import Candidate
+from sdimu_calibration.core.diagnosis.linear import LinearEvidence
+from sdimu_calibration.core.effects.effect import Effect, Timetable
+from sdimu_calibration.core.effects.motion import Motion
+from sdimu_calibration.core.handheld.handheld_data import HandheldRun, Turns, seen_at_rest, turns
+from sdimu_calibration.core.handheld.handheld_fit import FitPriors, LinearisationPoint, equations, row_sigmas
+
+CHANNELS = (
+    "gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z", "turn_north", "turn_east", "turn_down",
+)  # fmt: skip
+"""What is measured: rate and force at each rest, and the way to it (the heading of north is arbitrary)."""
+_LARGEST = 30.0
+"""So many times what physics gives it an effect is never."""
+_ANY_ATTITUDE = 1.0
+"""Sigma of the prior of an attitude (rad): none, but an attitude whose rows are left out stays finite."""
+
+
+@dataclass(frozen=True)
+class HandheldEvidence(LinearEvidence):
+    """Evidence of a hand-held run; the model's parameters are its coefficients, the Earth's rate, attitudes.
+
+    Attributes
+    ----------
+    channel : ndarray of int, shape (N,)
+        Into `CHANNELS`.
+    known : int
+        How many of the parameters are coefficients.
+    run : HandheldRun
+    rests : Motion
+        What a perfect IMU sees at the rests.
+    gone : Turns
+    sigma : ndarray, shape (N,)
+        Of each row (SI; rad for turns).
+    """
+
+    channel: Ints
+    known: int
+    run: HandheldRun
+    rests: Motion
+    gone: Turns
+    sigma: Floats
+
+    @property
+    def coefficients(self) -> int:
+        """How many of the model's parameters are coefficients."""
+        return self.known
+
+    @property
+    def unpredictable(self) -> float:
+        """Without the way to a rest nothing says where it heads, and the last rest has no attitude at all."""
+        return 1e4
+
+    def signature(self, effects: Sequence[Effect]) -> Floats:
+        """Columns of all parameters of `effects`, shape (N, parameters)."""
+        if not effects:
+            return np.zeros((len(self.e), 0))
+        parts = [_signature(self.run, self.rests, self.gone, effect) for effect in effects]
+        W = np.hstack(parts) / self.sigma[:, None]
+        prior = np.concatenate([np.full(len(e.parameters), e.prior.get(self.grade, np.inf)) for e in effects])
+        # What only shows by the gyros' answer to a force that is wrong in a turn is not seen: no sensor is so bad.
+        seen = _LARGEST * prior * np.linalg.norm(W, axis=0) > 1.0
+        return np.where(seen, W, 0.0)
+
+
+def collect(
+    run: HandheldRun, scene: FitPriors, point: LinearisationPoint, effects: Sequence[Effect], grade: str
+) -> HandheldEvidence:
+    """Linearise about a finished fit.
+
+    Parameters
+    ----------
+    run, scene : HandheldRun, FitPriors
+    point : LinearisationPoint
+        Where the fit ended.
+    effects : sequence of Effect
+        Each of their parameters becomes a candidate.
+    grade : str
+        Of the IMU.
+    """
+    k, q = len(run.t), len(scene.kept)
+    rows, residual, kind = equations(run, scene, point)
+    sigma = row_sigmas(run, scene, kind, point.extra)
+    data = kind >= 0
+    attitude, coefficient, earth = np.split(rows[data], [3 * k, 3 * k + q], axis=1)
+    W = -np.hstack([coefficient, earth, attitude]) / sigma[data, None]
+    held = np.full(3 * k, _ANY_ATTITUDE**-2)
+    held[2] = float(np.sum(rows[-1] ** 2))
+    names = tuple(scene.model.names[i] for i in scene.kept)
+    begun = HandheldEvidence(
+        e=residual[data] / sigma[data], W=W,
+        stop=np.concatenate([np.repeat(np.arange(k), 6), np.repeat(np.arange(1, k), 3)]),
+        names=(*names, *(f"Earth rate {i}" for i in range(3)), *(f"attitude {i // 3} {i % 3}" for i in range(3 * k))),
+        weight=np.concatenate([1.0 / np.diag(scene.prior), scene.earth_sigma**-2, held]),
+        shift=np.concatenate([-point.coefficients[scene.kept], scene.earth_mean - point.earth, np.zeros(3 * k)]),
+        stated=np.concatenate([np.sqrt(np.diag(scene.prior)), scene.earth_sigma, held**-0.5]),
+        candidates=(), prior=np.zeros(0), grade=grade,
+        channel=np.concatenate([np.tile(np.arange(6), k), np.tile(np.arange(6, 9), k - 1)]), known=q,
+        run=run, rests=seen_at_rest(run, point.C_nb, point.earth, scene.gravity),
+        gone=turns(run, scene.model, point.coefficients, point.C_nb, scene.gravity), sigma=sigma[data],
+    )  # fmt: skip
+    return begun.with_effects(effects)
+
+
+def timetable(run: HandheldRun) -> Timetable:
+    """When the run rested and turned."""
+    start, end = run.t - 0.5 * run.seconds, run.t + 0.5 * run.seconds
+    rests = tuple((i, float(a), float(b)) for i, (a, b) in enumerate(zip(start, end, strict=True)))
+    ways = tuple((i, float(a), float(b)) for i, (a, b) in enumerate(zip(end[:-1], start[1:], strict=True)))
+    return Timetable(float(end[-1]), rests, ways)
+
+
+def _signature(run: HandheldRun, rests: Motion, gone: Turns, effect: Effect) -> Floats:
+    """Change of the measured rates, forces and ways per unit of an effect's parameters, shape (N, parameters)."""
+    count = len(effect.parameters)
+    values = effect.regressors(rests)
+    at_rest = np.zeros((len(run.t), 6, count))
+    for column, term in enumerate(effect.terms):
+        at_rest[:, term.channel, term.parameter] += values[:, column]
+    terms = [(term.channel, term.parameter) for term in effect.terms]
+    way = gone.by_parameter(run, effect.regressors(gone.seen), terms, count)
+    # A turn's residual is the next attitude less the way of the gyros, the change of which is `way`.
+    return np.vstack([at_rest.reshape(-1, count), way.reshape(-1, count)])
+
+
+def forget(about: HandheldEvidence, count: int, tried: Sequence[Candidate]) -> HandheldEvidence:
+    """Make candidates of the last `count` coefficients: as if the fit had not known them.
+
+    The residuals are those of a model that has them at their estimates; in the linear model they were larger by the
+    signature times the estimate without.
+    """
+    if not count:
+        return about
+    p, q = len(about.weight), about.known
+    gone, stays = np.arange(q - count, q), np.concatenate([np.arange(q - count), np.arange(q, p)])
+    estimate = -about.shift[gone]
+    order = np.concatenate([stays, gone, np.arange(p, len(about.names))])
+    # As every other candidate has it: the fit took what was added much wider.
+    prior = [c.effect.prior.get(about.grade, np.inf) for c in tried]
+    return replace(
+        about, e=about.e + about.W[:, gone] @ estimate, W=np.ascontiguousarray(about.W[:, order]),
+        names=(*(about.names[i] for i in stays), *(c.label for c in tried), *about.names[p:]),
+        weight=about.weight[stays], shift=about.shift[stays], stated=about.stated[stays],
+        candidates=(*tried, *about.candidates), prior=np.concatenate([prior, about.prior]),
+        known=q - count,
+    )  # fmt: skip
+
+
+def standardised(evidence: HandheldEvidence, chosen: Ints) -> Floats:
+    """Residual of every row over its own sigma, the model and `chosen` estimated; NaN where nothing is redundant."""
+    known = np.concatenate([evidence.model, chosen]).astype(np.int64)
+    weight = np.concatenate([evidence.weight, np.zeros(len(chosen))])
+    estimate, covariance = evidence.information.estimate(known, weight)
+    W = evidence.W[:, known]
+    free = 1.0 - np.einsum("ij,jk,ik->i", W, covariance, W)
+    left = evidence.e - W @ estimate
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.where(free > _REDUNDANT, left / np.sqrt(free), np.nan)
+
+
+_REDUNDANT = 1e-3
+"""Share of a row that the other rows check, below which its residual says nothing."""

@@ -1,0 +1,107 @@
+"""A model whose body frame is that of the accelerometers from the start, for errors of percents.
+
+Turning the body frame changes no measurement (`body_frame`). With errors of arcminutes the priors hold that free turn
+and nobody feels it. With errors of degrees it is the end of every iteration: the strong rows of the data cancel along
+the turn only as well as the derivatives are right, and what does not cancel outweighs the priors. So here the turn is
+no unknown: q_xy = q_xz = q_yx = 0 leave the model.
+
+What the turn takes along must be put back. Six of nine elements of the gyros' response to force are mass unbalance in
+the frame in which the sensor was built; in the turned frame the other three are products of unbalance and
+misalignment. They become parameters of that size, estimated and not reported, as the turned frame has no name for them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from sdimu_calibration.core.arrays import Floats, Ints
+from sdimu_calibration.core.effects import body_frame, imu_model, registry
+from sdimu_calibration.core.effects.effect import Effect
+from sdimu_calibration.core.effects.imu_model import ImuModel
+from sdimu_calibration.core.specification import ImuSpecification
+
+FRAME = "accelerometer_triad"
+_OUTSIDE = ("gyro_g_sensitivity_xz", "gyro_g_sensitivity_yz", "gyro_g_sensitivity_zx")
+"""Elements of the gyros' response to force that are no mass unbalance."""
+LARGE = 3e-3
+"""Prior of scale or misalignment from which errors count as large: its square is 9 ppm, the sigma of a good test."""
+
+
+@dataclass(frozen=True)
+class AccelerometerFrameModel:
+    """A model in the accelerometers' frame, and how its parameters lie in the model asked for.
+
+    Attributes
+    ----------
+    asked, inner : ImuModel
+        With p and q parameters.
+    place : ndarray of int, shape (p,)
+        Place of each parameter asked for among the inner ones; -1 for what is zero by definition.
+    """
+
+    asked: ImuModel
+    inner: ImuModel
+    place: Ints
+
+    def values(self, inner: Floats) -> Floats:
+        """Give the parameters asked for, shape (..., p), of inner ones, shape (..., q)."""
+        return np.asarray(np.where(self.place >= 0, inner[..., np.maximum(self.place, 0)], 0.0))
+
+    def covariance(self, inner: Floats) -> Floats:
+        """Give their covariance, shape (..., p, p)."""
+        at, known = np.maximum(self.place, 0), self.place >= 0
+        return np.asarray(inner[..., at[:, None], at] * np.outer(known, known))
+
+
+def squares_count(sensors: ImuModel) -> bool:
+    """Tell whether the specification lets errors be so large that their squares count."""
+    linear = [i for i, n in enumerate(sensors.names) if "_scale_" in n or "_misalignment_" in n]
+    return bool(linear) and float(np.max(sensors.prior[linear])) > LARGE
+
+
+def drifting(sensors: ImuModel, imu: ImuSpecification, gravity: float, duration: float) -> bool:
+    """Tell whether the gyros lose the attitude so far over the test that the square of that counts.
+
+    An attitude wrong by a shows gravity too small by g a^2 / 2. It counts when this, at three sigma of the gyros' white
+    noise over `duration` (s), exceeds three sigma of the mean force. Effects that change at random are left to the
+    ordinary passes: samples are corrected at constants here.
+    """
+    if ((sensors.decay_rate > 0) | (sensors.drive > 0)).any():
+        return False
+    attitude = 3.0 * imu.gyro_white_noise * float(np.sqrt(duration))
+    return bool(0.5 * gravity * attitude**2 > 3.0 * imu.accel_white_noise / float(np.sqrt(duration)))
+
+
+def accelerometer_frame_model(asked: ImuModel, imu: ImuSpecification) -> AccelerometerFrameModel | None:
+    """Put a model into the accelerometers' frame; None where it cannot turn because not all misalignments are in it."""
+    pinned = {f"accel_misalignment_{pair}" for pair in ("xy", "xz", "yx")}
+    if not pinned <= set(asked.names):
+        return None
+    effects: list[Effect] = []
+    for effect in asked.effects:
+        left = tuple(p.name for p in effect.parameters if p.name not in pinned)
+        if left:
+            effects.append(effect if len(left) == len(effect.parameters) else effect.only(left))
+    unbalance = [i for i, n in enumerate(asked.names) if n.startswith("gyro_mass_unbalance_d")]
+    outside = bool(unbalance) and not set(_OUTSIDE) & set(asked.names)
+    if outside:
+        effects.append(registry.get("gyro_g_sensitivity").only(_OUTSIDE))
+    inner = imu_model.build(effects, imu)
+    sizes = dict(zip(asked.names, _turned_prior(asked), strict=True))
+    if outside:
+        misalignment = asked.prior[asked.names.index("accel_misalignment_xy")]
+        sizes |= dict.fromkeys(_OUTSIDE, float(np.sqrt(2.0) * misalignment * np.max(asked.prior[unbalance])))
+    prior = np.array([sizes[name] for name in inner.names])
+    place = np.array([inner.names.index(n) if n in inner.names else -1 for n in asked.names])
+    return AccelerometerFrameModel(asked, replace(inner, prior=prior), place)
+
+
+def _turned_prior(asked: ImuModel) -> Floats:
+    """Sigma of each coefficient asked for, in the accelerometers' frame; their correlation is left out.
+
+    The data say a thousand times more than these priors, so that only their size matters.
+    """
+    J = body_frame.frame_jacobian(asked.names, FRAME)
+    return np.asarray(np.sqrt(np.diag(J @ np.diag(asked.prior**2) @ J.T)))

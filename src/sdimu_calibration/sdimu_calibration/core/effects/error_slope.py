@@ -1,0 +1,39 @@
+"""Change of the sensor errors with what the sensors see."""
+
+from __future__ import annotations
+
+from dataclasses import fields, replace
+
+import numpy as np
+
+from sdimu_calibration.core.arrays import Floats, Ints
+from sdimu_calibration.core.effects.imu_model import ImuModel
+from sdimu_calibration.core.effects.motion import Motion
+
+_STEP = (1e-9, 1e-6)
+"""Steps of rate (rad/s) and force (m/s^2) for derivatives: below every threshold of an effect."""
+
+
+def error_slope(model: ImuModel, seen: Motion, rows: slice | Ints, coefficients: Floats) -> Floats:
+    """Change of the sensor errors per change of what the sensors see, shape (rows, 6, 6).
+
+    With errors of percents it is percents too, and Gauss-Newton needs it: the three rotations of the body frame, which
+    only priors hold, feel every inconsistency between the derivatives.
+    """
+    at = _at(seen, rows)
+    before = model.errors(model.regressors(at), coefficients)
+    slope = np.empty((len(before), 6, 6))
+    moving = np.where(at.rest, 0.0, 1.0)[:, None]
+    for i in range(6):
+        step = np.zeros(6)
+        step[i] = _STEP[i // 3]
+        moved = replace(at, w=at.w + step[:3], f=at.f + step[3:], w_table=at.w_table + moving * step[:3])
+        slope[:, :, i] = (model.errors(model.regressors(moved), coefficients) - before) / step[i]
+    return slope
+
+
+def _at(seen: Motion, rows: slice | Ints) -> Motion:
+    """Rows of a motion."""
+    n = len(seen.t)
+    columns = {f.name: getattr(seen, f.name) for f in fields(seen)}
+    return Motion(**{name: v[rows] if len(v) == n else v for name, v in columns.items()})

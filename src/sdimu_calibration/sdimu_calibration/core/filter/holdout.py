@@ -1,0 +1,138 @@
+"""Stretches of a recording that are kept from a fit, so that it can be tried on what it has not seen.
+
+Only stretches at the start and at the end can be left out: the first position after a stretch in between would tell
+the fit what the samples in it add up to.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+
+from sdimu_calibration.core.alignment.prepared import PreparedData
+from sdimu_calibration.core.arrays import Bools, Floats
+from sdimu_calibration.core.data.epochs import Epochs
+from sdimu_calibration.core.data.gaps import Bridges
+from sdimu_calibration.core.data.phases import Phases
+from sdimu_calibration.core.recording import DataError
+
+WANTED_S = 600.0
+"""Length of the navigation (s)."""
+LEAST_S = 60.0
+"""A shorter one says nothing."""
+LEVEL_S = 100.0
+"""At most this much of the dwell before it levels (s)."""
+_LEAST_LEVEL_S = 10.0
+_KEPT = 0.5
+"""The fit keeps at least this share of the recording."""
+
+
+@dataclass(frozen=True)
+class Segment:
+    """A part of a recording that the fit does not see, as indices of epochs.
+
+    Attributes
+    ----------
+    place : str
+        ``end`` or ``start``.
+    first : int
+        First epoch of the dwell that levels.
+    start, last : int
+        First epoch that is navigated, and one after the last.
+    seen : tuple of int
+        First epoch of the fit, and one after its last.
+    begin_s, levelled_s, length_s : float
+        Begin of navigation, length of levelling and of navigation.
+    """
+
+    place: str
+    first: int
+    start: int
+    last: int
+    seen: tuple[int, int]
+    begin_s: float
+    levelled_s: float
+    length_s: float
+
+
+def holdout_segments(prepared: PreparedData, wanted_s: float = WANTED_S) -> tuple[Segment, ...]:
+    """Choose what to keep from the fit: `wanted_s` of navigation after a dwell, at the end and at the start.
+
+    Of a recording too short for that, the longest stretches that leave half of it to the fit.
+
+    Raises
+    ------
+    DataError
+        When no stretch of `LEAST_S` begins with a dwell.
+    """
+    used, epochs = prepared.phases.used, prepared.epochs
+    index = np.arange(len(used))
+    begun = np.maximum.accumulate(np.where(used, -1, index)) + 1
+    rested = np.where(used, epochs.end - epochs.start[np.minimum(begun, len(used) - 1)], 0.0)
+    level = np.minimum(rested, LEVEL_S)
+    # Where a dwell ends, or has lasted long enough.
+    ready = (rested >= _LEAST_LEVEL_S) & (np.append(~used[1:], True) | (rested >= LEVEL_S - 1e-6))
+    found = [s for s in (_at_end(prepared, ready, level, wanted_s), _at_start(prepared, ready, level, wanted_s)) if s]
+    if not found:
+        raise DataError(
+            f"the recording is too short to keep {LEAST_S:.0f} s after a dwell from the fit and leave half of it"
+        )
+    return tuple(found)
+
+
+def _at_end(prepared: PreparedData, ready: Bools, level: Floats, wanted_s: float) -> Segment | None:
+    end = prepared.epochs.end
+    fits = ready & (end - level >= _KEPT * end[-1])
+    late = np.flatnonzero(fits & (end <= end[-1] - wanted_s + 1e-6))
+    if not fits.any():
+        return None
+    at = int(late[-1] if len(late) else np.flatnonzero(fits)[0])
+    last = int(np.searchsorted(end, end[at] + wanted_s + 1e-6, side="right"))
+    first = _level_from(prepared, at, level)
+    return _stretch("end", prepared, first, at, last, (0, first))
+
+
+def _at_start(prepared: PreparedData, ready: Bools, level: Floats, wanted_s: float) -> Segment | None:
+    epochs, used = prepared.epochs, prepared.phases.used
+    if not ready.any():
+        return None
+    at = int(np.argmax(ready))
+    # The fit starts in a dwell: there it finds its attitude.
+    resumes = np.flatnonzero(used & (epochs.start <= (1.0 - _KEPT) * epochs.end[-1]))
+    resumes = resumes[resumes > at]
+    if not len(resumes):
+        return None
+    after = np.flatnonzero(epochs.start[resumes] >= epochs.end[at] + wanted_s - 1e-6)
+    resume = int(resumes[after[0]] if len(after) else resumes[-1])
+    last = min(resume, int(np.searchsorted(epochs.end, epochs.end[at] + wanted_s + 1e-6, side="right")))
+    return _stretch("start", prepared, _level_from(prepared, at, level), at, last, (resume, len(epochs)))
+
+
+def _level_from(prepared: PreparedData, at: int, level: Floats) -> int:
+    return int(np.searchsorted(prepared.epochs.start, prepared.epochs.end[at] - level[at] - 1e-6))
+
+
+def _stretch(
+    place: str, prepared: PreparedData, first: int, at: int, last: int, seen: tuple[int, int]
+) -> Segment | None:
+    epochs = prepared.epochs
+    begin = float(epochs.end[at])
+    length = float(epochs.end[last - 1]) - begin
+    if length < LEAST_S:
+        return None
+    return Segment(place, first, at + 1, last, seen, begin, begin - float(epochs.start[first]), length)
+
+
+def part(prepared: PreparedData, first: int, last: int) -> PreparedData:
+    """Cut out epochs ``first:last`` with their cycles."""
+    epochs, rows = prepared.epochs, slice(first, last)
+    begin, end = int(epochs.first[first]), int(epochs.last[last - 1])
+    cut = {field.name: getattr(epochs, field.name)[rows] for field in fields(Epochs)}
+    cut |= {name: cut[name] - begin for name in ("first", "last")}
+    phases = Phases(*(getattr(prepared.phases, field.name)[rows] for field in fields(Phases)))
+    bridges = Bridges(*(getattr(prepared.bridges, field.name)[rows] for field in fields(Bridges)))
+    return replace(
+        prepared, cycles=prepared.cycles[begin:end], epochs=Epochs(**cut), phases=phases, kind=prepared.kind[rows],
+        bridges=bridges,
+    )  # fmt: skip

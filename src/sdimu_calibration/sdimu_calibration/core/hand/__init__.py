@@ -1,1 +1,0 @@
-"""Calibration by hand: many attitudes, no table, no place."""

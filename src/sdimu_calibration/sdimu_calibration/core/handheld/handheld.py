@@ -1,0 +1,269 @@
+"""Hand-held multi-position calibration: any IMU, put into many attitudes by hand, without a place.
+
+For sensors whose noise hides the Earth's rate navigation has nothing to hold on to: no north, and a velocity that is
+unknown as soon as a hand moves the IMU. What is left is enough: at rest the force is gravity, whatever the attitude,
+and from rest to rest the gyros must turn it as the accelerometers see it turned. One least squares over all rests and
+turns (`handheld_fit`).
+
+What nobody knows without a place is said, not guessed: the magnitude of gravity scales all accelerometers together,
+so a convention takes its place (9.80665 m/s^2, or the site's); the Earth's rate is three more unknowns whose prior is
+its size. The body frame is that of the accelerometers.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from sdimu_calibration.core import earth
+from sdimu_calibration.core.alignment.alignment import levelled
+from sdimu_calibration.core.arrays import Bools
+from sdimu_calibration.core.data.static_detection import StaticIntervals, detect_static
+from sdimu_calibration.core.effects import body_frame, imu_model
+from sdimu_calibration.core.effects.imu_model import ImuModel
+from sdimu_calibration.core.handheld.handheld_data import HandheldRun, reduce_run, turns
+from sdimu_calibration.core.handheld.handheld_faults import data_faults, without_impossible
+from sdimu_calibration.core.handheld.handheld_fit import (
+    FORCE,
+    RATE,
+    TURN,
+    FitPriors,
+    HandheldSolution,
+    LinearisationPoint,
+    fit_run,
+)
+from sdimu_calibration.core.progress import Progress
+from sdimu_calibration.core.recording import DataError, DataFault, Recording
+from sdimu_calibration.core.results import Calibration, no_history
+from sdimu_calibration.core.specification import ImuSpecification, Model, Site
+from sdimu_calibration.core.units import STANDARD_GRAVITY, from_si
+
+FEWEST_RESTS = 6
+"""Scale and bias of three accelerometers need as many attitudes."""
+_UNKNOWN = 0.5
+"""A coefficient whose sigma stays above this share of its prior is not determined by the recording."""
+_LEAST_NOISE = 0.01
+"""Learned noise is not believed below this share of the specification's."""
+_ROOM = 30.0
+"""What the IMU's file gives no prior for is taken so many times larger than its class has it: held back by a prior, an
+effect that was added would be learned as scatter."""
+_SEEN = 3.0
+"""Sigmas at which the Earth's rate is seen."""
+
+
+def by_hand(recording: Recording, imu: ImuSpecification) -> bool:
+    """Decide whether navigation has nothing to hold on to because a rest does not show the Earth's rate.
+
+    It does not when the gyros' white noise in the usual rest, specified or learned, exceeds a third of it.
+    """
+    if _SEEN * imu.gyro_white_noise < earth.RATE:  # seen within a second: no need to look at the samples
+        return False
+    try:
+        rests = detect_static(recording)
+    except DataError:
+        return False
+    usual = float(np.median(rests.last - rests.first)) * recording.interval_s
+    return bool(_SEEN * max(imu.gyro_white_noise, rests.gyro_white_noise) / np.sqrt(usual) > earth.RATE)
+
+
+def handheld_calibrate(
+    recording: Recording, site: Site | None, imu: ImuSpecification, model: Model, progress: Progress | None = None
+) -> Calibration:
+    """Calibrate an IMU from rests and turns by hand.
+
+    Parameters
+    ----------
+    recording : Recording
+        A status in it is not used.
+    site : Site or None
+        None takes standard gravity and leaves the Earth's rate free.
+    imu : ImuSpecification
+        Its priors; the noise is learned from the recording.
+    model : Model
+        Effects to estimate.
+    progress : callable, optional
+        Called with a word and the fraction done.
+
+    Returns
+    -------
+    Calibration
+        In the frame of the accelerometers, without history; ``notes`` say what was assumed, learned and not determined.
+
+    Raises
+    ------
+    DataError
+        When there are too few rests, an effect changes at random, or nothing fits.
+    """
+    if progress is not None:
+        progress("rests", 0.1)
+    sensors = imu_model.build(model.effects, imu)
+    ready = prepare(recording)
+    scene = fit_priors(sensors, imu, site, ready.rests)
+    if progress is not None:
+        progress("least squares", 0.3)
+    found = fit_run(ready.run, scene, first_linearisation(ready.run, sensors, scene.gravity))
+    return assemble(ready, scene, found, site, model)
+
+
+@dataclass(frozen=True)
+class PreparedRun:
+    """A hand-held recording, made ready: without impossible samples, its rests found, reduced.
+
+    Attributes
+    ----------
+    recording : Recording
+    rests : StaticIntervals
+    run : HandheldRun
+    impossible : tuple of DataFault
+        What was taken out.
+    """
+
+    recording: Recording
+    rests: StaticIntervals
+    run: HandheldRun
+    impossible: tuple[DataFault, ...]
+
+
+def prepare(recording: Recording) -> PreparedRun:
+    """Find the rests and reduce the recording to them and the turns between.
+
+    Raises
+    ------
+    DataError
+        When there are too few rests.
+    """
+    recording, impossible = without_impossible(recording)
+    rests = detect_static(recording)
+    if len(rests) < FEWEST_RESTS:
+        raise DataError(
+            f"/imu/data_raw: {len(rests)} rests; a hand-held calibration needs {FEWEST_RESTS} and more, "
+            "in different attitudes"
+        )
+    return PreparedRun(recording, rests, reduce_run(recording, rests), impossible)
+
+
+def fit_priors(sensors: ImuModel, imu: ImuSpecification, site: Site | None, rests: StaticIntervals) -> FitPriors:
+    """Say what is known before the fit.
+
+    Raises
+    ------
+    DataError
+        When an effect changes at random by itself.
+    """
+    changing = (sensors.decay_rate > 0) | (sensors.drive > 0)
+    if changing.any():
+        name = sensors.names[int(np.argmax(changing))]
+        raise DataError(f"a hand-held run takes constants only, and '{name}' changes at random: leave it out")
+    # The prior holds in a frame of its own; the three turns that lead to the accelerometers' frame go with it.
+    J = body_frame.frame_jacobian(sensors.names, "accelerometer_triad")
+    size = sensors.prior * np.where(_stated(sensors, imu), 1.0, _ROOM)
+    prior = J @ np.diag(size**2) @ J.T
+    kept = np.flatnonzero(np.diag(prior) > 1e-12 * size**2)
+    gravity, mean, sigma = STANDARD_GRAVITY, np.zeros(3), np.full(3, earth.RATE / np.sqrt(3.0))
+    if site is not None:
+        gravity = site.gravity_m_s2 or float(earth.normal_gravity(site.latitude_rad, site.height_m))
+        rate = earth.earth_rate(site.latitude_rad)
+        mean[2] = rate[2]
+        # The heading is free, so north is any way; 1e-9 rad/s is a ten-thousandth of a degree an hour.
+        sigma = np.array([abs(rate[0]) / np.sqrt(2.0) + 1e-9, abs(rate[0]) / np.sqrt(2.0) + 1e-9, 1e-9])
+    return FitPriors(
+        sensors, kept, prior[np.ix_(kept, kept)], gravity, mean, sigma,
+        max(rests.gyro_white_noise, _LEAST_NOISE * imu.gyro_white_noise),
+        max(rests.accel_white_noise, _LEAST_NOISE * imu.accel_white_noise),
+    )  # fmt: skip
+
+
+def _stated(sensors: ImuModel, imu: ImuSpecification) -> Bools:
+    """Which coefficients have a prior in the IMU's own file."""
+    return np.array([(e.family or e.name) in imu.prior for e in sensors.effects for _ in e.parameters])
+
+
+def first_linearisation(run: HandheldRun, sensors: ImuModel, gravity: float) -> LinearisationPoint:
+    """Begin with the mean rate at rest as bias; gyros lead from rest to rest, and every rest is levelled."""
+    coefficients = np.zeros(len(sensors.prior))
+    for axis, value in zip("xyz", np.median(run.mean[:, :3], axis=0), strict=True):
+        if f"gyro_bias_{axis}" in sensors.names:
+            coefficients[sensors.names.index(f"gyro_bias_{axis}")] = value
+    k = len(run.t)
+    turned = turns(run, sensors, coefficients, np.repeat(np.eye(3)[None], k, axis=0), gravity).C_nb
+    C_nb = [levelled(np.eye(3), run.mean[0, 3:])]
+    for i in range(k - 1):
+        C_nb.append(levelled(C_nb[-1] @ turned[i], run.mean[i + 1, 3:]))
+    return LinearisationPoint(coefficients, np.array(C_nb), np.zeros(3), np.zeros(3))
+
+
+def assemble(
+    ready: PreparedRun, scene: FitPriors, found: HandheldSolution, site: Site | None, model: Model
+) -> Calibration:
+    """Put a finished fit into the form of a calibration."""
+    recording, run = ready.recording, ready.run
+    faults = (*ready.impossible, *data_faults(recording, run, found))
+    sensors, p = scene.model, len(scene.model.prior)
+    covariance = np.zeros((p, p))
+    covariance[np.ix_(scene.kept, scene.kept)] = found.covariance
+    pinned = len(scene.kept) < p
+    return Calibration(
+        body_frame="accelerometer_triad" if pinned else model.body_frame,
+        model=tuple(e.name for e in sensors.effects),
+        names=sensors.names,
+        units=tuple(q.unit for q in sensors.parameters),
+        display_units=tuple(q.display_unit for q in sensors.parameters),
+        values=found.point.coefficients,
+        covariance=covariance,
+        fit={
+            "log_likelihood": found.log_likelihood,
+            "nis_mean": found.chi2 / max(found.dof, 1.0),
+            "nis_dof": found.dof,
+            "held_out_rms": found.held_out_rms,
+            "passes": float(found.steps),
+        },
+        data={
+            "samples": float(len(recording.t)),
+            "lost": float(run.cycles.lost.sum()),
+            "rejected": float(recording.rejected),
+            "contradicted_s": 0.0,
+            "duration_s": float(recording.t[-1]),
+            "stops": float(len(run.t)),
+        },
+        notes=(*recording.notes, *(f.text for f in faults), *_notes(run, scene, found, site)),
+        history=no_history(p),
+        warnings=tuple(f.text for f in faults if f.grave),
+        faults=faults,
+    )
+
+
+def _notes(run: HandheldRun, scene: FitPriors, found: HandheldSolution, site: Site | None) -> list[str]:
+    """Say what was taken for granted, what was learned, and what stays unknown."""
+    extra = found.point.extra
+    out = [
+        f"by hand: {len(run.t)} rests of {run.seconds.min():.1f} to {run.seconds.max():.1f} s; white noise at rest "
+        f"{from_si(scene.gyro_white_noise, 'deg/h'):.3g} deg/h/sqrt(Hz), "
+        f"{from_si(scene.accel_white_noise, 'ug'):.3g} ug/sqrt(Hz); beyond it force {from_si(extra[FORCE], 'ug'):.3g} "
+        f"ug, rate {np.degrees(extra[RATE]):.2g} deg/s, turns {100.0 * extra[TURN]:.2g} % of the way",
+        _gravity_note(scene, site),
+        _earth_note(found, site),
+    ]
+    sigma = np.sqrt(np.diag(found.covariance))
+    names = [scene.model.names[i] for i in scene.kept]
+    unknown = [n for n, s, q in zip(names, sigma, np.sqrt(np.diag(scene.prior)), strict=True) if s > _UNKNOWN * q]
+    if unknown:
+        out.append(f"not determined by this recording: {', '.join(unknown)}")
+    return out
+
+
+def _gravity_note(scene: FitPriors, site: Site | None) -> str:
+    source = "standard gravity, as no site is given" if site is None else "of the site"
+    return (
+        f"gravity {scene.gravity:.5f} m/s^2 ({source}); "
+        "an error of it is one of all accelerometer scale factors together"
+    )
+
+
+def _earth_note(found: HandheldSolution, site: Site | None) -> str:
+    size = from_si(float(np.linalg.norm(found.point.earth)), "deg/h")
+    sigma = from_si(float(np.sqrt(np.mean(found.earth_sigma**2))), "deg/h")
+    if site is not None:
+        return "Earth rate: vertical part of the site, north free"
+    seen = "seen" if size > _SEEN * sigma else "not seen"
+    return f"Earth rate left free, as no site is given: {size:.2g} +- {sigma:.2g} deg/h, {seen} in this recording"

@@ -1,0 +1,166 @@
+"""What a hand-held run gives the least squares of `handheld`: means at rest, and the turns between the rests.
+
+Between two rests only the gyros count: a hand moves the IMU about, so velocity and place are unknown. The samples of
+a turn are freed of the sensor errors exactly (`correct_cycles`), not to first order, and the derivatives follow the
+slope of the errors: with errors of percents both are needed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from sdimu_calibration.core.alignment.prepared import nominal_interval
+from sdimu_calibration.core.arrays import Floats, Ints
+from sdimu_calibration.core.compiled import compiled
+from sdimu_calibration.core.data.gaps import GAP_SHARE
+from sdimu_calibration.core.data.static_detection import StaticIntervals
+from sdimu_calibration.core.effects.imu_model import ImuModel
+from sdimu_calibration.core.effects.motion import Motion
+from sdimu_calibration.core.matrix3 import elements, multiplied, orthonormal3, rotation3, store
+from sdimu_calibration.core.navigation.correct_cycles import correct_cycles
+from sdimu_calibration.core.navigation.strapdown import Cycles, Reducer
+from sdimu_calibration.core.navigation.track import MAGNETIC_FIELD, motion, temperatures
+from sdimu_calibration.core.recording import Recording, TemperatureLog
+
+
+@dataclass(frozen=True)
+class HandheldRun:
+    """A hand-held recording, reduced: k rests and the k - 1 turns between them.
+
+    Attributes
+    ----------
+    t, seconds : ndarray, shape (k,)
+        Middle and length of each rest (s).
+    mean : ndarray, shape (k, 6)
+        Mean rate (rad/s) and specific force (m/s^2) at each rest, as measured.
+    cycles : Cycles
+        Of the whole recording.
+    first, last : ndarray of int, shape (k - 1,)
+        Cycles of each turn.
+    turn_s, path, gap : ndarray, shape (k - 1,)
+        Duration (s), angle summed over all ways (rad), and uncertainty of bridged angle (rad) of each turn.
+    temperature : TemperatureLog or None
+    """
+
+    t: Floats
+    seconds: Floats
+    mean: Floats
+    cycles: Cycles
+    first: Ints
+    last: Ints
+    turn_s: Floats
+    path: Floats
+    gap: Floats
+    temperature: TemperatureLog | None
+
+
+def reduce_run(recording: Recording, rests: StaticIntervals) -> HandheldRun:
+    """Take the means of the rests and the cycles of the turns.
+
+    A turn is cut at whole cycles, of a tenth of a second, inside the two rests that it joins; the means are taken
+    between these cuts, so that no sample is used twice.
+    """
+    cycles = Reducer(nominal_interval(recording.t)).add(recording.t, recording.omega_ib_b, recording.f_ib_b)
+    start = cycles.t - cycles.dt
+    eps = 1e-9
+    begin = np.searchsorted(start, recording.t[np.maximum(rests.first - 1, 0)] - eps)
+    end = np.searchsorted(cycles.t, recording.t[rests.last - 1] + eps, side="right")
+    # A rest shorter than its cuts leave keeps the one cycle in its middle.
+    end = np.maximum(end, begin + 1)
+    total = np.vstack([np.zeros(7), np.cumsum(np.hstack([cycles.dt[:, None], cycles.alpha, cycles.upsilon]), axis=0)])
+    part = total[end] - total[begin]
+    first, last = end[:-1], begin[1:]
+    angle = np.sqrt(np.sum(cycles.alpha**2, axis=1))
+    gap = np.sum(cycles.gap_angle**2, axis=1)
+    return HandheldRun(
+        0.5 * (start[begin] + cycles.t[end - 1]), part[:, 0], part[:, 1:] / part[:, :1], cycles, first, last,
+        _sums(cycles.dt, first, last), _sums(angle, first, last), GAP_SHARE * np.sqrt(_sums(gap, first, last)),
+        recording.temperature,
+    )  # fmt: skip
+
+
+def _sums(values: Floats, first: Ints, last: Ints) -> Floats:
+    """Sum over ranges of rows."""
+    total = np.concatenate([np.zeros((1, *values.shape[1:])), np.cumsum(values, axis=0)])
+    return np.asarray(total[last] - total[first])
+
+
+def seen_at_rest(run: HandheldRun, C_nb: Floats, rate_n: Floats, gravity: float) -> Motion:
+    """Make what a perfect IMU sees at the rests, with attitudes `C_nb` (k, 3, 3) and rate `rate_n` (3,)."""
+    k = len(run.t)
+    heat, heat_rate = temperatures(run.temperature, run.t, causal=False)
+    none = np.zeros((k, 3))
+    w = np.einsum("kij,i->kj", C_nb, rate_n)
+    return Motion(
+        run.t, run.seconds, w, -gravity * C_nb[:, 2, :], C_nb, none, none, np.ones(k, dtype=bool), heat, heat_rate,
+        none, none, np.full(k, np.inf), MAGNETIC_FIELD,
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Turns:
+    """Turns, freed of sensor errors.
+
+    Attributes
+    ----------
+    C_nb : ndarray, shape (k - 1, 3, 3)
+        Attitude at the end of each turn, by the gyros, against a frame that does not turn.
+    by_coefficient : ndarray, shape (k - 1, 3, p)
+        Change of that attitude (small turn in n) per unit of each coefficient taken out of the samples.
+    seen : Motion
+        What a perfect IMU saw in every cycle of the recording.
+    weight : ndarray, shape (n, 3, 6)
+        Small turn in n per measured rate (rad/s) and force (m/s^2) of every cycle.
+    """
+
+    C_nb: Floats
+    by_coefficient: Floats
+    seen: Motion
+    weight: Floats
+
+    def by_parameter(self, run: HandheldRun, values: Floats, terms: Sequence[tuple[int, int]], count: int) -> Floats:
+        """Change of the attitudes per unit of `count` parameters, shape (k - 1, 3, count).
+
+        `values` are the regressors of `seen`; `terms` gives sensor axis and parameter of each of their columns.
+        """
+        out = np.zeros((len(run.first), 3, count))
+        for column, (channel, parameter) in enumerate(terms):
+            out[:, :, parameter] -= _sums(self.weight[:, :, channel] * values[:, column, None], run.first, run.last)
+        return out
+
+
+def turns(run: HandheldRun, model: ImuModel, coefficients: Floats, C_nb: Floats, gravity: float) -> Turns:
+    """Integrate the gyros over every turn from the attitude of its rest, `C_nb` (k, 3, 3)."""
+    cycles = run.cycles
+    none = np.zeros(len(cycles), dtype=bool)
+    # Earth rate is below what the gyros know of themselves here: the table's rate and the body's are one.
+    near = motion(
+        cycles, none, model, coefficients, C_nb[0].copy(), 0.0, gravity, run.temperature, predicted=False
+    )  # fmt: skip
+    clean = correct_cycles(cycles, near, model, coefficients)
+    phi = clean.cycles.alpha + clean.cycles.coning
+    middle, end = _integrate(np.ascontiguousarray(C_nb), run.first, run.last, np.ascontiguousarray(phi))
+    weight = middle @ clean.weight[:, :3, :] * cycles.dt[:, None, None]
+    found = Turns(end, np.zeros(0), clean.seen, weight)
+    terms = list(zip(model.channel.tolist(), model.parameter.tolist(), strict=True))
+    known = found.by_parameter(run, model.regressors(clean.seen), terms, len(model.prior))
+    return replace(found, by_coefficient=known)
+
+
+@compiled
+def _integrate(C_nb: Floats, first: Ints, last: Ints, phi: Floats) -> tuple[Floats, Floats]:
+    """Attitude in the middle of every cycle of the turns (n, 3, 3), and at the end of each turn (k - 1, 3, 3)."""
+    middle = np.zeros((phi.shape[0], 3, 3))
+    end = np.empty((first.shape[0], 3, 3))
+    for k in range(first.shape[0]):
+        C = elements(C_nb[k])
+        for c in range(first[k], last[k]):
+            half = rotation3(0.5 * phi[c, 0], 0.5 * phi[c, 1], 0.5 * phi[c, 2])
+            between = multiplied(C, half)
+            store(between, middle[c])
+            C = orthonormal3(multiplied(between, half))
+        store(C, end[k])
+    return middle, end

@@ -1,0 +1,112 @@
+"""What is wrong with the data of a run by hand and no physics of the sensor: said, so that nobody has to guess.
+
+The least squares learns how far its equations miss, so that most faults only widen its sigmas. A hand knocks and jerks,
+and a cheap sensor repeats its numbers at rest: the tests of `soundness`, which are made for a table, would call that
+spikes and a stuck axis. Here only what no hand does is looked for.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from sdimu_calibration.core.arrays import Bools
+from sdimu_calibration.core.data.sample_screening import CHANNELS
+from sdimu_calibration.core.handheld.handheld_data import HandheldRun
+from sdimu_calibration.core.handheld.handheld_fit import FORCE, TURN, HandheldSolution
+from sdimu_calibration.core.recording import DataFault, Recording
+from sdimu_calibration.core.units import STANDARD_GRAVITY, from_si
+
+_BEYOND = 10.0
+"""A rate so many times beyond the fastest hundredth is no turn: hands accelerate for longer than a sample."""
+_LEAST_IN_A_ROW = 3
+"""So many readings in a row at the very largest number are the end of the range."""
+_TURN_MISSES = 0.01
+"""Share of the way by which turns may miss; the Xsens recording has 0.0004."""
+_FORCE_MISSES = 0.01 * STANDARD_GRAVITY
+"""Force at rest may miss by so much (m/s^2); the Xsens recording has a hundredth of it."""
+
+
+def without_impossible(recording: Recording) -> tuple[Recording, tuple[DataFault, ...]]:
+    """Take away samples of a rate far beyond all others; they count as missing.
+
+    Parameters
+    ----------
+    recording : Recording
+
+    Returns
+    -------
+    recording : Recording
+        The same object when nothing is wrong.
+    faults : tuple of DataFault
+    """
+    rate = np.max(np.abs(recording.omega_ib_b - np.median(recording.omega_ib_b, axis=0)), axis=1)
+    bad = rate > _BEYOND * float(np.quantile(rate, 0.99))
+    if not bad.any():
+        return recording, ()
+    t = recording.t[bad]
+    text = (
+        f"the gyros jump to {_BEYOND:.0f} times the fastest turns and more in {len(t)} samples ({t[0]:.1f} to "
+        f"{t[-1]:.1f} s); they count as missing"
+    )
+    keep = ~bad
+    mended = replace(
+        recording, t=recording.t[keep], omega_ib_b=recording.omega_ib_b[keep], f_ib_b=recording.f_ib_b[keep],
+        rejected=recording.rejected + len(t),
+    )  # fmt: skip
+    return mended, (DataFault("spike", text, len(t), float(t[0]), float(t[-1])),)
+
+
+def data_faults(recording: Recording, run: HandheldRun, found: HandheldSolution) -> tuple[DataFault, ...]:
+    """Say what is missing, what stands at the end of its range, and where the fit is no fit."""
+    return (*_missing(run), *_clipped(recording), *_misfit(found))
+
+
+def _missing(run: HandheldRun) -> list[DataFault]:
+    at = np.flatnonzero(run.cycles.lost)
+    if not len(at):
+        return []
+    lost, t = int(run.cycles.lost.sum()), run.cycles.t[at]
+    text = f"{lost} samples are missing by their stamps ({t[0]:.1f} to {t[-1]:.1f} s), bridged"
+    return [DataFault("gap", text, lost, float(t[0]), float(t[-1]))]
+
+
+def _clipped(recording: Recording) -> list[DataFault]:
+    """Find channels that stand at their largest or smallest number, several samples in a row."""
+    out = []
+    for name, x in zip(CHANNELS, (*recording.omega_ib_b.T, *recording.f_ib_b.T), strict=True):
+        if x.min() == x.max():
+            continue
+        rows = np.flatnonzero(_in_a_row(x == x.max()) | _in_a_row(x == x.min()))
+        if len(rows):
+            t = recording.t[rows]
+            text = f"{name} stands at the end of its range in {len(rows)} samples ({t[0]:.1f} to {t[-1]:.1f} s)"
+            out.append(DataFault("saturated", text, len(rows), float(t[0]), float(t[-1])))
+    return out
+
+
+def _in_a_row(flags: Bools) -> Bools:
+    """Keep runs of `_LEAST_IN_A_ROW` and more."""
+    edge = np.diff(np.concatenate([[0], flags.astype(np.int8), [0]]))
+    first, last = np.flatnonzero(edge == 1), np.flatnonzero(edge == -1)
+    out = np.zeros(len(flags), dtype=bool)
+    for a, b in zip(first, last, strict=True):
+        out[a:b] = b - a >= _LEAST_IN_A_ROW
+    return out
+
+
+def _misfit(found: HandheldSolution) -> list[DataFault]:
+    """Warn when what the model leaves over is no noise of any sensor."""
+    because = (
+        "far more than any sensor: the estimate is not to be trusted; look for samples that are clipped, stuck or "
+        "missing, an axis without its sign, an IMU switched off in between"
+    )
+    out = []
+    extra = found.point.extra
+    if extra[TURN] > _TURN_MISSES:
+        out.append(DataFault("misfit", f"turns miss by {100.0 * extra[TURN]:.2g} % of the way, {because}", grave=True))
+    if extra[FORCE] > _FORCE_MISSES:
+        text = f"force at rest misses by {from_si(float(extra[FORCE]), 'mg'):.3g} mg, {because}"
+        out.append(DataFault("misfit", text, grave=True))
+    return out

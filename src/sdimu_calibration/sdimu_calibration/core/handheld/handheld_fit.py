@@ -1,0 +1,345 @@
+"""Least squares of a hand-held run: attitude of every rest, coefficients, the Earth's rate as it may be.
+
+Unknowns: a small turn of every rest (3 each), the coefficients (p), the Earth's rate as a vector in n (3). Equations,
+all whitened:
+
+    force at rest  - (-g C_bn z) - D c               = noise of the mean, and what the model leaves over
+    rate at rest   - C_bn w_e    - D c               = noise of the mean, and the wandering of the bias
+    attitude of the next rest against the gyros' turn = noise over the turn, that wandering, and a share of the way
+    priors of the coefficients and of w_e; one free heading, held.
+
+What is more than the white noise is not specified by anybody for a cheap IMU in a hand, so three sigmas are learned:
+each is as large as makes the squared residuals of its equations as many as their redundancy (the moment estimate of
+Paule & Mandel, J. Res. NBS 87, 1982; for least squares, Koch, *Parameter Estimation and Hypothesis Testing in Linear
+Models*, section 3.6).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from sdimu_calibration.core.arrays import Bools, Floats, Ints
+from sdimu_calibration.core.effects.error_slope import error_slope
+from sdimu_calibration.core.effects.imu_model import ImuModel
+from sdimu_calibration.core.handheld.handheld_data import HandheldRun, seen_at_rest, turns
+from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.rotation import rotation_matrix, rotation_vector, skew
+
+CONVERGED = 1e-3
+"""Largest step of a coefficient in its sigma at which Gauss-Newton ends."""
+MOST_STEPS = 120
+_FREE = 8
+"""Steps after which the learned sigmas no longer go where they were learned, but at a pace of their own."""
+_SLOWEST, _FASTEST, _FASTER = 0.5, 64.0, 1.5
+"""Pace of the learned sigmas: half where they swing, faster and faster where two of them trade along a ridge."""
+MOST_RESTS = 400
+"""The least squares is dense: a thousand unknowns take a second a step."""
+_HEADING = 1e-6
+"""Sigma that holds the free heading of the first rest (rad); it says nothing about any coefficient."""
+_BISECTIONS = 50
+
+FORCE, RATE, TURN = 0, 1, 2
+"""The three kinds of equation."""
+
+
+@dataclass(frozen=True)
+class FitPriors:
+    """What is known before the fit.
+
+    Attributes
+    ----------
+    model : ImuModel
+    kept : ndarray of int, shape (q,)
+        Coefficients that are estimated; the others stay zero (they define the body frame).
+    prior : ndarray, shape (q, q)
+        Covariance of the kept ones.
+    gravity : float
+        Magnitude (m/s^2).
+    earth_mean, earth_sigma : ndarray, shape (3,)
+        Prior of the Earth's rate in n (rad/s); the heading of n is free.
+    gyro_white_noise, accel_white_noise : float
+        Densities.
+    """
+
+    model: ImuModel
+    kept: Ints
+    prior: Floats
+    gravity: float
+    earth_mean: Floats
+    earth_sigma: Floats
+    gyro_white_noise: float
+    accel_white_noise: float
+
+
+@dataclass(frozen=True)
+class LinearisationPoint:
+    """Where the equations stand: coefficients (p,), attitudes (k, 3, 3), Earth rate (3,), learned sigmas (3,)."""
+
+    coefficients: Floats
+    C_nb: Floats
+    earth: Floats
+    extra: Floats
+
+
+@dataclass(frozen=True)
+class HandheldSolution:
+    """Where the fit ended.
+
+    Attributes
+    ----------
+    point : LinearisationPoint
+        ``extra`` holds the learned sigmas: force (m/s^2), rate (rad/s), turn (rad per rad of way).
+    covariance : ndarray, shape (q, q)
+        Of the kept coefficients.
+    earth_sigma : ndarray, shape (3,)
+        Sigma of the Earth's rate after the fit (rad/s).
+    chi2, dof, log_likelihood, held_out_rms : float
+    residual : ndarray, shapes (k, 6), (k - 1, 3)
+        Of the rests (SI) and of the turns (rad).
+    steps : int
+    """
+
+    point: LinearisationPoint
+    covariance: Floats
+    earth_sigma: Floats
+    chi2: float
+    dof: float
+    log_likelihood: float
+    held_out_rms: float
+    rest_residual: Floats
+    turn_residual: Floats
+    steps: int
+
+
+def fit_run(run: HandheldRun, scene: FitPriors, start: LinearisationPoint) -> HandheldSolution:
+    """Gauss-Newton with the sigmas learned on the way.
+
+    Raises
+    ------
+    DataError
+        When there are too many rests for a dense solution, or the steps do not end.
+    """
+    if len(run.t) > MOST_RESTS:
+        raise DataError(
+            f"/imu/data_raw: {len(run.t)} rests; a hand-held run may have {MOST_RESTS}: cut the recording in parts"
+        )
+    point = start
+    change, pace = np.zeros(3), 1.0
+    for steps in range(1, MOST_STEPS + 1):
+        rows, residual, kind = equations(run, scene, point)
+        Q, R, white = _solve(rows, residual, row_sigmas(run, scene, kind, point.extra))
+        step = np.asarray(-np.linalg.solve(R, Q.T @ white))
+        extra = _learn(run, scene, kind, point.extra, rows, residual, step)
+        moved = float(np.max(np.abs(R[-len(scene.kept) - 3 : -3] @ step)))
+        # A hundredth of a sigma that is known to a tenth; half steps, as weights and residuals chase each other.
+        settled = bool(np.all(np.abs(extra - point.extra) <= 1e-2 * extra + 1e-12))
+        change, before = extra - point.extra, change
+        pace = _pace(pace, change, before) if steps > _FREE else 1.0
+        extra = np.maximum(point.extra + pace * change, 0.0)
+        point = _moved(replace(point, extra=extra), step, scene)
+        if not np.isfinite(step).all():
+            break
+        if moved < CONVERGED and settled and steps > 2:
+            return _finish(run, scene, point, steps)
+    raise DataError(
+        "the hand-held run does not fit any IMU of the specification: check the units, and that --imu is as wide as "
+        "the sensor's errors"
+    )
+
+
+def _pace(pace: float, change: Floats, before: Floats) -> float:
+    """Speed up what goes on in one direction, slow down what turns."""
+    along = float(change @ before)
+    if along > 0.5 * float(np.linalg.norm(change) * np.linalg.norm(before)):
+        return min(pace * _FASTER, _FASTEST)
+    return _SLOWEST
+
+
+def _moved(point: LinearisationPoint, step: Floats, scene: FitPriors) -> LinearisationPoint:
+    """Take a step."""
+    q, k = len(scene.kept), len(point.C_nb)
+    small = step[: 3 * k].reshape(k, 3)
+    C_nb = np.array([rotation_matrix(a) @ C for a, C in zip(small, point.C_nb, strict=True)])
+    coefficients = point.coefficients.copy()
+    coefficients[scene.kept] += step[3 * k : 3 * k + q]
+    return replace(point, coefficients=coefficients, C_nb=C_nb, earth=point.earth + step[-3:])
+
+
+def equations(
+    run: HandheldRun, scene: FitPriors, point: LinearisationPoint
+) -> tuple[Floats, Floats, Ints]:
+    """Rows, residuals and kinds (-1 for priors, which come whitened).
+
+    Unknowns in this order: turns of the rests, coefficients, Earth rate. Equations in this order: six of each rest,
+    three of each turn, priors.
+    """
+    k, q = len(run.t), len(scene.kept)
+    model = scene.model
+    seen = seen_at_rest(run, point.C_nb, point.earth, scene.gravity)
+    values = model.regressors(seen)
+    slope = np.eye(6) + error_slope(model, seen, slice(None), point.coefficients)
+    true = np.hstack([seen.w, seen.f])
+    rest_residual = run.mean - true - model.errors(values, point.coefficients)
+    gone = turns(run, model, point.coefficients, point.C_nb, scene.gravity)
+    rows = np.zeros((6 * k + 3 * (k - 1), 3 * k + q + 3))
+    residual = np.zeros(len(rows))
+    design = np.zeros((k, 6, len(model.prior)))
+    for column, (channel, parameter) in enumerate(zip(model.channel, model.parameter, strict=True)):
+        design[:, channel, parameter] += values[:, column]
+    # C turned by a: C_bn v becomes C_bn (v - a x v) = C_bn (v + [v x] a).
+    g_n = np.array([0.0, 0.0, -scene.gravity])
+    for i in range(k):
+        at, C_bn = slice(6 * i, 6 * i + 6), point.C_nb[i].T
+        rows[at, 3 * i : 3 * i + 3] = -slope[i] @ np.vstack([C_bn @ skew(point.earth), C_bn @ skew(g_n)])
+        rows[at, 3 * k : 3 * k + q] = -design[i][:, scene.kept]
+        rows[at, -3:] = -slope[i][:, :3] @ C_bn
+        residual[at] = rest_residual[i]
+    for i in range(k - 1):
+        at = slice(6 * k + 3 * i, 6 * k + 3 * i + 3)
+        reached = rotation_matrix(-run.turn_s[i] * point.earth) @ gone.C_nb[i]
+        rows[at, 3 * i : 3 * i + 3] = -np.eye(3)
+        rows[at, 3 * i + 3 : 3 * i + 6] = np.eye(3)
+        rows[at, 3 * k : 3 * k + q] = -gone.by_coefficient[i][:, scene.kept]
+        rows[at, -3:] = run.turn_s[i] * np.eye(3)
+        residual[at] = rotation_vector(point.C_nb[i + 1] @ reached.T)
+    kind = np.concatenate([np.tile([RATE] * 3 + [FORCE] * 3, k), np.full(3 * (k - 1), TURN), np.full(q + 4, -1)])
+    more, left = _priors(scene, point, rows.shape[1])
+    return np.vstack([rows, more]), np.concatenate([residual, left]), kind
+
+
+def _priors(scene: FitPriors, point: LinearisationPoint, width: int) -> tuple[Floats, Floats]:
+    """Whitened rows of what is known before."""
+    q = len(scene.kept)
+    rows, residual = np.zeros((q + 4, width)), np.zeros(q + 4)
+    white = np.linalg.inv(np.linalg.cholesky(scene.prior))
+    rows[:q, width - 3 - q : width - 3] = white
+    residual[:q] = white @ point.coefficients[scene.kept]
+    rows[q : q + 3, -3:] = np.diag(1.0 / scene.earth_sigma)
+    residual[q : q + 3] = (point.earth - scene.earth_mean) / scene.earth_sigma
+    rows[q + 3, 2] = 1.0 / _HEADING
+    return rows, residual
+
+
+def row_sigmas(run: HandheldRun, scene: FitPriors, kind: Ints, extra: Floats) -> Floats:
+    """Sigma of every row."""
+    white, more = _variances(run, scene, extra)
+    return np.asarray(np.sqrt(_spread(run, kind, white + more)))
+
+
+def _variances(run: HandheldRun, scene: FitPriors, extra: Floats) -> tuple[Floats, Floats]:
+    """Variance by white noise, and beyond it, of the rate and force at each rest and of each turn, (3 k - 1,)."""
+    k = len(run.t)
+    white = np.concatenate([
+        scene.gyro_white_noise**2 / run.seconds, scene.accel_white_noise**2 / run.seconds,
+        scene.gyro_white_noise**2 * run.turn_s + run.gap**2,
+    ])  # fmt: skip
+    more = np.concatenate([
+        np.full(k, extra[RATE] ** 2), np.full(k, extra[FORCE] ** 2),
+        (extra[RATE] * run.turn_s) ** 2 + (extra[TURN] * run.path) ** 2,
+    ])  # fmt: skip
+    return white, more
+
+
+def _spread(run: HandheldRun, kind: Ints, by_group: Floats) -> Floats:
+    """Values by rest and turn (3 k - 1,) to the rows; priors are whitened already and take 1."""
+    k = len(run.t)
+    out = np.ones(len(kind))
+    at_rest = np.stack([by_group[:k], by_group[:k], by_group[:k], *[by_group[k : 2 * k]] * 3], axis=1)
+    out[: 6 * k] = at_rest.ravel()
+    out[6 * k : 6 * k + 3 * (k - 1)] = np.repeat(by_group[2 * k :], 3)
+    return out
+
+
+def _solve(rows: Floats, residual: Floats, sigma: Floats) -> tuple[Floats, Floats, Floats]:
+    """QR of the whitened rows, and the whitened residual."""
+    Q, R = np.linalg.qr(rows / sigma[:, None])
+    return np.asarray(Q), np.asarray(R), np.asarray(residual / sigma)
+
+
+def _learn(
+    run: HandheldRun,
+    scene: FitPriors,
+    kind: Ints,
+    extra: Floats,
+    rows: Floats,
+    residual: Floats,
+    step: Floats,
+) -> Floats:
+    """Learn the sigmas beyond white noise from what the step leaves over.
+
+    Each is searched with the redundancies of the present weights; Gauss-Newton repeats it until both stand.
+    """
+    left = residual + rows @ step
+    sigma = row_sigmas(run, scene, kind, extra)
+    Q = np.linalg.qr(rows / sigma[:, None])[0]
+    free = 1.0 - np.sum(Q**2, axis=1)
+    out = extra.copy()
+    for which in (FORCE, RATE, TURN):
+        mine = kind == which
+
+        def excess(
+            value: float, which: int = which, mine: Bools = mine, target: float = float(free[mine].sum())
+        ) -> float:
+            trial = out.copy()
+            trial[which] = value
+            return float(np.sum((left[mine] / row_sigmas(run, scene, kind, trial)[mine]) ** 2)) - target
+
+        out[which] = _root(excess, float(np.sqrt(np.mean(left[mine] ** 2))))
+    return out
+
+
+def _root(excess: Callable[[float], float], scale: float) -> float:
+    """Smallest value >= 0 at which a falling function is no more above zero, by bisection."""
+    low, high = 0.0, scale
+    if excess(0.0) <= 0.0:
+        return 0.0
+    while excess(high) > 0.0:
+        high *= 2.0
+    for _ in range(_BISECTIONS):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if excess(middle) > 0.0 else (low, middle)
+    return high
+
+
+def _finish(run: HandheldRun, scene: FitPriors, point: LinearisationPoint, steps: int) -> HandheldSolution:
+    """Put the statistics together."""
+    rows, residual, kind = equations(run, scene, point)
+    sigma = row_sigmas(run, scene, kind, point.extra)
+    Q, R, white = _solve(rows, residual, sigma)
+    k, q = len(run.t), len(scene.kept)
+    inverse = np.linalg.inv(R)
+    covariance = inverse @ inverse.T
+    measured = kind >= 0
+    log = -float(np.sum(np.log(sigma[measured]))) - 0.5 * int(measured.sum()) * np.log(2.0 * np.pi)
+    # The determinant of the priors too: without it a coefficient more would count by its unit.
+    log += float(np.sum(np.log(np.diag(np.linalg.inv(np.linalg.cholesky(scene.prior))))))
+    log -= float(np.sum(np.log(scene.earth_sigma))) + float(np.sum(np.log(np.abs(np.diag(R)))))
+    free = 1.0 - np.sum(Q**2, axis=1)
+    return HandheldSolution(
+        point=point,
+        covariance=covariance[3 * k : 3 * k + q, 3 * k : 3 * k + q],
+        earth_sigma=np.sqrt(np.diag(covariance)[-3:]),
+        chi2=float(np.sum(white[measured] ** 2)),
+        dof=float(free[measured].sum()),
+        log_likelihood=log - 0.5 * float(white @ white),
+        held_out_rms=_held_out(Q, white, k),
+        rest_residual=residual[: 6 * k].reshape(k, 6),
+        turn_residual=residual[6 * k : 9 * k - 3].reshape(k - 1, 3),
+        steps=steps,
+    )
+
+
+def _held_out(Q: Floats, white: Floats, k: int) -> float:
+    """RMS of normalised errors of the forces at each rest, predicted from everything but themselves.
+
+    Leaving rows out of a least squares needs no new fit: with H their part of the hat matrix the prediction error is
+    ``(I - H)^-1 e`` with covariance ``(I - H)^-1`` (Belsley, Kuh & Welsch, *Regression Diagnostics*, section 2.1).
+    """
+    total = 0.0
+    for i in range(k):
+        at = slice(6 * i + 3, 6 * i + 6)
+        total += float(white[at] @ np.linalg.solve(np.eye(3) - Q[at] @ Q[at].T, white[at]))
+    return float(np.sqrt(total / (3 * k)))

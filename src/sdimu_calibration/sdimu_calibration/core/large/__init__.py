@@ -1,1 +1,0 @@
-"""Errors of percents: samples corrected exactly, passes about them, until filter and batch agree."""

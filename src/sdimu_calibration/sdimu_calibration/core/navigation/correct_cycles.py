@@ -1,0 +1,103 @@
+"""Sensor errors taken out of cycles exactly: what a perfect IMU would have given.
+
+`track.motion` finds the compensated motion by rounds, each of which gains a factor of the size of the errors; with
+errors of percents three rounds leave 4e-5 of the rate. One Newton step from there, with the slope S of the errors,
+leaves nothing of errors that are linear in what the sensors see:
+
+    measured = true + error(true)   ->   true = seen + (I + S)^-1 (measured - seen - error(seen)).
+
+The same (I + S)^-1 says what a small change of the coefficients, and noise, become in samples so corrected.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from sdimu_calibration.core.arrays import Floats, Ints
+from sdimu_calibration.core.effects.error_slope import error_slope
+from sdimu_calibration.core.effects.imu_model import ImuModel
+from sdimu_calibration.core.effects.motion import Motion
+from sdimu_calibration.core.navigation.strapdown import Cycles
+
+
+@dataclass(frozen=True)
+class CorrectedCycles:
+    """Cycles without the sensor errors.
+
+    Attributes
+    ----------
+    cycles : Cycles
+    seen : Motion
+        Its rate and force are those of the corrected cycles.
+    weight : ndarray, shape (n, 6, 6)
+        ``(I + S)^-1``: change of true rate and force per change of the measured ones.
+    """
+
+    cycles: Cycles
+    seen: Motion
+    weight: Floats
+
+
+def correct_cycles(cycles: Cycles, seen: Motion, model: ImuModel, coefficients: Floats) -> CorrectedCycles:
+    """Take the errors at `coefficients` (p,) out of cycles.
+
+    Parameters
+    ----------
+    cycles : Cycles
+        As measured.
+    seen : Motion
+        Near the true motion of the same cycles.
+    model : ImuModel
+    coefficients : ndarray, shape (p,)
+    """
+    slope = error_slope(model, seen, slice(None), coefficients)
+    weight: Floats = np.asarray(np.linalg.inv(np.eye(6) + slope), dtype=np.float64)
+    dt = cycles.dt[:, None]
+    near = np.hstack([seen.w, seen.f])
+    defect = np.hstack([cycles.alpha, cycles.upsilon]) / dt - near - model.errors(model.regressors(seen), coefficients)
+    true = near + np.einsum("kij,kj->ki", weight, defect)
+    corrected = replace(
+        cycles,
+        alpha=true[:, :3] * dt,
+        upsilon=true[:, 3:] * dt,
+        coning=_crossed(weight[:, :3, :3], cycles.coning),
+        # Of two different vectors: right to the difference of the triads' errors times the correction itself.
+        sculling=_crossed(weight[:, 3:, 3:], cycles.sculling),
+    )
+    return CorrectedCycles(corrected, replace(seen, w=true[:, :3], f=true[:, 3:]), weight)
+
+
+def _crossed(U: Floats, product: Floats) -> Floats:
+    """Cross products of vectors that go through `U` (n, 3, 3): the products (n, 3) go through its cofactors."""
+    cofactor = np.linalg.det(U)[:, None, None] * np.linalg.inv(U).transpose(0, 2, 1)
+    return np.asarray(np.einsum("kij,kj->ki", cofactor, product))
+
+
+def spread(values: Floats, model: ImuModel, weight: Floats) -> tuple[Floats, Ints, Ints]:
+    """Regressors of corrected samples: ``weight @`` those of the measured ones, with the empty columns left out.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n, m)
+        Regressors of the model's columns.
+    model : ImuModel
+    weight : ndarray, shape (n, 6, 6)
+
+    Returns
+    -------
+    values : ndarray, shape (n, m')
+    channel, parameter : ndarray of int, shape (m',)
+    """
+    columns: list[Floats] = []
+    channel: list[int] = []
+    parameter: list[int] = []
+    for column, (source, owner) in enumerate(zip(model.channel, model.parameter, strict=True)):
+        for target in range(6):
+            share = weight[:, target, source]
+            if share.any():
+                columns.append(share * values[:, column])
+                channel.append(target)
+                parameter.append(int(owner))
+    return np.ascontiguousarray(np.column_stack(columns)), np.array(channel), np.array(parameter)

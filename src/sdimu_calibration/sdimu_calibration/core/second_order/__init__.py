@@ -1,0 +1,1 @@
+"""The estimator for errors of percents, whose squares count."""

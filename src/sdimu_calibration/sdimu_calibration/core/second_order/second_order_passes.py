@@ -1,0 +1,269 @@
+"""The filter for errors of percents: passes about samples that are corrected exactly, until nothing moves.
+
+The passes of `passes` take sensor errors out to first order, see the world along an attitude that the gyros carry
+through the whole test, and leave the body frame to the priors. Errors of arcminutes allow all three. Of percents:
+
+- the cycles are corrected exactly at the coefficients of the pass before (`correct_cycles`); the regressors are those
+  of corrected samples;
+- the body frame is the accelerometers' from the start (`accelerometer_frame`);
+- every stop is levelled by its own corrected force before it is measured: without this the attitude of a cheap gyro is
+  0.3 deg off after an hour, whose square is more than an accelerometer's noise. A shift of the point of linearisation
+  changes nothing that is known, so the state shifts with it.
+
+Each pass is a Gauss-Newton step of the whole test, with the original prior.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from sdimu_calibration.core import earth
+from sdimu_calibration.core.alignment.alignment import Alignment, levelled
+from sdimu_calibration.core.alignment.coarse_alignment import coarse_start
+from sdimu_calibration.core.alignment.prepared import PreparedData, TestSetup
+from sdimu_calibration.core.alignment.rest_means import Layout, layout
+from sdimu_calibration.core.arrays import Floats, Ints
+from sdimu_calibration.core.effects.motion import Motion
+from sdimu_calibration.core.filter.filter_pass import COPY, NAV, PassInput, PassOutput, PassState, new_output, run_pass
+from sdimu_calibration.core.filter.passes import pass_input, pass_settings, start_state
+from sdimu_calibration.core.navigation.correct_cycles import CorrectedCycles, correct_cycles, spread
+from sdimu_calibration.core.navigation.strapdown import Cycles
+from sdimu_calibration.core.navigation.track import integrate, motion
+from sdimu_calibration.core.progress import Progress
+from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.rotation import orthonormal, rotation_matrix, rotation_vector
+
+CONVERGED = 0.02
+"""Largest movement of a coefficient in its own sigma at which the passes end."""
+MOST_PASSES = 30
+_LOOSE = (1.0, 100.0)
+"""Sigmas of Zv (m/s) and Zp (m) until the coefficients move by less than `_NEAR` sigmas."""
+_NEAR = 1.0
+_FIRM = 0.05
+"""Later sigmas of Zv and Zp at least, as a share of what white noise leaves in a motion of `_MOTION_S`: no less can be
+told from zero, and a covariance that falls by more than ten digits loses its symmetry."""
+_MOTION_S = 60.0
+_PIECE = 3
+"""Epochs of a stop between two shifts of the attitude to that of the stop."""
+
+
+@dataclass(frozen=True)
+class SecondOrderPass:
+    """A finished pass.
+
+    Attributes
+    ----------
+    reference : ndarray, shape (q,)
+        Coefficients at which the samples were corrected.
+    C_start : ndarray, shape (3, 3)
+    start, state : PassState
+        The coefficients in them are deviations from the reference.
+    output : PassOutput
+        Of all epochs; the covariances are those of the epochs `rows`.
+    rows : ndarray of int
+    data : PassInput
+    C_stop : ndarray, shape (k, 3, 3)
+        Where each stop was linearised.
+    """
+
+    reference: Floats
+    C_start: Floats
+    start: PassState
+    state: PassState
+    output: PassOutput
+    rows: Ints
+    data: PassInput
+    C_stop: Floats
+
+    @property
+    def estimate(self) -> Floats:
+        """Coefficients at the end, shape (q,)."""
+        q = len(self.reference)
+        return np.asarray(self.reference + self.state.x[NAV : NAV + q])
+
+    @property
+    def covariance(self) -> Floats:
+        """Their covariance, shape (q, q)."""
+        q = len(self.reference)
+        return np.asarray(self.state.P[NAV : NAV + q, NAV : NAV + q])
+
+
+def solve_second_order(
+    setup: TestSetup, prepared: PreparedData, start: Alignment, progress: Progress
+) -> tuple[list[SecondOrderPass], bool]:
+    """Repeat passes from the coarse start until the coefficients stand still.
+
+    Parameters
+    ----------
+    setup : TestSetup
+        With the inner model of a `triad.AccelerometerFrameModel`.
+    prepared, start : PreparedData, Alignment
+
+    Returns
+    -------
+    passes : list of SecondOrderPass
+    converged : bool
+    """
+    coarse = coarse_start(prepared, setup, start)
+    reference, C_nb, loose = coarse.coefficients, coarse.C_nb, True
+    wide = replace(setup, model=replace(setup.model, velocity_sigma=_LOOSE[0], position_sigma=_LOOSE[1]))
+    firm = firm_setup(setup)
+    done: list[SecondOrderPass] = []
+    for count in range(1, MOST_PASSES + 1):
+        progress("passes", min(0.95, 0.2 + 0.05 * count))
+        new = second_order_pass(prepared, wide if loose else firm, start, C_nb, reference)
+        done.append(new)
+        moved = float(np.max(np.abs(new.estimate - reference) / np.sqrt(np.diag(new.covariance))))
+        reference = new.estimate
+        C_nb = np.asarray(rotation_matrix(new.state.x[-COPY:].copy()) @ new.C_start)
+        if not loose and moved < CONVERGED:
+            return done, True
+        loose = loose and moved > _NEAR
+    return done, False
+
+
+def firm_setup(setup: TestSetup) -> TestSetup:
+    """Make the setup of the later passes: Zv and Zp no tighter than can be told from zero."""
+    model = setup.model
+    velocity = _FIRM * setup.imu.accel_white_noise * float(np.sqrt(_MOTION_S))
+    position = velocity * _MOTION_S / float(np.sqrt(3.0))
+    return replace(
+        setup,
+        model=replace(
+            model,
+            velocity_sigma=max(model.velocity_sigma, velocity),
+            position_sigma=max(model.position_sigma, position),
+        ),
+    )
+
+
+def second_order_pass(
+    prepared: PreparedData, setup: TestSetup, start: Alignment, C_nb: Floats, reference: Floats
+) -> SecondOrderPass:
+    """Run one pass about samples corrected at `reference` (q,), from the initial attitude `C_nb`.
+
+    Raises
+    ------
+    DataError
+        When the filter diverges.
+    """
+    sensors, site, where = setup.sensors, setup.site, layout(prepared)
+    near = motion(
+        prepared.cycles, prepared.rest, sensors, reference, C_nb.copy(), site.latitude_rad, setup.gravity,
+        prepared.temperature, predicted=False,
+    )  # fmt: skip
+    clean = correct_cycles(prepared.cycles, near, sensors, reference)
+    C_stop, track = _stops(clean.cycles, where, C_nb, site.latitude_rad)
+    seen = _predicted(clean, prepared, where, track, setup)
+    values, channel, parameter = spread(sensors.regressors(seen), sensors, clean.weight)
+    data = pass_input(replace(prepared, cycles=clean.cycles), values, channel, parameter)
+    begin = start_state(setup, start, C_stop[0], reference)._replace(used=np.zeros(len(reference)))
+    return _finish(run_stops(data, setup, begin, prepared, where, C_stop), data, begin, reference, C_stop)
+
+
+def _finish(
+    ran: tuple[PassState, PassOutput, Ints],
+    data: PassInput, begin: PassState, reference: Floats, C_stop: Floats,
+) -> SecondOrderPass:  # fmt: skip
+    state, output, rows = ran
+    if not (np.isfinite(state.x).all() and np.isfinite(state.P).all()):
+        raise DataError(
+            "the filter diverged: the recording contradicts the IMU's specification; check --imu and --site"
+        )
+    return SecondOrderPass(reference, C_stop[0], begin, state, output, rows, data, C_stop)
+
+
+def _stops(cycles: Cycles, where: Layout, C_nb: Floats, latitude: float) -> tuple[Floats, Floats]:
+    """Attitude of every stop (k, 3, 3), levelled, and of every cycle (n, 3, 3), led on by the gyros from each stop."""
+    first = np.append(where.stop_first, len(cycles))
+    C = C_nb.copy()
+    stops, track = [], [integrate(C, cycles[: int(first[0])], latitude)]
+    for k in range(len(where.stop_first)):
+        rest = slice(int(where.stop_first[k]), int(where.stop_last[k]))
+        C = levelled(C, cycles.upsilon[rest].sum(axis=0))
+        stops.append(C.copy())
+        track.append(np.repeat(C[None], rest.stop - rest.start, axis=0))
+        track.append(integrate(C, cycles[rest.stop : int(first[k + 1])], latitude))
+    return np.array(stops), np.concatenate(track)
+
+
+def _predicted(
+    clean: CorrectedCycles, prepared: PreparedData, where: Layout, track: Floats, setup: TestSetup
+) -> Motion:
+    """Motion along the reference attitudes: without noise at the stops, by the corrected samples elsewhere."""
+    w_earth = np.einsum("kij,i->kj", track, earth.earth_rate(setup.site.latitude_rad))
+    still = np.zeros(len(track), dtype=bool)
+    for a, b in zip(where.stop_first, where.stop_last, strict=True):
+        still[a:b] = True
+    w = np.where(still[:, None], w_earth, clean.seen.w)
+    f = np.where(still[:, None], -setup.gravity * track[:, 2, :], clean.seen.f)
+    w_table = np.where(prepared.rest[:, None], 0.0, clean.seen.w - w_earth)
+    return replace(clean.seen, C_nb=track, w=w, f=f, w_table=w_table)
+
+
+def run_stops(
+    data: PassInput, setup: TestSetup, begin: PassState, prepared: PreparedData, where: Layout, C_stop: Floats
+) -> tuple[PassState, PassOutput, Ints]:
+    """Run a pass stop by stop, with each stop linearised at its own attitude.
+
+    Returns
+    -------
+    state : PassState
+    output : PassOutput
+    rows : ndarray of int
+        Epochs whose covariance was kept.
+    """
+    state = PassState(*(v.copy() for v in begin))
+    settings = pass_settings(setup, closed_loop=False)
+    edges, stop = _pieces(prepared, where)
+    parts: list[PassOutput] = []
+    rows: list[Ints] = []
+    for (a, b), k in zip(pairwise(edges), stop, strict=True):
+        if k >= 0:
+            _shift(state, C_stop[k])
+        part = data._replace(first=data.first[a:b], last=data.last[a:b], kind=data.kind[a:b])
+        out = new_output(b - a, len(state.used), False, b - a)
+        run_pass(part, settings, state, out)
+        parts.append(out)
+        rows.append(np.array([a]))
+    return state, PassOutput(*(_joined(parts, name) for name in PassOutput._fields)), np.concatenate(rows)
+
+
+def _joined(parts: list[PassOutput], name: str) -> Any:
+    return 1 if name == "stride" else np.concatenate([getattr(part, name) for part in parts])
+
+
+def _pieces(prepared: PreparedData, where: Layout) -> tuple[list[int], list[int]]:
+    """Cut the epochs at every stop and within stops; edges (m + 1), and the stop of each piece, -1 in motion.
+
+    Between two shifts the attitude of a cheap gyro drifts, and the horizontal force it then sees makes azimuth look
+    observable: three seconds keep that below what Earth rate tells.
+    """
+    epochs = prepared.epochs
+    first, last = (np.searchsorted(epochs.first, c) for c in (where.stop_first, where.stop_last))
+    edges, stop, at = [0], [], 0
+    for k, (a, b) in enumerate(zip(first.tolist(), last.tolist(), strict=True)):
+        for cut, owner in [(a, -1), *((min(c + _PIECE, b), k) for c in range(a, b, _PIECE))]:
+            if cut > at:
+                edges.append(cut)
+                stop.append(owner)
+                at = cut
+    if at < len(epochs):
+        edges.append(len(epochs))
+        stop.append(-1)
+    return edges, stop
+
+
+def _shift(state: PassState, C_nb: Floats) -> None:
+    """Go on from the attitude `C_nb` (3, 3), in place: the attitude error is counted from there.
+
+    No half product of shift and error is added as after a reset of a closed loop (`filter_pass`): the rows of Zf
+    know no second order, so an error in them is the tilt as it is seen, whatever the azimuth, and tilts so seen add.
+    With the half product every shift says something about azimuth that no sample said.
+    """
+    state.x[6:9] -= rotation_vector(C_nb @ state.C_nb.T)
+    state.C_nb[:, :] = orthonormal(np.ascontiguousarray(C_nb))

@@ -1,0 +1,68 @@
+"""The recordings that a page can choose from: the one that was asked for, and its neighbours in the same folder."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from threading import Lock
+
+from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.report.workbench.fit import FitSession
+
+_MOST_OPEN = 3
+"""Recordings that stay open: each holds some 100 MB of reduced samples."""
+
+
+class RecordingCache:
+    """Recordings by name; a bench is made when one is first asked for.
+
+    Parameters
+    ----------
+    paths : dict of str to Path
+        By name; the first is the one a fresh page shows.
+    make : callable
+        Opens a path; raises DataError.
+    """
+
+    def __init__(self, paths: dict[str, Path], make: Callable[[Path], FitSession]) -> None:
+        self._paths, self._make = paths, make
+        self._open: dict[str, FitSession] = {}
+        self._lock = Lock()
+
+    @property
+    def names(self) -> list[str]:
+        """All names, the first one shown first."""
+        return list(self._paths)
+
+    def bench(self, name: str = "") -> FitSession:
+        """Return the bench of a recording; the first one's when no name is given.
+
+        Raises
+        ------
+        DataError
+            When there is none of that name any more, or it cannot be read.
+        """
+        wanted = name or self.names[0]
+        if wanted not in self._paths:
+            raise DataError(f"no recording '{wanted}' here (choose one of: {', '.join(self.names)})")
+        with self._lock:
+            if wanted not in self._open:
+                bench = self._make(self._paths[wanted])
+                while len(self._open) >= _MOST_OPEN:
+                    self._open.pop(next(iter(self._open)))
+                self._open[wanted] = bench
+            return self._open[wanted]
+
+
+def neighbours(path: Path) -> dict[str, Path]:
+    """Find the recordings in the folder of `path`, by name: that one first, the others in the order of names."""
+    path = path.resolve()
+    try:
+        around = sorted(p for p in path.parent.iterdir() if p != path and _is_recording(p))
+    except OSError:
+        around = []
+    return {p.name: p for p in (path, *around)}
+
+
+def _is_recording(path: Path) -> bool:
+    return path.suffix in {".mcap", ".db3"} or (path / "metadata.yaml").is_file()

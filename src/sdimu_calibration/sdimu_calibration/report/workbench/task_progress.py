@@ -1,0 +1,32 @@
+"""What the server is doing for each page, for the bar that the page shows meanwhile."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+_WORDS = {
+    "read": "Reading the recording", "passes": "Fitting", "candidates": "Looking for what is missing",
+    "report": "Writing the report",
+}  # fmt: skip
+_MOST_PAGES = 200
+
+
+class TaskProgress:
+    """A word and a share done by page; written by the callback that works, read by the one that asks."""
+
+    def __init__(self) -> None:
+        self._at: dict[str, tuple[str, float]] = {}
+
+    def teller(self, page: str) -> Callable[[str, float], None]:
+        """Return the progress function of a page."""
+
+        def tell(word: str, fraction: float) -> None:
+            while len(self._at) >= _MOST_PAGES and page not in self._at:
+                self._at.pop(next(iter(self._at)))
+            self._at[page] = (_WORDS.get(word, word), fraction)
+
+        return tell
+
+    def at(self, page: str) -> tuple[str, float]:
+        """Word and share done (0 to 1) of a page."""
+        return self._at.get(page, ("Working", 0.0))

@@ -1,0 +1,45 @@
+"""Dwells without a status are found where a wide specification would let turns pass, and only there."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sdimu_calibration.core.data.dwell_detection import detected_dwells, with_detected_dwells
+from sdimu_calibration.core.data.phases import rest_limits
+from sdimu_calibration.core.plan import Plan
+from sdimu_calibration.storage.config import load_imu, load_plan, load_site
+from sdimu_sim.core.scenario import Scenario, generate
+
+MEMS, DTG, KIM18 = load_imu("mems_industrial"), load_imu("dtg"), load_plan("kim18")
+HURRIED = Plan("kim18, short dwells", (20.0,) * len(KIM18.dwell_s), KIM18.turns, np.radians(9.0))
+
+
+@pytest.mark.parametrize("seed", range(81, 85))
+def test_slow_turns_of_an_imu_with_a_bias_as_large_are_found(seed):
+    assert rest_limits(MEMS).rate > 0.5 * min(turn.rate_rad_s for turn in HURRIED.turns)
+    r, _ = generate(Scenario(HURRIED, MEMS, load_site("daejeon"), rate_hz=20.0, seed=seed))
+    found = with_detected_dwells(replace(r, phase=None), MEMS)
+    assert "no status" in found.notes[-1]
+    log = found.phase
+    said = r.phase.dwell[np.searchsorted(r.phase.t, log.t, side="right") - 1]
+    # What is called rest is rest; a window to each side of a turn is given away, and no more than a second and a half.
+    assert not (log.dwell & ~said).any()
+    assert (said & ~log.dwell).sum() * np.median(np.diff(log.t)) < 2 * 1.5 * len(HURRIED.turns)
+    assert len(np.unique(log.stop[log.dwell])) == len(HURRIED.dwell_s)
+
+
+def test_a_specification_that_tells_rest_and_a_status_are_left_alone():
+    r, _ = generate(Scenario(HURRIED, DTG, load_site("daejeon"), rate_hz=20.0, seed=85))
+    assert with_detected_dwells(r, MEMS) is r
+    silent = replace(r, phase=None)
+    assert with_detected_dwells(silent, DTG) is silent
+
+
+def test_an_imu_that_never_rests_has_no_dwells():
+    rng = np.random.default_rng(86)
+    r, _ = generate(Scenario(HURRIED, DTG, load_site("daejeon"), rate_hz=20.0, seed=86))
+    phase = 2.0 * np.pi * r.t[:, None] * [0.31, 0.47, 0.53] + rng.uniform(0.0, 6.0, 3)
+    assert detected_dwells(replace(r, omega_ib_b=np.sin(phase), phase=None)) is None

@@ -1,0 +1,38 @@
+"""What hangs on a choice is what two calibrations differ by, and nothing is said where they do not."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from sdimu_calibration.core.diagnosis.coefficient_shifts import coefficient_shifts
+from sdimu_calibration.core.diagnosis.found import found_effects
+from sdimu_calibration.core.diagnosis.rounds import with_effects
+from sdimu_calibration.core.diagnosis.search import Problem
+from sdimu_calibration.core.progress import silent
+
+_HIDDEN = ("accel_scale_asymmetry_z=60 ppm",)
+
+
+def _refit(bench, diagnosis, label):
+    (candidate,) = (c for c in diagnosis.evidence.candidates if c.label == label)
+    last = with_effects(bench.solution(effects=_HIDDEN), [candidate], silent).last
+    return last.estimate, np.sqrt(np.diag(last.covariance))
+
+
+def test_a_stake_is_the_difference_of_two_calibrations(bench):
+    diagnosis = bench.diagnosis(effects=_HIDDEN)
+    (column,) = (int(i) for i in diagnosis.found.chosen)
+    other = diagnosis.evidence.names.index("accel_quadratic_z")
+    (stake,) = coefficient_shifts(Problem(diagnosis.evidence), [column], column, [other], diagnosis.found.scale)
+    named, sigma = _refit(bench, diagnosis, "accel_scale_asymmetry_z")
+    instead, _ = _refit(bench, diagnosis, "accel_quadratic_z")
+    k = diagnosis.evidence.names.index(stake.coefficient)
+    assert stake.other == "accel_quadratic_z"
+    assert (instead[k] - named[k]) / sigma[k] == pytest.approx(stake.sigmas, rel=0.05)
+
+
+def test_nothing_hangs_on_a_choice_that_the_data_make(bench):
+    (one,) = found_effects(bench.diagnosis(effects=_HIDDEN))
+    assert one.alike == ()
+    assert one.coefficient_shifts == ()

@@ -1,0 +1,60 @@
+"""A run by hand says what was wrong with its data."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sdimu_calibration.core.handheld.handheld import handheld_calibrate
+from sdimu_calibration.storage.config import load_imu, load_site
+from sdimu_calibration.storage.effect_file import extended_model
+from sdimu_sim.core.by_hand import ByHand, by_hand_recording
+
+MEMS = load_imu("mems_by_hand")
+MODEL = extended_model("hand", [])
+
+
+@pytest.fixture(scope="module")
+def run():
+    return by_hand_recording(ByHand(12, MEMS, load_site("daejeon"), seed=3))[0]
+
+
+@pytest.fixture(scope="module")
+def sound(run):
+    return handheld_calibrate(run, None, MEMS, MODEL)
+
+
+def moved(found, sound):
+    sigma = np.sqrt(np.diag(found.covariance))
+    free = sigma > 0.0
+    return np.max(np.abs(found.values - sound.values)[free] / sigma[free])
+
+
+def test_a_sound_run_has_no_fault(sound):
+    assert sound.faults == ()
+
+
+def test_clipped_gyros_are_named_and_do_not_pass_for_a_good_fit(run, sound):
+    limit = 0.5 * np.abs(run.omega_ib_b).max()
+    clipped = replace(run, omega_ib_b=np.clip(run.omega_ib_b, -limit, limit))
+    found = handheld_calibrate(clipped, None, MEMS, MODEL)
+    assert "saturated" in {fault.kind for fault in found.faults}
+    assert any("not to be trusted" in warning for warning in found.warnings)
+    assert moved(found, sound) < 5.0
+
+
+def test_missing_samples_are_told(run):
+    keep = np.arange(len(run.t)) % 500 != 250
+    gone = replace(run, t=run.t[keep], omega_ib_b=run.omega_ib_b[keep], f_ib_b=run.f_ib_b[keep])
+    (fault,) = handheld_calibrate(gone, None, MEMS, MODEL).faults
+    assert fault.kind == "gap"
+    assert fault.count == np.count_nonzero(~keep[:-1])
+
+
+def test_rates_that_no_hand_makes_are_taken_away(run, sound):
+    rate = run.omega_ib_b.copy()
+    rate[[1000, 2000, 3000], 2] = 1e3
+    found = handheld_calibrate(replace(run, omega_ib_b=rate), None, MEMS, MODEL)
+    assert found.data["rejected"] == 3
+    assert "spike" in {fault.kind for fault in found.faults}
+    assert moved(found, sound) < 2.0
