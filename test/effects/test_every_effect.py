@@ -15,10 +15,11 @@ import pytest
 import sdimu_calibration.core.effects  # noqa: F401  (fills the registry)
 from rate_table_sim.core.specification import TableSpecification
 from sdimu_calibration.core import earth
-from sdimu_calibration.core.alignment.prepared import HELD_ALL, SKIP, first_attitude, reduce, set_up
+from sdimu_calibration.core.alignment.prepared import first_attitude, reduce, set_up
 from sdimu_calibration.core.effects import registry
 from sdimu_calibration.core.filter.filter_pass import NAV, PassState, new_output, run_pass
 from sdimu_calibration.core.filter.passes import one_pass, pass_settings
+from sdimu_calibration.core.measurement_kind import HELD_ALL, SKIP
 from sdimu_calibration.core.plan import Plan, Turn
 from sdimu_calibration.core.rotation import rotation_vector
 from sdimu_calibration.core.specification import ImuSpecification, Model, Site

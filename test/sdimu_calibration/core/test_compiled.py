@@ -44,5 +44,6 @@ def test_whatever_compiled_functions_take_from_the_core_is_part_of_the_key_of_th
         tree = ast.parse(file.read_text(encoding="utf-8"))
         used = names_of_compiled_functions(tree)
         for name, origin in imported_from_core(tree):
-            if name in used:
+            # Names of array types stand in annotations only, which are not compiled.
+            if name in used and origin.name != "arrays.py":
                 assert origin in files, f"{file.name} compiles {name} of {origin.name} into its functions"

@@ -11,8 +11,8 @@ import pytest
 from rate_table_sim.core.specification import TableSpecification
 from sdimu_calibration.core.alignment.prepared import reduce, set_up
 from sdimu_calibration.core.calibrate import calibrate
-from sdimu_calibration.core.diagnosis.evidence import collect
 from sdimu_calibration.core.effects import registry
+from sdimu_calibration.core.evidence.navigation_evidence import collect
 from sdimu_calibration.core.filter.passes import solve
 from sdimu_calibration.core.plan import Plan, Turn
 from sdimu_calibration.core.recording import DataError

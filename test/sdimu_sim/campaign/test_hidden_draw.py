@@ -7,9 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sdimu_calibration.core.diagnosis.candidates import catalogue, split
+from sdimu_calibration.core.diagnosis.candidates import catalogue
 from sdimu_calibration.core.effects.effect import CHANNELS, Timetable
 from sdimu_calibration.core.effects.motion import Motion
+from sdimu_calibration.core.evidence.candidate import split
 from sdimu_calibration.core.recording import DataError, Recording
 from sdimu_calibration.storage.config import load_imu
 from sdimu_sim.campaign.hidden_draw import KINDS, TESTABLE, Draw, Truth, draw, hideable_names

@@ -7,17 +7,7 @@ from zlib import crc32
 
 import numpy as np
 
-from sdimu_calibration.core.alignment.prepared import (
-    ALL,
-    HELD_ALL,
-    HELD_SENSORS,
-    SENSORS,
-    PreparedData,
-    TestSetup,
-    reduce,
-    set_up,
-    stops_line,
-)
+from sdimu_calibration.core.alignment.prepared import PreparedData, TestSetup, reduce, set_up, stops_line
 from sdimu_calibration.core.arrays import Bools, Floats
 from sdimu_calibration.core.effects import body_frame
 from sdimu_calibration.core.effects.accelerometer_frame import FRAME, accelerometer_frame_model, drifting, squares_count
@@ -26,6 +16,7 @@ from sdimu_calibration.core.filter.azimuth_known import azimuth_note, azimuth_wa
 from sdimu_calibration.core.filter.filter_pass import PassState, new_output, run_pass
 from sdimu_calibration.core.filter.passes import Pass, Solution, pass_settings, solve
 from sdimu_calibration.core.filter.stop_misfit import stop_misfit
+from sdimu_calibration.core.measurement_kind import ALL, HELD_ALL, HELD_SENSORS, SENSORS
 from sdimu_calibration.core.progress import Progress, silent
 from sdimu_calibration.core.recording import DataError, Recording
 from sdimu_calibration.core.results import Calibration, History

@@ -10,8 +10,8 @@ import numpy as np
 from sdimu_calibration.core.arrays import Bools, Floats, Ints
 from sdimu_calibration.core.diagnosis.consistency import CHANNEL_NAMES, Consistency
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
-from sdimu_calibration.core.diagnosis.linear import LinearEvidence
 from sdimu_calibration.core.diagnosis.scan import Scan, scan
+from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.units import from_si
 from sdimu_calibration.report.groups import is_free

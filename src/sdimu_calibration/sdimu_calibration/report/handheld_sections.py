@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from sdimu_calibration.core.diagnosis.handheld_evidence import CHANNELS
 from sdimu_calibration.core.diagnosis.handheld_summary import HandheldSummary, Place, shown
+from sdimu_calibration.core.evidence.handheld_evidence import CHANNELS
 from sdimu_calibration.core.handheld.handheld_fit import FORCE, RATE, TURN
 from sdimu_calibration.core.units import from_si
 from sdimu_calibration.report import data, evidence_figures

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
-from sdimu_calibration.core.diagnosis.evidence import columns
 from sdimu_calibration.core.diagnosis.found import found_effects
 from sdimu_calibration.core.diagnosis.scan import Scan, scan
+from sdimu_calibration.core.evidence.navigation_evidence import columns
 from sdimu_calibration.core.results import Calibration
 from sdimu_sim.campaign.hidden_draw import Draw, Truth
 from sdimu_sim.campaign.hidden_outside import OUTSIDE, shapes

@@ -10,8 +10,8 @@ import numpy as np
 
 from sdimu_calibration.core.alignment.prepared import reduce, set_up
 from sdimu_calibration.core.diagnosis.candidates import catalogue
-from sdimu_calibration.core.diagnosis.evidence import collect, timetable
 from sdimu_calibration.core.diagnosis.scan import scan
+from sdimu_calibration.core.evidence.navigation_evidence import collect, timetable
 from sdimu_calibration.core.filter.passes import solve
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.specification import ImuSpecification, Model, Site

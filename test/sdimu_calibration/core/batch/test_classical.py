@@ -57,7 +57,7 @@ def test_turned_into_the_accelerometers_frame_the_mount_is_gone(imu, model, site
 def test_an_encoder_that_counts_to_half_a_turn_is_followed_over_it(imu, model, site):
     recording, _ = generate(Scenario(KIM18, imu, site, seed=2, mount_rad=(0.0, 0.0, 0.0), rate_hz=20.0))
     table = recording.table
-    wrapped = replace(table, angle=np.free_input_test(table.angle + np.pi, 2.0 * np.pi) - np.pi)
+    wrapped = replace(table, angle=np.remainder(table.angle + np.pi, 2.0 * np.pi) - np.pi)
     assert np.abs(np.diff(wrapped.angle, axis=0)).max() > 6.0
     plain, folded = (classical_calibrate(replace(recording, table=log), site, imu, model) for log in (table, wrapped))
     np.testing.assert_allclose(folded.values, plain.values, rtol=0, atol=1e-9)

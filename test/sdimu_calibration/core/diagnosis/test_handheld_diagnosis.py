@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from sdimu_calibration.core.diagnosis.handheld_diagnosis import candidates, diagnose_handheld
-from sdimu_calibration.core.diagnosis.handheld_evidence import collect, timetable
 from sdimu_calibration.core.diagnosis.handheld_summary import summarise_handheld
 from sdimu_calibration.core.diagnosis.scan import POWER_80
 from sdimu_calibration.core.effects import imu_model
+from sdimu_calibration.core.evidence.handheld_evidence import collect, timetable
 from sdimu_calibration.core.handheld.handheld import first_linearisation, fit_priors, prepare
 from sdimu_calibration.core.handheld.handheld_fit import FORCE, equations, fit_run
 from sdimu_calibration.core.units import from_si, to_si

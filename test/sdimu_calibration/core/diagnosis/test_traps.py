@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 
 from sdimu_calibration.core.alignment.prepared import set_up
-from sdimu_calibration.core.diagnosis.evidence import collect, columns
 from sdimu_calibration.core.diagnosis.scan import scan
 from sdimu_calibration.core.effects import registry
+from sdimu_calibration.core.evidence.navigation_evidence import collect, columns
 from sdimu_calibration.core.filter.passes import solve
 from sdimu_calibration.core.navigation.track import motion
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sdimu_calibration.core import earth
-from sdimu_calibration.core.alignment.prepared import HELD_ALL, HELD_SENSORS, SKIP, first_attitude, reduce, set_up
+from sdimu_calibration.core.alignment.prepared import first_attitude, reduce, set_up
 from sdimu_calibration.core.filter.filter_pass import (
     COPY,
     MEASURED,
@@ -18,6 +18,7 @@ from sdimu_calibration.core.filter.filter_pass import (
     run_pass,
 )
 from sdimu_calibration.core.filter.passes import one_pass, pass_settings, start_state
+from sdimu_calibration.core.measurement_kind import HELD_ALL, HELD_SENSORS, SKIP
 from sdimu_calibration.core.rotation import rotation_matrix, rotation_vector, skew
 
 PARTS = 10

@@ -23,12 +23,11 @@ from sdimu_calibration.core.data.phases import (
 from sdimu_calibration.core.data.sample_screening import sound, wild
 from sdimu_calibration.core.effects import imu_model
 from sdimu_calibration.core.effects.imu_model import ImuModel
+from sdimu_calibration.core.measurement_kind import ALL, SENSORS, SKIP
 from sdimu_calibration.core.navigation.strapdown import Cycles, Reducer
 from sdimu_calibration.core.recording import NOMINAL_FROM, DataError, DataFault, Recording, TemperatureLog
 from sdimu_calibration.core.specification import ImuSpecification, Model, Site
 
-SKIP, SENSORS, ALL, HELD_SENSORS, HELD_ALL = 0, 1, 2, -1, -2
-"""What an epoch measures: nothing; Zw and Zf; all four. Held out: predicted and scored, not taken."""
 _LISTED = 40
 """So many stops are listed one by one."""
 ALIGN_S = 30.0

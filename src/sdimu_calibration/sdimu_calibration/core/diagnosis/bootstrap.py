@@ -14,8 +14,8 @@ from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.diagnosis.found import looked_at
 from sdimu_calibration.core.diagnosis.free_input_test import free_input_test
-from sdimu_calibration.core.diagnosis.information import Information
 from sdimu_calibration.core.diagnosis.search import FALSE_ALARM, search
+from sdimu_calibration.core.evidence.information import Information
 from sdimu_calibration.core.progress import Progress
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -12,44 +12,9 @@ from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.effects import registry
 from sdimu_calibration.core.effects.effect import AXES, CHANNELS, Column, Effect, Parameter, Term, Timetable, product
 from sdimu_calibration.core.effects.motion import Motion
+from sdimu_calibration.core.evidence.candidate import OWN
 
 _CYCLES = np.arange(1.0, 20.0, 0.5)
-OWN = "own equation"
-"""Title of an equation that no registered effect has."""
-
-
-@dataclass(frozen=True)
-class Candidate:
-    """One parameter that might be missing.
-
-    Attributes
-    ----------
-    effect : Effect
-        With this parameter alone.
-    family : str
-        Registry name of the effect, or ``own`` for an equation that no registered effect has.
-    label : str
-        What `sdimu calibrate --add` takes.
-    """
-
-    effect: Effect
-    family: str
-    label: str
-
-    @property
-    def parameter(self) -> Parameter:
-        """The parameter."""
-        return self.effect.parameters[0]
-
-
-def split(effect: Effect) -> list[Candidate]:
-    """One candidate for each parameter of an effect."""
-    out = []
-    for parameter, label in zip(effect.parameters, effect.labels, strict=True):
-        one = effect.only((parameter.name,))
-        family = "own" if effect.title == OWN else effect.family or effect.name
-        out.append(Candidate(one, family, label))
-    return out
 
 
 def catalogue(times: Timetable, in_model: set[str], has_temperature: bool) -> list[Effect]:

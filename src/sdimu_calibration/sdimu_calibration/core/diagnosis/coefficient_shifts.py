@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sdimu_calibration.core.diagnosis.linear import E
 from sdimu_calibration.core.diagnosis.search import Problem
+from sdimu_calibration.core.evidence.linear import E
 
 _MATTERS = 3.0
 """A coefficient that differs by less than this many of its sigmas is right enough whichever member it is."""

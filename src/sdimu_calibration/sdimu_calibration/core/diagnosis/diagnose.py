@@ -12,18 +12,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.stats import norm
 
-from sdimu_calibration.core.alignment.prepared import SKIP, PreparedData, TestSetup, reduce, set_up
+from sdimu_calibration.core.alignment.prepared import PreparedData, TestSetup, reduce, set_up
 from sdimu_calibration.core.arrays import Ints
 from sdimu_calibration.core.calibrate import NOT_CONVERGED, assemble
-from sdimu_calibration.core.diagnosis.candidates import Candidate
 from sdimu_calibration.core.diagnosis.consistency import SLOW_S, Consistency, check
-from sdimu_calibration.core.diagnosis.evidence import Evidence
 from sdimu_calibration.core.diagnosis.free_input_test import FreeInputTest
 from sdimu_calibration.core.diagnosis.rounds import UNEXPLAINED_P, Round, settle
 from sdimu_calibration.core.diagnosis.screen import Finding, beyond_specification, screen
 from sdimu_calibration.core.diagnosis.search import FALSE_ALARM, MOST_STEPS, Search
 from sdimu_calibration.core.effects.effect import Effect
+from sdimu_calibration.core.evidence.candidate import Candidate
+from sdimu_calibration.core.evidence.navigation_evidence import Evidence
 from sdimu_calibration.core.filter.passes import solve
+from sdimu_calibration.core.measurement_kind import SKIP
 from sdimu_calibration.core.progress import Progress, silent
 from sdimu_calibration.core.recording import Recording
 from sdimu_calibration.core.results import Calibration

@@ -8,13 +8,13 @@ import numpy as np
 from scipy.stats import norm
 
 from sdimu_calibration.core.arrays import Floats, Ints
-from sdimu_calibration.core.diagnosis.candidates import Candidate
 from sdimu_calibration.core.diagnosis.coefficient_shifts import CoefficientShift, coefficient_shifts
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
-from sdimu_calibration.core.diagnosis.evidence import Evidence
 from sdimu_calibration.core.diagnosis.free_input_test import free_input_test
 from sdimu_calibration.core.diagnosis.scan import POWER_80, Scan, alike, scan
 from sdimu_calibration.core.diagnosis.search import Problem
+from sdimu_calibration.core.evidence.candidate import Candidate
+from sdimu_calibration.core.evidence.navigation_evidence import Evidence
 
 
 @dataclass(frozen=True)

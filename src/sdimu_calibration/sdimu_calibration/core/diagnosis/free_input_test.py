@@ -8,7 +8,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from sdimu_calibration.core.arrays import Floats, Ints
-from sdimu_calibration.core.diagnosis.information import Information
+from sdimu_calibration.core.evidence.information import Information
 
 _TESTABLE = 1e-2
 """Directions of which the model leaves less than this share of the information (a tenth of the signature) are not

@@ -14,13 +14,14 @@ import numpy as np
 from scipy.stats import norm
 
 from sdimu_calibration.core.arrays import Floats, Ints
-from sdimu_calibration.core.diagnosis.candidates import Candidate, catalogue, equations, periodic
-from sdimu_calibration.core.diagnosis.handheld_evidence import HandheldEvidence, collect, forget, timetable
+from sdimu_calibration.core.diagnosis.candidates import catalogue, equations, periodic
 from sdimu_calibration.core.diagnosis.rounds import LEAST_SIGMAS, mark_dropped
 from sdimu_calibration.core.diagnosis.scan import Scan, alike
 from sdimu_calibration.core.diagnosis.search import FALSE_ALARM, Problem, Search, Step, search
 from sdimu_calibration.core.effects import imu_model
 from sdimu_calibration.core.effects.effect import Effect, Timetable
+from sdimu_calibration.core.evidence.candidate import Candidate
+from sdimu_calibration.core.evidence.handheld_evidence import HandheldEvidence, collect, forget, timetable
 from sdimu_calibration.core.handheld.handheld import PreparedRun, assemble, first_linearisation, fit_priors, prepare
 from sdimu_calibration.core.handheld.handheld_fit import FitPriors, HandheldSolution, LinearisationPoint, fit_run
 from sdimu_calibration.core.progress import Progress

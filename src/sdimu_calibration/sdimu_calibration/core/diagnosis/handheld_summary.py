@@ -11,9 +11,9 @@ from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.diagnosis.coefficient_shifts import coefficient_shifts
 from sdimu_calibration.core.diagnosis.found import DetectableSize, Found
 from sdimu_calibration.core.diagnosis.handheld_diagnosis import HandheldDiagnosis
-from sdimu_calibration.core.diagnosis.handheld_evidence import CHANNELS, HandheldEvidence, standardised
 from sdimu_calibration.core.diagnosis.scan import POWER_80, Scan, alike
 from sdimu_calibration.core.diagnosis.search import Problem
+from sdimu_calibration.core.evidence.handheld_evidence import CHANNELS, HandheldEvidence, standardised
 from sdimu_calibration.core.handheld.handheld_fit import FORCE, RATE, TURN
 from sdimu_calibration.core.units import from_si
 

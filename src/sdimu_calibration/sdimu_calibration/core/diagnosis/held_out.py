@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sdimu_calibration.core.arrays import Floats, Ints
-from sdimu_calibration.core.diagnosis.linear import LinearEvidence
+from sdimu_calibration.core.evidence.linear import LinearEvidence
 
 
 @dataclass(frozen=True)

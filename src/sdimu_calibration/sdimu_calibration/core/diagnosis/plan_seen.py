@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sdimu_calibration.core.diagnosis.evidence import Evidence
 from sdimu_calibration.core.effects.effect import AXES
+from sdimu_calibration.core.evidence.navigation_evidence import Evidence
 
 _SINGLE_AXIS = 0.9
 """Least share of a turn about one body axis that makes it a turn about that axis."""

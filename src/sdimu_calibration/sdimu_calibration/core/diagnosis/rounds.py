@@ -13,19 +13,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sdimu_calibration.core.arrays import Ints
-from sdimu_calibration.core.diagnosis.candidates import (
-    Candidate,
-    catalogue,
-    equations,
-    free_inputs,
-    periodic,
-    split,
-)
-from sdimu_calibration.core.diagnosis.evidence import Evidence, collect, timetable
+from sdimu_calibration.core.diagnosis.candidates import catalogue, equations, free_inputs, periodic
 from sdimu_calibration.core.diagnosis.free_input_test import FreeInputTest, free_input_test
 from sdimu_calibration.core.diagnosis.search import Search, Step, search
 from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.effects.imu_model import build
+from sdimu_calibration.core.evidence.candidate import Candidate, split
+from sdimu_calibration.core.evidence.navigation_evidence import Evidence, collect, timetable
 from sdimu_calibration.core.filter.passes import Solution, solve
 from sdimu_calibration.core.progress import Progress
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sdimu_calibration.core.arrays import Floats, Ints
-from sdimu_calibration.core.diagnosis.information import Information
+from sdimu_calibration.core.evidence.information import Information
 
 TESTABLE = 0.02
 """Share of a signature's length that must be left after the model's coefficients have taken theirs."""

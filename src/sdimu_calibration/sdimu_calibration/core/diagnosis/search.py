@@ -17,9 +17,9 @@ import numpy as np
 
 from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.diagnosis.held_out import HeldOut, gain, predict
-from sdimu_calibration.core.diagnosis.linear import E
 from sdimu_calibration.core.diagnosis.scan import Scan, alike, scan, threshold
 from sdimu_calibration.core.effects.effect import Effect
+from sdimu_calibration.core.evidence.linear import E
 
 FALSE_ALARM = 0.02
 """Probability that pure noise puts one of all candidates over the threshold: what is bearable (5 %) with room for what

@@ -28,11 +28,11 @@ from typing import NamedTuple
 import numpy as np
 
 from sdimu_calibration.core import earth
-from sdimu_calibration.core.alignment.prepared import ALL, SKIP
 from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.compiled import compiled
 from sdimu_calibration.core.filter.kalman import cholesky, propagate, update, whiten
 from sdimu_calibration.core.matrix3 import applied, elements
+from sdimu_calibration.core.measurement_kind import ALL, SKIP
 from sdimu_calibration.core.navigation.ins_errors import (
     add_response,
     navigation_error_matrix,

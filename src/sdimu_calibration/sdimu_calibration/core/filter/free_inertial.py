@@ -15,12 +15,13 @@ import numpy as np
 
 from sdimu_calibration.core import earth
 from sdimu_calibration.core.alignment.alignment import align, azimuth_of
-from sdimu_calibration.core.alignment.prepared import SENSORS, SKIP, PreparedData, TestSetup
+from sdimu_calibration.core.alignment.prepared import PreparedData, TestSetup
 from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.compiled import compiled
 from sdimu_calibration.core.filter.filter_pass import NAV, PassInput, PassOutput, PassState, new_output, run_pass
 from sdimu_calibration.core.filter.holdout import WANTED_S, Segment, holdout_segments, part
 from sdimu_calibration.core.filter.passes import Pass, pass_input, pass_settings, solve
+from sdimu_calibration.core.measurement_kind import SENSORS, SKIP
 from sdimu_calibration.core.navigation.strapdown import Cycles, navigate_cycle, velocity_increment
 from sdimu_calibration.core.navigation.track import motion
 from sdimu_calibration.core.progress import silent

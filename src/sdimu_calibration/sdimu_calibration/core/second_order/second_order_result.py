@@ -4,19 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from sdimu_calibration.core.alignment.prepared import (
-    ALL,
-    HELD_ALL,
-    HELD_SENSORS,
-    SENSORS,
-    PreparedData,
-    TestSetup,
-    first_attitude,
-    stops_line,
-)
+from sdimu_calibration.core.alignment.prepared import PreparedData, TestSetup, first_attitude, stops_line
 from sdimu_calibration.core.alignment.rest_means import layout
 from sdimu_calibration.core.calibrate import HELD_OUT_FOLDS, conditions, data_counts, outside, poor_fit
 from sdimu_calibration.core.effects.accelerometer_frame import FRAME, AccelerometerFrameModel
+from sdimu_calibration.core.measurement_kind import ALL, HELD_ALL, HELD_SENSORS, SENSORS
 from sdimu_calibration.core.progress import Progress
 from sdimu_calibration.core.recording import Recording
 from sdimu_calibration.core.results import Calibration, History

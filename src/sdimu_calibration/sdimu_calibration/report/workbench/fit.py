@@ -13,17 +13,18 @@ from typing import Any
 
 import numpy as np
 
-from sdimu_calibration.core.alignment.prepared import SKIP, PreparedData, TestSetup, first_attitude, reduce, set_up
+from sdimu_calibration.core.alignment.prepared import PreparedData, TestSetup, first_attitude, reduce, set_up
 from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.calibrate import assemble, predict_stops
 from sdimu_calibration.core.diagnosis.candidates import catalogue, free_inputs
 from sdimu_calibration.core.diagnosis.consistency import check
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
-from sdimu_calibration.core.diagnosis.evidence import Evidence, collect, timetable
 from sdimu_calibration.core.diagnosis.free_input_test import FreeInputTest, free_input_test
 from sdimu_calibration.core.diagnosis.scan import scan, threshold
 from sdimu_calibration.core.diagnosis.search import FALSE_ALARM, Problem, Search
+from sdimu_calibration.core.evidence.navigation_evidence import Evidence, collect, timetable
 from sdimu_calibration.core.filter.passes import Solution, one_pass, refine, smoothed_start, solve
+from sdimu_calibration.core.measurement_kind import SKIP
 from sdimu_calibration.core.progress import silent
 from sdimu_calibration.core.recording import DataError, Recording
 from sdimu_calibration.core.results import Calibration

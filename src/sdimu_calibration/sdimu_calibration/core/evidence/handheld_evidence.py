@@ -12,10 +12,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sdimu_calibration.core.arrays import Floats, Ints
-from sdimu_calibration.core.diagnosis.candidates import Candidate
-from sdimu_calibration.core.diagnosis.linear import LinearEvidence
 from sdimu_calibration.core.effects.effect import Effect, Timetable
 from sdimu_calibration.core.effects.motion import Motion
+from sdimu_calibration.core.evidence.candidate import Candidate
+from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.handheld.handheld_data import HandheldRun, Turns, seen_at_rest, turns
 from sdimu_calibration.core.handheld.handheld_fit import FitPriors, LinearisationPoint, equations, row_sigmas
 

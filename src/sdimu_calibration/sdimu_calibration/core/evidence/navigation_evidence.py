@@ -10,11 +10,11 @@ import numpy as np
 
 from sdimu_calibration.core.alignment.prepared import PreparedData, TestSetup
 from sdimu_calibration.core.arrays import Floats, Ints
-from sdimu_calibration.core.diagnosis.candidates import split
-from sdimu_calibration.core.diagnosis.linear import LinearEvidence
-from sdimu_calibration.core.diagnosis.signatures import measured_rows, signatures
 from sdimu_calibration.core.effects.effect import Effect, Timetable
 from sdimu_calibration.core.effects.motion import Motion
+from sdimu_calibration.core.evidence.candidate import split
+from sdimu_calibration.core.evidence.linear import LinearEvidence
+from sdimu_calibration.core.evidence.signatures import measured_rows, signatures
 from sdimu_calibration.core.filter.filter_pass import NAV, PassOutput, PassState, new_output, run_pass
 from sdimu_calibration.core.filter.passes import Pass, pass_settings
 from sdimu_calibration.core.navigation.track import motion

@@ -15,9 +15,9 @@ from typing import TypeVar
 import numpy as np
 
 from sdimu_calibration.core.arrays import Floats, Ints
-from sdimu_calibration.core.diagnosis.candidates import Candidate, split
-from sdimu_calibration.core.diagnosis.information import Information
 from sdimu_calibration.core.effects.effect import Effect
+from sdimu_calibration.core.evidence.candidate import Candidate, split
+from sdimu_calibration.core.evidence.information import Information
 
 E = TypeVar("E", bound="LinearEvidence")
 

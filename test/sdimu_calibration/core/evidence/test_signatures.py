@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 
 from sdimu_calibration.core.calibrate import fit_statistics
-from sdimu_calibration.core.diagnosis.evidence import collect
 from sdimu_calibration.core.diagnosis.scan import TESTABLE, scan
 from sdimu_calibration.core.effects import registry
 from sdimu_calibration.core.effects.imu_model import build
+from sdimu_calibration.core.evidence.navigation_evidence import collect
 from sdimu_calibration.core.filter.passes import solve
 
 

@@ -1,0 +1,44 @@
+"""One parameter that a model may lack."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from sdimu_calibration.core.effects.effect import Effect, Parameter
+
+OWN = "own equation"
+"""Title of an equation that no registered effect has."""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """One parameter that might be missing.
+
+    Attributes
+    ----------
+    effect : Effect
+        With this parameter alone.
+    family : str
+        Registry name of the effect, or ``own`` for an equation that no registered effect has.
+    label : str
+        What `sdimu calibrate --add` takes.
+    """
+
+    effect: Effect
+    family: str
+    label: str
+
+    @property
+    def parameter(self) -> Parameter:
+        """The parameter."""
+        return self.effect.parameters[0]
+
+
+def split(effect: Effect) -> list[Candidate]:
+    """One candidate for each parameter of an effect."""
+    out = []
+    for parameter, label in zip(effect.parameters, effect.labels, strict=True):
+        one = effect.only((parameter.name,))
+        family = "own" if effect.title == OWN else effect.family or effect.name
+        out.append(Candidate(one, family, label))
+    return out
