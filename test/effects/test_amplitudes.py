@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from sdimu_calibration.core.calibrate import calibrate
+from sdimu_calibration.core.estimation.outcome import calibrate
 from sdimu_calibration.core.units import to_si
 from sdimu_calibration.storage.config import load_imu, load_plan, load_site
 from sdimu_calibration.storage.effect_file import extended_model

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from sdimu_calibration.core.batch.batch import batch_calibrate
-from sdimu_calibration.core.calibrate import calibrate
+from sdimu_calibration.core.estimation.outcome import calibrate
 from sdimu_calibration.core.plan import Plan
 from sdimu_calibration.storage.config import load_imu, load_model, load_plan, load_site
 from sdimu_sim.core.scenario import Scenario, generate
@@ -22,7 +21,8 @@ def test_covariance_stays_symmetric_and_positive_and_errors_honest_over_a_day():
     day = Plan("a day", (100.0,) * (18 * REPEATS + 1), plan.turns * REPEATS, plan.acceleration_rad_s2)
     assert day.duration_s > 24 * 3600.0
     recording, truth = generate(Scenario(day, imu, site, seed=1, rate_hz=20.0))
-    for found in (calibrate(recording, site, imu, model, held_out=False), batch_calibrate(recording, site, imu, model)):
+    for estimator in ("filter", "batch"):
+        found = calibrate(recording, site, imu, model, held_out=False, estimator=estimator)
         true = in_body_frame(truth.imu.coefficients, found.body_frame)
         k = [i for i, name in enumerate(found.names) if name not in PINNED]
         sigma = np.sqrt(np.diag(found.covariance))[k]

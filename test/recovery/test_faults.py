@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sdimu_calibration.core.calibrate import calibrate
 from sdimu_calibration.core.data.arrival import arrange
+from sdimu_calibration.core.estimation.outcome import calibrate
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage.config import load_imu, load_model, load_plan, load_site
 from sdimu_sim.campaign.fault_run import OK, REFUSED, TOLD, TRACEBACK, WARNED, WRONG, as_read, run_fault, spoilt

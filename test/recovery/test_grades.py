@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from sdimu_calibration.core.batch.batch import batch_calibrate, bound_covariance
+from sdimu_calibration.core.batch.batch import bound_covariance
+from sdimu_calibration.core.estimation.outcome import calibrate
 from sdimu_calibration.core.planning.predict import predict
 from sdimu_calibration.storage.config import config_folder, load_imu, load_model, load_plan, load_site
 from sdimu_sim.core.scenario import Scenario, generate
@@ -34,7 +35,7 @@ def test_a_plan_tells_something_of_every_grade_and_the_filter_reaches_the_bound(
 def test_every_grade_is_calibrated_within_its_sigma(grade):
     imu = load_imu(grade)
     recording, truth = generate(Scenario(PLAN, imu, SITE, seed=3))
-    found = batch_calibrate(recording, SITE, imu, MODEL)
+    found = calibrate(recording, SITE, imu, MODEL, estimator="batch")
     true = in_body_frame(truth.imu.coefficients, found.body_frame)
     off = np.array([value - true[name] for name, value in zip(found.names, found.values, strict=True)])
     sigma = np.sqrt(np.diag(found.covariance))

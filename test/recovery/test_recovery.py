@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from sdimu_calibration.core.calibrate import calibrate
 from sdimu_calibration.core.effects import registry
+from sdimu_calibration.core.estimation.outcome import calibrate
 from sdimu_calibration.core.plan import Plan
 from sdimu_calibration.core.recording import Recording
 from sdimu_calibration.core.results import Calibration

@@ -5,7 +5,7 @@ import pytest
 import scipy.linalg
 
 from sdimu_calibration.core.data.static_detection import detect_static
-from sdimu_calibration.core.handheld.handheld import handheld_calibrate
+from sdimu_calibration.core.estimation.outcome import calibrate
 from sdimu_calibration.core.recording import Recording
 from sdimu_calibration.storage.config import load_imu, load_model
 
@@ -29,7 +29,7 @@ def xsens():
     accel, gyro = (np.loadtxt(folder / f"xsens_{name}.mat") for name in ("acc", "gyro"))
     t = accel[:, 0] - accel[0, 0] + 0.01
     recording = Recording(0, t, (gyro[:, 1:] - MIDDLE) / COUNTS[1], (accel[:, 1:] - MIDDLE) / COUNTS[0])
-    found = handheld_calibrate(recording, None, load_imu("mems_by_hand"), load_model("hand"))
+    found = calibrate(recording, None, load_imu("mems_by_hand"), load_model("hand"), estimator="handheld")
     value = dict(zip(found.names, found.values, strict=True))
     pairs = zip(("accel", "gyro"), COUNTS, strict=True)
     accel_matrix, gyro_matrix = (matrix(value, triad) * counts for triad, counts in pairs)

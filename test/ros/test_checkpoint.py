@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sdimu_calibration.core.calibrate import calibrate
+from sdimu_calibration.core.estimation.outcome import calibrate
 from sdimu_calibration.core.live import LiveCalibration
 from sdimu_calibration.nodes.feed import AWAY_S, NS, Feed
 from sdimu_calibration.storage.bag_reader import read_recording

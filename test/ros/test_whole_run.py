@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from rclpy.serialization import deserialize_message
 
-from sdimu_calibration.core.calibrate import calibrate
+from sdimu_calibration.core.estimation.outcome import calibrate
 from sdimu_calibration.nodes.recorder_node import message_class
 from sdimu_calibration.storage.bag_file import raw_messages
 from sdimu_calibration.storage.bag_reader import read_recording

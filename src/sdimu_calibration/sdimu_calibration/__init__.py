@@ -1,7 +1,37 @@
-"""Navigation-level calibration of a strapdown inertial measurement unit on a rate table."""
+"""Navigation-level calibration of a strapdown inertial measurement unit on a rate table.
+
+Frames: i inertial, e Earth, n local level (north, east, down), b body (the axes of the IMU), t table. ``C_nb`` maps a
+vector from b to n. Units are SI throughout; customary units (deg/h, ppm, arcmin, deg/h/g, ug) stand where a person
+reads. ``omega_ib_b`` is the rate of b against i in b (rad/s), ``f_ib_b`` the specific force in b (m/s^2).
+
+    import sdimu_calibration as sdimu
+    test = sdimu.open("bag", site="daejeon", imu="dtg")
+    fit = sdimu.calibrate(test)
+    found = sdimu.diagnose(fit)
+"""
+
+from __future__ import annotations
 
 import os
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
 # The matrices here are small (tens to hundreds of rows): a second thread costs more than it brings, and on a busy
 # machine it waits for its core a hundred times longer than the work takes. Only holds if numpy is not loaded yet.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+if TYPE_CHECKING:
+    from sdimu_calibration.api.functions import calibrate, compare, diagnose, open, plan, predict, simulate  # noqa: A004
+
+__all__ = ["calibrate", "compare", "diagnose", "open", "plan", "predict", "simulate"]
+
+
+def __getattr__(name: str) -> Any:
+    # The functions load the numerical modules, which the start of the command line does not wait for.
+    if name in __all__:
+        return getattr(import_module("sdimu_calibration.api.functions"), name)
+    raise AttributeError(f"module 'sdimu_calibration' has no attribute '{name}'")
+
+
+def __dir__() -> list[str]:
+    return [*__all__, "__doc__", "__version__"]

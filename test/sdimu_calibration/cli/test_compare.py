@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from sdimu_calibration.cli import main as cli
-from sdimu_calibration.core.diagnosis.grow import moved_coefficients
+from sdimu_calibration.core.diagnosis.ladder import moved_coefficients
 from sdimu_calibration.core.results import Calibration, History
 from sdimu_calibration.storage.result_file import write_result
 

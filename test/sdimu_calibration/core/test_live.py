@@ -9,7 +9,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from sdimu_calibration.core.calibrate import calibrate
+from sdimu_calibration.core.estimation.outcome import calibrate
 from sdimu_calibration.core.filter.passes import SNAPSHOT_EPOCHS
 from sdimu_calibration.core.live import LiveCalibration
 from sdimu_calibration.core.recording import DataError, seconds

@@ -38,5 +38,5 @@ def diagnosis(recording: Recording) -> Diagnosis:
 @pytest.fixture(scope="session")
 def more(recording: Recording, diagnosis: Diagnosis) -> ReportExtras:
     """With the table's angles, as a bag has them."""
-    named = replace(recording, table=TableLog(np.array([0.0, recording.t[-1]]), ("outer", "inner"), ANGLES))
-    return report_extras(named, diagnosis, load_site("daejeon"), load_imu("dtg"), load_model("baseline"))
+    table = TableLog(np.array([0.0, recording.t[-1]]), ("outer", "inner"), ANGLES)
+    return replace(report_extras(diagnosis), table=table)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sdimu_calibration.core.diagnosis.consistency import CHANNEL_NAMES
+from sdimu_calibration.core.evidence.consistency import CHANNEL_NAMES
 from sdimu_calibration.report import data
 
 HIDDEN = "accel_quadratic_x"

@@ -15,7 +15,8 @@ import pytest
 import yaml
 
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
-from sdimu_calibration.core.diagnosis.grow import Rung
+from sdimu_calibration.core.diagnosis.ladder import Rung
+from sdimu_calibration.core.diagnosis.summary import summarise
 from sdimu_calibration.report import (
     data,
     evidence_figures,
@@ -34,7 +35,7 @@ from sdimu_calibration.report.table import rows
 
 @pytest.fixture(scope="module")
 def text(diagnosis: Diagnosis, more: ReportExtras) -> str:
-    return page(diagnosis.after, "A test", diagnosis=diagnosis, more=more)
+    return page(diagnosis.after, "A test", summary=summarise(diagnosis), more=more)
 
 
 def all_figures(diagnosis: Diagnosis, more: ReportExtras) -> dict[str, object]:
@@ -120,11 +121,11 @@ def test_dashes_tell_compensations_apart(more):
 def test_the_page_says_what_it_means_in_use(text, more):
     for trial in more.trials:
         assert escape(use_section.told(trial)) in text
-        assert f"{trial.stretch.length_s / 60.0:.1f} min" in use_section.told(trial)
+        assert f"{trial.segment.length_s / 60.0:.1f} min" in use_section.told(trial)
 
 
 def test_the_page_says_why_nothing_was_navigated(diagnosis):
-    text = page(diagnosis.after, "x", diagnosis=diagnosis, more=ReportExtras(no_trial="too short"))
+    text = page(diagnosis.after, "x", summary=summarise(diagnosis), more=ReportExtras(no_trial="too short"))
     assert "Not tried: too short." in text
 
 
@@ -134,7 +135,7 @@ def test_the_ladder_of_refits_tells_every_rung(diagnosis):
         Rung("some_effect", True, "", 20.0, 30.0, 1.01, 0.98, 1.0, 0.001, (("gyro_bias_x", 7.1),)),
         Rung("other_effect", False, "does not lower it", 21.0, 1.0, 1.01, 0.99, 1.0, 0.001, ()),
     )
-    text = page(diagnosis.after, "x", diagnosis=diagnosis, more=ReportExtras(rungs=rungs))
+    text = page(diagnosis.after, "x", summary=summarise(replace(diagnosis, rungs=rungs)))
     for word in ("+ some_effect", "+30.0", "gyro_bias_x +7.1", "refused: does not lower it"):
         assert word in text
 
@@ -158,7 +159,7 @@ def test_a_diagnosis_of_a_right_model_makes_a_page_too(diagnosis):
         diagnosis.evidence,
     )
     quiet = type(diagnosis)(**{**vars(diagnosis), "found": empty, "adequate": True, "verdict": "consistent"})
-    text = page(diagnosis.before, "x", diagnosis=quiet)
+    text = page(diagnosis.before, "x", summary=summarise(quiet))
     assert "No candidate stands out" in text
     assert 'class="verdict good"' in text
 
@@ -184,7 +185,7 @@ def test_a_browser_opens_the_page_without_complaint(diagnosis, more, tmp_path):
     browser = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
     if not browser:
         pytest.skip("no Chromium here (package chromium)")
-    write_report(tmp_path / "report.html", diagnosis.after, diagnosis=diagnosis, more=more)
+    write_report(tmp_path / "report.html", diagnosis.after, summary=summarise(diagnosis), more=more)
     done = subprocess.run(
         [browser, "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
          "--disable-background-networking", "--disable-component-update", "--disable-sync", "--enable-logging=stderr",

@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 from sdimu_calibration.core.diagnosis.diagnose import diagnose
+from sdimu_calibration.core.diagnosis.summary import summarise
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.specification import Site
 from sdimu_calibration.core.units import to_si
 from sdimu_calibration.storage.config import load_imu, load_model, load_plan
-from sdimu_calibration.storage.diagnosis_file import account, content, read_diagnosis, write_diagnosis
+from sdimu_calibration.storage.diagnosis_file import content, read_diagnosis, write_diagnosis
 from sdimu_sim.core.scenario import Scenario, generate
 
 SITE = Site(latitude_rad=float(np.radians(36.4)))
@@ -24,7 +25,7 @@ def told():
     imu = load_imu("dtg")
     hidden = ("accel_quadratic_x=150 ug/g^2",)
     recording, _ = generate(Scenario(plan, imu, SITE, rate_hz=20.0, seed=301, effects=hidden))
-    return account(diagnose(recording, SITE, imu, load_model("baseline")))
+    return summarise(diagnose(recording, SITE, imu, load_model("baseline")))
 
 
 def test_the_file_has_every_name_of_the_interface(told, tmp_path):
@@ -63,7 +64,7 @@ def test_places_are_ordered_by_how_far_they_are_off(told):
 
 
 def test_what_was_tried_on_the_way_to_nothing_is_not_listed_as_found(told):
-    lost = account(replace(told.diagnosis, verdict="unexplained"))
+    lost = summarise(replace(told.diagnosis, verdict="unexplained"))
     written = content(lost)
     assert written["candidates"] == []
     assert [c["label"] for c in written["partial"]] == [f.candidate.label for f in told.found]

@@ -9,11 +9,10 @@ import numpy as np
 import pytest
 
 from rate_table_sim.core.specification import TableSpecification
-from sdimu_calibration.core.alignment.prepared import reduce, set_up
-from sdimu_calibration.core.calibrate import calibrate
 from sdimu_calibration.core.effects import registry
-from sdimu_calibration.core.evidence.navigation_evidence import collect
-from sdimu_calibration.core.filter.passes import solve
+from sdimu_calibration.core.estimation.outcome import calibrate
+from sdimu_calibration.core.estimation.prepared_test import PreparedTest
+from sdimu_calibration.core.estimation.solve import solve
 from sdimu_calibration.core.plan import Plan, Turn
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.specification import Site
@@ -68,10 +67,9 @@ def test_an_effect_by_file_gives_the_numbers_of_its_built_in_twin(write, recordi
 
 
 def test_as_a_candidate_it_has_the_signature_of_its_twin(write, recording):
-    setup = set_up(SITE, load_imu("dtg"), load_model("baseline"))
-    solution = solve(setup, reduce(recording, setup), lambda _what, _share: None, keep=True)
+    fit = solve(PreparedTest(recording, load_imu("dtg"), SITE), load_model("baseline"))
     pair = [registry.get("accel_quadratic").only(("accel_quadratic_x",)), *load_effect(write(TWIN))]
-    W = collect(solution.prepared, setup, solution.last, pair).W[:, -2:]
+    W = fit.evidence(pair).W[:, -2:]
     np.testing.assert_allclose(W[:, 1], W[:, 0], rtol=1e-9, atol=1e-9 * np.abs(W[:, 0]).max())
 
 

@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 
 from rate_table_sim.core.specification import TableSpecification
-from sdimu_calibration.core.alignment.prepared import reduce, set_up
 from sdimu_calibration.core.diagnosis.candidates import equations, periodic
 from sdimu_calibration.core.effects import registry
-from sdimu_calibration.core.evidence.navigation_evidence import predicted_motion
-from sdimu_calibration.core.filter.passes import solve
+from sdimu_calibration.core.estimation.prepared_test import PreparedTest
+from sdimu_calibration.core.estimation.solve import solve
 from sdimu_calibration.core.plan import Plan, Turn
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.specification import Site
@@ -29,9 +28,7 @@ def motion():
         Plan("four turns", (20.0,) * 5, turns, np.radians(60.0)), load_imu("dtg"), SITE, rate_hz=20.0, seed=8,
         table=TableSpecification(axes=None), temperature=TemperatureProfile(rise=5.0, tau_s=100.0),
     )  # fmt: skip
-    setup = set_up(SITE, load_imu("dtg"), load_model("baseline"))
-    prepared = reduce(generate(scenario)[0], setup)
-    return predicted_motion(prepared, setup, solve(setup, prepared, lambda _a, _b: None).last)
+    return solve(PreparedTest(generate(scenario)[0], load_imu("dtg"), SITE), load_model("baseline")).known.seen
 
 
 def test_every_equation_that_a_diagnosis_can_propose_is_found_by_its_label(motion):

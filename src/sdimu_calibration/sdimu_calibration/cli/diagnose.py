@@ -7,6 +7,18 @@ from typing import Annotated
 
 import typer
 
+from sdimu_calibration.cli.options import (
+    EstimatorOption,
+    HandOption,
+    ImuOption,
+    ModelOption,
+    NoiseOption,
+    SiteOption,
+    default_folder,
+    explained,
+    opened,
+    tell,
+)
 from sdimu_calibration.cli.source_options import (
     AccelSign,
     AccelUnit,
@@ -22,13 +34,9 @@ from sdimu_calibration.cli.source_options import (
 
 def diagnose(
     bag: Annotated[Path, typer.Argument(metavar="BAG", help="rosbag2 folder or .mcap file.")],
-    model: Annotated[
-        str | None, typer.Option(help="Model to examine: name in config/model or path; baseline (by hand: hand).")
-    ] = None,
-    site: Annotated[
-        str | None, typer.Option(help="Where the test was: name in config/site or path; daejeon (by hand: none).")
-    ] = None,
-    imu: Annotated[str, typer.Option(help="Specification of the IMU: name in config/imu or path.")] = "dtg",
+    model: ModelOption = None,
+    site: SiteOption = None,
+    imu: ImuOption = "dtg",
     add: Annotated[
         list[str] | None, typer.Option(metavar="EFFECT", help="Effect in the model besides: name or YAML file.")
     ] = None,
@@ -36,15 +44,13 @@ def diagnose(
         list[str] | None,
         typer.Option("--try", metavar="FILE", help="Effect of your own (YAML) to try with the catalogue."),
     ] = None,
-    grow: Annotated[bool, typer.Option("--grow", help="Add effects one at a time by real refits.")] = False,
+    grow: Annotated[bool, typer.Option("--grow", help="Refit with one found effect more at a time.")] = False,
     bootstrap: Annotated[
         int, typer.Option(min=0, metavar="N", help="Repeat the search on N draws of pure noise: how often it errs.")
     ] = 0,
-    noise: Annotated[
-        str | None, typer.Option(help="estimated: white noise from the rests of the recording, not from --imu.")
-    ] = None,
-    estimator: Annotated[str, typer.Option(help="filter, hand; auto: filter or hand.")] = "auto",
-    hand: Annotated[bool, typer.Option("--hand", help="Moved by hand: the same as --estimator hand.")] = False,
+    noise: NoiseOption = None,
+    estimator: EstimatorOption = "auto",
+    hand: HandOption = False,
     out: Annotated[Path | None, typer.Option(help="Folder of the results; BAG_diagnosis by default.")] = None,
     imu_topic: ImuTopic = None,
     status_topic: StatusTopic = None,
@@ -58,46 +64,46 @@ def diagnose(
     """Find what the model is missing; leaves diagnosis.json and report.html, and result.json of the model found."""
     from rich.console import Console
 
-    from sdimu_calibration.cli.calibrate import (
-        DIAGNOSED,
-        HAND_CHOSEN,
-        check_estimator,
-        check_options,
-        chosen_estimator,
-        default_folder,
-    )
-    from sdimu_calibration.cli.diagnose_with import Asked, diagnose_handheld_run, diagnose_navigated
-    from sdimu_calibration.cli.noise import with_noise
+    from sdimu_calibration.cli.diagnosis_text import print_summary
+    from sdimu_calibration.cli.progress import bar
+    from sdimu_calibration.core.diagnosis.bootstrap import bootstrap as repeat_on_noise
+    from sdimu_calibration.core.diagnosis.diagnose import climb
+    from sdimu_calibration.core.diagnosis.summary import summarise
+    from sdimu_calibration.core.estimation.solve import solve
     from sdimu_calibration.core.recording import DataError
-    from sdimu_calibration.storage.config import load_imu
-    from sdimu_calibration.storage.effect_file import extended_model, find_effects
-    from sdimu_calibration.storage.opening import open_recording, place
+    from sdimu_calibration.report.page import write_report
+    from sdimu_calibration.report.report_extras import report_extras
+    from sdimu_calibration.storage.diagnosis_file import write_diagnosis
+    from sdimu_calibration.storage.effect_file import find_effects
+    from sdimu_calibration.storage.result_file import write_result
 
     console = Console()
-    check_estimator(estimator, DIAGNOSED)
-    check_options(model, add, site)
-    specification = load_imu(imu)
     extra = [effect for text in attempt or [] for effect in find_effects(text)]
     origin = source(
         imu_topic, status_topic, joint_topic, temperature_topic, accel_unit, gyro_unit, accel_sign, gyro_sign
     )
-    recording = open_recording(bag, origin)
-    specification, told_noise = with_noise(specification, recording, noise)
-    folder, title = out or default_folder(bag, "diagnosis"), f"Diagnosis of {bag.name}"
-    by_hand = chosen_estimator("hand" if hand else estimator, recording, specification) == "hand"
-    wanted = extended_model(model or ("hand" if by_hand else "baseline"), add or [])
-    if by_hand:
-        if not (hand or estimator == "hand"):
-            console.print(HAND_CHOSEN, soft_wrap=True)
-        if bootstrap:
-            raise DataError("--bootstrap: a run by hand learns its scatter, so there is no noise to draw; leave it out")
-        where = None
-        if site is not None:
-            recording, where = place(recording, site, specification, origin)
-        asked = Asked(recording, where, specification, wanted, extra, folder, title, told_noise)
-        diagnose_handheld_run(console, asked)
-    else:
-        recording, where = place(recording, site, specification, origin)
-        asked = Asked(recording, where, specification, wanted, extra, folder, title, told_noise)
-        diagnose_navigated(console, asked, grow, bootstrap)
+    test, wanted, chosen = opened(
+        console, bag, model, site, imu, add, origin, "handheld" if hand else estimator, noise
+    )
+    if bootstrap and chosen == "handheld":
+        raise DataError("--bootstrap: a handheld run learns its scatter, so there is no noise to draw; leave it out")
+    notes = test.recording.notes
+    with explained(console, notes), bar(console) as progress:
+        found = climb(solve(test, wanted, chosen, progress=progress), extra, progress, refits=grow)
+    summary = summarise(found)
+    print_summary(console, summary)
+    null = None
+    if bootstrap:
+        with bar(console) as progress:
+            null = repeat_on_noise(found, bootstrap, progress=progress)
+        console.print(f"bootstrap: {null.sentence}", soft_wrap=True, markup=False, highlight=False)
+    folder = out or default_folder(bag, "diagnosis")
+    result = found.after if summary.candidates else found.before
+    write_diagnosis(folder / "diagnosis.json", summary, null)
+    write_result(folder / "result.json", result)
+    with bar(console) as progress:
+        progress("navigation without aid", 0.5)
+        more = report_extras(found)
+    write_report(folder / "report.html", found.after, title=f"Diagnosis of {bag.name}", summary=summary, more=more)
+    tell(console, (*notes, *(note for note in result.notes if found.fit.learns_scatter and note not in notes)))
     console.print(f"results in {folder}", soft_wrap=True)

@@ -5,19 +5,20 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from sdimu_calibration.cli.wide_table import print_table
+from sdimu_calibration.core.diagnosis.verdict import beyond
 from sdimu_calibration.core.units import UnitError, from_si
 
 if TYPE_CHECKING:
     from rich.console import Console
 
     from sdimu_calibration.core.diagnosis.found import DetectableSize
-    from sdimu_calibration.core.diagnosis.grow import Rung
-    from sdimu_calibration.storage.diagnosis_file import Account
+    from sdimu_calibration.core.diagnosis.ladder import Rung
+    from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary
 
 _TOP = 5
 
 
-def print_account(console: Console, told: Account) -> None:
+def print_summary(console: Console, told: DiagnosisSummary) -> None:
     """Print everything that a diagnosis has to say."""
     d = told.diagnosis
     line(console, d.sentence)
@@ -29,6 +30,7 @@ def print_account(console: Console, told: Account) -> None:
     _where(console, told)
     _candidates(console, told)
     _steps(console, told)
+    print_ladder(console, d.rungs)
     _out_of_sight(console, told)
     for text in told.advice:
         line(console, f"advice: {text}")
@@ -47,7 +49,7 @@ def line(console: Console, text: str) -> None:
     console.print(text, soft_wrap=True, markup=False, highlight=False)
 
 
-def _where(console: Console, told: Account) -> None:
+def _where(console: Console, told: DiagnosisSummary) -> None:
     top = told.diagnosis.consistency.where[:_TOP]
     if told.diagnosis.adequate or not top:
         return
@@ -55,7 +57,7 @@ def _where(console: Console, told: Account) -> None:
     line(console, f"worst: {places}")
 
 
-def _candidates(console: Console, told: Account) -> None:
+def _candidates(console: Console, told: DiagnosisSummary) -> None:
     shown = told.candidates or told.found
     if not shown:
         return
@@ -74,7 +76,7 @@ def _candidates(console: Console, told: Account) -> None:
     print_table(console, headings, lines, title)
 
 
-def _steps(console: Console, told: Account) -> None:
+def _steps(console: Console, told: DiagnosisSummary) -> None:
     steps = told.diagnosis.found.steps
     if not steps:
         return
@@ -91,7 +93,7 @@ def _steps(console: Console, told: Account) -> None:
                 line(console, f"  without it these were wrong: {moved}")
 
 
-def _out_of_sight(console: Console, told: Account) -> None:
+def _out_of_sight(console: Console, told: DiagnosisSummary) -> None:
     hidden = [r for r in told.reached if not r.testable]
     if hidden:
         line(console, f"{len(hidden)} of {len(told.reached)} candidates could not have been seen with this plan:")
@@ -121,21 +123,24 @@ def _size(r: DetectableSize) -> str:
 
 
 def print_ladder(console: Console, rungs: tuple[Rung, ...]) -> None:
-    """Print the ladder of real refits."""
-    lines = []
-    for r in rungs:
-        name = f"+ {r.added}" if r.added else "as given"
-        moved = ", ".join(f"{n} {s:+.1f}" for n, s in r.moved[:4])
-        if not r.accepted:
-            name, moved = f"{name} (refused)", r.reason
-        lines.append(
-            [
-                name, f"{r.log_likelihood:.1f}", f"{r.log_bayes_factor:+.1f}" if r.added else "", f"{r.nis_mean:.3f}",
-                f"{r.held_out_rms:.3f}", f"{r.jump:.2f} sigma, {1e3 * r.jump_velocity:.2f} mm/s", moved,
-            ]
-        )  # fmt: skip
-    headings = (
-        "model", "log-likelihood", "log Bayes factor", "nis", "held-out", "jump after turns",
-        "moved by more than 2 sigma",
-    )  # fmt: skip
-    print_table(console, headings, lines, "ladder of refits")
+    """Print the ladder of refits; nothing when there is none."""
+    if not rungs:
+        return
+    handheld = rungs[0].scatter is not None
+    last = ("beyond white noise",) if handheld else ("jump after turns", "moved by more than 2 sigma")
+    headings = ("model", "log-likelihood", "log Bayes factor", "nis", "held-out", *last)
+    print_table(console, headings, [_rung(r) for r in rungs], "ladder of refits")
+
+
+def _rung(r: Rung) -> list[str]:
+    name = f"+ {r.added}" if r.added else "as given"
+    moved = ", ".join(f"{n} {s:+.1f}" for n, s in r.moved[:4])
+    if not r.accepted:
+        name, moved = f"{name} (refused)", r.reason
+    row = [
+        name, f"{r.log_likelihood:.1f}", f"{r.log_bayes_factor:+.1f}" if r.added else "", f"{r.nis_mean:.3f}",
+        f"{r.held_out_rms:.3f}",
+    ]  # fmt: skip
+    if r.scatter is not None:
+        return [*row, beyond(r.scatter)]
+    return [*row, f"{r.jump:.2f} sigma, {1e3 * r.jump_velocity:.2f} mm/s", moved]

@@ -18,21 +18,22 @@ def pictures(
     """Draw a diagnosis as PNG files: heat map before and after, candidates, ladder, drift in use."""
     from rich.console import Console
 
-    from sdimu_calibration.cli.calibrate import default_folder
+    from sdimu_calibration.cli.options import default_folder
     from sdimu_calibration.cli.progress import bar
-    from sdimu_calibration.core.diagnosis.diagnose import diagnose
+    from sdimu_calibration.core.diagnosis.diagnose import climb
+    from sdimu_calibration.core.estimation.solve import solve
     from sdimu_calibration.report.pictures import write_pictures
     from sdimu_calibration.report.report_extras import report_extras
-    from sdimu_calibration.storage.bag_reader import read_recording
-    from sdimu_calibration.storage.config import load_imu, load_site
+    from sdimu_calibration.storage.config import load_imu
     from sdimu_calibration.storage.effect_file import extended_model
+    from sdimu_calibration.storage.opening import open_test
 
     console = Console()
-    where, specification, wanted = load_site(site), load_imu(imu), extended_model(model, [])
-    recording = read_recording(bag)
+    wanted = extended_model(model, [])
+    test = open_test(bag, site, load_imu(imu))
     with bar(console) as progress:
-        found = diagnose(recording, where, specification, wanted, progress=progress)
+        found = climb(solve(test, wanted, progress=progress), progress=progress)
         progress("navigation without aid", 0.95)
-        more = report_extras(recording, found, where, specification, wanted)
+        more = report_extras(found)
     for path in write_pictures(out or default_folder(bag, "pictures"), found, more.trials):
         console.print(f"{path}: {path.stat().st_size / 1000:.0f} kB", soft_wrap=True, highlight=False)

@@ -47,37 +47,37 @@ def workbench(
     from rich.console import Console
     from werkzeug.serving import make_server
 
-    from sdimu_calibration.cli.calibrate import check_options
     from sdimu_calibration.cli.progress import bar
-    from sdimu_calibration.core.handheld.handheld import by_hand
+    from sdimu_calibration.core.estimation.handheld_fit import HandheldFit
+    from sdimu_calibration.core.estimation.solve import choose_estimator
     from sdimu_calibration.core.recording import DataError
     from sdimu_calibration.report.workbench.app import build
     from sdimu_calibration.report.workbench.fit import FitSession
     from sdimu_calibration.report.workbench.recording_cache import RecordingCache, neighbours
-    from sdimu_calibration.storage.config import load_imu
+    from sdimu_calibration.storage.config import load_imu, load_site
     from sdimu_calibration.storage.effect_file import extended_model
-    from sdimu_calibration.storage.opening import open_recording, place
+    from sdimu_calibration.storage.opening import open_test
 
     with socket.socket() as probe:
         if probe.connect_ex((host, port)) == 0:
             raise DataError(f"port {port} is taken (choose another with --port)")
-    check_options(model, None, site)
     specification, wanted = load_imu(imu), extended_model(model, [])
+    if site is not None:
+        load_site(site)
     origin = source(
         imu_topic, status_topic, joint_topic, temperature_topic, accel_unit, gyro_unit, accel_sign, gyro_sign
     )
 
-    def opened(path: Path) -> FitSession:
-        recording = open_recording(path, origin)
-        if by_hand(recording, specification):
+    def session(path: Path) -> FitSession:
+        test = open_test(path, site, specification, origin)
+        if choose_estimator(test, wanted) == HandheldFit.estimator:
             raise DataError(
-                f"{path.name}: a run by hand, in which nothing is navigated: use sdimu diagnose {path.name} (its "
+                f"{path.name}: a handheld run, in which nothing is navigated: use sdimu diagnose {path.name} (its "
                 "report has the same figures), or --imu when the gyros are better than it says"
             )
-        recording, where = place(recording, site, specification, origin)
-        return FitSession(recording, where, specification, wanted)
+        return FitSession(test, wanted)
 
-    shelf = RecordingCache(neighbours(bag), opened)
+    shelf = RecordingCache(neighbours(bag), session)
     console = Console()
     with bar(Console(stderr=True)) as progress:
         progress("reading", 0.0)

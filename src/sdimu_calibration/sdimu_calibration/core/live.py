@@ -9,13 +9,13 @@ import numpy as np
 from sdimu_calibration.core.alignment.alignment import Alignment
 from sdimu_calibration.core.alignment.prepared import ALIGN_S, first_attitude, measurement_kinds, set_up
 from sdimu_calibration.core.arrays import Floats, Ints
-from sdimu_calibration.core.calibrate import calibrate
 from sdimu_calibration.core.data.arrival import arrange
 from sdimu_calibration.core.data.epochs import Epochs, cut
 from sdimu_calibration.core.data.gaps import bridges, largest_acceleration
 from sdimu_calibration.core.data.phases import Phases, PhaseState, classify
 from sdimu_calibration.core.effects import body_frame
 from sdimu_calibration.core.effects.motion import Motion
+from sdimu_calibration.core.estimation.outcome import calibrate
 from sdimu_calibration.core.filter.filter_pass import NAV, PassInput, PassState, new_output, run_pass
 from sdimu_calibration.core.filter.passes import pass_settings, start_state
 from sdimu_calibration.core.navigation.strapdown import Cycles, Reducer

@@ -72,6 +72,8 @@ class Calibration:
         Those of the notes that say that the estimate is not to be trusted as it stands.
     faults : tuple of DataFault
         What is wrong with the data and no physics of the sensor.
+    estimator : str
+        Name of the estimator; empty in results of others.
     """
 
     body_frame: str
@@ -87,3 +89,4 @@ class Calibration:
     history: History
     warnings: tuple[str, ...] = ()
     faults: tuple[DataFault, ...] = ()
+    estimator: str = ""

@@ -8,9 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from sdimu_calibration.core.arrays import Bools, Floats, Ints
-from sdimu_calibration.core.diagnosis.consistency import CHANNEL_NAMES, Consistency
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.diagnosis.scan import Scan, scan
+from sdimu_calibration.core.evidence.consistency import CHANNEL_NAMES, Consistency, StopMean
+from sdimu_calibration.core.evidence.handheld_evidence import CHANNELS as HANDHELD_CHANNELS
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.units import from_si
@@ -63,7 +64,7 @@ def residuals(diagnosis: Diagnosis) -> Residuals:
 
     "After" is the linear refit on the whitened innovations; a nonlinear one differs by second order.
     """
-    evidence = diagnosis.evidence
+    evidence = diagnosis.navigation
     given = _left(diagnosis, evidence.model, evidence.weight)
     left = _left(diagnosis, *added(diagnosis)) if len(diagnosis.found.chosen) else given
     L = evidence.output.L
@@ -80,14 +81,14 @@ def residuals(diagnosis: Diagnosis) -> Residuals:
 
 def _left(diagnosis: Diagnosis, known: Ints, weight: Floats) -> Floats:
     """Whitened innovations with the parameters at `known` estimated, wherever the evidence was linearised."""
-    evidence = diagnosis.evidence
+    evidence = diagnosis.navigation
     estimate, _ = evidence.information.estimate(known, weight)
     return np.asarray(evidence.e - evidence.W[:, known] @ estimate)
 
 
 def _coloured(white: Floats, diagnosis: Diagnosis, sigma: Floats) -> Floats:
     """Undo the whitening: innovations in their own sigmas, (e, 12)."""
-    evidence = diagnosis.evidence
+    evidence = diagnosis.navigation
     full = np.zeros(sigma.shape)
     full[evidence.epoch, evidence.channel] = white
     innovation = np.einsum("eij,ej->ei", evidence.output.L, full)
@@ -110,6 +111,19 @@ def where(consistency: Consistency) -> Grid:
     for mean in consistency.where:
         value[CHANNEL_NAMES.index(mean.channel), np.searchsorted(stops, mean.stop)] = mean.normalised_mean
     return Grid(stops, value)
+
+
+def places(rows: Sequence[StopMean]) -> tuple[Grid, list[str]]:
+    """Lay out residuals by the channels that occur, and name the channels.
+
+    Channels that nothing checks, such as the heading by which a handheld turn ends, do not occur.
+    """
+    stops = np.unique([p.stop for p in rows]).astype(np.int64)
+    channels = list(dict.fromkeys(c for c in (*CHANNEL_NAMES, *HANDHELD_CHANNELS) if any(p.channel == c for p in rows)))
+    value = np.full((len(channels), len(stops)), np.nan)
+    for place in rows:
+        value[channels.index(place.channel), np.searchsorted(stops, place.stop)] = place.normalised_mean
+    return Grid(stops, value), channels
 
 
 def stop_grid(found: Residuals, after: bool) -> Grid:
@@ -156,7 +170,7 @@ class Scored:
 
 def scored(diagnosis: Diagnosis) -> list[Scored]:
     """Every candidate of catalogue and own equations that was tried, largest score first."""
-    evidence = diagnosis.evidence
+    evidence = diagnosis.navigation
     p, free = len(evidence.weight), set(diagnosis.free.tolist())
     first = scan(evidence.information, evidence.model, evidence.weight, _first_scale(diagnosis.found.first))
     last = first if not len(diagnosis.found.chosen) else scan(
@@ -230,7 +244,7 @@ class FreeInputs:
 
 def free_inputs(diagnosis: Diagnosis) -> FreeInputs:
     """Lay the free-input remainders out in time."""
-    times = diagnosis.evidence.times
+    times = diagnosis.navigation.times
     spans = np.array([[a, b] for _, a, b in (*times.stops, *times.turns)]).reshape(-1, 2)
     turn = np.arange(len(spans)) >= len(times.stops)
     factor = np.array([from_si(1.0, "deg/h")] * 3 + [from_si(1.0, "ug")] * 3)
@@ -248,7 +262,7 @@ def free_inputs(diagnosis: Diagnosis) -> FreeInputs:
 
 def variables(diagnosis: Diagnosis) -> Floats:
     """Physical variables of `VARIABLES`, means over each epoch, shape (e, 8)."""
-    evidence = diagnosis.evidence
+    evidence = diagnosis.navigation
     seen, epochs = evidence.seen, evidence.prepared.epochs
     columns = np.column_stack([
         seen.a, seen.w * from_si(1.0, "deg/h"), (seen.t - 0.5 * seen.dt) * from_si(1.0, "min"), seen.temperature,
@@ -294,7 +308,7 @@ class Explained:
 
 def explained(diagnosis: Diagnosis) -> list[Explained]:
     """Added-variable data of everything that was found."""
-    evidence = diagnosis.evidence
+    evidence = diagnosis.navigation
     known, weight = added(diagnosis)
     J = evidence.information.J
     estimate, _ = evidence.information.estimate(known, weight)

@@ -10,8 +10,8 @@ import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
 from sdimu_calibration.core.arrays import Floats
-from sdimu_calibration.core.diagnosis.consistency import CHANNEL_NAMES
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
+from sdimu_calibration.core.evidence.consistency import CHANNEL_NAMES
 from sdimu_calibration.report import data
 from sdimu_calibration.report.drawing import AFTER, BEFORE, DIVERGING, PALE, lay_out
 from sdimu_calibration.report.table import with_sigma

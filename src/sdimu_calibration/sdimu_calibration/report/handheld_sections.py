@@ -2,33 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
-from sdimu_calibration.core.diagnosis.handheld_summary import HandheldSummary, Place, shown
-from sdimu_calibration.core.evidence.handheld_evidence import CHANNELS
+from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
+from sdimu_calibration.core.diagnosis.ladder import Rung
+from sdimu_calibration.core.diagnosis.search import Problem
+from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary
+from sdimu_calibration.core.diagnosis.verdict import shown
+from sdimu_calibration.core.evidence.handheld_evidence import HandheldEvidence, places
 from sdimu_calibration.core.handheld.handheld_fit import FORCE, RATE, TURN
 from sdimu_calibration.core.units import from_si
 from sdimu_calibration.report import data, evidence_figures
-from sdimu_calibration.report.markup import Draw, grid, prose, quiet, section, sentence
-from sdimu_calibration.report.sections import STEP_COLUMNS, step_row, verdict_box
+from sdimu_calibration.report.markup import Draw, grid, quiet, section, sentence
+from sdimu_calibration.report.sections import STEP_COLUMNS, step_row
 from sdimu_calibration.report.table import with_sigma
 
 
-def verdict(told: HandheldSummary) -> str:
-    """Return the verdict in one sentence, what to do, and the number behind it."""
-    d = told.diagnosis
-    listed = "<ul>" + "".join(f"<li>{prose(text)}</li>" for text in told.advice) + "</ul>" if told.advice else ""
-    return (
-        verdict_box(d.adequate, d.verdict, told.sentence) + listed
-        + quiet(f"p = {d.p_value:.2g} that a right model has a candidate as large as the largest.")
-    )  # fmt: skip
-
-
-def evidence(told: HandheldSummary, draw: Draw) -> list[str]:
+def evidence(summary: DiagnosisSummary, draw: Draw) -> list[str]:
     """Tell how the error falls, what is missing and where it shows."""
-    return [_ladder(told, draw), _missing(told, draw), _where(told, draw)]
+    return [_ladder(summary, draw), _missing(summary.diagnosis, draw), _where(summary.diagnosis, draw)]
 
 
 _RUNGS = (
@@ -37,21 +29,21 @@ _RUNGS = (
 )  # fmt: skip
 
 
-def _ladder(told: HandheldSummary, draw: Draw) -> str:
-    d = told.diagnosis
+def _ladder(summary: DiagnosisSummary, draw: Draw) -> str:
+    d = summary.diagnosis
     names = ["model as given", *(f"+ {r.added}" for r in d.rungs[1:])]
-    sizes = ["", *(_size(f.value, f.sigma, f.candidate.parameter.display_unit) for f in told.found)]
+    sizes = ["", *(_size(f.value, f.sigma, f.candidate.parameter.display_unit) for f in summary.found)]
     rows = [
         [
-            name, size, f"{r.held_out:.3f}", shown(from_si(float(r.extra[FORCE]), "ug")),
-            shown(float(np.degrees(r.extra[RATE]))), shown(100.0 * float(r.extra[TURN])), f"{r.log_likelihood:.1f}",
+            name, size, f"{r.held_out_rms:.3f}", shown(from_si(_scatter(r)[FORCE], "ug")),
+            shown(float(np.degrees(_scatter(r)[RATE]))), shown(100.0 * _scatter(r)[TURN]), f"{r.log_likelihood:.1f}",
         ]
         for name, size, r in zip(names, sizes, d.rungs, strict=True)
     ]  # fmt: skip
-    tried = [grid(STEP_COLUMNS, [step_row(step) for step in d.steps], {0, 7})] if d.steps else []
+    tried = [grid(STEP_COLUMNS, [step_row(step) for step in d.found.steps], {0, 7})] if d.found.steps else []
     return section(
         "Ladder of models: how far the error falls",
-        draw(evidence_figures.rungs(names, [r.held_out for r in d.rungs])) if told.found else "",
+        draw(evidence_figures.rungs(names, [r.held_out_rms for r in d.rungs])) if summary.found else "",
         grid(_RUNGS, rows, {0}),
         quiet(
             "Every model fitted anew. Held-out: every rest and the way to it predicted from the others, in sigmas of "
@@ -69,13 +61,17 @@ def _size(value: float, sigma: float, unit: str) -> str:
     return with_sigma(value * factor, sigma * factor, unit)
 
 
-def _missing(told: HandheldSummary, draw: Draw) -> str:
-    d = told.diagnosis
-    columns = range(len(d.evidence.weight), len(d.evidence.names))
-    entries = data.scores(d.evidence, told.first, told.last, columns, d.chosen)
+def _scatter(rung: Rung) -> tuple[float, ...]:
+    return rung.scatter or (0.0, 0.0, 0.0)
+
+
+def _missing(d: Diagnosis, draw: Draw) -> str:
+    problem, columns = Problem(d.evidence), range(len(d.evidence.weight), len(d.evidence.names))
+    first, last = problem.scan([]), problem.scan([int(c) for c in d.found.chosen])
+    entries = data.scores(d.evidence, first, last, columns, d.found.chosen)
     return section(
         "Which effect is missing?",
-        draw(evidence_figures.ranking(entries, d.threshold)),
+        draw(evidence_figures.ranking(entries, d.found.threshold)),
         quiet(
             "Each candidate added to the model alone, all else estimated again, in sigmas of the last model; beside "
             "each bar its size. The dashed line is what the largest of all candidates reaches on pure noise once in "
@@ -84,27 +80,18 @@ def _missing(told: HandheldSummary, draw: Draw) -> str:
     )
 
 
-def _where(told: HandheldSummary, draw: Draw) -> str:
+def _where(d: Diagnosis, draw: Draw) -> str:
+    assert isinstance(d.evidence, HandheldEvidence)
     parts = [
-        draw(evidence_figures.heat_map(*_grid(told.where))),
+        draw(evidence_figures.heat_map(*data.places(d.consistency.where))),
         quiet(
             "Residual of every rate and force at rest, and of the way to it, over its own sigma, model as given, in "
             "sigmas of the last model."
         ),
     ]
-    if told.found:
+    if len(d.found.chosen):
         parts += [
-            draw(evidence_figures.heat_map(*_grid(told.after))),
+            draw(evidence_figures.heat_map(*data.places(places(d.evidence, d.found.chosen)))),
             quiet("The same with what was found added."),
         ]
     return section("Where does it fail? Channel by rest", *parts)
-
-
-def _grid(places: Sequence[Place]) -> tuple[data.Grid, list[str]]:
-    """Lay out residuals; channels that nothing checks, as the heading by which a turn ends, are left out."""
-    stops = np.unique([p.stop for p in places]).astype(np.int64)
-    channels = [c for c in CHANNELS if any(p.channel == c for p in places)]
-    value = np.full((len(channels), len(stops)), np.nan)
-    for place in places:
-        value[channels.index(place.channel), np.searchsorted(stops, place.stop)] = place.normalised
-    return data.Grid(stops, value), channels

@@ -38,7 +38,7 @@ class Overlay:
 
 def overlay(diagnosis: Diagnosis, found: Residuals) -> Overlay:
     """Lay measured and predicted values out by stop."""
-    epochs = diagnosis.evidence.prepared.epochs
+    epochs = diagnosis.navigation.prepared.epochs
     factor = np.array([from_si(1.0, unit) for unit in (*UNITS[:9], "ug", "ug", "ug")])
     factor[9:] *= 1e-6
     before, after = found.before * found.sigma * factor, found.after * found.sigma * factor
@@ -92,7 +92,7 @@ class Jumps:
 def jumps(diagnosis: Diagnosis, found: Residuals) -> Jumps:
     """Join turns with the velocity measured after them."""
     taken: list[tuple[int, float, int]] = []
-    for turn, (_, _, end) in zip(plan_seen(diagnosis.evidence).turns, diagnosis.evidence.times.turns, strict=True):
+    for turn, (_, _, end) in zip(plan_seen(diagnosis.navigation).turns, diagnosis.navigation.times.turns, strict=True):
         rows = np.flatnonzero((found.t > end) & np.isfinite(found.before[:, 3]))
         if len(rows) and turn.axis is not None:
             taken.append((turn.axis, float(np.degrees(turn.angle)), int(rows[0])))

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from plotly.subplots import make_subplots
 
-from sdimu_calibration.core.diagnosis.consistency import CHANNEL_NAMES
+from sdimu_calibration.core.evidence.consistency import CHANNEL_NAMES
 from sdimu_calibration.report.drawing import AFTER, BEFORE, lay_out
 from sdimu_calibration.report.measured import UNITS, Jumps, Overlay
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
-from sdimu_calibration.core.diagnosis.handheld_summary import HandheldSummary
+from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.report import data, handheld_sections, sections, table
 from sdimu_calibration.report.drawing import html
@@ -29,9 +29,8 @@ def write_report(
     title: str = "Calibration",
     truth: Mapping[str, float] | None = None,
     reference: Mapping[str, float] | None = None,
-    diagnosis: Diagnosis | None = None,
+    summary: DiagnosisSummary | None = None,
     more: ReportExtras | None = None,
-    by_hand: HandheldSummary | None = None,
 ) -> None:
     """Write report.html.
 
@@ -40,24 +39,22 @@ def write_report(
     path : Path
         File to make or replace; its folder is made too.
     calibration : Calibration
-        Whose coefficients are shown; with a diagnosis usually `diagnosis.after`.
+        Whose coefficients are shown; with a diagnosis usually `summary.diagnosis.after`.
     title : str
         Heading of the page.
     truth : mapping of str to float, optional
         True values (SI) by coefficient name, in the body frame of the calibration.
     reference : mapping of str to float, optional
         Published sigmas (SI) by effect name.
-    diagnosis : Diagnosis, optional
+    summary : DiagnosisSummary, optional
         Adds the verdict, what is missing, where it fails, and how the error falls.
     more : ReportExtras, optional
-        What to show besides the diagnosis: table angles, drift in use, ladder of refits.
-    by_hand : HandheldSummary, optional
-        The diagnosis of a hand-held run, in place of `diagnosis`.
+        What to show besides the diagnosis: table angles, drift in use.
     """
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     temporary = path.with_name(f".{path.name}.part")
-    temporary.write_text(page(calibration, title, truth, reference, diagnosis, more, by_hand), encoding="utf-8")
+    temporary.write_text(page(calibration, title, truth, reference, summary, more), encoding="utf-8")
     temporary.replace(path)
 
 
@@ -77,17 +74,16 @@ def page(
     title: str,
     truth: Mapping[str, float] | None = None,
     reference: Mapping[str, float] | None = None,
-    diagnosis: Diagnosis | None = None,
+    summary: DiagnosisSummary | None = None,
     more: ReportExtras | None = None,
-    by_hand: HandheldSummary | None = None,
 ) -> str:
     """Make the page as HTML text; parameters as in `write_report`."""
     draw = _Drawing()
     more = more or ReportExtras()
-    parts = [] if diagnosis is None else _evidence(diagnosis, more, draw)
-    parts += [] if by_hand is None else handheld_sections.evidence(by_hand, draw)
+    handheld = summary is not None and summary.diagnosis.fit.learns_scatter
+    parts = [] if summary is None else _evidence(summary, more, draw)
     parts.append(_coefficients(calibration, truth, reference))
-    parts += [] if diagnosis is None else _residuals(diagnosis, more, draw)
+    parts += [] if summary is None or handheld else _residuals(summary.diagnosis, more, draw)
     if len(calibration.history.t):
         remark = quiet("Closed-loop pass. Grey: the table turns, no measurements.")
         parts.append(section("Sigma of every coefficient against time", remark, draw(sigma_history(calibration))))
@@ -95,10 +91,9 @@ def page(
     head = [
         f"<h1>{escape(title)}</h1>",
         f'<p class="quiet">{_summary(calibration)}</p>',
-        sections.verdict(diagnosis) if diagnosis else "",
-        handheld_sections.verdict(by_hand) if by_hand else "",
-        # By hand the ladder says it, in sigmas that models can be compared by.
-        "" if by_hand else f"<p>{_fit(calibration, diagnosis is not None)}</p>",
+        sections.verdict(summary) if summary else "",
+        # Of a handheld run the ladder says it, in sigmas that models can be compared by.
+        "" if handheld else f"<p>{_fit(calibration, summary is not None)}</p>",
         _notes(calibration),
     ]
     return (
@@ -110,11 +105,14 @@ def page(
     )  # fmt: skip
 
 
-def _evidence(diagnosis: Diagnosis, more: ReportExtras, draw: Draw) -> list[str]:
+def _evidence(summary: DiagnosisSummary, more: ReportExtras, draw: Draw) -> list[str]:
     """Tell what is missing and where it shows."""
+    diagnosis = summary.diagnosis
+    if diagnosis.fit.learns_scatter:
+        return handheld_sections.evidence(summary, draw)
     return [
         sections.ladder(diagnosis, draw),
-        sections.refits(more.rungs),
+        sections.refits(diagnosis.rungs),
         sections.missing(diagnosis, data.scored(diagnosis), draw),
         sections.where(diagnosis, data.residuals(diagnosis), draw),
         in_use(more, draw),

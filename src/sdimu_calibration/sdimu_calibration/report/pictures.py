@@ -16,9 +16,9 @@ from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 from PIL import Image
 
-from sdimu_calibration.core.diagnosis.consistency import CHANNEL_NAMES
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
-from sdimu_calibration.core.filter.free_inertial import FreeInertialRun
+from sdimu_calibration.core.estimation.free_inertial import FreeInertialRun
+from sdimu_calibration.core.evidence.consistency import CHANNEL_NAMES
 from sdimu_calibration.report import data
 from sdimu_calibration.report.architecture_figure import house
 from sdimu_calibration.report.drawing import AFTER, BEFORE, DIVERGING
@@ -157,7 +157,7 @@ def in_use(trials: Sequence[FreeInertialRun]) -> Figure:
         for (ink, dash), drift in zip((("#555", ":"), (BEFORE, "--"), (AFTER, "-")), trial.drifts, strict=False):
             rows = drift.t >= 30.0
             axes.semilogy(drift.t[rows] / 60.0, drift.distance[rows], dash, color=ink, lw=1.8, label=drift.name)
-        axes.set_title(f"Unseen {trial.stretch.place} of the recording")
+        axes.set_title(f"Unseen {trial.segment.place} of the recording")
         axes.set_xlabel("time without aid (min)")
         axes.set_ylabel("position error (m)" if place == 1 else "")
         axes.grid(visible=True, axis="y", color="#ddd", lw=0.6)

@@ -9,8 +9,8 @@ import numpy as np
 from plotly.subplots import make_subplots
 
 from sdimu_calibration.core.arrays import Floats
-from sdimu_calibration.core.diagnosis.consistency import CHANNEL_NAMES
 from sdimu_calibration.core.effects.effect import CHANNELS
+from sdimu_calibration.core.evidence.consistency import CHANNEL_NAMES
 from sdimu_calibration.core.units import from_si
 from sdimu_calibration.report import data
 from sdimu_calibration.report.drawing import AFTER, BAND, BEFORE, PALE, lay_out

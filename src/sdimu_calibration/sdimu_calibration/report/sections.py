@@ -8,8 +8,9 @@ from html import escape
 import numpy as np
 
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
-from sdimu_calibration.core.diagnosis.grow import Rung
+from sdimu_calibration.core.diagnosis.ladder import Rung
 from sdimu_calibration.core.diagnosis.search import Step
+from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.units import from_si
 from sdimu_calibration.report import data, evidence_figures, measured, measured_figures, residual_figures
@@ -18,23 +19,20 @@ from sdimu_calibration.report.report_extras import ReportExtras
 from sdimu_calibration.report.table import with_sigma
 
 
-def verdict(diagnosis: Diagnosis) -> str:
-    """Return the verdict in one sentence, what is wrong with data and noise, and the numbers behind it."""
-    told = [*(f.text for f in diagnosis.findings), *diagnosis.noise]
-    box = verdict_box(diagnosis.adequate, diagnosis.verdict, diagnosis.sentence)
+def verdict(summary: DiagnosisSummary) -> str:
+    """Return the verdict in one sentence, what is wrong with data and noise, what to do, and the numbers behind it."""
+    d = summary.diagnosis
+    told = [*(f.text for f in d.findings), *d.noise, *summary.advice]
+    mark, kind = ("\N{CHECK MARK}", "good") if d.adequate else ("\N{HEAVY BALLOT X}", "bad")
+    box = f'<p class="verdict {kind}"><strong>{mark} {escape(d.verdict)}.</strong> {prose(d.sentence)}</p>'
     listed = "<ul>" + "".join(f"<li>{prose(text)}</li>" for text in told) + "</ul>" if told else ""
-    return box + listed + quiet(_numbers(diagnosis))
-
-
-def verdict_box(adequate: bool, word: str, said: str) -> str:
-    """Return a verdict in its box."""
-    mark = "\N{CHECK MARK}" if adequate else "\N{HEAVY BALLOT X}"
-    kind = "good" if adequate else "bad"
-    return f'<p class="verdict {kind}"><strong>{mark} {escape(word)}.</strong> {prose(said)}</p>'
+    return box + listed + quiet(_numbers(d))
 
 
 def _numbers(d: Diagnosis) -> str:
     left, c = d.free_inputs_after, d.consistency
+    if d.fit.learns_scatter:
+        return f"p {_probability(d.p_value)} that a right model has a candidate as large as the largest."
     words = [
         f"p {_probability(d.p_value)} that a right model looks like this",
         f"free inputs: chi-square {d.free_inputs_before.chi2:.0f}"
@@ -215,7 +213,7 @@ def _variables(
     """Residuals against what could cause them: motion, then time, temperature and table, then turns."""
     values, names = data.variables(diagnosis), list(data.VARIABLES)
     if more.table is not None:
-        epochs = diagnosis.evidence.prepared.epochs
+        epochs = diagnosis.navigation.prepared.epochs
         values = np.column_stack([values, measured.table_angles(more.table, 0.5 * (epochs.start + epochs.end))])
         names += [(name.replace("_", " "), "deg") for name in more.table.names]
     parts = [

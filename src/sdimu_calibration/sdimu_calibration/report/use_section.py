@@ -9,8 +9,8 @@ import numpy as np
 from plotly.subplots import make_subplots
 
 from sdimu_calibration.core.arrays import Floats
-from sdimu_calibration.core.filter.free_inertial import Drift, FreeInertialRun
-from sdimu_calibration.core.filter.holdout import WANTED_S
+from sdimu_calibration.core.estimation.free_inertial import Drift, FreeInertialRun
+from sdimu_calibration.core.estimation.holdout import WANTED_S
 from sdimu_calibration.core.units import from_si
 from sdimu_calibration.report.drawing import AFTER, BEFORE, lay_out
 from sdimu_calibration.report.markup import Draw, grid, quiet, section, sentence
@@ -33,7 +33,7 @@ def in_use(report_extras: ReportExtras, draw: Draw) -> str:
     if not report_extras.trials:
         return section(heading, quiet(f"Not tried: {report_extras.no_trial}.")) if report_extras.no_trial else ""
     rows = [_row(trial, drift) for trial in report_extras.trials for drift in trial.drifts]
-    short = min(trial.stretch.length_s for trial in report_extras.trials) < WANTED_S - 1.0
+    short = min(trial.segment.length_s for trial in report_extras.trials) < WANTED_S - 1.0
     return section(
         heading,
         *(sentence(told(trial)) for trial in report_extras.trials),
@@ -53,7 +53,7 @@ def in_use(report_extras: ReportExtras, draw: Draw) -> str:
 
 def told(trial: FreeInertialRun) -> str:
     """Say a trial in one sentence."""
-    stretch = trial.stretch
+    stretch = trial.segment
     ends = "; ".join(
         f"{drift.name} {_metres(drift.distance[-1])} ({_rate(drift):.2g} nmi/h{_promise(drift)})"
         for drift in trial.drifts
@@ -69,7 +69,7 @@ def _promise(drift: Drift) -> str:
 
 def _row(trial: FreeInertialRun, drift: Drift) -> list[str]:
     promised = drift.promised[-1]
-    stretch = trial.stretch
+    stretch = trial.segment
     span = f"{stretch.begin_s / 60.0:.1f} to {(stretch.begin_s + stretch.length_s) / 60.0:.1f} min"
     return [
         drift.name, f"{stretch.place}: {span}", f"{drift.distance[-1]:.4g}", f"{_rate(drift):.2g}",
@@ -90,7 +90,7 @@ def _metres(value: float) -> str:
 def figure(trials: Sequence[FreeInertialRun]) -> Any:
     """Errors of position, velocity and heading against time, a column a stretch, a dash a compensation."""
     made = make_subplots(
-        rows=3, cols=len(trials), subplot_titles=[f"unseen {_PLACES[t.stretch.place]}" for t in trials],
+        rows=3, cols=len(trials), subplot_titles=[f"unseen {_PLACES[t.segment.place]}" for t in trials],
         shared_xaxes=True, shared_yaxes="rows", vertical_spacing=0.06, horizontal_spacing=0.04,
     )  # fmt: skip
     for column, trial in enumerate(trials, 1):

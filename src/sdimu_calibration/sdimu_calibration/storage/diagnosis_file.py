@@ -2,79 +2,39 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from sdimu_calibration.core.diagnosis.advice import Untestable, advice, untestable_reasons
 from sdimu_calibration.core.diagnosis.bootstrap import Null
-from sdimu_calibration.core.diagnosis.consistency import Noise
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
-from sdimu_calibration.core.diagnosis.found import DetectableSize, Found, found_effects, reach
+from sdimu_calibration.core.diagnosis.found import DetectableSize, Found
 from sdimu_calibration.core.diagnosis.free_input_test import FreeInputTest
-from sdimu_calibration.core.diagnosis.grow import Rung
-from sdimu_calibration.core.diagnosis.plan_seen import PlanSeen, plan_seen
+from sdimu_calibration.core.diagnosis.ladder import Rung
+from sdimu_calibration.core.diagnosis.plan_seen import PlanSeen
 from sdimu_calibration.core.diagnosis.search import Step
+from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary
+from sdimu_calibration.core.evidence.consistency import Noise
+from sdimu_calibration.core.handheld.handheld_fit import FORCE, RATE, TURN
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.storage.json_file import read_json, write_json
 
 FORMAT = "sdimu-diagnosis/1"
 
 
-@dataclass(frozen=True)
-class Account:
-    """What people and files read of a diagnosis.
-
-    Attributes
-    ----------
-    diagnosis : Diagnosis
-    found : tuple of Found
-        Chosen effects; when the verdict is ``unexplained`` they are what was tried, not what was found.
-    reached : tuple of DetectableSize
-        Smallest detectable size of every candidate.
-    plan : PlanSeen
-    untestable : tuple of Untestable
-        What could not have been seen, by reason.
-    advice : tuple of str
-    """
-
-    diagnosis: Diagnosis
-    found: tuple[Found, ...]
-    reached: tuple[DetectableSize, ...]
-    plan: PlanSeen
-    untestable: tuple[Untestable, ...]
-    advice: tuple[str, ...]
-
-    @property
-    def candidates(self) -> tuple[Found, ...]:
-        """What counts as found, best first."""
-        if self.diagnosis.verdict == "unexplained":
-            return ()
-        return tuple(sorted(self.found, key=lambda f: -f.log_likelihood_gain))
-
-
-def account(d: Diagnosis) -> Account:
-    """Work out what a diagnosis has to say."""
-    found, reached, plan = found_effects(d), reach(d), plan_seen(d.evidence)
-    return Account(d, found, reached, plan, untestable_reasons(reached, plan), advice(d, found, reached, plan))
-
-
-def write_diagnosis(path: Path, told: Account, ladder: tuple[Rung, ...] = (), null: Null | None = None) -> None:
+def write_diagnosis(path: Path, summary: DiagnosisSummary, null: Null | None = None) -> None:
     """Write diagnosis.json.
 
     Parameters
     ----------
     path : Path
         File to make or replace; its folder is made too.
-    told : Account
-    ladder : tuple of Rung
-        Of real refits, when the model was grown step by step.
+    summary : DiagnosisSummary
     null : Null, optional
         Of a bootstrap.
     """
-    write_json(path, content(told, ladder) | ({"bootstrap": _null(null)} if null else {}))
+    write_json(path, content(summary) | ({"bootstrap": _null(null)} if null else {}))
 
 
 def read_diagnosis(path: Path) -> dict[str, Any]:
@@ -89,12 +49,13 @@ def read_diagnosis(path: Path) -> dict[str, Any]:
     return read_json(path / "diagnosis.json" if path.is_dir() else path, FORMAT)
 
 
-def content(told: Account, ladder: tuple[Rung, ...] = ()) -> dict[str, Any]:
+def content(told: DiagnosisSummary) -> dict[str, Any]:
     """Give the diagnosis as plain data."""
     d = told.diagnosis
     is_unexplained = d.verdict == "unexplained"
     return {
         "format": FORMAT,
+        "estimator": d.fit.estimator,
         "adequate": d.adequate,
         "p_value": d.p_value,
         "verdict": d.verdict,
@@ -129,17 +90,24 @@ def content(told: Account, ladder: tuple[Rung, ...] = ()) -> dict[str, Any]:
         },
         "fit": {"before": fit_of(d.before), "after": fit_of(d.after)},
         "ladder": [step_of(s) for s in d.found.steps],
-        "grown": [_rung(r) for r in ladder],
-        "plan": {
-            "turns": [
-                {"after_stop": t.after_stop, "axis": None if t.axis is None else "xyz"[t.axis],
-                 "angle": t.angle, "rate": t.rate}
-                for t in told.plan.turns
-            ],
-            "oblique_stops": told.plan.oblique,
-        },
+        "grown": [_rung(r) for r in d.rungs],
+        "plan": _plan(told.plan),
         "not_testable": [reach_of(r) | {"reason": _reason(told, r)} for r in told.reached if not r.testable],
         "smallest_detectable": [reach_of(r) for r in told.reached if r.testable],
+    }  # fmt: skip
+
+
+def _plan(plan: PlanSeen | None) -> dict[str, Any] | None:
+    """Give the turns of a table as plain data; None where there is no table."""
+    if plan is None:
+        return None
+    return {
+        "turns": [
+            {"after_stop": t.after_stop, "axis": None if t.axis is None else "xyz"[t.axis],
+             "angle": t.angle, "rate": t.rate}
+            for t in plan.turns
+        ],
+        "oblique_stops": plan.oblique,
     }  # fmt: skip
 
 
@@ -212,6 +180,9 @@ def _rung(r: Rung) -> dict[str, Any]:
         "log_bayes_factor": r.log_bayes_factor, "nis_mean": r.nis_mean, "held_out_rms": r.held_out_rms,
         "jump": r.jump, "jump_velocity": r.jump_velocity,
         "moved": [{"name": name, "sigmas": size} for name, size in r.moved],
+        "beyond_white_noise": None if r.scatter is None else {
+            "force_m_s2": r.scatter[FORCE], "rate_rad_s": r.scatter[RATE], "turn_share": r.scatter[TURN],
+        },
     }  # fmt: skip
 
 
@@ -223,7 +194,7 @@ def reach_of(r: DetectableSize) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _reason(told: Account, r: DetectableSize) -> str:
+def _reason(told: DiagnosisSummary, r: DetectableSize) -> str:
     return next((b.reason for b in told.untestable if r.label in b.labels), "")
 
 

@@ -15,6 +15,11 @@ from sdimu_calibration.core.data.dejitter import dejittered
 from sdimu_calibration.core.data.dwell_detection import with_detected_dwells
 from sdimu_calibration.core.data.latitude_check import EarthRate, contradictions, observe_earth_rate, reversed_force
 from sdimu_calibration.core.data.status_clock import aligned
+from sdimu_calibration.core.estimation.handheld_fit import HandheldFit
+from sdimu_calibration.core.estimation.prepared_test import PreparedTest
+from sdimu_calibration.core.estimation.solve import AUTO
+from sdimu_calibration.core.handheld.handheld import hides_earth_rate
+from sdimu_calibration.core.noise import with_measured_noise
 from sdimu_calibration.core.recording import DataError, Recording
 from sdimu_calibration.core.specification import ImuSpecification, Site
 from sdimu_calibration.core.units import UnitError, parse_unit
@@ -190,3 +195,39 @@ def _assumed(where: Site, seen: EarthRate | None) -> str:
         return f"{text}; the data do not show the Earth's rate well enough to say the latitude"
     latitude, sigma = np.degrees(seen.latitude)
     return f"{text}; the Earth's rate in the data is that of latitude {latitude:.0f} +- {sigma:.0f} deg"
+
+
+def open_test(
+    path: Path, site: str | None, imu: ImuSpecification, source: Source | None = None, estimator: str = AUTO,
+    measured_noise: bool = False,
+) -> PreparedTest:  # fmt: skip
+    """Open a recording for an estimate: read, brought to SI and one clock, with its site.
+
+    Parameters
+    ----------
+    path : Path
+        Bag folder or file.
+    site : str or None
+        Name or path; None takes `DEFAULT_SITE` and says so, or none where a handheld run needs none.
+    imu : ImuSpecification
+    source : Source, optional
+        What the user says of the recording.
+    estimator : str
+        A handheld estimator, asked for or chosen, does without a site.
+    measured_noise : bool
+        White noise from the rests of the recording, not from `imu`.
+
+    Raises
+    ------
+    DataError
+        When the bag or the site cannot be used.
+    """
+    recording = open_recording(path, source)
+    if measured_noise:
+        imu, note = with_measured_noise(imu, recording)
+        recording = replace(recording, notes=(*recording.notes, note))
+    handheld = hides_earth_rate(recording, imu) if estimator == AUTO else estimator == HandheldFit.estimator
+    where = None
+    if site is not None or not handheld:
+        recording, where = place(recording, site, imu, source)
+    return PreparedTest(recording, imu, where)

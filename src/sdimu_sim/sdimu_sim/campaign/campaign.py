@@ -8,6 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from sdimu_calibration.core.progress import silent
 from sdimu_calibration.core.recording import DataError
 from sdimu_sim.campaign.cluster import cluster
 from sdimu_sim.campaign.shards import Row, Shards
@@ -65,7 +66,7 @@ def run_campaign(
     wanted = list(dict.fromkeys(seeds))
     done = {seed: row for seed, row in shards.read().items() if "error" not in row}
     missing = [seed for seed in wanted if seed not in done]
-    tell = progress or _silent
+    tell = progress or silent
     failures = 0
     tell(_word(len(wanted) - len(missing), len(wanted), failures), 1.0 - len(missing) / max(len(wanted), 1))
     if missing:
@@ -113,5 +114,3 @@ def _word(count: int, total: int, failures: int) -> str:
     return f"run {count} of {total}" + (f", {failures} failed" if failures else "")
 
 
-def _silent(_word: str, _share: float) -> None:
-    """Progress that nobody watches."""

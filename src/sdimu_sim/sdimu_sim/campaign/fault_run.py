@@ -9,8 +9,8 @@ from functools import lru_cache
 import numpy as np
 
 from rate_table_sim.core import TableMotion, phase_changes, table_motion
-from sdimu_calibration.core.calibrate import calibrate
 from sdimu_calibration.core.data.arrival import arrange
+from sdimu_calibration.core.estimation.outcome import calibrate
 from sdimu_calibration.core.recording import DataError, PhaseLog, Recording, origin_ns, seconds
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.specification import Model

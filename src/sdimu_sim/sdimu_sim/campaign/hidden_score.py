@@ -9,7 +9,6 @@ import numpy as np
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.diagnosis.found import found_effects
 from sdimu_calibration.core.diagnosis.scan import Scan, scan
-from sdimu_calibration.core.evidence.navigation_evidence import columns
 from sdimu_calibration.core.results import Calibration
 from sdimu_sim.campaign.hidden_draw import Draw, Truth
 from sdimu_sim.campaign.hidden_outside import OUTSIDE, shapes
@@ -140,7 +139,7 @@ def _signature_left(truth: Truth, found: Diagnosis) -> tuple[float, float]:
     shape = next((s for s in shapes(evidence.times) if s.label == truth.name), None)
     if shape is None:
         return 0.0, 0.0
-    w = columns(evidence.prepared, evidence.output, evidence.seen, evidence.latitude, [shape.effect()])[:, 0]
+    w = evidence.signature([shape.effect()])[:, 0]
     none = np.empty(0, dtype=np.int64)
     left = []
     for chosen in (none, found.found.chosen):

@@ -8,11 +8,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sdimu_calibration.core.alignment.prepared import reduce, set_up
 from sdimu_calibration.core.diagnosis.candidates import catalogue
 from sdimu_calibration.core.diagnosis.scan import scan
-from sdimu_calibration.core.evidence.navigation_evidence import collect, timetable
-from sdimu_calibration.core.filter.passes import solve
+from sdimu_calibration.core.estimation.prepared_test import PreparedTest
+from sdimu_calibration.core.estimation.solve import solve
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.specification import ImuSpecification, Model, Site
 from sdimu_calibration.storage.config import load_plan
@@ -70,12 +69,10 @@ def sizes(plan: str, latitude_deg: float, imu: ImuSpecification, model: Model) -
         plan=load_plan(plan), imu=imu, site=site, rate_hz=RATE_HZ, seed=_SEED + round(latitude_deg),
         temperature=WARM_UP, coefficients={},
     )
-    setup = set_up(site, imu, model)
-    prepared = reduce(simulate(scenario, imu_truth(scenario)), setup)
-    solution = solve(setup, prepared, lambda _word, _share: None, keep=True)
-    times = timetable(prepared)
-    known = catalogue(times, set(setup.sensors.names), True)
-    evidence = collect(prepared, setup, solution.last, [*known, *(s.effect() for s in shapes(times))])
+    fit = solve(PreparedTest(simulate(scenario, imu_truth(scenario)), imu, site), model)
+    times = fit.timetable
+    known = catalogue(times, set(fit.labels), True)
+    evidence = fit.evidence([*known, *(s.effect() for s in shapes(times))])
     scanned = scan(evidence.information, evidence.model, evidence.weight)
     p = len(evidence.weight)
     return Sizes(

@@ -12,8 +12,9 @@ from typing import Any
 import numpy as np
 
 from sdimu_calibration.core.arrays import Floats
-from sdimu_calibration.core.batch.classical import TABLE_FRAME, classical_calibrate
-from sdimu_calibration.core.calibrate import calibrate
+from sdimu_calibration.core.batch.classical import TABLE_FRAME
+from sdimu_calibration.core.effects import body_frame
+from sdimu_calibration.core.estimation.outcome import calibrate
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.specification import Model
 from sdimu_sim.core.scenario import Scenario, generate
@@ -23,6 +24,13 @@ Progress = Callable[[str, float], None]
 
 FORMAT = "sdimu-mount-study/1"
 ESTIMATORS = ("filter", "classical", "classical, turned afterwards")
+
+
+def turned(result: Calibration, frame: str) -> Calibration:
+    """Turn a result in the axes of the table into another body frame, exactly."""
+    J = body_frame.jacobian_at(result.names, result.values, frame)
+    values = body_frame.values_in_frame(result.names, result.values, frame)
+    return replace(result, body_frame=frame, values=values, covariance=J @ result.covariance @ J.T)
 
 
 def mount_study(
@@ -58,8 +66,8 @@ def mount_study(
         what = recording, scenario.site, scenario.imu, model
         results = (
             calibrate(*what, held_out=False),
-            classical_calibrate(*what),
-            classical_calibrate(*what, frame=model.body_frame),
+            classical := calibrate(*what, held_out=False, estimator="classical"),
+            turned(classical, model.body_frame),
         )
         for estimator, result in zip(ESTIMATORS, results, strict=True):
             for effect, error in errors_by_effect(result, truth).items():

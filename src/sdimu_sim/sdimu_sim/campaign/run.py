@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 
 from rate_table_sim.core import TableMotion, TableSpecification, phase_changes, table_motion
-from sdimu_calibration.core.alignment.prepared import reduce, set_up
 from sdimu_calibration.core.arrays import Bools, Floats, Ints
-from sdimu_calibration.core.effects import body_frame
-from sdimu_calibration.core.filter.passes import solve
+from sdimu_calibration.core.estimation.navigation_fit import NavigationFit
+from sdimu_calibration.core.estimation.prepared_test import PreparedTest
+from sdimu_calibration.core.estimation.solve import solve
 from sdimu_calibration.core.plan import Plan
-from sdimu_calibration.core.recording import PhaseLog, Recording
+from sdimu_calibration.core.recording import DataError, PhaseLog, Recording
 from sdimu_calibration.core.specification import Model
 from sdimu_sim.core.generator import simulate_imu
 from sdimu_sim.core.hidden import parse_effects
@@ -64,23 +64,21 @@ class CalibrationRun:
         """
         scenario = replace(self.scenario, seed=seed)
         sensor = imu_truth(scenario)
-        setup = set_up(scenario.site, scenario.imu, self.model)
-        solution = solve(setup, reduce(simulate(scenario, sensor), setup), lambda _word, _share: None)
-        last = solution.last
-        names, frame = setup.sensors.names, self.model.body_frame
-        J = body_frame.frame_jacobian(names, frame)
-        P = J @ last.covariance @ J.T
-        estimate = body_frame.values_in_frame(names, last.estimate, frame)
+        fit = solve(PreparedTest(simulate(scenario, sensor), scenario.imu, scenario.site), self.model)
+        if not isinstance(fit, NavigationFit):
+            raise DataError(f"IMU '{scenario.imu.name}': a handheld fit has no innovations to study; choose another")
+        names, frame, P, estimate = fit.names, fit.body_frame, fit.covariance, fit.values
         truth = true_values(sensor, names, frame)
         sigma = np.sqrt(np.diag(P))
-        free = sigma > _PINNED_SHARE * setup.sensors.prior
-        products, count = lag_one(last.output.normalised, solution.prepared.phases.stop)
-        nis = last.output.nis
+        free = sigma > _PINNED_SHARE * fit.sensors.prior
+        output = fit.last.output
+        products, count = lag_one(output.normalised, fit.prepared.phases.stop)
+        nis = output.nis
         return {
             "names": names, "estimate": estimate, "truth": truth, "sigma": sigma,
             "covariance": P[np.tril_indices(len(P))], "free": free, "nees": nees(estimate - truth, P, free),
             "nis": np.nansum(nis, axis=0), "nis_dof": 3 * np.isfinite(nis).sum(axis=0),
-            "lag1": products, "lag1_count": count, "passes": solution.passes,
+            "lag1": products, "lag1_count": count, "passes": fit.passes,
         }  # fmt: skip
 
 

@@ -60,7 +60,7 @@ def measure(plan: str, rate: float, repeats: int, folder: Path) -> list[tuple[st
     """
     from rate_table_sim.table_file import load_table
     from sdimu_calibration.core.alignment.prepared import first_attitude, reduce, set_up
-    from sdimu_calibration.core.calibrate import calibrate
+    from sdimu_calibration.core.estimation.outcome import calibrate
     from sdimu_calibration.core.filter.passes import one_pass
     from sdimu_calibration.storage.bag_reader import read_recording
     from sdimu_calibration.storage.config import load_imu, load_model, load_plan, load_site
@@ -81,7 +81,7 @@ def measure(plan: str, rate: float, repeats: int, folder: Path) -> list[tuple[st
     n = len(recording.t)
 
     def one() -> None:
-        one_pass(prepared, setup, start, start.C_nb, found.values, closed_loop=False, keep=False)
+        one_pass(prepared, setup, start, start.C_nb, found.values, closed_loop=False)
 
     def whole() -> None:
         write_result(folder / "result.json", calibrate(read_recording(bag), site, imu, model))

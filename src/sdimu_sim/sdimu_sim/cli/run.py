@@ -160,28 +160,29 @@ def _test(plan: str, model: str, duration: float) -> Outline:
 
 def _report(console: Console, out: Path, site: str, imu: str, model: str, plan: str) -> Calibration:
     """Diagnose the bag, print the table with the truth, write diagnosis and page."""
-    from sdimu_calibration.core.diagnosis.diagnose import diagnose
+    from sdimu_calibration.core.diagnosis.diagnose import climb
+    from sdimu_calibration.core.diagnosis.summary import summarise
+    from sdimu_calibration.core.estimation.solve import solve
     from sdimu_calibration.report.page import write_report
     from sdimu_calibration.report.report_extras import report_extras
     from sdimu_calibration.report.table import rich_table, rows
-    from sdimu_calibration.storage.bag_reader import read_recording
-    from sdimu_calibration.storage.config import load_imu, load_site
-    from sdimu_calibration.storage.diagnosis_file import account, write_diagnosis
+    from sdimu_calibration.storage.config import load_imu
+    from sdimu_calibration.storage.diagnosis_file import write_diagnosis
     from sdimu_calibration.storage.effect_file import extended_model
+    from sdimu_calibration.storage.opening import open_test
     from sdimu_calibration.storage.reference_file import read_reference, read_truth
     from sdimu_calibration.storage.result_file import read_result
 
     result = read_result(out / "result.json")
     truth = read_truth(out / "truth.yaml", result.body_frame)
     with console.status("diagnosing") if console.is_terminal else nullcontext():
-        recording = read_recording(out / "bag")
-        where, specification, wanted = load_site(site), load_imu(imu), extended_model(model, ())
-        diagnosis = diagnose(recording, where, specification, wanted)
-        more = report_extras(recording, diagnosis, where, specification, wanted)
-    write_diagnosis(out / "diagnosis.json", account(diagnosis))
+        test = open_test(out / "bag", site, load_imu(imu))
+        diagnosis = climb(solve(test, extended_model(model, ())))
+        summary, more = summarise(diagnosis), report_extras(diagnosis)
+    write_diagnosis(out / "diagnosis.json", summary)
     title = f"Simulated test: plan {plan}, model {model}"
     write_report(
-        out / "report.html", result, title=title, truth=truth, reference=read_reference(), diagnosis=diagnosis,
+        out / "report.html", result, title=title, truth=truth, reference=read_reference(), summary=summary,
         more=more,
     )  # fmt: skip
     shown = rich_table(rows(result, truth, read_reference()), f"body frame: {result.body_frame}")

@@ -7,11 +7,10 @@ import pytest
 from scipy.stats import chi2
 
 from sdimu_calibration.core.alignment.prepared import reduce, set_up
-from sdimu_calibration.core.batch.batch import batch_calibrate
 from sdimu_calibration.core.batch.preintegration import preintegrate
-from sdimu_calibration.core.calibrate import calibrate
 from sdimu_calibration.core.effects import registry
 from sdimu_calibration.core.effects.error_slope import error_slope
+from sdimu_calibration.core.estimation.outcome import calibrate
 from sdimu_calibration.core.navigation.track import motion
 from sdimu_calibration.core.plan import Plan
 from sdimu_calibration.core.recording import DataError
@@ -64,7 +63,7 @@ PINNED = ("accel_misalignment_xy", "accel_misalignment_xz", "accel_misalignment_
 def test_batch_and_filter_agree_in_covariance_and_in_estimate(imu, model, site, seed):
     recording, _ = generate(Scenario(KIM18, imu, site, seed=seed))
     filtered = calibrate(recording, site, imu, model, held_out=False)
-    batch = batch_calibrate(recording, site, imu, model)
+    batch = calibrate(recording, site, imu, model, estimator="batch")
     k = [i for i, name in enumerate(batch.names) if name not in PINNED]
     sigma = np.sqrt(np.diag(batch.covariance))[k]
     np.testing.assert_allclose(np.sqrt(np.diag(filtered.covariance))[k], sigma, rtol=0.03)
@@ -76,7 +75,7 @@ def test_errors_of_the_batch_are_as_large_as_it_says(imu, model, site):
     total, dof = 0.0, 0
     for seed in range(1, 9):
         recording, truth = generate(Scenario(SHORT, imu, site, seed=seed, rate_hz=50.0))
-        value, n = nees(batch_calibrate(recording, site, imu, model), truth)
+        value, n = nees(calibrate(recording, site, imu, model, estimator="batch"), truth)
         total, dof = total + value, dof + n
     assert chi2.ppf(5e-4, dof) < total < chi2.ppf(1.0 - 5e-4, dof)
 
@@ -85,7 +84,7 @@ def test_misfit_of_the_batch_is_that_of_the_noise(imu, model, site):
     total, dof = 0.0, 0.0
     for seed in range(1, 9):
         recording, _ = generate(Scenario(SHORT, imu, site, seed=seed, rate_hz=50.0))
-        fit = batch_calibrate(recording, site, imu, model).fit
+        fit = calibrate(recording, site, imu, model, estimator="batch").fit
         total, dof = total + fit["nis_mean"] * fit["nis_dof"], dof + fit["nis_dof"]
     # The simulated table stands perfectly still: six of the rows of a stop have less noise than the model says.
     assert chi2.ppf(5e-4, dof * 0.8) < total < chi2.ppf(1.0 - 5e-4, dof)
@@ -95,7 +94,7 @@ def test_errors_of_percents_are_found_with_honest_sigmas(model, site):
     total, dof = 0.0, 0
     for seed in range(1, 7):
         recording, truth = generate(Scenario(KIM18, PERCENTS, site, seed=seed, rate_hz=50.0))
-        found = batch_calibrate(recording, site, PERCENTS, model)
+        found = calibrate(recording, site, PERCENTS, model, estimator="batch")
         value, n = nees(found, truth)
         total, dof = total + value, dof + n
     assert chi2.ppf(5e-4, dof) < total < chi2.ppf(1.0 - 5e-4, dof)
@@ -104,9 +103,9 @@ def test_errors_of_percents_are_found_with_honest_sigmas(model, site):
 @pytest.mark.parametrize("azimuth_deg", [0.0, 90.0, 180.0])
 def test_a_wrong_azimuth_at_the_start_changes_nothing_at_the_end(imu, model, site, azimuth_deg):
     recording, _ = generate(Scenario(SHORT, imu, site, seed=5, rate_hz=50.0))
-    right = batch_calibrate(recording, site, imu, model)
+    right = calibrate(recording, site, imu, model, estimator="batch")
     told = replace(site, initial_azimuth_rad=np.radians(azimuth_deg), initial_azimuth_sigma_rad=np.radians(104.0))
-    found = batch_calibrate(recording, told, imu, model)
+    found = calibrate(recording, told, imu, model, estimator="batch")
     k = [i for i, name in enumerate(right.names) if name not in PINNED]
     assert np.max(np.abs(found.values - right.values)[k] / np.sqrt(np.diag(right.covariance))[k]) < 0.02
 
@@ -117,7 +116,7 @@ def test_coefficients_are_honest_near_and_at_the_poles(imu, model, site, latitud
     total, dof = 0.0, 0
     for seed in range(1, 5):
         recording, truth = generate(Scenario(KIM18, imu, there, seed=seed, rate_hz=20.0))
-        value, n = nees(batch_calibrate(recording, there, imu, model), truth)
+        value, n = nees(calibrate(recording, there, imu, model, estimator="batch"), truth)
         total, dof = total + value, dof + n
     assert chi2.ppf(5e-4, dof) < total < chi2.ppf(1.0 - 5e-4, dof)
 
@@ -137,7 +136,7 @@ def test_an_effect_that_changes_at_random_is_refused(imu, model, site):
     drifting = replace(bias, name="wandering_bias", parameters=renamed, decay_s=1000.0)
     recording, _ = generate(Scenario(SHORT, imu, site, seed=5, rate_hz=20.0))
     with pytest.raises(DataError, match="changes at random"):
-        batch_calibrate(recording, site, imu, replace(model, effects=(*model.effects, drifting)))
+        calibrate(recording, site, imu, replace(model, effects=(*model.effects, drifting)), estimator="batch")
 
 
 @pytest.mark.parametrize("share", [0.0, 0.3])

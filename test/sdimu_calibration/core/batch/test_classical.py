@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from sdimu_calibration.core.batch.classical import classical_calibrate
+from sdimu_calibration.core.estimation.outcome import calibrate
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.units import to_si
 from sdimu_calibration.storage.config import load_plan
+from sdimu_sim.campaign.mount_study import turned
 from sdimu_sim.core.scenario import Scenario, generate
 from sdimu_sim.core.truth import in_body_frame
 
@@ -20,7 +21,7 @@ def test_without_mount_the_errors_are_those_of_the_noise(imu, model, site):
     total, dof = 0.0, 0
     for seed in (1, 2, 3):
         recording, truth = generate(Scenario(KIM18, imu, site, seed=seed, mount_rad=(0.0, 0.0, 0.0), rate_hz=50.0))
-        found = classical_calibrate(recording, site, imu, model)
+        found = calibrate(recording, site, imu, model, estimator="classical")
         true = in_body_frame(truth.imu.coefficients, "prior")
         z = (found.values - np.array([true[n] for n in found.names])) / np.sqrt(np.diag(found.covariance))
         total, dof = total + float(z @ z), dof + len(z)
@@ -35,7 +36,7 @@ def test_a_mount_passes_for_misalignment_and_scale(imu, model, site, mount_deg):
     angle = np.radians(mount_deg)
     perfect = dict.fromkeys((), 0.0)
     scenario = Scenario(KIM18, imu, site, seed=2, mount_rad=(0.0, 0.0, angle), coefficients=perfect, rate_hz=50.0)
-    found = classical_calibrate(generate(scenario)[0], site, imu, model)
+    found = calibrate(generate(scenario)[0], site, imu, model, estimator="classical")
     value = dict(zip(found.names, found.values, strict=True))
     for triad in ("gyro", "accel"):
         # Turned about z, x and y both see sin(m) of the other and cos(m) of their own.
@@ -48,7 +49,7 @@ def test_a_mount_passes_for_misalignment_and_scale(imu, model, site, mount_deg):
 
 def test_turned_into_the_accelerometers_frame_the_mount_is_gone(imu, model, site):
     recording, truth = generate(Scenario(KIM18, imu, site, seed=2, mount_rad=(0.05, 0.04, -0.05), rate_hz=50.0))
-    found = classical_calibrate(recording, site, imu, model, frame="accelerometer_triad")
+    found = turned(calibrate(recording, site, imu, model, estimator="classical"), "accelerometer_triad")
     true = in_body_frame(truth.imu.coefficients, "accelerometer_triad")
     for name in ("gyro_scale_x", "accel_scale_y", "gyro_scale_z"):
         assert abs(found.values[found.names.index(name)] - true[name]) < to_si(10, "ppm"), name
@@ -59,18 +60,20 @@ def test_an_encoder_that_counts_to_half_a_turn_is_followed_over_it(imu, model, s
     table = recording.table
     wrapped = replace(table, angle=np.remainder(table.angle + np.pi, 2.0 * np.pi) - np.pi)
     assert np.abs(np.diff(wrapped.angle, axis=0)).max() > 6.0
-    plain, folded = (classical_calibrate(replace(recording, table=log), site, imu, model) for log in (table, wrapped))
+    plain, folded = (
+        calibrate(replace(recording, table=log), site, imu, model, estimator="classical") for log in (table, wrapped)
+    )
     np.testing.assert_allclose(folded.values, plain.values, rtol=0, atol=1e-9)
 
 
 def test_missing_table_angles_are_named(imu, model, site):
     recording, _ = generate(Scenario(KIM18, imu, site, seed=2, rate_hz=20.0))
     with pytest.raises(DataError, match="/rate_table/joint_states"):
-        classical_calibrate(replace(recording, table=None), site, imu, model)
+        calibrate(replace(recording, table=None), site, imu, model, estimator="classical")
 
 
 def test_angles_of_a_table_without_gimbals_are_refused(imu, model, site):
     recording, _ = generate(Scenario(KIM18, imu, site, seed=2, rate_hz=20.0))
     free = replace(recording.table, names=("x", "y", "z"))
     with pytest.raises(DataError, match="outer, middle, inner"):
-        classical_calibrate(replace(recording, table=free), site, imu, model)
+        calibrate(replace(recording, table=free), site, imu, model, estimator="classical")

@@ -9,7 +9,6 @@ import pytest
 
 from sdimu_calibration.core import earth
 from sdimu_calibration.core.alignment.prepared import reduce, set_up
-from sdimu_calibration.core.calibrate import calibrate
 from sdimu_calibration.core.data.epochs import Epochs
 from sdimu_calibration.core.data.phases import (
     STALE_S,
@@ -19,6 +18,7 @@ from sdimu_calibration.core.data.phases import (
     table_says,
     without_early_motion,
 )
+from sdimu_calibration.core.estimation.outcome import calibrate
 from sdimu_calibration.core.plan import Plan, Turn
 from sdimu_calibration.core.recording import DataError, PhaseLog
 

@@ -8,9 +8,10 @@ from functools import cache
 import numpy as np
 import pytest
 
-from sdimu_calibration.core.alignment.prepared import PreparedData, TestSetup, reduce, set_up
-from sdimu_calibration.core.diagnosis.diagnose import Diagnosis, diagnose
-from sdimu_calibration.core.filter.passes import Solution, solve
+from sdimu_calibration.core.diagnosis.diagnose import Diagnosis, climb
+from sdimu_calibration.core.estimation.navigation_fit import FilterFit
+from sdimu_calibration.core.estimation.prepared_test import PreparedTest
+from sdimu_calibration.core.estimation.solve import solve
 from sdimu_calibration.core.plan import Plan
 from sdimu_calibration.core.recording import Recording
 from sdimu_calibration.core.specification import ImuSpecification, Model, Site
@@ -22,7 +23,7 @@ SEEDS = (101, 102, 103)
 
 
 @dataclass(frozen=True)
-class FitSession:
+class Bench:
     """Simulate, solve and diagnose, each once."""
 
     site: Site
@@ -36,14 +37,14 @@ class FitSession:
     def recording(self, seed: int = 101, effects: tuple[str, ...] = (), plan: str = "kim18_signed") -> Recording:
         return _recording(seed, effects, plan)
 
-    def solution(self, seed: int = 101, effects: tuple[str, ...] = (), plan: str = "kim18_signed") -> Solution:
-        return _solution(seed, effects, plan)
+    def fit(self, seed: int = 101, effects: tuple[str, ...] = (), plan: str = "kim18_signed") -> FilterFit:
+        return _fit(seed, effects, plan)
 
     def diagnosis(self, seed: int = 101, effects: tuple[str, ...] = (), plan: str = "kim18_signed") -> Diagnosis:
         return _diagnosis(seed, effects, plan)
 
 
-BENCH = FitSession(SITE, load_imu("dtg"), load_model("baseline"))
+BENCH = Bench(SITE, load_imu("dtg"), load_model("baseline"))
 
 
 @cache
@@ -53,17 +54,15 @@ def _recording(seed: int, effects: tuple[str, ...], plan: str) -> Recording:
 
 
 @cache
-def _solution(seed: int, effects: tuple[str, ...], plan: str) -> Solution:
-    setup: TestSetup = set_up(BENCH.site, BENCH.imu, BENCH.model)
-    prepared: PreparedData = reduce(_recording(seed, effects, plan), setup)
-    return solve(setup, prepared, lambda _what, _share: None, keep=True)
+def _fit(seed: int, effects: tuple[str, ...], plan: str) -> FilterFit:
+    return solve(PreparedTest(_recording(seed, effects, plan), BENCH.imu, BENCH.site), BENCH.model)
 
 
 @cache
 def _diagnosis(seed: int, effects: tuple[str, ...], plan: str) -> Diagnosis:
-    return diagnose(_recording(seed, effects, plan), BENCH.site, BENCH.imu, BENCH.model)
+    return climb(_fit(seed, effects, plan))
 
 
 @pytest.fixture(scope="session")
-def bench() -> FitSession:
+def bench() -> Bench:
     return BENCH

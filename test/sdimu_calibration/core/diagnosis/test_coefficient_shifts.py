@@ -7,17 +7,16 @@ import pytest
 
 from sdimu_calibration.core.diagnosis.coefficient_shifts import coefficient_shifts
 from sdimu_calibration.core.diagnosis.found import found_effects
-from sdimu_calibration.core.diagnosis.rounds import with_effects
 from sdimu_calibration.core.diagnosis.search import Problem
-from sdimu_calibration.core.progress import silent
+from sdimu_calibration.core.estimation.solve import extend
 
 _HIDDEN = ("accel_scale_asymmetry_z=60 ppm",)
 
 
 def _refit(bench, diagnosis, label):
     (candidate,) = (c for c in diagnosis.evidence.candidates if c.label == label)
-    last = with_effects(bench.solution(effects=_HIDDEN), [candidate], silent).last
-    return last.estimate, np.sqrt(np.diag(last.covariance))
+    fit = extend(bench.fit(effects=_HIDDEN), [candidate.effect])
+    return fit.estimate, np.sqrt(np.diag(fit.estimate_covariance))
 
 
 def test_a_stake_is_the_difference_of_two_calibrations(bench):

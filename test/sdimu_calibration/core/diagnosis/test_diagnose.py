@@ -11,9 +11,9 @@ from scipy.signal import lfilter
 from sdimu_calibration.core.diagnosis.advice import advice, untestable_reasons
 from sdimu_calibration.core.diagnosis.bootstrap import bootstrap
 from sdimu_calibration.core.diagnosis.candidates import own_equation
-from sdimu_calibration.core.diagnosis.diagnose import diagnose
+from sdimu_calibration.core.diagnosis.diagnose import climb, diagnose
 from sdimu_calibration.core.diagnosis.found import found_effects, reach
-from sdimu_calibration.core.diagnosis.grow import jump, rung
+from sdimu_calibration.core.diagnosis.ladder import jump, refused
 from sdimu_calibration.core.diagnosis.plan_seen import plan_seen
 from sdimu_calibration.core.units import to_si
 
@@ -59,16 +59,21 @@ def test_the_free_input_shares_of_what_was_found_sum_to_what_was_explained(bench
 
 
 def test_velocity_jumps_after_turns_while_an_effect_is_missing(bench):
-    missing, none = jump(bench.diagnosis(effects=_HIDDEN))[0], jump(bench.diagnosis())[0]
+    missing, none = jump(bench.fit(effects=_HIDDEN))[0], jump(bench.fit())[0]
     # Standardised: 19 stops of three components scatter by a tenth about one.
     assert none == pytest.approx(1.0, abs=0.4)
     assert missing > 2.0 * none
 
 
-def test_a_rung_that_does_not_lower_the_held_out_error_is_refused(bench):
-    good, bad = bench.diagnosis(), bench.diagnosis(effects=_HIDDEN)
-    assert rung("any", bad, good).reason
-    assert rung("any", good, bad).accepted
+def test_the_ladder_of_refits_says_how_far_the_error_falls_and_refuses_what_does_not_lower_it(bench):
+    diagnosis = climb(bench.fit(effects=_HIDDEN), refits=True)
+    given, added = diagnosis.rungs
+    assert added.added == "accel_scale_asymmetry_z"
+    assert added.accepted
+    assert added.held_out_rms == diagnosis.after.fit["held_out_rms"] < given.held_out_rms
+    assert added.log_bayes_factor > 10.0
+    assert not refused(replace(added, held_out_rms=0.9), given)
+    assert refused(replace(added, held_out_rms=given.held_out_rms + 0.1), given)
 
 
 def test_outliers_are_told_as_wrong_samples_and_end_as_no_effect(bench):

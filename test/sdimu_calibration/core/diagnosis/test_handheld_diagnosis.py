@@ -9,16 +9,19 @@ from functools import cache
 import numpy as np
 import pytest
 
-from sdimu_calibration.core.diagnosis.handheld_diagnosis import candidates, diagnose_handheld
-from sdimu_calibration.core.diagnosis.handheld_summary import summarise_handheld
+from sdimu_calibration.core.diagnosis.diagnose import diagnose
+from sdimu_calibration.core.diagnosis.rounds import candidates
 from sdimu_calibration.core.diagnosis.scan import POWER_80
+from sdimu_calibration.core.diagnosis.summary import summarise
 from sdimu_calibration.core.effects import imu_model
-from sdimu_calibration.core.evidence.handheld_evidence import collect, timetable
-from sdimu_calibration.core.handheld.handheld import first_linearisation, fit_priors, prepare
-from sdimu_calibration.core.handheld.handheld_fit import FORCE, equations, fit_run
+from sdimu_calibration.core.estimation.prepared_test import PreparedTest
+from sdimu_calibration.core.estimation.solve import solve
+from sdimu_calibration.core.evidence.handheld_evidence import places
+from sdimu_calibration.core.handheld.handheld import fit_priors
+from sdimu_calibration.core.handheld.handheld_fit import FORCE, equations
 from sdimu_calibration.core.units import from_si, to_si
 from sdimu_calibration.storage.config import load_imu, load_model
-from sdimu_calibration.storage.handheld_diagnosis_file import hand_content
+from sdimu_calibration.storage.diagnosis_file import content
 from sdimu_sim.core.by_hand import ByHand, by_hand_recording
 
 IMU, MODEL = load_imu("mems_by_hand"), load_model("hand")
@@ -41,44 +44,44 @@ def _recording(seed, effects=()):
 
 @cache
 def _diagnosis(seed, effects=()):
-    return diagnose_handheld(_recording(seed, effects), None, IMU, MODEL)
+    return diagnose(_recording(seed, effects), None, IMU, MODEL, estimator="handheld")
 
 
 def test_a_hidden_effect_is_named_measured_and_the_scatter_falls():
     found = _diagnosis(201, ("accel_quadratic_y=3000 ug/g^2",))
-    told = summarise_handheld(found)
+    told = summarise(found)
     (one,) = told.found
     assert not found.adequate
     assert "accel_quadratic_y" in {one.candidate.label, *one.alike}
     if one.candidate.label == "accel_quadratic_y":
         assert abs(one.value - to_si(3000, "ug/g^2")) < 3.5 * one.sigma
     first, last = found.rungs
-    assert last.extra[FORCE] < 0.5 * first.extra[FORCE]
-    assert last.held_out < 0.5 * first.held_out
+    assert last.scatter[FORCE] < 0.5 * first.scatter[FORCE]
+    assert last.held_out_rms < 0.5 * first.held_out_rms
     assert one.explained == pytest.approx(1.0)
-    worst = [place.channel for place in told.where[:3]]
+    worst = [place.channel for place in found.consistency.where[:3]]
     assert "accel_y" in worst
     # What stood out is gone: the largest of some 200 residuals.
-    assert abs(told.after[0].normalised) < 5.0
+    assert abs(places(found.evidence, found.found.chosen)[0].normalised_mean) < 5.0
 
 
 def test_a_turn_shows_what_acts_only_in_turns():
-    (one,) = summarise_handheld(_diagnosis(202, ("gyro_scale_asymmetry_z=4000 ppm",))).found
+    (one,) = summarise(_diagnosis(202, ("gyro_scale_asymmetry_z=4000 ppm",))).found
     assert "gyro_scale_asymmetry_z" in {one.candidate.label, *one.alike}
 
 
 def test_two_that_stood_for_one_in_the_scatter_give_way_to_it():
     found = _diagnosis(201, ("gyro_scale_asymmetry_y=10000 ppm",))
-    (one,) = summarise_handheld(found).found
+    (one,) = summarise(found).found
     assert one.candidate.label == "gyro_scale_asymmetry_y"
-    assert all(step.taken_out for step in found.steps if step.label != one.candidate.label)
+    assert all(step.taken_out for step in found.found.steps if step.label != one.candidate.label)
 
 
 def test_a_swing_in_time_is_told_with_its_period():
     still = _recording(201)
     swing = 5e-3 * 9.8 * np.sin(2.0 * np.pi * still.t / 37.0)
     force = still.f_ib_b + np.outer(swing, [1.0, 0.0, 0.0])
-    (one, *_) = summarise_handheld(diagnose_handheld(replace(still, f_ib_b=force), None, IMU, MODEL)).found
+    (one, *_) = summarise(diagnose(replace(still, f_ib_b=force), None, IMU, MODEL, estimator="handheld")).found
     channel, _, period = one.candidate.label.partition(": sin(2 pi t / ")
     assert channel == "accel_x"
     # A tenth of a cycle over the run.
@@ -88,23 +91,21 @@ def test_a_swing_in_time_is_told_with_its_period():
 
 
 def test_a_right_model_is_left_alone():
-    finds = [len(_diagnosis(seed).steps) for seed in SEEDS]
+    finds = [len(_diagnosis(seed).found.steps) for seed in SEEDS]
     # A find has probability 0.02 a run: two of three have 1e-3.
     assert sum(n > 0 for n in finds) <= 1
-    told = summarise_handheld(_diagnosis(SEEDS[int(np.argmin(finds))]))
+    told = summarise(_diagnosis(SEEDS[int(np.argmin(finds))]))
     assert told.diagnosis.verdict == "consistent"
     assert told.found == ()
     assert told.diagnosis.before is told.diagnosis.after
 
 
 def test_signatures_are_what_the_equations_do_when_the_effect_acts():
-    ready = prepare(_recording(203))
-    sensors = imu_model.build(MODEL.effects, IMU)
-    scene = fit_priors(sensors, IMU, None, ready.rests)
-    fit = fit_run(ready.run, scene, first_linearisation(ready.run, sensors, scene.gravity))
-    evidence = collect(ready.run, scene, fit.point, [_effect(ready.run, label) for label in SHOWN], IMU.grade)
+    whole = _fit(203)
+    ready, fit = whole.ready, whole.solution
+    evidence = whole.evidence([_effect(whole, label) for label in SHOWN])
     for column, label in enumerate(SHOWN, start=len(evidence.weight)):
-        wider = imu_model.build([*MODEL.effects, _effect(ready.run, label)], IMU)
+        wider = imu_model.build([*MODEL.effects, _effect(whole, label)], IMU)
         there = fit_priors(wider, IMU, None, ready.rests)
         step = 1e-3 * wider.prior[-1]
         left = []
@@ -118,55 +119,58 @@ def test_signatures_are_what_the_equations_do_when_the_effect_acts():
         assert error < 0.05, label
 
 
-def _effect(run, label):
-    (effect,) = (e for e in candidates(timetable(run), set(), False, (), own=False) if label in e.labels)
+def _fit(seed):
+    return solve(PreparedTest(_recording(seed), IMU), MODEL, "handheld")
+
+
+def _effect(fit, label):
+    (effect,) = (e for e in candidates(fit, (), (), own=False) if label in e.labels)
     return effect.only((label,))
 
 
 def test_the_evidence_of_the_model_is_the_fit():
-    ready = prepare(_recording(201))
-    sensors = imu_model.build(MODEL.effects, IMU)
-    scene = fit_priors(sensors, IMU, None, ready.rests)
-    fit = fit_run(ready.run, scene, first_linearisation(ready.run, sensors, scene.gravity))
-    evidence = collect(ready.run, scene, fit.point, [], IMU.grade)
+    whole = _fit(201)
+    fit, evidence = whole.solution, whole.evidence()
     step, covariance = evidence.information.estimate(evidence.model, evidence.weight)
     sigma = np.sqrt(np.diag(fit.covariance))
-    np.testing.assert_allclose(np.sqrt(np.diag(covariance))[: evidence.known], sigma, rtol=1e-3)
-    assert np.max(np.abs(step[: evidence.known] / sigma)) < 0.02
+    np.testing.assert_allclose(np.sqrt(np.diag(covariance))[: evidence.coefficients], sigma, rtol=1e-3)
+    assert np.max(np.abs(step[: evidence.coefficients] / sigma)) < 0.02
 
 
 def test_neither_the_place_nor_a_lost_sample_is_a_candidate():
-    effects = candidates(timetable(prepare(_recording(201)).run), set(), True, (), own=True)
+    effects = candidates(_fit(201), (), (), own=True)
     names = {e.family or e.name for e in effects}
     assert not {n for n in names if n.startswith(("reference", "gyro_lost_data"))}
     assert "accel_quadratic" in names
 
 
 def test_the_file_has_the_keys_of_every_diagnosis():
-    told = summarise_handheld(_diagnosis(201, ("accel_quadratic_y=3000 ug/g^2",)))
-    content = hand_content(told)
-    assert content["format"] == "sdimu-diagnosis/1"
-    assert content["adequate"] is False
-    (one,) = content["candidates"]
+    told = summarise(_diagnosis(201, ("accel_quadratic_y=3000 ug/g^2",)))
+    written = content(told)
+    assert written["format"] == "sdimu-diagnosis/1"
+    assert written["adequate"] is False
+    (one,) = written["candidates"]
     assert one["held_out_rms_after"] < one["held_out_rms_before"]
     assert one["parameters"][0]["unit"] == "m/s^2/g^2"
-    assert content["where"][0]["normalised_mean"] == told.where[0].normalised
-    assert content["unexplained"] == {"is": False, "fraction": 0.0, "best_variables": []}
-    assert content["beyond_white_noise"][1]["force_m_s2"] < content["beyond_white_noise"][0]["force_m_s2"]
+    assert written["where"][0]["normalised_mean"] == told.diagnosis.consistency.where[0].normalised_mean
+    assert written["unexplained"] == {"is": False, "fraction": 0.0, "best_variables": []}
+    assert written["grown"][1]["beyond_white_noise"]["force_m_s2"] < (
+        written["grown"][0]["beyond_white_noise"]["force_m_s2"]
+    )
 
 
 @pytest.mark.slow
 def test_forty_runs_name_what_is_hidden_and_forty_others_nothing(capsys):
     finds, named, sizes, drawn = 0, 0, [], 0
     for seed in range(3001, 3041):
-        clean = summarise_handheld(_diagnosis(seed))
+        clean = summarise(_diagnosis(seed))
         finds += bool(clean.found)
         hidden = _draw(clean, np.random.default_rng(seed))
         if hidden is None:
             continue
         drawn += 1
         label, size, unit = hidden
-        told = summarise_handheld(_diagnosis(seed, (f"{label}={from_si(size, unit):.8g} {unit}",)))
+        told = summarise(_diagnosis(seed, (f"{label}={from_si(size, unit):.8g} {unit}",)))
         named += any(label in {f.candidate.label, *f.alike} for f in told.found)
         sizes += [(f.value - size) / f.sigma for f in told.found if f.candidate.label == label]
     spread = float(np.sqrt(np.mean(np.square(sizes))))

@@ -6,14 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from sdimu_calibration.core.diagnosis.rounds import drop_companions, settle
+from sdimu_calibration.core.diagnosis.rounds import Request, drop_companions, search_until_stable
 from sdimu_calibration.core.diagnosis.search import FALSE_ALARM
 from sdimu_calibration.core.progress import silent
 
 
 def test_a_companion_that_is_noise_once_calibrated_is_taken_out_and_says_so(bench):
-    base = bench.solution(effects=("accel_scale_asymmetry_z=60 ppm",))
-    look = settle(base, (), FALSE_ALARM, silent)
+    base = bench.fit(effects=("accel_scale_asymmetry_z=60 ppm",))
+    look = search_until_stable(Request(base, (), FALSE_ALARM), silent)
     (step,) = look.found.steps
     assert step.fate == "added"
     column = look.evidence.names.index("accel_cubic_x")

@@ -2,25 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
-from sdimu_calibration.core.calibrate import fit_statistics
 from sdimu_calibration.core.diagnosis.scan import TESTABLE, scan
 from sdimu_calibration.core.effects import registry
-from sdimu_calibration.core.effects.imu_model import build
-from sdimu_calibration.core.evidence.navigation_evidence import collect
-from sdimu_calibration.core.filter.passes import solve
-
-
-def _silent(_what, _share):
-    return None
+from sdimu_calibration.core.estimation.solve import extend
 
 
 def _evidence(bench, names, **options):
-    solution = bench.solution(**options)
-    return collect(solution.prepared, solution.setup, solution.last, [registry.get(n) for n in names])
+    return bench.fit(**options).evidence([registry.get(n) for n in names])
 
 
 def _share_left(evidence, weights):
@@ -33,27 +23,25 @@ def _share_left(evidence, weights):
 
 
 def test_information_of_the_signatures_is_the_covariance_of_the_filter(bench):
-    solution = bench.solution()
+    fit = bench.fit()
     evidence = _evidence(bench, [])
     p = len(evidence.weight)
     covariance = np.linalg.inv(evidence.information.J[:p, :p] + np.diag(evidence.weight))
-    unit = 1.0 / np.sqrt(np.diag(solution.last.covariance))
+    unit = 1.0 / np.sqrt(np.diag(fit.estimate_covariance))
     # Both describe one linear model; they differ by the coefficients' last step, thousandths of a sigma.
     np.testing.assert_allclose(
-        covariance * np.outer(unit, unit), solution.last.covariance * np.outer(unit, unit), atol=1e-3
+        covariance * np.outer(unit, unit), fit.estimate_covariance * np.outer(unit, unit), atol=1e-3
     )
 
 
 def test_the_score_is_the_fall_of_chi_square_of_a_refit(bench):
     hidden = ("accel_quadratic_x=60 ug/g^2",)
-    solution = bench.solution(effects=hidden)
+    fit = bench.fit(effects=hidden)
     evidence = _evidence(bench, ["accel_quadratic"], effects=hidden)
     column = evidence.names.index("accel_quadratic_x")
     scanned = scan(evidence.information, evidence.model, evidence.weight)
     effect = registry.get("accel_quadratic").only(("accel_quadratic_x",))
-    wide = replace(solution.setup, sensors=build([*solution.setup.sensors.effects, effect], solution.setup.imu))
-    refit = solve(wide, solution.prepared, _silent)
-    gain = fit_statistics(refit.last)["log_likelihood"] - fit_statistics(solution.last)["log_likelihood"]
+    gain = extend(fit, [effect]).statistics()["log_likelihood"] - fit.statistics()["log_likelihood"]
     # The filter's likelihood is marginal over the prior: log N(d; 0, J + w) against the score d^2 / J.
     J, d, w = scanned.information.J[column, column], scanned.information.d[column], effect.prior["navigation"] ** -2
     assert abs(scanned.z[column]) > 8.0

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from sdimu_calibration.core.handheld.handheld import by_hand, handheld_calibrate
+from sdimu_calibration.core.estimation.outcome import calibrate
+from sdimu_calibration.core.handheld.handheld import hides_earth_rate
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.specification import ImuSpecification, Model
 from sdimu_calibration.core.units import STANDARD_GRAVITY, to_si
@@ -39,7 +40,7 @@ def rests_of(seed):
 def errors(seed, site, **options):
     """Normalised errors of the free coefficients, their covariance, and the errors themselves."""
     recording, truth = by_hand_recording(ByHand(rests_of(seed), options.pop("imu", MEMS), site, seed=seed, **options))
-    found = handheld_calibrate(recording, None, MEMS, MODEL)
+    found = calibrate(recording, None, MEMS, MODEL, estimator="handheld")
     true = in_body_frame(against_gravity(truth, STANDARD_GRAVITY, gravity_of(site)).imu.coefficients, found.body_frame)
     k = np.flatnonzero(np.diag(found.covariance))
     error = np.array([found.values[i] - true[found.names[i]] for i in k])
@@ -79,7 +80,7 @@ def test_without_noise_the_squares_of_the_errors_come_out_too(site):
 
 def test_gravity_that_nobody_states_is_a_convention_and_said(site):
     recording, _ = by_hand_recording(ByHand(20, MEMS, site, seed=5))
-    free, placed = (handheld_calibrate(recording, where, MEMS, MODEL) for where in (None, site))
+    free, placed = (calibrate(recording, where, MEMS, MODEL, estimator="handheld") for where in (None, site))
     k = [free.names.index(f"accel_scale_{axis}") for axis in "xyz"]
     ratio = (1.0 + free.values[k]) / (1.0 + placed.values[k])
     # The convention makes all axes longer alike, and knows nothing of the noise.
@@ -90,13 +91,12 @@ def test_gravity_that_nobody_states_is_a_convention_and_said(site):
 
 def test_an_extra_force_at_rest_is_learned_and_widens_the_sigmas(site):
     recording, _ = by_hand_recording(ByHand(20, MEMS, site, seed=6))
-    plain = handheld_calibrate(recording, None, MEMS, MODEL)
+    plain = calibrate(recording, None, MEMS, MODEL, estimator="handheld")
     rng = np.random.default_rng(6)
     moved = np.concatenate([[0.0], np.cumsum(np.linalg.norm(recording.omega_ib_b, axis=1) > 0.3)])[1:]
     level = rng.standard_normal((int(moved[-1]) + 1, 3)) * 0.05
-    shaken = handheld_calibrate(
-        replace(recording, f_ib_b=recording.f_ib_b + level[moved.astype(int)]), None, MEMS, MODEL
-    )
+    shaken = calibrate(
+        replace(recording, f_ib_b=recording.f_ib_b + level[moved.astype(int)]), None, MEMS, MODEL, estimator="handheld")
     i = plain.names.index("accel_bias_x")
     # 0.05 m/s^2 against 150 ug of noise over 3 s: 60 times as much.
     assert 20.0 < np.sqrt(shaken.covariance[i, i] / plain.covariance[i, i]) < 180.0
@@ -104,26 +104,27 @@ def test_an_extra_force_at_rest_is_learned_and_widens_the_sigmas(site):
 
 def test_the_choice_is_made_by_what_a_rest_shows_of_the_earth(imu, three_stops, recorded_test, site):
     recording, _ = by_hand_recording(ByHand(20, MEMS, site, seed=5))
-    assert by_hand(recording, MEMS)
-    assert not by_hand(recorded_test(three_stops), imu)
+    assert hides_earth_rate(recording, MEMS)
+    assert not hides_earth_rate(recorded_test(three_stops), imu)
 
 
 def test_a_coefficient_that_no_turn_shows_is_named(site):
     recording, _ = by_hand_recording(ByHand(8, MEMS, site, seed=8))
     loose = replace(MEMS, prior={**MEMS.prior, "gyro_g_squared": 1e-9})
-    found = handheld_calibrate(recording, None, loose, replace(MODEL, effects=(*MODEL.effects, "gyro_g_squared")))
+    wider = replace(MODEL, effects=(*MODEL.effects, "gyro_g_squared"))
+    found = calibrate(recording, None, loose, wider, estimator="handheld")
     assert any(note.startswith("not determined") and "gyro_g_squared" in note for note in found.notes)
 
 
 def test_a_coefficient_that_was_known_before_changes_no_likelihood(site):
     recording, _ = by_hand_recording(ByHand(12, MEMS, site, seed=1))
     known = replace(MEMS, prior={**MEMS.prior, "gyro_g_sensitivity": 1e-12})
-    without = handheld_calibrate(recording, None, MEMS, MODEL)
-    more = handheld_calibrate(recording, None, known, Model((*MODEL.effects, "gyro_g_sensitivity")))
+    without = calibrate(recording, None, MEMS, MODEL, estimator="handheld")
+    more = calibrate(recording, None, known, Model((*MODEL.effects, "gyro_g_sensitivity")), estimator="handheld")
     assert more.fit["log_likelihood"] == pytest.approx(without.fit["log_likelihood"], abs=0.05)
 
 
 def test_few_rests_are_refused(site):
     recording, _ = by_hand_recording(ByHand(3, MEMS, site, seed=8))
     with pytest.raises(DataError, match="3 rests"):
-        handheld_calibrate(recording, None, MEMS, MODEL)
+        calibrate(recording, None, MEMS, MODEL, estimator="handheld")

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sdimu_calibration.core.handheld.handheld import handheld_calibrate
+from sdimu_calibration.core.estimation.outcome import calibrate
 from sdimu_calibration.storage.config import load_imu, load_site
 from sdimu_calibration.storage.effect_file import extended_model
 from sdimu_sim.core.by_hand import ByHand, by_hand_recording
@@ -21,7 +21,7 @@ def run():
 
 @pytest.fixture(scope="module")
 def sound(run):
-    return handheld_calibrate(run, None, MEMS, MODEL)
+    return calibrate(run, None, MEMS, MODEL, estimator="handheld")
 
 
 def moved(found, sound):
@@ -37,7 +37,7 @@ def test_a_sound_run_has_no_fault(sound):
 def test_clipped_gyros_are_named_and_do_not_pass_for_a_good_fit(run, sound):
     limit = 0.5 * np.abs(run.omega_ib_b).max()
     clipped = replace(run, omega_ib_b=np.clip(run.omega_ib_b, -limit, limit))
-    found = handheld_calibrate(clipped, None, MEMS, MODEL)
+    found = calibrate(clipped, None, MEMS, MODEL, estimator="handheld")
     assert "saturated" in {fault.kind for fault in found.faults}
     assert any("not to be trusted" in warning for warning in found.warnings)
     assert moved(found, sound) < 5.0
@@ -46,7 +46,7 @@ def test_clipped_gyros_are_named_and_do_not_pass_for_a_good_fit(run, sound):
 def test_missing_samples_are_told(run):
     keep = np.arange(len(run.t)) % 500 != 250
     gone = replace(run, t=run.t[keep], omega_ib_b=run.omega_ib_b[keep], f_ib_b=run.f_ib_b[keep])
-    (fault,) = handheld_calibrate(gone, None, MEMS, MODEL).faults
+    (fault,) = calibrate(gone, None, MEMS, MODEL, estimator="handheld").faults
     assert fault.kind == "gap"
     assert fault.count == np.count_nonzero(~keep[:-1])
 
@@ -54,7 +54,7 @@ def test_missing_samples_are_told(run):
 def test_rates_that_no_hand_makes_are_taken_away(run, sound):
     rate = run.omega_ib_b.copy()
     rate[[1000, 2000, 3000], 2] = 1e3
-    found = handheld_calibrate(replace(run, omega_ib_b=rate), None, MEMS, MODEL)
+    found = calibrate(replace(run, omega_ib_b=rate), None, MEMS, MODEL, estimator="handheld")
     assert found.data["rejected"] == 3
     assert "spike" in {fault.kind for fault in found.faults}
     assert moved(found, sound) < 2.0

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sdimu_calibration.core.batch.batch import bound_covariance
-from sdimu_calibration.core.calibrate import calibrate
+from sdimu_calibration.core.estimation.outcome import calibrate
 from sdimu_calibration.core.planning.noise_set import NoiseSet, apply
 from sdimu_calibration.core.planning.predict import largest_by_effect, predict
 from sdimu_calibration.core.recording import DataError

@@ -7,10 +7,9 @@ import pytest
 from scipy.stats import chi2
 
 from sdimu_calibration.core.alignment.prepared import reduce, set_up
-from sdimu_calibration.core.batch.batch import batch_calibrate
-from sdimu_calibration.core.calibrate import calibrate
 from sdimu_calibration.core.effects import imu_model
 from sdimu_calibration.core.effects.accelerometer_frame import accelerometer_frame_model, drifting, squares_count
+from sdimu_calibration.core.estimation.outcome import calibrate
 from sdimu_calibration.core.navigation.correct_cycles import correct_cycles, spread
 from sdimu_calibration.core.navigation.track import motion
 from sdimu_calibration.core.specification import ImuSpecification
@@ -56,7 +55,7 @@ def agreement(filtered, batch):
 def test_the_filter_agrees_with_the_batch(model, site):
     recording, truth = generate(Scenario(KIM18, PERCENTS, site, seed=201, rate_hz=20.0))
     filtered = calibrate(recording, site, PERCENTS, model, held_out=False)
-    batch = batch_calibrate(recording, site, PERCENTS, model)
+    batch = calibrate(recording, site, PERCENTS, model, estimator="batch")
     # Two computations on the same samples; the filter's epochs of a second and the batch's means of twenty share the
     # noise, not its rounding into weights.
     assert np.sqrt(np.mean(agreement(filtered, batch) ** 2)) < 0.3
@@ -70,7 +69,7 @@ def test_fifty_fresh_seeds_converge_and_agree(model, site):
     for seed in range(101, 151):
         recording, truth = generate(Scenario(KIM18, PERCENTS, site, seed=seed, rate_hz=50.0))
         filtered = calibrate(recording, site, PERCENTS, model, held_out=False)
-        batch = batch_calibrate(recording, site, PERCENTS, model)
+        batch = calibrate(recording, site, PERCENTS, model, estimator="batch")
         z.append([normalised(one, truth)[0] for one in (filtered, batch)])
         differences.append(agreement(filtered, batch))
         lost += [seed] if any("did not come to rest" in note for note in filtered.notes) else []

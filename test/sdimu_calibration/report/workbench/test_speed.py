@@ -8,6 +8,7 @@ import time
 import pytest
 
 from rate_table_sim.core import TableSpecification
+from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.report.workbench.fit import FitSession
 from sdimu_calibration.storage.config import load_imu, load_model, load_plan, load_site
 from sdimu_sim.core.scenario import Scenario, generate
@@ -23,7 +24,7 @@ def test_a_refit_of_298000_samples_takes_less_than_three_seconds(capsys):
     plan = load_plan("kim18_signed")
     recording = generate(Scenario(plan, imu, site, table, rate_hz=100.0, seed=7, effects=effects))[0]
     assert len(recording.t) == 298_000
-    bench = FitSession(recording, site, imu, load_model("baseline"))
+    bench = FitSession(PreparedTest(recording, imu, site), load_model("baseline"))
     bench.fit((), ())
     bench.missing((), ())
     for added in (("gyro_scale_asymmetry_y",), ("gyro_scale_asymmetry_y", "accel_quadratic_x")):

@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sdimu_calibration.core.calibrate import calibrate
+from sdimu_calibration.core.estimation.outcome import calibrate
+from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.report.workbench.app import build
 from sdimu_calibration.report.workbench.fit import FitSession
@@ -31,7 +32,7 @@ parameters:
 
 
 def new_bench(recording: Any) -> FitSession:
-    return FitSession(recording, load_site("daejeon"), load_imu("dtg"), load_model("baseline"))
+    return FitSession(PreparedTest(recording, load_imu("dtg"), load_site("daejeon")), load_model("baseline"))
 
 
 @pytest.fixture(scope="module")

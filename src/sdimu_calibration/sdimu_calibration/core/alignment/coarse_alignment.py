@@ -34,15 +34,15 @@ _STOPS = 20
 
 
 @dataclass(frozen=True)
-class CoarseAlignment:
-    """Where to linearise.
+class StartPoint:
+    """Where passes or least squares linearise first.
 
     Attributes
     ----------
     C_nb : ndarray, shape (3, 3)
-        Initial attitude.
+        Initial attitude, b to n.
     coefficients : ndarray, shape (p,)
-        Biases where the model has them, else zero.
+        SI; after a coarse alignment the biases where the model has them, else zero.
     """
 
     C_nb: Floats
@@ -58,7 +58,7 @@ def _turn(alpha: Floats, coning: Floats, dt: Floats, offset: Floats) -> Floats:
     return C
 
 
-def coarse_start(prepared: PreparedData, setup: TestSetup, start: Alignment) -> CoarseAlignment:
+def coarse_start(prepared: PreparedData, setup: TestSetup, start: Alignment) -> StartPoint:
     """Find attitude and biases from all stops.
 
     Parameters
@@ -70,13 +70,13 @@ def coarse_start(prepared: PreparedData, setup: TestSetup, start: Alignment) -> 
 
     Returns
     -------
-    CoarseAlignment
+    StartPoint
     """
     names, prior = setup.sensors.names, setup.sensors.prior
     coefficients = np.zeros(len(prior))
     where = layout(prepared)
     if len(where.stop_first) < 3:
-        return CoarseAlignment(start.C_nb, coefficients)
+        return StartPoint(start.C_nb, coefficients)
     none = np.zeros((len(prepared.cycles), len(setup.sensors.channel)))
     rest = rest_means(prepared, where, setup.sensors, none)
     time = np.bincount(where.block_stop, rest.seconds)
@@ -95,7 +95,7 @@ def coarse_start(prepared: PreparedData, setup: TestSetup, start: Alignment) -> 
         for axis, value in zip("xyz", bias, strict=True):
             if f"{stem}_{axis}" in names:
                 coefficients[names.index(f"{stem}_{axis}")] = value
-    return CoarseAlignment(_level_and_north(down, rate), coefficients)
+    return StartPoint(_level_and_north(down, rate), coefficients)
 
 
 def _orientations(prepared: PreparedData, last: Ints, first: Ints, rate: Floats) -> Floats:

@@ -28,7 +28,7 @@ import numpy as np
 from sdimu_calibration.core import earth
 from sdimu_calibration.core.alignment.alignment import Alignment, levelled
 from sdimu_calibration.core.alignment.coarse_alignment import coarse_start
-from sdimu_calibration.core.alignment.prepared import PreparedData, TestSetup, first_attitude, reduce, set_up
+from sdimu_calibration.core.alignment.prepared import PreparedData, TestSetup
 from sdimu_calibration.core.alignment.rest_means import Layout, layout, rest_means
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.batch.batch_rows import (
@@ -43,17 +43,13 @@ from sdimu_calibration.core.batch.batch_rows import (
 )
 from sdimu_calibration.core.batch.chain import Link, Solution, solve
 from sdimu_calibration.core.batch.preintegration import Preintegration, preintegrate
-from sdimu_calibration.core.calibrate import data_counts
 from sdimu_calibration.core.effects import body_frame
-from sdimu_calibration.core.effects.accelerometer_frame import FRAME, accelerometer_frame_model, squares_count
 from sdimu_calibration.core.effects.error_slope import error_slope
 from sdimu_calibration.core.effects.motion import Motion
 from sdimu_calibration.core.navigation.track import motion
 from sdimu_calibration.core.progress import Progress
-from sdimu_calibration.core.recording import DataError, Recording
-from sdimu_calibration.core.results import Calibration, no_history
+from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.rotation import rotation_matrix
-from sdimu_calibration.core.specification import ImuSpecification, Model, Site
 
 CONVERGED = 1e-2
 """Largest step of a coefficient in its sigma at which Gauss-Newton ends."""
@@ -67,7 +63,7 @@ _ALIKE, _CREEPING, _LONGEST = 0.95, 0.5, 30.0
 
 
 @dataclass(frozen=True)
-class Fit:
+class BatchSolution:
     """Where Gauss-Newton ended.
 
     Attributes
@@ -94,74 +90,13 @@ class Fit:
     steps: int
 
 
-def batch_calibrate(
-    recording: Recording, site: Site, imu: ImuSpecification, model: Model, progress: Progress | None = None
-) -> Calibration:
-    """Calibrate an IMU from one recording by batch least squares.
-
-    Parameters
-    ----------
-    recording : Recording
-    site : Site
-    imu : ImuSpecification
-    model : Model
-    progress : callable, optional
-        Called with a word and the fraction done.
-
-    Returns
-    -------
-    Calibration
-        Without history; ``nis_mean`` is chi-square per degree of freedom of the whole fit.
-
-    Raises
-    ------
-    DataError
-        When the recording or the options cannot be used, or an effect changes at random by itself.
-    """
-    setup = set_up(site, imu, model)
-    turned = accelerometer_frame_model(setup.sensors, imu) if squares_count(setup.sensors) else None
-    inner = setup if turned is None else replace(setup, sensors=turned.inner)
-    prepared = reduce(recording, inner)
-    start = first_attitude(prepared.epochs, prepared.phases, inner)
-    found = fit(prepared, inner, start, progress=progress)
-    names = setup.sensors.names
-    if turned is None:
-        frame = model.body_frame
-        J = body_frame.jacobian_at(names, found.coefficients, frame)
-        values, covariance = body_frame.values_in_frame(names, found.coefficients, frame), J @ found.covariance @ J.T
-    else:
-        frame, values, covariance = FRAME, turned.values(found.coefficients), turned.covariance(found.covariance)
-    return Calibration(
-        body_frame=frame,
-        model=tuple(e.name for e in setup.sensors.effects),
-        names=names,
-        units=tuple(p.unit for p in setup.sensors.parameters),
-        display_units=tuple(p.display_unit for p in setup.sensors.parameters),
-        values=values,
-        covariance=covariance,
-        fit={
-            "log_likelihood": found.log_evidence,
-            "nis_mean": found.chi2 / max(found.dof, 1),
-            "nis_dof": float(found.dof),
-            "held_out_rms": None,
-            "passes": float(found.steps),
-        },
-        data=data_counts(recording, prepared),
-        notes=recording.notes,
-        history=no_history(len(names)),
-    )
-
-
-
-
-
 def bound_covariance(prepared: PreparedData, setup: TestSetup, start: Alignment) -> Floats:
     """Covariance (p, p), frame of the prior, that the data of a perfect recording hold."""
     point, where = _begin(prepared, setup, start.C_nb, np.zeros(len(setup.sensors.prior)))
     return _scaled(solve(_links(prepared, setup, start, where, point)[0]), setup)[1]
 
 
-def fit(prepared: PreparedData, setup: TestSetup, start: Alignment, progress: Progress | None = None) -> Fit:
+def solve_batch(prepared: PreparedData, setup: TestSetup, start: Alignment, progress: Progress) -> BatchSolution:
     """Gauss-Newton from the coarse start.
 
     First with stops that need not stand quite still: far from the solution the second order of large errors is much
@@ -180,8 +115,7 @@ def fit(prepared: PreparedData, setup: TestSetup, start: Alignment, progress: Pr
         last, moved = np.zeros(len(setup.sensors.prior)), np.inf
         while moved > near:
             taken += 1
-            if progress is not None:
-                progress("least squares", min(0.95, 0.1 * taken))
+            progress("least squares", min(0.95, 0.1 * taken))
             links, log_weight = _links(prepared, stage, start, where, point)
             solution = solve(links)
             step, covariance = _scaled(solution, stage)
@@ -195,7 +129,9 @@ def fit(prepared: PreparedData, setup: TestSetup, start: Alignment, progress: Pr
             before, point = point, _moved(point, stretch * step, stretch * solution.links)
             moved = _movement(setup, before, point, covariance)
     evidence = log_weight - 0.5 * solution.chi2 - 0.5 * solution.dof * np.log(2.0 * np.pi) - solution.log_det
-    return Fit(point.coefficients, covariance, point.C_nb, solution.chi2, solution.dof, float(evidence), taken)
+    return BatchSolution(
+        point.coefficients, covariance, point.C_nb, solution.chi2, solution.dof, float(evidence), taken
+    )
 
 
 def _begin(

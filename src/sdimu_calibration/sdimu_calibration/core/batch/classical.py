@@ -14,89 +14,67 @@ rate-table testing).
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from sdimu_calibration.core import earth
-from sdimu_calibration.core.alignment.prepared import PreparedData, TestSetup, reduce, set_up
+from sdimu_calibration.core.alignment.prepared import PreparedData, TestSetup
 from sdimu_calibration.core.alignment.rest_means import layout
 from sdimu_calibration.core.arrays import Floats
-from sdimu_calibration.core.calibrate import data_counts
-from sdimu_calibration.core.effects import body_frame
 from sdimu_calibration.core.effects.motion import Motion
 from sdimu_calibration.core.navigation.track import MAGNETIC_FIELD, temperatures
-from sdimu_calibration.core.progress import Progress
-from sdimu_calibration.core.recording import DataError, Recording, TableLog
-from sdimu_calibration.core.results import Calibration, no_history
-from sdimu_calibration.core.specification import ImuSpecification, Model, Site
+from sdimu_calibration.core.recording import DataError, TableLog
 
 GIMBALS = ("Y", "Z", "X")
 """IMU axes about which outer, middle and inner table axis turn when all angles are zero."""
 TABLE_FRAME = "table"
 
 
-def classical_calibrate(
-    recording: Recording,
-    site: Site,
-    imu: ImuSpecification,
-    model: Model,
-    progress: Progress | None = None,
-    gimbals: tuple[str, str, str] = GIMBALS,
-    frame: str = TABLE_FRAME,
-) -> Calibration:
+@dataclass(frozen=True)
+class ClassicalSolution:
+    """Coefficients with the table's angles as reference.
+
+    Attributes
+    ----------
+    values, covariance : ndarray, shapes (p,) and (p, p)
+        SI, in the axes of the table.
+    chi2 : float
+    dof : int
+    C_start : ndarray, shape (3, 3)
+        Attitude of the platform at the start (table axes to n).
+    """
+
+    values: Floats
+    covariance: Floats
+    chi2: float
+    dof: int
+    C_start: Floats
+
+
+def solve_classical(
+    prepared: PreparedData, setup: TestSetup, table: TableLog | None, gimbals: tuple[str, str, str] = GIMBALS
+) -> ClassicalSolution:
     """Calibrate an IMU against the angles of the table.
 
     Parameters
     ----------
-    recording : Recording
-        With the table's angles.
-    site : Site
-    imu : ImuSpecification
+    prepared : PreparedData
+    setup : TestSetup
         Its noise weighs the means; its priors are not used.
-    model : Model
-        Effects to estimate.
-    progress : callable, optional
-        Called with a word and the fraction done.
+    table : TableLog or None
+        Angles of the table's axes (rad).
     gimbals : tuple of str
         Axis letters of outer, middle and inner axis.
-    frame : str
-        ``table``, or a body frame into which the result is turned afterwards.
-
-    Returns
-    -------
-    Calibration
-        Without history.
 
     Raises
     ------
     DataError
         When the table's angles are missing or of a table without gimbals, or the test does not show all coefficients.
     """
-    if progress is not None:
-        progress("least squares", 0.2)
-    log = _gimbal_log(recording.table)
-    setup = set_up(site, imu, model)
-    prepared = reduce(recording, setup)
-    values, covariance, chi2, dof = _fit(prepared, setup, reference_motion(prepared, setup, log, gimbals))
-    names = setup.sensors.names
-    if frame != TABLE_FRAME:
-        J = body_frame.jacobian_at(names, values, frame)
-        values, covariance = body_frame.values_in_frame(names, values, frame), J @ covariance @ J.T
-    return Calibration(
-        body_frame=frame,
-        model=tuple(e.name for e in setup.sensors.effects),
-        names=names,
-        units=tuple(p.unit for p in setup.sensors.parameters),
-        display_units=tuple(p.display_unit for p in setup.sensors.parameters),
-        values=values,
-        covariance=covariance,
-        fit={
-            "log_likelihood": -0.5 * chi2, "nis_mean": chi2 / max(dof, 1), "nis_dof": float(dof),
-            "held_out_rms": None, "passes": 1.0,
-        },
-        data=data_counts(recording, prepared),
-        notes=recording.notes,
-        history=no_history(len(names)),
-    )  # fmt: skip
+    log = _gimbal_log(table)
+    seen = reference_motion(prepared, setup, log, gimbals)
+    return ClassicalSolution(*_fit(prepared, setup, seen), seen.C_nb[0])
 
 
 def _gimbal_log(log: TableLog | None) -> TableLog:

@@ -27,7 +27,7 @@ from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.effects.imu_model import ImuModel
 from sdimu_calibration.core.effects.motion import Motion
 from sdimu_calibration.core.navigation.track import temperatures
-from sdimu_calibration.core.recording import DataError, TemperatureLog
+from sdimu_calibration.core.recording import DataError, Recording, TemperatureLog
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.specification import ImuSpecification
 
@@ -280,6 +280,19 @@ def compensate(
         )
     omega_covariance, f_covariance = _covariances(using, values, interval_s)
     return Compensated(x[:, :3], x[:, 3:], omega_covariance, f_covariance)
+
+
+def compensate_recording(using: Compensator, recording: Recording) -> Compensated:
+    """Take the errors out of all samples of a recording.
+
+    Raises
+    ------
+    DataError
+        When the errors cannot be inverted at a sample.
+    """
+    t, interval = recording.t, recording.interval_s
+    heat = heat_since(recording.temperature, t - 0.5 * interval, using.start_temperature, causal=False)
+    return compensate(using, t, interval, recording.omega_ib_b, recording.f_ib_b, heat)
 
 
 def _covariances(using: Compensator, values: Floats, interval_s: float) -> tuple[Floats, Floats]:

@@ -1,7 +1,7 @@
 """Is the model adequate, where does it fail, which effect is missing? The order of work is that of the files here.
 
 Screen of the data; noise scale; consistency; one scan over all candidates; search step by step with held-out score;
-free-input remainder; equations outside the catalogue; refit of what was found. Design: doc/diagnosis.md.
+free-input test; equations outside the catalogue; refit of what was found. Design: doc/diagnosis.md.
 """
 
 from __future__ import annotations
@@ -12,28 +12,41 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.stats import norm
 
-from sdimu_calibration.core.alignment.prepared import PreparedData, TestSetup, reduce, set_up
 from sdimu_calibration.core.arrays import Ints
-from sdimu_calibration.core.calibrate import NOT_CONVERGED, assemble
-from sdimu_calibration.core.diagnosis.consistency import SLOW_S, Consistency, check
 from sdimu_calibration.core.diagnosis.free_input_test import FreeInputTest
-from sdimu_calibration.core.diagnosis.rounds import UNEXPLAINED_P, Round, settle
-from sdimu_calibration.core.diagnosis.screen import Finding, beyond_specification, screen
+from sdimu_calibration.core.diagnosis.ladder import Rung, ladder
+from sdimu_calibration.core.diagnosis.rounds import UNEXPLAINED_P, Request, Round, search_until_stable
+from sdimu_calibration.core.diagnosis.screen import Finding, screen
 from sdimu_calibration.core.diagnosis.search import FALSE_ALARM, MOST_STEPS, Search
+from sdimu_calibration.core.diagnosis.verdict import Verdict, sentence, verdict
 from sdimu_calibration.core.effects.effect import Effect
+from sdimu_calibration.core.estimation.fit import NOT_CONVERGED, Fit
+from sdimu_calibration.core.estimation.outcome import outcome
+from sdimu_calibration.core.estimation.prepared_test import PreparedTest
+from sdimu_calibration.core.estimation.solve import AUTO, solve
 from sdimu_calibration.core.evidence.candidate import Candidate
-from sdimu_calibration.core.evidence.navigation_evidence import Evidence
-from sdimu_calibration.core.filter.passes import solve
-from sdimu_calibration.core.measurement_kind import SKIP
+from sdimu_calibration.core.evidence.consistency import Consistency
+from sdimu_calibration.core.evidence.linear import LinearEvidence
+from sdimu_calibration.core.evidence.navigation_evidence import NavigationEvidence
 from sdimu_calibration.core.progress import Progress, silent
 from sdimu_calibration.core.recording import Recording
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.specification import ImuSpecification, Model, Site
 
 STILL_WRONG = 1.25
-"""Held-out error (1 is right) beyond which a model is not called explained, whatever it fits."""
+"""Held-out error (sigma; 1 is right) from which a model is not called explained, whatever it fits."""
 NOISE_OFF = 0.05
-"""Least deviation of the noise from its specification that is worth telling."""
+"""Deviation of the white noise from its specification, as a share, from which a user is told."""
+_KURTOSIS = 4.0
+"""Kurtosis of the differences of neighbouring seconds from which tails are heavy; Gaussian noise in a test of an hour
+stays below 3.3."""
+_MISFIT = 0.05
+"""Excess of the NIS below which sigmas are right enough."""
+_MISFIT_SIGMAS = 5.0
+"""The same in standard deviations of the excess."""
+_DRIFTS = ("bias_ramp", "bias_step", "bias_warm_up", "bias_random_walk")
+_PATCHES = 3
+"""Drifts of one bias that together follow any wander and say nothing of its cause."""
 
 
 @dataclass(frozen=True)
@@ -49,23 +62,28 @@ class Diagnosis:
         The verdict for people.
     adequate : bool
     p_value : float
-        Of the model that was asked about, from scan, remainder and noise together.
+        Probability that a right model looks like this, from scan, free inputs and noise together.
     findings : tuple of Finding
         Of the data screen.
     noise : tuple of str
         What is wrong with the noise model, one line each.
     consistency : Consistency
-    before, after : Calibration
+        Of the model as given.
+    fit, extended : Fit
         With the model as given, and with what was found added (the same object when nothing was).
+    before, after : Calibration
+        Their results.
     found : Search
         Of the catalogue, or of own equations where those explain it.
-    evidence : Evidence
-    free_inputs_before, remainder_after : FreeInputTest
+    evidence : LinearEvidence
+    free_inputs_before, free_inputs_after : FreeInputTest
     free : ndarray of int
         Columns of the free inputs in `evidence`.
     own : bool
         What was found are own equations, not registered effects.
     unexplained : bool
+    rungs : tuple of Rung
+        The fit as given and with each found effect added; empty where it was not asked for.
     """
 
     verdict: str
@@ -75,21 +93,37 @@ class Diagnosis:
     findings: tuple[Finding, ...]
     noise: tuple[str, ...]
     consistency: Consistency
+    fit: Fit
+    extended: Fit
     before: Calibration
     after: Calibration
-    found: Search[Evidence]
-    evidence: Evidence
+    found: Search[LinearEvidence]
+    evidence: LinearEvidence
     free_inputs_before: FreeInputTest
     free_inputs_after: FreeInputTest
     free: Ints
     own: bool
     unexplained: bool
+    rungs: tuple[Rung, ...] = ()
 
     @property
     def chosen(self) -> tuple[Candidate, ...]:
         """What was found, accepted and kept, in the order of the search."""
         p = len(self.evidence.weight)
         return tuple(self.evidence.candidates[i - p] for i in self.found.chosen)
+
+    @property
+    def navigation(self) -> NavigationEvidence:
+        """The evidence of a fit that navigates.
+
+        Raises
+        ------
+        TypeError
+            When the fit is that of a handheld run.
+        """
+        if not isinstance(self.evidence, NavigationEvidence):
+            raise TypeError(f"a {self.fit.estimator} fit has no innovations of a navigation")
+        return self.evidence
 
     @property
     def explained(self) -> float:
@@ -100,70 +134,91 @@ class Diagnosis:
 
 
 def diagnose(
-    recording: Recording,
-    site: Site,
-    imu: ImuSpecification,
-    model: Model,
-    extra: Sequence[Effect] = (),
-    alpha: float = FALSE_ALARM,
-    progress: Progress | None = None,
-) -> Diagnosis:
-    """Find what the model is missing.
-
-    Parameters
-    ----------
-    recording, site, imu, model
-        As for `calibrate`.
-    extra : sequence of Effect
-        Effects of the user's own, tried with the catalogue.
-    alpha : float
-        False-alarm probability of a whole scan.
-    progress : callable, optional
+    recording: Recording, site: Site | None, imu: ImuSpecification, model: Model,
+    extra: Sequence[Effect] = (), progress: Progress = silent, estimator: str = AUTO,
+) -> Diagnosis:  # fmt: skip
+    """Solve, then `climb`; parameters as for `PreparedTest`, `solve` and `climb`.
 
     Raises
     ------
     DataError
         When the recording or the options cannot be used.
     """
-    tell = progress or silent
-    setup = set_up(site, imu, model)
-    prepared = reduce(recording, setup)
-    findings = screen(recording, prepared)
-    solution = solve(setup, prepared, tell, keep=True)
-    consistency = check(solution.last, prepared)
-    noise, setup = _mend_noise(consistency, setup, prepared)
+    return climb(solve(PreparedTest(recording, imu, site), model, estimator, progress=progress), extra, progress)
+
+
+def climb(
+    fit: Fit, extra: Sequence[Effect] = (), progress: Progress = silent, alpha: float = FALSE_ALARM,
+    refits: bool = False,
+) -> Diagnosis:  # fmt: skip
+    """Find what the model of a fit is missing.
+
+    Parameters
+    ----------
+    fit : Fit
+        With the model as given.
+    extra : sequence of Effect
+        Effects of the user's own, tried with the catalogue.
+    progress : callable
+        Called with a word and the fraction done.
+    alpha : float
+        False-alarm probability of a whole scan.
+    refits : bool
+        Also fit the model with the first, the first two, ... of what was found.
+
+    Raises
+    ------
+    DataError
+        When an extended model cannot be fitted.
+    """
+    consistency = fit.consistency()
+    noise, imu = measured_noise(consistency, fit)
+    stated = fit.test.imu
     if noise:
-        solution = solve(setup, prepared, tell, keep=True)
-    look = settle(solution, extra, alpha, tell)
-    findings += beyond_specification(look.solution)
-    if not look.solution.converged:
-        findings += (Finding(NOT_CONVERGED, True),)
-    tell("report", 0.9)
-    base = assemble(recording, solution, held_out=True)
-    final = assemble(recording, look.solution, held_out=True) if look.chosen else base
-    own = any(c.family == "own" for c in look.chosen)
+        fit = solve(fit.test.with_noise(imu), fit.model, fit.estimator, progress=progress)
+    done = search_until_stable(Request(fit, tuple(extra), alpha), progress)
+    final = done.fit
+    findings = (*screen(fit), *(Finding(text, grave=False) for text in final.beyond_specification()))
+    findings += () if final.converged else (Finding(NOT_CONVERGED, grave=True),)
+    progress("report", 0.9)
+    if fit.learns_scatter:
+        consistency = fit.consistency(done.evidence)
+    before = outcome(fit)
+    after = outcome(final) if done.chosen else before
+    own = any(c.family == "own" for c in done.chosen)
     # What was added must also predict: an effect that only mimics the missing one fits here and fails elsewhere.
     # The free inputs are constant in a dwell and in a turn; what changes within one shows in the NIS alone.
-    loud = misfit(final, consistency, imu, setup.imu) > largest_misfit(float(final.fit["nis_dof"] or 1.0))
-    unexplained = look.after.p_value < UNEXPLAINED_P or _rms(final) > STILL_WRONG or loud or patched(look)
-    p_value = _p_value(look.found, look.before, consistency, bool(noise) or loud)
-    verdict = _verdict(look, own, unexplained, noise, findings)
-    adequate = verdict == "consistent"
-    tell("done", 1.0)
+    excess = 0.0 if fit.learns_scatter else misfit(after, consistency, stated, imu)
+    loud = excess > largest_misfit(float(after.fit["nis_dof"] or 1.0))
+    still = not fit.learns_scatter and _held_out(after) > STILL_WRONG
+    unexplained = done.after.p_value < UNEXPLAINED_P or still or loud or patched(done)
+    rungs = ladder(fit, final, done, progress) if refits or fit.learns_scatter else ()
+    facts = Verdict(done.found, done.chosen, findings, noise, own, unexplained)
+    word = verdict(facts)
+    progress("done", 1.0)
     partial = Diagnosis(
-        verdict, "", adequate, p_value, findings, noise, consistency, base, final, look.found, look.evidence,
-        look.before, look.after, look.free, own, unexplained,
+        word, "", word == "consistent", p_value(done, consistency, bool(noise) or loud), findings, noise, consistency,
+        fit, final, before, after, done.found, done.evidence, done.before, done.after, done.free, own, unexplained,
+        rungs,
     )  # fmt: skip
-    return replace(partial, sentence=_sentence(partial))
+    return replace(partial, sentence=sentence(partial))
 
 
-def misfit(final: Calibration, consistency: Consistency, stated: ImuSpecification, mended: ImuSpecification) -> float:
+def misfit(final: Calibration, consistency: Consistency, stated: ImuSpecification, taken: ImuSpecification) -> float:
     """Excess of the NIS over what the noise of the recording itself explains, outliers and all.
 
     Differences of neighbouring seconds say what that noise is, whatever is slow.
+
+    Parameters
+    ----------
+    final : Calibration
+    consistency : Consistency
+        Measured against `stated`.
+    stated, taken : ImuSpecification
+        Noise of the IMU file, and noise that the fit took.
     """
-    gyro = consistency.gyro.spread * stated.gyro_white_noise / mended.gyro_white_noise
-    accel = consistency.accel.spread * stated.accel_white_noise / mended.accel_white_noise
+    gyro = consistency.gyro.spread * stated.gyro_white_noise / taken.gyro_white_noise
+    accel = consistency.accel.spread * stated.accel_white_noise / taken.accel_white_noise
     return float((final.fit["nis_mean"] or 0.0) / (0.5 * (gyro**2 + accel**2)) - 1.0)
 
 
@@ -176,18 +231,10 @@ def largest_misfit(dof: float) -> float:
     return max(_MISFIT, _MISFIT_SIGMAS / float(np.sqrt(dof)))
 
 
-_MISFIT = 0.05
-"""What is smaller matters to no sigma."""
-_MISFIT_SIGMAS = 5.0
-
-
-def patched(look: Round) -> bool:
-    """Whether the choice is a patchwork: the search ran out of steps, or one bias drifts by three effects at once.
-
-    Steps and transients in a row can follow any drift, and say nothing of its cause.
-    """
-    steps = look.found.steps
-    drifts = {(c.family, c.label if not c.family.endswith("random_walk") else "", _sensor(c)) for c in look.chosen}
+def patched(done: Round) -> bool:
+    """Whether the choice is a patchwork: the search ran out of steps, or one bias drifts by three effects at once."""
+    steps = done.found.steps
+    drifts = {(c.family, c.label if not c.family.endswith("random_walk") else "", _sensor(c)) for c in done.chosen}
     of_sensor = [sensor for family, _, sensor in drifts if family.endswith(_DRIFTS)]
     many = any(of_sensor.count(sensor) >= _PATCHES for sensor in of_sensor)
     return many or (len(steps) == MOST_STEPS and steps[-1].accepted)
@@ -197,14 +244,8 @@ def _sensor(candidate: Candidate) -> int:
     return candidate.effect.terms[0].channel
 
 
-_DRIFTS = ("bias_ramp", "bias_step", "bias_warm_up", "bias_random_walk")
-_PATCHES = 3
-
-
-def _mend_noise(
-    consistency: Consistency, setup: TestSetup, prepared: PreparedData
-) -> tuple[tuple[str, ...], TestSetup]:
-    """Put measured noise in place of a specification that is wrong.
+def measured_noise(consistency: Consistency, fit: Fit) -> tuple[tuple[str, ...], ImuSpecification]:
+    """Say where the white noise is not as specified, and put the measured one in its place.
 
     Noise with heavy tails is taken at its standard deviation, outliers and all. To leave the outliers out of the
     measurements instead would be wrong: the same samples drive the navigation, and it is the measurement that
@@ -218,101 +259,31 @@ def _mend_noise(
             told.append(f"{triad} white noise is {noise.ratio:.2f} +- {noise.sigma:.2f} times the specification")
         if noise.kurtosis > _KURTOSIS:
             scales[triad] = noise.spread
+            share = 100 * len(noise.outliers) / max(1, consistency.seconds)
             told.append(
-                f"{triad} noise has heavy tails: kurtosis {noise.kurtosis:.1f} (3 is Gaussian), "
-                f"{100 * len(noise.outliers) / max(1, int((prepared.kind != SKIP).sum())):.1f} % of the seconds are "
-                f"outliers, with them it is {noise.spread:.2f} times the specification"
+                f"{triad} noise has heavy tails: kurtosis {noise.kurtosis:.1f} (3 is Gaussian), {share:.1f} % of the "
+                f"seconds are outliers, with them it is {noise.spread:.2f} times the specification"
             )
-    if not told:
-        return (), setup
-    imu = replace(
-        setup.imu,
-        gyro_white_noise=setup.imu.gyro_white_noise * scales["gyro"],
-        accel_white_noise=setup.imu.accel_white_noise * scales["accel"],
+    imu = fit.test.imu
+    return tuple(told), replace(
+        imu,
+        gyro_white_noise=imu.gyro_white_noise * scales["gyro"],
+        accel_white_noise=imu.accel_white_noise * scales["accel"],
     )
-    return tuple(told), replace(setup, imu=imu)
 
 
-_KURTOSIS = 4.0
-"""Of the differences of neighbouring seconds; Gaussian noise in a test of an hour stays below 3.3."""
-
-
-def _p_value(found: Search[Evidence], before: FreeInputTest, consistency: Consistency, noise: bool) -> float:
-    """Bonferroni over the three tests that can call a model inadequate."""
-    largest = float(np.max(np.abs(found.first.z), initial=0.0))
-    count = int(np.isfinite(found.first.sigma).sum())
+def p_value(done: Round, consistency: Consistency, noise: bool) -> float:
+    """Bonferroni over the tests that can call a model inadequate."""
+    first = done.found.first
+    largest = float(np.max(np.abs(first.z), initial=0.0))
+    count = int(np.isfinite(first.sigma).sum())
     of_scan = min(1.0, count * 2.0 * float(norm.sf(largest)))
+    if not len(done.free):
+        return float(of_scan)
     of_noise = consistency.nis_p_value if noise else 1.0
-    return float(min(1.0, 3.0 * min(of_scan, before.p_value, of_noise)))
+    return float(min(1.0, 3.0 * min(of_scan, done.before.p_value, of_noise)))
 
 
-def _verdict(
-    look: Round, own: bool, unexplained: bool, noise: tuple[str, ...], findings: tuple[Finding, ...]
-) -> str:
-    if any(f.grave for f in findings):
-        return "data fault"
-    if unexplained:
-        return "unexplained"
-    if look.chosen:
-        if own:
-            return "own equation"
-        if len(look.chosen) > 1:
-            return "several effects"
-        if look.chosen[0].effect.run_local:
-            return "data fault"
-        return "class of effects" if _alike(look.found, look.chosen[0].label) else "one effect"
-    if noise:
-        return "noise model wrong"
-    if look.found.steps:
-        # Something stood out of the noise and was refused or did not last.
-        return "unexplained"
-    return "consistent"
-
-
-def _alike(found: Search[Evidence], label: str) -> tuple[str, ...]:
-    """Name what the data cannot tell from a chosen effect."""
-    return next((s.alike for s in found.steps if s.label == label), ())
-
-
-def _sentence(d: Diagnosis) -> str:
-    """Put the verdict into one sentence."""
-    names = " and ".join(c.label for c in d.chosen)
-    if d.verdict == "consistent":
-        odd = "; ".join(f.text for f in d.findings)
-        return "The model explains the recording: nothing stands out of the noise" + (f"; but {odd}." if odd else ".")
-    if d.verdict == "noise model wrong":
-        return f"The noise model is wrong, the physics is not: {'; '.join(d.noise)}."
-    if d.verdict == "data fault":
-        faults = [f.text for f in d.findings if f.grave] or [f"{names} (a fault of this recording)"]
-        return f"The data have a fault: {'; '.join(faults)}."
-    if d.verdict == "unexplained":
-        tail = f"; {names} would take {100 * d.explained:.0f} % of it" if names else ""
-        if names and _rms(d.after) > STILL_WRONG:
-            tail += f", but the error at stops held out is then still {_rms(d.after):.2f} (1 is right)"
-        return f"Something is missing that no effect of the catalogue explains{tail}{_coloured(d.consistency)}."
-    if d.verdict == "own equation":
-        return f"Something is missing that is not in the catalogue; it follows {names}."
-    rest = f"error at stops held out, a third at a time: {_rms(d.before):.3f} -> {_rms(d.after):.3f}"
-    if d.verdict == "class of effects":
-        others = ", ".join(_alike(d.found, d.chosen[0].label)[:4])
-        return f"One effect is missing: {names}, or what looks the same here ({others}); {rest}."
-    return f"{'One effect is' if d.verdict == 'one effect' else 'Several effects are'} missing: {names}; {rest}."
-
-
-def _coloured(consistency: Consistency) -> str:
-    """Say whose noise is not white: it passes for drifts that no effect has."""
-    told = [
-        f"{triad} scatters {noise.slow:.1f} times more over {SLOW_S} s than white noise of its seconds would"
-        for triad, noise in (("gyro", consistency.gyro), ("accel", consistency.accel))
-        if noise.slow > _COLOURED
-    ]
-    return f"; coloured noise would do it: {' and '.join(told)}" if told else ""
-
-
-_COLOURED = 1.2
-"""Five sigma of a test of fifty minutes."""
-
-
-def _rms(calibration: Calibration) -> float:
+def _held_out(calibration: Calibration) -> float:
     value = calibration.fit.get("held_out_rms")
     return float("nan") if value is None else float(value)

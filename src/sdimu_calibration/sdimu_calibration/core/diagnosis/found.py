@@ -14,7 +14,7 @@ from sdimu_calibration.core.diagnosis.free_input_test import free_input_test
 from sdimu_calibration.core.diagnosis.scan import POWER_80, Scan, alike, scan
 from sdimu_calibration.core.diagnosis.search import Problem
 from sdimu_calibration.core.evidence.candidate import Candidate
-from sdimu_calibration.core.evidence.navigation_evidence import Evidence
+from sdimu_calibration.core.evidence.linear import LinearEvidence
 
 
 @dataclass(frozen=True)
@@ -74,6 +74,7 @@ def found_effects(d: Diagnosis) -> tuple[Found, ...]:
     whole = max(misfit[0], 1e-9) if misfit else 1.0
     values, sigmas = _estimates(d, problem, chosen)
     allowed = looked_at(d)
+    held_out = [problem.held_out(chosen[:k], 1.0).rms for k in range(len(chosen) + 1)] if chosen else []
     out = []
     for k, column in enumerate(chosen):
         scanned = problem.scan(chosen[:k], d.found.scale)
@@ -88,16 +89,21 @@ def found_effects(d: Diagnosis) -> tuple[Found, ...]:
                 sigma=float(sigmas[k]),
                 z=z,
                 log_likelihood_gain=0.5 * z * z,
-                log_bayes_factor=float(scores[column]),
+                log_bayes_factor=_bayes(d, k, float(scores[column])),
                 p_value_adjusted=float(min(1.0, count * 2.0 * float(norm.sf(abs(z))))),
                 explained=float(np.clip((misfit[k] - misfit[k + 1]) / whole, 0.0, 1.0)),
-                held_out_before=problem.held_out(chosen[:k], 1.0).rms,
-                held_out_after=problem.held_out(chosen[: k + 1], 1.0).rms,
+                held_out_before=held_out[k],
+                held_out_after=held_out[k + 1],
                 alike=tuple(d.evidence.names[i] for i in others),
                 coefficient_shifts=coefficient_shifts(problem, chosen, column, others, d.found.scale),
             )
         )
     return tuple(out)
+
+
+def _bayes(d: Diagnosis, k: int, linear: float) -> float:
+    """Log Bayes factor of the k-th found effect: of two refits where they were made, else of the linear model."""
+    return d.rungs[k + 1].log_bayes_factor if d.fit.learns_scatter else linear
 
 
 def looked_at(d: Diagnosis) -> Ints:
@@ -175,33 +181,38 @@ def _partners(names: tuple[str, ...], J: Floats, weight: Floats, column: int) ->
     return tuple(names[i] for i in np.argsort(-share)[:3] if share[i] > 0.05)
 
 
-def _misfits(d: Diagnosis, problem: Problem[Evidence], chosen: list[int]) -> list[float]:
-    """Free-input chi-square beyond its degrees of freedom with none, one, two ... of the chosen in the model."""
+def _misfits(d: Diagnosis, problem: Problem[LinearEvidence], chosen: list[int]) -> list[float]:
+    """Misfit with none, one, two ... of the chosen in the model.
+
+    Free-input chi-square beyond its degrees of freedom; chi-square of the residuals where no free inputs are testable.
+    """
     out = []
     for k in range(len(chosen) + 1):
-        known = np.concatenate([problem.evidence.model, chosen[:k]]).astype(np.int64)
-        weight = np.concatenate([problem.evidence.weight, np.zeros(k)])
-        left = free_input_test(d.evidence.information, known, weight, d.free, d.found.scale)
-        out.append(max(left.chi2 - left.dof, 0.0))
-    return out
+        known, weight, _ = problem.known(chosen[:k])
+        if len(d.free):
+            weight = np.concatenate([problem.evidence.weight, np.zeros(k)])
+            left = free_input_test(d.evidence.information, known, weight, d.free, d.found.scale)
+            out.append(max(left.chi2 - left.dof, 0.0))
+        else:
+            estimate, _ = problem.evidence.information.estimate(known, weight)
+            residual = problem.evidence.e - problem.evidence.W[:, known] @ estimate
+            out.append(float(residual @ residual))
+    return out if len(d.free) else [value - out[-1] for value in out]
 
 
-def _estimates(d: Diagnosis, problem: Problem[Evidence], chosen: list[int]) -> tuple[Floats, Floats]:
+def _estimates(d: Diagnosis, problem: Problem[LinearEvidence], chosen: list[int]) -> tuple[Floats, Floats]:
     """Value and sigma of each, of the refit where there is one."""
     known, weight, _ = problem.known(chosen)
     estimate, covariance = d.evidence.information.estimate(known, weight)
     p = len(d.evidence.weight)
     values, sigmas = estimate[p:].copy(), d.found.scale * np.sqrt(np.diag(covariance))[p:]
-    refit = {name: k for k, name in enumerate(d.after.names)}
-    for k, candidate in enumerate(d.chosen):
-        # The second of two variants of one parameter stands under its label.
-        at = refit.get(candidate.label, refit.get(candidate.parameter.name))
-        if at is not None:
-            values[k], sigmas[k] = d.after.values[at], np.sqrt(d.after.covariance[at, at])
+    if d.extended is not d.fit:
+        last = slice(len(d.after.names) - len(chosen), None)
+        return d.after.values[last], np.sqrt(np.diag(d.after.covariance)[last])
     return values, sigmas
 
 
-def _alike(d: Diagnosis, problem: Problem[Evidence], chosen: list[int], column: int, allowed: Ints) -> list[int]:
+def _alike(d: Diagnosis, problem: Problem[LinearEvidence], chosen: list[int], column: int, allowed: Ints) -> list[int]:
     """Columns that the data cannot tell from a chosen one, all others chosen being in the model."""
     others = [c for c in chosen if c != column]
     scanned: Scan = problem.scan(others, d.found.scale)

@@ -52,4 +52,4 @@ def free_input_test(full: Information, known: Ints, weight: Floats, free: Ints, 
         own = np.diag(J)
         z = np.where(own > (0.02 / unit) ** 2, d / np.sqrt(own) / scale, 0.0)
     dof = int(keep.sum())
-    return FreeInputTest(fall, dof, float(chi2.sf(fall, dof)), estimate, np.nan_to_num(z))
+    return FreeInputTest(fall, dof, float(chi2.sf(fall, dof)) if dof else 1.0, estimate, np.nan_to_num(z))

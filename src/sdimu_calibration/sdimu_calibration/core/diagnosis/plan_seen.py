@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sdimu_calibration.core.effects.effect import AXES
-from sdimu_calibration.core.evidence.navigation_evidence import Evidence
+from sdimu_calibration.core.evidence.navigation_evidence import NavigationEvidence
 
 _SINGLE_AXIS = 0.9
 """Least share of a turn about one body axis that makes it a turn about that axis."""
@@ -74,7 +74,7 @@ class PlanSeen:
         return tuple(out)
 
 
-def plan_seen(evidence: Evidence) -> PlanSeen:
+def plan_seen(evidence: NavigationEvidence) -> PlanSeen:
     """Read turns and stops from the predicted motion of a diagnosis."""
     seen, times = evidence.seen, evidence.times
     turns = []

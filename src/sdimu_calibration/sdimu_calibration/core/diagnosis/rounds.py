@@ -1,8 +1,11 @@
-"""Round, choose, linearise again about what was chosen, look again, until the choice stands.
+"""The one search: fit, take the evidence, choose, fit again about the choice, until the choice stands.
 
-A large effect that is not in the model bends the trajectory about which everything is linear, and the error of that
-looks like small companions of the effect. So each round calibrates with what the last one chose, takes the evidence
-there, and lets the search start afresh: what was chosen is one candidate among the others.
+A large effect that is not in the model bends the fit about which everything is linear, and the error of that looks like
+small companions of the effect. So each round fits with what the last one chose, takes the evidence there, and starts
+the search afresh: what was chosen is one candidate among the others.
+
+Where the estimator learns the scatter of its own run (handheld), a missing effect is learned as scatter. There the
+choice grows by one effect a round, because each addition lets the scatter fall and shows what it hid.
 """
 
 from __future__ import annotations
@@ -15,21 +18,45 @@ import numpy as np
 from sdimu_calibration.core.arrays import Ints
 from sdimu_calibration.core.diagnosis.candidates import catalogue, equations, free_inputs, periodic
 from sdimu_calibration.core.diagnosis.free_input_test import FreeInputTest, free_input_test
-from sdimu_calibration.core.diagnosis.search import Search, Step, search
+from sdimu_calibration.core.diagnosis.search import MOST_STEPS, Search, Step, search
 from sdimu_calibration.core.effects.effect import Effect
-from sdimu_calibration.core.effects.imu_model import build
+from sdimu_calibration.core.estimation.fit import Fit
+from sdimu_calibration.core.estimation.solve import extend
 from sdimu_calibration.core.evidence.candidate import Candidate, split
-from sdimu_calibration.core.evidence.navigation_evidence import Evidence, collect, timetable
-from sdimu_calibration.core.filter.passes import Solution, solve
+from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.progress import Progress
 
 UNEXPLAINED_P = 1e-3
-"""A free-input remainder less probable than this is not noise."""
+"""Probability of the free-input test below which what is left is not noise."""
 MOST_ROUNDS = 4
+"""Rounds at most, where a round may choose any number of effects."""
+MOST_GROWING_ROUNDS = 8
+"""Rounds at most, where a round adds one effect."""
 LEAST_SIGMAS = 3.0
-"""What is smaller than this many of its sigmas once it is in the calibration is dropped."""
+"""An effect smaller than this many of its sigmas, once it is in the fit, is dropped."""
 _MANY = 3
-"""So many catalogue terms are suspicious: one equation may do."""
+"""Number of chosen catalogue terms from which one equation is tried in their place."""
+_NOT_HANDHELD = ("reference", "gyro_lost_data", "gyro_delay", "accel_delay")
+"""There is no reference but gravity; a turn by hand may miss anyhow, by a sigma that is learned."""
+
+
+@dataclass(frozen=True)
+class Request:
+    """What is searched for.
+
+    Attributes
+    ----------
+    base : Fit
+        With the model as given.
+    extra : tuple of Effect
+        The user's own effects, candidates like those of the catalogue.
+    alpha : float
+        False-alarm probability of a whole scan.
+    """
+
+    base: Fit
+    extra: tuple[Effect, ...]
+    alpha: float
 
 
 @dataclass(frozen=True)
@@ -38,9 +65,9 @@ class Round:
 
     Attributes
     ----------
-    solution : Solution
-        Calibration about which this round is linear: the model with `tried`.
-    evidence : Evidence
+    fit : Fit
+        About which this round is linear: the model with what the last round chose.
+    evidence : LinearEvidence
     free : ndarray of int
         Columns of the free inputs in `evidence`.
     found : Search
@@ -48,10 +75,10 @@ class Round:
         With nothing added, with `found` added.
     """
 
-    solution: Solution
-    evidence: Evidence
+    fit: Fit
+    evidence: LinearEvidence
     free: Ints
-    found: Search[Evidence]
+    found: Search[LinearEvidence]
     before: FreeInputTest
     after: FreeInputTest
 
@@ -62,65 +89,79 @@ class Round:
         return tuple(self.evidence.candidates[i - p] for i in self.found.chosen)
 
     @property
-    def suspect(self) -> bool:
-        """Whether something is left, or suspiciously many terms were needed."""
-        return self.after.p_value < UNEXPLAINED_P or len(self.found.chosen) >= _MANY
+    def wants_equations(self) -> bool:
+        """Whether something is left, or suspiciously many terms were needed, or nothing that was tried helped."""
+        refused = not len(self.free) and not len(self.found.chosen)
+        return self.after.p_value < UNEXPLAINED_P or len(self.found.chosen) >= _MANY or refused
 
 
-def settle(base: Solution, extra: Sequence[Effect], alpha: float, progress: Progress) -> Round:
-    """Repeat looks until the choice stands.
-
-    Parameters
-    ----------
-    base : Solution
-        Calibration with the model as given; its last pass kept its matrices.
-    extra : sequence of Effect
-        The user's own effects, candidates like those of the catalogue.
-    alpha : float
-        False-alarm probability of a scan.
-    progress : callable
+def search_until_stable(request: Request, progress: Progress) -> Round:
+    """Repeat rounds until the choice stands, then drop what is small once it is fitted.
 
     Returns
     -------
     Round
-        The last one; its solution holds what it chose.
+        The last one; its fit holds what it chose.
     """
+    base = request.base
+    growing = base.learns_scatter
     tried: tuple[Candidate, ...] = ()
-    own = False
-    for turn in range(MOST_ROUNDS):
-        progress("candidates", 0.4 + 0.1 * turn)
-        solution = base if not tried else with_effects(base, tried, progress)
-        look = take(base, solution, tried, extra, alpha, own)
-        if look.suspect and not own:
-            progress("equations", 0.45 + 0.1 * turn)
-            wide = take(base, solution, tried, extra, alpha, own=True)
-            if prefer(wide, look):
-                look, own = wide, True
-        if {c.label for c in look.chosen} == {c.label for c in tried}:
+    fit, own = base, False
+    steps: tuple[Step, ...] = ()
+    seen = {frozenset[str]()}
+    for turn in range(MOST_GROWING_ROUNDS if growing else MOST_ROUNDS):
+        progress("candidates", min(0.8, 0.4 + 0.1 * turn))
+        done = run_round(request, fit, tried, own)
+        if done.wants_equations and not own:
+            progress("equations", min(0.8, 0.45 + 0.1 * turn))
+            wide = run_round(request, fit, tried, own=True)
+            if prefer(wide, done):
+                done, own = wide, True
+        labels = frozenset(c.label for c in done.chosen)
+        new = tuple(s for s in done.found.steps if s.label not in {old.label for old in steps})
+        steps = (*steps, *new) if growing else done.found.steps
+        if labels == {c.label for c in tried} or (growing and labels in seen):
             break
-        tried = look.chosen
-    return drop_companions(base, look, progress)
+        seen.add(labels)
+        trial = extend(base, [c.effect for c in done.chosen], progress=progress)
+        if growing and len(labels) <= len(tried) and not _likelier(trial, fit):
+            done = _with_choice(done, tried)
+            break
+        tried, fit = done.chosen, trial
+    return drop_companions(base, replace(done, found=replace(done.found, steps=steps)), progress)
 
 
-def drop_companions(base: Solution, look: Round, progress: Progress) -> Round:
-    """Calibrate with what was chosen; drop the weakest below three of its sigmas, one at a time."""
+def _likelier(one: Fit, other: Fit) -> bool:
+    return (one.statistics()["log_likelihood"] or 0.0) > (other.statistics()["log_likelihood"] or 0.0)
+
+
+def _with_choice(done: Round, chosen: Sequence[Candidate]) -> Round:
+    """Put another choice among the candidates of a round in place of its own."""
+    p = len(done.evidence.weight)
+    labels = [c.label for c in done.evidence.candidates]
+    columns = np.array([p + labels.index(c.label) for c in chosen], dtype=np.int64)
+    after = left(done.evidence, columns, done.free, done.found.scale)
+    return replace(done, found=replace(done.found, chosen=columns), after=after)
+
+
+def drop_companions(base: Fit, done: Round, progress: Progress) -> Round:
+    """Fit with what was chosen; drop the weakest below `LEAST_SIGMAS` of its sigmas, one at a time."""
     small: set[str] = set()
     while True:
-        chosen = look.chosen
-        solution = with_effects(base, chosen, progress) if chosen else base
-        last, p = solution.last, len(look.evidence.weight)
-        size = np.abs(last.estimate[p:]) / np.sqrt(np.diag(last.covariance)[p:])
+        chosen = done.chosen
+        fit = extend(base, [c.effect for c in chosen], progress=progress) if chosen else base
+        size = fit.size_in_sigmas(len(chosen))
         keep = np.ones(len(size), dtype=bool)
         if len(size) and size.min() < LEAST_SIGMAS:
             weakest = int(np.argmin(size))
             keep[weakest] = False
             small.add(chosen[weakest].label)
-        kept = look.found.chosen[keep]
-        look = replace(look, solution=solution, found=replace(look.found, chosen=kept))
+        kept = done.found.chosen[keep]
+        done = replace(done, fit=fit, found=replace(done.found, chosen=kept))
         if keep.all():
-            steps = mark_dropped(look.found.steps, {c.label for c in look.chosen}, small)
-            found = replace(look.found, steps=steps)
-            return replace(look, found=found, after=left(look.evidence, kept, look.free, look.found.scale))
+            steps = mark_dropped(done.found.steps, {c.label for c in done.chosen}, small)
+            found = replace(done.found, steps=steps)
+            return replace(done, found=found, after=left(done.evidence, kept, done.free, done.found.scale))
 
 
 def mark_dropped(steps: Sequence[Step], kept: set[str], small: set[str]) -> tuple[Step, ...]:
@@ -133,84 +174,87 @@ def mark_dropped(steps: Sequence[Step], kept: set[str], small: set[str]) -> tupl
     )
 
 
-def prefer(wide: Round, look: Round) -> bool:
+def prefer(wide: Round, done: Round) -> bool:
     """Whether equations tell more than the catalogue.
 
-    They do when they leave less by more than chance, or as little with fewer terms.
+    They do when they leave less by more than chance, or as little with fewer terms; and where nothing can be left,
+    when they found something and the catalogue did not.
     """
-    chance = 3.0 * np.sqrt(2.0 * look.after.dof)
-    fewer = 0 < len(wide.found.chosen) < len(look.found.chosen)
-    if len(wide.found.chosen) > max(1, len(look.found.chosen)) and look.after.p_value > UNEXPLAINED_P:
+    many, few = len(done.found.chosen), len(wide.found.chosen)
+    if not len(done.free):
+        return few > 0 and not many
+    chance = 3.0 * np.sqrt(2.0 * done.after.dof)
+    if few > max(1, many) and done.after.p_value > UNEXPLAINED_P:
         return False
-    return bool(wide.after.chi2 < look.after.chi2 - chance or (fewer and wide.after.chi2 < look.after.chi2 + chance))
+    fewer = 0 < few < many
+    return bool(wide.after.chi2 < done.after.chi2 - chance or (fewer and wide.after.chi2 < done.after.chi2 + chance))
 
 
-def with_effects(base: Solution, added: Sequence[Candidate], progress: Progress) -> Solution:
-    """Calibrate with more effects in the model."""
-    setup = base.setup
-    sensors = build([*setup.sensors.effects, *(c.effect for c in added)], setup.imu)
-    return solve(replace(setup, sensors=sensors), base.prepared, progress, keep=True)
+def run_round(request: Request, fit: Fit, tried: Sequence[Candidate], own: bool) -> Round:
+    """Collect the evidence about a fit, with what it tried as candidates, and search it.
 
-
-def take(
-    base: Solution, solution: Solution, tried: Sequence[Candidate], extra: Sequence[Effect], alpha: float, own: bool
-) -> Round:
-    """Collect the evidence about a solution, with what it tried as candidates, and search it."""
-    times = timetable(base.prepared)
-    in_model = {label for effect in base.setup.sensors.effects for label in effect.labels}
-    has_temperature = base.prepared.temperature is not None
-    known = _untried([*extra, *catalogue(times, in_model, has_temperature)], tried, in_model)
-    more = _untried([*equations(has_temperature), *periodic(times.duration)], tried, in_model) if own else []
-    free = free_inputs(times)
-    about = collect(base.prepared, solution.setup, solution.last, [*known, *more, *free])
-    evidence = forget(about, len(in_model), tried)
-    count = len(evidence.names) - sum(len(effect.parameters) for effect in free)
-    columns = np.arange(len(evidence.weight), count)
-    free_columns = np.arange(count, len(evidence.names))
-    found = search(evidence, columns, alpha)
-    nothing = np.empty(0, dtype=np.int64)
-    evidence = found.evidence
-    return Round(
-        solution, evidence, free_columns, found,
-        left(evidence, nothing, free_columns, found.scale), left(evidence, found.chosen, free_columns, found.scale),
-    )  # fmt: skip
-
-
-def forget(about: Evidence, p: int, tried: Sequence[Candidate]) -> Evidence:
-    """Make candidates of the coefficients behind the first `p`: as if the calibration had not known them.
-
-    The innovations are those of a model that has them at their estimates; in the linear model they were larger by the
-    signature times the estimate without.
+    Parameters
+    ----------
+    request : Request
+    fit : Fit
+        The model as given with `tried`.
+    tried : sequence of Candidate
+    own : bool
+        Try equations that no effect has besides the catalogue.
     """
-    q = len(about.weight)
-    if q == p:
-        return about
-    estimate = -about.shift[p:]
-    # Not the prior that the calibration had: it was widened where the data contradicted it.
-    stated = about.stated[p:q]
-    return replace(
-        about, e=about.e + about.W[:, p:q] @ estimate, weight=about.weight[:p], shift=about.shift[:p],
-        stated=about.stated[:p],
-        names=(*about.names[:p], *(c.label for c in tried), *about.names[q:]),
-        candidates=(*tried, *about.candidates), prior=np.concatenate([stated, about.prior]),
+    base = request.base
+    known = candidates(base, tried, request.extra, own)
+    free = free_inputs(base.timetable) if base.free_inputs_testable else []
+    evidence = fit.evidence([*known, *free]).as_candidates(fit.added_columns(len(tried)), tried)
+    count = len(evidence.names) - sum(len(effect.parameters) for effect in free)
+    most = len(tried) + 1 if base.learns_scatter else MOST_STEPS
+    found = search(evidence, np.arange(len(evidence.weight), count), request.alpha, most)
+    return _round(fit, found, np.arange(count, len(evidence.names)))
+
+
+def _round(fit: Fit, found: Search[LinearEvidence], free: Ints) -> Round:
+    evidence, nothing = found.evidence, np.empty(0, dtype=np.int64)
+    return Round(
+        fit, evidence, free, found,
+        left(evidence, nothing, free, found.scale), left(evidence, found.chosen, free, found.scale),
     )  # fmt: skip
 
 
-def left(evidence: Evidence, chosen: Ints, free: Ints, scale: float) -> FreeInputTest:
-    """Free-input remainder with the chosen columns in the model."""
+def candidates(base: Fit, tried: Sequence[Candidate], extra: Sequence[Effect], own: bool) -> list[Effect]:
+    """Effects that a fit may lack: the user's, the catalogue, equations; without those tried or in the model.
+
+    Parameters
+    ----------
+    base : Fit
+        With the model as given.
+    tried : sequence of Candidate
+    extra : sequence of Effect
+    own : bool
+        Equations and sines of time too.
+    """
+    times, has_temperature = base.timetable, base.has_temperature
+    more = [*equations(has_temperature), *periodic(times.duration)] if own else []
+    known = [*extra, *catalogue(times, set(base.labels), has_temperature), *more]
+    if base.learns_scatter:
+        known = [
+            e for e in known
+            if not (e.family or e.name).startswith(_NOT_HANDHELD) and not e.random_walk and e.decay_s is None
+        ]  # fmt: skip
+    return _untried(known, {c.label for c in tried} | base.labels)
+
+
+def left(evidence: LinearEvidence, chosen: Ints, free: Ints, scale: float) -> FreeInputTest:
+    """Free-input test with the chosen columns in the model."""
     known = np.concatenate([evidence.model, chosen]).astype(np.int64)
     weight = np.concatenate([evidence.weight, np.zeros(len(chosen))])
     return free_input_test(evidence.information, known, weight, free, scale)
 
 
-def _untried(effects: Sequence[Effect], tried: Sequence[Candidate], in_model: set[str]) -> list[Effect]:
-    """Effects without the parameters that the model has or that were tried in the same variant."""
-    labels = {c.label for c in tried}
+def _untried(effects: Sequence[Effect], have: set[str] | frozenset[str]) -> list[Effect]:
+    """Effects without the parameters, by label, that `have` holds."""
     out = []
     for effect in effects:
-        names = tuple(
-            c.parameter.name for c in split(effect) if c.label not in labels and c.label not in in_model
-        )
+        names = tuple(c.parameter.name for c in split(effect) if c.label not in have)
         if names:
             out.append(effect.only(names) if len(names) < len(effect.parameters) else effect)
     return out

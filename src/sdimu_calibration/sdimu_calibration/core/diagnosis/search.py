@@ -172,7 +172,7 @@ class Problem(Generic[E]):
         return predict(self.evidence, known, weight, shift, scale)
 
 
-def search(evidence: E, allowed: Ints, alpha: float = FALSE_ALARM) -> Search[E]:
+def search(evidence: E, allowed: Ints, alpha: float = FALSE_ALARM, most: int = MOST_STEPS) -> Search[E]:
     """Grow the model from the allowed candidates.
 
     Parameters
@@ -182,6 +182,8 @@ def search(evidence: E, allowed: Ints, alpha: float = FALSE_ALARM) -> Search[E]:
         Columns that may be chosen.
     alpha : float
         False-alarm probability of a whole scan.
+    most : int
+        Steps at most.
     """
     problem = Problem(evidence.only(allowed))
     chosen: list[int] = []
@@ -191,7 +193,7 @@ def search(evidence: E, allowed: Ints, alpha: float = FALSE_ALARM) -> Search[E]:
     limit = first_limit = threshold(first, alpha)
     before = problem.held_out(chosen, 1.0)
     scanned = first
-    while len(steps) < MOST_STEPS:
+    while len(steps) < most:
         scores = problem.scores(scanned, scale)
         above = np.where(np.abs(scanned.z) > limit, scores, -np.inf)
         best = int(np.argmax(above))

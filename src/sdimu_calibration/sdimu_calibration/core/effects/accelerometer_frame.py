@@ -95,7 +95,7 @@ def accelerometer_frame_model(asked: ImuModel, imu: ImuSpecification) -> Acceler
         sizes |= dict.fromkeys(_OUTSIDE, float(np.sqrt(2.0) * misalignment * np.max(asked.prior[unbalance])))
     prior = np.array([sizes[name] for name in inner.names])
     place = np.array([inner.names.index(n) if n in inner.names else -1 for n in asked.names])
-    return AccelerometerFrameModel(asked, replace(inner, prior=prior), place)
+    return AccelerometerFrameModel(asked, replace(inner, prior=prior, stated=prior), place)
 
 
 def _turned_prior(asked: ImuModel) -> Floats:

@@ -98,7 +98,7 @@ def build(effects: Sequence[str | Effect], imu: ImuSpecification) -> ImuModel:
         channel += [t.channel for t in effect.terms]
         parameter += [len(parameters) + t.parameter for t in effect.terms]
         parameters += effect.parameters
-        size = imu.prior.get(effect.family or effect.name, effect.prior.get(imu.grade))
+        size = prior_size(effect, imu)
         if size is None or not size > 0:
             raise DataError(f"IMU '{imu.name}' gives no prior for effect '{effect.name}': add it under prior:")
         prior += [size] * len(effect.parameters)
@@ -108,6 +108,11 @@ def build(effects: Sequence[str | Effect], imu: ImuSpecification) -> ImuModel:
         chosen, tuple(parameters), np.array(channel, dtype=np.int64), np.array(parameter, dtype=np.int64),
         np.array(prior), np.array(prior), np.array(decay), np.array(drive),
     )  # fmt: skip
+
+
+def prior_size(effect: Effect, imu: ImuSpecification) -> float | None:
+    """One-sigma (SI) of each parameter of an effect: of the IMU file, else of its grade; None where neither has it."""
+    return imu.prior.get(effect.family or effect.name, effect.prior.get(imu.grade))
 
 
 def _check_priors(chosen: Sequence[Effect], imu: ImuSpecification) -> None:

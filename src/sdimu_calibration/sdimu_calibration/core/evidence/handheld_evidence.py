@@ -7,17 +7,18 @@ rate are parameters of the model like the coefficients, so that a candidate is s
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.effects.effect import Effect, Timetable
 from sdimu_calibration.core.effects.motion import Motion
-from sdimu_calibration.core.evidence.candidate import Candidate
-from sdimu_calibration.core.evidence.linear import LinearEvidence
+from sdimu_calibration.core.evidence.consistency import StopMean
+from sdimu_calibration.core.evidence.linear import LinearEvidence, candidate_priors
 from sdimu_calibration.core.handheld.handheld_data import HandheldRun, Turns, seen_at_rest, turns
 from sdimu_calibration.core.handheld.handheld_fit import FitPriors, LinearisationPoint, equations, row_sigmas
+from sdimu_calibration.core.specification import ImuSpecification
 
 CHANNELS = (
     "gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z", "turn_north", "turn_east", "turn_down",
@@ -37,8 +38,6 @@ class HandheldEvidence(LinearEvidence):
     ----------
     channel : ndarray of int, shape (N,)
         Into `CHANNELS`.
-    known : int
-        How many of the parameters are coefficients.
     run : HandheldRun
     rests : Motion
         What a perfect IMU sees at the rests.
@@ -48,16 +47,10 @@ class HandheldEvidence(LinearEvidence):
     """
 
     channel: Ints
-    known: int
     run: HandheldRun
     rests: Motion
     gone: Turns
     sigma: Floats
-
-    @property
-    def coefficients(self) -> int:
-        """How many of the model's parameters are coefficients."""
-        return self.known
 
     @property
     def unpredictable(self) -> float:
@@ -70,14 +63,14 @@ class HandheldEvidence(LinearEvidence):
             return np.zeros((len(self.e), 0))
         parts = [_signature(self.run, self.rests, self.gone, effect) for effect in effects]
         W = np.hstack(parts) / self.sigma[:, None]
-        prior = np.concatenate([np.full(len(e.parameters), e.prior.get(self.grade, np.inf)) for e in effects])
+        _, prior = candidate_priors(effects, self.imu)
         # What only shows by the gyros' answer to a force that is wrong in a turn is not seen: no sensor is so bad.
         seen = _LARGEST * prior * np.linalg.norm(W, axis=0) > 1.0
         return np.where(seen, W, 0.0)
 
 
-def collect(
-    run: HandheldRun, scene: FitPriors, point: LinearisationPoint, effects: Sequence[Effect], grade: str
+def handheld_evidence(
+    run: HandheldRun, scene: FitPriors, point: LinearisationPoint, effects: Sequence[Effect], imu: ImuSpecification
 ) -> HandheldEvidence:
     """Linearise about a finished fit.
 
@@ -88,8 +81,8 @@ def collect(
         Where the fit ended.
     effects : sequence of Effect
         Each of their parameters becomes a candidate.
-    grade : str
-        Of the IMU.
+    imu : ImuSpecification
+        Gives candidates their prior.
     """
     k, q = len(run.t), len(scene.kept)
     rows, residual, kind = equations(run, scene, point)
@@ -107,8 +100,8 @@ def collect(
         weight=np.concatenate([1.0 / np.diag(scene.prior), scene.earth_sigma**-2, held]),
         shift=np.concatenate([-point.coefficients[scene.kept], scene.earth_mean - point.earth, np.zeros(3 * k)]),
         stated=np.concatenate([np.sqrt(np.diag(scene.prior)), scene.earth_sigma, held**-0.5]),
-        candidates=(), prior=np.zeros(0), grade=grade,
-        channel=np.concatenate([np.tile(np.arange(6), k), np.tile(np.arange(6, 9), k - 1)]), known=q,
+        candidates=(), prior=np.zeros(0), imu=imu, times=timetable(run), coefficients=q,
+        channel=np.concatenate([np.tile(np.arange(6), k), np.tile(np.arange(6, 9), k - 1)]),
         run=run, rests=seen_at_rest(run, point.C_nb, point.earth, scene.gravity),
         gone=turns(run, scene.model, point.coefficients, point.C_nb, scene.gravity), sigma=sigma[data],
     )  # fmt: skip
@@ -136,29 +129,6 @@ def _signature(run: HandheldRun, rests: Motion, gone: Turns, effect: Effect) -> 
     return np.vstack([at_rest.reshape(-1, count), way.reshape(-1, count)])
 
 
-def forget(about: HandheldEvidence, count: int, tried: Sequence[Candidate]) -> HandheldEvidence:
-    """Make candidates of the last `count` coefficients: as if the fit had not known them.
-
-    The residuals are those of a model that has them at their estimates; in the linear model they were larger by the
-    signature times the estimate without.
-    """
-    if not count:
-        return about
-    p, q = len(about.weight), about.known
-    gone, stays = np.arange(q - count, q), np.concatenate([np.arange(q - count), np.arange(q, p)])
-    estimate = -about.shift[gone]
-    order = np.concatenate([stays, gone, np.arange(p, len(about.names))])
-    # As every other candidate has it: the fit took what was added much wider.
-    prior = [c.effect.prior.get(about.grade, np.inf) for c in tried]
-    return replace(
-        about, e=about.e + about.W[:, gone] @ estimate, W=np.ascontiguousarray(about.W[:, order]),
-        names=(*(about.names[i] for i in stays), *(c.label for c in tried), *about.names[p:]),
-        weight=about.weight[stays], shift=about.shift[stays], stated=about.stated[stays],
-        candidates=(*tried, *about.candidates), prior=np.concatenate([prior, about.prior]),
-        known=q - count,
-    )  # fmt: skip
-
-
 def standardised(evidence: HandheldEvidence, chosen: Ints) -> Floats:
     """Residual of every row over its own sigma, the model and `chosen` estimated; NaN where nothing is redundant."""
     known = np.concatenate([evidence.model, chosen]).astype(np.int64)
@@ -169,6 +139,16 @@ def standardised(evidence: HandheldEvidence, chosen: Ints) -> Floats:
     left = evidence.e - W @ estimate
     with np.errstate(invalid="ignore", divide="ignore"):
         return np.where(free > _REDUNDANT, left / np.sqrt(free), np.nan)
+
+
+def places(evidence: HandheldEvidence, chosen: Ints) -> tuple[StopMean, ...]:
+    """Residuals with the columns `chosen` in the model, over their own sigmas, the largest first."""
+    values = standardised(evidence, chosen)
+    rows = [
+        StopMean(CHANNELS[c], int(s), float(v))
+        for c, s, v in zip(evidence.channel, evidence.stop, values, strict=True) if np.isfinite(v)
+    ]  # fmt: skip
+    return tuple(sorted(rows, key=lambda place: -abs(place.normalised_mean)))
 
 
 _REDUNDANT = 1e-3

@@ -15,9 +15,11 @@ from typing import TypeVar
 import numpy as np
 
 from sdimu_calibration.core.arrays import Floats, Ints
-from sdimu_calibration.core.effects.effect import Effect
+from sdimu_calibration.core.effects.effect import Effect, Timetable
+from sdimu_calibration.core.effects.imu_model import prior_size
 from sdimu_calibration.core.evidence.candidate import Candidate, split
 from sdimu_calibration.core.evidence.information import Information
+from sdimu_calibration.core.specification import ImuSpecification
 
 E = TypeVar("E", bound="LinearEvidence")
 
@@ -45,8 +47,12 @@ class LinearEvidence(ABC):
     candidates : tuple of Candidate, length q
     prior : ndarray, shape (q,)
         One-sigma that physics gives the candidates (inf where unknown).
-    grade : str
-        Of the IMU: gives candidates their prior.
+    imu : ImuSpecification
+        Gives candidates their prior.
+    times : Timetable
+        When the recording stood and turned.
+    coefficients : int
+        How many of the model's parameters, the first ones, are sensor coefficients.
     """
 
     e: Floats
@@ -58,7 +64,9 @@ class LinearEvidence(ABC):
     stated: Floats
     candidates: tuple[Candidate, ...]
     prior: Floats
-    grade: str
+    imu: ImuSpecification
+    times: Timetable
+    coefficients: int
 
     @abstractmethod
     def signature(self, effects: Sequence[Effect]) -> Floats:
@@ -68,11 +76,6 @@ class LinearEvidence(ABC):
     def model(self) -> Ints:
         """Indices of the model's own parameters."""
         return np.arange(len(self.weight))
-
-    @property
-    def coefficients(self) -> int:
-        """How many of the model's parameters, the first ones, are sensor coefficients."""
-        return len(self.weight)
 
     @property
     def unpredictable(self) -> float:
@@ -88,12 +91,12 @@ class LinearEvidence(ABC):
 
     def with_effects(self: E, effects: Sequence[Effect]) -> E:
         """Return the evidence with the parameters of more effects behind the candidates it has."""
-        more = [c for effect in effects for c in split(effect)]
+        more, prior = candidate_priors(effects, self.imu)
         W = self.signature(effects)
         wider = replace(
             self, W=np.hstack([self.W, W]), names=(*self.names, *(c.label for c in more)),
             candidates=(*self.candidates, *more),
-            prior=np.concatenate([self.prior, [c.effect.prior.get(self.grade, np.inf) for c in more]]),
+            prior=np.concatenate([self.prior, prior]),
         )  # fmt: skip
         # Only what is new is multiplied: the old columns are many.
         old, across = self.information, self.W.T @ W
@@ -112,3 +115,38 @@ class LinearEvidence(ABC):
         full = self.information
         part.__dict__["information"] = Information(full.J[np.ix_(keep, keep)], full.d[keep])
         return part
+
+    def as_candidates(self: E, columns: Ints, tried: Sequence[Candidate]) -> E:
+        """Make candidates of coefficients of the model, as if the calibration had not known them.
+
+        The residuals are those of a model that has the coefficients at their estimates; in the linear model they were
+        larger by the signature times the estimate without.
+
+        Parameters
+        ----------
+        columns : ndarray of int, shape (k,)
+            Coefficients of the model.
+        tried : sequence of Candidate, length k
+            The same as candidates; they come before the others.
+        """
+        if not len(columns):
+            return self
+        p = len(self.weight)
+        stays = np.setdiff1d(self.model, columns)
+        order = np.concatenate([stays, columns, np.arange(p, len(self.names))]).astype(np.int64)
+        # Not the prior that the calibration had: it was widened where the data contradicted it.
+        _, prior = candidate_priors([c.effect for c in tried], self.imu)
+        return replace(
+            self, e=self.e - self.W[:, columns] @ self.shift[columns], W=np.ascontiguousarray(self.W[:, order]),
+            names=(*(self.names[i] for i in stays), *(c.label for c in tried), *self.names[p:]),
+            weight=self.weight[stays], shift=self.shift[stays], stated=self.stated[stays],
+            candidates=(*tried, *self.candidates), prior=np.concatenate([prior, self.prior]),
+            coefficients=self.coefficients - len(columns),
+        )  # fmt: skip
+
+
+def candidate_priors(effects: Sequence[Effect], imu: ImuSpecification) -> tuple[tuple[Candidate, ...], Floats]:
+    """Candidates of all parameters of `effects`, and the one-sigma (SI) that the IMU gives each (inf where unknown)."""
+    candidates = tuple(c for effect in effects for c in split(effect))
+    sizes = [prior_size(c.effect, imu) for c in candidates]
+    return candidates, np.array([np.inf if size is None else size for size in sizes])

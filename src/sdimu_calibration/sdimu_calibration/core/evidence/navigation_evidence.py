@@ -1,4 +1,9 @@
-"""Everything a diagnosis reads: whitened innovations and the signature of every known and suspected parameter."""
+"""Evidence of a navigation: whitened innovations, and the signature of every known and suspected parameter.
+
+The navigation filter runs once more with the coefficients known at their final values, so that only navigation errors
+are estimated. About the passes of the filter, samples are corrected to first order; about the second-order passes they
+are corrected exactly, and an effect shows in corrected samples through the inverse slope of the sensor errors.
+"""
 
 from __future__ import annotations
 
@@ -8,30 +13,58 @@ from itertools import pairwise
 
 import numpy as np
 
+from sdimu_calibration.core.alignment.alignment import Alignment
 from sdimu_calibration.core.alignment.prepared import PreparedData, TestSetup
 from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.effects.effect import Effect, Timetable
 from sdimu_calibration.core.effects.motion import Motion
-from sdimu_calibration.core.evidence.candidate import split
-from sdimu_calibration.core.evidence.linear import LinearEvidence
+from sdimu_calibration.core.evidence.linear import LinearEvidence, candidate_priors
 from sdimu_calibration.core.evidence.signatures import measured_rows, signatures
 from sdimu_calibration.core.filter.filter_pass import NAV, PassOutput, PassState, new_output, run_pass
-from sdimu_calibration.core.filter.passes import Pass, pass_settings
+from sdimu_calibration.core.filter.passes import Pass, check_finite, pass_settings, start_state
+from sdimu_calibration.core.navigation.correct_cycles import spread
 from sdimu_calibration.core.navigation.track import motion
+from sdimu_calibration.core.second_order.second_order_passes import (
+    SecondOrderPass,
+    firm_setup,
+    linearise,
+    run_linearised,
+)
+
+_SHORTEST_DWELL_S = 3.0
+"""Dwells that are shorter (s) are part of a turn."""
+_BLOCK = 24
+"""Effects whose regressors are in memory at a time."""
 
 
 @dataclass(frozen=True)
-class Evidence(LinearEvidence):
+class KnownPass:
+    """A navigation with the coefficients known.
+
+    Attributes
+    ----------
+    output : PassOutput
+        With the matrices of every epoch.
+    seen : Motion
+        Motion along which it was linearised, n cycles.
+    weight : ndarray, shape (n, 6, 6), or None
+        Change of corrected rate and force per change of the measured ones; None is the identity.
+    """
+
+    output: PassOutput
+    seen: Motion
+    weight: Floats | None
+
+
+@dataclass(frozen=True)
+class NavigationEvidence(LinearEvidence):
     """Innovations of the navigation filter about a converged calibration; every parameter of the model a coefficient.
 
     Attributes
     ----------
     epoch, channel : ndarray of int, shape (N,)
         Of each row; channels 0-11 are position, velocity, rate, force, three each.
-    output : PassOutput
-        Of the navigation filter.
-    seen : Motion
-    times : Timetable
+    known : KnownPass
     prepared : PreparedData
     latitude : float
         Of the site (rad).
@@ -39,15 +72,23 @@ class Evidence(LinearEvidence):
 
     epoch: Ints
     channel: Ints
-    output: PassOutput
-    seen: Motion
-    times: Timetable
+    known: KnownPass
     prepared: PreparedData
     latitude: float
 
+    @property
+    def output(self) -> PassOutput:
+        """Output of the navigation filter."""
+        return self.known.output
+
+    @property
+    def seen(self) -> Motion:
+        """Predicted motion."""
+        return self.known.seen
+
     def signature(self, effects: Sequence[Effect]) -> Floats:
         """Columns of all parameters of `effects`, shape (N, parameters)."""
-        return columns(self.prepared, self.output, self.seen, self.latitude, effects)
+        return columns(self.prepared, self.known, self.latitude, effects)
 
 
 def timetable(prepared: PreparedData) -> Timetable:
@@ -58,72 +99,87 @@ def timetable(prepared: PreparedData) -> Timetable:
         (int(phases.stop[a]), float(epochs.start[a]), float(epochs.end[b - 1]))
         for a, b in zip(edges[::2], edges[1::2], strict=True)
     ]
-    dwells = [d for d in dwells if d[2] - d[1] >= 3.0]
+    dwells = [d for d in dwells if d[2] - d[1] >= _SHORTEST_DWELL_S]
     turns = [(a[0], a[2], b[1]) for a, b in pairwise(dwells)]
     return Timetable(float(epochs.end[-1]), tuple(dwells), tuple(turns))
 
 
-def navigation_pass(prepared: PreparedData, setup: TestSetup, finished: Pass) -> Pass:
-    """Repeat the last pass with the coefficients known at their final values: only navigation errors are estimated."""
+def known_pass(prepared: PreparedData, setup: TestSetup, finished: Pass) -> KnownPass:
+    """Repeat the last pass of the filter with the coefficients known at their final values.
+
+    Raises
+    ------
+    DataError
+        When the filter diverges.
+    """
     p = len(setup.sensors.prior)
-    start = finished.start
-    x, P = start.x.copy(), start.P.copy()
-    # About the final coefficients: the deviation is zero and has no variance.
-    x[NAV : NAV + p] = 0.0
-    P[NAV : NAV + p, :] = P[:, NAV : NAV + p] = 0.0
-    state = PassState(x, P, start.C_nb.copy(), start.velocity.copy(), start.position.copy(), finished.estimate.copy())
+    state = _with_known_coefficients(finished.start, p)._replace(used=finished.estimate.copy())
     output = new_output(len(prepared.epochs), p, True, len(prepared.epochs))
-    begin = PassState(*(v.copy() for v in state))
-    settings = pass_settings(setup, closed_loop=False)
-    run_pass(finished.data._replace(kind=prepared.kind), settings, state, output)
-    return Pass(finished.C_start, begin, state, output, finished.data, settings)
-
-
-def predicted_motion(prepared: PreparedData, setup: TestSetup, finished: Pass) -> Motion:
-    """Motion that the finished calibration predicts."""
-    return motion(
+    run_pass(finished.data._replace(kind=prepared.kind), pass_settings(setup, closed_loop=False), state, output)
+    check_finite(state)
+    seen = motion(
         prepared.cycles, prepared.rest, setup.sensors, finished.estimate, finished.C_start.copy(),
         setup.site.latitude_rad, setup.gravity, prepared.temperature, predicted=True,
     )  # fmt: skip
+    return KnownPass(output, seen, None)
 
 
-def collect(prepared: PreparedData, setup: TestSetup, finished: Pass, effects: Sequence[Effect]) -> Evidence:
-    """Run the navigation filter and the signature recursion.
+def known_second_order_pass(
+    prepared: PreparedData, setup: TestSetup, start: Alignment, finished: SecondOrderPass
+) -> KnownPass:
+    """Run a pass about samples corrected exactly at the final coefficients, which are known.
+
+    Shifts of the attitude between stops change no covariance, so the recursion of the signatures holds as it stands.
+
+    Raises
+    ------
+    DataError
+        When the filter diverges.
+    """
+    firm, estimate = firm_setup(setup), finished.estimate
+    at = linearise(prepared, firm, finished.smoothed_start, estimate)
+    begin = start_state(firm, start, at.C_stop[0], estimate)._replace(used=np.zeros(len(estimate)))
+    done = run_linearised(at, firm, _with_known_coefficients(begin, len(estimate)), prepared, keep=True)
+    return KnownPass(done.output, at.seen, at.weight)
+
+
+def _with_known_coefficients(start: PassState, p: int) -> PassState:
+    """Copy a state with the deviations of the first `p` coefficients at zero, without variance."""
+    state = PassState(*(v.copy() for v in start))
+    state.x[NAV : NAV + p] = 0.0
+    state.P[NAV : NAV + p, :] = state.P[:, NAV : NAV + p] = 0.0
+    return state
+
+
+def navigation_evidence(
+    prepared: PreparedData, setup: TestSetup, known: KnownPass, estimate: Floats, effects: Sequence[Effect]
+) -> NavigationEvidence:
+    """Put whitened innovations and signatures together.
 
     Parameters
     ----------
     prepared, setup : PreparedData, TestSetup
-    finished : Pass
-        The last pass of a converged calibration.
+    known : KnownPass
+    estimate : ndarray, shape (p,)
+        Coefficients of the model (SI), at which `known` ran.
     effects : sequence of Effect
         Each of their parameters becomes a candidate.
     """
-    known = navigation_pass(prepared, setup, finished)
-    seen = predicted_motion(prepared, setup, finished)
-    sensors = setup.sensors
-    candidates = [c for effect in effects for c in split(effect)]
-    W = columns(prepared, known.output, seen, setup.site.latitude_rad, [*sensors.effects, *effects])
+    sensors, latitude = setup.sensors, setup.site.latitude_rad
     epoch, channel = measured_rows(known.output)
-    prior = np.array([c.effect.prior.get(setup.imu.grade, np.inf) for c in candidates])
-    return Evidence(
-        e=known.output.normalised[epoch, channel], W=W, epoch=epoch, channel=channel, stop=prepared.phases.stop[epoch],
-        names=(*sensors.names, *(c.label for c in candidates)),
-        weight=1.0 / sensors.prior**2, shift=-finished.estimate, stated=sensors.stated, candidates=tuple(candidates),
-        prior=prior,
-        grade=setup.imu.grade,
-        output=known.output, seen=seen, times=timetable(prepared), prepared=prepared, latitude=setup.site.latitude_rad,
+    candidates, prior = candidate_priors(effects, setup.imu)
+    return NavigationEvidence(
+        e=known.output.normalised[epoch, channel], W=columns(prepared, known, latitude, [*sensors.effects, *effects]),
+        stop=prepared.phases.stop[epoch], names=(*sensors.names, *(c.label for c in candidates)),
+        weight=1.0 / sensors.prior**2, shift=-estimate, stated=sensors.stated, candidates=candidates, prior=prior,
+        imu=setup.imu, times=timetable(prepared), coefficients=len(sensors.prior),
+        epoch=epoch, channel=channel, known=known, prepared=prepared, latitude=latitude,
     )  # fmt: skip
 
 
-_BLOCK = 24
-"""Effects whose regressors are in memory at a time."""
-
-
-def columns(
-    prepared: PreparedData, output: PassOutput, seen: Motion, latitude: float, effects: Sequence[Effect]
-) -> Floats:
+def columns(prepared: PreparedData, known: KnownPass, latitude: float, effects: Sequence[Effect]) -> Floats:
     """Signatures of all parameters of `effects` at a latitude (rad), shape (N, parameters)."""
-    epochs = prepared.epochs
+    epochs, seen = prepared.epochs, known.seen
     parts = []
     for start in range(0, len(effects), _BLOCK):
         block = effects[start : start + _BLOCK]
@@ -133,10 +189,10 @@ def columns(
             channel += [t.channel for t in effect.terms]
             parameter += [count + t.parameter for t in effect.terms]
             count += len(effect.parameters)
+        terms = np.hstack(values), np.array(channel, dtype=np.int64), np.array(parameter, dtype=np.int64)
+        if known.weight is not None:
+            terms = spread(*terms, known.weight)
         parts.append(
-            signatures(
-                seen, epochs.first, epochs.last, prepared.kind, output, np.hstack(values),
-                np.array(channel, dtype=np.int64), np.array(parameter, dtype=np.int64), count, latitude,
-            )
-        )  # fmt: skip
+            signatures(seen, epochs.first, epochs.last, prepared.kind, known.output, *terms, count, latitude)
+        )
     return np.hstack(parts)

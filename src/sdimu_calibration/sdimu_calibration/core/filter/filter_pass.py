@@ -105,6 +105,7 @@ class PassOutput(NamedTuple):
     sigma: Floats  # (e, s)
     innovation: Floats  # (e, 12); NaN where not measured
     normalised: Floats  # (e, 12) L^-1 innovation
+    innovation_sigma: Floats  # (e, 12) predicted sigma of each innovation (SI); NaN where not measured
     log_likelihood: Floats  # (e,)
     nis: Floats  # (e, 4) squared normalised innovation of position, velocity, rate, force
     C_nb: Floats  # (e, 3, 3) at the end of the epoch
@@ -124,6 +125,7 @@ def new_output(epochs: int, parameters: int, keep: bool, stride: int) -> PassOut
     nan = np.nan
     return PassOutput(
         np.zeros((e, p)), np.zeros((e, s)), np.full((e, MEASURED), nan), np.full((e, MEASURED), nan),
+        np.full((e, MEASURED), nan),
         np.zeros(e), np.full((e, 4), nan), np.zeros((e, 3, 3)), stride, np.zeros((-(-e // stride), p, p)),
         np.zeros((k, NAV, NAV)), np.zeros((k, NAV, p)), np.zeros((k, MEASURED, s)), np.zeros((k, MEASURED, MEASURED)),
         np.zeros((k, s, MEASURED)),
@@ -326,6 +328,11 @@ def run_pass(data: PassInput, settings: PassSettings, state: PassState, out: Pas
             white = whiten(L, innovation.reshape(-1, 1))[:, 0]
             out.innovation[e, low:] = innovation
             out.normalised[e, low:] = white
+            for i in range(MEASURED - low):
+                variance = 0.0
+                for j in range(i + 1):
+                    variance += L[i, j] ** 2
+                out.innovation_sigma[e, low + i] = np.sqrt(variance)
             log = -0.5 * (MEASURED - low) * np.log(2.0 * np.pi)
             for i in range(MEASURED - low):
                 log -= 0.5 * white[i] ** 2 + np.log(L[i, i])

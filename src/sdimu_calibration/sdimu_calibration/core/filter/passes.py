@@ -13,9 +13,10 @@ import numpy as np
 
 from sdimu_calibration.core import earth
 from sdimu_calibration.core.alignment.alignment import Alignment
-from sdimu_calibration.core.alignment.coarse_alignment import coarse_start
+from sdimu_calibration.core.alignment.coarse_alignment import StartPoint, coarse_start
 from sdimu_calibration.core.alignment.prepared import PreparedData, TestSetup, first_attitude
 from sdimu_calibration.core.arrays import Floats, Ints
+from sdimu_calibration.core.effects.imu_model import ImuModel
 from sdimu_calibration.core.filter.filter_pass import (
     COPY,
     NAV,
@@ -57,6 +58,11 @@ class Pass:
     output: PassOutput
     data: PassInput
     settings: PassSettings
+
+    @property
+    def smoothed_start(self) -> Floats:
+        """Initial attitude as the whole test sees it, shape (3, 3)."""
+        return np.asarray(rotation_matrix(self.state.x[-COPY:].copy()) @ self.C_start)
 
     @property
     def estimate(self) -> Floats:
@@ -128,7 +134,7 @@ def one_pass(
     C_nb: Floats,
     reference: Floats,
     closed_loop: bool,
-    keep: bool,
+    keep: bool = False,
 ) -> Pass:
     """Run one pass linearised at initial attitude `C_nb` and coefficients `reference`."""
     sensors = setup.sensors
@@ -145,20 +151,26 @@ def one_pass(
     output = new_output(len(prepared.epochs), len(sensors.prior), keep, SNAPSHOT_EPOCHS)
     settings = pass_settings(setup, closed_loop)
     run_pass(data, settings, state, output)
+    check_finite(state)
+    return Pass(C_nb, begin, state, output, data, settings)
+
+
+def check_finite(state: PassState) -> None:
+    """Refuse a pass that did not end in numbers.
+
+    Raises
+    ------
+    DataError
+        When the filter diverged.
+    """
     if not (np.isfinite(state.x).all() and np.isfinite(state.P).all() and (np.diag(state.P) >= 0.0).all()):
         raise DataError(
             "the filter diverged: the recording contradicts the IMU's specification; check --imu and --site"
         )
-    return Pass(C_nb, begin, state, output, data, settings)
-
-
-def smoothed_start(finished: Pass) -> Floats:
-    """Give the initial attitude as the whole test sees it, shape (3, 3)."""
-    return np.asarray(rotation_matrix(finished.state.x[-COPY:].copy()) @ finished.C_start)
 
 
 def refine(
-    prepared: PreparedData, setup: TestSetup, start: Alignment, first: Pass, progress: Progress, keep: bool
+    prepared: PreparedData, setup: TestSetup, start: Alignment, first: Pass, progress: Progress
 ) -> tuple[Pass, int, bool]:
     """Repeat open-loop passes until the coefficients stand still.
 
@@ -182,7 +194,7 @@ def refine(
         progress("passes", min(0.95, 0.3 + 0.1 * (count - 1)))
         reference = last.estimate * (setup.sensors.decay_rate == 0.0)
         use = loose if settling else setup
-        new = one_pass(prepared, use, start, smoothed_start(last), reference, closed_loop=False, keep=keep)
+        new = one_pass(prepared, use, start, last.smoothed_start, reference, closed_loop=False)
         moved = np.max(np.abs(new.estimate - last.estimate) / np.sqrt(np.diag(new.covariance)))
         last = new
         if settling:
@@ -204,7 +216,7 @@ def coarse_pass(prepared: PreparedData, setup: TestSetup, start: Alignment) -> P
         When the filter diverges.
     """
     coarse = coarse_start(prepared, setup, start)
-    return one_pass(prepared, setup, start, coarse.C_nb, coarse.coefficients, closed_loop=True, keep=False)
+    return one_pass(prepared, setup, start, coarse.C_nb, coarse.coefficients, closed_loop=True)
 
 
 @dataclass(frozen=True)
@@ -231,22 +243,28 @@ class Solution:
     converged: bool
 
 
-def widen_contradicted_priors(setup: TestSetup, finished: Pass) -> TestSetup:
+def widen_contradicted_priors(sensors: ImuModel, estimate: Floats, covariance: Floats) -> ImuModel:
     """Widen the prior of an effect that is far beyond it and that it holds back; the same object when none is.
 
-    A prior is a statement about the class of the sensor. Where the data contradict it, a size between the two is
-    wrong, and what is missing of the effect goes into the other coefficients. Misalignments keep theirs: nothing
-    else holds their common part, the frame of the prior.
+    A prior is a statement about the class of the sensor. Where the data contradict a prior, the estimate lies between
+    the two and is wrong, and the rest of the effect goes into the other coefficients. Misalignments keep their prior:
+    nothing else holds their common part, the frame of the prior.
+
+    Parameters
+    ----------
+    sensors : ImuModel
+        With p parameters.
+    estimate, covariance : ndarray, shapes (p,) and (p, p)
+        SI.
     """
-    sensors = setup.sensors
-    sigma = np.sqrt(np.diag(finished.covariance))
-    size = np.abs(finished.estimate)
+    sigma = np.sqrt(np.diag(covariance))
+    size = np.abs(estimate)
     pull = size * sigma / sensors.prior**2
     effect = np.array([e.family or e.name for e in sensors.effects for _ in e.parameters])
     held = (size > _BEYOND * sensors.prior) & (pull > _PULL) & ~np.isin(effect, _IN_THE_FRAME)
     if not held.any():
-        return setup
-    return replace(setup, sensors=replace(sensors, prior=np.where(held, _ROOM * size, sensors.prior)))
+        return sensors
+    return replace(sensors, prior=np.where(held, _ROOM * size, sensors.prior))
 
 
 _BEYOND = 3.0
@@ -254,20 +272,22 @@ _BEYOND = 3.0
 _PULL = 0.1
 """Shift of an estimate by its prior, in its own sigma, that is worth repeating the passes."""
 _ROOM = 10.0
-"""A prior that was too narrow becomes so many times the estimate: it then says nothing."""
-_MOST_WIDENINGS = 3
+"""New sigma of a contradicted prior, as a multiple of the estimate: it then says nothing."""
+MOST_WIDENINGS = 3
+"""Times that priors are widened and the passes repeated, at most."""
 _IN_THE_FRAME = ("gyro_misalignment", "accel_misalignment")
 
 
-def solve(setup: TestSetup, prepared: PreparedData, progress: Progress, keep: bool = False) -> Solution:
+def solve(setup: TestSetup, prepared: PreparedData, begin: StartPoint | None, progress: Progress) -> Solution:
     """Align, run the closed loop, refine.
 
     Parameters
     ----------
     setup, prepared : TestSetup, PreparedData
+    begin : StartPoint or None
+        Where a fit of nearly the same model ended: the passes go on from there, without a closed-loop pass. None
+        begins with the first dwell.
     progress : callable
-    keep : bool
-        Keep the matrices of the later passes.
 
     Raises
     ------
@@ -276,21 +296,24 @@ def solve(setup: TestSetup, prepared: PreparedData, progress: Progress, keep: bo
     """
     start = first_attitude(prepared.epochs, prepared.phases, setup)
     progress("passes", 0.2)
-    none = np.zeros(len(setup.sensors.prior))
-    first = one_pass(prepared, setup, start, start.C_nb, none, closed_loop=True, keep=False)
+    point = begin or StartPoint(start.C_nb, np.zeros(len(setup.sensors.prior)))
+    first = one_pass(prepared, setup, start, point.C_nb, point.coefficients, closed_loop=begin is None)
     try:
-        last, passes, converged = refine(prepared, setup, start, first, progress, keep=keep)
+        last, passes, converged = refine(prepared, setup, start, first, progress)
     except DataError:
         converged = False
     if not converged:
         # The first dwell misled the first pass (an azimuth that may be anything): all stops together know better.
+        first = first if begin is None else one_pass(
+            prepared, setup, start, start.C_nb, np.zeros(len(setup.sensors.prior)), closed_loop=True
+        )  # fmt: skip
         begun = coarse_pass(prepared, setup, start)
-        last, passes, converged = refine(prepared, setup, start, begun, progress, keep=keep)
-    for _ in range(_MOST_WIDENINGS):
-        room = widen_contradicted_priors(setup, last)
-        if room is setup:
+        last, passes, converged = refine(prepared, setup, start, begun, progress)
+    for _ in range(MOST_WIDENINGS):
+        wider = widen_contradicted_priors(setup.sensors, last.estimate, last.covariance)
+        if wider is setup.sensors:
             break
-        setup = room
-        last, more, converged = refine(prepared, setup, start, last, progress, keep=keep)
+        setup = replace(setup, sensors=wider)
+        last, more, converged = refine(prepared, setup, start, last, progress)
         passes += more - 1
     return Solution(setup, prepared, start, first, last, passes, converged)

@@ -20,10 +20,10 @@ from sdimu_calibration.core import earth
 from sdimu_calibration.core.alignment.alignment import levelled
 from sdimu_calibration.core.arrays import Bools
 from sdimu_calibration.core.data.static_detection import StaticIntervals, detect_static
-from sdimu_calibration.core.effects import body_frame, imu_model
+from sdimu_calibration.core.effects import body_frame
 from sdimu_calibration.core.effects.imu_model import ImuModel
 from sdimu_calibration.core.handheld.handheld_data import HandheldRun, reduce_run, turns
-from sdimu_calibration.core.handheld.handheld_faults import data_faults, without_impossible
+from sdimu_calibration.core.handheld.handheld_faults import without_impossible
 from sdimu_calibration.core.handheld.handheld_fit import (
     FORCE,
     RATE,
@@ -31,12 +31,9 @@ from sdimu_calibration.core.handheld.handheld_fit import (
     FitPriors,
     HandheldSolution,
     LinearisationPoint,
-    fit_run,
 )
-from sdimu_calibration.core.progress import Progress
 from sdimu_calibration.core.recording import DataError, DataFault, Recording
-from sdimu_calibration.core.results import Calibration, no_history
-from sdimu_calibration.core.specification import ImuSpecification, Model, Site
+from sdimu_calibration.core.specification import ImuSpecification, Site
 from sdimu_calibration.core.units import STANDARD_GRAVITY, from_si
 
 FEWEST_RESTS = 6
@@ -52,7 +49,7 @@ _SEEN = 3.0
 """Sigmas at which the Earth's rate is seen."""
 
 
-def by_hand(recording: Recording, imu: ImuSpecification) -> bool:
+def hides_earth_rate(recording: Recording, imu: ImuSpecification) -> bool:
     """Decide whether navigation has nothing to hold on to because a rest does not show the Earth's rate.
 
     It does not when the gyros' white noise in the usual rest, specified or learned, exceeds a third of it.
@@ -65,45 +62,6 @@ def by_hand(recording: Recording, imu: ImuSpecification) -> bool:
         return False
     usual = float(np.median(rests.last - rests.first)) * recording.interval_s
     return bool(_SEEN * max(imu.gyro_white_noise, rests.gyro_white_noise) / np.sqrt(usual) > earth.RATE)
-
-
-def handheld_calibrate(
-    recording: Recording, site: Site | None, imu: ImuSpecification, model: Model, progress: Progress | None = None
-) -> Calibration:
-    """Calibrate an IMU from rests and turns by hand.
-
-    Parameters
-    ----------
-    recording : Recording
-        A status in it is not used.
-    site : Site or None
-        None takes standard gravity and leaves the Earth's rate free.
-    imu : ImuSpecification
-        Its priors; the noise is learned from the recording.
-    model : Model
-        Effects to estimate.
-    progress : callable, optional
-        Called with a word and the fraction done.
-
-    Returns
-    -------
-    Calibration
-        In the frame of the accelerometers, without history; ``notes`` say what was assumed, learned and not determined.
-
-    Raises
-    ------
-    DataError
-        When there are too few rests, an effect changes at random, or nothing fits.
-    """
-    if progress is not None:
-        progress("rests", 0.1)
-    sensors = imu_model.build(model.effects, imu)
-    ready = prepare(recording)
-    scene = fit_priors(sensors, imu, site, ready.rests)
-    if progress is not None:
-        progress("least squares", 0.3)
-    found = fit_run(ready.run, scene, first_linearisation(ready.run, sensors, scene.gravity))
-    return assemble(ready, scene, found, site, model)
 
 
 @dataclass(frozen=True)
@@ -125,7 +83,7 @@ class PreparedRun:
     impossible: tuple[DataFault, ...]
 
 
-def prepare(recording: Recording) -> PreparedRun:
+def prepare_run(recording: Recording) -> PreparedRun:
     """Find the rests and reduce the recording to them and the turns between.
 
     Raises
@@ -193,47 +151,7 @@ def first_linearisation(run: HandheldRun, sensors: ImuModel, gravity: float) -> 
     return LinearisationPoint(coefficients, np.array(C_nb), np.zeros(3), np.zeros(3))
 
 
-def assemble(
-    ready: PreparedRun, scene: FitPriors, found: HandheldSolution, site: Site | None, model: Model
-) -> Calibration:
-    """Put a finished fit into the form of a calibration."""
-    recording, run = ready.recording, ready.run
-    faults = (*ready.impossible, *data_faults(recording, run, found))
-    sensors, p = scene.model, len(scene.model.prior)
-    covariance = np.zeros((p, p))
-    covariance[np.ix_(scene.kept, scene.kept)] = found.covariance
-    pinned = len(scene.kept) < p
-    return Calibration(
-        body_frame="accelerometer_triad" if pinned else model.body_frame,
-        model=tuple(e.name for e in sensors.effects),
-        names=sensors.names,
-        units=tuple(q.unit for q in sensors.parameters),
-        display_units=tuple(q.display_unit for q in sensors.parameters),
-        values=found.point.coefficients,
-        covariance=covariance,
-        fit={
-            "log_likelihood": found.log_likelihood,
-            "nis_mean": found.chi2 / max(found.dof, 1.0),
-            "nis_dof": found.dof,
-            "held_out_rms": found.held_out_rms,
-            "passes": float(found.steps),
-        },
-        data={
-            "samples": float(len(recording.t)),
-            "lost": float(run.cycles.lost.sum()),
-            "rejected": float(recording.rejected),
-            "contradicted_s": 0.0,
-            "duration_s": float(recording.t[-1]),
-            "stops": float(len(run.t)),
-        },
-        notes=(*recording.notes, *(f.text for f in faults), *_notes(run, scene, found, site)),
-        history=no_history(p),
-        warnings=tuple(f.text for f in faults if f.grave),
-        faults=faults,
-    )
-
-
-def _notes(run: HandheldRun, scene: FitPriors, found: HandheldSolution, site: Site | None) -> list[str]:
+def handheld_notes(run: HandheldRun, scene: FitPriors, found: HandheldSolution, site: Site | None) -> list[str]:
     """Say what was taken for granted, what was learned, and what stays unknown."""
     extra = found.point.extra
     out = [

@@ -75,15 +75,17 @@ def _crossed(U: Floats, product: Floats) -> Floats:
     return np.asarray(np.einsum("kij,kj->ki", cofactor, product))
 
 
-def spread(values: Floats, model: ImuModel, weight: Floats) -> tuple[Floats, Ints, Ints]:
+def spread(values: Floats, channel: Ints, parameter: Ints, weight: Floats) -> tuple[Floats, Ints, Ints]:
     """Regressors of corrected samples: ``weight @`` those of the measured ones, with the empty columns left out.
 
     Parameters
     ----------
     values : ndarray, shape (n, m)
-        Regressors of the model's columns.
-    model : ImuModel
+        Regressors as measured (SI).
+    channel, parameter : ndarray of int, shape (m,)
+        Sensor axis and parameter of each column.
     weight : ndarray, shape (n, 6, 6)
+        As in `CorrectedCycles`.
 
     Returns
     -------
@@ -91,13 +93,15 @@ def spread(values: Floats, model: ImuModel, weight: Floats) -> tuple[Floats, Int
     channel, parameter : ndarray of int, shape (m',)
     """
     columns: list[Floats] = []
-    channel: list[int] = []
-    parameter: list[int] = []
-    for column, (source, owner) in enumerate(zip(model.channel, model.parameter, strict=True)):
+    channels: list[int] = []
+    parameters: list[int] = []
+    for column, (source, owner) in enumerate(zip(channel, parameter, strict=True)):
         for target in range(6):
             share = weight[:, target, source]
             if share.any():
                 columns.append(share * values[:, column])
-                channel.append(target)
-                parameter.append(int(owner))
-    return np.ascontiguousarray(np.column_stack(columns)), np.array(channel), np.array(parameter)
+                channels.append(target)
+                parameters.append(int(owner))
+    return (
+        np.ascontiguousarray(np.column_stack(columns)), np.array(channels, np.int64), np.array(parameters, np.int64),
+    )  # fmt: skip

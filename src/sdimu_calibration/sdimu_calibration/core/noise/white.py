@@ -15,6 +15,7 @@ from sdimu_calibration.core.noise.allan import allan
 from sdimu_calibration.core.noise.rests import rests
 from sdimu_calibration.core.recording import DataError, Recording
 from sdimu_calibration.core.specification import ImuSpecification
+from sdimu_calibration.core.units import from_si
 
 AT_S = 1.0
 
@@ -79,3 +80,29 @@ def white_noise(recording: Recording, rows: Sequence[slice] | None = None) -> Wh
 def measured_specification(imu: ImuSpecification, measured: WhiteNoise) -> ImuSpecification:
     """Return a specification with the white noise replaced by the measured one."""
     return replace(imu, gyro_white_noise=measured.gyro, accel_white_noise=measured.accel)
+
+
+def with_measured_noise(imu: ImuSpecification, recording: Recording) -> tuple[ImuSpecification, str]:
+    """Put the white noise of a recording's rests in place of the specification's.
+
+    Returns
+    -------
+    imu : ImuSpecification
+    note : str
+        What was replaced.
+
+    Raises
+    ------
+    DataError
+        When the recording has no rest.
+    """
+    found = white_noise(recording)
+    parts = []
+    for word, here, sigma, told, unit in (
+        ("gyro", found.gyro, found.gyro_sigma, imu.gyro_white_noise, "deg/h/sqrt(Hz)"),
+        ("accelerometer", found.accel, found.accel_sigma, imu.accel_white_noise, "ug/sqrt(Hz)"),
+    ):
+        value, error, before = (from_si(v, unit) for v in (here, sigma, told))
+        parts.append(f"{word} {value:.4g} +- {error:.2g} {unit} ({before:.4g} as specified)")
+    note = f"noise as measured in {found.rest_s:.0f} s of rest: {'; '.join(parts)}"
+    return measured_specification(imu, found), note

@@ -23,18 +23,17 @@ import numpy as np
 
 from sdimu_calibration.core import earth
 from sdimu_calibration.core.alignment.alignment import Alignment, levelled
-from sdimu_calibration.core.alignment.coarse_alignment import coarse_start
+from sdimu_calibration.core.alignment.coarse_alignment import StartPoint, coarse_start
 from sdimu_calibration.core.alignment.prepared import PreparedData, TestSetup
 from sdimu_calibration.core.alignment.rest_means import Layout, layout
 from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.effects.motion import Motion
 from sdimu_calibration.core.filter.filter_pass import COPY, NAV, PassInput, PassOutput, PassState, new_output, run_pass
-from sdimu_calibration.core.filter.passes import pass_input, pass_settings, start_state
+from sdimu_calibration.core.filter.passes import check_finite, pass_input, pass_settings, start_state
 from sdimu_calibration.core.navigation.correct_cycles import CorrectedCycles, correct_cycles, spread
 from sdimu_calibration.core.navigation.strapdown import Cycles
 from sdimu_calibration.core.navigation.track import integrate, motion
 from sdimu_calibration.core.progress import Progress
-from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.rotation import orthonormal, rotation_matrix, rotation_vector
 
 CONVERGED = 0.02
@@ -68,6 +67,8 @@ class SecondOrderPass:
     data : PassInput
     C_stop : ndarray, shape (k, 3, 3)
         Where each stop was linearised.
+    where : Layout
+        Of the stops.
     """
 
     reference: Floats
@@ -78,6 +79,12 @@ class SecondOrderPass:
     rows: Ints
     data: PassInput
     C_stop: Floats
+    where: Layout
+
+    @property
+    def smoothed_start(self) -> Floats:
+        """Initial attitude as the whole test sees it, shape (3, 3)."""
+        return np.asarray(rotation_matrix(self.state.x[-COPY:].copy()) @ self.C_start)
 
     @property
     def estimate(self) -> Floats:
@@ -93,37 +100,43 @@ class SecondOrderPass:
 
 
 def solve_second_order(
-    setup: TestSetup, prepared: PreparedData, start: Alignment, progress: Progress
-) -> tuple[list[SecondOrderPass], bool]:
-    """Repeat passes from the coarse start until the coefficients stand still.
+    setup: TestSetup, prepared: PreparedData, start: Alignment, begin: StartPoint | None, progress: Progress
+) -> tuple[SecondOrderPass, int, bool]:
+    """Repeat passes until the coefficients stand still.
 
     Parameters
     ----------
     setup : TestSetup
-        With the inner model of a `triad.AccelerometerFrameModel`.
+        With the inner model of an `accelerometer_frame.AccelerometerFrameModel`.
     prepared, start : PreparedData, Alignment
+    begin : StartPoint or None
+        Attitude and coefficients of the first linearisation; None finds them from all stops.
+    progress : callable
 
     Returns
     -------
-    passes : list of SecondOrderPass
+    last : SecondOrderPass
+    passes : int
     converged : bool
+
+    Raises
+    ------
+    DataError
+        When the filter diverges.
     """
-    coarse = coarse_start(prepared, setup, start)
-    reference, C_nb, loose = coarse.coefficients, coarse.C_nb, True
+    first = begin or coarse_start(prepared, setup, start)
+    reference, C_nb, loose = first.coefficients, first.C_nb, begin is None
     wide = replace(setup, model=replace(setup.model, velocity_sigma=_LOOSE[0], position_sigma=_LOOSE[1]))
     firm = firm_setup(setup)
-    done: list[SecondOrderPass] = []
     for count in range(1, MOST_PASSES + 1):
         progress("passes", min(0.95, 0.2 + 0.05 * count))
-        new = second_order_pass(prepared, wide if loose else firm, start, C_nb, reference)
-        done.append(new)
-        moved = float(np.max(np.abs(new.estimate - reference) / np.sqrt(np.diag(new.covariance))))
-        reference = new.estimate
-        C_nb = np.asarray(rotation_matrix(new.state.x[-COPY:].copy()) @ new.C_start)
+        last = second_order_pass(prepared, wide if loose else firm, start, C_nb, reference)
+        moved = float(np.max(np.abs(last.estimate - reference) / np.sqrt(np.diag(last.covariance))))
+        reference, C_nb = last.estimate, last.smoothed_start
         if not loose and moved < CONVERGED:
-            return done, True
+            return last, count, True
         loose = loose and moved > _NEAR
-    return done, False
+    return last, MOST_PASSES, False
 
 
 def firm_setup(setup: TestSetup) -> TestSetup:
@@ -141,16 +154,34 @@ def firm_setup(setup: TestSetup) -> TestSetup:
     )
 
 
-def second_order_pass(
-    prepared: PreparedData, setup: TestSetup, start: Alignment, C_nb: Floats, reference: Floats
-) -> SecondOrderPass:
-    """Run one pass about samples corrected at `reference` (q,), from the initial attitude `C_nb`.
+@dataclass(frozen=True)
+class Linearisation:
+    """Samples corrected at a set of coefficients, and what they become when the coefficients change a little.
 
-    Raises
-    ------
-    DataError
-        When the filter diverges.
+    Attributes
+    ----------
+    reference : ndarray, shape (q,)
+        Coefficients (SI) at which the samples were corrected.
+    where : Layout
+    C_stop : ndarray, shape (k, 3, 3)
+        Attitude of every stop (b to n), levelled by its own corrected force.
+    seen : Motion
+        Motion along these attitudes, n cycles.
+    weight : ndarray, shape (n, 6, 6)
+        Change of corrected rate and force per change of the measured ones.
+    data : PassInput
     """
+
+    reference: Floats
+    where: Layout
+    C_stop: Floats
+    seen: Motion
+    weight: Floats
+    data: PassInput
+
+
+def linearise(prepared: PreparedData, setup: TestSetup, C_nb: Floats, reference: Floats) -> Linearisation:
+    """Correct the samples at `reference` (q,) exactly and linearise there, from the initial attitude `C_nb` (3, 3)."""
     sensors, site, where = setup.sensors, setup.site, layout(prepared)
     near = motion(
         prepared.cycles, prepared.rest, sensors, reference, C_nb.copy(), site.latitude_rad, setup.gravity,
@@ -159,22 +190,39 @@ def second_order_pass(
     clean = correct_cycles(prepared.cycles, near, sensors, reference)
     C_stop, track = _stops(clean.cycles, where, C_nb, site.latitude_rad)
     seen = _predicted(clean, prepared, where, track, setup)
-    values, channel, parameter = spread(sensors.regressors(seen), sensors, clean.weight)
+    values, channel, parameter = spread(sensors.regressors(seen), sensors.channel, sensors.parameter, clean.weight)
     data = pass_input(replace(prepared, cycles=clean.cycles), values, channel, parameter)
-    begin = start_state(setup, start, C_stop[0], reference)._replace(used=np.zeros(len(reference)))
-    return _finish(run_stops(data, setup, begin, prepared, where, C_stop), data, begin, reference, C_stop)
+    return Linearisation(reference, where, C_stop, seen, clean.weight, data)
 
 
-def _finish(
-    ran: tuple[PassState, PassOutput, Ints],
-    data: PassInput, begin: PassState, reference: Floats, C_stop: Floats,
-) -> SecondOrderPass:  # fmt: skip
-    state, output, rows = ran
-    if not (np.isfinite(state.x).all() and np.isfinite(state.P).all()):
-        raise DataError(
-            "the filter diverged: the recording contradicts the IMU's specification; check --imu and --site"
-        )
-    return SecondOrderPass(reference, C_stop[0], begin, state, output, rows, data, C_stop)
+def second_order_pass(
+    prepared: PreparedData, setup: TestSetup, start: Alignment, C_nb: Floats, reference: Floats
+) -> SecondOrderPass:
+    """Run one pass about samples corrected at `reference` (q,), from the initial attitude `C_nb` (3, 3).
+
+    Raises
+    ------
+    DataError
+        When the filter diverges.
+    """
+    at = linearise(prepared, setup, C_nb, reference)
+    begin = start_state(setup, start, at.C_stop[0], reference)._replace(used=np.zeros(len(reference)))
+    return run_linearised(at, setup, begin, prepared)
+
+
+def run_linearised(
+    at: Linearisation, setup: TestSetup, begin: PassState, prepared: PreparedData, keep: bool = False
+) -> SecondOrderPass:
+    """Run the filter about a linearisation from the state `begin`; `keep` the matrices of every epoch.
+
+    Raises
+    ------
+    DataError
+        When the filter diverges.
+    """
+    state, output, rows = run_stops(at.data, setup, begin, prepared, at.where, at.C_stop, keep)
+    check_finite(state)
+    return SecondOrderPass(at.reference, at.C_stop[0], begin, state, output, rows, at.data, at.C_stop, at.where)
 
 
 def _stops(cycles: Cycles, where: Layout, C_nb: Floats, latitude: float) -> tuple[Floats, Floats]:
@@ -206,7 +254,8 @@ def _predicted(
 
 
 def run_stops(
-    data: PassInput, setup: TestSetup, begin: PassState, prepared: PreparedData, where: Layout, C_stop: Floats
+    data: PassInput, setup: TestSetup, begin: PassState, prepared: PreparedData, where: Layout, C_stop: Floats,
+    keep: bool = False,
 ) -> tuple[PassState, PassOutput, Ints]:
     """Run a pass stop by stop, with each stop linearised at its own attitude.
 
@@ -226,7 +275,7 @@ def run_stops(
         if k >= 0:
             _shift(state, C_stop[k])
         part = data._replace(first=data.first[a:b], last=data.last[a:b], kind=data.kind[a:b])
-        out = new_output(b - a, len(state.used), False, b - a)
+        out = new_output(b - a, len(state.used), keep, b - a)
         run_pass(part, settings, state, out)
         parts.append(out)
         rows.append(np.array([a]))

@@ -10,7 +10,7 @@ import numpy as np
 from dash import Dash, Input, Output, dcc, html, no_update
 from dash import State as Kept
 
-from sdimu_calibration.core.diagnosis.consistency import CHANNEL_NAMES
+from sdimu_calibration.core.evidence.consistency import CHANNEL_NAMES
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.units import UnitError
 from sdimu_calibration.report import data

@@ -11,6 +11,7 @@ from pathlib import Path
 import yaml
 
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
+from sdimu_calibration.core.diagnosis.summary import summarise
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.specification import Model
 from sdimu_calibration.report.page import write_report
@@ -56,7 +57,7 @@ def archive(model: Model, added: Sequence[str], final: Diagnosis, title: str) ->
     with tempfile.TemporaryDirectory() as folder:
         root = Path(folder)
         write_result(root / "result.json", final.after)
-        write_report(root / "report.html", final.after, title=title, diagnosis=final)
+        write_report(root / "report.html", final.after, title=title, summary=summarise(final))
         for name, text in model_files(model, added).items():
             (root / name).write_text(text, encoding="utf-8")
         kept = io.BytesIO()

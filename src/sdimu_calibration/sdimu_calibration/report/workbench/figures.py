@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import plotly.graph_objects as go
 
-from sdimu_calibration.core.diagnosis.consistency import CHANNEL_NAMES
+from sdimu_calibration.core.evidence.consistency import CHANNEL_NAMES
 from sdimu_calibration.report import data, evidence_figures
 from sdimu_calibration.report.drawing import AFTER, BAND, BEFORE, lay_out
 

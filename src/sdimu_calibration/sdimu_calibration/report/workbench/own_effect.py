@@ -4,34 +4,33 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 
-from sdimu_calibration.core.alignment.prepared import TestSetup
 from sdimu_calibration.core.diagnosis.candidates import without
 from sdimu_calibration.core.effects import imu_model
 from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.specification import ImuSpecification, Model
 from sdimu_calibration.storage.effect_file import find_effects, load_effect
 
 
-def extended(setup: TestSetup, added: Sequence[str]) -> TestSetup:
-    """Add effects to a model: by name, or by the text of an effect file.
+def added_effects(model: Model, added: Sequence[str], imu: ImuSpecification) -> tuple[Effect, ...]:
+    """Effects that a page adds to a model: by name, or by the text of an effect file.
 
     Raises
     ------
     DataError
-        When one cannot be read.
+        When one cannot be read, or is in the model already.
     """
-    effects: list[Effect] = list(setup.sensors.effects)
+    effects = list(imu_model.build(model.effects, imu).effects)
+    given = len(effects)
     for text in added:
         have = {label for e in effects for label in e.labels}
         new = [part for effect in read_effect(text) for part in without(effect, have)]
         if not new:
             raise DataError(f"'{named(text)}' is in the model already")
         effects += new
-    sensors = imu_model.build(effects, setup.imu)
-    return replace(setup, sensors=sensors, model=replace(setup.model, effects=tuple(e.name for e in effects)))
+    return tuple(effects[given:])
 
 
 def read_effect(text: str) -> tuple[Effect, ...]:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from dash import html
 
-from sdimu_calibration.core.diagnosis.grow import moved_coefficients
+from sdimu_calibration.core.diagnosis.ladder import moved_coefficients
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.units import from_si
 from sdimu_calibration.report.table import as_far

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -18,13 +19,11 @@ from sdimu_calibration.core.alignment.alignment import align, azimuth_of
 from sdimu_calibration.core.alignment.prepared import PreparedData, TestSetup
 from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.compiled import compiled
-from sdimu_calibration.core.filter.filter_pass import NAV, PassInput, PassOutput, PassState, new_output, run_pass
-from sdimu_calibration.core.filter.holdout import WANTED_S, Segment, holdout_segments, part
-from sdimu_calibration.core.filter.passes import Pass, pass_input, pass_settings, solve
+from sdimu_calibration.core.estimation.holdout import WANTED_S, Segment, holdout_segments, part
+from sdimu_calibration.core.filter.filter_pass import COPY, NAV, PassInput, PassOutput, PassState, new_output, run_pass
+from sdimu_calibration.core.filter.passes import pass_input, pass_settings
 from sdimu_calibration.core.measurement_kind import SENSORS, SKIP
 from sdimu_calibration.core.navigation.strapdown import Cycles, navigate_cycle, velocity_increment
-from sdimu_calibration.core.navigation.track import motion
-from sdimu_calibration.core.progress import silent
 from sdimu_calibration.core.rotation import rotation_vector
 
 NOTHING = "no compensation"
@@ -74,20 +73,54 @@ class Drift:
 class FreeInertialRun:
     """Free navigations of one stretch: without compensation, then with each model."""
 
-    stretch: Segment
+    segment: Segment
     drifts: tuple[Drift, ...]
 
 
-def in_use(
-    prepared: PreparedData, setups: Sequence[tuple[str, TestSetup]], reference: PassOutput, wanted_s: float = WANTED_S
+class Compensated(NamedTuple):
+    """Cycles without the sensor errors of a fit, and how they change with its coefficients.
+
+    Shapes: n cycles, m columns, q coefficients of the estimator.
+    """
+
+    cycles: Cycles
+    values: Floats  # (n, m) regressors of the corrected cycles (SI)
+    channel: Ints  # (m,)
+    parameter: Ints  # (m,)
+
+
+class Navigator(Protocol):
+    """What free navigation needs of a fit."""
+
+    @property
+    def setup(self) -> TestSetup:
+        """Site, IMU and sensor model, as the estimator has them."""
+
+    @property
+    def estimate(self) -> Floats:
+        """Coefficients of the estimator (SI), shape (q,)."""
+
+    @property
+    def estimate_covariance(self) -> Floats:
+        """Their covariance, shape (q, q)."""
+
+    def on(self, prepared: PreparedData, C_nb: Floats) -> Navigator:
+        """Fit the same model to a part of the recording that starts at attitude `C_nb` (3, 3)."""
+
+    def compensated(self, prepared: PreparedData, estimate: Floats, C_start: Floats, end_of_fit: float) -> Compensated:
+        """Take the errors at `estimate` (q,) out of all cycles; the fit ended at `end_of_fit` (s)."""
+
+
+def free_inertial_runs(
+    prepared: PreparedData, fits: Sequence[tuple[str, Navigator]], reference: PassOutput, wanted_s: float = WANTED_S
 ) -> tuple[FreeInertialRun, ...]:
-    """Navigate unseen stretches uncompensated and with each model, fitted to the rest of the recording.
+    """Navigate unseen segments uncompensated and with each model, fitted to the rest of the recording.
 
     Parameters
     ----------
     prepared : PreparedData
-    setups : sequence of (str, TestSetup)
-        Names and models.
+    fits : sequence of (str, Navigator)
+        Names and fits of the whole recording; each is fitted again to the rest.
     reference : PassOutput
         Of a fit to the whole recording: azimuth at the start, and what heading is compared with.
     wanted_s : float
@@ -96,74 +129,59 @@ def in_use(
     Raises
     ------
     DataError
-        When there is no such stretch, or the rest of the recording cannot be calibrated.
+        When there is no such segment, or the rest of the recording cannot be calibrated.
     """
-    return tuple(_trial(prepared, setups, reference, stretch) for stretch in holdout_segments(prepared, wanted_s))
+    return tuple(_run(prepared, fits, reference, segment) for segment in holdout_segments(prepared, wanted_s))
 
 
-def _trial(
-    prepared: PreparedData, setups: Sequence[tuple[str, TestSetup]], reference: PassOutput, stretch: Segment
+def _run(
+    prepared: PreparedData, fits: Sequence[tuple[str, Navigator]], reference: PassOutput, segment: Segment
 ) -> FreeInertialRun:
-    seen = part(prepared, *stretch.seen)
-    fits = [(name, setup, solve(setup, seen, silent).last) for name, setup in setups]
-    drifts = [free_navigation(NOTHING, prepared, *fits[0][1:], stretch, reference, compensated=False)]
-    drifts += [free_navigation(name, prepared, setup, fit, stretch, reference) for name, setup, fit in fits]
-    return FreeInertialRun(stretch, tuple(drifts))
+    first = segment.seen[0]
+    C_nb = reference.C_nb[max(first - 1, 0)]
+    seen = part(prepared, *segment.seen)
+    again = [(name, fit.on(seen, C_nb)) for name, fit in fits]
+    drifts = [free_navigation(NOTHING, prepared, again[0][1], segment, reference, compensated=False)]
+    drifts += [free_navigation(name, prepared, fit, segment, reference) for name, fit in again]
+    return FreeInertialRun(segment, tuple(drifts))
 
 
 def free_navigation(
-    name: str,
-    prepared: PreparedData,
-    setup: TestSetup,
-    fitted: Pass,
-    stretch: Segment,
-    reference: PassOutput,
+    name: str, prepared: PreparedData, fit: Navigator, segment: Segment, reference: PassOutput,
     compensated: bool = True,
-) -> Drift:
-    """Navigate the stretch with the coefficients of `fitted`, or with none."""
-    estimate = fitted.estimate if compensated else np.zeros_like(fitted.estimate)
-    errors, values = _sensor_errors(prepared, setup, estimate, stretch, reference.C_nb[0])
-    epochs = part(prepared, stretch.first, stretch.last)
-    levelling = stretch.start - stretch.first
-    border = int(epochs.epochs.last[levelling - 1])
-    clean = _compensated(epochs.cycles, errors)
-    C_start = _aligned(clean, border, setup, reference.C_nb[stretch.start - 1])
-    position, velocity, C_nb = _navigated(clean, border, epochs.epochs.last[levelling:], setup, C_start)
-    rows = slice(stretch.start, stretch.last)
+) -> Drift:  # fmt: skip
+    """Navigate a segment with the coefficients of a fit, or with none.
+
+    Parameters
+    ----------
+    name : str
+    prepared : PreparedData
+        Of the whole recording: some effects remember what was before the segment.
+    fit : Navigator
+        Of the rest of the recording.
+    segment : Segment
+    reference : PassOutput
+    compensated : bool
+    """
+    estimate = fit.estimate if compensated else np.zeros_like(fit.estimate)
+    end_of_fit = float(prepared.epochs.end[segment.seen[1] - 1])
+    whole = fit.compensated(prepared, estimate, reference.C_nb[0].copy(), end_of_fit)
+    clean = part(replace(prepared, cycles=whole.cycles), segment.first, segment.last)
+    levelling = segment.start - segment.first
+    border = int(clean.epochs.last[levelling - 1])
+    C_start = _aligned(clean.cycles, border, fit.setup, reference.C_nb[segment.start - 1])
+    position, velocity, C_nb = _navigated(clean.cycles, border, clean.epochs.last[levelling:], fit.setup, C_start)
+    rows = slice(segment.start, segment.last)
     azimuth = [rotation_vector(C @ R.T)[2] for C, R in zip(C_nb, reference.C_nb[rows], strict=True)]
-    at_start = rotation_vector(C_start @ reference.C_nb[stretch.start - 1].T)[2]
-    t = prepared.epochs.end[rows] - prepared.epochs.end[stretch.start - 1]
+    at_start = rotation_vector(C_start @ reference.C_nb[segment.start - 1].T)[2]
+    t = prepared.epochs.end[rows] - prepared.epochs.end[segment.start - 1]
     promised = np.full(len(t), np.nan)
     if compensated:
-        sigma_azimuth = float(reference.sigma[stretch.start - 1, 8])
-        promised = _promised(epochs, setup, fitted, values, levelling, C_start, sigma_azimuth)
+        begin, end = int(prepared.epochs.first[segment.first]), int(prepared.epochs.last[segment.last - 1])
+        terms = whole._replace(cycles=clean.cycles, values=np.ascontiguousarray(whole.values[begin:end]))
+        sigma_azimuth = float(reference.sigma[segment.start - 1, 8])
+        promised = _promised(clean, fit, terms, levelling, C_start, sigma_azimuth)
     return Drift(name, t, position, velocity, np.asarray(azimuth) - at_start, promised)
-
-
-def _sensor_errors(
-    prepared: PreparedData, setup: TestSetup, estimate: Floats, stretch: Segment, C_start: Floats
-) -> tuple[Floats, Floats]:
-    """Sensor errors (n, 6) and regressors of the cycles of the stretch.
-
-    The motion is that of the whole recording, some effects remember what was before; it starts at rest, where the
-    attitude does not change.
-    """
-    sensors = setup.sensors
-    seen = motion(
-        prepared.cycles, prepared.rest, sensors, estimate, C_start.copy(), setup.site.latitude_rad, setup.gravity,
-        prepared.temperature, predicted=False,
-    )  # fmt: skip
-    begin, end = int(prepared.epochs.first[stretch.first]), int(prepared.epochs.last[stretch.last - 1])
-    values = sensors.regressors(seen)[begin:end]
-    # What fades is known where the fit ended, and fades away from there.
-    since = np.abs(seen.t[begin:end] - float(prepared.epochs.end[stretch.seen[1] - 1]))
-    fading = np.exp(-np.outer(since, sensors.decay_rate[sensors.parameter]))
-    return sensors.errors(values * fading, estimate), np.ascontiguousarray(values)
-
-
-def _compensated(cycles: Cycles, errors: Floats) -> Cycles:
-    dt = cycles.dt[:, None]
-    return replace(cycles, alpha=cycles.alpha - errors[:, :3] * dt, upsilon=cycles.upsilon - errors[:, 3:] * dt)
 
 
 def _aligned(cycles: Cycles, border: int, setup: TestSetup, C_reference: Floats) -> Floats:
@@ -222,39 +240,35 @@ def _navigate(
 
 
 def _promised(
-    stretch: PreparedData,
-    setup: TestSetup,
-    fitted: Pass,
-    values: Floats,
-    levelling: int,
-    C_start: Floats,
-    sigma_azimuth: float,
+    clean: PreparedData, fit: Navigator, terms: Compensated, levelling: int, C_start: Floats, sigma_azimuth: float
 ) -> Floats:
     """One sigma of the horizontal distance (m) that the covariance of the fit gives at the end of each epoch, (k,).
 
     The filter of the fit levels by Zf alone, with everything it knows of the coefficients, and then measures nothing.
     """
-    p = len(setup.sensors.prior)
-    s = fitted.state.P.shape[0]
+    setup, q = fit.setup, len(fit.estimate)
+    s = NAV + q + COPY
     P = np.zeros((s, s))
-    P[NAV : NAV + p, NAV : NAV + p] = fitted.covariance
+    P[NAV : NAV + q, NAV : NAV + q] = fit.estimate_covariance
     P[range(6, 9), range(6, 9)] = np.square([_WIDE_LEVEL, _WIDE_LEVEL, sigma_azimuth])
     settings = pass_settings(setup, closed_loop=False)._replace(extra_gyro=_BLIND)
     place = np.array([setup.site.latitude_rad, 0.0, setup.site.height_m])
-    state = PassState(np.zeros(s), P, C_start.copy(), np.zeros(3), place.copy(), fitted.estimate.copy())
-    border, count = int(stretch.epochs.last[levelling - 1]), len(stretch.epochs) - levelling
-    resting, free = part(stretch, 0, levelling), part(stretch, levelling, len(stretch.epochs))
-    run_pass(_input(resting, SENSORS, setup, values[:border]), settings, state, new_output(levelling, p, False, count))
+    known = np.zeros(q)
+    state = PassState(np.zeros(s), P, C_start.copy(), np.zeros(3), place.copy(), known.copy())
+    border, count = int(clean.epochs.last[levelling - 1]), len(clean.epochs) - levelling
+    resting, free = part(clean, 0, levelling), part(clean, levelling, len(clean.epochs))
+    levelled = _input(resting, SENSORS, terms, slice(0, border))
+    run_pass(levelled, settings, state, new_output(levelling, q, False, count))
     # Navigation starts from the known point.
     P = state.P.copy()
     P[:6, :] = P[:, :6] = 0.0
-    state = PassState(np.zeros(s), P, C_start.copy(), np.zeros(3), place, fitted.estimate.copy())
-    out = new_output(count, p, False, count)
-    run_pass(_input(free, SKIP, setup, values[border:]), settings, state, out)
+    state = PassState(np.zeros(s), P, C_start.copy(), np.zeros(3), place, known)
+    out = new_output(count, q, False, count)
+    run_pass(_input(free, SKIP, terms, slice(border, None)), settings, state, out)
     return np.asarray(np.hypot(out.sigma[:, 0], out.sigma[:, 1]))
 
 
-def _input(stretch: PreparedData, kind: int, setup: TestSetup, values: Floats) -> PassInput:
+def _input(segment: PreparedData, kind: int, terms: Compensated, rows: slice) -> PassInput:
     """Every epoch measures the same `kind`."""
-    same = replace(stretch, kind=np.full(len(stretch.epochs), kind, dtype=np.int64))
-    return pass_input(same, np.ascontiguousarray(values), setup.sensors.channel, setup.sensors.parameter)
+    same = replace(segment, kind=np.full(len(segment.epochs), kind, dtype=np.int64))
+    return pass_input(same, np.ascontiguousarray(terms.values[rows]), terms.channel, terms.parameter)

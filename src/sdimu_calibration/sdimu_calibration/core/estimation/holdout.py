@@ -1,6 +1,6 @@
-"""Stretches of a recording that are kept from a fit, so that it can be tried on what it has not seen.
+"""Segments of a recording that are kept from a fit, so that it can be tried on what it has not seen.
 
-Only stretches at the start and at the end can be left out: the first position after a stretch in between would tell
+Only segments at the start and at the end can be left out: the first position after a segment in between would tell
 the fit what the samples in it add up to.
 """
 
@@ -59,12 +59,12 @@ class Segment:
 def holdout_segments(prepared: PreparedData, wanted_s: float = WANTED_S) -> tuple[Segment, ...]:
     """Choose what to keep from the fit: `wanted_s` of navigation after a dwell, at the end and at the start.
 
-    Of a recording too short for that, the longest stretches that leave half of it to the fit.
+    Of a recording too short for that, the longest segments that leave half of it to the fit.
 
     Raises
     ------
     DataError
-        When no stretch of `LEAST_S` begins with a dwell.
+        When no segment of `LEAST_S` begins with a dwell.
     """
     used, epochs = prepared.phases.used, prepared.epochs
     index = np.arange(len(used))
@@ -90,7 +90,7 @@ def _at_end(prepared: PreparedData, ready: Bools, level: Floats, wanted_s: float
     at = int(late[-1] if len(late) else np.flatnonzero(fits)[0])
     last = int(np.searchsorted(end, end[at] + wanted_s + 1e-6, side="right"))
     first = _level_from(prepared, at, level)
-    return _stretch("end", prepared, first, at, last, (0, first))
+    return _segment("end", prepared, first, at, last, (0, first))
 
 
 def _at_start(prepared: PreparedData, ready: Bools, level: Floats, wanted_s: float) -> Segment | None:
@@ -106,14 +106,14 @@ def _at_start(prepared: PreparedData, ready: Bools, level: Floats, wanted_s: flo
     after = np.flatnonzero(epochs.start[resumes] >= epochs.end[at] + wanted_s - 1e-6)
     resume = int(resumes[after[0]] if len(after) else resumes[-1])
     last = min(resume, int(np.searchsorted(epochs.end, epochs.end[at] + wanted_s + 1e-6, side="right")))
-    return _stretch("start", prepared, _level_from(prepared, at, level), at, last, (resume, len(epochs)))
+    return _segment("start", prepared, _level_from(prepared, at, level), at, last, (resume, len(epochs)))
 
 
 def _level_from(prepared: PreparedData, at: int, level: Floats) -> int:
     return int(np.searchsorted(prepared.epochs.start, prepared.epochs.end[at] - level[at] - 1e-6))
 
 
-def _stretch(
+def _segment(
     place: str, prepared: PreparedData, first: int, at: int, last: int, seen: tuple[int, int]
 ) -> Segment | None:
     epochs = prepared.epochs

@@ -9,7 +9,9 @@ from scipy.stats import chi2
 
 from sdimu_calibration.core.alignment.prepared import PreparedData
 from sdimu_calibration.core.arrays import Floats, Ints
-from sdimu_calibration.core.filter.passes import Pass
+from sdimu_calibration.core.filter.filter_pass import PassOutput
+from sdimu_calibration.core.measurement_kind import SKIP
+from sdimu_calibration.core.specification import ImuSpecification
 
 CHANNEL_NAMES = (
     "position_n", "position_e", "position_d", "velocity_n", "velocity_e", "velocity_d",
@@ -52,6 +54,10 @@ class Noise:
     slow: float = 1.0
 
 
+NO_NOISE = Noise(1.0, 1.0, 1.0, 3.0, np.empty(0, dtype=np.int64))
+"""Where there are too few neighbours to measure the noise: as specified."""
+
+
 @dataclass(frozen=True)
 class StopMean:
     """Mean normalised innovation of a channel at a stop; standard normal when the model is right."""
@@ -75,6 +81,8 @@ class Consistency:
     gyro, accel : Noise
     where : tuple of StopMean
         Every channel and stop, largest first.
+    seconds : int
+        Epochs that were measured.
     """
 
     nis_mean: float
@@ -84,34 +92,34 @@ class Consistency:
     gyro: Noise
     accel: Noise
     where: tuple[StopMean, ...]
+    seconds: int = 0
 
 
-def check(finished: Pass, prepared: PreparedData) -> Consistency:
-    """Test the innovations of a finished pass."""
-    out = finished.output
-    total, dof = float(np.nansum(out.nis)), 3 * int(np.isfinite(out.nis).sum())
+def check(output: PassOutput, prepared: PreparedData, imu: ImuSpecification) -> Consistency:
+    """Test the innovations of a finished pass.
+
+    Parameters
+    ----------
+    output : PassOutput
+    prepared : PreparedData
+    imu : ImuSpecification
+        Whose white noise the pass took.
+    """
+    total, dof = float(np.nansum(output.nis)), 3 * int(np.isfinite(output.nis).sum())
     first = prepared.phases.first & (prepared.kind > 0)
-    at_first = out.nis[first]
-    standard = standardised(out.innovation, out.normalised, finished)
+    at_first = output.nis[first]
+    standard = output.innovation / output.innovation_sigma
     sensors = standard[prepared.kind > 0][:, 6:]
     return Consistency(
         nis_mean=total / max(dof, 1),
         nis_p_value=float(2.0 * min(chi2.sf(total, dof), chi2.cdf(total, dof))),
         first_nis=float(np.nanmean(at_first) / 3.0) if at_first.size else float("nan"),
         ljung_box_p=ljung_box(sensors),
-        gyro=triad_noise(prepared, prepared.epochs.w_mean, finished.settings.gyro_psd**0.5),
-        accel=triad_noise(prepared, prepared.epochs.f_mean, finished.settings.accel_psd**0.5),
+        gyro=triad_noise(prepared, prepared.epochs.w_mean, imu.gyro_white_noise),
+        accel=triad_noise(prepared, prepared.epochs.f_mean, imu.accel_white_noise),
         where=stop_means(standard, prepared),
+        seconds=int((prepared.kind != SKIP).sum()),
     )
-
-
-def standardised(innovation: Floats, normalised: Floats, finished: Pass) -> Floats:
-    """Innovations over their own predicted sigma, channel by channel, (e, 12); NaN where not measured."""
-    L = finished.output.L
-    if len(L):
-        sigma = np.sqrt(np.einsum("eij,eij->ei", L, L))
-        return np.where(np.isfinite(normalised), innovation / np.where(sigma > 0, sigma, 1.0), np.nan)
-    return normalised
 
 
 def ljung_box(series: Floats) -> float:
@@ -143,7 +151,7 @@ def triad_noise(prepared: PreparedData, means: Floats, density: float) -> Noise:
     good = prepared.phases.used
     pair = good[1:] & good[:-1] & (prepared.phases.stop[1:] == prepared.phases.stop[:-1])
     if pair.sum() < _LEAST_PAIRS:
-        return Noise(1.0, 1.0, 1.0, 3.0, np.empty(0, dtype=np.int64))
+        return NO_NOISE
     length = epochs.end - epochs.start
     sigma = density * np.sqrt(1.0 / length[1:] + 1.0 / length[:-1])
     difference = ((means[1:] - means[:-1]) / sigma[:, None])[pair]

@@ -9,9 +9,10 @@ import pytest
 
 from sdimu_calibration.core import earth
 from sdimu_calibration.core.alignment.prepared import reduce, set_up
-from sdimu_calibration.core.filter.free_inertial import NOTHING, in_use
-from sdimu_calibration.core.filter.holdout import LEAST_S, WANTED_S, holdout_segments, part
-from sdimu_calibration.core.filter.passes import solve
+from sdimu_calibration.core.estimation.free_inertial import NOTHING
+from sdimu_calibration.core.estimation.holdout import LEAST_S, WANTED_S, holdout_segments, part
+from sdimu_calibration.core.estimation.prepared_test import PreparedTest
+from sdimu_calibration.core.estimation.solve import solve
 from sdimu_calibration.core.plan import Plan, Turn
 from sdimu_calibration.core.planning.nominal import nominal_recording
 from sdimu_calibration.core.recording import DataError
@@ -29,14 +30,8 @@ def plan_of(dwell_s: float, turns: tuple[Turn, ...] = TURNS) -> Plan:
     return Plan("test", (dwell_s,) * (len(turns) + 1), turns, np.radians(20.0))
 
 
-def silent(_what: str, _fraction: float) -> None:
-    return None
-
-
 def trials_of(recording, setup):
-    prepared = reduce(recording, setup)
-    reference = solve(setup, prepared, silent).last.output
-    return in_use(prepared, [("model", setup)], reference)
+    return solve(PreparedTest(recording, setup.imu, setup.site), setup.model, "filter").free_inertial([])
 
 
 @pytest.fixture
@@ -46,7 +41,7 @@ def setup(site, imu, model):
 
 def test_a_perfect_imu_does_not_drift(setup, site):
     for trial in trials_of(nominal_recording(plan_of(180.0), site), setup):
-        assert trial.stretch.length_s == pytest.approx(WANTED_S, abs=1.0)
+        assert trial.segment.length_s == pytest.approx(WANTED_S, abs=1.0)
         for drift in trial.drifts:
             # 1 m in 10 min is a constant error of 0.6 ug: less than a tenth of what the noise makes of a dwell.
             assert drift.distance.max() < 1.0

@@ -1,0 +1,111 @@
+"""A diagnosis as scripts and notebooks see it."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from html import escape
+from pathlib import Path
+from typing import Any
+
+from sdimu_calibration.api.fit import CalibrationFit
+from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
+from sdimu_calibration.core.diagnosis.found import Found
+from sdimu_calibration.core.diagnosis.search import Problem
+from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary, summarise
+from sdimu_calibration.core.evidence.candidate import Candidate
+from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.report import data, evidence_figures
+from sdimu_calibration.report.page import write_report
+from sdimu_calibration.report.report_extras import report_extras
+from sdimu_calibration.storage.diagnosis_file import write_diagnosis
+from sdimu_calibration.storage.result_file import write_result
+
+
+class FitDiagnosis:
+    """What the model of a fit is missing.
+
+    Attributes
+    ----------
+    core : Diagnosis
+        With the evidence and both fits.
+    """
+
+    def __init__(self, core: Diagnosis) -> None:
+        self.core = core
+
+    @cached_property
+    def summary(self) -> DiagnosisSummary:
+        """What was found, what could have been seen, advice."""
+        return summarise(self.core)
+
+    @property
+    def verdict(self) -> str:
+        """The verdict in a word or two."""
+        return self.core.verdict
+
+    @property
+    def adequate(self) -> bool:
+        """Whether the model explains the recording."""
+        return self.core.adequate
+
+    @property
+    def found(self) -> tuple[Found, ...]:
+        """Effects that were found, best first."""
+        return self.summary.candidates
+
+    @property
+    def best(self) -> Candidate:
+        """The effect that explains most, for `CalibrationFit.add`.
+
+        Raises
+        ------
+        DataError
+            When nothing was found.
+        """
+        if not self.found:
+            raise DataError(f"nothing was found: {self.core.sentence}")
+        return self.found[0].candidate
+
+    @cached_property
+    def extended(self) -> CalibrationFit:
+        """The fit with everything that was found."""
+        return CalibrationFit(self.core.extended)
+
+    @property
+    def advice(self) -> tuple[str, ...]:
+        """What to do next, one sentence each."""
+        return self.summary.advice
+
+    def plot_ranking(self) -> Any:
+        """Scores of the candidates against what noise reaches (a plotly figure)."""
+        problem, found = Problem(self.core.evidence), self.core.found
+        first, last = problem.scan([]), problem.scan([int(c) for c in found.chosen])
+        free = set(self.core.free.tolist())
+        columns = [k for k in range(problem.p, len(self.core.evidence.names)) if k not in free]
+        return evidence_figures.ranking(
+            data.scores(self.core.evidence, first, last, columns, found.chosen), found.threshold
+        )
+
+    def plot_heat_map(self) -> Any:
+        """Mean residual of every channel at every stop over its sigma, model as given (a plotly figure)."""
+        return evidence_figures.heat_map(*data.places(self.core.consistency.where))
+
+    def save(self, folder: str | Path) -> Path:
+        """Write diagnosis.json, result.json and report.html into a folder, as `sdimu diagnose` does."""
+        folder = Path(folder)
+        write_diagnosis(folder / "diagnosis.json", self.summary)
+        write_result(folder / "result.json", self.core.after if self.found else self.core.before)
+        write_report(
+            folder / "report.html", self.core.after, title="Diagnosis", summary=self.summary,
+            more=report_extras(self.core),
+        )  # fmt: skip
+        return folder
+
+    def __repr__(self) -> str:
+        """Sentence and advice."""
+        return "\n".join([f"{self.verdict}: {self.core.sentence}", *(f"advice: {text}" for text in self.advice)])
+
+    def _repr_html_(self) -> str:
+        """Sentence and advice as HTML."""
+        listed = "".join(f"<li>{escape(text)}</li>" for text in self.advice)
+        return f"<p><b>{escape(self.verdict)}.</b> {escape(self.core.sentence)}</p><ul>{listed}</ul>"

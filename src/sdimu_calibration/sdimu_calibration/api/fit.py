@@ -1,0 +1,200 @@
+"""A fit as scripts and notebooks see it: coefficients with units, residuals, refits, files."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterator, Sequence
+from functools import cached_property
+from html import escape
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from rich.console import Console
+
+from sdimu_calibration.api.coefficient import Coefficient
+from sdimu_calibration.core.arrays import Floats
+from sdimu_calibration.core.compensation import Compensated, compensate_recording, compensator
+from sdimu_calibration.core.effects.effect import Effect
+from sdimu_calibration.core.estimation.fit import Fit
+from sdimu_calibration.core.estimation.outcome import outcome
+from sdimu_calibration.core.estimation.prepared_test import PreparedTest
+from sdimu_calibration.core.estimation.solve import extend
+from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.results import Calibration
+from sdimu_calibration.report.page import write_report
+from sdimu_calibration.report.table import cells, headings, rich_table, rows
+from sdimu_calibration.storage.effect_file import find_effects
+from sdimu_calibration.storage.result_file import write_result
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from sdimu_calibration.core.evidence.candidate import Candidate
+
+_WIDTH = 110
+"""Columns of the table that stands for a fit."""
+
+
+class CalibrationFit:
+    """A model fitted to a test.
+
+    Indexed by the name of a coefficient; its ``repr`` is the table of coefficients, in a notebook as HTML.
+
+    Attributes
+    ----------
+    core : Fit
+        The fit of the estimator, with its matrices.
+    """
+
+    def __init__(self, core: Fit) -> None:
+        self.core = core
+
+    @property
+    def test(self) -> PreparedTest:
+        """The test that was fitted."""
+        return self.core.test
+
+    @cached_property
+    def result(self) -> Calibration:
+        """Coefficients, covariance, fit figures, notes and history."""
+        return outcome(self.core)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the coefficients, length p."""
+        return self.core.names
+
+    @property
+    def values(self) -> Floats:
+        """Coefficients (SI) in the reported body frame, shape (p,)."""
+        return self.core.values
+
+    @property
+    def covariance(self) -> Floats:
+        """Covariance of `values`, shape (p, p)."""
+        return self.core.covariance
+
+    @cached_property
+    def residuals(self) -> Floats:
+        """Whitened residuals with every coefficient at its estimate, shape (N,): standard normal when all is right."""
+        evidence = self.core.evidence()
+        estimate, _ = evidence.information.estimate(evidence.model, evidence.weight)
+        return np.asarray(evidence.e - evidence.W @ estimate)
+
+    def __getitem__(self, name: str) -> Coefficient:
+        """Give a coefficient by its name."""
+        if name not in self.names:
+            raise KeyError(f"no coefficient '{name}' in this model (it has {', '.join(self.names[:6])}, ...)")
+        k = self.names.index(name)
+        parameter = self.core.sensors.parameters[k]
+        sigma = float(np.sqrt(self.covariance[k, k]))
+        return Coefficient(name, float(self.values[k]), sigma, parameter.unit, parameter.display_unit)
+
+    def __iter__(self) -> Iterator[Coefficient]:
+        """Go through the coefficients in the order of `values`."""
+        return (self[name] for name in self.names)
+
+    def __len__(self) -> int:
+        """Return the number of coefficients."""
+        return len(self.names)
+
+    def __repr__(self) -> str:
+        """Table of coefficients with units, and how well the fit predicts."""
+        text = io.StringIO()
+        console = Console(file=text, width=_WIDTH, color_system=None)
+        console.print(rich_table(rows(self.result), f"{self.core.estimator}, body frame: {self.result.body_frame}"))
+        return text.getvalue() + self._figures()
+
+    def _repr_html_(self) -> str:
+        """Table of coefficients as HTML."""
+        entries = rows(self.result)
+        columns = headings(entries)
+        head = "".join(f"<th>{escape(c)}</th>" for c in columns)
+        body = "".join(
+            "<tr>" + "".join(f"<td>{escape(text)}</td>" for text in cells(row, columns)) + "</tr>" for row in entries
+        )
+        table = f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
+        return f"<p>{escape(self.core.estimator)}, body frame: {escape(self.result.body_frame)}</p>{table}" + (
+            f"<p>{escape(self._figures())}</p>"
+        )
+
+    def _figures(self) -> str:
+        fit = self.result.fit
+        held_out = fit["held_out_rms"]
+        shown = "" if held_out is None else f", held-out error {held_out:.3f}"
+        return f"NIS {fit['nis_mean']:.3f}{shown} (1 is right)"
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """Coefficients as a table: name, value, sigma, unit (customary).
+
+        Raises
+        ------
+        DataError
+            When pandas is not installed.
+        """
+        try:
+            import pandas as pd  # noqa: PLC0415 (optional, and slow to load)
+        except ImportError as error:
+            raise DataError("to_dataframe needs pandas: pip install pandas") from error
+        numbers = [(c.name, *c.to(c.display_unit), c.display_unit) for c in self]
+        return pd.DataFrame(numbers, columns=["name", "value", "sigma", "unit"]).set_index("name")
+
+    def add(self, effect: str | Effect | Candidate) -> CalibrationFit:
+        """Fit again with an effect more, beginning where this fit ended.
+
+        Parameters
+        ----------
+        effect : str, Effect or Candidate
+            As `--add` takes it, or what a diagnosis found.
+
+        Raises
+        ------
+        DataError
+            When there is no such effect, the model has it already, or the extended model cannot be fitted.
+        """
+        return CalibrationFit(extend(self.core, _effects(effect, self.core), warm=True))
+
+    def compensate(self, test: PreparedTest) -> Compensated:
+        """Take the sensor errors out of the samples of a test.
+
+        Parameters
+        ----------
+        test : PreparedTest
+
+        Returns
+        -------
+        Compensated
+            Rates (rad/s) and specific forces (m/s^2), shape (n, 3) each, with covariances.
+
+        Raises
+        ------
+        DataError
+            When the result has no effect that samples can be freed of.
+        """
+        recording = test.recording
+        own = [e for e in self.core.sensors.effects if not isinstance(e, str)]
+        using = compensator(
+            self.result, test.imu, own=own, has_temperature=recording.temperature is not None,
+            same_start=recording.start_ns == self.test.recording.start_ns,
+        )  # fmt: skip
+        return compensate_recording(using, recording)
+
+    def save(self, folder: str | Path) -> Path:
+        """Write result.json and report.html into a folder, as `sdimu calibrate` does."""
+        folder = Path(folder)
+        write_result(folder / "result.json", self.result)
+        write_report(folder / "report.html", self.result, title="Calibration")
+        return folder
+
+
+def _effects(effect: str | Effect | Candidate, fit: Fit) -> Sequence[Effect]:
+    """Effects that are meant; refused when the model has all their parameters."""
+    if isinstance(effect, str):
+        meant: Sequence[Effect] = find_effects(effect)
+    else:
+        meant = (effect if isinstance(effect, Effect) else effect.effect,)
+    new = [e for e in meant if not set(e.labels) <= fit.labels]
+    if not new:
+        raise DataError(f"'{effect if isinstance(effect, str) else meant[0].name}' is in the model already")
+    return new

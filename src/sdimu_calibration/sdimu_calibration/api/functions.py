@@ -1,0 +1,197 @@
+"""The functions of the Python interface."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from importlib.metadata import entry_points
+from pathlib import Path
+from typing import Any
+
+from sdimu_calibration.api.comparison import Comparison
+from sdimu_calibration.api.diagnosis import FitDiagnosis
+from sdimu_calibration.api.fit import CalibrationFit
+from sdimu_calibration.core.diagnosis.diagnose import climb
+from sdimu_calibration.core.estimation.prepared_test import PreparedTest
+from sdimu_calibration.core.estimation.solve import AUTO, choose_estimator, solve
+from sdimu_calibration.core.plan import Plan
+from sdimu_calibration.core.plan_search import Found, Goal, Question, search
+from sdimu_calibration.core.plan_search.bound import bounds
+from sdimu_calibration.core.plan_search.moves import Abilities
+from sdimu_calibration.core.planning.predict import Prediction
+from sdimu_calibration.core.planning.predict import predict as predict_test
+from sdimu_calibration.core.progress import Progress, silent
+from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.specification import ImuSpecification
+from sdimu_calibration.storage.config import load_imu, load_plan, load_site
+from sdimu_calibration.storage.effect_file import extended_model, find_effects
+from sdimu_calibration.storage.opening import Source, open_test
+
+_ABLE = Abilities((math.radians(2.0), math.radians(10.0)), math.radians(20.0), (20.0, 40.0, 60.0, 80.0, 100.0, 130.0))
+"""What the table may be asked for: mean rates (rad/s), acceleration (rad/s^2) and dwells (s), as of `sdimu plan`."""
+
+
+def open(  # noqa: A001 (as every library of files has it)
+    bag: str | Path,
+    site: str | None = None,
+    imu: str | ImuSpecification = "dtg",
+    source: Source | None = None,
+    estimator: str = AUTO,
+    measured_noise: bool = False,
+) -> PreparedTest:
+    """Open a recording: read, brought to SI and one clock, with its site and the IMU's file.
+
+    Parameters
+    ----------
+    bag : str or Path
+        rosbag2 folder or .mcap file.
+    site : str, optional
+        Name in config/site or path; left out it is assumed, and a note says so. A handheld run needs none.
+    imu : str or ImuSpecification
+        Name in config/imu, path, or the specification itself.
+    source : Source, optional
+        Topics, units and senses, where they are not to be recognised.
+    estimator : str
+        A handheld estimator does without a site.
+    measured_noise : bool
+        White noise from the rests of the recording, not from `imu`.
+
+    Raises
+    ------
+    DataError
+        When the bag, the site or the IMU cannot be used.
+    """
+    specification = load_imu(imu) if isinstance(imu, str) else imu
+    return open_test(Path(bag), site, specification, source, estimator, measured_noise)
+
+
+def calibrate(
+    test: PreparedTest, model: str | None = None, add: Sequence[str] = (), estimator: str = AUTO,
+    progress: Progress = silent,
+) -> CalibrationFit:  # fmt: skip
+    """Fit a model to a test.
+
+    Parameters
+    ----------
+    test : PreparedTest
+    model : str, optional
+        Name in config/model or path; ``baseline``, or ``hand`` for a handheld run.
+    add : sequence of str
+        Effects besides, as for `sdimu calibrate --add`.
+    estimator : str
+        ``auto``, ``filter``, ``second-order``, ``handheld``, ``batch`` or ``classical``.
+    progress : callable
+        Called with a word and the fraction done.
+
+    Raises
+    ------
+    DataError
+        When the test, the model or the estimator cannot be used.
+    """
+    given = extended_model(model or "baseline", list(add))
+    chosen = choose_estimator(test, given) if estimator == AUTO else estimator
+    if model is None and chosen == "handheld":
+        given = extended_model("hand", list(add))
+    return CalibrationFit(solve(test, given, chosen, progress=progress))
+
+
+def diagnose(
+    fit: CalibrationFit, attempt: Sequence[str] = (), refits: bool = False, progress: Progress = silent
+) -> FitDiagnosis:
+    """Find what the model of a fit is missing.
+
+    Parameters
+    ----------
+    fit : CalibrationFit
+    attempt : sequence of str
+        Effects of your own that are tried with the catalogue, as for `sdimu diagnose --try`.
+    refits : bool
+        Also fit with one found effect more at a time.
+    progress : callable
+        Called with a word and the fraction done.
+
+    Raises
+    ------
+    DataError
+        When an effect cannot be read, or an extended model cannot be fitted.
+    """
+    extra = [effect for text in attempt for effect in find_effects(text)]
+    return FitDiagnosis(climb(fit.core, extra, progress, refits=refits))
+
+
+def compare(*fits: CalibrationFit) -> Comparison:
+    """Compare models fitted to one recording, the simplest first.
+
+    Raises
+    ------
+    DataError
+        When there are fewer than two, or they are of different recordings or body frames.
+    """
+    return Comparison(fits)
+
+
+def predict(
+    plan: str | Plan = "kim18", imu: str = "dtg", site: str = "daejeon", model: str = "baseline",
+) -> Prediction:  # fmt: skip
+    """Simulate the covariance of a test before it is run; names as for `sdimu predict`.
+
+    Raises
+    ------
+    DataError
+        When a name is unknown.
+    """
+    chosen = load_plan(plan) if isinstance(plan, str) else plan
+    return predict_test(chosen, load_site(site), load_imu(imu), extended_model(model, []))
+
+
+def plan(
+    start: str | Plan = "kim18", imu: str = "dtg", site: str = "daejeon", model: str = "baseline",
+    add: Sequence[str] = (), minutes: float | None = None, slack: float = 1.2, tries: int = 150,
+    progress: Progress = silent,
+) -> Found:  # fmt: skip
+    """Search for a shorter or more telling plan with the bound of the data.
+
+    Parameters
+    ----------
+    start : str or Plan
+        Plan to begin with.
+    imu, site, model, add
+        As for `sdimu plan`.
+    minutes : float, optional
+        Time there is: the best sigmas in it. Without: the shortest plan.
+    slack : float
+        Factor on the sigmas of `start` that are the limits.
+    tries : int
+        Plans that are evaluated at most.
+    progress : callable
+        Called with a word and the fraction done.
+
+    Raises
+    ------
+    DataError
+        When a name is unknown.
+    """
+    first = load_plan(start) if isinstance(start, str) else start
+    asked = Question(load_site(site), load_imu(imu), extended_model(model, list(add)))
+    limits = {effect: slack * sigma for effect, sigma in bounds(first, asked).largest().items()}
+    return search(first, asked, _ABLE, Goal(limits, minutes), tries, progress)
+
+
+def simulate(out: str | Path, **options: Any) -> Path:
+    """Simulate a test into a bag; options as of `sdimu simulate` (plan, imu, site, seed, effect, ...).
+
+    Returns
+    -------
+    Path
+        The bag; the truth lies beside it.
+
+    Raises
+    ------
+    DataError
+        When the simulator is not installed, or an option cannot be used.
+    """
+    points = {point.name: point for point in entry_points(group="sdimu_calibration.verbs")}
+    if "simulate" not in points:
+        raise DataError("simulate: the package sdimu_sim is not installed")
+    points["simulate"].load()(out=Path(out), **options)
+    return Path(out)

@@ -1,0 +1,102 @@
+"""Options that several verbs have, checked before a long recording is read, and where results go."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from sdimu_calibration.core.estimation.prepared_test import PreparedTest
+    from sdimu_calibration.core.specification import Model
+    from sdimu_calibration.storage.opening import Source
+
+ImuOption = Annotated[str, typer.Option(help="Specification of the IMU: name in config/imu or path.")]
+SiteOption = Annotated[
+    str | None, typer.Option(help="Where the test was: name in config/site or path; daejeon (handheld: none).")
+]
+ModelOption = Annotated[
+    str | None, typer.Option(help="Model to estimate: name in config/model or path; baseline (handheld: hand).")
+]
+NoiseOption = Annotated[
+    str | None, typer.Option(help="estimated: white noise from the rests of the recording, not from --imu.")
+]
+EstimatorOption = Annotated[
+    str, typer.Option(help="filter, second-order, handheld, batch, classical; auto chooses one of the first three.")
+]
+HandOption = Annotated[bool, typer.Option("--hand", help="Moved by hand: the same as --estimator handheld.")]
+_OLD_NAMES = {"hand": "handheld"}
+HANDHELD_CHOSEN = (
+    "handheld: in rests as short as these the gyros' noise hides the Earth's rate, so nothing is navigated "
+    "(--estimator filter to do it all the same)"
+)
+
+
+def opened(
+    console: Console, bag: Path, model: str | None, site: str | None, imu: str, add: list[str] | None,
+    source: Source, estimator: str, noise: str | None,
+) -> tuple[PreparedTest, Model, str]:  # fmt: skip
+    """Open the test of a bag, read its model and choose its estimator.
+
+    Returns
+    -------
+    test : PreparedTest
+    model : Model
+    estimator : str
+
+    Raises
+    ------
+    DataError
+        When an option names nothing, or the bag cannot be used.
+    """
+    from sdimu_calibration.core.estimation.solve import AUTO, ESTIMATORS, choose_estimator
+    from sdimu_calibration.core.recording import DataError
+    from sdimu_calibration.storage.config import load_imu, load_site
+    from sdimu_calibration.storage.effect_file import extended_model
+    from sdimu_calibration.storage.opening import open_test
+
+    wanted = _OLD_NAMES.get(estimator, estimator)
+    if wanted not in (AUTO, *ESTIMATORS):
+        raise DataError(f"--estimator {estimator}: expected one of {', '.join((AUTO, *ESTIMATORS))}")
+    if noise not in {None, "estimated"}:
+        raise DataError(f"--noise {noise}: expected 'estimated' (or leave it out: the noise of --imu)")
+    # What is wrong with a name is said before a long recording is read.
+    specification, given = load_imu(imu), extended_model(model or "baseline", add or [])
+    if site is not None:
+        load_site(site)
+    test = open_test(bag, site, specification, source, wanted, noise is not None)
+    chosen = choose_estimator(test, given) if wanted == AUTO else wanted
+    if chosen == "handheld":
+        if wanted == AUTO:
+            console.print(HANDHELD_CHOSEN, soft_wrap=True)
+        given = extended_model(model or "hand", add or [])
+    return test, given, chosen
+
+
+def tell(console: Console, notes: Iterable[str]) -> None:
+    """Print notes, one line each."""
+    for note in notes:
+        console.print(f"note: {note}", soft_wrap=True, markup=False, highlight=False)
+
+
+@contextmanager
+def explained(console: Console, notes: Iterable[str]) -> Iterator[None]:
+    """Print the notes of a recording when an estimate refuses it: they may say why."""
+    from sdimu_calibration.core.recording import DataError
+
+    try:
+        yield
+    except DataError:
+        tell(console, notes)
+        raise
+
+
+def default_folder(bag: Path, what: str = "calibration") -> Path:
+    """Folder of the results of a bag: beside it, its stem with ``_calibration``."""
+    bag = bag.resolve()
+    return bag.with_name(f"{bag.stem if bag.is_file() else bag.name}_{what}")

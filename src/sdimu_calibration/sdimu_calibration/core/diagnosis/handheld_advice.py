@@ -1,0 +1,32 @@
+"""What to do next after the diagnosis of a handheld run."""
+
+from __future__ import annotations
+
+from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
+from sdimu_calibration.core.diagnosis.found import Found
+
+
+def handheld_advice(d: Diagnosis, found: tuple[Found, ...]) -> tuple[str, ...]:
+    """Advise in sentences, the most useful first."""
+    out = [f"Mend the recording first: {f.text}." for f in d.findings if f.grave]
+    for one in found:
+        label = one.candidate.label
+        out.append(f"Keep {label} in the model: --add '{label}'.")
+        if one.alike:
+            out.append(f"To tell {label} from {', '.join(one.alike[:3])}: {_more(one)}.")
+            out += [
+                f"Which it is matters: with {s.other} instead of {label}, {s.coefficient} moves by {s.sigmas:+.0f} of "
+                "its sigmas." for s in one.coefficient_shifts[:3]
+            ]  # fmt: skip
+    if d.verdict == "unexplained":
+        out.append("Record the run again in another order: what comes back at the same attitude belongs to the sensor.")
+    return tuple(dict.fromkeys(out))
+
+
+def _more(one: Found) -> str:
+    """Say what to do by hand that would tell a class apart."""
+    if "(" in one.candidate.label or any(word in one.candidate.family for word in ("ramp", "temperature")):
+        return "come back to the first attitudes at the end, and rest there"
+    if one.candidate.effect.terms[0].channel < 3:
+        return "turn about that axis both ways, slowly and fast"
+    return "rest in more attitudes between the axes, both ends of that axis up"

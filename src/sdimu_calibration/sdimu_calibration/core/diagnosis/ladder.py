@@ -1,0 +1,140 @@
+"""The ladder of models: the fit as given, then with one found effect more each, and how far the error fell."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sdimu_calibration.core.diagnosis.search import Problem
+from sdimu_calibration.core.estimation.fit import Fit
+from sdimu_calibration.core.estimation.handheld_fit import HandheldFit
+from sdimu_calibration.core.estimation.navigation_fit import NavigationFit
+from sdimu_calibration.core.estimation.outcome import outcome
+from sdimu_calibration.core.estimation.solve import extend
+from sdimu_calibration.core.progress import Progress
+from sdimu_calibration.core.results import Calibration
+
+if TYPE_CHECKING:
+    from sdimu_calibration.core.diagnosis.rounds import Round
+
+MOVED = 2.0
+"""Change of a coefficient, in its sigma, from which it is listed."""
+
+
+@dataclass(frozen=True)
+class Rung:
+    """One model on the ladder.
+
+    Attributes
+    ----------
+    added : str
+        What this model has beyond the one before; empty for the first.
+    accepted : bool
+    reason : str
+        Why it is refused; empty when accepted.
+    log_likelihood, log_bayes_factor, nis_mean, held_out_rms : float
+        Bayes factor against the rung before.
+    jump, jump_velocity : float
+        After turns: RMS of the velocity innovation at the first epoch of each stop, over its sigma and in m/s; NaN
+        where nothing is navigated.
+    moved : tuple of (str, float)
+        Coefficients that moved against the rung before, in their sigmas, largest first.
+    scatter : tuple of float, or None
+        What a handheld fit learned beyond white noise: force (m/s^2), rate (rad/s), turn (share of the way).
+    """
+
+    added: str
+    accepted: bool
+    reason: str
+    log_likelihood: float
+    log_bayes_factor: float
+    nis_mean: float
+    held_out_rms: float
+    jump: float
+    jump_velocity: float
+    moved: tuple[tuple[str, float], ...]
+    scatter: tuple[float, ...] | None = None
+
+
+def ladder(fit: Fit, final: Fit, done: Round, progress: Progress) -> tuple[Rung, ...]:
+    """Fit the model with the first, the first two, ... of what a round chose.
+
+    Parameters
+    ----------
+    fit, final : Fit
+        With the model as given, and with everything that was chosen.
+    done : Round
+    progress : callable
+    """
+    effects = [c.effect for c in done.chosen]
+    fits = [fit]
+    for k in range(1, len(effects)):
+        progress("refits", 0.9)
+        fits.append(extend(fit, effects[:k], progress=progress))
+    if effects:
+        fits.append(final)
+    results = [outcome(one) for one in fits]
+    # Handheld fits learn their sigmas, so their errors compare in the sigmas of one fit only: the last.
+    problem, chosen = Problem(done.evidence), [int(c) for c in done.found.chosen]
+    rungs: list[Rung] = []
+    for k, (one, result) in enumerate(zip(fits, results, strict=True)):
+        held_out = problem.held_out(chosen[:k], 1.0).rms if one.learns_scatter else number(result.fit["held_out_rms"])
+        added = done.chosen[k - 1].label if k else ""
+        rungs.append(_rung(added, one, result, held_out, results[k - 1] if k else None, rungs[-1] if rungs else None))
+    return tuple(rungs)
+
+
+def _rung(
+    added: str, fit: Fit, result: Calibration, held_out: float, earlier: Calibration | None, below: Rung | None
+) -> Rung:
+    likelihood = number(result.fit["log_likelihood"])
+    standard, velocity = jump(fit)
+    rung = Rung(
+        added, True, "", likelihood, likelihood - below.log_likelihood if below else 0.0,
+        number(result.fit["nis_mean"]), held_out, standard, velocity,
+        moved_coefficients(earlier, result) if earlier else (),
+        tuple(fit.scatter.tolist()) if isinstance(fit, HandheldFit) else None,
+    )  # fmt: skip
+    reason = refused(rung, below)
+    return replace(rung, accepted=not reason, reason=reason)
+
+
+def refused(rung: Rung, below: Rung | None) -> str:
+    """Say why a rung is refused against the one below; empty when it is not."""
+    if below is None or rung.held_out_rms < below.held_out_rms:
+        return ""
+    return "does not lower the error at stops that the fit has not seen"
+
+
+def jump(fit: Fit) -> tuple[float, float]:
+    """RMS of the velocity innovation at the first epoch of each stop: over its sigma, and in m/s; NaN if none."""
+    if not isinstance(fit, NavigationFit):
+        return float("nan"), float("nan")
+    output = fit.known.output
+    rows = np.flatnonzero(fit.prepared.phases.first & np.isfinite(output.innovation[:, 3]))
+    if not len(rows):
+        return float("nan"), float("nan")
+    nu, sigma = output.innovation[rows, 3:6], output.innovation_sigma[rows, 3:6]
+    return float(np.sqrt(np.mean((nu / sigma) ** 2))), float(np.sqrt(np.mean(nu**2)))
+
+
+def moved_coefficients(
+    earlier: Calibration, later: Calibration, least: float = MOVED
+) -> tuple[tuple[str, float], ...]:
+    """Coefficients of both results that differ by more than `least` of the earlier sigma, largest first."""
+    index = {name: k for k, name in enumerate(later.names)}
+    out = []
+    for k, name in enumerate(earlier.names):
+        sigma = float(np.sqrt(earlier.covariance[k, k]))
+        if name in index and sigma > 0.0:
+            size = float(later.values[index[name]] - earlier.values[k]) / sigma
+            if abs(size) > least:
+                out.append((name, size))
+    return tuple(sorted(out, key=lambda item: -abs(item[1])))
+
+
+def number(value: float | None) -> float:
+    """Give NaN for what was not computed."""
+    return float("nan") if value is None else float(value)

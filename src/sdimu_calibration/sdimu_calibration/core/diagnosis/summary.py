@@ -1,0 +1,58 @@
+"""What people and files read of a diagnosis."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from sdimu_calibration.core.diagnosis.advice import Untestable, advice, untestable_reasons
+from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
+from sdimu_calibration.core.diagnosis.found import DetectableSize, Found, found_effects, reach
+from sdimu_calibration.core.diagnosis.handheld_advice import handheld_advice
+from sdimu_calibration.core.diagnosis.plan_seen import PlanSeen, plan_seen
+from sdimu_calibration.core.evidence.navigation_evidence import NavigationEvidence
+
+
+@dataclass(frozen=True)
+class DiagnosisSummary:
+    """What people and files read of a diagnosis.
+
+    Attributes
+    ----------
+    diagnosis : Diagnosis
+    found : tuple of Found
+        Chosen effects; when the verdict is ``unexplained`` they are what was tried, not what was found.
+    reached : tuple of DetectableSize
+        Smallest detectable size of every candidate.
+    plan : PlanSeen or None
+        Turns and stops of the table; None for a handheld run.
+    untestable : tuple of Untestable
+        What could not have been seen, by reason.
+    advice : tuple of str
+    """
+
+    diagnosis: Diagnosis
+    found: tuple[Found, ...]
+    reached: tuple[DetectableSize, ...]
+    plan: PlanSeen | None
+    untestable: tuple[Untestable, ...]
+    advice: tuple[str, ...]
+
+    @property
+    def candidates(self) -> tuple[Found, ...]:
+        """What counts as found, best first."""
+        if self.diagnosis.verdict == "unexplained":
+            return ()
+        return tuple(sorted(self.found, key=lambda f: -f.log_likelihood_gain))
+
+
+def summarise(d: Diagnosis) -> DiagnosisSummary:
+    """Work out what a diagnosis has to say."""
+    found, reached = found_effects(d), reach(d)
+    if not isinstance(d.evidence, NavigationEvidence):
+        hidden = tuple(r.label for r in reached if not r.testable)
+        reasons = (Untestable("the motion of this run does not excite it", hidden),) if hidden else ()
+        return DiagnosisSummary(d, found, reached, None, reasons, handheld_advice(d, found))
+    plan = plan_seen(d.evidence)
+    return DiagnosisSummary(
+        d, found, reached, plan, untestable_reasons(reached, plan), advice(d, found, reached, plan)
+    )

@@ -1,0 +1,154 @@
+"""The verdict of a diagnosis: a word that programs read, and a sentence for people."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sdimu_calibration.core.arrays import Floats
+from sdimu_calibration.core.diagnosis.screen import Finding
+from sdimu_calibration.core.diagnosis.search import Search
+from sdimu_calibration.core.evidence.candidate import Candidate
+from sdimu_calibration.core.evidence.consistency import SLOW_S, Consistency
+from sdimu_calibration.core.evidence.linear import LinearEvidence
+from sdimu_calibration.core.handheld.handheld_fit import FORCE, RATE, TURN
+from sdimu_calibration.core.results import Calibration
+from sdimu_calibration.core.units import from_si
+
+if TYPE_CHECKING:
+    from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
+
+_COLOURED = 1.2
+"""Scatter over ten seconds against white noise from which noise is called coloured: five sigma of fifty minutes."""
+_ROUNDING = 1e-6
+"""A learned sigma (in its customary unit) below this is rounding."""
+_LISTED = 4
+"""Effects that look the same are listed up to this number."""
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What the verdict follows from.
+
+    Attributes
+    ----------
+    found : Search
+    chosen : tuple of Candidate
+    findings : tuple of Finding
+    noise : tuple of str
+    own, unexplained : bool
+    """
+
+    found: Search[LinearEvidence]
+    chosen: tuple[Candidate, ...]
+    findings: tuple[Finding, ...]
+    noise: tuple[str, ...]
+    own: bool
+    unexplained: bool
+
+
+def verdict(facts: Verdict) -> str:
+    """Give the verdict in a word or two, one of those of `Diagnosis`."""
+    chosen = facts.chosen
+    if any(f.grave for f in facts.findings):
+        return "data fault"
+    if facts.unexplained:
+        return "unexplained"
+    if chosen:
+        if facts.own:
+            return "own equation"
+        if len(chosen) > 1:
+            return "several effects"
+        if chosen[0].effect.run_local:
+            return "data fault"
+        return "class of effects" if alike_of(facts.found, chosen[0].label) else "one effect"
+    if facts.noise:
+        return "noise model wrong"
+    # Something stood out of the noise and was refused or did not last.
+    return "unexplained" if facts.found.steps else "consistent"
+
+
+def alike_of(found: Search[LinearEvidence], label: str) -> tuple[str, ...]:
+    """Name what the data cannot tell from a chosen effect."""
+    return next((s.alike for s in reversed(found.steps) if s.label == label), ())
+
+
+def sentence(d: Diagnosis) -> str:
+    """Put the verdict into one sentence."""
+    names = " and ".join(c.label for c in d.chosen)
+    if d.verdict == "consistent":
+        return _consistent(d)
+    if d.verdict == "noise model wrong":
+        return f"The noise model is wrong, the physics is not: {'; '.join(d.noise)}."
+    if d.verdict == "data fault":
+        faults = [f.text for f in d.findings if f.grave] or [f"{names} (a fault of this recording)"]
+        return f"The data have a fault: {'; '.join(faults)}."
+    if d.verdict == "unexplained":
+        return _unexplained(d, names)
+    rest = error_falls(d)
+    if d.verdict == "own equation":
+        return f"Something is missing that is not in the catalogue; it follows {names}; {rest}."
+    if d.verdict == "class of effects":
+        others = ", ".join(alike_of(d.found, d.chosen[0].label)[:_LISTED])
+        return f"One effect is missing: {names}, or what looks the same here ({others}); {rest}."
+    return f"{'One effect is' if d.verdict == 'one effect' else 'Several effects are'} missing: {names}; {rest}."
+
+
+def _consistent(d: Diagnosis) -> str:
+    if d.rungs and d.rungs[0].scatter is not None:
+        left = beyond(d.rungs[0].scatter)
+        return f"No effect of the catalogue stands out of the scatter of this run; beyond white noise: {left}."
+    odd = "; ".join(f.text for f in d.findings)
+    return "The model explains the recording: nothing stands out of the noise" + (f"; but {odd}." if odd else ".")
+
+
+def _unexplained(d: Diagnosis, names: str) -> str:
+    if d.rungs and d.rungs[-1].scatter is not None:
+        most = f", {d.found.steps[0].label} most, but adding it does not help" if d.found.steps else ""
+        left = beyond(d.rungs[-1].scatter)
+        return f"Something stands out of the scatter{most}; beyond white noise: {left}."
+    tail = f"; {names} would take {100 * d.explained:.0f} % of it" if names else ""
+    if names and _rms(d.after) > 1.0 and _rms(d.after) == _rms(d.after):
+        tail += f", and the error at stops held out is then {_rms(d.after):.2f} (1 is right)"
+    return f"Something is missing that no effect of the catalogue explains{tail}{_coloured(d.consistency)}."
+
+
+def error_falls(d: Diagnosis) -> str:
+    """Say how far the error falls with what was found."""
+    if d.rungs and d.rungs[0].scatter is not None and d.rungs[-1].scatter is not None:
+        first, last = d.rungs[0], d.rungs[-1]
+        return (
+            f"error at rests held out: {first.held_out_rms:.3f} -> {last.held_out_rms:.3f}; beyond white noise: "
+            f"{beyond(d.rungs[0].scatter)} -> {beyond(d.rungs[-1].scatter)}"
+        )
+    return f"error at stops held out, a third at a time: {_rms(d.before):.3f} -> {_rms(d.after):.3f}"
+
+
+def beyond(scatter: Sequence[float] | Floats) -> str:
+    """Say what is left beyond white noise: force (m/s^2), rate (rad/s) and turns (share of the way), shape (3,)."""
+    force, rate = from_si(float(scatter[FORCE]), "ug"), float(np.degrees(scatter[RATE]))
+    turns = 100.0 * float(scatter[TURN])
+    return f"force {shown(force)} ug, rate {shown(rate)} deg/s, turns {shown(turns)} % of the way"
+
+
+def shown(value: float) -> str:
+    """Write a learned sigma in its customary unit; zero when only rounding made it."""
+    return f"{value:.3g}" if value > _ROUNDING else "0"
+
+
+def _coloured(consistency: Consistency) -> str:
+    """Say whose noise is not white: it passes for drifts that no effect has."""
+    told = [
+        f"{triad} scatters {noise.slow:.1f} times more over {SLOW_S} s than white noise of its seconds would"
+        for triad, noise in (("gyro", consistency.gyro), ("accel", consistency.accel))
+        if noise.slow > _COLOURED
+    ]
+    return f"; coloured noise would do it: {' and '.join(told)}" if told else ""
+
+
+def _rms(calibration: Calibration) -> float:
+    value = calibration.fit.get("held_out_rms")
+    return float("nan") if value is None else float(value)

@@ -1,0 +1,188 @@
+"""What every estimator ends with: a fit that answers the same questions, whichever estimator made it."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from sdimu_calibration.core.arrays import Floats, Ints
+from sdimu_calibration.core.effects.effect import Effect, Timetable
+from sdimu_calibration.core.effects.imu_model import ImuModel
+from sdimu_calibration.core.estimation.free_inertial import FreeInertialRun
+from sdimu_calibration.core.estimation.prepared_test import PreparedTest
+from sdimu_calibration.core.evidence.consistency import Consistency
+from sdimu_calibration.core.evidence.linear import LinearEvidence
+from sdimu_calibration.core.recording import DataFault
+from sdimu_calibration.core.results import History, no_history
+from sdimu_calibration.core.specification import Model
+
+NOT_CONVERGED = "the passes did not come to rest: the estimate is not trustworthy; check --imu and --site"
+
+
+@dataclass(frozen=True)
+class Start:
+    """Where a fit ended, for a fit of nearly the same model to begin.
+
+    Attributes
+    ----------
+    names : tuple of str, length p
+    coefficients : ndarray, shape (p,)
+        SI, in the frame in which the estimator works.
+    C_nb : ndarray, shape (3, 3) or (k, 3, 3)
+        Initial attitude, or that of every rest.
+    more : ndarray
+        Whatever else the estimator learned.
+    """
+
+    names: tuple[str, ...]
+    coefficients: Floats
+    C_nb: Floats
+    more: Floats
+
+    def coefficients_of(self, names: Sequence[str]) -> Floats:
+        """Coefficients in the order of `names`; zero for a new one; shape (len(names),)."""
+        known = dict(zip(self.names, self.coefficients.tolist(), strict=True))
+        return np.array([known.get(name, 0.0) for name in names])
+
+
+@dataclass(frozen=True)
+class Fit(ABC):
+    """A finished fit of one model to one test.
+
+    Attributes
+    ----------
+    test : PreparedTest
+    model : Model
+    sensors : ImuModel
+        The sensor model that was asked for, p parameters.
+    """
+
+    test: PreparedTest
+    model: Model
+    sensors: ImuModel
+
+    estimator = ""
+    """Name of the estimator, as `--estimator` takes it."""
+    learns_scatter = False
+    """The estimator learns the noise beyond white noise from the residuals, a missing effect with it."""
+    free_inputs_testable = True
+    """A constant error of each stop and turn leaves residuals to test it by."""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Coefficients in the order of `values`."""
+        return self.sensors.names
+
+    @property
+    @abstractmethod
+    def body_frame(self) -> str:
+        """Name of the frame of `values`."""
+
+    @property
+    @abstractmethod
+    def values(self) -> Floats:
+        """Coefficients (SI) in `body_frame`, shape (p,)."""
+
+    @property
+    @abstractmethod
+    def covariance(self) -> Floats:
+        """Covariance of `values`, shape (p, p)."""
+
+    @property
+    @abstractmethod
+    def converged(self) -> bool:
+        """Whether the estimate stood still at the end."""
+
+    @abstractmethod
+    def statistics(self) -> dict[str, float | None]:
+        """``log_likelihood``, ``nis_mean``, ``nis_dof``, ``passes``."""
+
+    @abstractmethod
+    def held_out_rms(self) -> float | None:
+        """RMS of the normalised prediction errors at stops that a fit has not seen; None with fewer than two stops."""
+
+    @abstractmethod
+    def evidence(self, effects: Sequence[Effect] = ()) -> LinearEvidence:
+        """Whitened residuals about this fit and the signatures of its parameters and those of `effects`."""
+
+    @abstractmethod
+    def added_columns(self, count: int) -> Ints:
+        """Columns in `evidence` of the last `count` parameters of the model, shape (count,)."""
+
+    @abstractmethod
+    def consistency(self, evidence: LinearEvidence | None = None) -> Consistency:
+        """Check noise and innovations; say where the model fails.
+
+        `evidence` about an extended fit, with nothing added, serves where the fit itself learned its sigmas.
+        """
+
+    @abstractmethod
+    def data_counts(self) -> dict[str, float]:
+        """Entries of the data section of a result."""
+
+    @property
+    @abstractmethod
+    def timetable(self) -> Timetable:
+        """When the recording stood and turned."""
+
+    @property
+    @abstractmethod
+    def faults(self) -> tuple[DataFault, ...]:
+        """What is wrong with the data and no physics of the sensor."""
+
+    @property
+    @abstractmethod
+    def start(self) -> Start:
+        """Where a fit of nearly the same model begins."""
+
+    @abstractmethod
+    def free_inertial(self, rivals: Sequence[tuple[str, Fit]]) -> tuple[FreeInertialRun, ...]:
+        """Navigate without aid, with this fit and with `rivals` (name, fit), on parts that no fit has seen.
+
+        Raises
+        ------
+        DataError
+            When there is no such part, or the estimator does not navigate.
+        """
+
+    def history(self) -> History:
+        """Estimate as the test went on; empty where the estimator knows only the end."""
+        return no_history(len(self.names))
+
+    def notes(self) -> tuple[str, ...]:
+        """Say what was assumed, learned and not determined, one line each."""
+        return ()
+
+    def warnings(self, statistics: dict[str, float | None]) -> tuple[str, ...]:
+        """Say what speaks against the estimate, one line each; `statistics` with ``held_out_rms`` where it is known.
+
+        Raises
+        ------
+        DataError
+            When there is no fit at all.
+        """
+        del statistics
+        return ()
+
+    def beyond_specification(self) -> list[str]:
+        """Name coefficients far outside the IMU's file, one line each, the furthest first."""
+        return []
+
+    @property
+    def has_temperature(self) -> bool:
+        """Whether the recording has a temperature."""
+        return self.test.recording.temperature is not None
+
+    @cached_property
+    def labels(self) -> frozenset[str]:
+        """Labels of all parameters that the model, or the estimator for it, has."""
+        return frozenset(label for effect in self.sensors.effects for label in effect.labels)
+
+    def size_in_sigmas(self, count: int) -> Floats:
+        """Size of the last `count` parameters, in their sigmas, shape (count,)."""
+        last = slice(len(self.names) - count, None)
+        return np.abs(self.values[last]) / np.sqrt(np.diag(self.covariance)[last])

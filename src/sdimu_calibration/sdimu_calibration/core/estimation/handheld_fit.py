@@ -1,0 +1,153 @@
+"""A fit of a handheld run: rests and turns by one least squares, nothing navigated."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from sdimu_calibration.core.arrays import Floats, Ints
+from sdimu_calibration.core.effects.accelerometer_frame import FRAME
+from sdimu_calibration.core.effects.effect import Effect, Timetable
+from sdimu_calibration.core.estimation.fit import Fit, Start
+from sdimu_calibration.core.estimation.free_inertial import FreeInertialRun
+from sdimu_calibration.core.estimation.navigation_fit import checksum
+from sdimu_calibration.core.evidence.consistency import NO_NOISE, Consistency
+from sdimu_calibration.core.evidence.handheld_evidence import (
+    HandheldEvidence,
+    handheld_evidence,
+    places,
+    timetable,
+)
+from sdimu_calibration.core.evidence.linear import LinearEvidence
+from sdimu_calibration.core.handheld.handheld import PreparedRun, handheld_notes
+from sdimu_calibration.core.handheld.handheld_faults import data_faults
+from sdimu_calibration.core.handheld.handheld_fit import FitPriors, HandheldSolution
+from sdimu_calibration.core.recording import DataError, DataFault
+
+
+@dataclass(frozen=True)
+class HandheldFit(Fit):
+    """A fit of a handheld run.
+
+    Attributes
+    ----------
+    ready : PreparedRun
+    priors : FitPriors
+    solution : HandheldSolution
+    """
+
+    ready: PreparedRun
+    priors: FitPriors
+    solution: HandheldSolution
+
+    estimator = "handheld"
+    learns_scatter = True
+    free_inputs_testable = False
+
+    @property
+    def body_frame(self) -> str:
+        """Frame of the accelerometers, where the model lets it turn."""
+        return FRAME if len(self.priors.kept) < len(self.names) else self.model.body_frame
+
+    @property
+    def values(self) -> Floats:
+        """Coefficients (SI), shape (p,)."""
+        return self.solution.point.coefficients
+
+    @property
+    def covariance(self) -> Floats:
+        """Covariance of `values`, shape (p, p); zero for what the frame pins."""
+        out = np.zeros((len(self.names), len(self.names)))
+        out[np.ix_(self.priors.kept, self.priors.kept)] = self.solution.covariance
+        return out
+
+    @property
+    def converged(self) -> bool:
+        """True: a least squares that does not converge is refused."""
+        return True
+
+    @property
+    def scatter(self) -> Floats:
+        """What is left beyond white noise: force (m/s^2), rate (rad/s), turn (share of the way), shape (3,)."""
+        return self.solution.point.extra
+
+    @property
+    def start(self) -> Start:
+        """Where a fit of nearly the same model begins."""
+        point = self.solution.point
+        return Start(self.names, point.coefficients, point.C_nb, np.concatenate([point.earth, point.extra]))
+
+    def statistics(self) -> dict[str, float | None]:
+        """Marginal log-likelihood, mean squared residual over its redundancy, steps."""
+        found = self.solution
+        return {
+            "log_likelihood": found.log_likelihood, "nis_mean": found.chi2 / max(found.dof, 1.0),
+            "nis_dof": found.dof, "passes": float(found.steps),
+        }  # fmt: skip
+
+    def held_out_rms(self) -> float | None:
+        """RMS of the normalised errors of the forces at each rest, predicted from everything else."""
+        return self.solution.held_out_rms
+
+    def evidence(self, effects: Sequence[Effect] = ()) -> HandheldEvidence:
+        """Residuals of rests and turns about this fit, and the signatures of its parameters and those of `effects`."""
+        return handheld_evidence(self.ready.run, self.priors, self.solution.point, effects, self.test.imu)
+
+    def added_columns(self, count: int) -> Ints:
+        """Columns in `evidence` of the last `count` parameters of the model, shape (count,)."""
+        q = len(self.priors.kept)
+        return np.arange(q - count, q)
+
+    def consistency(self, evidence: LinearEvidence | None = None) -> Consistency:
+        """Say where the model fails: every residual over its own sigma; the noise was learned.
+
+        With `evidence` of an extended fit the sigmas are those that the extended fit learned.
+        """
+        about = evidence if isinstance(evidence, HandheldEvidence) else self.evidence()
+        return Consistency(
+            self.statistics()["nis_mean"] or 0.0, 1.0, float("nan"), 1.0, NO_NOISE, NO_NOISE,
+            places(about, np.empty(0, dtype=np.int64)),
+        )  # fmt: skip
+
+    @cached_property
+    def timetable(self) -> Timetable:
+        """When the run rested and turned."""
+        return timetable(self.ready.run)
+
+    @cached_property
+    def faults(self) -> tuple[DataFault, ...]:
+        """What no hand does and no sensor should."""
+        return (*self.ready.impossible, *data_faults(self.ready.recording, self.ready.run, self.solution))
+
+    def data_counts(self) -> dict[str, float]:
+        """Entries of the data section of a result."""
+        recording, log = self.ready.recording, self.ready.recording.temperature
+        start = {} if log is None or not len(log.t) else {"start_temperature_degc": float(log.value[0])}
+        return start | {
+            "samples": float(len(recording.t)),
+            "checksum": checksum(recording.t, recording.omega_ib_b, recording.f_ib_b),
+            "lost": float(self.ready.run.cycles.lost.sum()),
+            "rejected": float(recording.rejected),
+            "contradicted_s": 0.0,
+            "duration_s": float(recording.t[-1]),
+            "stops": float(len(self.ready.run.t)),
+            "conditions": checksum(np.array([self.priors.gravity, *self.priors.earth_mean])),
+        }
+
+    def notes(self) -> tuple[str, ...]:
+        """Say what was assumed, learned and not determined."""
+        return tuple(handheld_notes(self.ready.run, self.priors, self.solution, self.test.site))
+
+    def free_inertial(self, rivals: Sequence[tuple[str, Fit]]) -> tuple[FreeInertialRun, ...]:
+        """Refuse: a hand moves the IMU, so that its velocity and place are unknown.
+
+        Raises
+        ------
+        DataError
+            Always.
+        """
+        del rivals
+        raise DataError("a handheld run has no known velocity and place to compare a free navigation with")

@@ -1,0 +1,479 @@
+"""Fits that navigate: the filter's passes, and the second-order passes about exactly corrected samples."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from zlib import crc32
+
+import numpy as np
+
+from sdimu_calibration.core.alignment.alignment import Alignment
+from sdimu_calibration.core.alignment.coarse_alignment import StartPoint
+from sdimu_calibration.core.alignment.prepared import PreparedData, TestSetup, first_attitude, stops_line
+from sdimu_calibration.core.arrays import Bools, Floats, Ints
+from sdimu_calibration.core.effects import body_frame
+from sdimu_calibration.core.effects.accelerometer_frame import FRAME, AccelerometerFrameModel
+from sdimu_calibration.core.effects.effect import Effect, Timetable
+from sdimu_calibration.core.effects.imu_model import ImuModel
+from sdimu_calibration.core.estimation.azimuth_check import azimuth_note, azimuth_warning
+from sdimu_calibration.core.estimation.fit import NOT_CONVERGED, Fit, Start
+from sdimu_calibration.core.estimation.free_inertial import (
+    Compensated,
+    FreeInertialRun,
+    Navigator,
+    free_inertial_runs,
+)
+from sdimu_calibration.core.evidence.consistency import Consistency, check
+from sdimu_calibration.core.evidence.linear import LinearEvidence
+from sdimu_calibration.core.evidence.navigation_evidence import (
+    KnownPass,
+    NavigationEvidence,
+    known_pass,
+    known_second_order_pass,
+    navigation_evidence,
+    timetable,
+)
+from sdimu_calibration.core.evidence.stop_misfit import stop_misfit
+from sdimu_calibration.core.filter.filter_pass import PassOutput, PassState, new_output, run_pass
+from sdimu_calibration.core.filter.passes import Pass, Solution, pass_settings
+from sdimu_calibration.core.filter.passes import solve as solve_filter
+from sdimu_calibration.core.measurement_kind import ALL, HELD_ALL, HELD_SENSORS, SENSORS
+from sdimu_calibration.core.navigation.correct_cycles import correct_cycles, spread
+from sdimu_calibration.core.navigation.track import motion
+from sdimu_calibration.core.progress import silent
+from sdimu_calibration.core.recording import DataError, DataFault
+from sdimu_calibration.core.results import History
+from sdimu_calibration.core.second_order.second_order_passes import (
+    SecondOrderPass,
+    firm_setup,
+    run_stops,
+    solve_second_order,
+)
+
+HELD_OUT_FOLDS = 3
+"""Interleaved groups of stops; each group is held out once."""
+_ABSURD = 1e3
+"""NIS per degree of freedom from which there is no fit at all: units, axes or site are wrong."""
+_MISFIT = 1.2
+"""NIS per degree of freedom, and held-out error (sigma), from which a user is warned; 1 is right."""
+_OUTSIDE = 4.5
+"""Size of a coefficient in its stated sigma from which a user is warned."""
+
+
+@dataclass(frozen=True)
+class NavigationFit(Fit):
+    """A fit by navigation.
+
+    Attributes
+    ----------
+    setup : TestSetup
+        With the sensor model of the estimator, q coefficients.
+    prepared : PreparedData
+    alignment : Alignment
+    """
+
+    setup: TestSetup
+    prepared: PreparedData
+    alignment: Alignment
+
+    @property
+    @abstractmethod
+    def last(self) -> Pass | SecondOrderPass:
+        """The last pass."""
+
+    @property
+    @abstractmethod
+    def passes(self) -> int:
+        """Number of passes."""
+
+    @property
+    @abstractmethod
+    def known(self) -> KnownPass:
+        """Navigation with the coefficients known at their final values."""
+
+    @abstractmethod
+    def run_kinds(self, kind: Ints) -> PassOutput:
+        """Repeat the last pass with other kinds of measurement, shape (e,)."""
+
+    @abstractmethod
+    def on(self, prepared: PreparedData, C_nb: Floats) -> Navigator:
+        """Fit the same model to a part of the recording that starts at attitude `C_nb` (3, 3)."""
+
+    @abstractmethod
+    def compensated(self, prepared: PreparedData, estimate: Floats, C_start: Floats, end_of_fit: float) -> Compensated:
+        """Take the errors at `estimate` (q,) out of all cycles; the fit ended at `end_of_fit` (s)."""
+
+    @property
+    def estimate(self) -> Floats:
+        """Coefficients of the estimator (SI), shape (q,)."""
+        return self.last.estimate
+
+    @property
+    def estimate_covariance(self) -> Floats:
+        """Covariance of `estimate`, shape (q, q)."""
+        return self.last.covariance
+
+    @property
+    def start(self) -> Start:
+        """Where a fit of nearly the same model begins."""
+        return Start(self.setup.sensors.names, self.estimate, self.last.smoothed_start, np.empty(0))
+
+    def statistics(self) -> dict[str, float | None]:
+        """Log-likelihood and mean normalised innovation squared of the last pass."""
+        return fit_statistics(self.last.output) | {"passes": float(self.passes)}
+
+    def held_out_rms(self) -> float | None:
+        """RMS of normalised prediction errors at stops that the fit has not seen.
+
+        The first stop stays in every fit (it gives the attitude); the others are left out in turn, in
+        `HELD_OUT_FOLDS` interleaved groups. None when there are fewer than two stops.
+        """
+        stops = np.unique(self.prepared.phases.stop[self.prepared.kind > 0])
+        total, count = 0.0, 0
+        for fold in range(HELD_OUT_FOLDS):
+            out = np.isin(self.prepared.phases.stop, stops[1:][fold::HELD_OUT_FOLDS]) & (self.prepared.kind > 0)
+            if out.any():
+                white = self.predict(out)[out]
+                total += float(np.nansum(white**2))
+                count += int(np.isfinite(white).sum())
+        return float(np.sqrt(total / count)) if count else None
+
+    def predict(self, out: Bools) -> Floats:
+        """Whitened innovations (e, 12) of the last pass with the epochs `out` (e,) predicted but not taken."""
+        kind = self.prepared.kind.copy()
+        kind[out & (kind == SENSORS)] = HELD_SENSORS
+        kind[out & (kind == ALL)] = HELD_ALL
+        return self.run_kinds(kind).normalised
+
+    def evidence(self, effects: Sequence[Effect] = ()) -> NavigationEvidence:
+        """Whitened innovations about this fit and the signatures of its parameters and those of `effects`."""
+        return navigation_evidence(self.prepared, self.setup, self.known, self.estimate, effects)
+
+    def consistency(self, evidence: LinearEvidence | None = None) -> Consistency:
+        """Check noise and innovations; say where the model fails."""
+        del evidence
+        return check(self.last.output, self.prepared, self.setup.imu)
+
+    @cached_property
+    def timetable(self) -> Timetable:
+        """When the recording stood and turned."""
+        return timetable(self.prepared)
+
+    @property
+    def faults(self) -> tuple[DataFault, ...]:
+        """What the preparation found wrong with the data."""
+        return self.prepared.faults
+
+    def data_counts(self) -> dict[str, float]:
+        """Entries of the data section of a result."""
+        recording, phases, epochs = self.test.recording, self.prepared.phases, self.prepared.epochs
+        log = recording.temperature
+        # Temperature effects count from the start of this recording; who uses the result needs to know from where.
+        start = {} if log is None or not len(log.t) else {"start_temperature_degc": float(log.value[0])}
+        return start | {
+            "samples": float(len(recording.t)),
+            "checksum": checksum(recording.t, recording.omega_ib_b, recording.f_ib_b),
+            "lost": float(self.prepared.cycles.lost.sum()),
+            "rejected": float(recording.rejected),
+            "contradicted_s": float((epochs.end - epochs.start)[phases.contradicted].sum()),
+            "duration_s": float(recording.t[-1]),
+            "stops": float(len(np.unique(phases.stop[phases.used]))),
+            "conditions": conditions(self.setup),
+        }
+
+    def notes(self) -> tuple[str, ...]:
+        """List the stops that were found, and those held out."""
+        held = self.test.held_out
+        told = (f"stops held out of the fit: {', '.join(map(str, held))}",) if held else ()
+        return (*stops_line(self.test.recording, self.prepared), *told)
+
+    def warnings(self, statistics: dict[str, float | None]) -> tuple[str, ...]:
+        """Misfit as a whole and of single stops, and coefficients outside the specification.
+
+        Raises
+        ------
+        DataError
+            When there is no fit at all.
+        """
+        nis, held_out = statistics["nis_mean"] or 0.0, statistics.get("held_out_rms")
+        lost = int(self.prepared.cycles.lost.sum())
+        in_turn = f"; {lost} samples are missing by their stamps" if lost else ""
+        if nis > _ABSURD:
+            raise DataError(
+                f"the recording contradicts the model: squared innovations are {nis:.3g} times what the noise explains"
+                f"{in_turn}; check --imu, --site, units and axes"
+            )
+        out = [] if self.converged else [NOT_CONVERGED]
+        if nis > _MISFIT or (held_out is not None and held_out > _MISFIT):
+            text = f"NIS {nis:.3f}" + ("" if held_out is None else f", held-out error {held_out:.3f}")
+            out.append(f"the model does not fit ({text}; 1 is right){in_turn}; run: sdimu diagnose")
+        worst = stop_misfit(self.last.output.normalised, self.prepared)
+        return (*out, *([worst] if worst else []), *self.beyond_specification()[:1])
+
+    def beyond_specification(self) -> list[str]:
+        """Name coefficients far outside the IMU's file, one line each, the furthest first."""
+        return outside(self.setup.sensors, self.estimate)
+
+    def free_inertial(self, rivals: Sequence[tuple[str, Fit]]) -> tuple[FreeInertialRun, ...]:
+        """Navigate without aid, with this fit and with `rivals` (name, fit), on parts that no fit has seen.
+
+        Raises
+        ------
+        DataError
+            When there is no such part.
+        """
+        navigators = [(name, fit) for name, fit in rivals if isinstance(fit, NavigationFit)]
+        return free_inertial_runs(self.prepared, [("model as given", self), *navigators], self.known.output)
+
+    def _rows_of_history(self, rows: Ints, output: PassOutput, values: Floats, covariance: Floats) -> History:
+        phases = self.prepared.phases
+        return History(
+            self.prepared.epochs.end[rows], values, np.sqrt(np.diagonal(covariance, axis1=1, axis2=2)),
+            output.sigma[rows, 6:9], phases.stop[rows], phases.dwell[rows], phases.used[rows], output.nis[rows],
+        )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class FilterFit(NavigationFit):
+    """A fit by passes of the navigation filter.
+
+    Attributes
+    ----------
+    solution : Solution
+    """
+
+    solution: Solution
+    estimator = "filter"
+
+    @property
+    def last(self) -> Pass:
+        """The last pass."""
+        return self.solution.last
+
+    @property
+    def passes(self) -> int:
+        """Number of passes."""
+        return self.solution.passes
+
+    @property
+    def converged(self) -> bool:
+        """Whether the passes stood still at the end."""
+        return self.solution.converged
+
+    @property
+    def body_frame(self) -> str:
+        """Frame that the model asks for."""
+        return self.model.body_frame
+
+    @property
+    def values(self) -> Floats:
+        """Coefficients (SI) in `body_frame`, shape (p,)."""
+        return body_frame.values_in_frame(self.names, self.estimate, self.body_frame)
+
+    @cached_property
+    def covariance(self) -> Floats:
+        """Covariance of `values`, shape (p, p)."""
+        J = body_frame.frame_jacobian(self.names, self.body_frame)
+        return np.asarray(J @ self.estimate_covariance @ J.T)
+
+    @cached_property
+    def known(self) -> KnownPass:
+        """Navigation with the coefficients known at their final values."""
+        return known_pass(self.prepared, self.setup, self.last)
+
+    def added_columns(self, count: int) -> Ints:
+        """Columns in `evidence` of the last `count` parameters of the model, shape (count,)."""
+        return np.arange(len(self.names) - count, len(self.names))
+
+    def run_kinds(self, kind: Ints) -> PassOutput:
+        """Repeat the last pass with other kinds of measurement, shape (e,)."""
+        state = PassState(*(v.copy() for v in self.last.start))
+        output = new_output(len(kind), len(self.estimate), False, len(kind))
+        run_pass(self.last.data._replace(kind=kind), pass_settings(self.setup, closed_loop=False), state, output)
+        return output
+
+    def on(self, prepared: PreparedData, C_nb: Floats) -> FilterFit:
+        """Fit the same model to a part of the recording that starts at attitude `C_nb` (3, 3)."""
+        constant = self.setup.sensors.decay_rate == 0.0
+        begin = StartPoint(np.ascontiguousarray(C_nb), self.estimate * constant)
+        solution = solve_filter(self.setup, prepared, begin, silent)
+        return replace(self, prepared=prepared, solution=solution)
+
+    def compensated(self, prepared: PreparedData, estimate: Floats, C_start: Floats, end_of_fit: float) -> Compensated:
+        """Take the errors at `estimate` (p,) out of all cycles to first order; the fit ended at `end_of_fit` (s)."""
+        setup, sensors, cycles = self.setup, self.setup.sensors, prepared.cycles
+        seen = motion(
+            cycles, prepared.rest, sensors, estimate, C_start.copy(), setup.site.latitude_rad, setup.gravity,
+            prepared.temperature, predicted=False,
+        )  # fmt: skip
+        values = sensors.regressors(seen)
+        # What fades is known where the fit ended, and fades away from there.
+        fading = np.exp(-np.outer(np.abs(seen.t - end_of_fit), sensors.decay_rate[sensors.parameter]))
+        errors = sensors.errors(values * fading, estimate) * cycles.dt[:, None]
+        clean = replace(cycles, alpha=cycles.alpha - errors[:, :3], upsilon=cycles.upsilon - errors[:, 3:])
+        return Compensated(clean, values, sensors.channel, sensors.parameter)
+
+    def history(self) -> History:
+        """History of the first pass in the reported frame, at the epochs whose covariance was kept."""
+        out = self.solution.first.output
+        J = body_frame.frame_jacobian(self.names, self.body_frame)
+        rows = np.arange(0, len(self.prepared.epochs), out.stride)
+        values = np.array(
+            [body_frame.values_in_frame(self.names, v, self.body_frame) for v in out.estimate[rows]]
+        )
+        return self._rows_of_history(rows, out, values, J @ out.covariance[: len(rows)] @ J.T)
+
+    def notes(self) -> tuple[str, ...]:
+        """List the stops that were found; name an azimuth that is not observable."""
+        heading = azimuth_note(self.solution)
+        return (*super().notes(), *([heading] if heading else []))
+
+    def warnings(self, statistics: dict[str, float | None]) -> tuple[str, ...]:
+        """Misfit, an azimuth that is too little known, coefficients outside the specification.
+
+        Raises
+        ------
+        DataError
+            When there is no fit at all.
+        """
+        azimuth = azimuth_warning(self.solution)
+        return (*super().warnings(statistics), *([azimuth] if azimuth else []))
+
+
+@dataclass(frozen=True)
+class SecondOrderFit(NavigationFit):
+    """A fit by passes about exactly corrected samples, in the frame of the accelerometers.
+
+    Attributes
+    ----------
+    frame_model : AccelerometerFrameModel
+    finished : SecondOrderPass
+    count : int
+        Number of passes.
+    stood_still : bool
+    """
+
+    frame_model: AccelerometerFrameModel
+    finished: SecondOrderPass
+    count: int
+    stood_still: bool
+    estimator = "second-order"
+
+    @property
+    def last(self) -> SecondOrderPass:
+        """The last pass."""
+        return self.finished
+
+    @property
+    def passes(self) -> int:
+        """Number of passes."""
+        return self.count
+
+    @property
+    def converged(self) -> bool:
+        """Whether the passes stood still at the end."""
+        return self.stood_still
+
+    @property
+    def body_frame(self) -> str:
+        """Frame of the accelerometers."""
+        return FRAME
+
+    @property
+    def values(self) -> Floats:
+        """Coefficients (SI) in `body_frame`, shape (p,)."""
+        return self.frame_model.values(self.estimate)
+
+    @property
+    def covariance(self) -> Floats:
+        """Covariance of `values`, shape (p, p)."""
+        return self.frame_model.covariance(self.estimate_covariance)
+
+    @cached_property
+    def known(self) -> KnownPass:
+        """Navigation with the coefficients known at their final values."""
+        return known_second_order_pass(self.prepared, self.setup, self.alignment, self.last)
+
+    @cached_property
+    def labels(self) -> frozenset[str]:
+        """Labels of all parameters that the model, or the estimator for it, has."""
+        return super().labels | {label for effect in self.setup.sensors.effects for label in effect.labels}
+
+    def added_columns(self, count: int) -> Ints:
+        """Columns in `evidence` of the last `count` parameters of the model, shape (count,)."""
+        return self.frame_model.place[len(self.names) - count :]
+
+    def run_kinds(self, kind: Ints) -> PassOutput:
+        """Repeat the last pass with other kinds of measurement, shape (e,)."""
+        last = self.last
+        data = last.data._replace(kind=kind)
+        return run_stops(data, firm_setup(self.setup), last.start, self.prepared, last.where, last.C_stop)[1]
+
+    def on(self, prepared: PreparedData, C_nb: Floats) -> SecondOrderFit:
+        """Fit the same model to a part of the recording that starts at attitude `C_nb` (3, 3)."""
+        begin = StartPoint(np.ascontiguousarray(C_nb), self.estimate)
+        alignment = first_attitude(prepared.epochs, prepared.phases, self.setup)
+        last, count, converged = solve_second_order(self.setup, prepared, alignment, begin, silent)
+        return replace(
+            self, prepared=prepared, alignment=alignment, finished=last, count=count, stood_still=converged
+        )
+
+    def compensated(self, prepared: PreparedData, estimate: Floats, C_start: Floats, end_of_fit: float) -> Compensated:
+        """Take the errors at `estimate` (q,) out of all cycles exactly; constants, so `end_of_fit` does not matter."""
+        del end_of_fit
+        setup, sensors = self.setup, self.setup.sensors
+        near = motion(
+            prepared.cycles, prepared.rest, sensors, estimate, C_start.copy(), setup.site.latitude_rad, setup.gravity,
+            prepared.temperature, predicted=False,
+        )  # fmt: skip
+        clean = correct_cycles(prepared.cycles, near, sensors, estimate)
+        terms = spread(sensors.regressors(clean.seen), sensors.channel, sensors.parameter, clean.weight)
+        return Compensated(clean.cycles, *terms)
+
+    def history(self) -> History:
+        """History of the last pass, at the epochs whose covariance was kept."""
+        rows, out = self.last.rows, self.last.output
+        values = self.frame_model.values(self.last.reference + out.estimate[rows])
+        return self._rows_of_history(rows, out, values, self.frame_model.covariance(out.covariance))
+
+    def notes(self) -> tuple[str, ...]:
+        """List the stops that were found; say that the second order counts."""
+        text = f"second order counts: {self.count} passes about exactly corrected samples, in the accelerometers' frame"
+        return (*super().notes(), text)
+
+
+def fit_statistics(output: PassOutput) -> dict[str, float | None]:
+    """Log-likelihood and mean normalised innovation squared of a pass."""
+    dof = 3 * int(np.isfinite(output.nis).sum())
+    return {
+        "log_likelihood": float(output.log_likelihood.sum()),
+        "nis_mean": float(np.nansum(output.nis) / max(dof, 1)),
+        "nis_dof": float(dof),
+    }
+
+
+def outside(sensors: ImuModel, estimate: Floats) -> list[str]:
+    """Name the coefficients of `estimate` (q,) beyond what the specification allows, the furthest first."""
+    size = np.abs(estimate) / sensors.stated
+    return [
+        f"{sensors.names[i]} is {size[i]:.1f} times the sigma of the specification"
+        for i in np.argsort(-size) if size[i] > _OUTSIDE
+    ]  # fmt: skip
+
+
+def checksum(*arrays: Floats) -> float:
+    """Give a number that other samples do not have: the same recording is known again by it."""
+    value = 0
+    for array in arrays:
+        value = crc32(np.ascontiguousarray(array).tobytes(), value)
+    return float(value)
+
+
+def conditions(setup: TestSetup) -> float:
+    """Give a number that another site or other noise densities do not have: they change what a likelihood means."""
+    site, imu = setup.site, setup.imu
+    place = (site.latitude_rad, site.height_m, setup.gravity)
+    return checksum(np.array([*place, imu.gyro_white_noise, imu.accel_white_noise]))

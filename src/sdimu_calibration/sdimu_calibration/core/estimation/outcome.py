@@ -1,0 +1,77 @@
+"""From a fit to the result that is written, shown and used: the one builder of `Calibration`."""
+
+from __future__ import annotations
+
+from sdimu_calibration.core.estimation.fit import Fit
+from sdimu_calibration.core.estimation.prepared_test import PreparedTest
+from sdimu_calibration.core.estimation.solve import AUTO, solve
+from sdimu_calibration.core.progress import Progress, silent
+from sdimu_calibration.core.recording import Recording
+from sdimu_calibration.core.results import Calibration
+from sdimu_calibration.core.specification import ImuSpecification, Model, Site
+
+
+def outcome(fit: Fit, held_out: bool = True) -> Calibration:
+    """Put a result together, in the body frame of the fit.
+
+    Parameters
+    ----------
+    fit : Fit
+    held_out : bool
+        Also predict every stop from the others (costs some passes).
+
+    Raises
+    ------
+    DataError
+        When there is no fit at all.
+    """
+    statistics = fit.statistics()
+    statistics["held_out_rms"] = fit.held_out_rms() if held_out else None
+    parameters = fit.sensors.parameters
+    warnings = (*(f.text for f in fit.faults if f.grave), *fit.warnings(statistics))
+    return Calibration(
+        body_frame=fit.body_frame,
+        model=tuple(e.name if e.name.endswith(e.variant) else e.name + e.variant for e in fit.sensors.effects),
+        names=fit.names,
+        units=tuple(p.unit for p in parameters),
+        display_units=tuple(p.display_unit for p in parameters),
+        values=fit.values,
+        covariance=fit.covariance,
+        fit=statistics,
+        data=fit.data_counts(),
+        notes=(*fit.test.recording.notes, *fit.notes(), *(f.text for f in fit.faults if not f.grave), *warnings),
+        history=fit.history(),
+        warnings=warnings,
+        faults=fit.faults,
+        estimator=fit.estimator,
+    )
+
+
+def calibrate(
+    recording: Recording,
+    site: Site | None,
+    imu: ImuSpecification,
+    model: Model,
+    progress: Progress = silent,
+    held_out: bool = True,
+    estimator: str = AUTO,
+) -> Calibration:
+    """Solve and put the result together.
+
+    Parameters
+    ----------
+    recording, site, imu
+        As in `PreparedTest`.
+    model, progress, estimator
+        As for `solve`.
+    held_out : bool
+        As for `outcome`.
+
+    Raises
+    ------
+    DataError
+        When the recording or the options cannot be used.
+    """
+    result = outcome(solve(PreparedTest(recording, imu, site), model, estimator, progress=progress), held_out)
+    progress("done", 1.0)
+    return result

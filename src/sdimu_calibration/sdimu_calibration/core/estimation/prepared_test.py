@@ -1,0 +1,83 @@
+"""A test that is ready for an estimator: a recording in SI on one clock, the IMU's file, the site."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from sdimu_calibration.core.alignment.prepared import PreparedData, TestSetup, reduce
+from sdimu_calibration.core.handheld.handheld import PreparedRun, prepare_run
+from sdimu_calibration.core.measurement_kind import SKIP
+from sdimu_calibration.core.recording import DataError, Recording
+from sdimu_calibration.core.specification import ImuSpecification, Site
+
+
+@dataclass(frozen=True)
+class PreparedTest:
+    """What every estimate of one test begins with.
+
+    Attributes
+    ----------
+    recording : Recording
+        In SI, right-handed axes and one clock, with the dwells where they are known.
+    imu : ImuSpecification
+    site : Site or None
+        None where nobody says: only a handheld run does without.
+    held_out : tuple of int
+        Stops whose measurements no fit takes.
+    """
+
+    recording: Recording
+    imu: ImuSpecification
+    site: Site | None = None
+    held_out: tuple[int, ...] = ()
+    _prepared: dict[Any, Any] = field(default_factory=dict, repr=False, compare=False)
+
+    def without_stops(self, stops: tuple[int, ...]) -> PreparedTest:
+        """Hold stops out of all fits."""
+        return replace(self, held_out=tuple(stops))
+
+    def with_noise(self, imu: ImuSpecification) -> PreparedTest:
+        """Take other white noise for the fits; phases and data faults stay as they were decided."""
+        return replace(self, imu=imu)
+
+    def data(self, setup: TestSetup) -> PreparedData:
+        """Cycles, epochs and phases for the navigation, made once.
+
+        Raises
+        ------
+        DataError
+            When there are too few samples, or the stops that are left give no attitude.
+        """
+        key = (setup.model.settle_s, setup.model.zero_velocity)
+        if key not in self._prepared:
+            self._prepared[key] = reduce(self.recording, setup)
+        return _masked(self._prepared[key], self.held_out)
+
+    @property
+    def run(self) -> PreparedRun:
+        """Rests and turns of a handheld run, made once.
+
+        Raises
+        ------
+        DataError
+            When there are too few rests.
+        """
+        if "run" not in self._prepared:
+            self._prepared["run"] = prepare_run(self.recording)
+        done: PreparedRun = self._prepared["run"]
+        return done
+
+
+def _masked(prepared: PreparedData, stops: tuple[int, ...]) -> PreparedData:
+    """Leave the measurements of some stops out."""
+    if not stops:
+        return prepared
+    out = np.isin(prepared.phases.stop, stops)
+    left = np.unique(prepared.phases.stop[(prepared.kind > 0) & ~out])
+    first = int(prepared.phases.stop[np.argmax(prepared.kind > 0)])
+    if first in stops or len(left) < 2:
+        raise DataError("held-out stops: keep the first stop, which gives the attitude, and at least one more")
+    return replace(prepared, kind=np.where(out, SKIP, prepared.kind).astype(np.int64))

@@ -1,0 +1,127 @@
+"""Fits by other methods than navigation: batch least squares, and the classical one against the table's angles.
+
+Their residuals are not innovations, so what a diagnosis asks of them is answered by a navigation about their
+coefficients: a pass of the estimator that `solve` would choose, which keeps the coefficients as they are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from sdimu_calibration.core.arrays import Floats, Ints
+from sdimu_calibration.core.effects.effect import Effect, Timetable
+from sdimu_calibration.core.estimation.fit import Fit, Start
+from sdimu_calibration.core.estimation.free_inertial import FreeInertialRun
+from sdimu_calibration.core.estimation.navigation_fit import NavigationFit
+from sdimu_calibration.core.evidence.consistency import Consistency
+from sdimu_calibration.core.evidence.linear import LinearEvidence
+from sdimu_calibration.core.evidence.navigation_evidence import NavigationEvidence
+from sdimu_calibration.core.recording import DataFault
+
+
+@dataclass(frozen=True)
+class ReferenceFit(Fit):
+    """A fit whose residuals are those of a navigation about its coefficients.
+
+    Attributes
+    ----------
+    frame : str
+    coefficients, coefficient_covariance : ndarray, shapes (p,) and (p, p)
+        SI, in `frame`.
+    summary : dict
+        ``log_likelihood``, ``nis_mean``, ``nis_dof``, ``passes`` of the least squares.
+    about : NavigationFit
+        About the coefficients of this fit.
+    """
+
+    frame: str
+    coefficients: Floats
+    coefficient_covariance: Floats
+    summary: dict[str, float | None]
+    about: NavigationFit
+
+    @property
+    def body_frame(self) -> str:
+        """Name of the frame of `values`."""
+        return self.frame
+
+    @property
+    def values(self) -> Floats:
+        """Coefficients (SI) in `body_frame`, shape (p,)."""
+        return self.coefficients
+
+    @property
+    def covariance(self) -> Floats:
+        """Covariance of `values`, shape (p, p)."""
+        return self.coefficient_covariance
+
+    @property
+    def converged(self) -> bool:
+        """True: a least squares that does not converge is refused."""
+        return True
+
+    @property
+    def start(self) -> Start:
+        """Where a navigation of nearly the same model begins."""
+        return self.about.start
+
+    def statistics(self) -> dict[str, float | None]:
+        """Chi-square of the least squares and its degrees of freedom."""
+        return dict(self.summary)
+
+    def held_out_rms(self) -> float | None:
+        """RMS of the normalised prediction errors at stops that a navigation has not seen."""
+        return self.about.held_out_rms()
+
+    def evidence(self, effects: Sequence[Effect] = ()) -> NavigationEvidence:
+        """Whitened innovations about the coefficients of this fit, and the signatures of parameters and `effects`."""
+        return self.about.evidence(effects)
+
+    def added_columns(self, count: int) -> Ints:
+        """Columns in `evidence` of the last `count` parameters of the model, shape (count,)."""
+        return self.about.added_columns(count)
+
+    def consistency(self, evidence: LinearEvidence | None = None) -> Consistency:
+        """Check the innovations of a navigation about the coefficients of this fit."""
+        return self.about.consistency(evidence)
+
+    @property
+    def timetable(self) -> Timetable:
+        """When the recording stood and turned."""
+        return self.about.timetable
+
+    @property
+    def faults(self) -> tuple[DataFault, ...]:
+        """What the preparation found wrong with the data."""
+        return self.about.faults
+
+    def data_counts(self) -> dict[str, float]:
+        """Entries of the data section of a result."""
+        return self.about.data_counts()
+
+    def notes(self) -> tuple[str, ...]:
+        """List the stops that were found."""
+        return super(type(self.about), self.about).notes()
+
+    def free_inertial(self, rivals: Sequence[tuple[str, Fit]]) -> tuple[FreeInertialRun, ...]:
+        """Navigate without aid on parts that no fit has seen; each is fitted again by navigation.
+
+        Raises
+        ------
+        DataError
+            When there is no such part.
+        """
+        return self.about.free_inertial(rivals)
+
+
+class BatchFit(ReferenceFit):
+    """One least squares over all dwells and turns."""
+
+    estimator = "batch"
+
+
+class ClassicalFit(ReferenceFit):
+    """Least squares of stops and turns against the table's angles."""
+
+    estimator = "classical"

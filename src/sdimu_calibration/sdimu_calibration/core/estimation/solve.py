@@ -1,0 +1,288 @@
+"""From a prepared test and a model to a fit. The estimator is chosen here and nowhere else.
+
+| estimator | chosen when |
+|---|---|
+| ``handheld`` | the gyros' white noise in the usual rest hides the Earth's rate: nothing can be navigated |
+| ``second-order`` | squares of errors count: by the priors of scale and misalignment, or by the drift of the attitude |
+| ``filter`` | otherwise |
+| ``batch``, ``classical`` | by request |
+
+The choice depends on the IMU file, the model and the length of the rests and of the test.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import cast
+
+from sdimu_calibration.core.alignment.alignment import Alignment
+from sdimu_calibration.core.alignment.coarse_alignment import StartPoint
+from sdimu_calibration.core.alignment.prepared import PreparedData, TestSetup, first_attitude, set_up
+from sdimu_calibration.core.arrays import Floats
+from sdimu_calibration.core.batch.batch import solve_batch
+from sdimu_calibration.core.batch.classical import TABLE_FRAME, solve_classical
+from sdimu_calibration.core.effects import body_frame, imu_model
+from sdimu_calibration.core.effects.accelerometer_frame import (
+    FRAME,
+    AccelerometerFrameModel,
+    accelerometer_frame_model,
+    drifting,
+    squares_count,
+)
+from sdimu_calibration.core.effects.effect import Effect
+from sdimu_calibration.core.effects.imu_model import ImuModel
+from sdimu_calibration.core.estimation.fit import Fit, Start
+from sdimu_calibration.core.estimation.handheld_fit import HandheldFit
+from sdimu_calibration.core.estimation.navigation_fit import FilterFit, NavigationFit, SecondOrderFit
+from sdimu_calibration.core.estimation.prepared_test import PreparedTest
+from sdimu_calibration.core.estimation.reference_fits import BatchFit, ClassicalFit
+from sdimu_calibration.core.filter.filter_pass import NAV
+from sdimu_calibration.core.filter.passes import MOST_WIDENINGS, Solution, one_pass, widen_contradicted_priors
+from sdimu_calibration.core.filter.passes import solve as solve_filter
+from sdimu_calibration.core.handheld.handheld import first_linearisation, fit_priors, hides_earth_rate
+from sdimu_calibration.core.handheld.handheld_fit import LinearisationPoint, fit_run
+from sdimu_calibration.core.progress import Progress, silent
+from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.second_order.second_order_passes import second_order_pass, solve_second_order
+from sdimu_calibration.core.specification import Model
+
+AUTO = "auto"
+
+
+def solve(
+    test: PreparedTest,
+    model: Model,
+    estimator: str = AUTO,
+    start: Start | None = None,
+    progress: Progress = silent,
+) -> Fit:
+    """Fit a model to a test.
+
+    Parameters
+    ----------
+    test : PreparedTest
+    model : Model
+        Effects to estimate, weights of the measurements, frame of the report.
+    estimator : str
+        One of `ESTIMATORS`, or ``auto``.
+    start : Start, optional
+        Where a fit of nearly the same model ended: the estimator goes on from there.
+    progress : callable
+        Called with a word and the fraction done.
+
+    Raises
+    ------
+    DataError
+        When the test, the model or the estimator cannot be used.
+    """
+    name = choose_estimator(test, model) if estimator == AUTO else estimator
+    if name not in ESTIMATORS:
+        raise DataError(f"estimator '{name}': expected one of {', '.join((AUTO, *ESTIMATORS))}")
+    return ESTIMATORS[name](test, model, start, progress)
+
+
+def choose_estimator(test: PreparedTest, model: Model) -> str:
+    """Choose between ``handheld``, ``second-order`` and ``filter``.
+
+    Raises
+    ------
+    DataError
+        When model and IMU do not fit together.
+    """
+    if hides_earth_rate(test.recording, test.imu):
+        return HandheldFit.estimator
+    setup = _setup(test, model)
+    if _second_order_model(setup, float(test.recording.t[-1])) is not None:
+        return SecondOrderFit.estimator
+    return FilterFit.estimator
+
+
+def extend(fit: Fit, effects: Sequence[Effect], warm: bool = False, progress: Progress = silent) -> Fit:
+    """Fit the same test with more effects in the model.
+
+    Parameters
+    ----------
+    fit : Fit
+    effects : sequence of Effect
+        They come behind those of the model.
+    warm : bool
+        Begin where `fit` ended; else as `solve` does, which gives the same digits from any history.
+    progress : callable
+
+    Raises
+    ------
+    DataError
+        When the extended model cannot be fitted.
+    """
+    model = with_effects(fit.model, effects)
+    return solve(fit.test, model, fit.estimator, fit.start if warm else None, progress)
+
+
+def with_effects(model: Model, effects: Sequence[Effect]) -> Model:
+    """Return the model with more effects.
+
+    A model names its effects; one that no registry knows stands for itself, as `imu_model.build` takes it.
+    """
+    return replace(model, effects=cast("tuple[str, ...]", (*model.effects, *effects)))
+
+
+def _setup(test: PreparedTest, model: Model) -> TestSetup:
+    if test.site is None:
+        raise DataError("no site: the navigation needs the latitude and height of the test; state --site")
+    return set_up(test.site, test.imu, model)
+
+
+def _second_order_model(setup: TestSetup, duration: float) -> AccelerometerFrameModel | None:
+    """Model in the accelerometers' frame where squares count and the model can turn; `duration` of the test (s)."""
+    turns = setup.model.body_frame == FRAME
+    if not (squares_count(setup.sensors) or (turns and drifting(setup.sensors, setup.imu, setup.gravity, duration))):
+        return None
+    return accelerometer_frame_model(setup.sensors, setup.imu)
+
+
+def _filter(test: PreparedTest, model: Model, start: Start | None, progress: Progress) -> Fit:
+    setup = _setup(test, model)
+    progress("reduce", 0.0)
+    prepared = test.data(setup)
+    solution = solve_filter(setup, prepared, _begin(start, setup.sensors), progress)
+    return FilterFit(test, model, setup.sensors, solution.setup, prepared, solution.alignment, solution)
+
+
+def _begin(start: Start | None, sensors: ImuModel) -> StartPoint | None:
+    if start is None:
+        return None
+    return StartPoint(start.C_nb.copy(), start.coefficients_of(sensors.names) * (sensors.decay_rate == 0.0))
+
+
+def _second_order(test: PreparedTest, model: Model, start: Start | None, progress: Progress) -> Fit:
+    setup = _setup(test, model)
+    frame_model = accelerometer_frame_model(setup.sensors, setup.imu)
+    if frame_model is None:
+        raise DataError(
+            "the second-order estimator needs all misalignments of the accelerometers in the model "
+            "(accel_misalignment): add the effect, or choose the estimator 'filter'"
+        )
+    progress("reduce", 0.0)
+    prepared = test.data(setup)
+    inner = replace(setup, sensors=frame_model.inner)
+    alignment = first_attitude(prepared.epochs, prepared.phases, inner)
+    begin = _begin(start, inner.sensors)
+    last, count, converged = solve_second_order(inner, prepared, alignment, begin, progress)
+    for _ in range(MOST_WIDENINGS):
+        wider = widen_contradicted_priors(inner.sensors, last.estimate, last.covariance)
+        if wider is inner.sensors:
+            break
+        inner = replace(inner, sensors=wider)
+        begin = StartPoint(last.smoothed_start, last.estimate)
+        last, more, converged = solve_second_order(inner, prepared, alignment, begin, progress)
+        count += more
+    return SecondOrderFit(
+        test, model, setup.sensors, inner, prepared, alignment, frame_model, last, count, converged
+    )
+
+
+def _handheld(test: PreparedTest, model: Model, start: Start | None, progress: Progress) -> Fit:
+    progress("rests", 0.1)
+    sensors = imu_model.build(model.effects, test.imu)
+    ready = test.run
+    priors = fit_priors(sensors, test.imu, test.site, ready.rests)
+    progress("least squares", 0.3)
+    if start is None:
+        point = first_linearisation(ready.run, sensors, priors.gravity)
+    else:
+        point = LinearisationPoint(
+            start.coefficients_of(sensors.names), start.C_nb, start.more[:3].copy(), start.more[3:].copy()
+        )
+    return HandheldFit(test, model, sensors, ready, priors, fit_run(ready.run, priors, point))
+
+
+@dataclass(frozen=True)
+class _Reduced:
+    """What both reference estimators begin with."""
+
+    setup: TestSetup
+    prepared: PreparedData
+    alignment: Alignment
+
+
+def _reduced(test: PreparedTest, model: Model, progress: Progress) -> _Reduced:
+    setup = _setup(test, model)
+    progress("reduce", 0.0)
+    prepared = test.data(setup)
+    return _Reduced(setup, prepared, first_attitude(prepared.epochs, prepared.phases, setup))
+
+
+def _batch(test: PreparedTest, model: Model, _start: Start | None, progress: Progress) -> Fit:
+    begun = _reduced(test, model, progress)
+    setup = begun.setup
+    frame_model = accelerometer_frame_model(setup.sensors, setup.imu) if squares_count(setup.sensors) else None
+    inner = setup if frame_model is None else replace(setup, sensors=frame_model.inner)
+    found = solve_batch(begun.prepared, inner, begun.alignment, progress)
+    if frame_model is None:
+        frame = model.body_frame
+        J = body_frame.jacobian_at(setup.sensors.names, found.coefficients, frame)
+        values = body_frame.values_in_frame(setup.sensors.names, found.coefficients, frame)
+        covariance = J @ found.covariance @ J.T
+    else:
+        frame, values = FRAME, frame_model.values(found.coefficients)
+        covariance = frame_model.covariance(found.covariance)
+    summary: dict[str, float | None] = {
+        "log_likelihood": found.log_evidence, "nis_mean": found.chi2 / max(found.dof, 1),
+        "nis_dof": float(found.dof), "passes": float(found.steps),
+    }  # fmt: skip
+    about = _navigation_about(
+        test, model, replace(begun, setup=inner), frame_model, found.C_nb[0], found.coefficients
+    )
+    return BatchFit(test, model, setup.sensors, frame, values, covariance, summary, about)
+
+
+def _classical(test: PreparedTest, model: Model, _start: Start | None, progress: Progress) -> Fit:
+    begun = _reduced(test, model, progress)
+    setup = begun.setup
+    progress("least squares", 0.2)
+    found = solve_classical(begun.prepared, setup, test.recording.table)
+    summary: dict[str, float | None] = {
+        "log_likelihood": -0.5 * found.chi2, "nis_mean": found.chi2 / max(found.dof, 1),
+        "nis_dof": float(found.dof), "passes": 1.0,
+    }  # fmt: skip
+    # The mount stands in the misalignments: turned into the accelerometers' frame they are those of the sensors.
+    turned = body_frame.values_in_frame(setup.sensors.names, found.values, FRAME)
+    about = _navigation_about(test, model, begun, None, begun.alignment.C_nb, turned)
+    return ClassicalFit(test, model, setup.sensors, TABLE_FRAME, found.values, found.covariance, summary, about)
+
+
+def _navigation_about(
+    test: PreparedTest, model: Model, begun: _Reduced, frame_model: AccelerometerFrameModel | None,
+    C_nb: Floats, coefficients: Floats,
+) -> NavigationFit:  # fmt: skip
+    """Navigate about coefficients that stay as they are; the attitude is the filter's own.
+
+    Raises
+    ------
+    DataError
+        When the filter diverges about them.
+    """
+    setup, prepared, alignment = begun.setup, begun.prepared, begun.alignment
+    if frame_model is not None:
+        at = second_order_pass(prepared, setup, alignment, C_nb, coefficients)
+        again = second_order_pass(prepared, setup, alignment, at.smoothed_start, coefficients)
+        again.state.x[NAV : NAV + len(coefficients)] = 0.0
+        return SecondOrderFit(
+            test, model, frame_model.asked, setup, prepared, alignment, frame_model, again, 2, stood_still=True
+        )
+    first = one_pass(prepared, setup, alignment, C_nb, coefficients, closed_loop=False)
+    last = one_pass(prepared, setup, alignment, first.smoothed_start, coefficients, closed_loop=False)
+    last.state.x[NAV : NAV + len(coefficients)] = 0.0
+    solution = Solution(setup, prepared, alignment, first, last, 2, converged=True)
+    return FilterFit(test, model, setup.sensors, setup, prepared, alignment, solution)
+
+
+ESTIMATORS: Mapping[str, Callable[[PreparedTest, Model, Start | None, Progress], Fit]] = {
+    FilterFit.estimator: _filter,
+    SecondOrderFit.estimator: _second_order,
+    HandheldFit.estimator: _handheld,
+    BatchFit.estimator: _batch,
+    ClassicalFit.estimator: _classical,
+}
+"""Every estimator by its name."""
