@@ -5,7 +5,6 @@ A file holds formulas by sensor, the parameters in which they are linear, and fi
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from importlib.metadata import entry_points
@@ -17,15 +16,20 @@ from pydantic import Field
 
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.diagnosis.candidates import USUAL_TURN, own_equation, without
+from sdimu_calibration.core.effect_key import EffectKey, parse_key
 from sdimu_calibration.core.effects import registry, selection
+from sdimu_calibration.core.effects.bias import ACCEL_BIAS, GYRO_BIAS
 from sdimu_calibration.core.effects.effect import CHANNELS, Effect, Parameter, Term
+from sdimu_calibration.core.effects.formula_variables import VALUES
 from sdimu_calibration.core.effects.motion import Motion
 from sdimu_calibration.core.expression import (
     TEMPERATURE_NAMES,
     VARIABLES,
     Expression,
     dimension_of,
+    equation_text,
     parse_expression,
+    reciprocal_unit,
     written,
 )
 from sdimu_calibration.core.recording import DataError
@@ -39,25 +43,39 @@ ENTRY_POINTS = "sdimu_calibration.effects"
 SUFFIXES = (".yaml", ".yml")
 _GRADES = ("navigation", "tactical", "mems")
 _SENSOR_UNIT = {"gyro": "rad/s", "accel": "m/s^2"}
-_JOINED = re.compile(r"(?<=[\w)])\s+(?=[A-Za-z(])")
-"""A blank between two factors stands for a product, as in the equations that a diagnosis proposes."""
 _NAME = r"^[A-Za-z][A-Za-z0-9_]*$"
 
 
-class _ParameterFile(Schema):
+class ParameterFile(Schema):
+    """A parameter of an effect of one's own: quantities with their units."""
+
     unit: str
     display_unit: str | None = None
     prior: str
 
 
-class _EffectFile(Schema):
+class EffectFile(Schema):
+    """An effect of one's own, format ``sdimu-effect/1``."""
+
     format: Literal["sdimu-effect/1"]
     name: str = Field(pattern=_NAME)
     title: str | None = None
     description: str = ""
     expressions: dict[Literal["gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z"], str] = Field(min_length=1)
-    parameters: dict[str, _ParameterFile] = Field(min_length=1)
+    parameters: dict[str, ParameterFile] = Field(min_length=1)
     constants: dict[str, str | float] = Field(default_factory=dict)
+
+
+def read_effect_file(path: Path) -> EffectFile:
+    """Read an effect of one's own and check it: names, units, linearity in its parameters.
+
+    Raises
+    ------
+    DataError
+        One line with file and sensor: what cannot be read, is not linear in the parameters, or has the wrong unit.
+    """
+    file, _ = _read(Path(path))
+    return file
 
 
 def load_effect(path: Path) -> tuple[Effect, ...]:
@@ -76,71 +94,88 @@ def load_effect(path: Path) -> tuple[Effect, ...]:
     Raises
     ------
     DataError
-        One line with file and sensor: what cannot be read, is not linear in the parameters, or has the wrong unit.
+        As `read_effect_file`.
     """
-    path = Path(path)
+    _, effects = _read(Path(path))
+    return effects
+
+
+def _read(path: Path) -> tuple[EffectFile, tuple[Effect, ...]]:
     if not path.is_file():
         raise DataError(f"{path}: no such effect file")
-    file = read_yaml(path, _EffectFile)
+    file = read_yaml(path, EffectFile)
     try:
-        return _effects(file)
+        return file, _effects(file)
     except (DataError, UnitError) as error:
         raise DataError(f"{path}: {error}") from error
 
 
 def find_effects(text: str) -> tuple[Effect, ...]:
-    """Find effects by a registered name, a coefficient, one with options, an equation, or the path of a YAML file.
+    """Find effects by a canonical key: a registered name, a coefficient, one with options, an equation, or a file.
 
     An equation is ``SENSOR: FORMULA``, as a diagnosis proposes it (``gyro_x: ey^2``) or in the names of an effect
-    file (``accel_z: ax * wty``); its one parameter is the factor before it.
+    file (``accel_z: ax * wty``); its one parameter is the factor before it. ``my.yaml`` gives all parameters of a file,
+    ``my.yaml:k`` one.
 
     Raises
     ------
     DataError
-        When there is none.
+        When there is none, or the key has a size.
     """
-    if Path(text).suffix in SUFFIXES:
-        return load_effect(Path(text))
-    if text.partition(":")[0].strip() in CHANNELS:
-        return (_equation(text),)
-    if ":" in text:
-        raise DataError(f"equation '{text}': no such sensor (expected {', '.join(CHANNELS)}, then ': FORMULA')")
+    key = parse_key(text)
+    selection.refuse_size(key)
+    if key.file:
+        return _of_file(*key.file)
+    if key.equation:
+        return (_equation(*key.equation),)
     register_plugins()
     return (selection.resolve(text),)
 
 
+def _of_file(path: str, parameter: str) -> tuple[Effect, ...]:
+    effects = load_effect(Path(path))
+    if not parameter:
+        return effects
+    chosen = tuple(e for e in effects if e.name == f"{e.family}_{parameter}")
+    if not chosen:
+        known = ", ".join(e.name.removeprefix(f"{e.family}_") for e in effects)
+        raise DataError(f"{path}: parameters.{parameter}: no such parameter (there are: {known})")
+    return chosen
+
+
 def effects_of_result(model: Sequence[str], named: Sequence[str]) -> tuple[Effect, ...]:
-    """Effects of a result (their names: `model`) that are in no catalogue: those `named`, and equations it states."""
+    """Effects of a result (their keys: `model`) that are in no catalogue: those `named`, and equations it states."""
     register_plugins()
-    equations = [text for text in model if text.partition(":")[0] in CHANNELS and text not in named]
+    equations = [text for text in model if parse_key(text).equation and text not in named]
     return tuple(effect for text in (*named, *equations) for effect in find_effects(text))
 
 
-def _equation(text: str) -> Effect:
+def _equation(sensor: str, formula: str) -> Effect:
     """Effect ``d(sensor) = k formula``; k as large as a bias may be where the formula comes to its usual size."""
-    sensor, _, formula = (part.strip() for part in text.partition(":"))
-    proposed = own_equation(f"{sensor}: {formula}")
+    text = str(EffectKey(f"{sensor}: {formula}"))
+    proposed = own_equation(text)
     if proposed:
         return proposed
-    shown = "deg/h" if sensor.startswith("gyro") else "ug"
+    bias = GYRO_BIAS if sensor.startswith("gyro") else ACCEL_BIAS
+    shown = bias.parameters[0].display_unit
     try:
-        written_out = _JOINED.sub("*", formula.replace("^", "**"))
-        about = parse_expression(written_out, frozenset(VARIABLES))
-        dimension = about.dimension({name: dimension_of(variable.unit) for name, variable in VARIABLES.items()})
-        below = "".join(
-            ("/" if p > 0 else "*") + n + ("" if abs(p) == 1 else f"^{abs(p)}") for n, p in sorted(dimension.items())
-        )
+        about = parse_expression(equation_text(formula), frozenset(VARIABLES))
+        dimension = about.dimension(_VARIABLE_UNITS)
+        below = reciprocal_unit(dimension)
         usual = USUAL_TURN ** max(0, -int(dimension.get("s", 0))) if "m" not in dimension else 1.0
-        prior = {grade: size / usual for grade, size in registry.get(f"{sensor[:-2]}_bias").prior.items()}
-        file = _EffectFile.model_validate({
+        file = EffectFile.model_validate({
             "format": FORMAT, "name": "equation", "expressions": {sensor: f"k * ({about.text})"},
             "parameters": {"k": {"unit": shown + below, "prior": f"1 {shown}{below}"}},
         })  # fmt: skip
         (effect,) = _effects(file)
     except (DataError, UnitError) as error:
         raise DataError(f"equation '{text}': {error}") from error
-    parameter = replace(effect.parameters[0], name=f"{sensor}: {formula}")
-    return replace(effect, name=parameter.name, family=parameter.name, parameters=(parameter,), prior=prior)
+    prior = {grade: size / usual for grade, size in bias.prior.items()}
+    parameter = replace(effect.parameters[0], name=text)
+    return replace(effect, name=text, family=text, parameters=(parameter,), prior=prior)
+
+
+_VARIABLE_UNITS = {name: dimension_of(variable.unit) for name, variable in VARIABLES.items()}
 
 
 def extended_model(name: str, added: Sequence[str]) -> Model:
@@ -170,7 +205,8 @@ def extended_model(name: str, added: Sequence[str]) -> Model:
 
 def _beside(folder: Path, text: str) -> str:
     """Path of an effect file that a model names, so that the two can be moved together; other names as they are."""
-    return str(folder / text) if Path(text).suffix in SUFFIXES and (folder / text).is_file() else text
+    file = parse_key(text).file
+    return str(folder / text) if file and (folder / file[0]).is_file() else text
 
 
 def _append(effects: list[Effect], effect: Effect) -> None:
@@ -213,9 +249,9 @@ def register_plugins() -> tuple[str, ...]:
 _LOADED: set[str] = set()
 
 
-def _effects(file: _EffectFile) -> tuple[Effect, ...]:
+def _effects(file: EffectFile) -> tuple[Effect, ...]:
     _check_names(file)
-    constants = {name: _constant(name, text) for name, text in file.constants.items()}
+    constants = constants_of(file)
     known = frozenset({*VARIABLES, *file.parameters, *constants})
     formulas: dict[str, Expression] = {}
     for sensor, text in file.expressions.items():
@@ -227,7 +263,7 @@ def _effects(file: _EffectFile) -> tuple[Effect, ...]:
 
 
 def _formula(
-    file: _EffectFile, sensor: str, text: str, known: frozenset[str], constants: Mapping[str, float]
+    file: EffectFile, sensor: str, text: str, known: frozenset[str], constants: Mapping[str, float]
 ) -> Expression:
     """Read one formula and hold it to its unit and to linearity."""
     try:
@@ -239,13 +275,18 @@ def _formula(
     return formula
 
 
-def _check_names(file: _EffectFile) -> None:
+def _check_names(file: EffectFile) -> None:
     if file.name in registry.names():
         raise DataError(f"name: '{file.name}' is a registered effect (choose another)")
     for group, names in (("parameters", file.parameters), ("constants", file.constants)):
         for name in names:
             if name in VARIABLES or (group == "constants" and name in file.parameters):
                 raise DataError(f"{group}.{name}: that name means something else (choose another)")
+
+
+def constants_of(file: EffectFile) -> dict[str, float]:
+    """Constants of an effect of one's own (SI)."""
+    return {name: _constant(name, text) for name, text in file.constants.items()}
 
 
 def _constant(name: str, text: str | float) -> float:
@@ -256,9 +297,8 @@ def _constant(name: str, text: str | float) -> float:
         raise DataError(f"constants.{name}: {error}") from error
 
 
-def _check_unit(sensor: str, formula: Expression, file: _EffectFile) -> None:
-    units = {name: dimension_of(variable.unit) for name, variable in VARIABLES.items()}
-    units |= {name: dimension_of(parameter.unit) for name, parameter in file.parameters.items()}
+def _check_unit(sensor: str, formula: Expression, file: EffectFile) -> None:
+    units = _VARIABLE_UNITS | {name: dimension_of(parameter.unit) for name, parameter in file.parameters.items()}
     units |= {name: dimension_of(str(text).strip().partition(" ")[2] or "1") for name, text in file.constants.items()}
     expected = _SENSOR_UNIT[sensor.partition("_")[0]]
     found = formula.dimension(units)
@@ -288,7 +328,7 @@ def _check_linear(formula: Expression, parameters: tuple[str, ...], constants: M
 
 
 def _one(
-    file: _EffectFile, name: str, formulas: Mapping[str, Expression], constants: Mapping[str, float]
+    file: EffectFile, name: str, formulas: Mapping[str, Expression], constants: Mapping[str, float]
 ) -> Effect:
     """Effect of one parameter: the formulas with it at one and the others at nought."""
     about = file.parameters[name]
@@ -323,7 +363,7 @@ def _regressors(formulas: Sequence[Expression], fixed: Mapping[str, float]) -> C
         n = len(motion.t)
         out = np.empty((n, len(formulas)))
         for k, formula in enumerate(formulas):
-            values: dict[str, Any] = {v: VARIABLES[v].value(motion) for v in formula.names if v in VARIABLES}
+            values: dict[str, Any] = {v: VALUES[v](motion) for v in formula.names if v in VALUES}
             out[:, k] = formula.evaluate({**values, **fixed})
         return out
 
