@@ -56,14 +56,8 @@ def test_a_seed_draws_the_same_test_twice_and_another_seed_another(kind: str) ->
 def test_the_simulator_reads_every_effect_with_the_size_that_the_score_will_look_for(kind: str) -> None:
     for one in _draws(kind):
         hidden = parse_effects(t.text for t in one.truths)
-        sizes = {t.name: t.parameters["k"] for t in hidden.terms if "k" in t.parameters}
         for truth in one.truths:
-            if truth.name in sizes:
-                # Ten digits are written.
-                assert sizes[truth.name] == pytest.approx(truth.value, rel=1e-8)
-            else:
-                delayed = max(hidden.delay_s) + sum(length for _, length in hidden.lost)
-                assert delayed == pytest.approx(truth.value, rel=1e-8)
+            assert hidden.sizes[truth.name] == pytest.approx(truth.value, rel=1e-12)
 
 
 SPANS = [("weak", 5, 5), ("strong", 8, 30), ("pair", 10, 30), ("outside", 15, 40)]

@@ -6,6 +6,7 @@
     gyro_x: ey^2                            an equation: the sensor, then the formula whose factor is the coefficient
     my.yaml, my.yaml:k                      an effect file, and one coefficient of it
     gyro_bias_warm_up_x(tau=300 s)=0.3 deg/h     with the size that a simulation gives it
+    gyro_x: wx*exp(-t/300.0)=1e-6 rad/s; name=my_k   an equation that is coefficient `my_k` of an effect file
 
 A key knows no physics: the estimator and the simulator read the same keys, each with formulas of its own.
 """
@@ -13,7 +14,7 @@ A key knows no physics: the estimator and the simulator read the same keys, each
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from sdimu_calibration.core.recording import DataError
@@ -46,7 +47,11 @@ class EffectKey:
 
     def __str__(self) -> str:
         """Write the key in its canonical spelling."""
-        return self.name + variant(self.options) + (f"={self.size}" if self.size else "")
+        size = f"={self.size}" if self.size else ""
+        if self.equation:
+            # Brackets belong to the formula.
+            return self.name + size + "".join(f"; {k}={v}" for k, v in self.options.items())
+        return self.name + variant(self.options) + size
 
     @property
     def equation(self) -> tuple[str, str] | None:
@@ -80,7 +85,7 @@ def parse_key(text: str) -> EffectKey:
     size, *older = (part.strip() for part in size.split(";"))
     sensor, colon, formula = (part.strip() for part in left.partition(":"))
     if colon and sensor in SENSORS:
-        return EffectKey(f"{sensor}: {formula}", {}, size)
+        return EffectKey(f"{sensor}: {formula}", _options(text, older), size)
     if _FILE.fullmatch(left):
         return EffectKey(left, {}, size)
     if colon:
@@ -92,11 +97,14 @@ def parse_key(text: str) -> EffectKey:
             "a simulation adds =SIZE)"
         )
     inside = form.group(2)
-    parts = [*(inside.split(",") if inside else []), *older]
-    pairs = [tuple(p.strip() for p in part.partition("=")[::2]) for part in parts]
-    if not all(key and value for key, value in pairs) or len(dict(pairs)) < len(pairs):
+    return EffectKey(form.group(1), _options(text, [*(inside.split(",") if inside else []), *older]), size)
+
+
+def _options(text: str, parts: Sequence[str]) -> dict[str, str]:
+    pairs = [(name.strip(), value.strip()) for name, _, value in (part.partition("=") for part in parts)]
+    if not all(name and value for name, value in pairs) or len(dict(pairs)) < len(pairs):
         raise DataError(f"effect '{text}': cannot read its options (expected option=value, each once)")
-    return EffectKey(form.group(1), dict(pairs), size)
+    return dict(pairs)
 
 
 def _split(text: str) -> tuple[str, str]:

@@ -9,10 +9,9 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from importlib.metadata import entry_points
 from pathlib import Path
-from typing import Any, Literal, cast
+from typing import Any, cast
 
 import numpy as np
-from pydantic import Field
 
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.diagnosis.candidates import USUAL_TURN, own_equation, without
@@ -26,56 +25,28 @@ from sdimu_calibration.core.expression import (
     TEMPERATURE_NAMES,
     VARIABLES,
     Expression,
-    dimension_of,
     equation_text,
     parse_expression,
     reciprocal_unit,
-    written,
 )
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.specification import Model
 from sdimu_calibration.core.units import UnitError, parse_quantity, parse_unit
-from sdimu_calibration.storage.config import Schema, find_config, load_model, read_yaml
+from sdimu_calibration.storage.config import find_config, load_model
+from sdimu_calibration.storage.effect_schema import (
+    FORMAT,
+    VARIABLE_UNITS,
+    EffectFile,
+    constants_of,
+    formulas_of,
+    read_effect_file,
+    si_unit,
+)
 
-FORMAT = "sdimu-effect/1"
 ENTRY_POINTS = "sdimu_calibration.effects"
 """Group of entry points that name callables without arguments, each returning an `Effect`."""
 SUFFIXES = (".yaml", ".yml")
 _GRADES = ("navigation", "tactical", "mems")
-_SENSOR_UNIT = {"gyro": "rad/s", "accel": "m/s^2"}
-_NAME = r"^[A-Za-z][A-Za-z0-9_]*$"
-
-
-class ParameterFile(Schema):
-    """A parameter of an effect of one's own: quantities with their units."""
-
-    unit: str
-    display_unit: str | None = None
-    prior: str
-
-
-class EffectFile(Schema):
-    """An effect of one's own, format ``sdimu-effect/1``."""
-
-    format: Literal["sdimu-effect/1"]
-    name: str = Field(pattern=_NAME)
-    title: str | None = None
-    description: str = ""
-    expressions: dict[Literal["gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z"], str] = Field(min_length=1)
-    parameters: dict[str, ParameterFile] = Field(min_length=1)
-    constants: dict[str, str | float] = Field(default_factory=dict)
-
-
-def read_effect_file(path: Path) -> EffectFile:
-    """Read an effect of one's own and check it: names, units, linearity in its parameters.
-
-    Raises
-    ------
-    DataError
-        One line with file and sensor: what cannot be read, is not linear in the parameters, or has the wrong unit.
-    """
-    file, _ = _read(Path(path))
-    return file
 
 
 def load_effect(path: Path) -> tuple[Effect, ...]:
@@ -94,18 +65,13 @@ def load_effect(path: Path) -> tuple[Effect, ...]:
     Raises
     ------
     DataError
-        As `read_effect_file`.
+        One line with file and sensor: what cannot be read, is not linear in the parameters, or has the wrong unit.
     """
-    _, effects = _read(Path(path))
-    return effects
-
-
-def _read(path: Path) -> tuple[EffectFile, tuple[Effect, ...]]:
-    if not path.is_file():
-        raise DataError(f"{path}: no such effect file")
-    file = read_yaml(path, EffectFile)
+    file = read_effect_file(path)
+    if file.name in registry.names():
+        raise DataError(f"{path}: name: '{file.name}' is a registered effect (choose another)")
     try:
-        return file, _effects(file)
+        return _effects(file)
     except (DataError, UnitError) as error:
         raise DataError(f"{path}: {error}") from error
 
@@ -160,7 +126,7 @@ def _equation(sensor: str, formula: str) -> Effect:
     shown = bias.parameters[0].display_unit
     try:
         about = parse_expression(equation_text(formula), frozenset(VARIABLES))
-        dimension = about.dimension(_VARIABLE_UNITS)
+        dimension = about.dimension(VARIABLE_UNITS)
         below = reciprocal_unit(dimension)
         usual = USUAL_TURN ** max(0, -int(dimension.get("s", 0))) if "m" not in dimension else 1.0
         file = EffectFile.model_validate({
@@ -173,9 +139,6 @@ def _equation(sensor: str, formula: str) -> Effect:
     prior = {grade: size / usual for grade, size in bias.prior.items()}
     parameter = replace(effect.parameters[0], name=text)
     return replace(effect, name=text, family=text, parameters=(parameter,), prior=prior)
-
-
-_VARIABLE_UNITS = {name: dimension_of(variable.unit) for name, variable in VARIABLES.items()}
 
 
 def extended_model(name: str, added: Sequence[str]) -> Model:
@@ -250,81 +213,8 @@ _LOADED: set[str] = set()
 
 
 def _effects(file: EffectFile) -> tuple[Effect, ...]:
-    _check_names(file)
-    constants = constants_of(file)
-    known = frozenset({*VARIABLES, *file.parameters, *constants})
-    formulas: dict[str, Expression] = {}
-    for sensor, text in file.expressions.items():
-        formulas[sensor] = _formula(file, sensor, text, known, constants)
-    for name in file.parameters:
-        if not any(name in formula.names for formula in formulas.values()):
-            raise DataError(f"parameters.{name}: no expression has it")
+    constants, formulas = constants_of(file), formulas_of(file)
     return tuple(_one(file, name, formulas, constants) for name in file.parameters)
-
-
-def _formula(
-    file: EffectFile, sensor: str, text: str, known: frozenset[str], constants: Mapping[str, float]
-) -> Expression:
-    """Read one formula and hold it to its unit and to linearity."""
-    try:
-        formula = parse_expression(text, known)
-        _check_unit(sensor, formula, file)
-        _check_linear(formula, tuple(file.parameters), constants)
-    except DataError as error:
-        raise DataError(f"expressions.{sensor}: {error}") from error
-    return formula
-
-
-def _check_names(file: EffectFile) -> None:
-    if file.name in registry.names():
-        raise DataError(f"name: '{file.name}' is a registered effect (choose another)")
-    for group, names in (("parameters", file.parameters), ("constants", file.constants)):
-        for name in names:
-            if name in VARIABLES or (group == "constants" and name in file.parameters):
-                raise DataError(f"{group}.{name}: that name means something else (choose another)")
-
-
-def constants_of(file: EffectFile) -> dict[str, float]:
-    """Constants of an effect of one's own (SI)."""
-    return {name: _constant(name, text) for name, text in file.constants.items()}
-
-
-def _constant(name: str, text: str | float) -> float:
-    unit = str(text).strip().partition(" ")[2] or "1"
-    try:
-        return parse_quantity(str(text), unit)
-    except UnitError as error:
-        raise DataError(f"constants.{name}: {error}") from error
-
-
-def _check_unit(sensor: str, formula: Expression, file: EffectFile) -> None:
-    units = _VARIABLE_UNITS | {name: dimension_of(parameter.unit) for name, parameter in file.parameters.items()}
-    units |= {name: dimension_of(str(text).strip().partition(" ")[2] or "1") for name, text in file.constants.items()}
-    expected = _SENSOR_UNIT[sensor.partition("_")[0]]
-    found = formula.dimension(units)
-    if found != dimension_of(expected):
-        # An angle counts as a number, so rad/s is 1/s here.
-        raise DataError(f"'{formula.text}' comes to {written(found)}, but an error of {sensor} is in {expected}")
-
-
-def _check_linear(formula: Expression, parameters: tuple[str, ...], constants: Mapping[str, float]) -> None:
-    """Superposition at random values: f(a + b) = f(a) + f(b), f(3 a) = 3 f(a), so f(0) = 0."""
-    rng = np.random.default_rng(7)
-    at = {name: rng.uniform(0.5, 1.5, 16) for name in VARIABLES} | dict(constants)
-    # Of both signs, or |k| would pass.
-    a, b = ({name: sign * rng.uniform(0.5, 1.5) for name in parameters} for sign in (1.0, -1.0))
-
-    def value(k: Mapping[str, float]) -> Floats:
-        return np.asarray(formula.evaluate({**at, **k})) * np.ones(16)
-
-    both = value({name: a[name] + b[name] for name in parameters})
-    thrice = value({name: 3.0 * a[name] for name in parameters})
-    fa, fb = value(a), value(b)
-    size = 1e-9 * (np.abs(fa) + np.abs(fb))
-    if not np.isfinite(both).all():
-        raise DataError(f"'{formula.text}' is not finite at ordinary values of its variables")
-    if np.any(np.abs(both - fa - fb) > size) or np.any(np.abs(thrice - 3.0 * fa) > 3.0 * size):
-        raise DataError(f"'{formula.text}' is not linear in {', '.join(parameters)} (fix what is not as a constant)")
 
 
 def _one(
@@ -368,17 +258,3 @@ def _regressors(formulas: Sequence[Expression], fixed: Mapping[str, float]) -> C
         return out
 
     return columns
-
-
-def si_unit(unit: str) -> str:
-    """Write the SI unit of the kind of `unit`, as it stands in files."""
-    parts = parse_unit(unit).dimension
-
-    def power(name: str, n: Any) -> str:
-        if n == 1:
-            return name
-        return f"sqrt({name})" if 2 * n == 1 else f"{name}^{n}"
-
-    above = [power(name, n) for name, n in parts if n > 0]
-    below = [power(name, -n) for name, n in parts if n < 0]
-    return "/".join(["*".join(above) or "1", *below])
