@@ -16,8 +16,9 @@ from sdimu_sim.campaign.hidden_draw import KINDS, TESTABLE, Draw, Truth, draw, h
 from sdimu_sim.campaign.hidden_outside import OUTSIDE, shapes
 from sdimu_sim.campaign.hidden_run import with_fault
 from sdimu_sim.campaign.hidden_sizes import LATITUDES_DEG, PLANS, Sizes, between
+from sdimu_sim.core.equation import CONSTANTS
 from sdimu_sim.core.expression import parse_expression
-from sdimu_sim.core.hidden import CONSTANTS, VARIABLES, parse_effects
+from sdimu_sim.core.hidden import VARIABLES, parse_effects
 
 STOPS = tuple((k, 150.0 * k, 150.0 * k + 100.0) for k in range(8))
 TURNS = tuple((k, 150.0 * k + 100.0, 150.0 * k + 150.0) for k in range(7))

@@ -9,8 +9,8 @@ from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.units import STANDARD_GRAVITY as G
 from sdimu_calibration.core.units import to_si
 from sdimu_sim.core import hidden as hidden_module
+from sdimu_sim.core.equation import CONSTANTS
 from sdimu_sim.core.hidden import (
-    CONSTANTS,
     SENSORS,
     VARIABLES,
     Row,

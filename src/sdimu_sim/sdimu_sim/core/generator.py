@@ -11,7 +11,8 @@ from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.rotation import rotation_matrix
 from sdimu_calibration.core.specification import Site
-from sdimu_sim.core.hidden import CONSTANTS, DIRECTIONS, LOST_AFTER_S, parse_effects
+from sdimu_sim.core.equation import CONSTANTS
+from sdimu_sim.core.hidden import DIRECTIONS, LOST_AFTER_S, parse_effects
 from sdimu_sim.core.imu import Electronics, response
 from sdimu_sim.core.platform import PlatformMotion, mean_motion
 from sdimu_sim.core.samples import SampleClock, TrueSamples, Variables, in_body, rotated

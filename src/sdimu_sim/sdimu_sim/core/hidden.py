@@ -13,21 +13,15 @@ from __future__ import annotations
 
 import difflib
 import itertools
-import math
-import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from fractions import Fraction
 from importlib.metadata import entry_points
 from typing import NamedTuple
 
 from sdimu_calibration.core.effect_key import SENSORS, EffectKey, parse_key, read_options, read_quantity
-from sdimu_calibration.core.expression import VARIABLES as EQUATION_VARIABLES
-from sdimu_calibration.core.expression import dimension_of, equation_text, reciprocal_unit
-from sdimu_calibration.core.expression import parse_expression as parse_with_units
 from sdimu_calibration.core.recording import DataError
-from sdimu_calibration.core.units import STANDARD_GRAVITY, UnitError, parse_unit
-from sdimu_sim.core.expression import Expression, parse_expression, with_values
+from sdimu_sim.core.equation import CONSTANTS, read_equation
+from sdimu_sim.core.expression import Expression, parse_expression
 from sdimu_sim.core.truth import COEFFICIENT_UNITS
 
 _XYZ = "xyz"
@@ -49,17 +43,6 @@ t (s), temperature T (deg C), its change since the start dT (K) and rate dTdt (K
 time since the last turn ended (since; s, 0 in turns, very long before the first)."""
 DIRECTIONS = frozenset(f"{v}{i}" for v in "ne" for i in _XYZ)
 """Variables that cost the generator a pass of their own."""
-
-CONSTANTS: dict[str, float] = {
-    "g": STANDARD_GRAVITY,
-    "ug": 1e-6 * STANDARD_GRAVITY,
-    "mg": 1e-3 * STANDARD_GRAVITY,
-    "deg": math.pi / 180.0,
-    "s": 1.0,
-    "h": 3600.0,
-    "ppm": 1e-6,
-    "pi": math.pi,
-}
 
 TEMPERATURE_NAMES = frozenset({"T", "dT", "dTdt"})
 
@@ -162,8 +145,8 @@ _TABLE: dict[str, tuple[str, Row]] = {name: entry for row in _ROWS for name, ent
 _DELAYS: dict[str, tuple[str, ...]] = {
     **{f"{triad}_delay": tuple(s for s in SENSORS if s.startswith(triad)) for triad in ("gyro", "accel")},
     **{f"{sensor[:-2]}_delay_{sensor[-1]}": (sensor,) for sensor in SENSORS},
+    "accel_triad_delay": SENSORS[3:],
 }
-_TRIAD_DELAY = {"accel_triad_delay": _DELAYS["accel_delay"]}
 _LOST = "gyro_lost_data"
 LOST_AFTER_S = 3.0
 """Data of a turn are lost from this long after its start where the key does not say at what time."""
@@ -296,7 +279,7 @@ def load_plugins(name: str) -> bool:
 
 
 _UNITS: dict[str, str] = {
-    **dict.fromkeys((*_DELAYS, *_TRIAD_DELAY, _LOST), "ms"),
+    **dict.fromkeys((*_DELAYS, _LOST), "ms"),
     **dict.fromkeys(_LEVER_ARM, "mm"),
     **{name: unit for name, (_, unit) in _SITE.items()},
     **COEFFICIENT_UNITS,
@@ -311,7 +294,8 @@ def effect_names() -> tuple[str, ...]:
 
 def drawn_names() -> tuple[str, ...]:
     """Names that the campaign on hidden effects may draw."""
-    return (*sorted(n for n, (_, row) in _TABLE.items() if row.drawn), *sorted(_DELAYS), _LOST)
+    delays = (name for name in _DELAYS if "triad" not in name)
+    return (*sorted(name for name, (_, row) in _TABLE.items() if row.drawn), *sorted(delays), _LOST)
 
 
 def size_unit(name: str) -> str:
@@ -321,7 +305,7 @@ def size_unit(name: str) -> str:
 
 def one_sided(name: str) -> bool:
     """Whether the size of an effect cannot be negative: a sensor delays and loses, it does not foresee."""
-    return name in _DELAYS or name in _TRIAD_DELAY or name == _LOST or name.startswith("gyro_dead_band_")
+    return name in _DELAYS or name == _LOST or name.startswith("gyro_dead_band_")
 
 
 def effect_example(name: str) -> str:
@@ -350,13 +334,7 @@ def parse_effects(texts: Iterable[str]) -> Hidden:
     DataError
         Names the effect and says what was expected.
     """
-    terms: list[Term] = []
-    delay = dict.fromkeys(SENSORS, 0.0)
-    lost: list[Lost] = []
-    site = SiteError()
-    lever_arm: dict[int, float] = {}
-    coefficients: dict[str, float] = {}
-    sizes: dict[str, float] = {}
+    found = _Found()
     for text in texts:
         key = parse_key(text)
         if not key.size:
@@ -364,38 +342,57 @@ def parse_effects(texts: Iterable[str]) -> Hidden:
             raise DataError(f"effect '{text}' has no size (expected something like '{example}')")
         if key.name in SENSORS:
             formula = parse_expression(key.size, (*VARIABLES, *CONSTANTS))
-            terms.append(Term(key.name, SENSORS.index(key.name), formula, {}))
-            continue
-        if key.equation:
-            terms.append(_own_term(key, *key.equation))
-            sizes[terms[-1].name] = terms[-1].parameters["k"]
-            continue
-        if key.name not in effect_names() and not load_plugins(key.name):
-            raise DataError(f"unknown effect '{key.name}'{_suggestion(key.name)}")
-        size = read_quantity(f"effect {key.name}", key.size, size_unit(key.name))
-        if key.name in _TABLE:
-            terms.append(_named_term(key, size))
-        elif key.name == _LOST:
-            lost.append(_lost(key, size))
+            found.terms.append(Term(key.name, SENSORS.index(key.name), formula, {}))
+        elif key.equation:
+            name, formula, size = read_equation(key, *key.equation)
+            found.terms.append(Term(name, SENSORS.index(key.equation[0]), formula, {"k": size}))
+            found.sizes[name] = size
         else:
-            read_options(key, {})
-        if key.name in _DELAYS or key.name in _TRIAD_DELAY:
-            if size < 0.0:
-                raise DataError(f"effect {key.name}: a delay is not negative (delay the other triad instead)")
-            for sensor in (_DELAYS | _TRIAD_DELAY)[key.name]:
-                delay[sensor] += size
-        elif key.name in _LEVER_ARM:
-            lever_arm[_LEVER_ARM[key.name]] = size
-        elif key.name in _SITE:
-            site = site._replace(**{_SITE[key.name][0]: size})
-        elif key.name in COEFFICIENT_UNITS:
-            coefficients[key.name] = size
-            continue
-        # A second variant of one effect is estimated under its key.
-        sizes[str(EffectKey(key.name, key.options)) if key.name in sizes else key.name] = size
+            _take_named(key, found)
+    delay = tuple(found.delay[s] for s in SENSORS)
     return Hidden(
-        tuple(terms), tuple(delay[s] for s in SENSORS), tuple(lost), site, lever_arm, coefficients, sizes
+        tuple(found.terms), delay, tuple(found.lost), found.site, found.lever_arm, found.coefficients, found.sizes
     )
+
+
+@dataclass
+class _Found:
+    """What has been read so far: the fields of `Hidden`."""
+
+    terms: list[Term] = field(default_factory=list)
+    delay: dict[str, float] = field(default_factory=lambda: dict.fromkeys(SENSORS, 0.0))
+    lost: list[Lost] = field(default_factory=list)
+    site: SiteError = field(default_factory=SiteError)
+    lever_arm: dict[int, float] = field(default_factory=dict)
+    coefficients: dict[str, float] = field(default_factory=dict)
+    sizes: dict[str, float] = field(default_factory=dict)
+
+
+def _take_named(key: EffectKey, found: _Found) -> None:
+    name = key.name
+    if name not in effect_names() and not load_plugins(name):
+        raise DataError(f"unknown effect '{name}'{_suggestion(name)}")
+    size = read_quantity(f"effect {name}", key.size, size_unit(name))
+    if name in _TABLE:
+        found.terms.append(_named_term(key, size))
+    elif name == _LOST:
+        found.lost.append(_lost(key, size))
+    else:
+        read_options(key, {})
+    if name in _DELAYS:
+        if size < 0.0:
+            raise DataError(f"effect {name}: a delay is not negative (delay the other triad instead)")
+        for sensor in _DELAYS[name]:
+            found.delay[sensor] += size
+    elif name in _LEVER_ARM:
+        found.lever_arm[_LEVER_ARM[name]] = size
+    elif name in _SITE:
+        found.site = found.site._replace(**{_SITE[name][0]: size})
+    if name in COEFFICIENT_UNITS:
+        found.coefficients[name] = size
+    else:
+        # A second variant of one effect is estimated under its key.
+        found.sizes[str(EffectKey(name, key.options)) if name in found.sizes else name] = size
 
 
 def _named_term(key: EffectKey, size: float) -> Term:
@@ -415,45 +412,6 @@ def _lost(key: EffectKey, size: float) -> Lost:
     if options["turn"] < 1 or options["turn"] % 1 or size <= 0.0:
         raise DataError(f"effect {key.name}: expected something like '{effect_example(key.name)}' (turns count from 1)")
     return Lost(int(options["turn"]), size, options.get("at"))
-
-
-_IN_EQUATIONS = {"T": "dT"}
-"""Names that mean something else in an equation of the calibrator: its temperature counts from the start."""
-
-
-def _own_term(key: EffectKey, sensor: str, formula: str) -> Term:
-    """Term of an equation in the calibrator's names, on true motion; `name` says the coefficient of an effect file."""
-    text = equation_text(_QUANTITY.sub(r"(\1*\2)", formula))
-    known = frozenset({*EQUATION_VARIABLES, *CONSTANTS})
-    expression = with_values(parse_expression(f"k*({text})", (*known, "k")), _IN_EQUATIONS)
-    if "name" in key.options:
-        number, _, unit = key.size.partition(" ")
-        size = float(number) * parse_unit(unit).factor
-        return Term(key.options["name"], SENSORS.index(sensor), expression, {"k": size})
-    try:
-        units = {n: dimension_of(v.unit) for n, v in EQUATION_VARIABLES.items()} | _CONSTANT_DIMENSIONS
-        below = reciprocal_unit(parse_with_units(text, known).dimension(units))
-        expected, given = ("deg/h" if sensor.startswith("gyro") else "ug") + below, key.size.lstrip("+-.0123456789eE ")
-        fits = given and _without_angle(given) == _without_angle(expected)
-        size = read_quantity(f"effect '{key.name}'", key.size, given if fits else expected)
-    except UnitError as error:
-        raise DataError(f"effect '{key.name}': {error}") from error
-    return Term(key.name, SENSORS.index(sensor), expression, {"k": size})
-
-
-_QUANTITY = re.compile(r"(\d[\d.]*) (s|deg)\b")
-"""A period or a phase in an equation that a diagnosis proposes."""
-
-
-def _without_angle(unit: str) -> dict[str, Fraction]:
-    """Dimension of a unit; per rad/s and per 1/s are alike, as in the calibrator's check of formulas."""
-    return {name: power for name, power in parse_unit(unit).dimension if name != "rad"}
-
-
-_CONSTANT_DIMENSIONS = {
-    name: dimension_of({"s": "s", "h": "s", "g": "m/s^2", "ug": "m/s^2", "mg": "m/s^2"}.get(name, "1"))
-    for name in CONSTANTS
-}
 
 
 def _suggestion(name: str) -> str:
