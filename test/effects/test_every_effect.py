@@ -24,9 +24,11 @@ from sdimu_calibration.core.plan import Plan, Turn
 from sdimu_calibration.core.rotation import rotation_vector
 from sdimu_calibration.core.specification import ImuSpecification, Model, Site
 from sdimu_calibration.core.units import parse_unit, to_si
+from sdimu_calibration.storage.effect_file import find_effects
 from sdimu_sim.core.hidden import effect_names, parse_effects
 from sdimu_sim.core.scenario import Scenario, generate
 from sdimu_sim.core.temperature import TemperatureProfile
+from sdimu_sim.own_effects import simulated_effects
 
 GRADES = ("navigation", "tactical", "mems")
 EFFECTS = registry.names()
@@ -183,7 +185,11 @@ def test_regressors_are_the_derivative_of_the_simulated_sensor(name, perfect):
     sizes = rng.uniform(0.5, 1.5, len(effect.parameters)) * effect.prior["navigation"]
     if name not in NOT_NEGATIVE:
         sizes *= rng.choice([-1.0, 1.0], len(effect.parameters))
-    recording = with_errors(effect, sizes)
+    compare(perfect, effect, sizes, with_errors(effect, sizes), NOT_OF_THE_MEAN.get(name, 2e-3))
+
+
+def compare(perfect, effect, sizes, recording, allowed):
+    """Hold the errors that the regressors predict to those of a simulated recording, cycle by cycle."""
     np.testing.assert_array_equal(recording.t, perfect.recording.t)
     dt = np.diff(recording.t, prepend=0.0)[:, None]
     cycles = perfect.prepared.cycles
@@ -201,13 +207,49 @@ def test_regressors_are_the_derivative_of_the_simulated_sensor(name, perfect):
     )
     found, setup = passed(perfect, effect)
     predicted = setup.sensors.errors(found.data.values, sizes)
-    allowed = NOT_OF_THE_MEAN.get(name, 2e-3)
     for channel in sorted({t.channel for t in effect.terms}):
         size = np.linalg.norm(measured[:, channel])
         assert size > 0.0, channel
         assert np.linalg.norm(predicted[:, channel] - measured[:, channel]) < allowed * size, channel
     silent = sorted(set(range(6)) - {t.channel for t in effect.terms})
     assert np.abs(measured[:, silent]).max(initial=0.0) <= 1e-3 * np.abs(measured).max()
+
+
+OWN = """\
+format: sdimu-effect/1
+name: cross_talk
+expressions:
+  gyro_x: k * ax * ey * exp(-t / tau) + 3 * q * wx
+  accel_z: b * T * (nx + dz)
+  gyro_y: -2 * k * ay * tanh(fz / f0) * dx
+parameters:
+  k: {unit: deg/h/g, prior: 1 deg/h/g}
+  b: {unit: ug/K, prior: 20 ug/K}
+  q: {unit: ppm, prior: 50 ppm}
+constants: {tau: 60 s, f0: 3 m/s^2}
+"""
+
+
+@pytest.mark.parametrize("parameter", ["k", "b", "q"])
+def test_an_effect_file_is_simulated_as_it_is_estimated(parameter, perfect, tmp_path):
+    (tmp_path / "own.yaml").write_text(OWN)
+    (effect,) = find_effects(f"{tmp_path}/own.yaml:{parameter}")
+    size = effect.prior["navigation"]
+    effects = simulated_effects([sized(f"{tmp_path}/own.yaml:{parameter}", size, effect.parameters[0].display_unit)])
+    assert dict(parse_effects(effects).sizes) == {f"cross_talk_{parameter}": pytest.approx(size)}
+    assert str(tmp_path) not in "".join(effects)
+    compare(perfect, effect, np.array([size]), simulated(effects=effects), 4e-3)
+
+
+@pytest.mark.parametrize(
+    "label",
+    ["gyro_x: ey^2", "accel_y: ax wtz", "gyro_z: T", "accel_x: ax^2 ay", "gyro_y: sin(2 pi t / 31 s + 40 deg)"],
+)
+def test_an_equation_is_simulated_by_the_label_by_which_it_is_added(label, perfect):
+    (effect,) = find_effects(label)
+    size = effect.prior["navigation"]
+    recording = simulated(effects=(sized(effect.key, size, effect.parameters[0].display_unit),))
+    compare(perfect, effect, np.array([size]), recording, 0.02)
 
 
 def test_data_lost_in_a_turn_take_the_angle_of_that_turn_that_the_simulator_loses(perfect):
