@@ -33,7 +33,8 @@ def motions(n=400, seed=2):
 
 def measured(result, omega, force):
     """What the simulated sensor (written apart from the estimator) shows of its own coefficients."""
-    true = TrueSamples(omega.T, force.T, omega.T, 0 * omega.T, 0 * omega.T, force.T / -9.8, np.zeros((3, 3, len(omega))))
+    none = 0 * omega.T
+    true = TrueSamples(omega.T, force.T, omega.T, none, none, force.T / -9.8, np.zeros((3, 3, len(omega))))
     truth = ImuTruth(coefficients=dict(zip(result.names, result.values, strict=True)))
     out = response(truth, true).T
     return out[:, :3], out[:, 3:]
