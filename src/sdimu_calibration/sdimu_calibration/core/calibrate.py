@@ -107,7 +107,7 @@ def assemble(recording: Recording, solution: Solution, held_out: bool) -> Calibr
     told = (*recording.notes, *stops_line(recording, prepared), *([heading] if heading else []))
     return Calibration(
         body_frame=frame,
-        model=tuple(e.name if e.name.endswith(e.variant) else e.name + e.variant for e in setup.sensors.effects),
+        model=tuple(e.key for e in setup.sensors.effects),
         names=names,
         units=tuple(p.unit for p in setup.sensors.parameters),
         display_units=tuple(p.display_unit for p in setup.sensors.parameters),

@@ -155,7 +155,7 @@ def _test(plan: str, model: str, duration: float) -> Outline:
 
     effects = [selection.resolve(e) if isinstance(e, str) else e for e in extended_model(model, ()).effects]
     units = {q.name: q.display_unit for effect in effects for q in effect.parameters}
-    return Outline(duration, len(load_plan(plan).dwell_s), [effect.name for effect in effects], units)
+    return Outline(duration, len(load_plan(plan).dwell_s), [effect.key for effect in effects], units)
 
 
 def _report(console: Console, out: Path, site: str, imu: str, model: str, plan: str) -> Calibration:

@@ -133,7 +133,7 @@ def batch_calibrate(
         frame, values, covariance = FRAME, turned.values(found.coefficients), turned.covariance(found.covariance)
     return Calibration(
         body_frame=frame,
-        model=tuple(e.name for e in setup.sensors.effects),
+        model=tuple(e.key for e in setup.sensors.effects),
         names=names,
         units=tuple(p.unit for p in setup.sensors.parameters),
         display_units=tuple(p.display_unit for p in setup.sensors.parameters),

@@ -83,7 +83,7 @@ def classical_calibrate(
         values, covariance = body_frame.values_in_frame(names, values, frame), J @ covariance @ J.T
     return Calibration(
         body_frame=frame,
-        model=tuple(e.name for e in setup.sensors.effects),
+        model=tuple(e.key for e in setup.sensors.effects),
         names=names,
         units=tuple(p.unit for p in setup.sensors.parameters),
         display_units=tuple(p.display_unit for p in setup.sensors.parameters),

@@ -186,8 +186,8 @@ def patched(look: Round) -> bool:
     Steps and transients in a row can follow any drift, and say nothing of its cause.
     """
     steps = look.found.steps
-    drifts = {(c.family, c.label if not c.family.endswith("random_walk") else "", _sensor(c)) for c in look.chosen}
-    of_sensor = [sensor for family, _, sensor in drifts if family.endswith(_DRIFTS)]
+    drifts = {(c.family, c.effect.variant, _sensor(c)) for c in look.chosen if c.effect.bias_drift}
+    of_sensor = [sensor for _, _, sensor in drifts]
     many = any(of_sensor.count(sensor) >= _PATCHES for sensor in of_sensor)
     return many or (len(steps) == MOST_STEPS and steps[-1].accepted)
 
@@ -196,7 +196,6 @@ def _sensor(candidate: Candidate) -> int:
     return candidate.effect.terms[0].channel
 
 
-_DRIFTS = ("bias_ramp", "bias_step", "bias_warm_up", "bias_random_walk")
 _PATCHES = 3
 
 
@@ -257,7 +256,7 @@ def _verdict(
             return "own equation"
         if len(look.chosen) > 1:
             return "several effects"
-        if look.chosen[0].effect.run_local:
+        if look.chosen[0].effect.scope == "recording":
             return "data fault"
         return "class of effects" if _alike(look.found, look.chosen[0].label) else "one effect"
     if noise:

@@ -29,8 +29,6 @@ from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.specification import ImuSpecification, Model, Site
 
 MOST_EFFECTS = 6
-_NOT_BY_HAND = ("reference", "gyro_lost_data", "gyro_delay", "accel_delay")
-"""There is no reference but gravity; a turn by hand may miss anyhow, by a sigma that is learned."""
 
 
 @dataclass(frozen=True)
@@ -278,7 +276,7 @@ def candidates(
     known = [*extra, *catalogue(times, in_model, has_temperature), *more]
     return [
         effect for effect in known
-        if not (effect.family or effect.name).startswith(_NOT_BY_HAND)
+        if not effect.needs_table
         and not effect.random_walk and effect.decay_s is None and not in_model & set(effect.labels)
     ]  # fmt: skip
 

@@ -14,6 +14,7 @@ from sdimu_calibration.core.diagnosis.handheld_diagnosis import HandheldDiagnosi
 from sdimu_calibration.core.diagnosis.handheld_evidence import CHANNELS, HandheldEvidence, standardised
 from sdimu_calibration.core.diagnosis.scan import POWER_80, Scan, alike
 from sdimu_calibration.core.diagnosis.search import Problem
+from sdimu_calibration.core.effects.effect import Excitation
 from sdimu_calibration.core.handheld.handheld_fit import FORCE, RATE, TURN
 from sdimu_calibration.core.units import from_si
 
@@ -188,7 +189,7 @@ def _advice(d: HandheldDiagnosis, found: tuple[Found, ...]) -> tuple[str, ...]:
 
 def _more(one: Found) -> str:
     """Say what to do by hand that would tell a class apart."""
-    if "(" in one.candidate.label or any(word in one.candidate.family for word in ("ramp", "temperature")):
+    if Excitation.REPEATED_ATTITUDES in one.candidate.effect.excitation:
         return "come back to the first attitudes at the end, and rest there"
     if one.candidate.family.startswith("gyro"):
         return "turn about that axis both ways, slowly and fast"

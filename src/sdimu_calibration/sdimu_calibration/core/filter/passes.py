@@ -242,8 +242,8 @@ def widen_contradicted_priors(setup: TestSetup, finished: Pass) -> TestSetup:
     sigma = np.sqrt(np.diag(finished.covariance))
     size = np.abs(finished.estimate)
     pull = size * sigma / sensors.prior**2
-    effect = np.array([e.family or e.name for e in sensors.effects for _ in e.parameters])
-    held = (size > _BEYOND * sensors.prior) & (pull > _PULL) & ~np.isin(effect, _IN_THE_FRAME)
+    gauge = np.array([e.gauge for e in sensors.effects for _ in e.parameters])
+    held = (size > _BEYOND * sensors.prior) & (pull > _PULL) & ~gauge
     if not held.any():
         return setup
     return replace(setup, sensors=replace(sensors, prior=np.where(held, _ROOM * size, sensors.prior)))
@@ -256,7 +256,6 @@ _PULL = 0.1
 _ROOM = 10.0
 """A prior that was too narrow becomes so many times the estimate: it then says nothing."""
 _MOST_WIDENINGS = 3
-_IN_THE_FRAME = ("gyro_misalignment", "accel_misalignment")
 
 
 def solve(setup: TestSetup, prepared: PreparedData, progress: Progress, keep: bool = False) -> Solution:

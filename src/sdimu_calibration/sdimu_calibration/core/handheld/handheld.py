@@ -21,6 +21,7 @@ from sdimu_calibration.core.alignment.alignment import levelled
 from sdimu_calibration.core.arrays import Bools
 from sdimu_calibration.core.data.static_detection import StaticIntervals, detect_static
 from sdimu_calibration.core.effects import body_frame, imu_model
+from sdimu_calibration.core.effects.bias import GYRO_BIAS
 from sdimu_calibration.core.effects.imu_model import ImuModel
 from sdimu_calibration.core.handheld.handheld_data import HandheldRun, reduce_run, turns
 from sdimu_calibration.core.handheld.handheld_faults import data_faults, without_impossible
@@ -182,9 +183,9 @@ def _stated(sensors: ImuModel, imu: ImuSpecification) -> Bools:
 def first_linearisation(run: HandheldRun, sensors: ImuModel, gravity: float) -> LinearisationPoint:
     """Begin with the mean rate at rest as bias; gyros lead from rest to rest, and every rest is levelled."""
     coefficients = np.zeros(len(sensors.prior))
-    for axis, value in zip("xyz", np.median(run.mean[:, :3], axis=0), strict=True):
-        if f"gyro_bias_{axis}" in sensors.names:
-            coefficients[sensors.names.index(f"gyro_bias_{axis}")] = value
+    for name, value in zip(GYRO_BIAS.labels, np.median(run.mean[:, :3], axis=0), strict=True):
+        if name in sensors.names:
+            coefficients[sensors.names.index(name)] = value
     k = len(run.t)
     turned = turns(run, sensors, coefficients, np.repeat(np.eye(3)[None], k, axis=0), gravity).C_nb
     C_nb = [levelled(np.eye(3), run.mean[0, 3:])]
@@ -205,7 +206,7 @@ def assemble(
     pinned = len(scene.kept) < p
     return Calibration(
         body_frame="accelerometer_triad" if pinned else model.body_frame,
-        model=tuple(e.name for e in sensors.effects),
+        model=tuple(e.key for e in sensors.effects),
         names=sensors.names,
         units=tuple(q.unit for q in sensors.parameters),
         display_units=tuple(q.display_unit for q in sensors.parameters),

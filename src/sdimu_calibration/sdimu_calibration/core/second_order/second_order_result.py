@@ -80,7 +80,7 @@ def second_order_calibrate(
     progress("done", 1.0)
     return Calibration(
         body_frame=FRAME,
-        model=tuple(e.name for e in asked.effects),
+        model=tuple(e.key for e in asked.effects),
         names=asked.names,
         units=tuple(p.unit for p in asked.parameters),
         display_units=tuple(p.display_unit for p in asked.parameters),

@@ -31,7 +31,7 @@ def extended(setup: TestSetup, added: Sequence[str]) -> TestSetup:
             raise DataError(f"'{named(text)}' is in the model already")
         effects += new
     sensors = imu_model.build(effects, setup.imu)
-    return replace(setup, sensors=sensors, model=replace(setup.model, effects=tuple(e.name for e in effects)))
+    return replace(setup, sensors=sensors, model=replace(setup.model, effects=tuple(e.key for e in effects)))
 
 
 def read_effect(text: str) -> tuple[Effect, ...]:
