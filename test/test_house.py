@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import re
 import subprocess
 import sys
@@ -10,6 +11,8 @@ from pathlib import Path
 import pytest
 import yaml
 
+import sdimu_calibration.core.effects  # noqa: F401  (fills the registry)
+from sdimu_calibration.core.effects import registry
 from sdimu_calibration.storage.config import load_imu, load_model, load_plan, load_site
 from sdimu_calibration.storage.reference_file import read_reference
 
@@ -77,3 +80,75 @@ def test_every_package_declares_itself_as_ament_python():
     for manifest in ROOT.glob("src/*/package.xml"):
         assert "<build_type>ament_python</build_type>" in manifest.read_text()
         assert (manifest.parent / "resource" / manifest.parent.name).is_file()
+
+_NAMED_IN = ("core/effects/", "core/hidden.py", "core/truth.py")
+"""Where effects have their names: the registry, and the truth of the simulator."""
+_OTHER_WORDS = {"temperature_rate", "random_walk"}
+"""A field of `Motion`, and a term of the Allan deviation."""
+
+
+def effect_names_in(tree: ast.AST) -> list[tuple[int, str]]:
+    """Line and text of every literal that is the name of an effect or coefficient, a part of one, or makes one.
+
+    Sentences may name effects; a word alone, or a pattern such as ``f"{triad}_misalignment_{pair}"``, is a list of
+    effects kept where a new one does not find it.
+    """
+    effects = [registry.get(name) for name in registry.names()]
+    names = {e.name for e in effects} | {p.name for e in effects for p in e.parameters}
+    prose = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
+    inner = {id(part) for node in ast.walk(tree) if isinstance(node, ast.JoinedStr) for part in node.values}
+    found = []
+    for node in ast.walk(tree):
+        if isinstance(node, ast.JoinedStr):
+            parts = [part.value if isinstance(part, ast.Constant) else None for part in node.values]
+        elif isinstance(node, ast.Constant) and isinstance(node.value, str) and not {id(node)} & (prose | inner):
+            parts = [node.value]
+        else:
+            continue
+        fixed = "".join(part or "" for part in parts)
+        if "_" not in fixed.strip("_") and fixed.strip("_") not in names and None not in parts:
+            continue
+        if fixed in _OTHER_WORDS or not re.fullmatch(r"[a-z0-9_]{5,}", fixed):
+            continue
+        pattern = "".join(r"\w+" if part is None else re.escape(part) for part in parts)
+        if any(re.search(rf"(^|_){pattern.strip('_')}(_|$)", name) for name in names):
+            found.append((node.lineno, ast.unparse(node)))
+    return found
+
+
+def test_no_effect_is_named_outside_its_file_and_the_truth_of_the_simulator():
+    # A list of effects elsewhere is a trait in the wrong place: a new effect would not be in it (CONTRIBUTING.md).
+    guilty = [
+        f"{path.relative_to(ROOT)}:{line}: {text}"
+        for path in sorted((ROOT / "src").rglob("*.py"))
+        if not any(part in path.as_posix() for part in _NAMED_IN)
+        for line, text in effect_names_in(ast.parse(path.read_text()))
+    ]
+    assert guilty == []
+
+
+@pytest.mark.parametrize(
+    "code",
+    [
+        'x = "gyro_bias"',
+        'x = ("accel_quadratic_x", 3)',
+        'x = prior.get("accel_misalignment")',
+        'x = f"gyro_bias_{axis}"',
+        'x = f"{triad}_misalignment_{pair}"',
+        'x = name.endswith("bias_warm_up")',
+        'x = name.startswith("gyro_g_sensitivity_")',
+    ],
+)
+def test_a_name_of_an_effect_is_noticed(code):
+    assert len(effect_names_in(ast.parse(code))) == 1
+
+
+@pytest.mark.parametrize(
+    "code",
+    [
+        '"""gyro_bias"""', 'x = "the gyro_bias is large"', 'x = f"{stem}_{axis}"', 'x = "gyro_white_noise"',
+        'x = "accel"',
+    ],
+)
+def test_what_names_no_effect_is_left_alone(code):
+    assert effect_names_in(ast.parse(code)) == []

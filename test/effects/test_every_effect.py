@@ -14,9 +14,10 @@ import pytest
 
 import sdimu_calibration.core.effects  # noqa: F401  (fills the registry)
 from rate_table_sim.core.specification import TableSpecification
-from sdimu_calibration.core import earth
 from sdimu_calibration.core.alignment.prepared import first_attitude, reduce, set_up
+from sdimu_calibration.core.effect_key import sized
 from sdimu_calibration.core.effects import registry
+from sdimu_calibration.core.effects.selection import resolve
 from sdimu_calibration.core.filter.filter_pass import NAV, PassState, new_output, run_pass
 from sdimu_calibration.core.filter.passes import one_pass, pass_settings
 from sdimu_calibration.core.measurement_kind import HELD_ALL, SKIP
@@ -24,10 +25,11 @@ from sdimu_calibration.core.plan import Plan, Turn
 from sdimu_calibration.core.rotation import rotation_vector
 from sdimu_calibration.core.specification import ImuSpecification, Model, Site
 from sdimu_calibration.core.units import parse_unit, to_si
+from sdimu_calibration.storage.effect_file import find_effects
 from sdimu_sim.core.hidden import effect_names, parse_effects
 from sdimu_sim.core.scenario import Scenario, generate
 from sdimu_sim.core.temperature import TemperatureProfile
-from sdimu_sim.core.truth import COEFFICIENTS
+from sdimu_sim.own_effects import simulated_effects
 
 GRADES = ("navigation", "tactical", "mems")
 EFFECTS = registry.names()
@@ -140,39 +142,20 @@ def test_every_parameter_acts_on_some_sensor_and_every_term_has_its_parameter(na
 # -- its regressors against the simulated sensor -----------------------------------------------------------------------
 
 
-def hidden_text(parameter, value):
-    """``NAME=VALUE`` of the simulator for an SI value, with what is fixed in the effect."""
-    name = parameter.name
-    factor = parse_unit(parameter.display_unit).factor
-    text = f"{name}={float(value / factor)!r} {parameter.display_unit}"
-    if "_warm_up_" in name or "_settling_" in name:
-        text += "; tau=40 s"
-    if "_bias_step_" in name:
-        text += f"; t0={STEP_AT} s"
-    return text
-
-
 def with_errors(effect, sizes):
-    """Simulate the sensor with sizes (SI) of the parameters of an effect; None when the simulator has no such thing."""
-    names = [p.name for p in effect.parameters]
-    if set(names) <= set(COEFFICIENTS):
-        return simulated(coefficients=dict(zip(names, sizes, strict=True)))
-    if effect.name == "reference_gravity":
-        # What is believed is more than what is true.
-        return simulated(site=replace(SITE, gravity_m_s2=earth.normal_gravity(SITE.latitude_rad, 80.0) - sizes[0]))
-    if effect.name == "gyro_mass_unbalance_ramp":
-        mx, qx, my, qy, mz, qz = (float(v) for v in sizes)
-        terms = (f"{mx!r}*ax + {qx!r}*ay", f"{my!r}*ay + {qy!r}*ax", f"{mz!r}*az + {qz!r}*ay")
-        return simulated(effects=tuple(f"gyro_{axis}=t*({term})" for axis, term in zip("xyz", terms, strict=True)))
-    if effect.name == "lever_arm":
-        return simulated(extras={"lever_arm_m": tuple(sizes)})
-    if effect.name == "accel_triad_delay":
-        return simulated(effects=(f"accel_delay={float(sizes[0] * 1e3)!r} ms",))
-    if effect.name == "gyro_lost_data" or not set(names) <= set(effect_names()):
-        return None
-    texts = tuple(hidden_text(p, v) for p, v in zip(effect.parameters, sizes, strict=True))
-    assert parse_effects(texts)
-    return simulated(effects=texts)
+    """Simulate the sensor with sizes (SI) of the parameters of an effect, by the keys that the estimator gives them."""
+    named = zip(effect.labels, effect.parameters, sizes, strict=True)
+    return simulated(effects=tuple(sized(label, size, p.display_unit) for label, p, size in named))
+
+
+@pytest.mark.parametrize("name", EFFECTS)
+def test_what_can_be_estimated_can_be_simulated_by_the_same_key(name):
+    effect = of(name)
+    for parameter, label in zip(effect.parameters, effect.labels, strict=True):
+        assert parameter.name in effect_names()
+        assert resolve(label).parameters == (parameter,)
+        hidden = parse_effects([sized(label, 1e-3, parameter.display_unit)])
+        assert (dict(hidden.sizes) | dict(hidden.coefficients)) == {parameter.name: pytest.approx(1e-3)}
 
 
 NOT_OF_THE_MEAN = {
@@ -185,6 +168,10 @@ NOT_OF_THE_MEAN = {
     # Powers and kinks: the mean over a cycle of a ramp is not that of its mean.
     "gyro_scale_cubic": 0.01, "gyro_scale_quadratic": 0.01, "gyro_scale_asymmetry": 0.01, "gyro_anisoinertia": 0.01,
     "gyro_misalignment_asymmetry": 0.01,
+    # The full rate of the turn is the median over it, in a rate that a mount of a radian spreads over three axes.
+    "gyro_lost_data": 0.01,
+    # Second order of up to 7.5 mrad of latitude.
+    "reference_latitude": 4e-3,
 }  # fmt: skip
 """Share of the signal that regressors may miss because they are functions of a cycle's mean motion. For all others the
 second order of the coefficients and of half a cycle, 2e-3. A wrong sign or axis misses 100 %."""
@@ -199,9 +186,11 @@ def test_regressors_are_the_derivative_of_the_simulated_sensor(name, perfect):
     sizes = rng.uniform(0.5, 1.5, len(effect.parameters)) * effect.prior["navigation"]
     if name not in NOT_NEGATIVE:
         sizes *= rng.choice([-1.0, 1.0], len(effect.parameters))
-    recording = with_errors(effect, sizes)
-    if recording is None:
-        pytest.skip("the simulator has no sensor of this kind")
+    compare(perfect, effect, sizes, with_errors(effect, sizes), NOT_OF_THE_MEAN.get(name, 2e-3))
+
+
+def compare(perfect, effect, sizes, recording, allowed):
+    """Hold the errors that the regressors predict to those of a simulated recording, cycle by cycle."""
     np.testing.assert_array_equal(recording.t, perfect.recording.t)
     dt = np.diff(recording.t, prepend=0.0)[:, None]
     cycles = perfect.prepared.cycles
@@ -219,7 +208,6 @@ def test_regressors_are_the_derivative_of_the_simulated_sensor(name, perfect):
     )
     found, setup = passed(perfect, effect)
     predicted = setup.sensors.errors(found.data.values, sizes)
-    allowed = NOT_OF_THE_MEAN.get(name, 2e-3)
     for channel in sorted({t.channel for t in effect.terms}):
         size = np.linalg.norm(measured[:, channel])
         assert size > 0.0, channel
@@ -228,10 +216,47 @@ def test_regressors_are_the_derivative_of_the_simulated_sensor(name, perfect):
     assert np.abs(measured[:, silent]).max(initial=0.0) <= 1e-3 * np.abs(measured).max()
 
 
+OWN = """\
+format: sdimu-effect/1
+name: cross_talk
+expressions:
+  gyro_x: k * ax * ey * exp(-t / tau) + 3 * q * wx
+  accel_z: b * T * (nx + dz)
+  gyro_y: -2 * k * ay * tanh(fz / f0) * dx
+parameters:
+  k: {unit: deg/h/g, prior: 1 deg/h/g}
+  b: {unit: ug/K, prior: 20 ug/K}
+  q: {unit: ppm, prior: 50 ppm}
+constants: {tau: 60 s, f0: 3 m/s^2}
+"""
+
+
+@pytest.mark.parametrize("parameter", ["k", "b", "q"])
+def test_an_effect_file_is_simulated_as_it_is_estimated(parameter, perfect, tmp_path):
+    (tmp_path / "own.yaml").write_text(OWN)
+    (effect,) = find_effects(f"{tmp_path}/own.yaml:{parameter}")
+    size = effect.prior["navigation"]
+    effects = simulated_effects([sized(f"{tmp_path}/own.yaml:{parameter}", size, effect.parameters[0].display_unit)])
+    assert dict(parse_effects(effects).sizes) == {f"cross_talk_{parameter}": pytest.approx(size)}
+    assert str(tmp_path) not in "".join(effects)
+    compare(perfect, effect, np.array([size]), simulated(effects=effects), 4e-3)
+
+
+@pytest.mark.parametrize(
+    "label",
+    ["gyro_x: ey^2", "accel_y: ax wtz", "gyro_z: T", "accel_x: ax^2 ay", "gyro_y: sin(2 pi t / 31 s + 40 deg)"],
+)
+def test_an_equation_is_simulated_by_the_label_by_which_it_is_added(label, perfect):
+    (effect,) = find_effects(label)
+    size = effect.prior["navigation"]
+    recording = simulated(effects=(sized(effect.key, size, effect.parameters[0].display_unit),))
+    compare(perfect, effect, np.array([size]), recording, 0.02)
+
+
 def test_data_lost_in_a_turn_take_the_angle_of_that_turn_that_the_simulator_loses(perfect):
     # Spread over the turn here, lost at a moment there: the same angle, to the step of the simulator's samples.
     effect, tau = registry.get("gyro_lost_data").with_options(turn=1, at=15.0), 0.05
-    recording = simulated(effects=(f"gyro_lost_data={1e3 * tau} ms; turn=1",))
+    recording = simulated(effects=(f"gyro_lost_data(turn=1)={1e3 * tau} ms",))
     dt = np.diff(recording.t, prepend=0.0)[:, None]
     angle = np.sum((recording.omega_ib_b - perfect.recording.omega_ib_b) * dt, axis=0)
     found, setup = passed(perfect, effect)

@@ -67,7 +67,7 @@ def write_truth(path: Path, truth: Truth) -> None:
         When the file cannot be written.
     """
     imu = truth.imu
-    hidden = {t.name: t.parameters["k"] for t in parse_effects(imu.effects).terms if "k" in t.parameters}
+    hidden = dict(parse_effects(imu.effects).sizes)
     content: dict[str, Any] = {
         "format": "sdimu-truth/1",
         "plan": truth.plan,

@@ -17,8 +17,9 @@ from sdimu_sim.campaign.hidden_draw import KINDS, TESTABLE, Draw, Truth, draw, h
 from sdimu_sim.campaign.hidden_outside import OUTSIDE, shapes
 from sdimu_sim.campaign.hidden_run import with_fault
 from sdimu_sim.campaign.hidden_sizes import LATITUDES_DEG, PLANS, Sizes, between
+from sdimu_sim.core.equation import CONSTANTS
 from sdimu_sim.core.expression import parse_expression
-from sdimu_sim.core.hidden import CONSTANTS, VARIABLES, parse_effects
+from sdimu_sim.core.hidden import VARIABLES, parse_effects
 
 STOPS = tuple((k, 150.0 * k, 150.0 * k + 100.0) for k in range(8))
 TURNS = tuple((k, 150.0 * k + 100.0, 150.0 * k + 150.0) for k in range(7))
@@ -57,14 +58,8 @@ def test_a_seed_draws_the_same_test_twice_and_another_seed_another(kind: str) ->
 def test_the_simulator_reads_every_effect_with_the_size_that_the_score_will_look_for(kind: str) -> None:
     for one in _draws(kind):
         hidden = parse_effects(t.text for t in one.truths)
-        sizes = {t.name: t.parameters["k"] for t in hidden.terms if "k" in t.parameters}
         for truth in one.truths:
-            if truth.name in sizes:
-                # Ten digits are written.
-                assert sizes[truth.name] == pytest.approx(truth.value, rel=1e-8)
-            else:
-                delayed = max(hidden.delay_s) + sum(length for _, length in hidden.lost)
-                assert delayed == pytest.approx(truth.value, rel=1e-8)
+            assert hidden.sizes[truth.name] == pytest.approx(truth.value, rel=1e-12)
 
 
 SPANS = [("weak", 5, 5), ("strong", 8, 30), ("pair", 10, 30), ("outside", 15, 40)]

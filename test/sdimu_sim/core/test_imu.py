@@ -11,7 +11,7 @@ from sdimu_sim.core.truth import COEFFICIENTS, ImuTruth
 W, F = np.array([0.31, -0.17, 0.23]), np.array([3.1, -5.7, -7.3])
 A = F / STANDARD_GRAVITY
 ONE = np.ones((3, 1))
-TRUE = TrueSamples(W[:, None], F[:, None], 0 * ONE, 0 * ONE, 0 * ONE, np.zeros((3, 3, 1)))
+TRUE = TrueSamples(W[:, None], F[:, None], 0 * ONE, 0 * ONE, 0 * ONE, F[:, None] / -9.8, np.zeros((3, 3, 1)))
 
 # Derivative of the reading (sensor 0-2 gyro, 3-5 accelerometer) by each coefficient: the error equations of
 # doc/conventions.md, term by term.

@@ -46,19 +46,14 @@ def _table(title: str, found: list[Effect]) -> Table:
 
 
 def _page(name: str) -> list[str]:
-    from sdimu_calibration.report.catalogue import sizes
+    from sdimu_calibration.report.catalogue import facts, sizes
     from sdimu_calibration.storage.effect_file import find_effects
 
     effect = find_effects(name)[0]
     lines = [f"{effect.name}: {effect.title}", "", effect.equation, "", effect.description, ""]
     lines += [f"  {p.name}  ({p.display_unit}; in files {p.unit})" for p in effect.parameters]
     if effect.options:
-        lines += ["", f"options: {effect.name}{effect.variant}"]
+        lines += ["", f"options: {effect.key}"]
     if effect.typical:
         lines += ["", f"typical: {effect.typical}"]
-    lines += [f"prior, one sigma: {sizes(effect)}"]
-    if effect.needs:
-        lines += [f"needs: {effect.needs}"]
-    if effect.confused_with:
-        lines += [f"confused with: {', '.join(effect.confused_with)}"]
-    return lines
+    return [*lines, f"prior, one sigma: {sizes(effect)}", *facts(effect)]

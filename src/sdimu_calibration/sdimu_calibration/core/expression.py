@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import ast
 import operator
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
@@ -15,8 +16,6 @@ from typing import Any
 
 import numpy as np
 
-from sdimu_calibration.core.arrays import Floats
-from sdimu_calibration.core.effects.motion import Motion
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.units import parse_unit
 
@@ -33,40 +32,39 @@ _OF_NUMBERS: dict[str, Callable[[Any], Any]] = {
 _ONE: dict[str, Callable[[Any], Any]] = {**_OF_NUMBERS, "abs": np.abs, "sqrt": np.sqrt, "sign": np.sign}
 _TWO: dict[str, Callable[[Any, Any], Any]] = {"min": np.minimum, "max": np.maximum}
 _LONGEST = 2000
+_JOINED = re.compile(r"(?<=[\w)])\s+(?=[A-Za-z(])")
+"""A blank between two factors stands for a product, as in the equations that a diagnosis proposes."""
 
 
 @dataclass(frozen=True)
 class Variable:
-    """A physical quantity that a formula may name: its unit, what it is, and where it comes from."""
+    """A physical quantity that a formula may name: its unit and what it is."""
 
     unit: str
     text: str
-    value: Callable[[Motion], Floats]
 
 
-def _axes(stem: str, unit: str, text: str, of: Callable[[Motion], Floats]) -> dict[str, Variable]:
-    def axis(i: int) -> Callable[[Motion], Floats]:
-        return lambda motion: np.asarray(of(motion)[:, i])
-
-    return {stem + "xyz"[i]: Variable(unit, text.format("xyz"[i]), axis(i)) for i in range(3)}
+def _axes(stem: str, unit: str, text: str) -> dict[str, Variable]:
+    return {stem + axis: Variable(unit, text.format(axis)) for axis in "xyz"}
 
 
 VARIABLES: dict[str, Variable] = {
-    **_axes("w", "rad/s", "body rate against inertial space, {}", lambda m: m.w),
-    **_axes("wt", "rad/s", "rate of the table, {}; exactly zero at rest", lambda m: m.w_table),
-    **_axes("alpha", "rad/s^2", "angular acceleration, {}", lambda m: m.alpha),
-    **_axes("a", "g", "specific force in units of g, {}", lambda m: m.a),
-    **_axes("f", "m/s^2", "specific force, {}", lambda m: m.f),
-    **_axes("n", "1", "North component of body axis {}", lambda m: m.C_nb[:, 0, :]),
-    **_axes("e", "1", "East component of body axis {}", lambda m: m.C_nb[:, 1, :]),
-    **_axes("d", "1", "Down component of body axis {}", lambda m: m.C_nb[:, 2, :]),
-    **_axes("turned", "1", "sign of the last turn about {}", lambda m: m.turned),
-    **_axes("leant", "1", "sign of the last change of force along {}", lambda m: m.leant),
-    "moving": Variable("1", "1 while the table turns, 0 at rest", lambda m: m.moving),
-    "t": Variable("s", "time since the start", lambda m: m.t - 0.5 * m.dt),
-    "T": Variable("K", "temperature, change since the start", lambda m: m.temperature),
-    "dTdt": Variable("K/s", "rate of the temperature", lambda m: m.temperature_rate),
+    **_axes("w", "rad/s", "body rate against inertial space, {}"),
+    **_axes("wt", "rad/s", "rate of the table, {}; exactly zero at rest"),
+    **_axes("alpha", "rad/s^2", "angular acceleration, {}"),
+    **_axes("a", "g", "specific force in units of g, {}"),
+    **_axes("f", "m/s^2", "specific force, {}"),
+    **_axes("n", "1", "North component of body axis {}"),
+    **_axes("e", "1", "East component of body axis {}"),
+    **_axes("d", "1", "Down component of body axis {}"),
+    **_axes("turned", "1", "sign of the last turn about {}"),
+    **_axes("leant", "1", "sign of the last change of force along {}"),
+    "moving": Variable("1", "1 while the table turns, 0 at rest"),
+    "t": Variable("s", "time since the start"),
+    "T": Variable("K", "temperature, change since the start"),
+    "dTdt": Variable("K/s", "rate of the temperature"),
 }
+"""Names of a formula; their values: `core.effects.formula_variables`, and the simulator's own from true motion."""
 TEMPERATURE_NAMES = frozenset({"T", "dTdt"})
 
 
@@ -113,6 +111,18 @@ def written(dimension: Dimension) -> str:
     above = [f"{n}^{p}" if p != 1 else n for n, p in sorted(dimension.items()) if p > 0]
     below = [f"/{n}^{-p}" if p != -1 else f"/{n}" for n, p in sorted(dimension.items()) if p < 0]
     return ("*".join(above) or "1") + "".join(below)
+
+
+def reciprocal_unit(dimension: Dimension) -> str:
+    """Write the unit that takes a quantity of `dimension` away again, to stand behind another, such as ``/g*s^2``."""
+    return "".join(
+        ("/" if p > 0 else "*") + n + ("" if abs(p) == 1 else f"^{abs(p)}") for n, p in sorted(dimension.items())
+    )
+
+
+def equation_text(formula: str) -> str:
+    """Write an equation as a diagnosis proposes it (``ax^2 wty``) with the operators of a formula."""
+    return _JOINED.sub("*", formula.strip().replace("^", "**"))
 
 
 def parse_expression(text: str, known: frozenset[str]) -> Expression:

@@ -162,7 +162,7 @@ class CalibrationNode:
         self._first = self._first or sigmas
         if e.used:
             units = dict(zip(e.names, e.display_units, strict=True))
-            effects = [effect if isinstance(effect, str) else effect.name for effect in self._model.effects]
+            effects = [effect if isinstance(effect, str) else effect.key for effect in self._model.effects]
             words = sigma_words(falling(self._first, sigmas, units, effects))
             self._last = f"stop {e.stop} after {e.t:.0f} s; {words}; {light(e.nis, e.verdict)}"
         elif self._last and not e.dwell:

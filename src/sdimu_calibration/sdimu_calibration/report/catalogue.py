@@ -3,39 +3,54 @@
 from __future__ import annotations
 
 from sdimu_calibration.core.effects import registry
-from sdimu_calibration.core.effects.effect import Effect
+from sdimu_calibration.core.effects.effect import ACCEL, BASELINE, GYRO, REFERENCES, Effect
 from sdimu_calibration.core.units import from_si
 
-_BASELINE = (
-    "gyro_bias", "gyro_scale", "gyro_misalignment", "gyro_mass_unbalance", "accel_bias", "accel_scale",
-    "accel_misalignment",
-)  # fmt: skip
-_GROUPS = (
-    ("The baseline", lambda e: e.name in _BASELINE),
-    ("Accelerometer", lambda e: e.name.startswith("accel_")),
-    ("Gyro", lambda e: e.name.startswith("gyro_")),
-    ("References and geometry", lambda e: e.name.startswith(("reference_", "lever_"))),
-    ("Other", lambda _e: True),
-)
+_ORDER = (BASELINE, "Accelerometer", "Gyro", REFERENCES, "Other")
 
 _HEAD = """# Catalogue of effects
 
 Made by `sdimu effects --markdown` from the registry (`core/effects/`, one file per physical cause); do not edit.
 dw, df: measured minus true body rate and specific force; a = f/g; w: body rate against inertial space. Axis i is the
-sensor's own, j and k the others. Any name here, or one of its coefficients, can be given to `--add`; an effect of one's
-own is a file, see [diagnosis.md](diagnosis.md).
+sensor's own, j and k the others. Any name here, or one of its coefficients, can be given to `--add`; with a size behind
+it, a coefficient can be given to `simulate --effect`. How effects are written, those of one's own too, is in
+[diagnosis.md](diagnosis.md).
 """
 
 
 def grouped() -> list[tuple[str, list[Effect]]]:
     """All registered effects under headings; no heading without effects."""
-    rest = [registry.get(name) for name in registry.names()]
-    out = []
-    for title, belongs in _GROUPS:
-        chosen = [effect for effect in rest if belongs(effect)]
-        rest = [effect for effect in rest if not belongs(effect)]
-        if chosen:
-            out.append((title, chosen))
+    found: dict[str, list[Effect]] = {title: [] for title in _ORDER}
+    for effect in map(registry.get, registry.names()):
+        found.setdefault(_heading(effect), []).append(effect)
+    return [(title, effects) for title, effects in found.items() if effects]
+
+
+def _heading(effect: Effect) -> str:
+    channels = {term.channel for term in effect.terms}
+    triad = "Gyro" if channels <= set(GYRO) else "Accelerometer" if channels <= set(ACCEL) else "Other"
+    return effect.group or triad
+
+
+_SCOPES = {
+    "unit": "the unit", "power-on": "the time from switch-on to switch-off", "setup": "site and mount of the test",
+    "recording": "one recording: a fault of its data",
+}  # fmt: skip
+
+
+def facts(effect: Effect) -> list[str]:
+    """Say what an effect needs to be seen, what its value holds for, and what it is confused with."""
+    out = [f"holds for: {_SCOPES[effect.scope]}"]
+    if effect.excitation:
+        out.append("shown by: " + ", ".join(sorted(e.value for e in effect.excitation)))
+    if effect.never_seen:
+        out.append(f"shown by no plan: {effect.never_seen}")
+    if effect.gauge:
+        out.append("part of the turn of the body frame, which no measurement shows")
+    if effect.needs or effect.needs_table:
+        out.append("needs: " + ", ".join(n for n in (effect.needs, "a table" if effect.needs_table else "") if n))
+    if effect.confused_with:
+        out.append(f"confused with: {', '.join(effect.confused_with)}")
     return out
 
 
@@ -58,18 +73,12 @@ def _entry(effect: Effect) -> str:
     lines = [f"\n### {effect.name}\n", f"\n{effect.title}. `{effect.equation}`"]
     if effect.description:
         lines.append(f"\n{effect.description}")
-    facts = [f"Coefficients: {_names(effect)}", f"prior: {sizes(effect)}"]
+    lines.append(f"\n- Coefficients: {_names(effect)}\n- prior: {sizes(effect)}")
     if effect.typical:
-        facts.append(f"typical: {effect.typical}")
+        lines.append(f"- typical: {effect.typical}")
     if effect.options:
-        facts.append("options, scanned by a diagnosis: " + ", ".join(effect.options))
-    if effect.needs:
-        facts.append(f"needs: {effect.needs}")
-    if effect.run_local:
-        facts.append("a fault of one recording")
-    if effect.confused_with:
-        facts.append("confused with: " + ", ".join(effect.confused_with))
-    return "\n".join(lines) + "\n\n" + "\n".join(f"- {fact}" for fact in facts) + "\n"
+        lines.append("- options, scanned by a diagnosis: " + ", ".join(effect.options))
+    return "\n".join([*lines, *(f"- {fact}" for fact in facts(effect))]) + "\n"
 
 
 def _names(effect: Effect) -> str:

@@ -5,59 +5,48 @@ A file holds formulas by sensor, the parameters in which they are linear, and fi
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from importlib.metadata import entry_points
 from pathlib import Path
-from typing import Any, Literal, cast
+from typing import Any, cast
 
 import numpy as np
-from pydantic import Field
 
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.diagnosis.candidates import USUAL_TURN, own_equation, without
+from sdimu_calibration.core.effect_key import EffectKey, parse_key
 from sdimu_calibration.core.effects import registry, selection
+from sdimu_calibration.core.effects.bias import ACCEL_BIAS, GYRO_BIAS
 from sdimu_calibration.core.effects.effect import CHANNELS, Effect, Parameter, Term
+from sdimu_calibration.core.effects.formula_variables import VALUES
 from sdimu_calibration.core.effects.motion import Motion
 from sdimu_calibration.core.expression import (
     TEMPERATURE_NAMES,
     VARIABLES,
     Expression,
-    dimension_of,
+    equation_text,
     parse_expression,
-    written,
+    reciprocal_unit,
 )
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.specification import Model
 from sdimu_calibration.core.units import UnitError, parse_quantity, parse_unit
-from sdimu_calibration.storage.config import Schema, find_config, load_model, read_yaml
+from sdimu_calibration.storage.config import find_config, load_model
+from sdimu_calibration.storage.effect_schema import (
+    FORMAT,
+    VARIABLE_UNITS,
+    EffectFile,
+    constants_of,
+    formulas_of,
+    read_effect_file,
+    si_unit,
+)
 
-FORMAT = "sdimu-effect/1"
 ENTRY_POINTS = "sdimu_calibration.effects"
 """Group of entry points that name callables without arguments, each returning an `Effect`."""
 SUFFIXES = (".yaml", ".yml")
 _GRADES = ("navigation", "tactical", "mems")
-_SENSOR_UNIT = {"gyro": "rad/s", "accel": "m/s^2"}
-_JOINED = re.compile(r"(?<=[\w)])\s+(?=[A-Za-z(])")
-"""A blank between two factors stands for a product, as in the equations that a diagnosis proposes."""
-_NAME = r"^[A-Za-z][A-Za-z0-9_]*$"
-
-
-class _ParameterFile(Schema):
-    unit: str
-    display_unit: str | None = None
-    prior: str
-
-
-class _EffectFile(Schema):
-    format: Literal["sdimu-effect/1"]
-    name: str = Field(pattern=_NAME)
-    title: str | None = None
-    description: str = ""
-    expressions: dict[Literal["gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z"], str] = Field(min_length=1)
-    parameters: dict[str, _ParameterFile] = Field(min_length=1)
-    constants: dict[str, str | float] = Field(default_factory=dict)
 
 
 def load_effect(path: Path) -> tuple[Effect, ...]:
@@ -78,10 +67,9 @@ def load_effect(path: Path) -> tuple[Effect, ...]:
     DataError
         One line with file and sensor: what cannot be read, is not linear in the parameters, or has the wrong unit.
     """
-    path = Path(path)
-    if not path.is_file():
-        raise DataError(f"{path}: no such effect file")
-    file = read_yaml(path, _EffectFile)
+    file = read_effect_file(path)
+    if file.name in registry.names():
+        raise DataError(f"{path}: name: '{file.name}' is a registered effect (choose another)")
     try:
         return _effects(file)
     except (DataError, UnitError) as error:
@@ -89,58 +77,68 @@ def load_effect(path: Path) -> tuple[Effect, ...]:
 
 
 def find_effects(text: str) -> tuple[Effect, ...]:
-    """Find effects by a registered name, a coefficient, one with options, an equation, or the path of a YAML file.
+    """Find effects by a canonical key: a registered name, a coefficient, one with options, an equation, or a file.
 
     An equation is ``SENSOR: FORMULA``, as a diagnosis proposes it (``gyro_x: ey^2``) or in the names of an effect
-    file (``accel_z: ax * wty``); its one parameter is the factor before it.
+    file (``accel_z: ax * wty``); its one parameter is the factor before it. ``my.yaml`` gives all parameters of a file,
+    ``my.yaml:k`` one.
 
     Raises
     ------
     DataError
-        When there is none.
+        When there is none, or the key has a size.
     """
-    if Path(text).suffix in SUFFIXES:
-        return load_effect(Path(text))
-    if text.partition(":")[0].strip() in CHANNELS:
-        return (_equation(text),)
-    if ":" in text:
-        raise DataError(f"equation '{text}': no such sensor (expected {', '.join(CHANNELS)}, then ': FORMULA')")
+    key = parse_key(text)
+    selection.refuse_size(key)
+    if key.file:
+        return _of_file(*key.file)
+    if key.equation:
+        return (_equation(*key.equation),)
     register_plugins()
     return (selection.resolve(text),)
 
 
+def _of_file(path: str, parameter: str) -> tuple[Effect, ...]:
+    effects = load_effect(Path(path))
+    if not parameter:
+        return effects
+    chosen = tuple(e for e in effects if e.name == f"{e.family}_{parameter}")
+    if not chosen:
+        known = ", ".join(e.name.removeprefix(f"{e.family}_") for e in effects)
+        raise DataError(f"{path}: parameters.{parameter}: no such parameter (there are: {known})")
+    return chosen
+
+
 def effects_of_result(model: Sequence[str], named: Sequence[str]) -> tuple[Effect, ...]:
-    """Effects of a result (their names: `model`) that are in no catalogue: those `named`, and equations it states."""
+    """Effects of a result (their keys: `model`) that are in no catalogue: those `named`, and equations it states."""
     register_plugins()
-    equations = [text for text in model if text.partition(":")[0] in CHANNELS and text not in named]
+    equations = [text for text in model if parse_key(text).equation and text not in named]
     return tuple(effect for text in (*named, *equations) for effect in find_effects(text))
 
 
-def _equation(text: str) -> Effect:
+def _equation(sensor: str, formula: str) -> Effect:
     """Effect ``d(sensor) = k formula``; k as large as a bias may be where the formula comes to its usual size."""
-    sensor, _, formula = (part.strip() for part in text.partition(":"))
-    proposed = own_equation(f"{sensor}: {formula}")
+    text = str(EffectKey(f"{sensor}: {formula}"))
+    proposed = own_equation(text)
     if proposed:
         return proposed
-    shown = "deg/h" if sensor.startswith("gyro") else "ug"
+    bias = GYRO_BIAS if sensor.startswith("gyro") else ACCEL_BIAS
+    shown = bias.parameters[0].display_unit
     try:
-        written_out = _JOINED.sub("*", formula.replace("^", "**"))
-        about = parse_expression(written_out, frozenset(VARIABLES))
-        dimension = about.dimension({name: dimension_of(variable.unit) for name, variable in VARIABLES.items()})
-        below = "".join(
-            ("/" if p > 0 else "*") + n + ("" if abs(p) == 1 else f"^{abs(p)}") for n, p in sorted(dimension.items())
-        )
+        about = parse_expression(equation_text(formula), frozenset(VARIABLES))
+        dimension = about.dimension(VARIABLE_UNITS)
+        below = reciprocal_unit(dimension)
         usual = USUAL_TURN ** max(0, -int(dimension.get("s", 0))) if "m" not in dimension else 1.0
-        prior = {grade: size / usual for grade, size in registry.get(f"{sensor[:-2]}_bias").prior.items()}
-        file = _EffectFile.model_validate({
+        file = EffectFile.model_validate({
             "format": FORMAT, "name": "equation", "expressions": {sensor: f"k * ({about.text})"},
             "parameters": {"k": {"unit": shown + below, "prior": f"1 {shown}{below}"}},
         })  # fmt: skip
         (effect,) = _effects(file)
     except (DataError, UnitError) as error:
         raise DataError(f"equation '{text}': {error}") from error
-    parameter = replace(effect.parameters[0], name=f"{sensor}: {formula}")
-    return replace(effect, name=parameter.name, family=parameter.name, parameters=(parameter,), prior=prior)
+    prior = {grade: size / usual for grade, size in bias.prior.items()}
+    parameter = replace(effect.parameters[0], name=text)
+    return replace(effect, name=text, family=text, parameters=(parameter,), prior=prior)
 
 
 def extended_model(name: str, added: Sequence[str]) -> Model:
@@ -170,7 +168,8 @@ def extended_model(name: str, added: Sequence[str]) -> Model:
 
 def _beside(folder: Path, text: str) -> str:
     """Path of an effect file that a model names, so that the two can be moved together; other names as they are."""
-    return str(folder / text) if Path(text).suffix in SUFFIXES and (folder / text).is_file() else text
+    file = parse_key(text).file
+    return str(folder / text) if file and (folder / file[0]).is_file() else text
 
 
 def _append(effects: list[Effect], effect: Effect) -> None:
@@ -213,82 +212,13 @@ def register_plugins() -> tuple[str, ...]:
 _LOADED: set[str] = set()
 
 
-def _effects(file: _EffectFile) -> tuple[Effect, ...]:
-    _check_names(file)
-    constants = {name: _constant(name, text) for name, text in file.constants.items()}
-    known = frozenset({*VARIABLES, *file.parameters, *constants})
-    formulas: dict[str, Expression] = {}
-    for sensor, text in file.expressions.items():
-        formulas[sensor] = _formula(file, sensor, text, known, constants)
-    for name in file.parameters:
-        if not any(name in formula.names for formula in formulas.values()):
-            raise DataError(f"parameters.{name}: no expression has it")
+def _effects(file: EffectFile) -> tuple[Effect, ...]:
+    constants, formulas = constants_of(file), formulas_of(file)
     return tuple(_one(file, name, formulas, constants) for name in file.parameters)
 
 
-def _formula(
-    file: _EffectFile, sensor: str, text: str, known: frozenset[str], constants: Mapping[str, float]
-) -> Expression:
-    """Read one formula and hold it to its unit and to linearity."""
-    try:
-        formula = parse_expression(text, known)
-        _check_unit(sensor, formula, file)
-        _check_linear(formula, tuple(file.parameters), constants)
-    except DataError as error:
-        raise DataError(f"expressions.{sensor}: {error}") from error
-    return formula
-
-
-def _check_names(file: _EffectFile) -> None:
-    if file.name in registry.names():
-        raise DataError(f"name: '{file.name}' is a registered effect (choose another)")
-    for group, names in (("parameters", file.parameters), ("constants", file.constants)):
-        for name in names:
-            if name in VARIABLES or (group == "constants" and name in file.parameters):
-                raise DataError(f"{group}.{name}: that name means something else (choose another)")
-
-
-def _constant(name: str, text: str | float) -> float:
-    unit = str(text).strip().partition(" ")[2] or "1"
-    try:
-        return parse_quantity(str(text), unit)
-    except UnitError as error:
-        raise DataError(f"constants.{name}: {error}") from error
-
-
-def _check_unit(sensor: str, formula: Expression, file: _EffectFile) -> None:
-    units = {name: dimension_of(variable.unit) for name, variable in VARIABLES.items()}
-    units |= {name: dimension_of(parameter.unit) for name, parameter in file.parameters.items()}
-    units |= {name: dimension_of(str(text).strip().partition(" ")[2] or "1") for name, text in file.constants.items()}
-    expected = _SENSOR_UNIT[sensor.partition("_")[0]]
-    found = formula.dimension(units)
-    if found != dimension_of(expected):
-        # An angle counts as a number, so rad/s is 1/s here.
-        raise DataError(f"'{formula.text}' comes to {written(found)}, but an error of {sensor} is in {expected}")
-
-
-def _check_linear(formula: Expression, parameters: tuple[str, ...], constants: Mapping[str, float]) -> None:
-    """Superposition at random values: f(a + b) = f(a) + f(b), f(3 a) = 3 f(a), so f(0) = 0."""
-    rng = np.random.default_rng(7)
-    at = {name: rng.uniform(0.5, 1.5, 16) for name in VARIABLES} | dict(constants)
-    # Of both signs, or |k| would pass.
-    a, b = ({name: sign * rng.uniform(0.5, 1.5) for name in parameters} for sign in (1.0, -1.0))
-
-    def value(k: Mapping[str, float]) -> Floats:
-        return np.asarray(formula.evaluate({**at, **k})) * np.ones(16)
-
-    both = value({name: a[name] + b[name] for name in parameters})
-    thrice = value({name: 3.0 * a[name] for name in parameters})
-    fa, fb = value(a), value(b)
-    size = 1e-9 * (np.abs(fa) + np.abs(fb))
-    if not np.isfinite(both).all():
-        raise DataError(f"'{formula.text}' is not finite at ordinary values of its variables")
-    if np.any(np.abs(both - fa - fb) > size) or np.any(np.abs(thrice - 3.0 * fa) > 3.0 * size):
-        raise DataError(f"'{formula.text}' is not linear in {', '.join(parameters)} (fix what is not as a constant)")
-
-
 def _one(
-    file: _EffectFile, name: str, formulas: Mapping[str, Expression], constants: Mapping[str, float]
+    file: EffectFile, name: str, formulas: Mapping[str, Expression], constants: Mapping[str, float]
 ) -> Effect:
     """Effect of one parameter: the formulas with it at one and the others at nought."""
     about = file.parameters[name]
@@ -323,22 +253,8 @@ def _regressors(formulas: Sequence[Expression], fixed: Mapping[str, float]) -> C
         n = len(motion.t)
         out = np.empty((n, len(formulas)))
         for k, formula in enumerate(formulas):
-            values: dict[str, Any] = {v: VARIABLES[v].value(motion) for v in formula.names if v in VARIABLES}
+            values: dict[str, Any] = {v: VALUES[v](motion) for v in formula.names if v in VALUES}
             out[:, k] = formula.evaluate({**values, **fixed})
         return out
 
     return columns
-
-
-def si_unit(unit: str) -> str:
-    """Write the SI unit of the kind of `unit`, as it stands in files."""
-    parts = parse_unit(unit).dimension
-
-    def power(name: str, n: Any) -> str:
-        if n == 1:
-            return name
-        return f"sqrt({name})" if 2 * n == 1 else f"{name}^{n}"
-
-    above = [power(name, n) for name, n in parts if n > 0]
-    below = [power(name, -n) for name, n in parts if n < 0]
-    return "/".join(["*".join(above) or "1", *below])

@@ -9,21 +9,20 @@ from typing import Any
 import numpy as np
 
 from sdimu_calibration.core import earth
+from sdimu_calibration.core.effects import registry
+from sdimu_calibration.core.effects.gyro_g_sensitivity import G_SENSITIVITY
+from sdimu_calibration.core.effects.mass_unbalance import GYRO_MASS_UNBALANCE
+from sdimu_calibration.core.effects.misalignment import ACCEL_MISALIGNMENT
+from sdimu_calibration.core.effects.scale import ACCEL_SCALE
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.units import parse_quantity
 from sdimu_calibration.storage.config import find_config, read_mapping
 
 _TRUTH_FORMAT = "sdimu-truth/1"
 _REFERENCE_FORMAT = "sdimu-reference/1"
-_EXPECTED = {
-    "gyro_bias": "rad/s",
-    "gyro_scale": "ppm",
-    "gyro_misalignment": "rad",
-    "gyro_mass_unbalance": "rad/s/g",
-    "accel_bias": "m/s^2",
-    "accel_scale": "ppm",
-    "accel_misalignment": "rad",
-}
+_SCALE = frozenset(ACCEL_SCALE.labels)
+_RESPONSES = frozenset((*ACCEL_MISALIGNMENT.labels, *GYRO_MASS_UNBALANCE.labels, *G_SENSITIVITY.labels))
+"""Other coefficients that multiply the force."""
 
 
 def read_reference(name_or_path: str | Path = "table33", mount: str = "1 deg") -> dict[str, float]:
@@ -51,7 +50,8 @@ def read_reference(name_or_path: str | Path = "table33", mount: str = "1 deg") -
     if mount not in columns:
         raise DataError(f"{path}: no column '{mount}' (there are {', '.join(map(str, columns))})")
     column = columns[mount]
-    return {name: parse_quantity(column[name], unit) for name, unit in _EXPECTED.items() if name in column}
+    units = {name: registry.get(name).parameters[0].display_unit for name in registry.names()}
+    return {name: parse_quantity(column[name], unit) for name, unit in units.items() if name in column}
 
 
 def read_columns(name_or_path: str | Path) -> tuple[str, ...]:
@@ -125,9 +125,9 @@ def _restated(true: dict[str, float], share: float) -> dict[str, float]:
     """Multiply every response to force by `share`: less force, more response, the same reading."""
     out = dict(true)
     for name, value in true.items():
-        if name.startswith("accel_scale_") and name[12:] in ("x", "y", "z"):
+        if name in _SCALE:
             out[name] = (1.0 + value) * share - 1.0
-        elif name.startswith(("accel_misalignment_", "gyro_mass_unbalance_", "gyro_g_sensitivity_")):
+        elif name in _RESPONSES:
             out[name] = value * share
     return out
 

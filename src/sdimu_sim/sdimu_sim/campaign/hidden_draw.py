@@ -8,11 +8,11 @@ from zlib import crc32
 
 import numpy as np
 
+from sdimu_calibration.core.effect_key import parse_key, sized
 from sdimu_calibration.core.effects.selection import resolve
-from sdimu_calibration.core.units import from_si
 from sdimu_sim.campaign.hidden_outside import OUTSIDE
 from sdimu_sim.campaign.hidden_sizes import PLANS, Sizes, between
-from sdimu_sim.core.hidden import effect_example, effect_names
+from sdimu_sim.core.hidden import drawn_names, one_sided, size_unit
 
 KINDS = ("weak", "strong", "pair", "clean", "outside", "noise")
 """One effect at 5 sigma; one at 8 to 30; two at 10 to 30 each; none; not in the catalogue at 15 to 40; wrong noise."""
@@ -96,7 +96,7 @@ def draw(kind: str, seed: int, tables: Sequence[Sizes], hideable: frozenset[str]
 
 def hideable_names() -> frozenset[str]:
     """Parameters that both the simulator and the registry have."""
-    return frozenset(effect_names())
+    return frozenset(drawn_names())
 
 
 def _effect(rng: np.random.Generator, found: Sizes, size: float, hideable: frozenset[str]) -> Truth:
@@ -112,8 +112,8 @@ def _effect(rng: np.random.Generator, found: Sizes, size: float, hideable: froze
     name = str(rng.choice(sorted(pool[family])))
     k = int(rng.choice(pool[family][name]))
     value = size * found.sigma[k] * float(rng.choice((-1.0, 1.0)))
-    if "_delay" in name or "lost_data" in name or "dead_band" in name:
-        value = abs(value)  # the simulator delays and loses; it does not foresee
+    if one_sided(name):
+        value = abs(value)
     option = _option(found.label[k])
     if option and option[0] == "tau":
         option = ("tau", option[1] * float(rng.uniform(2.0**-0.5, 2.0**0.5)))
@@ -141,22 +141,15 @@ def outside_kind(label: str) -> str:
 
 
 def _option(label: str) -> tuple[str, float] | None:
-    """Read what stands in brackets behind a name: ``("tau", 300.0)``."""
-    _, bracket, inside = label.partition("(")
-    if not bracket:
-        return None
-    key, _, value = inside.rstrip(")").partition(",")[0].partition("=")
-    return key, float(value.split()[0])
+    """Read the first option of a label: ``("tau", 300.0)``."""
+    options = parse_key(label).options
+    return next(((key, float(value.split()[0])) for key, value in options.items()), None)
 
 
 def _text(name: str, value: float, option: tuple[str, float] | None) -> str:
-    """``NAME=VALUE`` as the simulator reads it, in the unit that it takes."""
-    example = effect_example(name).partition("=")[2]
-    unit = example.partition(";")[0].split(maxsplit=1)[1]
-    text = f"{name}={from_si(value, unit):.9e} {unit}"
-    if option is None:
-        return text
-    return text + f"; {option[0]}={option[1]:g}" + ("" if option[0] == "turn" else " s")
+    """Canonical key with its size, in the unit that people use."""
+    inside = "" if option is None else f"({option[0]}={option[1]:g}{'' if option[0] == 'turn' else ' s'})"
+    return sized(name + inside, value, size_unit(name))
 
 
 def _sensor(name: str) -> str:

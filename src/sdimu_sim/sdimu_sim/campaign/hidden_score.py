@@ -9,6 +9,7 @@ import numpy as np
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.diagnosis.found import found_effects
 from sdimu_calibration.core.diagnosis.scan import Scan, scan
+from sdimu_calibration.core.effects import body_frame
 from sdimu_calibration.core.results import Calibration
 from sdimu_sim.campaign.hidden_draw import Draw, Truth
 from sdimu_sim.campaign.hidden_outside import OUTSIDE, shapes
@@ -157,11 +158,6 @@ def baseline_rms_z(calibration: Calibration, sensor: ImuTruth) -> float:
     rows = [i for i, name in enumerate(calibration.names) if name in COEFFICIENTS]
     error = np.array([calibration.values[i] - truth[calibration.names[i]] for i in rows])
     sigma = np.sqrt(np.abs(np.diag(calibration.covariance)[rows]))
-    pinned = [calibration.names[i] in _zero_names(calibration.body_frame) for i in rows]
+    pinned = [calibration.names[i] in body_frame.pinned_names(calibration.body_frame) for i in rows]
     free = ~np.array(pinned) & (sigma > 0.0)
     return float(np.sqrt(np.mean((error[free] / sigma[free]) ** 2)))
-
-
-def _zero_names(frame: str) -> tuple[str, ...]:
-    pairs = ("xy", "xz", "yx") if frame == "accelerometer_triad" else ()
-    return tuple(f"accel_misalignment_{pair}" for pair in pairs)

@@ -104,8 +104,7 @@ def _table_motion(plan: Plan, table: TableSpecification) -> TableMotion:
 
 def true_values(sensor: ImuTruth, names: tuple[str, ...], frame: str) -> Floats:
     """Truth of the estimated coefficients by name, shape (p,); what the simulator does not have is zero."""
-    hidden = {t.name: t.parameters["k"] for t in parse_effects(sensor.effects).terms if "k" in t.parameters}
-    truth = in_body_frame(sensor.coefficients, frame) | hidden
+    truth = in_body_frame(sensor.coefficients, frame) | dict(parse_effects(sensor.effects).sizes)
     return np.array([truth.get(name, 0.0) for name in names])
 
 

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from sdimu_calibration.core.recording import DataError
+from sdimu_sim.cli.simulate import EFFECT
 
 if TYPE_CHECKING:
     from sdimu_sim.campaign.run import CalibrationRun
 
-_EFFECT = "Hide an effect in every test, NAME=VALUE or SENSOR=FORMULA; repeatable."
 _SCHEDULER = "Address of a dask scheduler (tcp://host:8786); without it: processes on this machine."
 
 
@@ -31,7 +31,7 @@ def monte_carlo(
     seed: Annotated[int, typer.Option(help="Seed of the first run; the others follow.")] = 1,
     mount: Annotated[str | None, typer.Option(help="Rotation of the IMU on the table: 'X,Y,Z' (deg).")] = None,
     mount_max: Annotated[float, typer.Option(help="Without --mount: drawn up to this about every axis (deg).")] = 3.0,
-    effect: Annotated[list[str] | None, typer.Option(help=_EFFECT)] = None,
+    effect: Annotated[list[str] | None, typer.Option(help=EFFECT)] = None,
     temperature: Annotated[str | None, typer.Option(help="Temperature profile: name or path.")] = None,
     scheduler: Annotated[str | None, typer.Option(help=_SCHEDULER)] = None,
     workers: Annotated[int, typer.Option(help="Local processes.")] = 2,
@@ -51,6 +51,7 @@ def monte_carlo(
     from sdimu_sim.campaign.summary import summarise
     from sdimu_sim.cli.simulate import mount_rad
     from sdimu_sim.core.scenario import Scenario
+    from sdimu_sim.own_effects import simulated_effects
     from sdimu_sim.temperature_file import load_temperature
 
     scenario = Scenario(
@@ -61,7 +62,7 @@ def monte_carlo(
         rate_hz=rate,
         mount_rad=None if mount is None else mount_rad(mount),
         mount_max_rad=math.radians(mount_max),
-        effects=tuple(effect or ()),
+        effects=simulated_effects(effect or ()),
         temperature=None if temperature is None else load_temperature(temperature),
     )
     work = CalibrationRun(scenario, load_model(model))

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from sdimu_sim.cli.simulate import EFFECT
+
 if TYPE_CHECKING:
     from rich.console import Console
 
@@ -16,7 +18,6 @@ if TYPE_CHECKING:
     from sdimu_calibration.core.results import Calibration
 
 STALL_S = 180.0
-_EFFECT = "Hide an effect, NAME=VALUE (accel_quadratic_x='20 ug/g^2') or SENSOR=FORMULA; repeatable."
 
 
 def run(
@@ -30,7 +31,7 @@ def run(
     rate: Annotated[float, typer.Option(help="Sample rate of the IMU (Hz), 10 to 1000.")] = 100.0,
     mount: Annotated[str | None, typer.Option(help="Rotation of the IMU on the table: 'X,Y,Z' (deg).")] = None,
     mount_max: Annotated[float, typer.Option(help="Without --mount: drawn up to this about every axis (deg).")] = 3.0,
-    effect: Annotated[list[str] | None, typer.Option(help=_EFFECT)] = None,
+    effect: Annotated[list[str] | None, typer.Option(help=EFFECT)] = None,
     temperature: Annotated[str | None, typer.Option(help="Temperature profile: name or path.")] = None,
     out: Annotated[Path, typer.Option(help="Folder of the results.")] = Path("out/run"),
 ) -> None:
@@ -39,13 +40,14 @@ def run(
 
     from sdimu_calibration.cli.console import console as make_console
     from sdimu_calibration.cli.processes import Children, own_domain
+    from sdimu_sim.own_effects import simulated_effects
 
     options: dict[str, dict[str, Any]] = {
         "table": {"plan": plan, "table": table, "seed": seed, "speed": speed},
         "imu": {
             "imu": imu, "site": site, "plan": plan, "seed": seed, "rate_hz": rate, "mount": mount or "",
-            "mount_max_deg": mount_max, "effects": list(effect or ()), "temperature": temperature or "",
-            "truth_file": str(out / "truth.yaml"),
+            "mount_max_deg": mount_max, "effects": list(simulated_effects(effect or ())),
+            "temperature": temperature or "", "truth_file": str(out / "truth.yaml"),
         },
         "calibration": {"site": site, "imu": imu, "model": model, "out": str(out)},
     }  # fmt: skip
@@ -72,7 +74,6 @@ def _check(options: dict[str, dict[str, Any]]) -> float:
     from sdimu_calibration.storage.config import load_imu, load_plan, load_site
     from sdimu_calibration.storage.effect_file import extended_model
     from sdimu_sim.cli.simulate import mount_rad
-    from sdimu_sim.core.hidden import parse_effects
     from sdimu_sim.temperature_file import load_temperature
 
     table, imu, calibration = options["table"], options["imu"], options["calibration"]
@@ -81,7 +82,6 @@ def _check(options: dict[str, dict[str, Any]]) -> float:
     load_imu(imu["imu"])
     load_site(imu["site"])
     extended_model(calibration["model"], ())
-    parse_effects(tuple(imu["effects"]))
     if imu["mount"]:
         mount_rad(imu["mount"])
     if imu["temperature"]:
@@ -155,7 +155,7 @@ def _test(plan: str, model: str, duration: float) -> Outline:
 
     effects = [selection.resolve(e) if isinstance(e, str) else e for e in extended_model(model, ()).effects]
     units = {q.name: q.display_unit for effect in effects for q in effect.parameters}
-    return Outline(duration, len(load_plan(plan).dwell_s), [effect.name for effect in effects], units)
+    return Outline(duration, len(load_plan(plan).dwell_s), [effect.key for effect in effects], units)
 
 
 def _report(console: Console, out: Path, site: str, imu: str, model: str, plan: str) -> Calibration:

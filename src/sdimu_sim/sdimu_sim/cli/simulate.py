@@ -10,7 +10,7 @@ import typer
 
 from sdimu_calibration.core.recording import DataError
 
-_EFFECT = "Hide an effect, NAME=VALUE (accel_quadratic_x='20 ug/g^2') or SENSOR=FORMULA; repeatable."
+EFFECT = "Hide an effect: what --add takes, =SIZE, such as 'accel_quadratic_x=20 ug/g^2'; repeatable."
 
 
 def simulate(
@@ -25,7 +25,7 @@ def simulate(
     seed: Annotated[int, typer.Option(help="Of coefficients, mount and noise.")] = 1,
     mount: Annotated[str | None, typer.Option(help="Rotation of the IMU on the table: 'X,Y,Z' (deg).")] = None,
     mount_max: Annotated[float, typer.Option(help="Without --mount: drawn up to this about every axis (deg).")] = 3.0,
-    effect: Annotated[list[str] | None, typer.Option(help=_EFFECT)] = None,
+    effect: Annotated[list[str] | None, typer.Option(help=EFFECT)] = None,
     temperature: Annotated[str | None, typer.Option(help="Temperature profile: name or path.")] = None,
     truth: Annotated[Path | None, typer.Option(help="Truth file; default: OUT.truth.yaml beside the bag.")] = None,
     by_hand: Annotated[
@@ -41,15 +41,17 @@ def simulate(
     from sdimu_calibration.storage.config import load_imu, load_plan, load_site
     from sdimu_sim.bag_file import write_test
     from sdimu_sim.core.scenario import Scenario, simulate_test
+    from sdimu_sim.own_effects import simulated_effects
     from sdimu_sim.temperature_file import load_temperature
     from sdimu_sim.truth_file import write_truth
 
+    effects = simulated_effects(effect or ())
     truth_path = truth or out.with_name(f"{out.name}.truth.yaml")
     if by_hand is not None:
         from sdimu_sim.bag_file import write_by_hand
         from sdimu_sim.core.by_hand import ByHand, simulate_by_hand
 
-        run = ByHand(by_hand, load_imu(imu or "mems_by_hand"), load_site(site), seed, rate, effects=tuple(effect or ()))
+        run = ByHand(by_hand, load_imu(imu or "mems_by_hand"), load_site(site), seed, rate, effects=effects)
         samples, true = simulate_by_hand(run)
         write_by_hand(out, samples, replace=replace)
         write_truth(truth_path, true)
@@ -65,7 +67,7 @@ def simulate(
         seed=seed,
         mount_rad=None if mount is None else mount_rad(mount),
         mount_max_rad=math.radians(mount_max),
-        effects=tuple(effect or ()),
+        effects=effects,
         temperature=None if temperature is None else load_temperature(temperature),
     )
     test = simulate_test(scenario)

@@ -17,8 +17,8 @@ from sdimu_calibration.core.rotation import quaternion_matrix, rotation_vector
 from sdimu_calibration.core.specification import ImuSpecification, Site
 from sdimu_sim.core.generator import ImuSamples, simulate_imu
 from sdimu_sim.core.platform import PlatformMotion
-from sdimu_sim.core.scenario import DEFAULT_START_NS
-from sdimu_sim.core.truth import ImuTruth, Truth, child_rng, draw_coefficients
+from sdimu_sim.core.scenario import DEFAULT_START_NS, with_hidden
+from sdimu_sim.core.truth import ImuTruth, Truth, child_rng, draw_coefficients, with_longer_axes
 
 _MOTION_HZ = 200.0
 """Samples of the motion: twenty a swing of the tremor."""
@@ -47,7 +47,7 @@ class ByHand:
     lever_arm_m : tuple of float
         Accelerometers from the wrist, in b: their force in a turn is not gravity's alone.
     effects : tuple of str
-        Hidden effects, ``NAME=VALUE``.
+        Hidden effects, canonical keys with sizes.
     """
 
     rests: int
@@ -73,12 +73,14 @@ def simulate_by_hand(run: ByHand) -> tuple[ImuSamples, Truth]:
         raise DataError(f"{run.rests} attitudes by hand: expected 2 and more")
     if not 10.0 <= run.rate_hz <= 1000.0:
         raise DataError(f"sample rate {run.rate_hz:g} Hz: expected 10 to 1000 Hz")
-    imu = ImuTruth(
-        coefficients=draw_coefficients(run.imu, run.seed),
-        gyro_white_noise=run.imu.gyro_white_noise,
-        accel_white_noise=run.imu.accel_white_noise,
-        effects=run.effects,
-        lever_arm_m=run.lever_arm_m,
+    imu = with_hidden(
+        ImuTruth(
+            coefficients=draw_coefficients(run.imu, run.seed),
+            gyro_white_noise=run.imu.gyro_white_noise,
+            accel_white_noise=run.imu.accel_white_noise,
+            effects=run.effects,
+            lever_arm_m=run.lever_arm_m,
+        )
     )
     samples = simulate_imu(by_hand_motion(run), imu, run.site, run.rate_hz, run.seed, None)
     return samples, Truth(imu, run.site, run.seed, run.rate_hz, f"{run.rests} attitudes by hand")
@@ -93,11 +95,7 @@ def by_hand_recording(run: ByHand) -> tuple[Recording, Truth]:
 def against_gravity(truth: Truth, gravity: float, true_gravity: float) -> Truth:
     """State a truth as one would who takes gravity for `gravity` (m/s^2): accelerometer axes longer or shorter."""
     share = true_gravity / gravity
-    coefficients = dict(truth.imu.coefficients)
-    for axis in "xyz":
-        name = f"accel_scale_{axis}"
-        coefficients[name] = (1.0 + coefficients.get(name, 0.0)) * share - 1.0
-    return replace(truth, imu=replace(truth.imu, coefficients=coefficients))
+    return replace(truth, imu=replace(truth.imu, coefficients=with_longer_axes(truth.imu.coefficients, share)))
 
 
 def by_hand_motion(run: ByHand) -> PlatformMotion:

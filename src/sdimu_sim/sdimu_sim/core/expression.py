@@ -23,7 +23,9 @@ _OPERATORS: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
 _FUNCTIONS: dict[str, tuple[int, Callable[..., Any]]] = {
     "sin": (1, np.sin),
     "cos": (1, np.cos),
+    "tan": (1, np.tan),
     "exp": (1, np.exp),
+    "log": (1, np.log),
     "abs": (1, np.abs),
     "sign": (1, np.sign),
     "sqrt": (1, np.sqrt),
@@ -63,7 +65,7 @@ def parse_expression(text: str, known: Collection[str]) -> Expression:
     Parameters
     ----------
     text : str
-        Numbers, the `known` names, ``+ - * / **`` and sin, cos, exp, abs, sign, sqrt, tanh, min, max.
+        Numbers, the `known` names, ``+ - * / **`` and sin, cos, tan, exp, log, abs, sign, sqrt, tanh, min, max.
     known : collection of str
         Names that may be used.
 
@@ -84,6 +86,23 @@ def parse_expression(text: str, known: Collection[str]) -> Expression:
     names: set[str] = set()
     _check(tree, text, known, names)
     return Expression(text, tree, frozenset(names))
+
+
+def with_values(expression: Expression, values: Mapping[str, float | str]) -> Expression:
+    """Put numbers, or other names, in the place of some names of a formula."""
+
+    class Replace(ast.NodeTransformer):
+        def visit_Name(self, node: ast.Name) -> ast.expr:
+            new = values.get(node.id, node.id)
+            return ast.Name(new, node.ctx) if isinstance(new, str) else ast.Constant(float(new))
+
+        def visit_Call(self, node: ast.Call) -> ast.expr:
+            # The name of a function is no variable.
+            return ast.Call(node.func, [self.visit(argument) for argument in node.args], [])
+
+    tree = Replace().visit(ast.parse(expression.text.strip(), mode="eval").body)
+    names = {values.get(name, name) for name in expression.names}
+    return Expression(ast.unparse(tree), tree, frozenset(name for name in names if isinstance(name, str)))
 
 
 def _check(node: ast.expr, text: str, known: Collection[str], names: set[str]) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,10 +11,11 @@ from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.rotation import rotation_matrix
 from sdimu_calibration.core.specification import Site
-from sdimu_sim.core.hidden import CONSTANTS, LOST_AFTER_S, parse_effects
+from sdimu_sim.core.equation import CONSTANTS
+from sdimu_sim.core.hidden import DIRECTIONS, LOST_AFTER_S, parse_effects
 from sdimu_sim.core.imu import Electronics, response
 from sdimu_sim.core.platform import PlatformMotion, mean_motion
-from sdimu_sim.core.samples import SampleClock, TrueSamples, Variables, in_body
+from sdimu_sim.core.samples import SampleClock, TrueSamples, Variables, in_body, rotated
 from sdimu_sim.core.temperature import TemperatureProfile
 from sdimu_sim.core.truth import ImuTruth
 
@@ -59,8 +60,9 @@ class ImuGenerator:
         self._clock = SampleClock(rate_hz)
         self._electronics = Electronics(truth, self._clock.interval_s, seed)
         self._variables = Variables(temperature)
-        self._gravity = gravity_of(site)
-        self._omega_ie_n = earth.earth_rate(site.latitude_rad)
+        off = self._hidden.site
+        self._gravity = gravity_of(site) - off.gravity
+        self._omega_ie_n = earth.earth_rate(site.latitude_rad - off.latitude)
         self._field_n = np.asarray(truth.magnetic_field, dtype=np.float64)
         self._C_tb = rotation_matrix(np.asarray(truth.mount_rad, dtype=np.float64))
         self._motion = PlatformMotion(np.empty(0), np.empty((0, 4)), np.empty((0, 3)))
@@ -110,7 +112,19 @@ class ImuGenerator:
     def _true(self, edges: Floats) -> TrueSamples:
         m = self._motion
         means = mean_motion(m.t, m.q_nt, m.omega_nt_t, edges, self._omega_ie_n, self._field_n)
-        return in_body(means, self._C_tb, self._gravity, np.asarray(self._truth.lever_arm_m))
+        true = in_body(means, self._C_tb, self._gravity, np.asarray(self._truth.lever_arm_m))
+        east = self._hidden.site.east
+        if not east:
+            return true
+        # The plumb line hangs West of the Down that the test believes in: f turns with it.
+        tilt = np.sin(east) * self._direction(edges, 1) + (1.0 - np.cos(east)) * true.down
+        return replace(true, f_ib=true.f_ib + self._gravity * tilt)
+
+    def _direction(self, edges: Floats, axis: int) -> Floats:
+        """Mean North (0) or East (1) component of each body axis, shape (3, m): seen as a field of size one."""
+        m = self._motion
+        means = mean_motion(m.t, m.q_nt, m.omega_nt_t, edges, self._omega_ie_n, np.eye(3)[axis])
+        return rotated(self._C_tb, means[12:15])
 
     def _readings(self, edges: Floats) -> Floats:
         """Make the readings of the six sensors (6, m), without noise."""
@@ -122,6 +136,9 @@ class ImuGenerator:
             out[late] = response(self._truth, self._true(edges - delay))[late]
         if self._hidden.terms:
             values = CONSTANTS | self._variables.of(true, 0.5 * (edges[:-1] + edges[1:]))
+            if self._hidden.reads & DIRECTIONS:
+                pairs = (("n", self._direction(edges, 0)), ("e", self._direction(edges, 1)))
+                values |= {f"{name}{axis}": v[i] for name, v in pairs for i, axis in enumerate("xyz")}
             for term in self._hidden.terms:
                 out[term.sensor] += term.expression.evaluate({**values, **term.parameters})
         self._lose(out, true, edges)
@@ -131,9 +148,9 @@ class ImuGenerator:
 
     def _lose(self, out: Floats, true: TrueSamples, edges: Floats) -> None:
         """Take away the gyros' increments over the lost stretch of a turn."""
-        for turn, length in self._hidden.lost:
+        for turn, length, at in self._hidden.lost:
             if turn <= len(self._turn_starts):
-                begin = self._turn_starts[turn - 1] + LOST_AFTER_S
+                begin = self._turn_starts[turn - 1] + LOST_AFTER_S if at is None else at - 0.5 * length
                 overlap = np.minimum(edges[1:], begin + length) - np.maximum(edges[:-1], begin)
                 out[:3] -= true.omega_ib * (np.maximum(overlap, 0.0) / self._clock.interval_s)
 

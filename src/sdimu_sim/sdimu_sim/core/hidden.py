@@ -1,8 +1,9 @@
-"""Hidden effects: what a test can put into the truth that the baseline model does not have.
+"""Hidden effects: what a test can put into the truth that a model does not have, or has.
 
-An effect is given as ``NAME=VALUE``: ``accel_quadratic_x=20 ug/g^2``; parameters follow after semicolons:
-``gyro_bias_warm_up_x=0.3 deg/h; tau=1200 s``. A name of a sensor (``gyro_x`` ... ``accel_z``) takes a formula in
-rad/s or m/s^2: ``accel_z=20*ug*ax*wz``.
+An effect is given by its canonical key with a size (`sdimu_calibration.core.effect_key`):
+``accel_quadratic_x=20 ug/g^2``, ``gyro_bias_warm_up_x(tau=1200 s)=0.3 deg/h``, ``gyro_x: ey^2=0.1 deg/h``. A
+coefficient of the baseline takes this value instead of a drawn one. A sensor (``gyro_x`` ... ``accel_z``) takes a
+formula in rad/s or m/s^2: ``accel_z=20*ug*ax*wz``.
 
 Each row of the table is a formula in the TRUE sample means, written here from the physics and not from the
 calibrator's regressors. Index letters: {i} the sensor's own axis, {j} and {k} the others.
@@ -12,20 +13,21 @@ from __future__ import annotations
 
 import difflib
 import itertools
-import math
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from importlib.metadata import entry_points
+from typing import NamedTuple
 
+from sdimu_calibration.core.effect_key import SENSORS, EffectKey, parse_key, read_options, read_quantity
 from sdimu_calibration.core.recording import DataError
-from sdimu_calibration.core.units import STANDARD_GRAVITY, UnitError, parse_quantity
+from sdimu_sim.core.equation import CONSTANTS, read_equation
 from sdimu_sim.core.expression import Expression, parse_expression
+from sdimu_sim.core.truth import COEFFICIENT_UNITS
 
 _XYZ = "xyz"
-SENSORS: tuple[str, ...] = tuple(f"{triad}_{own}" for triad in ("gyro", "accel") for own in _XYZ)
-"""The six sensors, in the order of every array of six."""
 
 VARIABLES: tuple[str, ...] = (
-    *(f"{v}{i}" for v in ("w", "a", "alpha", "wt", "B", "turned", "leant") for i in _XYZ),
+    *(f"{v}{i}" for v in ("w", "a", "f", "alpha", "wt", "n", "e", "d", "B", "turned", "leant") for i in _XYZ),
     *(f"L{i}{j}" for i in _XYZ for j in _XYZ),
     "t",
     "T",
@@ -34,100 +36,126 @@ VARIABLES: tuple[str, ...] = (
     "moving",
     "since",
 )
-"""True means over the sample: body rate w (rad/s), specific force a (f/g), angular acceleration alpha (rad/s^2),
-rate of the table wt (rad/s), magnetic field B (T), lever-arm tensor L (1/s^2), sign of the last turn about and of
-the last change of a along an axis (turned, leant), time t (s), temperature T (deg C), its change since the start dT
-(K) and rate dTdt (K/s), moving (1 while the table turns), time since the last turn ended (since; s, 0 in turns, very
-long before the first)."""
-
-CONSTANTS: dict[str, float] = {
-    "g": STANDARD_GRAVITY,
-    "ug": 1e-6 * STANDARD_GRAVITY,
-    "mg": 1e-3 * STANDARD_GRAVITY,
-    "deg": math.pi / 180.0,
-    "h": 3600.0,
-    "ppm": 1e-6,
-    "pi": math.pi,
-}
+"""True means over the sample: body rate w (rad/s), specific force a (f/g) and f (m/s^2), angular acceleration alpha
+(rad/s^2), rate of the table wt (rad/s), North, East and Down component of a body axis (n, e, d), magnetic field B (T),
+lever-arm tensor L (1/s^2), sign of the last turn about and of the last change of a along an axis (turned, leant), time
+t (s), temperature T (deg C), its change since the start dT (K) and rate dTdt (K/s), moving (1 while the table turns),
+time since the last turn ended (since; s, 0 in turns, very long before the first)."""
+DIRECTIONS = frozenset(f"{v}{i}" for v in "ne" for i in _XYZ)
+"""Variables that cost the generator a pass of their own."""
 
 TEMPERATURE_NAMES = frozenset({"T", "dT", "dTdt"})
 
 
 @dataclass(frozen=True)
-class _Row:
-    """Family of effects: names, unit of k, formula; `parameters` as (name, unit)."""
+class Row:
+    """Family of effects.
+
+    Attributes
+    ----------
+    names : str
+        Coefficients, ``gyro_...`` or ``accel_...``, with index letters.
+    unit : str
+        Of the size k.
+    formula : str
+        rad/s or m/s^2, in `VARIABLES`, k and the options (SI).
+    options : mapping of str to str
+        Unit of each option.
+    drawn : bool
+        The campaign on hidden effects draws it; what came later is left out, so that a seed draws what it drew before.
+    """
 
     names: str
     unit: str
     formula: str
-    parameters: tuple[tuple[str, str], ...] = ()
+    options: Mapping[str, str] = field(default_factory=dict)
+    drawn: bool = True
 
 
 _BOTH = (("gyro", "deg/h", "w{i}"), ("accel", "ug", "g*a{i}"))
 
-_ROWS: tuple[_Row, ...] = (
-    _Row("accel_quadratic_{i}", "ug/g^2", "k*a{i}**2"),
-    _Row("accel_cubic_{i}", "ug/g^3", "k*a{i}**3"),
-    _Row("accel_odd_quadratic_{i}", "ug/g^2", "k*a{i}*abs(a{i})"),
-    _Row("accel_scale_asymmetry_{i}", "ppm", "k*g*abs(a{i})"),
-    _Row("accel_bias_asymmetry_{i}", "ug", "k*sign(a{i})"),
-    _Row("accel_cross_coupling_{i}{j}", "ug/g^2", "k*a{i}*a{j}"),
-    _Row("accel_cross_square_{i}{j}", "ug/g^2", "k*a{j}**2"),
-    _Row("accel_cross_product_{i}", "ug/g^2", "k*a{o}*a{p}"),
-    _Row("accel_size_{i}{any}", "mm", "k*L{i}{any}"),
-    _Row("accel_hysteresis_{i}", "ug", "k*leant{i}"),
-    _Row("accel_magnetic_{i}{any}", "ug/G", "k*B{any}"),
-    _Row("gyro_g_sensitivity_{i}{any}", "deg/h/g", "k*a{any}"),
-    _Row("gyro_g_squared_{i}{any}", "deg/h/g^2", "k*a{any}**2"),
-    _Row("gyro_g_product_{i}{pair}", "deg/h/g^2", "k*a{pair[0]}*a{pair[1]}"),
-    _Row("gyro_g_dependent_scale_{i}", "ppm/g", "k*a{i}*w{i}"),
-    _Row("gyro_scale_asymmetry_{i}", "ppm", "k*abs(w{i})"),
-    _Row("gyro_scale_quadratic_{i}", "ppm*s/deg", "k*w{i}**2"),
-    _Row("gyro_scale_cubic_{i}", "ppm*s^2/deg^2", "k*w{i}**3"),
-    _Row("gyro_misalignment_asymmetry_{i}{j}", "arcsec", "k*abs(w{j})"),
-    _Row("gyro_anisoinertia_{i}", "s/rad", "k*w{o}*w{p}"),
-    _Row("gyro_acceleration_sensitivity_{i}{any}", "s", "k*alpha{any}"),
-    _Row("gyro_dead_band_{i}", "deg/h", "-min(max(w{i}, -k), k)"),
-    _Row("gyro_hysteresis_{i}", "deg/h", "k*turned{i}"),
-    _Row("gyro_magnetic_{i}{any}", "deg/h/G", "k*B{any}"),
+_ROWS: tuple[Row, ...] = (
+    Row("accel_quadratic_{i}", "ug/g^2", "k*a{i}**2"),
+    Row("accel_cubic_{i}", "ug/g^3", "k*a{i}**3"),
+    Row("accel_odd_quadratic_{i}", "ug/g^2", "k*a{i}*abs(a{i})"),
+    Row("accel_scale_asymmetry_{i}", "ppm", "k*g*abs(a{i})"),
+    Row("accel_bias_asymmetry_{i}", "ug", "k*sign(a{i})"),
+    Row("accel_cross_coupling_{i}{j}", "ug/g^2", "k*a{i}*a{j}"),
+    Row("accel_cross_square_{i}{j}", "ug/g^2", "k*a{j}**2"),
+    Row("accel_cross_product_{i}", "ug/g^2", "k*a{o}*a{p}"),
+    Row("accel_size_{i}{any}", "mm", "k*L{i}{any}"),
+    Row("accel_hysteresis_{i}", "ug", "k*leant{i}"),
+    Row("accel_magnetic_{i}{any}", "ug/G", "k*B{any}"),
+    Row("gyro_g_sensitivity_{i}{any}", "deg/h/g", "k*a{any}"),
+    Row("gyro_g_squared_{i}{any}", "deg/h/g^2", "k*a{any}**2"),
+    Row("gyro_g_product_{i}{pair}", "deg/h/g^2", "k*a{pair[0]}*a{pair[1]}"),
+    Row("gyro_g_dependent_scale_{i}", "ppm/g", "k*a{i}*w{i}"),
+    Row("gyro_scale_asymmetry_{i}", "ppm", "k*abs(w{i})"),
+    Row("gyro_scale_quadratic_{i}", "ppm*s/deg", "k*w{i}**2"),
+    Row("gyro_scale_cubic_{i}", "ppm*s^2/deg^2", "k*w{i}**3"),
+    Row("gyro_misalignment_asymmetry_{i}{j}", "arcsec", "k*abs(w{j})"),
+    Row("gyro_anisoinertia_{i}", "s/rad", "k*w{o}*w{p}"),
+    Row("gyro_acceleration_sensitivity_{i}{any}", "s", "k*alpha{any}"),
+    Row("gyro_dead_band_{i}", "deg/h", "-min(max(w{i}, -k), k)"),
+    Row("gyro_hysteresis_{i}", "deg/h", "k*turned{i}"),
+    Row("gyro_magnetic_{i}{any}", "deg/h/G", "k*B{any}"),
     *(
         row
         for triad, unit, signal in _BOTH
         for row in (
-            _Row(f"{triad}_bias_temperature_{{i}}", f"{unit}/degC", "k*dT"),
-            _Row(f"{triad}_bias_temperature_rate_{{i}}", f"{unit}*s/degC", "k*dTdt"),
-            _Row(f"{triad}_bias_warm_up_{{i}}", unit, "k*exp(-t/tau)", (("tau", "s"),)),
-            _Row(f"{triad}_bias_ramp_{{i}}", f"{unit}/h", "k*t"),
-            _Row(f"{triad}_bias_step_{{i}}", unit, "k*(1 + sign(t - t0))/2", (("t0", "s"),)),
-            _Row(f"{triad}_bias_in_motion_{{i}}", unit, "k*moving"),
-            _Row(f"{triad}_bias_settling_{{i}}", unit, "k*(1 - moving)*exp(-since/tau)", (("tau", "s"),)),
-            _Row(f"{triad}_scale_temperature_{{i}}", "ppm/degC", f"k*dT*{signal}"),
-            _Row(f"{triad}_scale_ramp_{{i}}", "ppm/h", f"k*t*{signal}"),
+            Row(f"{triad}_bias_temperature_{{i}}", f"{unit}/degC", "k*dT"),
+            Row(f"{triad}_bias_temperature_rate_{{i}}", f"{unit}*s/degC", "k*dTdt"),
+            Row(f"{triad}_bias_warm_up_{{i}}", unit, "k*exp(-t/tau)", {"tau": "s"}),
+            Row(f"{triad}_bias_ramp_{{i}}", f"{unit}/h", "k*t"),
+            Row(f"{triad}_bias_step_{{i}}", unit, "k*(1 + sign(t - t0))/2", {"t0": "s"}),
+            Row(f"{triad}_bias_in_motion_{{i}}", unit, "k*moving"),
+            Row(f"{triad}_bias_settling_{{i}}", unit, "k*(1 - moving)*exp(-since/tau)", {"tau": "s"}),
+            Row(f"{triad}_scale_temperature_{{i}}", "ppm/degC", f"k*dT*{signal}"),
+            Row(f"{triad}_scale_ramp_{{i}}", "ppm/h", f"k*t*{signal}"),
+            # The first four modes of a random walk (Karhunen-Loeve): a size each.
+            *(
+                Row(f"{triad}_bias_random_walk_{{i}}{m}", unit, f"k*sin({m - 0.5}*pi*min(t/span, 1))/({m - 0.5}*pi)",
+                    {"span": "s"}, drawn=False)
+                for m in (1, 2, 3, 4)
+            ),
         )
     ),
-)
+    # The centre of mass moves at a constant rate: d along the axis named, q in quadrature to it.
+    *(
+        Row(f"gyro_mass_unbalance_ramp_{kind}{{i}}", "deg/h/g/h", f"k*t*a{{{kind}}}", drawn=False) for kind in "dq"
+    ),
+)  # fmt: skip
 
 
-def _expand(row: _Row) -> Iterable[tuple[str, tuple[str, _Row]]]:
+def _expand(row: Row) -> Iterable[tuple[str, tuple[str, Row]]]:
     """Every name of a family, with its sensor and its formula filled in."""
     triad = row.names.split("_", 1)[0]
     for i in _XYZ:
         o, p = (a for a in _XYZ if a != i)
+        # Quadrature of the mass unbalance (doc/conventions.md): x with y, y with x, z with y.
+        quadrature = "x" if i == "y" else "y"
         for j, whichever, pair in itertools.product(o + p, _XYZ, ("xy", "xz", "yz")):
-            letters = {"i": i, "j": j, "o": o, "p": p, "any": whichever, "pair": pair}
-            filled = _Row(row.names, row.unit, row.formula.format(**letters), row.parameters)
+            letters = {"i": i, "j": j, "o": o, "p": p, "any": whichever, "pair": pair, "d": i, "q": quadrature}
+            filled = Row(row.names, row.unit, row.formula.format(**letters), row.options, row.drawn)
             yield row.names.format(**letters), (f"{triad}_{i}", filled)
 
 
-_TABLE: dict[str, tuple[str, _Row]] = {name: entry for row in _ROWS for name, entry in _expand(row)}
+_TABLE: dict[str, tuple[str, Row]] = {name: entry for row in _ROWS for name, entry in _expand(row)}
 
 _DELAYS: dict[str, tuple[str, ...]] = {
     **{f"{triad}_delay": tuple(s for s in SENSORS if s.startswith(triad)) for triad in ("gyro", "accel")},
     **{f"{sensor[:-2]}_delay_{sensor[-1]}": (sensor,) for sensor in SENSORS},
+    "accel_triad_delay": SENSORS[3:],
 }
 _LOST = "gyro_lost_data"
 LOST_AFTER_S = 3.0
-"""Data of a turn are lost from this long after its start."""
+"""Data of a turn are lost from this long after its start where the key does not say at what time."""
+_LEVER_ARM = {f"lever_arm_{axis}": i for i, axis in enumerate(_XYZ)}
+_SITE = {
+    "reference_gravity": ("gravity", "ug"),
+    "reference_latitude": ("latitude", "arcsec"),
+    "reference_deflection_east": ("east", "arcsec"),
+}
 
 
 @dataclass(frozen=True)
@@ -152,6 +180,25 @@ class Term:
     parameters: dict[str, float]
 
 
+class Lost(NamedTuple):
+    """Gyro data lost in a turn: its number (from 1), length (s), and the middle (s; None: early in the turn)."""
+
+    turn: int
+    length: float
+    at: float | None = None
+
+
+class SiteError(NamedTuple):
+    """By what the site that a test believes in exceeds the true one.
+
+    Gravity (m/s^2), latitude for the Earth's rate (rad), and deflection of the vertical to the East (rad).
+    """
+
+    gravity: float = 0.0
+    latitude: float = 0.0
+    east: float = 0.0
+
+
 @dataclass(frozen=True)
 class Hidden:
     """All hidden effects of a test.
@@ -161,33 +208,117 @@ class Hidden:
     terms : tuple of Term
     delay_s : tuple of float
         Of each of the six sensors (>= 0).
-    lost : tuple of (int, float)
-        Turn (from 1) and length (s) of gyro data lost in it.
+    lost : tuple of Lost
+    site : SiteError
+    lever_arm_m : mapping of int to float
+        Components of the lever arm that are given.
+    coefficients : mapping of str to float
+        Of the baseline (SI), as built.
+    sizes : mapping of str to float
+        Size (SI) of every effect but the coefficients of the baseline, by the name that its estimate has.
     """
 
     terms: tuple[Term, ...] = ()
     delay_s: tuple[float, ...] = (0.0,) * 6
-    lost: tuple[tuple[int, float], ...] = ()
+    lost: tuple[Lost, ...] = ()
+    site: SiteError = field(default_factory=SiteError)
+    lever_arm_m: Mapping[int, float] = field(default_factory=dict)
+    coefficients: Mapping[str, float] = field(default_factory=dict)
+    sizes: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def reads(self) -> frozenset[str]:
+        """Variables that the terms read."""
+        return frozenset[str]().union(*(term.expression.names for term in self.terms))
 
     @property
     def needs_temperature(self) -> bool:
         """Whether any term reads the temperature."""
-        return any(term.expression.names & TEMPERATURE_NAMES for term in self.terms)
+        return bool(self.reads & TEMPERATURE_NAMES)
+
+
+def register_row(row: Row) -> None:
+    """Add a family of effects that a plug-in brings.
+
+    Raises
+    ------
+    DataError
+        When one of its names is taken or its formula cannot be read.
+    """
+    for name, (sensor, filled) in _expand(row):
+        if (name in _TABLE and _TABLE[name] != (sensor, filled)) or name in _UNITS:
+            raise DataError(f"simulated effect '{name}' is there already")
+        parse_expression(filled.formula, (*VARIABLES, *CONSTANTS, "k", *filled.options))
+        _TABLE[name] = (sensor, filled)
+
+
+ENTRY_POINTS = "sdimu_sim.effects"
+"""Group of entry points that name callables without arguments, each returning a tuple of `Row`."""
+_LOADED: set[str] = set()
+
+
+def load_plugins(name: str) -> bool:
+    """Register what other packages bring, once; tell whether `name` is known then.
+
+    Raises
+    ------
+    DataError
+        When one does not load.
+    """
+    for point in entry_points(group=ENTRY_POINTS):
+        if point.name in _LOADED:
+            continue
+        try:
+            rows = tuple(point.load()())
+        except Exception as error:
+            raise DataError(f"simulated effect '{point.name}' ({point.value}) does not load: {error}") from error
+        for row in rows:
+            register_row(row)
+        _LOADED.add(point.name)
+    return name in effect_names()
+
+
+_UNITS: dict[str, str] = {
+    **dict.fromkeys((*_DELAYS, _LOST), "ms"),
+    **dict.fromkeys(_LEVER_ARM, "mm"),
+    **{name: unit for name, (_, unit) in _SITE.items()},
+    **COEFFICIENT_UNITS,
+}
+"""Customary unit of everything that is no row of the table."""
 
 
 def effect_names() -> tuple[str, ...]:
     """Names that `parse_effects` takes, without the six sensors."""
-    return (*sorted(_TABLE), *sorted(_DELAYS), _LOST)
+    return (*sorted(_TABLE), *_UNITS)
+
+
+def drawn_names() -> tuple[str, ...]:
+    """Names that the campaign on hidden effects may draw."""
+    delays = (name for name in _DELAYS if "triad" not in name)
+    return (*sorted(name for name, (_, row) in _TABLE.items() if row.drawn), *sorted(delays), _LOST)
+
+
+def size_unit(name: str) -> str:
+    """Customary unit of the size of an effect of `effect_names`."""
+    return _TABLE[name][1].unit if name in _TABLE else _UNITS[name]
+
+
+def one_sided(name: str) -> bool:
+    """Whether the size of an effect cannot be negative: a sensor delays and loses, it does not foresee."""
+    return name in _DELAYS or name == _LOST or name.startswith("gyro_dead_band_")
 
 
 def effect_example(name: str) -> str:
-    """Return a ``NAME=VALUE`` that is read, with the unit people use; `name` is one of `effect_names`."""
-    if name in _DELAYS:
-        return f"{name}=1 ms"
+    """Return a key with a size that is read, with the unit people use; `name` is one of `effect_names`."""
     if name == _LOST:
-        return f"{name}=10 ms; turn=1"
-    _, row = _TABLE[name]
-    return f"{name}=1 {row.unit}" + "".join(f"; {key}=100 {unit}" for key, unit in row.parameters)
+        return f"{name}(turn=1, at=100 s)=10 ms"
+    options = {key: f"100 {unit}" for key, unit in _TABLE[name][1].options.items()} if name in _TABLE else {}
+    return str(EffectKey(name, options, f"1 {size_unit(name)}"))
+
+
+def canonical(text: str) -> str:
+    """Write an effect in the one spelling; the former one (``NAME=VALUE; option=value``) is read."""
+    return str(parse_key(text))
 
 
 def parse_effects(texts: Iterable[str]) -> Hidden:
@@ -196,60 +327,91 @@ def parse_effects(texts: Iterable[str]) -> Hidden:
     Parameters
     ----------
     texts : iterable of str
-        ``NAME=VALUE`` each.
+        Canonical keys with a size; files of effects of one's own are put in before (`sdimu_sim.own_effects`).
 
     Raises
     ------
     DataError
         Names the effect and says what was expected.
     """
-    terms: list[Term] = []
-    delay = dict.fromkeys(SENSORS, 0.0)
-    lost: list[tuple[int, float]] = []
+    found = _Found()
     for text in texts:
-        name, equals, value = (part.strip() for part in text.partition("="))
-        if not equals or not value:
-            raise DataError(f"effect '{text}': expected NAME=VALUE, such as accel_quadratic_x='20 ug/g^2'")
-        if name in SENSORS:
-            terms.append(Term(name, SENSORS.index(name), parse_expression(value, (*VARIABLES, *CONSTANTS)), {}))
-        elif name in _DELAYS:
-            (seconds,) = _values(name, value, (("k", "ms"),)).values()
-            if seconds < 0.0:
-                raise DataError(f"effect {name}: a delay is not negative (delay the other triad instead)")
-            for sensor in _DELAYS[name]:
-                delay[sensor] += seconds
-        elif name == _LOST:
-            values = _values(name, value, (("k", "ms"), ("turn", "1")))
-            if values["turn"] < 1 or values["turn"] % 1 or values["k"] <= 0.0:
-                raise DataError(f"effect {name}: expected something like '10 ms; turn=7' (turns count from 1)")
-            lost.append((int(values["turn"]), values["k"]))
-        elif name in _TABLE:
-            terms.append(_named_term(name, value))
+        key = parse_key(text)
+        if not key.size:
+            example = f"{key}=1 {size_unit(key.name)}" if key.name in effect_names() else "accel_quadratic_x=20 ug/g^2"
+            raise DataError(f"effect '{text}' has no size (expected something like '{example}')")
+        if key.name in SENSORS:
+            formula = parse_expression(key.size, (*VARIABLES, *CONSTANTS))
+            found.terms.append(Term(key.name, SENSORS.index(key.name), formula, {}))
+        elif key.equation:
+            name, formula, size = read_equation(key, *key.equation)
+            found.terms.append(Term(name, SENSORS.index(key.equation[0]), formula, {"k": size}))
+            found.sizes[name] = size
         else:
-            raise DataError(f"unknown effect '{name}'{_suggestion(name)}")
-    return Hidden(tuple(terms), tuple(delay[s] for s in SENSORS), tuple(lost))
+            _take_named(key, found)
+    delay = tuple(found.delay[s] for s in SENSORS)
+    return Hidden(
+        tuple(found.terms), delay, tuple(found.lost), found.site, found.lever_arm, found.coefficients, found.sizes
+    )
 
 
-def _named_term(name: str, value: str) -> Term:
-    sensor, row = _TABLE[name]
-    values = _values(name, value, (("k", row.unit), *row.parameters))
-    if values.get("tau", 1.0) <= 0.0:
-        raise DataError(f"effect {name}: tau must be positive")
-    known = (*VARIABLES, *CONSTANTS, *values)
-    return Term(name, SENSORS.index(sensor), parse_expression(row.formula, known), values)
+@dataclass
+class _Found:
+    """What has been read so far: the fields of `Hidden`."""
+
+    terms: list[Term] = field(default_factory=list)
+    delay: dict[str, float] = field(default_factory=lambda: dict.fromkeys(SENSORS, 0.0))
+    lost: list[Lost] = field(default_factory=list)
+    site: SiteError = field(default_factory=SiteError)
+    lever_arm: dict[int, float] = field(default_factory=dict)
+    coefficients: dict[str, float] = field(default_factory=dict)
+    sizes: dict[str, float] = field(default_factory=dict)
 
 
-def _values(name: str, text: str, wanted: tuple[tuple[str, str], ...]) -> dict[str, float]:
-    """Read ``VALUE; name=VALUE ...``: the size k first, then exactly the wanted parameters."""
-    first, *rest = (part.strip() for part in text.split(";"))
-    given = {"k": first} | {key.strip(): value.strip() for key, _, value in (part.partition("=") for part in rest)}
-    example = "; ".join(f"1 {unit}" if key == "k" else f"{key}=1 {unit}" for key, unit in wanted)
-    if set(given) != {key for key, _ in wanted}:
-        raise DataError(f"effect {name}: cannot read '{text}' (expected something like '{example}')")
-    try:
-        return {key: parse_quantity(given[key], unit) for key, unit in wanted}
-    except UnitError as error:
-        raise DataError(f"effect {name}: {error}") from error
+def _take_named(key: EffectKey, found: _Found) -> None:
+    name = key.name
+    if name not in effect_names() and not load_plugins(name):
+        raise DataError(f"unknown effect '{name}'{_suggestion(name)}")
+    size = read_quantity(f"effect {name}", key.size, size_unit(name))
+    if name in _TABLE:
+        found.terms.append(_named_term(key, size))
+    elif name == _LOST:
+        found.lost.append(_lost(key, size))
+    else:
+        read_options(key, {})
+    if name in _DELAYS:
+        if size < 0.0:
+            raise DataError(f"effect {name}: a delay is not negative (delay the other triad instead)")
+        for sensor in _DELAYS[name]:
+            found.delay[sensor] += size
+    elif name in _LEVER_ARM:
+        found.lever_arm[_LEVER_ARM[name]] = size
+    elif name in _SITE:
+        found.site = found.site._replace(**{_SITE[name][0]: size})
+    if name in COEFFICIENT_UNITS:
+        found.coefficients[name] = size
+    else:
+        # A second variant of one effect is estimated under its key.
+        found.sizes[str(EffectKey(name, key.options)) if name in found.sizes else name] = size
+
+
+def _named_term(key: EffectKey, size: float) -> Term:
+    sensor, row = _TABLE[key.name]
+    options = read_options(key, row.options)
+    for name in ("tau", "span"):
+        if options.get(name, 1.0) <= 0.0:
+            raise DataError(f"effect {key.name}: {name} must be positive")
+    values = {"k": size, **options}
+    formula = parse_expression(row.formula, (*VARIABLES, *CONSTANTS, *values))
+    return Term(key.name, SENSORS.index(sensor), formula, values)
+
+
+def _lost(key: EffectKey, size: float) -> Lost:
+    units = {"turn": "1", "at": "s"}
+    options = read_options(key, units if "at" in key.options else {"turn": "1"})
+    if options["turn"] < 1 or options["turn"] % 1 or size <= 0.0:
+        raise DataError(f"effect {key.name}: expected something like '{effect_example(key.name)}' (turns count from 1)")
+    return Lost(int(options["turn"]), size, options.get("at"))
 
 
 def _suggestion(name: str) -> str:

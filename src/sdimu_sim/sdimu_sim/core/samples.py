@@ -62,6 +62,8 @@ class TrueSamples:
     ----------
     omega_ib, f_ib, omega_nb, alpha, field : ndarray, shape (3, m)
         rad/s, m/s^2, rad/s, rad/s^2, T.
+    down : ndarray, shape (3, m)
+        Down component of each body axis.
     lever : ndarray, shape (3, 3, m)
         Mean of ``[alpha x] + [omega x]^2`` (1/s^2).
     """
@@ -71,6 +73,7 @@ class TrueSamples:
     omega_nb: Floats
     alpha: Floats
     field: Floats
+    down: Floats
     lever: Floats
 
 
@@ -86,17 +89,17 @@ def in_body(means: Floats, C_tb: Floats, gravity: float, lever_arm: Floats) -> T
     lever_arm : ndarray, shape (3,)
         Of the accelerometers, in b (m).
     """
-    omega, down, turning, alpha, field = (_rotated(C_tb, means[i : i + 3]) for i in range(0, 15, 3))
-    half = np.array([_rotated(C_tb, means[15 + 3 * i : 18 + 3 * i]) for i in range(3)])
-    lever = np.array([_rotated(C_tb, half[:, j]) for j in range(3)]).transpose(1, 0, 2)
+    omega, down, turning, alpha, field = (rotated(C_tb, means[i : i + 3]) for i in range(0, 15, 3))
+    half = np.array([rotated(C_tb, means[15 + 3 * i : 18 + 3 * i]) for i in range(3)])
+    lever = np.array([rotated(C_tb, half[:, j]) for j in range(3)]).transpose(1, 0, 2)
     f_ib = -gravity * down
     for j in range(3):
         if lever_arm[j]:
             f_ib = f_ib + lever_arm[j] * lever[:, j]
-    return TrueSamples(omega, f_ib, turning, alpha, field, np.ascontiguousarray(lever))
+    return TrueSamples(omega, f_ib, turning, alpha, field, down, np.ascontiguousarray(lever))
 
 
-def _rotated(C_tb: Floats, v: Floats) -> Floats:
+def rotated(C_tb: Floats, v: Floats) -> Floats:
     """``C_tb.T @ v``, term by term: a matrix product's digits would depend on the number of columns."""
     return np.array([C_tb[0, i] * v[0] + C_tb[1, i] * v[1] + C_tb[2, i] * v[2] for i in range(3)])
 
@@ -118,7 +121,7 @@ class Variables:
         turned, self._turned = _last_sign(wt, TURNED_RAD_S, self._turned)
         leant, self._leant = _last_sign(change, LEANT_PER_S, self._leant)
         groups = {"w": true.omega_ib, "a": a, "alpha": true.alpha, "wt": wt, "B": true.field}
-        groups |= {"turned": turned, "leant": leant}
+        groups |= {"turned": turned, "leant": leant, "f": true.f_ib, "d": true.down}
         values: dict[str, Floats | float] = {f"{n}{i}": v[k] for n, v in groups.items() for k, i in enumerate(_XYZ)}
         values |= {f"L{i}{j}": true.lever[k, n] for k, i in enumerate(_XYZ) for n, j in enumerate(_XYZ)}
         values["t"] = middle

@@ -12,6 +12,7 @@ from sdimu_calibration.core.plan import Plan
 from sdimu_calibration.core.recording import DataError, PhaseLog, Recording, TableLog, TemperatureLog
 from sdimu_calibration.core.specification import ImuSpecification, Site
 from sdimu_sim.core.generator import ImuSamples, simulate_imu
+from sdimu_sim.core.hidden import canonical, parse_effects
 from sdimu_sim.core.platform import PlatformMotion
 from sdimu_sim.core.temperature import TemperatureProfile
 from sdimu_sim.core.truth import ImuTruth, Truth, draw_coefficients, draw_mount
@@ -35,7 +36,7 @@ class Scenario:
     mount_rad : tuple of float or None
         Rotation vector of the IMU on the platform; None draws it up to `mount_max_rad` about every axis.
     effects : tuple of str
-        Hidden effects, ``NAME=VALUE``.
+        Hidden effects, canonical keys with sizes.
     temperature : TemperatureProfile or None
     coefficients : mapping of str to float or None
         As built, SI; None draws them from the IMU's specification.
@@ -72,7 +73,19 @@ def imu_truth(scenario: Scenario) -> ImuTruth:
         accel_white_noise=scenario.imu.accel_white_noise,
         effects=tuple(scenario.effects),
     )
-    return replace(truth, **scenario.extras)  # type: ignore[arg-type]
+    return with_hidden(replace(truth, **scenario.extras))  # type: ignore[arg-type]
+
+
+def with_hidden(truth: ImuTruth) -> ImuTruth:
+    """Take coefficients and lever arm that its effects name into a truth, and write the effects canonically."""
+    hidden = parse_effects(truth.effects)
+    lever_arm = [hidden.lever_arm_m.get(i, value) for i, value in enumerate(truth.lever_arm_m)]
+    return replace(
+        truth,
+        coefficients={**truth.coefficients, **hidden.coefficients},
+        lever_arm_m=(lever_arm[0], lever_arm[1], lever_arm[2]),
+        effects=tuple(map(canonical, truth.effects)),
+    )
 
 
 @dataclass(frozen=True)

@@ -27,7 +27,14 @@ _GROUPS: dict[str, tuple[str, ...]] = {
     "accel_scale": tuple(_XYZ),
     "accel_misalignment": _PAIRS,
 }
-COEFFICIENTS: tuple[str, ...] = tuple(f"{group}_{part}" for group, parts in _GROUPS.items() for part in parts)
+_CUSTOMARY = {"bias": ("deg/h", "ug"), "scale": ("ppm", "ppm"), "misalignment": ("arcmin", "arcmin")}
+COEFFICIENT_UNITS: dict[str, str] = {
+    f"{group}_{part}": _CUSTOMARY.get(group.partition("_")[2], ("deg/h/g",) * 2)[group.startswith("accel")]
+    for group, parts in _GROUPS.items()
+    for part in parts
+}
+"""Customary unit of each coefficient."""
+COEFFICIENTS: tuple[str, ...] = tuple(COEFFICIENT_UNITS)
 """The thirty coefficient names, in the order of the paper."""
 
 DEFAULT_MAGNETIC_FIELD = (30.0e-6, -4.5e-6, 40.0e-6)
@@ -48,7 +55,8 @@ class ImuTruth:
     gyro_white_noise, accel_white_noise : float
         Densities (rad/s/sqrt(Hz), m/s^2/sqrt(Hz)).
     effects : tuple of str
-        Hidden effects, ``NAME=VALUE`` as in `sdimu_sim.core.hidden`.
+        Hidden effects, canonical keys with sizes (`sdimu_sim.core.hidden`); those that name a coefficient or the lever
+        arm are in `coefficients` and `lever_arm_m` already.
     lever_arm_m : tuple of float
         Of the accelerometers from the point that stands still, in b.
     magnetic_field : tuple of float
@@ -137,6 +145,12 @@ def input_axes(triad: str, coefficients: Mapping[str, float]) -> Floats:
                 turn[j] = coefficients.get(f"{triad}_misalignment_{own}{about}", 0.0)
         rows[i] = (1.0 + coefficients.get(f"{triad}_scale_{own}", 0.0)) * rotation_matrix(turn)[:, i]
     return rows
+
+
+def with_longer_axes(coefficients: Mapping[str, float], share: float) -> dict[str, float]:
+    """Coefficients (as built) of the sensor whose accelerometer axes are `share` times as long."""
+    longer = {f"accel_scale_{own}": (1.0 + coefficients.get(f"accel_scale_{own}", 0.0)) * share - 1.0 for own in _XYZ}
+    return {**coefficients, **longer}
 
 
 def unbalance_matrix(coefficients: Mapping[str, float]) -> Floats:

@@ -28,7 +28,7 @@ def made(effects: Sequence[str], size: float = 1.0, seed: int = 1, **data: float
             values[k] = 0.0
     root = 0.01 * sigma[:, None] * rng.standard_normal((len(parameters), len(parameters)))
     return Calibration(
-        "accelerometer_triad", tuple(e.name for e in found), tuple(p.name for p in parameters),
+        "accelerometer_triad", tuple(effects), tuple(p.name for p in parameters),
         tuple(p.unit for p in parameters), tuple(p.display_unit for p in parameters), values, root @ root.T,
         {}, dict(data), (), no_history(len(parameters)),
     )  # fmt: skip

@@ -33,7 +33,8 @@ def motions(n=400, seed=2):
 
 def measured(result, omega, force):
     """What the simulated sensor (written apart from the estimator) shows of its own coefficients."""
-    true = TrueSamples(omega.T, force.T, omega.T, 0 * omega.T, 0 * omega.T, np.zeros((3, 3, len(omega))))
+    none = 0 * omega.T
+    true = TrueSamples(omega.T, force.T, omega.T, none, none, force.T / -9.8, np.zeros((3, 3, len(omega))))
     truth = ImuTruth(coefficients=dict(zip(result.names, result.values, strict=True)))
     out = response(truth, true).T
     return out[:, :3], out[:, 3:]
@@ -91,6 +92,19 @@ def test_temperature_counts_from_the_start_of_the_calibrated_recording(make_resu
     cold = compensate(using, t, DT, omega, force)
     moved = (cold.f_ib_b - warm.f_ib_b) @ linear_model(result).accel.T
     np.testing.assert_allclose(moved, np.broadcast_to(10.0 * result.values[-3:], moved.shape), rtol=1e-9)
+
+
+def test_a_variant_whose_key_is_in_the_result_is_compensated(make_result):
+    effect = selection.resolve("gyro_bias_warm_up(tau=300 s)")
+    result = make_result((*BASELINE, effect.key))
+    using = compensator(result, IMU, same_start=True)
+    assert using.left_out == ()
+    assert len(using.coefficients) == 33
+    assert compensator(result, IMU).left_out == (f"{effect.key} (a function of time in the calibrated recording)",)
+    t = np.array([10.0, 310.0])
+    seen = samples_motion(t, 0.0 * t, np.zeros((2, 3)), np.zeros((2, 3)), 0.0 * t, 0.0 * t)
+    warm_up = using.model.regressors(seen)[:, -3:]
+    np.testing.assert_allclose(warm_up[1] / warm_up[0], np.exp(-1.0), rtol=1e-12)
 
 
 @pytest.mark.parametrize(

@@ -15,6 +15,9 @@ import numpy as np
 
 from sdimu_calibration.core import earth
 from sdimu_calibration.core.arrays import Floats
+from sdimu_calibration.core.effects.bias import ACCEL_BIAS, GYRO_BIAS
+from sdimu_calibration.core.effects.mass_unbalance import GYRO_MASS_UNBALANCE
+from sdimu_calibration.core.effects.misalignment import ACCEL_MISALIGNMENT
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.rotation import rotation_matrix
 from sdimu_calibration.core.specification import ImuSpecification, Site
@@ -92,11 +95,11 @@ def align(w_mean: Floats, f_mean: Floats, duration_s: float, site: Site, imu: Im
     C_nb = np.vstack([np.cross(east, down), east, down])
 
     prior = imu.prior
-    accel = np.hypot(prior.get("accel_bias", 0.0), imu.accel_white_noise / np.sqrt(duration_s))
-    level = float(np.hypot(accel / norm, prior.get("accel_misalignment", 0.0)))
+    accel = np.hypot(prior.get(ACCEL_BIAS.name, 0.0), imu.accel_white_noise / np.sqrt(duration_s))
+    level = float(np.hypot(accel / norm, prior.get(ACCEL_MISALIGNMENT.name, 0.0)))
     gyro = np.sqrt(
-        prior.get("gyro_bias", 0.0) ** 2
-        + prior.get("gyro_mass_unbalance", 0.0) ** 2
+        prior.get(GYRO_BIAS.name, 0.0) ** 2
+        + prior.get(GYRO_MASS_UNBALANCE.name, 0.0) ** 2
         + imu.gyro_white_noise**2 / duration_s
     )
     rate = max(earth.RATE * np.cos(site.latitude_rad), 1e-12)

@@ -22,6 +22,8 @@ from sdimu_calibration.core.alignment.prepared import PreparedData, TestSetup
 from sdimu_calibration.core.alignment.rest_means import layout, rest_means
 from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.compiled import compiled
+from sdimu_calibration.core.effects.bias import ACCEL_BIAS, GYRO_BIAS
+from sdimu_calibration.core.effects.mass_unbalance import GYRO_MASS_UNBALANCE
 from sdimu_calibration.core.rotation import orthonormal, rotation_matrix
 
 _FREE = 1e3
@@ -85,16 +87,16 @@ def coarse_start(prepared: PreparedData, setup: TestSetup, start: Alignment) -> 
     to_first = _orientations(prepared, where.stop_last, where.stop_first, mean[:, :3])
     sizes = dict(zip(names, prior, strict=True))
     noise = np.array([setup.imu.gyro_white_noise, setup.imu.accel_white_noise]) / np.sqrt(np.mean(time))
-    accel_bias = sizes.get("accel_bias_x", 0.0)
+    accel_bias = sizes.get(ACCEL_BIAS.labels[0], 0.0)
     down, bias_f = _constant(to_first, -mean[:, 3:], setup.gravity, accel_bias, np.zeros((len(time), 0)), 0.0, noise[1])
-    g_sensitivity = sizes.get("gyro_mass_unbalance_dx", 0.0)
+    g_sensitivity = sizes.get(GYRO_MASS_UNBALANCE.labels[0], 0.0)
     a = -np.einsum("kji,j->ki", to_first, down) / setup.gravity
-    gyro_bias = sizes.get("gyro_bias_x", 0.0)
+    gyro_bias = sizes.get(GYRO_BIAS.labels[0], 0.0)
     rate, bias_w = _constant(to_first, mean[:, :3], earth.RATE, gyro_bias, a, g_sensitivity, noise[0])
-    for stem, bias in (("gyro_bias", bias_w), ("accel_bias", -bias_f)):
-        for axis, value in zip("xyz", bias, strict=True):
-            if f"{stem}_{axis}" in names:
-                coefficients[names.index(f"{stem}_{axis}")] = value
+    for effect, bias in ((GYRO_BIAS, bias_w), (ACCEL_BIAS, -bias_f)):
+        for name, value in zip(effect.labels, bias, strict=True):
+            if name in names:
+                coefficients[names.index(name)] = value
     return StartPoint(_level_and_north(down, rate), coefficients)
 
 

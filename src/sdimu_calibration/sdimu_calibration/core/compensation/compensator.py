@@ -22,6 +22,7 @@ import numpy as np
 
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.compensation.reads import reads, samples_motion
+from sdimu_calibration.core.effect_key import parse_key
 from sdimu_calibration.core.effects import imu_model, selection
 from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.effects.imu_model import ImuModel
@@ -111,10 +112,10 @@ def resolved(calibration: Calibration, own: Sequence[Effect] = ()) -> tuple[Effe
     DataError
         When an effect is unknown, or the coefficients are not those of the effects.
     """
-    given = {effect.name: effect for effect in own}
+    given = {effect.key: effect for effect in own}
     try:
         effects = imu_model.told_apart(
-            [given[name] if name in given else selection.resolve(name) for name in calibration.model]
+            [given[key] if key in given else selection.resolve(key) for key in calibration.model]
         )
     except DataError as error:
         raise DataError(f"the result has an effect of no catalogue: {error}; name its file (--effect)") from error
@@ -161,10 +162,10 @@ def compensator(
     taken: list[Effect] = []
     kept: list[int] = []
     place = 0
-    for effect in effects:
-        reason = _reason(effect, has_temperature, start is not None, same_start)
+    for effect, key in zip(effects, calibration.model, strict=True):
+        reason = _reason(effect, key, has_temperature, start is not None, same_start)
         if reason:
-            left.append(f"{effect.name} ({reason})")
+            left.append(f"{key} ({reason})")
         else:
             taken.append(effect)
             kept += range(place, place + len(effect.parameters))
@@ -184,11 +185,11 @@ def compensator(
     )  # fmt: skip
 
 
-def _reason(effect: Effect, has_temperature: bool, start_known: bool, same_start: bool) -> str:
+def _reason(effect: Effect, key: str, has_temperature: bool, start_known: bool, same_start: bool) -> str:
     """Say why samples cannot be freed of an effect; empty when they can."""
-    if effect.run_local:
+    if effect.scope == "recording":
         return "a fault of the recording in which it was found"
-    if effect.options and "(" not in effect.name:
+    if effect.options and not parse_key(key).options:
         return f"the result does not say its {' and '.join(effect.options)}"
     needed = reads(effect)
     for name, reason in _ABSENT.items():

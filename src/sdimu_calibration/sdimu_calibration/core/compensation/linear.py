@@ -85,7 +85,7 @@ def linear_model(calibration: Calibration, own: Sequence[Effect] = ()) -> Linear
 def _shape(effect: Effect) -> tuple[Floats, Floats, frozenset[int]]:
     """Regressor columns as ``constant + slope x``: (m,), (m, 6), and the columns that are not of this shape."""
     m = len(effect.terms)
-    if effect.run_local or reads(effect) - {"w", "f"}:
+    if effect.scope == "recording" or reads(effect) - {"w", "f"}:
         return np.zeros(m), np.zeros((m, 6)), frozenset(range(m))
     scale = np.array([1.0, 1.0, 1.0, 10.0, 10.0, 10.0])
     points = np.vstack([np.zeros(6), np.diag(scale), np.random.default_rng(5).normal(size=(40, 6)) * scale])

@@ -22,7 +22,7 @@ _SPAN_S = 20_000.0
 def reads(effect: Effect) -> frozenset[str]:
     """Names of the fields of `Motion` on which the regressors of an effect depend."""
     rng = np.random.default_rng(3)
-    one, other = _motion(rng), _motion(rng)
+    one, other = any_motion(rng), any_motion(rng)
     other = replace(other, t=0.6 * one.t + 7.0, rest=~one.rest)
     before = effect.regressors(one)
     return frozenset(
@@ -34,7 +34,7 @@ def _changed(one: Motion, other: Motion, name: str) -> Motion:
     return replace(one, **{name: getattr(other, name)})
 
 
-def _motion(rng: np.random.Generator) -> Motion:
+def any_motion(rng: np.random.Generator) -> Motion:
     """Motion in which every variable goes its own way."""
 
     def any_of(*shape: int) -> Floats:

@@ -16,6 +16,9 @@ import numpy as np
 from sdimu_calibration.core import earth
 from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.data.windows import Windows, cut_windows
+from sdimu_calibration.core.effects.bias import ACCEL_BIAS
+from sdimu_calibration.core.effects.mass_unbalance import GYRO_MASS_UNBALANCE
+from sdimu_calibration.core.effects.scale import ACCEL_SCALE
 from sdimu_calibration.core.specification import ImuSpecification, Site
 from sdimu_calibration.core.units import STANDARD_GRAVITY
 
@@ -83,8 +86,9 @@ def observe_earth_rate(t: Floats, omega_ib_b: Floats, f_ib_b: Floats, imu: ImuSp
     mean = np.array([[*windows.w_mean[r].mean(axis=0), *windows.f_mean[r].mean(axis=0)] for r in rests])
     prior = imu.prior
     force = np.linalg.norm(mean[:, 3:], axis=1)
-    gravity_sigma = np.hypot(prior.get("accel_bias", 0.0), STANDARD_GRAVITY * prior.get("accel_scale", 0.0))
-    up_rate, up_sigma = _vertical_rate(mean[:, :3], mean[:, 3:] / force[:, None], prior.get("gyro_mass_unbalance", 0.0))
+    gravity_sigma = np.hypot(prior.get(ACCEL_BIAS.name, 0.0), STANDARD_GRAVITY * prior.get(ACCEL_SCALE.name, 0.0))
+    unbalance = prior.get(GYRO_MASS_UNBALANCE.name, 0.0)
+    up_rate, up_sigma = _vertical_rate(mean[:, :3], mean[:, 3:] / force[:, None], unbalance)
     return EarthRate(up_rate, up_sigma, float(np.median(force)), float(gravity_sigma), len(rests))
 
 

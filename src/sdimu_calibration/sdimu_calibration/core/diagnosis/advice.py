@@ -14,25 +14,9 @@ from sdimu_calibration.core.diagnosis.coefficient_shifts import CoefficientShift
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.diagnosis.found import DetectableSize, Found
 from sdimu_calibration.core.diagnosis.plan_seen import PlanSeen
+from sdimu_calibration.core.effects import references, registry
+from sdimu_calibration.core.effects.effect import Excitation
 
-_EVEN = frozenset(
-    {"gyro_scale_asymmetry", "gyro_scale_quadratic", "gyro_misalignment_asymmetry", "gyro_bias_in_motion"}
-)
-"""Even in the rate: one sense of turn leaves them to scale factor and misalignment."""
-_SHAPE = frozenset({"gyro_scale_asymmetry", "gyro_scale_quadratic", "gyro_scale_cubic"})
-"""Functions of the rate that one rate cannot tell apart."""
-_OBLIQUE = frozenset(
-    {"gyro_g_product", "accel_cross_product", "accel_cross_coupling", "accel_cubic", "accel_odd_quadratic"}
-)
-"""Products and powers of forces: seen between the cardinal attitudes."""
-_SLOW_BIAS = ("temperature", "warm_up", "ramp", "random_walk", "temperature_rate", "step")
-_SLOW = frozenset(f"{triad}_bias_{kind}" for triad in ("gyro", "accel") for kind in _SLOW_BIAS)
-"""Functions of time."""
-_TWO_AXES = frozenset({"gyro_anisoinertia"})
-_EXACT = {
-    "reference_gravity": "a wrong gravity is a common scale factor of the accelerometers whatever the plan: survey it",
-    "reference_deflection_east": "a deflection to the East is an azimuth whatever the plan",
-}
 _SLOW_MINUTES = 20.0
 _MOST_STAKES = 3
 
@@ -57,15 +41,17 @@ def untestable_reasons(reached: tuple[DetectableSize, ...], plan: PlanSeen) -> t
 
 def reason(one: DetectableSize, plan: PlanSeen) -> str:
     """Say why a candidate is not testable with this plan."""
-    if one.family in _EXACT:
-        return _EXACT[one.family]
-    if one.family in _EVEN and plan.one_sided():
+    effect = registry.find(one.family)
+    needed = effect.excitation if effect else frozenset()
+    if effect and effect.never_seen:
+        return effect.never_seen
+    if Excitation.BOTH_SENSES in needed and plan.one_sided():
         return f"{_senses(plan)}: drive some negative (the second turn of each 180 deg pair costs nothing)"
-    if one.family in _SHAPE and plan.one_rate():
+    if Excitation.TWO_RATES in needed and plan.one_rate():
         return f"{_rates(plan)}: drive every other turn at another rate, such as 2 and 10 deg/s"
-    if one.family in _TWO_AXES:
+    if Excitation.TWO_AXES in needed:
         return "every turn is about one body axis: needs turns about two at once"
-    if one.family in _OBLIQUE and not plan.oblique:
+    if Excitation.OBLIQUE_STOPS in needed and not plan.oblique:
         return "no stop lies between the body axes: split turns of 90 deg into halves of 45 deg"
     if one.partners:
         return "coefficients of the model take it"
@@ -106,12 +92,13 @@ def _about_found(d: Diagnosis, found: tuple[Found, ...], plan: PlanSeen) -> list
             out.append(f"Try an equation of your own (--try FILE); nearest in this test: {names}.")
         return out
     for one in found:
-        if one.candidate.family == "reference_latitude":
+        label = one.candidate.label
+        if one.candidate.family == references.LATITUDE.name:
             out.append(_about_latitude(one))
-        elif not one.candidate.effect.run_local:
-            out.append(f"Keep {one.candidate.label} in the model: --add '{one.candidate.label}'.")
-        if one.candidate.effect.run_local:
-            out.append(f"{one.candidate.label} is a fault of this recording: record again and do not carry it over.")
+        elif one.candidate.effect.scope == "recording":
+            out.append(f"{label} is a fault of this recording: record again and do not carry it over.")
+        else:
+            out.append(f"Keep {label} in the model: --add '{label}'.")
         if one.alike:
             out.append(separate(one, plan) + _calculated(one))
         if one.coefficient_shifts:
@@ -145,19 +132,19 @@ def separate(one: Found, plan: PlanSeen) -> str:
     """Name the next turn or stop that would tell a class apart, with minutes."""
     label, others = one.candidate.label, ", ".join(one.alike[:3])
     dwell = max(plan.dwell_minutes, 1.0)
-    family = one.candidate.family
+    needed = one.candidate.effect.excitation
     head = f"To tell {label} from {others}: "
-    if family in _SHAPE and plan.one_rate():
+    if Excitation.TWO_RATES in needed and plan.one_rate():
         minutes = 2 * (dwell + 0.3)
         return head + f"add a turn of 180 deg and back about that axis, level, at 10 deg/s ({minutes:.0f} min)."
-    if family in _EVEN and plan.one_sided():
+    if Excitation.BOTH_SENSES in needed and plan.one_sided():
         return head + f"add a turn of 180 deg about that axis in the other sense ({dwell + 1.5:.0f} min)."
-    if family in _SLOW:
+    if Excitation.REPEATED_ATTITUDES in needed:
         return head + (
             f"stay at the last stop for {_SLOW_MINUTES:.0f} min more, then repeat the first stop "
             f"({dwell + 1.0:.0f} min)."
         )
-    if family in _OBLIQUE or family.startswith(("accel_quadratic", "accel_scale_asymmetry", "accel_bias_asymmetry")):
+    if Excitation.OBLIQUE_STOPS in needed:
         return head + (
             f"add two stops on the body diagonal, X +45 deg and Y -35.3 deg and back ({2 * (dwell + 0.6):.0f} min), "
             "or run the plan 'recommended'."
@@ -175,13 +162,13 @@ def _calculated(one: Found) -> str:
 
 def _about_plan(reached: tuple[DetectableSize, ...], plan: PlanSeen) -> list[str]:
     out = []
-    hidden = {one.family for one in reached if not one.testable}
-    if hidden & _EVEN and plan.one_sided():
+    hidden = [effect.excitation for r in reached if not r.testable and (effect := registry.find(r.family))]
+    if any(Excitation.BOTH_SENSES in needed for needed in hidden) and plan.one_sided():
         out.append(
             f"{_capital(_senses(plan))}, so scale-factor asymmetry of the gyros cannot be seen: drive the second turn "
             "of each 180 deg pair negative (0 min more; the plan 'kim18_signed')."
         )
-    if "gyro_scale_cubic" in hidden and plan.one_rate():
+    if {Excitation.TWO_RATES} in hidden and plan.one_rate():
         out.append(
             f"{_capital(_rates(plan))}, so the shape of the scale factor cannot be seen: alternate 2 and 10 deg/s "
             "(shorter; the plan 'recommended')."

@@ -10,7 +10,18 @@ import numpy as np
 
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.effects import registry
-from sdimu_calibration.core.effects.effect import AXES, CHANNELS, Column, Effect, Parameter, Term, Timetable, product
+from sdimu_calibration.core.effects.bias import ACCEL_BIAS, GYRO_BIAS
+from sdimu_calibration.core.effects.effect import (
+    AXES,
+    CHANNELS,
+    Column,
+    Effect,
+    Excitation,
+    Parameter,
+    Term,
+    Timetable,
+    product,
+)
 from sdimu_calibration.core.effects.motion import Motion
 from sdimu_calibration.core.evidence.candidate import OWN
 
@@ -129,9 +140,13 @@ def wave(period: float, lead: float, spacing: tuple[float, float] = (0.0, 0.0)) 
         )
 
     both = _plain(text, _wave(2.0 * np.pi / period, np.radians(lead)))
-    return [replace(e, nearer=nearer(k) if phase > _LEAST_PHASE else None) for k, e in enumerate(both)]
+    return [
+        replace(e, nearer=nearer(k) if phase > _LEAST_PHASE else None, excitation=_OVER_TIME)
+        for k, e in enumerate(both)
+    ]
 
 
+_OVER_TIME = frozenset({Excitation.REPEATED_ATTITUDES})
 _LEAST_PHASE = 3.0
 """Steps of the phase (deg) finer than this change less of an amplitude of twenty sigma than its noise."""
 
@@ -164,8 +179,6 @@ def _wave(rate: float, lead: float) -> Column:
 
 USUAL_TURN = float(np.deg2rad(2.0))
 """Rate of an ordinary turn (rad/s): what a rate in an equation is of the order of."""
-# A term whose variable is of its usual order is not larger than the bias is.
-_OWN_GYRO, _OWN_ACCEL = registry.get("gyro_bias"), registry.get("accel_bias")
 
 
 def _plain(text: str, value: Callable[[Motion], Floats]) -> list[Effect]:
@@ -189,7 +202,8 @@ def _own(text: str, unit: str, shown: str, value: Callable[[Motion], Floats], us
             prior={grade: sigma / usual for grade, sigma in like.prior.items()},
         )  # fmt: skip
 
-    return [triad("gyro", ("rad/s", "deg/h"), _OWN_GYRO), triad("accel", ("m/s^2", "ug"), _OWN_ACCEL)]
+    # A term whose variable is of its usual order is not larger than the bias is.
+    return [triad("gyro", ("rad/s", "deg/h"), GYRO_BIAS), triad("accel", ("m/s^2", "ug"), ACCEL_BIAS)]
 
 
 _TIME: dict[str, Column] = {

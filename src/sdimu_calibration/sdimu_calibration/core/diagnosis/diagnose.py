@@ -44,7 +44,6 @@ _MISFIT = 0.05
 """Excess of the NIS below which sigmas are right enough."""
 _MISFIT_SIGMAS = 5.0
 """The same in standard deviations of the excess."""
-_DRIFTS = ("bias_ramp", "bias_step", "bias_warm_up", "bias_random_walk")
 _PATCHES = 3
 """Drifts of one bias that together follow any wander and say nothing of its cause."""
 
@@ -234,8 +233,8 @@ def largest_misfit(dof: float) -> float:
 def patched(done: Round) -> bool:
     """Whether the choice is a patchwork: the search ran out of steps, or one bias drifts by three effects at once."""
     steps = done.found.steps
-    drifts = {(c.family, c.label if not c.family.endswith("random_walk") else "", _sensor(c)) for c in done.chosen}
-    of_sensor = [sensor for family, _, sensor in drifts if family.endswith(_DRIFTS)]
+    drifts = {(c.family, c.effect.variant, _sensor(c)) for c in done.chosen if c.effect.bias_drift}
+    of_sensor = [sensor for _, _, sensor in drifts]
     many = any(of_sensor.count(sensor) >= _PATCHES for sensor in of_sensor)
     return many or (len(steps) == MOST_STEPS and steps[-1].accepted)
 

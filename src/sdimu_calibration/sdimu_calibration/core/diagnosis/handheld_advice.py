@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.diagnosis.found import Found
+from sdimu_calibration.core.effects.effect import Excitation
 
 
 def handheld_advice(d: Diagnosis, found: tuple[Found, ...]) -> tuple[str, ...]:
@@ -25,7 +26,7 @@ def handheld_advice(d: Diagnosis, found: tuple[Found, ...]) -> tuple[str, ...]:
 
 def _more(one: Found) -> str:
     """Say what to do by hand that would tell a class apart."""
-    if "(" in one.candidate.label or any(word in one.candidate.family for word in ("ramp", "temperature")):
+    if Excitation.REPEATED_ATTITUDES in one.candidate.effect.excitation:
         return "come back to the first attitudes at the end, and rest there"
     if one.candidate.effect.terms[0].channel < 3:
         return "turn about that axis both ways, slowly and fast"

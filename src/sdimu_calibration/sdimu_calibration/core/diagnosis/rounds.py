@@ -36,8 +36,6 @@ LEAST_SIGMAS = 3.0
 """An effect smaller than this many of its sigmas, once it is in the fit, is dropped."""
 _MANY = 3
 """Number of chosen catalogue terms from which one equation is tried in their place."""
-_NOT_HANDHELD = ("reference", "gyro_lost_data", "gyro_delay", "accel_delay")
-"""There is no reference but gravity; a turn by hand may miss anyhow, by a sigma that is learned."""
 
 
 @dataclass(frozen=True)
@@ -238,7 +236,7 @@ def candidates(base: Fit, tried: Sequence[Candidate], extra: Sequence[Effect], o
     if base.learns_scatter:
         known = [
             e for e in known
-            if not (e.family or e.name).startswith(_NOT_HANDHELD) and not e.random_walk and e.decay_s is None
+            if not e.needs_table and not e.random_walk and e.decay_s is None
         ]  # fmt: skip
     return _untried(known, {c.label for c in tried} | base.labels)
 

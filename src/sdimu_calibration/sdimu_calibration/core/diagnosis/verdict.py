@@ -62,7 +62,7 @@ def verdict(facts: Verdict) -> str:
             return "own equation"
         if len(chosen) > 1:
             return "several effects"
-        if chosen[0].effect.run_local:
+        if chosen[0].effect.scope == "recording":
             return "data fault"
         return "class of effects" if alike_of(facts.found, chosen[0].label) else "one effect"
     if facts.noise:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from sdimu_calibration.core.arrays import Floats
-from sdimu_calibration.core.effects.effect import ACCEL, AXES, Column, family, matrix_columns
+from sdimu_calibration.core.effects.effect import ACCEL, AXES, Column, Excitation, family, matrix_columns
 from sdimu_calibration.core.effects.motion import Motion
 from sdimu_calibration.core.effects.registry import register
 
@@ -26,6 +26,7 @@ CROSS_COUPLING = register(
     family(
         "accel_cross_coupling", "accelerometer cross-coupling Kip, Kio", "df_i = K_ij a_i a_j",
         _COUPLING, ("m/s^2/g^2", "ug/g^2"), (20, 100, 1500),
+        excitation=frozenset({Excitation.OBLIQUE_STOPS}),
         typical="navigation 5-30, tactical 50-200, MEMS 500-3000 ug/g^2",
         description="Product of the forces along and across the input axis. Zero at cardinal stops; a velocity jump "
         "after "
@@ -47,6 +48,7 @@ CROSS_PRODUCT = register(
     family(
         "accel_cross_product", "accelerometer cross-axis product Kpo", "df_i = K_jk a_j a_k",
         _PRODUCT, ("m/s^2/g^2", "ug/g^2"), (10, 60, 500),
+        excitation=frozenset({Excitation.OBLIQUE_STOPS}),
         typical="navigation below 10, tactical 20-100 ug/g^2",
         description="Product of both forces across the input axis; acts in turns about the input axis.",
     )

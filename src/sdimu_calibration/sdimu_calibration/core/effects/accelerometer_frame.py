@@ -76,7 +76,7 @@ def drifting(sensors: ImuModel, imu: ImuSpecification, gravity: float, duration:
 
 def accelerometer_frame_model(asked: ImuModel, imu: ImuSpecification) -> AccelerometerFrameModel | None:
     """Put a model into the accelerometers' frame; None where it cannot turn because not all misalignments are in it."""
-    pinned = {f"accel_misalignment_{pair}" for pair in ("xy", "xz", "yx")}
+    pinned = set(body_frame.pinned_names())
     if not pinned <= set(asked.names):
         return None
     effects: list[Effect] = []

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from sdimu_calibration.core.arrays import Floats
-from sdimu_calibration.core.effects.effect import ACCEL, GYRO, Effect, own_axis, per_axis
+from sdimu_calibration.core.effects.effect import ACCEL, BASELINE, GYRO, Effect, own_axis, per_axis
 from sdimu_calibration.core.effects.motion import Motion
 from sdimu_calibration.core.effects.registry import register
 from sdimu_calibration.core.units import to_si
@@ -26,6 +26,8 @@ GYRO_BIAS = register(
         prior={"navigation": to_si(1, "deg/h"), "tactical": to_si(10, "deg/h"), "mems": to_si(1, "deg/s")},
         description="What the gyro shows at rest against inertial space, free of specific force.",
         typical="navigation 0.005-1, tactical 1-10, MEMS 10-4000 deg/h",
+        group=BASELINE,
+        scope="power-on",
         confused_with=("gyro_mass_unbalance",),
     )
 )
@@ -41,5 +43,7 @@ ACCEL_BIAS = register(
         prior={"navigation": to_si(150, "ug"), "tactical": to_si(1, "mg"), "mems": to_si(50, "mg")},
         description="What the accelerometer shows without specific force along its input axis.",
         typical="navigation 20-150, tactical 200-1000, MEMS 1000-50000 ug",
+        group=BASELINE,
+        scope="power-on",
     )
 )

@@ -81,7 +81,7 @@ def values_in_frame(names: Sequence[str], values: Floats, frame: str) -> Floats:
     """
     _check(frame)
     out = np.array(values, dtype=float)
-    if frame == "prior" or not set(_pinned_names()) <= set(names):
+    if frame == "prior" or not set(pinned_names()) <= set(names):
         return out
     places = _places("accel")
     M_a = np.eye(3) + _matrix(places, names, out)
@@ -104,7 +104,7 @@ def frame_jacobian(names: Sequence[str], frame: str) -> Floats:
     _check(frame)
     p = len(names)
     T = np.eye(p)
-    if frame == "prior" or not set(_pinned_names()) <= set(names):
+    if frame == "prior" or not set(pinned_names()) <= set(names):
         return T
     index = {n: i for i, n in enumerate(names)}
     turns = np.zeros((p, 3))
@@ -113,7 +113,7 @@ def frame_jacobian(names: Sequence[str], frame: str) -> Floats:
             if name in index and row != column:
                 for k in range(3):
                     turns[index[name], k] = -sign * _levi_civita(row, column, k)
-    pinned = [index[n] for n in _pinned_names()]
+    pinned = [index[n] for n in pinned_names()]
     return np.asarray(T - turns @ np.linalg.inv(turns[pinned]) @ T[pinned])
 
 
@@ -130,8 +130,8 @@ def jacobian_at(names: Sequence[str], values: Floats, frame: str) -> Floats:
         step[j] = _STEP
         ahead = values_in_frame(names, values + step, frame)
         J[:, j] = (ahead - values_in_frame(names, values - step, frame)) / (2.0 * _STEP)
-    if frame != "prior" and set(_pinned_names()) <= set(names):
-        J[[list(names).index(name) for name in _pinned_names()]] = 0.0  # by definition; rounding leaves 1e-11
+    if frame != "prior" and set(pinned_names()) <= set(names):
+        J[[list(names).index(name) for name in pinned_names()]] = 0.0  # by definition; rounding leaves 1e-11
     return J
 
 
@@ -140,8 +140,9 @@ def _levi_civita(row: int, column: int, k: int) -> float:
     return float(-np.linalg.det(np.eye(3)[[row, column, k]]))
 
 
-def _pinned_names() -> list[str]:
-    return [f"accel_misalignment_{pair}" for pair in _PINNED]
+def pinned_names(frame: str = FRAMES[0]) -> tuple[str, ...]:
+    """Coefficients that a body frame makes zero by definition."""
+    return () if frame == "prior" else tuple(f"accel_misalignment_{pair}" for pair in _PINNED)
 
 
 def _check(frame: str) -> None:

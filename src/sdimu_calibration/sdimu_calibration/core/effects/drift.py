@@ -13,6 +13,7 @@ from sdimu_calibration.core.effects.effect import (
     GYRO,
     Column,
     Effect,
+    Excitation,
     Timetable,
     family,
     per_axis_columns,
@@ -28,6 +29,7 @@ _TRIADS = {
 }
 _SCAN_TAU_S = (150.0, 300.0, 600.0, 1200.0, 2400.0)
 _MODES = 4
+_OVER_TIME = frozenset({Excitation.REPEATED_ATTITUDES})
 
 
 def _columns(values: Floats) -> Floats:
@@ -45,6 +47,7 @@ def warm_up(stem: str, tau: float, ratio: float = 2.0) -> Effect:
     return family(
         f"{stem}_bias_warm_up", f"{word} warm-up transient", f"d{letter}_i = k_i exp(-t/tau)",
         per_axis_columns(triad, lambda m: _columns(np.exp(-_time(m) / tau))), units, prior,
+        scope="power-on", excitation=_OVER_TIME, bias_drift=True,
         typical="gyro 0.05-1 deg/h with 300-1800 s, accelerometer 5-50 ug",
         description="Turn-on transient. Early stops against later ones in the same orientation.",
         confused_with=(f"{stem}_bias_temperature", f"{stem}_bias_ramp", f"{stem}_bias_random_walk"),
@@ -68,6 +71,7 @@ def step(stem: str, t0: float, spacing: float = 60.0) -> Effect:
         f"{stem}_bias_step", f"{word} bias step", f"d{letter}_i = k_i (t > t0)",
         per_axis_columns(triad, lambda m: _columns(np.clip((m.t - t0) / m.dt, 0.0, 1.0))), units,
         _times(0.3, prior),
+        scope="power-on", excitation=_OVER_TIME, bias_drift=True,
         typical="any size; after a shock, a power dip, a turn",
         description="Bias that changes at one moment. Scanned over the starts and ends of the turns.",
         confused_with=(f"{stem}_bias_ramp", f"{stem}_bias_temperature_rate"),
@@ -97,6 +101,7 @@ def random_walk(stem: str, span: float) -> Effect:
         f"{stem}_bias_random_walk", f"{word} bias random walk (rate random walk)",
         f"d{letter}_i = sum_k c_ik sin((k - 1/2) pi t/T) / ((k - 1/2) pi), k = 1..4",
         columns, units, prior,
+        scope="power-on", excitation=_OVER_TIME, bias_drift=True,
         typical="see the Allan deviation",
         description="Slow wander, by its first four Karhunen-Loeve modes over the test.",
         confused_with=(f"{stem}_bias_ramp", f"{stem}_bias_warm_up", f"{stem}_bias_temperature"),
@@ -112,6 +117,7 @@ def _ramp(stem: str) -> Effect:
         f"{stem}_bias_ramp", f"{word} bias ramp", f"d{letter}_i = k_i t",
         per_axis_columns(triad, lambda m: _columns(_time(m))), (f"{si}/s", f"{shown}/h"),
         _times(0.4, prior),
+        scope="power-on", excitation=_OVER_TIME, bias_drift=True,
         typical="accelerometer 1-20 ug/h",
         description="Bias that runs away at a constant rate.",
         confused_with=(f"{stem}_bias_warm_up", f"{stem}_bias_temperature", f"{stem}_bias_random_walk"),
@@ -127,6 +133,7 @@ def _scale_ramp(stem: str, per_hour: tuple[float, float, float]) -> Effect:
     return family(
         f"{stem}_scale_ramp", f"{word} scale-factor ramp", f"d{letter}_i = k_i t {letter}_i",
         per_axis_columns(triad, signal), ("1/s", "ppm/h"), per_hour,
+        scope="power-on", excitation=_OVER_TIME,
         typical="as the temperature coefficient times the warm-up",
         description="Scale factor that runs away at a constant rate.",
         confused_with=(f"{stem}_scale_temperature",),
@@ -153,6 +160,7 @@ MASS_UNBALANCE_RAMP = register(
             },
             ("rad/s/g/s", "deg/h/g/h"), (0.1, 0.5, 5),
         ),
+        scope="power-on", excitation=_OVER_TIME,
         typical="DTG 0.005-0.05 deg/h/g/h",
         description="The rotor's centre of mass moves with the temperature of the suspension.",
         confused_with=("gyro_bias_ramp",),

@@ -9,11 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
+from enum import Enum
+from typing import Any, Literal
 
 import numpy as np
 
 from sdimu_calibration.core.arrays import Floats
+from sdimu_calibration.core.effect_key import SENSORS, variant
 from sdimu_calibration.core.effects.motion import Motion
 from sdimu_calibration.core.units import to_si
 
@@ -21,8 +23,28 @@ GYRO = (0, 1, 2)
 """Channels of gyro x, y, z."""
 ACCEL = (3, 4, 5)
 """Channels of accelerometer x, y, z."""
-CHANNELS = ("gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z")
+CHANNELS = SENSORS
 AXES = "xyz"
+BASELINE = "The baseline"
+"""Group of the seven effects of Kim, Song & Lyou."""
+REFERENCES = "References and geometry"
+"""Group of errors of the test, not of the sensors."""
+Scope = Literal["unit", "power-on", "setup", "recording"]
+
+
+class Excitation(Enum):
+    """What a test must do to show an effect, or to tell it from its lookalikes."""
+
+    BOTH_SENSES = "turns in both senses"
+    """Even in the rate: one sense of turn leaves the effect to scale factor and misalignment."""
+    TWO_RATES = "turns at two rates"
+    """Functions of the rate that one rate cannot tell apart."""
+    TWO_AXES = "turns about two axes at once"
+    """Products of rates about different axes."""
+    OBLIQUE_STOPS = "stops between the body axes"
+    """Products and powers of forces."""
+    REPEATED_ATTITUDES = "the same attitude early and late"
+    """Functions of time."""
 
 
 @dataclass(frozen=True)
@@ -74,12 +96,26 @@ class Effect:
         What causes it and how it shows; usual sizes.
     confused_with : tuple of str
         Effects that look alike in a rate-table test.
+    group : str
+        Heading on pages; empty: the triad that the effect acts on.
+    scope : str
+        What a value holds for: ``unit`` (the instrument until it is calibrated again), ``power-on`` (from switch-on to
+        switch-off: biases and their drifts), ``setup`` (site and mount of the test, no sensor error) or ``recording``
+        (a fault of the data of one recording).
+    excitation : frozenset of Excitation
+        Motion without which a test does not show the effect.
+    bias_drift : bool
+        A change of a bias in time by itself: several in a row follow any drift and say nothing of its cause.
+    needs_table : bool
+        Has no meaning handheld: no reference but gravity is known, and no turn is known better than the gyros tell it.
+    gauge : bool
+        Part of the turn of the body frame that no measurement shows: only its prior holds it.
+    never_seen : str
+        Why no plan tells it from the model's coefficients, and what to do instead; empty when a plan can.
     decay_s : float or None
         Correlation time of a first-order Gauss-Markov parameter; None for constants and random walks.
     random_walk : mapping of str to float
         Density of a random walk of the parameters by grade (SI/sqrt(s)); empty for constants.
-    run_local : bool
-        A fault of this one recording: it has no meaning for another.
     family : str
         Registry name of the effect of which this is a part; empty for whole effects.
     needs : str
@@ -106,7 +142,13 @@ class Effect:
     confused_with: tuple[str, ...] = ()
     decay_s: float | None = None
     random_walk: Mapping[str, float] = field(default_factory=dict)
-    run_local: bool = False
+    group: str = ""
+    scope: Scope = "unit"
+    excitation: frozenset[Excitation] = frozenset()
+    bias_drift: bool = False
+    needs_table: bool = False
+    gauge: bool = False
+    never_seen: str = ""
     needs: str = ""
     family: str = ""
     options: Mapping[str, str] = field(default_factory=dict)
@@ -130,15 +172,22 @@ class Effect:
         )
 
     @property
+    def key(self) -> str:
+        """Canonical key (`core.effect_key`): the name with its variant; `selection.resolve` reads it back."""
+        return self._key(self.name)
+
+    @property
     def labels(self) -> tuple[str, ...]:
-        """Name of each parameter with the variant behind it: what tells it from that of another variant."""
-        variant = self.variant
-        return tuple(p.name if p.name.endswith(variant) else p.name + variant for p in self.parameters)
+        """Canonical key of each parameter: what tells it from that of another variant."""
+        return tuple(self._key(p.name) for p in self.parameters)
 
     @property
     def variant(self) -> str:
         """What stands behind the name in brackets, e.g. ``(tau=1200 s)``; empty without options."""
-        return "(" + ", ".join(f"{k}={v}" for k, v in self.options.items()) + ")" if self.options else ""
+        return variant(self.options)
+
+    def _key(self, name: str) -> str:
+        return name if name.endswith(self.variant) else name + self.variant
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from sdimu_calibration.core.arrays import Floats
-from sdimu_calibration.core.effects.effect import AXES, GYRO, family, matrix_columns, product
+from sdimu_calibration.core.effects.effect import AXES, GYRO, Excitation, family, matrix_columns, product
 from sdimu_calibration.core.effects.motion import Motion
 from sdimu_calibration.core.effects.registry import register
 
@@ -44,6 +44,7 @@ G_PRODUCT = register(
             for i in range(3) for j, k in _PAIRS
         },
         ("rad/s/g^2", "deg/h/g^2"), (0.03, 0.1, 3),
+        excitation=frozenset({Excitation.OBLIQUE_STOPS}),
         typical="DTG 0.005-0.05, tactical 0.05-0.2, MEMS 0.1-3 deg/h/g^2",
         description="Zero at cardinal stops; little time in turns. Stops at 45 deg make it visible.",
         confused_with=("gyro_misalignment_asymmetry",),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from sdimu_calibration.core.arrays import Floats
-from sdimu_calibration.core.effects.effect import ACCEL, AXES, Effect, Parameter, Term, family, pick
+from sdimu_calibration.core.effects.effect import ACCEL, AXES, REFERENCES, Effect, Parameter, Term, family, pick
 from sdimu_calibration.core.effects.motion import Motion
 from sdimu_calibration.core.effects.registry import register
 
@@ -36,6 +36,8 @@ LEVER_ARM = register(
         terms=tuple(Term(ACCEL[i], j) for i in range(3) for j in range(3)),
         regressors=_lever,
         prior={"navigation": 0.1, "tactical": 0.1, "mems": 0.1},
+        group=REFERENCES,
+        scope="setup",
         description="The IMU really moves when the table turns. Not a sensor error; seen as an error because the "
         "filter holds "
         "the IMU at one point.",

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from sdimu_calibration.core.arrays import Floats
-from sdimu_calibration.core.effects.effect import GYRO, Effect, Parameter, Term
+from sdimu_calibration.core.effects.effect import BASELINE, GYRO, Effect, Parameter, Term
 from sdimu_calibration.core.effects.motion import Motion
 from sdimu_calibration.core.effects.registry import register
 from sdimu_calibration.core.units import to_si
@@ -33,6 +33,7 @@ GYRO_MASS_UNBALANCE = register(
         description="The centre of mass of the rotor is off the suspension: specific force across the spin axis makes "
         "a torque. Direct acts about the axis of the force, quadrature about the other.",
         typical="DTG 0.1-2, optical gyros none, MEMS 1-100 deg/h/g",
+        group=BASELINE,
         confused_with=("gyro_bias",),
     )
 )

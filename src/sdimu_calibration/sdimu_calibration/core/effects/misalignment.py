@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from sdimu_calibration.core.arrays import Floats
-from sdimu_calibration.core.effects.effect import ACCEL, GYRO, Effect, Parameter, Term
+from sdimu_calibration.core.effects.effect import ACCEL, BASELINE, GYRO, Effect, Parameter, Term
 from sdimu_calibration.core.effects.motion import Motion
 from sdimu_calibration.core.effects.registry import register
 from sdimu_calibration.core.units import to_si
@@ -48,6 +48,8 @@ GYRO_MISALIGNMENT = register(
         prior=_PRIOR,
         description="The input axes do not lie along the body axes. Seen when the table turns.",
         typical="navigation 0.1-1, tactical 1-5, MEMS 10-120 arcmin",
+        group=BASELINE,
+        gauge=True,
         confused_with=("accel_misalignment",),
     )
 )
@@ -64,6 +66,8 @@ ACCEL_MISALIGNMENT = register(
         description="The input axes do not lie along the body axes. Three combinations turn the whole body frame "
         "together with the gyros' and are a matter of definition (doc/conventions.md).",
         typical="navigation 0.1-1, tactical 1-5, MEMS 10-120 arcmin",
+        group=BASELINE,
+        gauge=True,
         confused_with=("gyro_misalignment",),
     )
 )

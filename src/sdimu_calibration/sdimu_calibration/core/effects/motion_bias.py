@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from sdimu_calibration.core.arrays import Floats
-from sdimu_calibration.core.effects.effect import ACCEL, GYRO, family, per_axis_columns
+from sdimu_calibration.core.effects.effect import ACCEL, GYRO, Excitation, family, per_axis_columns
 from sdimu_calibration.core.effects.motion import Motion
 from sdimu_calibration.core.effects.registry import register
 
@@ -16,6 +16,7 @@ GYRO_BIAS_IN_MOTION = register(
     family(
         "gyro_bias_in_motion", "gyro bias in motion", "dw_i = k_i while the table turns",
         per_axis_columns(GYRO, _moving), ("rad/s", "deg/h"), (0.1, 1, 20),
+        excitation=frozenset({Excitation.BOTH_SENSES}),
         typical="0.01-0.2 deg/h",
         description="Vibration and electromagnetic interference of the drive. Needs turns of both signs.",
         confused_with=("gyro_scale", "gyro_scale_asymmetry"),

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from sdimu_calibration.core.arrays import Floats
-from sdimu_calibration.core.effects.effect import ACCEL, GYRO, Effect, Parameter, Term
+from sdimu_calibration.core.effects.effect import ACCEL, GYRO, REFERENCES, Effect, Parameter, Term
 from sdimu_calibration.core.effects.motion import Motion
 from sdimu_calibration.core.effects.registry import register
 from sdimu_calibration.core.units import STANDARD_GRAVITY
@@ -35,6 +35,10 @@ GRAVITY = register(
         terms=tuple(Term(channel, 0) for channel in ACCEL),
         regressors=lambda m: _along(m, 2),
         prior=dict.fromkeys(("navigation", "tactical", "mems"), 1e-3),
+        group=REFERENCES,
+        scope="setup",
+        needs_table=True,
+        never_seen="a wrong gravity is a common scale factor of the accelerometers whatever the plan: survey it",
         typical="WGS-84 normal gravity: 10-50 ug; a survey: below 1 ug",
         description="Cannot be told from a common scale factor of the accelerometers, whatever the plan: quote it as "
         "a floor of "
@@ -52,6 +56,10 @@ DEFLECTION_EAST = register(
         terms=tuple(Term(channel, 0) for channel in ACCEL),
         regressors=lambda m: STANDARD_GRAVITY * _along(m, 1),
         prior=dict.fromkeys(("navigation", "tactical", "mems"), 5e-5),
+        group=REFERENCES,
+        scope="setup",
+        needs_table=True,
+        never_seen="a deflection to the East is an azimuth whatever the plan",
         typical="1-20 arcsec",
         description="Cannot be told from azimuth; harmless for the coefficients.",
     )
@@ -66,6 +74,9 @@ LATITUDE = register(
         terms=tuple(Term(channel, 0) for channel in GYRO),
         regressors=_latitude,
         prior=dict.fromkeys(("navigation", "tactical", "mems"), 5e-3),
+        group=REFERENCES,
+        scope="setup",
+        needs_table=True,
         typical="a gross error of the site file only",
         description="A wrong Earth rate in the meridian plane. Visible from some minutes of arc on.",
     )

@@ -31,6 +31,11 @@ def names() -> tuple[str, ...]:
     return tuple(_EFFECTS)
 
 
+def find(name: str) -> Effect | None:
+    """Look an effect up that may be in no catalogue: None for equations and effects of one's own."""
+    return _EFFECTS.get(name)
+
+
 def get(name: str) -> Effect:
     """Look an effect up.
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sdimu_calibration.core.effects.effect import ACCEL, GYRO, Effect, own_axis, per_axis
+from sdimu_calibration.core.effects.effect import ACCEL, BASELINE, GYRO, Effect, own_axis, per_axis
 from sdimu_calibration.core.effects.registry import register
 from sdimu_calibration.core.units import to_si
 
@@ -19,6 +19,7 @@ GYRO_SCALE = register(
         prior=_PRIOR,
         description="Relative error of the gyro's output per unit of rate. Seen in turns, not at rest.",
         typical="navigation 5-150, tactical 100-500, MEMS 1000-30000 ppm",
+        group=BASELINE,
     )
 )
 
@@ -34,5 +35,6 @@ ACCEL_SCALE = register(
         description="Relative error of the accelerometer's output per unit of specific force. A wrong value of gravity "
         "looks the same on all three axes.",
         typical="navigation 10-150, tactical 100-500, MEMS 1000-30000 ppm",
+        group=BASELINE,
     )
 )

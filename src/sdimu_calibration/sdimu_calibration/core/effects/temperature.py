@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from sdimu_calibration.core.arrays import Floats
-from sdimu_calibration.core.effects.effect import ACCEL, GYRO, Effect, family, per_axis_columns
+from sdimu_calibration.core.effects.effect import ACCEL, GYRO, Effect, Excitation, family, per_axis_columns
 from sdimu_calibration.core.effects.motion import Motion
 from sdimu_calibration.core.effects.registry import register
+
+_OVER_TIME = frozenset({Excitation.REPEATED_ATTITUDES})
 
 
 def _change(motion: Motion) -> Floats:
@@ -24,7 +26,8 @@ def _triad(
     by_temperature = register(
         family(
             f"{stem}_bias_temperature", f"{word} bias temperature coefficient", f"d{letter}_i = k_i (T - T0)",
-            per_axis_columns(triad, _change), (f"{si}/K", f"{shown}/degC"), bias, needs="temperature",
+            per_axis_columns(triad, _change), (f"{si}/K", f"{shown}/degC"), bias,
+            needs="temperature", excitation=_OVER_TIME,
             typical="residual: gyro 0.002-0.1 deg/h/C, accelerometer 0.5-5 ug/C; raw 10-100 times more",
             description="Slow; stops that repeat an orientation at another temperature decide. T0 is the temperature "
             "at the "
@@ -36,7 +39,7 @@ def _triad(
         family(
             f"{stem}_bias_temperature_rate", f"{word} bias temperature-rate coefficient (Shupe)",
             f"d{letter}_i = k_i dT/dt", per_axis_columns(triad, _rate), (f"{si}*s/K", f"{shown}*min/degC"), rate,
-            needs="temperature",
+            needs="temperature", excitation=_OVER_TIME,
             typical="FOG 0.05-1 deg/h/(C/min), accelerometer 1-20 ug/(C/min)",
             description="Gradients inside the instrument: large while the temperature changes.",
             confused_with=(f"{stem}_bias_warm_up", f"{stem}_bias_step"),
@@ -55,7 +58,8 @@ ACCEL_BIAS_TEMPERATURE, ACCEL_BIAS_TEMPERATURE_RATE = _triad(
 GYRO_SCALE_TEMPERATURE = register(
     family(
         "gyro_scale_temperature", "gyro scale-factor temperature coefficient", "dw_i = k_i (T - T0) w_i",
-        per_axis_columns(GYRO, lambda m: _change(m) * m.w), ("1/K", "ppm/degC"), (20, 50, 100), needs="temperature",
+        per_axis_columns(GYRO, lambda m: _change(m) * m.w), ("1/K", "ppm/degC"), (20, 50, 100),
+        needs="temperature", excitation=_OVER_TIME,
         typical="DTG 5-20, FOG 5-50, tactical 20-100 ppm/C",
         description="Seen in turns about the same axis at different temperatures.",
         confused_with=("gyro_scale_ramp",),
@@ -65,7 +69,8 @@ GYRO_SCALE_TEMPERATURE = register(
 ACCEL_SCALE_TEMPERATURE = register(
     family(
         "accel_scale_temperature", "accelerometer scale-factor temperature coefficient", "df_i = k_i (T - T0) f_i",
-        per_axis_columns(ACCEL, lambda m: _change(m) * m.f), ("1/K", "ppm/degC"), (5, 50, 200), needs="temperature",
+        per_axis_columns(ACCEL, lambda m: _change(m) * m.f), ("1/K", "ppm/degC"), (5, 50, 200),
+        needs="temperature", excitation=_OVER_TIME,
         typical="residual 0.5-5, raw 100-180 ppm/C",
         description="Seen where an axis carries gravity at different temperatures.",
         confused_with=("accel_scale_ramp",),

@@ -14,6 +14,7 @@ GYRO_DELAY = register(
     family(
         "gyro_delay", "gyro delay against the other sensors", "dw_i = -tau_i dw_i/dt",
         per_axis_columns(GYRO, lambda m: -m.alpha), ("s", "ms"), (1, 2, 5),
+        needs_table=True,
         typical="0.01-5 ms",
         description="Transport delay or bandwidth. A delay common to all six sensors cannot be seen.",
         confused_with=("accel_delay", "gyro_acceleration_sensitivity"),
@@ -24,6 +25,7 @@ ACCEL_DELAY = register(
     family(
         "accel_delay", "accelerometer delay against the gyros (time skew)", "df_i = -tau_i df_i/dt = tau_i (w x f)_i",
         per_axis_columns(ACCEL, lambda m: -STANDARD_GRAVITY * m.a_rate), ("s", "ms"), (1, 2, 5),
+        needs_table=True,
         typical="0.01-5 ms; 1 ms makes 14 mm/s in a 90 deg turn",
         description="The force that an accelerometer reports is older than the attitude of the gyros.",
         confused_with=("gyro_delay",),
@@ -78,7 +80,8 @@ def lost_data(turn: int, at: float, spacing: float = 15.0) -> Effect:
         description="Samples dropped before the stamps were given: the angle of one turn is too small. A fault of "
         "the recording, "
         "not of the sensor.",
-        run_local=True,
+        scope="recording",
+        needs_table=True,
         options={"turn": str(turn), "at": f"{at:g} s"},
         with_options=lambda turn, at: lost_data(int(turn), at),
         scan=lambda times: tuple(lost_data(stop + 1, at) for stop, t0, t1 in times.turns for at in _moments(t0, t1)),

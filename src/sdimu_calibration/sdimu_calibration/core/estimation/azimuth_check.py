@@ -11,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from sdimu_calibration.core import earth
+from sdimu_calibration.core.effects.bias import GYRO_BIAS
 from sdimu_calibration.core.filter.filter_pass import NAV
 from sdimu_calibration.core.filter.passes import Solution
 
@@ -36,7 +37,7 @@ def azimuth_warning(solution: Solution) -> str | None:
         )
     P, names = solution.last.state.P, solution.setup.sensors.names
     sigma = np.sqrt(np.diag(P))
-    biases = [sigma[NAV + i] for i, name in enumerate(names) if name.startswith("gyro_bias")]
+    biases = [sigma[NAV + i] for i, name in enumerate(names) if name in GYRO_BIAS.labels]
     if not biases:
         return None
     azimuth = float(sigma[-1])
@@ -57,7 +58,7 @@ def azimuth_note(solution: Solution) -> str | None:
     """
     site = solution.setup.site
     p = len(solution.setup.sensors.prior)
-    biases = [k for k, name in enumerate(solution.setup.sensors.names) if name.startswith("gyro_bias")]
+    biases = [k for k, name in enumerate(solution.setup.sensors.names) if name in GYRO_BIAS.labels]
     if site.initial_azimuth_rad is not None or not biases:
         return None
     bias = float(np.sqrt(min(np.diag(solution.last.state.P[NAV : NAV + p, NAV : NAV + p])[biases])))

@@ -31,7 +31,7 @@ def outcome(fit: Fit, held_out: bool = True) -> Calibration:
     warnings = (*(f.text for f in fit.faults if f.grave), *fit.warnings(statistics))
     return Calibration(
         body_frame=fit.body_frame,
-        model=tuple(e.name if e.name.endswith(e.variant) else e.name + e.variant for e in fit.sensors.effects),
+        model=tuple(e.key for e in fit.sensors.effects),
         names=fit.names,
         units=tuple(p.unit for p in parameters),
         display_units=tuple(p.display_unit for p in parameters),

@@ -260,8 +260,8 @@ def widen_contradicted_priors(sensors: ImuModel, estimate: Floats, covariance: F
     sigma = np.sqrt(np.diag(covariance))
     size = np.abs(estimate)
     pull = size * sigma / sensors.prior**2
-    effect = np.array([e.family or e.name for e in sensors.effects for _ in e.parameters])
-    held = (size > _BEYOND * sensors.prior) & (pull > _PULL) & ~np.isin(effect, _IN_THE_FRAME)
+    gauge = np.array([e.gauge for e in sensors.effects for _ in e.parameters])
+    held = (size > _BEYOND * sensors.prior) & (pull > _PULL) & ~gauge
     if not held.any():
         return sensors
     return replace(sensors, prior=np.where(held, _ROOM * size, sensors.prior))
@@ -275,7 +275,6 @@ _ROOM = 10.0
 """New sigma of a contradicted prior, as a multiple of the estimate: it then says nothing."""
 MOST_WIDENINGS = 3
 """Times that priors are widened and the passes repeated, at most."""
-_IN_THE_FRAME = ("gyro_misalignment", "accel_misalignment")
 
 
 def solve(setup: TestSetup, prepared: PreparedData, begin: StartPoint | None, progress: Progress) -> Solution:

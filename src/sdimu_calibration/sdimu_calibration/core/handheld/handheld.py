@@ -21,6 +21,7 @@ from sdimu_calibration.core.alignment.alignment import levelled
 from sdimu_calibration.core.arrays import Bools
 from sdimu_calibration.core.data.static_detection import StaticIntervals, detect_static
 from sdimu_calibration.core.effects import body_frame
+from sdimu_calibration.core.effects.bias import GYRO_BIAS
 from sdimu_calibration.core.effects.imu_model import ImuModel
 from sdimu_calibration.core.handheld.handheld_data import HandheldRun, reduce_run, turns
 from sdimu_calibration.core.handheld.handheld_faults import without_impossible
@@ -140,9 +141,9 @@ def _stated(sensors: ImuModel, imu: ImuSpecification) -> Bools:
 def first_linearisation(run: HandheldRun, sensors: ImuModel, gravity: float) -> LinearisationPoint:
     """Begin with the mean rate at rest as bias; gyros lead from rest to rest, and every rest is levelled."""
     coefficients = np.zeros(len(sensors.prior))
-    for axis, value in zip("xyz", np.median(run.mean[:, :3], axis=0), strict=True):
-        if f"gyro_bias_{axis}" in sensors.names:
-            coefficients[sensors.names.index(f"gyro_bias_{axis}")] = value
+    for name, value in zip(GYRO_BIAS.labels, np.median(run.mean[:, :3], axis=0), strict=True):
+        if name in sensors.names:
+            coefficients[sensors.names.index(name)] = value
     k = len(run.t)
     turned = turns(run, sensors, coefficients, np.repeat(np.eye(3)[None], k, axis=0), gravity).C_nb
     C_nb = [levelled(np.eye(3), run.mean[0, 3:])]

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sdimu_calibration.core.arrays import Floats
+from sdimu_calibration.core.effects.misalignment import ACCEL_MISALIGNMENT, GYRO_MISALIGNMENT
 
 UNSEEN = 0.5
 """Share of the prior variance that is left: above it the data say less than the prior did."""
@@ -25,7 +26,7 @@ _CONTAINED = 0.9
 
 _AXES = "xyz"
 _ROTATION = {
-    axis: tuple(f"{triad}_misalignment_{pair}" for triad in ("gyro", "accel") for pair in pairs)
+    axis: tuple(f"{effect.name}_{pair}" for effect in (GYRO_MISALIGNMENT, ACCEL_MISALIGNMENT) for pair in pairs)
     for axis, pairs in (("x", ("yx", "zx")), ("y", ("xy", "zy")), ("z", ("xz", "yz")))
 }
 """Turning the body about an axis turns the two other sensor axes of both triads about it, alike."""

@@ -160,7 +160,7 @@ def predict(
     return Prediction(
         body_frame=frame,
         duration_s=nominal.duration_s,
-        model=tuple(e.name for e in sensors.effects),
+        model=tuple(e.key for e in sensors.effects),
         names=sensors.names,
         units=tuple(p.unit for p in sensors.parameters),
         display_units=tuple(p.display_unit for p in sensors.parameters),

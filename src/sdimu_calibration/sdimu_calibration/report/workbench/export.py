@@ -29,7 +29,7 @@ def model_files(model: Model, added: Sequence[str]) -> dict[str, str]:
     """
     own = {f"effect-{k}.yaml": text for k, text in enumerate(added, 1) if "\n" in text.strip()}
     by_text = {text: name for name, text in own.items()}
-    effects = [e if isinstance(e, str) else e.name for e in model.effects]
+    effects = [e if isinstance(e, str) else e.key for e in model.effects]
     for name in effects:
         _check_named(name)
     content = {
