@@ -34,6 +34,7 @@ DEVELOPMENT = [
     "import-linter",
     "mcap-ros2-support",
     "mypy",
+    "numpydoc",
     "playwright",
     "pytest",
     "pytest-timeout",

@@ -1,13 +1,13 @@
-"""A coarse start from the whole test: where passes and least squares linearise when the first dwell alone misleads.
+"""Coarse alignment from the whole test: attitude and biases where the first dwell alone gives a wrong azimuth.
 
 Gyrocompassing in one dwell fails when the gyro bias exceeds Earth rate, and an azimuth from a site file may be wrong by
-any angle. All stops together know better. While the table rests, the mean rate is bias plus Earth rate; that mean taken
-out of the samples of a turn leaves the turn itself, good to the scale factors, hence the orientation of every stop in
-the body frame of the first one. In these orientations gravity and Earth rate are two constant vectors, the biases two
-others, and least squares tells them apart without any starting value.
+any angle. All stops together determine both. At rest the mean rate is bias plus Earth rate; subtracted from the samples
+of a turn it leaves the turn itself, good to the scale factors, hence the orientation of every stop in the body frame of
+the first one. In these orientations gravity and Earth rate are two constant vectors, the biases two others, and linear
+least squares separates them without a starting value.
 
 The idea is that of multi-position alignment (Groves, *Principles of GNSS, Inertial, and Multisensor Integrated
-Navigation Systems*, 2nd ed., section 5.6.3), made linear.
+Navigation Systems*, 2nd ed., section 5.6.3), made linear. SI units; frames n (North, East, Down) and b (body).
 """
 
 from __future__ import annotations
@@ -25,24 +25,23 @@ from sdimu_calibration.core.compiled import compiled
 from sdimu_calibration.core.rotation import orthonormal, rotation_matrix
 
 _FREE = 1e3
-"""Sigma of what is wholly unknown, in its own size."""
+"""Sigma of an unknown vector, a multiple of its size: wide enough to be no prior."""
 _MODEL_ERROR = 0.01
-"""Misfit from what is left out (scale, misalignment, error of the orientations), as a share of the vector sought."""
-
+"""Sigma of the misfit, a share of the vector sought: scale, misalignment and orientation errors are left out."""
 _STOPS = 20
-"""Stops used, from the first on: later ones add less than the gyros' errors in all the turns before them take away."""
+"""Number of stops used, from the first on: the error of the orientations grows with every turn."""
 
 
 @dataclass(frozen=True)
 class CoarseAlignment:
-    """Where to linearise.
+    """Point about which to linearise.
 
     Attributes
     ----------
     C_nb : ndarray, shape (3, 3)
         Initial attitude.
     coefficients : ndarray, shape (p,)
-        Biases where the model has them, else zero.
+        Biases where the model has them (rad/s, m/s^2), zero elsewhere.
     """
 
     C_nb: Floats
@@ -66,7 +65,7 @@ def coarse_start(prepared: PreparedData, setup: TestSetup, start: Alignment) -> 
     prepared : PreparedData
     setup : TestSetup
     start : Alignment
-        Kept where a test of fewer than three stops cannot do better.
+        Returned unchanged for a test of fewer than three stops.
 
     Returns
     -------

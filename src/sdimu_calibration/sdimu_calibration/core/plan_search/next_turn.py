@@ -1,9 +1,9 @@
-"""The extra turn that tells effects apart which look alike so far.
+"""The extra turn that separates effects which the plan so far cannot separate.
 
-The information of plan and extra turn together on the parameters of the class, everything else estimated along with
-them, is J. The part of parameter i that parameter j cannot take over shows with ``theta_i^2 (J_ii - J_ij^2 / J_jj)``
-in squares of sigma; the worst pair counts, and of extra turns the one that gains most a minute is named
-(T-optimality: Atkinson & Fedorov, *Biometrika* 62 (1975)).
+J is the information of plan and extra turn together on the parameters of the class, with everything else estimated too.
+The part of parameter i that parameter j cannot replace has a significance of ``theta_i^2 (J_ii - J_ij^2 / J_jj)`` in
+squares of sigma. The worst pair counts; the extra turn with the largest gain a minute comes first (T-optimality:
+Atkinson & Fedorov, *Biometrika* 62 (1975)).
 """
 
 from __future__ import annotations
@@ -23,8 +23,11 @@ from sdimu_calibration.core.plan_search.bound import Bounds, Question, bounds
 from sdimu_calibration.core.recording import DataError
 
 RATES_RAD_S = (math.radians(2.0), math.radians(10.0))
+"""Rates of extra turns (rad/s): that of the plan kim18, and a fast one for effects of higher order in the rate."""
 _ANGLES_RAD = tuple(math.radians(a) for a in (90.0, -90.0, 180.0, -180.0))
+"""Angles of extra turns (rad): both senses, ending on a cardinal direction."""
 _ACCELERATION_RAD_S2 = math.radians(20.0)
+"""Least acceleration of extra turns (rad/s^2): half a second to the fastest rate."""
 
 
 @dataclass(frozen=True)
