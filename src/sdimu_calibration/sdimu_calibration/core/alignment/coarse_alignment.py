@@ -100,7 +100,7 @@ def coarse_start(prepared: PreparedData, setup: TestSetup, start: Alignment) -> 
 def _orientations(prepared: PreparedData, last: Ints, first: Ints, rate: Floats) -> Floats:
     """Orientation of every stop in the body frame of the first, shape (k, 3, 3).
 
-    `rate` (k, 3) at rest before and after a turn stands for what is not the turn.
+    The mean of `rate` (k, 3) at rest before and after a turn is subtracted from the rate in the turn.
     """
     out = [np.eye(3)]
     for k in range(len(rate) - 1):
@@ -128,13 +128,13 @@ def _constant(
     ----------
     to_first : ndarray, shape (k, 3, 3)
     mean : ndarray, shape (k, 3)
-        Their sum as seen by the body at each stop.
+        Sum of both vectors at each stop, in the body frame.
     size : float
         Of the first vector, for scale.
     bias : float
         Sigma of the second.
     more : ndarray, shape (k, m)
-        Variables to which each body axis may respond besides, with responses of sigma `sigma`.
+        Further variables to which each body axis may respond, with coefficients of sigma `sigma`.
     noise : float
         Sigma of the means.
 
@@ -148,7 +148,7 @@ def _constant(
     rows[:, 3:6] = np.tile(np.eye(3) * bias, (k, 1))
     for axis in range(3):
         rows[axis::3, 6 + axis * m : 6 + (axis + 1) * m] = more * sigma
-    # Unknowns in their own size; a weak pull to zero decides what the stops leave open.
+    # Unknowns in units of their size; a weak prior at zero fixes what the stops do not determine.
     noise = float(np.hypot(noise, _MODEL_ERROR * size))
     pull = np.eye(rows.shape[1])
     pull[range(3), range(3)] = 1.0 / _FREE

@@ -83,8 +83,9 @@ def preintegrate(
 ) -> Preintegration:  # fmt: skip
     """Integrate one motion and linearise it.
 
-    The linear responses are taken in the frame that does not turn and meets n at the end of the motion, where
-    attitude errors stand still and velocity errors grow by their product with the force and by the gradient of gravity.
+    The linear responses are taken in the frame that does not turn and coincides with n at the end of the motion. There,
+    attitude errors are constant and velocity errors grow by their product with the force and by the gradient of
+    gravity.
 
     Parameters
     ----------

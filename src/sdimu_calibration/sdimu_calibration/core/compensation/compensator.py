@@ -306,7 +306,7 @@ def compensate(
 
     scaled = np.zeros((n, 6))
     for _ in range(_MOST_STEPS):
-        # What runs away is told below, in words.
+        # Divergence ends in the DataError below.
         with np.errstate(over="ignore", invalid="ignore"):
             values = using.model.regressors(seen())
             step = (measured - x - using.model.errors(values, using.coefficients)) @ using.inverse.T

@@ -45,7 +45,7 @@ def _changed(one: Motion, other: Motion, name: str) -> Motion:
 
 
 def _motion(rng: np.random.Generator) -> Motion:
-    """Motion in which every variable goes its own way."""
+    """Motion in which all variables are independent of each other."""
 
     def any_of(*shape: int) -> Floats:
         return rng.normal(size=shape)

@@ -16,9 +16,8 @@ and accelerometer noise densities q_g, q_a (power)
     E[attitude Zw'] = -C q_g,      E[velocity Zf'] = C q_a,       E[position Zf'] = C q_a T / 2,
     E[velocity Zw'] = -[f x] C q_g T / 2,                         E[position Zw'] = -[f x] C q_g T^2 / 6.
 
-While the table rests, Zv and Zp are the sums of what Zf has already said, so they are taken once after each
-motion; taking them at every epoch would only be news if they had noise of their own. Derivation:
-doc/shared-noise.md.
+While the table rests, Zv and Zp are integrals of Zf, so they are taken once after each motion; at every epoch they
+would add information only if they had noise of their own. Derivation: doc/shared-noise.md.
 """
 
 from __future__ import annotations

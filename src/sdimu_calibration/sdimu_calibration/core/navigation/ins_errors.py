@@ -4,8 +4,8 @@ State: position error N, E, D (m), velocity error N, E, D (m/s), attitude error 
 computed minus true and ``C_nb(computed) = (I - [err_attitude x]) C_nb(true)``.
 
 Source: Titterton & Weston, *Strapdown Inertial Navigation Technology*, 2nd ed., section 12.3; the same in
-Britting, *Inertial Navigation Systems Analysis*, ch. 6. Here position errors are metres, so the division
-by the radii stands in the transport rate instead.
+Britting, *Inertial Navigation Systems Analysis*, ch. 6. Here position errors are metres, so the transport
+rate contains the division by the radii.
 """
 
 from __future__ import annotations

@@ -168,7 +168,7 @@ def _acceleration(
     """Angular acceleration (rad/s^2), shape (n, 3): mean over each cycle, or by causal differences for a live filter.
 
     The mean is the difference of the rates at the ends of the cycle, so that it sums up to the change of the rate.
-    Between rest and turn the rate is nought: what of a jerk is put into a dwell would there be measured as a rate.
+    Between rest and turn the rate is zero: angular acceleration within a dwell would count as a rate there.
     """
     dt = cycles.dt[:, None]
     if causal or len(w_table) < 2:

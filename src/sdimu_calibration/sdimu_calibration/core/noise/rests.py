@@ -77,7 +77,7 @@ def _whole(t: Floats, size: int, count: int, interval: float) -> Bools:
 
 
 def _dwells(log: PhaseLog | None, t: Floats, interval: float) -> Bools:
-    """Windows in which the table dwells from begin to end, or says nothing; `t` (count, size)."""
+    """Windows in which the table dwells throughout, all of them without a status; `t` (count, size)."""
     if log is None or not len(log.t):
         return np.ones(len(t), dtype=bool)
     first = np.maximum(np.searchsorted(log.t, t[:, 0] - interval + 1e-6, side="right") - 1, 0)

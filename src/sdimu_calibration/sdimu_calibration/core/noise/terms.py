@@ -118,12 +118,12 @@ def _scatter(again: list[Allan], value: Floats, among: Bools | None) -> Floats:
     fits = np.array([np.sqrt(_squares(one, among)) for one in again])
     if among is None:
         return np.asarray(np.sqrt(np.mean((fits - value) ** 2, axis=0)))
-    # Fits without the terms that are left out stand about another mean.
+    # Fits without the terms that are left out have another mean.
     return np.asarray(fits.std(axis=0, ddof=1))
 
 
 def _squares(found: Allan, among: Bools | None = None) -> Floats:
-    """Least squares for the squares of the terms, the others nought."""
+    """Non-negative least squares for the squares of the terms `among`, the others zero."""
     variance, columns = found.deviation**2, basis(found.tau)
     if among is not None:
         columns = columns * among

@@ -40,7 +40,7 @@ class NextTurn:
     minutes : float
         Turns and the stops after them.
     before, after : float
-        Sigmas by which the pair that is worst to tell apart differs, without and with it.
+        Significance in sigma by which the least separable pair differs, without and with the extra turn.
     """
 
     turns: tuple[Turn, ...]
@@ -70,7 +70,7 @@ def next_turn(
     rates_rad_s: Sequence[float] = RATES_RAD_S,
     progress: Callable[[str, float], None] | None = None,
 ) -> tuple[NextTurn, ...]:
-    """Rank the extra turns that tell effects apart.
+    """Rank the extra turns that separate effects.
 
     Parameters
     ----------
@@ -94,7 +94,7 @@ def next_turn(
     Raises
     ------
     DataError
-        When there are fewer than two parameters to tell apart, or an effect is unknown.
+        When there are fewer than two parameters to separate, or an effect is unknown.
     """
     effects = [selection.resolve(e) if isinstance(e, str) else e for e in alike]
     names = tuple(p.name for e in effects for p in e.parameters)
@@ -138,10 +138,10 @@ def _extras(rates: Sequence[float]) -> list[tuple[Turn, ...]]:
 
 
 def _apart(told: Bounds, names: Sequence[str], sizes: Mapping[str, float] | None) -> float:
-    """Sigmas by which the two parameters differ that are worst to tell apart."""
+    """Significance in sigma by which the least separable pair of parameters differs."""
     rows = [told.names.index(name) for name in names]
     prior = told.prior[rows]
-    # In units of the priors: coefficients of ppm and of rad/s stand in one matrix.
+    # In units of the priors, because coefficients of ppm and of rad/s share the matrix.
     covariance = told.covariance[np.ix_(rows, rows)] / np.outer(prior, prior)
     J = np.linalg.inv(covariance) - np.eye(len(rows))
     size = np.array([1.0 if sizes is None else sizes.get(n, p) / p for n, p in zip(names, prior, strict=True)])

@@ -112,7 +112,7 @@ def search(
         return False
 
     for plans in whole(start, able):
-        # Shorter stops tell less: when one length does not do, the shorter ones will not.
+        # Shorter stops give larger sigmas: when one length misses the limits, the shorter ones miss them too.
         for plan in plans:
             if tried < tries and _may_win(plan, best, goal) and not consider(plan):
                 break

@@ -1,8 +1,8 @@
 """Recording of a plan by a perfect IMU: no sensor errors, no noise.
 
-The table turns about its own axes; a mount rotation stands between them and the IMU's. A turn is a rotation about one
-fixed axis with a trapezoidal rate, so the angle is a closed formula at every instant, and what the sensors see
-is a constant vector turned by that angle: its mean over a sample is a mean of a cosine and a sine, taken by
+The table turns about its own axes; a constant mount rotation relates them to those of the IMU. A turn is a rotation
+about one fixed axis with a trapezoidal rate, so the angle is a closed formula at every instant, and the sensors measure
+a constant vector turned by that angle. Its mean over a sample is a mean of a cosine and a sine, computed by
 Gauss-Legendre with three nodes (error of sixth order in the angle of one sample).
 
 Used by the covariance simulation and the bound of the batch estimator. The simulator of the tests is a separate

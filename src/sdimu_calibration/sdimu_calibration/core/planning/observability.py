@@ -70,7 +70,7 @@ def unobservable(
     attitude_prior, attitude_sigma : ndarray, shape (3,), optional
         Sigma of the initial attitude about N, E, D before and after (rad).
     C_nb : ndarray, shape (3, 3), optional
-        Initial attitude: tells which body axis was vertical.
+        Initial attitude, for the name of the body axis that was vertical.
 
     Returns
     -------

@@ -168,7 +168,7 @@ def predict(
     sigma = np.sqrt(np.diag(covariance))
     limit = np.full(len(sigma), np.nan)
     if bound is not None:
-        # The bound is what the data of this IMU hold, whatever the filter is told about them.
+        # The bound depends on the noise of this IMU, not on the noise set of the filter.
         own = prepare(plan, site, imu, model, mount_rad, None)
         limit = np.sqrt(np.diag(J @ bound(own.prepared, own.setup, own.start) @ J.T))
     attitude = np.sqrt(np.diag(done.state.P)[-3:])
