@@ -194,7 +194,7 @@ def compensator(
 
 
 def _reason(effect: Effect, has_temperature: bool, start_known: bool, same_start: bool) -> str:
-    """Say why an effect cannot be compensated in samples; empty when it can."""
+    """Say why samples cannot be freed of an effect; empty when they can."""
     if effect.run_local:
         return "a fault of the recording in which it was found"
     if effect.options and "(" not in effect.name:
