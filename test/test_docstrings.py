@@ -24,10 +24,7 @@ EXEMPT = {
         "core.alignment": "prepared",
         "core.batch": "batch classical",
         "core": "calibrate expression live recording",
-        "core.data": (
-            "arrival axes_and_units dejitter dwell_detection gaps latitude_check phases resample sample_screening "
-            "static_detection status_clock windows"
-        ),
+        "core.data": "arrival axes_and_units dwell_detection gaps phases resample static_detection status_clock windows",
         "core.diagnosis": (
             "advice bootstrap candidates coefficient_shifts consistency diagnose evidence found free_input_test "
             "grow handheld_diagnosis handheld_evidence handheld_summary held_out information linear plan_seen "
@@ -38,7 +35,7 @@ EXEMPT = {
             "motion settling timing"
         ),
         "core.filter": "azimuth_known free_inertial holdout passes stop_misfit",
-        "core.handheld": "handheld handheld_data handheld_faults handheld_fit",
+        "core.handheld": "handheld handheld_data handheld_fit",
         "core.second_order": "second_order_passes",
     }.items()
     for module in modules_of.split()
