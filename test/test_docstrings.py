@@ -24,15 +24,18 @@ EXEMPT = {
         "core.alignment": "prepared",
         "core.batch": "batch classical",
         "core": "calibrate expression live recording",
-        "core.data": "arrival axes_and_units dwell_detection gaps phases resample static_detection status_clock windows",
+        "core.data": (
+            "arrival axes_and_units dwell_detection gaps phases resample static_detection status_clock "
+            "windows"
+        ),
         "core.diagnosis": (
-            "advice bootstrap candidates coefficient_shifts consistency diagnose evidence found free_input_test "
-            "grow handheld_diagnosis handheld_evidence handheld_summary held_out information linear plan_seen "
-            "rounds scan screen search signatures"
+            "advice bootstrap candidates coefficient_shifts consistency diagnose evidence found "
+            "free_input_test grow handheld_diagnosis handheld_evidence handheld_summary held_out "
+            "information linear plan_seen rounds scan screen search signatures"
         ),
         "core.effects": (
-            "accel_nonlinearity accelerometer_frame body_frame dead_band drift effect error_slope imu_model "
-            "motion settling timing"
+            "accel_nonlinearity accelerometer_frame body_frame dead_band drift effect error_slope "
+            "imu_model motion settling timing"
         ),
         "core.filter": "azimuth_known free_inertial holdout passes stop_misfit",
         "core.handheld": "handheld handheld_data handheld_fit",
