@@ -1,4 +1,4 @@
-# make setup | demo | test | check | colcon | bench | study | docs | pictures | campaigns : each does its own set-up and needs nothing before it.
+# make setup | demo | test | check | colcon | wheels | bench | study | docs | pictures | campaigns : each does its own set-up and needs nothing before it.
 PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
@@ -38,10 +38,16 @@ colcon: setup
 	work=$$(mktemp -d) && trap 'rm -rf "$$work"' EXIT && \
 	test "$$(colcon --log-base $$work/log list --base-paths src | grep -c '(ros.ament_python)')" -eq $(NUMBER) && \
 	colcon --log-base $$work/log build --base-paths src --build-base $$work/build --install-base $$work/install && \
-	SDIMU_CONFIG=$(CURDIR)/config colcon --log-base $$work/log test --base-paths src --build-base $$work/build \
+	colcon --log-base $$work/log test --base-paths src --build-base $$work/build \
 	    --install-base $$work/install --python-testing pytest --return-code-on-test-failure \
 	    --packages-select $(COLCON_TEST) \
 	    --pytest-args -q -m "not slow and not bench and not ros"
+
+# For a machine without a clone: pip install out/wheels/*.whl brings `sdimu`, its config files and what it needs to run.
+wheels: setup
+	work=$$(mktemp -d) && trap 'rm -rf "$$work"' EXIT && cp -r LICENSE config src "$$work" && rm -rf "$$work"/src/*/build && \
+	$(BIN)/python -m pip wheel -qq --disable-pip-version-check --no-deps --no-build-isolation -w out/wheels \
+	    $(foreach package,$(PACKAGES),"$$work/src/$(package)")
 
 # How fast: samples a second, bags, start of the command line.
 bench: setup
@@ -69,4 +75,4 @@ campaigns: setup
 	$(BIN)/sdimu monte-carlo -n 200 --out out/monte-carlo
 	$(BIN)/sdimu hidden-campaign -n 200 --out out/hidden-campaign
 
-.PHONY: setup demo check test colcon bench study docs faults pictures campaigns
+.PHONY: setup demo check test colcon wheels bench study docs faults pictures campaigns

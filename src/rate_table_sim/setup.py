@@ -3,13 +3,21 @@
 from setuptools import find_packages, setup
 
 NAME = "rate_table_sim"
+VERSION = "0.1.0"
 
 setup(
     name=NAME,
-    version="0.1.0",
+    version=VERSION,
     description="Simulated three-axis rate table",
+    maintainer="sdimu-calibration maintainers",
+    maintainer_email="maintainers@sdimu-calibration.org",
     license="Apache-2.0",
+    license_files=["LICENSE"],
+    platforms=["Linux x86_64"],
+    python_requires=">=3.10",
     packages=find_packages(),
+    package_data={NAME: ["py.typed"]},
+    install_requires=["numpy>=2.0", "pydantic>=2", f"sdimu_calibration=={VERSION}"],
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),

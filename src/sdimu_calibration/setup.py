@@ -1,15 +1,87 @@
 """Package the sdimu_calibration ROS 2 package; the entry points are the nodes and the command-line verbs."""
 
+import shutil
+from pathlib import Path
+
 from setuptools import find_packages, setup
+from setuptools.command.build_py import build_py
 
 NAME = "sdimu_calibration"
+CONFIG = Path(__file__).resolve().parents[2] / "config"
+"""The repository's configuration files, which every copy that is installed takes along."""
+
+RUN_TIME = [
+    "AllanTools",
+    "PyYAML",
+    "dash",
+    "matplotlib",
+    "mcap",
+    "numba",
+    "numpy>=2.0",
+    "plotly",
+    "pydantic>=2",
+    "rich",
+    "ros-jazzy-common-interfaces",
+    "ros-jazzy-rclpy[fastrtps]",
+    "rosbags>=0.10",
+    "scipy",
+    "typer",
+    "zstandard",
+]
+DEVELOPMENT = [
+    "colcon-common-extensions",
+    "hypothesis",
+    "import-linter",
+    "mcap-ros2-support",
+    "mypy",
+    "numpydoc",
+    "playwright",
+    "pytest",
+    "pytest-timeout",
+    "pytest-xdist",
+    "ruff",
+    "setuptools",
+    "types-PyYAML",
+]
+
+
+class BuildWithConfig(build_py):
+    """Copy config/ into the package that is built; an editable install finds it in the repository."""
+
+    def _config(self):
+        target = Path(self.build_lib) / NAME / "config"
+        return {path: target / path.relative_to(CONFIG) for path in sorted(CONFIG.rglob("*")) if path.is_file()}
+
+    def run(self):
+        super().run()
+        if self.editable_mode:
+            return
+        if not CONFIG.is_dir():
+            raise SystemExit(f"{CONFIG}: no such folder (build from the repository, not from a part of it)")
+        for source, target in self._config().items():
+            target.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy(source, target)
+
+    def get_outputs(self, include_bytecode=True):
+        added = [] if self.editable_mode else [str(target) for target in self._config().values()]
+        return super().get_outputs(include_bytecode) + added
+
 
 setup(
     name=NAME,
     version="0.1.0",
     description="Navigation-level calibration of a strapdown IMU on a rate table",
+    maintainer="sdimu-calibration maintainers",
+    maintainer_email="maintainers@sdimu-calibration.org",
     license="Apache-2.0",
+    license_files=["LICENSE"],
+    platforms=["Linux x86_64"],
+    python_requires=">=3.10",
     packages=find_packages(),
+    package_data={NAME: ["py.typed"]},
+    cmdclass={"build_py": BuildWithConfig},
+    install_requires=RUN_TIME,
+    extras_require={"dev": DEVELOPMENT},
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),

@@ -3,13 +3,32 @@
 from setuptools import find_packages, setup
 
 NAME = "sdimu_sim"
+VERSION = "0.1.0"
 
 setup(
     name=NAME,
-    version="0.1.0",
+    version=VERSION,
     description="Simulated strapdown IMU on a rate table, with hidden effects",
+    maintainer="sdimu-calibration maintainers",
+    maintainer_email="maintainers@sdimu-calibration.org",
     license="Apache-2.0",
+    license_files=["LICENSE"],
+    platforms=["Linux x86_64"],
+    python_requires=">=3.10",
     packages=find_packages(),
+    package_data={NAME: ["py.typed"]},
+    install_requires=[
+        "PyYAML",
+        "dask",
+        "distributed",
+        "numpy>=2.0",
+        "pydantic>=2",
+        "rich",
+        "scipy",
+        "typer",
+        f"rate_table_sim=={VERSION}",
+        f"sdimu_calibration=={VERSION}",
+    ],
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from importlib.metadata import version
 from pathlib import Path
 
 import pytest
@@ -41,6 +42,10 @@ def test_help_lists_the_verbs_of_all_packages(sdimu):
     assert status == 0
     for verb in ("run", "simulate", "calibrate", "effects", "replay", "bag"):
         assert verb in out
+
+
+def test_the_version_is_that_of_the_package(sdimu):
+    assert sdimu("--version") == (0, f"sdimu {version('sdimu_calibration')}\n", "")
 
 
 def test_help_loads_nothing_heavy():

@@ -146,6 +146,17 @@ def test_the_environment_names_another_config_folder(tmp_path, monkeypatch):
         find_config("plan", "short")
 
 
+def test_a_copy_that_is_installed_reads_the_files_that_it_brings(tmp_path, monkeypatch):
+    (tmp_path / "config" / "plan").mkdir(parents=True)
+    monkeypatch.delenv("SDIMU_CONFIG", raising=False)
+    monkeypatch.setattr("sdimu_calibration.storage.config._PACKAGE", tmp_path)
+    assert config_folder() == tmp_path / "config"
+    monkeypatch.setattr("sdimu_calibration.storage.config._PACKAGE", tmp_path / "without")
+    monkeypatch.setattr("sdimu_calibration.storage.config._REPOSITORY", tmp_path / "without")
+    with pytest.raises(DataError, match="SDIMU_CONFIG"):
+        config_folder()
+
+
 def test_of_a_file_of_another_kind_the_format_is_told_and_not_its_keys(tmp_path):
     with pytest.raises(DataError, match=r"mine.yaml: format: .*'sdimu-effect/1'"):
         load_plan(written(tmp_path, "format: sdimu-effect/1\nname: bent\nexpressions: {}\n"))

@@ -9,8 +9,8 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable
 from importlib import import_module
-from importlib.metadata import entry_points
-from typing import Any
+from importlib.metadata import entry_points, version
+from typing import Annotated, Any
 
 import typer
 from typer.core import TyperGroup
@@ -19,6 +19,7 @@ from typer.main import get_command
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.units import UnitError
 
+PACKAGE = "sdimu_calibration"
 ENTRY_POINTS = "sdimu_calibration.verbs"
 
 _VERBS = {
@@ -67,8 +68,18 @@ app = typer.Typer(
 )
 
 
+def _say_version(asked: bool) -> None:
+    if asked:
+        typer.echo(f"sdimu {version(PACKAGE)}")
+        raise typer.Exit
+
+
 @app.callback()
-def _root() -> None:
+def _root(
+    _version: Annotated[
+        bool, typer.Option("--version", callback=_say_version, is_eager=True, help="Say the version and leave.")
+    ] = False,
+) -> None:
     """Calibrate a strapdown inertial measurement unit on a rate table at navigation level."""
 
 
@@ -99,7 +110,7 @@ def _unavailable(name: str, error: ImportError) -> Callable[[], None]:
     reason = str(error)
 
     def verb() -> None:
-        raise DataError(f"{name}: its package does not load ({reason}); run: make setup")
+        raise DataError(f"{name}: its package does not load ({reason}); install it again")
 
     verb.__doc__ = f"(not available: {reason})"
     return verb

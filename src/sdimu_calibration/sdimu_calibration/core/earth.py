@@ -12,23 +12,37 @@ from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.compiled import compiled
 
 RATE = 7.292115e-5
-"""Earth rate against inertial space (rad/s)."""
+"""Earth rate against inertial space (rad/s): WGS-84."""
 SEMI_MAJOR = 6378137.0
-"""Equatorial radius (m)."""
+"""Equatorial radius (m): WGS-84."""
 FLATTENING = 1.0 / 298.257223563
+"""Flattening of the ellipsoid (1): WGS-84."""
 ECCENTRICITY_SQUARED = FLATTENING * (2.0 - FLATTENING)
+"""First eccentricity squared (1): follows from the flattening."""
 GRAVITATION = 3.986004418e14
-"""GM of the Earth with its atmosphere (m^3/s^2)."""
+"""GM of the Earth with its atmosphere (m^3/s^2): WGS-84."""
 GRAVITY_EQUATOR = 9.7803253359
-"""Normal gravity on the ellipsoid at the equator (m/s^2)."""
+"""Normal gravity on the ellipsoid at the equator (m/s^2): WGS-84."""
 SOMIGLIANA_K = 0.00193185265241
+"""Coefficient of the squared sine of the latitude in Somigliana's formula (1): WGS-84."""
 POLE_LIMIT = np.radians(89.9)
-"""Beyond this latitude the transport rate keeps the value it has here: NED is singular at the pole."""
+"""Largest latitude in the transport rate (rad): NED is singular at the pole."""
 
 
 @compiled
 def earth_rate(latitude: float) -> Floats:
-    """Earth rate in NED (rad/s), shape (3,), at a geodetic latitude (rad)."""
+    """Earth rate in NED.
+
+    Parameters
+    ----------
+    latitude : float
+        Geodetic (rad).
+
+    Returns
+    -------
+    ndarray, shape (3,)
+        rad/s.
+    """
     w = np.zeros(3)
     w[0] = RATE * np.cos(latitude)
     w[2] = -RATE * np.sin(latitude)
@@ -69,7 +83,20 @@ def normal_gravity(latitude: float, height: float) -> float:
 
 @compiled
 def transport_rate(latitude: float, height: float, velocity: Floats) -> Floats:
-    """Rate of NED against the Earth (rad/s), shape (3,), for a velocity N, E, D (m/s)."""
+    """Rate of NED against the Earth, in NED.
+
+    Parameters
+    ----------
+    latitude, height : float
+        Geodetic latitude (rad), above 89.9 deg that of 89.9 deg; height above the ellipsoid (m).
+    velocity : ndarray, shape (3,)
+        N, E, D (m/s).
+
+    Returns
+    -------
+    ndarray, shape (3,)
+        rad/s.
+    """
     lat = min(max(latitude, -POLE_LIMIT), POLE_LIMIT)
     r_n, r_e = radii(lat)
     w = np.empty(3)

@@ -1,6 +1,7 @@
 """3x3 matrices as nine numbers, row by row: what loops over cycles use, because it allocates nothing.
 
-A call of BLAS for a 3x3 product costs more than the product.
+A call of BLAS for a 3x3 product costs more than the product. Elements have any unit; those of rotations are
+dimensionless.
 """
 
 from __future__ import annotations
@@ -31,13 +32,25 @@ def rotation3(x: float, y: float, z: float) -> Matrix3:
 
 @compiled
 def elements(C: Floats) -> Matrix3:
-    """Take the elements of an array of shape (3, 3)."""
+    """Take the elements of an array.
+
+    Parameters
+    ----------
+    C : ndarray, shape (3, 3)
+    """
     return C[0, 0], C[0, 1], C[0, 2], C[1, 0], C[1, 1], C[1, 2], C[2, 0], C[2, 1], C[2, 2]
 
 
 @compiled
 def store(m: Matrix3, out: Floats) -> None:
-    """Write elements to an array of shape (3, 3)."""
+    """Write elements to an array.
+
+    Parameters
+    ----------
+    m : tuple of float, length 9
+    out : ndarray, shape (3, 3)
+        Filled in place.
+    """
     out[0, 0], out[0, 1], out[0, 2] = m[0], m[1], m[2]
     out[1, 0], out[1, 1], out[1, 2] = m[3], m[4], m[5]
     out[2, 0], out[2, 1], out[2, 2] = m[6], m[7], m[8]
@@ -70,7 +83,7 @@ def applied(m: Matrix3, x: float, y: float, z: float) -> tuple[float, float, flo
 
 @compiled
 def orthonormal3(m: Matrix3) -> Matrix3:
-    """Nearest rotation matrix to one that rounding has bent a little: ``1.5 m - 0.5 m m' m`` (one Newton step)."""
+    """Rotation matrix nearest to one with rounding errors: ``1.5 m - 0.5 m m' m`` (one Newton step)."""
     b = multiplied(multiplied(m, transposed(m)), m)
     return (
         1.5 * m[0] - 0.5 * b[0], 1.5 * m[1] - 0.5 * b[1], 1.5 * m[2] - 0.5 * b[2],

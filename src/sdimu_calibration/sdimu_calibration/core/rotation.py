@@ -2,6 +2,9 @@
 
 `C_nb` maps b to n and `q_nb` is the same rotation. A rotation vector `phi` with
 ``C = rotation_matrix(phi)`` turns the frame it is resolved in: ``C_nb(t+dt) = C_nb(t) @ rotation_matrix(phi_b)``.
+Rotation vectors are in rad; matrices and quaternions are dimensionless.
+
+Source: Shuster, "A Survey of Attitude Representations", J. Astronautical Sciences 41 (1993).
 """
 
 from __future__ import annotations
@@ -15,7 +18,18 @@ from sdimu_calibration.core.matrix3 import elements, orthonormal3, rotation3, st
 
 @compiled
 def skew(v: Floats) -> Floats:
-    """Cross-product matrix: ``skew(a) @ b == cross(a, b)``; `v` shape (3,)."""
+    """Cross-product matrix: ``skew(a) @ b == cross(a, b)``.
+
+    Parameters
+    ----------
+    v : ndarray, shape (3,)
+        Any unit.
+
+    Returns
+    -------
+    ndarray, shape (3, 3)
+        In the unit of `v`.
+    """
     m = np.zeros((3, 3))
     m[0, 1], m[0, 2] = -v[2], v[1]
     m[1, 0], m[1, 2] = v[2], -v[0]
@@ -25,7 +39,17 @@ def skew(v: Floats) -> Floats:
 
 @compiled
 def cross(a: Floats, b: Floats) -> Floats:
-    """Cross product of two vectors of shape (3,)."""
+    """Cross product of two vectors.
+
+    Parameters
+    ----------
+    a, b : ndarray, shape (3,)
+        Any units, one frame.
+
+    Returns
+    -------
+    ndarray, shape (3,)
+    """
     c = np.empty(3)
     c[0] = a[1] * b[2] - a[2] * b[1]
     c[1] = a[2] * b[0] - a[0] * b[2]
@@ -57,6 +81,14 @@ def quaternion(C: Floats) -> Floats:
     """Give the unit quaternion (w, x, y, z), w >= 0, of a rotation matrix.
 
     Divides by the largest of the four components, so no angle loses digits (Shepperd, J. Guidance and Control 1, 1978).
+
+    Parameters
+    ----------
+    C : ndarray, shape (3, 3)
+
+    Returns
+    -------
+    ndarray, shape (4,)
     """
     q = np.empty(4)
     trace = C[0, 0] + C[1, 1] + C[2, 2]
@@ -81,7 +113,16 @@ def quaternion(C: Floats) -> Floats:
 
 @compiled
 def rotation_vector(C: Floats) -> Floats:
-    """Rotation vector of a rotation matrix, angle in [0, pi]; the inverse of `rotation_matrix`."""
+    """Rotation vector of a rotation matrix, angle in [0, pi]; the inverse of `rotation_matrix`.
+
+    Parameters
+    ----------
+    C : ndarray, shape (3, 3)
+
+    Returns
+    -------
+    ndarray, shape (3,)
+    """
     q = quaternion(C)
     n = np.sqrt(q[1] ** 2 + q[2] ** 2 + q[3] ** 2)
     scale = 2.0 if n < 1e-12 else 2.0 * np.arctan2(n, q[0]) / n
@@ -90,7 +131,17 @@ def rotation_vector(C: Floats) -> Floats:
 
 @compiled
 def orthonormal(C: Floats) -> Floats:
-    """Give the nearest rotation matrix to one that rounding has bent a little (one Newton step)."""
+    """Give the rotation matrix nearest to one with rounding errors (one Newton step).
+
+    Parameters
+    ----------
+    C : ndarray, shape (3, 3)
+        Orthonormal but for a small error e; what is left is of the order of e^2.
+
+    Returns
+    -------
+    ndarray, shape (3, 3)
+    """
     out = np.empty((3, 3))
     store(orthonormal3(elements(C)), out)
     return out
@@ -98,7 +149,17 @@ def orthonormal(C: Floats) -> Floats:
 
 @compiled
 def quaternion_matrix(q: Floats) -> Floats:
-    """Rotation matrix of a quaternion (w, x, y, z); it is normalised first."""
+    """Rotation matrix of a quaternion.
+
+    Parameters
+    ----------
+    q : ndarray, shape (4,)
+        (w, x, y, z) of any length but zero; the function normalises it.
+
+    Returns
+    -------
+    ndarray, shape (3, 3)
+    """
     n = np.sqrt(q[0] ** 2 + q[1] ** 2 + q[2] ** 2 + q[3] ** 2)
     w, x, y, z = q[0] / n, q[1] / n, q[2] / n, q[3] / n
     m = np.empty((3, 3))

@@ -16,9 +16,10 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 STANDARD_GRAVITY = 9.80665
-"""Standard gravity (m/s^2), the size of the unit g (CGPM 1901)."""
+"""Standard gravity (m/s^2): the size of the unit g (CGPM 1901)."""
 
 _DEG = math.pi / 180.0
+"""Degree (rad): definition."""
 _G = STANDARD_GRAVITY
 
 # name -> (factor to SI, dimension as {base: power})

@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 import os
 import re
-import sys
 from collections.abc import Hashable, Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar, get_args
@@ -27,6 +26,9 @@ CONFIG_VARIABLE = "SDIMU_CONFIG"
 
 LONGEST_PLAN_S = 7.0 * 86400.0
 """A plan beyond a week is one with a wrong unit; its samples would not fit into the memory."""
+
+_PACKAGE = Path(__file__).resolve().parents[1]
+_REPOSITORY = _PACKAGE.parents[2]
 
 _SUFFIXES = (".yaml", ".yml", ".json")
 
@@ -62,7 +64,9 @@ def _quantity_of_any_unit(value: Any) -> tuple[float, str]:
 
 
 def config_folder() -> Path:
-    """Folder of the configuration: `SDIMU_CONFIG`, else the repository's ``config/``, else the share folder.
+    """Folder of the configuration: `SDIMU_CONFIG`, else the package's own, else the repository's.
+
+    A wheel and a build by colcon carry the files inside the package; an editable install leaves them in the repository.
 
     Raises
     ------
@@ -74,12 +78,9 @@ def config_folder() -> Path:
         if not Path(named).is_dir():
             raise DataError(f"{named}: not a folder (environment variable {CONFIG_VARIABLE})")
         return Path(named)
-    for parent in Path(__file__).resolve().parents:
+    for parent in _PACKAGE, _REPOSITORY:
         if (parent / "config" / "plan").is_dir():
             return parent / "config"
-    share = Path(sys.prefix) / "share" / "sdimu_calibration" / "config"
-    if share.is_dir():
-        return share
     raise DataError(f"no config folder found; set {CONFIG_VARIABLE} to the folder that holds plan/, imu/, model/")
 
 

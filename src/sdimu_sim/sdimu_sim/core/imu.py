@@ -58,12 +58,12 @@ class Electronics:
 
 
 @compiled
-def _count_pulses(values: Floats, step: float, free_input_test: Floats) -> Floats:
-    """Whole pulses per sample; what is left over stays in the integrator (`free_input_test` (3,), in place)."""
+def _count_pulses(values: Floats, step: float, remainder: Floats) -> Floats:
+    """Whole pulses per sample; what is left over stays in the integrator (`remainder` (3,), in place)."""
     out = np.empty_like(values)
     for k in range(values.shape[0]):
         for i in range(3):
-            total = values[k, i] + free_input_test[i]
+            total = values[k, i] + remainder[i]
             out[k, i] = step * np.round(total / step)
-            free_input_test[i] = total - out[k, i]
+            remainder[i] = total - out[k, i]
     return out

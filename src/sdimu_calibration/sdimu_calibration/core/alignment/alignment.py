@@ -1,7 +1,9 @@
 """Coarse alignment: level from specific force, azimuth from Earth rate, for any orientation of the axes.
 
-Its answer is where the filter linearises. The filter starts with much wider sigmas than these and takes the same
-samples as its first measurements, which gives attitude and biases their right correlation at once.
+The filter linearises about this attitude. It starts with wider sigmas than the alignment has and takes the same samples
+as its first measurements, so that attitude and biases get their correlation from one source.
+
+SI units; frames n (North, East, Down) and b (body); `C_nb` maps b to n.
 
 Source: Groves, *Principles of GNSS, Inertial, and Multisensor Integrated Navigation Systems*, 2nd ed., section 5.6
 (TRIAD on gravity and Earth rate).
@@ -23,9 +25,9 @@ from sdimu_calibration.core.rotation import rotation_matrix
 from sdimu_calibration.core.specification import ImuSpecification, Site
 
 UNKNOWN_AZIMUTH = np.pi / np.sqrt(3.0)
-"""Sigma of an azimuth that may be anything (rad): that of a uniform distribution over the circle."""
+"""Sigma of an unknown azimuth (rad): that of a uniform distribution over the circle."""
 _WIDEN = 10.0
-"""The filter's initial sigmas are this many times the alignment's."""
+"""Factor from the sigmas of the alignment to those of the filter: the filter takes the same samples again."""
 
 
 @dataclass(frozen=True)
@@ -36,9 +38,9 @@ class Alignment:
     ----------
     C_nb : ndarray, shape (3, 3)
     sigma : ndarray, shape (3,)
-        Honest one-sigma of the attitude error about N, E, D (rad).
+        Sigma of the attitude error about N, E, D (rad).
     filter_sigma : ndarray, shape (3,)
-        What the filter starts with (rad).
+        Sigma with which the filter starts (rad).
     azimuth_from : str
         ``earth rate``, ``site file`` or ``nothing``.
     """
@@ -50,13 +52,34 @@ class Alignment:
 
 
 def azimuth_of(C_nb: Floats) -> float:
-    """Azimuth of body X (of body Y, when X is within 45 deg of the vertical), rad."""
+    """Azimuth of body X, or of body Y where X is within 45 deg of the vertical.
+
+    Parameters
+    ----------
+    C_nb : ndarray, shape (3, 3)
+
+    Returns
+    -------
+    float
+        rad, clockwise from north.
+    """
     axis = C_nb[:, 0] if abs(C_nb[2, 0]) < np.sqrt(0.5) else C_nb[:, 1]
     return float(np.arctan2(axis[1], axis[0]))
 
 
 def levelled(C_nb: Floats, f_ib_b: Floats) -> Floats:
-    """Turn an attitude (3, 3) the shortest way to where the force at rest, shape (3,), points up."""
+    """Turn an attitude by the smallest angle that makes the specific force at rest point up.
+
+    Parameters
+    ----------
+    C_nb : ndarray, shape (3, 3)
+    f_ib_b : ndarray, shape (3,)
+        Specific force at rest (m/s^2).
+
+    Returns
+    -------
+    ndarray, shape (3, 3)
+    """
     f_n = C_nb @ f_ib_b
     axis = np.array([-f_n[1], f_n[0], 0.0])
     sine = float(np.hypot(f_n[0], f_n[1]))
@@ -72,11 +95,15 @@ def align(w_mean: Floats, f_mean: Floats, duration_s: float, site: Site, imu: Im
     w_mean, f_mean : ndarray, shape (3,)
         Mean body rate (rad/s) and specific force (m/s^2) at rest, in b.
     duration_s : float
-        Length of the mean.
+        Time over which they are means.
     site : Site
         An azimuth given there replaces gyrocompassing.
     imu : ImuSpecification
         Its priors give the sigmas.
+
+    Returns
+    -------
+    Alignment
 
     Raises
     ------

@@ -1,13 +1,13 @@
-"""A coarse start from the whole test: where passes and least squares linearise when the first dwell alone misleads.
+"""Coarse alignment from the whole test: attitude and biases where the first dwell alone gives a wrong azimuth.
 
 Gyrocompassing in one dwell fails when the gyro bias exceeds Earth rate, and an azimuth from a site file may be wrong by
-any angle. All stops together know better. While the table rests, the mean rate is bias plus Earth rate; that mean taken
-out of the samples of a turn leaves the turn itself, good to the scale factors, hence the orientation of every stop in
-the body frame of the first one. In these orientations gravity and Earth rate are two constant vectors, the biases two
-others, and least squares tells them apart without any starting value.
+any angle. All stops together determine both. At rest the mean rate is bias plus Earth rate; subtracted from the samples
+of a turn it leaves the turn itself, good to the scale factors, hence the orientation of every stop in the body frame of
+the first one. In these orientations gravity and Earth rate are two constant vectors, the biases two others, and linear
+least squares separates them without a starting value.
 
 The idea is that of multi-position alignment (Groves, *Principles of GNSS, Inertial, and Multisensor Integrated
-Navigation Systems*, 2nd ed., section 5.6.3), made linear.
+Navigation Systems*, 2nd ed., section 5.6.3), made linear. SI units; frames n (North, East, Down) and b (body).
 """
 
 from __future__ import annotations
@@ -27,12 +27,11 @@ from sdimu_calibration.core.effects.mass_unbalance import GYRO_MASS_UNBALANCE
 from sdimu_calibration.core.rotation import orthonormal, rotation_matrix
 
 _FREE = 1e3
-"""Sigma of what is wholly unknown, in its own size."""
+"""Sigma of an unknown vector, a multiple of its size: wide enough to be no prior."""
 _MODEL_ERROR = 0.01
-"""Misfit from what is left out (scale, misalignment, error of the orientations), as a share of the vector sought."""
-
+"""Sigma of the misfit, a share of the vector sought: scale, misalignment and orientation errors are left out."""
 _STOPS = 20
-"""Stops used, from the first on: later ones add less than the gyros' errors in all the turns before them take away."""
+"""Number of stops used, from the first on: the error of the orientations grows with every turn."""
 
 
 @dataclass(frozen=True)
@@ -68,7 +67,7 @@ def coarse_start(prepared: PreparedData, setup: TestSetup, start: Alignment) -> 
     prepared : PreparedData
     setup : TestSetup
     start : Alignment
-        Kept where a test of fewer than three stops cannot do better.
+        Returned unchanged for a test of fewer than three stops.
 
     Returns
     -------
@@ -103,7 +102,7 @@ def coarse_start(prepared: PreparedData, setup: TestSetup, start: Alignment) -> 
 def _orientations(prepared: PreparedData, last: Ints, first: Ints, rate: Floats) -> Floats:
     """Orientation of every stop in the body frame of the first, shape (k, 3, 3).
 
-    `rate` (k, 3) at rest before and after a turn stands for what is not the turn.
+    The mean of `rate` (k, 3) at rest before and after a turn is subtracted from the rate in the turn.
     """
     out = [np.eye(3)]
     for k in range(len(rate) - 1):
@@ -131,13 +130,13 @@ def _constant(
     ----------
     to_first : ndarray, shape (k, 3, 3)
     mean : ndarray, shape (k, 3)
-        Their sum as seen by the body at each stop.
+        Sum of both vectors at each stop, in the body frame.
     size : float
         Of the first vector, for scale.
     bias : float
         Sigma of the second.
     more : ndarray, shape (k, m)
-        Variables to which each body axis may respond besides, with responses of sigma `sigma`.
+        Further variables to which each body axis may respond, with coefficients of sigma `sigma`.
     noise : float
         Sigma of the means.
 
@@ -151,7 +150,7 @@ def _constant(
     rows[:, 3:6] = np.tile(np.eye(3) * bias, (k, 1))
     for axis in range(3):
         rows[axis::3, 6 + axis * m : 6 + (axis + 1) * m] = more * sigma
-    # Unknowns in their own size; a weak pull to zero decides what the stops leave open.
+    # Unknowns in units of their size; a weak prior at zero fixes what the stops do not determine.
     noise = float(np.hypot(noise, _MODEL_ERROR * size))
     pull = np.eye(rows.shape[1])
     pull[range(3), range(3)] = 1.0 / _FREE

@@ -1,4 +1,4 @@
-"""Stops of a recording, and means of its samples over blocks of rest."""
+"""Stops of a recording, and means of its samples over blocks of rest. SI units, body frame."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.effects.imu_model import ImuModel
 
 BLOCK_EPOCHS = 20
-"""Epochs in a mean at most: a slow change of a regressor is not lost in it."""
+"""Largest number of epochs in a mean: regressors that change slowly, such as temperature, are constant within it."""
 
 
 @dataclass(frozen=True)
 class Layout:
-    """Where the stops are; cycles are half-open ranges.
+    """Cycles of stops and blocks, as half-open ranges.
 
     Attributes
     ----------
     stop_first, stop_last : ndarray of int, shape (k,)
-        Cycles of each stop: consecutive epochs that the phases call used.
+        First cycle of each stop, and one after its last: consecutive epochs that the phases mark as used.
     block_first, block_last, block_stop : ndarray of int, shape (b,)
-        Blocks of rest, and the stop of each.
+        The same for each block of rest, and the stop it belongs to.
     """
 
     stop_first: Ints
@@ -34,7 +34,7 @@ class Layout:
 
 
 def layout(prepared: PreparedData) -> Layout:
-    """Cut the used epochs into stops and blocks."""
+    """Divide the used epochs into stops and blocks of at most `BLOCK_EPOCHS` epochs."""
     used = np.flatnonzero(prepared.phases.used)
     starts = np.flatnonzero(np.diff(used, prepend=-2) != 1)
     ends = np.append(starts[1:], len(used))
@@ -55,6 +55,7 @@ class Rest:
     Attributes
     ----------
     seconds : ndarray, shape (b,)
+        Length of each block (s).
     mean : ndarray, shape (b, 6)
         Rate (rad/s) and force (m/s^2) as measured.
     design : ndarray, shape (b, 6, p)
@@ -67,7 +68,21 @@ class Rest:
 
 
 def rest_means(prepared: PreparedData, where: Layout, model: ImuModel, values: Floats) -> Rest:
-    """Take means over the blocks; `values` (n, m) are the regressors of every cycle."""
+    """Take means over the blocks.
+
+    Parameters
+    ----------
+    prepared : PreparedData
+        Of n cycles.
+    where : Layout
+    model : ImuModel
+    values : ndarray, shape (n, m)
+        Regressors of every cycle (SI).
+
+    Returns
+    -------
+    Rest
+    """
     c = prepared.cycles
     integrals = np.hstack([c.dt[:, None], c.alpha, c.upsilon, values * c.dt[:, None]])
     total = np.vstack([np.zeros(integrals.shape[1]), np.cumsum(integrals, axis=0)])

@@ -1,4 +1,8 @@
-"""The whitened equations of the batch estimator (`batch`), stop by stop."""
+"""Whitened equations of the batch estimator (`batch`), stop by stop.
+
+Unknowns of a stop: small rotation (rad), velocity (m/s) and displacement (m), all in n (North, East, Down).
+Coefficients are in SI units; `prior` scales their columns to units of the prior's sigma.
+"""
 
 from __future__ import annotations
 
@@ -14,12 +18,20 @@ from sdimu_calibration.core.batch.preintegration import Preintegration
 from sdimu_calibration.core.rotation import rotation_vector, skew
 
 PER_STOP = 9
-"""Unknowns of a stop: attitude, velocity, position."""
+"""Number of unknowns of a stop: attitude, velocity, position."""
 
 
 @dataclass(frozen=True)
 class LinearisationPoint:
-    """Where the equations are linearised: coefficients (p,) and, for k stops, attitude, velocity and position."""
+    """Point about which the equations of k stops are linearised.
+
+    Attributes
+    ----------
+    coefficients : ndarray, shape (p,)
+    C_nb : ndarray, shape (k, 3, 3)
+    velocity, position : ndarray, shape (k, 3)
+        Velocity (m/s), and displacement from the known point (m).
+    """
 
     coefficients: Floats
     C_nb: Floats
@@ -28,16 +40,42 @@ class LinearisationPoint:
 
 
 def rest_weights(setup: TestSetup, seconds: Floats) -> Floats:
-    """One over sigma of the means of each block, shape (b, 6)."""
+    """One over the sigma of the means of each block.
+
+    Parameters
+    ----------
+    setup : TestSetup
+    seconds : ndarray, shape (b,)
+        Length of each block (s).
+
+    Returns
+    -------
+    ndarray, shape (b, 6)
+        Of rate (s/rad) and specific force (s^2/m).
+    """
     rate = (setup.imu.gyro_white_noise**2 + setup.model.extra_rate_sigma**2) / seconds
     force = (setup.imu.accel_white_noise**2 + setup.model.extra_force_sigma**2) / seconds
     return 1.0 / np.sqrt(np.repeat(np.column_stack([rate, force]), 3, axis=1))
 
 
 def rest_residual(setup: TestSetup, mean: Floats, slope: Floats, C_nb: Floats) -> tuple[Floats, Floats]:
-    """Measured minus predicted means (b, 6) of a perfect IMU, and their change per small turn in n (b, 6, 3).
+    """Measured means minus those of a perfect IMU, and the change of the difference per small rotation.
 
-    With C turned by a: C_bn v becomes C_bn (v - a x v); `slope` (b, 6, 6) of the errors goes with it.
+    With C_nb turned by a small a in n, ``C_bn v`` becomes ``C_bn (v - a x v)``, and the errors follow with their slope.
+
+    Parameters
+    ----------
+    setup : TestSetup
+    mean : ndarray, shape (b, 6)
+        Rate (rad/s) and specific force (m/s^2).
+    slope : ndarray, shape (b, 6, 6)
+        `error_slope` of the blocks.
+    C_nb : ndarray, shape (3, 3)
+
+    Returns
+    -------
+    residual : ndarray, shape (b, 6)
+    change : ndarray, shape (b, 6, 3)
     """
     w_ie, g_n = earth.earth_rate(setup.site.latitude_rad), np.array([0.0, 0.0, setup.gravity])
     residual = mean - np.concatenate([C_nb.T @ w_ie, -C_nb.T @ g_n])
@@ -46,7 +84,21 @@ def rest_residual(setup: TestSetup, mean: Floats, slope: Floats, C_nb: Floats) -
 
 
 def still(setup: TestSetup, velocity: Floats, position: Floats, p: int) -> tuple[Floats, Floats, Floats]:
-    """Say that a stop stands still at the known point."""
+    """Rows that hold a stop at rest at the known point.
+
+    Parameters
+    ----------
+    setup : TestSetup
+    velocity, position : ndarray, shape (3,)
+        Of the stop (m/s, m).
+    p : int
+        Number of coefficients.
+
+    Returns
+    -------
+    own, common, residual : ndarray, shapes (6, 9), (6, p), (6,)
+        As in `chain.Link`.
+    """
     sigma = np.repeat([setup.model.velocity_sigma, setup.model.position_sigma], 3)
     own = np.zeros((6, PER_STOP))
     own[:, 3:] = np.diag(1.0 / sigma)
@@ -54,7 +106,21 @@ def still(setup: TestSetup, velocity: Floats, position: Floats, p: int) -> tuple
 
 
 def initial(start: Alignment, C_nb: Floats, p: int) -> tuple[Floats, Floats, Floats]:
-    """Say that the first attitude is the alignment's within its sigma."""
+    """Rows that hold the first attitude at that of the alignment within its sigma.
+
+    Parameters
+    ----------
+    start : Alignment
+    C_nb : ndarray, shape (3, 3)
+        Attitude at the first stop.
+    p : int
+        Number of coefficients.
+
+    Returns
+    -------
+    own, common, residual : ndarray, shapes (3, 9), (3, p), (3,)
+        As in `chain.Link`.
+    """
     own = np.zeros((3, PER_STOP))
     own[:, :3] = np.diag(1.0 / start.filter_sigma)
     return own, np.zeros((3, p)), rotation_vector(C_nb @ start.C_nb.T) / start.filter_sigma
@@ -63,7 +129,25 @@ def initial(start: Alignment, C_nb: Floats, p: int) -> tuple[Floats, Floats, Flo
 def step_rows(
     gone: Preintegration, point: LinearisationPoint, k: int, resting: float, prior: Floats
 ) -> tuple[tuple[Floats, Floats, Floats, Floats], float]:
-    """Whitened rows from stop k to the next, and the log of their weight."""
+    """Rows that couple stop k to the next by what the IMU integrated in between.
+
+    Parameters
+    ----------
+    gone : Preintegration
+    point : LinearisationPoint
+    k : int
+    resting : float
+        Length of stop k (s); its unknowns are those at its start.
+    prior : ndarray, shape (p,)
+        Sigma of each coefficient.
+
+    Returns
+    -------
+    rows : tuple of ndarray, shapes (9, 9), (9, 9), (9, p), (9,)
+        `step_own`, `step_next`, `step_common`, `step_residual` of `chain.Link`.
+    log_weight : float
+        Logarithm of the determinant of the whitening.
+    """
     L = np.linalg.cholesky(gone.noise)
     seconds = resting + gone.seconds
     own = np.zeros((9, PER_STOP))
@@ -81,5 +165,15 @@ def step_rows(
 
 
 def nothing(p: int) -> tuple[Floats, Floats, Floats, Floats]:
-    """Make the rows from the last stop to none."""
+    """Make the empty coupling of the last stop.
+
+    Parameters
+    ----------
+    p : int
+        Number of coefficients.
+
+    Returns
+    -------
+    tuple of ndarray, shapes (0, 9), (0, 9), (0, p), (0,)
+    """
     return np.zeros((0, PER_STOP)), np.zeros((0, PER_STOP)), np.zeros((0, p)), np.zeros(0)

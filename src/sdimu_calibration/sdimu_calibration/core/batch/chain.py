@@ -1,6 +1,7 @@
-"""Least squares of a chain: unknowns that meet only their neighbours, and unknowns that meet all.
+"""Least squares of a chain: unknowns of each link, coupled to the next link only, and unknowns common to all links.
 
-Orthogonal elimination (Householder QR) link by link: the memory is that of one link, whatever the chain's length.
+Orthogonal elimination (Householder QR) link by link needs the memory of one link, whatever the length of the chain.
+Rows are whitened (dimensionless); an unknown has whatever unit its columns imply.
 
 Source: Bierman, *Factorization Methods for Discrete Sequential Estimation* (1977), ch. V; Björck, *Numerical Methods
 for Least Squares Problems* (1996), section 6.3.
@@ -17,14 +18,14 @@ from sdimu_calibration.core.arrays import Floats
 
 @dataclass(frozen=True)
 class Link:
-    """Rows of one link, whitened: ``own @ y_k + common @ c + residual`` and ``onward`` to the next link.
+    """Whitened rows of one link: ``own @ y_k + common @ c + residual``, and those that couple y_k to y_(k+1).
 
     Attributes
     ----------
     own, common, residual : ndarray, shapes (r, q), (r, p), (r,)
         Rows of this link alone.
     step_own, step_next, step_common, step_residual : ndarray, shapes (s, q), (s, q), (s, p), (s,)
-        Rows that tie it to the next link; s = 0 at the last.
+        Rows that couple it to the next link; s = 0 at the last.
     """
 
     own: Floats
@@ -43,7 +44,9 @@ class Solution:
     Attributes
     ----------
     links : ndarray, shape (k, q)
+        Unknowns of each link.
     common : ndarray, shape (p,)
+        Common unknowns.
     covariance : ndarray, shape (p, p)
         Of the common unknowns.
     chi2 : float
@@ -63,7 +66,18 @@ class Solution:
 
 
 def solve(links: list[Link]) -> Solution:
-    """Solve the chain; the residuals are those at zero, the answer is the step to take."""
+    """Solve the chain by elimination forwards and substitution backwards.
+
+    Parameters
+    ----------
+    links : list of Link
+        Residuals at the linearisation point.
+
+    Returns
+    -------
+    Solution
+        Step from the linearisation point.
+    """
     q, p = links[0].own.shape[1], links[0].common.shape[1]
     carry = np.zeros((0, q + p + 1))
     eliminated: list[Floats] = []

@@ -1,4 +1,10 @@
-"""What the batch estimator integrates over a motion from rest to rest, and its linear response (preintegration)."""
+"""Preintegration: what the IMU integrates over a motion from rest to rest, and its linear response.
+
+SI units; frame n is North, East, Down.
+
+The idea is that of Forster, Carlone, Dellaert & Scaramuzza, "On-Manifold Preintegration for Real-Time Visual-Inertial
+Odometry", IEEE Trans. Robotics 33 (2017); here with Earth rate, Coriolis force and the gradient of gravity.
+"""
 
 from __future__ import annotations
 
@@ -18,21 +24,22 @@ from sdimu_calibration.core.rotation import rotation_matrix, skew
 
 @dataclass(frozen=True)
 class Preintegration:
-    """What the IMU integrates over one motion from rest to rest, starting at attitude C with velocity zero.
+    """Integral of one motion from rest to rest that starts at a given attitude with velocity zero.
 
     Attributes
     ----------
     C_nb : ndarray, shape (3, 3)
-        At the end.
+        Attitude at the end.
     moved : ndarray, shape (6,)
         Velocity (m/s) and change of position (m), N, E, D.
     seconds : float
+        Length of the motion.
     by_attitude : ndarray, shape (9, 3)
-        Change of attitude, velocity, position at the end per small turn (in n) at the start.
+        Change of attitude (rad), velocity (m/s) and position (m) at the end per small rotation in n at the start (rad).
     by_coefficient : ndarray, shape (9, p)
-        Per unit of each coefficient taken out of the samples.
+        Change per unit of each coefficient for which the samples are corrected.
     noise : ndarray, shape (9, 9)
-        Covariance that white sensor noise leaves in attitude, velocity and position.
+        Covariance of attitude, velocity and position from white sensor noise.
     """
 
     C_nb: Floats
@@ -76,8 +83,9 @@ def preintegrate(
 ) -> Preintegration:  # fmt: skip
     """Integrate one motion and linearise it.
 
-    The linear responses are taken in the frame that does not turn and meets n at the end of the motion, where
-    attitude errors stand still and velocity errors grow by their product with the force and by the gradient of gravity.
+    The linear responses are taken in the frame that does not turn and coincides with n at the end of the motion. There,
+    attitude errors are constant and velocity errors grow by their product with the force and by the gradient of
+    gravity.
 
     Parameters
     ----------
@@ -90,13 +98,17 @@ def preintegrate(
     slope : ndarray, shape (rows, 6, 6)
         `error_slope` of the cycles of the motion.
     coefficients : ndarray, shape (p,)
-        Taken out of the samples.
+        Coefficients for which the samples are corrected.
     C_nb : ndarray, shape (3, 3)
         Attitude at the start.
     latitude, height, gravity_excess : float
         Site (rad, m), gravity beyond normal (m/s^2).
     densities : tuple of float
-        White noise of gyros and accelerometers (power).
+        White noise of gyros and accelerometers ((rad/s)^2/Hz, (m/s^2)^2/Hz).
+
+    Returns
+    -------
+    Preintegration
     """
     c = prepared.cycles[rows]
     own = values[rows]

@@ -1,16 +1,16 @@
-"""Sensor errors taken out of samples.
+"""Compensation of samples for the sensor errors.
 
-A sensor shows ``m = x + E(x)``, x = (body rate, specific force) in the body frame of the coefficients, with the error E
-linear in the coefficients and, for most effects, in x. Solved for x by
+A sensor measures ``m = x + E(x)``, x = (body rate, specific force) in the body frame of the coefficients, with an
+error E that is linear in the coefficients and, for most effects, in x. Solved for x by
 
-    x <- x + inv(A) (m - x - E(x)),    A = I + dE/dx at nought,
+    x <- x + inv(A) (m - x - E(x)),    A = I + dE/dx at x = 0,
 
-which is exact after one step where E is affine in x (scale, misalignment, mass unbalance, bias: no first order in the
-errors is taken, so percents are as good as ppm) and gains a factor of the size of the rest of E a step where it is not.
+which is exact after one step where E is affine in x (bias, scale, misalignment, mass unbalance), however large E is;
+elsewhere each step multiplies the error by the size of the remainder of E.
 
 Covariance to first order: ``inv(A) (D P D' + N^2/dt) inv(A)'`` with the regressors D at x, the covariance P of the
 coefficients and the white noise N of the IMU. The first part is common to all samples, not independent from one to the
-next; a message has no place to say so.
+next; a ROS message has no field for that.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.specification import ImuSpecification
 
 START_TEMPERATURE = "start_temperature_degc"
-"""Key of a result's data section: the temperature from which temperature effects count (deg C)."""
+"""Key in the data section of a result: temperature from which temperature effects count (deg C)."""
 _ABSENT = {
     "alpha": "needs the angular acceleration",
     "w_table": "needs the rate against the Earth, which only the table test knows",
@@ -45,8 +45,9 @@ _ABSENT = {
     "since_turn": "needs the history of turns",
 }
 _CLOSE = 1e-13
-"""Largest step, against 1 rad/s and 10 m/s^2, at which the solution stands: a few units of rounding."""
+"""Largest step at convergence, a share of 1 rad/s or 1 m/s^2 plus the value: a few hundred units of rounding."""
 _MOST_STEPS = 80
+"""Largest number of steps: converges to rounding where each step leaves at most 0.68 of the error."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +57,7 @@ class Compensator:
     Attributes
     ----------
     model : ImuModel
-        Of the effects that samples can be freed of.
+        Of the effects that can be compensated in samples.
     coefficients, covariance : ndarray, shape (p,) and (p, p)
         SI, in `body_frame`.
     inverse : ndarray, shape (6, 6)
@@ -67,7 +68,7 @@ class Compensator:
     left_out : tuple of str
         Effects that are not compensated, each with its reason.
     start_temperature : float or None
-        Temperature from which the coefficients count (deg C); None where none of them asks for it.
+        Temperature from which the coefficients count (deg C); None where none of them depends on it.
     """
 
     model: ImuModel
@@ -106,6 +107,10 @@ def resolved(calibration: Calibration, own: Sequence[Effect] = ()) -> tuple[Effe
     calibration : Calibration
     own : sequence of Effect
         Effects that are in no catalogue, such as those read from files.
+
+    Returns
+    -------
+    tuple of Effect
 
     Raises
     ------
@@ -147,9 +152,13 @@ def compensator(
     has_temperature : bool
         The temperature of the IMU is recorded with the samples.
     same_start : bool
-        The time of the samples counts as in the calibrated recording (switched on alike), so functions of time hold.
+        The samples count time from the same event as the calibrated recording (power-on): functions of time hold.
     start_temperature : float, optional
-        Temperature at the start of the calibrated recording (deg C), where the result does not say it.
+        Temperature at the start of the calibrated recording (deg C), where the result does not state it.
+
+    Returns
+    -------
+    Compensator
 
     Raises
     ------
@@ -205,7 +214,19 @@ def _reason(effect: Effect, key: str, has_temperature: bool, start_known: bool, 
 
 
 def slope_at_nought(model: ImuModel, coefficients: Floats) -> Floats:
-    """Return ``I + dE/dx`` at x = 0, shape (6, 6), by central differences: exact where E is affine in x."""
+    """Return ``I + dE/dx`` at x = 0 by central differences: exact where E is affine in x.
+
+    Parameters
+    ----------
+    model : ImuModel
+    coefficients : ndarray, shape (p,)
+        SI.
+
+    Returns
+    -------
+    ndarray, shape (6, 6)
+        Rates first.
+    """
     steps = np.diag([1.0, 1.0, 1.0, 10.0, 10.0, 10.0])
     ahead, behind = (_error(model, coefficients, sign * steps) for sign in (1.0, -1.0))
     slope = (ahead - behind).T / (2.0 * np.diag(steps))
@@ -219,7 +240,24 @@ def _error(model: ImuModel, coefficients: Floats, x: Floats) -> Floats:
 
 
 def heat_since(log: TemperatureLog | None, t: Floats, start_degc: float | None, causal: bool) -> tuple[Floats, Floats]:
-    """Temperature since `start_degc` (K) and its rate (K/s) at times `t` (n,), as the calibration takes them."""
+    """Temperature difference and its rate, computed as in the calibration.
+
+    Parameters
+    ----------
+    log : TemperatureLog or None
+        None gives zeros.
+    t : ndarray, shape (n,)
+        s.
+    start_degc : float or None
+        Temperature from which the difference counts (deg C); None for the first of the log.
+    causal : bool
+        Use only what was measured up to t.
+
+    Returns
+    -------
+    temperature, rate : ndarray, shape (n,)
+        K, K/s.
+    """
     heat, rate = temperatures(log, t, causal)
     if log is not None and len(log.t) and start_degc is not None:
         heat = heat + (float(log.value[0]) - start_degc)
@@ -234,7 +272,7 @@ def compensate(
     f_ib_b: Floats,
     heat: tuple[Floats, Floats] | None = None,
 ) -> Compensated:
-    """Take the errors out of samples.
+    """Compensate samples.
 
     Parameters
     ----------
@@ -247,6 +285,10 @@ def compensate(
         As measured (rad/s, m/s^2).
     heat : (ndarray, ndarray), shape (n,) each, optional
         `heat_since` at the middle of each sample.
+
+    Returns
+    -------
+    Compensated
 
     Raises
     ------
@@ -265,7 +307,7 @@ def compensate(
 
     scaled = np.zeros((n, 6))
     for _ in range(_MOST_STEPS):
-        # What runs away is told below, in words.
+        # Divergence ends in the DataError below.
         with np.errstate(over="ignore", invalid="ignore"):
             values = using.model.regressors(seen())
             step = (measured - x - using.model.errors(values, using.coefficients)) @ using.inverse.T

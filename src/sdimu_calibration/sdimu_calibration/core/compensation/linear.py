@@ -1,4 +1,4 @@
-"""The part of a result that two matrices and biases can hold: ``m = A x + b``."""
+"""The affine part of a result, as matrices and biases: ``m = A x + b``."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.results import Calibration
 
 _AFFINE = 1e-10
-"""Deviation from a straight line, against the size of a regressor, that is rounding."""
+"""Deviation from a straight line, a share of the size of the regressor: above rounding, below any nonlinearity."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class LinearModel:
         rad/s, m/s^2.
     body_frame : str
     left : tuple of str
-        Coefficients that matrices cannot hold.
+        Coefficients of effects that are not affine.
     """
 
     gyro: Floats
@@ -54,6 +54,10 @@ def linear_model(calibration: Calibration, own: Sequence[Effect] = ()) -> Linear
     calibration : Calibration
     own : sequence of Effect
         Effects of the result that are in no catalogue.
+
+    Returns
+    -------
+    LinearModel
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Which variables of the motion an effect reads: found by changing them one at a time, not by a list of names."""
+"""Variables of the motion on which an effect depends: found by changing them one at a time, not by a list of names."""
 
 from __future__ import annotations
 
@@ -15,12 +15,22 @@ FIELDS = (
     "leant", "since_turn",
 )  # fmt: skip
 _ROWS = 2000
+"""Number of rows of the random motion: enough to cross the thresholds of effects."""
 _SPAN_S = 20_000.0
-"""Longer than a test: a step or a transient lies within."""
+"""Length of the random motion (s): longer than a test, so that steps and transients lie within."""
 
 
 def reads(effect: Effect) -> frozenset[str]:
-    """Names of the fields of `Motion` on which the regressors of an effect depend."""
+    """Names of the fields of `Motion` on which the regressors of an effect depend.
+
+    Parameters
+    ----------
+    effect : Effect
+
+    Returns
+    -------
+    frozenset of str
+    """
     rng = np.random.default_rng(3)
     one, other = any_motion(rng), any_motion(rng)
     other = replace(other, t=0.6 * one.t + 7.0, rest=~one.rest)
@@ -50,7 +60,7 @@ def any_motion(rng: np.random.Generator) -> Motion:
 
 
 def samples_motion(t: Floats, dt: Floats, w: Floats, f: Floats, heat: Floats, heat_rate: Floats) -> Motion:
-    """Motion as samples alone know it: what they do not show (attitude, table, acceleration) is left at nought.
+    """Motion as far as samples alone determine it: attitude, table rate and angular acceleration are zero.
 
     Parameters
     ----------
@@ -60,6 +70,10 @@ def samples_motion(t: Floats, dt: Floats, w: Floats, f: Floats, heat: Floats, he
         Body rate (rad/s) and specific force (m/s^2).
     heat, heat_rate : ndarray, shape (n,)
         Temperature since the start of the calibrated recording (K) and its rate (K/s).
+
+    Returns
+    -------
+    Motion
     """
     n = len(t)
     none = np.broadcast_to(np.zeros(3), (n, 3))

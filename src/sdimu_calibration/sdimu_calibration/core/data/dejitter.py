@@ -1,8 +1,8 @@
-"""Stamps that jitter about even sampling: the clock behind them, not the moment a computer read it.
+"""Removal of jitter from stamps of even sampling.
 
-An IMU samples evenly and integrates all the time; a driver that stamps messages as they arrive adds the delays of its
-computer. A rate times a jittering interval is an angle that nobody turned. The samples' own count is the better clock,
-as long as no more than a quarter of an interval is in doubt; slow drift of the one clock against the other is kept.
+An IMU samples evenly and integrates continuously; a driver that stamps messages on arrival adds the delays of its
+computer. A rate times a jittering interval is a wrong angle. The count of the samples is the better clock, as long as
+the jitter is below a quarter of an interval; slow drift of the one clock against the other is kept.
 """
 
 from __future__ import annotations
@@ -15,20 +15,24 @@ from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.recording import Recording
 
 _DOUBT = 0.25
-"""Jitter beyond this share of the interval makes it doubtful which samples are missing."""
+"""Largest jitter that is removed, a share of the interval: beyond it missing samples cannot be counted."""
 _LEAST = 2e-3
-"""Jitter (rms) below this share of the interval is the rounding of stamps."""
+"""Least jitter (rms) that is removed, a share of the interval: below it is the rounding of stamps."""
 _DRIFT_S = 20.0
-"""Clocks drift against each other over longer than this."""
+"""Time over which the drift of the clocks is smoothed (s): clocks drift more slowly."""
 
 
 def dejittered(recording: Recording) -> Recording:
-    """Replace jittering stamps by even ones, and say so.
+    """Replace jittering stamps by even ones, with a note.
+
+    Parameters
+    ----------
+    recording : Recording
 
     Returns
     -------
     Recording
-        The same object when the stamps are even, or too uneven for anybody to know; the latter with a note.
+        The same object when the stamps are even; with a note and its own stamps when they are too uneven.
     """
     t = recording.t
     interval = recording.interval_s

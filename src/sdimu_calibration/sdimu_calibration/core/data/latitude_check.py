@@ -23,11 +23,13 @@ from sdimu_calibration.core.specification import ImuSpecification, Site
 from sdimu_calibration.core.units import STANDARD_GRAVITY
 
 _FEWEST_STOPS = 6
-"""Four unknowns, and two stops more to see how well they fit."""
+"""Least number of stops: four unknowns, and two more for the misfit."""
 _SEEN = 0.15
-"""The Earth's rate is seen when its vertical part is known to this share of it."""
+"""Largest sigma of an observed vertical Earth rate, a share of the Earth rate: 9 deg of latitude at the equator."""
 _SIGMAS = 4.0
-"""A place contradicts the data beyond so many sigma."""
+"""Ratio of a difference to its sigma from which a site contradicts the data: one false alarm in 16,000."""
+
+
 @dataclass(frozen=True)
 class EarthRate:
     """What the rests say of the place.

@@ -18,30 +18,32 @@ from sdimu_calibration.core.recording import DataFault, Recording
 
 CHANNELS = tuple(f"{triad} {axis}" for triad in ("gyro", "accelerometer") for axis in "xyz")
 _FALSE_ALARM = 1e-3
-"""Sound tests with a false alarm, a channel."""
+"""Probability of a false alarm in a recording, a channel: one sound recording in a thousand."""
 _BLOCK = 500
-"""Samples over which the share of repeated numbers is counted."""
+"""Number of samples in a block for the share of repeated numbers: the median drops the blocks of a stuck stretch."""
 _REPEATS = 0.5
-"""Share of repeated numbers from which a channel says nothing of being stuck: no noise, or far too coarse."""
+"""Share of repeated numbers from which the test for a stuck channel is skipped: no noise, or resolution too coarse."""
 _LEAST_AT_END = 3
-"""So many readings at the very largest number are no chance in continuous noise."""
+"""Least number of readings at the extreme number that is saturation: continuous noise does not repeat its extreme."""
 _PERFECT = 1e-7
-"""Noise against the largest reading; a navigation-grade gyro on a table has 5e-6."""
+"""Ratio of noise to largest reading below which a channel has no noise: a navigation-grade gyro on a table has 5e-6."""
 _SPIKE = 8.0
-"""Second differences beyond so many sigma: 6.2 would do for a million Gaussian samples."""
+"""Ratio of a second difference to its sigma from which it is a spike: a million Gaussian samples reach 6.2."""
 _ALONE = 0.25
-"""A spike stands out of its surroundings, the second differences nearby, by at least the inverse of this."""
+"""Largest ratio of the second differences around a spike to its own: more is motion."""
 _AROUND = np.r_[-12:-2, 3:13]
 _OF_ANOTHER = 3
-"""Second differences that another spike nearby makes large; a shock or a shaking table makes more of them so."""
+"""Number of large second differences around a spike that are ignored: another spike makes three, a shock more."""
 _ROUNDS = 4
+"""Largest number of searches for spikes: a spike may hide another beside it."""
 _WINDOW = 20
-"""Samples over which the roughness of a channel is taken, by the median: a corner of the motion is one sample."""
+"""Number of samples in a median of the roughness: a corner of the motion is one sample."""
 _WILD = 4.0
-"""Times the usual roughness; medians of twenty reach 2.2 in an hour of white noise."""
+"""Ratio to the usual roughness from which a window is disturbed: white noise reaches 2.2 in an hour."""
 _RARE = 0.02
-"""A larger share of rough windows is how this recording is (a table that shakes in turns), and no fault."""
+"""Largest share of rough windows that is a fault: more is a property of the recording, such as a table that shakes."""
 _GAUSS_MAD = 1.482602218505602
+"""Ratio of sigma to median absolute deviation: that of a Gaussian."""
 
 
 def sound(recording: Recording) -> tuple[Recording, tuple[DataFault, ...]]:
@@ -143,6 +145,7 @@ def _counts(x: Floats) -> bool:
 
 
 _ROUNDING = 1e-9
+"""Ratio of a step to the largest reading below which it is rounding: pulses are larger."""
 
 
 def _saturated(x: Floats) -> Ints:

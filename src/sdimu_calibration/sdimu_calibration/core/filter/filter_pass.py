@@ -16,9 +16,8 @@ and accelerometer noise densities q_g, q_a (power)
     E[attitude Zw'] = -C q_g,      E[velocity Zf'] = C q_a,       E[position Zf'] = C q_a T / 2,
     E[velocity Zw'] = -[f x] C q_g T / 2,                         E[position Zw'] = -[f x] C q_g T^2 / 6.
 
-While the table rests, Zv and Zp are the sums of what Zf has already said, so they are taken once after each
-motion; taking them at every epoch would only be news if they had noise of their own. Derivation:
-doc/shared-noise.md.
+While the table rests, Zv and Zp are integrals of Zf, so they are taken once after each motion; at every epoch they
+would add information only if they had noise of their own. Derivation: doc/shared-noise.md.
 """
 
 from __future__ import annotations
@@ -43,83 +42,165 @@ from sdimu_calibration.core.navigation.strapdown import navigate_cycle, velocity
 from sdimu_calibration.core.rotation import orthonormal, rotation_matrix, skew
 
 NAV = 9
-"""Navigation error states."""
+"""Number of navigation error states: position, velocity, attitude."""
 COPY = 3
-"""Copies of the initial attitude error."""
+"""Number of copies of the initial attitude error: one an axis."""
 MEASURED = 12
-"""Rows of a full measurement: Zp, Zv, Zw, Zf."""
-
+"""Number of rows of a full measurement: Zp, Zv, Zw, Zf."""
 
 
 class PassInput(NamedTuple):
-    """Data of a pass: cycles, epochs, regressors. Shapes: n cycles, e epochs, m regressor columns."""
+    """Data of a pass: n cycles, e epochs, m regressor columns.
 
-    dt: Floats  # (n,) s
-    alpha: Floats  # (n, 3) rad
-    upsilon: Floats  # (n, 3) m/s
-    coning: Floats  # (n, 3) rad
-    sculling: Floats  # (n, 3) m/s
-    first: Ints  # (e,) first cycle
-    last: Ints  # (e,) one after the last cycle
-    white: Floats  # (e,) variance of the white noise over that of a whole epoch
-    gap_angle: Floats  # (e,) rad: sigma that missing samples add, every axis
-    gap_velocity: Floats  # (e,) m/s
-    kind: Ints  # (e,) SKIP ... HELD_ALL
-    values: Floats  # (n, m) regressors
-    channel: Ints  # (m,)
-    parameter: Ints  # (m,)
+    Attributes
+    ----------
+    dt : ndarray, shape (n,)
+        Length of each cycle (s).
+    alpha, upsilon, coning, sculling : ndarray, shape (n, 3)
+        As in `Cycles` (rad, m/s, rad, m/s).
+    first, last : ndarray of int, shape (e,)
+        First cycle of each epoch, and one after its last.
+    white : ndarray, shape (e,)
+        Variance of the white noise, a multiple of that of a complete epoch (1).
+    gap_angle, gap_velocity : ndarray, shape (e,)
+        Sigma that missing samples add on every axis (rad, m/s).
+    kind : ndarray of int, shape (e,)
+        ``SKIP`` to ``HELD_ALL`` of `alignment.prepared`.
+    values : ndarray, shape (n, m)
+        Regressors (SI).
+    channel, parameter : ndarray of int, shape (m,)
+        Sensor axis and coefficient of each regressor.
+    """
+
+    dt: Floats
+    alpha: Floats
+    upsilon: Floats
+    coning: Floats
+    sculling: Floats
+    first: Ints
+    last: Ints
+    white: Floats
+    gap_angle: Floats
+    gap_velocity: Floats
+    kind: Ints
+    values: Floats
+    channel: Ints
+    parameter: Ints
 
 
 class PassSettings(NamedTuple):
-    """Constants of a pass."""
+    """Constants of a pass.
 
-    reference: Floats  # (3,) latitude (rad), longitude (rad), height (m) of the known point
-    gravity_excess: float  # site gravity minus normal gravity (m/s^2)
-    gyro_psd: float  # (rad/s)^2/Hz
-    accel_psd: float  # (m/s^2)^2/Hz
-    extra_gyro: float  # variance of Zw beyond white noise (rad/s)^2
-    extra_accel: float  # variance of Zf beyond white noise (m/s^2)^2
-    velocity_sigma: float  # m/s
-    position_sigma: float  # m
-    decay_rate: Floats  # (p,) 1/s
-    drive: Floats  # (p,) variance per second
-    closed_loop: bool  # feed attitude and coefficients back too, not only position and velocity
-    shared_noise: bool  # model M
+    Attributes
+    ----------
+    reference : ndarray, shape (3,)
+        Latitude (rad), longitude (rad), height (m) of the known point.
+    gravity_excess : float
+        Gravity of the site minus normal gravity (m/s^2).
+    gyro_psd, accel_psd : float
+        White noise ((rad/s)^2/Hz, (m/s^2)^2/Hz).
+    extra_gyro, extra_accel : float
+        Variance of Zw and Zf beyond white noise ((rad/s)^2, (m/s^2)^2).
+    velocity_sigma, position_sigma : float
+        Sigma of Zv and Zp (m/s, m).
+    decay_rate, drive : ndarray, shape (p,)
+        Decay (1/s) and added variance per second of each coefficient.
+    closed_loop : bool
+        Feed attitude and coefficients back too, not only position and velocity.
+    shared_noise : bool
+        Model the cross-covariance M.
+    """
+
+    reference: Floats
+    gravity_excess: float
+    gyro_psd: float
+    accel_psd: float
+    extra_gyro: float
+    extra_accel: float
+    velocity_sigma: float
+    position_sigma: float
+    decay_rate: Floats
+    drive: Floats
+    closed_loop: bool
+    shared_noise: bool
 
 
 class PassState(NamedTuple):
-    """Where a pass stands; changed in place. Size of the state: s = 9 + p + 3."""
+    """State of a pass, of size s = 9 + p + 3; changed in place.
 
-    x: Floats  # (s,)
-    P: Floats  # (s, s)
-    C_nb: Floats  # (3, 3)
-    velocity: Floats  # (3,) m/s
-    position: Floats  # (3,) rad, rad, m
-    used: Floats  # (p,) coefficients in the compensation
+    Attributes
+    ----------
+    x : ndarray, shape (s,)
+        Mean (SI).
+    P : ndarray, shape (s, s)
+        Covariance.
+    C_nb : ndarray, shape (3, 3)
+    velocity, position : ndarray, shape (3,)
+        N, E, D (m/s); latitude (rad), longitude (rad), height (m).
+    used : ndarray, shape (p,)
+        Coefficients in the compensation (SI).
+    """
+
+    x: Floats
+    P: Floats
+    C_nb: Floats
+    velocity: Floats
+    position: Floats
+    used: Floats
 
 
 class PassOutput(NamedTuple):
-    """What a pass leaves, one row an epoch; `keep` rows hold the matrices (0 when not wanted)."""
+    """Output of a pass, one row an epoch; k = e where the matrices are kept, else 0. SI units.
 
-    estimate: Floats  # (e, p) coefficients
-    sigma: Floats  # (e, s)
-    innovation: Floats  # (e, 12); NaN where not measured
-    normalised: Floats  # (e, 12) L^-1 innovation
-    innovation_sigma: Floats  # (e, 12) predicted sigma of each innovation (SI); NaN where not measured
-    log_likelihood: Floats  # (e,)
-    nis: Floats  # (e, 4) squared normalised innovation of position, velocity, rate, force
-    C_nb: Floats  # (e, 3, 3) at the end of the epoch
-    stride: int  # epochs between snapshots
-    covariance: Floats  # (e / stride, p, p) of the coefficients
-    Phi: Floats  # (keep, 9, 9)
-    G: Floats  # (keep, 9, p)
-    H: Floats  # (keep, 12, s)
-    L: Floats  # (keep, 12, 12)
-    K: Floats  # (keep, s, 12)
+    Attributes
+    ----------
+    estimate : ndarray, shape (e, p)
+        Coefficients.
+    sigma : ndarray, shape (e, s)
+        Of every state.
+    innovation, normalised : ndarray, shape (e, 12)
+        Innovations and ``L^-1`` times them; NaN where not measured.
+    innovation_sigma : ndarray, shape (e, 12)
+        Predicted sigma of each innovation; NaN where not measured.
+    log_likelihood : ndarray, shape (e,)
+    nis : ndarray, shape (e, 4)
+        Squared normalised innovation of position, velocity, rate, force.
+    C_nb : ndarray, shape (e, 3, 3)
+        At the end of the epoch.
+    stride : int
+        Epochs between snapshots of the covariance.
+    covariance : ndarray, shape (ceil(e / stride), p, p)
+        Of the coefficients.
+    Phi : ndarray, shape (k, 9, 9)
+        Transition of the navigation errors.
+    G : ndarray, shape (k, 9, p)
+        Their response to the coefficients.
+    H : ndarray, shape (k, 12, s)
+    L : ndarray, shape (k, 12, 12)
+        Lower Cholesky factor of the innovations' covariance.
+    K : ndarray, shape (k, s, 12)
+        Gain.
+    """
+
+    estimate: Floats
+    sigma: Floats
+    innovation: Floats
+    normalised: Floats
+    innovation_sigma: Floats
+    log_likelihood: Floats
+    nis: Floats
+    C_nb: Floats
+    stride: int
+    covariance: Floats
+    Phi: Floats
+    G: Floats
+    H: Floats
+    L: Floats
+    K: Floats
 
 
 def new_output(epochs: int, parameters: int, keep: bool, stride: int) -> PassOutput:
-    """Allocate the output of a pass; `keep` the matrices of every epoch, the covariance every `stride`."""
+    """Allocate the output of a pass: matrices of every epoch where `keep`, the covariance every `stride` epochs."""
     e, p, s = epochs, parameters, NAV + parameters + COPY
     k = e if keep else 0
     nan = np.nan

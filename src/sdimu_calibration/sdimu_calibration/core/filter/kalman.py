@@ -1,7 +1,9 @@
 """The Kalman filter's two steps, for a state whose first rows move and whose other rows do not.
 
-Knows no navigation. The measurement noise may be correlated with the process noise of the interval that it ends
-(the same samples drive the navigation and make the measurement), so the update carries the cross-covariance M.
+Knows no navigation: every row of the state has the SI unit of its owner, a covariance the product of two of them,
+and whitened quantities are dimensionless. The measurement noise may be correlated with the process noise of the
+interval that it ends (the same samples drive the navigation and make the measurement), so the update carries the
+cross-covariance M.
 
 Source: the joint covariance of prediction error and measurement noise is [[P, M], [M', R]]; with gain K the error after
 the update is [I - KH, -K] times it, for every K (Jazwinski, *Stochastic Processes and Filtering Theory*,
@@ -20,7 +22,17 @@ from sdimu_calibration.core.compiled import compiled
 
 @compiled
 def sparse_product(A: Floats, B: Floats) -> Floats:
-    """Product ``A @ B`` that skips the zeros of A; shapes (m, n) and (n, q)."""
+    """Product ``A @ B`` that skips the zeros of A.
+
+    Parameters
+    ----------
+    A : ndarray, shape (m, n)
+    B : ndarray, shape (n, q)
+
+    Returns
+    -------
+    ndarray, shape (m, q)
+    """
     out = np.zeros((A.shape[0], B.shape[1]))
     for i in range(A.shape[0]):
         for k in range(A.shape[1]):
@@ -76,7 +88,16 @@ def propagate(x: Floats, P: Floats, Phi: Floats, G: Floats, Q: Floats, decay: Fl
 
 @compiled
 def cholesky(S: Floats) -> Floats:
-    """Lower Cholesky factor; a matrix that is not positive gives NaN rather than an exception."""
+    """Lower Cholesky factor; a matrix that is not positive definite gives NaN rather than an exception.
+
+    Parameters
+    ----------
+    S : ndarray, shape (m, m)
+
+    Returns
+    -------
+    ndarray, shape (m, m)
+    """
     n = S.shape[0]
     L = np.zeros((n, n))
     for j in range(n):
@@ -94,7 +115,17 @@ def cholesky(S: Floats) -> Floats:
 
 @compiled
 def whiten(L: Floats, B: Floats) -> Floats:
-    """Solve ``L X = B`` for lower triangular L; `B` shape (m, q)."""
+    """Solve ``L X = B`` for lower triangular L.
+
+    Parameters
+    ----------
+    L : ndarray, shape (m, m)
+    B : ndarray, shape (m, q)
+
+    Returns
+    -------
+    ndarray, shape (m, q)
+    """
     # Element by element: a row operation on arrays would allocate for every pair of rows.
     X = B.copy()
     for i in range(L.shape[0]):

@@ -19,13 +19,13 @@ from sdimu_calibration.core.recording import DataFault, Recording
 from sdimu_calibration.core.units import STANDARD_GRAVITY, from_si
 
 _BEYOND = 10.0
-"""A rate so many times beyond the fastest hundredth is no turn: hands accelerate for longer than a sample."""
+"""Ratio to the 99th percentile from which a rate is impossible: a hand accelerates for longer than a sample."""
 _LEAST_IN_A_ROW = 3
-"""So many readings in a row at the very largest number are the end of the range."""
+"""Least number of consecutive readings at the extreme number that is saturation: noise does not repeat its extreme."""
 _TURN_MISSES = 0.01
-"""Share of the way by which turns may miss; the Xsens recording has 0.0004."""
+"""Largest misfit of turns, a share of their angle: the Xsens recording has 0.0004."""
 _FORCE_MISSES = 0.01 * STANDARD_GRAVITY
-"""Force at rest may miss by so much (m/s^2); the Xsens recording has a hundredth of it."""
+"""Largest misfit of the specific force at rest (m/s^2): the Xsens recording has a hundredth of it."""
 
 
 def without_impossible(recording: Recording) -> tuple[Recording, tuple[DataFault, ...]]:

@@ -1,12 +1,12 @@
-"""Sensor errors taken out of cycles exactly: what a perfect IMU would have given.
+"""Exact correction of cycles: what a perfect IMU would have measured.
 
-`track.motion` finds the compensated motion by rounds, each of which gains a factor of the size of the errors; with
-errors of percents three rounds leave 4e-5 of the rate. One Newton step from there, with the slope S of the errors,
-leaves nothing of errors that are linear in what the sensors see:
+`track.motion` compensates in rounds, each of which leaves an error smaller by a factor of the size of the sensor
+errors; with sensor errors of percents three rounds leave 4e-5 of the rate. One Newton step from there, with the slope S
+of the sensor errors, is exact for errors that are linear in rate and force:
 
     measured = true + error(true)   ->   true = seen + (I + S)^-1 (measured - seen - error(seen)).
 
-The same (I + S)^-1 says what a small change of the coefficients, and noise, become in samples so corrected.
+The same (I + S)^-1 maps small changes of the coefficients, and noise, to corrected samples.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ class CorrectedCycles:
 
 
 def correct_cycles(cycles: Cycles, seen: Motion, model: ImuModel, coefficients: Floats) -> CorrectedCycles:
-    """Take the errors at `coefficients` (p,) out of cycles.
+    """Correct cycles for the sensor errors at given coefficients.
 
     Parameters
     ----------
@@ -51,6 +51,10 @@ def correct_cycles(cycles: Cycles, seen: Motion, model: ImuModel, coefficients: 
         Near the true motion of the same cycles.
     model : ImuModel
     coefficients : ndarray, shape (p,)
+
+    Returns
+    -------
+    CorrectedCycles
     """
     slope = error_slope(model, seen, slice(None), coefficients)
     weight: Floats = np.asarray(np.linalg.inv(np.eye(6) + slope), dtype=np.float64)

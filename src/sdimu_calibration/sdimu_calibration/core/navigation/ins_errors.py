@@ -4,8 +4,8 @@ State: position error N, E, D (m), velocity error N, E, D (m/s), attitude error 
 computed minus true and ``C_nb(computed) = (I - [err_attitude x]) C_nb(true)``.
 
 Source: Titterton & Weston, *Strapdown Inertial Navigation Technology*, 2nd ed., section 12.3; the same in
-Britting, *Inertial Navigation Systems Analysis*, ch. 6. Here position errors are metres, so the division
-by the radii stands in the transport rate instead.
+Britting, *Inertial Navigation Systems Analysis*, ch. 6. Here position errors are metres, so the transport
+rate contains the division by the radii.
 """
 
 from __future__ import annotations
@@ -88,7 +88,18 @@ def navigation_error_matrix(position: Floats, velocity: Floats, f_n: Floats) -> 
 
 @compiled
 def transition(F: Floats, dt: float) -> Floats:
-    """Transition matrix over `dt` (s): the exponential to third order, enough for epochs of seconds; (9, 9)."""
+    """Transition matrix: the exponential of ``F dt`` to third order.
+
+    Parameters
+    ----------
+    F : ndarray, shape (9, 9)
+    dt : float
+        Length of the epoch (s); the first term left out is ``(F dt)^4 / 24``, 2e-12 in natural units at 1 s.
+
+    Returns
+    -------
+    ndarray, shape (9, 9)
+    """
     A = F * dt
     A2 = A @ A
     return np.eye(9) + A + 0.5 * A2 + (A2 @ A) / 6.0
@@ -105,6 +116,7 @@ def process_noise(C_qg: Floats, C_qa: Floats, f_n: Floats, dt: float) -> Floats:
     f_n : ndarray, shape (3,)
         Mean specific force (m/s^2).
     dt : float
+        Length of the epoch (s).
 
     Returns
     -------
@@ -133,9 +145,23 @@ def process_noise(C_qg: Floats, C_qa: Floats, f_n: Floats, dt: float) -> Floats:
 
 @compiled
 def add_response(G: Floats, att: Floats, vel: Floats, f_n: Floats, w_ie: Floats, dt: float) -> None:
-    """Add one cycle to the integrated response of the navigation to each coefficient, G (9, p), in place.
+    """Add one cycle to the integrated response of the navigation errors to each coefficient.
 
-    With the Coriolis force on the velocity gained since the epoch began: a lever arm moves by decimetres a second.
+    Includes the Coriolis force on the velocity gained since the start of the epoch: a lever arm moves at decimetres per
+    second.
+
+    Parameters
+    ----------
+    G : ndarray, shape (9, p)
+        Response since the start of the epoch, per unit of each coefficient; changed in place.
+    att, vel : ndarray, shape (3, p)
+        Attitude (rad) and velocity (m/s) that the sensor errors of this cycle add, in n, per unit.
+    f_n : ndarray, shape (3,)
+        Specific force (m/s^2).
+    w_ie : ndarray, shape (3,)
+        Earth rate in n (rad/s).
+    dt : float
+        Length of the cycle (s).
     """
     c0, c2 = -2.0 * w_ie[0] * dt, -2.0 * w_ie[2] * dt
     for j in range(G.shape[1]):

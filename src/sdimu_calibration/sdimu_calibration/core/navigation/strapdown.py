@@ -21,11 +21,11 @@ from sdimu_calibration.core.compiled import compiled
 from sdimu_calibration.core.matrix3 import applied, elements, multiplied, orthonormal3, rotation3, store
 
 CYCLE_S = 0.1
-"""Longest navigation cycle (s)."""
+"""Longest navigation cycle (s): coning and sculling are integrated at the sample rate, so 10 Hz is enough."""
 CYCLE_ANGLE = 0.05
-"""A cycle closes early when the angle in it exceeds this (rad): the series of coning stops being short."""
+"""Angle at which a cycle closes early (rad): the series of coning and sculling are of low order."""
 GAP = 1.5
-"""An interval longer than this many nominal ones has lost samples in it."""
+"""Interval between samples that counts as a gap, a multiple of the nominal one: halfway to one lost sample."""
 
 
 @dataclass(frozen=True)
@@ -179,6 +179,10 @@ class Reducer:
             End of each sample (s), ascending; the first interval starts at 0.
         omega_ib_b, f_ib_b : ndarray, shape (n, 3)
             Mean rate (rad/s) and specific force (m/s^2) over the interval.
+
+        Returns
+        -------
+        Cycles
         """
         out = np.empty((len(t), _COLUMNS))
         n = _reduce(
@@ -211,6 +215,7 @@ def navigate_cycle(
     phi, dv : ndarray, shape (3,)
         Rotation vector (rad) and velocity increment (m/s) in the body frame at the cycle's start.
     dt : float
+        Length of the cycle (s).
     gravity : float
         Magnitude of gravity at the present position (m/s^2).
     """
@@ -239,12 +244,22 @@ def navigate_cycle(
 
 @compiled
 def velocity_increment(alpha: Floats, upsilon: Floats, sculling: Floats) -> Floats:
-    """Velocity increment in the frame at the start of the cycle (m/s), shape (3,).
+    """Velocity increment of a cycle.
 
     ``upsilon + alpha x upsilon / 2 + alpha x (alpha x upsilon) / 6 + sculling``: Savage's rotation compensation with
     its coefficients (1 - cos a)/a^2 and (1 - sin a / a)/a^2 to second order. Without the second-order term a table at
     2 deg/s makes the force across its axis 2 ppm too small. `sculling` holds what a force that turns in the body (the
     table turns, gravity does not) changes in both orders; leaving out the second makes 2 ppm at 20 deg/s.
+
+    Parameters
+    ----------
+    alpha, upsilon, sculling : ndarray, shape (3,)
+        As in `Cycles`.
+
+    Returns
+    -------
+    ndarray, shape (3,)
+        In the body frame at the start of the cycle (m/s).
     """
     c0 = alpha[1] * upsilon[2] - alpha[2] * upsilon[1]
     c1 = alpha[2] * upsilon[0] - alpha[0] * upsilon[2]

@@ -14,15 +14,15 @@ from sdimu_calibration.core.navigation.strapdown import Cycles
 from sdimu_calibration.core.recording import TemperatureLog
 
 _COMPENSATIONS = 3
-"""Rounds of "error at the compensated motion": each gains a factor of the size of the errors."""
+"""Number of rounds of compensation: each leaves an error smaller by a factor of the size of the sensor errors."""
 MAGNETIC_FIELD = np.array([30.0e-6, -4.5e-6, 40.0e-6])
-"""Field in NED (T) where the site gives none: size and dip of mid-northern latitudes."""
+"""Magnetic field in NED (T) where the site gives none: size and dip of mid-northern latitudes."""
 _STANDING = np.radians(0.01)
-"""Rate below which a table that comes to rest stands: above the bias of a gyro worth a table (rad/s)."""
+"""Rate below which the table stands (rad/s): above the bias of a gyro that is worth a rate table."""
 _TURNING = np.radians(0.5)
-"""A body rate about an axis that counts as a turn about it (rad/s); a force that changes so fast (1/s) as leaning."""
+"""Body rate that counts as a turn (rad/s), and change of the force per g that counts as leaning (1/s): above biases."""
 _TEMPERATURE_WINDOW_S = 60.0
-"""Base of the temperature rate (s): shorter ones differentiate the sensor's resolution."""
+"""Time over which the temperature rate is a mean (s): a shorter one differentiates the resolution of the sensor."""
 
 
 @compiled
@@ -45,7 +45,21 @@ def _attitudes(C_nb: Floats, alpha: Floats, coning: Floats, dt: Floats, latitude
 
 
 def integrate(C_nb: Floats, cycles: Cycles, latitude: float) -> Floats:
-    """Attitude at the middle of each cycle, (n, 3, 3), by the gyros; `C_nb` (3, 3) is moved to the end, in place."""
+    """Integrate the gyros to the attitude at the middle of each cycle.
+
+    Parameters
+    ----------
+    C_nb : ndarray, shape (3, 3)
+        Attitude at the start; moved to the end of the cycles, in place.
+    cycles : Cycles
+    latitude : float
+        rad.
+
+    Returns
+    -------
+    ndarray, shape (n, 3, 3)
+        `C_nb` at the middle of each cycle.
+    """
     return np.asarray(_attitudes(C_nb, np.ascontiguousarray(cycles.alpha), cycles.coning, cycles.dt, latitude))
 
 
@@ -57,8 +71,13 @@ def temperatures(log: TemperatureLog | None, t: Floats, causal: bool) -> tuple[F
     log : TemperatureLog or None
         None gives zeros.
     t : ndarray, shape (n,)
+        s.
     causal : bool
         Use only what was measured up to t, as a live filter must.
+
+    Returns
+    -------
+    temperature, rate : ndarray, shape (n,)
     """
     if log is None or not len(log.t):
         return np.zeros(len(t)), np.zeros(len(t))
@@ -86,7 +105,7 @@ def motion(
     before: Motion | None = None,
     magnetic_n: Floats = MAGNETIC_FIELD,
 ) -> Motion:
-    """Motion of each cycle.
+    """Motion of each cycle, as the effects see it.
 
     Parameters
     ----------
@@ -104,7 +123,13 @@ def motion(
         Put the rate and force that the attitude predicts in place of the measured ones at rest, so that regressors
         such as sign(w) carry no noise there. Needs a good `C_start` and coefficients.
     before : Motion, optional
-        Of the block before this one, where blocks follow each other.
+        Motion of the block before this one, where blocks follow each other.
+    magnetic_n : ndarray, shape (3,)
+        Magnetic field in NED (T).
+
+    Returns
+    -------
+    Motion
     """
     dt = cycles.dt
     w_measured, f_measured = cycles.alpha / dt[:, None], cycles.upsilon / dt[:, None]
@@ -143,7 +168,7 @@ def _acceleration(
     """Angular acceleration (rad/s^2), shape (n, 3): mean over each cycle, or by causal differences for a live filter.
 
     The mean is the difference of the rates at the ends of the cycle, so that it sums up to the change of the rate.
-    Between rest and turn the rate is nought: what of a jerk is put into a dwell would there be measured as a rate.
+    Between rest and turn the rate is zero: angular acceleration within a dwell would count as a rate there.
     """
     dt = cycles.dt[:, None]
     if causal or len(w_table) < 2:

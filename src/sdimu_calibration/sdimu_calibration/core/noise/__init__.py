@@ -1,4 +1,4 @@
-"""Noise of an IMU at rest: where it rests, its Allan deviation, the terms that explain it.
+"""Noise of an IMU at rest: static stretches, Allan deviation, noise terms. SI units.
 
 A package of its own so that a change here compiles none of the loops of the estimator again.
 """

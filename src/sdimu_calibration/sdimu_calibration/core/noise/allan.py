@@ -1,7 +1,7 @@
-"""Overlapping Allan deviation of rates or forces, pooled over stretches of rest, with allantools.
+"""Overlapping Allan deviation of rates (rad/s) or specific forces (m/s^2), pooled over stretches of rest.
 
-Pooled: the overlapping Allan variance at an averaging time is a mean over differences, and each stretch adds its
-differences; what lies between stretches (turns, gaps) enters nowhere.
+The overlapping Allan variance at an averaging time is a mean over differences; each stretch adds its differences, so
+that turns and gaps between stretches have no influence. Computed with allantools.
 """
 
 from __future__ import annotations
@@ -14,8 +14,9 @@ import numpy as np
 from sdimu_calibration.core.arrays import Floats, Ints
 
 _PER_OCTAVE = 2
+"""Number of averaging times an octave: neighbours share most of their data."""
 LEAST_FREEDOM = 3.0
-"""Averaging times with fewer degrees of freedom than this say nothing: their variance is off by its own size."""
+"""Least number of degrees of freedom of an averaging time: with fewer the variance is uncertain by its own size."""
 
 
 @dataclass(frozen=True)
@@ -31,6 +32,7 @@ class Allan:
     freedom : ndarray, shape (k,)
         Equivalent degrees of freedom of the squares, for white noise.
     interval_s : float
+        Sample interval.
     lengths : tuple of int
         Samples of each stretch.
     """
@@ -43,7 +45,7 @@ class Allan:
 
     @property
     def sigma(self) -> Floats:
-        """Standard error of the deviation."""
+        """Standard error of the deviation, shape (k,), in the unit of the channel."""
         return np.asarray(self.deviation / np.sqrt(2.0 * self.freedom))
 
 
@@ -51,6 +53,17 @@ def freedom_of(length: int, m: Floats) -> Floats:
     """Equivalent degrees of freedom of the overlapping Allan variance of white noise.
 
     Source: Riley, *Handbook of Frequency Stability Analysis*, NIST SP 1065 (2008), table 5, white FM.
+
+    Parameters
+    ----------
+    length : int
+        Samples of the stretch.
+    m : ndarray, shape (k,)
+        Averaging times (samples).
+
+    Returns
+    -------
+    ndarray, shape (k,)
     """
     n = float(length + 1)
     out = (3.0 * (n - 1.0) / (2.0 * m) - 2.0 * (n - 2.0) / n) * 4.0 * m**2 / (4.0 * m**2 + 5.0)
@@ -58,7 +71,16 @@ def freedom_of(length: int, m: Floats) -> Floats:
 
 
 def factors(longest: int) -> Ints:
-    """Averaging factors for stretches of at most `longest` samples: powers of two and between."""
+    """Averaging factors for stretches of at most `longest` samples: powers of the square root of two.
+
+    Parameters
+    ----------
+    longest : int
+
+    Returns
+    -------
+    ndarray of int, shape (k,)
+    """
     steps = np.arange(0.0, _PER_OCTAVE * np.log2(max(longest / 2.0, 1.0)) + 1e-9)
     return np.unique(np.rint(2.0 ** (steps / _PER_OCTAVE)).astype(np.int64))
 
@@ -71,6 +93,7 @@ def allan(stretches: Sequence[Floats], interval_s: float) -> Allan:
     stretches : sequence of ndarray, shape (n_i,)
         Samples at rest, each stretch without gaps.
     interval_s : float
+        Sample interval.
 
     Returns
     -------

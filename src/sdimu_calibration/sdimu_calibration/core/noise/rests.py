@@ -1,4 +1,4 @@
-"""Stretches of a recording in which the IMU rests, found without a specification: the quiet parts set the measure."""
+"""Static detection without a specification: the least scattered part of the recording gives the noise level."""
 
 from __future__ import annotations
 
@@ -8,23 +8,24 @@ from sdimu_calibration.core.arrays import Bools, Floats
 from sdimu_calibration.core.recording import DataError, PhaseLog, Recording
 
 WINDOW_S = 1.0
+"""Length of a window (s): short against a dwell, long against vibration."""
 _FEWEST = 10
-"""Samples a window has at least."""
+"""Least number of samples of a window: the scatter of fewer is uncertain by more than a quarter."""
 _QUIET = 20.0
-"""Percentile of the scatter within windows that counts as noise alone: a fifth of every test rests."""
+"""Percentile of the scatter of all windows that is taken as noise: a fifth of every test is at rest."""
 _RESTLESS = 3.0
-"""A window with this many times the quiet scatter is in motion (a Gaussian one of 10 samples never is)."""
+"""Multiple of the noise from which a window is in motion: Gaussian noise of 10 samples does not reach it."""
 _TURNING = np.radians(0.3)
-"""Mean rate (rad/s) apart from that of rest that is a turn: below every table's, above every drift of a bias."""
+"""Deviation of the mean rate that is a turn (rad/s): below the rates of tables, above the drift of a bias."""
 _SHORTEST = 8
-"""Windows that make a rest, after the first and the last have been left to settling."""
+"""Least number of windows of a rest: without its first and last one, which are left to settling."""
 
 
 def rests(recording: Recording) -> tuple[slice, ...]:
-    """Find where the IMU rests.
+    """Find where the IMU is at rest.
 
-    A window of a second rests when all six channels scatter no more than in the quiet windows, its mean rate is that of
-    the quiet windows, no sample is missing, and the table (where it says anything) dwells all through it. The first
+    A window is at rest when all six channels scatter no more than the noise, its mean rate is that of the least
+    scattered windows, no sample is missing, and the table, where its status is recorded, dwells throughout. The first
     and the last window of each rest are left out.
 
     Parameters
@@ -76,7 +77,7 @@ def _whole(t: Floats, size: int, count: int, interval: float) -> Bools:
 
 
 def _dwells(log: PhaseLog | None, t: Floats, interval: float) -> Bools:
-    """Windows in which the table dwells from begin to end, or says nothing; `t` (count, size)."""
+    """Windows in which the table dwells throughout, all of them without a status; `t` (count, size)."""
     if log is None or not len(log.t):
         return np.ones(len(t), dtype=bool)
     first = np.maximum(np.searchsorted(log.t, t[:, 0] - interval + 1e-6, side="right") - 1, 0)

@@ -3,11 +3,11 @@
     variance(tau) = 3 Q^2 / tau^2 + N^2 / tau + (2 ln 2 / pi) B^2 + K^2 tau / 3
 
 with quantisation Q, white noise N (angle or velocity random walk), bias instability B (flicker) and random walk K of
-the bias. Source: IEEE Std 952-1997, annex C. Linear in the squares, so it is a least squares with squares not below
-nought, each variance weighed by its own standard error under the fit. Neighbouring averaging times share data; so the
-standard errors of the terms are not those of the fit but the scatter of the same fit on noise drawn from it. A term
-that is not there would still take its share, because none may fall below nought; so the fit is repeated with those
-alone that stand out of their standard errors.
+the bias. Source: IEEE Std 952-1997, annex C. The variance is linear in the squares of the terms, so they follow from a
+non-negative least squares in which each variance has the weight of its standard error under the fit. Neighbouring
+averaging times share data, so the standard errors of the terms are the scatter of the same fit on simulated noise. A
+term that is absent still gets a positive value, because none may be negative, so the fit is repeated with only the
+terms that exceed their standard errors.
 """
 
 from __future__ import annotations
@@ -22,9 +22,13 @@ from sdimu_calibration.core.noise.allan import Allan, allan
 
 TERMS = ("quantisation", "white", "instability", "random_walk")
 _ROUNDS = 6
+"""Number of least squares: the weights of each depend on the fit before it and converge in a few."""
 _DRAWS = 24
-_SEEN, _ROOM = 3.0, 2.0
-"""A term is called seen from this many sigma; of one that is not, so many above the fit are the limit."""
+"""Number of simulations: standard errors to 14 %."""
+_SEEN = 3.0
+"""Least ratio of a term to its sigma at which it counts as seen: one false term in a thousand."""
+_ROOM = 2.0
+"""Multiple of sigma above the fit that bounds a term that is not seen: 97.7 % of a Gaussian."""
 
 
 @dataclass(frozen=True)
@@ -42,22 +46,44 @@ class Terms:
 
     @property
     def seen(self) -> Bools:
-        """Terms that stand out of their sigma; of the others only `upper` is known."""
+        """Terms that exceed their sigma, shape (4,); of the others only `upper` is known."""
         seen: Bools = self.value > _SEEN * self.sigma
         return seen
 
     @property
     def upper(self) -> Floats:
-        """Largest value that the data leave room for: two sigma above the fit."""
+        """Upper bound of each term, shape (4,), two sigma above the fit."""
         return np.asarray(self.value + _ROOM * self.sigma)
 
     def deviation(self, tau: Floats) -> Floats:
-        """Allan deviation of the terms that are seen, at averaging times (k,)."""
+        """Allan deviation of the terms that are seen.
+
+        Parameters
+        ----------
+        tau : ndarray, shape (k,)
+            Averaging times (s).
+
+        Returns
+        -------
+        ndarray, shape (k,)
+            In the unit of the channel.
+        """
         return np.asarray(np.sqrt(basis(tau) @ (self.value * self.seen) ** 2))
 
 
 def basis(tau: Floats) -> Floats:
-    """Variance per square of each term, shape (k, 4)."""
+    """Variance per square of each term.
+
+    Parameters
+    ----------
+    tau : ndarray, shape (k,)
+        Averaging times (s).
+
+    Returns
+    -------
+    ndarray, shape (k, 4)
+        In the order of `TERMS` (1/s^2, 1/s, 1, s).
+    """
     one = np.ones(len(tau))
     return np.column_stack([3.0 / tau**2, 1.0 / tau, 2.0 * np.log(2.0) / np.pi * one, tau / 3.0])
 
@@ -72,6 +98,10 @@ def fit_terms(found: Allan, rng: np.random.Generator, draws: int = _DRAWS) -> Te
         For the draws that give the standard errors.
     draws : int
         The standard errors are known to ``1 / sqrt(2 draws)``.
+
+    Returns
+    -------
+    Terms
     """
     value = np.sqrt(_squares(found))
     again = [
@@ -88,12 +118,12 @@ def _scatter(again: list[Allan], value: Floats, among: Bools | None) -> Floats:
     fits = np.array([np.sqrt(_squares(one, among)) for one in again])
     if among is None:
         return np.asarray(np.sqrt(np.mean((fits - value) ** 2, axis=0)))
-    # Fits without the terms that are left out stand about another mean.
+    # Fits without the terms that are left out have another mean.
     return np.asarray(fits.std(axis=0, ddof=1))
 
 
 def _squares(found: Allan, among: Bools | None = None) -> Floats:
-    """Least squares for the squares of the terms, the others nought."""
+    """Non-negative least squares for the squares of the terms `among`, the others zero."""
     variance, columns = found.deviation**2, basis(found.tau)
     if among is not None:
         columns = columns * among
@@ -111,7 +141,23 @@ def _squares(found: Allan, among: Bools | None = None) -> Floats:
 
 
 def drawn(value: Floats, n: int, interval_s: float, rng: np.random.Generator) -> Floats:
-    """Draw `n` samples (means over `interval_s`) of noise with the terms `value` (4,)."""
+    """Simulate noise.
+
+    Parameters
+    ----------
+    value : ndarray, shape (4,)
+        Terms, with the units of `Terms.value`.
+    n : int
+        Number of samples.
+    interval_s : float
+        Time over which each sample is a mean.
+    rng : numpy.random.Generator
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        In the unit of the channel.
+    """
     Q, N, B, K = value
     edges = Q * rng.standard_normal(n + 1)
     out = np.diff(edges) / interval_s

@@ -1,7 +1,7 @@
-"""The white noise that the estimators need, from the recording itself.
+"""White noise for the estimators, measured in the recording.
 
-They take means over a second at rest, so what they must be told is the noise of such means: the Allan deviation at one
-second. Where the noise is white it is the density of the data sheet; where it is not, it is what acts.
+The estimators take means over a second at rest, so they need the noise of such means: the Allan deviation at one
+second. Where the noise is white this is the density of the data sheet.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from sdimu_calibration.core.specification import ImuSpecification
 from sdimu_calibration.core.units import from_si
 
 AT_S = 1.0
+"""Averaging time at which the noise is read (s): the length of an epoch at rest."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Plans before they are run: a shorter or more telling one, and the turn that tells effects apart.
+"""Search for a shorter or more informative plan, and for the turn that separates effects. SI units.
 
 A package of its own so that a change here compiles none of the loops of the estimator again.
 """

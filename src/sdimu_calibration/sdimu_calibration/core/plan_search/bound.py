@@ -1,4 +1,4 @@
-"""What a plan will tell: sigma of every coefficient at the bound that the data hold, about a perfect IMU."""
+"""Bound of a plan: sigma of every coefficient that a batch of all data of a perfect IMU reaches."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from sdimu_calibration.core.planning.predict import prepare
 from sdimu_calibration.core.specification import ImuSpecification, Model, Site
 
 _FIXED = 1e-6
-"""A sigma below this share of its prior is one that the body frame makes nought."""
+"""Share of its prior below which a sigma is zero by definition of the body frame: above rounding."""
 
 
 @dataclass(frozen=True)
 class Question:
-    """For whom a plan is made: IMU, site, and the model with the effects that shall be seen."""
+    """Site, IMU, and the model whose effects a plan has to determine."""
 
     site: Site
     imu: ImuSpecification
@@ -28,7 +28,7 @@ class Question:
 
 @dataclass(frozen=True)
 class Bounds:
-    """What a plan tells.
+    """Sigmas that a plan reaches.
 
     Attributes
     ----------
@@ -37,10 +37,11 @@ class Bounds:
     effect : tuple of str, length p
         Effect of each coefficient.
     covariance : ndarray, shape (p, p)
-        Frame of the prior.
+        Frame of the prior; SI.
     sigma : ndarray, shape (p,)
         In the reported body frame; SI.
     prior : ndarray, shape (p,)
+        Sigma before the test; SI.
     """
 
     names: tuple[str, ...]
@@ -60,7 +61,16 @@ class Bounds:
 
 
 def bounds(plan: Plan, asked: Question) -> Bounds:
-    """Say what a plan tells.
+    """Compute the sigmas that a plan reaches.
+
+    Parameters
+    ----------
+    plan : Plan
+    asked : Question
+
+    Returns
+    -------
+    Bounds
 
     Raises
     ------

@@ -1,8 +1,8 @@
-"""Changes of a plan that any table can follow which can run the plan.
+"""Changes of a plan that every table can run that can run the plan.
 
-Every change leaves the attitudes of the stops that stay as they were and turns about the same axes: another dwell,
-another rate, the other sense of a half turn, a turn split in halves, two turns about one axis made one. So no order of
-gimbals has to be known.
+Every change keeps the attitudes of the remaining stops and the axes of the turns: another dwell, another rate, the
+other sense of a half turn, a turn split in halves, two turns about one axis merged. The order of the gimbals does not
+matter.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from sdimu_calibration.core.plan import Plan, Turn
 
 @dataclass(frozen=True)
 class Abilities:
-    """What the table may be asked for.
+    """Rates, acceleration and dwells that the table may use.
 
     Attributes
     ----------

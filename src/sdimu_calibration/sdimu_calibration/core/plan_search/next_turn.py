@@ -1,9 +1,9 @@
-"""The extra turn that tells effects apart which look alike so far.
+"""The extra turn that separates effects which the plan so far cannot separate.
 
-The information of plan and extra turn together on the parameters of the class, everything else estimated along with
-them, is J. The part of parameter i that parameter j cannot take over shows with ``theta_i^2 (J_ii - J_ij^2 / J_jj)``
-in squares of sigma; the worst pair counts, and of extra turns the one that gains most a minute is named
-(T-optimality: Atkinson & Fedorov, *Biometrika* 62 (1975)).
+J is the information of plan and extra turn together on the parameters of the class, with everything else estimated too.
+The part of parameter i that parameter j cannot replace has a significance of ``theta_i^2 (J_ii - J_ij^2 / J_jj)`` in
+squares of sigma. The worst pair counts; the extra turn with the largest gain a minute comes first (T-optimality:
+Atkinson & Fedorov, *Biometrika* 62 (1975)).
 """
 
 from __future__ import annotations
@@ -23,8 +23,11 @@ from sdimu_calibration.core.plan_search.bound import Bounds, Question, bounds
 from sdimu_calibration.core.recording import DataError
 
 RATES_RAD_S = (math.radians(2.0), math.radians(10.0))
+"""Rates of extra turns (rad/s): that of the plan kim18, and a fast one for effects of higher order in the rate."""
 _ANGLES_RAD = tuple(math.radians(a) for a in (90.0, -90.0, 180.0, -180.0))
+"""Angles of extra turns (rad): both senses, ending on a cardinal direction."""
 _ACCELERATION_RAD_S2 = math.radians(20.0)
+"""Least acceleration of extra turns (rad/s^2): half a second to the fastest rate."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +40,7 @@ class NextTurn:
     minutes : float
         Turns and the stops after them.
     before, after : float
-        Sigmas by which the pair that is worst to tell apart differs, without and with it.
+        Significance in sigma by which the least separable pair differs, without and with the extra turn.
     """
 
     turns: tuple[Turn, ...]
@@ -67,7 +70,7 @@ def next_turn(
     rates_rad_s: Sequence[float] = RATES_RAD_S,
     progress: Callable[[str, float], None] | None = None,
 ) -> tuple[NextTurn, ...]:
-    """Rank the extra turns that tell effects apart.
+    """Rank the extra turns that separate effects.
 
     Parameters
     ----------
@@ -91,7 +94,7 @@ def next_turn(
     Raises
     ------
     DataError
-        When there are fewer than two parameters to tell apart, or an effect is unknown.
+        When there are fewer than two parameters to separate, or an effect is unknown.
     """
     effects = [selection.resolve(e) if isinstance(e, str) else e for e in alike]
     names = tuple(p.name for e in effects for p in e.parameters)
@@ -135,10 +138,10 @@ def _extras(rates: Sequence[float]) -> list[tuple[Turn, ...]]:
 
 
 def _apart(told: Bounds, names: Sequence[str], sizes: Mapping[str, float] | None) -> float:
-    """Sigmas by which the two parameters differ that are worst to tell apart."""
+    """Significance in sigma by which the least separable pair of parameters differs."""
     rows = [told.names.index(name) for name in names]
     prior = told.prior[rows]
-    # In units of the priors: coefficients of ppm and of rad/s stand in one matrix.
+    # In units of the priors, because coefficients of ppm and of rad/s share the matrix.
     covariance = told.covariance[np.ix_(rows, rows)] / np.outer(prior, prior)
     J = np.linalg.inv(covariance) - np.eye(len(rows))
     size = np.array([1.0 if sizes is None else sizes.get(n, p) / p for n, p in zip(names, prior, strict=True)])

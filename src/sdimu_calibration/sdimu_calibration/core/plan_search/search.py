@@ -1,6 +1,6 @@
-"""Greedy search: changes of the whole plan first, then of one stop or turn at a time, as long as they serve the goal.
+"""Greedy search: changes of the whole plan first, then of one stop or turn at a time, while they improve the plan.
 
-Greedy: what it ends with is better than where it began, not the best there is.
+The result is better than the start, not the best possible plan.
 """
 
 from __future__ import annotations
@@ -14,21 +14,23 @@ from sdimu_calibration.core.plan_search.moves import Abilities, single, whole
 from sdimu_calibration.core.recording import DataError
 
 _SLACK = 1e-6
+"""Tolerance of comparisons (min, or share of a limit): rounding."""
 _WORTH_MIN = 0.05
+"""Least time that a change must save (min): less is not worth another round."""
 _WORTH_SHARE = 0.003
-"""A change must save three seconds, or three thousandths of the worst ratio: less is not worth another round."""
+"""Least share of the worst ratio that a change must save: less is not worth another round."""
 
 
 @dataclass(frozen=True)
 class Goal:
-    """What is asked for.
+    """Goal of the search.
 
     Attributes
     ----------
     limits : mapping of str to float
         Largest sigma allowed by effect (SI).
     minutes : float or None
-        Time there is: then the worst ratio of sigma to limit is made small; without, the time is.
+        Time available, in which the worst ratio of sigma to limit is minimised; None minimises the time.
     """
 
     limits: Mapping[str, float]
@@ -37,7 +39,7 @@ class Goal:
 
 @dataclass(frozen=True)
 class Found:
-    """A plan, what it tells, its worst ratio of sigma to limit, and how many plans were tried for it."""
+    """A plan, its bounds, its worst ratio of sigma to limit, and the number of plans evaluated to find it."""
 
     plan: Plan
     bounds: Bounds
@@ -74,7 +76,7 @@ def search(
     Returns
     -------
     Found
-        The start itself when nothing serves the goal better.
+        The start itself when no change improves it.
 
     Raises
     ------
@@ -110,7 +112,7 @@ def search(
         return False
 
     for plans in whole(start, able):
-        # Shorter stops tell less: when one length does not do, the shorter ones will not.
+        # Shorter stops give larger sigmas: when one length misses the limits, the shorter ones miss them too.
         for plan in plans:
             if tried < tries and _may_win(plan, best, goal) and not consider(plan):
                 break

@@ -1,1 +1,1 @@
-"""A plan before it is run: perfect data, covariance simulation, bound, observability."""
+"""A plan before it is run: perfect data, covariance simulation, bound, observability. SI units, frames n, t, b."""

@@ -1,4 +1,4 @@
-"""A named set of noise assumptions: what a filter is told, as against what the IMU has."""
+"""A named set of noise assumptions of a filter, as distinct from the noise of the IMU."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class NoiseSet:
     zero_velocity : str
         ``every_epoch`` or ``after_motion``.
     shared_noise : bool
-        Whether process and measurement noise are modelled as the same samples' noise.
+        Whether the correlation of process and measurement noise is modelled.
     level_sigma, azimuth_sigma : float
         Initial attitude (rad).
     reference : str
@@ -50,10 +50,20 @@ class NoiseSet:
 def apply(noise: NoiseSet, imu: ImuSpecification, model: Model) -> tuple[ImuSpecification, Model]:
     """IMU and model with the noise of a set in place of their own.
 
+    Parameters
+    ----------
+    noise : NoiseSet
+    imu : ImuSpecification
+    model : Model
+
+    Returns
+    -------
+    ImuSpecification, Model
+
     Raises
     ------
     DataError
-        When R is smaller than what Q alone makes of a mean over a second.
+        When R of a mean over a second is smaller than the part of it that Q implies.
     """
     for what, sigma, density in (
         ("rate_sigma", noise.rate_sigma, noise.gyro_density),

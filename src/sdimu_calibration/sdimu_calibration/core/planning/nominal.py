@@ -1,12 +1,12 @@
-"""The recording that a perfect IMU would make of a plan: no sensor errors, no noise.
+"""Recording of a plan by a perfect IMU: no sensor errors, no noise.
 
-The table turns about its own axes; a mount rotation stands between them and the IMU's. A turn is a rotation about one
-fixed axis with a trapezoidal rate, so the angle is a closed formula at every instant, and what the sensors see
-is a constant vector turned by that angle: its mean over a sample is a mean of a cosine and a sine, taken by
+The table turns about its own axes; a constant mount rotation relates them to those of the IMU. A turn is a rotation
+about one fixed axis with a trapezoidal rate, so the angle is a closed formula at every instant, and the sensors measure
+a constant vector turned by that angle. Its mean over a sample is a mean of a cosine and a sine, computed by
 Gauss-Legendre with three nodes (error of sixth order in the angle of one sample).
 
-For covariance simulation and for the batch estimator's bound. It is not the simulator of the tests: that one is written
-apart, on purpose.
+Used by the covariance simulation and the bound of the batch estimator. The simulator of the tests is a separate
+implementation, so that an error here cannot cancel there.
 """
 
 from __future__ import annotations
@@ -23,20 +23,34 @@ from sdimu_calibration.core.rotation import rotation_matrix
 from sdimu_calibration.core.specification import Site
 
 RATE_HZ = 20.0
-"""Sample rate: two samples a navigation cycle."""
+"""Sample rate (Hz): two samples a navigation cycle."""
 _NODES = 0.5 + np.array([-1.0, 0.0, 1.0]) * math.sqrt(15.0) / 10.0
+"""Nodes of Gauss-Legendre, a share of the interval: exact to the fifth order."""
 _WEIGHTS = np.array([5.0, 8.0, 5.0]) / 18.0
+"""Weights of Gauss-Legendre (1): for the same three nodes."""
 
 
 def ramp_length(turn: Turn, acceleration_rad_s2: float, number: int) -> float:
-    """Length of each ramp (s) of the trapezoid that makes a turn at its mean rate.
+    """Length of each ramp of the trapezoidal rate that makes a turn at its mean rate.
 
     With angle A, length T and ramps t_r at acceleration a: ``A = a t_r (T - t_r)``, the smaller root.
+
+    Parameters
+    ----------
+    turn : Turn
+    acceleration_rad_s2 : float
+    number : int
+        Number of the turn in the plan, for the message.
+
+    Returns
+    -------
+    float
+        s.
 
     Raises
     ------
     DataError
-        When the acceleration is too small for the mean rate; `number` names the turn.
+        When the acceleration is too small for the mean rate.
     """
     size = abs(turn.angle_rad)
     length = size / turn.rate_rad_s
@@ -51,7 +65,21 @@ def ramp_length(turn: Turn, acceleration_rad_s2: float, number: int) -> float:
 
 
 def turned(t: Floats, turn: Turn, ramp_s: float) -> tuple[Floats, Floats]:
-    """Angle (rad) and rate (rad/s) at times `t` (s) after the start of a turn; constant outside it."""
+    """Angle and rate of a turn; the angle is constant before and after it.
+
+    Parameters
+    ----------
+    t : ndarray, shape (m,)
+        Time after the start of the turn (s); any shape.
+    turn : Turn
+    ramp_s : float
+        Length of each ramp.
+
+    Returns
+    -------
+    angle, rate : ndarray, shape (m,)
+        rad, rad/s.
+    """
     length = abs(turn.angle_rad) / turn.rate_rad_s
     peak = turn.angle_rad / (length - ramp_s)
     at = np.clip(t, 0.0, length)
@@ -62,7 +90,7 @@ def turned(t: Floats, turn: Turn, ramp_s: float) -> tuple[Floats, Floats]:
 
 
 _LEAST_DWELL_S = 2.0
-"""A whole epoch of a second at rest, wherever it begins."""
+"""Shortest first dwell (s): contains a complete epoch of a second, wherever the epochs begin."""
 
 
 def nominal_recording(plan: Plan, site: Site, mount_rad: Floats | None = None, rate_hz: float = RATE_HZ) -> Recording:
@@ -74,13 +102,14 @@ def nominal_recording(plan: Plan, site: Site, mount_rad: Floats | None = None, r
         At stop 0 the table's X, Y, Z point north, east, down.
     site : Site
     mount_rad : ndarray, shape (3,), optional
-        Rotation vector of the IMU on the table, ``C_tb = rotation_matrix(mount)``; none by default.
+        Rotation vector of the IMU on the table (rad), ``C_tb = rotation_matrix(mount)``; zero by default.
     rate_hz : float
+        Sample rate.
 
     Returns
     -------
     Recording
-        With the table's phases, as the status topic would give them.
+        With the phases of the table, as in the status topic.
 
     Raises
     ------

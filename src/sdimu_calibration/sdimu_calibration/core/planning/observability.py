@@ -1,8 +1,8 @@
-"""Which combinations of coefficients a test does not show, in words.
+"""Combinations of coefficients that a test does not determine, in words.
 
-In units of the prior's sigmas the posterior covariance has eigenvalues between 0 (fully seen) and 1 (nothing learnt).
-The eigenvectors near 1 are the unobservable combinations. A subspace has many bases; the one given here
-starts with the rotations of the body frame, which have a name, and goes on with combinations of few coefficients.
+In units of the prior's sigmas the posterior covariance has eigenvalues between 0 (fully determined) and 1 (nothing
+learnt). The eigenvectors near 1 are the unobservable combinations. A subspace has many bases; the one given here
+starts with the rotations of the body frame, which have a name, and continues with combinations of few coefficients.
 
 Source: Ham & Brown, "Observability, Eigenvalues, and Kalman Filtering", IEEE Trans. AES-19 (1983).
 """
@@ -18,18 +18,18 @@ from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.effects.misalignment import ACCEL_MISALIGNMENT, GYRO_MISALIGNMENT
 
 UNSEEN = 0.5
-"""Share of the prior variance that is left: above it the data say less than the prior did."""
+"""Share of the prior variance left from which a combination is unobservable: the data tell less than the prior."""
 _MEMBER = 0.2
-"""A coefficient is named in a combination from this weight on (the largest weight being 1)."""
+"""Least weight of a coefficient that is named, a share of the largest: smaller ones change the variance by 4 %."""
 _CONTAINED = 0.9
-"""A named direction counts as unobservable when this much of it lies in the unobservable subspace."""
+"""Share of a named direction within the unobservable subspace from which it counts as unobservable: allows rounding."""
 
 _AXES = "xyz"
 _ROTATION = {
     axis: tuple(f"{effect.name}_{pair}" for effect in (GYRO_MISALIGNMENT, ACCEL_MISALIGNMENT) for pair in pairs)
     for axis, pairs in (("x", ("yx", "zx")), ("y", ("xy", "zy")), ("z", ("xz", "yz")))
 }
-"""Turning the body about an axis turns the two other sensor axes of both triads about it, alike."""
+"""Misalignments that a rotation of the body frame about an axis changes together, in both triads."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ def unobservable(
     attitude_prior, attitude_sigma : ndarray, shape (3,), optional
         Sigma of the initial attitude about N, E, D before and after (rad).
     C_nb : ndarray, shape (3, 3), optional
-        Initial attitude: tells which body axis was vertical.
+        Initial attitude, for the name of the body axis that was vertical.
 
     Returns
     -------

@@ -1,7 +1,7 @@
-"""Covariance simulation: what a plan will tell, before it is run.
+"""Covariance simulation: the sigmas of a test before it is run.
 
-The filter itself runs on the recording of a perfect IMU (`nominal`), so its covariance is the one that a real test
-would end with, to first order. No noise is drawn and nothing is estimated.
+The filter itself runs on the recording of a perfect IMU (`nominal`), so its covariance is to first order that of a real
+test. No noise is drawn and nothing is estimated.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ Bound = Callable[[PreparedData, TestSetup, Alignment], Floats]
 
 @dataclass(frozen=True)
 class Prediction:
-    """What a plan tells about an IMU.
+    """Predicted sigmas of a plan for one IMU.
 
     Attributes
     ----------
@@ -73,7 +73,7 @@ class Prediction:
 
 @dataclass(frozen=True)
 class Nominal:
-    """A plan reduced for one set-up: what is shared by every covariance simulation of it."""
+    """Prepared perfect recording of a plan, shared by all covariance simulations of it."""
 
     prepared: PreparedData
     setup: TestSetup
@@ -84,7 +84,22 @@ class Nominal:
 def prepare(
     plan: Plan, site: Site, imu: ImuSpecification, model: Model, mount_rad: Floats | None, noise: NoiseSet | None
 ) -> Nominal:
-    """Record, reduce and align a plan with a perfect IMU.
+    """Record a plan with a perfect IMU and prepare it for the filter.
+
+    Parameters
+    ----------
+    plan : Plan
+    site : Site
+    imu : ImuSpecification
+    model : Model
+    mount_rad : ndarray, shape (3,), or None
+        Rotation vector of the IMU on the table (rad); None for zero.
+    noise : NoiseSet or None
+        Replaces the noise of IMU and model and the initial attitude.
+
+    Returns
+    -------
+    Nominal
 
     Raises
     ------
@@ -123,7 +138,7 @@ def predict(
     model : Model
         Effects and weights; the sigmas are given in its body frame.
     mount_rad : ndarray, shape (3,), optional
-        Rotation vector of the IMU on the table.
+        Rotation vector of the IMU on the table (rad).
     noise : NoiseSet, optional
         Replaces the noise of IMU and model and the initial attitude.
     bound : callable, optional
@@ -153,7 +168,7 @@ def predict(
     sigma = np.sqrt(np.diag(covariance))
     limit = np.full(len(sigma), np.nan)
     if bound is not None:
-        # The bound is what the data of this IMU hold, whatever the filter is told about them.
+        # The bound depends on the noise of this IMU, not on the noise set of the filter.
         own = prepare(plan, site, imu, model, mount_rad, None)
         limit = np.sqrt(np.diag(J @ bound(own.prepared, own.setup, own.start) @ J.T))
     attitude = np.sqrt(np.diag(done.state.P)[-3:])
