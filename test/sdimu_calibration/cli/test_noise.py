@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sdimu_calibration.cli.noise import noise, with_noise
-from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.cli.noise import noise
+from sdimu_calibration.core.noise import with_measured_noise
 from sdimu_calibration.core.units import to_si
 from sdimu_calibration.storage.bag_reader import read_recording
 from sdimu_calibration.storage.bag_writer import write_recording
@@ -45,9 +45,6 @@ def test_the_file_written_is_an_imu_with_the_noise_of_the_recording(still: Path,
 
 def test_estimated_noise_replaces_that_of_the_specification_and_says_so(still: Path) -> None:
     recording = read_recording(still)
-    imu, notes = with_noise(load_imu("dtg"), recording, "estimated")
+    imu, note = with_measured_noise(load_imu("dtg"), recording)
     assert imu.gyro_white_noise == pytest.approx(GYRO, rel=0.1)
-    assert "0.1 as specified" in notes[0]
-    assert with_noise(load_imu("dtg"), recording, None) == (load_imu("dtg"), [])
-    with pytest.raises(DataError, match="expected 'estimated'"):
-        with_noise(load_imu("dtg"), recording, "guessed")
+    assert "0.1 as specified" in note

@@ -72,18 +72,15 @@ def calibrate(
     gyro_sign: GyroSign = None,
 ) -> None:
     """Estimate the coefficients from a recording; leaves result.json and report.html."""
-    from dataclasses import replace
-
     from rich.console import Console
 
-    from sdimu_calibration.cli.noise import with_noise
     from sdimu_calibration.cli.progress import bar
     from sdimu_calibration.core.units import STANDARD_GRAVITY
     from sdimu_calibration.report.page import write_report
     from sdimu_calibration.report.table import rich_table, rows
     from sdimu_calibration.storage.config import load_imu
     from sdimu_calibration.storage.effect_file import extended_model
-    from sdimu_calibration.storage.opening import open_recording, place
+    from sdimu_calibration.storage.opening import open_test
     from sdimu_calibration.storage.reference_file import read_truth
     from sdimu_calibration.storage.result_file import write_result
 
@@ -94,9 +91,10 @@ def calibrate(
     origin = source(
         imu_topic, status_topic, joint_topic, temperature_topic, accel_unit, gyro_unit, accel_sign, gyro_sign
     )
-    recording = open_recording(bag, origin)
-    specification, told = with_noise(specification, recording, noise)
-    chosen = chosen_estimator("hand" if hand else estimator, recording, specification)
+    asked = "hand" if hand else estimator
+    test = open_test(bag, site, specification, origin, noise, None if asked == "auto" else asked == "hand")
+    recording, specification, where = test
+    chosen = chosen_estimator(asked, recording, specification)
     if truth is not None and chosen == "classical":
         raise typer.BadParameter(
             "the classical estimator answers in the table's axes, in which no truth is kept: leave it out, or see "
@@ -105,14 +103,9 @@ def calibrate(
     if chosen == "hand" and not (hand or estimator == "hand"):
         console.print(HAND_CHOSEN, soft_wrap=True)
     wanted = extended_model(model or ("hand" if chosen == "hand" else "baseline"), add or [])
-    # By hand nobody needs to say where: the result says what was taken for granted.
-    where = None
-    if site is not None or chosen != "hand":
-        recording, where = place(recording, site, specification, origin)
     estimate = _estimators()[chosen]
     with explained(console, recording.notes), bar(console) as progress:
         result = estimate(recording, where, specification, wanted, progress=progress)
-    result = replace(result, notes=(*result.notes, *told))
     # Without a place gravity is a convention, and the truth is compared at it.
     taken = STANDARD_GRAVITY if where is None else None
     true = None if truth is None else read_truth(truth, result.body_frame, taken)
@@ -172,7 +165,7 @@ def check_estimator(name: str, known: tuple[str, ...] = ESTIMATORS) -> None:
 
 def chosen_estimator(name: str, recording: Recording, imu: ImuSpecification) -> str:
     """Decide between filter and hand when it is left open, by what the gyros see of the Earth's rate."""
-    from sdimu_calibration.core.handheld.handheld import by_hand
+    from sdimu_calibration.core.data.static_detection import by_hand
 
     if name != "auto":
         return name

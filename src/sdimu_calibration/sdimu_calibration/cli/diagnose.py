@@ -67,11 +67,10 @@ def diagnose(
         default_folder,
     )
     from sdimu_calibration.cli.diagnose_with import Asked, diagnose_handheld_run, diagnose_navigated
-    from sdimu_calibration.cli.noise import with_noise
     from sdimu_calibration.core.recording import DataError
     from sdimu_calibration.storage.config import load_imu
     from sdimu_calibration.storage.effect_file import extended_model, find_effects
-    from sdimu_calibration.storage.opening import open_recording, place
+    from sdimu_calibration.storage.opening import open_test
 
     console = Console()
     check_estimator(estimator, DIAGNOSED)
@@ -81,23 +80,20 @@ def diagnose(
     origin = source(
         imu_topic, status_topic, joint_topic, temperature_topic, accel_unit, gyro_unit, accel_sign, gyro_sign
     )
-    recording = open_recording(bag, origin)
-    specification, told_noise = with_noise(specification, recording, noise)
+    chosen = "hand" if hand else estimator
+    handheld = None if chosen == "auto" else chosen == "hand"
+    recording, specification, where = open_test(bag, site, specification, origin, noise, handheld)
     folder, title = out or default_folder(bag, "diagnosis"), f"Diagnosis of {bag.name}"
-    by_hand = chosen_estimator("hand" if hand else estimator, recording, specification) == "hand"
+    by_hand = chosen_estimator(chosen, recording, specification) == "hand"
     wanted = extended_model(model or ("hand" if by_hand else "baseline"), add or [])
     if by_hand:
         if not (hand or estimator == "hand"):
             console.print(HAND_CHOSEN, soft_wrap=True)
         if bootstrap:
             raise DataError("--bootstrap: a run by hand learns its scatter, so there is no noise to draw; leave it out")
-        where = None
-        if site is not None:
-            recording, where = place(recording, site, specification, origin)
-        asked = Asked(recording, where, specification, wanted, extra, folder, title, told_noise)
+    asked = Asked(recording, where, specification, wanted, extra, folder, title)
+    if by_hand:
         diagnose_handheld_run(console, asked)
     else:
-        recording, where = place(recording, site, specification, origin)
-        asked = Asked(recording, where, specification, wanted, extra, folder, title, told_noise)
         diagnose_navigated(console, asked, grow, bootstrap)
     console.print(f"results in {folder}", soft_wrap=True)

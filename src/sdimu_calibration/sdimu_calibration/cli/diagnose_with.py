@@ -31,8 +31,6 @@ class Asked:
     folder : Path
     title : str
         Of the report.
-    told : sequence of str
-        What was said of the noise.
     """
 
     recording: Recording
@@ -42,7 +40,6 @@ class Asked:
     extra: Sequence[Effect]
     folder: Path
     title: str
-    told: Sequence[str]
 
 
 def diagnose_navigated(console: Console, asked: Asked, grow: bool, draws: int) -> None:
@@ -80,7 +77,7 @@ def diagnose_navigated(console: Console, asked: Asked, grow: bool, draws: int) -
         progress("navigation without aid", 0.5)
         more = report_extras(asked.recording, found, *data[1:], rungs)
     write_report(asked.folder / "report.html", found.after, title=asked.title, diagnosis=found, more=more)
-    tell(console, (*asked.recording.notes, *asked.told))
+    tell(console, asked.recording.notes)
 
 
 def diagnose_handheld_run(console: Console, asked: Asked) -> None:
@@ -104,4 +101,4 @@ def diagnose_handheld_run(console: Console, asked: Asked) -> None:
     write_handheld_diagnosis(asked.folder / "diagnosis.json", told)
     write_result(asked.folder / "result.json", found.after)
     write_report(asked.folder / "report.html", found.after, title=asked.title, by_hand=told)
-    tell(console, (*known, *(note for note in (*found.after.notes, *asked.told) if note not in known)))
+    tell(console, (*known, *(note for note in found.after.notes if note not in known)))

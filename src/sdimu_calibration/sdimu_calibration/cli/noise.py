@@ -3,13 +3,9 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
-
-if TYPE_CHECKING:
-    from sdimu_calibration.core.recording import Recording
-    from sdimu_calibration.core.specification import ImuSpecification
 
 
 def noise(
@@ -60,37 +56,3 @@ def noise(
         console.print(f"note: {word}", soft_wrap=True, markup=False, highlight=False)
     console.print(f"note: grade and priors in imu.yaml are those of '{imu}' (--imu)", soft_wrap=True, highlight=False)
     console.print(f"results in {folder}; use: --imu {folder / 'imu.yaml'}", soft_wrap=True, highlight=False)
-
-
-def with_noise(imu: ImuSpecification, recording: Recording, source: str | None) -> tuple[ImuSpecification, list[str]]:
-    """Return the IMU as ``--noise`` says: None as specified, ``estimated`` with the noise of the recording's rests.
-
-    Returns
-    -------
-    imu : ImuSpecification
-    notes : list of str
-        What was replaced.
-
-    Raises
-    ------
-    DataError
-        When the word is another, or the recording has no rest.
-    """
-    from sdimu_calibration.core.noise import measured_specification, white_noise
-    from sdimu_calibration.core.recording import DataError
-    from sdimu_calibration.core.units import from_si
-
-    if source is None:
-        return imu, []
-    if source != "estimated":
-        raise DataError(f"--noise {source}: expected 'estimated' (or leave it out: the noise of --imu)")
-    found = white_noise(recording)
-    parts = []
-    for word, here, sigma, told, unit in (
-        ("gyro", found.gyro, found.gyro_sigma, imu.gyro_white_noise, "deg/h/sqrt(Hz)"),
-        ("accelerometer", found.accel, found.accel_sigma, imu.accel_white_noise, "ug/sqrt(Hz)"),
-    ):
-        value, error, before = (from_si(v, unit) for v in (here, sigma, told))
-        parts.append(f"{word} {value:.4g} +- {error:.2g} {unit} ({before:.4g} as specified)")
-    note = f"noise as measured in {found.rest_s:.0f} s of rest: {'; '.join(parts)}"
-    return measured_specification(imu, found), [note]

@@ -49,14 +49,14 @@ def workbench(
 
     from sdimu_calibration.cli.calibrate import check_options
     from sdimu_calibration.cli.progress import bar
-    from sdimu_calibration.core.handheld.handheld import by_hand
+    from sdimu_calibration.core.data.static_detection import by_hand
     from sdimu_calibration.core.recording import DataError
     from sdimu_calibration.report.workbench.app import build
     from sdimu_calibration.report.workbench.fit import FitSession
     from sdimu_calibration.report.workbench.recording_cache import RecordingCache, neighbours
     from sdimu_calibration.storage.config import load_imu
     from sdimu_calibration.storage.effect_file import extended_model
-    from sdimu_calibration.storage.opening import open_recording, place
+    from sdimu_calibration.storage.opening import open_test
 
     with socket.socket() as probe:
         if probe.connect_ex((host, port)) == 0:
@@ -68,13 +68,12 @@ def workbench(
     )
 
     def opened(path: Path) -> FitSession:
-        recording = open_recording(path, origin)
-        if by_hand(recording, specification):
+        recording, _, where = open_test(path, site, specification, origin)
+        if where is None or by_hand(recording, specification):
             raise DataError(
                 f"{path.name}: a run by hand, in which nothing is navigated: use sdimu diagnose {path.name} (its "
                 "report has the same figures), or --imu when the gyros are better than it says"
             )
-        recording, where = place(recording, site, specification, origin)
         return FitSession(recording, where, specification, wanted)
 
     shelf = RecordingCache(neighbours(bag), opened)

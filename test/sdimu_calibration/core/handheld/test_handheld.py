@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from sdimu_calibration.core.handheld.handheld import by_hand, handheld_calibrate
+from sdimu_calibration.core.data.static_detection import by_hand
+from sdimu_calibration.core.handheld.handheld import handheld_calibrate
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.specification import ImuSpecification, Model
 from sdimu_calibration.core.units import STANDARD_GRAVITY, to_si

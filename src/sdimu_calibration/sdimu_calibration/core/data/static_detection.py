@@ -15,8 +15,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sdimu_calibration.core import earth
 from sdimu_calibration.core.arrays import Bools, Floats, Ints
 from sdimu_calibration.core.recording import DataError, Recording
+from sdimu_calibration.core.specification import ImuSpecification
 
 WINDOW_S = 0.3
 """Length of a window (s): shorter than any rest worth having, longer than a swing of a trembling hand (0.1 s)."""
@@ -28,6 +30,8 @@ _SCATTER = 4.0
 """Scatter (variance) of rest, as a multiple of that of the quietest windows."""
 _DRIFT = np.radians(1.0)
 """Mean rates at rest may differ by so much (rad/s): what gravity and warmth do to the bias of a cheap gyro."""
+_EARTH_SEEN = 3.0
+"""Sigmas of the gyros' white noise in a rest from which the Earth's rate is seen in it."""
 _BLOCK_S = 0.5
 """Noise is learned from the differences of means over so much (s): slow enough for what a filter in the sensor does."""
 
@@ -81,6 +85,21 @@ def detect_static(recording: Recording) -> StaticIntervals:
     return StaticIntervals(
         first, last, _density(recording.omega_ib_b, first, last, dt), _density(recording.f_ib_b, first, last, dt)
     )
+
+
+def by_hand(recording: Recording, imu: ImuSpecification) -> bool:
+    """Decide whether navigation has nothing to hold on to because a rest does not show the Earth's rate.
+
+    It does not when the gyros' white noise in the usual rest, specified or learned, exceeds a third of it.
+    """
+    if _EARTH_SEEN * imu.gyro_white_noise < earth.RATE:  # seen within a second: no need to look at the samples
+        return False
+    try:
+        rests = detect_static(recording)
+    except DataError:
+        return False
+    usual = float(np.median(rests.last - rests.first)) * recording.interval_s
+    return bool(_EARTH_SEEN * max(imu.gyro_white_noise, rests.gyro_white_noise) / np.sqrt(usual) > earth.RATE)
 
 
 def _moving(values: Floats, width: int) -> tuple[Floats, Floats]:

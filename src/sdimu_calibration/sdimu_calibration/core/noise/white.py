@@ -15,6 +15,7 @@ from sdimu_calibration.core.noise.allan import allan
 from sdimu_calibration.core.noise.rests import rests
 from sdimu_calibration.core.recording import DataError, Recording
 from sdimu_calibration.core.specification import ImuSpecification
+from sdimu_calibration.core.units import from_si
 
 AT_S = 1.0
 
@@ -76,6 +77,27 @@ def white_noise(recording: Recording, rows: Sequence[slice] | None = None) -> Wh
     return WhiteNoise(gyro, accel, gyro * share, accel * share, tuple(densities), rest_s)
 
 
-def measured_specification(imu: ImuSpecification, measured: WhiteNoise) -> ImuSpecification:
-    """Return a specification with the white noise replaced by the measured one."""
-    return replace(imu, gyro_white_noise=measured.gyro, accel_white_noise=measured.accel)
+def with_measured_noise(imu: ImuSpecification, recording: Recording) -> tuple[ImuSpecification, str]:
+    """Replace the white noise of a specification by that of a recording's rests.
+
+    Returns
+    -------
+    imu : ImuSpecification
+    note : str
+        What was measured, and what the specification said.
+
+    Raises
+    ------
+    DataError
+        When there is no rest, or a sensor does not scatter at all.
+    """
+    found = white_noise(recording)
+    parts = []
+    for word, here, sigma, told, unit in (
+        ("gyro", found.gyro, found.gyro_sigma, imu.gyro_white_noise, "deg/h/sqrt(Hz)"),
+        ("accelerometer", found.accel, found.accel_sigma, imu.accel_white_noise, "ug/sqrt(Hz)"),
+    ):
+        value, error, before = (from_si(v, unit) for v in (here, sigma, told))
+        parts.append(f"{word} {value:.4g} +- {error:.2g} {unit} ({before:.4g} as specified)")
+    measured = replace(imu, gyro_white_noise=found.gyro, accel_white_noise=found.accel)
+    return measured, f"noise as measured in {found.rest_s:.0f} s of rest: {'; '.join(parts)}"
