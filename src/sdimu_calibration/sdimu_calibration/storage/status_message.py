@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from sdimu_calibration.core.data.front_door import UNSAID
+from sdimu_calibration.core.recording import UNNUMBERED
 
 
 def stamp_ns(message: Any) -> int:
@@ -21,7 +21,7 @@ def phase_word(message: Any) -> str:
 
 
 def status_entry(message: Any) -> tuple[int, bool, int] | None:
-    """Stamp (ns), True for dwell, stop (`UNSAID` without one); None without a phase.
+    """Stamp (ns), True for dwell, stop (`UNNUMBERED` without one); None without a phase.
 
     A phase of any other name than ``dwell`` is no dwell.
     """
@@ -30,4 +30,4 @@ def status_entry(message: Any) -> tuple[int, bool, int] | None:
         return None
     values = {entry.key: entry.value for entry in message.status[0].values}
     stop = values.get("stop", "").strip()
-    return stamp_ns(message), phase == "dwell", int(stop) if stop.isdecimal() else UNSAID
+    return stamp_ns(message), phase == "dwell", int(stop) if stop.isdecimal() else UNNUMBERED

@@ -26,18 +26,24 @@ from sdimu_calibration.core.data.dwell_detection import with_detected_dwells
 from sdimu_calibration.core.data.latitude_check import EarthRate, contradictions, observe_earth_rate, reversed_force
 from sdimu_calibration.core.data.static_detection import by_hand
 from sdimu_calibration.core.data.status_clock import aligned
-from sdimu_calibration.core.recording import DataError, PhaseLog, Recording, TemperatureLog, origin_ns, seconds
+from sdimu_calibration.core.recording import (
+    UNNUMBERED,
+    DataError,
+    PhaseLog,
+    Recording,
+    TemperatureLog,
+    origin_ns,
+    seconds,
+)
 from sdimu_calibration.core.specification import ImuSpecification, Site
 
 FEWEST = 100
 """Samples below which nothing can be recognised."""
 IMU_TOPIC, STATUS_TOPIC, TEMPERATURE_TOPIC = "/imu/data_raw", "/rate_table/status", "/imu/temperature"
-UNSAID = -1
-"""Stop of a status that names none."""
 
 
 class RawStatus(NamedTuple):
-    """Status messages: stamps (m,) ns, dwell (m,) bool, stop (m,) int (`UNSAID` where the message names none)."""
+    """Status messages: stamps (m,) ns, dwell (m,) bool, stop (m,) int (`UNNUMBERED` where the message names none)."""
 
     ns: Ints
     dwell: Bools
@@ -137,7 +143,7 @@ def _phase(raw: RawTest, start_ns: int, notes: list[str]) -> PhaseLog | None:
         return None
     order = np.argsort(raw.status.ns, kind="stable")
     dwell, stop = raw.status.dwell[order], raw.status.stop[order]
-    if (stop == UNSAID).any():
+    if (stop == UNNUMBERED).any():
         notes.append(f"{raw.status_topic} does not always say the stop: stops are counted from the dwells")
         stop = np.maximum(np.cumsum(dwell & ~np.concatenate([[False], dwell[:-1]])) - 1, 0)
     return PhaseLog(seconds(raw.status.ns[order], start_ns), dwell, stop.astype(np.int64))

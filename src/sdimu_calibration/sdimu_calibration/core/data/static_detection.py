@@ -17,6 +17,7 @@ import numpy as np
 
 from sdimu_calibration.core import earth
 from sdimu_calibration.core.arrays import Bools, Floats, Ints
+from sdimu_calibration.core.data.windows import runs
 from sdimu_calibration.core.recording import DataError, Recording
 from sdimu_calibration.core.specification import ImuSpecification
 
@@ -77,7 +78,7 @@ def detect_static(recording: Recording) -> StaticIntervals:
         still &= np.max(np.abs(mean - np.median(mean[still], axis=0)), axis=1) < _DRIFT
     # A hole in the samples is no rest: nobody saw what happened in it.
     holes = np.convolve(np.diff(recording.t, prepend=0.0) > 3.0 * dt, np.ones(width), mode="same")[: len(still)] > 0
-    first, last = _runs(still & ~holes)
+    first, last = runs(still & ~holes)
     long = last - first >= max(round(SHORTEST_S / dt), 3)
     if not long.any():
         raise DataError("/imu/data_raw: no rest of half a second was found: put the IMU down between the turns")
@@ -121,12 +122,6 @@ def _like_the_quietest(scatter: Floats, values: Floats) -> Bools:
     resolution = np.array([np.min(s[s > 0.0], initial=np.inf) for s in steps.T])
     floor = float(np.sum(np.where(np.isfinite(resolution), resolution, 0.0) ** 2) / 12.0)
     return np.asarray(scatter <= max(_SCATTER * float(np.quantile(scatter, _QUIETEST)), floor))
-
-
-def _runs(flags: Bools) -> tuple[Ints, Ints]:
-    """First of each run of True, and one after its last."""
-    edges = np.diff(np.concatenate([[0], flags.astype(np.int64), [0]]))
-    return np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
 
 
 def _density(values: Floats, first: Ints, last: Ints, dt: float) -> float:
