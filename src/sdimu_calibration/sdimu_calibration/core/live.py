@@ -275,7 +275,7 @@ class LiveCalibration:
         phases = Phases(
             *(np.concatenate([getattr(w[2], n) for w in self._waiting]) for n in Phases.__dataclass_fields__)
         )
-        if len(epochs) < ALIGN_S and phases.dwell.all():
+        if len(epochs) < ALIGN_S and len(np.unique(phases.dwell)) == 1:
             return False
         self._alignment = first_attitude(epochs, phases, self.setup)
         self._track = self._alignment.C_nb.copy()

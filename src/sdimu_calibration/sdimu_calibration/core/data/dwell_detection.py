@@ -105,15 +105,16 @@ class GrowingDwells:
 
     def add(self, t: Floats, omega_ib_b: Floats, f_ib_b: Floats) -> None:
         """Take samples: time (n,) s, ascending, rate and force (n, 3) in SI."""
-        new = tuple(np.concatenate(pair) for pair in zip(self._rest, (t, omega_ib_b, f_ib_b), strict=True))
+        t, w, f = (np.concatenate(pair) for pair in zip(self._rest, (t, omega_ib_b, f_ib_b), strict=True))
         # `cut_windows` leaves out the first of its windows, and here the first of each piece is the last one before it.
-        whole = max((len(new[0]) - self._side) // self._length - 1, 0)
+        whole = max((len(t) - self._side) // self._length - 1, 0)
         if whole:
-            found = cut_windows(*new, _WINDOW_S, self._interval_s)
+            found = cut_windows(t, w, f, _WINDOW_S, self._interval_s)
             joined = found if self._windows is None else self._windows.followed_by(found)
             self._windows = joined[-_REMEMBERED:]
             self._calm = np.concatenate([self._calm, np.zeros(len(found), dtype=bool)])[-_REMEMBERED:]
-        self._rest = (new[0][whole * self._length :], new[1][whole * self._length :], new[2][whole * self._length :])
+        kept = slice(whole * self._length, None)
+        self._rest = (t[kept], w[kept], f[kept])
 
     def log(self) -> tuple[PhaseLog | None, float]:
         """Phases so far without numbers of stops, and the time (s) up to which they are decided."""

@@ -97,7 +97,7 @@ class Windows:
         return self.still_as(self.quiet)
 
     def still_as(self, quiet: Bools) -> Bools:
-        """Windows at rest, shape (k,), where those of `quiet` (k,) show the usual reading of the gyros and its noise."""
+        """Windows at rest, shape (k,); those of `quiet` (k,) show the usual reading of the gyros and its noise."""
         if not quiet.any():
             return np.zeros(len(self), dtype=bool)
         steps = np.diff(self.w_mean, axis=0)[quiet[1:] & quiet[:-1]]
