@@ -78,7 +78,11 @@ def test_foreign_units_and_stamps_give_the_same_digits_live_and_from_the_bag(ben
 
 @pytest.mark.parametrize(
     ("parameter", "words"),
-    [({"gyro_unit": "turns"}, "unknown unit"), ({"accel_unit": "deg"}, "expected a unit"), ({"gyro_sign": 2}, "1 or -1")],
+    [
+        ({"gyro_unit": "turns"}, "unknown unit"),
+        ({"accel_unit": "deg"}, "expected a unit"),
+        ({"gyro_sign": 2}, "expected 1 or -1"),
+    ],
 )
 def test_a_unit_or_sign_that_is_none_is_refused_as_by_the_command_line(
     bench: FitSession, parameter: dict[str, object], words: str

@@ -167,18 +167,18 @@ def _report(console: Console, out: Path, site: str, imu: str, model: str, plan: 
     from sdimu_calibration.report.page import write_report
     from sdimu_calibration.report.report_extras import report_extras
     from sdimu_calibration.report.table import rich_table, rows
-    from sdimu_calibration.storage.bag_reader import read_recording
     from sdimu_calibration.storage.config import load_imu, load_site
     from sdimu_calibration.storage.diagnosis_file import account, write_diagnosis
     from sdimu_calibration.storage.effect_file import extended_model
+    from sdimu_calibration.storage.opening import open_test
     from sdimu_calibration.storage.reference_file import read_reference, read_truth
     from sdimu_calibration.storage.result_file import read_result
 
     result = read_result(out / "result.json")
     truth = read_truth(out / "truth.yaml", result.body_frame)
     with console.status("diagnosing") if console.is_terminal else nullcontext():
-        recording = read_recording(out / "bag")
-        where, specification, wanted = load_site(site), load_imu(imu), extended_model(model, ())
+        recording, specification, _ = open_test(out / "bag", site, load_imu(imu), handheld=False)
+        where, wanted = load_site(site), extended_model(model, ())
         diagnosis = diagnose(recording, where, specification, wanted)
         more = report_extras(recording, diagnosis, where, specification, wanted)
     write_diagnosis(out / "diagnosis.json", account(diagnosis))
