@@ -7,8 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from sdimu_calibration.cli.calibrate import measured
 from sdimu_calibration.cli.noise import noise
 from sdimu_calibration.core.noise import with_measured_noise
+from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.units import to_si
 from sdimu_calibration.storage.bag_reader import read_recording
 from sdimu_calibration.storage.bag_writer import write_recording
@@ -48,3 +50,10 @@ def test_estimated_noise_replaces_that_of_the_specification_and_says_so(still: P
     imu, note = with_measured_noise(load_imu("dtg"), recording)
     assert imu.gyro_white_noise == pytest.approx(GYRO, rel=0.1)
     assert "0.1 as specified" in note
+
+
+def test_noise_takes_one_word() -> None:
+    assert measured("estimated")
+    assert not measured(None)
+    with pytest.raises(DataError, match="expected 'estimated'"):
+        measured("guessed")

@@ -136,12 +136,10 @@ def test_the_negative_of_the_force_is_turned_round_by_the_earth_unless_stated(tm
 def test_noise_is_measured_only_where_the_user_asks(tmp_path):
     path = write(tmp_path / "b")
     assert open_test(path, "daejeon", DTG).imu == DTG
-    test = open_test(path, "daejeon", DTG, noise="estimated")
+    test = open_test(path, "daejeon", DTG, measured_noise=True)
     # A fifth of the hour's rests: the density of the simulation to some percents.
     assert 0.9 < test.imu.gyro_white_noise / DTG.gyro_white_noise < 1.1
     assert "as specified" in test.recording.notes[-1]
-    with pytest.raises(DataError, match="expected 'estimated'"):
-        open_test(path, "daejeon", DTG, noise="guessed")
 
 
 def test_by_hand_no_place_is_needed_and_a_stated_one_is_kept(tmp_path):

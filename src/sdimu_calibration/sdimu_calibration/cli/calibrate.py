@@ -92,8 +92,8 @@ def calibrate(
         imu_topic, status_topic, joint_topic, temperature_topic, accel_unit, gyro_unit, accel_sign, gyro_sign
     )
     asked = "hand" if hand else estimator
-    test = open_test(bag, site, specification, origin, noise, None if asked == "auto" else asked == "hand")
-    recording, specification, where = test
+    handheld = None if asked == "auto" else asked == "hand"
+    recording, specification, where = open_test(bag, site, specification, origin, handheld, measured(noise))
     chosen = chosen_estimator(asked, recording, specification)
     if truth is not None and chosen == "classical":
         raise typer.BadParameter(
@@ -150,6 +150,21 @@ def check_options(model: str | None, add: list[str] | None, site: str | None) ->
         load_site(site)
 
 
+def measured(noise: str | None) -> bool:
+    """Whether ``--noise`` asks for the white noise of the rests.
+
+    Raises
+    ------
+    DataError
+        When it is another word.
+    """
+    from sdimu_calibration.core.recording import DataError
+
+    if noise not in {None, "estimated"}:
+        raise DataError(f"--noise {noise}: expected 'estimated' (or leave it out: the noise of --imu)")
+    return noise is not None
+
+
 def check_estimator(name: str, known: tuple[str, ...] = ESTIMATORS) -> None:
     """Refuse an estimator that does not exist, before anything is read.
 
@@ -165,11 +180,11 @@ def check_estimator(name: str, known: tuple[str, ...] = ESTIMATORS) -> None:
 
 def chosen_estimator(name: str, recording: Recording, imu: ImuSpecification) -> str:
     """Decide between filter and hand when it is left open, by what the gyros see of the Earth's rate."""
-    from sdimu_calibration.core.data.static_detection import by_hand
+    from sdimu_calibration.core.data.static_detection import hides_earth_rate
 
     if name != "auto":
         return name
-    return "hand" if by_hand(recording, imu) else "filter"
+    return "hand" if hides_earth_rate(recording, imu) else "filter"
 
 
 def _estimators() -> dict[str, Callable[..., Calibration]]:

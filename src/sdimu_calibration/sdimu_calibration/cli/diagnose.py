@@ -65,6 +65,7 @@ def diagnose(
         check_options,
         chosen_estimator,
         default_folder,
+        measured,
     )
     from sdimu_calibration.cli.diagnose_with import Asked, diagnose_handheld_run, diagnose_navigated
     from sdimu_calibration.core.recording import DataError
@@ -82,7 +83,7 @@ def diagnose(
     )
     chosen = "hand" if hand else estimator
     handheld = None if chosen == "auto" else chosen == "hand"
-    recording, specification, where = open_test(bag, site, specification, origin, noise, handheld)
+    recording, specification, where = open_test(bag, site, specification, origin, handheld, measured(noise))
     folder, title = out or default_folder(bag, "diagnosis"), f"Diagnosis of {bag.name}"
     by_hand = chosen_estimator(chosen, recording, specification) == "hand"
     wanted = extended_model(model or ("hand" if by_hand else "baseline"), add or [])

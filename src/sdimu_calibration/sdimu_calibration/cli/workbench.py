@@ -49,7 +49,7 @@ def workbench(
 
     from sdimu_calibration.cli.calibrate import check_options
     from sdimu_calibration.cli.progress import bar
-    from sdimu_calibration.core.data.static_detection import by_hand
+    from sdimu_calibration.core.data.static_detection import hides_earth_rate
     from sdimu_calibration.core.recording import DataError
     from sdimu_calibration.report.workbench.app import build
     from sdimu_calibration.report.workbench.fit import FitSession
@@ -69,7 +69,7 @@ def workbench(
 
     def opened(path: Path) -> FitSession:
         recording, _, where = open_test(path, site, specification, origin)
-        if where is None or by_hand(recording, specification):
+        if where is None or hides_earth_rate(recording, specification):
             raise DataError(
                 f"{path.name}: a run by hand, in which nothing is navigated: use sdimu diagnose {path.name} (its "
                 "report has the same figures), or --imu when the gyros are better than it says"

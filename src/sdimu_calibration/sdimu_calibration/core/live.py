@@ -7,7 +7,7 @@ samples decide (`early_reading`), without a status the rests so far (`GrowingDwe
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -224,7 +224,7 @@ class LiveCalibration:
             When there is too little of it.
         """
         test = self.opened()
-        return calibrate(test.recording, self.setup.site, test.imu, self.setup.model)
+        return calibrate(test.recording, test.site or self.setup.site, test.imu, self.setup.model)
 
     def opened(self) -> OpenedTest:
         """Everything taken so far, opened as a recording is.
@@ -234,8 +234,7 @@ class LiveCalibration:
         DataError
             When there is too little of it, or physics does not decide and the user has to.
         """
-        # What the node runs on the way navigates: the answer of a run by hand has nothing in common with it.
-        return open_test(in_order(self._intake.raw()), replace(self.options, handheld=False))
+        return open_test(in_order(self._intake.raw()), self.options)
 
     def _close_epochs(self, limit: float, log: PhaseLog | None) -> None:
         """Cut the pending cycles into epochs that end by `limit` and decide their phases."""

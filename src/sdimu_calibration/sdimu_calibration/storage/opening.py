@@ -9,15 +9,13 @@ from sdimu_calibration.core.data.axes_and_units import Stated
 from sdimu_calibration.core.data.front_door import OpenedTest, OpeningOptions, in_si
 from sdimu_calibration.core.data.front_door import open_test as open_recorded
 from sdimu_calibration.core.recording import DataError, Recording
-from sdimu_calibration.core.specification import ImuSpecification, Site
+from sdimu_calibration.core.specification import ImuSpecification
 from sdimu_calibration.core.units import UnitError, parse_unit
 from sdimu_calibration.storage.bag_reader import read_recording
 from sdimu_calibration.storage.config import load_site
 from sdimu_calibration.storage.topic_choice import TopicChoice
 
 DEFAULT_SITE = "daejeon"
-MEASURED = "estimated"
-"""Word of --noise for the white noise of the rests."""
 
 
 @dataclass(frozen=True)
@@ -70,7 +68,7 @@ def _factor(option: str, unit: str | None, expected: str) -> float | None:
 
 
 def opening_options(
-    site: str | None, imu: ImuSpecification, source: Source, noise: str | None = None, handheld: bool | None = None
+    site: str | None, imu: ImuSpecification, source: Source, handheld: bool | None = None, measured_noise: bool = False
 ) -> OpeningOptions:
     """Put what the user says of a test together; command line and live node use this one function.
 
@@ -80,34 +78,30 @@ def opening_options(
         Name or path; None takes `DEFAULT_SITE`, which a note then says.
     imu : ImuSpecification
     source : Source
-    noise : str, optional
-        `MEASURED` replaces the white noise of the specification by that of the rests.
     handheld : bool, optional
         Moved by hand; None decides by the noise of the gyros.
+    measured_noise : bool
+        Replace the white noise of the specification by that of the rests.
 
     Raises
     ------
     DataError
-        When there is no such site, or a unit, a sign or `noise` is none.
+        When there is no such site, or a unit or a sign is none.
     """
-    if noise not in {None, MEASURED}:
-        raise DataError(f"--noise {noise}: expected '{MEASURED}' (or leave it out: the noise of --imu)")
-    where: Site = load_site(site or DEFAULT_SITE)
-    return OpeningOptions(
-        imu, where, "" if site is not None else DEFAULT_SITE, source.stated, handheld, measured_noise=noise is not None
-    )
+    assumed = DEFAULT_SITE if site is None else ""
+    return OpeningOptions(imu, load_site(site or DEFAULT_SITE), assumed, source.stated, handheld, measured_noise)
 
 
 def open_test(
-    path: Path, site: str | None, imu: ImuSpecification, source: Source | None = None, noise: str | None = None,
-    handheld: bool | None = None,
+    path: Path, site: str | None, imu: ImuSpecification, source: Source | None = None, handheld: bool | None = None,
+    measured_noise: bool = False,
 ) -> OpenedTest:  # fmt: skip
     """Read a bag and make it ready for an estimator.
 
     Parameters
     ----------
     path : Path
-    site, imu, noise, handheld
+    site, imu, handheld, measured_noise
         As for `opening_options`.
     source : Source, optional
         Topics, units and signs; what is left out is recognised.
@@ -123,7 +117,7 @@ def open_test(
         When bag or options cannot be used, or physics does not decide and the user has to.
     """
     source = source or Source()
-    options = opening_options(site, imu, source, noise, handheld)
+    options = opening_options(site, imu, source, handheld, measured_noise)
     return open_recorded(read_recording(path, source.topics), options, str(path))
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from sdimu_calibration.core.data.static_detection import by_hand
+from sdimu_calibration.core.data.static_detection import hides_earth_rate
 from sdimu_calibration.core.handheld.handheld import handheld_calibrate
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.specification import ImuSpecification, Model
@@ -105,8 +105,8 @@ def test_an_extra_force_at_rest_is_learned_and_widens_the_sigmas(site):
 
 def test_the_choice_is_made_by_what_a_rest_shows_of_the_earth(imu, three_stops, recorded_test, site):
     recording, _ = by_hand_recording(ByHand(20, MEMS, site, seed=5))
-    assert by_hand(recording, MEMS)
-    assert not by_hand(recorded_test(three_stops), imu)
+    assert hides_earth_rate(recording, MEMS)
+    assert not hides_earth_rate(recorded_test(three_stops), imu)
 
 
 def test_a_coefficient_that_no_turn_shows_is_named(site):

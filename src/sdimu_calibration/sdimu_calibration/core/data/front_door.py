@@ -24,7 +24,7 @@ from sdimu_calibration.core.data.axes_and_units import Stated, recognise
 from sdimu_calibration.core.data.dejitter import dejittered
 from sdimu_calibration.core.data.dwell_detection import with_detected_dwells
 from sdimu_calibration.core.data.latitude_check import EarthRate, contradictions, observe_earth_rate, reversed_force
-from sdimu_calibration.core.data.static_detection import by_hand
+from sdimu_calibration.core.data.static_detection import hides_earth_rate
 from sdimu_calibration.core.data.status_clock import aligned
 from sdimu_calibration.core.recording import (
     UNNUMBERED,
@@ -242,7 +242,7 @@ def open_test(recording: Recording, options: OpeningOptions, where: str = IMU_TO
     recording, imu = in_si(recording, options.stated, where), options.imu
     if options.measured_noise:
         recording, imu = _with_measured_noise(recording, imu)
-    handheld = by_hand(recording, imu) if options.handheld is None else options.handheld
+    handheld = hides_earth_rate(recording, imu) if options.handheld is None else options.handheld
     if handheld and options.assumed_site:
         return OpenedTest(recording, imu, None)
     return OpenedTest(_placed(recording, imu, options), imu, options.site)

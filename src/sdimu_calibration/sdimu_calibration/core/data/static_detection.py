@@ -83,7 +83,7 @@ def detect_static(recording: Recording) -> StaticIntervals:
     )
 
 
-def by_hand(recording: Recording, imu: ImuSpecification) -> bool:
+def hides_earth_rate(recording: Recording, imu: ImuSpecification) -> bool:
     """Decide whether navigation has nothing to hold on to because a rest does not show the Earth's rate.
 
     It does not when the gyros' white noise in the usual rest, specified or learned, exceeds a third of it.
