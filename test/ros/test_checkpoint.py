@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from sdimu_calibration.core.calibrate import calibrate
-from sdimu_calibration.core.data.front_door import OpeningOptions
+from sdimu_calibration.core.front_door import OpeningOptions
 from sdimu_calibration.core.live import NS, LiveCalibration
 from sdimu_calibration.nodes.feed import AWAY_S, Feed
 from sdimu_calibration.storage.bag_reader import read_recording

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from sdimu_calibration.core.calibrate import calibrate
 from sdimu_calibration.core.data.axes_and_units import Stated
-from sdimu_calibration.core.data.front_door import OpeningOptions
 from sdimu_calibration.core.filter.passes import SNAPSHOT_EPOCHS
+from sdimu_calibration.core.front_door import OpeningOptions
 from sdimu_calibration.core.live import NS, LiveCalibration
 from sdimu_calibration.core.recording import DataError, seconds
 

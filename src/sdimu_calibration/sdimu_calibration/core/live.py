@@ -15,10 +15,10 @@ from sdimu_calibration.core.alignment.alignment import Alignment
 from sdimu_calibration.core.alignment.prepared import ALIGN_S, first_attitude, measurement_kinds, set_up
 from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.calibrate import calibrate
+from sdimu_calibration.core.data.arrival import in_order
 from sdimu_calibration.core.data.dwell_detection import GrowingDwells, specification_is_wide
 from sdimu_calibration.core.data.early_reading import EarlyReading
 from sdimu_calibration.core.data.epochs import Epochs, cut
-from sdimu_calibration.core.data.front_door import OpenedTest, OpeningOptions, in_order, open_test
 from sdimu_calibration.core.data.gaps import bridges, largest_acceleration
 from sdimu_calibration.core.data.intake import Intake
 from sdimu_calibration.core.data.phases import Phases, PhaseState, classify
@@ -26,6 +26,7 @@ from sdimu_calibration.core.effects import body_frame
 from sdimu_calibration.core.effects.motion import Motion
 from sdimu_calibration.core.filter.filter_pass import NAV, PassInput, PassState, new_output, run_pass
 from sdimu_calibration.core.filter.passes import pass_settings, start_state
+from sdimu_calibration.core.front_door import OpenedTest, OpeningOptions, open_test
 from sdimu_calibration.core.navigation.strapdown import Cycles, Reducer
 from sdimu_calibration.core.navigation.track import motion
 from sdimu_calibration.core.recording import DataError, PhaseLog, seconds

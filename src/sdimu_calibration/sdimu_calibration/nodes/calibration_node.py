@@ -34,7 +34,7 @@ from std_srvs.srv import Trigger
 
 from sdimu_calibration.core.arrays import Ints
 from sdimu_calibration.core.data.axes_and_units import Stated
-from sdimu_calibration.core.data.front_door import OpeningOptions
+from sdimu_calibration.core.front_door import OpeningOptions
 from sdimu_calibration.core.live import NS, EpochEstimate, LiveCalibration
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.results import Calibration

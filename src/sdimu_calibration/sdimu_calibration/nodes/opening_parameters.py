@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from rclpy.node import Node
 
-from sdimu_calibration.core.data.front_door import OpeningOptions
+from sdimu_calibration.core.front_door import OpeningOptions
 from sdimu_calibration.storage.config import load_imu
 from sdimu_calibration.storage.opening import Source, opening_options
 from sdimu_calibration.storage.topics import Topics

@@ -13,7 +13,7 @@ import numpy as np
 from rosbags.typesys import Stores, get_typestore
 
 from sdimu_calibration.core.arrays import Floats
-from sdimu_calibration.core.data.front_door import RawStatus, RawTemperature, RawTest, in_order
+from sdimu_calibration.core.data.arrival import RawStatus, RawTemperature, RawTest, in_order
 from sdimu_calibration.core.recording import Recording, TableLog, seconds
 from sdimu_calibration.storage import cdr
 from sdimu_calibration.storage.bag_file import raw_messages, read_topics

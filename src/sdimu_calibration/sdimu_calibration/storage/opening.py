@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from sdimu_calibration.core.data.axes_and_units import Stated
-from sdimu_calibration.core.data.front_door import OpenedTest, OpeningOptions, in_si
-from sdimu_calibration.core.data.front_door import open_test as open_recorded
+from sdimu_calibration.core.front_door import OpenedTest, OpeningOptions, in_si
+from sdimu_calibration.core.front_door import open_test as open_recorded
 from sdimu_calibration.core.recording import DataError, Recording
 from sdimu_calibration.core.specification import ImuSpecification
 from sdimu_calibration.core.units import UnitError, parse_unit

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from sdimu_calibration.core.arrays import Bools, Floats, Ints
-from sdimu_calibration.core.data.front_door import RawStatus, RawTemperature, RawTest
+from sdimu_calibration.core.data.arrival import RawStatus, RawTemperature, RawTest
 from sdimu_calibration.core.recording import (
     NOMINAL_FROM,
     DataError,

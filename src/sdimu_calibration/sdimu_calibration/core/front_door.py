@@ -1,11 +1,11 @@
 """The front door of every test, live and offline: samples as they arrived become a recording ready for an estimator.
 
-Stamps are integers (ns) until `in_order` counts seconds from one origin; nothing turns them back. The order of work:
+Stamps are integers (ns) until `arrival.in_order` counts seconds from one origin; nothing turns them back. The steps:
 
-1. samples by their stamps, each stamp once, every number finite (`arrival`)
-2. units and signs (`axes_and_units`), even stamps (`dejitter`), one clock (`status_clock`)
-3. white noise measured at rest, where the user asks for it (`core.noise`)
-4. rests without a status (`dwell_detection`), latitude, gravity and sign of the force (`latitude_check`)
+1. samples by their stamps, each stamp once, every number finite (`data.arrival`)
+2. units and signs (`data.axes_and_units`), even stamps (`data.dejitter`), one clock (`data.status_clock`)
+3. white noise measured at rest, where the user asks for it (`noise`)
+4. rests without a status (`data.dwell_detection`), latitude, gravity, sign of the force (`data.latitude_check`)
 
 What the data contradict or leave open is told in a note or refused with a question: never silently wrong. Samples that
 are no measurement (spikes, stuck sensors) stay: `alignment.prepared` screens them in every estimate.
@@ -18,71 +18,18 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sdimu_calibration.core.arrays import Bools, Floats, Ints
-from sdimu_calibration.core.data.arrival import arrange
+from sdimu_calibration.core.data.arrival import IMU_TOPIC
 from sdimu_calibration.core.data.axes_and_units import Stated, recognise
 from sdimu_calibration.core.data.dejitter import dejittered
 from sdimu_calibration.core.data.dwell_detection import with_detected_dwells
 from sdimu_calibration.core.data.latitude_check import EarthRate, contradictions, observe_earth_rate, reversed_force
 from sdimu_calibration.core.data.static_detection import hides_earth_rate
 from sdimu_calibration.core.data.status_clock import aligned
-from sdimu_calibration.core.recording import (
-    UNNUMBERED,
-    DataError,
-    PhaseLog,
-    Recording,
-    TemperatureLog,
-    origin_ns,
-    seconds,
-)
+from sdimu_calibration.core.recording import DataError, Recording
 from sdimu_calibration.core.specification import ImuSpecification, Site
 
 FEWEST = 100
 """Samples below which nothing can be recognised."""
-IMU_TOPIC, STATUS_TOPIC, TEMPERATURE_TOPIC = "/imu/data_raw", "/rate_table/status", "/imu/temperature"
-
-
-class RawStatus(NamedTuple):
-    """Status messages: stamps (m,) ns, dwell (m,) bool, stop (m,) int (`UNNUMBERED` where the message names none)."""
-
-    ns: Ints
-    dwell: Bools
-    stop: Ints
-
-
-class RawTemperature(NamedTuple):
-    """Temperatures: stamps (m,) ns, value (m,) deg C."""
-
-    ns: Ints
-    value: Floats
-
-
-@dataclass(frozen=True)
-class RawTest:
-    """What the topics of a test brought, in the order of arrival.
-
-    Attributes
-    ----------
-    ns : ndarray of int, shape (n,)
-        header.stamp of the samples (ns).
-    omega_ib_b, f_ib_b : ndarray, shape (n, 3)
-        Body rate and specific force, in the unit and sign of the messages.
-    status : RawStatus or None
-    temperature : RawTemperature or None
-    where : str
-        File and topic of the IMU, for errors.
-    status_topic, temperature_topic : str
-        For notes.
-    """
-
-    ns: Ints
-    omega_ib_b: Floats
-    f_ib_b: Floats
-    status: RawStatus | None = None
-    temperature: RawTemperature | None = None
-    where: str = IMU_TOPIC
-    status_topic: str = STATUS_TOPIC
-    temperature_topic: str = TEMPERATURE_TOPIC
 
 
 @dataclass(frozen=True)
@@ -117,47 +64,6 @@ class OpenedTest(NamedTuple):
     recording: Recording
     imu: ImuSpecification
     site: Site | None
-
-
-def in_order(raw: RawTest) -> Recording:
-    """Order samples and logs by their stamps and count seconds from one nominal interval before the first sample.
-
-    Raises
-    ------
-    DataError
-        When no sample can be used, or the clock of the stamps was set back.
-    """
-    arranged = arrange(raw.ns, raw.omega_ib_b, raw.f_ib_b, raw.where)
-    rows, notes = arranged.rows, [*arranged.notes]
-    start_ns = origin_ns(raw.ns[rows])
-    return Recording(
-        start_ns=start_ns, t=seconds(raw.ns[rows], start_ns),
-        omega_ib_b=raw.omega_ib_b[rows], f_ib_b=raw.f_ib_b[rows],
-        phase=_phase(raw, start_ns, notes), temperature=_temperature(raw, start_ns, notes),
-        rejected=len(raw.ns) - len(rows), notes=tuple(notes),
-    )  # fmt: skip
-
-
-def _phase(raw: RawTest, start_ns: int, notes: list[str]) -> PhaseLog | None:
-    if raw.status is None or not len(raw.status.ns):
-        return None
-    order = np.argsort(raw.status.ns, kind="stable")
-    dwell, stop = raw.status.dwell[order], raw.status.stop[order]
-    if (stop == UNNUMBERED).any():
-        notes.append(f"{raw.status_topic} does not always say the stop: stops are counted from the dwells")
-        stop = np.maximum(np.cumsum(dwell & ~np.concatenate([[False], dwell[:-1]])) - 1, 0)
-    return PhaseLog(seconds(raw.status.ns[order], start_ns), dwell, stop.astype(np.int64))
-
-
-def _temperature(raw: RawTest, start_ns: int, notes: list[str]) -> TemperatureLog | None:
-    if raw.temperature is None:
-        return None
-    ns, value = raw.temperature
-    chosen = np.flatnonzero(np.isfinite(value))
-    if len(chosen) < len(value):
-        notes.append(f"{len(value) - len(chosen)} temperatures of {raw.temperature_topic} were not finite and dropped")
-    chosen = chosen[np.unique(ns[chosen], return_index=True)[1]]
-    return TemperatureLog(seconds(ns[chosen], start_ns), value[chosen]) if len(chosen) else None
 
 
 def in_si(recording: Recording, stated: Stated, where: str = IMU_TOPIC) -> Recording:
