@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from sdimu_calibration.core.estimation.outcome import calibrate
-from sdimu_calibration.core.live import LiveCalibration
-from sdimu_calibration.nodes.feed import AWAY_S, NS, Feed
+from sdimu_calibration.core.front_door import OpeningOptions
+from sdimu_calibration.core.live import NS, LiveCalibration
+from sdimu_calibration.nodes.feed import AWAY_S, Feed
 from sdimu_calibration.storage.bag_reader import read_recording
 from sdimu_calibration.storage.cdr import encode_imu
 from sdimu_calibration.storage.config import load_imu, load_model, load_site
@@ -33,7 +34,7 @@ def messages(seed: int = 1, start: int = START) -> list[bytes]:
 
 
 def feed_of(path: Path) -> Feed:
-    return Feed(lambda start: LiveCalibration(SITE, IMU, MODEL, start), Journal(path, digest("same")))
+    return Feed(lambda: LiveCalibration(OpeningOptions(IMU, SITE), MODEL), Journal(path, digest("same")))
 
 
 def give(feed: Feed, raw: list[bytes]) -> None:

@@ -13,7 +13,7 @@ from sdimu_calibration.core.plan import Plan
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage.bag_writer import write_recording
 from sdimu_calibration.storage.config import load_imu, load_plan, load_site
-from sdimu_calibration.storage.opening import Source, open_recording, place
+from sdimu_calibration.storage.opening import Source, open_recording, open_test
 from sdimu_calibration.storage.topic_choice import TopicChoice
 from sdimu_calibration.storage.topics import Topics
 from sdimu_sim.core.scenario import Scenario, generate
@@ -101,19 +101,18 @@ def test_a_temperature_of_another_day_is_not_used_and_told(tmp_path):
 
 
 def test_a_place_that_nobody_stated_is_named_with_what_the_data_say(tmp_path):
-    r = open_recording(write(tmp_path / "b"))
-    opened, where = place(r, None, DTG)
-    assert where == load_site("daejeon")
-    (note,) = opened.notes
+    path = write(tmp_path / "b")
+    opened = open_test(path, None, DTG)
+    assert opened.site == load_site("daejeon")
+    (note,) = opened.recording.notes
     assert "no --site: daejeon is assumed" in note
     assert re.search(r"that of latitude \d+ \+- \d+ deg", note)
-    stated, _ = place(r, "daejeon", DTG)
-    assert stated.notes == ()
+    assert open_test(path, "daejeon", DTG).recording.notes == ()
 
 
 def test_a_place_that_contradicts_the_data_is_told(tmp_path):
     (tmp_path / "quito.yaml").write_text("format: sdimu-site/1\nlatitude_deg: -0.2\nheight_m: 2850\n")
-    r, _ = place(open_recording(write(tmp_path / "b")), str(tmp_path / "quito.yaml"), DTG)
+    r = open_test(write(tmp_path / "b"), str(tmp_path / "quito.yaml"), DTG).recording
     (note,) = [note for note in r.notes if "Earth's rate" in note]
     latitude, sigma = map(float, re.search(r"latitude (\S+) \+- (\S+) deg", note).groups())
     assert abs(latitude - 36.4) < 4.0 * sigma
@@ -122,14 +121,32 @@ def test_a_place_that_contradicts_the_data_is_told(tmp_path):
 
 
 def test_the_negative_of_the_force_is_turned_round_by_the_earth_unless_stated(tmp_path):
-    r = open_recording(write(tmp_path / "b", f=-1.0))
-    turned, _ = place(r, "daejeon", DTG)
+    path = write(tmp_path / "b", f=-1.0)
+    turned = open_test(path, "daejeon", DTG).recording
     assert np.array_equal(turned.f_ib_b, simulated().f_ib_b)
     assert "opposite sign" in turned.notes[-1]
-    left, _ = place(r, "daejeon", DTG, Source(accel_sign=1))
-    assert np.array_equal(left.f_ib_b, r.f_ib_b)
+    left = open_test(path, "daejeon", DTG, Source(accel_sign=1)).recording
+    assert np.array_equal(left.f_ib_b, -simulated().f_ib_b)
     assert any("--site" in note for note in left.notes)
     # Without a stated place the sign is not guessed from an assumed one.
-    assumed, _ = place(r, None, DTG)
-    assert np.array_equal(assumed.f_ib_b, r.f_ib_b)
-    assert np.array_equal(open_recording(write(tmp_path / "c", f=-1.0), Source(accel_sign=-1)).f_ib_b, -r.f_ib_b)
+    assert np.array_equal(open_test(path, None, DTG).recording.f_ib_b, -simulated().f_ib_b)
+    assert np.array_equal(open_recording(path, Source(accel_sign=-1)).f_ib_b, simulated().f_ib_b)
+
+
+def test_noise_is_measured_only_where_the_user_asks(tmp_path):
+    path = write(tmp_path / "b")
+    assert open_test(path, "daejeon", DTG).imu == DTG
+    test = open_test(path, "daejeon", DTG, measured_noise=True)
+    # A fifth of the hour's rests: the density of the simulation to some percents.
+    assert 0.9 < test.imu.gyro_white_noise / DTG.gyro_white_noise < 1.1
+    assert "as specified" in test.recording.notes[-1]
+
+
+def test_by_hand_no_place_is_needed_and_a_stated_one_is_kept(tmp_path):
+    path = write(tmp_path / "b")
+    assert open_test(path, None, DTG, handheld=True).site is None
+    assert open_test(path, "daejeon", DTG, handheld=True).site == load_site("daejeon")
+    # Gyros as noisy as these do not see the Earth's rate in rests of 20 s: then the IMU is taken to be moved by hand.
+    noisy = replace(DTG, gyro_white_noise=np.radians(0.1))
+    assert open_test(path, None, noisy).site is None
+    assert open_test(path, None, noisy, handheld=False).site == load_site("daejeon")

@@ -36,7 +36,7 @@ def open(  # noqa: A001 (as every library of files has it)
     site: str | None = None,
     imu: str | ImuSpecification = "dtg",
     source: Source | None = None,
-    estimator: str = AUTO,
+    handheld: bool | None = None,
     measured_noise: bool = False,
 ) -> PreparedTest:
     """Open a recording: read, brought to SI and one clock, with its site and the IMU's file.
@@ -51,8 +51,8 @@ def open(  # noqa: A001 (as every library of files has it)
         Name in config/imu, path, or the specification itself.
     source : Source, optional
         Topics, units and senses, where they are not to be recognised.
-    estimator : str
-        A handheld estimator does without a site.
+    handheld : bool, optional
+        Moved by hand; None decides by the noise of the gyros.
     measured_noise : bool
         White noise from the rests of the recording, not from `imu`.
 
@@ -62,7 +62,7 @@ def open(  # noqa: A001 (as every library of files has it)
         When the bag, the site or the IMU cannot be used.
     """
     specification = load_imu(imu) if isinstance(imu, str) else imu
-    return open_test(Path(bag), site, specification, source, estimator, measured_noise)
+    return open_test(Path(bag), site, specification, source, handheld, measured_noise)
 
 
 def calibrate(

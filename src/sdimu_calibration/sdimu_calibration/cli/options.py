@@ -69,7 +69,8 @@ def opened(
     specification, given = load_imu(imu), extended_model(model or "baseline", add or [])
     if site is not None:
         load_site(site)
-    test = open_test(bag, site, specification, source, wanted, noise is not None)
+    handheld = None if wanted == AUTO else wanted == "handheld"
+    test = open_test(bag, site, specification, source, handheld, noise is not None)
     chosen = choose_estimator(test, given) if wanted == AUTO else wanted
     if chosen == "handheld":
         if wanted == AUTO:

@@ -7,15 +7,37 @@ from typing import Annotated
 
 import typer
 
+from sdimu_calibration.cli.source_options import (
+    AccelSign,
+    AccelUnit,
+    GyroSign,
+    GyroUnit,
+    ImuTopic,
+    JointTopic,
+    StatusTopic,
+    TemperatureTopic,
+    source,
+)
+
 
 def replay(
     bag: Annotated[Path, typer.Argument(metavar="BAG", help="rosbag2 folder or .mcap file.")],
     model: Annotated[str, typer.Option(help="Model to estimate: name in config/model or path.")] = "baseline",
-    site: Annotated[str, typer.Option(help="Where the test was: name in config/site or path.")] = "daejeon",
+    site: Annotated[
+        str | None, typer.Option(help="Where the test was: name in config/site or path; daejeon when left out.")
+    ] = None,
     imu: Annotated[str, typer.Option(help="Specification of the IMU: name in config/imu or path.")] = "dtg",
     speed: Annotated[float, typer.Option(help="Times real time; 0 is as fast as the calibration allows.")] = 0.0,
     out: Annotated[Path | None, typer.Option(help="Folder of the results; BAG_replay by default.")] = None,
     patience: Annotated[float, typer.Option(help="Longest time without an end (s); 0 waits for ever.")] = 0.0,
+    imu_topic: ImuTopic = None,
+    status_topic: StatusTopic = None,
+    joint_topic: JointTopic = None,
+    temperature_topic: TemperatureTopic = None,
+    accel_unit: AccelUnit = None,
+    gyro_unit: GyroUnit = None,
+    accel_sign: AccelSign = None,
+    gyro_sign: GyroSign = None,
 ) -> None:
     """Play a recording into the live calibration node; leaves result.json."""
     import time
@@ -26,9 +48,16 @@ def replay(
     from sdimu_calibration.core.recording import DataError
     from sdimu_calibration.report.table import rich_table, rows
     from sdimu_calibration.storage.bag_file import bag_parts
+    from sdimu_calibration.storage.config import load_imu
+    from sdimu_calibration.storage.opening import opening_options
     from sdimu_calibration.storage.result_file import read_result
 
-    bag_parts(bag)  # what is wrong with the bag is said before anything is started
+    # What is wrong with bag or options is said before anything is started.
+    bag_parts(bag)
+    origin = source(
+        imu_topic, status_topic, joint_topic, temperature_topic, accel_unit, gyro_unit, accel_sign, gyro_sign
+    )
+    opening_options(site, load_imu(imu), origin)
     folder = out or bag.resolve().with_name(f"{bag.resolve().stem if bag.is_file() else bag.resolve().name}_replay")
     result = folder / "result.json"
     result.unlink(missing_ok=True)
@@ -40,9 +69,16 @@ def replay(
         Children(folder / "log") as children,
         console.status("replaying") if console.is_terminal else Console(quiet=True).status(""),
     ):
-        options = {"site": site, "imu": imu, "model": model, "out": str(folder)}
+        options = {
+            "site": site or "", "imu": imu, "model": model, "out": str(folder), "accel_unit": accel_unit or "",
+            "gyro_unit": gyro_unit or "", "accel_sign": accel_sign or 0, "gyro_sign": gyro_sign or 0,
+        }  # fmt: skip
         children.start("calibration", "sdimu_calibration.nodes.calibration_node", options)
-        player = {"bag": str(bag), "speed": speed, "consumers": 1}
+        topics = {
+            "imu_topic": imu_topic, "status_topic": status_topic, "joint_topic": joint_topic,
+            "temperature_topic": temperature_topic,
+        }  # fmt: skip
+        player = {"bag": str(bag), "speed": speed, "consumers": 1} | {k: topic or "" for k, topic in topics.items()}
         children.start("replay", "sdimu_calibration.nodes.replay_node", player)
         while children.running():
             if patience and time.monotonic() - begun > patience:

@@ -1,4 +1,9 @@
-"""The closed-loop filter fed in pieces, as a test goes on; the end of the test is `calibrate` on all of it."""
+"""The closed-loop filter fed in pieces, as a test goes on; the end of the test is `calibrate` on all of it.
+
+Stamps are integers (ns). The end goes through the front door of every recording (`front_door`), so that live and
+offline give the same digits. On the way the filter gets what can be known by then: units and signs as soon as the
+samples decide (`early_reading`), without a status the rests so far (`GrowingDwells`), stamps as they come.
+"""
 
 from __future__ import annotations
 
@@ -9,32 +14,27 @@ import numpy as np
 from sdimu_calibration.core.alignment.alignment import Alignment
 from sdimu_calibration.core.alignment.prepared import ALIGN_S, first_attitude, measurement_kinds, set_up
 from sdimu_calibration.core.arrays import Floats, Ints
-from sdimu_calibration.core.data.arrival import arrange
+from sdimu_calibration.core.data.arrival import in_order
+from sdimu_calibration.core.data.dwell_detection import GrowingDwells, specification_is_wide
+from sdimu_calibration.core.data.early_reading import EarlyReading
 from sdimu_calibration.core.data.epochs import Epochs, cut
 from sdimu_calibration.core.data.gaps import bridges, largest_acceleration
+from sdimu_calibration.core.data.intake import Intake
 from sdimu_calibration.core.data.phases import Phases, PhaseState, classify
 from sdimu_calibration.core.effects import body_frame
 from sdimu_calibration.core.effects.motion import Motion
 from sdimu_calibration.core.estimation.outcome import calibrate
 from sdimu_calibration.core.filter.filter_pass import NAV, PassInput, PassState, new_output, run_pass
 from sdimu_calibration.core.filter.passes import pass_settings, start_state
+from sdimu_calibration.core.front_door import OpenedTest, OpeningOptions, open_test
 from sdimu_calibration.core.navigation.strapdown import Cycles, Reducer
 from sdimu_calibration.core.navigation.track import motion
-from sdimu_calibration.core.recording import (
-    NOMINAL_FROM,
-    DataError,
-    PhaseLog,
-    Recording,
-    TemperatureLog,
-    nominal_interval_ns,
-    origin_ns,
-    seconds,
-)
+from sdimu_calibration.core.recording import DataError, PhaseLog, seconds
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.rotation import quaternion
-from sdimu_calibration.core.specification import ImuSpecification, Model, Site
+from sdimu_calibration.core.specification import Model
 
-Stamps = Ints
+NS = 1_000_000_000
 
 NIS_CHANNELS = ("position", "velocity", "rate", "force")
 _FAR = 5.0
@@ -47,8 +47,10 @@ class EpochEstimate:
 
     Attributes
     ----------
+    ns : int
+        Stamp of the end of the epoch (ns).
     t : float
-        End of the epoch (s after the `start_ns` that the caller gave).
+        The same in seconds after the origin of the recording.
     dwell, used : bool
         At rest; a measurement was taken.
     stop : int
@@ -71,6 +73,7 @@ class EpochEstimate:
         samples, late, lost, rejected, contradicted.
     """
 
+    ns: int
     t: float
     dwell: bool
     used: bool
@@ -98,9 +101,9 @@ class LiveCalibration:
 
     Parameters
     ----------
-    site, imu, model : Site, ImuSpecification, Model
-    start_ns : int
-        Stamp from which the caller counts its times; only a convention between caller and object.
+    options : OpeningOptions
+        IMU, site, and what the user states of units and signs.
+    model : Model
 
     Raises
     ------
@@ -108,22 +111,18 @@ class LiveCalibration:
         When model and IMU do not fit together.
     """
 
-    def __init__(self, site: Site, imu: ImuSpecification, model: Model, start_ns: int) -> None:
-        self.setup = set_up(site, imu, model)
-        self.start_ns = start_ns
-        # As they came, for the end; and what of them is new and finite, for the filter on the way.
-        self._arrived: list[tuple[Stamps, Floats, Floats]] = []
-        self._ns: list[Stamps] = []
-        self._omega: list[Floats] = []
-        self._force: list[Floats] = []
+    def __init__(self, options: OpeningOptions, model: Model) -> None:
+        self.options = options
+        self.setup = set_up(options.site, options.imu, model)
+        self.notes: list[str] = []
+        """What the caller should publish, such as what the filter waits for; the caller empties the list."""
+        self._intake = Intake()
+        self._reading = EarlyReading(options.stated)
+        self._dwells: GrowingDwells | None = None
+        self._second = 0  # whole seconds after the origin that are done
+        self._idle = False
         self._acceleration = 0.0
-        self._phase: list[tuple[int, bool, int]] = []
-        self._temperature: list[tuple[int, float]] = []
-        self._late = self._rejected = self._lost = self._contradicted = self._samples = 0
-        self._reduced_to = 0  # blocks of samples already handed to the reducer
-        self._last_ns = -(2**62)
-        self._origin_ns: int | None = None
-        self._nominal_s = 0.0
+        self._lost = self._contradicted = 0
         self._reducer: Reducer | None = None
         self._pending: list[Cycles] = []
         self._waiting: list[tuple[Cycles, Epochs, Phases]] = []
@@ -138,59 +137,84 @@ class LiveCalibration:
         self._nis_count = np.zeros(4)
         self._stop_nis = np.zeros((2, 4))  # sum and degrees of freedom at the present stop
 
-    def add_samples(self, t: Floats, omega_ib_b: Floats, f_ib_b: Floats) -> None:
-        """Take samples: end stamps (s after `start_ns`) shape (n,), rates and specific forces shape (n, 3).
+    def add_samples(self, ns: Ints, omega_ib_b: Floats, f_ib_b: Floats) -> None:
+        """Take samples as the messages have them: header stamps (n,) ns, rates and specific forces (n, 3).
 
         Samples that are not finite, or not later than the last one taken, are counted and do not reach the filter on
         the way; the end of the test sorts them in as the reader of bags does.
         """
-        ns = self.start_ns + np.rint(np.asarray(t) * 1e9).astype(np.int64)
-        self._arrived.append((ns, np.array(omega_ib_b, dtype=float), np.array(f_ib_b, dtype=float)))
-        finite = np.isfinite(omega_ib_b).all(axis=1) & np.isfinite(f_ib_b).all(axis=1)
-        newest = np.maximum.accumulate(np.concatenate([[self._last_ns], np.where(finite, ns, self._last_ns)]))
-        later = ns > newest[:-1]
-        keep = finite & later
-        self._rejected += int(np.sum(~keep))
-        self._late += int(np.sum(finite & ~later))
-        if keep.any():
-            self._ns.append(ns[keep])
-            self._omega.append(np.array(omega_ib_b, dtype=float)[keep])
-            self._force.append(np.array(f_ib_b, dtype=float)[keep])
-            self._last_ns = int(ns[keep][-1])
-            self._samples += int(keep.sum())
+        self._intake.add_samples(ns, omega_ib_b, f_ib_b)
 
-    def add_phase(self, t: float, dwell: bool, stop: int) -> None:
-        """Take a status of the table that holds from `t` (s after `start_ns`) on."""
-        self._phase.append((self.start_ns + round(t * 1e9), dwell, stop))
+    def add_phase(self, ns: int, dwell: bool, stop: int) -> None:
+        """Take a status of the table that holds from a stamp (ns) on; stop `UNNUMBERED` where it names none."""
+        self._intake.add_status(ns, dwell, stop)
 
-    def add_temperature(self, t: float, value: float) -> None:
-        """Take an IMU temperature (deg C) at `t` (s after `start_ns`)."""
-        if np.isfinite(value):
-            self._temperature.append((self.start_ns + round(t * 1e9), value))
+    def add_temperature(self, ns: int, value: float) -> None:
+        """Take an IMU temperature (deg C) at a stamp (ns)."""
+        self._intake.add_temperature(ns, value)
 
-    def advance(self, until_s: float, status_known: bool = True) -> list[EpochEstimate]:
-        """Process the whole epochs that end at or before `until_s` (s after `start_ns`).
+    @property
+    def next_ns(self) -> int | None:
+        """Stamp (ns) at which the next whole second ends; None while too few samples have come to know the origin."""
+        origin_ns = self._intake.origin_ns
+        return None if origin_ns is None else origin_ns + (self._second + 1) * NS
+
+    def advance(self, until_ns: int, status_known: bool = True, *, final: bool = False) -> list[EpochEstimate]:
+        """Process the whole seconds that end at or before a stamp (ns).
 
         The caller makes sure that all samples, and all status and temperature messages that will come, are in up to
-        then. `status_known` is False when there is no status topic.
+        then. `status_known` is False when there is no status topic. `final` says that no more will come: what the
+        filter still waits for is then taken as it stands.
 
         Returns
         -------
         list of EpochEstimate
-            Empty until the first alignment is possible; then it catches up.
+            Empty while units and signs are not recognised, and until the first alignment; then it catches up. Samples
+            that the filter on the way cannot use (they start in motion) leave it empty, with a note; the end decides.
         """
-        if not self._begin():
+        estimates: list[EpochEstimate] = []
+        while (end_ns := self.next_ns) is not None and end_ns <= until_ns:
+            self._second += 1
+            estimates += self._advance(end_ns, float(self._second), status_known, final=False)
+        origin_ns = self._intake.origin_ns
+        if final and origin_ns is not None:
+            estimates += self._advance(until_ns, (until_ns - origin_ns) * 1e-9, status_known, final=True)
+        return estimates
+
+    def _advance(self, until_ns: int, until_s: float, status_known: bool, final: bool) -> list[EpochEstimate]:
+        origin_ns = self._intake.origin_ns
+        assert origin_ns is not None
+        ns, omega, force = self._intake.due(until_ns)
+        if self._idle:
             return []
-        assert self._reducer is not None
-        assert self._origin_ns is not None
-        for ns, omega, force in zip(
-            self._ns[self._reduced_to :], self._omega[self._reduced_to :], self._force[self._reduced_to :], strict=True
-        ):
-            self._pending.append(self._reducer.add(seconds(ns, self._origin_ns), omega, force))
-        self._reduced_to = len(self._ns)
-        limit = until_s - (self._origin_ns - self.start_ns) * 1e-9
-        self._close_epochs(limit, self._phase_log() if status_known else None)
-        return self._filter()
+        samples = self._reading.read(seconds(ns, origin_ns), omega, force, until_s, final)
+        self.notes += self._reading.notes
+        self._reading.notes = []
+        if samples is None:
+            return []
+        if self._reducer is None:
+            self._reducer = Reducer(self._intake.interval_s)
+            if specification_is_wide(self.setup.imu):
+                self._dwells = GrowingDwells(self._intake.interval_s)
+        self._pending.append(self._reducer.add(*samples))
+        log, decided_s = self._phases(samples, status_known)
+        self._close_epochs(until_s if final else min(until_s, decided_s), log)
+        try:
+            return self._filter()
+        except DataError as error:
+            # The same samples may do at the end, when clocks are compared and the whole test is seen.
+            self.notes.append(f"the filter on the way stops: {error}; the end of the test is calibrated all the same")
+            self._idle, self._pending, self._waiting = True, [], []
+            return []
+
+    def _phases(self, samples: tuple[Floats, Floats, Floats], status_known: bool) -> tuple[PhaseLog | None, float]:
+        """Phases of the table, or as the samples show them, and the time up to which they are decided (s)."""
+        if self._dwells is not None:
+            if not self._intake.has_status:
+                self._dwells.add(*samples)
+                return self._dwells.log()
+            self._dwells = None
+        return (self._intake.phase_log() if status_known else None), np.inf
 
     def finish(self) -> Calibration:
         """Calibrate on everything taken so far; what `sdimu calibrate` says of the same data.
@@ -200,50 +224,18 @@ class LiveCalibration:
         DataError
             When there is too little of it.
         """
-        return calibrate(self.recording(), self.setup.site, self.setup.imu, self.setup.model)
+        test = self.opened()
+        return calibrate(test.recording, test.site or self.setup.site, test.imu, self.setup.model)
 
-    def recording(self) -> Recording:
-        """Everything taken so far."""
-        if not self._ns or sum(map(len, self._ns)) < NOMINAL_FROM + 1:
-            raise DataError("/imu/data_raw: too few samples have come to calibrate")
-        ns, omega, force = (np.concatenate(part) for part in zip(*self._arrived, strict=True))
-        done = arrange(ns, omega, force, "/imu/data_raw")
-        rows = done.rows
-        start = origin_ns(ns[rows])
-        self._origin_ns = start
-        return Recording(
-            start, seconds(ns[rows], start), omega[rows], force[rows], self._phase_log(), self._temperature_log(),
-            rejected=len(ns) - len(rows), notes=done.notes,
-        )  # fmt: skip
+    def opened(self) -> OpenedTest:
+        """Everything taken so far, opened as a recording is.
 
-    def _begin(self) -> bool:
-        """Learn origin and sample interval from the first samples; False while there are too few."""
-        if self._reducer is None:
-            if sum(map(len, self._ns)) < NOMINAL_FROM + 1:
-                return False
-            ns = np.concatenate(self._ns)
-            self._origin_ns = origin_ns(ns)
-            self._nominal_s = nominal_interval_ns(ns) * 1e-9
-            self._reducer = Reducer(self._nominal_s)
-        return True
-
-    def _phase_log(self) -> PhaseLog | None:
-        if not self._phase or self._origin_ns is None:
-            return None
-        entries = sorted(self._phase, key=lambda entry: entry[0])
-        ns = np.array([entry[0] for entry in entries], dtype=np.int64)
-        return PhaseLog(
-            seconds(ns, self._origin_ns),
-            np.array([entry[1] for entry in entries]),
-            np.array([entry[2] for entry in entries], dtype=np.int64),
-        )
-
-    def _temperature_log(self) -> TemperatureLog | None:
-        if not self._temperature or self._origin_ns is None:
-            return None
-        entries = dict(sorted(self._temperature))
-        ns = np.array(list(entries), dtype=np.int64)
-        return TemperatureLog(seconds(ns, self._origin_ns), np.array(list(entries.values())))
+        Raises
+        ------
+        DataError
+            When there is too little of it, or physics does not decide and the user has to.
+        """
+        return open_test(in_order(self._intake.raw()), self.options)
 
     def _close_epochs(self, limit: float, log: PhaseLog | None) -> None:
         """Cut the pending cycles into epochs that end by `limit` and decide their phases."""
@@ -251,7 +243,7 @@ class LiveCalibration:
             return
         cycles = Cycles.concatenate(self._pending)
         whole = cycles[: int(np.searchsorted(cycles.t, limit + 1e-9, side="right"))]
-        epochs = cut(whole, self._nominal_s) if len(whole) else None
+        epochs = cut(whole, self._intake.interval_s) if len(whole) else None
         if epochs is None or not len(epochs):
             self._pending = [cycles]
             return
@@ -283,7 +275,7 @@ class LiveCalibration:
         phases = Phases(
             *(np.concatenate([getattr(w[2], n) for w in self._waiting]) for n in Phases.__dataclass_fields__)
         )
-        if len(epochs) < ALIGN_S and phases.dwell.all():
+        if len(epochs) < ALIGN_S and len(np.unique(phases.dwell)) == 1:
             return False
         self._alignment = first_attitude(epochs, phases, self.setup)
         self._track = self._alignment.C_nb.copy()
@@ -298,7 +290,7 @@ class LiveCalibration:
         rest = np.full(len(part), phases.dwell[k])
         seen = motion(
             part, rest, sensors, np.zeros(len(sensors.prior)), self._track, setup.site.latitude_rad, setup.gravity,
-            self._temperature_log(), predicted=False, before=self._before,
+            self._intake.temperature_log(), predicted=False, before=self._before,
         )  # fmt: skip
         self._before = seen
         one = Phases(*(getattr(phases, n)[k : k + 1] for n in Phases.__dataclass_fields__))
@@ -309,7 +301,7 @@ class LiveCalibration:
             np.zeros(1, dtype=np.int64), np.full(1, len(part), dtype=np.int64),
             *(getattr(epochs, n)[k : k + 1] for n in ("start", "end", "peak_rate", "f_mean", "w_mean")),
         )  # fmt: skip
-        gap = bridges(part, alone, one.dwell, self._nominal_s, self._acceleration, setup.gravity)
+        gap = bridges(part, alone, one.dwell, self._intake.interval_s, self._acceleration, setup.gravity)
         data = PassInput(
             part.dt, part.alpha, part.upsilon, part.coning, part.sculling, alone.first, alone.last,
             gap.white, gap.angle, gap.velocity, kind,
@@ -327,7 +319,8 @@ class LiveCalibration:
 
     def _report(self, epochs: Epochs, phases: Phases, k: int, estimate: Floats) -> EpochEstimate:
         assert self._state is not None
-        assert self._origin_ns is not None
+        origin_ns = self._intake.origin_ns
+        assert origin_ns is not None
         sensors, frame, state = self.setup.sensors, self.setup.model.body_frame, self._state
         p = len(sensors.prior)
         site = self.setup.site
@@ -335,7 +328,7 @@ class LiveCalibration:
         with np.errstate(invalid="ignore"):
             nis = self._nis_sum / self._nis_count
         return EpochEstimate(
-            t=float(epochs.end[k]) + (self._origin_ns - self.start_ns) * 1e-9,
+            ns=origin_ns + round(float(epochs.end[k]) * 1e9), t=float(epochs.end[k]),
             dwell=bool(phases.dwell[k]), used=bool(phases.used[k]), stop=int(phases.stop[k]),
             body_frame=frame, names=sensors.names,
             units=tuple(q.unit for q in sensors.parameters),
@@ -354,7 +347,8 @@ class LiveCalibration:
             verdict=stop_verdict(*self._stop_nis),
             nis={c: float(v) for c, v in zip(NIS_CHANNELS, nis, strict=True) if np.isfinite(v)},
             counts={
-                "samples": self._samples, "late": self._late, "lost": self._lost, "rejected": self._rejected,
+                "samples": self._intake.taken, "late": self._intake.late, "lost": self._lost,
+                "rejected": self._intake.rejected,
                 "contradicted": self._contradicted,
             },
         )  # fmt: skip

@@ -10,6 +10,8 @@ from sdimu_calibration.core.arrays import Bools, Floats, Ints
 
 NOMINAL_FROM = 50
 """Sample intervals that give the nominal one: the first ones, so that live and offline agree."""
+UNNUMBERED = -1
+"""Stop of a phase that has no number: stops are then counted."""
 
 
 class DataError(ValueError):
@@ -53,7 +55,7 @@ class PhaseLog:
     dwell : ndarray of bool, shape (m,)
         True for ``dwell``, False for ``rotating``.
     stop : ndarray of int, shape (m,)
-        Index of the stop.
+        Index of the stop; `UNNUMBERED` where nobody says it.
     """
 
     t: Floats

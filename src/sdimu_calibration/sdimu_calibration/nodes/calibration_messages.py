@@ -71,3 +71,9 @@ def diagnostics(stamp_ns: int, estimate: EpochEstimate) -> DiagnosticArray:
     status = DiagnosticStatus(level=level, name="calibration", message=phase, hardware_id="imu")
     status.values = [KeyValue(key=key, value=value) for key, value in values.items()]
     return DiagnosticArray(header=header(stamp_ns), status=[status])
+
+
+def notice(stamp_ns: int, text: str) -> DiagnosticArray:
+    """Return a note of the calibration that is no estimate, such as what it waits for."""
+    status = DiagnosticStatus(level=DiagnosticStatus.WARN, name="calibration", message=text, hardware_id="imu")
+    return DiagnosticArray(header=header(stamp_ns), status=[status])

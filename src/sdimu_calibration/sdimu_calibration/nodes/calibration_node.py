@@ -1,14 +1,16 @@
 """Node that calibrates while the test runs.
 
 Parameters: site, imu, model (names or paths), add (effects beyond the model's: names, equations or files, as for
-`sdimu calibrate --add`), out (folder for result.json), stay (do not leave at the end of the stream), checkpoint (keep a
-journal in the folder of results; on by default).
+`sdimu calibrate --add`), accel_unit, gyro_unit, accel_sign, gyro_sign (of the messages; recognised when empty or 0),
+imu_topic, status_topic, temperature_topic, out (folder for result.json), stay (do not leave at the end of the stream),
+checkpoint (keep a journal in the folder of results; on by default).
 Subscriptions (remap them at will): /imu/data_raw, /rate_table/status, /imu/temperature. Publications once a second of
 data: /calibration/coefficients, /calibration/covariance, /calibration/navigation, /diagnostics. Services: ~/save
 writes result.json from everything that has come, ~/reset forgets it.
 
-A header stamp decides what happens, never the order of arrival. At the end of the stream the whole test is calibrated
-once more as `sdimu calibrate` does it; the last coefficients and covariance are that result.
+A header stamp decides what happens, never the order of arrival. At the end of the stream the whole test is opened and
+calibrated once more as `sdimu calibrate` does it; the last coefficients and covariance are that result. On the way
+the filter waits until the first turns tell unit and sign of the gyros; with both stated it starts at once.
 
 Samples, status and temperatures go into a journal before they are acknowledged. A node that is started in the folder of
 one that was killed goes on with its journal; what it missed in between is a gap, unless the producer kept it.
@@ -17,6 +19,7 @@ one that was killed goes on with its journal; what it missed in between is a gap
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -29,28 +32,34 @@ from sensor_msgs.msg import Imu, JointState, Temperature
 from std_msgs.msg import Float64MultiArray
 from std_srvs.srv import Trigger
 
-from sdimu_calibration.core.arrays import Floats
-from sdimu_calibration.core.live import EpochEstimate, LiveCalibration
+from sdimu_calibration.core.arrays import Ints
+from sdimu_calibration.core.data.axes_and_units import Stated
+from sdimu_calibration.core.front_door import OpeningOptions
+from sdimu_calibration.core.live import NS, EpochEstimate, LiveCalibration
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.results import Calibration
+from sdimu_calibration.core.specification import Model
 from sdimu_calibration.nodes import calibration_messages as messages
-from sdimu_calibration.nodes.credits import STREAM, Consumer, Producer, publish, to_ns
-from sdimu_calibration.nodes.feed import NS, Feed
+from sdimu_calibration.nodes.credits import STREAM, Consumer, Producer, publish
+from sdimu_calibration.nodes.feed import Feed
 from sdimu_calibration.nodes.listening import Listener
+from sdimu_calibration.nodes.opening_parameters import declare_opening
 from sdimu_calibration.nodes.spinning import run_node
 from sdimu_calibration.nodes.ticking import Ticker
 from sdimu_calibration.report.progress_text import falling, light, sigma_words
-from sdimu_calibration.storage.config import load_imu, load_model, load_site
+from sdimu_calibration.storage.config import load_model
 from sdimu_calibration.storage.effect_file import SUFFIXES, extended_model
 from sdimu_calibration.storage.journal import Journal, digest
 from sdimu_calibration.storage.result_file import write_result
+from sdimu_calibration.storage.status_message import stamp_ns, status_entry
 
-IMU, STATUS, TEMPERATURE = "/imu/data_raw", "/rate_table/status", "/imu/temperature"
 JOURNAL = "calibration.journal"
 BLOCK = 20
 SETTLE_S = 2.0
 FAREWELL_S = 10.0
 GRAVITY = 9.8
+_NEARLY_NS = 1_000
+"""A status this much before the last sample is the one that belongs to it (ns)."""
 
 
 class CalibrationNode:
@@ -60,20 +69,19 @@ class CalibrationNode:
         self.node = Node("calibration")
         self.done = Future()
         declare = self.node.declare_parameter
-        self._site = load_site(str(declare("site", "daejeon").value))
-        self._imu = load_imu(str(declare("imu", "dtg").value))
+        self._options, self._topics = declare_opening(self.node)
         model = str(declare("model", "baseline").value)
         # An empty string keeps the parameter's type when nothing is added.
         added = [str(effect) for effect in declare("add", [""]).value if effect]
         self._model = extended_model(model, added)
         self._out = Path(str(declare("out", ".").value))
         self._stay = bool(declare("stay", False).value)
-        _warm_up(self._make(0))
+        _warm_up(self._options, self._model)
         self._journal: Journal | None = None
         if bool(declare("checkpoint", True).value):
             # The text of an effect file too: its name says little of what it computes.
             texts = [path.read_text() for path in map(Path, added) if path.suffix in SUFFIXES]
-            options = digest(self._site, self._imu, load_model(model), added, texts)
+            options = digest(self._options, load_model(model), added, texts)
             self._journal = Journal(self._out / JOURNAL, options)
         self._feed = Feed(self._make, self._journal)
         resumed = self._feed.resumed_ns
@@ -90,11 +98,11 @@ class CalibrationNode:
         self._diagnostics = node.create_publisher(DiagnosticArray, "/diagnostics", STREAM)
         self._save = node.create_service(Trigger, "~/save", self._answer_save)
         self._reset = node.create_service(Trigger, "~/reset", self._answer_reset)
-        self._stream = Consumer(node, ticker, IMU, every=BLOCK, on_end=self._take_end)
+        self._stream = Consumer(node, ticker, self._topics.imu, every=BLOCK, on_end=self._take_end)
         self._listeners = (
-            Listener(node, ticker, DiagnosticArray, STATUS, self._take_status, late=bool(resumed)),
-            Listener(node, ticker, Temperature, TEMPERATURE, self._take_temperature, late=bool(resumed)),
-            Listener(node, ticker, Imu, IMU, self._take_imu, raw=True, late=bool(resumed)),
+            Listener(node, ticker, DiagnosticArray, self._topics.status, self._take_status, late=bool(resumed)),
+            Listener(node, ticker, Temperature, self._topics.temperature, self._take_temperature, late=bool(resumed)),
+            Listener(node, ticker, Imu, self._topics.imu, self._take_imu, raw=True, late=bool(resumed)),
         )
         if resumed:
             self._catch_up(resumed)
@@ -112,8 +120,8 @@ class CalibrationNode:
         self._stream.reached(resumed_ns, 0)
         self.node.get_logger().info(f"goes on after {count} s from {self._out / JOURNAL}")
 
-    def _make(self, start_ns: int) -> LiveCalibration:
-        return LiveCalibration(self._site, self._imu, self._model, start_ns)
+    def _make(self) -> LiveCalibration:
+        return LiveCalibration(self._options, self._model)
 
     def _take_imu(self, message: bytes) -> None:
         self._feed.take_imu(message)
@@ -121,27 +129,23 @@ class CalibrationNode:
             self._work()
 
     def _take_status(self, message: DiagnosticArray) -> None:
-        if not message.status:
+        entry = status_entry(message)
+        if entry is None:
+            self.node.get_logger().warning(f"{self._topics.status}: a message without a phase is ignored", once=True)
             return
-        status = message.status[0]
-        values = {entry.key: entry.value for entry in status.values}
-        phase, stop = values.get("phase", status.message), values.get("stop", "0")
-        if phase not in {"dwell", "rotating"} or not stop.isdigit():
-            self.node.get_logger().warning(
-                f"{STATUS}: phase '{phase}', stop '{stop}' ignored; expected dwell or rotating, and a number", once=True
-            )
-            return
-        self._feed.take_status(to_ns(message.header.stamp), phase == "dwell", int(stop))
+        self._feed.take_status(*entry)
 
     def _take_temperature(self, message: Temperature) -> None:
-        self._feed.take_temperature(to_ns(message.header.stamp), float(message.temperature))
+        self._feed.take_temperature(stamp_ns(message), float(message.temperature))
 
     def _work(self) -> None:
         """Decode, process, publish, and grant a credit for what has been taken."""
         count = self._feed.waiting
         reached = self._feed.decode()
-        for estimate in self._feed.process(self._published(STATUS), self._published(TEMPERATURE)):
+        published = self._published(self._topics.status), self._published(self._topics.temperature)
+        for estimate in self._feed.process(*published):
             self._publish(estimate)
+        self._tell_notes()
         if reached and count:
             self._stream.reached(reached, count)
 
@@ -150,11 +154,16 @@ class CalibrationNode:
         return bool(self.node.count_publishers(self.node.resolve_topic_name(topic)))
 
     def _publish(self, e: EpochEstimate) -> None:
-        stamp = self._feed.start_ns + round(e.t * NS)
-        self._publish_coefficients(stamp, e.body_frame, e.names, e.coefficients, e.covariance)
-        publish(self._navigation, messages.navigation(stamp, e))
-        publish(self._diagnostics, messages.diagnostics(stamp, e))
+        self._publish_coefficients(e.ns, e.body_frame, e.names, e.coefficients, e.covariance)
+        publish(self._navigation, messages.navigation(e.ns, e))
+        publish(self._diagnostics, messages.diagnostics(e.ns, e))
         self._tell(e)
+
+    def _tell_notes(self) -> None:
+        """Log and publish what the filter on the way waits for, recognised or gave up."""
+        for note in self._feed.notes():
+            self.node.get_logger().warning(note)
+            publish(self._diagnostics, messages.notice(self._feed.imu_ns, note))
 
     def _tell(self, e: EpochEstimate) -> None:
         """Log one line at the end of each stop: how far the sigmas have fallen, and the innovations."""
@@ -177,7 +186,8 @@ class CalibrationNode:
     def _tick(self) -> None:
         self._work()
         if self._ended is not None and self._departed is None:
-            complete = self._feed.status.latest_s is None or self._feed.status.latest_s >= self._feed.imu_s - 1e-6
+            said_ns = self._feed.status.latest_ns
+            complete = said_ns is None or said_ns >= self._feed.imu_ns - _NEARLY_NS
             if complete or time.monotonic() - self._ended > SETTLE_S:
                 self._conclude()
         if self._departed is not None and not self._stay and not self.done.done():
@@ -192,6 +202,7 @@ class CalibrationNode:
         """Calibrate on the whole test, publish that as the last word, and write it."""
         for estimate in self._feed.process(False, False, final=True):
             self._publish(estimate)
+        self._tell_notes()
         self._departed = time.monotonic()
         try:
             result = self._write_result()
@@ -201,7 +212,7 @@ class CalibrationNode:
             if not self.done.done():
                 self.done.set_exception(error)
             return
-        stamp = self._feed.start_ns + round(self._feed.imu_s * NS)
+        stamp = self._feed.imu_ns
         self._publish_coefficients(stamp, result.body_frame, result.names, result.values, result.covariance)
         self._coefficients.end(stamp)
         self._departed = time.monotonic()
@@ -235,12 +246,13 @@ class CalibrationNode:
         return response
 
 
-def _warm_up(live: LiveCalibration) -> None:
+def _warm_up(options: OpeningOptions, model: Model) -> None:
     """Compile, or load from the cache, everything that a test at rest uses."""
-    t: Floats = np.arange(1.0, 401.0) * 0.1
-    live.add_phase(0.0, True, 0)
-    live.add_samples(t, np.full((len(t), 3), 4e-5), np.tile([0.0, 0.0, -GRAVITY], (len(t), 1)))
-    live.advance(float(t[-1]), True)
+    live = LiveCalibration(replace(options, stated=Stated(1.0, 1.0, 1, 1)), model)
+    ns: Ints = np.arange(1, 401) * (NS // 10)
+    live.add_phase(0, True, 0)
+    live.add_samples(ns, np.full((len(ns), 3), 4e-5), np.tile([0.0, 0.0, -GRAVITY], (len(ns), 1)))
+    live.advance(int(ns[-1]), True)
 
 
 def main() -> None:

@@ -11,15 +11,15 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from sdimu_calibration.core.arrays import Bools, Floats
-from sdimu_calibration.core.live import EpochEstimate, LiveCalibration
-from sdimu_calibration.core.recording import NOMINAL_FROM, DataError, origin_ns
+from sdimu_calibration.core.arrays import Bools
+from sdimu_calibration.core.data.intake import NEVER
+from sdimu_calibration.core.live import NS, EpochEstimate, LiveCalibration
+from sdimu_calibration.core.recording import NOMINAL_FROM, DataError
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.nodes.gate import Companion
 from sdimu_calibration.storage.cdr import LayoutError, decode_imu
 from sdimu_calibration.storage.journal import Journal, Samples, Status
 
-NS = 1_000_000_000
 AWAY_S = 600.0
 """Samples that come so long after those of the journal are of another test."""
 _STRANGERS = 10
@@ -29,18 +29,18 @@ _STRANGERS = 10
 class Feed:
     """A live calibration and what waits in front of it.
 
-    Samples enter the filter in steps that end at whole seconds after the origin, so that the counts and
-    estimates published for a second do not depend on how messages arrived.
+    Stamps stay as the messages have them (ns). Samples enter the filter by whole seconds after the origin, so that the
+    counts and estimates published for a second do not depend on how messages arrived.
 
     Parameters
     ----------
     make : callable
-        Makes a `LiveCalibration` from the stamp (ns) from which times count.
+        Makes a `LiveCalibration`.
     journal : Journal, optional
         Where everything is written; what is in it already comes first.
     """
 
-    def __init__(self, make: Callable[[int], LiveCalibration], journal: Journal | None = None) -> None:
+    def __init__(self, make: Callable[[], LiveCalibration], journal: Journal | None = None) -> None:
         self._make = make
         self._journal = journal
         self._known: Samples | None = None
@@ -48,13 +48,10 @@ class Feed:
         self.resumed_ns = 0
         self._raw: list[bytes] = []
         self._statuses: set[tuple[int, bool, int]] = set()
-        self._early: list[tuple[Callable[..., None], tuple[object, ...]]] = []
-        self._blocks: list[tuple[Floats, Floats, Floats]] = []
-        self._live: LiveCalibration | None = None
-        self._step = 1
+        self._live = make()
         self._born = time.monotonic()
-        self.start_ns = 0
-        self.imu_s = 0.0
+        self._first_ns: int | None = None
+        self.imu_ns = NEVER
         self.status = Companion()
         self.temperature = Companion()
         if journal is not None and journal.before:
@@ -124,10 +121,10 @@ class Feed:
         DataError
             When messages are not of type Imu.
         """
-        if self._live is None and len(self._raw) <= NOMINAL_FROM:
+        if self._first_ns is None and len(self._raw) <= NOMINAL_FROM:
             return 0
         if not self._raw:
-            return self.start_ns + round(self.imu_s * NS)
+            return self.imu_ns
         try:
             ns, omega, force = decode_imu(self._raw)
         except LayoutError as error:
@@ -141,25 +138,17 @@ class Feed:
             new = ~self._repeats(samples)
             samples = Samples(ns[new], omega[new], force[new])
             if not new.any():
-                return self.start_ns + round(self.imu_s * NS)
+                return self.imu_ns
         if self._journal is not None:
             self._journal.samples(samples.ns, samples.omega_ib_b, samples.f_ib_b)
         self._keep(samples)
-        return self.start_ns + round(self.imu_s * NS)
+        return self.imu_ns
 
     def _keep(self, samples: Samples) -> None:
-        if self._live is None:
-            self._begin(origin_ns(samples.ns))
-        t: Floats = (samples.ns - self.start_ns).astype(np.float64) * 1e-9
-        self._blocks.append((t, samples.omega_ib_b, samples.f_ib_b))
-        self.imu_s = max(self.imu_s, float(t.max()))
-
-    def _begin(self, start_ns: int) -> None:
-        self.start_ns = start_ns
-        self._live = self._make(start_ns)
-        for action, arguments in self._early:
-            action(*arguments)
-        self._early = []
+        if self._first_ns is None:
+            self._first_ns = int(samples.ns[0])
+        self._live.add_samples(samples.ns, samples.omega_ib_b, samples.f_ib_b)
+        self.imu_ns = max(self.imu_ns, int(samples.ns.max()))
 
     def take_status(self, stamp_ns: int, dwell: bool, stop: int) -> None:
         """Take a status that holds from `stamp_ns` on."""
@@ -170,15 +159,11 @@ class Feed:
         self._note_status(stamp_ns, dwell, stop)
 
     def _note_status(self, stamp_ns: int, dwell: bool, stop: int) -> None:
-        if self._live is None:
-            self._early.append((self._note_status, (stamp_ns, dwell, stop)))
-            return
         if (stamp_ns, dwell, stop) in self._statuses:
             return
         self._statuses.add((stamp_ns, dwell, stop))
-        t = (stamp_ns - self.start_ns) * 1e-9
-        self._live.add_phase(t, dwell, stop)
-        self.status.take(t, time.monotonic())
+        self._live.add_phase(stamp_ns, dwell, stop)
+        self.status.take(stamp_ns, time.monotonic())
 
     def take_temperature(self, stamp_ns: int, value: float) -> None:
         """Take a temperature (deg C)."""
@@ -189,41 +174,30 @@ class Feed:
         self._note_temperature(stamp_ns, value)
 
     def _note_temperature(self, stamp_ns: int, value: float) -> None:
-        if self._live is None:
-            self._early.append((self._note_temperature, (stamp_ns, value)))
-            return
-        t = (stamp_ns - self.start_ns) * 1e-9
-        self._live.add_temperature(t, value)
-        self.temperature.take(t, time.monotonic())
+        self._live.add_temperature(stamp_ns, value)
+        self.temperature.take(stamp_ns, time.monotonic())
 
     def process(
         self, status_published: bool, temperature_published: bool, *, final: bool = False
     ) -> Iterator[EpochEstimate]:
         """Process the whole seconds that samples, status and temperature have passed; all of them when `final`."""
-        if self._live is None:
+        if self._first_ns is None:
             return
         now = time.monotonic()
-        until, known = self.status.allows(self.imu_s, status_published, now, self._born)
-        warm, _ = self.temperature.allows(self.imu_s, temperature_published, now, self._born)
+        until, known = self.status.allows(self._first_ns, self.imu_ns, status_published, now, self._born)
+        warm, _ = self.temperature.allows(self._first_ns, self.imu_ns, temperature_published, now, self._born)
         until = min(until, warm)
         if final:
-            until, known = self.imu_s, self.status.latest_s is not None
-        while self._step <= until + 1e-9:
-            self._hand_over(float(self._step))
-            yield from self._live.advance(float(self._step), known)
-            self._step += 1
+            until, known = self.imu_ns, self.status.latest_ns is not None
+        while (step := self._live.next_ns) is not None and step <= until:
+            yield from self._live.advance(step, known)
+        if final:
+            yield from self._live.advance(until, known, final=True)
 
-    def _hand_over(self, until_s: float) -> None:
-        """Give the calibration the samples up to a time."""
-        assert self._live is not None
-        later = []
-        for t, omega, force in self._blocks:
-            due = t <= until_s + 1e-9
-            if due.any():
-                self._live.add_samples(t[due], omega[due], force[due])
-            if not due.all():
-                later.append((t[~due], omega[~due], force[~due]))
-        self._blocks = later
+    def notes(self) -> list[str]:
+        """Return what is to be told since the last call, such as what the filter waits for."""
+        told, self._live.notes = self._live.notes, []
+        return told
 
     def finish(self) -> Calibration:
         """Calibrate on everything that has come.
@@ -233,8 +207,7 @@ class Feed:
         DataError
             When nothing, or too little, has come.
         """
-        if self._live is None:
+        if self._first_ns is None:
             raise DataError("the IMU topic: no samples have come; is the IMU running and its topic remapped?")
         self.decode()
-        self._hand_over(np.inf)
         return self._live.finish()

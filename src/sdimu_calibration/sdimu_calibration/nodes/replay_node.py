@@ -1,7 +1,8 @@
 """Node that plays a recording: raw messages of the input topics, in the order of their stamps, with credits.
 
-Parameters: bag (path), speed (0 = as fast as credits allow, N = N times real time), consumers (how many must
-have granted a credit before it starts).
+Parameters: bag (path), imu_topic, status_topic, joint_topic, temperature_topic (of the bag; chosen as `sdimu calibrate`
+does when empty; published under the names of the project), speed (0 = as fast as credits allow, N = N times real time),
+consumers (how many must have granted a credit before it starts).
 """
 
 from __future__ import annotations
@@ -20,8 +21,8 @@ from sdimu_calibration.nodes.convert import NS, stamp_of
 from sdimu_calibration.nodes.credits import HISTORY, STREAM, Producer, publish
 from sdimu_calibration.nodes.spinning import run_node
 from sdimu_calibration.nodes.ticking import Ticker
-from sdimu_calibration.storage.bag_file import raw_messages
-from sdimu_calibration.storage.cdr import IMU, JOINT_STATE, STATUS, TEMPERATURE
+from sdimu_calibration.storage.bag_reader import read_messages
+from sdimu_calibration.storage.topic_choice import TopicChoice
 from sdimu_calibration.storage.topics import Topics
 
 WINDOW_SAMPLES = 200
@@ -29,6 +30,10 @@ FAREWELL_S = 20.0
 PEERS_PATIENCE_S = 5.0
 TICK_S = 0.005
 BURST = 400
+_CLASSES: dict[str, type] = {
+    "status": DiagnosticArray, "temperature": Temperature, "joint_states": JointState, "imu": Imu,
+}  # fmt: skip
+"""In the order in which messages of one stamp are sent: a status holds from its stamp on."""
 
 
 class ReplayNode:
@@ -41,18 +46,17 @@ class ReplayNode:
         bag = Path(str(declare("bag", "").value))
         self._speed = float(declare("speed", 0.0).value)
         self._needed = int(declare("consumers", 0).value)
+        asked = [str(declare(f"{kind}_topic", "").value) or None for kind in ("imu", "status", "joint", "temperature")]
+        notes: list[str] = []
+        chosen, raw = read_messages(bag, TopicChoice(*asked), notes)
+        for note in notes:
+            self.node.get_logger().info(note)
         topics = Topics()
-        kinds: dict[str, tuple[str, type]] = {
-            topics.status: (STATUS, DiagnosticArray),
-            topics.temperature: (TEMPERATURE, Temperature),
-            topics.joint_states: (JOINT_STATE, JointState),
-            topics.imu: (IMU, Imu),
-        }
-        found = raw_messages(bag, {topic: kind for topic, (kind, _) in kinds.items()}, topics.imu)
+        found = {getattr(topics, kind): raw.get(getattr(chosen, kind), []) for kind in _CLASSES}
         self._imu_topic = topics.imu
-        self._queue = _merge(found, list(kinds))
+        self._queue = _merge(found, list(found))
         if len(found[topics.imu]) <= NOMINAL_FROM:
-            raise DataError(f"{bag}: topic {topics.imu} has only {len(found[topics.imu])} messages")
+            raise DataError(f"{bag}: topic {chosen.imu} has only {len(found[topics.imu])} messages")
         self._first_ns = self._queue[0][0]
         self._end_ns = max(map(stamp_of, found[topics.imu]))
         self._next = 0
@@ -62,9 +66,9 @@ class ReplayNode:
         window = round(WINDOW_SAMPLES * (self._end_ns - stamp_of(found[topics.imu][0])) / len(found[topics.imu]))
         self._imu = Producer(self.node, Ticker(self.node), Imu, topics.imu, window_ns=window, on_credit=self._pump)
         self._others: dict[str, Any] = {
-            topic: self.node.create_publisher(kinds[topic][1], topic, HISTORY if topic == topics.status else STREAM)
-            for topic, messages in found.items()
-            if topic != topics.imu and messages
+            topic: self.node.create_publisher(kind, topic, HISTORY if topic == topics.status else STREAM)
+            for topic, kind in ((getattr(topics, name), kind) for name, kind in _CLASSES.items())
+            if topic != topics.imu and found[topic]
         }
         self._timer = self.node.create_timer(TICK_S, self._pump)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -12,11 +13,12 @@ import numpy as np
 from rosbags.typesys import Stores, get_typestore
 
 from sdimu_calibration.core.arrays import Floats
-from sdimu_calibration.core.data.arrival import arrange
-from sdimu_calibration.core.recording import PhaseLog, Recording, TableLog, TemperatureLog, origin_ns
+from sdimu_calibration.core.data.arrival import RawStatus, RawTemperature, RawTest, in_order
+from sdimu_calibration.core.recording import Recording, TableLog, seconds
 from sdimu_calibration.storage import cdr
 from sdimu_calibration.storage.bag_file import raw_messages, read_topics
 from sdimu_calibration.storage.cdr import LayoutError, Stamps
+from sdimu_calibration.storage.status_message import phase_word, stamp_ns, status_entry
 from sdimu_calibration.storage.topic_choice import KINDS, TopicChoice, choose
 from sdimu_calibration.storage.topics import Topics
 
@@ -46,30 +48,35 @@ def read_recording(path: Path, topics: Topics | TopicChoice | None = None) -> Re
     """
     path = Path(path)
     notes: list[str] = []
-    topics, raw = _messages(path, topics, notes)
+    topics, raw = read_messages(path, topics, notes)
     ns, omega_ib_b, f_ib_b = _imu(raw[topics.imu])
-    total = len(ns)
-    arranged = arrange(ns, omega_ib_b, f_ib_b, f"{path}: {topics.imu}")
-    notes.extend(arranged.notes)
-    ns, omega_ib_b, f_ib_b = ns[arranged.rows], omega_ib_b[arranged.rows], f_ib_b[arranged.rows]
-    start_ns = origin_ns(ns)
-    return Recording(
-        start_ns=start_ns,
-        t=_seconds(ns, start_ns),
-        omega_ib_b=omega_ib_b,
-        f_ib_b=f_ib_b,
-        phase=_phase(raw.get(topics.status, []), start_ns, topics.status, notes),
-        temperature=_temperature(raw.get(topics.temperature, []), start_ns, topics.temperature, notes),
-        table=_table(raw.get(topics.joint_states, []), start_ns, topics.joint_states, notes),
-        rejected=total - len(ns),
-        notes=tuple(notes),
-    )
+    recording = in_order(
+        RawTest(
+            ns, omega_ib_b, f_ib_b,
+            _status(raw.get(topics.status, []), topics.status, notes), _temperature(raw.get(topics.temperature, [])),
+            f"{path}: {topics.imu}", topics.status, topics.temperature,
+        )
+    )  # fmt: skip
+    table = _table(raw.get(topics.joint_states, []), recording.start_ns, topics.joint_states, notes)
+    return replace(recording, table=table, notes=(*notes, *recording.notes))
 
 
-def _messages(
+def read_messages(
     path: Path, topics: Topics | TopicChoice | None, notes: list[str]
 ) -> tuple[Topics, dict[str, list[bytes]]]:
-    """Read the messages of the topics of the test."""
+    """Read the messages of the topics of a test; `notes` gets what was chosen by type.
+
+    Returns
+    -------
+    topics : Topics
+    messages : dict of str to list of bytes
+        By topic, as recorded (CDR).
+
+    Raises
+    ------
+    DataError
+        When it is not a bag, has no IMU topic, or several topics could be the IMU or the status.
+    """
     if isinstance(topics, Topics):
         wanted = {getattr(topics, kind): type_name for kind, type_name in KINDS.items()}
         return topics, raw_messages(path, wanted, required=topics.imu)
@@ -79,59 +86,28 @@ def _messages(
 
 
 def _is_phase(raw: bytes) -> bool:
-    return _phase_word(_message(raw, cdr.STATUS)) in {"dwell", "rotating"}
+    return phase_word(_message(raw, cdr.STATUS)) in {"dwell", "rotating"}
 
 
-def _phase_word(message: Any) -> str:
-    """Phase in a status, empty when there is none."""
-    if not message.status:
-        return ""
-    values = {entry.key: entry.value for entry in message.status[0].values}
-    return str(values.get("phase") or message.status[0].message).strip().lower()
-
-
-def _phase(raw: list[bytes], start_ns: int, topic: str, notes: list[str]) -> PhaseLog | None:
-    """Phases in the order of their stamps; a message without a phase is ignored."""
-    parsed = [entry for entry in map(_status, raw) if entry is not None]
+def _status(raw: list[bytes], topic: str, notes: list[str]) -> RawStatus | None:
+    """Phases in the order of arrival; a message without a phase is ignored."""
+    parsed = [entry for entry in (status_entry(_message(data, cdr.STATUS)) for data in raw) if entry is not None]
     if len(parsed) < len(raw):
         notes.append(f"{len(raw) - len(parsed)} messages of {topic} had no phase and were ignored")
     if not parsed:
         return None
-    ns = np.array([entry[0] for entry in parsed], np.int64)
-    order = np.argsort(ns, kind="stable")
-    dwell = np.array([entry[1] for entry in parsed])[order]
-    counted = np.cumsum(dwell & ~np.concatenate([[False], dwell[:-1]])) - 1
-    said = np.array([-1 if entry[2] is None else entry[2] for entry in parsed])[order]
-    if (said < 0).any():
-        notes.append(f"{topic} does not always say the stop: stops are counted from the dwells")
-        said = np.maximum(counted, 0)
-    return PhaseLog(_seconds(ns[order], start_ns), dwell, said.astype(np.int64))
+    ns, dwell, stop = zip(*parsed, strict=True)
+    return RawStatus(np.array(ns, np.int64), np.array(dwell), np.array(stop, np.int64))
 
 
-def _status(raw: bytes) -> tuple[int, bool, int | None] | None:
-    """Stamp (ns), True for dwell, stop; None without a phase. A phase of any other name is no dwell."""
-    message = _message(raw, cdr.STATUS)
-    phase = _phase_word(message)
-    if not phase:
-        return None
-    values = {entry.key: entry.value for entry in message.status[0].values}
-    stop = values.get("stop", "").strip()
-    return _stamp(message), phase == "dwell", int(stop) if stop.isdecimal() else None
-
-
-def _temperature(raw: list[bytes], start_ns: int, topic: str, notes: list[str]) -> TemperatureLog | None:
+def _temperature(raw: list[bytes]) -> RawTemperature | None:
     if not raw:
         return None
     try:
         ns, values = cdr.decode_doubles(raw, 2)
-        value = values[:, 0]
+        return RawTemperature(ns, values[:, 0])
     except LayoutError:
-        ns, value = _one_by_one(raw, cdr.TEMPERATURE, lambda message: message.temperature)
-    chosen = np.flatnonzero(np.isfinite(value))
-    if len(chosen) < len(value):
-        notes.append(f"{len(value) - len(chosen)} temperatures of {topic} were not finite and were dropped")
-    chosen = chosen[np.unique(ns[chosen], return_index=True)[1]]
-    return TemperatureLog(_seconds(ns[chosen], start_ns), value[chosen]) if len(chosen) else None
+        return RawTemperature(*_one_by_one(raw, cdr.TEMPERATURE, lambda message: message.temperature))
 
 
 def _table(raw: list[bytes], start_ns: int, topic: str, notes: list[str]) -> TableLog | None:
@@ -151,7 +127,7 @@ def _table(raw: list[bytes], start_ns: int, topic: str, notes: list[str]) -> Tab
         notes.append(f"{topic} has no angle for every axis and was ignored")
         return None
     _, chosen = np.unique(ns, return_index=True)
-    return TableLog(_seconds(ns[chosen], start_ns), names, angle[chosen])
+    return TableLog(seconds(ns[chosen], start_ns), names, angle[chosen])
 
 
 def _imu(raw: list[bytes]) -> tuple[Stamps, Floats, Floats]:
@@ -170,16 +146,8 @@ def _imu_values(message: Any) -> list[float]:
 def _one_by_one(raw: list[bytes], type_name: str, values: Callable[[Any], Any]) -> tuple[Stamps, Floats]:
     """Decode messages that share no layout; slow, and right for every encoding rosbags knows."""
     messages = [_message(data, type_name) for data in raw]
-    stamps = np.array([_stamp(message) for message in messages], np.int64)
+    stamps = np.array([stamp_ns(message) for message in messages], np.int64)
     return stamps, np.array([values(message) for message in messages], float)
-
-
-def _seconds(ns: Stamps, start_ns: int) -> Floats:
-    return np.asarray((ns - start_ns) * 1e-9, np.float64)
-
-
-def _stamp(message: Any) -> int:
-    return int(message.header.stamp.sec) * 1_000_000_000 + int(message.header.stamp.nanosec)
 
 
 def _message(raw: bytes, type_name: str) -> Any:

@@ -49,7 +49,10 @@ def run(
             "mount_max_deg": mount_max, "effects": list(simulated_effects(effect or ())),
             "temperature": temperature or "", "truth_file": str(out / "truth.yaml"),
         },
-        "calibration": {"site": site, "imu": imu, "model": model, "out": str(out)},
+        # What the simulated gyros send is known, so the filter on the way need not wait for a turn.
+        "calibration": {
+            "site": site, "imu": imu, "model": model, "out": str(out), "gyro_unit": "rad/s", "gyro_sign": 1,
+        },
     }  # fmt: skip
     duration = _check(options)
     console = make_console()

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sdimu_calibration.core.data.dwell_detection import detected_dwells, with_detected_dwells
+from sdimu_calibration.core.data.dwell_detection import GrowingDwells, detected_dwells, with_detected_dwells
 from sdimu_calibration.core.data.phases import rest_limits
 from sdimu_calibration.core.plan import Plan
 from sdimu_calibration.storage.config import load_imu, load_plan, load_site
@@ -43,3 +43,26 @@ def test_an_imu_that_never_rests_has_no_dwells():
     r, _ = generate(Scenario(HURRIED, DTG, load_site("daejeon"), rate_hz=20.0, seed=86))
     phase = 2.0 * np.pi * r.t[:, None] * [0.31, 0.47, 0.53] + rng.uniform(0.0, 6.0, 3)
     assert detected_dwells(replace(r, omega_ib_b=np.sin(phase), phase=None)) is None
+
+
+@pytest.mark.parametrize("seed", [81, 82])
+@pytest.mark.parametrize("block_s", [1.0, 7.3])
+def test_a_test_that_goes_on_knows_its_dwells_a_few_seconds_later(seed, block_s):
+    r, _ = generate(Scenario(HURRIED, MEMS, load_site("daejeon"), rate_hz=20.0, seed=seed))
+    growing, decided, found, at = GrowingDwells(0.05), 0.0, [], 0
+    for until in np.arange(block_s, r.t[-1], block_s):
+        rows = slice(at, int(np.searchsorted(r.t, until + 1e-9)))
+        at = rows.stop
+        growing.add(r.t[rows], r.omega_ib_b[rows], r.f_ib_b[rows])
+        log, limit = growing.log()
+        assert until - 4.0 < limit <= until or until < 4.0
+        if log is not None and limit > decided:
+            now = (log.t >= decided) & (log.t < limit)
+            found += list(zip(log.t[now], log.dwell[now], strict=True))
+            decided = limit
+    t, dwell = map(np.array, zip(*found, strict=True))
+    assert (np.diff(t) > 0.0).all()
+    said = r.phase.dwell[np.searchsorted(r.phase.t, t, side="right") - 1]
+    # What is called rest is rest; to each side of a turn a window is given away, and the seconds it takes to decide.
+    assert not (dwell & ~said).any()
+    assert (said & ~dwell).sum() * np.median(np.diff(t)) < 2 * 1.5 * len(HURRIED.turns)

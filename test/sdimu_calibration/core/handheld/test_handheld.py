@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
+from sdimu_calibration.core.data.static_detection import hides_earth_rate
 from sdimu_calibration.core.estimation.outcome import calibrate
-from sdimu_calibration.core.handheld.handheld import hides_earth_rate
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.specification import ImuSpecification, Model
 from sdimu_calibration.core.units import STANDARD_GRAVITY, to_si

@@ -1,19 +1,30 @@
 """From samples as they arrive to samples in the order of their stamps, every stamp once, every number finite.
 
-Reader and live node use this one function, so that a bag and the node that recorded it work on the same samples.
+Reader and live node use `in_order`, so that a bag and the node that recorded it work on the same samples; there, and
+nowhere else, stamps (ns) become the seconds of a recording.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from sdimu_calibration.core.arrays import Floats, Ints
-from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.arrays import Bools, Floats, Ints
+from sdimu_calibration.core.recording import (
+    UNNUMBERED,
+    DataError,
+    PhaseLog,
+    Recording,
+    TemperatureLog,
+    origin_ns,
+    seconds,
+)
 
 Stamps = Ints
 
+IMU_TOPIC, STATUS_TOPIC, TEMPERATURE_TOPIC = "/imu/data_raw", "/rate_table/status", "/imu/temperature"
 _MINIMUM_SAMPLES = 2
 _SAME_TIME = 0.5
 """Two samples nearer than this many intervals are of the same time."""
@@ -22,6 +33,49 @@ _OVERLAP = 3
 
 _WRONG_STAMPS = 0.2
 """Share of samples with the stamp of another reading from which the other stamps are no times of samples either."""
+
+
+class RawStatus(NamedTuple):
+    """Status messages: stamps (m,) ns, dwell (m,) bool, stop (m,) int (`UNNUMBERED` where the message names none)."""
+
+    ns: Ints
+    dwell: Bools
+    stop: Ints
+
+
+class RawTemperature(NamedTuple):
+    """Temperatures: stamps (m,) ns, value (m,) deg C."""
+
+    ns: Ints
+    value: Floats
+
+
+@dataclass(frozen=True)
+class RawTest:
+    """What the topics of a test brought, in the order of arrival.
+
+    Attributes
+    ----------
+    ns : ndarray of int, shape (n,)
+        header.stamp of the samples (ns).
+    omega_ib_b, f_ib_b : ndarray, shape (n, 3)
+        Body rate and specific force, in the unit and sign of the messages.
+    status : RawStatus or None
+    temperature : RawTemperature or None
+    where : str
+        File and topic of the IMU, for errors.
+    status_topic, temperature_topic : str
+        For notes.
+    """
+
+    ns: Ints
+    omega_ib_b: Floats
+    f_ib_b: Floats
+    status: RawStatus | None = None
+    temperature: RawTemperature | None = None
+    where: str = IMU_TOPIC
+    status_topic: str = STATUS_TOPIC
+    temperature_topic: str = TEMPERATURE_TOPIC
 
 
 @dataclass(frozen=True)
@@ -118,3 +172,44 @@ def _refuse_clock_set_back(ns: Stamps, omega_ib_b: Floats, f_ib_b: Floats, where
             f"({(ns[first] - ns[0]) * 1e-9:.1f} s after the start), so stamps mean two times; cut the recording there, "
             "or correct its stamps"
         )
+
+
+def in_order(raw: RawTest) -> Recording:
+    """Order samples and logs by their stamps and count seconds from one nominal interval before the first sample.
+
+    Raises
+    ------
+    DataError
+        When no sample can be used, or the clock of the stamps was set back.
+    """
+    arranged = arrange(raw.ns, raw.omega_ib_b, raw.f_ib_b, raw.where)
+    rows, notes = arranged.rows, [*arranged.notes]
+    start_ns = origin_ns(raw.ns[rows])
+    return Recording(
+        start_ns=start_ns, t=seconds(raw.ns[rows], start_ns),
+        omega_ib_b=raw.omega_ib_b[rows], f_ib_b=raw.f_ib_b[rows],
+        phase=_phase(raw, start_ns, notes), temperature=_temperature(raw, start_ns, notes),
+        rejected=len(raw.ns) - len(rows), notes=tuple(notes),
+    )  # fmt: skip
+
+
+def _phase(raw: RawTest, start_ns: int, notes: list[str]) -> PhaseLog | None:
+    if raw.status is None or not len(raw.status.ns):
+        return None
+    order = np.argsort(raw.status.ns, kind="stable")
+    dwell, stop = raw.status.dwell[order], raw.status.stop[order]
+    if (stop == UNNUMBERED).any():
+        notes.append(f"{raw.status_topic} does not always say the stop: stops are counted from the dwells")
+        stop = np.maximum(np.cumsum(dwell & ~np.concatenate([[False], dwell[:-1]])) - 1, 0)
+    return PhaseLog(seconds(raw.status.ns[order], start_ns), dwell, stop.astype(np.int64))
+
+
+def _temperature(raw: RawTest, start_ns: int, notes: list[str]) -> TemperatureLog | None:
+    if raw.temperature is None:
+        return None
+    ns, value = raw.temperature
+    chosen = np.flatnonzero(np.isfinite(value))
+    if len(chosen) < len(value):
+        notes.append(f"{len(value) - len(chosen)} temperatures of {raw.temperature_topic} were not finite and dropped")
+    chosen = chosen[np.unique(ns[chosen], return_index=True)[1]]
+    return TemperatureLog(seconds(ns[chosen], start_ns), value[chosen]) if len(chosen) else None

@@ -77,11 +77,14 @@ class Reading:
         Factors, with sign.
     notes : tuple of str
         What was recognised and is not what the message says, one line each; empty for SI of the usual sense.
+    turned : bool
+        The turns decided; False where no turn changes the direction of gravity.
     """
 
     accel: float
     gyro: float
     notes: tuple[str, ...]
+    turned: bool = True
 
 
 def recognise(t: Floats, w: Floats, f: Floats, stated: Stated) -> Reading:
@@ -105,8 +108,8 @@ def recognise(t: Floats, w: Floats, f: Floats, stated: Stated) -> Reading:
         When physics contradicts what was stated, or does not decide.
     """
     accel, notes = _accel_unit(f, stated)
-    gyro, more = _gyro_reading(t, w, f, stated)
-    return Reading(accel * (stated.accel_sign or 1), gyro, (*notes, *more))
+    gyro, more, turned_enough = _gyro_reading(t, w, f, stated)
+    return Reading(accel * (stated.accel_sign or 1), gyro, (*notes, *more), turned_enough)
 
 
 def _accel_unit(f: Floats, stated: Stated) -> tuple[float, tuple[str, ...]]:
@@ -137,8 +140,8 @@ def _is_gravity(size: float) -> bool:
     return abs(size / STANDARD_GRAVITY - 1.0) < _NEAR_GRAVITY
 
 
-def _gyro_reading(t: Floats, w: Floats, f: Floats, stated: Stated) -> tuple[float, tuple[str, ...]]:
-    """Recognise the factor of the gyros from the turns."""
+def _gyro_reading(t: Floats, w: Floats, f: Floats, stated: Stated) -> tuple[float, tuple[str, ...], bool]:
+    """Recognise the factor of the gyros from the turns; also return whether there were any."""
     units = (1.0, DEGREE) if stated.gyro is None else (stated.gyro,)
     signs = (1.0, -1.0) if stated.gyro_sign is None else (float(stated.gyro_sign),)
     readings = [unit * sign for unit in units for sign in signs]
@@ -153,10 +156,11 @@ def _gyro_reading(t: Floats, w: Floats, f: Floats, stated: Stated) -> tuple[floa
         best = now.best()
         if best is not None:
             now.check_axes(best)
-            return best, _told(best, stated)
+            return best, _told(best, stated), True
         seen = seen or now
     if seen is None:
-        return readings[0], ("no turn changes the direction of gravity: unit and sense of the gyros are not checked",)
+        note = "no turn changes the direction of gravity: unit and sense of the gyros are not checked"
+        return readings[0], (note,), False
     raise DataError(seen.undecided(stated))
 
 

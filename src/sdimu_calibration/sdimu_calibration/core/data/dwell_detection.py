@@ -12,9 +12,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from sdimu_calibration.core.arrays import Bools, Floats, Ints
 from sdimu_calibration.core.data.phases import rest_limits
-from sdimu_calibration.core.data.windows import cut_windows
-from sdimu_calibration.core.recording import PhaseLog, Recording
+from sdimu_calibration.core.data.windows import Windows, cut_windows, runs, samples_of
+from sdimu_calibration.core.recording import UNNUMBERED, PhaseLog, Recording
 from sdimu_calibration.core.specification import ImuSpecification
 
 _WIDE = float(np.radians(0.1))
@@ -22,6 +23,17 @@ _WIDE = float(np.radians(0.1))
 _WINDOW_S = 0.5
 _SHORTEST_S = 2.0
 """Rests that are shorter are a part of the turn."""
+_REMEMBERED = 4096
+"""Windows from which a running test learns noise and usual reading: half an hour and more."""
+_BEGIN = 6
+"""Windows at the beginning of a running test that are taken for rest: three seconds."""
+_FEWEST_CALM = 20
+"""Windows at rest from which noise is learned to a fifth: ten seconds."""
+
+
+def specification_is_wide(imu: ImuSpecification) -> bool:
+    """Whether bias and noise of the specification allow readings like those of a turn."""
+    return rest_limits(imu).rate > _WIDE
 
 
 def with_detected_dwells(recording: Recording, imu: ImuSpecification) -> Recording:
@@ -32,7 +44,7 @@ def with_detected_dwells(recording: Recording, imu: ImuSpecification) -> Recordi
     Recording
         The same object when nothing is to be done; else with a note.
     """
-    if recording.phase is not None or rest_limits(imu).rate <= _WIDE:
+    if recording.phase is not None or not specification_is_wide(imu):
         return recording
     log = detected_dwells(recording)
     if log is None:
@@ -47,20 +59,82 @@ def with_detected_dwells(recording: Recording, imu: ImuSpecification) -> Recordi
 def detected_dwells(recording: Recording) -> PhaseLog | None:
     """Find the dwells from the samples; None when there are none."""
     windows = cut_windows(recording.t, recording.omega_ib_b, recording.f_ib_b, _WINDOW_S)
-    if not len(windows):
-        return None
-    still = windows.still
+    log = _dwells(windows, windows.still)
+    return log if log.dwell.any() else None
+
+
+def _dwells(windows: Windows, still: Bools) -> PhaseLog:
+    """Phase of each window from those that are still (k,)."""
     # Motion that fills a part of a window only is not always seen in it: its neighbours count as motion too.
     moving = ~still
     moving[1:] |= ~still[:-1]
     moving[:-1] |= ~still[1:]
-    edges = np.flatnonzero(np.diff(np.concatenate([[True], moving, [True]]).astype(np.int64)))
     dwell = np.zeros(len(still), dtype=bool)
     stop = np.zeros(len(still), dtype=np.int64)
     count = 0
-    for first, last in edges.reshape(-1, 2):
+    for first, last in zip(*runs(~moving), strict=True):
         if windows.end[last - 1] - windows.start[first] >= _SHORTEST_S:
             dwell[first:last] = True
             stop[first:] = count
             count += 1
-    return PhaseLog(windows.start, dwell, stop) if count else None
+    return PhaseLog(windows.start, dwell, stop)
+
+
+class GrowingDwells:
+    """The dwells of a test that is still going on, from the samples so far.
+
+    The test begins at rest, or the filter on the way has no attitude to begin with: the first windows show the usual
+    reading of the gyros and its noise, later on all that were called rest. Half of the windows so far, the measure of a
+    whole recording, may be one long turn. Only the last `_REMEMBERED` windows are kept, so that work and memory stay
+    bounded.
+
+    Parameters
+    ----------
+    interval_s : float
+        Nominal interval of the samples.
+    """
+
+    def __init__(self, interval_s: float) -> None:
+        self._interval_s = interval_s
+        self._length, self._side = samples_of(_WINDOW_S, interval_s)
+        self._rest = (np.empty(0), np.empty((0, 3)), np.empty((0, 3)))
+        self._windows: Windows | None = None
+        self._calm = np.zeros(0, dtype=bool)
+        """Windows that were called rest when they were decided."""
+        self._decided_s = -np.inf
+
+    def add(self, t: Floats, omega_ib_b: Floats, f_ib_b: Floats) -> None:
+        """Take samples: time (n,) s, ascending, rate and force (n, 3) in SI."""
+        t, w, f = (np.concatenate(pair) for pair in zip(self._rest, (t, omega_ib_b, f_ib_b), strict=True))
+        # `cut_windows` leaves out the first of its windows, and here the first of each piece is the last one before it.
+        whole = max((len(t) - self._side) // self._length - 1, 0)
+        if whole:
+            found = cut_windows(t, w, f, _WINDOW_S, self._interval_s)
+            joined = found if self._windows is None else self._windows.followed_by(found)
+            self._windows = joined[-_REMEMBERED:]
+            self._calm = np.concatenate([self._calm, np.zeros(len(found), dtype=bool)])[-_REMEMBERED:]
+        kept = slice(whole * self._length, None)
+        self._rest = (t[kept], w[kept], f[kept])
+
+    def log(self) -> tuple[PhaseLog | None, float]:
+        """Phases so far without numbers of stops, and the time (s) up to which they are decided."""
+        if self._windows is None or not len(self._windows):
+            return None, 0.0
+        windows = self._windows
+        calm = self._calm
+        if calm.sum() < _FEWEST_CALM:
+            calm = windows.still_as(np.arange(len(windows)) < _BEGIN)
+        found = _dwells(windows, windows.still_as(calm))
+        # The last window may count as motion of the next; a rest must last until it counts as a dwell.
+        last = len(windows) - 1
+        while last > 0 and not found.dwell[last - 1] and windows.end[-1] - found.t[last - 1] < _SHORTEST_S + _WINDOW_S:
+            last -= 1
+        decided_s = max(self._decided_s, float(found.t[last]))
+        new = (found.t >= self._decided_s) & (found.t < decided_s)
+        self._calm[new] = found.dwell[new]
+        self._decided_s = decided_s
+        return PhaseLog(found.t, self._calm | (found.dwell & (found.t >= decided_s)), _unnumbered(found)), decided_s
+
+
+def _unnumbered(log: PhaseLog) -> Ints:
+    return np.full(len(log.t), UNNUMBERED, dtype=np.int64)

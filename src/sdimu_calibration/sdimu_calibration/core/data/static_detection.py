@@ -15,8 +15,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sdimu_calibration.core import earth
 from sdimu_calibration.core.arrays import Bools, Floats, Ints
+from sdimu_calibration.core.data.windows import runs
 from sdimu_calibration.core.recording import DataError, Recording
+from sdimu_calibration.core.specification import ImuSpecification
 
 WINDOW_S = 0.3
 """Length of a window (s): shorter than any rest worth having, longer than a swing of a trembling hand (0.1 s)."""
@@ -28,6 +31,10 @@ _SCATTER = 4.0
 """Scatter (variance) of rest, as a multiple of that of the quietest windows."""
 _DRIFT = np.radians(1.0)
 """Mean rates at rest may differ by so much (rad/s): what gravity and warmth do to the bias of a cheap gyro."""
+_HOLE = 3.0
+"""Sample intervals between two samples in which a hand may have moved."""
+_EARTH_SEEN = 3.0
+"""Sigmas of the gyros' white noise in a rest from which the Earth's rate is seen in it."""
 _BLOCK_S = 0.5
 """Noise is learned from the differences of means over so much (s): slow enough for what a filter in the sensor does."""
 
@@ -66,14 +73,7 @@ def detect_static(recording: Recording) -> StaticIntervals:
     width = max(round(WINDOW_S / dt), 4)
     if len(recording.t) < 10 * width:
         raise DataError(f"/imu/data_raw: {recording.t[-1]:.1f} s are too short to find rests in")
-    mean, rate_scatter = _moving(recording.omega_ib_b, width)
-    _, force_scatter = _moving(recording.f_ib_b, width)
-    still = _like_the_quietest(rate_scatter, recording.omega_ib_b) & _like_the_quietest(force_scatter, recording.f_ib_b)
-    if still.any():
-        still &= np.max(np.abs(mean - np.median(mean[still], axis=0)), axis=1) < _DRIFT
-    # A hole in the samples is no rest: nobody saw what happened in it.
-    holes = np.convolve(np.diff(recording.t, prepend=0.0) > 3.0 * dt, np.ones(width), mode="same")[: len(still)] > 0
-    first, last = _runs(still & ~holes)
+    first, last = runs(still_samples(recording, width, _DRIFT, _HOLE))
     long = last - first >= max(round(SHORTEST_S / dt), 3)
     if not long.any():
         raise DataError("/imu/data_raw: no rest of half a second was found: put the IMU down between the turns")
@@ -83,16 +83,62 @@ def detect_static(recording: Recording) -> StaticIntervals:
     )
 
 
+def hides_earth_rate(recording: Recording, imu: ImuSpecification) -> bool:
+    """Decide whether navigation has nothing to hold on to because a rest does not show the Earth's rate.
+
+    It does not when the gyros' white noise in the usual rest, specified or learned, exceeds a third of it.
+    """
+    if _EARTH_SEEN * imu.gyro_white_noise < earth.RATE:  # seen within a second: no need to look at the samples
+        return False
+    try:
+        rests = detect_static(recording)
+    except DataError:
+        return False
+    usual = float(np.median(rests.last - rests.first)) * recording.interval_s
+    return bool(_EARTH_SEEN * max(imu.gyro_white_noise, rests.gyro_white_noise) / np.sqrt(usual) > earth.RATE)
+
+
+def still_samples(recording: Recording, width: int, turning: float, hole: float) -> Bools:
+    """Find the samples about which the IMU rests.
+
+    Parameters
+    ----------
+    recording : Recording
+    width : int
+        Samples of the window about each: it rests when both triads scatter as they do in the quietest windows, and the
+        mean rate is that of all windows at rest.
+    turning : float
+        Deviation of the mean rate that is a turn (rad/s).
+    hole : float
+        Sample intervals between two samples from which nobody knows what happened between them.
+
+    Returns
+    -------
+    ndarray of bool, shape (n,)
+        False for half a window at both ends of the recording and to both sides of a hole.
+    """
+    mean, rate_scatter = _moving(recording.omega_ib_b, width)
+    _, force_scatter = _moving(recording.f_ib_b, width)
+    still = _like_the_quietest(rate_scatter, recording.omega_ib_b) & _like_the_quietest(force_scatter, recording.f_ib_b)
+    if still.any():
+        still &= np.max(np.abs(mean - np.median(mean[still], axis=0)), axis=1) < turning
+    apart = np.diff(recording.t, prepend=0.0) > hole * recording.interval_s
+    return still & ~(np.convolve(apart, np.ones(width), mode="same")[: len(still)] > 0)
+
+
 def _moving(values: Floats, width: int) -> tuple[Floats, Floats]:
     """Mean (n, 3) and summed variance (n,) over the window about each sample; infinite scatter near the ends."""
-    centred = values - np.median(values, axis=0)
-    total = np.vstack([np.zeros((1, 6)), np.cumsum(np.hstack([centred, centred**2]), axis=0)])
-    window = (total[width:] - total[:-width]) / width
     mean = np.zeros_like(values)
     scatter = np.full(len(values), np.inf)
-    at = slice(width // 2, width // 2 + len(window))
-    mean[at] = window[:, :3] + np.median(values, axis=0)
-    scatter[at] = np.sum(window[:, 3:] - window[:, :3] ** 2, axis=1)
+    at = slice(width // 2, width // 2 + len(values) - width + 1)
+    scatter[at] = 0.0
+    # One axis after the other: a recording of noise may last for days.
+    for axis, x in enumerate(values.T):
+        middle = np.median(x)
+        total, squares = (np.concatenate([[0.0], np.cumsum((x - middle) ** power)]) for power in (1, 2))
+        within = (total[width:] - total[:-width]) / width
+        mean[at, axis] = within + middle
+        scatter[at] += (squares[width:] - squares[:-width]) / width - within**2
     return mean, scatter
 
 
@@ -102,12 +148,6 @@ def _like_the_quietest(scatter: Floats, values: Floats) -> Bools:
     resolution = np.array([np.min(s[s > 0.0], initial=np.inf) for s in steps.T])
     floor = float(np.sum(np.where(np.isfinite(resolution), resolution, 0.0) ** 2) / 12.0)
     return np.asarray(scatter <= max(_SCATTER * float(np.quantile(scatter, _QUIETEST)), floor))
-
-
-def _runs(flags: Bools) -> tuple[Ints, Ints]:
-    """First of each run of True, and one after its last."""
-    edges = np.diff(np.concatenate([[0], flags.astype(np.int64), [0]]))
-    return np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
 
 
 def _density(values: Floats, first: Ints, last: Ints, dt: float) -> float:

@@ -6,6 +6,7 @@ Nothing but `Windows.still` needs to know units or signs: it is what they are re
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -63,6 +64,17 @@ class Windows:
         """Return the number of windows."""
         return len(self.first)
 
+    def __getitem__(self, rows: slice) -> Windows:
+        """Return the windows of a slice."""
+        return self._with({name: getattr(self, name)[rows] for name in _ROWS})
+
+    def followed_by(self, later: Windows) -> Windows:
+        """Return both, of one recording in two pieces; `first` counts from the beginning of each piece."""
+        return self._with({name: np.concatenate([getattr(self, name), getattr(later, name)]) for name in _ROWS})
+
+    def _with(self, columns: dict[str, Any]) -> Windows:
+        return Windows(length=self.length, interval_s=self.interval_s, **columns)
+
     @property
     def swing(self) -> Floats:
         """Angle between the directions at the edges (rad), shape (k,)."""
@@ -79,23 +91,36 @@ class Windows:
         """Reading of the gyros when nothing turns, shape (3,)."""
         return np.asarray(np.median(self.w_mean[self.quiet], axis=0)) if len(self) else np.zeros(3)
 
-
     @property
     def still(self) -> Bools:
         """Windows at rest: the gyros read what they usually do, but for noise and Earth; the force does not turn."""
-        if not len(self):
-            return np.zeros(0, dtype=bool)
-        quiet = self.quiet
+        return self.still_as(self.quiet)
+
+    def still_as(self, quiet: Bools) -> Bools:
+        """Windows at rest, shape (k,); those of `quiet` (k,) show the usual reading of the gyros and its noise."""
+        if not quiet.any():
+            return np.zeros(len(self), dtype=bool)
         steps = np.diff(self.w_mean, axis=0)[quiet[1:] & quiet[:-1]]
         noise = _MAD * np.median(np.abs(steps), axis=0) / np.sqrt(2.0) if len(steps) else np.zeros(3)
         usual = _MAD * float(np.median(self.swing[quiet]))
         limit = np.minimum(_TURNING_EARTH * earth.RATE + _REST * noise, _MOVING)
-        still = (np.abs(self.w_mean - self.rate_offset) < limit).all(axis=1)
+        still = (np.abs(self.w_mean - np.median(self.w_mean[quiet], axis=0)) < limit).all(axis=1)
         earth_turn = self.length * self.interval_s * _TURNING_EARTH * earth.RATE
         return np.asarray(still & (self.swing < _REST * usual + earth_turn))
 
 
-def cut_windows(t: Floats, w: Floats, f: Floats, length_s: float = WINDOW_S) -> Windows:
+_ROWS = ("start", "end", "first", "up_first", "up_last", "w_mean", "f_mean")
+
+
+def runs(flags: Bools) -> tuple[Ints, Ints]:
+    """First of each run of True, and one after its last."""
+    edges = np.diff(np.concatenate([[0], flags.astype(np.int64), [0]]))
+    return np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
+
+
+def cut_windows(
+    t: Floats, w: Floats, f: Floats, length_s: float = WINDOW_S, interval_s: float | None = None
+) -> Windows:
     """Cut a recording into windows.
 
     Parameters
@@ -106,10 +131,11 @@ def cut_windows(t: Floats, w: Floats, f: Floats, length_s: float = WINDOW_S) -> 
         Body rate and specific force in any unit and sign.
     length_s : float
         Of a window, to a factor of the root of two.
+    interval_s : float, optional
+        Of the samples; by default the median of their stamps' differences.
     """
-    dt = float(np.median(np.diff(t)))
-    m = int(2 ** max(round(float(np.log2(length_s / dt))), 0))
-    q = max(m // _END, 1)
+    dt = interval_s or float(np.median(np.diff(t)))
+    m, q = samples_of(length_s, dt)
     first = np.arange(m, len(t) - m - q + 1, m)
     whole = t[np.minimum(first + m + q, len(t)) - 1] - t[first - q] < _GAP * (m + 2 * q) * dt
     first = first[whole]
@@ -124,6 +150,12 @@ def cut_windows(t: Floats, w: Floats, f: Floats, length_s: float = WINDOW_S) -> 
         up_last=_unit(mean(total_f, f, first + m - q, first + m + q)),
         w_mean=mean(total_w, w, first, first + m), f_mean=mean(total_f, f, first, first + m),
     )  # fmt: skip
+
+
+def samples_of(length_s: float, interval_s: float) -> tuple[int, int]:
+    """Return the samples of a window (a power of two) and those to each side of an edge that give the direction."""
+    m = int(2 ** max(round(float(np.log2(length_s / interval_s))), 0))
+    return m, max(m // _END, 1)
 
 
 def turned(w: Floats, windows: Windows, chosen: Ints, factor: float) -> Floats:

@@ -22,6 +22,7 @@ from sdimu_calibration.core.alignment.prepared import PreparedData, TestSetup, f
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.batch.batch import solve_batch
 from sdimu_calibration.core.batch.classical import TABLE_FRAME, solve_classical
+from sdimu_calibration.core.data.static_detection import hides_earth_rate
 from sdimu_calibration.core.effects import body_frame, imu_model
 from sdimu_calibration.core.effects.accelerometer_frame import (
     FRAME,
@@ -40,7 +41,7 @@ from sdimu_calibration.core.estimation.reference_fits import BatchFit, Classical
 from sdimu_calibration.core.filter.filter_pass import NAV
 from sdimu_calibration.core.filter.passes import MOST_WIDENINGS, Solution, one_pass, widen_contradicted_priors
 from sdimu_calibration.core.filter.passes import solve as solve_filter
-from sdimu_calibration.core.handheld.handheld import first_linearisation, fit_priors, hides_earth_rate
+from sdimu_calibration.core.handheld.handheld import first_linearisation, fit_priors
 from sdimu_calibration.core.handheld.handheld_fit import LinearisationPoint, fit_run
 from sdimu_calibration.core.progress import Progress, silent
 from sdimu_calibration.core.recording import DataError

@@ -50,19 +50,6 @@ _SEEN = 3.0
 """Sigmas at which the Earth's rate is seen."""
 
 
-def hides_earth_rate(recording: Recording, imu: ImuSpecification) -> bool:
-    """Decide whether navigation has nothing to hold on to because a rest does not show the Earth's rate.
-
-    It does not when the gyros' white noise in the usual rest, specified or learned, exceeds a third of it.
-    """
-    if _SEEN * imu.gyro_white_noise < earth.RATE:  # seen within a second: no need to look at the samples
-        return False
-    try:
-        rests = detect_static(recording)
-    except DataError:
-        return False
-    usual = float(np.median(rests.last - rests.first)) * recording.interval_s
-    return bool(_SEEN * max(imu.gyro_white_noise, rests.gyro_white_noise) / np.sqrt(usual) > earth.RATE)
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ A package of its own so that a change here compiles none of the loops of the est
 from sdimu_calibration.core.noise.allan import Allan, allan
 from sdimu_calibration.core.noise.rests import rests
 from sdimu_calibration.core.noise.terms import TERMS, Terms, fit_terms
-from sdimu_calibration.core.noise.white import WhiteNoise, measured_specification, white_noise, with_measured_noise
+from sdimu_calibration.core.noise.white import WhiteNoise, white_noise, with_measured_noise
 
 __all__ = [
     "TERMS",
@@ -15,7 +15,6 @@ __all__ = [
     "WhiteNoise",
     "allan",
     "fit_terms",
-    "measured_specification",
     "rests",
     "white_noise",
     "with_measured_noise",

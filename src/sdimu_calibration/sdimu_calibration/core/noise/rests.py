@@ -1,32 +1,31 @@
-"""Static detection without a specification: the least scattered part of the recording gives the noise level."""
+"""Rests of a recording whose samples are noise alone: those of static detection, long, and whole."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from sdimu_calibration.core.arrays import Bools, Floats
+from sdimu_calibration.core.arrays import Bools, Floats, Ints
+from sdimu_calibration.core.data.static_detection import still_samples
+from sdimu_calibration.core.data.windows import runs
 from sdimu_calibration.core.recording import DataError, PhaseLog, Recording
 
 WINDOW_S = 1.0
-"""Length of a window (s): short against a dwell, long against vibration."""
+"""Length of a window (s), and what is left to settling at both ends of a rest."""
 _FEWEST = 10
-"""Least number of samples of a window: the scatter of fewer is uncertain by more than a quarter."""
-_QUIET = 20.0
-"""Percentile of the scatter of all windows that is taken as noise: a fifth of every test is at rest."""
-_RESTLESS = 3.0
-"""Multiple of the noise from which a window is in motion: Gaussian noise of 10 samples does not reach it."""
-_TURNING = np.radians(0.3)
-"""Deviation of the mean rate that is a turn (rad/s): below the rates of tables, above the drift of a bias."""
+"""Samples a window has at least."""
+_TURNING = float(np.radians(0.3))
+"""Mean rate (rad/s) apart from that of rest that is a turn: below every table's, above every drift of a bias."""
+_MISSING = 1.5
+"""Sample intervals between two samples from which one is missing: an Allan deviation counts samples for time."""
 _SHORTEST = 8
-"""Least number of windows of a rest: without its first and last one, which are left to settling."""
+"""Windows that make a rest."""
 
 
 def rests(recording: Recording) -> tuple[slice, ...]:
     """Find where the IMU is at rest.
 
-    A window is at rest when all six channels scatter no more than the noise, its mean rate is that of the least
-    scattered windows, no sample is missing, and the table, where its status is recorded, dwells throughout. The first
-    and the last window of each rest are left out.
+    A sample is at rest when the second about it scatters no more than the quietest do, its mean rate is theirs, no
+    sample is missing, and the table (where it says anything) dwells. A second at both ends of each rest is left out.
 
     Parameters
     ----------
@@ -42,25 +41,15 @@ def rests(recording: Recording) -> tuple[slice, ...]:
     DataError
         When there is no rest.
     """
-    interval = recording.interval_s
-    size = max(round(WINDOW_S / interval), _FEWEST)
-    count = len(recording.t) // size
-    data = np.hstack([recording.omega_ib_b, recording.f_ib_b])[: count * size].reshape(count, size, 6)
-    still = np.zeros(0, dtype=bool)
-    if count:
-        scatter, mean_rate = data.std(axis=1), data[:, :, :3].mean(axis=1)
-        limit = np.percentile(scatter, _QUIET, axis=0)
-        quiet = np.all(scatter <= _RESTLESS * limit, axis=1)
-        usual = np.median(mean_rate[quiet], axis=0) if quiet.any() else mean_rate[0]
-        near = np.abs(mean_rate - usual) < _TURNING + 6.0 * limit[:3] / np.sqrt(size)
-        still = quiet & near.all(axis=1) & _whole(recording.t, size, count, interval)
-        still &= _dwells(recording.phase, recording.t[: count * size].reshape(count, size), interval)
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], still.astype(int), [0]])))
-    found = tuple(
-        slice(int(a + 1) * size, int(b - 1) * size)
-        for a, b in zip(edges[::2], edges[1::2], strict=True)
-        if b - a - 2 >= _SHORTEST
-    )
+    size = max(round(WINDOW_S / recording.interval_s), _FEWEST)
+    found: tuple[slice, ...] = ()
+    if len(recording.t) > size:
+        still = still_samples(recording, size, _TURNING, _MISSING) & _dwells(recording)
+        found = tuple(
+            slice(int(a) + size, int(b) - size)
+            for a, b in zip(*runs(still), strict=True)
+            if b - a >= (_SHORTEST + 2) * size
+        )
     if not found:
         raise DataError(
             f"/imu/data_raw: no rest of {_SHORTEST + 2} s in {recording.t[-1]:.0f} s; record the IMU while it stands "
@@ -69,19 +58,17 @@ def rests(recording: Recording) -> tuple[slice, ...]:
     return found
 
 
-def _whole(t: Floats, size: int, count: int, interval: float) -> Bools:
-    """Windows without a missing sample, counted from the last sample of the window before."""
-    edges = np.concatenate([[t[0] - interval], t[size - 1 : count * size : size]])
-    whole: Bools = np.abs(np.diff(edges) - size * interval) < 0.5 * interval
-    return whole
-
-
-def _dwells(log: PhaseLog | None, t: Floats, interval: float) -> Bools:
-    """Windows in which the table dwells throughout, all of them without a status; `t` (count, size)."""
+def _dwells(recording: Recording) -> Bools:
+    """Find the samples in whose interval the table dwells at one stop, or says nothing, shape (n,)."""
+    log, t = recording.phase, recording.t
     if log is None or not len(log.t):
         return np.ones(len(t), dtype=bool)
-    first = np.maximum(np.searchsorted(log.t, t[:, 0] - interval + 1e-6, side="right") - 1, 0)
-    last = np.maximum(np.searchsorted(log.t, t[:, -1] - 1e-6, side="right") - 1, 0)
+    first = _entry(log, t - recording.interval_s + 1e-6)
+    last = _entry(log, t - 1e-6)
     turning = np.concatenate([[0], np.cumsum(~log.dwell)])
-    same: Bools = (turning[last + 1] == turning[first]) & (log.stop[first] == log.stop[last])
-    return same
+    return np.asarray((turning[last + 1] == turning[first]) & (log.stop[first] == log.stop[last]))
+
+
+def _entry(log: PhaseLog, t: Floats) -> Ints:
+    """Entry of the log that holds at each time; the first one before all."""
+    return np.maximum(np.searchsorted(log.t, t, side="right") - 1, 0)

@@ -78,24 +78,19 @@ def white_noise(recording: Recording, rows: Sequence[slice] | None = None) -> Wh
     return WhiteNoise(gyro, accel, gyro * share, accel * share, tuple(densities), rest_s)
 
 
-def measured_specification(imu: ImuSpecification, measured: WhiteNoise) -> ImuSpecification:
-    """Return a specification with the white noise replaced by the measured one."""
-    return replace(imu, gyro_white_noise=measured.gyro, accel_white_noise=measured.accel)
-
-
 def with_measured_noise(imu: ImuSpecification, recording: Recording) -> tuple[ImuSpecification, str]:
-    """Put the white noise of a recording's rests in place of the specification's.
+    """Replace the white noise of a specification by that of a recording's rests.
 
     Returns
     -------
     imu : ImuSpecification
     note : str
-        What was replaced.
+        What was measured, and what the specification said.
 
     Raises
     ------
     DataError
-        When the recording has no rest.
+        When there is no rest, or a sensor does not scatter at all.
     """
     found = white_noise(recording)
     parts = []
@@ -105,5 +100,5 @@ def with_measured_noise(imu: ImuSpecification, recording: Recording) -> tuple[Im
     ):
         value, error, before = (from_si(v, unit) for v in (here, sigma, told))
         parts.append(f"{word} {value:.4g} +- {error:.2g} {unit} ({before:.4g} as specified)")
-    note = f"noise as measured in {found.rest_s:.0f} s of rest: {'; '.join(parts)}"
-    return measured_specification(imu, found), note
+    measured = replace(imu, gyro_white_noise=found.gyro, accel_white_noise=found.accel)
+    return measured, f"noise as measured in {found.rest_s:.0f} s of rest: {'; '.join(parts)}"

@@ -1,0 +1,193 @@
+"""The front door of every test, live and offline: samples as they arrived become a recording ready for an estimator.
+
+Stamps are integers (ns) until `arrival.in_order` counts seconds from one origin; nothing turns them back. The steps:
+
+1. samples by their stamps, each stamp once, every number finite (`data.arrival`)
+2. units and signs (`data.axes_and_units`), even stamps (`data.dejitter`), one clock (`data.status_clock`)
+3. white noise measured at rest, where the user asks for it (`noise`)
+4. rests without a status (`data.dwell_detection`), latitude, gravity, sign of the force (`data.latitude_check`)
+
+What the data contradict or leave open is told in a note or refused with a question: never silently wrong. Samples that
+are no measurement (spikes, stuck sensors) stay: `alignment.prepared` screens them in every estimate.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from sdimu_calibration.core.data.arrival import IMU_TOPIC
+from sdimu_calibration.core.data.axes_and_units import Stated, recognise
+from sdimu_calibration.core.data.dejitter import dejittered
+from sdimu_calibration.core.data.dwell_detection import with_detected_dwells
+from sdimu_calibration.core.data.latitude_check import EarthRate, contradictions, observe_earth_rate, reversed_force
+from sdimu_calibration.core.data.static_detection import hides_earth_rate
+from sdimu_calibration.core.data.status_clock import aligned
+from sdimu_calibration.core.recording import DataError, Recording
+from sdimu_calibration.core.specification import ImuSpecification, Site
+
+FEWEST = 100
+"""Samples below which nothing can be recognised."""
+
+
+@dataclass(frozen=True)
+class OpeningOptions:
+    """What the user says of a test.
+
+    Attributes
+    ----------
+    imu : ImuSpecification
+    site : Site
+    assumed_site : str
+        Name of the default site where the user states none; empty for a stated site.
+    stated : Stated
+        Units and signs; what is left out is recognised.
+    handheld : bool or None
+        Whether the IMU is moved by hand; None decides by the noise of the gyros in the rests.
+    measured_noise : bool
+        Replace the white noise of the specification by that of the rests.
+    """
+
+    imu: ImuSpecification
+    site: Site
+    assumed_site: str = ""
+    stated: Stated = field(default_factory=Stated)
+    handheld: bool | None = None
+    measured_noise: bool = False
+
+
+class OpenedTest(NamedTuple):
+    """A test ready for an estimator; `site` is None by hand when the user states none."""
+
+    recording: Recording
+    imu: ImuSpecification
+    site: Site | None
+
+
+def in_si(recording: Recording, stated: Stated, where: str = IMU_TOPIC) -> Recording:
+    """Bring a recording to SI, right-handed axes, even stamps and one clock.
+
+    Parameters
+    ----------
+    recording : Recording
+        As `in_order` returns it.
+    stated : Stated
+    where : str
+        File or topic, for errors.
+
+    Returns
+    -------
+    Recording
+        What was recognised and changed is in its notes.
+
+    Raises
+    ------
+    DataError
+        When an axis is dead, or physics contradicts what was stated or does not decide.
+    """
+    if len(recording.t) < FEWEST:
+        return recording
+    dead = _dead(recording)
+    if dead is not None:
+        raise DataError(f"{where}: {dead}")
+    try:
+        reading = recognise(recording.t, recording.omega_ib_b, recording.f_ib_b, stated)
+    except DataError as error:
+        raise DataError(f"{where}: {error}") from error
+    if reading.accel != 1.0 or reading.gyro != 1.0:
+        recording = replace(
+            recording, omega_ib_b=recording.omega_ib_b * reading.gyro, f_ib_b=recording.f_ib_b * reading.accel
+        )
+    recording = replace(recording, notes=(*recording.notes, *reading.notes))
+    return _with_temperature(aligned(dejittered(recording)))
+
+
+def _dead(recording: Recording) -> str | None:
+    """Name an axis that shows one number all the time, although the IMU is not a perfect one at rest."""
+    if not np.ptp(recording.f_ib_b, axis=0).any():
+        return None
+    for kind, values in (("angular_velocity", recording.omega_ib_b), ("linear_acceleration", recording.f_ib_b)):
+        for axis, x in zip("xyz", values.T, strict=True):
+            if x.min() == x.max():
+                return f"{kind}.{axis} is {x[0] + 0.0:.4g} in all {len(x)} samples: the axis is dead; check the driver"
+    return None
+
+
+def _with_temperature(recording: Recording) -> Recording:
+    """Leave a temperature of another time out: what it was in the test is not known."""
+    log = recording.temperature
+    if log is None or (log.t[0] < recording.t[-1] and log.t[-1] > 0.0):
+        return recording
+    note = "the temperature has no time in common with the IMU: not used"
+    return replace(recording, temperature=None, notes=(*recording.notes, note))
+
+
+def open_test(recording: Recording, options: OpeningOptions, where: str = IMU_TOPIC) -> OpenedTest:
+    """Make a recording ready for an estimator: all steps after `in_order`.
+
+    Parameters
+    ----------
+    recording : Recording
+        As `in_order` returns it.
+    options : OpeningOptions
+    where : str
+        File or topic, for errors.
+
+    Returns
+    -------
+    OpenedTest
+        What was recognised, changed, assumed or contradicted is in the notes of its recording.
+
+    Raises
+    ------
+    DataError
+        When the data cannot be used, or physics does not decide and the user has to.
+    """
+    recording, imu = in_si(recording, options.stated, where), options.imu
+    if options.measured_noise:
+        recording, imu = _with_measured_noise(recording, imu)
+    handheld = hides_earth_rate(recording, imu) if options.handheld is None else options.handheld
+    if handheld and options.assumed_site:
+        return OpenedTest(recording, imu, None)
+    return OpenedTest(_placed(recording, imu, options), imu, options.site)
+
+
+def _with_measured_noise(recording: Recording, imu: ImuSpecification) -> tuple[Recording, ImuSpecification]:
+    # The tools of the Allan deviation take time to load, and few tests need them.
+    from sdimu_calibration.core.noise.white import with_measured_noise  # noqa: PLC0415
+
+    imu, note = with_measured_noise(imu, recording)
+    return replace(recording, notes=(*recording.notes, note)), imu
+
+
+def _placed(recording: Recording, imu: ImuSpecification, options: OpeningOptions) -> Recording:
+    """Find rests that no status says, and compare the site with the Earth's rate and gravity in the data."""
+    site, seen = options.site, None
+    if len(recording.t) >= FEWEST:
+        recording = with_detected_dwells(recording, imu)
+        seen = observe_earth_rate(recording.t, recording.omega_ib_b, recording.f_ib_b, imu)
+    notes = [_assumed(options.assumed_site, site, seen)] if options.assumed_site else []
+    if seen is not None:
+        may_turn = not options.assumed_site and options.stated.accel_sign is None
+        if may_turn and reversed_force(seen, site):
+            notes.append(
+                "specific force is read with the opposite sign: as it stands the Earth turns the wrong way for the "
+                "latitude of the site"
+            )
+            recording = replace(recording, f_ib_b=-recording.f_ib_b)
+            seen = replace(seen, up_rate=-seen.up_rate)
+        notes += contradictions(seen, site)
+    return replace(recording, notes=(*recording.notes, *notes))
+
+
+def _assumed(name: str, site: Site, seen: EarthRate | None) -> str:
+    text = (
+        f"no --site: {name} is assumed (latitude {np.degrees(site.latitude_rad):.1f} deg, height "
+        f"{site.height_m:.0f} m)"
+    )
+    if seen is None or not seen.seen:
+        return f"{text}; the data do not show the Earth's rate well enough to say the latitude"
+    latitude, sigma = np.degrees(seen.latitude)
+    return f"{text}; the Earth's rate in the data is that of latitude {latitude:.0f} +- {sigma:.0f} deg"
