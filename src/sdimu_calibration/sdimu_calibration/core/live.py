@@ -225,7 +225,7 @@ class LiveCalibration:
             When there is too little of it.
         """
         test = self.opened()
-        return calibrate(test.recording, test.site or self.setup.site, test.imu, self.setup.model)
+        return calibrate(test.recording, test.site, test.imu, self.setup.model)
 
     def opened(self) -> OpenedTest:
         """Everything taken so far, opened as a recording is.

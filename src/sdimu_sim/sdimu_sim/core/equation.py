@@ -65,6 +65,8 @@ def read_equation(key: EffectKey, sensor: str, formula: str) -> tuple[str, Expre
     try:
         below = reciprocal_unit(parse_with_units(text, known).dimension(_DIMENSIONS))
         expected, given = ("deg/h" if sensor.startswith("gyro") else "ug") + below, key.size.lstrip("+-.0123456789eE ")
+        if not key.size:
+            raise DataError(f"effect '{key.name}' has no size (expected something like '{key.name}=1 {expected}')")
         fits = given and _without_angle(given) == _without_angle(expected)
         return key.name, expression, read_quantity(f"effect '{key.name}'", key.size, given if fits else expected)
     except UnitError as error:

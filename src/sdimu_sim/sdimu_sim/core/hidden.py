@@ -337,7 +337,7 @@ def parse_effects(texts: Iterable[str]) -> Hidden:
     found = _Found()
     for text in texts:
         key = parse_key(text)
-        if not key.size:
+        if not key.size and not key.equation:
             example = f"{key}=1 {size_unit(key.name)}" if key.name in effect_names() else "accel_quadratic_x=20 ug/g^2"
             raise DataError(f"effect '{text}' has no size (expected something like '{example}')")
         if key.name in SENSORS:

@@ -1,6 +1,9 @@
 """Sensor effects, one file per physical cause. Importing the package fills the registry."""
 
-from sdimu_calibration.core.effects import (  # noqa: I001, F401 - the order is the order of the catalogue
+import importlib  # noqa: I001 - below, the order is the order of the catalogue
+import pkgutil
+
+from sdimu_calibration.core.effects import (  # noqa: F401
     registry,
     bias,
     scale,
@@ -22,5 +25,9 @@ from sdimu_calibration.core.effects import (  # noqa: I001, F401 - the order is 
     references,
     selection,
 )
+
+# A new file needs no entry above: it comes last in the catalogue.
+for _module in sorted(pkgutil.iter_modules(__path__), key=lambda module: module.name):
+    importlib.import_module(f"{__name__}.{_module.name}")
 
 __all__ = ["registry", "selection"]
