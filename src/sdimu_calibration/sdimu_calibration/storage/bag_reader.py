@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rosbags.typesys import Stores, get_typestore
 
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.data.arrival import arrange
@@ -17,6 +16,7 @@ from sdimu_calibration.core.recording import PhaseLog, Recording, TableLog, Temp
 from sdimu_calibration.storage import cdr
 from sdimu_calibration.storage.bag_file import raw_messages, read_topics
 from sdimu_calibration.storage.cdr import LayoutError, Stamps
+from sdimu_calibration.storage.raw_messages import RawMessages
 from sdimu_calibration.storage.topic_choice import KINDS, TopicChoice, choose
 from sdimu_calibration.storage.topics import Topics
 
@@ -68,7 +68,7 @@ def read_recording(path: Path, topics: Topics | TopicChoice | None = None) -> Re
 
 def _messages(
     path: Path, topics: Topics | TopicChoice | None, notes: list[str]
-) -> tuple[Topics, dict[str, list[bytes]]]:
+) -> tuple[Topics, dict[str, RawMessages]]:
     """Read the messages of the topics of the test."""
     if isinstance(topics, Topics):
         wanted = {getattr(topics, kind): type_name for kind, type_name in KINDS.items()}
@@ -79,18 +79,23 @@ def _messages(
 
 
 def _is_phase(raw: bytes) -> bool:
-    return _phase_word(_message(raw, cdr.STATUS)) in {"dwell", "rotating"}
+    return _phase_word(*_status_entry(raw)) in {"dwell", "rotating"}
 
 
-def _phase_word(message: Any) -> str:
+def _phase_word(text: str, values: Mapping[str, str]) -> str:
     """Phase in a status, empty when there is none."""
-    if not message.status:
-        return ""
-    values = {entry.key: entry.value for entry in message.status[0].values}
-    return str(values.get("phase") or message.status[0].message).strip().lower()
+    return (values.get("phase") or text).strip().lower()
 
 
-def _phase(raw: list[bytes], start_ns: int, topic: str, notes: list[str]) -> PhaseLog | None:
+def _status_entry(raw: bytes) -> tuple[str, dict[str, str]]:
+    """Text and values of a status; empty where the message is none."""
+    try:
+        return cdr.decode_status(raw)
+    except LayoutError:
+        return "", {}
+
+
+def _phase(raw: Sequence[bytes], start_ns: int, topic: str, notes: list[str]) -> PhaseLog | None:
     """Phases in the order of their stamps; a message without a phase is ignored."""
     parsed = [entry for entry in map(_status, raw) if entry is not None]
     if len(parsed) < len(raw):
@@ -110,16 +115,15 @@ def _phase(raw: list[bytes], start_ns: int, topic: str, notes: list[str]) -> Pha
 
 def _status(raw: bytes) -> tuple[int, bool, int | None] | None:
     """Stamp (ns), True for dwell, stop; None without a phase. A phase of any other name is no dwell."""
-    message = _message(raw, cdr.STATUS)
-    phase = _phase_word(message)
+    text, values = _status_entry(raw)
+    phase = _phase_word(text, values)
     if not phase:
         return None
-    values = {entry.key: entry.value for entry in message.status[0].values}
     stop = values.get("stop", "").strip()
-    return _stamp(message), phase == "dwell", int(stop) if stop.isdecimal() else None
+    return cdr.stamp_of(raw), phase == "dwell", int(stop) if stop.isdecimal() else None
 
 
-def _temperature(raw: list[bytes], start_ns: int, topic: str, notes: list[str]) -> TemperatureLog | None:
+def _temperature(raw: Sequence[bytes], start_ns: int, topic: str, notes: list[str]) -> TemperatureLog | None:
     if not raw:
         return None
     try:
@@ -134,13 +138,16 @@ def _temperature(raw: list[bytes], start_ns: int, topic: str, notes: list[str]) 
     return TemperatureLog(_seconds(ns[chosen], start_ns), value[chosen]) if len(chosen) else None
 
 
-def _table(raw: list[bytes], start_ns: int, topic: str, notes: list[str]) -> TableLog | None:
+def _table(raw: Sequence[bytes], start_ns: int, topic: str, notes: list[str]) -> TableLog | None:
     if not raw:
         return None
-    first = _message(raw[0], cdr.JOINT_STATE)
-    names = tuple(first.name)
     try:
-        ns, angle = cdr.decode_joint_positions(raw, names, np.asarray(first.position, float))
+        names, first = cdr.decode_joint_state(raw[0])
+    except LayoutError:
+        notes.append(f"{topic} cannot be read and was ignored")
+        return None
+    try:
+        ns, angle = cdr.decode_joint_positions(raw, names, first)
     except LayoutError:
         try:
             ns, angle = _one_by_one(raw, cdr.JOINT_STATE, lambda message: message.position)
@@ -154,7 +161,7 @@ def _table(raw: list[bytes], start_ns: int, topic: str, notes: list[str]) -> Tab
     return TableLog(_seconds(ns[chosen], start_ns), names, angle[chosen])
 
 
-def _imu(raw: list[bytes]) -> tuple[Stamps, Floats, Floats]:
+def _imu(raw: Sequence[bytes]) -> tuple[Stamps, Floats, Floats]:
     try:
         return cdr.decode_imu(raw)
     except LayoutError:
@@ -167,7 +174,7 @@ def _imu_values(message: Any) -> list[float]:
     return [rate.x, rate.y, rate.z, force.x, force.y, force.z]
 
 
-def _one_by_one(raw: list[bytes], type_name: str, values: Callable[[Any], Any]) -> tuple[Stamps, Floats]:
+def _one_by_one(raw: Sequence[bytes], type_name: str, values: Callable[[Any], Any]) -> tuple[Stamps, Floats]:
     """Decode messages that share no layout; slow, and right for every encoding rosbags knows."""
     messages = [_message(data, type_name) for data in raw]
     stamps = np.array([_stamp(message) for message in messages], np.int64)
@@ -188,6 +195,8 @@ def _message(raw: bytes, type_name: str) -> Any:
 
 @cache
 def _typestore() -> Any:
+    from rosbags.typesys import Stores, get_typestore  # noqa: PLC0415 (slow to load, and rarely needed)
+
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         return get_typestore(Stores.ROS2_JAZZY)
