@@ -1,4 +1,4 @@
-"""3x3 matrices as nine numbers, row by row: what loops over cycles use, because it allocates nothing.
+"""Small matrices in compiled loops: those of 3x3 as nine numbers, row by row, because that allocates nothing.
 
 A call of BLAS for a 3x3 product costs more than the product.
 """
@@ -77,3 +77,37 @@ def orthonormal3(m: Matrix3) -> Matrix3:
         1.5 * m[3] - 0.5 * b[3], 1.5 * m[4] - 0.5 * b[4], 1.5 * m[5] - 0.5 * b[5],
         1.5 * m[6] - 0.5 * b[6], 1.5 * m[7] - 0.5 * b[7], 1.5 * m[8] - 0.5 * b[8],
     )  # fmt: skip
+
+
+@compiled
+def sparse_product(A: Floats, B: Floats) -> Floats:
+    """Product ``A @ B`` that skips the zeros of A; shapes (m, n) and (n, q)."""
+    out = np.zeros((A.shape[0], B.shape[1]))
+    for i in range(A.shape[0]):
+        for k in range(A.shape[1]):
+            a = A[i, k]
+            if a != 0.0:
+                for j in range(B.shape[1]):
+                    out[i, j] += a * B[k, j]
+    return out
+
+
+@compiled
+def product(A: Floats, B: Floats) -> Floats:
+    """Product ``A @ B`` of full matrices, shapes (m, n) and (n, q): three rows at a time, so that B is read less."""
+    m = A.shape[0]
+    out = np.zeros((m, B.shape[1]))
+    for i in range(0, m - 2, 3):
+        out0, out1, out2 = out[i], out[i + 1], out[i + 2]
+        for k in range(A.shape[1]):
+            a0, a1, a2, row = A[i, k], A[i + 1, k], A[i + 2, k], B[k]
+            for j in range(B.shape[1]):
+                b = row[j]
+                out0[j] += a0 * b
+                out1[j] += a1 * b
+                out2[j] += a2 * b
+    for i in range(m - m % 3, m):
+        for k in range(A.shape[1]):
+            for j in range(B.shape[1]):
+                out[i, j] += A[i, k] * B[k, j]
+    return out

@@ -23,40 +23,8 @@ from sdimu_calibration.core.compiled import compiled
 from sdimu_calibration.core.effects.motion import Motion
 from sdimu_calibration.core.filter.filter_pass import MEASURED, NAV, PassOutput
 from sdimu_calibration.core.filter.kalman import whiten
-from sdimu_calibration.core.navigation.ins_errors import add_response
-
-
-@compiled
-def _epoch_response(
-    C_nb: Floats, f_b: Floats, dt: Floats, first: int, last: int, values: Floats, channel: Ints, parameter: Ints,
-    w_ie: Floats, G: Floats, D: Floats, att: Floats, vel: Floats,
-) -> float:  # fmt: skip
-    """Fill G (9, q) and D (6, q) with the response over an epoch; return its length (s)."""
-    G[:, :] = 0.0
-    D[:, :] = 0.0
-    T = 0.0
-    f_n = np.empty(3)
-    for c in range(first, last):
-        h = dt[c]
-        T += h
-        for i in range(3):
-            f_n[i] = C_nb[c, i, 0] * f_b[c, 0] + C_nb[c, i, 1] * f_b[c, 1] + C_nb[c, i, 2] * f_b[c, 2]
-        att[:, :] = 0.0
-        vel[:, :] = 0.0
-        for j in range(channel.shape[0]):
-            v = values[c, j] * h
-            ch, k = channel[j], parameter[j]
-            D[ch, k] += v
-            if ch < 3:
-                att[0, k] -= C_nb[c, 0, ch] * v
-                att[1, k] -= C_nb[c, 1, ch] * v
-                att[2, k] -= C_nb[c, 2, ch] * v
-            else:
-                vel[0, k] += C_nb[c, 0, ch - 3] * v
-                vel[1, k] += C_nb[c, 1, ch - 3] * v
-                vel[2, k] += C_nb[c, 2, ch - 3] * v
-        add_response(G, att, vel, f_n, w_ie, h)
-    return T
+from sdimu_calibration.core.matrix3 import applied, elements, sparse_product
+from sdimu_calibration.core.navigation.ins_errors import add_columns, responses
 
 
 @compiled
@@ -69,20 +37,24 @@ def _signatures(
     V = np.zeros((NAV, q))
     G = np.zeros((NAV, q))
     D = np.zeros((6, q))
-    att = np.zeros((3, q))
-    vel = np.zeros((3, q))
+    longest = (last - first).max()
+    R, f_n = np.empty((longest, 6, NAV)), np.empty((longest, 3))
     row = 0
     for e in range(first.shape[0]):
-        T = _epoch_response(C_nb, f_b, dt, first[e], last[e], values, channel, parameter, w_ie, G, D, att, vel)
-        V[:, :] = Phi[e] @ V + G
+        a, b = first[e], last[e]
+        for c in range(a, b):
+            f_n[c - a, 0], f_n[c - a, 1], f_n[c - a, 2] = applied(elements(C_nb[c]), f_b[c, 0], f_b[c, 1], f_b[c, 2])
+        responses(C_nb[a:b], f_n, dt[a:b], 0, b - a, w_ie, R)
+        add_columns(values[a:b], channel, parameter, R, dt[a:b], G, D)
+        V[:, :] = sparse_product(Phi[e], V) + G
         if kind[e] == 0:
             continue
         low = 0 if abs(kind[e]) == 2 else 6
         m = MEASURED - low
-        S = np.ascontiguousarray(H[e, low:, :NAV]) @ V
-        S[6 - low :] += D / T
-        W[row : row + m] = whiten(np.ascontiguousarray(L[e, low:, low:]), S)
-        V -= np.ascontiguousarray(K[e, :NAV, low:]) @ S
+        S = sparse_product(H[e, low:, :NAV], V)
+        S[6 - low :] += D / dt[a:b].sum()
+        W[row : row + m] = whiten(L[e, low:, low:], S)
+        V -= sparse_product(K[e, :NAV, low:], S)
         row += m
 
 

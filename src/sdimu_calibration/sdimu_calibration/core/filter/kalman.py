@@ -16,19 +16,7 @@ import numpy as np
 
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.compiled import compiled
-
-
-@compiled
-def sparse_product(A: Floats, B: Floats) -> Floats:
-    """Product ``A @ B`` that skips the zeros of A; shapes (m, n) and (n, q)."""
-    out = np.zeros((A.shape[0], B.shape[1]))
-    for i in range(A.shape[0]):
-        for k in range(A.shape[1]):
-            a = A[i, k]
-            if a != 0.0:
-                for j in range(B.shape[1]):
-                    out[i, j] += a * B[k, j]
-    return out
+from sdimu_calibration.core.matrix3 import product, sparse_product
 
 
 @compiled
@@ -53,9 +41,10 @@ def propagate(x: Floats, P: Floats, Phi: Floats, G: Floats, Q: Floats, decay: Fl
     F = np.empty((k, n))
     F[:, :k] = Phi
     F[:, k:] = G
-    FP = F @ P
-    x[:k] = F @ x
-    P[:k, :k] = FP @ F.T + Q
+    Ft = np.ascontiguousarray(F.T)
+    FP = product(F, P)
+    x[:k] = product(x.reshape(1, -1), Ft)[0]
+    P[:k, :k] = product(FP, Ft) + Q
     P[:k, k:] = FP[:, k:]
     for i in range(k, n):
         d = decay[i - k]
@@ -161,10 +150,15 @@ def update(x: Floats, P: Floats, z: Floats, H: Floats, R: Floats, M: Floats) -> 
             x[k] += Kt[i, k] * innovation[i]
     F = B - 0.5 * sparse_product(S, Kt)
     for i in range(n):
-        for r in range(m):
-            a, b = Kt[r, i], F[r, i]
+        row = P[i]
+        for r in range(0, m - 2, 3):
+            a0, a1, a2, b0, b1, b2 = Kt[r, i], Kt[r + 1, i], Kt[r + 2, i], F[r, i], F[r + 1, i], F[r + 2, i]
+            F0, F1, F2, K0, K1, K2 = F[r], F[r + 1], F[r + 2], Kt[r], Kt[r + 1], Kt[r + 2]
             for j in range(i + 1):
-                P[i, j] -= a * F[r, j] + b * Kt[r, j]
+                row[j] -= (a0 * F0[j] + b0 * K0[j]) + (a1 * F1[j] + b1 * K1[j]) + (a2 * F2[j] + b2 * K2[j])
+        for r in range(m - m % 3, m):
+            for j in range(i + 1):
+                row[j] -= Kt[r, i] * F[r, j] + F[r, i] * Kt[r, j]
     for i in range(n):
         for j in range(i):
             P[j, i] = P[i, j]
