@@ -123,20 +123,25 @@ def columns(
     prepared: PreparedData, output: PassOutput, seen: Motion, latitude: float, effects: Sequence[Effect]
 ) -> Floats:
     """Signatures of all parameters of `effects` at a latitude (rad), shape (N, parameters)."""
-    epochs = prepared.epochs
-    parts = []
-    for start in range(0, len(effects), _BLOCK):
-        block = effects[start : start + _BLOCK]
-        values, channel, parameter, count = [], [], [], 0
+    epochs, count = prepared.epochs, sum(len(effect.parameters) for effect in effects)
+    # Column by column in memory: what is chosen of them later is a few columns.
+    W = np.zeros((int(np.isfinite(output.normalised).sum()), count), order="F")
+    blocks = [effects[start : start + _BLOCK] for start in range(0, len(effects), _BLOCK)]
+    # One buffer for all blocks: memory that is new costs more than the numbers in it.
+    values = np.empty((len(seen.t), max((sum(len(e.terms) for e in block) for block in blocks), default=0)))
+    start = 0
+    for block in blocks:
+        channel, parameter, terms, parameters = [], [], 0, 0
         for effect in block:
-            values.append(effect.regressors(seen))
+            values[:, terms : terms + len(effect.terms)] = effect.regressors(seen)
             channel += [t.channel for t in effect.terms]
-            parameter += [count + t.parameter for t in effect.terms]
-            count += len(effect.parameters)
-        parts.append(
-            signatures(
-                seen, epochs.first, epochs.last, prepared.kind, output, np.hstack(values),
-                np.array(channel, dtype=np.int64), np.array(parameter, dtype=np.int64), count, latitude,
-            )
+            parameter += [parameters + t.parameter for t in effect.terms]
+            terms += len(effect.terms)
+            parameters += len(effect.parameters)
+        signatures(
+            seen, epochs.first, epochs.last, prepared.kind, output, values,
+            np.array(channel, dtype=np.int64), np.array(parameter, dtype=np.int64), latitude,
+            W[:, start : start + parameters],
         )  # fmt: skip
-    return np.hstack(parts)
+        start += parameters
+    return W

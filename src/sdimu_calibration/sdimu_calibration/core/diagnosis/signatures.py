@@ -60,9 +60,9 @@ def _signatures(
 
 def signatures(
     seen: Motion, first: Ints, last: Ints, kind: Ints, output: PassOutput,
-    values: Floats, channel: Ints, parameter: Ints, count: int, latitude: float,
-) -> Floats:  # fmt: skip
-    """Signatures of `count` parameters in the whitened innovations of a navigation filter.
+    values: Floats, channel: Ints, parameter: Ints, latitude: float, W: Floats,
+) -> None:  # fmt: skip
+    """Signatures of q parameters in the whitened innovations of a navigation filter.
 
     Parameters
     ----------
@@ -72,27 +72,20 @@ def signatures(
         Epochs, as in `filter_pass.PassInput`.
     output : PassOutput
         Of the pass with known coefficients, with its matrices kept.
-    values : ndarray, shape (n, m)
-        Regressor columns.
+    values : ndarray, shape (n, m) or wider
+        Regressor columns; what is behind the first m is not read.
     channel, parameter : ndarray of int, shape (m,)
         Sensor axis and parameter of each column.
-    count : int
-        Number of parameters q.
     latitude : float
         Of the site (rad).
-
-    Returns
-    -------
-    ndarray, shape (rows, q)
-        Rows in the order of `measured_rows`.
+    W : ndarray, shape (rows, q)
+        Filled; rows in the order of `measured_rows`.
     """
-    W = np.zeros((int(np.isfinite(output.normalised).sum()), count))
     _signatures(
         np.ascontiguousarray(seen.C_nb), np.ascontiguousarray(seen.f), seen.dt, first, last, kind,
-        np.ascontiguousarray(values), channel, parameter, count, earth.earth_rate(latitude),
+        np.ascontiguousarray(values), channel, parameter, W.shape[1], earth.earth_rate(latitude),
         output.Phi, output.H, output.L, output.K, W,
     )  # fmt: skip
-    return W
 
 
 def measured_rows(output: PassOutput) -> tuple[Ints, Ints]:
