@@ -76,12 +76,12 @@ def with_noise(imu: ImuSpecification, recording: Recording, source: str | None) 
     DataError
         When the word is another, or the recording has no rest.
     """
+    if source is None:
+        return imu, []
     from sdimu_calibration.core.noise import measured_specification, white_noise
     from sdimu_calibration.core.recording import DataError
     from sdimu_calibration.core.units import from_si
 
-    if source is None:
-        return imu, []
     if source != "estimated":
         raise DataError(f"--noise {source}: expected 'estimated' (or leave it out: the noise of --imu)")
     found = white_noise(recording)

@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2
 
 from sdimu_calibration.core.alignment.prepared import PreparedData
 from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.filter.passes import Pass
+from sdimu_calibration.core.probability import chi2_head, chi2_tail
 
 CHANNEL_NAMES = (
     "position_n", "position_e", "position_d", "velocity_n", "velocity_e", "velocity_d",
@@ -96,7 +96,7 @@ def check(finished: Pass, prepared: PreparedData) -> Consistency:
     sensors = standard[prepared.kind > 0][:, 6:]
     return Consistency(
         nis_mean=total / max(dof, 1),
-        nis_p_value=float(2.0 * min(chi2.sf(total, dof), chi2.cdf(total, dof))),
+        nis_p_value=2.0 * min(chi2_tail(total, dof), chi2_head(total, dof)),
         first_nis=float(np.nanmean(at_first) / 3.0) if at_first.size else float("nan"),
         ljung_box_p=ljung_box(sensors),
         gyro=triad_noise(prepared, prepared.epochs.w_mean, finished.settings.gyro_psd**0.5),
@@ -124,7 +124,7 @@ def ljung_box(series: Floats) -> float:
         x = series[:, column] - series[:, column].mean()
         r = np.array([float(x[lag:] @ x[:-lag]) for lag in range(1, _LAGS + 1)]) / float(x @ x)
         q = n * (n + 2) * float(np.sum(r**2 / (n - np.arange(1, _LAGS + 1))))
-        worst = min(worst, float(chi2.sf(q, _LAGS)))
+        worst = min(worst, chi2_tail(q, _LAGS))
     return float(min(1.0, worst * count))
 
 

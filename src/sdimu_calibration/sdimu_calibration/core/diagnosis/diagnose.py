@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import norm
 
 from sdimu_calibration.core.alignment.prepared import SKIP, PreparedData, TestSetup, reduce, set_up
 from sdimu_calibration.core.arrays import Ints
@@ -24,6 +23,7 @@ from sdimu_calibration.core.diagnosis.screen import Finding, beyond_specificatio
 from sdimu_calibration.core.diagnosis.search import FALSE_ALARM, MOST_STEPS, Search
 from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.filter.passes import solve
+from sdimu_calibration.core.probability import normal_tail
 from sdimu_calibration.core.progress import Progress, silent
 from sdimu_calibration.core.recording import Recording
 from sdimu_calibration.core.results import Calibration
@@ -240,7 +240,7 @@ def _p_value(found: Search[Evidence], before: FreeInputTest, consistency: Consis
     """Bonferroni over the three tests that can call a model inadequate."""
     largest = float(np.max(np.abs(found.first.z), initial=0.0))
     count = int(np.isfinite(found.first.sigma).sum())
-    of_scan = min(1.0, count * 2.0 * float(norm.sf(largest)))
+    of_scan = min(1.0, count * 2.0 * normal_tail(float(largest)))
     of_noise = consistency.nis_p_value if noise else 1.0
     return float(min(1.0, 3.0 * min(of_scan, before.p_value, of_noise)))
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import norm
 
 from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.diagnosis.candidates import Candidate
@@ -15,6 +14,7 @@ from sdimu_calibration.core.diagnosis.evidence import Evidence
 from sdimu_calibration.core.diagnosis.free_input_test import free_input_test
 from sdimu_calibration.core.diagnosis.scan import POWER_80, Scan, alike, scan
 from sdimu_calibration.core.diagnosis.search import Problem
+from sdimu_calibration.core.probability import normal_tail
 
 
 @dataclass(frozen=True)
@@ -89,7 +89,7 @@ def found_effects(d: Diagnosis) -> tuple[Found, ...]:
                 z=z,
                 log_likelihood_gain=0.5 * z * z,
                 log_bayes_factor=float(scores[column]),
-                p_value_adjusted=float(min(1.0, count * 2.0 * float(norm.sf(abs(z))))),
+                p_value_adjusted=float(min(1.0, count * 2.0 * normal_tail(float(abs(z))))),
                 explained=float(np.clip((misfit[k] - misfit[k + 1]) / whole, 0.0, 1.0)),
                 held_out_before=problem.held_out(chosen[:k], 1.0).rms,
                 held_out_after=problem.held_out(chosen[: k + 1], 1.0).rms,

@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import norm
 
 from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.diagnosis.candidates import Candidate, catalogue, equations, periodic
@@ -23,6 +22,7 @@ from sdimu_calibration.core.effects import imu_model
 from sdimu_calibration.core.effects.effect import Effect, Timetable
 from sdimu_calibration.core.handheld.handheld import PreparedRun, assemble, first_linearisation, fit_priors, prepare
 from sdimu_calibration.core.handheld.handheld_fit import FitPriors, HandheldSolution, LinearisationPoint, fit_run
+from sdimu_calibration.core.probability import normal_tail
 from sdimu_calibration.core.progress import Progress
 from sdimu_calibration.core.recording import Recording
 from sdimu_calibration.core.results import Calibration
@@ -299,7 +299,7 @@ def _sizes(fitted: _Fitted) -> Floats:
 def _p_value(first: Scan) -> float:
     """Bonferroni over the scan."""
     count = int(np.isfinite(first.sigma).sum())
-    return float(min(1.0, count * 2.0 * float(norm.sf(np.max(np.abs(first.z), initial=0.0)))))
+    return float(min(1.0, count * 2.0 * normal_tail(float(np.max(np.abs(first.z), initial=0.0)))))
 
 
 def _verdict(added: tuple[Candidate, ...], tried: bool, twins: bool, after: Calibration) -> str:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import norm
 
 from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.diagnosis.coefficient_shifts import coefficient_shifts
@@ -15,6 +14,7 @@ from sdimu_calibration.core.diagnosis.handheld_evidence import CHANNELS, Handhel
 from sdimu_calibration.core.diagnosis.scan import POWER_80, Scan, alike
 from sdimu_calibration.core.diagnosis.search import Problem
 from sdimu_calibration.core.handheld.handheld_fit import FORCE, RATE, TURN
+from sdimu_calibration.core.probability import normal_tail
 from sdimu_calibration.core.units import from_si
 
 
@@ -112,7 +112,7 @@ def _found(d: HandheldDiagnosis, problem: Problem[HandheldEvidence], chosen: lis
                 candidate=d.evidence.candidates[column - p], value=float(value), sigma=sigma, z=z,
                 log_likelihood_gain=0.5 * z * z,
                 log_bayes_factor=d.rungs[k + 1].log_likelihood - d.rungs[k].log_likelihood,
-                p_value_adjusted=float(min(1.0, count * 2.0 * float(norm.sf(abs(z))))),
+                p_value_adjusted=float(min(1.0, count * 2.0 * normal_tail(float(abs(z))))),
                 explained=(left[k] - left[k + 1]) / misfit,
                 held_out_before=d.rungs[k].held_out, held_out_after=d.rungs[k + 1].held_out,
                 alike=tuple(d.evidence.names[i] for i in others),
