@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -116,21 +117,23 @@ def collect(prepared: PreparedData, setup: TestSetup, finished: Pass, effects: S
 
 
 _BLOCK = 24
-"""Effects whose regressors are in memory at a time."""
+"""Effects whose regressors are in memory at a time, in each thread."""
+_THREADS = 2
+"""Of a small machine; more blocks at a time than it has caches for gain nothing."""
 
 
 def columns(
     prepared: PreparedData, output: PassOutput, seen: Motion, latitude: float, effects: Sequence[Effect]
 ) -> Floats:
     """Signatures of all parameters of `effects` at a latitude (rad), shape (N, parameters)."""
-    epochs, count = prepared.epochs, sum(len(effect.parameters) for effect in effects)
-    # Column by column in memory: what is chosen of them later is a few columns.
-    W = np.zeros((int(np.isfinite(output.normalised).sum()), count), order="F")
     blocks = [effects[start : start + _BLOCK] for start in range(0, len(effects), _BLOCK)]
-    # One buffer for all blocks: memory that is new costs more than the numbers in it.
-    values = np.empty((len(seen.t), max((sum(len(e.terms) for e in block) for block in blocks), default=0)))
-    start = 0
-    for block in blocks:
+    ends = np.cumsum([0, *(sum(len(effect.parameters) for effect in block) for block in blocks)])
+    # Column by column in memory: what is chosen of them later is a few columns.
+    W = np.zeros((int(np.isfinite(output.normalised).sum()), int(ends[-1])), order="F")
+
+    def fill(number: int) -> None:
+        block, epochs = blocks[number], prepared.epochs
+        values = np.empty((len(seen.t), sum(len(effect.terms) for effect in block)))
         channel, parameter, terms, parameters = [], [], 0, 0
         for effect in block:
             values[:, terms : terms + len(effect.terms)] = effect.regressors(seen)
@@ -141,7 +144,10 @@ def columns(
         signatures(
             seen, epochs.first, epochs.last, prepared.kind, output, values,
             np.array(channel, dtype=np.int64), np.array(parameter, dtype=np.int64), latitude,
-            W[:, start : start + parameters],
+            W[:, ends[number] : ends[number + 1]],
         )  # fmt: skip
-        start += parameters
+
+    # The recursion of one column knows nothing of the others, and compiled loops run beside each other.
+    with ThreadPoolExecutor(_THREADS) as pool:
+        list(pool.map(fill, range(len(blocks))))
     return W

@@ -23,7 +23,7 @@ from sdimu_calibration.core.compiled import compiled
 from sdimu_calibration.core.effects.motion import Motion
 from sdimu_calibration.core.filter.filter_pass import MEASURED, NAV, PassOutput
 from sdimu_calibration.core.filter.kalman import whiten
-from sdimu_calibration.core.matrix3 import applied, elements, sparse_product
+from sdimu_calibration.core.matrix3 import applied, elements
 from sdimu_calibration.core.navigation.ins_errors import add_columns, responses
 
 
@@ -46,15 +46,15 @@ def _signatures(
             f_n[c - a, 0], f_n[c - a, 1], f_n[c - a, 2] = applied(elements(C_nb[c]), f_b[c, 0], f_b[c, 1], f_b[c, 2])
         responses(C_nb[a:b], f_n, dt[a:b], 0, b - a, w_ie, R)
         add_columns(values[a:b], channel, parameter, R, dt[a:b], G, D)
-        V[:, :] = sparse_product(Phi[e], V) + G
+        V = Phi[e] @ V + G
         if kind[e] == 0:
             continue
         low = 0 if abs(kind[e]) == 2 else 6
         m = MEASURED - low
-        S = sparse_product(H[e, low:, :NAV], V)
+        S = np.ascontiguousarray(H[e, low:, :NAV]) @ V
         S[6 - low :] += D / dt[a:b].sum()
-        W[row : row + m] = whiten(L[e, low:, low:], S)
-        V -= sparse_product(K[e, :NAV, low:], S)
+        W[row : row + m] = whiten(np.ascontiguousarray(L[e, low:, low:]), S)
+        V -= np.ascontiguousarray(K[e, :NAV, low:]) @ S
         row += m
 
 
@@ -72,8 +72,8 @@ def signatures(
         Epochs, as in `filter_pass.PassInput`.
     output : PassOutput
         Of the pass with known coefficients, with its matrices kept.
-    values : ndarray, shape (n, m) or wider
-        Regressor columns; what is behind the first m is not read.
+    values : ndarray, shape (n, m)
+        Regressor columns.
     channel, parameter : ndarray of int, shape (m,)
         Sensor axis and parameter of each column.
     latitude : float
