@@ -90,24 +90,3 @@ def sparse_product(A: Floats, B: Floats) -> Floats:
                 for j in range(B.shape[1]):
                     out[i, j] += a * B[k, j]
     return out
-
-
-@compiled
-def product(A: Floats, B: Floats) -> Floats:
-    """Product ``A @ B`` of full matrices, shapes (m, n) and (n, q): three rows at a time, so that B is read less."""
-    m = A.shape[0]
-    out = np.zeros((m, B.shape[1]))
-    for i in range(0, m - 2, 3):
-        out0, out1, out2 = out[i], out[i + 1], out[i + 2]
-        for k in range(A.shape[1]):
-            a0, a1, a2, row = A[i, k], A[i + 1, k], A[i + 2, k], B[k]
-            for j in range(B.shape[1]):
-                b = row[j]
-                out0[j] += a0 * b
-                out1[j] += a1 * b
-                out2[j] += a2 * b
-    for i in range(m - m % 3, m):
-        for k in range(A.shape[1]):
-            for j in range(B.shape[1]):
-                out[i, j] += A[i, k] * B[k, j]
-    return out

@@ -7,6 +7,7 @@ have granted a credit before it starts).
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -108,7 +109,7 @@ class ReplayNode:
             self.done.set_result(None)
 
 
-def _merge(found: dict[str, list[bytes]], order: list[str]) -> list[tuple[int, str, bytes]]:
+def _merge(found: Mapping[str, Sequence[bytes]], order: list[str]) -> list[tuple[int, str, bytes]]:
     """All messages by stamp; at equal stamps in the order of topics, status before the samples it is about."""
     rank = {topic: k for k, topic in enumerate(order)}
     entries = [(stamp_of(message), topic, message) for topic, messages in found.items() for message in messages]

@@ -68,7 +68,7 @@ def _number(content: NDArray[np.uint8], start: int, size: int) -> int:
     """Little-endian number of `size` bytes."""
     value = 0
     for k in range(size):
-        value |= np.int64(content[start + k]) << (8 * k)
+        value |= int(content[start + k]) << (8 * k)
     return value
 
 

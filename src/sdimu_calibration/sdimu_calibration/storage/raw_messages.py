@@ -44,7 +44,7 @@ class Block:
         size = count * np.dtype(dtype).itemsize
         # Every byte of the buffer as the beginning of a field: numpy then copies whole fields.
         fields = np.ndarray((len(self.buffer) - size + 1,), f"V{size}", self.buffer, strides=(1,))
-        return fields[self.start + place].view(dtype).reshape(-1, count)
+        return np.asarray(fields[self.start + place].view(dtype).reshape(-1, count))
 
 
 class RawMessages(Sequence[bytes]):

@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from sdimu_calibration.core.arrays import Bools, Floats
+from sdimu_calibration.core.arrays import Bools, Floats, Ints
 from sdimu_calibration.core.units import STANDARD_GRAVITY
 
 _TURNING = np.radians(0.01)
@@ -68,6 +68,16 @@ class Motion:
     def a_rate(self) -> Floats:
         """Rate of change of `a` by turning under gravity, ``-w_table x a`` (1/s), shape (n, 3)."""
         return np.asarray(-np.cross(self.w_table, self.a))
+
+    @cached_property
+    def table_rate(self) -> Floats:
+        """Size of `w_table` (rad/s), shape (n,)."""
+        return np.asarray(np.linalg.norm(self.w_table, axis=1))
+
+    @cached_property
+    def standing(self) -> Ints:
+        """Cycles in which the table does not turn at all."""
+        return np.flatnonzero(self.table_rate == 0.0)
 
     @cached_property
     def moving(self) -> Floats:

@@ -16,7 +16,7 @@ import numpy as np
 
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.compiled import compiled
-from sdimu_calibration.core.matrix3 import product, sparse_product
+from sdimu_calibration.core.matrix3 import sparse_product
 
 
 @compiled
@@ -41,10 +41,9 @@ def propagate(x: Floats, P: Floats, Phi: Floats, G: Floats, Q: Floats, decay: Fl
     F = np.empty((k, n))
     F[:, :k] = Phi
     F[:, k:] = G
-    Ft = np.ascontiguousarray(F.T)
-    FP = product(F, P)
-    x[:k] = product(x.reshape(1, -1), Ft)[0]
-    P[:k, :k] = product(FP, Ft) + Q
+    FP = F @ P
+    x[:k] = F @ x
+    P[:k, :k] = FP @ F.T + Q
     P[:k, k:] = FP[:, k:]
     for i in range(k, n):
         d = decay[i - k]
@@ -149,17 +148,8 @@ def update(x: Floats, P: Floats, z: Floats, H: Floats, R: Floats, M: Floats) -> 
         for k in range(n):
             x[k] += Kt[i, k] * innovation[i]
     F = B - 0.5 * sparse_product(S, Kt)
+    KF = Kt.T @ F
     for i in range(n):
-        row = P[i]
-        for r in range(0, m - 2, 3):
-            a0, a1, a2, b0, b1, b2 = Kt[r, i], Kt[r + 1, i], Kt[r + 2, i], F[r, i], F[r + 1, i], F[r + 2, i]
-            F0, F1, F2, K0, K1, K2 = F[r], F[r + 1], F[r + 2], Kt[r], Kt[r + 1], Kt[r + 2]
-            for j in range(i + 1):
-                row[j] -= (a0 * F0[j] + b0 * K0[j]) + (a1 * F1[j] + b1 * K1[j]) + (a2 * F2[j] + b2 * K2[j])
-        for r in range(m - m % 3, m):
-            for j in range(i + 1):
-                row[j] -= Kt[r, i] * F[r, j] + F[r, i] * Kt[r, j]
-    for i in range(n):
-        for j in range(i):
-            P[j, i] = P[i, j]
+        for j in range(n):
+            P[i, j] -= KF[i, j] + KF[j, i]
     return innovation, L, np.ascontiguousarray(Kt.T)
