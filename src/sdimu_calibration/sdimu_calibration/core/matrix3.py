@@ -1,4 +1,4 @@
-"""3x3 matrices as nine numbers, row by row: what loops over cycles use, because it allocates nothing.
+"""Small matrices in compiled loops: those of 3x3 as nine numbers, row by row, because that allocates nothing.
 
 A call of BLAS for a 3x3 product costs more than the product. Elements have any unit; those of rotations are
 dimensionless.
@@ -90,3 +90,16 @@ def orthonormal3(m: Matrix3) -> Matrix3:
         1.5 * m[3] - 0.5 * b[3], 1.5 * m[4] - 0.5 * b[4], 1.5 * m[5] - 0.5 * b[5],
         1.5 * m[6] - 0.5 * b[6], 1.5 * m[7] - 0.5 * b[7], 1.5 * m[8] - 0.5 * b[8],
     )  # fmt: skip
+
+
+@compiled
+def sparse_product(A: Floats, B: Floats) -> Floats:
+    """Product ``A @ B`` that skips the zeros of A; shapes (m, n) and (n, q)."""
+    out = np.zeros((A.shape[0], B.shape[1]))
+    for i in range(A.shape[0]):
+        for k in range(A.shape[1]):
+            a = A[i, k]
+            if a != 0.0:
+                for j in range(B.shape[1]):
+                    out[i, j] += a * B[k, j]
+    return out

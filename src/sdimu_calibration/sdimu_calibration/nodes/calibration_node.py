@@ -51,7 +51,7 @@ from sdimu_calibration.storage.config import load_model
 from sdimu_calibration.storage.effect_file import SUFFIXES, extended_model
 from sdimu_calibration.storage.journal import Journal, digest
 from sdimu_calibration.storage.result_file import write_result
-from sdimu_calibration.storage.status_message import stamp_ns, status_entry
+from sdimu_calibration.storage.status_message import first_entry, phase_entry, stamp_ns
 
 JOURNAL = "calibration.journal"
 BLOCK = 20
@@ -129,7 +129,7 @@ class CalibrationNode:
             self._work()
 
     def _take_status(self, message: DiagnosticArray) -> None:
-        entry = status_entry(message)
+        entry = phase_entry(stamp_ns(message), *first_entry(message))
         if entry is None:
             self.node.get_logger().warning(f"{self._topics.status}: a message without a phase is ignored", once=True)
             return

@@ -8,6 +8,7 @@ consumers (how many must have granted a credit before it starts).
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -52,7 +53,9 @@ class ReplayNode:
         for note in notes:
             self.node.get_logger().info(note)
         topics = Topics()
-        found = {getattr(topics, kind): raw.get(getattr(chosen, kind), []) for kind in _CLASSES}
+        found: dict[str, Sequence[bytes]] = {
+            getattr(topics, kind): raw.get(getattr(chosen, kind), ()) for kind in _CLASSES
+        }
         self._imu_topic = topics.imu
         self._queue = _merge(found, list(found))
         if len(found[topics.imu]) <= NOMINAL_FROM:
@@ -114,7 +117,7 @@ class ReplayNode:
             self.done.set_result(None)
 
 
-def _merge(found: dict[str, list[bytes]], order: list[str]) -> list[tuple[int, str, bytes]]:
+def _merge(found: Mapping[str, Sequence[bytes]], order: list[str]) -> list[tuple[int, str, bytes]]:
     """All messages by stamp; at equal stamps in the order of topics, status before the samples it is about."""
     rank = {topic: k for k, topic in enumerate(order)}
     entries = [(stamp_of(message), topic, message) for topic, messages in found.items() for message in messages]

@@ -9,14 +9,13 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+import numpy as np
 import yaml
 import zstandard
-from rosbags.convert.converter import convert
-from rosbags.rosbag2 import Reader
-from rosbags.typesys import Stores, get_typestore
 
 from sdimu_calibration.core.recording import DataError
-from sdimu_calibration.storage.mcap_walk import MAGIC, DamagedError, McapWalk
+from sdimu_calibration.storage.mcap_walk import MAGIC, DamagedError, McapWalk, Messages
+from sdimu_calibration.storage.raw_messages import Block, RawMessages
 
 ROS1 = ".bag"
 _PACKED = ".zstd"
@@ -30,14 +29,14 @@ class TopicContent:
     """Type of a topic (such as ``sensor_msgs/msg/Imu``), and its messages (CDR bytes) in the order of the bag."""
 
     type_name: str
-    raw: list[bytes] = field(default_factory=list)
+    raw: RawMessages = field(default_factory=RawMessages)
 
 
 Takes = Callable[[str, str], bool]
 """Whether the messages of a topic (name, type) are wanted."""
 
 
-def raw_messages(path: Path, wanted: Mapping[str, str], required: str) -> dict[str, list[bytes]]:
+def raw_messages(path: Path, wanted: Mapping[str, str], required: str) -> dict[str, RawMessages]:
     """Read the CDR bytes of the messages of some topics.
 
     Parameters
@@ -52,7 +51,7 @@ def raw_messages(path: Path, wanted: Mapping[str, str], required: str) -> dict[s
 
     Returns
     -------
-    dict of str to list of bytes
+    dict of str to RawMessages
         Messages in the order of the bag.
 
     Raises
@@ -72,7 +71,7 @@ def raw_messages(path: Path, wanted: Mapping[str, str], required: str) -> dict[s
     return {topic: found[topic].raw for topic in wanted if topic in found}
 
 
-def check_filled(path: Path, topic: str, raw: list[bytes]) -> None:
+def check_filled(path: Path, topic: str, raw: RawMessages) -> None:
     """Raise DataError when a topic has no messages."""
     if not raw:
         raise DataError(f"{path}: topic {topic} has no messages; record the bag while the IMU is running")
@@ -146,6 +145,9 @@ def _opened(part: Path, folder: Path) -> Path:
 
 def _from_ros1(part: Path, target: Path) -> Path:
     """Convert a bag of ROS 1 to one of ROS 2: the standard messages differ in nothing that is used here."""
+    from rosbags.convert.converter import convert  # noqa: PLC0415 (slow to load, and bags of ROS 1 are rare)
+    from rosbags.typesys import Stores, get_typestore  # noqa: PLC0415
+
     typestore = get_typestore(Stores.ROS2_JAZZY)
     kinds = ["sensor_msgs/msg/Imu", "sensor_msgs/msg/JointState", "sensor_msgs/msg/Temperature"]
     kinds.append("diagnostic_msgs/msg/DiagnosticArray")
@@ -218,15 +220,15 @@ def _metadata(folder: Path) -> Mapping[str, Any]:
 def _read_mcap(part: Path, bag: Path, takes: Takes, unpack: Unpack | None, content: dict[str, TopicContent]) -> None:
     check_magic(part)
     walk = McapWalk(part)
-    targets: dict[int, list[bytes] | None] = {}
+    targets: dict[int, RawMessages | None] = {}
     try:
         for block in walk.blocks():
             for channel in walk.channels.keys() - targets.keys():
                 targets[channel] = _target(walk.channels[channel].topic, walk.type_name(channel), takes, content)
-            for channel, _, raw in block:
-                target = targets[channel]
+            for channel in np.unique(block.channel):
+                target = targets[int(channel)]
                 if target is not None:
-                    target.append(raw if unpack is None else unpack(raw))
+                    _take(block, int(channel), unpack, target)
     except DamagedError as error:
         if bag not in {part.parent, part}:
             raise DataError(f"{bag}: a file in it is cut short or damaged") from error
@@ -238,7 +240,18 @@ def _read_mcap(part: Path, bag: Path, takes: Takes, unpack: Unpack | None, conte
         content.setdefault(channel.topic, TopicContent(walk.type_name(key)))
 
 
-def _target(topic: str, type_name: str, takes: Takes, content: dict[str, TopicContent]) -> list[bytes] | None:
+def _take(block: Messages, channel: int, unpack: Unpack | None, target: RawMessages) -> None:
+    """Append the messages of a channel; each is unpacked where they are packed one by one."""
+    rows = block.channel == channel
+    messages = Block(block.content, block.start[rows], block.length[rows])
+    if unpack is None:
+        target.extend(messages)
+        return
+    for start, length in zip(messages.start, messages.length, strict=True):
+        target.append(unpack(block.content[start : start + length]))
+
+
+def _target(topic: str, type_name: str, takes: Takes, content: dict[str, TopicContent]) -> RawMessages | None:
     """Where the messages of a topic go; None when they are not wanted."""
     wanted = takes(topic, type_name)
     entry = content.setdefault(topic, TopicContent(type_name))
@@ -256,6 +269,8 @@ def check_magic(part: Path) -> None:
 
 
 def _read_with_rosbags(part: Path, bag: Path, takes: Takes, content: dict[str, TopicContent]) -> None:
+    from rosbags.rosbag2 import Reader  # noqa: PLC0415 (slow to load, and most bags are MCAP)
+
     try:
         with Reader(part) as reader:
             targets = {c.topic: _target(c.topic, c.msgtype, takes, content) for c in reader.connections}

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from functools import cache
+from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rosbags.typesys import Stores, get_typestore
 
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.data.arrival import RawStatus, RawTemperature, RawTest, in_order
@@ -18,7 +17,8 @@ from sdimu_calibration.core.recording import Recording, TableLog, seconds
 from sdimu_calibration.storage import cdr
 from sdimu_calibration.storage.bag_file import raw_messages, read_topics
 from sdimu_calibration.storage.cdr import LayoutError, Stamps
-from sdimu_calibration.storage.status_message import phase_word, stamp_ns, status_entry
+from sdimu_calibration.storage.raw_messages import RawMessages
+from sdimu_calibration.storage.status_message import phase_entry, phase_word, stamp_ns
 from sdimu_calibration.storage.topic_choice import KINDS, TopicChoice, choose
 from sdimu_calibration.storage.topics import Topics
 
@@ -63,13 +63,13 @@ def read_recording(path: Path, topics: Topics | TopicChoice | None = None) -> Re
 
 def read_messages(
     path: Path, topics: Topics | TopicChoice | None, notes: list[str]
-) -> tuple[Topics, dict[str, list[bytes]]]:
+) -> tuple[Topics, dict[str, RawMessages]]:
     """Read the messages of the topics of a test; `notes` gets what was chosen by type.
 
     Returns
     -------
     topics : Topics
-    messages : dict of str to list of bytes
+    messages : dict of str to RawMessages
         By topic, as recorded (CDR).
 
     Raises
@@ -86,12 +86,27 @@ def read_messages(
 
 
 def _is_phase(raw: bytes) -> bool:
-    return phase_word(_message(raw, cdr.STATUS)) in {"dwell", "rotating"}
+    return phase_word(*_status_entry(raw)) in {"dwell", "rotating"}
 
 
-def _status(raw: list[bytes], topic: str, notes: list[str]) -> RawStatus | None:
+def _status_entry(raw: bytes) -> tuple[str, Mapping[str, str]]:
+    """Text and values of a status; empty where the message is none."""
+    # A status is repeated every second: but for the stamp a test has few different ones.
+    return _decoded_status(raw[:4] + raw[12:])
+
+
+@lru_cache(maxsize=64)
+def _decoded_status(without_stamp: bytes) -> tuple[str, Mapping[str, str]]:
+    try:
+        return cdr.decode_status(without_stamp[:4] + bytes(8) + without_stamp[4:])
+    except LayoutError:
+        return "", {}
+
+
+def _status(raw: Sequence[bytes], topic: str, notes: list[str]) -> RawStatus | None:
     """Phases in the order of arrival; a message without a phase is ignored."""
-    parsed = [entry for entry in (status_entry(_message(data, cdr.STATUS)) for data in raw) if entry is not None]
+    found = (phase_entry(cdr.stamp_of(data), *_status_entry(data)) for data in raw)
+    parsed = [entry for entry in found if entry is not None]
     if len(parsed) < len(raw):
         notes.append(f"{len(raw) - len(parsed)} messages of {topic} had no phase and were ignored")
     if not parsed:
@@ -100,7 +115,7 @@ def _status(raw: list[bytes], topic: str, notes: list[str]) -> RawStatus | None:
     return RawStatus(np.array(ns, np.int64), np.array(dwell), np.array(stop, np.int64))
 
 
-def _temperature(raw: list[bytes]) -> RawTemperature | None:
+def _temperature(raw: Sequence[bytes]) -> RawTemperature | None:
     if not raw:
         return None
     try:
@@ -110,13 +125,16 @@ def _temperature(raw: list[bytes]) -> RawTemperature | None:
         return RawTemperature(*_one_by_one(raw, cdr.TEMPERATURE, lambda message: message.temperature))
 
 
-def _table(raw: list[bytes], start_ns: int, topic: str, notes: list[str]) -> TableLog | None:
+def _table(raw: Sequence[bytes], start_ns: int, topic: str, notes: list[str]) -> TableLog | None:
     if not raw:
         return None
-    first = _message(raw[0], cdr.JOINT_STATE)
-    names = tuple(first.name)
     try:
-        ns, angle = cdr.decode_joint_positions(raw, names, np.asarray(first.position, float))
+        names, first = cdr.decode_joint_state(raw[0])
+    except LayoutError:
+        notes.append(f"{topic} cannot be read and was ignored")
+        return None
+    try:
+        ns, angle = cdr.decode_joint_positions(raw, names, first)
     except LayoutError:
         try:
             ns, angle = _one_by_one(raw, cdr.JOINT_STATE, lambda message: message.position)
@@ -130,7 +148,7 @@ def _table(raw: list[bytes], start_ns: int, topic: str, notes: list[str]) -> Tab
     return TableLog(seconds(ns[chosen], start_ns), names, angle[chosen])
 
 
-def _imu(raw: list[bytes]) -> tuple[Stamps, Floats, Floats]:
+def _imu(raw: Sequence[bytes]) -> tuple[Stamps, Floats, Floats]:
     try:
         return cdr.decode_imu(raw)
     except LayoutError:
@@ -143,7 +161,7 @@ def _imu_values(message: Any) -> list[float]:
     return [rate.x, rate.y, rate.z, force.x, force.y, force.z]
 
 
-def _one_by_one(raw: list[bytes], type_name: str, values: Callable[[Any], Any]) -> tuple[Stamps, Floats]:
+def _one_by_one(raw: Sequence[bytes], type_name: str, values: Callable[[Any], Any]) -> tuple[Stamps, Floats]:
     """Decode messages that share no layout; slow, and right for every encoding rosbags knows."""
     messages = [_message(data, type_name) for data in raw]
     stamps = np.array([stamp_ns(message) for message in messages], np.int64)
@@ -156,6 +174,8 @@ def _message(raw: bytes, type_name: str) -> Any:
 
 @cache
 def _typestore() -> Any:
+    from rosbags.typesys import Stores, get_typestore  # noqa: PLC0415 (slow to load, and rarely needed)
+
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         return get_typestore(Stores.ROS2_JAZZY)

@@ -8,12 +8,14 @@ counted from the end of the encapsulation.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sdimu_calibration.core.arrays import Bools, Floats, Ints
+from sdimu_calibration.storage.raw_messages import RawMessages
 
 Stamps = Ints
 Rows = NDArray[np.uint8]
@@ -201,12 +203,12 @@ def encode_status(
     return list(encoded)
 
 
-def decode_imu(raw: list[bytes]) -> tuple[Stamps, Floats, Floats]:
+def decode_imu(raw: Sequence[bytes]) -> tuple[Stamps, Floats, Floats]:
     """Decode sensor_msgs/Imu.
 
     Parameters
     ----------
-    raw : list of bytes, length n
+    raw : sequence of bytes, length n
 
     Returns
     -------
@@ -219,16 +221,16 @@ def decode_imu(raw: list[bytes]) -> tuple[Stamps, Floats, Floats]:
     LayoutError
         When the bytes are not what a constant layout says.
     """
-    stamp_ns, values = decode_doubles(raw, _IMU_DOUBLES)
-    return stamp_ns, values[:, _RATE].copy(), values[:, _FORCE].copy()
+    stamp_ns, (omega, force) = _decode_parts(raw, _IMU_DOUBLES, (_RATE, _FORCE))
+    return stamp_ns, omega, force
 
 
-def decode_doubles(raw: list[bytes], number: int) -> tuple[Stamps, Floats]:
+def decode_doubles(raw: Sequence[bytes], number: int) -> tuple[Stamps, Floats]:
     """Decode messages made of a header and `number` doubles, whatever the length of frame_id.
 
     Parameters
     ----------
-    raw : list of bytes, length n
+    raw : sequence of bytes, length n
     number : int
 
     Returns
@@ -241,33 +243,88 @@ def decode_doubles(raw: list[bytes], number: int) -> tuple[Stamps, Floats]:
     LayoutError
         When a message is not made so.
     """
-    stamp_ns = np.empty(len(raw), np.int64)
-    values = np.empty((len(raw), number))
-    lengths = np.fromiter(map(len, raw), np.int64, len(raw))
-    for length in np.unique(lengths):
-        chosen = np.flatnonzero(lengths == length)
-        same = raw if len(chosen) == len(raw) else [raw[i] for i in chosen]
-        start = int(length) - 8 * number
-        if start < _STAMP_END + 4:
-            raise LayoutError("message too short")
-        messages = np.frombuffer(b"".join(same), _stamped(start, number, int(length)))
-        text = 12 + messages["text"].astype(np.int64)
-        if (messages["order"] != 1).any() or (4 + text + -text % 8 != start).any():
-            raise LayoutError("other layout")
-        stamp_ns[chosen] = messages["sec"] * np.int64(1_000_000_000) + messages["nanosec"]
-        values[chosen] = messages["values"]
+    stamp_ns, (values,) = _decode_parts(raw, number, (slice(0, number),))
     return stamp_ns, values
 
 
-def _stamped(start: int, number: int, length: int) -> np.dtype[Any]:
-    return np.dtype(
-        {
-            "names": ["order", "sec", "nanosec", "text", "values"],
-            "formats": ["u1", "<i4", "<u4", "<u4", ("<f8", (number,))],
-            "offsets": [1, 4, 8, 12, start],
-            "itemsize": length,
-        }
-    )
+def _decode_parts(raw: Sequence[bytes], number: int, parts: Sequence[slice]) -> tuple[Stamps, list[Floats]]:
+    """Decode stamps (n,) and some of the doubles: one array (n, k) for each of `parts`."""
+    messages = raw if isinstance(raw, RawMessages) else RawMessages(raw)
+    stamps = [np.empty(0, np.int64)]
+    values = [[np.empty((0, part.stop - part.start)) for part in parts]]
+    for block in messages.blocks():
+        start = block.length - 8 * number
+        if (start < _STAMP_END + 4).any():
+            raise LayoutError("message too short")
+        text = 12 + block.field(12, "<u4")[:, 0].astype(np.int64)
+        if (block.field(1, np.uint8) != 1).any() or (4 + text + -text % 8 != start).any():
+            raise LayoutError("other layout")
+        second, nanosecond = block.field(4, "<i4")[:, 0], block.field(8, "<u4")[:, 0]
+        stamps.append(second * np.int64(1_000_000_000) + nanosecond)
+        values.append([block.field(start + 8 * part.start, "<f8", part.stop - part.start) for part in parts])
+    return np.concatenate(stamps), [np.concatenate(columns) for columns in zip(*values, strict=True)]
+
+
+class _Cursor:
+    """Reads one message from front to back, from behind the stamp of its header."""
+
+    def __init__(self, message: bytes) -> None:
+        if len(message) < _STAMP_END:
+            raise LayoutError("message too short")
+        self._message, self._order = message, _order(message)
+        self._place = _STAMP_END
+        self.string()  # frame_id
+
+    def skip(self, size: int) -> bytes:
+        """Pass over `size` bytes and return them."""
+        self._place += size
+        if self._place > len(self._message):
+            raise LayoutError("message too short")
+        return self._message[self._place - size : self._place]
+
+    def count(self) -> int:
+        """Read a uint32, such as the length of a sequence."""
+        self.skip(-(self._place - 4) % 4)
+        return int.from_bytes(self.skip(4), self._order)
+
+    def string(self) -> str:
+        """Read a string."""
+        return self.skip(self.count()).rstrip(b"\x00").decode(errors="replace")
+
+    def doubles(self) -> Floats:
+        """Read a sequence of doubles, shape (n,)."""
+        number = self.count()
+        if number:
+            self.skip(-(self._place - 4) % 8)
+        return np.frombuffer(self.skip(8 * number), "<f8" if self._order == "little" else ">f8").astype(np.float64)
+
+
+def decode_status(message: bytes) -> tuple[str, dict[str, str]]:
+    """Decode text and values of the first entry of a diagnostic_msgs/DiagnosticArray; nothing when there is none.
+
+    Raises
+    ------
+    LayoutError
+        When the message ends before the entry does.
+    """
+    cursor = _Cursor(message)
+    if not cursor.count():
+        return "", {}
+    cursor.skip(1)  # level
+    _, text, _ = cursor.string(), cursor.string(), cursor.string()
+    return text, {cursor.string(): cursor.string() for _ in range(cursor.count())}
+
+
+def decode_joint_state(message: bytes) -> tuple[tuple[str, ...], Floats]:
+    """Decode names (length k) and angles (rad), shape (k,), of a sensor_msgs/JointState.
+
+    Raises
+    ------
+    LayoutError
+        When the message ends before they do.
+    """
+    cursor = _Cursor(message)
+    return tuple(cursor.string() for _ in range(cursor.count())), cursor.doubles()
 
 
 def decode_stamps(rows: Rows) -> Stamps:
@@ -276,12 +333,12 @@ def decode_stamps(rows: Rows) -> Stamps:
     return second * 1_000_000_000 + rows[:, 8:12].copy().view("<u4")[:, 0].astype(np.int64)
 
 
-def decode_joint_positions(raw: list[bytes], names: tuple[str, ...], first: Floats) -> tuple[Stamps, Floats]:
+def decode_joint_positions(raw: Sequence[bytes], names: tuple[str, ...], first: Floats) -> tuple[Stamps, Floats]:
     """Decode the angles of sensor_msgs/JointState that all name the same axes.
 
     Parameters
     ----------
-    raw : list of bytes, length n
+    raw : sequence of bytes, length n
     names : tuple of str, length k
         As in the first message.
     first : ndarray, shape (k,)

@@ -1,7 +1,8 @@
-"""A status of the rate table as a message object: reader of bags and live node take it alike."""
+"""A status of the rate table: reader of bags and live node take it alike."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 from sdimu_calibration.core.recording import UNNUMBERED
@@ -12,22 +13,26 @@ def stamp_ns(message: Any) -> int:
     return int(message.header.stamp.sec) * 1_000_000_000 + int(message.header.stamp.nanosec)
 
 
-def phase_word(message: Any) -> str:
-    """Phase in a diagnostic_msgs/DiagnosticArray, empty when there is none."""
+def first_entry(message: Any) -> tuple[str, dict[str, str]]:
+    """Text and values of the first entry of a diagnostic_msgs/DiagnosticArray; empty where there is none."""
     if not message.status:
-        return ""
-    values = {entry.key: entry.value for entry in message.status[0].values}
-    return str(values.get("phase") or message.status[0].message).strip().lower()
+        return "", {}
+    first = message.status[0]
+    return first.message, {entry.key: entry.value for entry in first.values}
 
 
-def status_entry(message: Any) -> tuple[int, bool, int] | None:
+def phase_word(text: str, values: Mapping[str, str]) -> str:
+    """Phase in the text and values of a status, empty when there is none."""
+    return (values.get("phase") or text).strip().lower()
+
+
+def phase_entry(ns: int, text: str, values: Mapping[str, str]) -> tuple[int, bool, int] | None:
     """Stamp (ns), True for dwell, stop (`UNNUMBERED` without one); None without a phase.
 
     A phase of any other name than ``dwell`` is no dwell.
     """
-    phase = phase_word(message)
+    phase = phase_word(text, values)
     if not phase:
         return None
-    values = {entry.key: entry.value for entry in message.status[0].values}
     stop = values.get("stop", "").strip()
-    return stamp_ns(message), phase == "dwell", int(stop) if stop.isdecimal() else UNNUMBERED
+    return ns, phase == "dwell", int(stop) if stop.isdecimal() else UNNUMBERED

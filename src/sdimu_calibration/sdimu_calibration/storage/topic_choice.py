@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -103,7 +103,7 @@ def _found(path: Path, content: Mapping[str, TopicContent], kind: str, is_phase:
     return own
 
 
-def _extent(raw: list[bytes]) -> str:
+def _extent(raw: Sequence[bytes]) -> str:
     """Say how many messages there are, and their rate by header.stamp."""
     stamps = [_stamp_ns(message) for message in (raw[0], raw[-1])]
     span = (stamps[1] - stamps[0]) * 1e-9

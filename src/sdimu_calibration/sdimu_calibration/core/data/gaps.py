@@ -22,7 +22,6 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import maximum_filter1d
 
 from sdimu_calibration.core.arrays import Bools, Floats, Ints
 from sdimu_calibration.core.data.epochs import Epochs
@@ -81,6 +80,8 @@ def _steps(cycles: Cycles) -> Floats:
 
 def _nearby(cycles: Cycles) -> Floats:
     """Largest angular acceleration within `_NEAR_S` of each cycle (rad/s^2), shape (n,)."""
+    from scipy.ndimage import maximum_filter1d  # noqa: PLC0415 (0.2 s that a whole recording does not need)
+
     step = _steps(cycles)
     beside = np.maximum(np.append(step, 0.0), np.insert(step, 0, 0.0))
     width = 2 * math.ceil(_NEAR_S / float(np.median(cycles.dt))) + 1

@@ -9,6 +9,7 @@ noise repeat numbers by nature; for them a run must be as long as their own repe
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -62,9 +63,7 @@ def sound(recording: Recording) -> tuple[Recording, tuple[DataFault, ...]]:
     """
     bad = np.zeros(len(recording.t), dtype=bool)
     found: dict[str, list[tuple[str, Ints]]] = {}
-    for name, x in zip(CHANNELS, (*recording.omega_ib_b.T, *recording.f_ib_b.T), strict=True):
-        if _noiseless(x):
-            continue
+    for name, x in _channels(recording):
         for kind, test in _TESTS.items():
             rows = test(x)
             if len(rows):
@@ -79,6 +78,14 @@ def sound(recording: Recording) -> tuple[Recording, tuple[DataFault, ...]]:
         rejected=recording.rejected + int(bad.sum()),
     )  # fmt: skip
     return mended, faults
+
+
+def _channels(recording: Recording) -> Iterator[tuple[str, Floats]]:
+    """Name and numbers of each channel that has noise, one after the other in memory."""
+    for name, column in zip(CHANNELS, (*recording.omega_ib_b.T, *recording.f_ib_b.T), strict=True):
+        x = np.ascontiguousarray(column)
+        if not _noiseless(x):
+            yield name, x
 
 
 _TEXT = {
@@ -182,24 +189,34 @@ def _spikes(x: Floats) -> Ints:
 
 def _stand_out(x: Floats, width: int) -> Ints:
     """Find `width` neighbouring samples that all stand off the line between the samples before and after them."""
-    second = np.zeros_like(x)
-    second[1:-1] = x[1:-1] - 0.5 * (x[:-2] + x[2:])
-    size = np.abs(second)
+    size = np.zeros_like(x)
+    size[1:-1] = np.abs(x[1:-1] - 0.5 * (x[:-2] + x[2:]))
     sigma = _GAUSS_MAD * float(np.median(size))
     if sigma == 0.0:
         return np.empty(0, dtype=np.int64)
     last = len(x) - width - 1
-    before, after = x[:last], x[width + 1 : width + 1 + last]
-    share = np.arange(1, width + 1) / (width + 1)
-    off = np.abs([x[j : j + last] - ((1.0 - s) * before + s * after) for j, s in enumerate(share, start=1)]).min(axis=0)
-    at = np.flatnonzero((off > _SPIKE * sigma) & (np.abs(after - before) < 0.5 * off))
+    # Few samples are far from the line; the rest is asked of these alone.
+    at = np.flatnonzero(np.abs(_off_line(x, slice(0, last), 1, width)) > _SPIKE * sigma)
+    off = np.abs([_off_line(x, at, j, width) for j in range(1, width + 1)]).min(axis=0)
+    good = (off > _SPIKE * sigma) & (np.abs(x[at + width + 1] - x[at]) < 0.5 * off)
+    at, off = at[good], off[good]
     beside = np.r_[_AROUND[_AROUND < 0], _AROUND[_AROUND > 0] + width - 1]
-    around = np.sort(size[np.clip(at[:, None] + 1 + beside, 0, len(x) - 1)], axis=1)[:, -1 - _OF_ANOTHER]
+    near = np.clip(at[:, None] + 1 + beside, 0, len(x) - 1)
+    around = np.sort(size[near], axis=1)[:, -1 - _OF_ANOTHER]
     # The peak of a turn that never runs steady stands off as far as its flanks climb in a sample.
-    climb = np.abs(np.diff(x, prepend=x[0]))
-    slope = np.median(climb[np.clip(at[:, None] + 1 + beside, 0, len(x) - 1)], axis=1)
-    first = at[np.maximum(around, slope) * width < _ALONE * off[at]] + 1
+    slope = np.median(np.abs(x[near] - x[np.maximum(near - 1, 0)]), axis=1)
+    first = at[np.maximum(around, slope) * width < _ALONE * off] + 1
     return np.unique(first[:, None] + np.arange(width))
+
+
+def _off_line(x: Floats, at: slice | Ints, place: int, width: int) -> Floats:
+    """Distance of sample `place` behind each of `at` from the line between it and the one behind `width` samples."""
+    share = place / (width + 1)
+    if isinstance(at, slice):
+        before, here, after = (x[at.start + j : at.stop + j] for j in (0, place, width + 1))
+    else:
+        before, here, after = x[at], x[at + place], x[at + width + 1]
+    return np.asarray(here - ((1.0 - share) * before + share * after))
 
 
 _TESTS = {"stuck": _stuck, "saturated": _saturated, "spike": _spikes}
@@ -207,11 +224,12 @@ _TESTS = {"stuck": _stuck, "saturated": _saturated, "spike": _spikes}
 
 def _medians(rows: Floats) -> Floats:
     """Median of each row without what is not a number; 0 where that is most of it."""
-    known = np.isfinite(rows)
-    enough = known.sum(axis=1) >= rows.shape[1] // 2
-    out = np.zeros(len(rows))
-    out[enough] = np.nanmedian(rows[enough], axis=1)
-    return out
+    known = np.isfinite(rows).sum(axis=1)
+    # What is no number is sorted behind all others.
+    ordered = np.sort(rows, axis=1)
+    each = np.arange(len(rows))
+    middle = 0.5 * (ordered[each, np.maximum(known - 1, 0) // 2] + ordered[each, known // 2])
+    return np.where(known >= rows.shape[1] // 2, middle, 0.0)
 
 
 def wild(recording: Recording) -> tuple[Floats, Floats, tuple[DataFault, ...]]:
@@ -239,9 +257,7 @@ def wild(recording: Recording) -> tuple[Floats, Floats, tuple[DataFault, ...]]:
     uneven = np.ones(len(recording.t), dtype=bool)
     uneven[2:-2] = np.abs(recording.t[4:] - recording.t[:-4] - 4.0 * recording.interval_s) > recording.interval_s / 2
     middle = recording.t[_WINDOW // 2 :: _WINDOW][:windows]
-    for name, x in zip(CHANNELS, (*recording.omega_ib_b.T, *recording.f_ib_b.T), strict=True):
-        if _noiseless(x):
-            continue
+    for name, x in _channels(recording):
         # Gravity turns through a body in motion: its fourth difference is nothing beside noise, its second is not.
         fourth = np.zeros_like(x)
         fourth[2:-2] = x[:-4] - 4.0 * x[1:-3] + 6.0 * x[2:-2] - 4.0 * x[3:-1] + x[4:]

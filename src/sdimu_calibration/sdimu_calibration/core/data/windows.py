@@ -139,16 +139,17 @@ def cut_windows(
     first = np.arange(m, len(t) - m - q + 1, m)
     whole = t[np.minimum(first + m + q, len(t)) - 1] - t[first - q] < _GAP * (m + 2 * q) * dt
     first = first[whole]
-    total_w, total_f = (np.vstack([np.zeros(3), np.cumsum(x - x.mean(axis=0), axis=0)]) for x in (w, f))
+    offset_w, offset_f = w.mean(axis=0), f.mean(axis=0)
+    total_w, total_f = (_running_sum(x, offset) for x, offset in ((w, offset_w), (f, offset_f)))
 
-    def mean(total: Floats, values: Floats, begin: Ints, end: Ints) -> Floats:
-        return np.asarray((total[end] - total[begin]) / (end - begin)[:, None] + values.mean(axis=0))
+    def mean(total: Floats, offset: Floats, begin: Ints, end: Ints) -> Floats:
+        return np.asarray((total[end] - total[begin]) / (end - begin)[:, None] + offset)
 
     return Windows(
         start=t[first - 1], end=t[first + m - 1], first=first, length=m, interval_s=dt,
-        up_first=_unit(mean(total_f, f, first - q, first + q)),
-        up_last=_unit(mean(total_f, f, first + m - q, first + m + q)),
-        w_mean=mean(total_w, w, first, first + m), f_mean=mean(total_f, f, first, first + m),
+        up_first=_unit(mean(total_f, offset_f, first - q, first + q)),
+        up_last=_unit(mean(total_f, offset_f, first + m - q, first + m + q)),
+        w_mean=mean(total_w, offset_w, first, first + m), f_mean=mean(total_f, offset_f, first, first + m),
     )  # fmt: skip
 
 
@@ -156,6 +157,13 @@ def samples_of(length_s: float, interval_s: float) -> tuple[int, int]:
     """Return the samples of a window (a power of two) and those to each side of an edge that give the direction."""
     m = int(2 ** max(round(float(np.log2(length_s / interval_s))), 0))
     return m, max(m // _END, 1)
+
+
+def _running_sum(x: Floats, offset: Floats) -> Floats:
+    """Sum of ``x - offset`` up to each row of x (n, 3), shape (n + 1, 3)."""
+    out = np.zeros((len(x) + 1, 3))
+    np.cumsum(x - offset, axis=0, out=out[1:])
+    return out
 
 
 def turned(w: Floats, windows: Windows, chosen: Ints, factor: float) -> Floats:

@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import norm
 
 from sdimu_calibration.core.arrays import Ints
 from sdimu_calibration.core.diagnosis.free_input_test import FreeInputTest
@@ -28,6 +27,7 @@ from sdimu_calibration.core.evidence.candidate import Candidate
 from sdimu_calibration.core.evidence.consistency import Consistency
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.evidence.navigation_evidence import NavigationEvidence
+from sdimu_calibration.core.probability import normal_tail
 from sdimu_calibration.core.progress import Progress, silent
 from sdimu_calibration.core.recording import Recording
 from sdimu_calibration.core.results import Calibration
@@ -276,7 +276,7 @@ def p_value(done: Round, consistency: Consistency, noise: bool) -> float:
     first = done.found.first
     largest = float(np.max(np.abs(first.z), initial=0.0))
     count = int(np.isfinite(first.sigma).sum())
-    of_scan = min(1.0, count * 2.0 * float(norm.sf(largest)))
+    of_scan = min(1.0, count * 2.0 * normal_tail(largest))
     if not len(done.free):
         return float(of_scan)
     of_noise = consistency.nis_p_value if noise else 1.0

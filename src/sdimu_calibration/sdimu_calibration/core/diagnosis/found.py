@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import norm
 
 from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.diagnosis.coefficient_shifts import CoefficientShift, coefficient_shifts
@@ -15,6 +14,7 @@ from sdimu_calibration.core.diagnosis.scan import POWER_80, Scan, alike, scan
 from sdimu_calibration.core.diagnosis.search import Problem
 from sdimu_calibration.core.evidence.candidate import Candidate
 from sdimu_calibration.core.evidence.linear import LinearEvidence
+from sdimu_calibration.core.probability import normal_tail
 
 
 @dataclass(frozen=True)
@@ -90,7 +90,7 @@ def found_effects(d: Diagnosis) -> tuple[Found, ...]:
                 z=z,
                 log_likelihood_gain=0.5 * z * z,
                 log_bayes_factor=_bayes(d, k, float(scores[column])),
-                p_value_adjusted=float(min(1.0, count * 2.0 * float(norm.sf(abs(z))))),
+                p_value_adjusted=float(min(1.0, count * 2.0 * normal_tail(abs(z)))),
                 explained=float(np.clip((misfit[k] - misfit[k + 1]) / whole, 0.0, 1.0)),
                 held_out_before=held_out[k],
                 held_out_after=held_out[k + 1],

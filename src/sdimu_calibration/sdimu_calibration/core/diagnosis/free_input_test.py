@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2
 
 from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.evidence.information import Information
+from sdimu_calibration.core.probability import chi2_tail
 
 _TESTABLE = 1e-2
 """Directions of which the model leaves less than this share of the information (a tenth of the signature) are not
@@ -52,4 +52,4 @@ def free_input_test(full: Information, known: Ints, weight: Floats, free: Ints, 
         own = np.diag(J)
         z = np.where(own > (0.02 / unit) ** 2, d / np.sqrt(own) / scale, 0.0)
     dof = int(keep.sum())
-    return FreeInputTest(fall, dof, float(chi2.sf(fall, dof)) if dof else 1.0, estimate, np.nan_to_num(z))
+    return FreeInputTest(fall, dof, chi2_tail(fall, dof) if dof else 1.0, estimate, np.nan_to_num(z))

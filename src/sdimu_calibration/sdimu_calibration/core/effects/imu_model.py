@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sdimu_calibration.core.arrays import Floats, Ints
+from sdimu_calibration.core.compiled import compiled
 from sdimu_calibration.core.effects import selection
 from sdimu_calibration.core.effects.effect import Effect, Parameter
 from sdimu_calibration.core.effects.motion import Motion
@@ -55,15 +56,27 @@ class ImuModel:
 
     def regressors(self, motion: Motion) -> Floats:
         """Regressor columns of all effects; shape (n, m), SI."""
-        return np.ascontiguousarray(np.hstack([e.regressors(motion) for e in self.effects]))
+        out = np.empty((len(motion.t), len(self.channel)))
+        start = 0
+        for effect in self.effects:
+            end = start + len(effect.terms)
+            out[:, start:end] = effect.regressors(motion)
+            start = end
+        return out
 
     def errors(self, values: Floats, coefficients: Floats) -> Floats:
         """Sensor errors of regressors `values` (n, m) at `coefficients` (p,): rad/s and m/s^2, shape (n, 6)."""
-        columns = values * coefficients[self.parameter]
-        out = np.zeros((len(values), 6))
-        for channel in range(6):
-            out[:, channel] = columns[:, self.channel == channel].sum(axis=1)
-        return out
+        return np.asarray(_errors(np.ascontiguousarray(values), self.channel, coefficients[self.parameter]))
+
+
+@compiled
+def _errors(values: Floats, channel: Ints, size: Floats) -> Floats:
+    """Sum of the columns (n, m) of each sensor axis, each times its size (m,)."""
+    out = np.zeros((values.shape[0], 6))
+    for k in range(values.shape[0]):
+        for j in range(values.shape[1]):
+            out[k, channel[j]] += values[k, j] * size[j]
+    return out
 
 
 def build(effects: Sequence[str | Effect], imu: ImuSpecification) -> ImuModel:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from sdimu_calibration.core.arrays import Bools, Floats
+from sdimu_calibration.core.arrays import Bools, Floats, Ints
 from sdimu_calibration.core.units import STANDARD_GRAVITY
 
 _TURNING = np.radians(0.01)
@@ -58,17 +59,27 @@ class Motion:
     since_turn: Floats
     magnetic_n: Floats
 
-    @property
+    @cached_property
     def a(self) -> Floats:
         """Specific force in units of standard gravity, shape (n, 3)."""
         return self.f / STANDARD_GRAVITY
 
-    @property
+    @cached_property
     def a_rate(self) -> Floats:
         """Rate of change of `a` by turning under gravity, ``-w_table x a`` (1/s), shape (n, 3)."""
         return np.asarray(-np.cross(self.w_table, self.a))
 
-    @property
+    @cached_property
+    def table_rate(self) -> Floats:
+        """Size of `w_table` (rad/s), shape (n,)."""
+        return np.asarray(np.linalg.norm(self.w_table, axis=1))
+
+    @cached_property
+    def standing(self) -> Ints:
+        """Cycles in which the table does not turn at all."""
+        return np.flatnonzero(self.table_rate == 0.0)
+
+    @cached_property
     def moving(self) -> Floats:
         """1 while the table turns, 0 at rest, shape (n,).
 
@@ -77,12 +88,12 @@ class Motion:
         turning = np.sum(self.w_table**2, axis=1) > _TURNING**2
         return np.asarray((~self.rest & turning).astype(np.float64))
 
-    @property
+    @cached_property
     def field(self) -> Floats:
         """Magnetic field in b (T), shape (n, 3)."""
         return np.asarray(np.einsum("kij,i->kj", self.C_nb, self.magnetic_n))
 
-    @property
+    @cached_property
     def lever(self) -> Floats:
         """``[alpha x] + [w_table x]^2`` (1/s^2), shape (n, 3, 3): acceleration of a point at r is ``lever @ r``."""
         w, d = self.w_table, self.alpha

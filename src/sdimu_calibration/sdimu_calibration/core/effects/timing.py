@@ -98,9 +98,8 @@ def _full_rate(motion: Motion, at: float) -> Floats:
 
     The median of what is faster than half: a loss that is being mended lifts the cycles about it.
     """
-    rate = np.linalg.norm(motion.w_table, axis=1)
+    rate, still = motion.table_rate, motion.standing
     here = min(int(np.searchsorted(motion.t, at)), len(rate) - 1)
-    still = np.flatnonzero(rate == 0.0)
     place = int(np.searchsorted(still, here))
     first = int(still[place - 1]) + 1 if place else 0
     last = int(still[place]) if place < len(still) else len(rate)

@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2
 
 from sdimu_calibration.core.alignment.prepared import PreparedData
 from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.filter.filter_pass import PassOutput
 from sdimu_calibration.core.measurement_kind import SKIP
+from sdimu_calibration.core.probability import chi2_head, chi2_tail
 from sdimu_calibration.core.specification import ImuSpecification
 
 CHANNEL_NAMES = (
@@ -112,7 +112,7 @@ def check(output: PassOutput, prepared: PreparedData, imu: ImuSpecification) -> 
     sensors = standard[prepared.kind > 0][:, 6:]
     return Consistency(
         nis_mean=total / max(dof, 1),
-        nis_p_value=float(2.0 * min(chi2.sf(total, dof), chi2.cdf(total, dof))),
+        nis_p_value=2.0 * min(chi2_tail(total, dof), chi2_head(total, dof)),
         first_nis=float(np.nanmean(at_first) / 3.0) if at_first.size else float("nan"),
         ljung_box_p=ljung_box(sensors),
         gyro=triad_noise(prepared, prepared.epochs.w_mean, imu.gyro_white_noise),
@@ -132,7 +132,7 @@ def ljung_box(series: Floats) -> float:
         x = series[:, column] - series[:, column].mean()
         r = np.array([float(x[lag:] @ x[:-lag]) for lag in range(1, _LAGS + 1)]) / float(x @ x)
         q = n * (n + 2) * float(np.sum(r**2 / (n - np.arange(1, _LAGS + 1))))
-        worst = min(worst, float(chi2.sf(q, _LAGS)))
+        worst = min(worst, chi2_tail(q, _LAGS))
     return float(min(1.0, worst * count))
 
 

@@ -108,8 +108,9 @@ class LinearEvidence(ABC):
         """Return the evidence with the model and the candidates at `columns` alone."""
         p = len(self.weight)
         keep = np.concatenate([self.model, columns]).astype(np.int64)
+        whole = np.array_equal(keep, np.arange(len(keep)))
         part = replace(
-            self, W=np.ascontiguousarray(self.W[:, keep]), names=tuple(self.names[i] for i in keep),
+            self, W=self.W[:, : len(keep)] if whole else self.W[:, keep], names=tuple(self.names[i] for i in keep),
             candidates=tuple(self.candidates[i - p] for i in columns), prior=self.prior[columns - p],
         )  # fmt: skip
         full = self.information

@@ -8,6 +8,7 @@ are corrected exactly, and an effect shows in corrected samples through the inve
 from __future__ import annotations
 
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -34,7 +35,9 @@ from sdimu_calibration.core.second_order.second_order_passes import (
 _SHORTEST_DWELL_S = 3.0
 """Dwells that are shorter (s) are part of a turn."""
 _BLOCK = 24
-"""Effects whose regressors are in memory at a time."""
+"""Effects whose regressors are in memory at a time, in each thread."""
+_THREADS = 2
+"""Threads: the cores of a small machine; more blocks at a time than there are caches for gain nothing."""
 
 
 @dataclass(frozen=True)
@@ -180,19 +183,35 @@ def navigation_evidence(
 def columns(prepared: PreparedData, known: KnownPass, latitude: float, effects: Sequence[Effect]) -> Floats:
     """Signatures of all parameters of `effects` at a latitude (rad), shape (N, parameters)."""
     epochs, seen = prepared.epochs, known.seen
-    parts = []
-    for start in range(0, len(effects), _BLOCK):
-        block = effects[start : start + _BLOCK]
-        values, channel, parameter, count = [], [], [], 0
-        for effect in block:
-            values.append(effect.regressors(seen))
-            channel += [t.channel for t in effect.terms]
-            parameter += [count + t.parameter for t in effect.terms]
-            count += len(effect.parameters)
-        terms = np.hstack(values), np.array(channel, dtype=np.int64), np.array(parameter, dtype=np.int64)
+    blocks = [effects[start : start + _BLOCK] for start in range(0, len(effects), _BLOCK)]
+    ends = np.cumsum([0, *(sum(len(effect.parameters) for effect in block) for block in blocks)])
+    # Column by column in memory: what is chosen of them later is a few columns.
+    W = np.zeros((int(np.isfinite(known.output.normalised).sum()), int(ends[-1])), order="F")
+
+    def fill(number: int) -> None:
+        terms = _terms(blocks[number], seen)
         if known.weight is not None:
             terms = spread(*terms, known.weight)
-        parts.append(
-            signatures(seen, epochs.first, epochs.last, prepared.kind, known.output, *terms, count, latitude)
-        )
-    return np.hstack(parts)
+        signatures(
+            seen, epochs.first, epochs.last, prepared.kind, known.output, *terms, latitude,
+            W[:, ends[number] : ends[number + 1]],
+        )  # fmt: skip
+
+    # The recursion of one column knows nothing of the others, and compiled loops run beside each other.
+    with ThreadPoolExecutor(_THREADS) as pool:
+        list(pool.map(fill, range(len(blocks))))
+    return W
+
+
+def _terms(effects: Sequence[Effect], seen: Motion) -> tuple[Floats, Ints, Ints]:
+    """Regressor columns (n, m) of effects, and the sensor axis and parameter (m,) of each."""
+    values = np.empty((len(seen.t), sum(len(effect.terms) for effect in effects)))
+    channel: list[int] = []
+    parameter: list[int] = []
+    parameters = 0
+    for effect in effects:
+        values[:, len(channel) : len(channel) + len(effect.terms)] = effect.regressors(seen)
+        channel += [t.channel for t in effect.terms]
+        parameter += [parameters + t.parameter for t in effect.terms]
+        parameters += len(effect.parameters)
+    return values, np.array(channel, dtype=np.int64), np.array(parameter, dtype=np.int64)

@@ -23,40 +23,8 @@ from sdimu_calibration.core.compiled import compiled
 from sdimu_calibration.core.effects.motion import Motion
 from sdimu_calibration.core.filter.filter_pass import MEASURED, NAV, PassOutput
 from sdimu_calibration.core.filter.kalman import whiten
-from sdimu_calibration.core.navigation.ins_errors import add_response
-
-
-@compiled
-def _epoch_response(
-    C_nb: Floats, f_b: Floats, dt: Floats, first: int, last: int, values: Floats, channel: Ints, parameter: Ints,
-    w_ie: Floats, G: Floats, D: Floats, att: Floats, vel: Floats,
-) -> float:  # fmt: skip
-    """Fill G (9, q) and D (6, q) with the response over an epoch; return its length (s)."""
-    G[:, :] = 0.0
-    D[:, :] = 0.0
-    T = 0.0
-    f_n = np.empty(3)
-    for c in range(first, last):
-        h = dt[c]
-        T += h
-        for i in range(3):
-            f_n[i] = C_nb[c, i, 0] * f_b[c, 0] + C_nb[c, i, 1] * f_b[c, 1] + C_nb[c, i, 2] * f_b[c, 2]
-        att[:, :] = 0.0
-        vel[:, :] = 0.0
-        for j in range(channel.shape[0]):
-            v = values[c, j] * h
-            ch, k = channel[j], parameter[j]
-            D[ch, k] += v
-            if ch < 3:
-                att[0, k] -= C_nb[c, 0, ch] * v
-                att[1, k] -= C_nb[c, 1, ch] * v
-                att[2, k] -= C_nb[c, 2, ch] * v
-            else:
-                vel[0, k] += C_nb[c, 0, ch - 3] * v
-                vel[1, k] += C_nb[c, 1, ch - 3] * v
-                vel[2, k] += C_nb[c, 2, ch - 3] * v
-        add_response(G, att, vel, f_n, w_ie, h)
-    return T
+from sdimu_calibration.core.matrix3 import applied, elements
+from sdimu_calibration.core.navigation.ins_errors import add_columns, responses
 
 
 @compiled
@@ -69,18 +37,22 @@ def _signatures(
     V = np.zeros((NAV, q))
     G = np.zeros((NAV, q))
     D = np.zeros((6, q))
-    att = np.zeros((3, q))
-    vel = np.zeros((3, q))
+    longest = (last - first).max()
+    R, f_n = np.empty((longest, 6, NAV)), np.empty((longest, 3))
     row = 0
     for e in range(first.shape[0]):
-        T = _epoch_response(C_nb, f_b, dt, first[e], last[e], values, channel, parameter, w_ie, G, D, att, vel)
-        V[:, :] = Phi[e] @ V + G
+        a, b = first[e], last[e]
+        for c in range(a, b):
+            f_n[c - a, 0], f_n[c - a, 1], f_n[c - a, 2] = applied(elements(C_nb[c]), f_b[c, 0], f_b[c, 1], f_b[c, 2])
+        responses(C_nb[a:b], f_n, dt[a:b], 0, b - a, w_ie, R)
+        add_columns(values[a:b], channel, parameter, R, dt[a:b], G, D)
+        V = Phi[e] @ V + G
         if kind[e] == 0:
             continue
         low = 0 if abs(kind[e]) == 2 else 6
         m = MEASURED - low
         S = np.ascontiguousarray(H[e, low:, :NAV]) @ V
-        S[6 - low :] += D / T
+        S[6 - low :] += D / dt[a:b].sum()
         W[row : row + m] = whiten(np.ascontiguousarray(L[e, low:, low:]), S)
         V -= np.ascontiguousarray(K[e, :NAV, low:]) @ S
         row += m
@@ -88,9 +60,9 @@ def _signatures(
 
 def signatures(
     seen: Motion, first: Ints, last: Ints, kind: Ints, output: PassOutput,
-    values: Floats, channel: Ints, parameter: Ints, count: int, latitude: float,
-) -> Floats:  # fmt: skip
-    """Signatures of `count` parameters in the whitened innovations of a navigation filter.
+    values: Floats, channel: Ints, parameter: Ints, latitude: float, W: Floats,
+) -> None:  # fmt: skip
+    """Signatures of q parameters in the whitened innovations of a navigation filter.
 
     Parameters
     ----------
@@ -104,23 +76,16 @@ def signatures(
         Regressor columns.
     channel, parameter : ndarray of int, shape (m,)
         Sensor axis and parameter of each column.
-    count : int
-        Number of parameters q.
     latitude : float
         Of the site (rad).
-
-    Returns
-    -------
-    ndarray, shape (rows, q)
-        Rows in the order of `measured_rows`.
+    W : ndarray, shape (rows, q)
+        Filled; rows in the order of `measured_rows`.
     """
-    W = np.zeros((int(np.isfinite(output.normalised).sum()), count))
     _signatures(
         np.ascontiguousarray(seen.C_nb), np.ascontiguousarray(seen.f), seen.dt, first, last, kind,
-        np.ascontiguousarray(values), channel, parameter, count, earth.earth_rate(latitude),
+        np.ascontiguousarray(values), channel, parameter, W.shape[1], earth.earth_rate(latitude),
         output.Phi, output.H, output.L, output.K, W,
     )  # fmt: skip
-    return W
 
 
 def measured_rows(output: PassOutput) -> tuple[Ints, Ints]:

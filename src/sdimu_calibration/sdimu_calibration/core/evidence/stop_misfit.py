@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.stats import norm
 
 from sdimu_calibration.core.alignment.prepared import PreparedData
 from sdimu_calibration.core.arrays import Floats
+from sdimu_calibration.core.probability import normal_limit
 
 _KINDS = ("position", "velocity", "gyro", "accelerometer")
 _FALSE_ALARM = 1e-4
@@ -40,7 +40,7 @@ def stop_misfit(normalised: Floats, prepared: PreparedData) -> str | None:
     if not count.any():
         return None
     z = total / np.sqrt(np.maximum(count, 1.0))
-    limit = float(norm.isf(0.5 * _FALSE_ALARM / np.count_nonzero(count)))
+    limit = normal_limit(0.5 * _FALSE_ALARM / np.count_nonzero(count))
     k, row = np.unravel_index(int(np.argmax(np.abs(z))), z.shape)
     if abs(z[k, row]) <= limit:
         return None

@@ -30,12 +30,13 @@ from sdimu_calibration.core import earth
 from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.compiled import compiled
 from sdimu_calibration.core.filter.kalman import cholesky, propagate, update, whiten
-from sdimu_calibration.core.matrix3 import applied, elements
+from sdimu_calibration.core.matrix3 import applied, elements, sparse_product, transposed
 from sdimu_calibration.core.measurement_kind import ALL, SKIP
 from sdimu_calibration.core.navigation.ins_errors import (
-    add_response,
+    add_columns,
     navigation_error_matrix,
     process_noise,
+    responses,
     transition,
 )
 from sdimu_calibration.core.navigation.strapdown import navigate_cycle, velocity_increment
@@ -230,28 +231,25 @@ def _mean_attitude(C_nb: Floats, phi: Floats, out: Floats) -> None:
 
 @compiled
 def _navigate_epoch(
-    data: PassInput, e: int, settings: PassSettings, state: PassState, G: Floats, D: Floats, sums: Floats
-) -> float:
+    data: PassInput, e: int, settings: PassSettings, state: PassState, G: Floats, D: Floats, sums: Floats,
+    C_mean: Floats, f_n: Floats, R: Floats,
+) -> float:  # fmt: skip
     """Navigate through an epoch, in place; return its length (s).
 
-    Filled: G (9, p), D (6, p), and sums (9,) of angle and velocity increment in b and of velocity increment in n.
+    Filled: G (9, p), D (6, p), and sums (9,) of angle and velocity increment in b and of velocity increment in n; of
+    the cycles of the epoch the mean attitude (n, 3, 3), the force (n, 3) and the responses (n, 6, 9).
     """
-    p = D.shape[1]
-    att = np.zeros((3, p))
-    vel = np.zeros((3, p))
-    error = np.zeros(6)
+    error = np.empty(6)
     phi = np.empty(3)
     alpha = np.empty(3)
     upsilon = np.empty(3)
-    f_n = np.empty(3)
-    C_mean = np.empty((3, 3))
-    w_ie = earth.earth_rate(settings.reference[0])
-    G[:, :] = 0.0
-    D[:, :] = 0.0
     sums[:] = 0.0
     T = 0.0
-    for c in range(data.first[e], data.last[e]):
-        dt = data.dt[c]
+    first, count = data.first[e], data.last[e] - data.first[e]
+    dts = data.dt[first : data.last[e]]
+    for k in range(count):
+        c = first + k
+        dt = dts[k]
         T += dt
         error[:] = 0.0
         for j in range(data.channel.shape[0]):
@@ -263,27 +261,16 @@ def _navigate_epoch(
             sums[i] += alpha[i]
             sums[3 + i] += upsilon[i]
         gravity = earth.normal_gravity(state.position[0], state.position[2]) + settings.gravity_excess
-        _mean_attitude(state.C_nb, phi, C_mean)
+        _mean_attitude(state.C_nb, phi, C_mean[k])
         dv = velocity_increment(alpha, upsilon, data.sculling[c])
         # Not the mean attitude times the mean force: that leans off the vertical in a turn, and a filter
         # that sees it takes it for knowledge of azimuth.
-        f_n[0], f_n[1], f_n[2] = applied(elements(state.C_nb), dv[0] / dt, dv[1] / dt, dv[2] / dt)
+        f_n[k, 0], f_n[k, 1], f_n[k, 2] = applied(elements(state.C_nb), dv[0] / dt, dv[1] / dt, dv[2] / dt)
         for i in range(3):
-            sums[6 + i] += f_n[i] * dt
+            sums[6 + i] += f_n[k, i] * dt
         navigate_cycle(state.C_nb, state.velocity, state.position, phi, dv, dt, gravity)
-        att[:, :] = 0.0
-        vel[:, :] = 0.0
-        for j in range(data.channel.shape[0]):
-            channel, k = data.channel[j], data.parameter[j]
-            v = data.values[c, j] * dt
-            D[channel, k] += v
-            if channel < 3:
-                for i in range(3):
-                    att[i, k] -= C_mean[i, channel] * v
-            else:
-                for i in range(3):
-                    vel[i, k] += C_mean[i, channel - 3] * v
-        add_response(G, att, vel, f_n, w_ie, dt)
+    responses(C_mean, f_n, dts, 0, count, earth.earth_rate(settings.reference[0]), R)
+    add_columns(data.values[first : data.last[e]], data.channel, data.parameter, R, dts, G, D)
     return T
 
 
@@ -299,7 +286,7 @@ def _measurement(
     R = np.zeros((MEASURED, MEASURED))
     M = np.zeros((s, MEASURED))
     C = state.C_nb
-    C_bn = np.ascontiguousarray(C.T)
+    C_bn = transposed(elements(C))
     r_n, r_e = earth.radii(settings.reference[0])
     height = settings.reference[2]
     w_ie = earth.earth_rate(settings.reference[0])
@@ -311,20 +298,21 @@ def _measurement(
     z[1] = (state.position[1] - settings.reference[1]) * (r_e + height) * cos
     z[2] = height - state.position[2]
     z[3:6] = state.velocity
-    z[6:9] = sums[:3] / T - C_bn @ w_ie
-    z[9:12] = sums[3:6] / T + C_bn @ g_n
+    w_b, g_b = applied(C_bn, w_ie[0], w_ie[1], w_ie[2]), applied(C_bn, g_n[0], g_n[1], g_n[2])
     for i in range(3):
         H[i, i] = 1.0
         H[3 + i, 3 + i] = 1.0
+        z[6 + i] = sums[i] / T - w_b[i]
+        z[9 + i] = sums[3 + i] / T + g_b[i]
         R[i, i] = settings.position_sigma**2
         R[3 + i, 3 + i] = settings.velocity_sigma**2
         R[6 + i, 6 + i] = gyro_psd / T + settings.extra_gyro
         R[9 + i, 9 + i] = accel_psd / T + settings.extra_accel
-    H[6:9, 6:9] = C_bn @ skew(w_ie)
-    H[9:12, 6:9] = C_bn @ skew(-g_n)
+    H[6:9, 6:9] = sparse_product(C.T, skew(w_ie))
+    H[9:12, 6:9] = sparse_product(C.T, skew(-g_n))
     H[6:12, NAV : NAV + p] = D / T
     if settings.shared_noise:
-        fC = skew(-g_n) @ C
+        fC = sparse_product(skew(-g_n), C)
         M[6:9, 6:9] = -gyro_psd * C
         M[3:6, 6:9] = -gyro_psd * T / 2.0 * fC
         M[0:3, 6:9] = -gyro_psd * T**2 / 6.0 * fC
@@ -351,11 +339,11 @@ def _feed_back(settings: PassSettings, state: PassState, p: int) -> None:
     if not settings.closed_loop:
         return
     e = x[6:9].copy()
-    state.C_nb[:, :] = orthonormal(rotation_matrix(e) @ state.C_nb)
+    state.C_nb[:, :] = orthonormal(sparse_product(rotation_matrix(e), state.C_nb))
     if e[0] ** 2 + e[1] ** 2 + e[2] ** 2 > 1e-14:
         J = np.eye(3) + 0.5 * skew(e)
-        P[6:9, :] = J @ np.ascontiguousarray(P[6:9, :])
-        P[:, 6:9] = np.ascontiguousarray(P[:, 6:9]) @ J.T
+        P[6:9, :] = sparse_product(J, P[6:9, :])
+        P[:, 6:9] = sparse_product(P[:, 6:9], J.T)
     state.used[:] += x[NAV : NAV + p]
     x[6 : NAV + p] = 0.0
 
@@ -371,9 +359,11 @@ def run_pass(data: PassInput, settings: PassSettings, state: PassState, out: Pas
     drive = np.zeros(p + COPY)
     gyro = np.eye(3) * settings.gyro_psd
     accel = np.eye(3) * settings.accel_psd
+    longest = (data.last - data.first).max()
+    C_mean, f_mean, response = np.empty((longest, 3, 3)), np.empty((longest, 3)), np.empty((longest, 6, NAV))
     for e in range(data.first.shape[0]):
         position, velocity = state.position.copy(), state.velocity.copy()
-        T = _navigate_epoch(data, e, settings, state, G[:, :p], D, sums)
+        T = _navigate_epoch(data, e, settings, state, G[:, :p], D, sums, C_mean, f_mean, response)
         f_n = sums[6:] / T
         Phi = transition(navigation_error_matrix(position, velocity, f_n), T)
         Q = process_noise(gyro * data.white[e], accel * data.white[e], f_n, T)
@@ -403,9 +393,10 @@ def run_pass(data: PassInput, settings: PassSettings, state: PassState, out: Pas
                 if keep:
                     out.K[e, :, low:] = K
             else:
-                HM = Hl @ Ml
-                L = cholesky(Hl @ state.P @ Hl.T + HM + HM.T + Rl)
-                innovation = z[low:] - Hl @ state.x
+                HM = sparse_product(Hl, Ml)
+                HP = sparse_product(Hl, state.P)
+                L = cholesky(sparse_product(HP, Hl.T) + HM + HM.T + Rl)
+                innovation = z[low:] - sparse_product(Hl, state.x.reshape(-1, 1))[:, 0]
             white = whiten(L, innovation.reshape(-1, 1))[:, 0]
             out.innovation[e, low:] = innovation
             out.normalised[e, low:] = white

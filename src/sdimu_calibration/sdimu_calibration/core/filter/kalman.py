@@ -18,29 +18,7 @@ import numpy as np
 
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.compiled import compiled
-
-
-@compiled
-def sparse_product(A: Floats, B: Floats) -> Floats:
-    """Product ``A @ B`` that skips the zeros of A.
-
-    Parameters
-    ----------
-    A : ndarray, shape (m, n)
-    B : ndarray, shape (n, q)
-
-    Returns
-    -------
-    ndarray, shape (m, q)
-    """
-    out = np.zeros((A.shape[0], B.shape[1]))
-    for i in range(A.shape[0]):
-        for k in range(A.shape[1]):
-            a = A[i, k]
-            if a != 0.0:
-                for j in range(B.shape[1]):
-                    out[i, j] += a * B[k, j]
-    return out
+from sdimu_calibration.core.matrix3 import sparse_product
 
 
 @compiled
@@ -191,12 +169,8 @@ def update(x: Floats, P: Floats, z: Floats, H: Floats, R: Floats, M: Floats) -> 
         for k in range(n):
             x[k] += Kt[i, k] * innovation[i]
     F = B - 0.5 * sparse_product(S, Kt)
+    KF = Kt.T @ F
     for i in range(n):
-        for r in range(m):
-            a, b = Kt[r, i], F[r, i]
-            for j in range(i + 1):
-                P[i, j] -= a * F[r, j] + b * Kt[r, j]
-    for i in range(n):
-        for j in range(i):
-            P[j, i] = P[i, j]
+        for j in range(n):
+            P[i, j] -= KF[i, j] + KF[j, i]
     return innovation, L, np.ascontiguousarray(Kt.T)

@@ -13,8 +13,9 @@ from __future__ import annotations
 import numpy as np
 
 from sdimu_calibration.core import earth
-from sdimu_calibration.core.arrays import Floats
+from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.compiled import compiled
+from sdimu_calibration.core.matrix3 import sparse_product
 
 
 @compiled
@@ -101,8 +102,8 @@ def transition(F: Floats, dt: float) -> Floats:
     ndarray, shape (9, 9)
     """
     A = F * dt
-    A2 = A @ A
-    return np.eye(9) + A + 0.5 * A2 + (A2 @ A) / 6.0
+    A2 = sparse_product(A, A)
+    return np.eye(9) + A + 0.5 * A2 + sparse_product(A, A2) / 6.0
 
 
 @compiled
@@ -128,8 +129,8 @@ def process_noise(C_qg: Floats, C_qa: Floats, f_n: Floats, dt: float) -> Floats:
     X[0, 1], X[0, 2] = -f_n[2], f_n[1]
     X[1, 0], X[1, 2] = f_n[2], -f_n[0]
     X[2, 0], X[2, 1] = -f_n[1], f_n[0]
-    Xg = X @ C_qg
-    XgX = Xg @ X.T
+    Xg = sparse_product(X, C_qg)
+    XgX = sparse_product(Xg, X.T)
     Q = np.zeros((9, 9))
     Q[6:9, 6:9] = C_qg * dt
     Q[3:6, 6:9] = Xg * (dt**2 / 2.0)
@@ -144,38 +145,116 @@ def process_noise(C_qg: Floats, C_qa: Floats, f_n: Floats, dt: float) -> Floats:
 
 
 @compiled
-def add_response(G: Floats, att: Floats, vel: Floats, f_n: Floats, w_ie: Floats, dt: float) -> None:
-    """Add one cycle to the integrated response of the navigation errors to each coefficient.
+def responses(C_nb: Floats, f_n: Floats, dt: Floats, first: int, last: int, w_ie: Floats, out: Floats) -> None:
+    """Response of the navigation at the end of an epoch to an error of each sensor axis in each of its cycles.
 
-    Includes the Coriolis force on the velocity gained since the start of the epoch: a lever arm moves at decimetres per
-    second.
+    An error ``v(c)`` of axis a moves the navigation by the sum over the cycles of ``out[c, a] * v(c)``, whatever effect
+    makes it, so the response is found once and serves all coefficients. With the Coriolis force on the velocity gained
+    since the epoch began: a lever arm moves by decimetres a second.
 
     Parameters
     ----------
-    G : ndarray, shape (9, p)
-        Response since the start of the epoch, per unit of each coefficient; changed in place.
-    att, vel : ndarray, shape (3, p)
-        Attitude (rad) and velocity (m/s) that the sensor errors of this cycle add, in n, per unit.
-    f_n : ndarray, shape (3,)
-        Specific force (m/s^2).
+    C_nb : ndarray, shape (n, 3, 3)
+        Mean attitude of each cycle.
+    f_n : ndarray, shape (n, 3)
+        Specific force in NED (m/s^2).
+    dt : ndarray, shape (n,)
+        Length of each cycle (s).
+    first, last : int
+        Cycles of the epoch.
     w_ie : ndarray, shape (3,)
-        Earth rate in n (rad/s).
-    dt : float
-        Length of the cycle (s).
+        Earth rate in NED (rad/s).
+    out : ndarray, shape (n, 6, 9)
+        Filled for the cycles of the epoch: gyro x, y, z (per rad/s), accelerometer x, y, z (per m/s^2).
     """
-    c0, c2 = -2.0 * w_ie[0] * dt, -2.0 * w_ie[2] * dt
-    for j in range(G.shape[1]):
-        a0, a1, a2 = G[6, j] + 0.5 * att[0, j], G[7, j] + 0.5 * att[1, j], G[8, j] + 0.5 * att[2, j]
-        u0, u1, u2 = G[3, j] + 0.5 * vel[0, j], G[4, j] + 0.5 * vel[1, j], G[5, j] + 0.5 * vel[2, j]
-        v0 = vel[0, j] + (f_n[1] * a2 - f_n[2] * a1) * dt - c2 * u1
-        v1 = vel[1, j] + (f_n[2] * a0 - f_n[0] * a2) * dt + c2 * u0 - c0 * u2
-        v2 = vel[2, j] + (f_n[0] * a1 - f_n[1] * a0) * dt + c0 * u1
-        G[0, j] += (G[3, j] + 0.5 * v0) * dt
-        G[1, j] += (G[4, j] + 0.5 * v1) * dt
-        G[2, j] += (G[5, j] + 0.5 * v2) * dt
-        G[3, j] += v0
-        G[4, j] += v1
-        G[5, j] += v2
-        G[6, j] += att[0, j]
-        G[7, j] += att[1, j]
-        G[8, j] += att[2, j]
+    # Transition from the end of a cycle to the end of the epoch: position by velocity and by attitude, velocity by
+    # velocity and by attitude. All other blocks are unity or zero.
+    pv, pa, vv, va = np.zeros((3, 3)), np.zeros((3, 3)), np.eye(3), np.zeros((3, 3))
+    V, A, x, y = np.empty((3, 3)), np.empty((3, 3)), np.empty(3), np.empty(3)
+    for c in range(last - 1, first - 1, -1):
+        h = dt[c]
+        f0, f1, f2 = f_n[c, 0] * h, f_n[c, 1] * h, f_n[c, 2] * h
+        c0, c2 = -2.0 * w_ie[0] * h, -2.0 * w_ie[2] * h
+        for a in range(3):
+            # An angle a in the cycle: velocity by half of it, ...
+            a0, a1, a2 = -C_nb[c, 0, a] * h, -C_nb[c, 1, a] * h, -C_nb[c, 2, a] * h
+            x[0], x[1], x[2] = 0.5 * (f1 * a2 - f2 * a1), 0.5 * (f2 * a0 - f0 * a2), 0.5 * (f0 * a1 - f1 * a0)
+            # ... a velocity u in the cycle: by itself and half of its Coriolis force.
+            u0, u1, u2 = C_nb[c, 0, a] * h, C_nb[c, 1, a] * h, C_nb[c, 2, a] * h
+            y[0] = u0 - 0.5 * c2 * u1
+            y[1] = u1 + 0.5 * (c2 * u0 - c0 * u2)
+            y[2] = u2 + 0.5 * c0 * u1
+            for i in range(3):
+                out[c, a, i] = 0.5 * h * x[i] + pv[i, 0] * x[0] + pv[i, 1] * x[1] + pv[i, 2] * x[2]
+                out[c, a, i] += pa[i, 0] * a0 + pa[i, 1] * a1 + pa[i, 2] * a2
+                out[c, a, 3 + i] = vv[i, 0] * x[0] + vv[i, 1] * x[1] + vv[i, 2] * x[2]
+                out[c, a, 3 + i] += va[i, 0] * a0 + va[i, 1] * a1 + va[i, 2] * a2
+                out[c, 3 + a, i] = 0.5 * h * y[i] + pv[i, 0] * y[0] + pv[i, 1] * y[1] + pv[i, 2] * y[2]
+                out[c, 3 + a, 3 + i] = vv[i, 0] * y[0] + vv[i, 1] * y[1] + vv[i, 2] * y[2]
+                out[c, 3 + a, 6 + i] = 0.0
+            out[c, a, 6], out[c, a, 7], out[c, a, 8] = a0, a1, a2
+        # One cycle further back: over the cycle velocity becomes V velocity + A attitude, position adds its mean.
+        V[0, 0], V[0, 1], V[0, 2] = 1.0, -c2, 0.0
+        V[1, 0], V[1, 1], V[1, 2] = c2, 1.0, -c0
+        V[2, 0], V[2, 1], V[2, 2] = 0.0, c0, 1.0
+        A[0, 0], A[0, 1], A[0, 2] = 0.0, -f2, f1
+        A[1, 0], A[1, 1], A[1, 2] = f2, 0.0, -f0
+        A[2, 0], A[2, 1], A[2, 2] = -f1, f0, 0.0
+        for i in range(3):
+            for j in range(3):
+                pa[i, j] += 0.5 * h * A[i, j] + pv[i, 0] * A[0, j] + pv[i, 1] * A[1, j] + pv[i, 2] * A[2, j]
+                va[i, j] += vv[i, 0] * A[0, j] + vv[i, 1] * A[1, j] + vv[i, 2] * A[2, j]
+            q0, q1, q2 = pv[i, 0], pv[i, 1], pv[i, 2]
+            r0, r1, r2 = vv[i, 0], vv[i, 1], vv[i, 2]
+            for j in range(3):
+                pv[i, j] = 0.5 * h * (V[i, j] + (1.0 if i == j else 0.0)) + q0 * V[0, j] + q1 * V[1, j] + q2 * V[2, j]
+                vv[i, j] = r0 * V[0, j] + r1 * V[1, j] + r2 * V[2, j]
+
+
+@compiled
+def add_columns(
+    values: Floats, channel: Ints, parameter: Ints, R: Floats, dt: Floats, G: Floats, D: Floats
+) -> None:
+    """Response over an epoch to parameters whose regressors are given, in place.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n, m)
+        Regressors of the cycles of the epoch.
+    channel, parameter : ndarray of int, shape (m,)
+        Sensor axis and parameter of each column.
+    R : ndarray, shape (n, 6, 9)
+        As `responses` leaves it.
+    dt : ndarray, shape (n,)
+        Length of each cycle (s).
+    G, D : ndarray, shapes (9, p) and (6, p)
+        Filled with the response of the navigation, and with the integral of the regressors for each sensor axis.
+    """
+    G[:, :] = 0.0
+    D[:, :] = 0.0
+    for j in range(channel.shape[0]):
+        ch, k = channel[j], parameter[j]
+        g0, g1, g2, g3, g4, g5, g6, g7, g8, total = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        for c in range(dt.shape[0]):
+            v = values[c, j]
+            if v != 0.0:
+                g0 += R[c, ch, 0] * v
+                g1 += R[c, ch, 1] * v
+                g2 += R[c, ch, 2] * v
+                g3 += R[c, ch, 3] * v
+                g4 += R[c, ch, 4] * v
+                g5 += R[c, ch, 5] * v
+                g6 += R[c, ch, 6] * v
+                g7 += R[c, ch, 7] * v
+                g8 += R[c, ch, 8] * v
+                total += v * dt[c]
+        G[0, k] += g0
+        G[1, k] += g1
+        G[2, k] += g2
+        G[3, k] += g3
+        G[4, k] += g4
+        G[5, k] += g5
+        G[6, k] += g6
+        G[7, k] += g7
+        G[8, k] += g8
+        D[ch, k] += total

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from sdimu_calibration.core import earth
@@ -60,7 +62,7 @@ def integrate(C_nb: Floats, cycles: Cycles, latitude: float) -> Floats:
     ndarray, shape (n, 3, 3)
         `C_nb` at the middle of each cycle.
     """
-    return np.asarray(_attitudes(C_nb, np.ascontiguousarray(cycles.alpha), cycles.coning, cycles.dt, latitude))
+    return np.asarray(_attitudes(C_nb, cycles.alpha, cycles.coning, cycles.dt, latitude))
 
 
 def temperatures(log: TemperatureLog | None, t: Floats, causal: bool) -> tuple[Floats, Floats]:
@@ -137,20 +139,15 @@ def motion(
     w, f = w_measured, f_measured
     C0 = C_start.copy()
     rounds = _COMPENSATIONS if np.any(coefficients) else 0
+    earlier = _AtStart.of(before)
+    w_ie = earth.earth_rate(latitude)
     for done in range(rounds + 1):
         C = C0.copy()
-        C_nb = _attitudes(C, np.ascontiguousarray(w * dt[:, None]), cycles.coning, dt, latitude)
-        w_earth = np.einsum("kij,i->kj", C_nb, earth.earth_rate(latitude))
-        w_table = np.where(rest[:, None], 0.0, w - w_earth)
-        if predicted:
-            w_seen = w_earth + w_table
-            f_seen = np.where(rest[:, None], -gravity * C_nb[:, 2, :], f)
-        else:
-            w_seen, f_seen = w, f
+        C_nb = _attitudes(C, w * dt[:, None], cycles.coning, dt, latitude)
+        w_seen, f_seen, w_table, turned, leant, since_turn = _seen(
+            C_nb, w, f, rest, cycles.t, dt, w_ie, gravity, predicted, earlier
+        )
         alpha = _acceleration(w_table, rest, cycles, before, causal=not predicted)
-        turned = _last_sign(w_table, None if before is None else before.turned[-1])
-        leant = _last_sign(-np.cross(w_table, f_seen) / gravity, None if before is None else before.leant[-1])
-        since_turn = _since_turn(w_table, cycles.t, dt, before)
         seen = Motion(
             cycles.t, dt, w_seen, f_seen, C_nb, w_table, alpha, rest, heat, heat_rate, turned, leant,
             since_turn, magnetic_n,
@@ -160,6 +157,62 @@ def motion(
             w, f = w_measured - error[:, :3], f_measured - error[:, 3:]
     C_start[:, :] = C
     return seen
+
+
+class _AtStart(NamedTuple):
+    """What the motion before the first cycle leaves behind."""
+
+    turned: Floats  # (3,)
+    leant: Floats  # (3,)
+    turn_end: float  # s
+
+    @staticmethod
+    def of(before: Motion | None) -> _AtStart:
+        """Nothing has turned yet where there is no block before."""
+        if before is None:
+            return _AtStart(np.zeros(3), np.zeros(3), -np.inf)
+        end = float(before.t[-1] - 0.5 * before.dt[-1] - before.since_turn[-1])
+        return _AtStart(before.turned[-1].copy(), before.leant[-1].copy(), end)
+
+
+@compiled
+def _seen(
+    C_nb: Floats, w: Floats, f: Floats, rest: Bools, t: Floats, dt: Floats, w_ie: Floats, gravity: float,
+    predicted: bool, before: _AtStart,
+) -> tuple[Floats, Floats, Floats, Floats, Floats, Floats]:  # fmt: skip
+    """Rate and force that effects see, the rate against the Earth, and what of past turns they remember.
+
+    Returns
+    -------
+    w_seen, f_seen, w_table, turned, leant : ndarray, shape (n, 3)
+    since_turn : ndarray, shape (n,)
+        All as in `Motion`.
+    """
+    n = len(t)
+    w_seen, f_seen, w_table = np.empty((n, 3)), np.empty((n, 3)), np.empty((n, 3))
+    turned, leant, since_turn = np.empty((n, 3)), np.empty((n, 3)), np.empty(n)
+    last_turned, last_leant, end = before.turned.copy(), before.leant.copy(), before.turn_end
+    for k in range(n):
+        square = 0.0
+        for i in range(3):
+            w_earth = C_nb[k, 0, i] * w_ie[0] + C_nb[k, 1, i] * w_ie[1] + C_nb[k, 2, i] * w_ie[2]
+            w_table[k, i] = 0.0 if rest[k] else w[k, i] - w_earth
+            w_seen[k, i] = w_earth + w_table[k, i] if predicted else w[k, i]
+            f_seen[k, i] = -gravity * C_nb[k, 2, i] if predicted and rest[k] else f[k, i]
+            square += w_table[k, i] ** 2
+        for i in range(3):
+            a, b = (i + 1) % 3, (i + 2) % 3
+            leaning = (w_table[k, b] * f_seen[k, a] - w_table[k, a] * f_seen[k, b]) / gravity
+            if abs(w_table[k, i]) > _TURNING:
+                last_turned[i] = np.sign(w_table[k, i])
+            if abs(leaning) > _TURNING:
+                last_leant[i] = np.sign(leaning)
+            turned[k, i], leant[k, i] = last_turned[i], last_leant[i]
+        if square > _STANDING**2:
+            end, since_turn[k] = t[k], 0.0
+        else:
+            since_turn[k] = t[k] - 0.5 * dt[k] - end
+    return w_seen, f_seen, w_table, turned, leant, since_turn
 
 
 def _acceleration(
@@ -178,20 +231,3 @@ def _acceleration(
     between[rest[1:] | rest[:-1]] = 0.0
     ends = np.vstack([w_table[:1], between, w_table[-1:]])
     return np.asarray(np.diff(ends, axis=0) / dt)
-
-
-def _last_sign(rate: Floats, before: Floats | None) -> Floats:
-    """Sign of the last rate beyond `_TURNING` in each column, carried forward; shape (n, 3)."""
-    sign = np.where(np.abs(rate) > _TURNING, np.sign(rate), 0.0)
-    rows = np.where(sign != 0.0, np.arange(1, len(sign) + 1)[:, None], 0)
-    last = np.maximum.accumulate(rows, axis=0)
-    start = np.zeros(3) if before is None else before
-    return np.where(last > 0, np.take_along_axis(sign, np.maximum(last - 1, 0), axis=0), start)
-
-
-def _since_turn(w_table: Floats, t: Floats, dt: Floats, before: Motion | None) -> Floats:
-    """Time from the end of the last cycle in which the table turned to the middle of each cycle, shape (n,)."""
-    turning = np.sum(w_table**2, axis=1) > _STANDING**2
-    start = -np.inf if before is None else float(before.t[-1] - 0.5 * before.dt[-1] - before.since_turn[-1])
-    end = np.maximum.accumulate(np.where(turning, t, start))
-    return np.where(turning, 0.0, t - 0.5 * dt - end)

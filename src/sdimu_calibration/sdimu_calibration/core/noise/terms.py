@@ -15,7 +15,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import nnls
 
 from sdimu_calibration.core.arrays import Bools, Floats
 from sdimu_calibration.core.noise.allan import Allan, allan
@@ -124,6 +123,8 @@ def _scatter(again: list[Allan], value: Floats, among: Bools | None) -> Floats:
 
 def _squares(found: Allan, among: Bools | None = None) -> Floats:
     """Non-negative least squares for the squares of the terms `among`, the others zero."""
+    from scipy.optimize import nnls  # noqa: PLC0415 (half a second that a calibration does not need)
+
     variance, columns = found.deviation**2, basis(found.tau)
     if among is not None:
         columns = columns * among

@@ -1,0 +1,33 @@
+"""Tail probabilities of the normal and the chi-square distribution.
+
+Functions of scipy.special, loaded when one is asked for: `scipy.stats` has the same behind a second of imports.
+"""
+
+from __future__ import annotations
+
+import math
+from statistics import NormalDist
+
+
+def normal_tail(z: float) -> float:
+    """Probability that a standard normal variable exceeds `z`."""
+    return 0.5 * math.erfc(z / math.sqrt(2.0))
+
+
+def normal_limit(p: float) -> float:
+    """Give the number that a standard normal variable exceeds with probability `p`."""
+    return -NormalDist().inv_cdf(p)
+
+
+def chi2_tail(x: float, dof: float) -> float:
+    """Probability that chi-square with `dof` degrees of freedom exceeds `x`."""
+    from scipy.special import chdtrc  # noqa: PLC0415 (0.2 s that a calibration does not need)
+
+    return float(chdtrc(dof, x))
+
+
+def chi2_head(x: float, dof: float) -> float:
+    """Probability that chi-square with `dof` degrees of freedom stays below `x`."""
+    from scipy.special import chdtr  # noqa: PLC0415
+
+    return float(chdtr(dof, x))
