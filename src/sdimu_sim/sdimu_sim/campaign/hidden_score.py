@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.diagnosis.found import found_effects
 from sdimu_calibration.core.diagnosis.scan import Scan, scan
@@ -154,10 +155,15 @@ def _signature_left(truth: Truth, found: Diagnosis) -> tuple[float, float]:
 
 def baseline_rms_z(calibration: Calibration, sensor: ImuTruth) -> float:
     """RMS of error over sigma of the baseline coefficients that the body frame leaves free."""
+    return float(np.sqrt(np.mean(baseline_z(calibration, sensor) ** 2)))
+
+
+def baseline_z(calibration: Calibration, sensor: ImuTruth) -> Floats:
+    """Error over sigma of the baseline coefficients that the body frame leaves free, shape (k,)."""
     truth = in_body_frame(sensor.coefficients, calibration.body_frame)
     rows = [i for i, name in enumerate(calibration.names) if name in COEFFICIENTS]
     error = np.array([calibration.values[i] - truth[calibration.names[i]] for i in rows])
     sigma = np.sqrt(np.abs(np.diag(calibration.covariance)[rows]))
     pinned = [calibration.names[i] in body_frame.pinned_names(calibration.body_frame) for i in rows]
     free = ~np.array(pinned) & (sigma > 0.0)
-    return float(np.sqrt(np.mean((error[free] / sigma[free]) ** 2)))
+    return np.asarray(error[free] / sigma[free])

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
+
+if TYPE_CHECKING:
+    from sdimu_calibration.core.progress import Progress
 
 app = typer.Typer(help="Put a claim of the method to the test, by simulation.", no_args_is_help=True)
 
@@ -105,3 +108,48 @@ def faults(
     console.print(f"results in {out}", soft_wrap=True)
     if {WRONG, TRACEBACK} & set(ended):
         raise typer.Exit(1)
+
+
+@app.command()
+def grades(
+    out: Annotated[Path, typer.Option(help="Folder of runs, grades.json, grades.md.")] = Path("out/study-grades"),
+    runs: Annotated[int, typer.Option("-n", min=1, help="Clean tests, and tests with an effect, of each file.")] = 30,
+    seed: Annotated[int, typer.Option(help="First seed.")] = 50_001,
+    draws: Annotated[int, typer.Option(min=0, help="Tests of each file and plan whose estimator is noted.")] = 50,
+    imu: Annotated[list[str] | None, typer.Option(help="IMU file; repeatable. All of config/imu by default.")] = None,
+    workers: Annotated[int, typer.Option(min=1, help="Processes.")] = 2,
+) -> None:
+    """Diagnose clean tests and tests with one hidden effect of every IMU file."""
+    from functools import partial
+
+    from rich.console import Console
+
+    from sdimu_calibration.cli.progress import bar
+    from sdimu_calibration.storage.config import config_folder
+    from sdimu_calibration.storage.json_file import write_json
+    from sdimu_sim.campaign.campaign import run_campaign
+    from sdimu_sim.campaign.grade_page import page
+    from sdimu_sim.campaign.grade_run import HANDHELD, PLANS, GradeRun, choice
+
+    names = imu or sorted(path.stem for path in (config_folder() / "imu").glob("*.yaml"))
+    console, seeds = Console(), range(seed, seed + runs)
+    clean, hidden, choices = {}, {}, {}
+    for name in names:
+        with bar(console) as progress:
+            tell = partial(_named, progress, name)
+            folder = out / name
+            clean[name] = run_campaign(GradeRun(name, False), seeds, folder / "clean", workers=workers, progress=tell)
+            hidden[name] = run_campaign(GradeRun(name, True), seeds, folder / "hidden", workers=workers, progress=tell)
+        plans = PLANS[:1] if name == HANDHELD else PLANS
+        choices[name] = [
+            {"plan": plan, "estimator": choice(name, plan, seed + k)} for plan in plans for k in range(draws)
+        ]
+    write_json(out / "grades.json", {"clean": clean, "hidden": hidden, "choices": choices})
+    text = page(clean, hidden, choices, seed)
+    (out / "grades.md").write_text(text, encoding="utf-8")
+    console.print(text, soft_wrap=True, markup=False, highlight=False)
+    console.print(f"results in {out}", soft_wrap=True)
+
+
+def _named(progress: Progress, name: str, word: str, share: float) -> None:
+    progress(f"{name}: {word}", share)
