@@ -23,22 +23,27 @@ EXEMPT = {
     for package, modules_of in {
         "core.alignment": "prepared",
         "core.batch": "batch classical",
-        "core": "calibrate expression live recording",
         "core.data": (
-            "arrival axes_and_units dwell_detection gaps phases resample static_detection status_clock "
-            "windows"
+            "arrival axes_and_units dwell_detection early_reading gaps intake phases resample "
+            "static_detection status_clock windows"
         ),
         "core.diagnosis": (
-            "advice bootstrap candidates coefficient_shifts consistency diagnose evidence found "
-            "free_input_test grow handheld_diagnosis handheld_evidence handheld_summary held_out "
-            "information linear plan_seen rounds scan screen search signatures"
+            "advice bootstrap candidates coefficient_shifts diagnose found free_input_test held_out "
+            "ladder plan_seen rounds scan search verdict"
         ),
         "core.effects": (
             "accel_nonlinearity accelerometer_frame body_frame dead_band drift effect error_slope "
             "imu_model motion settling timing"
         ),
-        "core.filter": "azimuth_known free_inertial holdout passes stop_misfit",
+        "core.estimation": (
+            "azimuth_check fit free_inertial handheld_fit holdout navigation_fit reference_fits "
+            "second_order_fit"
+        ),
+        "core.evidence": "consistency handheld_evidence information linear navigation_evidence signatures stop_misfit",
+        "core": "expression front_door live matrix3 recording",
+        "core.filter": "passes",
         "core.handheld": "handheld handheld_data handheld_fit",
+        "core.noise": "rests",
         "core.second_order": "second_order_passes",
     }.items()
     for module in modules_of.split()

@@ -18,7 +18,7 @@ from packaging.utils import canonicalize_name
 
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGES = ("rate_table_sim", "sdimu_calibration", "sdimu_sim")
-OPTIONAL = {"tf2_msgs"}
+OPTIONAL = {"pandas", "tf2_msgs"}
 """Imported where it is installed; nodes/transform_type stands in for it elsewhere."""
 
 

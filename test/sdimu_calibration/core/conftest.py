@@ -3,17 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 import pytest
 from hypothesis import settings
 
 from rate_table_sim.core.specification import TableSpecification
+from sdimu_calibration.core.diagnosis.diagnose import Diagnosis, climb
+from sdimu_calibration.core.estimation.navigation_fit import FilterFit
+from sdimu_calibration.core.estimation.prepared_test import PreparedTest
+from sdimu_calibration.core.estimation.solve import solve
 from sdimu_calibration.core.plan import Plan, Turn
 from sdimu_calibration.core.recording import Recording
 from sdimu_calibration.core.rotation import rotation_matrix
 from sdimu_calibration.core.specification import ImuSpecification, Model, Site
 from sdimu_calibration.core.units import to_si
+from sdimu_calibration.storage.config import load_imu, load_model, load_plan
 from sdimu_sim.core.scenario import Scenario, generate
 
 # The first call of a compiled function may compile it: no deadline says anything about the claim. The same examples
@@ -83,3 +90,52 @@ def recorded_test(imu: ImuSpecification, site: Site) -> Callable[..., Recording]
         return generate(Scenario(plan, imu, site, table=table, **options))[0]  # type: ignore[arg-type]
 
     return make
+
+
+BENCH_SITE = Site(latitude_rad=float(np.radians(36.4)), height_m=80.0)
+
+
+@dataclass(frozen=True)
+class Bench:
+    """Simulate, solve and diagnose, each once."""
+
+    site: Site
+    imu: ImuSpecification
+    model: Model
+
+    def plan(self, name: str = "kim18_signed") -> Plan:
+        plan = load_plan(name)
+        return replace(plan, dwell_s=(60.0,) * len(plan.dwell_s))
+
+    def recording(self, seed: int = 101, effects: tuple[str, ...] = (), plan: str = "kim18_signed") -> Recording:
+        return _recording(seed, effects, plan)
+
+    def fit(self, seed: int = 101, effects: tuple[str, ...] = (), plan: str = "kim18_signed") -> FilterFit:
+        return _fit(seed, effects, plan)
+
+    def diagnosis(self, seed: int = 101, effects: tuple[str, ...] = (), plan: str = "kim18_signed") -> Diagnosis:
+        return _diagnosis(seed, effects, plan)
+
+
+BENCH = Bench(BENCH_SITE, load_imu("dtg"), load_model("baseline"))
+
+
+@cache
+def _recording(seed: int, effects: tuple[str, ...], plan: str) -> Recording:
+    scenario = Scenario(BENCH.plan(plan), BENCH.imu, BENCH.site, rate_hz=20.0, seed=seed, effects=effects)
+    return generate(scenario)[0]
+
+
+@cache
+def _fit(seed: int, effects: tuple[str, ...], plan: str) -> FilterFit:
+    return solve(PreparedTest(_recording(seed, effects, plan), BENCH.imu, BENCH.site), BENCH.model)
+
+
+@cache
+def _diagnosis(seed: int, effects: tuple[str, ...], plan: str) -> Diagnosis:
+    return climb(_fit(seed, effects, plan))
+
+
+@pytest.fixture(scope="session")
+def bench() -> Bench:
+    return BENCH

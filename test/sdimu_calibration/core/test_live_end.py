@@ -7,8 +7,8 @@ from functools import cache
 
 import numpy as np
 import pytest
-from sdimu_calibration.core.calibrate import calibrate
 
+from sdimu_calibration.core.estimation.outcome import calibrate
 from sdimu_calibration.core.live import NS, LiveCalibration
 from sdimu_calibration.core.plan import Plan
 from sdimu_calibration.core.recording import UNNUMBERED

@@ -28,6 +28,7 @@ def write_result(path: Path, calibration: Calibration) -> None:
     """
     content = {
         "format": FORMAT,
+        "estimator": calibration.estimator,
         "body_frame": calibration.body_frame,
         "model": list(calibration.model),
         "coefficients": [
@@ -95,6 +96,7 @@ def _calibration(content: Mapping[str, Any]) -> Calibration:
         history=_history(content.get("history") or {}, number),
         warnings=tuple(content.get("warnings", ())),
         faults=tuple(_fault(entry) for entry in content["data"].get("faults", ())),
+        estimator=str(content.get("estimator", "")),
     )
 
 

@@ -117,7 +117,7 @@ def test_regressors_of_corrected_samples_are_derivatives_of_the_correction(model
         return correct_cycles(cycles, near, sensors, at)
 
     here = go(c)
-    values, channel, parameter = spread(sensors.regressors(here.seen), sensors, here.weight)
+    values, channel, parameter = spread(sensors.regressors(here.seen), sensors.channel, sensors.parameter, here.weight)
     for j, size in enumerate(sensors.prior):
         step = np.zeros(len(c))
         step[j] = 1e-3 * size

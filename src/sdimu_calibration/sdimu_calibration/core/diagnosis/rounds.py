@@ -147,7 +147,7 @@ def drop_companions(base: Fit, done: Round, progress: Progress) -> Round:
     small: set[str] = set()
     while True:
         chosen = done.chosen
-        fit = extend(base, [c.effect for c in chosen], progress=progress) if chosen else base
+        fit = _with_chosen(base, done, progress)
         size = fit.size_in_sigmas(len(chosen))
         keep = np.ones(len(size), dtype=bool)
         if len(size) and size.min() < LEAST_SIGMAS:
@@ -160,6 +160,15 @@ def drop_companions(base: Fit, done: Round, progress: Progress) -> Round:
             steps = mark_dropped(done.found.steps, {c.label for c in done.chosen}, small)
             found = replace(done.found, steps=steps)
             return replace(done, found=found, after=left(done.evidence, kept, done.free, done.found.scale))
+
+
+def _with_chosen(base: Fit, done: Round, progress: Progress) -> Fit:
+    """Fit with what a round chose: the fit of the round where that has the same effects in the same order."""
+    added = [c.label for c in done.chosen]
+    fitted = [label for effect in done.fit.sensors.effects[len(base.sensors.effects) :] for label in effect.labels]
+    if fitted == added:
+        return done.fit
+    return extend(base, [c.effect for c in done.chosen], progress=progress) if added else base
 
 
 def mark_dropped(steps: Sequence[Step], kept: set[str], small: set[str]) -> tuple[Step, ...]:

@@ -12,10 +12,9 @@ import numpy as np
 
 from sdimu_calibration.core.alignment.alignment import Alignment
 from sdimu_calibration.core.alignment.coarse_alignment import StartPoint
-from sdimu_calibration.core.alignment.prepared import PreparedData, TestSetup, first_attitude, stops_line
+from sdimu_calibration.core.alignment.prepared import PreparedData, TestSetup, stops_line
 from sdimu_calibration.core.arrays import Bools, Floats, Ints
 from sdimu_calibration.core.effects import body_frame
-from sdimu_calibration.core.effects.accelerometer_frame import FRAME, AccelerometerFrameModel
 from sdimu_calibration.core.effects.effect import Effect, Timetable
 from sdimu_calibration.core.effects.imu_model import ImuModel
 from sdimu_calibration.core.estimation.azimuth_check import azimuth_note, azimuth_warning
@@ -32,7 +31,6 @@ from sdimu_calibration.core.evidence.navigation_evidence import (
     KnownPass,
     NavigationEvidence,
     known_pass,
-    known_second_order_pass,
     navigation_evidence,
     timetable,
 )
@@ -41,16 +39,12 @@ from sdimu_calibration.core.filter.filter_pass import PassOutput, PassState, new
 from sdimu_calibration.core.filter.passes import Pass, Solution, pass_settings
 from sdimu_calibration.core.filter.passes import solve as solve_filter
 from sdimu_calibration.core.measurement_kind import ALL, HELD_ALL, HELD_SENSORS, SENSORS
-from sdimu_calibration.core.navigation.correct_cycles import correct_cycles, spread
 from sdimu_calibration.core.navigation.track import motion
 from sdimu_calibration.core.progress import silent
 from sdimu_calibration.core.recording import DataError, DataFault
 from sdimu_calibration.core.results import History
 from sdimu_calibration.core.second_order.second_order_passes import (
     SecondOrderPass,
-    firm_setup,
-    run_stops,
-    solve_second_order,
 )
 
 HELD_OUT_FOLDS = 3
@@ -341,108 +335,6 @@ class FilterFit(NavigationFit):
         """
         azimuth = azimuth_warning(self.solution)
         return (*super().warnings(statistics), *([azimuth] if azimuth else []))
-
-
-@dataclass(frozen=True)
-class SecondOrderFit(NavigationFit):
-    """A fit by passes about exactly corrected samples, in the frame of the accelerometers.
-
-    Attributes
-    ----------
-    frame_model : AccelerometerFrameModel
-    finished : SecondOrderPass
-    count : int
-        Number of passes.
-    stood_still : bool
-    """
-
-    frame_model: AccelerometerFrameModel
-    finished: SecondOrderPass
-    count: int
-    stood_still: bool
-    estimator = "second-order"
-
-    @property
-    def last(self) -> SecondOrderPass:
-        """The last pass."""
-        return self.finished
-
-    @property
-    def passes(self) -> int:
-        """Number of passes."""
-        return self.count
-
-    @property
-    def converged(self) -> bool:
-        """Whether the passes stood still at the end."""
-        return self.stood_still
-
-    @property
-    def body_frame(self) -> str:
-        """Frame of the accelerometers."""
-        return FRAME
-
-    @property
-    def values(self) -> Floats:
-        """Coefficients (SI) in `body_frame`, shape (p,)."""
-        return self.frame_model.values(self.estimate)
-
-    @property
-    def covariance(self) -> Floats:
-        """Covariance of `values`, shape (p, p)."""
-        return self.frame_model.covariance(self.estimate_covariance)
-
-    @cached_property
-    def known(self) -> KnownPass:
-        """Navigation with the coefficients known at their final values."""
-        return known_second_order_pass(self.prepared, self.setup, self.alignment, self.last)
-
-    @cached_property
-    def labels(self) -> frozenset[str]:
-        """Labels of all parameters that the model, or the estimator for it, has."""
-        return super().labels | {label for effect in self.setup.sensors.effects for label in effect.labels}
-
-    def added_columns(self, count: int) -> Ints:
-        """Columns in `evidence` of the last `count` parameters of the model, shape (count,)."""
-        return self.frame_model.place[len(self.names) - count :]
-
-    def run_kinds(self, kind: Ints) -> PassOutput:
-        """Repeat the last pass with other kinds of measurement, shape (e,)."""
-        last = self.last
-        data = last.data._replace(kind=kind)
-        return run_stops(data, firm_setup(self.setup), last.start, self.prepared, last.where, last.C_stop)[1]
-
-    def on(self, prepared: PreparedData, C_nb: Floats) -> SecondOrderFit:
-        """Fit the same model to a part of the recording that starts at attitude `C_nb` (3, 3)."""
-        begin = StartPoint(np.ascontiguousarray(C_nb), self.estimate)
-        alignment = first_attitude(prepared.epochs, prepared.phases, self.setup)
-        last, count, converged = solve_second_order(self.setup, prepared, alignment, begin, silent)
-        return replace(
-            self, prepared=prepared, alignment=alignment, finished=last, count=count, stood_still=converged
-        )
-
-    def compensated(self, prepared: PreparedData, estimate: Floats, C_start: Floats, end_of_fit: float) -> Compensated:
-        """Take the errors at `estimate` (q,) out of all cycles exactly; constants, so `end_of_fit` does not matter."""
-        del end_of_fit
-        setup, sensors = self.setup, self.setup.sensors
-        near = motion(
-            prepared.cycles, prepared.rest, sensors, estimate, C_start.copy(), setup.site.latitude_rad, setup.gravity,
-            prepared.temperature, predicted=False,
-        )  # fmt: skip
-        clean = correct_cycles(prepared.cycles, near, sensors, estimate)
-        terms = spread(sensors.regressors(clean.seen), sensors.channel, sensors.parameter, clean.weight)
-        return Compensated(clean.cycles, *terms)
-
-    def history(self) -> History:
-        """History of the last pass, at the epochs whose covariance was kept."""
-        rows, out = self.last.rows, self.last.output
-        values = self.frame_model.values(self.last.reference + out.estimate[rows])
-        return self._rows_of_history(rows, out, values, self.frame_model.covariance(out.covariance))
-
-    def notes(self) -> tuple[str, ...]:
-        """List the stops that were found; say that the second order counts."""
-        text = f"second order counts: {self.count} passes about exactly corrected samples, in the accelerometers' frame"
-        return (*super().notes(), text)
 
 
 def fit_statistics(output: PassOutput) -> dict[str, float | None]:

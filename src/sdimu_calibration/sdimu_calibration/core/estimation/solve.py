@@ -35,9 +35,10 @@ from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.effects.imu_model import ImuModel
 from sdimu_calibration.core.estimation.fit import Fit, Start
 from sdimu_calibration.core.estimation.handheld_fit import HandheldFit
-from sdimu_calibration.core.estimation.navigation_fit import FilterFit, NavigationFit, SecondOrderFit
+from sdimu_calibration.core.estimation.navigation_fit import FilterFit, NavigationFit
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.estimation.reference_fits import BatchFit, ClassicalFit
+from sdimu_calibration.core.estimation.second_order_fit import SecondOrderFit
 from sdimu_calibration.core.filter.filter_pass import NAV
 from sdimu_calibration.core.filter.passes import MOST_WIDENINGS, Solution, one_pass, widen_contradicted_priors
 from sdimu_calibration.core.filter.passes import solve as solve_filter

@@ -1,0 +1,114 @@
+"""The Python interface does what the verbs do, with the same digits, and says in one line what it cannot do."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import sdimu_calibration as sdimu
+from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.storage.result_file import read_result
+
+HIDDEN = "accel_quadratic_x"
+
+
+@pytest.fixture(scope="module")
+def bag(tmp_path_factory) -> Path:
+    return sdimu.simulate(
+        tmp_path_factory.mktemp("api") / "bag", plan="kim18", rate=20.0, seed=5, effect=[f"{HIDDEN}=40 ug/g^2"]
+    )
+
+
+@pytest.fixture(scope="module")
+def fit(bag):
+    return sdimu.calibrate(sdimu.open(bag, site="daejeon", imu="dtg"))
+
+
+@pytest.fixture(scope="module")
+def found(fit):
+    return sdimu.diagnose(fit)
+
+
+def test_a_coefficient_knows_its_units(fit):
+    bias = fit["gyro_bias_x"]
+    value, sigma = bias.to("deg/h")
+    assert value == pytest.approx(np.degrees(bias.value) * 3600.0)
+    assert sigma == pytest.approx(np.degrees(bias.sigma) * 3600.0)
+    assert "deg/h" in repr(bias)
+    with pytest.raises(DataError, match="another kind"):
+        bias.to("ug")
+    with pytest.raises(KeyError, match="no coefficient 'gyro_bias_q'"):
+        fit["gyro_bias_q"]
+
+
+def test_a_fit_is_shown_as_a_table_with_units(fit):
+    text = repr(fit)
+    assert "gyro_bias_x" in text
+    assert "deg/h" in text
+    assert len(text) < 10_000
+    assert "<table>" in fit._repr_html_()
+    frame = fit.to_dataframe()
+    assert list(frame.columns) == ["value", "sigma", "unit"]
+    assert frame.loc["accel_scale_y", "unit"] == "ppm"
+    assert frame.loc["accel_scale_y", "value"] == pytest.approx(1e6 * fit["accel_scale_y"].value)
+
+
+def test_what_was_found_is_added_and_the_error_falls(fit, found):
+    assert not found.adequate
+    assert HIDDEN in {found.best.label, *found.found[0].alike}
+    better = fit.add(found.best)
+    assert better.result.fit["held_out_rms"] < fit.result.fit["held_out_rms"]
+    # A warm start ends where a cold one does.
+    cold, sigma = found.extended, np.sqrt(np.diag(found.extended.covariance))
+    assert np.max(np.abs(better.values - cold.values)[sigma > 0] / sigma[sigma > 0]) < 0.05
+    ladder = sdimu.compare(fit, better)
+    assert f"+ {found.best.label}" in repr(ladder)
+    assert "<table>" in ladder._repr_html_()
+    assert float(np.std(better.residuals)) == pytest.approx(1.0, abs=0.05)
+    with pytest.raises(DataError, match="in the model already"):
+        better.add(found.best)
+
+
+def test_a_diagnosis_is_drawn_and_told(found):
+    assert found.plot_ranking().data
+    assert found.plot_heat_map().data
+    assert found.verdict in repr(found)
+    assert any("--add" in line for line in found.advice)
+
+
+def test_files_are_those_of_the_verbs(fit, found, tmp_path):
+    saved = read_result(fit.save(tmp_path / "fit"))
+    np.testing.assert_array_equal(saved.values, fit.values)
+    assert (tmp_path / "fit" / "report.html").is_file()
+    found.save(tmp_path / "diagnosis")
+    assert {p.name for p in (tmp_path / "diagnosis").iterdir()} == {"diagnosis.json", "result.json", "report.html"}
+
+
+def test_samples_are_freed_of_the_errors(bag, fit):
+    test = sdimu.open(bag, site="daejeon")
+    done = fit.compensate(test)
+    assert done.f_ib_b.shape == test.recording.f_ib_b.shape
+    assert np.abs(done.f_ib_b - test.recording.f_ib_b).max() > 1e-5
+
+
+def test_a_plan_is_predicted():
+    prediction = sdimu.predict("kim18", "dtg")
+    assert prediction.duration_s == pytest.approx(2980.0, rel=0.01)
+
+
+def test_the_package_shows_its_functions_and_no_more():
+    public = [name for name in dir(sdimu) if not name.startswith("_")]
+    assert public == ["calibrate", "compare", "diagnose", "open", "plan", "predict", "simulate"]
+    with pytest.raises(AttributeError, match="no attribute 'calibrat'"):
+        _ = sdimu.calibrat
+
+
+def test_what_cannot_be_used_is_one_line(fit, tmp_path):
+    with pytest.raises(DataError, match="no such"):
+        sdimu.open(tmp_path / "nothing", site="daejeon")
+    with pytest.raises(DataError, match="two results"):
+        sdimu.compare(fit)
+    with pytest.raises(DataError, match="unknown effect"):
+        fit.add("gyro_bias_wram_up_x")
