@@ -146,6 +146,7 @@ def test_the_threshold_is_drawn(diagnosis, more):
     (line,) = figure.layout["shapes"]
     assert line["x0"] == line["x1"] == diagnosis.found.threshold
     assert line["line"]["width"] > 0
+    assert line["opacity"] == 1.0
 
 
 def test_no_size_of_a_candidate_is_written_over_the_line_of_the_noise(diagnosis, more):

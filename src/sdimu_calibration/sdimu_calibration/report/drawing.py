@@ -111,7 +111,10 @@ class Figure:
         self.layout["annotations"].append({"text": text, "showarrow": False, "xref": f"x{n}", "yref": f"y{n}", **more})
 
     def shape(self, kind: str, *, row: int = 1, col: int = 1, **more: Any) -> None:
-        """Draw a ``line`` or a ``rect`` into a panel; without `x0` from side to side, without `y0` of full height."""
+        """Draw a ``line`` or a ``rect`` into a panel; without `x0` from side to side, without `y0` of full height.
+
+        The template makes shapes pale unless their `opacity` is given.
+        """
         n = self._number(row, col)
         made: dict[str, Any] = {"type": kind, "xref": f"x{n}", "yref": f"y{n}", **more}
         for letter in "xy":

@@ -82,7 +82,7 @@ def ranking(entries: Sequence[data.Scored], threshold: float) -> Figure:
             marker={"symbol": "diamond-open", "color": AFTER, "size": 9, "line": {"width": 2}},
             hovertemplate="%{y}<br>left: |z| = %{x:.1f}<extra></extra>",
         )  # fmt: skip
-    figure.shape("line", x0=threshold, x1=threshold, line=_LIMIT)
+    figure.shape("line", x0=threshold, x1=threshold, line=_LIMIT, opacity=1.0)
     figure.annotate(
         f"noise reaches {threshold:.1f}", x=threshold, y=1, yref="y domain", xanchor="center", yanchor="bottom"
     )
@@ -111,7 +111,7 @@ def rungs(names: Sequence[str], values: Sequence[float]) -> Figure:
         textposition="top right", line={"color": AFTER}, marker={"size": 10}, cliponaxis=False,
         hovertemplate="%{x}: %{y:.3f} sigma<extra></extra>",
     )  # fmt: skip
-    figure.shape("line", y0=1.0, y1=1.0, line=_LIMIT)
+    figure.shape("line", y0=1.0, y1=1.0, line=_LIMIT, opacity=1.0)
     figure.y_axes(title="held-out RMS (sigma)", rangemode="tozero", range=[0, 1.2 * max(*values, 1.0)])
     figure.x_axes(type="category", title="model", range=[-0.3, len(names) - 0.5])
     return lay_out(figure, 300)

@@ -42,13 +42,13 @@ def cell(found: data.Residuals, grid: data.Grid, channel: int, stop: int) -> Any
     rows = (found.stop == stop) & np.isfinite(found.before[:, channel])
     t, y = found.t[rows], found.before[rows, channel]
     figure = Figure()
-    figure.shape("rect", y0=-3.0, y1=3.0, fillcolor=BAND, line={"width": 0}, layer="below")
+    figure.shape("rect", y0=-3.0, y1=3.0, fillcolor=BAND, line={"width": 0}, opacity=1.0, layer="below")
     marker = {"color": AFTER, "size": 5}
     hover = "%{x:.0f} s: %{y:.2f}<extra></extra>"
     figure.add("scatter", x=t, y=y, mode="markers", marker=marker, hovertemplate=hover)
     if len(y):
         mean = float(y.mean())
-        figure.shape("line", y0=mean, y1=mean, line={"color": BEFORE, "width": 2, "dash": "dash"})
+        figure.shape("line", y0=mean, y1=mean, line={"color": BEFORE, "width": 2, "dash": "dash"}, opacity=1.0)
     figure.x_axes(title="time (s)")
     figure.y_axes(title="innovation (sigma)", zeroline=True, zerolinecolor="#999")
     met = grid.value[channel, grid.stops == stop]
@@ -70,7 +70,7 @@ def ladder(names: Sequence[str], values: Sequence[float], at_held: Sequence[floa
             "scatter", x=list(names), y=list(at_held), mode="markers+lines", name="stops held out",
             line={"color": BEFORE, "dash": "dot"}, marker={"symbol": "square-open", "size": 9},
         )  # fmt: skip
-    figure.shape("line", y0=1.0, y1=1.0, line={"dash": "dash", "color": "#222", "width": 1.5})
+    figure.shape("line", y0=1.0, y1=1.0, line={"dash": "dash", "color": "#222", "width": 1.5}, opacity=1.0)
     figure.annotate("1 is right", x=0, xref="x domain", y=1.0, xanchor="left", yanchor="top")
     top = max([*values, *(v for v in at_held if v is not None), 1.0])
     figure.y_axes(title="held-out RMS (sigma)", range=[0, 1.25 * top])
