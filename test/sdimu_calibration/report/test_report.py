@@ -75,7 +75,7 @@ def test_the_ladder_tells_the_fall_of_the_held_out_error(text, diagnosis):
 
 def test_cells_of_the_heat_map_say_their_sign_without_colour(diagnosis):
     grid = data.where(diagnosis.consistency)
-    cells = evidence_figures.heat_map(grid).data[0].text
+    cells = evidence_figures.heat_map(grid).data[0]["text"]
     for row, values in zip(cells, grid.value, strict=True):
         for cell, value in zip(row, values, strict=True):
             sign = "+" if value >= 0.0 else "\N{MINUS SIGN}"
@@ -84,7 +84,7 @@ def test_cells_of_the_heat_map_say_their_sign_without_colour(diagnosis):
 
 def test_before_and_after_differ_in_more_than_colour(diagnosis, more):
     figure = all_figures(diagnosis, more)["innovations"]
-    symbols = {trace.name: trace.marker.symbol for trace in figure.data if trace.legendgroup}
+    symbols = {trace["name"]: trace["marker"]["symbol"] for trace in figure.data if "legendgroup" in trace}
     assert len(symbols) == 2
     assert len(set(symbols.values())) == 2
 
@@ -96,24 +96,25 @@ UNITS = {*data.CHANNEL_UNITS, *measured.UNITS}
 def test_every_axis_says_its_quantity_and_unit(diagnosis, more):
     """Axes that share the scale of another may leave the words to it, never both."""
     for name, figure in all_figures(diagnosis, more).items():
-        for axes in (list(figure.select_xaxes()), list(figure.select_yaxes())):
-            said = {axis.plotly_name.removesuffix("axis"): axis.title.text for axis in axes}
-            for axis in axes:
-                title = axis.title.text
-                shared = axis.matches is not None or axis.showticklabels is False or _shares(axes, axis)
-                assert title or shared, (name, axis.plotly_name)
+        for letter in "xy":
+            axes = {key: axis for key, axis in figure.layout.items() if key.startswith(f"{letter}axis")}
+            said = {key: axis.get("title", {}).get("text") for key, axis in axes.items()}
+            for key, axis in axes.items():
+                title = said[key]
+                shared = "matches" in axis or axis.get("showticklabels") is False or _shares(axes, key)
+                assert title or shared, (name, key)
                 if title:
                     bare = title.replace("<br>", " ")
                     assert bare in CATEGORIES | UNITS or re.search(r"\(.+\)", bare), (name, title)
             assert any(said.values()), name
 
 
-def _shares(axes, axis):
-    return any(other.matches == axis.plotly_name.replace("axis", "") for other in axes)
+def _shares(axes, key):
+    return any(other.get("matches") == key.replace("axis", "") for other in axes.values())
 
 
 def test_dashes_tell_compensations_apart(more):
-    dashes = {trace.name: trace.line.dash for trace in use_section.figure(more.trials).data}
+    dashes = {trace["name"]: trace["line"]["dash"] for trace in use_section.figure(more.trials).data}
     drawn = {dashes[drift.name] for drift in more.trials[0].drifts}
     assert len(drawn) == len(more.trials[0].drifts) == 3
 
@@ -142,20 +143,26 @@ def test_the_ladder_of_refits_tells_every_rung(diagnosis):
 
 def test_the_threshold_is_drawn(diagnosis, more):
     figure = all_figures(diagnosis, more)["ranking"]
-    (line,) = figure.layout.shapes
-    assert line.x0 == line.x1 == diagnosis.found.threshold
-    assert line.line.width > 0
+    (line,) = figure.layout["shapes"]
+    assert line["x0"] == line["x1"] == diagnosis.found.threshold
+    assert line["line"]["width"] > 0
+    assert line["opacity"] == 1.0
 
 
 def test_no_size_of_a_candidate_is_written_over_the_line_of_the_noise(diagnosis, more):
     figure = all_figures(diagnosis, more)["ranking"]
-    (sizes,) = (trace for trace in figure.data if trace.type == "scatter" and trace.mode == "text")
-    assert min(sizes.x) >= diagnosis.found.threshold
+    (sizes,) = (trace for trace in figure.data if trace["type"] == "scatter" and trace["mode"] == "text")
+    assert min(sizes["x"]) >= diagnosis.found.threshold
 
 
 def test_a_diagnosis_of_a_right_model_makes_a_page_too(diagnosis):
     empty = type(diagnosis.found)(
-        (), diagnosis.found.chosen[:0], diagnosis.found.first, diagnosis.found.first, diagnosis.found.threshold, 1.0,
+        (),
+        diagnosis.found.chosen[:0],
+        diagnosis.found.first,
+        diagnosis.found.first,
+        diagnosis.found.threshold,
+        1.0,
         diagnosis.evidence,
     )
     quiet = type(diagnosis)(**{**vars(diagnosis), "found": empty, "adequate": True, "verdict": "consistent"})

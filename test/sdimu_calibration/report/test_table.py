@@ -111,7 +111,7 @@ def test_the_page_without_a_history_has_the_table_alone(calibration):
 
 def test_every_free_coefficient_has_a_line_that_ends_at_its_sigma(calibration):
     figure = sigma_history(calibration)
-    ends = {trace.name: float(trace.y[-1]) for trace in figure.data}
+    ends = {trace["name"]: float(trace["y"][-1]) for trace in figure.data}
     assert ends.keys() == set(calibration.names) - {"accel_misalignment_xy"}
     last = calibration.history.sigma[-1, 0] / to_si(1.0, "deg/h")
     # Lines are kept in single precision.
@@ -120,7 +120,7 @@ def test_every_free_coefficient_has_a_line_that_ends_at_its_sigma(calibration):
 
 def test_lines_of_a_panel_differ_without_colour(calibration):
     figure = sigma_history(calibration)
-    dashes = [trace.line.dash for trace in figure.data if trace.name.startswith("gyro_bias")]
+    dashes = [trace["line"]["dash"] for trace in figure.data if trace["name"].startswith("gyro_bias")]
     assert len(set(dashes)) == len(dashes)
 
 

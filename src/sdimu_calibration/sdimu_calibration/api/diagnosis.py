@@ -84,11 +84,11 @@ class FitDiagnosis:
         columns = [k for k in range(problem.p, len(self.core.evidence.names)) if k not in free]
         return evidence_figures.ranking(
             data.scores(self.core.evidence, first, last, columns, found.chosen), found.threshold
-        )
+        ).as_plotly()
 
     def plot_heat_map(self) -> Any:
         """Mean residual of every channel at every stop over its sigma, model as given (a plotly figure)."""
-        return evidence_figures.heat_map(*data.places(self.core.consistency.where))
+        return evidence_figures.heat_map(*data.places(self.core.consistency.where)).as_plotly()
 
     def save(self, folder: str | Path) -> Path:
         """Write diagnosis.json, result.json and report.html into a folder, as `sdimu diagnose` does."""

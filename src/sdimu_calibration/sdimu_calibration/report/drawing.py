@@ -1,11 +1,15 @@
-"""What all figures share: ink, signs that do without colour, layout."""
+"""What all figures share: panels as plotly.js takes them, ink, signs that do without colour, layout."""
 
 from __future__ import annotations
 
 import json
+from base64 import b64encode
+from collections.abc import Iterator, Mapping, Sequence
+from importlib.util import find_spec
+from pathlib import Path
 from typing import Any
 
-from plotly.offline import get_plotlyjs
+import numpy as np
 
 BEFORE, AFTER = "#b45f06", "#0b5394"
 """Ink of "model as given" and of "with what was found"."""
@@ -13,18 +17,133 @@ BAND = "rgba(0, 0, 0, 0.10)"
 PALE = "rgba(90, 90, 90, 0.45)"
 DIVERGING = ((0.0, "#2166ac"), (0.25, "#92c5de"), (0.5, "#ffffff"), (0.75, "#f4a582"), (1.0, "#b2182b"))
 """Blue, white, red (C. Brewer's RdBu): also tells signs to those who do not see red and green."""
+TEMPLATE = "simple_white"
 
 
-def lay_out(figure: Any, height: int, **more: Any) -> Any:
+class Figure:
+    """Traces and layout as plotly.js takes them, in a grid of panels; rows and columns count from 1, from the top left.
+
+    The objects of the Python package check every value, which takes seconds a page: only notebooks and the workbench
+    need them (`as_plotly`).
+
+    Parameters
+    ----------
+    rows, cols : int
+    titles : sequence of str
+        Above the panels, row by row.
+    share_x : bool
+        Panels of a column have the scale of the lowest.
+    share_y : bool
+        Panels of a row have the scale of the first.
+    gap_x, gap_y : float
+        Between panels, as a share of the figure.
+
+    Attributes
+    ----------
+    data : list of dict
+        Traces; arrays of numbers are kept in single precision.
+    layout : dict
+    """
+
+    def __init__(
+        self, rows: int = 1, cols: int = 1, *, titles: Sequence[str] = (), share_x: bool = False,
+        share_y: bool = False, gap_x: float = 0.0, gap_y: float = 0.0,
+    ) -> None:  # fmt: skip
+        self.rows, self.cols = rows, cols
+        self.data: list[dict[str, Any]] = []
+        self.layout: dict[str, Any] = {"annotations": [], "shapes": []}
+        width, height = (1.0 - gap_x * (cols - 1)) / cols, (1.0 - gap_y * (rows - 1)) / rows
+        for row, col in self._panels(None, None):
+            n = self._number(row, col)
+            left, low = (col - 1) * (width + gap_x), (rows - row) * (height + gap_y)
+            x: dict[str, Any] = {"anchor": f"y{n}", "domain": [left, left + width]}
+            y: dict[str, Any] = {"anchor": f"x{n}", "domain": [low, low + height]}
+            if share_x and row < rows:
+                x |= {"matches": f"x{self._number(rows, col)}", "showticklabels": False}
+            if share_y and col > 1:
+                y |= {"matches": f"y{self._number(row, 1)}", "showticklabels": False}
+            self.layout |= {f"xaxis{n}": x, f"yaxis{n}": y}
+        for title, (row, col) in zip(titles, self._panels(None, None), strict=False):
+            across, up = (self.axis(letter, row, col)["domain"] for letter in "xy")
+            self.annotate(
+                title, x=0.5 * sum(across), y=up[1], xref="paper", yref="paper", xanchor="center", yanchor="bottom",
+                font={"size": 16},
+            )  # fmt: skip
+
+    def _number(self, row: int, col: int) -> str:
+        """Return what plotly.js appends to the names of the axes of a panel: nothing for the first."""
+        n = (row - 1) * self.cols + col
+        return str(n) if n > 1 else ""
+
+    def _panels(self, row: int | None, col: int | None) -> Iterator[tuple[int, int]]:
+        for r in range(1, self.rows + 1) if row is None else (row,):
+            for c in range(1, self.cols + 1) if col is None else (col,):
+                yield r, c
+
+    def axis(self, letter: str, row: int = 1, col: int = 1) -> dict[str, Any]:
+        """Axis ``x`` or ``y`` of a panel."""
+        found: dict[str, Any] = self.layout[f"{letter}axis{self._number(row, col)}"]
+        return found
+
+    def add(self, kind: str, *, row: int = 1, col: int = 1, **trace: Any) -> None:
+        """Add a trace of a kind (``scatter``, ``bar``, ``heatmap``, ``histogram``) to a panel."""
+        n = self._number(row, col)
+        self.data.append({"type": kind, **_single(trace), "xaxis": f"x{n}", "yaxis": f"y{n}"})
+
+    def x_axes(self, *, row: int | None = None, col: int | None = None, **changes: Any) -> None:
+        """Change the horizontal axes of a panel, a row, a column or all; `title` and `standoff` (px) are its words."""
+        self._change("x", row, col, changes)
+
+    def y_axes(self, *, row: int | None = None, col: int | None = None, **changes: Any) -> None:
+        """Change the vertical axes, as `x_axes`."""
+        self._change("y", row, col, changes)
+
+    def _change(self, letter: str, row: int | None, col: int | None, changes: dict[str, Any]) -> None:
+        if "title" in changes:
+            words = {"text": changes.pop("title"), "standoff": changes.pop("standoff", None)}
+            changes["title"] = {key: value for key, value in words.items() if value is not None}
+        for place in self._panels(row, col):
+            self.axis(letter, *place).update(changes)
+
+    def annotate(self, text: str, *, row: int = 1, col: int = 1, **more: Any) -> None:
+        """Write a text into a panel."""
+        n = self._number(row, col)
+        self.layout["annotations"].append({"text": text, "showarrow": False, "xref": f"x{n}", "yref": f"y{n}", **more})
+
+    def shape(self, kind: str, *, row: int = 1, col: int = 1, **more: Any) -> None:
+        """Draw a ``line`` or a ``rect`` into a panel; without `x0` from side to side, without `y0` of full height.
+
+        The template makes shapes pale unless their `opacity` is given.
+        """
+        n = self._number(row, col)
+        made: dict[str, Any] = {"type": kind, "xref": f"x{n}", "yref": f"y{n}", **more}
+        for letter in "xy":
+            if f"{letter}0" not in more:
+                made |= {f"{letter}ref": f"{letter}{n} domain", f"{letter}0": 0, f"{letter}1": 1}
+        self.layout["shapes"].append(made)
+
+    def as_plotly(self) -> Any:
+        """Return it as a `plotly.graph_objects.Figure`, for a notebook or the workbench."""
+        from plotly.graph_objects import Figure as PlotlyFigure  # noqa: PLC0415 (slow to load; reports do without)
+
+        return PlotlyFigure({"data": self.data, "layout": {"template": TEMPLATE, **self.layout}})
+
+
+def _single(value: Any) -> Any:
+    """Numbers of a trace in single precision, which is finer than a screen."""
+    if isinstance(value, Mapping):
+        return {key: _single(part) for key, part in value.items()}
+    return value.astype(np.float32) if isinstance(value, np.ndarray) and value.dtype.kind == "f" else value
+
+
+def lay_out(figure: Figure, height: int, **more: Any) -> Figure:
     """Give a figure the look of the house."""
-    figure.update_layout(
-        template="simple_white", height=height, font={"size": 13, "color": "#222"}, hoverlabel={"namelength": -1},
-        **{
-            "showlegend": False, "margin": {"l": 80, "r": 30, "t": 40, "b": 60},
-            "legend": {"orientation": "h", "yanchor": "bottom", "y": 1.02, "x": 0},
-            **more,
-        },
-    )  # fmt: skip
+    figure.layout |= {
+        "height": height, "font": {"size": 13, "color": "#222"}, "hoverlabel": {"namelength": -1},
+        "showlegend": False, "margin": {"l": 80, "r": 30, "t": 40, "b": 60},
+        "legend": {"orientation": "h", "yanchor": "bottom", "y": 1.02, "x": 0},
+        **more,
+    }  # fmt: skip
     return figure
 
 
@@ -54,6 +173,7 @@ _QUEUE = """
   }
   window.drawLater = function (id, figure, config) {
     waiting.push(function () {
+      figure.layout.template = FIGURE_TEMPLATE;
       if (window.innerWidth >= 2400) { forLargeScreen(id, figure); }
       Plotly.newPlot(id, figure.data, figure.layout, config);
     });
@@ -87,14 +207,37 @@ PRINT = """
 """Fits the figures of a page to the sheet while it is printed."""
 
 
-def html(figure: Any, number: int) -> str:
+def html(figure: Figure, number: int) -> str:
     """Return a figure as a part of a page; number 1 brings the library along, so it has to be the first on it.
 
     Figures are drawn one after another once the page is read, so that it opens before the last one is drawn.
     """
-    library = f"<script>{get_plotlyjs()}</script><script>{_QUEUE}{PRINT}</script>" if number == 1 else ""
+    content = {"data": figure.data, "layout": figure.layout}
+    name, height = f"figure-{number}", figure.layout["height"]
+    place = f'<div id="{name}" class="plotly-graph-div" style="height:{height}px; width:100%;"></div>'
+    script = f'drawLater("{name}", {_script(content)}, {_script(CONFIG)});'
+    return f"{_library() if number == 1 else ''}<div>{place}<script>{script}</script></div>"
+
+
+def _library() -> str:
+    """Scripts that draw: those of the Python package, found without loading it, which takes long."""
+    spec = find_spec("plotly")
+    if spec is None or spec.origin is None:
+        raise ModuleNotFoundError("figures need the Python package plotly: pip install plotly", name="plotly")
+    folder = Path(spec.origin).parent / "package_data"
+    script = (folder / "plotly.min.js").read_text(encoding="utf-8")
+    look = (folder / "templates" / f"{TEMPLATE}.json").read_text(encoding="utf-8")
+    return f"<script>{script}</script><script>var FIGURE_TEMPLATE = {look};{_QUEUE}{PRINT}</script>"
+
+
+def _script(content: Any) -> str:
     # "</" would end the script wherever it stands.
-    content = str(figure.to_json()).replace("</", "<\\/")
-    name, config = f"figure-{number}", json.dumps(CONFIG)
-    place = f'<div id="{name}" class="plotly-graph-div" style="height:{figure.layout.height}px; width:100%;"></div>'
-    return f'{library}<div>{place}<script>drawLater("{name}", {content}, {config});</script></div>'
+    return json.dumps(content, default=_array, separators=(",", ":")).replace("</", "<\\/")
+
+
+def _array(values: Any) -> Any:
+    """Numbers as plotly.js reads them fastest: the bytes of single precision; integers and words as a list."""
+    if isinstance(values, np.ndarray) and values.dtype.kind == "f":
+        spec: dict[str, Any] = {"dtype": "f4", "bdata": b64encode(values.astype("<f4").tobytes()).decode("ascii")}
+        return spec | ({"shape": ", ".join(map(str, values.shape))} if values.ndim > 1 else {})
+    return values.tolist()

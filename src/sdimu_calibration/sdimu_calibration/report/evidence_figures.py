@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
-import plotly.graph_objects as go
-from plotly.subplots import make_subplots
 
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.evidence.consistency import CHANNEL_NAMES
 from sdimu_calibration.report import data
-from sdimu_calibration.report.drawing import AFTER, BEFORE, DIVERGING, PALE, lay_out
+from sdimu_calibration.report.drawing import AFTER, BEFORE, DIVERGING, PALE, Figure, lay_out
 from sdimu_calibration.report.table import with_sigma
 
 _FULL = 8.0
@@ -28,29 +25,19 @@ _ABOVE = "{}<br>\N{NO-BREAK SPACE}<br>\N{NO-BREAK SPACE}"
 _LIMIT = {"dash": "dash", "color": "#222", "width": 1.5}
 
 
-def heat_map(grid: data.Grid, channels: Sequence[str] = CHANNEL_NAMES) -> Any:
+def heat_map(grid: data.Grid, channels: Sequence[str] = CHANNEL_NAMES) -> Figure:
     """Normalised residual means, channel by stop: number and sign in each cell, colour besides."""
     numbered = len(grid.stops) <= _MOST_NUMBERED
     text = [[cell(v) if numbered else _sign(v) for v in row] for row in grid.value]
-    figure = go.Figure(
-        go.Heatmap(
-            x=[str(s) for s in grid.stops],
-            y=[c.replace("_", " ") for c in channels],
-            z=grid.value.astype(np.float32),
-            text=text,
-            texttemplate="%{text}",
-            textfont={"size": 12},
-            zmin=-_FULL,
-            zmax=_FULL,
-            colorscale=DIVERGING,
-            xgap=2,
-            ygap=2,
-            colorbar={"title": {"text": _ABOVE.format("sigma"), "side": "top"}, "thickness": 12},
-            hovertemplate="%{y} at stop %{x}: %{z:+.1f} sigma<extra></extra>",
-        )
-    )
-    figure.update_xaxes(title_text="stop", type="category", showgrid=False, ticks="")
-    figure.update_yaxes(autorange="reversed", ticks="", title_text="channel")
+    figure = Figure()
+    figure.add(
+        "heatmap", x=[str(s) for s in grid.stops], y=[c.replace("_", " ") for c in channels], z=grid.value,
+        text=text, texttemplate="%{text}", textfont={"size": 12}, zmin=-_FULL, zmax=_FULL, colorscale=DIVERGING,
+        xgap=2, ygap=2, colorbar={"title": {"text": _ABOVE.format("sigma"), "side": "top"}, "thickness": 12},
+        hovertemplate="%{y} at stop %{x}: %{z:+.1f} sigma<extra></extra>",
+    )  # fmt: skip
+    figure.x_axes(title="stop", type="category", showgrid=False, ticks="")
+    figure.y_axes(autorange="reversed", ticks="", title="channel")
     return lay_out(figure, 440, margin={"l": 120, "r": 20, "t": 40, "b": 55})
 
 
@@ -71,41 +58,42 @@ def _sign(value: float) -> str:
     return "+" if value > 0.0 else "\N{MINUS SIGN}"
 
 
-def ranking(entries: Sequence[data.Scored], threshold: float) -> Any:
+def ranking(entries: Sequence[data.Scored], threshold: float) -> Figure:
     """Bars of ``|z|``: what each candidate says alone, and what is left of it; the line is what noise reaches."""
     shown = data.best_variants(entries)[:_MOST_BARS]
     names = [("\N{BLACK RIGHT-POINTING TRIANGLE} " if s.chosen else "") + s.label for s in shown]
     sizes = [with_sigma(s.estimate, s.sigma, s.unit) for s in shown]
-    figure = go.Figure()
-    figure.add_bar(
-        y=names, x=[abs(s.z) for s in shown], orientation="h", name="model as given",
+    figure = Figure()
+    figure.add(
+        "bar", y=names, x=[abs(s.z) for s in shown], orientation="h", name="model as given",
         marker={"color": ["#555" if s.chosen else "#bbb" for s in shown], "line": {"color": "#222", "width": 1}},
         customdata=sizes, hovertemplate="%{y}<br>|z| = %{x:.1f}<br>%{customdata}<extra></extra>",
     )  # fmt: skip
     # Beside the bar, but never under the line of the noise.
-    figure.add_scatter(
-        y=names, x=[max(abs(s.z), threshold) for s in shown], mode="text",
+    figure.add(
+        "scatter", y=names, x=[max(abs(s.z), threshold) for s in shown], mode="text",
         text=[f"\N{NO-BREAK SPACE}{size}" for size in sizes], textposition="middle right", cliponaxis=False,
         hoverinfo="skip", showlegend=False,
     )  # fmt: skip
     if any(s.chosen for s in shown):
-        figure.add_scatter(
-            y=names, x=[abs(s.left) for s in shown], mode="markers", name="left when what was found is added",
+        figure.add(
+            "scatter", y=names, x=[abs(s.left) for s in shown], mode="markers",
+            name="left when what was found is added",
             marker={"symbol": "diamond-open", "color": AFTER, "size": 9, "line": {"width": 2}},
             hovertemplate="%{y}<br>left: |z| = %{x:.1f}<extra></extra>",
         )  # fmt: skip
-    figure.add_vline(
-        x=threshold, line=_LIMIT, opacity=1.0, annotation_text=f"noise reaches {threshold:.1f}",
-        annotation_position="top",
-    )  # fmt: skip
+    figure.shape("line", x0=threshold, x1=threshold, line=_LIMIT, opacity=1.0)
+    figure.annotate(
+        f"noise reaches {threshold:.1f}", x=threshold, y=1, yref="y domain", xanchor="center", yanchor="bottom"
+    )
     top = max([abs(s.z) for s in shown] + [threshold])
-    figure.update_xaxes(title_text="score |z| (sigma)", range=[0, 1.3 * top])
-    figure.update_yaxes(range=[len(shown) - 0.5, -0.5], ticks="", automargin=True, title_text="candidate")
+    figure.x_axes(title="score |z| (sigma)", range=[0, 1.3 * top])
+    figure.y_axes(range=[len(shown) - 0.5, -0.5], ticks="", automargin=True, title="candidate")
     margin = {"l": 80, "r": 20, "t": 75, "b": 55}
     return lay_out(figure, 24 * len(shown) + 150, showlegend=True, margin=margin, legend=_LEGEND)
 
 
-def ladder(diagnosis: Diagnosis) -> Any:
+def ladder(diagnosis: Diagnosis) -> Figure | None:
     """Held-out RMS rung by rung; one is right."""
     accepted = [step for step in diagnosis.found.steps if step.accepted and not step.taken_out]
     if not diagnosis.found.steps:
@@ -115,75 +103,56 @@ def ladder(diagnosis: Diagnosis) -> Any:
     return rungs(names, values)
 
 
-def rungs(names: Sequence[str], values: Sequence[float]) -> Any:
+def rungs(names: Sequence[str], values: Sequence[float]) -> Figure:
     """Draw the held-out RMS of one model after the other."""
-    figure = go.Figure(
-        go.Scatter(
-            x=names,
-            y=values,
-            mode="lines+markers+text",
-            text=[f"{v:.3f}" for v in values],
-            textposition="top right",
-            line={"color": AFTER},
-            marker={"size": 10},
-            cliponaxis=False,
-            hovertemplate="%{x}: %{y:.3f} sigma<extra></extra>",
-        )
-    )
-    figure.add_hline(y=1.0, line=_LIMIT, opacity=1.0)
-    figure.update_yaxes(title_text="held-out RMS (sigma)", rangemode="tozero", range=[0, 1.2 * max(*values, 1.0)])
-    figure.update_xaxes(type="category", title_text="model", range=[-0.3, len(names) - 0.5])
+    figure = Figure()
+    figure.add(
+        "scatter", x=names, y=values, mode="lines+markers+text", text=[f"{v:.3f}" for v in values],
+        textposition="top right", line={"color": AFTER}, marker={"size": 10}, cliponaxis=False,
+        hovertemplate="%{x}: %{y:.3f} sigma<extra></extra>",
+    )  # fmt: skip
+    figure.shape("line", y0=1.0, y1=1.0, line=_LIMIT, opacity=1.0)
+    figure.y_axes(title="held-out RMS (sigma)", rangemode="tozero", range=[0, 1.2 * max(*values, 1.0)])
+    figure.x_axes(type="category", title="model", range=[-0.3, len(names) - 0.5])
     return lay_out(figure, 300)
 
 
-def explained(parts: Sequence[data.Explained]) -> Any:
+def explained(parts: Sequence[data.Explained]) -> Figure:
     """Misfit against what each found effect predicts, binned means; on the diagonal when it is right."""
-    figure = make_subplots(
-        rows=1, cols=len(parts), subplot_titles=[part.label for part in parts], horizontal_spacing=0.1
-    )
+    figure = Figure(rows=1, cols=len(parts), titles=[part.label for part in parts], gap_x=0.1)
     for column, part in enumerate(parts, 1):
         x, mean, error = data.binned(part.predicted, part.misfit, _BINS)
         ends = [float(x.min()), float(x.max())] if len(x) else [0.0, 0.0]
-        figure.add_scatter(
-            x=ends, y=ends, mode="lines", line={"color": "#222", "dash": "dash", "width": 1}, hoverinfo="skip",
-            row=1, col=column,
+        figure.add(
+            "scatter", x=ends, y=ends, mode="lines", line={"color": "#222", "dash": "dash", "width": 1},
+            hoverinfo="skip", col=column,
         )  # fmt: skip
-        figure.add_scatter(
-            x=x.astype(np.float32), y=mean.astype(np.float32), mode="markers",
-            error_y={"array": error.astype(np.float32), "color": BEFORE, "thickness": 1.5},
+        figure.add(
+            "scatter", x=x, y=mean, mode="markers",
+            error_y={"array": error, "color": BEFORE, "thickness": 1.5},
             marker={"color": BEFORE, "size": 7},
-            hovertemplate="predicted %{x:.2f}, found %{y:.2f} sigma<extra></extra>", row=1, col=column,
+            hovertemplate="predicted %{x:.2f}, found %{y:.2f} sigma<extra></extra>", col=column,
         )  # fmt: skip
-        figure.update_xaxes(title_text="effect predicts (sigma)", row=1, col=column)
-    figure.update_yaxes(title_text="misfit found (sigma)", col=1)
+        figure.x_axes(title="effect predicts (sigma)", col=column)
+    figure.y_axes(title="misfit found (sigma)", col=1)
     return lay_out(figure, 360)
 
 
-def correlation(names: Sequence[str], C: Floats) -> Any:
+def correlation(names: Sequence[str], C: Floats) -> Figure:
     """Correlation of the coefficients; cells beyond one half carry their number."""
     shown = [name.replace("_", " ") for name in names]
     text = [[f"{v:+.1f}".replace("-", "\N{MINUS SIGN}") if abs(v) > 0.5 and i != j else "" for j, v in enumerate(row)]
             for i, row in enumerate(C)]  # fmt: skip
-    figure = go.Figure(
-        go.Heatmap(
-            x=shown,
-            y=shown,
-            z=C.astype(np.float32),
-            text=text,
-            texttemplate="%{text}",
-            textfont={"size": 11},
-            zmin=-1,
-            zmax=1,
-            colorscale=DIVERGING,
-            xgap=1,
-            ygap=1,
-            colorbar={"title": {"text": _ABOVE.format("correlation"), "side": "top"}, "thickness": 12},
-            hovertemplate="%{y} \u00b7 %{x}: %{z:.2f}<extra></extra>",
-        )
-    )
-    figure.update_xaxes(tickangle=-60)
-    figure.update_yaxes(autorange="reversed")
-    for update in (figure.update_xaxes, figure.update_yaxes):
-        update(ticks="", automargin=True, showline=False, tickfont={"size": 11}, title_text="coefficient")
-    figure.add_hline(y=-0.5, line={"color": PALE, "width": 1})
+    figure = Figure()
+    figure.add(
+        "heatmap", x=shown, y=shown, z=C, text=text, texttemplate="%{text}", textfont={"size": 11}, zmin=-1, zmax=1,
+        colorscale=DIVERGING, xgap=1, ygap=1,
+        colorbar={"title": {"text": _ABOVE.format("correlation"), "side": "top"}, "thickness": 12},
+        hovertemplate="%{y} \u00b7 %{x}: %{z:.2f}<extra></extra>",
+    )  # fmt: skip
+    figure.x_axes(tickangle=-60)
+    figure.y_axes(autorange="reversed")
+    for update in (figure.x_axes, figure.y_axes):
+        update(ticks="", automargin=True, showline=False, tickfont={"size": 11}, title="coefficient")
+    figure.shape("line", y0=-0.5, y1=-0.5, line={"color": PALE, "width": 1})
     return lay_out(figure, 20 * len(shown) + 260, margin={"l": 60, "r": 20, "t": 20, "b": 60})

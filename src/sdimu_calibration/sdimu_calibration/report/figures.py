@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-import plotly.graph_objects as go
-from plotly.subplots import make_subplots
 
 from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.results import Calibration, History
 from sdimu_calibration.core.units import from_si
+from sdimu_calibration.report.drawing import BAND, Figure, lay_out
 from sdimu_calibration.report.groups import groups, is_free, short_name, title
 
 _COLOURS = ("#0b5394", "#b45f06", "#38761d", "#741b47", "#134f5c", "#7f6000")
 _DASHES = ("solid", "dash", "dot", "dashdot", "longdash", "longdashdot")
-_BAND = "rgba(0, 0, 0, 0.10)"
 _COLUMNS = 2
 _PANEL_HEIGHT = 260
 _GAP = 75
@@ -24,7 +20,7 @@ _LABEL_GAP = 0.075
 _MOST_POINTS = 700
 
 
-def sigma_history(calibration: Calibration) -> Any:
+def sigma_history(calibration: Calibration) -> Figure:
     """Sigma of every coefficient against time (as Fig. 3.1 of Kim, Song & Lyou), one panel an effect.
 
     Grey bands are rotations. A coefficient that the body frame makes zero by definition has no line.
@@ -35,95 +31,64 @@ def sigma_history(calibration: Calibration) -> Any:
 
     Returns
     -------
-    plotly.graph_objects.Figure
+    Figure
     """
     history = calibration.history
     panels = groups(calibration.names, calibration.model)
     rows = -(-len(panels) // _COLUMNS)
-    figure = make_subplots(
+    figure = Figure(
         rows=rows,
         cols=_COLUMNS,
-        subplot_titles=[title(effect) for effect in panels],
-        vertical_spacing=min(_GAP / (_PANEL_HEIGHT * rows), 1.0 / max(rows - 1, 1)),
-        horizontal_spacing=0.12,
+        titles=[title(effect) for effect in panels],
+        gap_y=min(_GAP / (_PANEL_HEIGHT * rows), 1.0 / max(rows - 1, 1)),
+        gap_x=0.12,
     )
-    kept = _thin(history)
+    kept, end = _thin(history), float(history.t[-1]) / 60.0
     for panel, (effect, indices) in enumerate(panels.items()):
-        row, column = panel // _COLUMNS + 1, panel % _COLUMNS + 1
+        place = {"row": panel // _COLUMNS + 1, "col": panel % _COLUMNS + 1}
         unit = calibration.display_units[indices[0]]
-        labels = _draw(figure, calibration, effect, indices, kept, (row, column))
-        _label(figure, labels, float(history.t[-1]) / 60.0, (row, column))
-        figure.update_yaxes(
-            title_text=f"sigma ({unit})", type="log", dtick=1, exponentformat="power", row=row, col=column
-        )
-        figure.update_xaxes(
-            title_text="time (min)",
-            title_standoff=2,
-            range=[0, float(history.t[-1]) / 60.0],
-            row=row,
-            col=column,
-        )
-    _bands(figure, history, len(panels))
-    figure.update_layout(
-        template="simple_white",
-        height=_PANEL_HEIGHT * rows + 60,
-        showlegend=False,
-        margin={"l": 70, "r": 50, "t": 40, "b": 50},
-        font={"size": 12, "color": "#222"},
-        hovermode="x",
-    )
-    return figure
+        _label(figure, _draw(figure, calibration, effect, indices, kept, place), end, place)
+        figure.y_axes(title=f"sigma ({unit})", type="log", dtick=1, exponentformat="power", **place)
+        figure.x_axes(title="time (min)", standoff=2, range=[0, end], **place)
+        for start, stop in rotations(history):
+            figure.shape(
+                "rect", x0=start / 60.0, x1=stop / 60.0, fillcolor=BAND, line={"width": 0}, layer="below", **place
+            )
+    return lay_out(
+        figure, _PANEL_HEIGHT * rows + 60, margin={"l": 70, "r": 50, "t": 40, "b": 50},
+        font={"size": 12, "color": "#222"}, hovermode="x",
+    )  # fmt: skip
 
 
 def _draw(
-    figure: Any,
-    calibration: Calibration,
-    effect: str,
-    indices: list[int],
-    kept: Ints,
-    place: tuple[int, int],
-) -> dict[str, float]:
-    """Draw the lines of one panel; return the last sigma by label."""
+    figure: Figure, calibration: Calibration, effect: str, indices: list[int], kept: Ints, place: dict[str, int]
+) -> list[tuple[str, Floats, str]]:
+    """Draw the lines of one panel; return label, sigmas and ink of each."""
     history = calibration.history
-    labels: dict[str, float] = {}
+    drawn = []
     for order, index in enumerate(indices):
         unit = calibration.display_units[index]
         sigma = history.sigma[kept, index] * from_si(1.0, unit)
         if not is_free(calibration, index):
             continue
-        name = short_name(calibration.names[index], effect)
-        labels[name] = float(sigma[-1])
-        line = go.Scatter(
-            x=(history.t[kept] / 60.0).astype(np.float32),
-            y=np.where(sigma > 0, sigma, np.nan).astype(np.float32),
-            mode="lines",
-            name=calibration.names[index],
-            line={"color": _COLOURS[order % 6], "dash": _DASHES[order % 6], "width": 1.6},
-            hovertemplate=f"%{{y:.3g}} {unit}",
-        )
-        figure.add_trace(line, row=place[0], col=place[1])
-    return labels
+        sigma, ink = np.where(sigma > 0, sigma, np.nan), _COLOURS[order % 6]
+        drawn.append((short_name(calibration.names[index], effect), sigma, ink))
+        figure.add(
+            "scatter", x=history.t[kept] / 60.0, y=sigma, mode="lines", name=calibration.names[index],
+            line={"color": ink, "dash": _DASHES[order % 6], "width": 1.6}, hovertemplate=f"%{{y:.3g}} {unit}", **place,
+        )  # fmt: skip
+    return drawn
 
 
-def _label(figure: Any, labels: dict[str, float], end_min: float, place: tuple[int, int]) -> None:
+def _label(figure: Figure, drawn: list[tuple[str, Floats, str]], end_min: float, place: dict[str, int]) -> None:
     """Write the names at the ends of their lines, pushed apart where lines end together."""
-    if not labels:
+    if not drawn:
         return
-    drawn = list(figure.select_traces(row=place[0], col=place[1]))
-    everything = np.concatenate([np.log10(np.asarray(trace.y, float)) for trace in drawn])
+    everything = np.log10([sigma for _, sigma, _ in drawn])
     gap = _LABEL_GAP * max(float(np.nanmax(everything) - np.nanmin(everything)), 0.5)
-    heights = spread(np.log10(list(labels.values())), gap)
-    for order, (name, height) in enumerate(zip(labels, heights, strict=True)):
-        figure.add_annotation(
-            x=end_min,
-            y=float(height),
-            text=name,
-            showarrow=False,
-            xanchor="left",
-            xshift=4,
-            font={"size": 11, "color": drawn[order].line.color},
-            row=place[0],
-            col=place[1],
+    for (name, _, ink), height in zip(drawn, spread(everything[:, -1], gap), strict=True):
+        figure.annotate(
+            name, x=end_min, y=float(height), xanchor="left", xshift=4, font={"size": 11, "color": ink}, **place
         )
 
 
@@ -161,27 +126,6 @@ def rotations(history: History) -> list[tuple[float, float]]:
     edges = np.flatnonzero(turning[1:] != turning[:-1])
     before = np.concatenate([[0.0], history.t])
     return [(float(before[a]), float(before[b])) for a, b in zip(edges[::2], edges[1::2], strict=True)]
-
-
-def _bands(figure: Any, history: History, panels: int) -> None:
-    """Grey bands over the rotations, set at once: adding shapes one by one is quadratic in plotly."""
-    shapes = [
-        {
-            "type": "rect",
-            "xref": f"x{panel + 1 if panel else ''}",
-            "yref": f"y{panel + 1 if panel else ''} domain",
-            "x0": start / 60.0,
-            "x1": end / 60.0,
-            "y0": 0,
-            "y1": 1,
-            "fillcolor": _BAND,
-            "line": {"width": 0},
-            "layer": "below",
-        }
-        for panel in range(panels)
-        for start, end in rotations(history)
-    ]
-    figure.update_layout(shapes=shapes)
 
 
 def _thin(history: History) -> Ints:

@@ -11,20 +11,18 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import plotly.graph_objects as go
-from plotly.subplots import make_subplots
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 from scipy import stats
 
 from sdimu_calibration.core.units import from_si
+from sdimu_calibration.report.drawing import BAND, Figure, html, lay_out
 from sdimu_calibration.report.style import STYLE
 from sdimu_calibration.storage.json_file import read_json
 
 FORMAT = "sdimu-monte-carlo/1"
 
 _INK, _WARN = "#0b5394", "#b45f06"
-_BAND = "rgba(0, 0, 0, 0.10)"
 
 _COLUMNS = ("coefficient", "bias", "+-", "RMS error", "sigma", "bound", "unit", "RMS / sigma", "RMS / bound")
 _CHECK_COLUMNS = ("check", "value", "interval", "passed")
@@ -91,7 +89,7 @@ def page(content: Mapping[str, Any]) -> str:
     bad = [c["name"] for c in content["checks"] if not c["passed"]]
     verdict = f"{len(bad)} of {len(content['checks'])} checks failed." if bad else "All checks passed."
     heading = f"Monte-Carlo campaign of {runs} runs"
-    figure = figures(content).to_html(full_html=False, include_plotlyjs=True, config={"responsive": True})
+    figure = html(figures(content), 1)
     parts = [
         f"<h1>{heading}</h1>",
         f'<p class="quiet">body frame: {escape(str(content["body_frame"]).replace("_", " "))} · '
@@ -114,10 +112,10 @@ def page(content: Mapping[str, Any]) -> str:
     )
 
 
-def figures(content: Mapping[str, Any]) -> Any:
+def figures(content: Mapping[str, Any]) -> Figure:
     """Four panels: error over sigma, bias, NEES, autocorrelation; grey is where a right estimator falls."""
     titles = ("RMS of error over sigma", "bias in standard errors", "NEES of the runs", "lag-1 autocorrelation")
-    figure = make_subplots(rows=2, cols=2, subplot_titles=titles, vertical_spacing=0.3, horizontal_spacing=0.1)
+    figure = Figure(rows=2, cols=2, titles=titles, gap_y=0.3, gap_x=0.1)
     names = [c["name"] for c in content["coefficients"]]
     _dots(figure, names, [c["rms_z"] for c in content["coefficients"]], content["rms_z_interval"], (1, 1))
     bias = content["checks"][0]["high"]
@@ -126,43 +124,33 @@ def figures(content: Mapping[str, Any]) -> Any:
     measured = [a for a in content["autocorrelation"] if a["pairs"]]
     limit = content["checks"][-1]["high"] / np.sqrt(min((a["pairs"] for a in measured), default=1))
     _dots(figure, [a["channel"] for a in measured], [a["value"] for a in measured], (-limit, limit), (2, 2))
-    figure.update_layout(
-        template="simple_white", height=900, showlegend=False, margin={"l": 60, "r": 20, "t": 40, "b": 130},
-        font={"size": 12, "color": "#222"},
-    )  # fmt: skip
-    return figure
+    return lay_out(figure, 900, margin={"l": 60, "r": 20, "t": 40, "b": 130}, font={"size": 12, "color": "#222"})
 
 
-def _dots(figure: Any, names: list[str], values: list[float], interval: Any, place: tuple[int, int]) -> None:
+def _dots(figure: Figure, names: list[str], values: list[float], interval: Any, place: tuple[int, int]) -> None:
     low, high = interval
     inside = [low <= value <= high for value in values]
-    figure.add_trace(
-        go.Scatter(
-            x=names, y=values, mode="markers",
-            marker={
-                "color": [_INK if ok else _WARN for ok in inside], "size": 8,
-                "symbol": ["circle" if ok else "x" for ok in inside],
-            },
-        ),
-        row=place[0], col=place[1],
-    )  # fmt: skip
-    figure.add_hrect(y0=low, y1=high, fillcolor=_BAND, line_width=0, layer="below", row=place[0], col=place[1])
-    figure.update_xaxes(tickangle=-60, row=place[0], col=place[1])
+    row, col = place
+    marker = {
+        "color": [_INK if ok else _WARN for ok in inside], "size": 8,
+        "symbol": ["circle" if ok else "x" for ok in inside],
+    }  # fmt: skip
+    figure.add("scatter", x=names, y=values, mode="markers", marker=marker, row=row, col=col)
+    figure.shape("rect", y0=low, y1=high, fillcolor=BAND, line={"width": 0}, layer="below", row=row, col=col)
+    figure.x_axes(tickangle=-60, row=row, col=col)
 
 
-def _nees(figure: Any, nees: Mapping[str, Any], place: tuple[int, int]) -> None:
+def _nees(figure: Figure, nees: Mapping[str, Any], place: tuple[int, int]) -> None:
     """Histogram of the NEES with the chi-square density that it should have."""
     dof = nees["dof"]
     values = np.asarray([v for v in nees["values"] if v is not None], dtype=float)
     x = np.linspace(max(0.0, dof - 4.5 * np.sqrt(2 * dof)), dof + 6.0 * np.sqrt(2 * dof), 200)
-    figure.add_trace(
-        go.Histogram(x=values, histnorm="probability density", marker={"color": _INK}, opacity=0.5),
-        row=place[0], col=place[1],
-    )  # fmt: skip
-    figure.add_trace(
-        go.Scatter(x=x, y=stats.chi2.pdf(x, dof), mode="lines", line={"color": "#222"}), row=place[0], col=place[1]
+    row, col = place
+    figure.add(
+        "histogram", x=values, histnorm="probability density", marker={"color": _INK}, opacity=0.5, row=row, col=col
     )
-    figure.update_xaxes(title_text=f"chi-square of {dof} degrees of freedom (line)", row=place[0], col=place[1])
+    figure.add("scatter", x=x, y=stats.chi2.pdf(x, dof), mode="lines", line={"color": "#222"}, row=row, col=col)
+    figure.x_axes(title=f"chi-square of {dof} degrees of freedom (line)", row=row, col=col)
 
 
 def _table(columns: tuple[str, ...], lines: list[list[str]], text: set[int]) -> str:

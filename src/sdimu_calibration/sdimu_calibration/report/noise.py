@@ -5,16 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from html import escape
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-import plotly.graph_objects as go
-from plotly.subplots import make_subplots
 from rich.table import Table
 
 from sdimu_calibration.core.noise import TERMS, Allan, Terms
 from sdimu_calibration.core.units import from_si
-from sdimu_calibration.report.drawing import html, lay_out
+from sdimu_calibration.report.drawing import Figure, html, lay_out
 from sdimu_calibration.report.style import STYLE
 
 CHANNELS = ("gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z")
@@ -61,33 +58,27 @@ def table(found: Mapping[str, Terms]) -> Table:
     return made
 
 
-def figure(deviations: Mapping[str, Allan], found: Mapping[str, Terms]) -> Any:
+def figure(deviations: Mapping[str, Allan], found: Mapping[str, Terms]) -> Figure:
     """Allan deviation of all channels with the fits, one panel a triad."""
-    made = make_subplots(rows=1, cols=2, subplot_titles=("Gyros", "Accelerometers"), horizontal_spacing=0.12)
+    made = Figure(rows=1, cols=2, titles=("Gyros", "Accelerometers"), gap_x=0.12)
     for channel, one in deviations.items():
         triad, axis = channel.split("_")
         column, k, unit = 1 + (triad == "accel"), "xyz".index(axis), _SHOWN[triad]
         factor = from_si(1.0, unit)
         error = {"type": "data", "array": factor * one.sigma, "thickness": 1, "width": 2}
-        made.add_trace(
-            go.Scatter(
-                x=one.tau, y=factor * one.deviation, mode="markers", name=f"{channel} ({unit})", error_y=error,
-                marker={"color": _INK[k], "symbol": ("circle", "square", "diamond")[k], "size": 6},
-            ),
-            row=1, col=column,
+        made.add(
+            "scatter", x=one.tau, y=factor * one.deviation, mode="markers", name=f"{channel} ({unit})", error_y=error,
+            marker={"color": _INK[k], "symbol": ("circle", "square", "diamond")[k], "size": 6}, col=column,
         )  # fmt: skip
         fine = np.geomspace(one.tau[0], one.tau[-1], 100)
-        made.add_trace(
-            go.Scatter(
-                x=fine, y=factor * found[channel].deviation(fine), mode="lines", name=f"fit of {channel}",
-                line={"color": _INK[k], "dash": _DASH[k], "width": 1.5}, hoverinfo="skip",
-            ),
-            row=1, col=column,
+        made.add(
+            "scatter", x=fine, y=factor * found[channel].deviation(fine), mode="lines", name=f"fit of {channel}",
+            line={"color": _INK[k], "dash": _DASH[k], "width": 1.5}, hoverinfo="skip", col=column,
         )  # fmt: skip
-    made.update_xaxes(type="log", title_text="averaging time (s)", exponentformat="power")
+    made.x_axes(type="log", title="averaging time (s)", exponentformat="power")
     for column, triad in ((1, "gyro"), (2, "accel")):
         title = f"Allan deviation ({_SHOWN[triad]})"
-        made.update_yaxes(type="log", title_text=title, exponentformat="power", row=1, col=column)
+        made.y_axes(type="log", title=title, exponentformat="power", col=column)
     return lay_out(made, 520)
 
 

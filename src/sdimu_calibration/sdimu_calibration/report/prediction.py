@@ -14,6 +14,7 @@ from rich.table import Table
 from sdimu_calibration.core.planning.predict import Prediction
 from sdimu_calibration.core.results import Calibration, History
 from sdimu_calibration.core.units import from_si
+from sdimu_calibration.report.drawing import html
 from sdimu_calibration.report.figures import sigma_history
 from sdimu_calibration.report.groups import effect_of, groups
 from sdimu_calibration.report.style import STYLE
@@ -127,9 +128,7 @@ def page(
             _html_table(("largest of the axes", *columns, "off by", "unit"), rows),
             '<p class="quiet">In brackets: as printed.</p>',
         ]
-    figure = sigma_history(as_history(prediction)).to_html(
-        full_html=False, include_plotlyjs=True, config={"responsive": True}
-    )
+    figure = html(sigma_history(as_history(prediction)), 1)
     parts += ["<h2>Sigma of every coefficient against time</h2>", '<p class="quiet">Grey: the table turns.</p>', figure]
     parts += ["<h2>At the end</h2>", _html_table(COLUMNS, coefficient_rows(prediction))]
     parts += ["<h2>Not observable</h2>", _unobservable(prediction)]

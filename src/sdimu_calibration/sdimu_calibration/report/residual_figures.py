@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
-from plotly.subplots import make_subplots
 
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.effects.effect import CHANNELS
 from sdimu_calibration.core.evidence.consistency import CHANNEL_NAMES
 from sdimu_calibration.core.units import from_si
 from sdimu_calibration.report import data
-from sdimu_calibration.report.drawing import AFTER, BAND, BEFORE, PALE, lay_out
+from sdimu_calibration.report.drawing import AFTER, BAND, BEFORE, PALE, Figure, lay_out
 
 _MOST_POINTS = 500
 _BINS = 12
@@ -28,7 +26,7 @@ def _layers(found: data.Residuals, two: bool) -> list[tuple[Floats, str, str, st
     return [given, (found.after, AFTER, "circle", "with what was found")] if two else [given]
 
 
-def innovations(found: data.Residuals, two: bool) -> Any:
+def innovations(found: data.Residuals, two: bool) -> Figure:
     """Innovations of the twelve channels in time with their 3-sigma bands.
 
     Position and velocity are measured once after each turn; rate and force every second: there the pale line keeps the
@@ -41,9 +39,7 @@ def innovations(found: data.Residuals, two: bool) -> Any:
         Draw both the model as given and with what was found.
     """
     titles = [name.replace("_", " ") for name in CHANNEL_NAMES]
-    figure = make_subplots(
-        rows=4, cols=3, subplot_titles=titles, vertical_spacing=0.075, horizontal_spacing=0.085, shared_xaxes=True
-    )
+    figure = Figure(rows=4, cols=3, titles=titles, gap_y=0.075, gap_x=0.085, share_x=True)
     minutes = found.t / 60.0
     for channel in range(12):
         place = {"row": channel // 3 + 1, "col": channel % 3 + 1}
@@ -56,16 +52,16 @@ def innovations(found: data.Residuals, two: bool) -> Any:
                 (minutes, values[:, channel] * sigma) if channel < 6 else _stop_means(found, values[:, channel] * sigma)
             )
             good = np.isfinite(y)
-            figure.add_scatter(
-                x=t[good].astype(np.float32), y=y[good].astype(np.float32), mode="markers", name=name, legendgroup=name,
+            figure.add(
+                "scatter", x=t[good], y=y[good], mode="markers", name=name, legendgroup=name,
                 showlegend=channel == 0, marker={"color": ink, "symbol": symbol, "size": 7},
                 hovertemplate=f"%{{x:.1f}} min: %{{y:.3g}} {data.CHANNEL_UNITS[channel]}<extra>{name}</extra>", **place,
             )  # fmt: skip
         reach = _reach([found.before[:, channel], found.after[:, channel]], found.sigma[:, channel], channel < 6)
         reach *= from_si(1.0, data.CHANNEL_UNITS[channel])
-        figure.update_yaxes(range=[-reach, reach], title_text=data.CHANNEL_UNITS[channel], title_standoff=2, **place)
-    figure.update_xaxes(title_text="time (min)", row=4)
-    figure.update_yaxes(zeroline=True, zerolinecolor="#999", zerolinewidth=1)
+        figure.y_axes(range=[-reach, reach], title=data.CHANNEL_UNITS[channel], standoff=2, **place)
+    figure.x_axes(title="time (min)", row=4)
+    figure.y_axes(zeroline=True, zerolinecolor="#999", zerolinewidth=1)
     return lay_out(
         figure,
         900,
@@ -84,27 +80,27 @@ def _reach(normalised: Sequence[Floats], sigma: Floats, all_of_it: bool) -> floa
     return 1.15 * max(usual, 0.25 * usual * far)
 
 
-def _bars(figure: Any, minutes: Floats, sigma: Floats, place: dict[str, int]) -> None:
+def _bars(figure: Figure, minutes: Floats, sigma: Floats, place: dict[str, int]) -> None:
     good = np.isfinite(sigma)
-    figure.add_scatter(
-        x=minutes[good].astype(np.float32), y=np.zeros(int(good.sum()), dtype=np.float32), mode="markers",
+    figure.add(
+        "scatter", x=minutes[good], y=np.zeros(int(good.sum())), mode="markers",
         marker={"size": 1, "color": PALE}, hoverinfo="skip", showlegend=False,
-        error_y={"array": (3.0 * sigma[good]).astype(np.float32), "color": _BAR, "thickness": 5, "width": 0}, **place,
+        error_y={"array": (3.0 * sigma[good]), "color": _BAR, "thickness": 5, "width": 0}, **place,
     )  # fmt: skip
 
 
-def _band(figure: Any, minutes: Floats, sigma: Floats, place: dict[str, int]) -> None:
+def _band(figure: Figure, minutes: Floats, sigma: Floats, place: dict[str, int]) -> None:
     t, s = data.envelope(minutes, 3.0 * sigma, 60)
-    figure.add_scatter(
-        x=np.concatenate([t, t[::-1]]).astype(np.float32), y=np.concatenate([s, -s[::-1]]).astype(np.float32),
+    figure.add(
+        "scatter", x=np.concatenate([t, t[::-1]]), y=np.concatenate([s, -s[::-1]]),
         fill="toself", fillcolor=BAND, line={"width": 0}, mode="lines", hoverinfo="skip", showlegend=False, **place,
     )  # fmt: skip
 
 
-def _raw(figure: Any, minutes: Floats, y: Floats, place: dict[str, int]) -> None:
+def _raw(figure: Figure, minutes: Floats, y: Floats, place: dict[str, int]) -> None:
     t, thin = data.interrupted(*data.envelope(minutes, y, _MOST_POINTS), _GAP_MIN)
-    figure.add_scatter(
-        x=t.astype(np.float32), y=thin.astype(np.float32), mode="lines", line={"color": PALE, "width": 0.7},
+    figure.add(
+        "scatter", x=t, y=thin, mode="lines", line={"color": PALE, "width": 0.7},
         hoverinfo="skip", showlegend=False, **place,
     )  # fmt: skip
 
@@ -119,7 +115,7 @@ def _stop_means(found: data.Residuals, y: Floats) -> tuple[Floats, Floats]:
 
 def against_variables(
     found: data.Residuals, variables: Floats, names: Sequence[tuple[str, str]], columns: Sequence[int], two: bool
-) -> Any:
+) -> Figure | None:
     """Residuals at rest against physical variables: binned means, standard errors, sigmas of one second.
 
     Parameters
@@ -137,59 +133,57 @@ def against_variables(
     used = [k for k in columns if np.ptp(variables[rest, k]) > 0]
     if not used:
         return None
-    figure = make_subplots(
-        rows=6, cols=len(used), shared_xaxes=True, shared_yaxes=True, vertical_spacing=0.02, horizontal_spacing=0.012,
+    figure = Figure(
+        rows=6, cols=len(used), share_x=True, share_y=True, gap_y=0.02, gap_x=0.012,
     )  # fmt: skip
     for row in range(6):
         for column, k in enumerate(used, 1):
             name, unit = names[k]
             for values, ink, symbol, of in _layers(found, two):
                 x, mean, error = data.binned(variables[:, k], values[:, 6 + row], _BINS)
-                figure.add_scatter(
-                    x=x.astype(np.float32), y=mean.astype(np.float32), mode="markers", name=of, legendgroup=of,
+                figure.add(
+                    "scatter", x=x, y=mean, mode="markers", name=of, legendgroup=of,
                     showlegend=row == 0 and column == 1, marker={"color": ink, "symbol": symbol, "size": 6},
-                    error_y={"array": error.astype(np.float32), "color": ink, "thickness": 1, "width": 0},
+                    error_y={"array": error, "color": ink, "thickness": 1, "width": 0},
                     hovertemplate=f"{name} = %{{x:.3g}} {unit}: %{{y:+.2f}} sigma<extra>{of}</extra>",
                     row=row + 1, col=column,
                 )  # fmt: skip
-        figure.update_yaxes(title_text=f"{CHANNELS[row].replace('_', ' ')}<br>(sigma)", row=row + 1, col=1)
+        figure.y_axes(title=f"{CHANNELS[row].replace('_', ' ')}<br>(sigma)", row=row + 1, col=1)
     for column, k in enumerate(used, 1):
-        figure.update_xaxes(title_text=f"{names[k][0]} ({names[k][1]})", row=6, col=column)
-    figure.update_yaxes(zeroline=True, zerolinecolor="#999", zerolinewidth=1, nticks=5)
-    figure.update_xaxes(nticks=5, tickangle=0)
+        figure.x_axes(title=f"{names[k][0]} ({names[k][1]})", row=6, col=column)
+    figure.y_axes(zeroline=True, zerolinecolor="#999", zerolinewidth=1, nticks=5)
+    figure.x_axes(nticks=5, tickangle=0)
     return lay_out(figure, 760, showlegend=True, margin={"l": 80, "r": 20, "t": 40, "b": 60})
 
 
-def free_inputs(found: data.FreeInputs, two: bool) -> Any:
+def free_inputs(found: data.FreeInputs, two: bool) -> Figure:
     """Constant error that every dwell (plain) and turn (hatched) would need; a star marks a score beyond three."""
     titles = [c.replace("_", " ") for c in CHANNELS]
-    figure = make_subplots(
-        rows=2, cols=3, subplot_titles=titles, vertical_spacing=0.14, horizontal_spacing=0.085, shared_xaxes=True
-    )
+    figure = Figure(rows=2, cols=3, titles=titles, gap_y=0.14, gap_x=0.085, share_x=True)
     middle, width = 0.5 * (found.start + found.end) / 60.0, (found.end - found.start) / 60.0
     for channel in range(6):
         place = {"row": channel // 3 + 1, "col": channel % 3 + 1}
         unit = "deg/h" if channel < 3 else "ug"
         far = np.abs(found.z[:, channel]) > data.NOTABLE
-        figure.add_bar(
-            x=middle.astype(np.float32), y=found.before[:, channel].astype(np.float32), width=width.astype(np.float32),
+        figure.add(
+            "bar", x=middle, y=found.before[:, channel], width=width,
             marker={
                 "color": "rgba(180, 95, 6, 0.55)", "line": {"color": BEFORE, "width": 0.5},
                 "pattern": {"shape": ["/" if turn else "" for turn in found.turn], "size": 4, "fgcolor": "#222"},
             },
             text=["\u2217" if f else "" for f in far], textposition="outside", cliponaxis=False, name="model as given",
-            legendgroup="before", showlegend=channel == 0, customdata=found.z[:, channel].astype(np.float32),
+            legendgroup="before", showlegend=channel == 0, customdata=found.z[:, channel],
             hovertemplate=f"%{{x:.1f}} min: %{{y:.3g}} {unit}, z = %{{customdata:.1f}}<extra></extra>", **place,
         )  # fmt: skip
         if two:
-            figure.add_scatter(
-                x=middle.astype(np.float32), y=found.after[:, channel].astype(np.float32), mode="markers",
+            figure.add(
+                "scatter", x=middle, y=found.after[:, channel], mode="markers",
                 marker={"color": AFTER, "symbol": "circle", "size": 5}, name="with what was found", legendgroup="after",
                 showlegend=channel == 0, hovertemplate=f"%{{x:.1f}} min: %{{y:.3g}} {unit}<extra></extra>", **place,
             )  # fmt: skip
-        figure.update_yaxes(title_text=unit, title_standoff=2, **place)
-    figure.update_xaxes(title_text="time (min)", row=2)
-    figure.update_yaxes(zeroline=True, zerolinecolor="#999", zerolinewidth=1)
+        figure.y_axes(title=unit, standoff=2, **place)
+    figure.x_axes(title="time (min)", row=2)
+    figure.y_axes(zeroline=True, zerolinecolor="#999", zerolinewidth=1)
     return lay_out(
         figure, 560, showlegend=True, bargap=0, barmode="overlay", margin={"l": 60, "r": 20, "t": 95, "b": 55},
         legend={"orientation": "h", "yanchor": "bottom", "y": 1.09, "x": 0},

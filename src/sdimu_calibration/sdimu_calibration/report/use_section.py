@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
-from plotly.subplots import make_subplots
 
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.estimation.free_inertial import Drift, FreeInertialRun
 from sdimu_calibration.core.estimation.holdout import WANTED_S
 from sdimu_calibration.core.units import from_si
-from sdimu_calibration.report.drawing import AFTER, BEFORE, lay_out
+from sdimu_calibration.report.drawing import AFTER, BEFORE, Figure, lay_out
 from sdimu_calibration.report.markup import Draw, grid, quiet, section, sentence
 from sdimu_calibration.report.report_extras import ReportExtras
 
@@ -87,11 +85,11 @@ def _metres(value: float) -> str:
     return f"{value / 1000.0:.2g} km" if value >= 1000.0 else f"{value:.0f} m"
 
 
-def figure(trials: Sequence[FreeInertialRun]) -> Any:
+def figure(trials: Sequence[FreeInertialRun]) -> Figure:
     """Errors of position, velocity and heading against time, a column a stretch, a dash a compensation."""
-    made = make_subplots(
-        rows=3, cols=len(trials), subplot_titles=[f"unseen {_PLACES[t.segment.place]}" for t in trials],
-        shared_xaxes=True, shared_yaxes="rows", vertical_spacing=0.06, horizontal_spacing=0.04,
+    made = Figure(
+        rows=3, cols=len(trials), titles=[f"unseen {_PLACES[t.segment.place]}" for t in trials],
+        share_x=True, share_y=True, gap_y=0.06, gap_x=0.04,
     )  # fmt: skip
     for column, trial in enumerate(trials, 1):
         for (ink, dash), drift in zip(_INK, trial.drifts, strict=False):
@@ -104,9 +102,9 @@ def figure(trials: Sequence[FreeInertialRun]) -> Any:
             if np.isfinite(drift.promised).any():
                 _line(made, drift.t[rows], drift.promised[rows], f"{drift.name}, promised|m", ink, dash, 1, column, 0.9)
     for row, title in enumerate(("position (m)", "velocity (m/s)", "heading (arcmin)"), start=1):
-        made.update_yaxes(type="log", title_text=title, dtick=1, exponentformat="power", row=row, col=1)
-        made.update_yaxes(type="log", dtick=1, exponentformat="power", row=row)
-    made.update_xaxes(title_text="time without aid (min)", row=3)
+        made.y_axes(type="log", title=title, dtick=1, exponentformat="power", row=row, col=1)
+        made.y_axes(type="log", dtick=1, exponentformat="power", row=row)
+    made.x_axes(title="time without aid (min)", row=3)
     return lay_out(
         made, 640, showlegend=True, margin={"l": 80, "r": 20, "t": 85, "b": 55},
         legend={"orientation": "h", "yanchor": "bottom", "y": 1.05, "x": 0},
@@ -114,12 +112,12 @@ def figure(trials: Sequence[FreeInertialRun]) -> Any:
 
 
 def _line(
-    made: Any, t: Floats, y: Floats, name: str, ink: str, dash: str, row: int, column: int, width: float = 2.2
+    made: Figure, t: Floats, y: Floats, name: str, ink: str, dash: str, row: int, column: int, width: float = 2.2
 ) -> None:
     said, _, unit = name.partition("|")
     thin = width < 1.0
-    made.add_scatter(
-        x=(t[::5] / 60.0).astype(np.float32), y=np.where(y > 0.0, y, np.nan)[::5].astype(np.float32), mode="lines",
+    made.add(
+        "scatter", x=(t[::5] / 60.0), y=np.where(y > 0.0, y, np.nan)[::5], mode="lines",
         name=said, legendgroup=said, showlegend=row == 1 and column == 1,
         line={"color": ink, "dash": "longdashdot" if thin else dash, "width": 1.2 if thin else width},
         hovertemplate=f"%{{x:.1f}} min: %{{y:.3g}} {unit}<extra>{said}</extra>", row=row, col=column,
