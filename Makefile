@@ -53,7 +53,7 @@ wheels: setup
 bench: setup
 	$(BIN)/python -m pytest -m bench -s
 
-# Many runs: is sigma honest, is the bias nought. Minutes to hours.
+# Many runs: is sigma honest, is the bias zero. Minutes to hours.
 study: setup
 	$(BIN)/python -m pytest -n 2 -m slow --timeout 0
 

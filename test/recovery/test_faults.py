@@ -11,7 +11,7 @@ from sdimu_calibration.core.data.arrival import arrange
 from sdimu_calibration.core.estimation.outcome import calibrate
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage.config import load_imu, load_model, load_plan, load_site
-from sdimu_sim.campaign.fault_run import OK, REFUSED, TOLD, TRACEBACK, WARNED, WRONG, as_read, run_fault, spoilt
+from sdimu_sim.campaign.fault_run import NOTED, OK, REFUSED, TRACEBACK, WARNED, WRONG, as_read, run_fault, spoilt
 from sdimu_sim.campaign.fault_study import fault_study, hurried
 from sdimu_sim.core.faults import FAULTS, Fault, fault_named
 from sdimu_sim.core.scenario import Scenario
@@ -89,7 +89,7 @@ def test_other_biases_after_a_gap_are_never_silent():
     for seed in range(11, 17):
         for size in fault.sizes:
             outcome = run_fault(SCENARIO, MODEL, fault, size, seed)
-            assert outcome.verdict in {TOLD, WARNED, REFUSED}
+            assert outcome.verdict in {NOTED, WARNED, REFUSED}
 
 
 def test_missing_samples_leave_the_sigmas_honest():

@@ -1,4 +1,4 @@
-"""The hand-held Xsens recording of imu_tk against the result that its authors published (not in the repository)."""
+"""The handheld Xsens recording of imu_tk against the result that its authors published (not in the repository)."""
 
 import numpy as np
 import pytest

@@ -39,7 +39,7 @@ def write_test(path: Path, scenario: Scenario, test: SimulatedTest, *, replace: 
 
 
 def write_by_hand(path: Path, samples: ImuSamples, *, replace: bool = False) -> None:
-    """Write a run by hand to a rosbag2 folder: samples of the IMU and nothing else.
+    """Write a handheld run to a rosbag2 folder: samples of the IMU and nothing else.
 
     Raises
     ------

@@ -57,7 +57,7 @@ def _of_file(key: EffectKey, path: str, parameter: str) -> tuple[str, ...]:
 
 
 def _formulas(file: EffectFile, parameter: str) -> dict[str, str]:
-    """Write the formula of every sensor that `parameter` acts on: it at one, the others at nought, constants put in."""
+    """Write the formula of every sensor that `parameter` acts on: it at one, the others at zero, constants put in."""
     numbers = {**constants_of(file), **{name: float(name == parameter) for name in file.parameters}}
     out: dict[str, str] = {}
     for sensor, text in file.expressions.items():

@@ -43,7 +43,7 @@ def cut(
     last: Annotated[float, typer.Option("--to", help="Seconds since the first sample; the end without it.")] = math.inf,
     replace: Annotated[bool, typer.Option(help="Delete what is there.")] = False,
 ) -> None:
-    """Take a part of a recording: what comes before a power cycle, or after somebody leant on the table."""
+    """Take a part of a recording: what comes before a power cycle, or after a push against the table."""
     from rich.console import Console
 
     from sdimu_calibration.storage.cut_bag import cut_bag

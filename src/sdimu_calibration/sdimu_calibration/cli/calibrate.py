@@ -41,7 +41,7 @@ def calibrate(
         list[str] | None,
         typer.Option(
             metavar="EFFECT",
-            help="Effect to estimate besides: a name, one of its coefficients, or a YAML file; may be repeated.",
+            help="Effect to add to the model: a name, one of its coefficients, or a YAML file; may be repeated.",
         ),
     ] = None,
     noise: NoiseOption = None,

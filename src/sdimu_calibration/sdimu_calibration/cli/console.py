@@ -8,7 +8,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 _PIPE_WIDTH = 140
-"""Columns when nobody says how wide the output is: a file or a pipe must not cut the table."""
+"""Columns when it is unknown how wide the output is: a file or a pipe must not cut the table."""
 
 
 def console() -> Console:

@@ -38,7 +38,7 @@ def diagnose(
     site: SiteOption = None,
     imu: ImuOption = "dtg",
     add: Annotated[
-        list[str] | None, typer.Option(metavar="EFFECT", help="Effect in the model besides: name or YAML file.")
+        list[str] | None, typer.Option(metavar="EFFECT", help="Effect to add to the model: name or YAML file.")
     ] = None,
     attempt: Annotated[
         list[str] | None,

@@ -18,21 +18,21 @@ if TYPE_CHECKING:
 _TOP = 5
 
 
-def print_summary(console: Console, told: DiagnosisSummary) -> None:
+def print_summary(console: Console, summary: DiagnosisSummary) -> None:
     """Print everything that a diagnosis has to say."""
-    d = told.diagnosis
+    d = summary.diagnosis
     line(console, d.sentence)
     for finding in d.findings:
         line(console, f"data: {finding.text}")
     for text in d.noise:
         line(console, f"noise: {text}")
     line(console, f"p of the model as given: {f'{d.p_value:.2g}' if d.p_value > 1e-300 else 'below 1e-300'}")
-    _where(console, told)
-    _candidates(console, told)
-    _steps(console, told)
+    _where(console, summary)
+    _candidates(console, summary)
+    _steps(console, summary)
     print_ladder(console, d.rungs)
-    _out_of_sight(console, told)
-    for text in told.advice:
+    _out_of_sight(console, summary)
+    for text in summary.advice:
         line(console, f"advice: {text}")
 
 
@@ -49,16 +49,16 @@ def line(console: Console, text: str) -> None:
     console.print(text, soft_wrap=True, markup=False, highlight=False)
 
 
-def _where(console: Console, told: DiagnosisSummary) -> None:
-    top = told.diagnosis.consistency.where[:_TOP]
-    if told.diagnosis.adequate or not top:
+def _where(console: Console, summary: DiagnosisSummary) -> None:
+    top = summary.diagnosis.consistency.where[:_TOP]
+    if summary.diagnosis.adequate or not top:
         return
     places = ", ".join(f"{w.channel} at stop {w.stop} ({w.normalised_mean:+.1f} sigma)" for w in top)
     line(console, f"worst: {places}")
 
 
-def _candidates(console: Console, told: DiagnosisSummary) -> None:
-    shown = told.candidates or told.found
+def _candidates(console: Console, summary: DiagnosisSummary) -> None:
+    shown = summary.candidates or summary.found
     if not shown:
         return
     lines = []
@@ -72,12 +72,12 @@ def _candidates(console: Console, told: DiagnosisSummary) -> None:
             ]
         )  # fmt: skip
     headings = ("effect", "estimate", "+-", "unit", "z", "explains", "one stop held out", "looks the same here")
-    title = "found" if told.candidates else "tried, but not enough to explain the misfit"
+    title = "found" if summary.candidates else "tried, but not enough to explain the misfit"
     print_table(console, headings, lines, title)
 
 
-def _steps(console: Console, told: DiagnosisSummary) -> None:
-    steps = told.diagnosis.found.steps
+def _steps(console: Console, summary: DiagnosisSummary) -> None:
+    steps = summary.diagnosis.found.steps
     if not steps:
         return
     for number, s in enumerate(steps, start=1):
@@ -93,15 +93,15 @@ def _steps(console: Console, told: DiagnosisSummary) -> None:
                 line(console, f"  without it these were wrong: {moved}")
 
 
-def _out_of_sight(console: Console, told: DiagnosisSummary) -> None:
-    hidden = [r for r in told.reached if not r.testable]
+def _out_of_sight(console: Console, summary: DiagnosisSummary) -> None:
+    hidden = [r for r in summary.reached if not r.testable]
     if hidden:
-        line(console, f"{len(hidden)} of {len(told.reached)} candidates could not have been seen with this plan:")
-    for group in told.untestable:
+        line(console, f"{len(hidden)} of {len(summary.reached)} candidates could not have been seen with this plan:")
+    for group in summary.untestable:
         names = ", ".join(group.labels[:3]) + (" ..." if len(group.labels) > 3 else "")
         line(console, f"  {group.reason}: {len(group.labels)} ({names})")
-    if told.diagnosis.adequate:
-        line(console, f"smallest sizes that would have been found (80 %): {smallest(told.reached)}")
+    if summary.diagnosis.adequate:
+        line(console, f"smallest sizes that would have been found (80 %): {smallest(summary.reached)}")
 
 
 def smallest(reached: tuple[DetectableSize, ...]) -> str:

@@ -27,7 +27,7 @@ def noise(
     from sdimu_calibration.storage.imu_file import write_measured_imu
     from sdimu_calibration.storage.opening import open_recording
 
-    find_config("imu", imu)  # what is wrong with it is said before the work
+    find_config("imu", imu)  # errors in it are reported before the work
     recording = open_recording(bag)
     rows = rests(recording)
     if longest:

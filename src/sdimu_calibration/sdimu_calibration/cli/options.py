@@ -32,8 +32,8 @@ EstimatorOption = Annotated[
 HandOption = Annotated[bool, typer.Option("--hand", help="Moved by hand: the same as --estimator handheld.")]
 _OLD_NAMES = {"hand": "handheld"}
 HANDHELD_CHOSEN = (
-    "handheld: in rests as short as these the gyros' noise hides the Earth's rate, so nothing is navigated "
-    "(--estimator filter to do it all the same)"
+    "handheld: the rests are so short that the gyros' noise hides the Earth's rate, so nothing is navigated "
+    "(--estimator filter forces navigation)"
 )
 
 
@@ -65,7 +65,7 @@ def opened(
         raise DataError(f"--estimator {estimator}: expected one of {', '.join((AUTO, *ESTIMATORS))}")
     if noise not in {None, "estimated"}:
         raise DataError(f"--noise {noise}: expected 'estimated' (or leave it out: the noise of --imu)")
-    # What is wrong with a name is said before a long recording is read.
+    # A wrong name is reported before a long recording is read.
     specification, given = load_imu(imu), extended_model(model or "baseline", add or [])
     if site is not None:
         load_site(site)

@@ -24,10 +24,10 @@ def plan(
     site: Annotated[str, typer.Option(help="Where the test will be: name in config/site or path.")] = "daejeon",
     model: Annotated[str, typer.Option(help="Model to estimate: name in config/model or path.")] = "baseline",
     add: Annotated[
-        list[str] | None, typer.Option(metavar="EFFECT", help="Effect that shall be seen besides; may be repeated.")
+        list[str] | None, typer.Option(metavar="EFFECT", help="Effect that the plan should also show; may be repeated.")
     ] = None,
     minutes: Annotated[
-        float | None, typer.Option(help="Time there is: the best sigmas in it. Without: the shortest plan.")
+        float | None, typer.Option(help="Time available: the best sigmas in it. Without: the shortest plan.")
     ] = None,
     limit: Annotated[list[str] | None, typer.Option(metavar="EFFECT=SIGMA", help=_LIMIT)] = None,
     slack: Annotated[float, typer.Option(min=0.01, help="Factor on the sigmas of --plan that are the limits.")] = 1.2,
@@ -112,12 +112,12 @@ def _limits(texts: Sequence[str]) -> dict[str, float]:
         effect = selection.resolve(name.strip())
         out[effect.family or effect.name] = parse_quantity(value, effect.parameters[0].display_unit)
         if not out[effect.family or effect.name] > 0.0:
-            raise DataError(f"--limit '{text}': expected more than nought")
+            raise DataError(f"--limit '{text}': expected more than zero")
     return out
 
 
 def _numbers(option: str, text: str) -> list[float]:
-    """Read numbers with commas between them, all above nought."""
+    """Read numbers with commas between them, all above zero."""
     from sdimu_calibration.core.recording import DataError
 
     try:
@@ -125,5 +125,5 @@ def _numbers(option: str, text: str) -> list[float]:
     except ValueError:
         values = []
     if not values or not all(math.isfinite(v) and v > 0.0 for v in values):
-        raise DataError(f"{option} '{text}': expected numbers above nought, such as '2,10'")
+        raise DataError(f"{option} '{text}': expected numbers above zero, such as '2,10'")
     return values

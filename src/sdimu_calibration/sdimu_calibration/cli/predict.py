@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from sdimu_calibration.core.specification import ImuSpecification, Model, Site
 
 _MOUNT = "Rotation of the IMU on the table: degrees about every axis, or 'X,Y,Z'."
-_NOISE = "Noise that the filter is told: name in config/noise (paper) or path; by default the IMU's own."
+_NOISE = "Noise that the filter assumes: name in config/noise (paper) or path; by default the IMU's own."
 
 
 def predict(
@@ -42,17 +42,17 @@ def predict(
 
     console = Console()
     what = load_plan(plan), load_site(site), load_imu(imu), load_model(model)
-    told = None if noise is None else load_noise(noise)
-    printed = _published(told)
+    assumed = None if noise is None else load_noise(noise)
+    printed = _published(assumed)
     at = mount or (next(iter(printed)).removesuffix(" deg") if printed else "0")
-    prediction = simulate(*what, mount_rad=_radians(at), noise=told, bound=bound_covariance)
+    prediction = simulate(*what, mount_rad=_radians(at), noise=assumed, bound=bound_covariance)
     about: dict[str, Any] = {"plan": what[0].name, "imu": what[2].name, "site": site, "mount_deg": at}
-    about["noise"] = told.name if told else "the IMU's own"
+    about["noise"] = assumed.name if assumed else "the IMU's own"
     published = None
-    if told is not None and printed:
-        rows = _beside(what, told, printed, prediction)
+    if assumed is not None and printed:
+        rows = _beside(what, assumed, printed, prediction)
         published = tuple(printed), rows
-        console.print(published_table(rows, tuple(printed), f"{told.reference}: here (printed), by mount"))
+        console.print(published_table(rows, tuple(printed), f"{assumed.reference}: here (printed), by mount"))
     console.print(coefficient_table(prediction))
     for found in prediction.unobservable:
         console.print(f"not observable: {found.text}", soft_wrap=True, markup=False, highlight=False)

@@ -52,7 +52,7 @@ def replay(
     from sdimu_calibration.storage.opening import opening_options
     from sdimu_calibration.storage.result_file import read_result
 
-    # What is wrong with bag or options is said before anything is started.
+    # Errors of bag or options are reported before anything is started.
     bag_parts(bag)
     origin = source(
         imu_topic, status_topic, joint_topic, temperature_topic, accel_unit, gyro_unit, accel_sign, gyro_sign

@@ -55,7 +55,7 @@ class Watch:
 
         self._console, self._test = console, test
         self._live = Live(console=console, transient=True, auto_refresh=False) if console.is_terminal else None
-        self._told = -1
+        self._reported = -1
 
     def __enter__(self) -> Watch:
         if self._live:
@@ -81,8 +81,8 @@ class Watch:
         """
         if self._live:
             self._live.update(self.picture(seen, streaming, wall_s), refresh=True)
-        elif streaming and seen.sigmas and seen.stop > self._told:
-            self._told = seen.stop
+        elif streaming and seen.sigmas and seen.stop > self._reported:
+            self._reported = seen.stop
             self._console.print(self.line(seen, wall_s), soft_wrap=True, markup=False, highlight=False)
 
     def line(self, seen: Seen, wall_s: float) -> str:

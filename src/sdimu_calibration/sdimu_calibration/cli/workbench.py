@@ -85,7 +85,7 @@ def workbench(
         bench.fit((), (), progress)
         bench.missing((), (), progress)
     logging.getLogger("werkzeug").setLevel(logging.ERROR)
-    # The address is told once the port listens: who follows it at once is not refused.
+    # The address is printed when the port listens: a browser that follows it at once is not refused.
     server = make_server(host, port, build(shelf).server, threaded=True)
     console.print(f"workbench of {bag.name} at http://{host}:{port} (Ctrl-C ends it)", soft_wrap=True)
     server.serve_forever()

@@ -262,7 +262,7 @@ class Consumer:
     def _repeat(self) -> None:
         if self._busy():
             return
-        # The end is said on another topic; data still on their way get two seconds to arrive.
+        # The end comes on another topic; data still on their way get two seconds to arrive.
         if self._end_ns is not None and time.monotonic() - self._changed > 2.0:
             self._reached_ns = max(self._reached_ns, self._end_ns)
         self._check_end()

@@ -195,9 +195,9 @@ class Feed:
             yield from self._live.advance(until, known, final=True)
 
     def notes(self) -> list[str]:
-        """Return what is to be told since the last call, such as what the filter waits for."""
-        told, self._live.notes = self._live.notes, []
-        return told
+        """Return the notes since the last call, such as what the filter waits for."""
+        notes, self._live.notes = self._live.notes, []
+        return notes
 
     def finish(self) -> Calibration:
         """Calibrate on everything that has come.

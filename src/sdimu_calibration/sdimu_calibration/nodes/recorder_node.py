@@ -74,7 +74,7 @@ class RecorderNode:
     def _record(self, name: str, type_name: str) -> None:
         self._bag.topic(name, type_name)
         take = self._writer(name, type_name)
-        # What is said once and kept for those who come later must be asked for as such.
+        # Messages that are sent once and kept for late subscribers need their own QoS.
         kind, late = message_class(type_name), name == STATIC
         self._listeners.append(Listener(self.node, self._ticker, kind, name, take, raw=True, late=late))
 

@@ -28,7 +28,7 @@ class Spinnable(Protocol):
 
 
 def run_node(make: Callable[[], Spinnable], args: Sequence[str] | None = None) -> None:
-    """Make a node and spin it until it is done or told to stop; never returns.
+    """Make a node and spin it until it is done or asked to stop; never returns.
 
     `EventsExecutor` keeps the order of arrival across topics and costs a fifth of the others per message. Its
     plain ``spin()`` dispatches nothing and looks at no signal, hence the loop.

@@ -1,20 +1,25 @@
-"""The architecture as one drawing: who hands what to whom."""
+"""The architecture as one drawing: the way of the data, and who uses whom."""
 
 from __future__ import annotations
 
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
+_TO = "\N{RIGHTWARDS ARROW}"
 _BOXES = {
-    "table": (0.2, 3.0, 1.9, "rate_table_sim", "plan \N{RIGHTWARDS ARROW} motion"),
-    "imu": (2.9, 3.0, 1.9, "sdimu_sim", "motion \N{RIGHTWARDS ARROW} samples\nwith errors"),
-    "nodes": (5.6, 3.0, 1.9, "nodes", "live calibration,\nrecorder, replay"),
-    "bag": (8.3, 3.0, 1.9, "bag", "samples, status,\nestimates (MCAP)"),
-    "storage": (8.3, 1.55, 1.9, "storage", "bags, YAML,\nresult files"),
-    "core": (2.9, 0.1, 4.6, "core", "reduce \N{RIGHTWARDS ARROW} navigate + filter \N{RIGHTWARDS ARROW} passes"
-             " \N{RIGHTWARDS ARROW} diagnose\nonly mathematics: no ROS, files, plots, clocks"),
-    "report": (5.6, 1.55, 1.9, "report", "report.html,\nworkbench"),
-    "cli": (2.9, 1.55, 1.9, "cli", "sdimu calibrate,\ndiagnose, compare"),
+    "table": (0.2, 4.3, 1.9, "rate_table_sim", f"plan {_TO} motion"),
+    "imu": (2.9, 4.3, 1.9, "sdimu_sim", f"motion {_TO} samples\nwith errors"),
+    "nodes": (5.6, 4.3, 1.9, "nodes", "live calibration,\nrecorder, replay"),
+    "bag": (8.3, 4.3, 1.9, "bag", "samples, status,\nestimates (MCAP)"),
+    "cli": (0.2, 2.85, 1.9, "cli", "sdimu calibrate,\ndiagnose, compare"),
+    "api": (2.9, 2.85, 1.9, "api", "the same from\nPython, notebooks"),
+    "report": (5.6, 2.85, 1.9, "report", "report.html,\nworkbench"),
+    "storage": (8.3, 2.85, 1.9, "storage", "bags, YAML,\nresult files"),
+    "open": (0.4, 1.25, 2.3, "open", f"front_door: live and bag\n{_TO} PreparedTest"),
+    "solve": (4.05, 1.25, 2.3, "solve", f"chooses the estimator\n{_TO} Fit"),
+    "outcome": (7.7, 1.25, 2.3, "outcome", f"coefficients, covariance\n{_TO} Calibration"),
+    "evidence": (4.05, 0.1, 2.3, "Fit.evidence", "residuals, signatures\nof the effects"),
+    "climb": (7.7, 0.1, 2.3, "climb", f"which effect is missing\n{_TO} Diagnosis"),
 }  # fmt: skip
 """Left, bottom, width, name, what it does; all are one high."""
 _DATA = (
@@ -22,56 +27,61 @@ _DATA = (
     ("imu", "right", "nodes", "left", "samples"),
     ("nodes", "right", "bag", "left", "recorder"),
     ("bag", "bottom", "storage", "top", ""),
+    ("open", "right", "solve", "left", "test"),
+    ("solve", "right", "outcome", "left", "fit"),
+    ("solve", "bottom", "evidence", "top", ""),
+    ("evidence", "right", "climb", "left", "evidence"),
+    ("climb", "top", "solve", "bottom", "refit"),
 )
-_USES = (
-    ("cli", "right", "report", "left", ""),
-    ("report", "right", "storage", "left", ""),
-    ("cli", "bottom", "core", "top", ""),
-    ("report", "bottom", "core", "top", ""),
-    ("storage", "bottom", "core", "right", ""),
-)
+_USES = tuple((user, "bottom", "core", "top", "") for user in ("cli", "api", "report", "storage"))
 """Imports point to the core and never back; the nodes use storage and core as the verbs do."""
-_HEIGHT = 0.95
+_CORE = (0.2, 0.0, 10.0, 2.55)
+"""Left, bottom, width, height of the core."""
+_HEIGHT = 0.85
 _LEGEND = """solid: data; dashed: uses.
 Table and IMU may be real:
 the calibrator reads the same
 topics and never the truth."""
 
 
-def house() -> Figure:
+def architecture_figure() -> Figure:
     """Draw the rooms and what goes between them."""
-    figure = Figure(figsize=(8.6, 3.4))
+    figure = Figure(figsize=(8.6, 4.4))
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
     axes.set_xlim(0.0, 10.4)
-    axes.set_ylim(0.0, 4.1)
+    axes.set_ylim(-0.1, 5.25)
     axes.set_axis_off()
-    for name, (left, bottom, width, title, text) in _BOXES.items():
-        heavy = name == "core"
-        axes.add_patch(_box(left, bottom, width, heavy))
+    axes.add_patch(Rectangle(_CORE[:2], *_CORE[2:], facecolor="#eee", edgecolor="#222", lw=1.8))
+    axes.text(0.4, 2.32, "core", va="center", weight="bold", fontsize=9)
+    axes.text(1.05, 2.32, "mathematics only: no ROS, files, plots, clocks", va="center", fontsize=7.5)
+    for left, bottom, width, title, text in _BOXES.values():
+        axes.add_patch(Rectangle((left, bottom), width, _HEIGHT, facecolor="white", edgecolor="#222"))
         middle = left + 0.5 * width
-        axes.text(middle, bottom + 0.74, title, ha="center", va="center", weight="bold", fontsize=9)
-        axes.text(middle, bottom + 0.32, text, ha="center", va="center", fontsize=7.5)
-    for start, leaves, end, enters, word in (*_DATA, *_USES):
-        a, b = _edge(start, leaves, end), _edge(end, enters, start)
-        dash = "-" if (start, leaves, end, enters, word) in _DATA else "--"
-        look = {"arrowstyle": "-|>", "color": "#222", "shrinkA": 1, "shrinkB": 1, "linestyle": dash}
-        axes.annotate("", b, a, arrowprops=look)
-        axes.text(0.5 * (a[0] + b[0]), a[1] + 0.12, word, ha="center", fontsize=6.5)
-    axes.text(0.2, 0.75, _LEGEND, fontsize=7.5, va="center", style="italic")
+        axes.text(middle, bottom + 0.67, title, ha="center", va="center", weight="bold", fontsize=9)
+        axes.text(middle, bottom + 0.29, text, ha="center", va="center", fontsize=7.5)
+    for arrows, dash in ((_DATA, "-"), (_USES, "--")):
+        for start, leaves, end, enters, word in arrows:
+            a, b = _edge(start, leaves, end), _edge(end, enters, start)
+            look = {"arrowstyle": "-|>", "color": "#222", "shrinkA": 1, "shrinkB": 1, "linestyle": dash}
+            axes.annotate("", b, a, arrowprops=look)
+            middle = (0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1]))
+            axes.text(middle[0], middle[1] + 0.1, word, ha="center", fontsize=6.5)
+    axes.text(0.4, 0.55, _LEGEND, fontsize=7.5, va="center", style="italic")
     return figure
 
 
-def _box(left: float, bottom: float, width: float, heavy: bool) -> Rectangle:
-    return Rectangle(
-        (left, bottom), width, _HEIGHT, facecolor="#eee" if heavy else "white", edgecolor="#222",
-        lw=1.8 if heavy else 1.0,
-    )  # fmt: skip
-
-
 def _edge(name: str, side: str, towards: str) -> tuple[float, float]:
-    """Middle of a side; on a wide box, the place nearest to the other."""
-    left, bottom, width = _BOXES[name][:3]
-    other = _BOXES[towards][0] + 0.5 * _BOXES[towards][2]
+    """Middle of a side, or the place on it that is nearest to the other box; arrows to the core are vertical."""
+    left, bottom, width, height = _place(name)
+    other_left, _, other_width, _ = _place(name if towards == "core" else towards)
     if side in {"top", "bottom"}:
-        return min(max(other, left + 0.2), left + width - 0.2), bottom + (_HEIGHT if side == "top" else 0.0)
-    return left + (width if side == "right" else 0.0), bottom + 0.5 * _HEIGHT
+        middle = other_left + 0.5 * other_width
+        return min(max(middle, left + 0.2), left + width - 0.2), bottom + (height if side == "top" else 0.0)
+    return left + (width if side == "right" else 0.0), bottom + 0.5 * height
+
+
+def _place(name: str) -> tuple[float, float, float, float]:
+    if name == "core":
+        return _CORE
+    left, bottom, width = _BOXES[name][:3]
+    return left, bottom, width, _HEIGHT

@@ -20,7 +20,7 @@ from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.estimation.free_inertial import FreeInertialRun
 from sdimu_calibration.core.evidence.consistency import CHANNEL_NAMES
 from sdimu_calibration.report import data
-from sdimu_calibration.report.architecture_figure import house
+from sdimu_calibration.report.architecture_figure import architecture_figure
 from sdimu_calibration.report.drawing import AFTER, BEFORE, DIVERGING
 from sdimu_calibration.report.evidence_figures import cell
 from sdimu_calibration.report.table import with_sigma
@@ -55,7 +55,10 @@ def write_pictures(folder: Path, diagnosis: Diagnosis, trials: Sequence[FreeIner
     """
     folder.mkdir(parents=True, exist_ok=True)
     with mpl.rc_context(_STYLE):
-        figures = {"heat-map": heat_maps(diagnosis), "candidates": candidates(diagnosis), "architecture": house()}
+        figures = {
+            "heat-map": heat_maps(diagnosis), "candidates": candidates(diagnosis),
+            "architecture": architecture_figure(),
+        }  # fmt: skip
         if diagnosis.found.steps:
             figures["ladder"] = ladder(diagnosis)
         if trials:

@@ -27,7 +27,7 @@ def read_recording(path: Path, topics: Topics | TopicChoice | None = None) -> Re
     """Read a bag.
 
     Samples that are not finite and samples with a stamp that was there before are dropped and counted;
-    samples out of order are sorted by stamp. What was mended is told in `notes`.
+    samples out of order are sorted by stamp. `notes` say what was mended.
 
     Parameters
     ----------

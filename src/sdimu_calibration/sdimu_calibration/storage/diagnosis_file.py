@@ -49,9 +49,9 @@ def read_diagnosis(path: Path) -> dict[str, Any]:
     return read_json(path / "diagnosis.json" if path.is_dir() else path, FORMAT)
 
 
-def content(told: DiagnosisSummary) -> dict[str, Any]:
+def content(summary: DiagnosisSummary) -> dict[str, Any]:
     """Give the diagnosis as plain data."""
-    d = told.diagnosis
+    d = summary.diagnosis
     is_unexplained = d.verdict == "unexplained"
     return {
         "format": FORMAT,
@@ -63,14 +63,14 @@ def content(told: DiagnosisSummary) -> dict[str, Any]:
         "where": [
             {"channel": w.channel, "stop": w.stop, "normalised_mean": w.normalised_mean} for w in d.consistency.where
         ],
-        "candidates": [candidate(f, d.own) for f in told.candidates],
-        "partial": [candidate(f, d.own) for f in told.found] if is_unexplained else [],
+        "candidates": [candidate(f, d.own) for f in summary.candidates],
+        "partial": [candidate(f, d.own) for f in summary.found] if is_unexplained else [],
         "unexplained": {
             "is": is_unexplained,
             "fraction": _unexplained_fraction(d),
-            "best_variables": [f.candidate.label for f in told.found] if is_unexplained or d.own else [],
+            "best_variables": [f.candidate.label for f in summary.found] if is_unexplained or d.own else [],
         },
-        "advice": list(told.advice),
+        "advice": list(summary.advice),
         "findings": [{"text": f.text, "grave": f.grave} for f in d.findings],
         "noise": {
             "wrong": list(d.noise),
@@ -91,9 +91,9 @@ def content(told: DiagnosisSummary) -> dict[str, Any]:
         "fit": {"before": fit_of(d.before), "after": fit_of(d.after)},
         "ladder": [step_of(s) for s in d.found.steps],
         "grown": [_rung(r) for r in d.rungs],
-        "plan": _plan(told.plan),
-        "not_testable": [reach_of(r) | {"reason": _reason(told, r)} for r in told.reached if not r.testable],
-        "smallest_detectable": [reach_of(r) for r in told.reached if r.testable],
+        "plan": _plan(summary.plan),
+        "not_testable": [reach_of(r) | {"reason": _reason(summary, r)} for r in summary.reached if not r.testable],
+        "smallest_detectable": [reach_of(r) for r in summary.reached if r.testable],
     }  # fmt: skip
 
 
@@ -194,8 +194,8 @@ def reach_of(r: DetectableSize) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _reason(told: DiagnosisSummary, r: DetectableSize) -> str:
-    return next((b.reason for b in told.untestable if r.label in b.labels), "")
+def _reason(summary: DiagnosisSummary, r: DetectableSize) -> str:
+    return next((b.reason for b in summary.untestable if r.label in b.labels), "")
 
 
 def _free_inputs(test: FreeInputTest) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Effects of one's own: YAML files (format ``sdimu-effect/1``) and plug-ins; and any effect by what people write.
+"""A user's own effects: YAML files (format ``sdimu-effect/1``) and plug-ins; and any effect by what people write.
 
 A file holds formulas by sensor, the parameters in which they are linear, and fixed quantities: doc/diagnosis.md.
 """
@@ -220,7 +220,7 @@ def _effects(file: EffectFile) -> tuple[Effect, ...]:
 def _one(
     file: EffectFile, name: str, formulas: Mapping[str, Expression], constants: Mapping[str, float]
 ) -> Effect:
-    """Effect of one parameter: the formulas with it at one and the others at nought."""
+    """Effect of one parameter: the formulas with it at one and the others at zero."""
     about = file.parameters[name]
     shown = about.display_unit or about.unit
     if dict(parse_unit(shown).dimension) != dict(parse_unit(about.unit).dimension):
@@ -230,7 +230,7 @@ def _one(
     except UnitError as error:
         raise DataError(f"parameters.{name}.prior: {error}") from error
     if not prior > 0.0:
-        raise DataError(f"parameters.{name}.prior: expected more than nought")
+        raise DataError(f"parameters.{name}.prior: expected more than zero")
     sensors = [s for s in CHANNELS if s in formulas and name in formulas[s].names]
     chosen = {p: float(p == name) for p in file.parameters}
     own = f"{file.name}_{name}"

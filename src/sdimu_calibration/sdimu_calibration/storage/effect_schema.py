@@ -1,4 +1,4 @@
-"""The file of an effect of one's own (format ``sdimu-effect/1``): read, and held to names, units and linearity.
+"""The file of a user's own effect (format ``sdimu-effect/1``): read, and held to names, units and linearity.
 
 It says what is written, and nothing of what it means: the estimator makes regressors of it (`effect_file`), the
 simulator a sensor.
@@ -26,7 +26,7 @@ _NAME = r"^[A-Za-z][A-Za-z0-9_]*$"
 
 
 class ParameterFile(Schema):
-    """A parameter of an effect of one's own: quantities with their units."""
+    """A parameter of a user's own effect: quantities with their units."""
 
     unit: str
     display_unit: str | None = None
@@ -34,7 +34,7 @@ class ParameterFile(Schema):
 
 
 class EffectFile(Schema):
-    """An effect of one's own, format ``sdimu-effect/1``."""
+    """A user's own effect, format ``sdimu-effect/1``."""
 
     format: Literal["sdimu-effect/1"]
     name: str = Field(pattern=_NAME)
@@ -105,7 +105,7 @@ def _check_names(file: EffectFile) -> None:
 
 
 def constants_of(file: EffectFile) -> dict[str, float]:
-    """Constants of an effect of one's own (SI)."""
+    """Constants of a user's own effect (SI)."""
     return {name: _constant(name, text) for name, text in file.constants.items()}
 
 

@@ -1,4 +1,4 @@
-"""The map that says what the columns of somebody's files are (format ``sdimu-import/1``): doc/recordings.md."""
+"""The map that says what the columns of a file from elsewhere are (format ``sdimu-import/1``): doc/recordings.md."""
 
 from __future__ import annotations
 

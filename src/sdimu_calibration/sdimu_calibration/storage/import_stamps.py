@@ -1,4 +1,4 @@
-"""Times of somebody's file as stamps: exact to the nanosecond where the file is."""
+"""Times of a file from elsewhere as stamps: exact to the nanosecond where the file is."""
 
 from __future__ import annotations
 

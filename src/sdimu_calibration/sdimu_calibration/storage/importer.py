@@ -1,4 +1,4 @@
-"""Files of others (CSV, MAT, NPZ) to the samples of an IMU, as a map says."""
+"""Files from elsewhere (CSV, MAT, NPZ) to the samples of an IMU, as a map says."""
 
 from __future__ import annotations
 

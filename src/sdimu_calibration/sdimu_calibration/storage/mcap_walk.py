@@ -1,6 +1,6 @@
 """An MCAP file read from front to back, as far as it is whole.
 
-Needs neither index nor footer, so it serves for reading and for mending alike: order is by stamp, later, and not by
+Needs neither index nor footer, so it serves both for reading and for mending: order is by stamp, later, and not by
 arrival. Records that no reader here asks for, such as message indices, are passed over.
 """
 

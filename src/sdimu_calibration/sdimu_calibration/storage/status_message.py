@@ -1,4 +1,4 @@
-"""A status of the rate table: reader of bags and live node take it alike."""
+"""A status of the rate table, as both the reader of bags and the live node take it."""
 
 from __future__ import annotations
 

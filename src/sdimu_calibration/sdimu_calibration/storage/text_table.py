@@ -112,8 +112,8 @@ class TextTable:
         if number:
             raise DataError(f"{self.path}: {number} columns are called '{column}'; use the column's number")
         there = ", ".join(self.headings[:_SHOWN]) + (", ..." if len(self.headings) > _SHOWN else "")
-        told = f"there are: {there}" if there else "the file has no headings; use the column's number"
-        raise DataError(f"{self.path}: no column '{column}' ({told})")
+        known = f"there are: {there}" if there else "the file has no headings; use the column's number"
+        raise DataError(f"{self.path}: no column '{column}' ({known})")
 
     def _first_line(self) -> int:
         for number, line in enumerate(self._lines):

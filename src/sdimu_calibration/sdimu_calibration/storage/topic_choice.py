@@ -29,7 +29,7 @@ IsPhase = Callable[[bytes], bool]
 
 @dataclass(frozen=True)
 class TopicChoice:
-    """Topics somebody asked for; None leaves the choice to the content of the bag."""
+    """Topics that the user asks for; None leaves the choice to the content of the bag."""
 
     imu: str | None = None
     status: str | None = None

@@ -7,40 +7,40 @@ from sdimu_sim.campaign.fault_study import table, totals
 
 _HEAD = """# Faults in the data
 
-Drivers, clocks, tables and people spoil data in ways that no sensor model knows. Each kind is tried at five sizes
+Drivers, clocks, tables and people spoil data in ways that no sensor model describes. Each kind is tried at five sizes
 (`sdimu study faults`, this page is its output). A run ends in one of these ways:
 
 | | |
 |---|---|
-| ok | every coefficient within {limit:g} sigma of the truth, nothing to say |
-| told | within {limit:g} sigma; result.json names what was wrong (`data.faults`, `notes`) |
+| ok | every coefficient within {limit:g} sigma of the truth, nothing to report |
+| noted | within {limit:g} sigma; result.json names what was wrong (`data.faults`, `notes`) |
 | warned | a coefficient beyond {limit:g} sigma, and `warnings` says that the result is not to be trusted |
 | refused | exit status 1, one line that says why and what to do |
 | SILENT WRONG, traceback | must not happen |
 
 ## How a fault is met
 
-- **Order of arrival** (`core/data/arrival`): numbers that are not finite and stamps that were there before are
-  dropped and counted; late samples are sorted in. Late samples whose time other readings have already are no late
-  samples: the clock was set back, and the run is refused.
-- **No measurement** (`core/data/soundness`): a number that stands still, a reading at the end of its range, a single
-  spike. Each is a probability under the channel's own noise; such samples count as missing.
+- **Order of arrival** (`core/data/arrival`): numbers that are not finite and repeated stamps are dropped and
+  counted; late samples are sorted in. When late samples cover a time that already has other readings, the clock was
+  set back, and the run is refused.
+- **No measurement** (`core/data/sample_screening`): a number that stands still, a reading at the end of its range, a
+  single spike. Each is a probability under the channel's own noise; such samples count as missing.
 - **Missing samples** (`core/data/gaps`): the noise of the two samples that bridge a gap is counted as often as they
-  stand in for others. In a turn the rate inside is known only as far as the largest angular acceleration in the
-  recording allows, +-(a^2 T^2 - D^2) / (4 a) of angle; force and velocity follow. At rest nothing is added, but
-  readings before and after must agree, or the IMU was moved or switched off. Where the attitude is left open by more
+  stand in for others. In a turn the rate inside the gap is limited by the largest angular acceleration in the
+  recording: the angle is known to +-(a^2 T^2 - D^2) / (4 a); force and velocity follow. At rest nothing is added, but
+  readings before and after must agree, or the IMU was moved or switched off. Where the attitude is uncertain by more
   than {linear:g} mrad the linear filter would be wrong by more than its noise: refused.
-- **Status** (`core/data/phases`): rest must be said by the table *and* felt by the IMU. A silent status leaves the
-  IMU to decide; numbers of stops that make no sense are replaced by counting.
-- **What does not fit** (`core/filter/stop_misfit`): the whitened innovations of every stop are summed; one stop that
-  is beyond chance (1e-4 a test) is named, where a mean over the whole test would hide it. An azimuth that too few
-  attitudes leave open bends the estimate (`core/filter/azimuth_known`): warned.
+- **Status** (`core/data/phases`): rest needs the status of the table *and* the readings of the IMU. Without a status the
+  IMU decides; impossible stop numbers are replaced by counting.
+- **What does not fit** (`core/evidence/stop_misfit`): the whitened innovations of every stop are summed; a stop
+  beyond chance (1e-4 a test) is named; a mean over the whole test would hide it. Too few attitudes leave the azimuth
+  uncertain, and the estimate is then biased (`core/estimation/azimuth_check`): warned.
 
-What no data can tell: a gap at rest in which the IMU was switched off and came back with biases that differ by
-less than the noise of the stops shows nowhere; every gap at rest from 2 s on is therefore a warning.
+No data can show one case: a gap at rest in which the IMU was switched off and came back with biases that differ by
+less than the noise of the stops. Every gap at rest from 2 s on is therefore a warning.
 
 A killed calibration node goes on from its journal (`calibration.journal` in its folder of results: every sample is
-written there before it is acknowledged) and ends with the same digits; what was missed meanwhile is a gap.
+written there before it is acknowledged) and ends with the same digits; samples missed meanwhile are a gap.
 
 ## The table
 

@@ -20,7 +20,7 @@ from sdimu_sim.core.generator import simulate_imu
 from sdimu_sim.core.platform import PlatformMotion
 from sdimu_sim.core.scenario import Scenario, imu_truth
 
-OK, TOLD, WARNED, REFUSED, WRONG, TRACEBACK = "ok", "told", "warned", "refused", "SILENT WRONG", "traceback"
+OK, NOTED, WARNED, REFUSED, WRONG, TRACEBACK = "ok", "noted", "warned", "refused", "SILENT WRONG", "traceback"
 LIMIT = 5.0
 """Error in sigmas from which a result without a warning is wrong."""
 
@@ -35,7 +35,7 @@ class Outcome:
     size : float
     seed : int
     verdict : str
-        ``ok`` (within `LIMIT`, nothing to say), ``told`` (within it, and the data section names something), ``warned``
+        ``ok`` (within `LIMIT`, nothing noted), ``noted`` (within it, and the data section names a fault), ``warned``
         (outside, and the result says that it is not to be trusted), ``refused`` (`DataError`), ``SILENT WRONG``,
         ``traceback``.
     worst : float
@@ -63,7 +63,7 @@ def run_fault(scenario: Scenario, model: Model, fault: Fault, size: float, seed:
         last = traceback.extract_tb(error.__traceback__)[-1]
         return Outcome(fault.name, size, seed, TRACEBACK, float("nan"), (f"{error!r} at {last.name}:{last.lineno}",))
     worst = largest_error(scenario, result)
-    inside = TOLD if result.notes else OK
+    inside = NOTED if result.notes else OK
     outside = WARNED if result.warnings else WRONG
     verdict = inside if worst < LIMIT else outside
     return Outcome(fault.name, size, seed, verdict, worst, result.notes)

@@ -17,7 +17,7 @@ def simulate(
     out: Annotated[Path, typer.Option(help="Bag (folder) to write.")],
     plan: Annotated[str, typer.Option(help="Test plan: name in config/plan or path.")] = "kim18",
     imu: Annotated[
-        str | None, typer.Option(help="IMU that gives the true errors their size; dtg (by hand: mems_by_hand).")
+        str | None, typer.Option(help="IMU that gives the true errors their size; dtg (handheld: mems_by_hand).")
     ] = None,
     site: Annotated[str, typer.Option(help="Site.")] = "daejeon",
     table: Annotated[str, typer.Option(help="Rate table.")] = "ideal",
@@ -55,7 +55,7 @@ def simulate(
         samples, true = simulate_by_hand(run)
         write_by_hand(out, samples, replace=replace)
         write_truth(truth_path, true)
-        text = f"{out}: {len(samples.t)} samples, {samples.t[-1]:.0f} s by hand; truth in {truth_path}"
+        text = f"{out}: {len(samples.t)} samples, {samples.t[-1]:.0f} s handheld; truth in {truth_path}"
         Console().print(text, soft_wrap=True)
         return
     scenario = Scenario(

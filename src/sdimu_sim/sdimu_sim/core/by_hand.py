@@ -30,14 +30,14 @@ _SWAY_RAD, _TREMOR_RAD = np.radians(3.0), np.radians(0.15)
 
 @dataclass(frozen=True)
 class ByHand:
-    """A run by hand.
+    """A handheld run.
 
     Attributes
     ----------
     rests : int
         Random attitudes, uniform over all.
     imu, site : ImuSpecification, Site
-        The site makes the truth; no estimator is told.
+        The site makes the truth; no estimator knows it.
     seed : int
         Of everything random: attitudes, times, sway, coefficients, noise.
     rate_hz : float

@@ -74,5 +74,5 @@ def read_equation(key: EffectKey, sensor: str, formula: str) -> tuple[str, Expre
 
 
 def _without_angle(unit: str) -> dict[str, Fraction]:
-    """Dimension of a unit; per rad/s and per 1/s are alike, as in the calibrator's check of formulas."""
+    """Dimension of a unit; per rad/s and per 1/s are the same, as in the calibrator's check of formulas."""
     return {name: power for name, power in parse_unit(unit).dimension if name != "rad"}

@@ -1,4 +1,4 @@
-"""A hand-held run tells what its model misses, stays quiet when it misses nothing, and knows how each effect shows."""
+"""A handheld run shows what its model misses, stays quiet when it misses nothing, and knows how each effect shows."""
 
 from __future__ import annotations
 

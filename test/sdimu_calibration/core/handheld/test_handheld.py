@@ -1,4 +1,4 @@
-"""A run by hand, without a place, gives coefficients of percents with honest sigmas."""
+"""A handheld run, without a site, gives coefficients of per cent with honest sigmas."""
 
 from dataclasses import replace
 
@@ -74,7 +74,7 @@ def test_without_noise_the_squares_of_the_errors_come_out_too(site):
     linear = np.array(["bias" not in n for n in names])
     # Squares of 2 % are 4e-4; the samples of a trembling turn leave a tenth of that at most.
     assert np.max(np.abs(error[linear])) < 4e-5
-    assert "Earth rate left free, as no site is given: 15 " in found.notes[-1]
+    assert "Earth rate is estimated, as no site is given: 15 " in found.notes[-1]
     assert "not seen" not in found.notes[-1]
 
 

@@ -1,4 +1,4 @@
-"""A run by hand says what was wrong with its data."""
+"""A handheld run says what was wrong with its data."""
 
 from dataclasses import replace
 

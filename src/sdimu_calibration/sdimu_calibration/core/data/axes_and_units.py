@@ -6,8 +6,8 @@
   wrong way, so no error of a sensor imitates either. Right-handed axes of any orientation (NED or ENU, forward-right-
   down or forward-left-up) all pass: they are rotations of each other. Left-handed axes turn the wrong way, as gyros
   of the wrong sign do.
-- **Sign of the force**: turns do not tell it, because a vector and its negative turn alike. The Earth does: its rate
-  has the component Omega sin(latitude) along the upward force (`earth_seen`). Where the Earth's rate is not seen the
+- **Sign of the force**: turns do not show it, because a vector and its negative turn in the same way. The Earth
+  does: its rate has the component Omega sin(latitude) along the upward force (`latitude_check`). Where the Earth's rate is not seen the
   sign changes nothing but the signs of the accelerometers' biases and of coefficients per g.
 
 Sources: the attitude kinematics of a fixed vector, du/dt = -omega x u (Groves, *Principles of GNSS, Inertial, and
@@ -156,7 +156,7 @@ def _gyro_reading(t: Floats, w: Floats, f: Floats, stated: Stated) -> tuple[floa
         best = now.best()
         if best is not None:
             now.check_axes(best)
-            return best, _told(best, stated), True
+            return best, _reading_notes(best, stated), True
         seen = seen or now
     if seen is None:
         note = "no turn changes the direction of gravity: unit and sense of the gyros are not checked"
@@ -256,13 +256,13 @@ def _wrong_axes(axes: Floats) -> str:
     )
 
 
-def _told(reading: float, stated: Stated) -> tuple[str, ...]:
+def _reading_notes(reading: float, stated: Stated) -> tuple[str, ...]:
     notes = []
     if stated.gyro is None and abs(reading) != 1.0:
-        notes.append("body rate is read in deg/s: so the turns agree with the change of gravity's direction")
+        notes.append("body rate is read in deg/s: the turns then agree with the change of gravity's direction")
     if stated.gyro_sign is None and reading < 0.0:
         notes.append(
-            "body rate is read with the opposite sign: as it stands the turns go the wrong way (gyros of the wrong "
+            "body rate is read with the opposite sign: as recorded the turns go the wrong way (gyros of the wrong "
             "sense, or left-handed axes)"
         )
     return tuple(notes)

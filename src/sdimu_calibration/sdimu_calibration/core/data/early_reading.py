@@ -13,7 +13,7 @@ _FIRST_S = 1.0
 _GROWTH = 1.1
 """Growth of the time from attempt to attempt: all attempts together look at each sample eleven times at most."""
 _NOTE_S = 5.0
-"""Wait (s) from which the user is told."""
+"""Wait (s) from which a note says so."""
 _TICK_S = 1e-9
 """Resolution of stamps (s)."""
 
@@ -34,7 +34,7 @@ class EarlyReading:
         self._stated = stated
         self._held: list[tuple[Floats, Floats, Floats]] = []
         self._attempt_s = _FIRST_S
-        self._told = False
+        self._noted = False
         self.notes: list[str] = []
         """What the caller should publish; the caller empties the list."""
         self.reading: Reading | None = None
@@ -96,10 +96,10 @@ class EarlyReading:
             self.reading = reading
             # That nothing has turned yet is no news while the test goes on.
             self.notes += reading.notes if reading.turned or final else reading.notes[:-1]
-            if self._told:
+            if self._noted:
                 self.notes.append(f"the filter starts with the samples of {at_s:.0f} s")
             return True
-        if at_s >= _NOTE_S and not self._told:
-            self._told = True
+        if at_s >= _NOTE_S and not self._noted:
+            self._noted = True
             self.notes.append(f"the filter waits: {why}")
         return False

@@ -3,7 +3,7 @@
 **White noise.** A gap of m samples is bridged by the mean of its two neighbours (`strapdown`), whose noise then counts
 1 + m/2 times instead of once. Against m + 2 samples of their own the variance of the integral grows from m + 2 to
 2 (1 + m/2)^2, by m + m^2/2 samples. An epoch that holds n intervals has 1 + (m + m^2/2) / n times the variance, in
-the navigation and in Zw and Zf alike, because both take the same bridged samples.
+the navigation and in both Zw and Zf, because both take the same bridged samples.
 
 **Motion.** In a turn the rate within the gap is not known. With an angular acceleration of at most a (the largest
 within half a second of a short gap, or in the recording) the missing angle lies within +- a T^2 / 4 of the straight
@@ -221,7 +221,7 @@ def _long_gap(
                 )
     return DataFault(
         "long gap",
-        f"{text}: if the IMU was switched off, its biases are others since, and the estimate is not to be trusted",
+        f"{text}: if the IMU was switched off, its biases may have changed, and the estimate is not to be trusted",
         int(cycles.lost[cycle]), at, float(cycles.t[cycle]), grave=True,
     )  # fmt: skip
 

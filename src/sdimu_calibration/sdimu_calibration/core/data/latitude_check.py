@@ -2,7 +2,7 @@
 
 At rest a gyro triad with bias b shows omega = b + C_bn omega_ie, and the accelerometers the upward direction u in the
 same axes. So u . omega = u . b + Omega sin(latitude): one line a stop in four unknowns, whatever the attitudes, which
-must not all lie on one cone. No azimuth is needed, and scale factors of percents change nothing that matters.
+must not all lie on one cone. No azimuth is needed, and scale errors of some per cent do not matter.
 
 Source: Groves, *Principles of GNSS, Inertial, and Multisensor Integrated Navigation Systems*, 2nd ed., section 2.4.1.
 """
@@ -108,8 +108,8 @@ def contradictions(seen: EarthRate, site: Site) -> tuple[str, ...]:
     gravity = site.gravity_m_s2 or float(earth.normal_gravity(site.latitude_rad, site.height_m))
     if abs(seen.gravity - gravity) > _SIGMAS * seen.gravity_sigma:
         lines.append(
-            f"|f| at rest is {seen.gravity:.4f} m/s^2, gravity at the site {gravity:.4f}: more apart than the IMU's "
-            "specification allows; check --site (latitude, height) and --imu"
+            f"|f| at rest is {seen.gravity:.4f} m/s^2, gravity at the site {gravity:.4f}: they differ by more than the "
+            "IMU's specification allows; check --site (latitude, height) and --imu"
         )
     return tuple(lines)
 

@@ -69,7 +69,7 @@ def sound(recording: Recording) -> tuple[Recording, tuple[DataFault, ...]]:
             if len(rows):
                 found.setdefault(kind, []).append((name, rows))
                 bad[rows] = True
-    faults = tuple(_told(kind, where, recording.t) for kind, where in found.items())
+    faults = tuple(_fault(kind, where, recording.t) for kind, where in found.items())
     if not bad.any():
         return recording, ()
     keep = ~bad
@@ -95,7 +95,7 @@ _TEXT = {
 }
 
 
-def _told(kind: str, where: list[tuple[str, Ints]], t: Floats) -> DataFault:
+def _fault(kind: str, where: list[tuple[str, Ints]], t: Floats) -> DataFault:
     """One line for a fault of any number of channels."""
     rows = np.unique(np.concatenate([at for _name, at in where]))
     first, last = float(t[rows[0]]), float(t[rows[-1]])
@@ -272,7 +272,7 @@ def wild(recording: Recording) -> tuple[Floats, Floats, tuple[DataFault, ...]]:
         t = middle[at]
         text = f"{name} is up to {ratio[at].max():.0f} times rougher than usual at {t[0]:.1f} s"
         more = f" and {np.count_nonzero(np.diff(t) > 1.0)} times more" if np.any(np.diff(t) > 1.0) else ""
-        line = f"{text}{more}; it weighs less there"
+        line = f"{text}{more}; its weight is reduced there"
         faults.append(DataFault("wild", line, int(at.sum()) * _WINDOW, float(t[0]), float(t[-1])))
     rows = largest > 1.0
     excess = (largest[rows] ** 2 - 1.0) * _WINDOW * recording.interval_s

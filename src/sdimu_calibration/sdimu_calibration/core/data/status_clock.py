@@ -64,7 +64,7 @@ def _without_common_time(recording: Recording, log: PhaseLog) -> Recording:
 
 
 def _on_grid(t: Floats, flag: Bools, step: float) -> tuple[Floats, float]:
-    """Put flags on the grid as 1, 0 and, where nobody knows, the mean; also return the time of the first."""
+    """Put flags on the grid as 1, 0 and, where it is unknown, the mean; also return the time of the first."""
     place = np.rint((t - t[0]) / step).astype(np.int64)
     out = np.full(int(place[-1]) + 1, float(flag.mean()))
     out[place] = flag

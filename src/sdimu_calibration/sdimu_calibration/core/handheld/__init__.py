@@ -1,1 +1,1 @@
-"""Runs by hand: no table, no place."""
+"""Handheld runs: no table, no site."""

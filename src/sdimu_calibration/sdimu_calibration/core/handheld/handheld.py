@@ -1,11 +1,11 @@
-"""Hand-held multi-position calibration: any IMU, put into many attitudes by hand, without a place.
+"""Handheld multi-position calibration: any IMU, put into many attitudes by hand, without a site.
 
 For sensors whose noise hides the Earth's rate navigation has nothing to hold on to: no north, and a velocity that is
 unknown as soon as a hand moves the IMU. What is left is enough: at rest the force is gravity, whatever the attitude,
 and from rest to rest the gyros must turn it as the accelerometers see it turned. One least squares over all rests and
 turns (`handheld_fit`).
 
-What nobody knows without a place is said, not guessed: the magnitude of gravity scales all accelerometers together,
+What is unknown without a site is noted, not guessed: the magnitude of gravity scales all accelerometers together,
 so a convention takes its place (9.80665 m/s^2, or the site's); the Earth's rate is three more unknowns whose prior is
 its size. The body frame is that of the accelerometers.
 """
@@ -54,7 +54,7 @@ _SEEN = 3.0
 
 @dataclass(frozen=True)
 class PreparedRun:
-    """A hand-held recording, made ready: without impossible samples, its rests found, reduced.
+    """A handheld recording, made ready: without impossible samples, its rests found, reduced.
 
     Attributes
     ----------
@@ -83,7 +83,7 @@ def prepare_run(recording: Recording) -> PreparedRun:
     rests = detect_static(recording)
     if len(rests) < FEWEST_RESTS:
         raise DataError(
-            f"/imu/data_raw: {len(rests)} rests; a hand-held calibration needs {FEWEST_RESTS} and more, "
+            f"/imu/data_raw: {len(rests)} rests; a handheld calibration needs {FEWEST_RESTS} and more, "
             "in different attitudes"
         )
     return PreparedRun(recording, rests, reduce_run(recording, rests), impossible)
@@ -100,7 +100,7 @@ def fit_priors(sensors: ImuModel, imu: ImuSpecification, site: Site | None, rest
     changing = (sensors.decay_rate > 0) | (sensors.drive > 0)
     if changing.any():
         name = sensors.names[int(np.argmax(changing))]
-        raise DataError(f"a hand-held run takes constants only, and '{name}' changes at random: leave it out")
+        raise DataError(f"a handheld run takes constants only, and '{name}' changes at random: leave it out")
     # The prior holds in a frame of its own; the three turns that lead to the accelerometers' frame go with it.
     J = body_frame.frame_jacobian(sensors.names, "accelerometer_triad")
     size = sensors.prior * np.where(_stated(sensors, imu), 1.0, _ROOM)
@@ -143,10 +143,10 @@ def handheld_notes(run: HandheldRun, scene: FitPriors, found: HandheldSolution, 
     """Say what was taken for granted, what was learned, and what stays unknown."""
     extra = found.point.extra
     out = [
-        f"by hand: {len(run.t)} rests of {run.seconds.min():.1f} to {run.seconds.max():.1f} s; white noise at rest "
+        f"handheld: {len(run.t)} rests of {run.seconds.min():.1f} to {run.seconds.max():.1f} s; white noise at rest "
         f"{from_si(scene.gyro_white_noise, 'deg/h'):.3g} deg/h/sqrt(Hz), "
         f"{from_si(scene.accel_white_noise, 'ug'):.3g} ug/sqrt(Hz); beyond it force {from_si(extra[FORCE], 'ug'):.3g} "
-        f"ug, rate {np.degrees(extra[RATE]):.2g} deg/s, turns {100.0 * extra[TURN]:.2g} % of the way",
+        f"ug, rate {np.degrees(extra[RATE]):.2g} deg/s, turns {100.0 * extra[TURN]:.2g} % of the angle",
         _gravity_note(scene, site),
         _earth_note(found, site),
     ]
@@ -162,7 +162,7 @@ def _gravity_note(scene: FitPriors, site: Site | None) -> str:
     source = "standard gravity, as no site is given" if site is None else "of the site"
     return (
         f"gravity {scene.gravity:.5f} m/s^2 ({source}); "
-        "an error of it is one of all accelerometer scale factors together"
+        "its error is a common error of all accelerometer scale factors"
     )
 
 
@@ -170,6 +170,6 @@ def _earth_note(found: HandheldSolution, site: Site | None) -> str:
     size = from_si(float(np.linalg.norm(found.point.earth)), "deg/h")
     sigma = from_si(float(np.sqrt(np.mean(found.earth_sigma**2))), "deg/h")
     if site is not None:
-        return "Earth rate: vertical part of the site, north free"
+        return "Earth rate: vertical part of the site, north part estimated"
     seen = "seen" if size > _SEEN * sigma else "not seen"
-    return f"Earth rate left free, as no site is given: {size:.2g} +- {sigma:.2g} deg/h, {seen} in this recording"
+    return f"Earth rate is estimated, as no site is given: {size:.2g} +- {sigma:.2g} deg/h, {seen} in this recording"

@@ -1,8 +1,8 @@
-"""What a hand-held run gives the least squares of `handheld`: means at rest, and the turns between the rests.
+"""What a handheld run gives the least squares of `handheld`: means at rest, and the turns between the rests.
 
 Between two rests only the gyros count: a hand moves the IMU about, so velocity and place are unknown. The samples of
 a turn are freed of the sensor errors exactly (`correct_cycles`), not to first order, and the derivatives follow the
-slope of the errors: with errors of percents both are needed.
+slope of the errors: with errors of per cent both are needed.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from sdimu_calibration.core.recording import Recording, TemperatureLog
 
 @dataclass(frozen=True)
 class HandheldRun:
-    """A hand-held recording, reduced: k rests and the k - 1 turns between them.
+    """A handheld recording, reduced: k rests and the k - 1 turns between them.
 
     Attributes
     ----------

@@ -1,8 +1,8 @@
-"""What is wrong with the data of a run by hand and no physics of the sensor: said, so that nobody has to guess.
+"""Faults in the data of a handheld run: what is wrong with the data and no physics of the sensor.
 
-The least squares learns how far its equations miss, so that most faults only widen its sigmas. A hand knocks and jerks,
-and a cheap sensor repeats its numbers at rest: the tests of `soundness`, which are made for a table, would call that
-spikes and a stuck axis. Here only what no hand does is looked for.
+The least squares learns the scatter of its equations, so most faults only widen its sigmas. A hand knocks and jerks,
+and a cheap sensor repeats its numbers at rest: `sample_screening`, which is made for a table, would report spikes and a
+stuck axis. Only what no hand can do is looked for here.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ _BEYOND = 10.0
 """Ratio to the 99th percentile from which a rate is impossible: a hand accelerates for longer than a sample."""
 _LEAST_IN_A_ROW = 3
 """Least number of consecutive readings at the extreme number that is saturation: noise does not repeat its extreme."""
-_TURN_MISSES = 0.01
+_TURN_MISFIT = 0.01
 """Largest misfit of turns, a share of their angle: the Xsens recording has 0.0004."""
-_FORCE_MISSES = 0.01 * STANDARD_GRAVITY
+_FORCE_MISFIT = 0.01 * STANDARD_GRAVITY
 """Largest misfit of the specific force at rest (m/s^2): the Xsens recording has a hundredth of it."""
 
 
@@ -59,7 +59,7 @@ def without_impossible(recording: Recording) -> tuple[Recording, tuple[DataFault
 
 
 def data_faults(recording: Recording, run: HandheldRun, found: HandheldSolution) -> tuple[DataFault, ...]:
-    """Say what is missing, what stands at the end of its range, and where the fit is no fit."""
+    """List missing samples, readings at the end of the range, and a misfit that no sensor explains."""
     return (*_missing(run), *_clipped(recording), *_misfit(found))
 
 
@@ -81,7 +81,7 @@ def _clipped(recording: Recording) -> list[DataFault]:
         rows = np.flatnonzero(_in_a_row(x == x.max()) | _in_a_row(x == x.min()))
         if len(rows):
             t = recording.t[rows]
-            text = f"{name} stands at the end of its range in {len(rows)} samples ({t[0]:.1f} to {t[-1]:.1f} s)"
+            text = f"{name} is at the end of its range in {len(rows)} samples ({t[0]:.1f} to {t[-1]:.1f} s)"
             out.append(DataFault("saturated", text, len(rows), float(t[0]), float(t[-1])))
     return out
 
@@ -104,9 +104,10 @@ def _misfit(found: HandheldSolution) -> list[DataFault]:
     )
     out = []
     extra = found.point.extra
-    if extra[TURN] > _TURN_MISSES:
-        out.append(DataFault("misfit", f"turns miss by {100.0 * extra[TURN]:.2g} % of the way, {because}", grave=True))
-    if extra[FORCE] > _FORCE_MISSES:
-        text = f"force at rest misses by {from_si(float(extra[FORCE]), 'mg'):.3g} mg, {because}"
+    if extra[TURN] > _TURN_MISFIT:
+        text = f"turns have errors of {100.0 * extra[TURN]:.2g} % of their angle, {because}"
+        out.append(DataFault("misfit", text, grave=True))
+    if extra[FORCE] > _FORCE_MISFIT:
+        text = f"force at rest has errors of {from_si(float(extra[FORCE]), 'mg'):.3g} mg, {because}"
         out.append(DataFault("misfit", text, grave=True))
     return out

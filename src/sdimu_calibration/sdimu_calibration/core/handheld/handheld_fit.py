@@ -1,11 +1,11 @@
-"""Least squares of a hand-held run: attitude of every rest, coefficients, the Earth's rate as it may be.
+"""Least squares of a handheld run: attitude of every rest, coefficients, the Earth's rate as it may be.
 
 Unknowns: a small turn of every rest (3 each), the coefficients (p), the Earth's rate as a vector in n (3). Equations,
 all whitened:
 
     force at rest  - (-g C_bn z) - D c               = noise of the mean, and what the model leaves over
     rate at rest   - C_bn w_e    - D c               = noise of the mean, and the wandering of the bias
-    attitude of the next rest against the gyros' turn = noise over the turn, that wandering, and a share of the way
+    attitude of the next rest against the gyros' turn = noise over the turn, that wandering, and a share of the angle
     priors of the coefficients and of w_e; one free heading, held.
 
 What is more than the white noise is not specified by anybody for a cheap IMU in a hand, so three sigmas are learned:
@@ -124,7 +124,7 @@ def fit_run(run: HandheldRun, scene: FitPriors, start: LinearisationPoint) -> Ha
     """
     if len(run.t) > MOST_RESTS:
         raise DataError(
-            f"/imu/data_raw: {len(run.t)} rests; a hand-held run may have {MOST_RESTS}: cut the recording in parts"
+            f"/imu/data_raw: {len(run.t)} rests; a handheld run may have {MOST_RESTS}: cut the recording in parts"
         )
     point = start
     change, pace = np.zeros(3), 1.0
@@ -145,7 +145,7 @@ def fit_run(run: HandheldRun, scene: FitPriors, start: LinearisationPoint) -> Ha
         if moved < CONVERGED and settled and steps > 2:
             return _finish(run, scene, point, steps)
     raise DataError(
-        "the hand-held run does not fit any IMU of the specification: check the units, and that --imu is as wide as "
+        "the handheld run does not fit any IMU of the specification: check the units, and that --imu is as wide as "
         "the sensor's errors"
     )
 
