@@ -9,6 +9,7 @@ import numpy as np
 from sdimu_calibration.core import earth
 from sdimu_calibration.core.alignment.alignment import Alignment, align
 from sdimu_calibration.core.arrays import Bools, Floats, Ints
+from sdimu_calibration.core.data.dwell_detection import specification_is_wide
 from sdimu_calibration.core.data.epochs import Epochs, cut
 from sdimu_calibration.core.data.gaps import Bridges, bridges, judge, largest_acceleration, weighed
 from sdimu_calibration.core.data.phases import (
@@ -119,7 +120,7 @@ def reduce(recording: Recording, setup: TestSetup, screened: bool = True) -> Pre
     unsound = (*unsound, *rough)
     noise = (setup.imu.gyro_white_noise, setup.imu.accel_white_noise)
     lost = judge(cycles, epochs, phases, nominal, found, noise, unsound)
-    faults = (*unsound, *lost, *contradictions(epochs, phases, recording.phase))
+    faults = (*unsound, *lost, *contradictions(epochs, phases, recording.phase, not specification_is_wide(setup.imu)))
     return PreparedData(cycles, epochs, phases, kind, recording.temperature, found, faults)
 
 

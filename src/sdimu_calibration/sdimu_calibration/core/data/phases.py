@@ -206,15 +206,24 @@ _EARLY_SIGMAS = 5.0
 """Deviation from the mean rate of its dwell at which the last second before a turn belongs to the turn."""
 
 
-def contradictions(epochs: Epochs, phases: Phases, log: PhaseLog | None) -> tuple[DataFault, ...]:
-    """Say where the status and the IMU do not agree."""
+def contradictions(epochs: Epochs, phases: Phases, log: PhaseLog | None, feels_turns: bool) -> tuple[DataFault, ...]:
+    """Say where the status and the IMU do not agree.
+
+    Parameters
+    ----------
+    epochs, phases : Epochs, Phases
+    log : PhaseLog or None
+        The status.
+    feels_turns : bool
+        The specification distinguishes a slow turn from rest; without it rest is no statement against the status.
+    """
     length = epochs.end - epochs.start
     out = []
     for where, kind, text in (
         (phases.contradicted, "motion at rest", "the IMU moved for {:.0f} s in which the table said dwell"),
         (phases.denied, "status", "the table said rotating for {:.0f} s in which the IMU rested"),
     ):
-        seconds = float(length[where].sum())
+        seconds = float(length[where].sum()) if feels_turns or kind != "status" else 0.0
         if seconds > (_DENIED * float(length[phases.dwell].sum()) if kind == "status" else 0.0):
             t = epochs.start[where]
             line = f"{text.format(seconds)} (first at {t[0]:.1f} s, stop {phases.stop[where][0]}); not used"
