@@ -64,8 +64,7 @@ def architecture_figure() -> Figure:
             a, b = _edge(start, leaves, end), _edge(end, enters, start)
             look = {"arrowstyle": "-|>", "color": "#222", "shrinkA": 1, "shrinkB": 1, "linestyle": dash}
             axes.annotate("", b, a, arrowprops=look)
-            middle = (0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1]))
-            axes.text(middle[0], middle[1] + 0.1, word, ha="center", fontsize=6.5)
+            axes.text(0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1]) + 0.1, word, ha="center", fontsize=6.5)
     axes.text(0.4, 0.55, _LEGEND, fontsize=7.5, va="center", style="italic")
     return figure
 

@@ -30,8 +30,8 @@ Drivers, clocks, tables and people spoil data in ways that no sensor model descr
   recording: the angle is known to +-(a^2 T^2 - D^2) / (4 a); force and velocity follow. At rest nothing is added, but
   readings before and after must agree, or the IMU was moved or switched off. Where the attitude is uncertain by more
   than {linear:g} mrad the linear filter would be wrong by more than its noise: refused.
-- **Status** (`core/data/phases`): rest needs the status of the table *and* the readings of the IMU. Without a status the
-  IMU decides; impossible stop numbers are replaced by counting.
+- **Status** (`core/data/phases`): rest needs the status of the table *and* the readings of the IMU. Without a status
+  the IMU decides; impossible stop numbers are replaced by counting.
 - **What does not fit** (`core/evidence/stop_misfit`): the whitened innovations of every stop are summed; a stop
   beyond chance (1e-4 a test) is named; a mean over the whole test would hide it. Too few attitudes leave the azimuth
   uncertain, and the estimate is then biased (`core/estimation/azimuth_check`): warned.

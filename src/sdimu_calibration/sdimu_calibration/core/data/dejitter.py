@@ -45,12 +45,12 @@ def dejittered(recording: Recording) -> Recording:
     rms = float(np.sqrt(np.mean(jitter**2)))
     if rms < _LEAST * interval:
         return recording
-    jitter = f"header stamps jitter by {rms * 1e3:.3g} ms (rms, {rms / interval:.1%} of the interval)"
+    measured = f"header stamps jitter by {rms * 1e3:.3g} ms (rms, {rms / interval:.1%} of the interval)"
     if np.abs(jitter).max() > _DOUBT * interval or (steps < 1.0).any():
-        note = f"{jitter}: too much to distinguish even sampling from missing samples; the stamps are used as they are"
+        note = f"{measured}: too much to distinguish even from missing samples; the stamps are used as they are"
         return replace(recording, notes=(*recording.notes, note))
     even = t - jitter
-    note = f"{jitter}: samples are taken as even, and their count as the clock"
+    note = f"{measured}: samples are taken as even, and their count as the clock"
     return replace(recording, t=even, notes=(*recording.notes, note))
 
 
