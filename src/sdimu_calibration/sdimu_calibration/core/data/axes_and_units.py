@@ -7,8 +7,9 @@
   down or forward-left-up) all pass: they are rotations of each other. Left-handed axes turn the wrong way, as gyros
   of the wrong sign do.
 - **Sign of the force**: turns do not show it, because a vector and its negative turn in the same way. The Earth
-  does: its rate has the component Omega sin(latitude) along the upward force (`latitude_check`). Where
-  the Earth's rate is not seen the sign only changes the signs of the accelerometers' biases and of coefficients per g.
+  does: its rate has the component Omega sin(latitude) along the upward force (`latitude_check`). Where the
+  Earth's rate is not seen the sign changes nothing but the signs of the accelerometers' biases and of coefficients
+  per g.
 
 Sources: the attitude kinematics of a fixed vector, du/dt = -omega x u (Groves, *Principles of GNSS, Inertial, and
 Multisensor Integrated Navigation Systems*, 2nd ed., section 2.3); Earth rate in local-level axes, section 2.4.

@@ -47,7 +47,7 @@ def dejittered(recording: Recording) -> Recording:
         return recording
     measured = f"header stamps jitter by {rms * 1e3:.3g} ms (rms, {rms / interval:.1%} of the interval)"
     if np.abs(jitter).max() > _DOUBT * interval or (steps < 1.0).any():
-        note = f"{measured}: too much to distinguish even from missing samples; the stamps are used as they are"
+        note = f"{measured}: too much to tell even sampling from missing samples; the stamps stay as they are"
         return replace(recording, notes=(*recording.notes, note))
     even = t - jitter
     note = f"{measured}: samples are taken as even, and their count as the clock"
