@@ -77,7 +77,7 @@ def calibrate(
     model : str, optional
         Name in config/model or path; ``baseline``, or ``hand`` for a handheld run.
     add : sequence of str
-        Effects besides, as for `sdimu calibrate --add`.
+        Effects to add, as for `sdimu calibrate --add`.
     estimator : str
         ``auto``, ``filter``, ``second-order``, ``handheld``, ``batch`` or ``classical``.
     progress : callable

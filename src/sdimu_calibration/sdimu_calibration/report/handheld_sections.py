@@ -1,4 +1,4 @@
-"""Parts of the page that tell the diagnosis of a hand-held run, as HTML text."""
+"""Parts of the page on the diagnosis of a handheld run, as HTML text."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def evidence(summary: DiagnosisSummary, draw: Draw) -> list[str]:
 
 
 _RUNGS = (
-    "model", "estimate", "held-out RMS", "force beyond noise (ug)", "rate beyond noise (deg/s)", "turns (% of the way)",
+    "model", "estimate", "held-out RMS", "force beyond noise (ug)", "rate beyond noise (deg/s)", "turns (% of angle)",
     "log-likelihood",
 )  # fmt: skip
 
@@ -46,13 +46,13 @@ def _ladder(summary: DiagnosisSummary, draw: Draw) -> str:
         draw(evidence_figures.rungs(names, [r.held_out_rms for r in d.rungs])) if summary.found else "",
         grid(_RUNGS, rows, {0}),
         quiet(
-            "Every model fitted anew. Held-out: every rest and the way to it predicted from the others, in sigmas of "
-            "the last model; 1 is right. Beyond noise: what force, rate and turns miss by, white noise taken off; "
-            "nobody specifies it for a sensor in a hand, so every fit learns it."
+            "Each model has its own fit. Held-out: every rest and the turn to it predicted from the others, in "
+            "sigmas of the last model; 1 is right. Beyond noise: scatter of force, rate and turns in addition to white "
+            "noise; no data sheet specifies it for a sensor in a hand, so every fit learns it."
         ),
         *tried,
-        quiet("Steps in sigmas of the fit that they were tried on, which the missing effect makes larger.")
-        if tried else sentence("No candidate stands out of the scatter: the model stays as it is."),
+        quiet("Steps are in sigmas of the fit on which they were tried; the missing effect makes these larger.")
+        if tried else sentence("No candidate exceeds the scatter: the model stays as it is."),
     )  # fmt: skip
 
 
@@ -73,9 +73,9 @@ def _missing(d: Diagnosis, draw: Draw) -> str:
         "Which effect is missing?",
         draw(evidence_figures.ranking(entries, d.found.threshold)),
         quiet(
-            "Each candidate added to the model alone, all else estimated again, in sigmas of the last model; beside "
-            "each bar its size. The dashed line is what the largest of all candidates reaches on pure noise once in "
-            "fifty runs. A triangle marks what was found."
+            "Each candidate is added to the model alone, everything else is estimated again, in sigmas of the last "
+            "model; its size stands at the bar. The dashed line is what the largest of all candidates reaches on pure "
+            "noise once in fifty runs. A triangle marks a found effect."
         ),
     )
 
@@ -85,13 +85,13 @@ def _where(d: Diagnosis, draw: Draw) -> str:
     parts = [
         draw(evidence_figures.heat_map(*data.places(d.consistency.where))),
         quiet(
-            "Residual of every rate and force at rest, and of the way to it, over its own sigma, model as given, in "
-            "sigmas of the last model."
+            "Residual of every rate and force at rest, and of the turn to it, model as given, in sigmas of the last "
+            "model."
         ),
     ]
     if len(d.found.chosen):
         parts += [
             draw(evidence_figures.heat_map(*data.places(places(d.evidence, d.found.chosen)))),
-            quiet("The same with what was found added."),
+            quiet("The same with the found effects added."),
         ]
     return section("Where does it fail? Channel by rest", *parts)

@@ -1,4 +1,4 @@
-"""What a page can show besides a diagnosis: table angles and navigation without aid."""
+"""What a page shows in addition to a diagnosis: table angles and navigation without aid."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class ReportExtras:
 
 
 def report_extras(diagnosis: Diagnosis) -> ReportExtras:
-    """Work out what the page of a diagnosis shows besides."""
+    """Work out what the page of a diagnosis shows in addition."""
     rivals = [("with what was found", diagnosis.extended)] if diagnosis.extended is not diagnosis.fit else []
     table = diagnosis.fit.test.recording.table
     try:

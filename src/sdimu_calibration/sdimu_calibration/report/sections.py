@@ -1,4 +1,4 @@
-"""Parts of the page that tell a diagnosis, as HTML text."""
+"""Parts of the page on a diagnosis, as HTML text."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def ladder(diagnosis: Diagnosis, draw: Draw) -> str:
         "<ul>" + "".join(f"<li>{prose(text)}</li>" for text in told) + "</ul>",
         quiet(
             "Held-out: every stop predicted from the others, in sigmas; 1 is right. In-sample likelihood rises with "
-            "every parameter, this does not. The verdict's held-out error leaves out every third stop at once: "
+            "every parameter, this error does not. The verdict's held-out error leaves out every third stop at once: "
             "larger when the model is wrong. Estimates are those of the step, with all before it."
         ),
     )
@@ -97,7 +97,7 @@ def refits(rungs: Sequence[Rung]) -> str:
         "Ladder of refits: one effect at a time",
         grid(_REFITS, [_refit(rung) for rung in rungs], {0, 6, 7}),
         quiet(
-            "Every model calibrated anew on the whole recording. Held-out leaves out every third stop at once. NIS: "
+            "Each model is fitted to the whole recording. Held-out leaves out every third stop at once. NIS: "
             "squared innovations a degree of freedom. Velocity after turns: RMS of the first second of each stop."
         ),
     )
@@ -129,7 +129,7 @@ def _told(step: Step) -> list[str]:
     moved = ", ".join(f"{name} by {size:+.1f} sigma" for name, size in step.moved if abs(size) >= 0.5)
     out = [f"{step.label}, while missing, pulled {moved}."] if moved and step.accepted and not step.taken_out else []
     if step.alike:
-        out.append(f"Nothing in these data tells {step.label} from {', '.join(step.alike[:6])}.")
+        out.append(f"These data cannot separate {step.label} from {', '.join(step.alike[:6])}.")
     return out
 
 
@@ -139,15 +139,18 @@ def missing(diagnosis: Diagnosis, entries: Sequence[data.Scored], draw: Draw) ->
     fits = [draw(evidence_figures.explained(parts))] if parts else []
     if parts:
         fits.append(
-            quiet("Misfit against what the effect predicts, everything else estimated along: on the line, it is right.")
+            quiet(
+                "Misfit against the prediction of the effect, everything else estimated with it: points on the line "
+                "confirm the effect."
+            )
         )
     return section(
         "Which effect is missing?",
         draw(evidence_figures.ranking(entries, diagnosis.found.threshold)),
         quiet(
-            "Each candidate added to the model alone, all coefficients estimated again; beside each bar its size. "
-            "The dashed line is what the largest of all candidates reaches on pure noise once in fifty tests. "
-            "A triangle marks what was found."
+            "Each candidate is added to the model alone, all coefficients are estimated again; its size stands at the "
+            "bar. The dashed line is what the largest of all candidates reaches on pure noise once in fifty tests. "
+            "A triangle marks a found effect."
         ),
         *fits,
     )
@@ -166,12 +169,12 @@ def where(diagnosis: Diagnosis, found: data.Residuals, draw: Draw) -> str:
     if two:
         parts += [
             draw(evidence_figures.heat_map(data.stop_grid(found, after=True))),
-            quiet("The same with what was found added: residuals of the fit."),
+            quiet("The same with the found effects added: residuals of the fit."),
         ]
     return section("Where does it fail? Channel by stop", *parts)
 
 
-_MARKS = "Orange triangles: model as given. Blue dots: with what was found added."
+_MARKS = "Orange triangles: model as given. Blue dots: with the found effects added."
 
 
 def residuals(diagnosis: Diagnosis, found: data.Residuals, more: ReportExtras, draw: Draw) -> str:
@@ -183,10 +186,10 @@ def residuals(diagnosis: Diagnosis, found: data.Residuals, more: ReportExtras, d
             "Measured against predicted",
             draw(measured_figures.overlay(measured.overlay(diagnosis, found))),
             quiet(
-                "Rate and force: means over each stop of what the sensors say, and what the model"
-                f"{' with what was found' if two else ''} says they should. Position and velocity: what navigation "
-                "with the model as given says after each turn, where the truth is rest, and what "
-                f"{'the found effects make of it' if two else 'the model expects'}."
+                "Rate and force: means over each stop of the readings, and the prediction of the model"
+                f"{' with the found effects' if two else ''}. Position and velocity: navigation with the model as "
+                "given after each turn, where the truth is rest, and the prediction of "
+                f"{'the found effects' if two else 'the model'}."
             ),
             draw(residual_figures.innovations(found, two)),
             quiet(
@@ -201,7 +204,7 @@ def residuals(diagnosis: Diagnosis, found: data.Residuals, more: ReportExtras, d
             draw(residual_figures.free_inputs(data.free_inputs(diagnosis), two)),
             quiet(
                 "A constant error of its own for every dwell (plain) and turn (hatched), the smallest that fits. "
-                "A star: its score alone is beyond three sigma. Dots: with what was found added."
+                "A star: its score alone is beyond three sigma. Dots: with the found effects added."
             ),
         ),
     ])  # fmt: skip

@@ -20,7 +20,7 @@ _PLACES = {"end": "end of the recording", "start": "start of the recording"}
 _SKIP_S = 30.0
 """Logarithmic axes begin here: before there is nothing to see and much room for it."""
 _COLUMNS = (
-    "compensation", "stretch", "position error (m)", "rate (nmi/h)", "the fit promised (m, 1 sigma)",
+    "compensation", "segment", "position error (m)", "rate (nmi/h)", "predicted by the fit (m, 1 sigma)",
     "velocity error (m/s)", "heading drift (arcmin)",
 )  # fmt: skip
 
@@ -38,12 +38,12 @@ def in_use(report_extras: ReportExtras, draw: Draw) -> str:
         draw(figure(report_extras.trials)),
         grid(_COLUMNS, rows, {0, 1}),
         quiet(
-            "Each stretch was kept from the fit that navigates it. At its first dwell the IMU levels by its own "
+            "Each segment was held out of the fit that navigates it. At its first dwell the IMU levels by its own "
             "compensated accelerometers and is given its azimuth; then it navigates freely through turns and stops, "
-            "height held. The table never leaves its place, so all of it is error. Heading is compared with a fit to "
-            "the whole recording. Promised: by the covariance of that fit; one stretch is one draw, so up to two or "
-            "three times the promise is chance, more is not."
-            + (" The recording is too short for 10 minutes: the longest stretches that leave half of it." if short
+            "height held. The table stays in its place, so the whole drift is error. Heading is compared with a fit "
+            "to the whole recording. Predicted: by the covariance of that fit; one segment is one draw, so up to two "
+            "or three times the prediction is chance, more is not."
+            + (" The recording is too short for 10 minutes: the segments are as long as half of it allows." if short
                else "")
         ),
     )  # fmt: skip
@@ -56,13 +56,13 @@ def told(trial: FreeInertialRun) -> str:
         f"{drift.name} {_metres(drift.distance[-1])} ({_rate(drift):.2g} nmi/h{_promise(drift)})"
         for drift in trial.drifts
     )
-    return f"Off after {stretch.length_s / 60.0:.1f} min without aid at the {_PLACES[stretch.place]}: {ends}."
+    return f"Error after {stretch.length_s / 60.0:.1f} min without aid at the {_PLACES[stretch.place]}: {ends}."
 
 
 def _promise(drift: Drift) -> str:
     """Say what the fit expected; nothing for the drift of no fit."""
     last = float(drift.promised[-1])
-    return f"; its fit promised {_metres(last)}" if np.isfinite(last) else ""
+    return f"; its fit predicted {_metres(last)}" if np.isfinite(last) else ""
 
 
 def _row(trial: FreeInertialRun, drift: Drift) -> list[str]:
