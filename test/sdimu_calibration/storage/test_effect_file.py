@@ -162,22 +162,42 @@ class _Point:
         return lambda: self._answer
 
 
-def test_a_plug_in_becomes_part_of_the_catalogue(monkeypatch):
+@pytest.fixture
+def installed(monkeypatch):
+    """Let other packages offer an answer; what is installed is read again before and after."""
+
+    def offer(answer):
+        groups = []
+
+        def entry_points(group):
+            groups.append(group)
+            return [_Point("p", answer)] if group == "sdimu_calibration.effects" else []
+
+        monkeypatch.setattr(effect_file, "_LOADED", set())
+        monkeypatch.setattr(effect_file, "entry_points", entry_points)
+        return groups
+
+    effect_file._installed.cache_clear()
+    yield offer
+    effect_file._installed.cache_clear()
+
+
+def test_a_plug_in_becomes_part_of_the_catalogue(monkeypatch, installed):
     like = registry.get("gyro_scale_cubic")
     parameters = tuple(replace(p, name=f"plugged_in_{k}") for k, p in enumerate(like.parameters))
     effect = replace(like, name="plugged_in", parameters=parameters)
     monkeypatch.setattr(registry, "_EFFECTS", dict(registry._EFFECTS))
-    monkeypatch.setattr(effect_file, "_LOADED", set())
-    monkeypatch.setattr(effect_file, "entry_points", lambda group: [_Point("p", effect)] if "effects" in group else [])
+    asked = installed(effect)
     assert find_effects("plugged_in")[0].parameters == effect.parameters
+    assert find_effects("plugged_in")[0].name == "plugged_in"
     assert "plugged_in" in registry.names()
+    assert asked == ["sdimu_calibration.effects"]
 
 
 @pytest.mark.parametrize("answer", [ImportError("gone"), "no effect", registry.get("gyro_bias")])
-def test_a_bad_plug_in_is_one_line(monkeypatch, answer):
-    monkeypatch.setattr(effect_file, "_LOADED", set())
-    monkeypatch.setattr(effect_file, "entry_points", lambda group: [_Point("bad", answer)] if group else [])
-    with pytest.raises(DataError, match="plug-in 'bad'"):
+def test_a_bad_plug_in_is_one_line(installed, answer):
+    installed(answer)
+    with pytest.raises(DataError, match="plug-in 'p'"):
         find_effects("gyro_bias")
 
 

@@ -38,5 +38,7 @@ def compiled(function: F) -> F:
     folder = Path(function.__code__.co_filename).parent
     place = folder / "__pycache__"
     if "NUMBA_CACHE_DIR" not in os.environ and os.access(folder, os.W_OK):
-        numba.config.CACHE_DIR = str(place / f"numba-{_sources_digest(folder)}")
+        # A room of the core has no sources besides those of the core: they are read once for all rooms.
+        sources = _CORE if folder.is_relative_to(_CORE) else folder
+        numba.config.CACHE_DIR = str(place / f"numba-{_sources_digest(sources)}")
     return cast(F, numba.njit(cache=True, nogil=True, error_model="numpy")(function))

@@ -7,7 +7,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from importlib.metadata import entry_points
+from functools import cache
+from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import Any, cast
 
@@ -191,7 +192,7 @@ def register_plugins() -> tuple[str, ...]:
         When one does not load or is no effect.
     """
     new = []
-    for point in entry_points(group=ENTRY_POINTS):
+    for point in _installed():
         if point.name in _LOADED:
             continue
         try:
@@ -210,6 +211,12 @@ def register_plugins() -> tuple[str, ...]:
 
 
 _LOADED: set[str] = set()
+
+
+@cache
+def _installed() -> tuple[EntryPoint, ...]:
+    """Plug-ins of the installed packages, read once: every reading opens the metadata of all packages."""
+    return tuple(entry_points(group=ENTRY_POINTS))
 
 
 def _effects(file: EffectFile) -> tuple[Effect, ...]:

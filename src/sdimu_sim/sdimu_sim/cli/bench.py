@@ -1,4 +1,4 @@
-"""The verb `sdimu bench`: how fast the core, the reader and the whole way from a bag to a result are."""
+"""The verb `sdimu bench`: how fast the core, the reader and the whole way from a bag to result and diagnosis are."""
 
 from __future__ import annotations
 
@@ -59,11 +59,14 @@ def measure(plan: str, rate: float, repeats: int, folder: Path) -> list[tuple[st
         When the plan or the rate cannot be used.
     """
     from rate_table_sim.table_file import load_table
+    from sdimu_calibration.api import functions as api
+    from sdimu_calibration.api.diagnosis import FitDiagnosis
     from sdimu_calibration.core.alignment.prepared import first_attitude, reduce, set_up
     from sdimu_calibration.core.estimation.outcome import calibrate
     from sdimu_calibration.core.filter.passes import one_pass
     from sdimu_calibration.storage.bag_reader import read_recording
     from sdimu_calibration.storage.config import load_imu, load_model, load_plan, load_site
+    from sdimu_calibration.storage.diagnosis_file import write_diagnosis
     from sdimu_calibration.storage.result_file import write_result
     from sdimu_sim.bag_file import write_test
     from sdimu_sim.campaign.run import CalibrationRun
@@ -86,12 +89,20 @@ def measure(plan: str, rate: float, repeats: int, folder: Path) -> list[tuple[st
     def whole() -> None:
         write_result(folder / "result.json", calibrate(read_recording(bag), site, imu, model))
 
+    def diagnosed() -> FitDiagnosis:
+        return api.diagnose(api.calibrate(api.open(bag)))
+
+    def diagnosis_alone() -> None:
+        write_diagnosis(folder / "diagnosis.json", diagnosed().summary)
+
     parts: list[tuple[str, Callable[[], Any], int, str]] = [
         ("reduce samples to cycles and epochs", lambda: reduce(recording, setup), n, "samples"),
         ("one pass: motion, navigation, filter", one, n, "samples"),
         ("calibrate with held-out stops", lambda: calibrate(recording, site, imu, model), n, "samples"),
         ("read the bag", lambda: read_recording(bag), n, "samples"),
         ("bag to result.json", whole, n, "samples"),
+        ("bag to diagnosis.json", diagnosis_alone, n, "samples"),
+        ("the same with result.json and report.html", lambda: diagnosed().save(folder), n, "samples"),
         ("one Monte-Carlo run", lambda: CalibrationRun(scenario, model)(1), 1, "runs"),
     ]
     return [(what, *_best(work, repeats), count, noun) for what, work, count, noun in parts]
