@@ -186,7 +186,7 @@ def test_noise_with_a_memory_is_told_beside_what_stays_unexplained(bench):
     wander = lfilter([1.0], [1.0, -keep], drive, axis=0)
     diagnosis = diagnose(replace(clean, f_ib_b=clean.f_ib_b + wander), bench.site, bench.imu, bench.model)
     assert diagnosis.verdict == "unexplained"
-    assert "coloured noise would do it: accel scatters" in diagnosis.sentence
+    assert "coloured noise would explain it: accel scatters" in diagnosis.sentence
     white = bench.diagnosis(seed=SEEDS[0]).consistency
     # 19 stops of six means: 285 differences that share their means.
     assert white.gyro.slow == pytest.approx(1.0, abs=0.2)

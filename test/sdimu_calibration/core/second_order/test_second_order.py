@@ -72,7 +72,7 @@ def test_fifty_fresh_seeds_converge_and_agree(model, site):
         batch = calibrate(recording, site, PERCENTS, model, estimator="batch")
         z.append([normalised(one, truth)[0] for one in (filtered, batch)])
         differences.append(agreement(filtered, batch))
-        lost += [seed] if any("did not come to rest" in note for note in filtered.notes) else []
+        lost += [seed] if any("did not converge" in note for note in filtered.notes) else []
     rms = np.sqrt(np.mean(np.square(z), axis=(0, 2)))
     assert (rms > 0.85).all()
     assert (rms < 1.15).all()
@@ -145,7 +145,7 @@ def test_gyros_that_lose_the_attitude_over_the_test_take_the_same_path(imu, mode
     assert drifting(sensors, fog, 9.8, 2980.0)
     assert not drifting(sensors, fog, 9.8, 300.0)
     assert not drifting(imu_model.build(model.effects, imu), imu, 9.8, 86400.0)
-    # Seed 5: the ordinary passes do not come to rest, and end with a normalised square of 60.
+    # Seed 5: the ordinary passes do not converge, and end with a normalised square of 60.
     recording, truth = generate(Scenario(KIM18, fog, site, seed=5, rate_hz=20.0))
     found = calibrate(recording, site, fog, model, held_out=False)
     _, square = normalised(found, truth)

@@ -1,4 +1,4 @@
-"""What hangs on a choice that the data cannot make: coefficients that differ between the members of a class."""
+"""Coefficients that depend on a choice that the data cannot make: they differ between the members of a class."""
 
 from __future__ import annotations
 

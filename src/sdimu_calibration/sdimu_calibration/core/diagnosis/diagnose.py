@@ -36,7 +36,7 @@ from sdimu_calibration.core.specification import ImuSpecification, Model, Site
 STILL_WRONG = 1.25
 """Held-out error (sigma; 1 is right) from which a model is not called explained, whatever it fits."""
 NOISE_OFF = 0.05
-"""Deviation of the white noise from its specification, as a share, from which a user is told."""
+"""Deviation of the white noise from its specification, as a share, from which a note reports it."""
 _KURTOSIS = 4.0
 """Kurtosis of the differences of neighbouring seconds from which tails are heavy; Gaussian noise in a test of an hour
 stays below 3.3."""

@@ -42,7 +42,7 @@ class Rung:
     moved : tuple of (str, float)
         Coefficients that moved against the rung before, in their sigmas, largest first.
     scatter : tuple of float, or None
-        What a handheld fit learned beyond white noise: force (m/s^2), rate (rad/s), turn (share of the way).
+        What a handheld fit learned beyond white noise: force (m/s^2), rate (rad/s), turn (share of the angle).
     """
 
     added: str

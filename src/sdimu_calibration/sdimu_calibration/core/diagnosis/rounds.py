@@ -207,7 +207,7 @@ def run_round(request: Request, fit: Fit, tried: Sequence[Candidate], own: bool)
         The model as given with `tried`.
     tried : sequence of Candidate
     own : bool
-        Try equations that no effect has besides the catalogue.
+        Also try equations that are not in the catalogue.
     """
     base = request.base
     known = candidates(base, tried, request.extra, own)

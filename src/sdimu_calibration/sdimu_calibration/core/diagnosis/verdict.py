@@ -128,10 +128,10 @@ def error_falls(d: Diagnosis) -> str:
 
 
 def beyond(scatter: Sequence[float] | Floats) -> str:
-    """Say what is left beyond white noise: force (m/s^2), rate (rad/s) and turns (share of the way), shape (3,)."""
+    """Say what is left beyond white noise: force (m/s^2), rate (rad/s) and turns (share of the angle), shape (3,)."""
     force, rate = from_si(float(scatter[FORCE]), "ug"), float(np.degrees(scatter[RATE]))
     turns = 100.0 * float(scatter[TURN])
-    return f"force {shown(force)} ug, rate {shown(rate)} deg/s, turns {shown(turns)} % of the way"
+    return f"force {shown(force)} ug, rate {shown(rate)} deg/s, turns {shown(turns)} % of the angle"
 
 
 def shown(value: float) -> str:
@@ -146,7 +146,7 @@ def _coloured(consistency: Consistency) -> str:
         for triad, noise in (("gyro", consistency.gyro), ("accel", consistency.accel))
         if noise.slow > _COLOURED
     ]
-    return f"; coloured noise would do it: {' and '.join(told)}" if told else ""
+    return f"; coloured noise would explain it: {' and '.join(told)}" if told else ""
 
 
 def _rms(calibration: Calibration) -> float:

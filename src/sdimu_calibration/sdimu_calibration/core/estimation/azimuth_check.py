@@ -33,7 +33,7 @@ def azimuth_warning(solution: Solution) -> str | None:
     if attitudes < _LEAST_ATTITUDES:
         return (
             f"the IMU was at rest in {attitudes} attitude{'s' if attitudes > 1 else ''} only: azimuth and gyro biases "
-            "cannot be told apart, and their sigmas are not to be trusted; use a plan with more attitudes"
+            "cannot be separated, and their sigmas are not to be trusted; use a plan with more attitudes"
         )
     P, names = solution.last.state.P, solution.setup.sensors.names
     sigma = np.sqrt(np.diag(P))

@@ -20,7 +20,7 @@ from sdimu_calibration.core.recording import DataFault
 from sdimu_calibration.core.results import History, no_history
 from sdimu_calibration.core.specification import Model
 
-NOT_CONVERGED = "the passes did not come to rest: the estimate is not trustworthy; check --imu and --site"
+NOT_CONVERGED = "the passes did not converge: the estimate is not trustworthy; check --imu and --site"
 
 
 @dataclass(frozen=True)

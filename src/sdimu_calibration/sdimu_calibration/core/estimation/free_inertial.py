@@ -1,7 +1,7 @@
 """What a compensation is worth in use: navigation without any aid, on a stretch of the recording that no fit has seen.
 
 The coefficients come from the rest of the recording alone. In the dwell at which the stretch begins, the IMU
-levels itself by its compensated accelerometers and is told its azimuth; then it navigates freely while the table turns
+levels itself by its compensated accelerometers and is given its azimuth; then it navigates freely while the table turns
 and rests. It never leaves the known point, so whatever it says of position and velocity is error. Height is held,
 as an altimeter would.
 """

@@ -71,7 +71,7 @@ class HandheldFit(Fit):
 
     @property
     def scatter(self) -> Floats:
-        """What is left beyond white noise: force (m/s^2), rate (rad/s), turn (share of the way), shape (3,)."""
+        """What is left beyond white noise: force (m/s^2), rate (rad/s), turn (share of the angle), shape (3,)."""
         return self.solution.point.extra
 
     @property

@@ -24,7 +24,7 @@ class PreparedTest:
         In SI, right-handed axes and one clock, with the dwells where they are known.
     imu : ImuSpecification
     site : Site or None
-        None where nobody says: only a handheld run does without.
+        None where no site is stated: only a handheld run does without.
     held_out : tuple of int
         Stops whose measurements no fit takes.
     """
