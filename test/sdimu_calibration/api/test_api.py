@@ -96,6 +96,8 @@ def test_samples_are_freed_of_the_errors(bag, fit):
 def test_a_plan_is_predicted():
     prediction = sdimu.predict("kim18", "dtg")
     assert prediction.duration_s == pytest.approx(2980.0, rel=0.01)
+    # The filter cannot know more than the data hold.
+    assert (prediction.sigma >= 0.98 * prediction.bound).all()
 
 
 def test_the_package_shows_its_functions_and_no_more():

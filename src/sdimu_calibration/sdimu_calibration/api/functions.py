@@ -11,6 +11,7 @@ from typing import Any
 from sdimu_calibration.api.comparison import Comparison
 from sdimu_calibration.api.diagnosis import FitDiagnosis
 from sdimu_calibration.api.fit import CalibrationFit
+from sdimu_calibration.core.batch.batch import bound_covariance
 from sdimu_calibration.core.diagnosis.diagnose import climb
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.estimation.solve import AUTO, choose_estimator, solve
@@ -141,7 +142,8 @@ def predict(
         When a name is unknown.
     """
     chosen = load_plan(plan) if isinstance(plan, str) else plan
-    return predict_test(chosen, load_site(site), load_imu(imu), extended_model(model, []))
+    what = (chosen, load_site(site), load_imu(imu), extended_model(model, []))
+    return predict_test(*what, bound=bound_covariance)
 
 
 def plan(
