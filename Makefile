@@ -1,4 +1,4 @@
-# make setup | demo | test | check | colcon | wheels | bench | study | docs | pictures | campaigns : each does its own set-up and needs nothing before it.
+# make setup | demo | test | check | colcon | wheels | bench | study | docs | pictures | grades | campaigns : each does its own set-up and needs nothing before it.
 PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
@@ -65,6 +65,10 @@ docs: setup
 faults: setup
 	$(BIN)/sdimu study faults --out out/study-faults && cp out/study-faults/faults.md doc/faults.md
 
+# Hours: every IMU file, clean and with one hidden effect.
+grades: setup
+	$(BIN)/sdimu study grades --out out/study-grades && cp out/study-grades/grades.md doc/grades.md
+
 # The pictures of the README, from a run with a hidden effect.
 pictures: setup
 	$(BIN)/sdimu simulate --plan kim18_signed --seed 7 --effect "gyro_scale_asymmetry_y=40 ppm" --replace \
@@ -75,4 +79,4 @@ campaigns: setup
 	$(BIN)/sdimu monte-carlo -n 200 --out out/monte-carlo
 	$(BIN)/sdimu hidden-campaign -n 200 --out out/hidden-campaign
 
-.PHONY: setup demo check test colcon wheels bench study docs faults pictures campaigns
+.PHONY: setup demo check test colcon wheels bench study docs faults grades pictures campaigns
