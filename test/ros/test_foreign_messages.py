@@ -67,7 +67,7 @@ def test_foreign_units_and_stamps_give_the_same_digits_live_and_from_the_bag(ben
     assert live.fit == offline.fit
     assert live.data == offline.data
     told = " ".join(live.notes)
-    for words in ("in g", "in deg/s", "samples are taken to be even"):
+    for words in ("in g", "in deg/s", "samples are taken as even"):
         assert words in told
     # The filter on the way caught up after the first turn had told the unit.
     coefficients = "/calibration/coefficients"
