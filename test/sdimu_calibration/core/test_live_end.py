@@ -71,12 +71,12 @@ def negated_rate(m):
 
 def jitter(m):
     late = np.random.default_rng(5).uniform(-0.1, 0.1, len(m.ns)) * INTERVAL
-    return replace(m, ns=m.ns + late.astype(np.int64), told=("samples are taken to be even",))
+    return replace(m, ns=m.ns + late.astype(np.int64), told=("samples are taken as even",))
 
 
 def bursts(m):
     """Every eighth sample is stamped too late by a fifth of the interval, as a busy computer does."""
-    return replace(m, ns=m.ns + (np.arange(len(m.ns)) % 8 == 7) * (INTERVAL // 5), told=("taken to be even",))
+    return replace(m, ns=m.ns + (np.arange(len(m.ns)) % 8 == 7) * (INTERVAL // 5), told=("taken as even",))
 
 
 def other_clock(m):

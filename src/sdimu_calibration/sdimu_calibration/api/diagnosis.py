@@ -13,8 +13,10 @@ from sdimu_calibration.core.diagnosis.found import Found
 from sdimu_calibration.core.diagnosis.search import Problem
 from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary, summarise
 from sdimu_calibration.core.evidence.candidate import Candidate
+from sdimu_calibration.core.evidence.navigation_evidence import NavigationEvidence
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.report import data, evidence_figures
+from sdimu_calibration.report.drawing import Figure
 from sdimu_calibration.report.page import write_report
 from sdimu_calibration.report.report_extras import report_extras
 from sdimu_calibration.storage.diagnosis_file import write_diagnosis
@@ -78,13 +80,18 @@ class FitDiagnosis:
 
     def plot_ranking(self) -> Any:
         """Scores of the candidates against what noise reaches (a plotly figure)."""
+        if not isinstance(self.core.evidence, NavigationEvidence):
+            return self._ranking_of_a_run().as_plotly()
+        return evidence_figures.ranking(data.scored(self.core), self.core.found.threshold).as_plotly()
+
+    def _ranking_of_a_run(self) -> Figure:
         problem, found = Problem(self.core.evidence), self.core.found
         first, last = problem.scan([]), problem.scan([int(c) for c in found.chosen])
         free = set(self.core.free.tolist())
         columns = [k for k in range(problem.p, len(self.core.evidence.names)) if k not in free]
         return evidence_figures.ranking(
             data.scores(self.core.evidence, first, last, columns, found.chosen), found.threshold
-        ).as_plotly()
+        )
 
     def plot_heat_map(self) -> Any:
         """Mean residual of every channel at every stop over its sigma, model as given (a plotly figure)."""

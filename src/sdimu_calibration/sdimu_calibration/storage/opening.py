@@ -119,7 +119,8 @@ def open_test(
     """
     source = source or Source()
     options = opening_options(site, imu, source, handheld, measured_noise)
-    return PreparedTest(*open_recorded(read_recording(path, source.topics), options, str(path)))
+    opened = open_recorded(read_recording(path, source.topics), options, str(path))
+    return PreparedTest(*opened, assumed_site=options.assumed_site if opened.site else "")
 
 
 def open_recording(path: Path, source: Source | None = None) -> Recording:

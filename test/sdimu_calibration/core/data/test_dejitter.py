@@ -45,4 +45,4 @@ def test_jitter_that_hides_missing_samples_is_told_and_left():
     r = recording(t)
     found = dejittered(r)
     assert np.array_equal(found.t, r.t)
-    assert "used as they are" in found.notes[0]
+    assert "stay as they are" in found.notes[0]

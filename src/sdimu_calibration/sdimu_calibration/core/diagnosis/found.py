@@ -38,7 +38,7 @@ class Found:
         RMS of the normalised prediction errors at stops left out.
     alike : tuple of str
         Candidates that the data cannot tell from it, all others found being in the model.
-    stakes : tuple of CoefficientShift
+    coefficient_shifts : tuple of CoefficientShift
         Coefficients of the model that hang on which of these it is.
     """
 

@@ -25,6 +25,7 @@ from sdimu_calibration.core.estimation.solve import extend
 from sdimu_calibration.core.evidence.candidate import Candidate, split
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.progress import Progress
+from sdimu_calibration.core.recording import DataError
 
 UNEXPLAINED_P = 1e-3
 """Probability of the free-input test below which what is left is not noise."""
@@ -121,12 +122,24 @@ def search_until_stable(request: Request, progress: Progress) -> Round:
         if labels == {c.label for c in tried} or (growing and labels in seen):
             break
         seen.add(labels)
-        trial = extend(base, [c.effect for c in done.chosen], progress=progress)
+        trial = _with(base, done.chosen, progress)
         if growing and len(labels) <= len(tried) and not _likelier(trial, fit):
             done = _with_choice(done, tried)
             break
         tried, fit = done.chosen, trial
     return drop_companions(base, replace(done, found=replace(done.found, steps=steps)), progress)
+
+
+def _with(base: Fit, chosen: Sequence[Candidate], progress: Progress) -> Fit:
+    """Fit the model with what a round chose; name the choice where the estimator cannot fit it."""
+    try:
+        return extend(base, [c.effect for c in chosen], progress=progress)
+    except DataError as error:
+        names = " and ".join(c.label for c in chosen)
+        raise DataError(
+            f"the search chose {names}, and the {base.estimator} estimator cannot fit it ({error}); diagnose with "
+            "another --estimator"
+        ) from error
 
 
 def _likelier(one: Fit, other: Fit) -> bool:

@@ -98,12 +98,6 @@ def correlation(scanned: Scan) -> Floats:
     return np.asarray(J * np.outer(s, s))
 
 
-def cosine(scanned: Scan, i: int, j: int) -> float:
-    """Cosine of two signatures after the model has taken its share."""
-    J = scanned.information.J
-    return float(J[i, j] / np.sqrt(J[i, i] * J[j, j]))
-
-
 def alike(scores: Floats, best: int) -> list[int]:
     """Candidates that the data cannot tell from `best` by their log Bayes factors; the nearest first."""
     gap = scores[best] - scores

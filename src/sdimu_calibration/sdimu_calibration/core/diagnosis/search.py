@@ -234,7 +234,7 @@ def _sharpen(problem: Problem[E], chosen: Sequence[int], best: int) -> Effect | 
         trial = Problem(small.with_effects(variants))
         scores = trial.scores(trial.scan(others))[p + len(chosen) :]
         # The middle one is the candidate itself.
-        first = max(first, scores[len(variants) // 2]) if np.isinf(first) else first
+        first = scores[len(variants) // 2] if np.isinf(first) else first
         score = float(np.max(scores))
         effect = variants[int(np.argmax(scores))]
     return effect if score > first + _SHARPER else None

@@ -27,12 +27,15 @@ class PreparedTest:
         None where no site is stated: only a handheld run does without.
     held_out : tuple of int
         Stops whose measurements no fit takes.
+    assumed_site : str
+        Name of the site where nobody stated one.
     """
 
     recording: Recording
     imu: ImuSpecification
     site: Site | None = None
     held_out: tuple[int, ...] = ()
+    assumed_site: str = ""
     _prepared: dict[Any, Any] = field(default_factory=dict, repr=False, compare=False)
 
     def without_stops(self, stops: tuple[int, ...]) -> PreparedTest:

@@ -1,7 +1,8 @@
 """Fits by other methods than navigation: batch least squares, and the classical one against the table's angles.
 
 Their residuals are not innovations, so what a diagnosis asks of them is answered by a navigation about their
-coefficients: a pass of the estimator that `solve` would choose, which keeps the coefficients as they are.
+coefficients that keeps them as they are: a pass of the filter, or of the second-order estimator for a batch whose
+priors make squares count.
 """
 
 from __future__ import annotations
@@ -102,7 +103,8 @@ class ReferenceFit(Fit):
 
     def notes(self) -> tuple[str, ...]:
         """List the stops that were found."""
-        return super(type(self.about), self.about).notes()
+        # Not those of the passes: the passes only answer questions about these coefficients.
+        return NavigationFit.notes(self.about)
 
     def free_inertial(self, rivals: Sequence[tuple[str, Fit]]) -> tuple[FreeInertialRun, ...]:
         """Navigate without aid on parts that no fit has seen; each is fitted again by navigation.

@@ -124,6 +124,6 @@ class SecondOrderFit(NavigationFit):
         return self._rows_of_history(rows, out, values, self.frame_model.covariance(out.covariance))
 
     def notes(self) -> tuple[str, ...]:
-        """List the stops that were found; say that the second order counts."""
-        text = f"second order counts: {self.count} passes about exactly corrected samples, in the accelerometers' frame"
+        """List the stops that were found; say how many passes were made."""
+        text = f"second order: {self.count} passes about exactly corrected samples, in the accelerometers' frame"
         return (*super().notes(), text)

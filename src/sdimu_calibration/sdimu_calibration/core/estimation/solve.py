@@ -131,7 +131,10 @@ def with_effects(model: Model, effects: Sequence[Effect]) -> Model:
 
 def _setup(test: PreparedTest, model: Model) -> TestSetup:
     if test.site is None:
-        raise DataError("no site: the navigation needs the latitude and height of the test; state --site")
+        raise DataError(
+            "no site: the navigation needs the latitude and height of the test; state the site (--site, in Python "
+            "open(..., site=...))"
+        )
     return set_up(test.site, test.imu, model)
 
 
@@ -185,6 +188,11 @@ def _second_order(test: PreparedTest, model: Model, start: Start | None, progres
 
 
 def _handheld(test: PreparedTest, model: Model, start: Start | None, progress: Progress) -> Fit:
+    if test.assumed_site:
+        raise DataError(
+            f"the test was opened for navigation at the assumed site {test.assumed_site}, and a handheld fit takes no "
+            "assumed site: in Python, state the site or open the test with open(..., handheld=True)"
+        )
     progress("rests", 0.1)
     sensors = imu_model.build(model.effects, test.imu)
     ready = test.run
