@@ -117,7 +117,7 @@ def test_what_cannot_be_used_is_one_line(fit, tmp_path):
 
 
 def test_a_handheld_fit_takes_no_assumed_site(bag):
-    with pytest.raises(DataError, match="assumed site daejeon.*handheld=True"):
+    with pytest.raises(DataError, match=r"assumed site daejeon.*handheld=True"):
         sdimu.calibrate(sdimu.open(bag), estimator="handheld")
     opened = sdimu.calibrate(sdimu.open(bag, handheld=True), estimator="handheld")
     assert opened.core.estimator == "handheld"
