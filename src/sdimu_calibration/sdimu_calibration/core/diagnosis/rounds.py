@@ -181,7 +181,7 @@ def _with_chosen(base: Fit, done: Round, progress: Progress) -> Fit:
     fitted = [label for effect in done.fit.sensors.effects[len(base.sensors.effects) :] for label in effect.labels]
     if fitted == added:
         return done.fit
-    return extend(base, [c.effect for c in done.chosen], progress=progress) if added else base
+    return _with(base, done.chosen, progress) if added else base
 
 
 def mark_dropped(steps: Sequence[Step], kept: set[str], small: set[str]) -> tuple[Step, ...]:
