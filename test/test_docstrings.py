@@ -28,7 +28,7 @@ EXEMPT = {
             "static_detection status_clock windows"
         ),
         "core.diagnosis": (
-            "advice bootstrap candidates coefficient_shifts diagnose found free_input_test held_out "
+            "advice bootstrap candidates coefficient_shifts diagnose found free_input_test "
             "ladder plan_seen rounds scan search verdict"
         ),
         "core.effects": (

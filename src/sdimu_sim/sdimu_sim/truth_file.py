@@ -27,6 +27,7 @@ class _SiteFile(Schema):
 class _NoiseFile(Schema):
     gyro_rad_s_sqrt_hz: float = Field(ge=0)
     accel_m_s2_sqrt_hz: float = Field(ge=0)
+    coloured: tuple[str, ...] = ()
 
 
 class _ElectronicsFile(Schema):
@@ -48,6 +49,7 @@ class _TruthFile(Schema):
     mount_rad: _Vector
     noise: _NoiseFile
     effects: tuple[str, ...] = ()
+    mean_bias: dict[str, float] = Field(default_factory=dict)
     lever_arm_m: _Vector = (0.0, 0.0, 0.0)
     magnetic_field_t: _Vector
     electronics: _ElectronicsFile = _ElectronicsFile()
@@ -85,8 +87,10 @@ def write_truth(path: Path, truth: Truth) -> None:
         "noise": {
             "gyro_rad_s_sqrt_hz": float(imu.gyro_white_noise),
             "accel_m_s2_sqrt_hz": float(imu.accel_white_noise),
+            "coloured": list(imu.noise),
         },
         "effects": list(imu.effects),
+        "mean_bias": {name: float(value) for name, value in truth.mean_bias.items()},
         "lever_arm_m": [float(v) for v in imu.lever_arm_m],
         "magnetic_field_t": [float(v) for v in imu.magnetic_field],
         "electronics": {
@@ -118,6 +122,7 @@ def read_truth(path: Path) -> Truth:
         gyro_white_noise=file.noise.gyro_rad_s_sqrt_hz,
         accel_white_noise=file.noise.accel_m_s2_sqrt_hz,
         effects=file.effects,
+        noise=file.noise.coloured,
         lever_arm_m=file.lever_arm_m,
         magnetic_field=file.magnetic_field_t,
         gyro_step_rad=limits.gyro_step_rad,
@@ -126,7 +131,7 @@ def read_truth(path: Path) -> Truth:
         accel_limit_m_s2=math.inf if limits.accel_limit_m_s2 is None else limits.accel_limit_m_s2,
     )
     site = Site(math.radians(file.site.latitude_deg), file.site.height_m, file.site.gravity_m_s2)
-    return Truth(imu, site, file.seed, file.rate_hz, file.plan)
+    return Truth(imu, site, file.seed, file.rate_hz, file.plan, file.mean_bias)
 
 
 class _Exact(yaml.SafeDumper):

@@ -160,7 +160,6 @@ def test_a_diagnosis_of_a_right_model_makes_a_page_too(diagnosis):
         (),
         diagnosis.found.chosen[:0],
         diagnosis.found.first,
-        diagnosis.found.first,
         diagnosis.found.threshold,
         1.0,
         diagnosis.evidence,

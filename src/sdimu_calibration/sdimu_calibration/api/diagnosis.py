@@ -101,7 +101,7 @@ class FitDiagnosis:
         """Write diagnosis.json, result.json and report.html into a folder, as `sdimu diagnose` does."""
         folder = Path(folder)
         write_diagnosis(folder / "diagnosis.json", self.summary)
-        write_result(folder / "result.json", self.core.after if self.found else self.core.before)
+        write_result(folder / "result.json", self.core.after, self.core.verdict)
         write_report(
             folder / "report.html", self.core.after, title="Diagnosis", summary=self.summary,
             more=report_extras(self.core),

@@ -14,7 +14,7 @@ from sdimu_calibration.api.fit import CalibrationFit
 from sdimu_calibration.core.batch.batch import bound_covariance
 from sdimu_calibration.core.diagnosis.diagnose import climb
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
-from sdimu_calibration.core.estimation.solve import AUTO, choose_estimator, solve
+from sdimu_calibration.core.estimation.solve import AUTO, solve
 from sdimu_calibration.core.plan import Plan
 from sdimu_calibration.core.plan_search import Found, Goal, Question, search
 from sdimu_calibration.core.plan_search.bound import bounds
@@ -90,10 +90,9 @@ def calibrate(
         When the test, the model or the estimator cannot be used.
     """
     given = extended_model(model or "baseline", list(add))
-    chosen = choose_estimator(test, given) if estimator == AUTO else estimator
-    if model is None and chosen == "handheld":
+    if model is None and (estimator == "handheld" or (estimator == AUTO and test.hides_earth_rate)):
         given = extended_model("hand", list(add))
-    return CalibrationFit(solve(test, given, chosen, progress=progress))
+    return CalibrationFit(solve(test, given, estimator, progress=progress))
 
 
 def diagnose(

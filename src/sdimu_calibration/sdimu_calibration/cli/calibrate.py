@@ -74,14 +74,14 @@ def calibrate(
     origin = source(
         imu_topic, status_topic, joint_topic, temperature_topic, accel_unit, gyro_unit, accel_sign, gyro_sign
     )
-    test, wanted, chosen = opened(
-        console, bag, model, site, imu, add, origin, "handheld" if hand else estimator, noise
-    )
-    if truth is not None and chosen == "classical":
+    if truth is not None and estimator == "classical":
         raise typer.BadParameter(
             "the classical estimator answers in the table's axes, in which no truth is kept: leave it out, or see "
             "sdimu study mount", param_hint="--truth",
         )  # fmt: skip
+    test, wanted, chosen = opened(
+        console, bag, model, site, imu, add, origin, "handheld" if hand else estimator, noise
+    )
     notes = test.recording.notes
     with explained(console, notes), bar(console) as progress:
         result = outcome(solve(test, wanted, chosen, progress=progress))

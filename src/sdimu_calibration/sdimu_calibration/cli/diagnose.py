@@ -31,6 +31,8 @@ from sdimu_calibration.cli.source_options import (
     source,
 )
 
+NO_BOOTSTRAP = "--bootstrap: a handheld run learns its scatter, so there is no noise to draw; leave it out"
+
 
 def diagnose(
     bag: Annotated[Path, typer.Argument(metavar="BAG", help="rosbag2 folder or .mcap file.")],
@@ -67,7 +69,7 @@ def diagnose(
     from sdimu_calibration.cli.diagnosis_text import print_summary
     from sdimu_calibration.cli.progress import bar
     from sdimu_calibration.core.diagnosis.bootstrap import bootstrap as repeat_on_noise
-    from sdimu_calibration.core.diagnosis.diagnose import climb
+    from sdimu_calibration.core.diagnosis.diagnose import NOT_DIAGNOSABLE, climb
     from sdimu_calibration.core.diagnosis.summary import summarise
     from sdimu_calibration.core.estimation.solve import solve
     from sdimu_calibration.core.recording import DataError
@@ -78,6 +80,10 @@ def diagnose(
     from sdimu_calibration.storage.result_file import write_result
 
     console = Console()
+    if estimator == "classical":
+        raise DataError(NOT_DIAGNOSABLE)
+    if bootstrap and (hand or estimator == "handheld"):
+        raise DataError(NO_BOOTSTRAP)
     extra = [effect for text in attempt or [] for effect in find_effects(text)]
     origin = source(
         imu_topic, status_topic, joint_topic, temperature_topic, accel_unit, gyro_unit, accel_sign, gyro_sign
@@ -85,8 +91,8 @@ def diagnose(
     test, wanted, chosen = opened(
         console, bag, model, site, imu, add, origin, "handheld" if hand else estimator, noise
     )
-    if bootstrap and chosen == "handheld":
-        raise DataError("--bootstrap: a handheld run learns its scatter, so there is no noise to draw; leave it out")
+    if bootstrap and test.hides_earth_rate and chosen == "auto":
+        raise DataError(NO_BOOTSTRAP)
     notes = test.recording.notes
     with explained(console, notes), bar(console) as progress:
         found = climb(solve(test, wanted, chosen, progress=progress), extra, progress, refits=grow)
@@ -98,9 +104,9 @@ def diagnose(
             null = repeat_on_noise(found, bootstrap, progress=progress)
         console.print(f"bootstrap: {null.sentence}", soft_wrap=True, markup=False, highlight=False)
     folder = out or default_folder(bag, "diagnosis")
-    result = found.after if summary.candidates else found.before
+    result = found.after
     write_diagnosis(folder / "diagnosis.json", summary, null)
-    write_result(folder / "result.json", result)
+    write_result(folder / "result.json", result, found.verdict)
     with bar(console) as progress:
         progress("navigation without aid", 0.5)
         more = report_extras(found)

@@ -32,7 +32,7 @@ EstimatorOption = Annotated[
 HandOption = Annotated[bool, typer.Option("--hand", help="Moved by hand: the same as --estimator handheld.")]
 _OLD_NAMES = {"hand": "handheld"}
 HANDHELD_CHOSEN = (
-    "handheld: the rests are so short that the gyros' noise hides the Earth's rate, so nothing is navigated "
+    "handheld: the gyros' white noise in the usual rest hides the Earth's rate, so nothing is navigated "
     "(--estimator filter forces navigation)"
 )
 
@@ -41,20 +41,21 @@ def opened(
     console: Console, bag: Path, model: str | None, site: str | None, imu: str, add: list[str] | None,
     source: Source, estimator: str, noise: str | None,
 ) -> tuple[PreparedTest, Model, str]:  # fmt: skip
-    """Open the test of a bag, read its model and choose its estimator.
+    """Open the test of a bag, read its model and check its estimator.
 
     Returns
     -------
     test : PreparedTest
     model : Model
     estimator : str
+        As it was asked for, ``auto`` included.
 
     Raises
     ------
     DataError
         When an option names nothing, or the bag cannot be used.
     """
-    from sdimu_calibration.core.estimation.solve import AUTO, ESTIMATORS, choose_estimator
+    from sdimu_calibration.core.estimation.solve import AUTO, ESTIMATORS
     from sdimu_calibration.core.recording import DataError
     from sdimu_calibration.storage.config import load_imu, load_site
     from sdimu_calibration.storage.effect_file import extended_model
@@ -71,12 +72,11 @@ def opened(
         load_site(site)
     handheld = None if wanted == AUTO else wanted == "handheld"
     test = open_test(bag, site, specification, source, handheld, noise is not None)
-    chosen = choose_estimator(test, given) if wanted == AUTO else wanted
-    if chosen == "handheld":
+    if wanted == "handheld" or (wanted == AUTO and test.hides_earth_rate):
         if wanted == AUTO:
             console.print(HANDHELD_CHOSEN, soft_wrap=True)
         given = extended_model(model or "hand", add or [])
-    return test, given, chosen
+    return test, given, wanted
 
 
 def tell(console: Console, notes: Iterable[str]) -> None:

@@ -48,8 +48,6 @@ def workbench(
     from werkzeug.serving import make_server
 
     from sdimu_calibration.cli.progress import bar
-    from sdimu_calibration.core.estimation.handheld_fit import HandheldFit
-    from sdimu_calibration.core.estimation.solve import choose_estimator
     from sdimu_calibration.core.recording import DataError
     from sdimu_calibration.report.workbench.app import build
     from sdimu_calibration.report.workbench.fit import FitSession
@@ -70,7 +68,7 @@ def workbench(
 
     def session(path: Path) -> FitSession:
         test = open_test(path, site, specification, origin)
-        if choose_estimator(test, wanted) == HandheldFit.estimator:
+        if test.hides_earth_rate:
             raise DataError(
                 f"{path.name}: a handheld run, in which nothing is navigated: use sdimu diagnose {path.name} (its "
                 "report has the same figures), or --imu when the gyros are better than it says"

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from sdimu_calibration.core.arrays import Bools, Floats, Ints
+from sdimu_calibration.core.noise_term import NoiseTerm
 from sdimu_calibration.core.recording import DataFault
 
 
@@ -74,6 +75,13 @@ class Calibration:
         What is wrong with the data and no physics of the sensor.
     estimator : str
         Name of the estimator; empty in results of others.
+    estimator_reason : str
+        Why it was taken.
+    noise : tuple of NoiseTerm
+        Noise with a memory that was learned; values and covariance are those in it.
+    drift_means : mapping of str to float
+        Mean over all dwells of the regressor of each drift of a bias (SI), by the name of its coefficient. The biases
+        are those in the mean over the dwells: the bias in the equation is less by coefficient times mean.
     """
 
     body_frame: str
@@ -90,3 +98,6 @@ class Calibration:
     warnings: tuple[str, ...] = ()
     faults: tuple[DataFault, ...] = ()
     estimator: str = ""
+    estimator_reason: str = ""
+    noise: tuple[NoiseTerm, ...] = ()
+    drift_means: Mapping[str, float] = field(default_factory=dict)

@@ -43,6 +43,9 @@ class ImuSpecification:
         Angle random walk as a density (rad/s/sqrt(Hz)): the sigma of a 1 s mean.
     accel_white_noise : float
         Velocity random walk as a density (m/s^2/sqrt(Hz)).
+    gyro_bias_instability, accel_bias_instability : float
+        Bias instability B of the data sheet (rad/s, m/s^2); 0 where it is not stated. Noise with a memory is learned
+        from the recording; these say what to expect.
     prior : mapping of str to float
         One-sigma size of every parameter of an effect, by effect name, SI.
     grade : str
@@ -57,6 +60,8 @@ class ImuSpecification:
     prior: Mapping[str, float] = field(default_factory=dict)
     grade: str = "navigation"
     prior_units: Mapping[str, str] = field(default_factory=dict)
+    gyro_bias_instability: float = 0.0
+    accel_bias_instability: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -204,7 +204,7 @@ def _first_scale(first: Scan) -> float:
     if not len(testable):
         return 1.0
     one = testable[0]
-    return float(first.sigma[one] * np.sqrt(first.information.J[one, one]))
+    return float(first.sigma[one] * np.sqrt(first.J[one]))
 
 
 def _scored(evidence: LinearEvidence, index: int, first: Scan, last: Scan, chosen: bool) -> Scored:

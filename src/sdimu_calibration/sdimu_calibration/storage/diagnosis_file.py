@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -74,6 +75,7 @@ def content(summary: DiagnosisSummary) -> dict[str, Any]:
         "findings": [{"text": f.text, "grave": f.grave} for f in d.findings],
         "noise": {
             "wrong": list(d.noise),
+            "terms": [asdict(term) | {"unit": term.unit, "words": term.words} for term in d.found.noise],
             "gyro": _noise(d.consistency.gyro),
             "accel": _noise(d.consistency.accel),
         },
@@ -136,9 +138,11 @@ def candidate(f: Found, own: bool) -> dict[str, Any]:
 
 
 def _unexplained_fraction(d: Diagnosis) -> float:
-    """Share of the misfit that is left; none when there is no misfit to speak of."""
+    """Share of the misfit that is left: none without a misfit; all or none where no free inputs measure it."""
     if d.verdict != "unexplained" and not len(d.found.chosen):
         return 0.0
+    if np.isnan(d.explained):
+        return float(d.verdict == "unexplained")
     return float(np.clip(1.0 - d.explained, 0.0, 1.0))
 
 

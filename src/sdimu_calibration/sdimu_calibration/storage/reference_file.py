@@ -106,6 +106,8 @@ def read_truth(path: Path, body_frame: str, gravity: float | None = None) -> dic
     values = content.get(key)
     if not isinstance(values, Mapping):
         raise DataError(f"{path}: no '{key}': the truth is not given in the body frame '{body_frame}'")
+    # Biases that drift or wander are estimated in the mean over the dwells.
+    values = {**values, **(content.get("mean_bias") or {})}
     true = {str(name): _number(path, str(name), value) for name, value in values.items()}
     return true if gravity is None else _restated(true, _gravity(path, content) / gravity)
 

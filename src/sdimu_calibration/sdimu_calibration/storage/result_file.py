@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from sdimu_calibration.core.arrays import Floats
+from sdimu_calibration.core.noise_term import NoiseTerm
 from sdimu_calibration.core.recording import DataError, DataFault
 from sdimu_calibration.core.results import Calibration, History
 from sdimu_calibration.storage.json_file import read_json, write_json
@@ -17,7 +18,7 @@ from sdimu_calibration.storage.json_file import read_json, write_json
 FORMAT = "sdimu-result/1"
 
 
-def write_result(path: Path, calibration: Calibration) -> None:
+def write_result(path: Path, calibration: Calibration, verdict: str = "") -> None:
     """Write result.json: SI numbers, ``null`` for what is not a finite number.
 
     Parameters
@@ -25,11 +26,16 @@ def write_result(path: Path, calibration: Calibration) -> None:
     path : Path
         File to make or replace; its folder is made too.
     calibration : Calibration
+    verdict : str
+        Of a diagnosis, where one was made.
     """
     content = {
         "format": FORMAT,
+        **({"verdict": verdict} if verdict else {}),
         "estimator": calibration.estimator,
+        "estimator_reason": calibration.estimator_reason,
         "body_frame": calibration.body_frame,
+        "drift_means": dict(calibration.drift_means),
         "model": list(calibration.model),
         "coefficients": [
             {"name": name, "value": value, "sigma": sigma, "unit": unit, "display_unit": display}
@@ -45,6 +51,7 @@ def write_result(path: Path, calibration: Calibration) -> None:
         "covariance": calibration.covariance.tolist(),
         "fit": dict(calibration.fit),
         "data": {**calibration.data, "faults": [asdict(fault) for fault in calibration.faults]},
+        "noise": [asdict(term) | {"unit": term.unit} for term in calibration.noise],
         "notes": list(calibration.notes),
         "warnings": list(calibration.warnings),
         "history": {entry.name: getattr(calibration.history, entry.name).tolist() for entry in fields(History)},
@@ -97,7 +104,15 @@ def _calibration(content: Mapping[str, Any]) -> Calibration:
         warnings=tuple(content.get("warnings", ())),
         faults=tuple(_fault(entry) for entry in content["data"].get("faults", ())),
         estimator=str(content.get("estimator", "")),
+        estimator_reason=str(content.get("estimator_reason", "")),
+        noise=tuple(_term(entry) for entry in content.get("noise", ())),
+        drift_means={name: float(mean) for name, mean in content.get("drift_means", {}).items()},
     )
+
+
+def _term(entry: Mapping[str, Any]) -> NoiseTerm:
+    given = {key: value for key, value in entry.items() if key != "unit"}
+    return NoiseTerm(**given | {"alike": tuple(given.get("alike", ()))})
 
 
 def _fault(entry: Mapping[str, Any]) -> DataFault:

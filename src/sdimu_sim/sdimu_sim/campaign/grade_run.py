@@ -25,7 +25,7 @@ from sdimu_calibration.core.units import STANDARD_GRAVITY
 from sdimu_calibration.storage.config import load_imu, load_model, load_plan
 from sdimu_sim.campaign.hidden_draw import PLAUSIBLE, TESTABLE, Truth, hideable_names
 from sdimu_sim.campaign.hidden_score import baseline_z, same_effect
-from sdimu_sim.campaign.run import simulate
+from sdimu_sim.campaign.run import in_the_mean, simulate
 from sdimu_sim.core.by_hand import ByHand, against_gravity, by_hand_recording
 from sdimu_sim.core.hidden import one_sided, size_unit
 from sdimu_sim.core.scenario import Scenario, imu_truth
@@ -85,8 +85,9 @@ class GradeRun:
 
 
 def simulated_test(
-    name: str, imu: ImuSpecification, plan: str, site: Site, seed: int, effects: tuple[str, ...]
-) -> tuple[PreparedTest, ImuTruth]:
+    name: str, imu: ImuSpecification, plan: str, site: Site, seed: int, effects: tuple[str, ...],
+    noise: tuple[str, ...] = (),
+) -> tuple[PreparedTest, ImuTruth]:  # fmt: skip
     """Simulate a test and open it as every recording is opened; a run by hand states no site."""
     if name == HANDHELD:
         run = ByHand(RESTS, imu, site, seed=seed, effects=effects)
@@ -94,9 +95,10 @@ def simulated_test(
         true_gravity = float(earth.normal_gravity(site.latitude_rad, site.height_m))
         told: TestTruth = against_gravity(truth, STANDARD_GRAVITY, true_gravity)
         return _opened(recording, imu, site, assumed="any"), told.imu
-    scenario = Scenario(load_plan(plan), imu, site, rate_hz=_RATE_HZ, seed=seed, effects=effects)
+    scenario = Scenario(load_plan(plan), imu, site, rate_hz=_RATE_HZ, seed=seed, effects=effects, noise=noise)
     sensor = imu_truth(scenario)
-    return _opened(simulate(scenario, sensor), imu, site, assumed=""), sensor
+    recording = simulate(scenario, sensor)
+    return _opened(recording, imu, site, assumed=""), in_the_mean(sensor, recording, seed)
 
 
 def _opened(recording: Recording, imu: ImuSpecification, site: Site, assumed: str) -> PreparedTest:
@@ -106,7 +108,7 @@ def _opened(recording: Recording, imu: ImuSpecification, site: Site, assumed: st
 def choice(name: str, plan: str, seed: int) -> str:
     """Name the estimator that a clean test of an IMU file on a plan gets."""
     test, _ = simulated_test(name, load_imu(name), plan, Site(math.radians(36.4), 0.0), seed, ())
-    return choose_estimator(test, _model(name))
+    return choose_estimator(test, _model(name)).estimator
 
 
 def _model(name: str) -> Model:

@@ -15,7 +15,7 @@ from sdimu_calibration.storage.config import load_plan
 from sdimu_sim.campaign.hidden_draw import Draw, draw, hideable_names
 from sdimu_sim.campaign.hidden_score import score
 from sdimu_sim.campaign.hidden_sizes import RATE_HZ, WARM_UP, Sizes
-from sdimu_sim.campaign.run import simulate
+from sdimu_sim.campaign.run import in_the_mean, simulate
 from sdimu_sim.core.scenario import Scenario, imu_truth
 from sdimu_sim.core.truth import child_rng
 
@@ -58,7 +58,7 @@ class HiddenRun:
         recording = with_fault(simulate(scenario, sensor), drawn, self.imu, seed)
         found = diagnose(recording, scenario.site, self.imu, self.model)
         # From here on the truth is known; nothing before this line has seen it.
-        return score(drawn, found, sensor)
+        return score(drawn, found, in_the_mean(sensor, recording, seed))
 
 
 def scenario_of(drawn: Draw, imu: ImuSpecification, seed: int) -> Scenario:

@@ -18,6 +18,7 @@ from sdimu_calibration.core.recording import DataError, PhaseLog, Recording
 from sdimu_calibration.core.specification import Model
 from sdimu_sim.core.generator import simulate_imu
 from sdimu_sim.core.hidden import parse_effects
+from sdimu_sim.core.mean_bias import mean_bias
 from sdimu_sim.core.platform import PlatformMotion
 from sdimu_sim.core.scenario import Scenario, imu_truth, temperature_log
 from sdimu_sim.core.truth import ImuTruth, in_body_frame
@@ -80,6 +81,14 @@ class CalibrationRun:
             "nis": np.nansum(nis, axis=0), "nis_dof": 3 * np.isfinite(nis).sum(axis=0),
             "lag1": products, "lag1_count": count, "passes": fit.passes,
         }  # fmt: skip
+
+
+def in_the_mean(sensor: ImuTruth, recording: Recording, seed: int) -> ImuTruth:
+    """Return a sensor with its biases in the mean over the dwells: what a calibration states of a bias that drifts."""
+    if recording.phase is None:
+        return sensor
+    mean = mean_bias(sensor, recording.t, recording.phase, recording.interval_s, seed)
+    return replace(sensor, coefficients={**sensor.coefficients, **mean})
 
 
 def simulate(scenario: Scenario, sensor: ImuTruth) -> Recording:

@@ -12,6 +12,11 @@ from sdimu_calibration.core.recording import DataError
 
 EFFECT = "Hide an effect: what --add takes, =SIZE, such as 'accel_quadratic_x=20 ug/g^2'; repeatable."
 
+NOISE = (
+    "Noise with a memory: gyro_noise_KIND=SIZE or accel_noise_KIND=SIZE, KIND random_walk, flicker, markov(tau=300 s), "
+    "stop, turn or shift; repeatable."
+)
+
 
 def simulate(
     out: Annotated[Path, typer.Option(help="Bag (folder) to write.")],
@@ -26,6 +31,7 @@ def simulate(
     mount: Annotated[str | None, typer.Option(help="Rotation of the IMU on the table: 'X,Y,Z' (deg).")] = None,
     mount_max: Annotated[float, typer.Option(help="Without --mount: drawn up to this about every axis (deg).")] = 3.0,
     effect: Annotated[list[str] | None, typer.Option(help=EFFECT)] = None,
+    noise: Annotated[list[str] | None, typer.Option(help=NOISE)] = None,
     temperature: Annotated[str | None, typer.Option(help="Temperature profile: name or path.")] = None,
     truth: Annotated[Path | None, typer.Option(help="Truth file; default: OUT.truth.yaml beside the bag.")] = None,
     by_hand: Annotated[
@@ -68,6 +74,7 @@ def simulate(
         mount_rad=None if mount is None else mount_rad(mount),
         mount_max_rad=math.radians(mount_max),
         effects=effects,
+        noise=tuple(noise or ()),
         temperature=None if temperature is None else load_temperature(temperature),
     )
     test = simulate_test(scenario)

@@ -151,5 +151,49 @@ def grades(
     console.print(f"results in {out}", soft_wrap=True)
 
 
+@app.command()
+def noise(
+    out: Annotated[Path, typer.Option(help="Folder of runs, noise.json, noise.md.")] = Path("out/study-noise"),
+    runs: Annotated[int, typer.Option("-n", min=1, help="Tests of each IMU file and kind of noise.")] = 40,
+    seed: Annotated[int, typer.Option(help="First seed.")] = 60_001,
+    imu: Annotated[list[str] | None, typer.Option(help="IMU file; repeatable. All on a table by default.")] = None,
+    kind: Annotated[list[str] | None, typer.Option(help="Kind of noise; repeatable. All by default.")] = None,
+    workers: Annotated[int, typer.Option(min=1, help="Processes.")] = 2,
+) -> None:
+    """Diagnose tests in noise with a memory: are terms named with their size, do the sigmas hold."""
+    from functools import partial
+
+    from rich.console import Console
+
+    from sdimu_calibration.cli.progress import bar
+    from sdimu_calibration.core.recording import DataError
+    from sdimu_calibration.storage.config import config_folder
+    from sdimu_calibration.storage.json_file import write_json
+    from sdimu_sim.campaign.campaign import run_campaign
+    from sdimu_sim.campaign.grade_run import HANDHELD
+    from sdimu_sim.campaign.noise_page import page
+    from sdimu_sim.campaign.noise_run import NoiseRun
+    from sdimu_sim.core.coloured import KINDS
+
+    known = ("white", *KINDS)
+    unknown = sorted(set(kind or ()) - set(known))
+    if unknown:
+        raise DataError(f"--kind {unknown[0]}: expected one of {', '.join(known)}")
+    names = imu or sorted(p.stem for p in (config_folder() / "imu").glob("*.yaml") if p.stem != HANDHELD)
+    console, seeds = Console(), range(seed, seed + runs)
+    results = {}
+    for name in names:
+        for one in kind or known:
+            with bar(console) as progress:
+                tell = partial(_named, progress, f"{name}, {one}")
+                folder = out / name / one
+                results[name, one] = run_campaign(NoiseRun(name, one), seeds, folder, workers=workers, progress=tell)
+    write_json(out / "noise.json", {f"{name} {one}": rows for (name, one), rows in results.items()})
+    text = page(results, seed)
+    (out / "noise.md").write_text(text, encoding="utf-8")
+    console.print(text, soft_wrap=True, markup=False, highlight=False)
+    console.print(f"results in {out}", soft_wrap=True)
+
+
 def _named(progress: Progress, name: str, word: str, share: float) -> None:
     progress(f"{name}: {word}", share)

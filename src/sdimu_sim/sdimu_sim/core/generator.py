@@ -11,11 +11,12 @@ from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.rotation import rotation_matrix
 from sdimu_calibration.core.specification import Site
+from sdimu_sim.core.coloured import ColouredNoise
 from sdimu_sim.core.equation import CONSTANTS
 from sdimu_sim.core.hidden import DIRECTIONS, LOST_AFTER_S, parse_effects
 from sdimu_sim.core.imu import Electronics, response
 from sdimu_sim.core.platform import PlatformMotion, mean_motion
-from sdimu_sim.core.samples import SampleClock, TrueSamples, Variables, in_body, rotated
+from sdimu_sim.core.samples import STILL_RAD_S, SampleClock, TrueSamples, Variables, in_body, rotated
 from sdimu_sim.core.temperature import TemperatureProfile
 from sdimu_sim.core.truth import ImuTruth
 
@@ -58,6 +59,7 @@ class ImuGenerator:
         if self._hidden.needs_temperature and temperature is None:
             raise DataError("a hidden effect needs the temperature: give a temperature profile")
         self._clock = SampleClock(rate_hz)
+        self._coloured = ColouredNoise(truth.noise, self._clock.interval_s, seed)
         self._electronics = Electronics(truth, self._clock.interval_s, seed)
         self._variables = Variables(temperature)
         off = self._hidden.site
@@ -127,7 +129,7 @@ class ImuGenerator:
         return rotated(self._C_tb, means[12:15])
 
     def _readings(self, edges: Floats) -> Floats:
-        """Make the readings of the six sensors (6, m), without noise."""
+        """Make the readings of the six sensors (6, m), without white noise."""
         delays = self._hidden.delay_s
         true = self._true(edges)
         out = response(self._truth, true)
@@ -141,6 +143,7 @@ class ImuGenerator:
                 values |= {f"{name}{axis}": v[i] for name, v in pairs for i, axis in enumerate("xyz")}
             for term in self._hidden.terms:
                 out[term.sensor] += term.expression.evaluate({**values, **term.parameters})
+        self._coloured.add(out, np.abs(true.omega_nb).max(axis=0) > STILL_RAD_S)
         self._lose(out, true, edges)
         if not np.isfinite(out).all():
             raise DataError("a hidden effect gives numbers that are not finite: check its formula")

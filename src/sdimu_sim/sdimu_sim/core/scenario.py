@@ -13,7 +13,9 @@ from sdimu_calibration.core.recording import DataError, PhaseLog, Recording, Tab
 from sdimu_calibration.core.specification import ImuSpecification, Site
 from sdimu_sim.core.generator import ImuSamples, simulate_imu
 from sdimu_sim.core.hidden import canonical, parse_effects
+from sdimu_sim.core.mean_bias import mean_bias
 from sdimu_sim.core.platform import PlatformMotion
+from sdimu_sim.core.samples import SampleClock
 from sdimu_sim.core.temperature import TemperatureProfile
 from sdimu_sim.core.truth import ImuTruth, Truth, draw_coefficients, draw_mount
 
@@ -37,6 +39,8 @@ class Scenario:
         Rotation vector of the IMU on the platform; None draws it up to `mount_max_rad` about every axis.
     effects : tuple of str
         Hidden effects, canonical keys with sizes.
+    noise : tuple of str
+        Noise with a memory, keys with sizes (`sdimu_sim.core.coloured`).
     temperature : TemperatureProfile or None
     coefficients : mapping of str to float or None
         As built, SI; None draws them from the IMU's specification.
@@ -55,6 +59,7 @@ class Scenario:
     mount_rad: tuple[float, float, float] | None = None
     mount_max_rad: float = float(np.radians(3.0))
     effects: tuple[str, ...] = ()
+    noise: tuple[str, ...] = ()
     temperature: TemperatureProfile | None = None
     coefficients: Mapping[str, float] | None = None
     extras: Mapping[str, object] = field(default_factory=dict)
@@ -72,6 +77,7 @@ def imu_truth(scenario: Scenario) -> ImuTruth:
         gyro_white_noise=scenario.imu.gyro_white_noise,
         accel_white_noise=scenario.imu.accel_white_noise,
         effects=tuple(scenario.effects),
+        noise=tuple(scenario.noise),
     )
     return with_hidden(replace(truth, **scenario.extras))  # type: ignore[arg-type]
 
@@ -113,7 +119,9 @@ def simulate_test(scenario: Scenario) -> SimulatedTest:
     motion = table_motion(scenario.plan, scenario.table, scenario.seed)
     platform = PlatformMotion(motion.t, motion.q_nt, motion.omega_nt_t)
     samples = simulate_imu(platform, imu, scenario.site, scenario.rate_hz, scenario.seed, scenario.temperature)
-    truth = Truth(imu, scenario.site, scenario.seed, scenario.rate_hz, scenario.plan.name)
+    interval = SampleClock(scenario.rate_hz).interval_s
+    mean = mean_bias(imu, samples.t, PhaseLog(*phase_changes(motion)), interval, scenario.seed)
+    truth = Truth(imu, scenario.site, scenario.seed, scenario.rate_hz, scenario.plan.name, mean)
     return SimulatedTest(motion, samples, truth)
 
 

@@ -57,6 +57,8 @@ class ImuTruth:
     effects : tuple of str
         Hidden effects, canonical keys with sizes (`sdimu_sim.core.hidden`); those that name a coefficient or the lever
         arm are in `coefficients` and `lever_arm_m` already.
+    noise : tuple of str
+        Noise with a memory, keys with sizes (`sdimu_sim.core.coloured`).
     lever_arm_m : tuple of float
         Of the accelerometers from the point that stands still, in b.
     magnetic_field : tuple of float
@@ -72,6 +74,7 @@ class ImuTruth:
     gyro_white_noise: float = 0.0
     accel_white_noise: float = 0.0
     effects: tuple[str, ...] = ()
+    noise: tuple[str, ...] = ()
     lever_arm_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
     magnetic_field: tuple[float, float, float] = DEFAULT_MAGNETIC_FIELD
     gyro_step_rad: float = 0.0
@@ -95,6 +98,8 @@ class Truth:
     seed: int
     rate_hz: float
     plan: str
+    mean_bias: Mapping[str, float] = field(default_factory=dict)
+    """Biases in the mean over the dwells (SI), where they drift or wander."""
 
 
 def child_rng(seed: int, name: str) -> np.random.Generator:

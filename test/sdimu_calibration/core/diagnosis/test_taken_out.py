@@ -13,7 +13,8 @@ from sdimu_calibration.core.progress import silent
 
 def test_a_companion_that_is_noise_once_calibrated_is_taken_out_and_says_so(bench):
     base = bench.fit(effects=("accel_scale_asymmetry_z=60 ppm",))
-    look = search_until_stable(Request(base, (), FALSE_ALARM), silent)
+    request = Request(base, (), FALSE_ALARM)
+    look = search_until_stable(request, silent)
     (step,) = look.found.steps
     assert step.fate == "added"
     column = look.evidence.names.index("accel_cubic_x")
@@ -21,7 +22,7 @@ def test_a_companion_that_is_noise_once_calibrated_is_taken_out_and_says_so(benc
     companion = replace(step, label="accel_cubic_x")
     exchanged = replace(step, label="accel_cubic_y")
     found = replace(look.found, chosen=joined, steps=(step, companion, exchanged))
-    settled = drop_companions(base, replace(look, found=found), silent)
+    settled = drop_companions(request, replace(look, found=found), silent)
     assert [c.label for c in settled.chosen] == ["accel_scale_asymmetry_z"]
     kept, small, other = settled.found.steps
     assert kept.fate == "added"

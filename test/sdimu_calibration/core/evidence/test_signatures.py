@@ -6,6 +6,7 @@ import numpy as np
 
 from sdimu_calibration.core.diagnosis.scan import TESTABLE, scan
 from sdimu_calibration.core.effects import registry
+from sdimu_calibration.core.estimation.noise_learning import in_white_noise
 from sdimu_calibration.core.estimation.solve import extend
 
 
@@ -36,14 +37,14 @@ def test_information_of_the_signatures_is_the_covariance_of_the_filter(bench):
 
 def test_the_score_is_the_fall_of_chi_square_of_a_refit(bench):
     hidden = ("accel_quadratic_x=60 ug/g^2",)
-    fit = bench.fit(effects=hidden)
+    fit = in_white_noise(bench.fit(effects=hidden))
     evidence = _evidence(bench, ["accel_quadratic"], effects=hidden)
     column = evidence.names.index("accel_quadratic_x")
     scanned = scan(evidence.information, evidence.model, evidence.weight)
     effect = registry.get("accel_quadratic").only(("accel_quadratic_x",))
-    gain = extend(fit, [effect]).statistics()["log_likelihood"] - fit.statistics()["log_likelihood"]
+    gain = extend(fit, [effect], learn=False).statistics()["log_likelihood"] - fit.statistics()["log_likelihood"]
     # The filter's likelihood is marginal over the prior: log N(d; 0, J + w) against the score d^2 / J.
-    J, d, w = scanned.information.J[column, column], scanned.information.d[column], effect.prior["navigation"] ** -2
+    J, d, w = scanned.J[column], scanned.d[column], effect.prior["navigation"] ** -2
     assert abs(scanned.z[column]) > 8.0
     expected = 0.5 * d**2 / (J + w) - 0.5 * np.log1p(J / w)
     # Second order in an effect of this size is percents of its chi-square.

@@ -15,7 +15,7 @@ next; a ROS message has no field for that.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,7 +23,7 @@ import numpy as np
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.compensation.reads import reads, samples_motion
 from sdimu_calibration.core.effect_key import parse_key
-from sdimu_calibration.core.effects import imu_model, selection
+from sdimu_calibration.core.effects import bias, imu_model, selection
 from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.effects.imu_model import ImuModel
 from sdimu_calibration.core.effects.motion import Motion
@@ -186,12 +186,27 @@ def compensator(
     if not (np.isfinite(values).all() and np.isfinite(covariance).all()):
         raise DataError("the result has a coefficient or covariance that is not a number")
     model = imu_model.build(taken, imu)
+    T = _origin(model, calibration.drift_means)
+    values, covariance = T @ values, T @ covariance @ T.T
     power: Floats = np.repeat(np.array([imu.gyro_white_noise**2, imu.accel_white_noise**2]), 3)
     inverse: Floats = np.asarray(np.linalg.inv(slope_at_nought(model, values)), dtype=np.float64)
     return Compensator(
         model, values, covariance, inverse, power, calibration.body_frame, tuple(left),
         start if any("temperature" in reads(effect) for effect in taken) else None,
     )  # fmt: skip
+
+
+def _origin(model: ImuModel, drift_means: Mapping[str, float]) -> Floats:
+    """Map from biases in the mean over the calibration to those of the equations, shape (p, p).
+
+    Where a drift is not taken out of the samples, its mean stays with the bias.
+    """
+    T = np.eye(len(model.names))
+    for channel, place in zip(model.channel.tolist(), model.parameter.tolist(), strict=True):
+        name = model.names[place]
+        if name in drift_means and bias.NAMES[channel] in model.names:
+            T[model.names.index(bias.NAMES[channel]), place] = -drift_means[name]
+    return T
 
 
 def _reason(effect: Effect, key: str, has_temperature: bool, start_known: bool, same_start: bool) -> str:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sdimu_calibration.core.diagnosis.search import Problem
+from sdimu_calibration.core.effects import bias
 from sdimu_calibration.core.evidence.linear import E
 
 _MATTERS = 3.0
@@ -66,7 +67,15 @@ def coefficient_shifts(
         known, weight, _ = problem.known([other if c == column else c for c in chosen])
         estimate, _ = problem.evidence.information.estimate(known, weight)
         moved = (estimate - named)[:p] / sigma
+        moved[_centred(problem, column, other)] = 0.0
         most = int(np.argmax(np.abs(moved)))
         if abs(moved[most]) > _MATTERS:
             out.append(CoefficientShift(names[other], names[known[most]], float(moved[most])))
     return tuple(out)
+
+
+def _centred(problem: Problem[E], column: int, other: int) -> list[int]:
+    """Places of biases that are stated in the mean over the test: which of two drifts it is does not move them."""
+    drifts = [problem.candidate(c).effect for c in (column, other) if problem.candidate(c).effect.bias_drift]
+    biases = {bias.NAMES[term.channel] for effect in drifts for term in effect.terms}
+    return [k for k, name in enumerate(problem.evidence.names[: problem.evidence.coefficients]) if name in biases]

@@ -14,22 +14,32 @@ import numpy as np
 from sdimu_calibration.core.arrays import Ints
 from sdimu_calibration.core.diagnosis.free_input_test import FreeInputTest
 from sdimu_calibration.core.diagnosis.ladder import Rung, ladder
-from sdimu_calibration.core.diagnosis.rounds import UNEXPLAINED_P, Request, Round, search_until_stable
+from sdimu_calibration.core.diagnosis.rounds import (
+    DRAWN,
+    UNEXPLAINED_P,
+    Request,
+    Round,
+    in_found_noise,
+    search_until_stable,
+)
 from sdimu_calibration.core.diagnosis.screen import Finding, screen
-from sdimu_calibration.core.diagnosis.search import FALSE_ALARM, MOST_STEPS, Search
+from sdimu_calibration.core.diagnosis.search import FALSE_ALARM, MOST_STEPS, Problem, Search, look_alikes, patchwork
 from sdimu_calibration.core.diagnosis.verdict import Verdict, sentence, verdict
 from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.estimation.fit import NOT_CONVERGED, Fit
+from sdimu_calibration.core.estimation.noise_estimate import told
+from sdimu_calibration.core.estimation.noise_learning import in_white_noise
 from sdimu_calibration.core.estimation.outcome import outcome
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.estimation.solve import AUTO, solve
 from sdimu_calibration.core.evidence.candidate import Candidate
 from sdimu_calibration.core.evidence.consistency import Consistency
+from sdimu_calibration.core.evidence.learned_noise import Wander
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.evidence.navigation_evidence import NavigationEvidence
 from sdimu_calibration.core.probability import normal_tail
 from sdimu_calibration.core.progress import Progress, silent
-from sdimu_calibration.core.recording import Recording
+from sdimu_calibration.core.recording import DataError, Recording
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.specification import ImuSpecification, Model, Site
 
@@ -44,8 +54,11 @@ _MISFIT = 0.05
 """Excess of the NIS below which sigmas are right enough."""
 _MISFIT_SIGMAS = 5.0
 """The same in standard deviations of the excess."""
-_PATCHES = 3
-"""Drifts of one bias that together follow any wander and say nothing of its cause."""
+NOT_DIAGNOSABLE = (
+    "the classical estimator gives coefficients in the axes of the table: a navigation about them shows the mount, and "
+    "no missing effect; diagnose with another --estimator (in Python estimator=...)"
+)
+"""Why a classical fit is not diagnosed."""
 
 
 @dataclass(frozen=True)
@@ -112,6 +125,11 @@ class Diagnosis:
         return tuple(self.evidence.candidates[i - p] for i in self.found.chosen)
 
     @property
+    def alike(self) -> tuple[str, ...]:
+        """What the data cannot tell from the first of `chosen`."""
+        return alike_first(self)
+
+    @property
     def navigation(self) -> NavigationEvidence:
         """The evidence of a fit that navigates.
 
@@ -126,7 +144,9 @@ class Diagnosis:
 
     @property
     def explained(self) -> float:
-        """Share of the misfit that what was found removes."""
+        """Share of the misfit that what was found removes; NaN where no free inputs are testable."""
+        if not len(self.free):
+            return float("nan")
         before = max(self.free_inputs_before.chi2 - self.free_inputs_before.dof, 1e-9)
         after = max(self.free_inputs_after.chi2 - self.free_inputs_after.dof, 0.0)
         return float(np.clip(1.0 - after / before, 0.0, 1.0))
@@ -168,31 +188,42 @@ def climb(
     Raises
     ------
     DataError
-        When an extended model cannot be fitted.
+        When the fit cannot be diagnosed, or an extended model cannot be fitted.
     """
+    if not fit.diagnosable:
+        raise DataError(NOT_DIAGNOSABLE)
     consistency = fit.consistency()
     noise, imu = measured_noise(consistency, fit)
     stated = fit.test.imu
     if noise:
-        fit = solve(fit.test.with_noise(imu), fit.model, fit.estimator, progress=progress)
-    done = search_until_stable(Request(fit, tuple(extra), alpha), progress)
+        fit = solve(fit.test.with_noise(imu), fit.model, fit.estimator, progress=progress, learn=False)
+    fit = in_white_noise(fit)
+    request = Request(fit, tuple(extra), alpha, None if fit.learns_scatter else Wander.of(fit.evidence()))
+    done = search_until_stable(request, progress)
     final = done.fit
     findings = (*screen(fit), *(Finding(text, grave=False) for text in final.beyond_specification()))
     findings += () if final.converged else (Finding(NOT_CONVERGED, grave=True),)
     progress("report", 0.9)
     if fit.learns_scatter:
         consistency = fit.consistency(done.evidence)
+    # In the noise that was learned without the effects nothing would be seen to be missing.
+    fit = in_found_noise(request, fit, done.found.noise) if done.chosen else final
     before = outcome(fit)
     after = outcome(final) if done.chosen else before
     own = any(c.family == "own" for c in done.chosen)
     # What was added must also predict: an effect that only mimics the missing one fits here and fails elsewhere.
     # The free inputs are constant in a dwell and in a turn; what changes within one shows in the NIS alone.
-    excess = 0.0 if fit.learns_scatter else misfit(after, consistency, stated, imu)
+    # Noise that is faster than a stretch is learned by what it leaves from stretch to stretch; within, it stays.
+    excess = 0.0 if fit.learns_scatter or done.found.noise else misfit(after, consistency, stated, imu)
     loud = excess > largest_misfit(float(after.fit["nis_dof"] or 1.0))
     still = not fit.learns_scatter and _held_out(after) > STILL_WRONG
-    unexplained = done.after.p_value < UNEXPLAINED_P or still or loud or patched(done)
+    # Wrong samples in turns leave noise that looks drawn anew in each turn.
+    spoilt = any(finding.kind == "spike" for finding in findings)
+    drawn = not spoilt and any(term.kind in DRAWN for term in done.found.noise)
+    unexplained = done.after.p_value < UNEXPLAINED_P or still or loud or drawn or patched(done)
+    noise += tuple(told(term) for term in done.found.noise)
     rungs = ladder(fit, final, done, progress) if refits or fit.learns_scatter else ()
-    facts = Verdict(done.found, done.chosen, findings, noise, own, unexplained)
+    facts = Verdict(done.found, done.chosen, alike_first(done), findings, noise, own, unexplained)
     word = verdict(facts)
     progress("done", 1.0)
     partial = Diagnosis(
@@ -201,6 +232,16 @@ def climb(
         rungs,
     )  # fmt: skip
     return replace(partial, sentence=sentence(partial))
+
+
+def alike_first(of: Round | Diagnosis) -> tuple[str, ...]:
+    """Labels of what the data cannot tell from the first effect of a choice, the others being in the model."""
+    chosen, evidence = of.found.chosen, of.evidence
+    if not len(chosen):
+        return ()
+    allowed = np.setdiff1d(np.arange(len(evidence.weight), len(evidence.names)), of.free)
+    found = look_alikes(Problem(evidence), chosen.tolist(), int(chosen[0]), allowed, of.found.scale)
+    return tuple(evidence.names[i] for i in found)
 
 
 def misfit(final: Calibration, consistency: Consistency, stated: ImuSpecification, taken: ImuSpecification) -> float:
@@ -218,7 +259,8 @@ def misfit(final: Calibration, consistency: Consistency, stated: ImuSpecificatio
     """
     gyro = consistency.gyro.spread * stated.gyro_white_noise / taken.gyro_white_noise
     accel = consistency.accel.spread * stated.accel_white_noise / taken.accel_white_noise
-    return float((final.fit["nis_mean"] or 0.0) / (0.5 * (gyro**2 + accel**2)) - 1.0)
+    nis = final.fit.get("nis_in_noise") or final.fit["nis_mean"]
+    return float((nis or 0.0) / (0.5 * (gyro**2 + accel**2)) - 1.0)
 
 
 def largest_misfit(dof: float) -> float:
@@ -233,14 +275,7 @@ def largest_misfit(dof: float) -> float:
 def patched(done: Round) -> bool:
     """Whether the choice is a patchwork: the search ran out of steps, or one bias drifts by three effects at once."""
     steps = done.found.steps
-    drifts = {(c.family, c.effect.variant, _sensor(c)) for c in done.chosen if c.effect.bias_drift}
-    of_sensor = [sensor for _, _, sensor in drifts]
-    many = any(of_sensor.count(sensor) >= _PATCHES for sensor in of_sensor)
-    return many or (len(steps) == MOST_STEPS and steps[-1].accepted)
-
-
-def _sensor(candidate: Candidate) -> int:
-    return candidate.effect.terms[0].channel
+    return patchwork(done.chosen) or (len(steps) >= MOST_STEPS and steps[-1].accepted)
 
 
 def measured_noise(consistency: Consistency, fit: Fit) -> tuple[tuple[str, ...], ImuSpecification]:
@@ -284,5 +319,5 @@ def p_value(done: Round, consistency: Consistency, noise: bool) -> float:
 
 
 def _held_out(calibration: Calibration) -> float:
-    value = calibration.fit.get("held_out_rms")
+    value = calibration.fit.get("held_out_in_noise", calibration.fit.get("held_out_rms"))
     return float("nan") if value is None else float(value)

@@ -10,8 +10,8 @@ from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.diagnosis.coefficient_shifts import CoefficientShift, coefficient_shifts
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.diagnosis.free_input_test import free_input_test
-from sdimu_calibration.core.diagnosis.scan import POWER_80, Scan, alike, scan
-from sdimu_calibration.core.diagnosis.search import Problem
+from sdimu_calibration.core.diagnosis.scan import POWER_80, scan
+from sdimu_calibration.core.diagnosis.search import Problem, look_alikes
 from sdimu_calibration.core.evidence.candidate import Candidate
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.probability import normal_tail
@@ -81,7 +81,7 @@ def found_effects(d: Diagnosis) -> tuple[Found, ...]:
         scores = problem.scores(scanned, d.found.scale)
         z = float(scanned.z[column])
         count = int(np.isfinite(scanned.sigma[allowed]).sum())
-        others = _alike(d, problem, chosen, column, allowed)
+        others = look_alikes(problem, chosen, column, allowed, d.found.scale)
         out.append(
             Found(
                 candidate=d.chosen[k],
@@ -149,7 +149,7 @@ def reach(d: Diagnosis) -> tuple[DetectableSize, ...]:
     p = len(evidence.weight)
     full = evidence.information
     scanned = scan(full, evidence.model, evidence.weight, d.found.scale)
-    J = np.diag(scanned.information.J)
+    J = scanned.J
     left = np.greater(J, _ROUNDING * np.diag(full.J))
     with np.errstate(divide="ignore", invalid="ignore"):
         smallest = np.where(left, POWER_80 * d.found.scale / np.sqrt(np.abs(J)), np.inf)
@@ -210,14 +210,3 @@ def _estimates(d: Diagnosis, problem: Problem[LinearEvidence], chosen: list[int]
         last = slice(len(d.after.names) - len(chosen), None)
         return d.after.values[last], np.sqrt(np.diag(d.after.covariance)[last])
     return values, sigmas
-
-
-def _alike(d: Diagnosis, problem: Problem[LinearEvidence], chosen: list[int], column: int, allowed: Ints) -> list[int]:
-    """Columns that the data cannot tell from a chosen one, all others chosen being in the model."""
-    others = [c for c in chosen if c != column]
-    scanned: Scan = problem.scan(others, d.found.scale)
-    scores = problem.scores(scanned, d.found.scale)
-    outside = np.ones(len(scores), dtype=bool)
-    outside[allowed] = False
-    scores[outside] = -np.inf
-    return alike(scores, column)

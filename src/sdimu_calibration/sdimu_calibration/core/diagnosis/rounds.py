@@ -18,12 +18,16 @@ import numpy as np
 from sdimu_calibration.core.arrays import Ints
 from sdimu_calibration.core.diagnosis.candidates import catalogue, equations, free_inputs, periodic
 from sdimu_calibration.core.diagnosis.free_input_test import FreeInputTest, free_input_test
+from sdimu_calibration.core.diagnosis.noise_search import search_with_noise
 from sdimu_calibration.core.diagnosis.search import MOST_STEPS, Search, Step, search
 from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.estimation.fit import Fit
+from sdimu_calibration.core.estimation.noise_learning import in_noise
 from sdimu_calibration.core.estimation.solve import extend
 from sdimu_calibration.core.evidence.candidate import Candidate, split
+from sdimu_calibration.core.evidence.learned_noise import Wander
 from sdimu_calibration.core.evidence.linear import LinearEvidence
+from sdimu_calibration.core.noise_term import SHIFT, STOP, TURN, NoiseTerm
 from sdimu_calibration.core.progress import Progress
 from sdimu_calibration.core.recording import DataError
 
@@ -35,6 +39,12 @@ MOST_GROWING_ROUNDS = 8
 """Rounds at most, where a round adds one effect."""
 LEAST_SIGMAS = 3.0
 """An effect smaller than this many of its sigmas, once it is in the fit, is dropped."""
+_OWN_GAIN = 3.0
+"""Likelihood by which equations must be better than the catalogue where noise takes what is left: odds of 20 to 1."""
+_PARALLEL = 1e-6
+"""Share of its length by which a signature must differ from another to be its own: rounding is far below."""
+DRAWN = (STOP, TURN, SHIFT)
+"""Kinds of noise that any cause may hide behind that depends on attitude or rate."""
 _MANY = 3
 """Number of chosen catalogue terms from which one equation is tried in their place."""
 
@@ -51,11 +61,14 @@ class Request:
         The user's own effects, candidates like those of the catalogue.
     alpha : float
         False-alarm probability of a whole scan.
+    wander : Wander or None
+        How wandering biases would show in the test; None where the estimator learns scatter instead.
     """
 
     base: Fit
     extra: tuple[Effect, ...]
     alpha: float
+    wander: Wander | None = None
 
 
 @dataclass(frozen=True)
@@ -89,9 +102,10 @@ class Round:
 
     @property
     def wants_equations(self) -> bool:
-        """Whether something is left, or suspiciously many terms were needed, or nothing that was tried helped."""
+        """Whether something is left, or took suspiciously many terms, or looks like noise, or nothing helped."""
         refused = not len(self.free) and not len(self.found.chosen)
-        return self.after.p_value < UNEXPLAINED_P or len(self.found.chosen) >= _MANY or refused
+        many = len(self.found.chosen) >= _MANY
+        return self.after.p_value < UNEXPLAINED_P or many or refused or bool(self.found.noise)
 
 
 def search_until_stable(request: Request, progress: Progress) -> Round:
@@ -105,15 +119,18 @@ def search_until_stable(request: Request, progress: Progress) -> Round:
     base = request.base
     growing = base.learns_scatter
     tried: tuple[Candidate, ...] = ()
-    fit, own = base, False
+    fit, own, asked = base, False, False
+    limits: dict[bool, float] = {}
+    done: Round | None = None
     steps: tuple[Step, ...] = ()
     seen = {frozenset[str]()}
     for turn in range(MOST_GROWING_ROUNDS if growing else MOST_ROUNDS):
         progress("candidates", min(0.8, 0.4 + 0.1 * turn))
-        done = run_round(request, fit, tried, own)
-        if done.wants_equations and not own:
+        done = run_round(request, fit, tried, own, limits, done)
+        if done.wants_equations and not own and not asked:
+            asked = True
             progress("equations", min(0.8, 0.45 + 0.1 * turn))
-            wide = run_round(request, fit, tried, own=True)
+            wide = run_round(request, fit, tried, True, limits, done)
             if prefer(wide, done):
                 done, own = wide, True
         labels = frozenset(c.label for c in done.chosen)
@@ -122,18 +139,21 @@ def search_until_stable(request: Request, progress: Progress) -> Round:
         if labels == {c.label for c in tried} or (growing and labels in seen):
             break
         seen.add(labels)
-        trial = _with(base, done.chosen, progress)
+        trial = _with(request, done.chosen, progress)
         if growing and len(labels) <= len(tried) and not _likelier(trial, fit):
             done = _with_choice(done, tried)
             break
         tried, fit = done.chosen, trial
-    return drop_companions(base, replace(done, found=replace(done.found, steps=steps)), progress)
+    if done is None:
+        raise AssertionError("a search has one round at least")
+    return drop_companions(request, replace(done, found=replace(done.found, steps=steps)), progress)
 
 
-def _with(base: Fit, chosen: Sequence[Candidate], progress: Progress) -> Fit:
+def _with(request: Request, chosen: Sequence[Candidate], progress: Progress) -> Fit:
     """Fit the model with what a round chose; name the choice where the estimator cannot fit it."""
+    base = request.base
     try:
-        return extend(base, [c.effect for c in chosen], progress=progress)
+        return extend(base, [c.effect for c in chosen], progress=progress, learn=False)
     except DataError as error:
         names = " and ".join(c.label for c in chosen)
         raise DataError(
@@ -155,12 +175,12 @@ def _with_choice(done: Round, chosen: Sequence[Candidate]) -> Round:
     return replace(done, found=replace(done.found, chosen=columns), after=after)
 
 
-def drop_companions(base: Fit, done: Round, progress: Progress) -> Round:
-    """Fit with what was chosen; drop the weakest below `LEAST_SIGMAS` of its sigmas, one at a time."""
+def drop_companions(request: Request, done: Round, progress: Progress) -> Round:
+    """Fit with what was chosen, in its noise; drop the weakest below `LEAST_SIGMAS` of its sigmas, one at a time."""
     small: set[str] = set()
     while True:
         chosen = done.chosen
-        fit = _with_chosen(base, done, progress)
+        fit = in_found_noise(request, _with_chosen(request, done, progress), done.found.noise)
         size = fit.size_in_sigmas(len(chosen))
         keep = np.ones(len(size), dtype=bool)
         if len(size) and size.min() < LEAST_SIGMAS:
@@ -175,13 +195,21 @@ def drop_companions(base: Fit, done: Round, progress: Progress) -> Round:
             return replace(done, found=found, after=left(done.evidence, kept, done.free, done.found.scale))
 
 
-def _with_chosen(base: Fit, done: Round, progress: Progress) -> Fit:
+def in_found_noise(request: Request, fit: Fit, terms: Sequence[NoiseTerm]) -> Fit:
+    """Estimate the coefficients of a fit in noise that was found."""
+    if request.wander is None or not terms:
+        return fit
+    return in_noise(fit, fit.evidence(), request.wander, terms)
+
+
+def _with_chosen(request: Request, done: Round, progress: Progress) -> Fit:
     """Fit with what a round chose: the fit of the round where that has the same effects in the same order."""
+    base = request.base
     added = [c.label for c in done.chosen]
     fitted = [label for effect in done.fit.sensors.effects[len(base.sensors.effects) :] for label in effect.labels]
     if fitted == added:
         return done.fit
-    return _with(base, done.chosen, progress) if added else base
+    return _with(request, done.chosen, progress) if added else base
 
 
 def mark_dropped(steps: Sequence[Step], kept: set[str], small: set[str]) -> tuple[Step, ...]:
@@ -203,6 +231,9 @@ def prefer(wide: Round, done: Round) -> bool:
     many, few = len(done.found.chosen), len(wide.found.chosen)
     if not len(done.free):
         return few > 0 and not many
+    if done.found.noise or wide.found.noise:
+        # Noise that is drawn anew leaves nothing in any dwell or turn: what explains more of it is better.
+        return wide.found.net > done.found.net + _OWN_GAIN
     chance = 3.0 * np.sqrt(2.0 * done.after.dof)
     if few > max(1, many) and done.after.p_value > UNEXPLAINED_P:
         return False
@@ -210,7 +241,9 @@ def prefer(wide: Round, done: Round) -> bool:
     return bool(wide.after.chi2 < done.after.chi2 - chance or (fewer and wide.after.chi2 < done.after.chi2 + chance))
 
 
-def run_round(request: Request, fit: Fit, tried: Sequence[Candidate], own: bool) -> Round:
+def run_round(
+    request: Request, fit: Fit, tried: Sequence[Candidate], own: bool, limits: dict[bool, float], earlier: Round | None
+) -> Round:
     """Collect the evidence about a fit, with what it tried as candidates, and search it.
 
     Parameters
@@ -221,15 +254,52 @@ def run_round(request: Request, fit: Fit, tried: Sequence[Candidate], own: bool)
     tried : sequence of Candidate
     own : bool
         Also try equations that are not in the catalogue.
+    limits : dict of bool to float
+        Thresholds of scans without and with equations, filled as they become known: the columns of all rounds are the
+        same but for finer variants, and so is the threshold.
+    earlier : Round, optional
+        The round before.
     """
-    base = request.base
-    known = candidates(base, tried, request.extra, own)
-    free = free_inputs(base.timetable) if base.free_inputs_testable else []
-    evidence = fit.evidence([*known, *free]).as_candidates(fit.added_columns(len(tried)), tried)
-    count = len(evidence.names) - sum(len(effect.parameters) for effect in free)
-    most = len(tried) + 1 if base.learns_scatter else MOST_STEPS
-    found = search(evidence, np.arange(len(evidence.weight), count), request.alpha, most)
-    return _round(fit, found, np.arange(count, len(evidence.names)))
+    evidence, free = _evidence(request, fit, tried, own, earlier)
+    allowed = np.setdiff1d(np.arange(len(evidence.weight), len(evidence.names)), free)
+    if request.wander is None:
+        most = len(tried) + 1 if request.base.learns_scatter else MOST_STEPS
+        return _round(fit, search(evidence, allowed, request.alpha, most), free)
+    # Noise alone is a rival from the start; once effects were preferred it need not be asked again.
+    found = search_with_noise(
+        evidence, allowed, request.wander, request.alpha, limits.get(own), not tried,
+        earlier.found.joint if earlier else None,
+    )  # fmt: skip
+    limits.setdefault(own, found.threshold)
+    return _round(fit, found, free)
+
+
+def _evidence(
+    request: Request, fit: Fit, tried: Sequence[Candidate], own: bool, earlier: Round | None
+) -> tuple[LinearEvidence, Ints]:
+    """Evidence about a fit, with what it tried as candidates, and the columns of the free inputs in it."""
+    base, columns = request.base, fit.added_columns(len(tried))
+    if earlier is None or base.learns_scatter:
+        free = free_inputs(base.timetable) if base.free_inputs_testable else []
+        known = candidates(base, tried, request.extra, own)
+        evidence = fit.evidence([*known, *free]).as_candidates(columns, tried)
+        count = len(evidence.names)
+        return evidence, np.arange(count - sum(len(effect.parameters) for effect in free), count)
+    before = earlier.found.evidence if earlier.found.white is None else earlier.found.white
+    evidence = before.about(fit.evidence(), columns, tried)
+    have = frozenset(evidence.names)
+    more = _untried(candidates(base, (), request.extra, own), have) if own else []
+    return _without_doubles(evidence, more) if more else evidence, earlier.free
+
+
+def _without_doubles(evidence: LinearEvidence, equations: Sequence[Effect]) -> LinearEvidence:
+    """Add equations, but those that a registered effect already is: the catalogue has the word."""
+    n, p = len(evidence.names), len(evidence.weight)
+    wider = evidence.with_effects(equations)
+    size = np.sqrt(np.maximum(np.diag(wider.information.J), 1e-300))
+    alike = np.abs(wider.information.J[n:, p:n]) / np.outer(size[n:], size[p:n])
+    single = np.flatnonzero(alike.max(axis=1, initial=0.0) < 1.0 - _PARALLEL) + n
+    return wider.only(np.concatenate([np.arange(p, n), single]))
 
 
 def _round(fit: Fit, found: Search[LinearEvidence], free: Ints) -> Round:

@@ -37,8 +37,8 @@ class Scan:
         Share of the signature that the model leaves.
     smallest : ndarray, shape (q,)
         Minimal detectable size (SI).
-    information : Information
-        On all parameters, given the model.
+    J, d : ndarray, shape (q,)
+        Information on each parameter, and its pull, given the model.
     """
 
     z: Floats
@@ -46,7 +46,8 @@ class Scan:
     sigma: Floats
     retention: Floats
     smallest: Floats
-    information: Information
+    J: Floats
+    d: Floats
 
 
 def scan(full: Information, known: Ints, weight: Floats, scale: float = 1.0) -> Scan:
@@ -62,27 +63,55 @@ def scan(full: Information, known: Ints, weight: Floats, scale: float = 1.0) -> 
     scale : float
         Factor by which the noise is larger than the specification says.
     """
-    given = full.given(known, weight)
-    J, J0 = np.diag(given.J), np.diag(full.J)
+    return scored(*full.diagonal_given(known, weight), np.diag(full.J), known, scale)
+
+
+def scored(J: Floats, d: Floats, J0: Floats, known: Ints, scale: float) -> Scan:
+    """Score every parameter by the information on it.
+
+    Parameters
+    ----------
+    J, d : ndarray, shape (q,)
+        Information on each and its pull, the parameters at `known` (k,) estimated along.
+    J0 : ndarray, shape (q,)
+        Information on each parameter alone.
+    known : ndarray of int, shape (k,)
+    scale : float
+        Factor by which the noise is larger than the specification says.
+    """
     with np.errstate(divide="ignore", invalid="ignore"):
         retention = np.sqrt(np.maximum(J, 0.0) / J0)
         testable = (retention > TESTABLE) & (J0 > 0.0)
         testable[known] = False
         sigma = np.where(testable, scale / np.sqrt(J), np.inf)
-        estimate = np.where(testable, given.d / J, 0.0)
+        estimate = np.where(testable, d / J, 0.0)
     z = np.where(testable, estimate / sigma, 0.0)
-    return Scan(z, estimate, sigma, np.nan_to_num(retention), POWER_80 * sigma, given)
+    return Scan(z, estimate, sigma, np.nan_to_num(retention), POWER_80 * sigma, J, d)
 
 
-def threshold(scanned: Scan, alpha: float, seed: int = 1) -> float:
+def threshold(
+    full: Information, known: Ints, weight: Floats, tested: Ints, alpha: float, seed: int = 1
+) -> float:  # fmt: skip
     """Size of the largest ``|z|`` that pure noise exceeds with probability `alpha`.
 
     The scores of pure noise are jointly normal with the correlation of the signatures, so the whole scan is simulated
     by drawing from it; correlated candidates cost less than Bonferroni would charge.
+
+    Parameters
+    ----------
+    full, known, weight
+        As for `scan`.
+    tested : ndarray of int, shape (t,)
+        Columns that are tested.
+    alpha : float
+    seed : int
     """
-    C = correlation(scanned)
-    if not len(C):
+    if not len(tested):
         return float("inf")
+    cut = np.concatenate([known, tested])
+    place = np.arange(len(known))
+    given = Information(full.J[np.ix_(cut, cut)], full.d[cut]).given(place, weight)
+    C = correlation(given.J[len(known) :, len(known) :])
     # The jitter stands for identical signatures, which make C singular.
     root = np.linalg.cholesky(C + _JITTER * np.eye(len(C)))
     rng = np.random.default_rng(seed)
@@ -90,10 +119,8 @@ def threshold(scanned: Scan, alpha: float, seed: int = 1) -> float:
     return float(np.quantile(largest, 1.0 - alpha))
 
 
-def correlation(scanned: Scan) -> Floats:
-    """Correlation of the signatures of the testable candidates, shape (t, t)."""
-    rows = np.flatnonzero(np.isfinite(scanned.sigma))
-    J = scanned.information.J[np.ix_(rows, rows)]
+def correlation(J: Floats) -> Floats:
+    """Correlation of signatures of which J is the information, shape (t, t)."""
     s = 1.0 / np.sqrt(np.diag(J))
     return np.asarray(J * np.outer(s, s))
 

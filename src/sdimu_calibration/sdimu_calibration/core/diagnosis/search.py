@@ -9,22 +9,30 @@ error at stops that it has not seen.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Generic
 
 import numpy as np
 
 from sdimu_calibration.core.arrays import Floats, Ints
-from sdimu_calibration.core.diagnosis.held_out import HeldOut, gain, predict
 from sdimu_calibration.core.diagnosis.scan import Scan, alike, scan, threshold
 from sdimu_calibration.core.effects.effect import Effect
+from sdimu_calibration.core.evidence.candidate import Candidate
+from sdimu_calibration.core.evidence.held_out import HeldOut, gain, predict
+from sdimu_calibration.core.evidence.joint_information import Joint
 from sdimu_calibration.core.evidence.linear import E
+from sdimu_calibration.core.noise_term import NoiseTerm
 
 FALSE_ALARM = 0.02
 """Probability that pure noise puts one of all candidates over the threshold: what is bearable (5 %) with room for what
 is not pure noise; at 0.01 effects of 5 sigma were found in 73 % of 49 tests instead of three quarters."""
-MOST_STEPS = 8
+MOST_STEPS = 40
+"""Steps at most: more than any sensor that is worth a calibration has effects."""
+_PATIENCE = 6
+"""Steps after which a patchwork of drifts ends the search."""
+_PATCHES = 3
+"""Drifts of one bias that together follow any wander."""
 LOG_BAYES = 3.0
 """Least log Bayes factor of an accepted step ("strong" on Jeffreys' scale)."""
 _WIDE = 3.0
@@ -46,8 +54,6 @@ class Step:
 
     Attributes
     ----------
-    index : int
-        Column among the model's coefficients and the allowed ones.
     label, family, unit, display_unit : str
     z, threshold : float
         Score when it was tried, and what noise reaches.
@@ -68,7 +74,6 @@ class Step:
         Why an accepted step is not among what was found in the end; empty when it is.
     """
 
-    index: int
     label: str
     family: str
     unit: str
@@ -107,23 +112,34 @@ class Search(Generic[E]):
         Accepted ones first to last; a refused one ends the list.
     chosen : ndarray of int
         Columns of the whole evidence: accepted candidates, pruned.
-    first, last : Scan
-        Before anything was added; after everything was. Their columns: the model's, then the allowed ones.
+    first : Scan
+        Before anything was added. Its columns: the model's, then the allowed ones.
     threshold : float
         Of the first scan.
     scale : float
         Residual noise over specified noise at the end.
     evidence : Evidence
-        With the finer variants that were chosen behind the candidates it had.
+        With the finer variants that were chosen behind the candidates it had, in the noise that was learned.
+    noise : tuple of NoiseTerm
+        Noise with a memory.
+    white : LinearEvidence or None
+        The same evidence in white noise; None where that is what `evidence` is.
+    joint : Joint or None
+        Information on its columns and on wandering biases; None where noise was not learned.
+    net : float
+        Log-likelihood less what effects and noise terms cost; NaN where no noise was learned.
     """
 
     steps: tuple[Step, ...]
     chosen: Ints
     first: Scan
-    last: Scan
     threshold: float
     scale: float
     evidence: E
+    noise: tuple[NoiseTerm, ...] = ()
+    net: float = float("nan")
+    white: E | None = None
+    joint: Joint | None = None
 
 
 class Problem(Generic[E]):
@@ -141,24 +157,33 @@ class Problem(Generic[E]):
         shift = np.concatenate([evidence.shift, np.zeros(len(chosen))])
         return np.concatenate([evidence.model, np.array(chosen, dtype=np.int64)]).astype(np.int64), weight, shift
 
+    def candidate(self, column: int) -> Candidate:
+        """Return the candidate at a column."""
+        return self.evidence.candidates[column - self.p]
+
     def scale(self, chosen: Sequence[int]) -> float:
         """Residual noise over specified noise, at least 1."""
         known, weight, _ = self.known(chosen)
         information = self.evidence.information
         estimate, _ = information.estimate(known, weight)
         residual = self.evidence.e - self.evidence.W[:, known] @ estimate
-        return float(np.sqrt(max(1.0, float(residual @ residual) / max(1, len(residual) - len(known)))))
+        misfit = float(residual @ self.evidence.weighed(residual[:, None])[:, 0])
+        return float(np.sqrt(max(1.0, misfit / max(1, len(residual) - len(known)))))
 
     def scan(self, chosen: Sequence[int], scale: float = 1.0) -> Scan:
         """Score the allowed columns given the chosen ones."""
         known, weight, _ = self.known(chosen)
         return scan(self.evidence.information, known, weight, scale)
 
+    def threshold(self, scanned: Scan, alpha: float) -> float:
+        """Size of the largest score of a scan with nothing chosen that pure noise exceeds with probability `alpha`."""
+        tested = np.flatnonzero(np.isfinite(scanned.sigma))
+        return threshold(self.evidence.information, self.evidence.model, self.evidence.weight, tested, alpha)
+
     def scores(self, scanned: Scan, scale: float = 1.0) -> Floats:
         """Log Bayes factor of every column against the model without it; -inf where not testable."""
-        information, p = scanned.information, self.p
-        J = np.diag(information.J)[p:] / scale**2
-        d = information.d[p:] / scale**2
+        p = self.p
+        J, d = scanned.J[p:] / scale**2, scanned.d[p:] / scale**2
         wide = 1.0 / (_WIDE * self.evidence.prior) ** 2
         with np.errstate(divide="ignore", invalid="ignore"):
             occam = np.where(wide > 0.0, 0.5 * np.log1p(J / wide), 0.0)
@@ -172,7 +197,9 @@ class Problem(Generic[E]):
         return predict(self.evidence, known, weight, shift, scale)
 
 
-def search(evidence: E, allowed: Ints, alpha: float = FALSE_ALARM, most: int = MOST_STEPS) -> Search[E]:
+def search(
+    evidence: E, allowed: Ints, alpha: float = FALSE_ALARM, most: int = MOST_STEPS, limit: float | None = None
+) -> Search[E]:
     """Grow the model from the allowed candidates.
 
     Parameters
@@ -184,22 +211,25 @@ def search(evidence: E, allowed: Ints, alpha: float = FALSE_ALARM, most: int = M
         False-alarm probability of a whole scan.
     most : int
         Steps at most.
+    limit : float, optional
+        Threshold of a scan of the same columns where it is known.
     """
     problem = Problem(evidence.only(allowed))
     chosen: list[int] = []
     steps: list[Step] = []
     scale = problem.scale(chosen)
     first = problem.scan(chosen, scale)
-    limit = first_limit = threshold(first, alpha)
+    # What is chosen changes the correlation of the others little: one threshold serves all steps.
+    limit = problem.threshold(first, alpha) if limit is None else limit
     before = problem.held_out(chosen, 1.0)
     scanned = first
-    while len(steps) < most:
+    while len(steps) < most and not (len(steps) >= _PATIENCE and patchwork(problem.candidate(c) for c in chosen)):
         scores = problem.scores(scanned, scale)
         above = np.where(np.abs(scanned.z) > limit, scores, -np.inf)
         best = int(np.argmax(above))
         if not np.isfinite(above[best]):
             break
-        finer = _sharpen(problem, chosen, best)
+        finer = sharpen(problem, chosen, best)
         if finer:
             evidence = evidence.with_effects([finer])
             allowed = np.append(allowed, len(evidence.names) - 1)
@@ -209,20 +239,37 @@ def search(evidence: E, allowed: Ints, alpha: float = FALSE_ALARM, most: int = M
             scores = problem.scores(scanned, scale)
         trial = _polish(problem, [*chosen, best])
         after = problem.held_out(trial, 1.0)
-        step = _step(problem, scanned, scores, chosen, best, limit, before, after)
+        step = judged(problem, scanned, scores, chosen, best, limit, before, after)
         steps.append(step)
         if not step.accepted:
             break
         chosen, before = trial, after
         scale = problem.scale(chosen)
         scanned = problem.scan(chosen, scale)
-        limit = threshold(scanned, alpha)
     back = np.array([allowed[c - problem.p] for c in chosen], dtype=np.int64)
-    return Search(tuple(steps), back, first, scanned, first_limit, scale, evidence)
+    return Search(tuple(steps), back, first, limit, scale, evidence)
 
 
-def _sharpen(problem: Problem[E], chosen: Sequence[int], best: int) -> Effect | None:
-    """Make the scan finer about the best candidate; None when that gains less than `_SHARPER`."""
+def patchwork(chosen: Iterable[Candidate]) -> bool:
+    """Whether one bias drifts by so many effects at once that they follow any wander and say nothing of its cause."""
+    drifts = {(c.family, c.effect.variant, c.effect.terms[0].channel) for c in chosen if c.effect.bias_drift}
+    of_sensor = [sensor for _, _, sensor in drifts]
+    return any(of_sensor.count(sensor) >= _PATCHES for sensor in of_sensor)
+
+
+def look_alikes(problem: Problem[E], chosen: Sequence[int], column: int, allowed: Ints, scale: float) -> list[int]:
+    """Columns among `allowed` that the data cannot tell from a chosen one, all others chosen being in the model."""
+    others = [c for c in chosen if c != column]
+    scores = problem.scores(problem.scan(others, scale), scale)
+    outside = np.ones(len(scores), dtype=bool)
+    outside[allowed] = False
+    outside[column] = False
+    scores[outside] = -np.inf
+    return alike(scores, column)
+
+
+def sharpen(problem: Problem[E], chosen: Sequence[int], best: int) -> Effect | None:
+    """Make the scan finer about the best candidate; None when no variant gains as much as `_SHARPER`."""
     p = problem.p
     candidate = problem.evidence.candidates[best - p]
     effect, name = candidate.effect, candidate.parameter.name
@@ -268,13 +315,14 @@ def _polish(problem: Problem[E], chosen: list[int]) -> list[int]:
     return kept
 
 
-def _step(
+def judged(
     problem: Problem[E], scanned: Scan, scores: Floats, chosen: Sequence[int], best: int, limit: float,
     before: HeldOut, after: HeldOut,
 ) -> Step:  # fmt: skip
+    """Judge the addition of the column `best` to a choice; the scores are those before it."""
     evidence, p = problem.evidence, problem.p
     candidate = evidence.candidates[best - p]
-    J, d = scanned.information.J[best, best], scanned.information.d[best]
+    J, d = scanned.J[best], scanned.d[best]
     bayes = float(scores[best])
     # A fault of one turn is nowhere to be seen once the stop after it is left out; all others must gain by it.
     apart = int(candidate.effect.options["turn"]) if "turn" in candidate.effect.options else None
@@ -285,7 +333,7 @@ def _step(
     elif not won > (2.0 * error if candidate.family == "own" else 0.0):
         reason = "does not lower the error at stops that the fit has not seen"
     return Step(
-        index=best, label=candidate.label, family=candidate.family,
+        label=candidate.label, family=candidate.family,
         unit=candidate.parameter.unit, display_unit=candidate.parameter.display_unit,
         z=float(scanned.z[best]), threshold=limit,
         estimate=float(scanned.estimate[best]), sigma=float(scanned.sigma[best]),

@@ -8,7 +8,6 @@ from sdimu_calibration.core.arrays import Ints
 from sdimu_calibration.core.diagnosis.candidates import free_inputs
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.diagnosis.rounds import UNEXPLAINED_P, candidates, left
-from sdimu_calibration.core.diagnosis.scan import threshold
 from sdimu_calibration.core.diagnosis.search import FALSE_ALARM, Problem, Search
 from sdimu_calibration.core.estimation.fit import Fit
 from sdimu_calibration.core.evidence.linear import LinearEvidence
@@ -53,4 +52,4 @@ def _nothing_added(evidence: LinearEvidence, columns: Ints) -> Search[LinearEvid
     scale = problem.scale([])
     first = problem.scan([], scale)
     none = np.empty(0, dtype=np.int64)
-    return Search((), none, first, first, threshold(first, FALSE_ALARM), scale, evidence)
+    return Search((), none, first, problem.threshold(first, FALSE_ALARM), scale, evidence)

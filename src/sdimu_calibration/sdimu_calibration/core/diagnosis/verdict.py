@@ -11,6 +11,7 @@ import numpy as np
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.diagnosis.screen import Finding
 from sdimu_calibration.core.diagnosis.search import Search
+from sdimu_calibration.core.estimation.noise_estimate import told
 from sdimu_calibration.core.evidence.candidate import Candidate
 from sdimu_calibration.core.evidence.consistency import SLOW_S, Consistency
 from sdimu_calibration.core.evidence.linear import LinearEvidence
@@ -37,6 +38,8 @@ class Verdict:
     ----------
     found : Search
     chosen : tuple of Candidate
+    alike : tuple of str
+        What the data cannot tell from the first of them.
     findings : tuple of Finding
     noise : tuple of str
     own, unexplained : bool
@@ -44,6 +47,7 @@ class Verdict:
 
     found: Search[LinearEvidence]
     chosen: tuple[Candidate, ...]
+    alike: tuple[str, ...]
     findings: tuple[Finding, ...]
     noise: tuple[str, ...]
     own: bool
@@ -64,16 +68,11 @@ def verdict(facts: Verdict) -> str:
             return "several effects"
         if chosen[0].effect.scope == "recording":
             return "data fault"
-        return "class of effects" if alike_of(facts.found, chosen[0].label) else "one effect"
+        return "class of effects" if facts.alike else "one effect"
     if facts.noise:
         return "noise model wrong"
     # Something stood out of the noise and was refused or did not last.
     return "unexplained" if facts.found.steps else "consistent"
-
-
-def alike_of(found: Search[LinearEvidence], label: str) -> tuple[str, ...]:
-    """Name what the data cannot tell from a chosen effect."""
-    return next((s.alike for s in reversed(found.steps) if s.label == label), ())
 
 
 def sentence(d: Diagnosis) -> str:
@@ -92,7 +91,7 @@ def sentence(d: Diagnosis) -> str:
     if d.verdict == "own equation":
         return f"Something is missing that is not in the catalogue; it follows {names}; {rest}."
     if d.verdict == "class of effects":
-        others = ", ".join(alike_of(d.found, d.chosen[0].label)[:_LISTED])
+        others = ", ".join(d.alike[:_LISTED])
         return f"One effect is missing: {names}, or what looks the same here ({others}); {rest}."
     return f"{'One effect is' if d.verdict == 'one effect' else 'Several effects are'} missing: {names}; {rest}."
 
@@ -110,6 +109,13 @@ def _unexplained(d: Diagnosis, names: str) -> str:
         most = f", {d.found.steps[0].label} most, but adding it does not help" if d.found.steps else ""
         left = beyond(d.rungs[-1].scatter)
         return f"Something stands out of the scatter{most}; beyond white noise: {left}."
+    drawn = [told(term) for term in d.found.noise]
+    if drawn:
+        begun = f"Found, but not all: {names}. What is left" if names else "Something is missing that"
+        return (
+            f"{begun} looks like {' and '.join(drawn)}: a cause outside the catalogue, or a bias that does so; the "
+            "sigmas take it into account."
+        )
     tail = f"; {names} would take {100 * d.explained:.0f} % of it" if names else ""
     if names and _rms(d.after) > 1.0 and _rms(d.after) == _rms(d.after):
         tail += f", and the error at stops held out is then {_rms(d.after):.2f} (1 is right)"

@@ -47,3 +47,6 @@ ACCEL_BIAS = register(
         scope="power-on",
     )
 )
+
+NAMES = tuple(p.name for effect in (GYRO_BIAS, ACCEL_BIAS) for p in effect.parameters)
+"""Name of the bias of each sensor, in the order of the channels."""

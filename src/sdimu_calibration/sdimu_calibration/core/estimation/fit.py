@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -16,6 +16,7 @@ from sdimu_calibration.core.estimation.free_inertial import FreeInertialRun
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.evidence.consistency import Consistency
 from sdimu_calibration.core.evidence.linear import LinearEvidence
+from sdimu_calibration.core.noise_term import NoiseTerm
 from sdimu_calibration.core.recording import DataFault
 from sdimu_calibration.core.results import History, no_history
 from sdimu_calibration.core.specification import Model
@@ -59,16 +60,21 @@ class Fit(ABC):
     model : Model
     sensors : ImuModel
         The sensor model that was asked for, p parameters.
+    reason : str
+        Why this estimator was taken.
     """
 
     test: PreparedTest
     model: Model
     sensors: ImuModel
+    reason: str = field(default="", kw_only=True)
 
     estimator = ""
     """Name of the estimator, as `--estimator` takes it."""
     learns_scatter = False
     """The estimator learns the noise beyond white noise from the residuals, a missing effect with it."""
+    diagnosable = True
+    """The navigation about the coefficients shows what the sensors do, and not how they are mounted."""
     free_inputs_testable = True
     """A constant error of each stop and turn leaves residuals to test it by."""
 
@@ -148,6 +154,16 @@ class Fit(ABC):
         DataError
             When there is no such part, or the estimator does not navigate.
         """
+
+    @property
+    def noise_terms(self) -> tuple[NoiseTerm, ...]:
+        """Noise with a memory that was learned."""
+        return ()
+
+    @property
+    def drift_means(self) -> Mapping[str, float]:
+        """Mean of the regressor of each drift of a bias over all dwells (SI); the biases are those in the mean."""
+        return {}
 
     def history(self) -> History:
         """Estimate as the test went on; empty where the estimator knows only the end."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from zlib import crc32
 
@@ -14,7 +14,7 @@ from sdimu_calibration.core.alignment.alignment import Alignment
 from sdimu_calibration.core.alignment.coarse_alignment import StartPoint
 from sdimu_calibration.core.alignment.prepared import PreparedData, TestSetup, stops_line
 from sdimu_calibration.core.arrays import Bools, Floats, Ints
-from sdimu_calibration.core.effects import body_frame
+from sdimu_calibration.core.effects import bias, body_frame
 from sdimu_calibration.core.effects.effect import Effect, Timetable
 from sdimu_calibration.core.effects.imu_model import ImuModel
 from sdimu_calibration.core.estimation.azimuth_check import azimuth_note, azimuth_warning
@@ -25,6 +25,7 @@ from sdimu_calibration.core.estimation.free_inertial import (
     Navigator,
     free_inertial_runs,
 )
+from sdimu_calibration.core.estimation.noise_estimate import NoiseEstimate
 from sdimu_calibration.core.evidence.consistency import Consistency, check
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.evidence.navigation_evidence import (
@@ -40,6 +41,7 @@ from sdimu_calibration.core.filter.passes import Pass, Solution, pass_settings
 from sdimu_calibration.core.filter.passes import solve as solve_filter
 from sdimu_calibration.core.measurement_kind import ALL, HELD_ALL, HELD_SENSORS, SENSORS
 from sdimu_calibration.core.navigation.track import motion
+from sdimu_calibration.core.noise_term import NoiseTerm
 from sdimu_calibration.core.progress import silent
 from sdimu_calibration.core.recording import DataError, DataFault
 from sdimu_calibration.core.results import History
@@ -53,6 +55,11 @@ _ABSURD = 1e3
 """NIS per degree of freedom from which there is no fit at all: units, axes or site are wrong."""
 _MISFIT = 1.2
 """NIS per degree of freedom, and held-out error (sigma), from which a user is warned; 1 is right."""
+NOT_WHITE = (
+    "the noise is not white: {}; values and sigmas take it into account. A missing effect can look the same: run sdimu "
+    "diagnose"
+)
+"""Note on the noise that was learned."""
 _OUTSIDE = 4.5
 """Size of a coefficient in its stated sigma from which a user is warned."""
 
@@ -67,11 +74,14 @@ class NavigationFit(Fit):
         With the sensor model of the estimator, q coefficients.
     prepared : PreparedData
     alignment : Alignment
+    noise : NoiseEstimate or None
+        Noise with a memory that was learned; None where white noise was taken.
     """
 
     setup: TestSetup
     prepared: PreparedData
     alignment: Alignment
+    noise: NoiseEstimate | None = field(default=None, kw_only=True)
 
     @property
     @abstractmethod
@@ -102,8 +112,60 @@ class NavigationFit(Fit):
 
     @property
     def estimate(self) -> Floats:
-        """Coefficients of the estimator (SI), shape (q,)."""
+        """Coefficients of the estimator (SI) about which everything is linear, shape (q,)."""
         return self.last.estimate
+
+    @property
+    def settled(self) -> Floats:
+        """Coefficients of the estimator (SI) in the noise that was learned, biases as means; shape (q,)."""
+        return self.centring @ (self.estimate if self.noise is None else self.estimate + self.noise.deviation)
+
+    @property
+    def settled_covariance(self) -> Floats:
+        """Covariance of `settled`, shape (q, q)."""
+        T = self.centring
+        return T @ (self.estimate_covariance if self.noise is None else self.noise.covariance) @ T.T
+
+    @cached_property
+    def centring(self) -> Floats:
+        """Map from coefficients as the equations have them to biases as means over all dwells, shape (q, q).
+
+        A bias beside a ramp is that at the start, beside a warm-up that at the end: which of them a test cannot tell
+        apart moves it by many sigmas. Its mean over the dwells is the same whatever drifts.
+        """
+        names = self.setup.sensors.names
+        T = np.eye(len(names))
+        for name, (channel, mean) in self._drifts.items():
+            if bias.NAMES[channel] in names:
+                T[names.index(bias.NAMES[channel]), names.index(name)] = mean
+        return T
+
+    @cached_property
+    def _drifts(self) -> dict[str, tuple[int, float]]:
+        """Channel of each drift of a bias, and the mean of its regressor over all dwells (SI)."""
+        drifting = [effect for effect in self.setup.sensors.effects if effect.bias_drift]
+        if not drifting:
+            return {}
+        epochs, seen = self.prepared.epochs, self.known.seen
+        rest = np.zeros(len(seen.t))
+        for a, b in zip(epochs.first[self.prepared.phases.dwell], epochs.last[self.prepared.phases.dwell], strict=True):
+            rest[a:b] = seen.dt[a:b]
+        out = {}
+        for effect in drifting:
+            means = rest @ effect.regressors(seen) / rest.sum()
+            for mean, term in zip(means.tolist(), effect.terms, strict=True):
+                out[effect.parameters[term.parameter].name] = (term.channel, mean)
+        return out
+
+    @property
+    def noise_terms(self) -> tuple[NoiseTerm, ...]:
+        """Noise with a memory that was learned."""
+        return () if self.noise is None else self.noise.terms
+
+    @property
+    def drift_means(self) -> dict[str, float]:
+        """Mean of the regressor of each drift of a bias over all dwells (SI), by the name of the coefficient."""
+        return {name: mean for name, (_, mean) in self._drifts.items() if name in self.names}
 
     @property
     def estimate_covariance(self) -> Floats:
@@ -116,8 +178,18 @@ class NavigationFit(Fit):
         return Start(self.setup.sensors.names, self.estimate, self.last.smoothed_start, np.empty(0))
 
     def statistics(self) -> dict[str, float | None]:
-        """Log-likelihood and mean normalised innovation squared of the last pass."""
-        return fit_statistics(self.last.output) | {"passes": float(self.passes)}
+        """Log-likelihood and mean normalised innovation squared of the last pass, and in the noise that was learned.
+
+        NIS and held-out error are those in the noise of the IMU's file, whatever was learned: so they compare between
+        models.
+        """
+        white = fit_statistics(self.last.output) | {"passes": float(self.passes)}
+        if self.noise is None:
+            return white
+        return white | {
+            "log_likelihood": (white["log_likelihood"] or 0.0) + self.noise.gain, "nis_in_noise": self.noise.nis,
+            "held_out_in_noise": self.noise.held_out_rms,
+        }  # fmt: skip
 
     def held_out_rms(self) -> float | None:
         """RMS of normalised prediction errors at stops that the fit has not seen.
@@ -182,7 +254,8 @@ class NavigationFit(Fit):
         """List the stops that were found, and those held out."""
         held = self.test.held_out
         told = (f"stops held out of the fit: {', '.join(map(str, held))}",) if held else ()
-        return (*stops_line(self.test.recording, self.prepared), *told)
+        noise = () if self.noise is None else (NOT_WHITE.format(self.noise.words),)
+        return (*stops_line(self.test.recording, self.prepared), *told, *noise)
 
     def warnings(self, statistics: dict[str, float | None]) -> tuple[str, ...]:
         """Misfit as a whole and of single stops, and coefficients outside the specification.
@@ -209,7 +282,7 @@ class NavigationFit(Fit):
 
     def beyond_specification(self) -> list[str]:
         """Name coefficients far outside the IMU's file, one line each, the furthest first."""
-        return outside(self.setup.sensors, self.estimate)
+        return outside(self.setup.sensors, self.settled)
 
     def free_inertial(self, rivals: Sequence[tuple[str, Fit]]) -> tuple[FreeInertialRun, ...]:
         """Navigate without aid, with this fit and with `rivals` (name, fit), on parts that no fit has seen.
@@ -265,13 +338,13 @@ class FilterFit(NavigationFit):
     @property
     def values(self) -> Floats:
         """Coefficients (SI) in `body_frame`, shape (p,)."""
-        return body_frame.values_in_frame(self.names, self.estimate, self.body_frame)
+        return body_frame.values_in_frame(self.names, self.settled, self.body_frame)
 
     @cached_property
     def covariance(self) -> Floats:
         """Covariance of `values`, shape (p, p)."""
         J = body_frame.frame_jacobian(self.names, self.body_frame)
-        return np.asarray(J @ self.estimate_covariance @ J.T)
+        return np.asarray(J @ self.settled_covariance @ J.T)
 
     @cached_property
     def known(self) -> KnownPass:
@@ -294,7 +367,7 @@ class FilterFit(NavigationFit):
         constant = self.setup.sensors.decay_rate == 0.0
         begin = StartPoint(np.ascontiguousarray(C_nb), self.estimate * constant)
         solution = solve_filter(self.setup, prepared, begin, silent)
-        return replace(self, prepared=prepared, solution=solution)
+        return replace(self, prepared=prepared, solution=solution, noise=None)
 
     def compensated(self, prepared: PreparedData, estimate: Floats, C_start: Floats, end_of_fit: float) -> Compensated:
         """Take the errors at `estimate` (p,) out of all cycles to first order; the fit ended at `end_of_fit` (s)."""
@@ -316,8 +389,9 @@ class FilterFit(NavigationFit):
         J = body_frame.frame_jacobian(self.names, self.body_frame)
         rows = np.arange(0, len(self.prepared.epochs), out.stride)
         values = np.array(
-            [body_frame.values_in_frame(self.names, v, self.body_frame) for v in out.estimate[rows]]
+            [body_frame.values_in_frame(self.names, self.centring @ v, self.body_frame) for v in out.estimate[rows]]
         )
+        J = J @ self.centring
         return self._rows_of_history(rows, out, values, J @ out.covariance[: len(rows)] @ J.T)
 
     def notes(self) -> tuple[str, ...]:

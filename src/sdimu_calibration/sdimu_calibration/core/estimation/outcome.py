@@ -44,6 +44,9 @@ def outcome(fit: Fit, held_out: bool = True) -> Calibration:
         warnings=warnings,
         faults=fit.faults,
         estimator=fit.estimator,
+        estimator_reason=fit.reason,
+        noise=fit.noise_terms,
+        drift_means=fit.drift_means,
     )
 
 

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from sdimu_calibration.core.alignment.prepared import PreparedData, TestSetup, reduce
+from sdimu_calibration.core.data.static_detection import hides_earth_rate
 from sdimu_calibration.core.handheld.handheld import PreparedRun, prepare_run
 from sdimu_calibration.core.measurement_kind import SKIP
 from sdimu_calibration.core.recording import DataError, Recording
@@ -58,6 +60,11 @@ class PreparedTest:
         if key not in self._prepared:
             self._prepared[key] = reduce(self.recording, setup)
         return _masked(self._prepared[key], self.held_out)
+
+    @cached_property
+    def hides_earth_rate(self) -> bool:
+        """Whether the gyros' white noise in the usual rest hides the Earth's rate: nothing can be navigated."""
+        return hides_earth_rate(self.recording, self.imu)
 
     @property
     def run(self) -> PreparedRun:

@@ -127,3 +127,4 @@ class ClassicalFit(ReferenceFit):
     """Least squares of stops and turns against the table's angles."""
 
     estimator = "classical"
+    diagnosable = False

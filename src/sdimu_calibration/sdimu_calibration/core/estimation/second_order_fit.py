@@ -69,12 +69,12 @@ class SecondOrderFit(NavigationFit):
     @property
     def values(self) -> Floats:
         """Coefficients (SI) in `body_frame`, shape (p,)."""
-        return self.frame_model.values(self.estimate)
+        return self.frame_model.values(self.settled)
 
     @property
     def covariance(self) -> Floats:
         """Covariance of `values`, shape (p, p)."""
-        return self.frame_model.covariance(self.estimate_covariance)
+        return self.frame_model.covariance(self.settled_covariance)
 
     @cached_property
     def known(self) -> KnownPass:
@@ -102,7 +102,7 @@ class SecondOrderFit(NavigationFit):
         alignment = first_attitude(prepared.epochs, prepared.phases, self.setup)
         last, count, converged = solve_second_order(self.setup, prepared, alignment, begin, silent)
         return replace(
-            self, prepared=prepared, alignment=alignment, finished=last, count=count, stood_still=converged
+            self, prepared=prepared, alignment=alignment, finished=last, count=count, stood_still=converged, noise=None
         )
 
     def compensated(self, prepared: PreparedData, estimate: Floats, C_start: Floats, end_of_fit: float) -> Compensated:
@@ -120,8 +120,9 @@ class SecondOrderFit(NavigationFit):
     def history(self) -> History:
         """History of the last pass, at the epochs whose covariance was kept."""
         rows, out = self.last.rows, self.last.output
-        values = self.frame_model.values(self.last.reference + out.estimate[rows])
-        return self._rows_of_history(rows, out, values, self.frame_model.covariance(out.covariance))
+        T = self.centring
+        values = self.frame_model.values((self.last.reference + out.estimate[rows]) @ T.T)
+        return self._rows_of_history(rows, out, values, self.frame_model.covariance(T @ out.covariance @ T.T))
 
     def notes(self) -> tuple[str, ...]:
         """List the stops that were found; say how many passes were made."""

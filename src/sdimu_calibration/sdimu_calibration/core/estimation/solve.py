@@ -22,7 +22,6 @@ from sdimu_calibration.core.alignment.prepared import PreparedData, TestSetup, f
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.batch.batch import solve_batch
 from sdimu_calibration.core.batch.classical import TABLE_FRAME, solve_classical
-from sdimu_calibration.core.data.static_detection import hides_earth_rate
 from sdimu_calibration.core.effects import body_frame, imu_model
 from sdimu_calibration.core.effects.accelerometer_frame import (
     FRAME,
@@ -36,6 +35,7 @@ from sdimu_calibration.core.effects.imu_model import ImuModel
 from sdimu_calibration.core.estimation.fit import Fit, Start
 from sdimu_calibration.core.estimation.handheld_fit import HandheldFit
 from sdimu_calibration.core.estimation.navigation_fit import FilterFit, NavigationFit
+from sdimu_calibration.core.estimation.noise_learning import with_noise_learned
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.estimation.reference_fits import BatchFit, ClassicalFit
 from sdimu_calibration.core.estimation.second_order_fit import SecondOrderFit
@@ -58,6 +58,7 @@ def solve(
     estimator: str = AUTO,
     start: Start | None = None,
     progress: Progress = silent,
+    learn: bool = True,
 ) -> Fit:
     """Fit a model to a test.
 
@@ -72,19 +73,30 @@ def solve(
         Where a fit of nearly the same model ended: the estimator goes on from there.
     progress : callable
         Called with a word and the fraction done.
+    learn : bool
+        Learn the noise where the innovations contradict white noise.
 
     Raises
     ------
     DataError
         When the test, the model or the estimator cannot be used.
     """
-    name = choose_estimator(test, model) if estimator == AUTO else estimator
-    if name not in ESTIMATORS:
-        raise DataError(f"estimator '{name}': expected one of {', '.join((AUTO, *ESTIMATORS))}")
-    return ESTIMATORS[name](test, model, start, progress)
+    choice = choose_estimator(test, model) if estimator == AUTO else Choice(estimator, "by request")
+    if choice.estimator not in ESTIMATORS:
+        raise DataError(f"estimator '{estimator}': expected one of {', '.join((AUTO, *ESTIMATORS))}")
+    fit = replace(ESTIMATORS[choice.estimator](test, model, start, progress), reason=choice.reason)
+    return with_noise_learned(fit) if learn else fit
 
 
-def choose_estimator(test: PreparedTest, model: Model) -> str:
+@dataclass(frozen=True)
+class Choice:
+    """An estimator, and why it is the one."""
+
+    estimator: str
+    reason: str
+
+
+def choose_estimator(test: PreparedTest, model: Model) -> Choice:
     """Choose between ``handheld``, ``second-order`` and ``filter``.
 
     Raises
@@ -92,15 +104,19 @@ def choose_estimator(test: PreparedTest, model: Model) -> str:
     DataError
         When model and IMU do not fit together.
     """
-    if hides_earth_rate(test.recording, test.imu):
-        return HandheldFit.estimator
+    if test.hides_earth_rate:
+        return Choice(HandheldFit.estimator, "the gyros' white noise in the usual rest hides the Earth's rate")
     setup = _setup(test, model)
-    if _second_order_model(setup, float(test.recording.t[-1])) is not None:
-        return SecondOrderFit.estimator
-    return FilterFit.estimator
+    if _second_order_model(setup, float(test.recording.t[-1])) is None:
+        return Choice(FilterFit.estimator, "errors are so small that their squares do not count")
+    if squares_count(setup.sensors):
+        return Choice(SecondOrderFit.estimator, "squares of the scale factors and misalignments of this IMU file count")
+    return Choice(SecondOrderFit.estimator, "the gyros lose the attitude over the test so far that its square counts")
 
 
-def extend(fit: Fit, effects: Sequence[Effect], warm: bool = False, progress: Progress = silent) -> Fit:
+def extend(
+    fit: Fit, effects: Sequence[Effect], warm: bool = False, progress: Progress = silent, learn: bool = True
+) -> Fit:
     """Fit the same test with more effects in the model.
 
     Parameters
@@ -111,6 +127,8 @@ def extend(fit: Fit, effects: Sequence[Effect], warm: bool = False, progress: Pr
     warm : bool
         Begin where `fit` ended; else as `solve` does, which gives the same digits from any history.
     progress : callable
+    learn : bool
+        As for `solve`.
 
     Raises
     ------
@@ -118,7 +136,8 @@ def extend(fit: Fit, effects: Sequence[Effect], warm: bool = False, progress: Pr
         When the extended model cannot be fitted.
     """
     model = with_effects(fit.model, effects)
-    return solve(fit.test, model, fit.estimator, fit.start if warm else None, progress)
+    wider = solve(fit.test, model, fit.estimator, fit.start if warm else None, progress, learn)
+    return replace(wider, reason=fit.reason)
 
 
 def with_effects(model: Model, effects: Sequence[Effect]) -> Model:

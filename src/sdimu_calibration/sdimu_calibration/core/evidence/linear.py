@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TypeVar
 
@@ -27,6 +27,8 @@ E = TypeVar("E", bound="LinearEvidence")
 @dataclass(frozen=True)
 class LinearEvidence(ABC):
     """Whitened residuals ``e = W theta + white noise``, theta the deviation from the calibration.
+
+    Noise with a memory that was learned stands beside: ``e = W theta + noise u + white noise``, u of unit variance.
 
     Attributes
     ----------
@@ -53,6 +55,8 @@ class LinearEvidence(ABC):
         When the recording stood and turned.
     coefficients : int
         How many of the model's parameters, the first ones, are sensor coefficients.
+    noise : ndarray, shape (N, r)
+        Signatures of the modes of noise with a memory.
     """
 
     e: Floats
@@ -67,6 +71,7 @@ class LinearEvidence(ABC):
     imu: ImuSpecification
     times: Timetable
     coefficients: int
+    noise: Floats = field(default_factory=lambda: np.zeros((0, 0)), kw_only=True)
 
     @abstractmethod
     def signature(self, effects: Sequence[Effect]) -> Floats:
@@ -85,9 +90,25 @@ class LinearEvidence(ABC):
     @cached_property
     def information(self) -> Information:
         """Information on all parameters, the prior's pull on the model's in d."""
-        d = self.W.T @ self.e
+        d = self.W.T @ self.residuals
         d[: len(self.weight)] += self.weight * self.shift
-        return Information(self.W.T @ self.W, d)
+        return Information(self.W.T @ self.weighed(self.W), d)
+
+    @property
+    def residuals(self) -> Floats:
+        """Residuals weighed with the inverse covariance of all noise, shape (N,)."""
+        return self.weighed(self.e[:, None])[:, 0]
+
+    def weighed(self, columns: Floats) -> Floats:
+        """Columns (N, k) weighed with the inverse covariance of all noise, ``I + noise noise'``, shape (N, k)."""
+        if not self.noise.size:
+            return columns
+        M = np.eye(self.noise.shape[1]) + self.noise.T @ self.noise
+        return np.asarray(columns - self.noise @ np.linalg.solve(M, self.noise.T @ columns))
+
+    def with_noise(self: E, modes: Floats) -> E:
+        """Return the evidence with other modes of noise with a memory, shape (N, r)."""
+        return replace(self, noise=modes) if modes.size or self.noise.size else self
 
     def with_effects(self: E, effects: Sequence[Effect]) -> E:
         """Return the evidence with the parameters of more effects behind the candidates it has."""
@@ -99,9 +120,10 @@ class LinearEvidence(ABC):
             prior=np.concatenate([self.prior, prior]),
         )  # fmt: skip
         # Only what is new is multiplied: the old columns are many.
-        old, across = self.information, self.W.T @ W
-        J = np.block([[old.J, across], [across.T, W.T @ W]])
-        wider.__dict__["information"] = Information(J, np.concatenate([old.d, W.T @ self.e]))
+        weighed = self.weighed(W)
+        old, across = self.information, self.W.T @ weighed
+        J = np.block([[old.J, across], [across.T, W.T @ weighed]])
+        wider.__dict__["information"] = Information(J, np.concatenate([old.d, weighed.T @ self.e]))
         return wider
 
     def only(self: E, columns: Ints) -> E:
@@ -116,6 +138,34 @@ class LinearEvidence(ABC):
         full = self.information
         part.__dict__["information"] = Information(full.J[np.ix_(keep, keep)], full.d[keep])
         return part
+
+    def about(self: E, fresh: E, columns: Ints, tried: Sequence[Candidate]) -> E:
+        """Return this evidence about another fit: its residuals and priors with the signatures as they are.
+
+        Signatures change with the point by their share of the sensor errors, parts in a thousand of what they are.
+        What is exact are the residuals, so that repeated fits end where their own signatures would end.
+
+        Parameters
+        ----------
+        fresh : LinearEvidence
+            About the other fit, with no candidates.
+        columns : ndarray of int, shape (k,)
+            Coefficients of the model of that fit which are candidates here.
+        tried : sequence of Candidate, length k
+            The same as candidates.
+        """
+        p, labels = len(self.weight), [c.label for c in self.candidates]
+        places = [p + labels.index(c.label) for c in tried]
+        stays = np.setdiff1d(fresh.model, columns)
+        moved = replace(
+            fresh, e=fresh.e - self.W[:, places] @ fresh.shift[columns], W=self.W, names=self.names,
+            weight=fresh.weight[stays], shift=fresh.shift[stays], stated=fresh.stated[stays],
+            candidates=self.candidates, prior=self.prior, coefficients=self.coefficients,
+        )  # fmt: skip
+        d = moved.W.T @ moved.e
+        d[:p] += moved.weight * moved.shift
+        moved.__dict__["information"] = Information(self.information.J, d)
+        return moved
 
     def as_candidates(self: E, columns: Ints, tried: Sequence[Candidate]) -> E:
         """Make candidates of coefficients of the model, as if the calibration had not known them.

@@ -46,6 +46,10 @@ def predict(evidence: LinearEvidence, chosen: Ints, weight: Floats, shift: Float
         Noise against specification.
     """
     W, e = evidence.W[:, chosen], evidence.e
+    if evidence.noise.size:
+        # Noise with a memory is predicted like a parameter of unit variance: what a stop shares with its neighbours.
+        W, r = np.hstack([W, evidence.noise]), evidence.noise.shape[1]
+        weight, shift = np.append(weight, np.ones(r)), np.append(shift, np.zeros(r))
     J, d = W.T @ W, W.T @ e
     unit = 1.0 / np.sqrt(np.diag(J) + weight)
     stops = np.unique(evidence.stop)
@@ -61,7 +65,7 @@ def predict(evidence: LinearEvidence, chosen: Ints, weight: Floats, shift: Float
         # log N(error; 0, I + Ws A^-1 Ws') by the matrix inversion lemma, in the size of the model.
         root = np.linalg.cholesky(0.5 * (inverse + inverse.T) + 1e-18 * np.diag(np.diag(inverse)))
         X = Ws @ root
-        M = np.eye(len(chosen)) + X.T @ X
+        M = np.eye(len(weight)) + X.T @ X
         y = X.T @ error
         chi2 = (error @ error - y @ np.linalg.solve(M, y)) / scale**2
         score[k] = -0.5 * (chi2 + np.linalg.slogdet(M)[1] + 2.0 * len(es) * np.log(scale))

@@ -1,0 +1,48 @@
+"""What noise with a memory does to an estimate."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from sdimu_calibration.core.arrays import Floats
+from sdimu_calibration.core.noise_term import WORDS, NoiseTerm
+from sdimu_calibration.core.units import from_si
+
+
+@dataclass(frozen=True)
+class NoiseEstimate:
+    """Noise that was learned with the coefficients, and the coefficients in it.
+
+    Attributes
+    ----------
+    terms : tuple of NoiseTerm
+    deviation : ndarray, shape (q,)
+        Coefficients of the estimator less those in white noise (SI).
+    covariance : ndarray, shape (q, q)
+        Of the coefficients in this noise.
+    gain : float
+        Log-likelihood over that of white noise.
+    nis : float
+        Mean of the squared residuals, whitened with all noise; 1 is right.
+    held_out_rms : float
+        RMS of the normalised prediction errors at stops left out one at a time.
+    """
+
+    terms: tuple[NoiseTerm, ...]
+    deviation: Floats
+    covariance: Floats
+    gain: float
+    nis: float
+    held_out_rms: float
+
+    @property
+    def words(self) -> str:
+        """Name the terms with their sizes."""
+        return "; ".join(told(term) for term in self.terms)
+
+
+def told(term: NoiseTerm) -> str:
+    """Name a term with its size and the 95 % interval of it."""
+    size, low, high = (f"{from_si(v, term.display_unit):.3g}" for v in (term.size, term.low, term.high))
+    others = f" (or what looks the same: {', '.join(WORDS[kind] for kind in term.alike)})" if term.alike else ""
+    return f"{term.words} {size} ({low} to {high}) {term.display_unit}{others}"

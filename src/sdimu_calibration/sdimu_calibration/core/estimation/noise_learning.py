@@ -1,0 +1,108 @@
+"""A fit in the noise that its own residuals show: white noise is the first guess, not the last word."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TypeVar
+
+import numpy as np
+
+from sdimu_calibration.core.arrays import Floats
+from sdimu_calibration.core.effects import bias
+from sdimu_calibration.core.estimation.fit import Fit
+from sdimu_calibration.core.estimation.navigation_fit import NavigationFit
+from sdimu_calibration.core.estimation.noise_estimate import NoiseEstimate
+from sdimu_calibration.core.evidence.consistency import stop_means
+from sdimu_calibration.core.evidence.held_out import predict
+from sdimu_calibration.core.evidence.information import Information
+from sdimu_calibration.core.evidence.joint_information import Joint, balance
+from sdimu_calibration.core.evidence.learned_noise import Modes, Wander
+from sdimu_calibration.core.evidence.linear import LinearEvidence
+from sdimu_calibration.core.noise_term import NoiseTerm
+from sdimu_calibration.core.probability import chi2_tail
+
+F = TypeVar("F", bound=Fit)
+SUSPECTED_P = 0.05
+"""Probability of the means of the innovations at stops below which white noise is doubted: noise that changes a
+coefficient by half its sigma shows there, and one clean test in twenty only costs the time of a look."""
+
+
+def with_noise_learned(fit: F) -> F:
+    """Learn the noise of a fit where its innovations contradict white noise; else return the fit as it is.
+
+    Only a fit that navigates by its own passes learns noise; a handheld one learns scatter instead.
+
+    Parameters
+    ----------
+    fit : Fit
+    """
+    if not isinstance(fit, NavigationFit) or not suspected(fit):
+        return fit
+    evidence = fit.evidence()
+    wander = Wander.of(evidence)
+    found = balance(Joint.of(evidence, wander).given(evidence.model, evidence.weight).noise, wander)
+    return in_noise(fit, evidence, wander, found.terms)
+
+
+def suspected(fit: NavigationFit) -> bool:
+    """Whether the means of the innovations at stops scatter more than white noise lets them."""
+    output = fit.last.output
+    standard = output.innovation / output.innovation_sigma
+    means = np.array([m.normalised_mean for m in stop_means(standard, fit.prepared)])
+    return chi2_tail(float(means @ means), len(means)) < SUSPECTED_P
+
+
+def in_noise(fit: F, evidence: LinearEvidence, wander: Wander, terms: Sequence[NoiseTerm]) -> F:
+    """Estimate the coefficients of a fit again, in noise of these terms; without terms the fit is in white noise.
+
+    Parameters
+    ----------
+    fit : Fit
+        That navigates.
+    evidence : LinearEvidence
+        About the fit, in white noise; candidates are not looked at.
+    wander : Wander
+        Of the same test.
+    terms : sequence of NoiseTerm
+    """
+    if not isinstance(fit, NavigationFit):
+        return fit
+    if not terms:
+        return replace(fit, noise=None)
+    bare, modes = evidence.only(np.empty(0, dtype=np.int64)), wander.modes(terms)
+    noisy = bare.with_noise(modes.columns)
+    deviation, covariance = _with_mean(bare, modes)
+    residual = noisy.e - noisy.W @ noisy.information.estimate(noisy.model, noisy.weight)[0]
+    squared = float(residual @ noisy.weighed(residual[:, None])[:, 0])
+    rms = predict(noisy, noisy.model, noisy.weight, noisy.shift).rms
+    joint = Joint.of(bare, wander).given(evidence.model, evidence.weight)
+    gain = joint.likelihood(terms) - joint.fitted
+    estimate = NoiseEstimate(
+        tuple(terms), deviation, covariance, gain, squared / max(1, len(residual) - len(deviation)), rms
+    )
+    return replace(fit, noise=estimate)
+
+
+def _with_mean(evidence: LinearEvidence, modes: Modes) -> tuple[Floats, Floats]:
+    """Deviation of the coefficients (q,) and its covariance, a bias with the mean of its noise over all dwells.
+
+    A constant part of wandering noise cannot be told from the bias, so the bias by itself means nothing in it; what
+    the bias was in the mean over the test is known well.
+    """
+    q, r = len(evidence.weight), modes.columns.shape[1]
+    W = np.hstack([evidence.W, modes.columns])
+    weight = np.append(evidence.weight, np.ones(r))
+    d = W.T @ evidence.e
+    d[:q] += evidence.weight * evidence.shift
+    estimate, covariance = Information(W.T @ W, d).estimate(np.arange(q + r), weight)
+    T = np.hstack([np.eye(q), np.zeros((q, r))])
+    for channel, name in enumerate(bias.NAMES):
+        if name in evidence.names:
+            T[evidence.names.index(name), q:] = modes.mean[channel]
+    return T @ estimate, T @ covariance @ T.T
+
+
+def in_white_noise(fit: F) -> F:
+    """Return the fit as its passes left it, in white noise."""
+    return replace(fit, noise=None) if isinstance(fit, NavigationFit) and fit.noise is not None else fit

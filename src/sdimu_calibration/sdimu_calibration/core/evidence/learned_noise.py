@@ -1,0 +1,333 @@
+"""Noise with a memory, learned from a linear model of a recording by maximum likelihood.
+
+Every sensor gets an unknown mean error in every stretch of the test; their signatures U stand in the whitened
+residuals like those of any parameter. A noise term says how these errors correlate (`noise_kernels`), so that
+
+    e = X theta + U u + white noise,   u ~ N(0, K),   K = sum of size^2 kernel
+
+With the coefficients theta estimated along (they are taken out by a Schur complement first), the log-likelihood of
+the sizes is the restricted one:
+
+    L = -1/2 log det(I + R'AR) + 1/2 (R'b)' (I + R'AR)^-1 R'b,   K = RR',
+
+A and b the information on u when theta is estimated with it. Source: H. Patterson, R. Thompson, "Recovery of
+inter-block information when block sizes are unequal", Biometrika 58 (1971).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from sdimu_calibration.core.arrays import Floats
+from sdimu_calibration.core.evidence.linear import LinearEvidence
+from sdimu_calibration.core.evidence.noise_kernels import Stretches, stretch_effects, stretches
+from sdimu_calibration.core.noise_term import FLICKER, KINDS, MARKOV, RANDOM_WALK, SHIFT, STOP, TRIADS, TURN, NoiseTerm
+
+LEAST_GAIN = 5.0
+"""Least gain of the log-likelihood (1) by a noise term: of 16 terms tried on white noise, one in two hundred tests
+reaches it."""
+_TUNING = tuple(1.25**k for k in range(-4, 5))
+"""Ratios of time constants to the one that was found: half way to its neighbours, and a quarter beyond."""
+_INDISTINGUISHABLE = 3.0
+"""Log-likelihood (1) within which kinds of noise are not told apart: odds of 20 to 1."""
+_MOST_TERMS = 2
+"""Number of noise terms of a triad at most: a test of an hour tells no more apart."""
+_SWEEPS = 3
+"""Number of times that all sizes are optimised in turn: a fourth changes them by less than a tenth of their sigma."""
+_SEEN = 5e-2
+"""Ratio of the information on a mode to that of its prior below which it is left out: the data say nothing of it."""
+_GRID = np.logspace(-3.0, 8.0, 111)
+"""Ratios of the variance to that at which the best seen mode is as large as its noise: no size lies outside."""
+_FINE = np.logspace(-0.12, 0.12, 49)
+"""Factors about the best variance of the grid: a hundredth of the width of its likelihood."""
+_INTERVAL = 1.92
+"""Fall of the log-likelihood (1) at the bounds of a 95 % interval: half of chi-square with one degree of freedom."""
+_SHORTEST_TAU = 0.2
+"""Ratio of the shortest time constant that is tried to a stretch: faster noise is white from stretch to stretch."""
+_TAUS = 8
+"""Number of time constants that are tried, up to a third of the test: neighbours differ by less than an interval."""
+
+
+@dataclass(frozen=True)
+class Modes:
+    """Independent modes of noise with a memory, r of unit variance.
+
+    Attributes
+    ----------
+    columns : ndarray, shape (N, r)
+        Signatures in the whitened residuals.
+    mean : ndarray, shape (6, r)
+        What each mode adds to the mean error of each sensor over all dwells (SI).
+    """
+
+    columns: Floats
+    mean: Floats
+
+
+@dataclass(frozen=True)
+class Wander:
+    """How wandering biases of the six sensors would show in a test.
+
+    Attributes
+    ----------
+    cut : Stretches
+        n stretches.
+    U : ndarray, shape (N, 6 n)
+        Signatures; column ``6 stretch + channel``.
+    """
+
+    cut: Stretches
+    U: Floats
+
+    @cached_property
+    def square(self) -> Floats:
+        """Information on the mean errors, ``U'U``.
+
+        Returns
+        -------
+        ndarray, shape (6 n, 6 n)
+            Inverse squares of the units (SI) of the errors.
+        """
+        return np.asarray(self.U.T @ self.U)
+
+    @classmethod
+    def of(cls, evidence: LinearEvidence) -> Wander:
+        """Work out the signatures for the test of an evidence."""
+        cut = stretches(evidence.times)
+        return cls(cut, evidence.signature(stretch_effects(cut)))
+
+    def modes(self, terms: Sequence[NoiseTerm]) -> Modes:
+        """Work out independent modes of noise, without those of which the data say nothing."""
+        root = root_of(terms, self.cut)
+        values, vectors = np.linalg.eigh(root.T @ self.square @ root)
+        root = root @ vectors[:, values > _SEEN]
+        share = np.where(self.cut.turning, 0.0, self.cut.end - self.cut.start)
+        share = share / share.sum()
+        mean = np.einsum("s,scr->cr", share, root.reshape(len(self.cut), 6, -1))
+        return Modes(self.U @ root, mean)
+
+
+@dataclass(frozen=True)
+class NoiseInformation:
+    """Information on the mean errors in all stretches, the known parameters estimated along.
+
+    Attributes
+    ----------
+    J : ndarray, shape (6 n, 6 n)
+    d : ndarray, shape (6 n,)
+    fitted : float
+        Log-likelihood that the known parameters add, with white noise alone.
+    """
+
+    J: Floats
+    d: Floats
+    fitted: float
+
+    def block(self, row: str, column: str) -> Floats:
+        """Cut out the information across two triads, stretch by axis.
+
+        Returns
+        -------
+        ndarray, shape (3 n, 3 n)
+            Inverse squares of the units (SI) of the errors.
+        """
+        n = len(self.d) // 6
+        a, b = 3 * TRIADS.index(row), 3 * TRIADS.index(column)
+        cut = self.J.reshape(n, 6, n, 6)[:, a : a + 3, :, b : b + 3]
+        return np.ascontiguousarray(cut).reshape(3 * n, 3 * n)
+
+    def part(self, triad: str) -> Floats:
+        """Cut out the information vector of a triad.
+
+        Returns
+        -------
+        ndarray, shape (3 n,)
+            Inverse units (SI) of the errors.
+        """
+        first = 3 * TRIADS.index(triad)
+        return np.ascontiguousarray(self.d.reshape(-1, 6)[:, first : first + 3]).ravel()
+
+
+def learn(information: NoiseInformation, cut: Stretches, start: Sequence[NoiseTerm] = ()) -> tuple[NoiseTerm, ...]:
+    """Find the noise terms that the data ask for, with their sizes; none where white noise will do.
+
+    Parameters
+    ----------
+    information : NoiseInformation
+    cut : Stretches
+    start : sequence of NoiseTerm
+        Terms to begin with.
+    """
+    terms = refined(information, cut, start)
+    tried = _kinds(cut)
+    while True:
+        given = {triad: _given(information, cut, terms, triad) for triad in TRIADS}
+        options = [_best_size(*given[t.triad], cut, t) for t in tried if _room(terms, t)]
+        best = max(options, key=lambda t: t.gain, default=None)
+        if best is None or best.gain < LEAST_GAIN:
+            return _tuned(information, cut, terms)
+        terms = refined(information, cut, (*terms, best))
+
+
+def _tuned(information: NoiseInformation, cut: Stretches, terms: Sequence[NoiseTerm]) -> tuple[NoiseTerm, ...]:
+    """Fit the time constants of Markov terms between those that were tried; the intervals of the sizes take them in."""
+    out = list(terms)
+    for place, term in enumerate(terms):
+        if not term.tau:
+            continue
+        given = _given(information, cut, [t for t in out if t is not term], term.triad)
+        near = [_best_size(*given, cut, replace(term, tau=float(f"{term.tau * k:.3g}"))) for k in _TUNING]
+        best = max(near, key=lambda t: t.gain)
+        likely = [t for t in near if t.gain > best.gain - _INTERVAL]
+        out[place] = replace(best, low=min(t.low for t in likely), high=max(t.high for t in likely))
+    return tuple(out)
+
+
+def with_alike(information: NoiseInformation, cut: Stretches, terms: Sequence[NoiseTerm]) -> tuple[NoiseTerm, ...]:
+    """Say of each term which kinds in its place are as likely, within odds of 20 to 1."""
+    out = []
+    for term in terms:
+        given = _given(information, cut, [t for t in terms if t is not term], term.triad)
+        others = [_best_size(*given, cut, t) for t in _kinds(cut) if t.triad == term.triad and t.kind != term.kind]
+        near = {t.kind for t in others if t.gain > term.gain - _INDISTINGUISHABLE}
+        out.append(replace(term, alike=tuple(kind for kind in KINDS if kind in near)))
+    return tuple(out)
+
+
+def _room(terms: Sequence[NoiseTerm], term: NoiseTerm) -> bool:
+    of_triad = [t for t in terms if t.triad == term.triad]
+    return len(of_triad) < _MOST_TERMS and term.kind not in {t.kind for t in of_triad}
+
+
+def _kinds(cut: Stretches) -> list[NoiseTerm]:
+    shortest = _SHORTEST_TAU * float(np.median(cut.end - cut.start))
+    longest = max(float(cut.end[-1]) / 3.0, 2.0 * shortest)
+    taus = [float(f"{tau:.3g}") for tau in np.geomspace(shortest, longest, _TAUS)]
+    out = []
+    for triad in TRIADS:
+        out += [NoiseTerm(triad, kind) for kind in (RANDOM_WALK, FLICKER, STOP, TURN, SHIFT)]
+        out += [NoiseTerm(triad, MARKOV, tau) for tau in taus]
+    return out
+
+
+def refined(information: NoiseInformation, cut: Stretches, terms: Sequence[NoiseTerm]) -> tuple[NoiseTerm, ...]:
+    """Optimise the sizes of all terms together; drop those that the data do not ask for."""
+    kept = list(terms)
+    for _ in range(_SWEEPS if len(kept) > 1 else 1):
+        for place in range(len(kept)):
+            others = [t for k, t in enumerate(kept) if k != place]
+            kept[place] = _alone(information, cut, others, kept[place])
+    weakest = min(kept, key=lambda t: t.gain, default=None)
+    if weakest is None or weakest.gain >= LEAST_GAIN:
+        return tuple(kept)
+    return refined(information, cut, [t for t in kept if t is not weakest])
+
+
+def likelihood(information: NoiseInformation, cut: Stretches, terms: Sequence[NoiseTerm]) -> float:
+    """Log-likelihood of the known parameters and the noise terms, against no parameters and white noise."""
+    if not terms:
+        return information.fitted
+    R = root_of(terms, cut)
+    M = np.eye(R.shape[1]) + R.T @ information.J @ R
+    y = R.T @ information.d
+    return information.fitted + 0.5 * float(y @ np.linalg.solve(M, y)) - 0.5 * float(np.linalg.slogdet(M)[1])
+
+
+def _alone(information: NoiseInformation, cut: Stretches, others: Sequence[NoiseTerm], term: NoiseTerm) -> NoiseTerm:
+    """Best size of one term, the others standing; with its interval, and the gain over doing without it."""
+    return _best_size(*_given(information, cut, others, term.triad), cut, term)
+
+
+def _best_size(J: Floats, d: Floats, cut: Stretches, term: NoiseTerm) -> NoiseTerm:
+    """Best size of a term, J (3 n, 3 n) and d (3 n,) the information on the wander of its triad."""
+    root = cut.mode(term.kind, term.tau)
+    values, vectors = np.linalg.eigh(_projected(J, root))
+    values = np.maximum(values, 0.0)
+    y2 = (vectors.T @ (root.T @ d.reshape(len(cut), 3)).ravel()) ** 2
+    largest = float(values.max(initial=0.0))
+    if largest <= 0.0:
+        return replace(term, size=0.0, low=0.0, high=0.0, gain=0.0)
+    variance = _GRID / largest
+    gain = _gain(variance, values, y2)
+    at = int(np.argmax(gain))
+    if gain[at] <= 0.0:
+        inside = np.flatnonzero(gain > -_INTERVAL)
+        high = float(np.sqrt(variance[inside[-1]])) if len(inside) else 0.0
+        return replace(term, size=0.0, low=0.0, high=high, gain=0.0)
+    fine = variance[at] * _FINE
+    near = _gain(fine, values, y2)
+    best = int(np.argmax(near))
+    inside = np.flatnonzero(gain > near[best] - _INTERVAL)
+    low = 0.0 if near[best] < _INTERVAL else float(np.sqrt(variance[max(inside[0] - 1, 0)]))
+    high = float(np.sqrt(variance[min(inside[-1] + 1, len(variance) - 1)]))
+    return replace(term, size=float(np.sqrt(fine[best])), low=low, high=high, gain=float(near[best]))
+
+
+def _projected(J: Floats, root: Floats) -> Floats:
+    """Information on the modes of a triad, ``R'JR`` with the root (n, r) for each of the three sensors; (3 r, 3 r)."""
+    n, r = root.shape
+    once = (root.T @ J.reshape(n, 9 * n)).reshape(3 * r, n, 3)
+    out = np.ascontiguousarray(once.transpose(0, 2, 1)).reshape(9 * r, n) @ root
+    return np.ascontiguousarray(out.reshape(3 * r, 3, r).transpose(0, 2, 1)).reshape(3 * r, 3 * r)
+
+
+def _gain(variance: Floats, values: Floats, y2: Floats) -> Floats:
+    """Log-likelihood at each variance (v,), of modes with information `values` and squared projections `y2` (m,)."""
+    grown = 1.0 + variance[:, None] * values
+    return np.asarray(0.5 * np.sum(variance[:, None] * y2 / grown - np.log(grown), axis=1))
+
+
+def _given(
+    information: NoiseInformation, cut: Stretches, terms: Sequence[NoiseTerm], triad: str
+) -> tuple[Floats, Floats]:
+    """Information on further wander of a triad when that of `terms` is in the model: J (3 n, 3 n) and d (3 n,)."""
+    blocks = {(a, b): information.block(a, b) for a in TRIADS for b in TRIADS}
+    J, d = blocks[triad, triad], information.part(triad)
+    roots = {name: _triad_root(terms, cut, name) for name in TRIADS}
+    taken = [name for name in TRIADS if roots[name].shape[1]]
+    if not taken:
+        return J, d
+    B = np.hstack([_times(blocks[triad, name], roots[name]) for name in taken])
+    M = np.block([[_times(_times(blocks[b, a], roots[a]).T, roots[b]).T for a in taken] for b in taken])
+    y = np.concatenate([(roots[name].T @ information.part(name).reshape(len(cut), 3)).ravel() for name in taken])
+    M[np.diag_indices_from(M)] += 1.0
+    X = np.linalg.solve(M, np.column_stack([B.T, y]))
+    return J - B @ X[:, :-1], d - B @ X[:, -1]
+
+
+def _times(J: Floats, root: Floats) -> Floats:
+    """``J (root x I3)``: columns of a matrix (m, 3 n) spread over the modes (n, r) of three sensors; (m, 3 r)."""
+    n, r = root.shape
+    return np.ascontiguousarray(np.tensordot(J.reshape(-1, n, 3), root, axes=(1, 0)).transpose(0, 2, 1)).reshape(
+        -1, 3 * r
+    )
+
+
+def root_of(terms: Sequence[NoiseTerm], cut: Stretches) -> Floats:
+    """Square root R of the covariance of the mean errors, ``K = RR'``.
+
+    Returns
+    -------
+    ndarray, shape (6 n, r)
+        SI.
+    """
+    return np.hstack([_spread(_triad_root(terms, cut, triad), triad, len(cut)) for triad in TRIADS])
+
+
+def _triad_root(terms: Sequence[NoiseTerm], cut: Stretches, triad: str) -> Floats:
+    """Square root of the covariance of the terms of a triad for one of its sensors, shape (n, r)."""
+    parts = [t.size * cut.mode(t.kind, t.tau) for t in terms if t.triad == triad and t.size > 0.0]
+    return np.hstack(parts) if parts else np.zeros((len(cut), 0))
+
+
+def _spread(root: Floats, triad: str, count: int) -> Floats:
+    """Root (n, r) of one sensor for the three of a triad, shape (6 n, 3 r)."""
+    out = np.zeros((count, 6, root.shape[1], 3))
+    first = 3 * TRIADS.index(triad)
+    for axis in range(3):
+        out[:, first + axis, :, axis] = root
+    return out.reshape(6 * count, -1)

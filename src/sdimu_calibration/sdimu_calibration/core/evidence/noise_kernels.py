@@ -1,0 +1,154 @@
+"""How noise that is not white correlates over the stretches of a test: random walk, flicker, Markov, drawn anew.
+
+A stretch is a part of a dwell or of a turn, over which the wandering bias of a sensor is taken as its mean. Each term
+has one size; its covariance over the stretches is the square of the size times a kernel.
+
+Sources: IEEE Std 952-1997, annex C (random walk, flicker, Markov noise); K. Keshner, "1/f noise", Proc. IEEE 70 (1982)
+(flicker as a sum of Markov terms whose time constants are in geometric progression).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from sdimu_calibration.core.arrays import Bools, Floats, Ints
+from sdimu_calibration.core.effects.effect import CHANNELS, Effect, Parameter, Term, Timetable
+from sdimu_calibration.core.effects.motion import Motion
+from sdimu_calibration.core.noise_term import FLICKER, MARKOV, RANDOM_WALK, SHIFT, TURN
+
+_LONGEST_S = 30.0
+"""Longest stretch (s): a third of the shortest time constant that is told from white noise."""
+_MOST = 100
+"""Number of stretches at most: longer tests have longer ones, and the time of an estimate goes with the cube."""
+_KEPT = 3e-3
+"""Share of the largest eigenvalue of a kernel below which a mode is left out: it is below white noise."""
+_RATIO = 4.0
+"""Ratio of neighbouring time constants of flicker noise: the density then ripples by 2 %."""
+_SHORTEST_TAU_S = 2.0
+"""Shortest time constant of flicker noise (s): below it white noise hides it."""
+
+
+@dataclass(frozen=True)
+class Stretches:
+    """Stretches of a test, n of them, in the order of time.
+
+    Attributes
+    ----------
+    start, end : ndarray, shape (n,)
+        s.
+    interval : ndarray of int, shape (n,)
+        Number of the dwell or turn that a stretch is part of.
+    turning : ndarray of bool, shape (n,)
+    """
+
+    start: Floats
+    end: Floats
+    interval: Ints
+    turning: Bools
+    _modes: dict[tuple[str, float], Floats] = field(default_factory=dict, repr=False, compare=False)
+
+    def __len__(self) -> int:
+        """Return the number of stretches."""
+        return len(self.start)
+
+    def mode(self, kind: str, tau: float) -> Floats:
+        """Square root R of the kernel of a kind of noise, ``kernel = RR'`` but for its small modes.
+
+        Returns
+        -------
+        ndarray, shape (n, r)
+            Unit of `kernel`, root.
+        """
+        if (kind, tau) not in self._modes:
+            values, vectors = np.linalg.eigh(kernel(kind, tau, self))
+            keep = values > _KEPT * values[-1]
+            self._modes[kind, tau] = np.asarray(vectors[:, keep] * np.sqrt(values[keep]))
+        return self._modes[kind, tau]
+
+
+def stretches(times: Timetable) -> Stretches:
+    """Cut the dwells and turns of a test into stretches."""
+    longest = max(_LONGEST_S, times.duration / _MOST)
+    spans = sorted([(a, b, False) for _, a, b in times.stops] + [(a, b, True) for _, a, b in times.turns])
+    rows: list[tuple[float, float, int, bool]] = []
+    for number, (begin, end, turning) in enumerate(spans):
+        edges = np.linspace(begin, end, max(1, int(np.ceil((end - begin) / longest - 1e-9))) + 1)
+        rows += [(a, b, number, turning) for a, b in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True)]
+    start, end_, interval, turns = zip(*rows, strict=True)
+    return Stretches(np.array(start), np.array(end_), np.array(interval, dtype=np.int64), np.array(turns))
+
+
+def stretch_effects(cut: Stretches) -> list[Effect]:
+    """Give every sensor a constant error of its own in every stretch; one effect a stretch, six parameters each."""
+
+    def one(begin: float, end: float) -> Effect:
+        def share(motion: Motion) -> Floats:
+            overlap = np.minimum(motion.t, end) - np.maximum(motion.t - motion.dt, begin)
+            return np.asarray(np.clip(overlap / motion.dt, 0.0, 1.0)[:, None].repeat(6, axis=1))
+
+        label = f"{begin:.1f} to {end:.1f} s"
+        return Effect(
+            name=label, title=label, equation="constant in this stretch",
+            parameters=tuple(
+                Parameter(f"{c} {label}", "rad/s" if i < 3 else "m/s^2", "deg/h" if i < 3 else "ug")
+                for i, c in enumerate(CHANNELS)
+            ),
+            terms=tuple(Term(i, i) for i in range(6)), regressors=share, prior={},
+        )  # fmt: skip
+
+    return [one(a, b) for a, b in zip(cut.start.tolist(), cut.end.tolist(), strict=True)]
+
+
+def kernel(kind: str, tau: float, cut: Stretches) -> Floats:
+    """Covariance of the mean of a kind of noise over the stretches, for a size of one.
+
+    Parameters
+    ----------
+    kind : str
+        One of `KINDS`.
+    tau : float
+        Time constant of Markov noise (s).
+    cut : Stretches
+
+    Returns
+    -------
+    ndarray, shape (n, n)
+        A pure number; for a random walk in s.
+    """
+    if kind == RANDOM_WALK:
+        return _walk(cut.start, cut.end)
+    if kind == MARKOV:
+        return _markov(cut.start, cut.end, tau)
+    if kind == FLICKER:
+        # One- and two-sided density B^2/(2 pi f): a Markov term of every time constant, variance B^2 ln(ratio)/pi.
+        longest = 10.0 * float(cut.end[-1])
+        count = int(np.ceil(np.log(longest / _SHORTEST_TAU_S) / np.log(_RATIO))) + 1
+        parts = [_markov(cut.start, cut.end, _SHORTEST_TAU_S * _RATIO**k) for k in range(count)]
+        return np.asarray(np.log(_RATIO) / np.pi * np.sum(parts, axis=0))
+    if kind == SHIFT:
+        passed = np.cumsum(np.concatenate([[0.0], (cut.turning[1:] & ~cut.turning[:-1]).astype(float)]))
+        passed = passed - 0.5 * cut.turning
+        return np.asarray(np.minimum.outer(passed, passed))
+    of_kind = cut.turning if kind == TURN else ~cut.turning
+    same = cut.interval[:, None] == cut.interval[None, :]
+    return np.asarray((same & of_kind[:, None]).astype(np.float64))
+
+
+def _walk(start: Floats, end: Floats) -> Floats:
+    """Covariance of the means of a random walk that starts at zero at t = 0."""
+    middle = 0.5 * (start + end)
+    out = np.minimum.outer(middle, middle)
+    np.fill_diagonal(out, start + (end - start) / 3.0)
+    return np.asarray(out)
+
+
+def _markov(start: Floats, end: Floats, tau: float) -> Floats:
+    """Covariance of the means of first-order Markov noise of unit variance."""
+    x = (end - start) / tau
+    share = -np.expm1(-x) / x
+    gap = np.maximum(start[None, :] - end[:, None], start[:, None] - end[None, :]) / tau
+    out = np.exp(-np.maximum(gap, 0.0)) * np.outer(share, share)
+    np.fill_diagonal(out, 2.0 * (1.0 - share) / x)
+    return np.asarray(out)

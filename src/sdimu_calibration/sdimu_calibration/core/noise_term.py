@@ -1,0 +1,72 @@
+"""One term of the noise of a triad that has a memory."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+RANDOM_WALK = "random_walk"
+FLICKER = "flicker"
+MARKOV = "markov"
+STOP = "stop"
+TURN = "turn"
+SHIFT = "shift"
+KINDS = (RANDOM_WALK, FLICKER, MARKOV, STOP, TURN, SHIFT)
+"""Kinds of noise with a memory."""
+WORDS = {
+    RANDOM_WALK: "rate random walk",
+    FLICKER: "bias instability (flicker)",
+    MARKOV: "Gauss-Markov noise",
+    STOP: "bias drawn anew at each stop",
+    TURN: "bias drawn anew in each turn",
+    SHIFT: "bias shifted in each turn for good",
+}
+_ACCEL_WALK = "acceleration random walk"
+TRIADS = ("gyro", "accel")
+
+
+@dataclass(frozen=True)
+class NoiseTerm:
+    """One term of the noise of a triad.
+
+    Attributes
+    ----------
+    triad : str
+        ``gyro`` or ``accel``.
+    kind : str
+        One of `KINDS`.
+    tau : float
+        Time constant of Markov noise (s); 0 for the other kinds.
+    size : float
+        SI: sigma of the wandering bias; of a random walk per root second; of flicker the bias instability B.
+    low, high : float
+        Bounds of the size, 95 %.
+    gain : float
+        Log-likelihood that the term adds.
+    alike : tuple of str
+        Kinds that the data cannot tell from it.
+    """
+
+    triad: str
+    kind: str
+    tau: float = 0.0
+    size: float = 0.0
+    low: float = 0.0
+    high: float = 0.0
+    gain: float = 0.0
+    alike: tuple[str, ...] = ()
+
+    @property
+    def words(self) -> str:
+        """Name the term as people do."""
+        word = _ACCEL_WALK if (self.triad, self.kind) == ("accel", RANDOM_WALK) else WORDS[self.kind]
+        return f"{self.triad} {word}" + (f" of {self.tau:.0f} s" if self.tau else "")
+
+    @property
+    def unit(self) -> str:
+        """Unit of the size (SI)."""
+        return ("rad/s" if self.triad == "gyro" else "m/s^2") + ("/sqrt(s)" if self.kind == RANDOM_WALK else "")
+
+    @property
+    def display_unit(self) -> str:
+        """Unit in which people read the size."""
+        return ("deg/h" if self.triad == "gyro" else "ug") + ("/sqrt(h)" if self.kind == RANDOM_WALK else "")

@@ -1,0 +1,88 @@
+"""Noise with a memory is found with its size where it is, and nowhere else."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from sdimu_calibration.core.effects.effect import Timetable
+from sdimu_calibration.core.evidence.learned_noise import LEAST_GAIN, NoiseInformation, learn, likelihood, root_of
+from sdimu_calibration.core.evidence.noise_kernels import kernel, stretches
+from sdimu_calibration.core.noise_term import KINDS, MARKOV, NoiseTerm
+
+STOPS = 12
+
+
+@pytest.fixture(scope="module")
+def cut():
+    """Twelve dwells of 120 s with turns of 40 s between them."""
+    stops = tuple((k, 160.0 * k, 160.0 * k + 120.0) for k in range(STOPS))
+    turns = tuple((k, 160.0 * k + 120.0, 160.0 * (k + 1)) for k in range(STOPS - 1))
+    return stretches(Timetable(160.0 * STOPS - 40.0, stops, turns))
+
+
+def drawn(cut, terms, seed):
+    """Information of an ideal sensor that measures each stretch with a white error of one, wandering by `terms`."""
+    rng = np.random.default_rng(seed)
+    root = root_of(terms, cut)
+    e = rng.standard_normal(6 * len(cut)) + root @ rng.standard_normal(root.shape[1])
+    return NoiseInformation(np.eye(6 * len(cut)), e, 0.0)
+
+
+def test_stretches_cover_dwells_and_turns(cut):
+    assert cut.start[0] == 0.0
+    np.testing.assert_allclose(cut.start[1:], cut.end[:-1])
+    assert not cut.turning[0]
+    assert (cut.end - cut.start).max() <= 30.0
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_kernel_is_the_covariance_of_means_of_draws(cut, kind):
+    """Against brute force: draws second by second, averaged over the stretches."""
+    tau = 100.0 if kind == MARKOV else 0.0
+    K = kernel(kind, tau, cut)
+    np.testing.assert_allclose(K, K.T)
+    assert np.linalg.eigvalsh(K).min() > -1e-9 * np.linalg.eigvalsh(K).max()
+    if kind != MARKOV:
+        return
+    t = np.arange(0.5, cut.end[-1])
+    C = np.exp(-np.abs(t[:, None] - t[None, :]) / tau)
+    mean = np.array([((t > a) & (t < b)) / ((t > a) & (t < b)).sum() for a, b in zip(cut.start, cut.end, strict=True)])
+    np.testing.assert_allclose(K, mean @ C @ mean.T, atol=2e-3)
+
+
+def test_flicker_has_the_allan_deviation_of_its_name():
+    """Half the mean square of differences of neighbouring means is (2 ln 2 / pi) B^2 (IEEE Std 952, annex C)."""
+    dwells = tuple((k, 30.0 * k, 30.0 * k + 30.0) for k in range(40))
+    K = kernel("flicker", 0.0, stretches(Timetable(1200.0, dwells, ())))
+    difference = np.diag(K)[1:] + np.diag(K)[:-1] - 2.0 * np.diag(K, 1)
+    assert 0.5 * difference.mean() == pytest.approx(2.0 * np.log(2.0) / np.pi, rel=0.05)
+
+
+@pytest.mark.parametrize(("kind", "size"), [(k, 0.2 if k == "random_walk" else 3.0) for k in KINDS])
+def test_the_size_of_a_term_is_inside_its_interval(cut, kind, size):
+    true = NoiseTerm("gyro", kind, 100.0 if kind == MARKOV else 0.0, size)
+    inside = named = 0
+    for seed in range(1, 21):
+        information = drawn(cut, [true], seed)
+        found = learn(information, cut)
+        assert all(t.triad == "gyro" for t in found)
+        own = [t for t in found if t.kind == kind]
+        named += bool(own)
+        # Of a family that looks alike, the true one is never much worse than the one that was taken.
+        assert likelihood(information, cut, found) > likelihood(information, cut, [true]) - 3.0
+        inside += any(t.low <= size <= t.high for t in own)
+    assert named >= 12
+    assert inside >= 0.75 * named
+
+
+def test_white_noise_has_no_memory(cut):
+    false = sum(bool(learn(drawn(cut, [], seed), cut)) for seed in range(100, 200))
+    assert false <= 3
+    assert LEAST_GAIN > 0.0
+
+
+def test_noise_of_one_triad_is_not_told_of_the_other(cut):
+    true = [NoiseTerm("accel", "random_walk", size=0.3)]
+    for seed in range(1, 11):
+        assert {t.triad for t in learn(drawn(cut, true, seed), cut)} == {"accel"}
