@@ -121,11 +121,14 @@ def _draw(rng: np.random.Generator, fit: Fit) -> Truth:
     evidence = fit.evidence([e for e in known if not (fit.learns_scatter and (e.options or e.needs_table))])
     scanned = scan(evidence.information, evidence.model, evidence.weight)
     p, hideable = len(evidence.weight), hideable_names()
+    # What a coefficient of the model is but for its prior is not missing: mass unbalance is a sensitivity to force.
+    free = scan(evidence.information, evidence.model, 1e-9 * evidence.weight).retention
     size = float(np.exp(rng.uniform(*np.log(_SPAN))))
     pool: dict[str, list[int]] = {}
     for k, candidate in enumerate(evidence.candidates):
         name = candidate.parameter.name
-        seen = name in hideable and not candidate.effect.options and scanned.retention[p + k] >= TESTABLE
+        left = min(scanned.retention[p + k], free[p + k])
+        seen = name in hideable and not candidate.effect.options and left >= TESTABLE
         if seen and size * scanned.sigma[p + k] <= PLAUSIBLE * evidence.prior[k]:
             pool.setdefault(candidate.family, []).append(k)
     family = str(rng.choice(sorted(pool)))

@@ -29,6 +29,7 @@ from sdimu_calibration.storage.effect_file import find_effects
 from sdimu_calibration.storage.export import FORMS, export
 from sdimu_calibration.storage.result_file import read_result, write_result
 from sdimu_sim.bag_file import write_test
+from sdimu_sim.campaign.grade_run import choice
 from sdimu_sim.campaign.run import CalibrationRun
 from sdimu_sim.core.by_hand import ByHand, by_hand_recording
 from sdimu_sim.core.scenario import Scenario, generate, simulate_test
@@ -186,3 +187,9 @@ def test_the_estimator_follows_from_the_file_and_the_plan(imu):
     small = {HANDHELD_IMU: "handheld", "dtg": "filter", "rlg_navigation": "filter", "fog_tactical": "filter"}
     expected = small.get(imu, "second-order")
     assert choose_estimator(test_of(imu), model_of(imu)).estimator == expected
+
+
+@pytest.mark.parametrize(("plan", "seed"), [("kim18", 50_001), ("kim18", 50_023), ("recommended", 50_016)])
+def test_the_estimator_does_not_hang_on_how_noise_cuts_the_rests(plan, seed):
+    """Tests whose rests the detection cut into pieces, so that a wide gyro seemed never to rest for long."""
+    assert choice("mems_consumer", plan, seed) == "second-order"

@@ -35,6 +35,10 @@ _HOLE = 3.0
 """Sample intervals between two samples in which a hand may have moved."""
 _EARTH_SEEN = 3.0
 """Sigmas of the gyros' white noise in a rest from which the Earth's rate is seen in it."""
+_SAME_ATTITUDE = np.radians(1.0)
+"""Angle between the specific forces of two rests (rad) below which they are pieces of one: a turn moves more."""
+_FRAGMENT_S = 3.0
+"""Gap between two pieces of one rest (s): what a jolt or a burst of noise takes."""
 _BLOCK_S = 0.5
 """Noise is learned from the differences of means over so much (s): slow enough for what a filter in the sensor does."""
 
@@ -94,8 +98,28 @@ def hides_earth_rate(recording: Recording, imu: ImuSpecification) -> bool:
         rests = detect_static(recording)
     except DataError:
         return False
-    usual = float(np.median(rests.last - rests.first)) * recording.interval_s
+    usual = _usual_rest(recording, rests)
     return bool(_EARTH_SEEN * max(imu.gyro_white_noise, rests.gyro_white_noise) / np.sqrt(usual) > earth.RATE)
+
+
+def _usual_rest(recording: Recording, rests: StaticIntervals) -> float:
+    """Median length of a rest (s): of the dwells that the table states, else of rests with their fragments joined.
+
+    Where noise or a jolt cuts one rest in pieces, as many pieces as chance makes, the length of a piece means nothing.
+    """
+    phase = recording.phase
+    if phase is not None and phase.dwell.any():
+        edge = np.diff(np.concatenate([[0], phase.dwell.astype(int), [0]]))
+        begin, end = np.append(phase.t, recording.t[-1])[edge > 0], np.append(phase.t, recording.t[-1])[edge < 0]
+        return float(np.median(end - begin))
+    mean = np.array([recording.f_ib_b[a:b].mean(axis=0) for a, b in zip(rests.first, rests.last, strict=True)])
+    unit = mean / np.linalg.norm(mean, axis=1, keepdims=True)
+    same = np.linalg.norm(np.diff(unit, axis=0), axis=1) < _SAME_ATTITUDE
+    near = (recording.t[rests.first[1:]] - recording.t[rests.last[:-1] - 1]) < _FRAGMENT_S
+    begins = np.append(True, ~(same & near))
+    first = recording.t[rests.first[begins]]
+    last = recording.t[rests.last[np.append(begins[1:], True)] - 1]
+    return float(np.median(last - first))
 
 
 def still_samples(recording: Recording, width: int, turning: float, hole: float) -> Bools:

@@ -68,7 +68,12 @@ def advice(
 
 def _about_data(d: Diagnosis) -> list[str]:
     out = [f"Mend the recording first: {f.text}." for f in d.findings if f.grave]
-    if d.noise:
+    if d.found.noise:
+        out.append(
+            "The noise has a memory, which no compensation removes; values and sigmas take it into account. More "
+            "stops, or the same attitudes again later, lower its share."
+        )
+    if len(d.noise) > len(d.found.noise):
         measured = d.consistency
         out.append(
             f"Correct the noise in the IMU's file: gyro times {measured.gyro.ratio:.2f}, "
@@ -82,7 +87,10 @@ def _about_found(d: Diagnosis, found: tuple[Found, ...], plan: PlanSeen) -> list
     if d.verdict == "unexplained":
         worst = d.consistency.where[0] if d.consistency.where else None
         place = f", worst at stop {worst.stop} in {worst.channel}" if worst else ""
-        out.append(f"Do not use coefficients of this test beyond their scatter: something unknown acts{place}.")
+        if d.found.noise:
+            out.append(f"Something unknown acts{place}: the sigmas of the result take it in as scatter.")
+        else:
+            out.append(f"Do not use coefficients of this test beyond their scatter: something unknown acts{place}.")
         out.append(
             "Run the plan again in another order: what comes back at the same attitude belongs to the sensor, what "
             "comes back at the same time to warm-up, what does not come back to this run."

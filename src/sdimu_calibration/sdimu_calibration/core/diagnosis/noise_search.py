@@ -74,6 +74,16 @@ class _Ground(Generic[E]):
         self.wander = wander
         self.limit = limit
 
+    def doubtful(self, state: _State) -> bool:
+        """Whether a chosen effect is one that wandering noise imitates, and not so large that noise cannot."""
+        for column in state.chosen:
+            candidate = self.white.candidate(column)
+            free = candidate.effect.bias_drift or candidate.effect.scope == "recording" or candidate.family == "own"
+            others = [c for c in state.chosen if c != column]
+            if free and abs(self.scanned(self.given(others), others, ()).z[column]) < _CLEAR:
+                return True
+        return False
+
     def cost(self, column: int, terms: Sequence[NoiseTerm], share: float = 1.0) -> float:
         """Likelihood that an effect must bring in noise of these terms; `share` of it where no wander is a rival."""
         effect = self.white.candidate(column).effect
@@ -154,7 +164,7 @@ def search_with_noise(
     if not doubted and not from_white.balance.terms:
         return replace(white, net=ground.net(from_white), joint=ground.joint)
     bare = ground.state(()) if len(white.chosen) else from_white
-    if not from_white.balance.terms and ground.net(from_white) > ground.net(bare):
+    if not from_white.balance.terms and ground.net(from_white) > ground.net(bare) and not ground.doubtful(from_white):
         # White noise will do for what is left, and the effects tell more than noise alone would.
         return replace(white, net=ground.net(from_white), joint=ground.joint)
     states = []
@@ -220,7 +230,8 @@ def _pruned(ground: _Ground[E], state: _State) -> _State:
             others = [c for c in state.chosen if c != column]
             given = ground.given(others)
             if abs(ground.scanned(given, others, terms).z[column]) < _CLEAR:
-                other = _State(tuple(others), balance(given.noise, ground.wander, terms, more=False))
+                # What was white with an effect may need noise without it.
+                other = _State(tuple(others), balance(given.noise, ground.wander, terms, more=not terms))
                 worth = state.balance.net - other.balance.net - ground.cost(column, terms, _KEPT)
                 without.append((worth, len(without), other))
         if not without or min(without)[0] > 0.0:

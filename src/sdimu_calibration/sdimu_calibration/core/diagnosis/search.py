@@ -189,6 +189,8 @@ class Problem(Generic[E]):
             occam = np.where(wide > 0.0, 0.5 * np.log1p(J / wide), 0.0)
             score = 0.5 * d**2 / (J + wide) - occam
         score = score - np.array([_OWN_ODDS if c.family == "own" else 0.0 for c in self.evidence.candidates])
+        wrong = (d < 0.0) & np.array([c.effect.positive for c in self.evidence.candidates], dtype=bool)
+        score = np.where(wrong, -np.inf, score)
         return np.concatenate([np.full(p, -np.inf), np.where(np.isfinite(scanned.sigma[p:]), score, -np.inf)])
 
     def held_out(self, chosen: Sequence[int], scale: float) -> HeldOut:

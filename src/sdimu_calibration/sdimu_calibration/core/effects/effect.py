@@ -106,6 +106,8 @@ class Effect:
         Motion without which a test does not show the effect.
     bias_drift : bool
         A change of a bias in time by itself: several in a row follow any drift and say nothing of its cause.
+    positive : bool
+        Of one sign by its nature: a stretch that was lost is no stretch that was gained.
     needs_table : bool
         Has no meaning handheld: no reference but gravity is known, and no turn is known better than the gyros tell it.
     gauge : bool
@@ -146,6 +148,7 @@ class Effect:
     scope: Scope = "unit"
     excitation: frozenset[Excitation] = frozenset()
     bias_drift: bool = False
+    positive: bool = False
     needs_table: bool = False
     gauge: bool = False
     never_seen: str = ""

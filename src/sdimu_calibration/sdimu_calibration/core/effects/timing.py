@@ -73,6 +73,7 @@ def lost_data(turn: int, at: float, spacing: float = 15.0) -> Effect:
         title="gyro data lost in a turn",
         equation="dw = -w of the full rate, over a time that is missing in one turn",
         parameters=(Parameter("gyro_lost_data", "s", "ms"),),
+        positive=True,
         terms=tuple(Term(channel, 0) for channel in GYRO),
         regressors=missing,
         prior={"navigation": 0.02, "tactical": 0.02, "mems": 0.02},
