@@ -290,7 +290,7 @@ class LiveCalibration:
         rest = np.full(len(part), phases.dwell[k])
         seen = motion(
             part, rest, sensors, np.zeros(len(sensors.prior)), self._track, setup.site.latitude_rad, setup.gravity,
-            self._intake.temperature_log(), predicted=False, before=self._before,
+            self._intake.temperature_log(), predicted=False, before=self._before, magnetic_n=setup.magnetic_n,
         )  # fmt: skip
         self._before = seen
         one = Phases(*(getattr(phases, n)[k : k + 1] for n in Phases.__dataclass_fields__))

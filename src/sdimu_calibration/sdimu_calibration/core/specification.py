@@ -23,6 +23,8 @@ class Site:
         None gyrocompasses.
     initial_azimuth_sigma_rad : float
         Its standard deviation; used only with an azimuth.
+    magnetic_field_t : tuple of float, or None
+        North, East, Down (T), for the effects of magnetism; None takes that of mid-northern latitudes.
     """
 
     latitude_rad: float
@@ -30,6 +32,7 @@ class Site:
     gravity_m_s2: float | None = None
     initial_azimuth_rad: float | None = None
     initial_azimuth_sigma_rad: float = np.radians(3.0)
+    magnetic_field_t: tuple[float, float, float] | None = None
 
 
 @dataclass(frozen=True)

@@ -245,6 +245,7 @@ class _SiteFile(Schema):
     height_m: float = Field(ge=-5000.0, le=20000.0)
     gravity_m_s2: float | None = Field(default=None, gt=9.5, lt=10.0)
     initial_azimuth_deg: float | None = None
+    magnetic_field_nt: tuple[float, float, float] | None = None
     initial_azimuth_sigma_deg: float = Field(default=math.degrees(Site.initial_azimuth_sigma_rad), gt=0.0)
 
 
@@ -313,11 +314,12 @@ def load_model(name_or_path: str | Path) -> Model:
 def load_site(name_or_path: str | Path) -> Site:
     """Read a site."""
     file = read_yaml(find_config("site", name_or_path), _SiteFile)
-    azimuth = file.initial_azimuth_deg
+    azimuth, field = file.initial_azimuth_deg, file.magnetic_field_nt
     return Site(
         latitude_rad=math.radians(file.latitude_deg),
         height_m=file.height_m,
         gravity_m_s2=file.gravity_m_s2,
         initial_azimuth_rad=None if azimuth is None else math.radians(azimuth),
         initial_azimuth_sigma_rad=math.radians(file.initial_azimuth_sigma_deg),
+        magnetic_field_t=None if field is None else (1e-9 * field[0], 1e-9 * field[1], 1e-9 * field[2]),
     )

@@ -17,7 +17,7 @@ from sdimu_sim.core.mean_bias import mean_bias
 from sdimu_sim.core.platform import PlatformMotion
 from sdimu_sim.core.samples import SampleClock
 from sdimu_sim.core.temperature import TemperatureProfile
-from sdimu_sim.core.truth import ImuTruth, Truth, draw_coefficients, draw_mount
+from sdimu_sim.core.truth import DEFAULT_MAGNETIC_FIELD, ImuTruth, Truth, draw_coefficients, draw_mount
 
 DEFAULT_START_NS = 1_700_000_000 * 10**9
 TABLE_LOG_HZ = 10.0
@@ -78,6 +78,7 @@ def imu_truth(scenario: Scenario) -> ImuTruth:
         accel_white_noise=scenario.imu.accel_white_noise,
         effects=tuple(scenario.effects),
         noise=tuple(scenario.noise),
+        magnetic_field=scenario.site.magnetic_field_t or DEFAULT_MAGNETIC_FIELD,
     )
     return with_hidden(replace(truth, **scenario.extras))  # type: ignore[arg-type]
 

@@ -26,6 +26,7 @@ from sdimu_calibration.core.effects import imu_model
 from sdimu_calibration.core.effects.imu_model import ImuModel
 from sdimu_calibration.core.measurement_kind import ALL, SENSORS, SKIP
 from sdimu_calibration.core.navigation.strapdown import Cycles, Reducer
+from sdimu_calibration.core.navigation.track import MAGNETIC_FIELD
 from sdimu_calibration.core.recording import NOMINAL_FROM, DataError, DataFault, Recording, TemperatureLog
 from sdimu_calibration.core.specification import ImuSpecification, Model, Site
 
@@ -45,6 +46,12 @@ class TestSetup:
     sensors: ImuModel
     limits: RestLimits
     gravity: float
+
+    @property
+    def magnetic_n(self) -> Floats:
+        """Magnetic field of the site in NED (T), shape (3,); that of mid-northern latitudes where none is stated."""
+        stated = self.site.magnetic_field_t
+        return MAGNETIC_FIELD if stated is None else np.array(stated)
 
 
 @dataclass(frozen=True)

@@ -58,6 +58,10 @@ def reason(one: DetectableSize, plan: PlanSeen) -> str:
     return "the motion of this test does not excite it"
 
 
+_ONE_LINE = 3
+"""Number of found effects from which one line of advice adds them all: it can be pasted."""
+
+
 def advice(
     d: Diagnosis, found: tuple[Found, ...], reached: tuple[DetectableSize, ...], plan: PlanSeen
 ) -> tuple[str, ...]:
@@ -99,19 +103,32 @@ def _about_found(d: Diagnosis, found: tuple[Found, ...], plan: PlanSeen) -> list
             names = ", ".join(f.candidate.label for f in found)
             out.append(f"Try an equation of your own (--try FILE); nearest in this test: {names}.")
         return out
+    kept = [f.candidate.label for f in found if _belongs(f)]
+    if len(kept) > _ONE_LINE:
+        out.append(f"Keep what was found in the model: {' '.join(f'--add {quoted(label)}' for label in kept)}.")
     for one in found:
         label = one.candidate.label
         if one.candidate.family == references.LATITUDE.name:
             out.append(_about_latitude(one))
         elif one.candidate.effect.scope == "recording":
             out.append(f"{label} is a fault of this recording: record again and do not carry it over.")
-        else:
+        elif len(kept) <= _ONE_LINE:
             out.append(f"Keep {label} in the model: --add '{label}'.")
         if one.alike:
             out.append(separate(one, plan) + _calculated(one))
         if one.coefficient_shifts:
             out.append(_at_stake(one))
     return out
+
+
+def _belongs(one: Found) -> bool:
+    """Whether an effect belongs into the model of the sensor: no wrong site, no fault of one recording."""
+    return one.candidate.family != references.LATITUDE.name and one.candidate.effect.scope != "recording"
+
+
+def quoted(label: str) -> str:
+    """Quote a label for a shell."""
+    return f"'{label}'"
 
 
 def _at_stake(one: Found) -> str:

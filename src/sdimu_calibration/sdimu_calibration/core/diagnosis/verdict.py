@@ -26,6 +26,8 @@ _COLOURED = 1.2
 """Scatter over ten seconds against white noise from which noise is called coloured: five sigma of fifty minutes."""
 _ROUNDING = 1e-6
 """A learned sigma (in its customary unit) below this is rounding."""
+_LARGEST = 3
+"""Number of effects that a sentence names where there are more than it lists: the table has the rest."""
 _LISTED = 4
 """Effects that look the same are listed up to this number."""
 
@@ -77,7 +79,7 @@ def verdict(facts: Verdict) -> str:
 
 def sentence(d: Diagnosis) -> str:
     """Put the verdict into one sentence."""
-    names = " and ".join(c.label for c in d.chosen)
+    names = _named(d)
     if d.verdict == "consistent":
         return _consistent(d)
     if d.verdict == "noise model wrong":
@@ -94,6 +96,16 @@ def sentence(d: Diagnosis) -> str:
         others = ", ".join(d.alike[:_LISTED])
         return f"One effect is missing: {names}, or what looks the same here ({others}); {rest}."
     return f"{'One effect is' if d.verdict == 'one effect' else 'Several effects are'} missing: {names}; {rest}."
+
+
+def _named(d: Diagnosis) -> str:
+    """Name what was found; of many the ones with the largest scores, and how many more."""
+    labels = [c.label for c in d.chosen]
+    if len(labels) <= _LISTED:
+        return " and ".join(labels)
+    score = {step.label: abs(step.z) for step in d.found.steps}
+    largest = sorted(labels, key=lambda label: -score.get(label, 0.0))[:_LARGEST]
+    return f"{', '.join(largest)} and {len(labels) - _LARGEST} more"
 
 
 def _consistent(d: Diagnosis) -> str:

@@ -55,11 +55,11 @@ _ABSURD = 1e3
 """NIS per degree of freedom from which there is no fit at all: units, axes or site are wrong."""
 _MISFIT = 1.2
 """NIS per degree of freedom, and held-out error (sigma), from which a user is warned; 1 is right."""
-NOT_WHITE = (
-    "the noise is not white: {}; values and sigmas take it into account. A missing effect can look the same: run sdimu "
-    "diagnose"
+NO_FIELD = (
+    "the site states no magnetic field: that of mid-northern latitudes is assumed; state magnetic_field_nt (north, "
+    "east, down) in the site's file, or what magnetism takes is wrong"
 )
-"""Note on the noise that was learned."""
+"""Note on an effect of magnetism without a stated field."""
 _OUTSIDE = 4.5
 """Size of a coefficient in its stated sigma from which a user is warned."""
 
@@ -254,8 +254,10 @@ class NavigationFit(Fit):
         """List the stops that were found, and those held out."""
         held = self.test.held_out
         told = (f"stops held out of the fit: {', '.join(map(str, held))}",) if held else ()
-        noise = () if self.noise is None else (NOT_WHITE.format(self.noise.words),)
-        return (*stops_line(self.test.recording, self.prepared), *told, *noise)
+        noise = () if self.noise is None else (self.noise.note,)
+        magnetic = any(effect.needs == "magnetic" for effect in self.sensors.effects)
+        field = (NO_FIELD,) if magnetic and self.setup.site.magnetic_field_t is None else ()
+        return (*stops_line(self.test.recording, self.prepared), *told, *noise, *field)
 
     def warnings(self, statistics: dict[str, float | None]) -> tuple[str, ...]:
         """Misfit as a whole and of single stops, and coefficients outside the specification.
@@ -374,7 +376,7 @@ class FilterFit(NavigationFit):
         setup, sensors, cycles = self.setup, self.setup.sensors, prepared.cycles
         seen = motion(
             cycles, prepared.rest, sensors, estimate, C_start.copy(), setup.site.latitude_rad, setup.gravity,
-            prepared.temperature, predicted=False,
+            prepared.temperature, predicted=False, magnetic_n=setup.magnetic_n,
         )  # fmt: skip
         values = sensors.regressors(seen)
         # What fades is known where the fit ended, and fades away from there.

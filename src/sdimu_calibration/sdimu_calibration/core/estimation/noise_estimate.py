@@ -36,9 +36,13 @@ class NoiseEstimate:
     held_out_rms: float
 
     @property
-    def words(self) -> str:
-        """Name the terms with their sizes."""
-        return "; ".join(told(term) for term in self.terms)
+    def note(self) -> str:
+        """What a user should know, with the terms and their sizes."""
+        terms = "; ".join(told(term) for term in self.terms)
+        return (
+            f"the noise is not white: {terms}; values and sigmas take it into account. A missing effect can look the "
+            "same: run sdimu diagnose"
+        )
 
 
 def told(term: NoiseTerm) -> str:

@@ -122,7 +122,7 @@ def known_pass(prepared: PreparedData, setup: TestSetup, finished: Pass) -> Know
     check_finite(state)
     seen = motion(
         prepared.cycles, prepared.rest, setup.sensors, finished.estimate, finished.C_start.copy(),
-        setup.site.latitude_rad, setup.gravity, prepared.temperature, predicted=True,
+        setup.site.latitude_rad, setup.gravity, prepared.temperature, predicted=True, magnetic_n=setup.magnetic_n,
     )  # fmt: skip
     return KnownPass(output, seen, None)
 

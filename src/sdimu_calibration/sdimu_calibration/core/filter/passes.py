@@ -140,7 +140,7 @@ def one_pass(
     sensors = setup.sensors
     seen = motion(
         prepared.cycles, prepared.rest, sensors, reference, C_nb.copy(), setup.site.latitude_rad, setup.gravity,
-        prepared.temperature, predicted=not closed_loop,
+        prepared.temperature, predicted=not closed_loop, magnetic_n=setup.magnetic_n,
     )  # fmt: skip
     values = sensors.regressors(seen)
     if not np.isfinite(values).all():

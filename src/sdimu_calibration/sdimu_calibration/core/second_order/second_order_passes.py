@@ -185,7 +185,7 @@ def linearise(prepared: PreparedData, setup: TestSetup, C_nb: Floats, reference:
     sensors, site, where = setup.sensors, setup.site, layout(prepared)
     near = motion(
         prepared.cycles, prepared.rest, sensors, reference, C_nb.copy(), site.latitude_rad, setup.gravity,
-        prepared.temperature, predicted=False,
+        prepared.temperature, predicted=False, magnetic_n=setup.magnetic_n,
     )  # fmt: skip
     clean = correct_cycles(prepared.cycles, near, sensors, reference)
     C_stop, track = _stops(clean.cycles, where, C_nb, site.latitude_rad)
