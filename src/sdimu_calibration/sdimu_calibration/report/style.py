@@ -7,7 +7,7 @@ body { font: 15px/1.5 system-ui, sans-serif; color: #222; max-width: 1180px; mar
 h1 { font-size: 1.5em; margin-bottom: 0; } h2 { font-size: 1.15em; margin-top: 2em; }
 table { border-collapse: collapse; font-variant-numeric: tabular-nums; }
 th, td { padding: .15em .8em; text-align: right; border-bottom: 1px solid #e4e4e4; }
-td { white-space: nowrap; } td.text:last-child { white-space: normal; }
+td { white-space: nowrap; } td.text:last-child { white-space: normal; min-width: 14em; }
 th { border-bottom: 2px solid #222; } th.text, td.text { text-align: left; }
 tr.first td { border-top: 1px solid #888; }
 .quiet { color: #555; }
@@ -27,7 +27,6 @@ section { min-width: 0; }
   main { display: block; }
   button, .modebar-container { display: none !important; }
   .wide { overflow: visible; } table { font-size: 9px; } th, td { padding: .1em .5em; }
-  td.text:last-child { min-width: 14em; }
   :has(> [id^="figure-"]), tr, .quiet, .verdict { break-inside: avoid; } p { break-inside: avoid; }
   h2, h2 + p, h2 + p + p, summary { break-after: avoid; }
   p.quiet { break-before: avoid; }

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from sdimu_calibration.core.diagnosis.rounds import Request, drop_companions, search_until_stable
+from sdimu_calibration.core.diagnosis.rounds import Request, drop_companions, mark_dropped, search_until_stable
 from sdimu_calibration.core.diagnosis.search import FALSE_ALARM
 from sdimu_calibration.core.progress import silent
 
@@ -28,3 +28,6 @@ def test_a_companion_that_is_noise_once_calibrated_is_taken_out_and_says_so(benc
     assert kept.fate == "added"
     assert small.fate == "added, then taken out: calibrated with it, it is below 3 of its sigmas"
     assert other.fate == "added, then taken out: what else was added explains the same better"
+    # Noise took a step out already: that reason stays.
+    noisy = replace(other, taken_out="noise with a memory explains the same")
+    assert mark_dropped((noisy,), set(), set()) == (noisy,)

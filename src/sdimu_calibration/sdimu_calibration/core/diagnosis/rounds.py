@@ -216,9 +216,10 @@ def mark_dropped(steps: Sequence[Step], kept: set[str], small: set[str]) -> tupl
     """Mark the steps that are not among what was found, by their labels, with why; `small` were too small once in."""
     weak = f"calibrated with it, it is below {LEAST_SIGMAS:.0f} of its sigmas"
     gone = "what else was added explains the same better"
+    stands = [not s.accepted or bool(s.taken_out) or s.label in kept for s in steps]
     return tuple(
-        s if not s.accepted or s.label in kept else replace(s, taken_out=weak if s.label in small else gone)
-        for s in steps
+        s if as_is else replace(s, taken_out=weak if s.label in small else gone)
+        for s, as_is in zip(steps, stands, strict=True)
     )
 
 
