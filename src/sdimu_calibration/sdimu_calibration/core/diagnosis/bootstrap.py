@@ -72,8 +72,10 @@ def bootstrap(d: Diagnosis, draws: int, seed: int = 1, progress: Progress | None
         if progress:
             progress("bootstrap", k / draws)
         e = rng.standard_normal(len(evidence.e))
+        if evidence.noise.size:
+            e = e + evidence.noise @ rng.standard_normal(evidence.noise.shape[1])
         part = replace(evidence, e=e, shift=np.zeros(len(evidence.weight)))
-        part.__dict__["information"] = Information(J, evidence.W.T @ e)
+        part.__dict__["information"] = Information(J, evidence.W.T @ part.residuals)
         found = search(part, columns, FALSE_ALARM)
         finds += int(len(found.chosen) > 0)
         z = found.first.z[np.isfinite(found.first.sigma)]

@@ -24,6 +24,7 @@ from sdimu_calibration.core.effects.effect import (
 )
 from sdimu_calibration.core.effects.motion import Motion
 from sdimu_calibration.core.evidence.candidate import OWN
+from sdimu_calibration.core.evidence.noise_kernels import constant_between
 
 _CYCLES = np.arange(1.0, 20.0, 0.5)
 
@@ -50,24 +51,8 @@ def without(effect: Effect, in_model: set[str]) -> list[Effect]:
 
 def free_inputs(times: Timetable) -> list[Effect]:
     """Give every sensor a constant error of its own in every dwell and every turn; one effect a segment."""
-
-    def segment(label: str, start: float, end: float) -> Effect:
-        def ones(motion: Motion) -> Floats:
-            overlap = np.minimum(motion.t, end) - np.maximum(motion.t - motion.dt, start)
-            share = np.clip(overlap / motion.dt, 0.0, 1.0)
-            return np.asarray(share[:, None].repeat(6, axis=1))
-
-        return Effect(
-            name=label, title=label, equation="constant in this stretch",
-            parameters=tuple(
-                Parameter(f"{c} in {label}", "rad/s" if i < 3 else "m/s^2", "deg/h" if i < 3 else "ug")
-                for i, c in enumerate(CHANNELS)
-            ),
-            terms=tuple(Term(i, i) for i in range(6)), regressors=ones, prior={},
-        )  # fmt: skip
-
-    stops = [segment(f"stop {k}", a, b) for k, a, b in times.stops]
-    turns = [segment(f"turn {k + 1}", a, b) for k, a, b in times.turns]
+    stops = [constant_between(f"stop {k}", a, b) for k, a, b in times.stops]
+    turns = [constant_between(f"turn {k + 1}", a, b) for k, a, b in times.turns]
     return stops + turns
 
 

@@ -62,6 +62,7 @@ class _State:
     chosen: tuple[int, ...]
     balance: Balance
 
+
 class _Ground(Generic[E]):
     """Evidence in white noise with its wander: what both ways search."""
 
@@ -77,22 +78,24 @@ class _Ground(Generic[E]):
     def doubtful(self, state: _State) -> bool:
         """Whether a chosen effect is one that wandering noise imitates, and not so large that noise cannot."""
         for column in state.chosen:
-            candidate = self.white.candidate(column)
-            free = candidate.effect.bias_drift or candidate.effect.scope == "recording" or candidate.family == "own"
             others = [c for c in state.chosen if c != column]
-            if free and abs(self.scanned(self.given(others), others, ()).z[column]) < _CLEAR:
+            if self.beside(column) and abs(self.scanned(self.given(others), others, ()).z[column]) < _CLEAR:
                 return True
         return False
+
+    def beside(self, column: int) -> float:
+        """Likelihood that an effect which a wander imitates must bring besides; 0 for every other."""
+        candidate = self.white.candidate(column)
+        if candidate.family == "own":
+            return _OWN_COST
+        return _DRIFT_COST if candidate.effect.bias_drift or candidate.effect.scope == "recording" else 0.0
 
     def cost(self, column: int, terms: Sequence[NoiseTerm], share: float = 1.0) -> float:
         """Likelihood that an effect must bring in noise of these terms; `share` of it where no wander is a rival."""
         effect = self.white.candidate(column).effect
         triads = {TRIADS[term.channel // 3] for term in effect.terms}
-        own = self.white.candidate(column).family == "own"
-        free = effect.bias_drift or effect.scope == "recording"
-        extra = _OWN_COST if own else _DRIFT_COST if free else 0.0
-        wanders = any(term.triad in triads for term in terms)
-        return share * max(_COST, 0.5 * self.limit**2) + (extra if wanders or effect.scope == "recording" else 0.0)
+        rival = effect.scope == "recording" or any(term.triad in triads for term in terms)
+        return share * max(_COST, 0.5 * self.limit**2) + (self.beside(column) if rival else 0.0)
 
     def net(self, state: _State) -> float:
         """Likelihood of a state less what its effects and noise terms cost."""
@@ -204,9 +207,8 @@ def _best_addition(ground: _Ground[E], state: _State) -> tuple[int | None, tuple
     pool = _first(scores) | _first(ground.white.scores(ground.scanned(given, state.chosen, ())))
     best, best_score, best_terms = None, LOG_BAYES, terms
     for column in sorted(pool):
-        prior = ground.evidence.prior[column - ground.white.p]
-        weight = 0.0 if np.isinf(prior) else 1.0 / (30.0 * prior) ** 2
-        found = balance(given.with_column(column, weight), ground.wander, terms, more=False)
+        weight = ground.white.known([column])[1][-1]
+        found = balance(given.with_column(column, float(weight)), ground.wander, terms, more=False)
         gain = found.net - state.balance.net
         # What a size costs before it is known is the same in any noise.
         occam = 0.5 * noisy.z[column] ** 2 - scores[column]

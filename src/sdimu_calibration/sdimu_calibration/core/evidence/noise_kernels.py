@@ -82,23 +82,25 @@ def stretches(times: Timetable) -> Stretches:
 
 def stretch_effects(cut: Stretches) -> list[Effect]:
     """Give every sensor a constant error of its own in every stretch; one effect a stretch, six parameters each."""
+    spans = zip(cut.start.tolist(), cut.end.tolist(), strict=True)
+    return [constant_between(f"{a:.1f} to {b:.1f} s", a, b) for a, b in spans]
 
-    def one(begin: float, end: float) -> Effect:
-        def share(motion: Motion) -> Floats:
-            overlap = np.minimum(motion.t, end) - np.maximum(motion.t - motion.dt, begin)
-            return np.asarray(np.clip(overlap / motion.dt, 0.0, 1.0)[:, None].repeat(6, axis=1))
 
-        label = f"{begin:.1f} to {end:.1f} s"
-        return Effect(
-            name=label, title=label, equation="constant in this stretch",
-            parameters=tuple(
-                Parameter(f"{c} {label}", "rad/s" if i < 3 else "m/s^2", "deg/h" if i < 3 else "ug")
-                for i, c in enumerate(CHANNELS)
-            ),
-            terms=tuple(Term(i, i) for i in range(6)), regressors=share, prior={},
-        )  # fmt: skip
+def constant_between(label: str, begin: float, end: float) -> Effect:
+    """Give every sensor a constant error of its own from `begin` to `end` (s); six parameters."""
 
-    return [one(a, b) for a, b in zip(cut.start.tolist(), cut.end.tolist(), strict=True)]
+    def share(motion: Motion) -> Floats:
+        overlap = np.minimum(motion.t, end) - np.maximum(motion.t - motion.dt, begin)
+        return np.asarray(np.clip(overlap / motion.dt, 0.0, 1.0)[:, None].repeat(6, axis=1))
+
+    return Effect(
+        name=label, title=label, equation="constant in this stretch",
+        parameters=tuple(
+            Parameter(f"{c} in {label}", "rad/s" if i < 3 else "m/s^2", "deg/h" if i < 3 else "ug")
+            for i, c in enumerate(CHANNELS)
+        ),
+        terms=tuple(Term(i, i) for i in range(6)), regressors=share, prior={},
+    )  # fmt: skip
 
 
 def kernel(kind: str, tau: float, cut: Stretches) -> Floats:
