@@ -12,7 +12,7 @@ from hypothesis import settings
 
 from rate_table_sim.core.specification import TableSpecification
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis, climb
-from sdimu_calibration.core.estimation.navigation_fit import FilterFit
+from sdimu_calibration.core.estimation.filter_fit import FilterFit
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.estimation.solve import solve
 from sdimu_calibration.core.plan import Plan, Turn

@@ -61,6 +61,7 @@ class Calibration:
     values : ndarray, shape (p,)
         SI, in `body_frame`.
     covariance : ndarray, shape (p, p)
+        With what models that the data leave open add, where a diagnosis asked which they are.
     fit : mapping
         log_likelihood, nis_mean, nis_dof, held_out_rms (None when not computed), passes.
     data : mapping
@@ -82,6 +83,8 @@ class Calibration:
     drift_means : mapping of str to float
         Mean over all dwells of the regressor of each drift of a bias (SI), by the name of its coefficient. The biases
         are those in the mean over the dwells: the bias in the equation is less by coefficient times mean.
+    conditional_sigma : ndarray, shape (p,), or None
+        Standard deviation (SI) if the model is right; None where `covariance` is that.
     """
 
     body_frame: str
@@ -101,3 +104,4 @@ class Calibration:
     estimator_reason: str = ""
     noise: tuple[NoiseTerm, ...] = ()
     drift_means: Mapping[str, float] = field(default_factory=dict)
+    conditional_sigma: Floats | None = None

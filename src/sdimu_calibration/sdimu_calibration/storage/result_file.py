@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any
@@ -29,6 +29,7 @@ def write_result(path: Path, calibration: Calibration, verdict: str = "") -> Non
     verdict : str
         Of a diagnosis, where one was made.
     """
+    conditional = calibration.conditional_sigma
     content = {
         "format": FORMAT,
         **({"verdict": verdict} if verdict else {}),
@@ -38,13 +39,15 @@ def write_result(path: Path, calibration: Calibration, verdict: str = "") -> Non
         "drift_means": dict(calibration.drift_means),
         "model": list(calibration.model),
         "coefficients": [
-            {"name": name, "value": value, "sigma": sigma, "unit": unit, "display_unit": display}
-            for name, value, sigma, unit, display in zip(
+            {"name": name, "value": value, "sigma": sigma, "unit": unit, "display_unit": display, **alone}
+            for name, value, sigma, unit, display, alone in zip(
                 calibration.names,
                 calibration.values.tolist(),
                 np.sqrt(np.diag(calibration.covariance)).tolist(),
                 calibration.units,
                 calibration.display_units,
+                [{} for _ in calibration.names] if conditional is None
+                else [{"conditional_sigma": sigma} for sigma in conditional.tolist()],
                 strict=True,
             )
         ],
@@ -106,8 +109,15 @@ def _calibration(content: Mapping[str, Any]) -> Calibration:
         estimator=str(content.get("estimator", "")),
         estimator_reason=str(content.get("estimator_reason", "")),
         noise=tuple(_term(entry) for entry in content.get("noise", ())),
+        conditional_sigma=_conditional(coefficients),
         drift_means={name: float(mean) for name, mean in content.get("drift_means", {}).items()},
     )
+
+
+def _conditional(coefficients: Sequence[Mapping[str, Any]]) -> Floats | None:
+    if not all("conditional_sigma" in entry for entry in coefficients):
+        return None
+    return _array([entry["conditional_sigma"] for entry in coefficients], (len(coefficients),))
 
 
 def _term(entry: Mapping[str, Any]) -> NoiseTerm:

@@ -14,6 +14,7 @@ import numpy as np
 from sdimu_calibration.core.arrays import Ints
 from sdimu_calibration.core.diagnosis.free_input_test import FreeInputTest
 from sdimu_calibration.core.diagnosis.ladder import Rung, ladder
+from sdimu_calibration.core.diagnosis.model_doubt import in_doubt
 from sdimu_calibration.core.diagnosis.rounds import (
     DRAWN,
     UNEXPLAINED_P,
@@ -200,7 +201,7 @@ def climb(
     fit = in_white_noise(fit)
     request = Request(fit, tuple(extra), alpha, None if fit.learns_scatter else Wander.of(fit.evidence()))
     done = search_until_stable(request, progress)
-    final = done.fit
+    final = in_doubt(fit, done.fit, done.evidence, done.found.chosen, done.free, done.found.scale)
     findings = (*screen(fit), *(Finding(text, grave=False) for text in final.beyond_specification()))
     findings += () if final.converged else (Finding(NOT_CONVERGED, grave=True),)
     progress("report", 0.9)

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 
@@ -62,12 +63,16 @@ class Fit(ABC):
         The sensor model that was asked for, p parameters.
     reason : str
         Why this estimator was taken.
+    doubt : ndarray, shape (q, q), or None
+        What models that the data leave open add to the covariance of the estimator's coefficients (SI); None where
+        nobody asked which they are.
     """
 
     test: PreparedTest
     model: Model
     sensors: ImuModel
     reason: str = field(default="", kw_only=True)
+    doubt: Floats | None = field(default=None, kw_only=True)
 
     estimator = ""
     """Name of the estimator, as `--estimator` takes it."""
@@ -187,6 +192,19 @@ class Fit(ABC):
     def beyond_specification(self) -> list[str]:
         """Name coefficients far outside the IMU's file, one line each, the furthest first."""
         return []
+
+    def dwell_means(self, effect: Effect) -> Floats:
+        """Mean of the regressors (SI) of a drift of a bias over all dwells; zero where biases are not their means.
+
+        Returns
+        -------
+        ndarray, shape (terms,)
+        """
+        return np.zeros(len(effect.terms))
+
+    def with_doubt(self, doubt: Floats | None) -> Self:
+        """Return the fit with another covariance (q, q) that open models add."""
+        return replace(self, doubt=doubt)
 
     @property
     def has_temperature(self) -> bool:

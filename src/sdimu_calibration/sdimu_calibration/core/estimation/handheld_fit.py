@@ -61,7 +61,8 @@ class HandheldFit(Fit):
     def covariance(self) -> Floats:
         """Covariance of `values`, shape (p, p); zero for what the frame pins."""
         out = np.zeros((len(self.names), len(self.names)))
-        out[np.ix_(self.priors.kept, self.priors.kept)] = self.solution.covariance
+        C = self.solution.covariance
+        out[np.ix_(self.priors.kept, self.priors.kept)] = C if self.doubt is None else C + self.doubt
         return out
 
     @property

@@ -1,4 +1,4 @@
-"""Fits that navigate: the filter's passes, and the second-order passes about exactly corrected samples."""
+"""Fits that navigate, whatever passes they make: what they say of coefficients, drifts, noise and prediction."""
 
 from __future__ import annotations
 
@@ -6,18 +6,17 @@ from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Self
 from zlib import crc32
 
 import numpy as np
 
 from sdimu_calibration.core.alignment.alignment import Alignment
-from sdimu_calibration.core.alignment.coarse_alignment import StartPoint
 from sdimu_calibration.core.alignment.prepared import PreparedData, TestSetup, stops_line
 from sdimu_calibration.core.arrays import Bools, Floats, Ints
-from sdimu_calibration.core.effects import bias, body_frame
+from sdimu_calibration.core.effects import bias
 from sdimu_calibration.core.effects.effect import Effect, Timetable
 from sdimu_calibration.core.effects.imu_model import ImuModel
-from sdimu_calibration.core.estimation.azimuth_check import azimuth_note, azimuth_warning
 from sdimu_calibration.core.estimation.fit import NOT_CONVERGED, Fit, Start
 from sdimu_calibration.core.estimation.free_inertial import (
     Compensated,
@@ -31,18 +30,14 @@ from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.evidence.navigation_evidence import (
     KnownPass,
     NavigationEvidence,
-    known_pass,
     navigation_evidence,
     timetable,
 )
 from sdimu_calibration.core.evidence.stop_misfit import stop_misfit
-from sdimu_calibration.core.filter.filter_pass import PassOutput, PassState, new_output, run_pass
-from sdimu_calibration.core.filter.passes import Pass, Solution, pass_settings
-from sdimu_calibration.core.filter.passes import solve as solve_filter
+from sdimu_calibration.core.filter.filter_pass import PassOutput
+from sdimu_calibration.core.filter.passes import Pass
 from sdimu_calibration.core.measurement_kind import ALL, HELD_ALL, HELD_SENSORS, SENSORS
-from sdimu_calibration.core.navigation.track import motion
 from sdimu_calibration.core.noise_term import NoiseTerm
-from sdimu_calibration.core.progress import silent
 from sdimu_calibration.core.recording import DataError, DataFault
 from sdimu_calibration.core.results import History
 from sdimu_calibration.core.second_order.second_order_passes import (
@@ -55,6 +50,8 @@ _ABSURD = 1e3
 """NIS per degree of freedom from which there is no fit at all: units, axes or site are wrong."""
 _MISFIT = 1.2
 """NIS per degree of freedom, and held-out error (sigma), from which a user is warned; 1 is right."""
+_OF_THE_PASSES = {"known", "timetable", "centring", "_drifts", "_share_of_rest"}
+"""Cached properties that neither noise nor doubt changes."""
 NO_FIELD = (
     "the site states no magnetic field: that of mid-northern latitudes is assumed; state magnetic_field_nt (north, "
     "east, down) in the site's file, or what magnetism takes is wrong"
@@ -124,7 +121,8 @@ class NavigationFit(Fit):
     def settled_covariance(self) -> Floats:
         """Covariance of `settled`, shape (q, q)."""
         T = self.centring
-        return T @ (self.estimate_covariance if self.noise is None else self.noise.covariance) @ T.T
+        C = self.estimate_covariance if self.noise is None else self.noise.covariance
+        return np.asarray(T @ (C if self.doubt is None else C + self.doubt) @ T.T)
 
     @cached_property
     def centring(self) -> Floats:
@@ -146,16 +144,38 @@ class NavigationFit(Fit):
         drifting = [effect for effect in self.setup.sensors.effects if effect.bias_drift]
         if not drifting:
             return {}
-        epochs, seen = self.prepared.epochs, self.known.seen
-        rest = np.zeros(len(seen.t))
-        for a, b in zip(epochs.first[self.prepared.phases.dwell], epochs.last[self.prepared.phases.dwell], strict=True):
-            rest[a:b] = seen.dt[a:b]
         out = {}
         for effect in drifting:
-            means = rest @ effect.regressors(seen) / rest.sum()
-            for mean, term in zip(means.tolist(), effect.terms, strict=True):
+            for mean, term in zip(self.dwell_means(effect).tolist(), effect.terms, strict=True):
                 out[effect.parameters[term.parameter].name] = (term.channel, mean)
         return out
+
+    @cached_property
+    def _share_of_rest(self) -> Floats:
+        """Share of each cycle in all dwells, shape (n,)."""
+        epochs, dwell, seen = self.prepared.epochs, self.prepared.phases.dwell, self.known.seen
+        rest = np.zeros(len(seen.t))
+        for a, b in zip(epochs.first[dwell], epochs.last[dwell], strict=True):
+            rest[a:b] = seen.dt[a:b]
+        return np.asarray(rest / rest.sum())
+
+    def dwell_means(self, effect: Effect) -> Floats:
+        """Mean of the regressors (SI) of a drift of a bias over all dwells, shape (terms,)."""
+        return np.asarray(self._share_of_rest @ effect.regressors(self.known.seen))
+
+    def with_doubt(self, doubt: Floats | None) -> Self:
+        """Return the fit with another covariance (q, q) that open models add."""
+        return self._with_passes(replace(self, doubt=doubt))
+
+    def with_noise(self, noise: NoiseEstimate | None) -> Self:
+        """Return the fit in other noise; None is white noise."""
+        return self._with_passes(replace(self, noise=noise))
+
+    def _with_passes(self, other: Self) -> Self:
+        """Hand over what is known of the passes to a fit by the same ones."""
+        for name in _OF_THE_PASSES & self.__dict__.keys():
+            other.__dict__[name] = self.__dict__[name]
+        return other
 
     @property
     def noise_terms(self) -> tuple[NoiseTerm, ...]:
@@ -303,114 +323,6 @@ class NavigationFit(Fit):
             self.prepared.epochs.end[rows], values, np.sqrt(np.diagonal(covariance, axis1=1, axis2=2)),
             output.sigma[rows, 6:9], phases.stop[rows], phases.dwell[rows], phases.used[rows], output.nis[rows],
         )  # fmt: skip
-
-
-@dataclass(frozen=True)
-class FilterFit(NavigationFit):
-    """A fit by passes of the navigation filter.
-
-    Attributes
-    ----------
-    solution : Solution
-    """
-
-    solution: Solution
-    estimator = "filter"
-
-    @property
-    def last(self) -> Pass:
-        """The last pass."""
-        return self.solution.last
-
-    @property
-    def passes(self) -> int:
-        """Number of passes."""
-        return self.solution.passes
-
-    @property
-    def converged(self) -> bool:
-        """Whether the passes stood still at the end."""
-        return self.solution.converged
-
-    @property
-    def body_frame(self) -> str:
-        """Frame that the model asks for."""
-        return self.model.body_frame
-
-    @property
-    def values(self) -> Floats:
-        """Coefficients (SI) in `body_frame`, shape (p,)."""
-        return body_frame.values_in_frame(self.names, self.settled, self.body_frame)
-
-    @cached_property
-    def covariance(self) -> Floats:
-        """Covariance of `values`, shape (p, p)."""
-        J = body_frame.frame_jacobian(self.names, self.body_frame)
-        return np.asarray(J @ self.settled_covariance @ J.T)
-
-    @cached_property
-    def known(self) -> KnownPass:
-        """Navigation with the coefficients known at their final values."""
-        return known_pass(self.prepared, self.setup, self.last)
-
-    def added_columns(self, count: int) -> Ints:
-        """Columns in `evidence` of the last `count` parameters of the model, shape (count,)."""
-        return np.arange(len(self.names) - count, len(self.names))
-
-    def run_kinds(self, kind: Ints) -> PassOutput:
-        """Repeat the last pass with other kinds of measurement, shape (e,)."""
-        state = PassState(*(v.copy() for v in self.last.start))
-        output = new_output(len(kind), len(self.estimate), False, len(kind))
-        run_pass(self.last.data._replace(kind=kind), pass_settings(self.setup, closed_loop=False), state, output)
-        return output
-
-    def on(self, prepared: PreparedData, C_nb: Floats) -> FilterFit:
-        """Fit the same model to a part of the recording that starts at attitude `C_nb` (3, 3)."""
-        constant = self.setup.sensors.decay_rate == 0.0
-        begin = StartPoint(np.ascontiguousarray(C_nb), self.estimate * constant)
-        solution = solve_filter(self.setup, prepared, begin, silent)
-        return replace(self, prepared=prepared, solution=solution, noise=None)
-
-    def compensated(self, prepared: PreparedData, estimate: Floats, C_start: Floats, end_of_fit: float) -> Compensated:
-        """Take the errors at `estimate` (p,) out of all cycles to first order; the fit ended at `end_of_fit` (s)."""
-        setup, sensors, cycles = self.setup, self.setup.sensors, prepared.cycles
-        seen = motion(
-            cycles, prepared.rest, sensors, estimate, C_start.copy(), setup.site.latitude_rad, setup.gravity,
-            prepared.temperature, predicted=False, magnetic_n=setup.magnetic_n,
-        )  # fmt: skip
-        values = sensors.regressors(seen)
-        # What fades is known where the fit ended, and fades away from there.
-        fading = np.exp(-np.outer(np.abs(seen.t - end_of_fit), sensors.decay_rate[sensors.parameter]))
-        errors = sensors.errors(values * fading, estimate) * cycles.dt[:, None]
-        clean = replace(cycles, alpha=cycles.alpha - errors[:, :3], upsilon=cycles.upsilon - errors[:, 3:])
-        return Compensated(clean, values, sensors.channel, sensors.parameter)
-
-    def history(self) -> History:
-        """History of the first pass in the reported frame, at the epochs whose covariance was kept."""
-        out = self.solution.first.output
-        J = body_frame.frame_jacobian(self.names, self.body_frame)
-        rows = np.arange(0, len(self.prepared.epochs), out.stride)
-        values = np.array(
-            [body_frame.values_in_frame(self.names, self.centring @ v, self.body_frame) for v in out.estimate[rows]]
-        )
-        J = J @ self.centring
-        return self._rows_of_history(rows, out, values, J @ out.covariance[: len(rows)] @ J.T)
-
-    def notes(self) -> tuple[str, ...]:
-        """List the stops that were found; name an azimuth that is not observable."""
-        heading = azimuth_note(self.solution)
-        return (*super().notes(), *([heading] if heading else []))
-
-    def warnings(self, statistics: dict[str, float | None]) -> tuple[str, ...]:
-        """Misfit, an azimuth that is too little known, coefficients outside the specification.
-
-        Raises
-        ------
-        DataError
-            When there is no fit at all.
-        """
-        azimuth = azimuth_warning(self.solution)
-        return (*super().warnings(statistics), *([azimuth] if azimuth else []))
 
 
 def fit_statistics(output: PassOutput) -> dict[str, float | None]:

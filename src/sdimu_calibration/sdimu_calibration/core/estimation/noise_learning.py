@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import TypeVar
 
 import numpy as np
@@ -69,7 +68,7 @@ def in_noise(fit: F, evidence: LinearEvidence, wander: Wander, terms: Sequence[N
     if not isinstance(fit, NavigationFit):
         return fit
     if not terms:
-        return replace(fit, noise=None)
+        return fit.with_noise(None)
     bare, modes = evidence.only(np.empty(0, dtype=np.int64)), wander.modes(terms)
     noisy = bare.with_noise(modes.columns)
     deviation, covariance = _with_mean(bare, modes)
@@ -81,7 +80,7 @@ def in_noise(fit: F, evidence: LinearEvidence, wander: Wander, terms: Sequence[N
     estimate = NoiseEstimate(
         tuple(terms), deviation, covariance, gain, squared / max(1, len(residual) - len(deviation)), rms
     )
-    return replace(fit, noise=estimate)
+    return fit.with_noise(estimate)
 
 
 def _with_mean(evidence: LinearEvidence, modes: Modes) -> tuple[Floats, Floats]:
@@ -105,4 +104,4 @@ def _with_mean(evidence: LinearEvidence, modes: Modes) -> tuple[Floats, Floats]:
 
 def in_white_noise(fit: F) -> F:
     """Return the fit as its passes left it, in white noise."""
-    return replace(fit, noise=None) if isinstance(fit, NavigationFit) and fit.noise is not None else fit
+    return fit.with_noise(None) if isinstance(fit, NavigationFit) and fit.noise is not None else fit

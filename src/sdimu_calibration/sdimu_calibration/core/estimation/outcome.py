@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import numpy as np
+
+from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.estimation.fit import Fit
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.estimation.solve import AUTO, solve
@@ -9,6 +12,9 @@ from sdimu_calibration.core.progress import Progress, silent
 from sdimu_calibration.core.recording import Recording
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.specification import ImuSpecification, Model, Site
+
+_TOLD = 1.2
+"""Ratio of a sigma to the one if the model is right, from which a note reports it: less is seen in no use of it."""
 
 
 def outcome(fit: Fit, held_out: bool = True) -> Calibration:
@@ -29,6 +35,8 @@ def outcome(fit: Fit, held_out: bool = True) -> Calibration:
     statistics["held_out_rms"] = fit.held_out_rms() if held_out else None
     parameters = fit.sensors.parameters
     warnings = (*(f.text for f in fit.faults if f.grave), *fit.warnings(statistics))
+    light = tuple(f.text for f in fit.faults if not f.grave)
+    conditional = None if fit.doubt is None else np.sqrt(np.diag(fit.with_doubt(None).covariance))
     return Calibration(
         body_frame=fit.body_frame,
         model=tuple(e.key for e in fit.sensors.effects),
@@ -37,9 +45,10 @@ def outcome(fit: Fit, held_out: bool = True) -> Calibration:
         display_units=tuple(p.display_unit for p in parameters),
         values=fit.values,
         covariance=fit.covariance,
+        conditional_sigma=conditional,
         fit=statistics,
         data=fit.data_counts(),
-        notes=(*fit.test.recording.notes, *fit.notes(), *(f.text for f in fit.faults if not f.grave), *warnings),
+        notes=(*fit.test.recording.notes, *fit.notes(), *widened(fit, conditional), *light, *warnings),
         history=fit.history(),
         warnings=warnings,
         faults=fit.faults,
@@ -47,6 +56,22 @@ def outcome(fit: Fit, held_out: bool = True) -> Calibration:
         estimator_reason=fit.reason,
         noise=fit.noise_terms,
         drift_means=fit.drift_means,
+    )
+
+
+def widened(fit: Fit, conditional: Floats | None) -> tuple[str, ...]:
+    """Say which sigma is much larger than the one (p,) that holds if the model is right; one line or none."""
+    if conditional is None:
+        return ()
+    free = conditional > 0.0
+    ratio = np.ones(len(conditional))
+    ratio[free] = np.sqrt(np.diag(fit.covariance))[free] / conditional[free]
+    worst = int(np.argmax(ratio))
+    if ratio[worst] < _TOLD:
+        return ()
+    return (
+        "sigmas hold for the models that the data leave open, too: that of "
+        f"{fit.names[worst]} is {ratio[worst]:.1f} times what it would be if this model were known to be right",
     )
 
 

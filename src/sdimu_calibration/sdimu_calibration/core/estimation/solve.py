@@ -32,9 +32,10 @@ from sdimu_calibration.core.effects.accelerometer_frame import (
 )
 from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.effects.imu_model import ImuModel
+from sdimu_calibration.core.estimation.filter_fit import FilterFit
 from sdimu_calibration.core.estimation.fit import Fit, Start
 from sdimu_calibration.core.estimation.handheld_fit import HandheldFit
-from sdimu_calibration.core.estimation.navigation_fit import FilterFit, NavigationFit
+from sdimu_calibration.core.estimation.navigation_fit import NavigationFit
 from sdimu_calibration.core.estimation.noise_learning import with_noise_learned
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.estimation.reference_fits import BatchFit, ClassicalFit

@@ -1,0 +1,175 @@
+"""What models that the data leave open do to the coefficients: the doubt about the model, beside the noise.
+
+A sigma of least squares holds if the model is right. Two kinds of other models are nearly as likely as the one that a
+diagnosis ends with: the same with one effect more, too small to be found; and the same with another effect of the
+class in the place of one that was found. Each moves the coefficients. Weighed with their posterior odds, the square of
+the move is what the covariance lacks:
+
+    C = C_0 + sum_m w_m (C_m - C_0 + D_m D_m'),   D_m = theta_m - theta_0
+
+Source: J. Hoeting et al., "Bayesian model averaging: a tutorial", Statistical Science 14 (1999).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from sdimu_calibration.core.arrays import Bools, Floats, Ints
+from sdimu_calibration.core.diagnosis.search import Problem
+from sdimu_calibration.core.effects import bias
+from sdimu_calibration.core.estimation.fit import Fit
+from sdimu_calibration.core.evidence.information import solved
+from sdimu_calibration.core.evidence.linear import LinearEvidence
+
+_LEAST_WEIGHT = 1e-5
+"""Posterior weight (1) of a model below which it is left out: a coefficient would have to move by a hundred sigma."""
+
+
+@dataclass(frozen=True)
+class _Alternatives:
+    """Every allowed column added to a choice: log odds, and how it moves the known parameters.
+
+    Attributes
+    ----------
+    score : ndarray, shape (a,)
+        Log Bayes factor over the choice without it; -inf where it cannot be seen.
+    estimate, variance : ndarray, shape (a,)
+        SI, with the prior that physics gives.
+    slope : ndarray, shape (k, a)
+        Change of each known parameter per unit of the column.
+    """
+
+    score: Floats
+    estimate: Floats
+    variance: Floats
+    slope: Floats
+
+
+def model_doubt(fit: Fit, evidence: LinearEvidence, chosen: Sequence[int], allowed: Ints, scale: float) -> Floats:
+    """Covariance that the open models add to that of the coefficients.
+
+    Parameters
+    ----------
+    fit : Fit
+        The fit as given: tells the mean of a drift over the test.
+    evidence : LinearEvidence
+        In the noise that was found.
+    chosen : sequence of int, length k
+        Columns that were found.
+    allowed : ndarray of int, shape (a,)
+        Columns that may be in a model, `chosen` among them.
+    scale : float
+        Residual noise over specified noise.
+
+    Returns
+    -------
+    ndarray, shape (q + k, q + k)
+        SI; the q coefficients of the model, then the sizes of what was found.
+    """
+    problem = Problem(evidence)
+    told = [*range(evidence.coefficients), *range(problem.p, problem.p + len(chosen))]
+    is_chosen = np.isin(allowed, chosen)
+    more = _alternatives(problem, chosen, allowed, scale)
+    open_ = np.isfinite(more.score) & ~is_chosen
+    catalogue = sum(evidence.candidates[c - problem.p].family != "own" for c in allowed.tolist())
+    # One effect that is missing is expected of a whole catalogue.
+    weight = _shares(more.score - np.log(max(catalogue, 1)), open_)
+    out = _spread(fit, evidence, allowed, more, weight, told)
+    for number, column in enumerate(chosen):
+        others = [c for c in chosen if c != column]
+        rivals = _alternatives(problem, others, allowed, scale)
+        place = int(np.flatnonzero(allowed == column)[0])
+        weight = _shares(rivals.score - rivals.score[place], np.isfinite(rivals.score) & ~is_chosen)
+        out += _exchanged(fit, evidence, allowed, rivals, weight, (place, number), len(out))
+    return out
+
+
+def in_doubt(fit: Fit, final: Fit, evidence: LinearEvidence, chosen: Ints, free: Ints, scale: float) -> Fit:
+    """Return a fit with what was found, its covariance with what open models add.
+
+    Parameters
+    ----------
+    fit, final : Fit
+        With the model as given, and with the k effects that were found behind it.
+    evidence : LinearEvidence
+        In the noise that was found.
+    chosen : ndarray of int, shape (k,)
+        Columns of what was found.
+    free : ndarray of int
+        Columns of the free inputs, which are no effects.
+    scale : float
+        Residual noise over specified noise.
+    """
+    allowed = np.setdiff1d(np.arange(len(evidence.weight), len(evidence.names)), free)
+    doubt = model_doubt(fit, evidence, chosen.tolist(), allowed, scale)
+    found = final.added_columns(len(chosen))
+    order = np.concatenate([np.setdiff1d(np.arange(len(doubt)), found), found]).astype(np.int64)
+    placed = np.zeros_like(doubt)
+    placed[np.ix_(order, order)] = doubt
+    return final.with_doubt(placed)
+
+
+def _alternatives(
+    problem: Problem[LinearEvidence], chosen: Sequence[int], allowed: Ints, scale: float
+) -> _Alternatives:
+    evidence, J = problem.evidence, problem.evidence.information.J
+    known, weight, _ = problem.known(chosen)
+    scanned = problem.scan(chosen, scale)
+    slope = -solved(J[np.ix_(known, known)] + np.diag(weight), J[np.ix_(known, allowed)])
+    variance = 1.0 / (scanned.J[allowed] / scale**2 + evidence.prior[allowed - problem.p] ** -2.0)
+    return _Alternatives(
+        problem.scores(scanned, scale)[allowed], scanned.d[allowed] / scale**2 * variance, variance, slope
+    )
+
+
+def _shares(log_odds: Floats, open_: Bools) -> Floats:
+    """Posterior weight of every open model beside one of log odds 0; shape (a,)."""
+    odds = np.where(open_, np.exp(np.minimum(np.where(open_, log_odds, 0.0), 50.0)), 0.0)
+    weight = odds / (1.0 + odds.sum())
+    return np.where(weight > _LEAST_WEIGHT, weight, 0.0)
+
+
+def _spread(
+    fit: Fit, evidence: LinearEvidence, allowed: Ints, more: _Alternatives, weight: Floats, told: Sequence[int]
+) -> Floats:
+    """Spread by one effect more; shape (len(told), len(told))."""
+    at = np.flatnonzero(weight)
+    S = more.slope[told][:, at]
+    _add_means(S, fit, evidence, allowed[at])
+    return np.asarray((S * (weight * (more.variance + more.estimate**2))[at]) @ S.T)
+
+
+def _exchanged(
+    fit: Fit, evidence: LinearEvidence, allowed: Ints, rivals: _Alternatives, weight: Floats,
+    where: tuple[int, int], size: int,
+) -> Floats:  # fmt: skip
+    """Spread by other effects in the place of one, which is `where` among the allowed and the chosen; (size, size)."""
+    out, q = np.zeros((size, size)), evidence.coefficients
+    place, number = where
+    at = np.append(np.flatnonzero(weight), place)
+    S = rivals.slope[:q, at]
+    _add_means(S, fit, evidence, allowed[at])
+    moved = S * rivals.estimate[at]
+    apart, w = moved[:, :-1] - moved[:, -1:], weight[at[:-1]]
+    own = rivals.slope[:q, place]
+    # Where the effect is not there, its own variance spreads nothing.
+    gone = own * (weight.sum() * rivals.variance[place])
+    S = S[:, :-1]
+    out[:q, :q] = (S * (w * rivals.variance[at[:-1]])) @ S.T + (apart * w) @ apart.T - np.outer(gone, own)
+    out[:q, q + number] = out[q + number, :q] = -gone
+    return out
+
+
+def _add_means(S: Floats, fit: Fit, evidence: LinearEvidence, columns: Ints) -> None:
+    """Turn the slope of the biases (k, a) into that of their means over the dwells, where a column is a drift."""
+    p = len(evidence.weight)
+    for place, column in enumerate(columns.tolist()):
+        effect = evidence.candidates[column - p].effect
+        if not effect.bias_drift:
+            continue
+        name = bias.NAMES[effect.terms[0].channel]
+        if name in evidence.names:
+            S[evidence.names.index(name), place] += fit.dwell_means(effect)[0]

@@ -1,0 +1,131 @@
+"""A fit by passes of the navigation filter."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from sdimu_calibration.core.alignment.coarse_alignment import StartPoint
+from sdimu_calibration.core.alignment.prepared import PreparedData
+from sdimu_calibration.core.arrays import Floats, Ints
+from sdimu_calibration.core.effects import body_frame
+from sdimu_calibration.core.estimation.azimuth_check import azimuth_note, azimuth_warning
+from sdimu_calibration.core.estimation.free_inertial import Compensated
+from sdimu_calibration.core.estimation.navigation_fit import NavigationFit
+from sdimu_calibration.core.evidence.navigation_evidence import KnownPass, known_pass
+from sdimu_calibration.core.filter.filter_pass import PassOutput, PassState, new_output, run_pass
+from sdimu_calibration.core.filter.passes import Pass, Solution, pass_settings
+from sdimu_calibration.core.filter.passes import solve as solve_filter
+from sdimu_calibration.core.navigation.track import motion
+from sdimu_calibration.core.progress import silent
+from sdimu_calibration.core.results import History
+
+
+@dataclass(frozen=True)
+class FilterFit(NavigationFit):
+    """A fit by passes of the navigation filter.
+
+    Attributes
+    ----------
+    solution : Solution
+    """
+
+    solution: Solution
+    estimator = "filter"
+
+    @property
+    def last(self) -> Pass:
+        """The last pass."""
+        return self.solution.last
+
+    @property
+    def passes(self) -> int:
+        """Number of passes."""
+        return self.solution.passes
+
+    @property
+    def converged(self) -> bool:
+        """Whether the passes stood still at the end."""
+        return self.solution.converged
+
+    @property
+    def body_frame(self) -> str:
+        """Frame that the model asks for."""
+        return self.model.body_frame
+
+    @property
+    def values(self) -> Floats:
+        """Coefficients (SI) in `body_frame`, shape (p,)."""
+        return body_frame.values_in_frame(self.names, self.settled, self.body_frame)
+
+    @cached_property
+    def covariance(self) -> Floats:
+        """Covariance of `values`, shape (p, p)."""
+        J = body_frame.frame_jacobian(self.names, self.body_frame)
+        return np.asarray(J @ self.settled_covariance @ J.T)
+
+    @cached_property
+    def known(self) -> KnownPass:
+        """Navigation with the coefficients known at their final values."""
+        return known_pass(self.prepared, self.setup, self.last)
+
+    def added_columns(self, count: int) -> Ints:
+        """Columns in `evidence` of the last `count` parameters of the model, shape (count,)."""
+        return np.arange(len(self.names) - count, len(self.names))
+
+    def run_kinds(self, kind: Ints) -> PassOutput:
+        """Repeat the last pass with other kinds of measurement, shape (e,)."""
+        state = PassState(*(v.copy() for v in self.last.start))
+        output = new_output(len(kind), len(self.estimate), False, len(kind))
+        run_pass(self.last.data._replace(kind=kind), pass_settings(self.setup, closed_loop=False), state, output)
+        return output
+
+    def on(self, prepared: PreparedData, C_nb: Floats) -> FilterFit:
+        """Fit the same model to a part of the recording that starts at attitude `C_nb` (3, 3)."""
+        constant = self.setup.sensors.decay_rate == 0.0
+        begin = StartPoint(np.ascontiguousarray(C_nb), self.estimate * constant)
+        solution = solve_filter(self.setup, prepared, begin, silent)
+        return replace(self, prepared=prepared, solution=solution, noise=None)
+
+    def compensated(self, prepared: PreparedData, estimate: Floats, C_start: Floats, end_of_fit: float) -> Compensated:
+        """Take the errors at `estimate` (p,) out of all cycles to first order; the fit ended at `end_of_fit` (s)."""
+        setup, sensors, cycles = self.setup, self.setup.sensors, prepared.cycles
+        seen = motion(
+            cycles, prepared.rest, sensors, estimate, C_start.copy(), setup.site.latitude_rad, setup.gravity,
+            prepared.temperature, predicted=False, magnetic_n=setup.magnetic_n,
+        )  # fmt: skip
+        values = sensors.regressors(seen)
+        # What fades is known where the fit ended, and fades away from there.
+        fading = np.exp(-np.outer(np.abs(seen.t - end_of_fit), sensors.decay_rate[sensors.parameter]))
+        errors = sensors.errors(values * fading, estimate) * cycles.dt[:, None]
+        clean = replace(cycles, alpha=cycles.alpha - errors[:, :3], upsilon=cycles.upsilon - errors[:, 3:])
+        return Compensated(clean, values, sensors.channel, sensors.parameter)
+
+    def history(self) -> History:
+        """History of the first pass in the reported frame, at the epochs whose covariance was kept."""
+        out = self.solution.first.output
+        J = body_frame.frame_jacobian(self.names, self.body_frame)
+        rows = np.arange(0, len(self.prepared.epochs), out.stride)
+        values = np.array(
+            [body_frame.values_in_frame(self.names, self.centring @ v, self.body_frame) for v in out.estimate[rows]]
+        )
+        J = J @ self.centring
+        return self._rows_of_history(rows, out, values, J @ out.covariance[: len(rows)] @ J.T)
+
+    def notes(self) -> tuple[str, ...]:
+        """List the stops that were found; name an azimuth that is not observable."""
+        heading = azimuth_note(self.solution)
+        return (*super().notes(), *([heading] if heading else []))
+
+    def warnings(self, statistics: dict[str, float | None]) -> tuple[str, ...]:
+        """Misfit, an azimuth that is too little known, coefficients outside the specification.
+
+        Raises
+        ------
+        DataError
+            When there is no fit at all.
+        """
+        azimuth = azimuth_warning(self.solution)
+        return (*super().warnings(statistics), *([azimuth] if azimuth else []))

@@ -1,0 +1,114 @@
+"""Models that the data leave open widen the covariance by what a mixture of them spreads."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from types import SimpleNamespace
+from typing import Any, cast
+
+import numpy as np
+import pytest
+
+from sdimu_calibration.core.arrays import Floats
+from sdimu_calibration.core.diagnosis.diagnose import climb
+from sdimu_calibration.core.diagnosis.model_doubt import model_doubt
+from sdimu_calibration.core.effects import registry
+from sdimu_calibration.core.estimation.fit import Fit
+from sdimu_calibration.core.evidence.candidate import split
+from sdimu_calibration.core.evidence.linear import LinearEvidence
+from sdimu_calibration.storage.config import load_imu
+
+RNG = np.random.default_rng(5)
+PRIOR = np.array([2.0, 20.0, 20.0])
+FIT = cast("Fit", SimpleNamespace(dwell_means=lambda effect: np.zeros(len(effect.terms))))
+
+
+@dataclass(frozen=True)
+class Bare(LinearEvidence):
+    """A linear model without a test behind it."""
+
+    def signature(self, effects: Any) -> Floats:
+        """Nothing further is tried."""
+        raise NotImplementedError
+
+
+def linear_model(truth: Floats, noise: float = 1.0) -> Bare:
+    """Two coefficients and three candidates; the last two candidates alike but for a coefficient."""
+    rows = 200
+    base = RNG.standard_normal((rows, 2))
+    first = base[:, 0] + 0.3 * RNG.standard_normal(rows)
+    second = 0.5 * base[:, 1] + RNG.standard_normal(rows)
+    third = second + 0.6 * base[:, 0] + 0.05 * RNG.standard_normal(rows)
+    W = 0.2 * np.column_stack([base, first, second, third])
+    candidates = tuple(c for c in split(registry.get("accel_quadratic")))
+    e = W @ truth + noise * RNG.standard_normal(rows)
+    return Bare(
+        e=e, W=W, stop=np.arange(rows) // 10, names=("a", "b", *(c.label for c in candidates)),
+        weight=np.full(2, 1e-6), shift=np.zeros(2), stated=np.ones(2), candidates=candidates, prior=PRIOR,
+        imu=load_imu("dtg"), times=cast("Any", None), coefficients=2,
+    )  # fmt: skip
+
+
+WIDE = 3.0
+"""Ratio of the prior that a search takes to that of physics: an effect may be three times as large as is usual."""
+
+
+def posterior(model: Bare, columns: list[int], ratio: float = 1.0) -> tuple[float, Floats, Floats]:
+    """Log evidence, and mean and covariance of the coefficients, with candidates of `ratio` times their prior."""
+    chosen = np.array(columns, dtype=int)
+    weight = np.concatenate([model.weight, (ratio * PRIOR[chosen - 2]) ** -2.0])
+    W = model.W[:, np.concatenate([[0, 1], chosen])]
+    A = W.T @ W + np.diag(weight)
+    mean = np.linalg.solve(A, W.T @ model.e)
+    log = 0.5 * mean @ A @ mean - 0.5 * np.linalg.slogdet(A)[1] - np.sum(np.log(ratio * PRIOR[chosen - 2]))
+    return float(log), mean[:2], np.linalg.inv(A)[:2, :2]
+
+
+def spread(model: Bare, about: list[int], models: list[tuple[float, list[int]]]) -> Floats:
+    """Second moment about one model over several with prior odds, less the covariance in the one."""
+    _, mean, covariance = posterior(model, about)
+    log = np.array([np.log(odds) + posterior(model, columns, WIDE)[0] for odds, columns in models])
+    share = np.exp(log - log.max())
+    share /= share.sum()
+    out = -covariance
+    for weight, (_, columns) in zip(share, models, strict=True):
+        _, m, C = posterior(model, columns)
+        out = out + weight * (C + np.outer(m - mean, m - mean))
+    return out
+
+
+@pytest.mark.parametrize("size", [0.0, 1.5, 3.0])
+def test_an_effect_too_small_to_be_found_widens_the_sigma_as_the_mixture_of_models_does(size: float) -> None:
+    model = linear_model(np.array([1.0, -1.0, size, 0.0, 0.0]))
+    got = model_doubt(FIT, model, [], np.array([2, 3, 4]), 1.0)
+    expected = spread(model, [], [(1.0, []), *((1.0 / 3.0, [c]) for c in (2, 3, 4))])
+    assert got == pytest.approx(expected, rel=1e-6)
+
+
+def test_two_effects_that_look_alike_widen_the_sigma_by_what_lies_between_them() -> None:
+    model = linear_model(np.array([1.0, -1.0, 0.0, 4.0, 0.0]))
+    got = model_doubt(FIT, model, [3], np.array([3, 4]), 1.0)
+    other = spread(model, [3], [(1.0, [3]), (1.0, [4])])
+    # One effect more, at odds of one in the two that were looked at.
+    more = spread(model, [3], [(1.0, [3]), (0.5, [3, 4])])
+    assert np.trace(other) > 0.01 * np.trace(posterior(model, [3])[2])
+    # What was found has thirty times its prior in a search, which is wide here already.
+    assert got[:2, :2] == pytest.approx(other + more, rel=0.02, abs=1e-3 * np.trace(other))
+
+
+def test_what_nothing_can_be_mistaken_for_widens_nothing() -> None:
+    model = linear_model(np.array([1.0, -1.0, 0.0, 40.0, 0.0]), noise=0.1)
+    doubt = model_doubt(FIT, model, [3], np.array([3]), 1.0)
+    assert doubt == pytest.approx(np.zeros((3, 3)), abs=1e-12)
+
+
+def test_the_sigma_of_a_diagnosis_is_at_least_the_conditional_one(bench: Any) -> None:
+    found = climb(bench.fit(seed=104))
+    conditional = found.after.conditional_sigma
+    assert conditional is not None
+    sigma = np.sqrt(np.diag(found.after.covariance))
+    free = conditional > 0.0
+    assert (sigma[free] >= conditional[free] * (1.0 - 1e-9)).all()
+    assert (sigma[free] < 3.0 * conditional[free]).all()
+    again = replace(found.extended, doubt=None).covariance
+    assert np.sqrt(np.diag(again)) == pytest.approx(conditional)
