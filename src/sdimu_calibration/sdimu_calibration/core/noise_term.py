@@ -12,6 +12,8 @@ TURN = "turn"
 SHIFT = "shift"
 KINDS = (RANDOM_WALK, FLICKER, MARKOV, STOP, TURN, SHIFT)
 """Kinds of noise with a memory."""
+DRAWN = (STOP, TURN, SHIFT)
+"""Kinds of noise that any cause may hide behind that depends on attitude or rate."""
 WORDS = {
     RANDOM_WALK: "rate random walk",
     FLICKER: "bias instability (flicker)",

@@ -88,12 +88,20 @@ def test_an_effect_too_small_to_be_found_widens_the_sigma_as_the_mixture_of_mode
 def test_two_effects_that_look_alike_widen_the_sigma_by_what_lies_between_them() -> None:
     model = linear_model(np.array([1.0, -1.0, 0.0, 4.0, 0.0]))
     got = model_doubt(FIT, model, [3], np.array([3, 4]), 1.0)
-    other = spread(model, [3], [(1.0, [3]), (1.0, [4])])
+    other = spread(model, [3], [(1.0, [3]), (1.0, [4]), (2.0, [])])
     # One effect more, at odds of one in the two that were looked at.
     more = spread(model, [3], [(1.0, [3]), (0.5, [3, 4])])
     assert np.trace(other) > 0.01 * np.trace(posterior(model, [3])[2])
     # What was found has thirty times its prior in a search, which is wide here already.
     assert got[:2, :2] == pytest.approx(other + more, rel=0.02, abs=1e-3 * np.trace(other))
+
+
+def test_an_effect_found_at_the_threshold_leaves_the_model_without_it_open() -> None:
+    model = linear_model(np.array([1.0, -1.0, 2.5, 0.0, 0.0]))
+    got = model_doubt(FIT, model, [2], np.array([2]), 1.0)
+    expected = spread(model, [2], [(1.0, [2]), (1.0, [])])
+    assert np.trace(expected) > 0.05 * np.trace(posterior(model, [2])[2])
+    assert got[:2, :2] == pytest.approx(expected, rel=0.1, abs=0.02 * np.trace(expected))
 
 
 def test_what_nothing_can_be_mistaken_for_widens_nothing() -> None:

@@ -16,7 +16,6 @@ from sdimu_calibration.core.diagnosis.free_input_test import FreeInputTest
 from sdimu_calibration.core.diagnosis.ladder import Rung, ladder
 from sdimu_calibration.core.diagnosis.model_doubt import in_doubt
 from sdimu_calibration.core.diagnosis.rounds import (
-    DRAWN,
     UNEXPLAINED_P,
     Request,
     Round,
@@ -38,6 +37,7 @@ from sdimu_calibration.core.evidence.consistency import Consistency
 from sdimu_calibration.core.evidence.learned_noise import Wander
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.evidence.navigation_evidence import NavigationEvidence
+from sdimu_calibration.core.noise_term import DRAWN
 from sdimu_calibration.core.probability import normal_tail
 from sdimu_calibration.core.progress import Progress, silent
 from sdimu_calibration.core.recording import DataError, Recording

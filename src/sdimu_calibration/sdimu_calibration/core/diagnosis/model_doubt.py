@@ -1,9 +1,9 @@
 """What models that the data leave open do to the coefficients: the doubt about the model, beside the noise.
 
-A sigma of least squares holds if the model is right. Two kinds of other models are nearly as likely as the one that a
-diagnosis ends with: the same with one effect more, too small to be found; and the same with another effect of the
-class in the place of one that was found. Each moves the coefficients. Weighed with their posterior odds, the square of
-the move is what the covariance lacks:
+A sigma of least squares holds if the model is right. Three kinds of other models are nearly as likely as the one that a
+diagnosis ends with: with one effect more, too small to be found; with another effect of the class in the place of one
+that was found; and without one that was found at the threshold. Each moves the coefficients. Weighed with their
+posterior odds, the square of the move is what the covariance lacks:
 
     C = C_0 + sum_m w_m (C_m - C_0 + D_m D_m'),   D_m = theta_m - theta_0
 
@@ -74,15 +74,17 @@ def model_doubt(fit: Fit, evidence: LinearEvidence, chosen: Sequence[int], allow
     is_chosen = np.isin(allowed, chosen)
     more = _alternatives(problem, chosen, allowed, scale)
     open_ = np.isfinite(more.score) & ~is_chosen
-    catalogue = sum(evidence.candidates[c - problem.p].family != "own" for c in allowed.tolist())
     # One effect that is missing is expected of a whole catalogue.
-    weight = _shares(more.score - np.log(max(catalogue, 1)), open_)
+    rare = np.log(max(1, sum(evidence.candidates[c - problem.p].family != "own" for c in allowed.tolist())))
+    weight = _shares(more.score - rare, open_)
     out = _spread(fit, evidence, allowed, more, weight, told)
     for number, column in enumerate(chosen):
         others = [c for c in chosen if c != column]
         rivals = _alternatives(problem, others, allowed, scale)
         place = int(np.flatnonzero(allowed == column)[0])
-        weight = _shares(rivals.score - rivals.score[place], np.isfinite(rivals.score) & ~is_chosen)
+        others_and_none = np.append(rivals.score, rare) - rivals.score[place]
+        open_ = np.append(np.isfinite(rivals.score) & ~is_chosen, np.isfinite(rivals.score[place]))
+        weight = _shares(others_and_none, open_)
         out += _exchanged(fit, evidence, allowed, rivals, weight, (place, number), len(out))
     return out
 
@@ -146,19 +148,23 @@ def _exchanged(
     fit: Fit, evidence: LinearEvidence, allowed: Ints, rivals: _Alternatives, weight: Floats,
     where: tuple[int, int], size: int,
 ) -> Floats:  # fmt: skip
-    """Spread by other effects in the place of one, which is `where` among the allowed and the chosen; (size, size)."""
+    """Spread by other effects in the place of one, or none; (size, size).
+
+    The one is `where` among the allowed and the chosen; `weight` (a + 1,) is that of every allowed one, then of none.
+    """
     out, q = np.zeros((size, size)), evidence.coefficients
     place, number = where
-    at = np.append(np.flatnonzero(weight), place)
+    at = np.append(np.flatnonzero(weight[:-1]), place)
     S = rivals.slope[:q, at]
     _add_means(S, fit, evidence, allowed[at])
     moved = S * rivals.estimate[at]
     apart, w = moved[:, :-1] - moved[:, -1:], weight[at[:-1]]
+    without = weight[-1] * np.outer(moved[:, -1], moved[:, -1])
     own = rivals.slope[:q, place]
     # Where the effect is not there, its own variance spreads nothing.
     gone = own * (weight.sum() * rivals.variance[place])
     S = S[:, :-1]
-    out[:q, :q] = (S * (w * rivals.variance[at[:-1]])) @ S.T + (apart * w) @ apart.T - np.outer(gone, own)
+    out[:q, :q] = (S * (w * rivals.variance[at[:-1]])) @ S.T + (apart * w) @ apart.T + without - np.outer(gone, own)
     out[:q, q + number] = out[q + number, :q] = -gone
     return out
 

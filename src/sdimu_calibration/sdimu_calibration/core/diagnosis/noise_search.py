@@ -32,7 +32,7 @@ from sdimu_calibration.core.diagnosis.search import (
 from sdimu_calibration.core.evidence.joint_information import Balance, Given, Joint, balance
 from sdimu_calibration.core.evidence.learned_noise import Wander, with_alike
 from sdimu_calibration.core.evidence.linear import E
-from sdimu_calibration.core.noise_term import TRIADS, NoiseTerm
+from sdimu_calibration.core.noise_term import DRAWN, TRIADS, NoiseTerm
 
 _POOL = 4
 """Number of candidates, best in white noise and best in the noise as it stands, for which noise is learned again: the
@@ -44,6 +44,9 @@ _DRIFT_COST = 8.0
 of the recording in any noise: a wander has jumps and trends by itself, and the scan looks for them at every time."""
 _OWN_COST = 16.0
 """Log-likelihood (1) that an equation must bring besides: a wander has waves of any period and phase."""
+_UNKNOWN_COST = 6.0
+"""Log-likelihood (1) that every effect must bring besides where errors are drawn anew: behind them is a cause that
+depends on attitude or rate, and a candidate that resembles a share of it is no finding."""
 _KEPT = 0.56
 """Share of its cost that a chosen effect must bring to stay: that of three sigma against four."""
 _HOPELESS = 60.0
@@ -51,6 +54,8 @@ _HOPELESS = 60.0
 _CLEAR = 10.0
 """Ratio of an effect to its sigma from which nobody asks whether noise explains the same: noise would have to grow
 by the effect as a whole."""
+_DOUBT = 3.0
+"""Log-likelihood (1) by which a choice with an effect that noise imitates must beat noise: odds of 20 to 1."""
 _EXCHANGES = 3
 """Number of times that every chosen effect is compared with all others in its place: the second changes little."""
 
@@ -95,7 +100,8 @@ class _Ground(Generic[E]):
         effect = self.white.candidate(column).effect
         triads = {TRIADS[term.channel // 3] for term in effect.terms}
         rival = effect.scope == "recording" or any(term.triad in triads for term in terms)
-        return share * max(_COST, 0.5 * self.limit**2) + (self.beside(column) if rival else 0.0)
+        unknown = _UNKNOWN_COST if any(term.kind in DRAWN for term in terms) else 0.0
+        return share * (max(_COST, 0.5 * self.limit**2) + unknown) + (self.beside(column) if rival else 0.0)
 
     def net(self, state: _State) -> float:
         """Likelihood of a state less what its effects and noise terms cost."""
@@ -175,7 +181,7 @@ def search_with_noise(
         if ground.net(state) > max(ground.net(from_white), ground.net(bare)) - _HOPELESS:
             ground, settled = _settled(ground, state)
             states.append(settled)
-    return _told(ground, max(states, key=ground.net), white)
+    return _told(ground, max(states, key=lambda s: ground.net(s) - _DOUBT * ground.doubtful(s)), white)
 
 
 def _settled(ground: _Ground[E], state: _State) -> tuple[_Ground[E], _State]:

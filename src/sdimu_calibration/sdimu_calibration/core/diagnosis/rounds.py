@@ -27,7 +27,7 @@ from sdimu_calibration.core.estimation.solve import extend
 from sdimu_calibration.core.evidence.candidate import Candidate, split
 from sdimu_calibration.core.evidence.learned_noise import Wander
 from sdimu_calibration.core.evidence.linear import LinearEvidence
-from sdimu_calibration.core.noise_term import SHIFT, STOP, TURN, NoiseTerm
+from sdimu_calibration.core.noise_term import NoiseTerm
 from sdimu_calibration.core.progress import Progress
 from sdimu_calibration.core.recording import DataError
 
@@ -43,8 +43,6 @@ _OWN_GAIN = 3.0
 """Likelihood by which equations must be better than the catalogue where noise takes what is left: odds of 20 to 1."""
 _PARALLEL = 1e-6
 """Share of its length by which a signature must differ from another to be its own: rounding is far below."""
-DRAWN = (STOP, TURN, SHIFT)
-"""Kinds of noise that any cause may hide behind that depends on attitude or rate."""
 _MANY = 3
 """Number of chosen catalogue terms from which one equation is tried in their place."""
 
@@ -266,9 +264,10 @@ def run_round(
     if request.wander is None:
         most = len(tried) + 1 if request.base.learns_scatter else MOST_STEPS
         return _round(fit, search(evidence, allowed, request.alpha, most), free)
-    # Noise alone is a rival from the start; once effects were preferred it need not be asked again.
+    # Noise is a rival from the start; once effects were preferred to all of it, it need not be asked again.
+    doubted = not tried or (earlier is not None and bool(earlier.found.noise))
     found = search_with_noise(
-        evidence, allowed, request.wander, request.alpha, limits.get(own), not tried,
+        evidence, allowed, request.wander, request.alpha, limits.get(own), doubted,
         earlier.found.joint if earlier else None,
     )  # fmt: skip
     limits.setdefault(own, found.threshold)
