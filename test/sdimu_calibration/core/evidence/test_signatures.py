@@ -3,11 +3,20 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from sdimu_calibration.core.diagnosis.scan import TESTABLE, scan
 from sdimu_calibration.core.effects import registry
 from sdimu_calibration.core.estimation.noise_learning import in_white_noise
-from sdimu_calibration.core.estimation.solve import extend
+from sdimu_calibration.core.estimation.prepared_test import PreparedTest
+from sdimu_calibration.core.estimation.solve import extend, solve
+from sdimu_calibration.core.evidence.navigation_evidence import columns
+from sdimu_calibration.core.evidence.noise_kernels import stretch_effects, stretches
+from sdimu_calibration.core.evidence.signatures import signatures
+from sdimu_calibration.core.navigation.correct_cycles import spread
+from sdimu_calibration.storage.config import load_imu
+from sdimu_sim.core.generator import generate
+from sdimu_sim.core.scenario import Scenario
 
 
 def _evidence(bench, names, **options):
@@ -21,6 +30,42 @@ def _share_left(evidence, weights):
     for name, value in weights.items():
         v[evidence.names.index(name)] = value
     return float(np.sqrt(max(v @ given.J @ v, 0.0) / (v**2 @ np.diag(evidence.information.J))))
+
+
+@pytest.fixture(scope="module")
+def second_order(bench):
+    """A fit of an IMU of which squares of the errors count."""
+    imu = load_imu("mems_industrial")
+    recording = generate(Scenario(bench.plan(), imu, bench.site, rate_hz=20.0, seed=7))[0]
+    fit = solve(PreparedTest(recording, imu, bench.site), bench.model, "second-order", learn=False)
+    assert fit.known.weight is not None
+    return fit
+
+
+@pytest.mark.parametrize("estimator", ["filter", "second-order"])
+def test_a_constant_error_of_a_stretch_shows_as_the_effect_that_is_one(bench, second_order, estimator):
+    evidence = (bench.fit() if estimator == "filter" else second_order).evidence()
+    cut = stretches(evidence.times)
+    slow, fast = evidence.signature(stretch_effects(cut)), evidence.constant_signature(cut)
+    assert np.abs(fast - slow).max(axis=0) == pytest.approx(0.0, abs=1e-12 * np.abs(slow).max())
+    assert (np.abs(fast - slow).max(axis=0) < 1e-10 * np.abs(slow).max(axis=0)).all()
+
+
+def test_corrected_samples_show_an_effect_as_it_goes_through_the_inverse_slope(second_order):
+    effects = [registry.get("accel_quadratic"), registry.get("gyro_scale_asymmetry")]
+    known, prepared, latitude = second_order.known, second_order.prepared, second_order.setup.site.latitude_rad
+    got = columns(prepared, known, latitude, effects)
+    expected = np.zeros_like(got)
+    for place, effect in enumerate(effects):
+        channel, parameter = np.array([(t.channel, t.parameter) for t in effect.terms]).T
+        terms = spread(effect.regressors(known.seen), channel, parameter, known.weight)
+        part = np.zeros((len(got), 3), order="F")
+        epochs = prepared.epochs
+        signatures(
+            known.seen, epochs.first, epochs.last, prepared.kind, known.output, *terms, latitude, None, part
+        )
+        expected[:, 3 * place : 3 * place + 3] = part
+    assert (np.abs(got - expected).max(axis=0) < 1e-10 * np.abs(expected).max(axis=0)).all()
 
 
 def test_information_of_the_signatures_is_the_covariance_of_the_filter(bench):

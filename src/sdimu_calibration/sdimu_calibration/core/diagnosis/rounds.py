@@ -287,9 +287,10 @@ def _evidence(
         return evidence, np.arange(count - sum(len(effect.parameters) for effect in free), count)
     before = earlier.found.evidence if earlier.found.white is None else earlier.found.white
     evidence = before.about(fit.evidence(), columns, tried)
-    have = frozenset(evidence.names)
-    more = _untried(candidates(base, (), request.extra, own), have) if own else []
-    return _without_doubles(evidence, more) if more else evidence, earlier.free
+    if not own or any(c.family == "own" for c in evidence.candidates):
+        return evidence, earlier.free
+    more = _untried(candidates(base, (), request.extra, own), frozenset(evidence.names))
+    return _without_doubles(evidence, more), earlier.free
 
 
 def _without_doubles(evidence: LinearEvidence, equations: Sequence[Effect]) -> LinearEvidence:

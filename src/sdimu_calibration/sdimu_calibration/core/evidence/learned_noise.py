@@ -24,7 +24,7 @@ import numpy as np
 
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.evidence.linear import LinearEvidence
-from sdimu_calibration.core.evidence.noise_kernels import Stretches, stretch_effects, stretches
+from sdimu_calibration.core.evidence.noise_kernels import Stretches, stretches
 from sdimu_calibration.core.noise_term import FLICKER, KINDS, MARKOV, RANDOM_WALK, SHIFT, STOP, TRIADS, TURN, NoiseTerm
 
 LEAST_GAIN = 5.0
@@ -98,7 +98,7 @@ class Wander:
     def of(cls, evidence: LinearEvidence) -> Wander:
         """Work out the signatures for the test of an evidence."""
         cut = stretches(evidence.times)
-        return cls(cut, evidence.signature(stretch_effects(cut)))
+        return cls(cut, evidence.constant_signature(cut))
 
     def modes(self, terms: Sequence[NoiseTerm]) -> Modes:
         """Work out independent modes of noise, without those of which the data say nothing."""

@@ -19,6 +19,7 @@ from sdimu_calibration.core.effects.effect import Effect, Timetable
 from sdimu_calibration.core.effects.imu_model import prior_size
 from sdimu_calibration.core.evidence.candidate import Candidate, split
 from sdimu_calibration.core.evidence.information import Information
+from sdimu_calibration.core.evidence.noise_kernels import Stretches, stretch_effects
 from sdimu_calibration.core.specification import ImuSpecification
 
 E = TypeVar("E", bound="LinearEvidence")
@@ -76,6 +77,10 @@ class LinearEvidence(ABC):
     @abstractmethod
     def signature(self, effects: Sequence[Effect]) -> Floats:
         """Columns of all parameters of `effects`, shape (N, parameters)."""
+
+    def constant_signature(self, cut: Stretches) -> Floats:
+        """Columns of a constant error of each sensor axis in each of s stretches, shape (N, 6 s)."""
+        return self.signature(stretch_effects(cut))
 
     @property
     def model(self) -> Ints:

@@ -20,10 +20,10 @@ from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.effects.effect import Effect, Timetable
 from sdimu_calibration.core.effects.motion import Motion
 from sdimu_calibration.core.evidence.linear import LinearEvidence, candidate_priors
-from sdimu_calibration.core.evidence.signatures import measured_rows, signatures
+from sdimu_calibration.core.evidence.noise_kernels import Stretches
+from sdimu_calibration.core.evidence.signatures import constant_signatures, measured_rows, signatures
 from sdimu_calibration.core.filter.filter_pass import NAV, PassOutput, PassState, new_output, run_pass
 from sdimu_calibration.core.filter.passes import Pass, check_finite, pass_settings, start_state
-from sdimu_calibration.core.navigation.correct_cycles import spread
 from sdimu_calibration.core.navigation.track import motion
 from sdimu_calibration.core.second_order.second_order_passes import (
     SecondOrderPass,
@@ -92,6 +92,10 @@ class NavigationEvidence(LinearEvidence):
     def signature(self, effects: Sequence[Effect]) -> Floats:
         """Columns of all parameters of `effects`, shape (N, parameters)."""
         return columns(self.prepared, self.known, self.latitude, effects)
+
+    def constant_signature(self, cut: Stretches) -> Floats:
+        """Columns of a constant error of each sensor axis in each of s stretches, shape (N, 6 s)."""
+        return constant_columns(self.prepared, self.known, self.latitude, cut)
 
 
 def timetable(prepared: PreparedData) -> Timetable:
@@ -189,17 +193,31 @@ def columns(prepared: PreparedData, known: KnownPass, latitude: float, effects: 
     W = np.zeros((int(np.isfinite(known.output.normalised).sum()), int(ends[-1])), order="F")
 
     def fill(number: int) -> None:
-        terms = _terms(blocks[number], seen)
-        if known.weight is not None:
-            terms = spread(*terms, known.weight)
         signatures(
-            seen, epochs.first, epochs.last, prepared.kind, known.output, *terms, latitude,
-            W[:, ends[number] : ends[number + 1]],
+            seen, epochs.first, epochs.last, prepared.kind, known.output, *_terms(blocks[number], seen), latitude,
+            known.weight, W[:, ends[number] : ends[number + 1]],
         )  # fmt: skip
 
     # The recursion of one column knows nothing of the others, and compiled loops run beside each other.
     with ThreadPoolExecutor(_THREADS) as pool:
         list(pool.map(fill, range(len(blocks))))
+    return W
+
+
+def constant_columns(prepared: PreparedData, known: KnownPass, latitude: float, cut: Stretches) -> Floats:
+    """Signatures of a constant error of each sensor axis in each of s stretches, at a latitude (rad); (N, 6 s)."""
+    epochs, blocks = prepared.epochs, range(0, len(cut), _BLOCK)
+    W = np.zeros((int(np.isfinite(known.output.normalised).sum()), 6 * len(cut)), order="F")
+
+    def fill(begin: int) -> None:
+        part = slice(begin, min(begin + _BLOCK, len(cut)))
+        constant_signatures(
+            known.seen, epochs.first, epochs.last, prepared.kind, known.output, cut.start[part], cut.end[part],
+            latitude, known.weight, W[:, 6 * part.start : 6 * part.stop],
+        )  # fmt: skip
+
+    with ThreadPoolExecutor(_THREADS) as pool:
+        list(pool.map(fill, blocks))
     return W
 
 

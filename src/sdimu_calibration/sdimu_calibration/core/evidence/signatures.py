@@ -28,24 +28,83 @@ from sdimu_calibration.core.navigation.ins_errors import add_columns, responses
 
 
 @compiled
+def _responses(
+    C_nb: Floats, f_b: Floats, dt: Floats, w_ie: Floats, weight: Floats, f_n: Floats, R: Floats, direct: Floats
+) -> None:
+    """Response of the navigation over an epoch of n cycles, and of the mean of each sensor, to the sensor axes.
+
+    Parameters
+    ----------
+    C_nb, f_b, dt, w_ie
+        Attitude, force (m/s^2) and length (s) of the cycles; Earth's rate in NED (rad/s).
+    weight : ndarray, shape (n, 6, 6) or (0, 6, 6)
+        Change of corrected rate and force per change of the measured ones; none is the identity.
+    f_n, R, direct : ndarray, shapes (n, 3), (n, 6, 9), (n, 6, 6)
+        Filled: force in NED; response to each axis; with a `weight`, integral of all sensors for each axis.
+    """
+    n = dt.shape[0]
+    for c in range(n):
+        f_n[c, 0], f_n[c, 1], f_n[c, 2] = applied(elements(C_nb[c]), f_b[c, 0], f_b[c, 1], f_b[c, 2])
+    responses(C_nb, f_n, dt, 0, n, w_ie, R)
+    if weight.shape[0] == 0:
+        return
+    own = np.empty((6, NAV))
+    for c in range(n):
+        own[:, :] = R[c]
+        for s in range(6):
+            for i in range(NAV):
+                R[c, s, i] = 0.0
+                for axis in range(6):
+                    R[c, s, i] += weight[c, axis, s] * own[axis, i]
+            for axis in range(6):
+                direct[c, s, axis] = weight[c, axis, s] * dt[c]
+
+
+@compiled
+def _add_weighed_columns(
+    values: Floats, channel: Ints, parameter: Ints, R: Floats, direct: Floats, G: Floats, D: Floats
+) -> None:
+    """Do as `add_columns` does, where an error of one sensor axis shows in the corrected samples of all."""
+    G[:, :] = 0.0
+    D[:, :] = 0.0
+    g, d = np.empty(NAV), np.empty(6)
+    for j in range(channel.shape[0]):
+        ch, k = channel[j], parameter[j]
+        g[:] = 0.0
+        d[:] = 0.0
+        for c in range(values.shape[0]):
+            v = values[c, j]
+            if v != 0.0:
+                for i in range(NAV):
+                    g[i] += R[c, ch, i] * v
+                for i in range(6):
+                    d[i] += direct[c, ch, i] * v
+        for i in range(NAV):
+            G[i, k] += g[i]
+        for i in range(6):
+            D[i, k] += d[i]
+
+
+@compiled
 def _signatures(
     C_nb: Floats, f_b: Floats, dt: Floats, first: Ints, last: Ints, kind: Ints,
     values: Floats, channel: Ints, parameter: Ints, q: int, w_ie: Floats,
-    Phi: Floats, H: Floats, L: Floats, K: Floats, W: Floats,
+    weight: Floats, Phi: Floats, H: Floats, L: Floats, K: Floats, W: Floats,
 ) -> None:  # fmt: skip
     """Fill W (rows, q), one row a measured scalar, in the order of epochs and channels."""
     V = np.zeros((NAV, q))
     G = np.zeros((NAV, q))
     D = np.zeros((6, q))
     longest = (last - first).max()
-    R, f_n = np.empty((longest, 6, NAV)), np.empty((longest, 3))
+    R, f_n, direct = np.empty((longest, 6, NAV)), np.empty((longest, 3)), np.empty((longest, 6, 6))
     row = 0
     for e in range(first.shape[0]):
         a, b = first[e], last[e]
-        for c in range(a, b):
-            f_n[c - a, 0], f_n[c - a, 1], f_n[c - a, 2] = applied(elements(C_nb[c]), f_b[c, 0], f_b[c, 1], f_b[c, 2])
-        responses(C_nb[a:b], f_n, dt[a:b], 0, b - a, w_ie, R)
-        add_columns(values[a:b], channel, parameter, R, dt[a:b], G, D)
+        _responses(C_nb[a:b], f_b[a:b], dt[a:b], w_ie, weight[a:b], f_n, R, direct)
+        if weight.shape[0]:
+            _add_weighed_columns(values[a:b], channel, parameter, R, direct, G, D)
+        else:
+            add_columns(values[a:b], channel, parameter, R, dt[a:b], G, D)
         V = Phi[e] @ V + G
         if kind[e] == 0:
             continue
@@ -60,7 +119,7 @@ def _signatures(
 
 def signatures(
     seen: Motion, first: Ints, last: Ints, kind: Ints, output: PassOutput,
-    values: Floats, channel: Ints, parameter: Ints, latitude: float, W: Floats,
+    values: Floats, channel: Ints, parameter: Ints, latitude: float, weight: Floats | None, W: Floats,
 ) -> None:  # fmt: skip
     """Signatures of q parameters in the whitened innovations of a navigation filter.
 
@@ -78,14 +137,90 @@ def signatures(
         Sensor axis and parameter of each column.
     latitude : float
         Of the site (rad).
+    weight : ndarray, shape (n, 6, 6), or None
+        Change of corrected rate and force per change of the measured ones; None is the identity.
     W : ndarray, shape (rows, q)
         Filled; rows in the order of `measured_rows`.
     """
     _signatures(
         np.ascontiguousarray(seen.C_nb), np.ascontiguousarray(seen.f), seen.dt, first, last, kind,
         np.ascontiguousarray(values), channel, parameter, W.shape[1], earth.earth_rate(latitude),
+        _or_none(weight), output.Phi, output.H, output.L, output.K, W,
+    )  # fmt: skip
+
+
+@compiled
+def _constant_signatures(
+    t: Floats, C_nb: Floats, f_b: Floats, dt: Floats, first: Ints, last: Ints, kind: Ints,
+    start: Floats, end: Floats, w_ie: Floats, weight: Floats,
+    Phi: Floats, H: Floats, L: Floats, K: Floats, W: Floats,
+) -> None:  # fmt: skip
+    """Fill W (rows, 6 s): a constant error of each axis in each of s stretches, which follow each other."""
+    count = start.shape[0]
+    V = np.zeros((NAV, 6 * count))
+    D = np.zeros((6, 6 * count))
+    longest = (last - first).max()
+    R, f_n, direct = np.empty((longest, 6, NAV)), np.empty((longest, 3)), np.empty((longest, 6, 6))
+    row = 0
+    for e in range(first.shape[0]):
+        a, b = first[e], last[e]
+        low = 0 if abs(kind[e]) == 2 else 6
+        m = MEASURED - low if kind[e] else 0
+        if t[b - 1] <= start[0]:
+            row += m
+            continue
+        _responses(C_nb[a:b], f_b[a:b], dt[a:b], w_ie, weight[a:b], f_n, R, direct)
+        V = Phi[e] @ V
+        D[:, :] = 0.0
+        for k in range(count):
+            if t[b - 1] <= start[k] or t[a] - dt[a] >= end[k]:
+                continue
+            for c in range(a, b):
+                share = (min(t[c], end[k]) - max(t[c] - dt[c], start[k])) / dt[c]
+                if share <= 0.0:
+                    continue
+                share = min(share, 1.0)
+                for s in range(6):
+                    for i in range(NAV):
+                        V[i, 6 * k + s] += share * R[c - a, s, i]
+                    if weight.shape[0]:
+                        for i in range(6):
+                            D[i, 6 * k + s] += share * direct[c - a, s, i]
+                    else:
+                        D[s, 6 * k + s] += share * dt[c]
+        if m == 0:
+            continue
+        S = np.ascontiguousarray(H[e, low:, :NAV]) @ V
+        S[6 - low :] += D / dt[a:b].sum()
+        W[row : row + m] = whiten(np.ascontiguousarray(L[e, low:, low:]), S)
+        V -= np.ascontiguousarray(K[e, :NAV, low:]) @ S
+        row += m
+
+
+def constant_signatures(
+    seen: Motion, first: Ints, last: Ints, kind: Ints, output: PassOutput,
+    start: Floats, end: Floats, latitude: float, weight: Floats | None, W: Floats,
+) -> None:  # fmt: skip
+    """Signatures of a constant error of each sensor axis in each of s stretches of time.
+
+    Parameters
+    ----------
+    seen, first, last, kind, output, latitude, weight
+        As for `signatures`.
+    start, end : ndarray, shape (s,)
+        s; in the order of time.
+    W : ndarray, shape (rows, 6 s)
+        Filled where a stretch has begun, zero before; column ``6 stretch + axis``.
+    """
+    _constant_signatures(
+        seen.t, np.ascontiguousarray(seen.C_nb), np.ascontiguousarray(seen.f), seen.dt, first, last, kind,
+        np.ascontiguousarray(start), np.ascontiguousarray(end), earth.earth_rate(latitude), _or_none(weight),
         output.Phi, output.H, output.L, output.K, W,
     )  # fmt: skip
+
+
+def _or_none(weight: Floats | None) -> Floats:
+    return np.zeros((0, 6, 6)) if weight is None else np.ascontiguousarray(weight)
 
 
 def measured_rows(output: PassOutput) -> tuple[Ints, Ints]:
