@@ -15,8 +15,7 @@ from sdimu_calibration.core.evidence.noise_kernels import stretch_effects, stret
 from sdimu_calibration.core.evidence.signatures import signatures
 from sdimu_calibration.core.navigation.correct_cycles import spread
 from sdimu_calibration.storage.config import load_imu
-from sdimu_sim.core.generator import generate
-from sdimu_sim.core.scenario import Scenario
+from sdimu_sim.core.scenario import Scenario, generate
 
 
 def _evidence(bench, names, **options):
