@@ -29,7 +29,7 @@ from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.estimation.fit import NOT_CONVERGED, Fit
 from sdimu_calibration.core.estimation.noise_estimate import told
 from sdimu_calibration.core.estimation.noise_learning import in_white_noise
-from sdimu_calibration.core.estimation.outcome import outcome
+from sdimu_calibration.core.estimation.outcome import doubted, outcome
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.estimation.solve import AUTO, solve
 from sdimu_calibration.core.evidence.candidate import Candidate
@@ -208,9 +208,9 @@ def climb(
     if fit.learns_scatter:
         consistency = fit.consistency(done.evidence)
     # In the noise that was learned without the effects nothing would be seen to be missing.
-    fit = in_found_noise(request, fit, done.found.noise) if done.chosen else final
+    fit = in_found_noise(request, fit, done.found.noise) if done.chosen else done.fit
     before = outcome(fit)
-    after = outcome(final) if done.chosen else before
+    after = doubted(outcome(done.fit) if done.chosen else before, final)
     own = any(c.family == "own" for c in done.chosen)
     # What was added must also predict: an effect that only mimics the missing one fits here and fails elsewhere.
     # The free inputs are constant in a dwell and in a turn; what changes within one shows in the NIS alone.

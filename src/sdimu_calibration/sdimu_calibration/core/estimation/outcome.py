@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
-from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.estimation.fit import Fit
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.estimation.solve import AUTO, solve
@@ -36,7 +37,6 @@ def outcome(fit: Fit, held_out: bool = True) -> Calibration:
     parameters = fit.sensors.parameters
     warnings = (*(f.text for f in fit.faults if f.grave), *fit.warnings(statistics))
     light = tuple(f.text for f in fit.faults if not f.grave)
-    conditional = None if fit.doubt is None else np.sqrt(np.diag(fit.with_doubt(None).covariance))
     return Calibration(
         body_frame=fit.body_frame,
         model=tuple(e.key for e in fit.sensors.effects),
@@ -45,10 +45,9 @@ def outcome(fit: Fit, held_out: bool = True) -> Calibration:
         display_units=tuple(p.display_unit for p in parameters),
         values=fit.values,
         covariance=fit.covariance,
-        conditional_sigma=conditional,
         fit=statistics,
         data=fit.data_counts(),
-        notes=(*fit.test.recording.notes, *fit.notes(), *widened(fit, conditional), *light, *warnings),
+        notes=(*fit.test.recording.notes, *fit.notes(), *light, *warnings),
         history=fit.history(),
         warnings=warnings,
         faults=fit.faults,
@@ -59,19 +58,27 @@ def outcome(fit: Fit, held_out: bool = True) -> Calibration:
     )
 
 
-def widened(fit: Fit, conditional: Floats | None) -> tuple[str, ...]:
-    """Say which sigma is much larger than the one (p,) that holds if the model is right; one line or none."""
-    if conditional is None:
-        return ()
+def doubted(result: Calibration, fit: Fit) -> Calibration:
+    """Put the covariance of a fit with doubt about its model in the place of the one if the model is right.
+
+    Parameters
+    ----------
+    result : Calibration
+        Of the same fit without doubt.
+    fit : Fit
+    """
+    conditional = np.sqrt(np.diag(result.covariance))
     free = conditional > 0.0
     ratio = np.ones(len(conditional))
     ratio[free] = np.sqrt(np.diag(fit.covariance))[free] / conditional[free]
     worst = int(np.argmax(ratio))
-    if ratio[worst] < _TOLD:
-        return ()
-    return (
+    note = (
         "sigmas hold for the models that the data leave open, too: that of "
-        f"{fit.names[worst]} is {ratio[worst]:.1f} times what it would be if this model were known to be right",
+        f"{result.names[worst]} is {ratio[worst]:.1f} times what it would be if this model were known to be right"
+    )
+    told = (note,) if ratio[worst] > _TOLD else ()
+    return replace(
+        result, covariance=fit.covariance, conditional_sigma=conditional, notes=(*result.notes, *told)
     )
 
 
