@@ -6,7 +6,7 @@ free-input test; equations outside the catalogue; refit of what was found. Desig
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -169,7 +169,7 @@ def diagnose(
 
 def climb(
     fit: Fit, extra: Sequence[Effect] = (), progress: Progress = silent, alpha: float = FALSE_ALARM,
-    refits: bool = False,
+    refits: bool = False, without: Collection[str] = (),
 ) -> Diagnosis:  # fmt: skip
     """Find what the model of a fit is missing.
 
@@ -185,6 +185,8 @@ def climb(
         False-alarm probability of a whole scan.
     refits : bool
         Also fit the model with the first, the first two, ... of what was found.
+    without : collection of str
+        Registry names of effects that are not tried, as if the catalogue lacked them.
 
     Raises
     ------
@@ -199,7 +201,8 @@ def climb(
     if noise:
         fit = solve(fit.test.with_noise(imu), fit.model, fit.estimator, progress=progress, learn=False)
     fit = in_white_noise(fit)
-    request = Request(fit, tuple(extra), alpha, None if fit.learns_scatter else Wander.of(fit.evidence()))
+    wander = None if fit.learns_scatter else Wander.of(fit.evidence())
+    request = Request(fit, tuple(extra), alpha, wander, frozenset(without))
     done = search_until_stable(request, progress)
     final = in_doubt(fit, done.fit, done.evidence, done.found.chosen, done.free, done.found.scale)
     findings = (*screen(fit), *(Finding(text, grave=False) for text in final.beyond_specification()))

@@ -61,12 +61,15 @@ class Request:
         False-alarm probability of a whole scan.
     wander : Wander or None
         How wandering biases would show in the test; None where the estimator learns scatter instead.
+    without : frozenset of str
+        Registry names of effects that are not tried.
     """
 
     base: Fit
     extra: tuple[Effect, ...]
     alpha: float
     wander: Wander | None = None
+    without: frozenset[str] = frozenset()
 
 
 @dataclass(frozen=True)
@@ -281,7 +284,7 @@ def _evidence(
     base, columns = request.base, fit.added_columns(len(tried))
     if earlier is None or base.learns_scatter:
         free = free_inputs(base.timetable) if base.free_inputs_testable else []
-        known = candidates(base, tried, request.extra, own)
+        known = candidates(request, tried, own)
         evidence = fit.evidence([*known, *free]).as_candidates(columns, tried)
         count = len(evidence.names)
         return evidence, np.arange(count - sum(len(effect.parameters) for effect in free), count)
@@ -289,7 +292,7 @@ def _evidence(
     evidence = before.about(fit.evidence(), columns, tried)
     if not own or any(c.family == "own" for c in evidence.candidates):
         return evidence, earlier.free
-    more = _untried(candidates(base, (), request.extra, own), frozenset(evidence.names))
+    more = _untried(candidates(request, (), own), frozenset(evidence.names))
     return _without_doubles(evidence, more), earlier.free
 
 
@@ -311,21 +314,21 @@ def _round(fit: Fit, found: Search[LinearEvidence], free: Ints) -> Round:
     )  # fmt: skip
 
 
-def candidates(base: Fit, tried: Sequence[Candidate], extra: Sequence[Effect], own: bool) -> list[Effect]:
+def candidates(request: Request, tried: Sequence[Candidate], own: bool) -> list[Effect]:
     """Effects that a fit may lack: the user's, the catalogue, equations; without those tried or in the model.
 
     Parameters
     ----------
-    base : Fit
-        With the model as given.
+    request : Request
     tried : sequence of Candidate
-    extra : sequence of Effect
     own : bool
         Equations and sines of time too.
     """
+    base = request.base
     times, has_temperature = base.timetable, base.has_temperature
     more = [*equations(has_temperature), *periodic(times.duration)] if own else []
-    known = [*extra, *catalogue(times, set(base.labels), has_temperature), *more]
+    known = [*request.extra, *catalogue(times, set(base.labels), has_temperature), *more]
+    known = [e for e in known if (e.family or e.name) not in request.without]
     if base.learns_scatter:
         known = [
             e for e in known

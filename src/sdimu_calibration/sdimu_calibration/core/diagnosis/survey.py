@@ -7,7 +7,7 @@ import numpy as np
 from sdimu_calibration.core.arrays import Ints
 from sdimu_calibration.core.diagnosis.candidates import free_inputs
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
-from sdimu_calibration.core.diagnosis.rounds import UNEXPLAINED_P, candidates, left
+from sdimu_calibration.core.diagnosis.rounds import UNEXPLAINED_P, Request, candidates, left
 from sdimu_calibration.core.diagnosis.search import FALSE_ALARM, Problem, Search
 from sdimu_calibration.core.estimation.fit import Fit
 from sdimu_calibration.core.evidence.linear import LinearEvidence
@@ -25,7 +25,7 @@ def survey(fit: Fit, result: Calibration, with_candidates: bool = True) -> Diagn
     with_candidates : bool
         Without them only the residuals are worked out.
     """
-    known = candidates(fit, (), (), own=False) if with_candidates else []
+    known = candidates(Request(fit, (), FALSE_ALARM), (), own=False) if with_candidates else []
     free = free_inputs(fit.timetable) if with_candidates and fit.free_inputs_testable else []
     evidence = fit.evidence([*known, *free])
     p = len(evidence.weight)
