@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Any
 from zlib import crc32
@@ -14,12 +15,12 @@ from sdimu_calibration.core.diagnosis.candidates import catalogue
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis, climb
 from sdimu_calibration.core.diagnosis.found import found_effects
 from sdimu_calibration.core.diagnosis.scan import scan
-from sdimu_calibration.core.effect_key import sized
+from sdimu_calibration.core.effect_key import parse_key, sized
 from sdimu_calibration.core.estimation.fit import Fit
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.estimation.solve import choose_estimator, solve
 from sdimu_calibration.core.front_door import OpeningOptions, open_test
-from sdimu_calibration.core.recording import Recording
+from sdimu_calibration.core.recording import DataError, Recording
 from sdimu_calibration.core.specification import ImuSpecification, Model, Site
 from sdimu_calibration.core.units import STANDARD_GRAVITY
 from sdimu_calibration.storage.config import load_imu, load_model, load_plan
@@ -76,12 +77,12 @@ class GradeRun:
         model = _model(self.imu)
         fit, truth = solve(test, model), None
         if self.hidden:
-            truth = _draw(rng, fit)
+            truth = drawn_effect(rng, fit)
             test, sensor = simulated_test(self.imu, imu, plan, site, seed, (truth.text,))
             fit = solve(test, model)
         found = climb(fit)
         # From here on the truth is known; nothing before this line has seen it.
-        return _row(found, sensor, truth) | {"plan": plan, "latitude_deg": math.degrees(site.latitude_rad)}
+        return scored_row(found, sensor, truth) | {"plan": plan, "latitude_deg": math.degrees(site.latitude_rad)}
 
 
 def simulated_test(
@@ -115,31 +116,64 @@ def _model(name: str) -> Model:
     return load_model("hand" if name == HANDHELD else "baseline")
 
 
-def _draw(rng: np.random.Generator, fit: Fit) -> Truth:
-    """Draw family, then parameter, among what this clean test can see at a plausible size."""
+def drawn_effect(
+    rng: np.random.Generator, fit: Fit, span: tuple[float, float] = _SPAN, families: Collection[str] = (),
+    options: bool = False,
+) -> Truth:  # fmt: skip
+    """Draw family, then parameter, among what a clean test can see at a plausible size.
+
+    Parameters
+    ----------
+    rng : Generator
+    fit : Fit
+        Of the clean test.
+    span : (float, float)
+        Size, in the sigma of the clean test.
+    families : collection of str
+        Those to draw from; all without any.
+    options : bool
+        Draw effects with a time constant or the like, too: those that the scan tries.
+
+    Raises
+    ------
+    DataError
+        When the test sees none of them.
+    """
     known = catalogue(fit.timetable, set(fit.labels), has_temperature=False)
     evidence = fit.evidence([e for e in known if not (fit.learns_scatter and (e.options or e.needs_table))])
     scanned = scan(evidence.information, evidence.model, evidence.weight)
     p, hideable = len(evidence.weight), hideable_names()
     # What a coefficient of the model is but for its prior is not missing: mass unbalance is a sensitivity to force.
     free = scan(evidence.information, evidence.model, 1e-9 * evidence.weight).retention
-    size = float(np.exp(rng.uniform(*np.log(_SPAN))))
+    size = float(np.exp(rng.uniform(*np.log(span))))
     pool: dict[str, list[int]] = {}
     for k, candidate in enumerate(evidence.candidates):
         name = candidate.parameter.name
         left = min(scanned.retention[p + k], free[p + k])
-        seen = name in hideable and not candidate.effect.options and left >= TESTABLE
+        wanted = candidate.family in families if families else name in hideable
+        seen = wanted and (options or not candidate.effect.options) and left >= TESTABLE
         if seen and size * scanned.sigma[p + k] <= PLAUSIBLE * evidence.prior[k]:
             pool.setdefault(candidate.family, []).append(k)
+    if not pool:
+        what = ", ".join(families) or "the catalogue"
+        raise DataError(f"nothing of {what} can be seen in this test at {size:.0f} sigma")
     family = str(rng.choice(sorted(pool)))
-    k = int(rng.choice(pool[family]))
-    name = evidence.candidates[k].parameter.name
+    candidate = evidence.candidates[k := int(rng.choice(pool[family]))]
+    name = candidate.parameter.name
     value = size * float(scanned.sigma[p + k]) * float(rng.choice((-1.0, 1.0)))
-    value = abs(value) if one_sided(name) else value
-    return Truth(name, family, None, value, size, sized(name, value, size_unit(name)))
+    value = abs(value) if one_sided(name) or candidate.effect.positive else value
+    return Truth(name, family, _option(candidate.label), value, size, sized(candidate.label, value, size_unit(name)))
 
 
-def _row(found: Diagnosis, sensor: ImuTruth, truth: Truth | None) -> dict[str, Any]:
+def _option(label: str) -> tuple[str, float] | None:
+    """First option of a label, such as ``("tau", 300.0)``."""
+    for key, text in parse_key(label).options.items():
+        return key, float(text.split()[0])
+    return None
+
+
+def scored_row(found: Diagnosis, sensor: ImuTruth, truth: Truth | None) -> dict[str, Any]:
+    """Score a diagnosis by the truth: errors over sigma of the coefficients, whether the effect was named."""
     z = baseline_z(found.after, sensor)
     named = [[f.candidate.label, *f.alike] for f in found_effects(found)]
     stops = found.evidence.times.stops

@@ -195,5 +195,91 @@ def noise(
     console.print(f"results in {out}", soft_wrap=True)
 
 
+@app.command()
+def missing(
+    out: Annotated[Path, typer.Option(help="Folder of runs, missing.json, missing.md.")] = Path("out/study-missing"),
+    runs: Annotated[int, typer.Option("-n", min=1, help="Tests of each effect.")] = 10,
+    seed: Annotated[int, typer.Option(help="First seed.")] = 65_001,
+    imu: Annotated[str, typer.Option(help="IMU file in config/imu.")] = "dtg",
+    effect: Annotated[list[str] | None, typer.Option(help="Effect; repeatable. All by default.")] = None,
+    workers: Annotated[int, typer.Option(min=1, help="Processes.")] = 2,
+) -> None:
+    """Diagnose tests as if the catalogue lacked what is hidden in them: is that seen, do the sigmas hold."""
+    from functools import partial
+
+    from rich.console import Console
+
+    from sdimu_calibration.cli.progress import bar
+    from sdimu_calibration.core.effects import registry
+    from sdimu_calibration.core.recording import DataError
+    from sdimu_calibration.storage.json_file import write_json
+    from sdimu_sim.campaign.campaign import run_campaign
+    from sdimu_sim.campaign.missing_page import page
+    from sdimu_sim.campaign.missing_run import MissingRun
+    from sdimu_sim.core.hidden import effect_names
+
+    shown = frozenset(effect_names())
+    known = [n for n in registry.names() if any(p.name in shown for p in registry.get(n).parameters)]
+    known = [n for n in known if registry.get(n).needs != "temperature"]
+    unknown = sorted(set(effect or ()) - set(registry.names()))
+    if unknown:
+        raise DataError(f"--effect {unknown[0]}: no effect of the catalogue; sdimu effects lists them")
+    console, seeds, results = Console(), range(seed, seed + runs), {}
+    for name in effect or known:
+        with bar(console) as progress:
+            tell = partial(_named, progress, name)
+            results[name] = run_campaign(MissingRun(imu, name), seeds, out / name, workers=workers, progress=tell)
+    write_json(out / "missing.json", results)
+    text = page(imu, results, seed)
+    (out / "missing.md").write_text(text, encoding="utf-8")
+    console.print(text, soft_wrap=True, markup=False, highlight=False)
+    console.print(f"results in {out}", soft_wrap=True)
+
+
+@app.command()
+def many(
+    out: Annotated[Path, typer.Option(help="Folder of runs and many.json.")] = Path("out/study-many"),
+    runs: Annotated[int, typer.Option("-n", min=1, help="Tests of each IMU file.")] = 50,
+    seed: Annotated[int, typer.Option(help="First seed.")] = 67_001,
+    imu: Annotated[list[str] | None, typer.Option(help="IMU file; repeatable. dtg, rlg_navigation by default.")] = None,
+    workers: Annotated[int, typer.Option(min=1, help="Processes.")] = 2,
+) -> None:
+    """Diagnose tests with five to twelve effects of 3 to 50 sigma at once."""
+    from functools import partial
+
+    import numpy as np
+    from rich.box import SIMPLE
+    from rich.console import Console
+    from rich.table import Table
+
+    from sdimu_calibration.cli.progress import bar
+    from sdimu_calibration.storage.json_file import write_json
+    from sdimu_sim.campaign.campaign import run_campaign
+    from sdimu_sim.campaign.many_run import ManyRun
+
+    console, seeds, results = Console(), range(seed, seed + runs), {}
+    for name in imu or ["dtg", "rlg_navigation"]:
+        with bar(console) as progress:
+            tell = partial(_named, progress, name)
+            results[name] = run_campaign(ManyRun(name), seeds, out / name, workers=workers, progress=tell)
+    write_json(out / "many.json", results)
+    headings = ("IMU file", "runs", "8 sigma or more, named", "5 to 8", "below", "wrong names", "RMS z", "s")
+    table = Table(*headings, box=SIMPLE)
+    for name, rows in results.items():
+        good = [row for row in rows if "error" not in row]
+        hits = [effect for row in good for effect in row["effects"]]
+        cells = [
+            f"{sum(e['named'] for e in part)} of {len(part)}"
+            for low, high in ((8.0, np.inf), (5.0, 8.0), (0.0, 5.0))
+            for part in [[e for e in hits if low <= e["sigmas"] < high]]
+        ]
+        wrong, found = sum(len(row["wrong"]) for row in good), sum(row["found"] for row in good)
+        z = np.sqrt(sum(row["z2"] for row in good) / max(1, sum(row["count"] for row in good)))
+        seconds = np.median([row["seconds"] for row in good]) if good else np.nan
+        table.add_row(name, f"{len(good)} of {len(rows)}", *cells, f"{wrong} of {found}", f"{z:.2f}", f"{seconds:.0f}")
+    console.print(table)
+    console.print(f"results in {out}", soft_wrap=True)
+
+
 def _named(progress: Progress, name: str, word: str, share: float) -> None:
     progress(f"{name}: {word}", share)
