@@ -105,7 +105,9 @@ class _Ground(Generic[E]):
 
     def net(self, state: _State) -> float:
         """Likelihood of a state less what its effects and noise terms cost."""
-        return state.balance.net - sum(self.cost(c, state.balance.terms) for c in state.chosen)
+        imitators = [self.beside(c) for c in state.chosen if self.beside(c)]
+        # One step or ramp is as good as any effect; several of them follow what has another cause.
+        return state.balance.net - sum(self.cost(c, state.balance.terms) for c in state.chosen) - sum(imitators[1:])
 
     def given(self, chosen: Sequence[int]) -> Given:
         """Information on everything else with a choice in the model."""
