@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sdimu_calibration.core.data.sample_screening import sound
+from sdimu_calibration.core.data.sample_screening import sound, wild
 from sdimu_calibration.core.recording import Recording
 
 N = 60_000
@@ -71,3 +71,33 @@ def test_a_counter_that_repeats_a_number_while_its_remainder_grows_is_not_stuck(
     given = recording(rng, np.zeros((N, 6)))
     counted = np.column_stack([3e-7 * pulses, given.omega_ib_b[:, 1:]])
     assert len(sound(Recording(0, given.t, counted, given.f_ib_b))[0].t) == N
+
+
+def brisk_turns(rng, steady):
+    """Twelve turns with ramps of three samples, `steady` samples long between them, in noise of one."""
+    rate = np.zeros(N)
+    for begin in rng.integers(1000, N - 1000, 12):
+        rate[begin : begin + 3] += 5000.0 * np.array([0.25, 0.5, 0.75])
+        rate[begin + 3 : begin + 3 + steady] += 5000.0
+        rate[begin + 3 + steady : begin + 6 + steady] += 5000.0 * np.array([0.75, 0.5, 0.25])
+    return recording(rng, rate[:, None])
+
+
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("steady", [8, 25, 60])
+def test_a_brisk_turn_is_not_rough(seed, steady):
+    assert wild(brisk_turns(np.random.default_rng(seed), steady))[2] == ()
+
+
+@pytest.mark.parametrize("size", [8.0, 50.0])
+def test_a_disturbed_line_is_rough_at_rest_and_in_a_steady_turn(size):
+    rng = np.random.default_rng(6)
+    given = recording(rng, np.zeros((N, 1)))
+    given.omega_ib_b[20_000:40_000] += 3000.0
+    for begin in (10_000, 30_000):
+        given.f_ib_b[begin : begin + 200, 1] += size * rng.normal(size=200)
+        given.omega_ib_b[begin : begin + 200, 2] += size * rng.normal(size=200)
+    t, _, faults = wild(given)
+    assert {fault.text.split(" is ")[0] for fault in faults} == {"gyro z", "accelerometer y"}
+    assert np.abs(t[t < 1000.0] - 505.0).max() < 6.0
+    assert np.abs(t[t > 1000.0] - 1505.0).max() < 6.0

@@ -43,6 +43,12 @@ _WILD = 4.0
 """Ratio to the usual roughness from which a window is disturbed: white noise reaches 2.2 in an hour."""
 _RARE = 0.02
 """Largest share of rough windows that is a fault: more is a property of the recording, such as a table that shakes."""
+_EDGE = 3
+"""Number of samples at the edge of a window that say what its rate was: one may be a spike."""
+_ONE_SIDED = 0.9
+"""Ratio of the sum of changes to the sum of their sizes from which they go to one side: white noise reaches 0.8."""
+_TURN_BEGINS = 10.0
+"""Ratio of a change of rate to the usual one from which it may be a turn: noise reaches 7."""
 _GAUSS_MAD = 1.482602218505602
 """Ratio of sigma to median absolute deviation: that of a Gaussian."""
 
@@ -257,6 +263,7 @@ def wild(recording: Recording) -> tuple[Floats, Floats, tuple[DataFault, ...]]:
     uneven = np.ones(len(recording.t), dtype=bool)
     uneven[2:-2] = np.abs(recording.t[4:] - recording.t[:-4] - 4.0 * recording.interval_s) > recording.interval_s / 2
     middle = recording.t[_WINDOW // 2 :: _WINDOW][:windows]
+    moving = _changing_rate(recording.omega_ib_b[: windows * _WINDOW].reshape(windows, _WINDOW, 3))
     for name, x in _channels(recording):
         # Gravity turns through a body in motion: its fourth difference is nothing beside noise, its second is not.
         fourth = np.zeros_like(x)
@@ -264,7 +271,7 @@ def wild(recording: Recording) -> tuple[Floats, Floats, tuple[DataFault, ...]]:
         fourth[uneven] = np.nan
         rough = _medians(np.abs(fourth[: windows * _WINDOW]).reshape(windows, _WINDOW))
         usual = float(np.median(rough[rough > 0.0])) if rough.any() else 0.0
-        at = rough > _WILD * usual
+        at = (rough > _WILD * usual) & ~moving
         if usual == 0.0 or not at.any() or at.mean() > _RARE:
             continue
         ratio = rough / usual
@@ -277,3 +284,25 @@ def wild(recording: Recording) -> tuple[Floats, Floats, tuple[DataFault, ...]]:
     rows = largest > 1.0
     excess = (largest[rows] ** 2 - 1.0) * _WINDOW * recording.interval_s
     return middle[rows], excess, tuple(faults)
+
+
+def _changing_rate(windows: Floats) -> Bools:
+    """Say in which windows a turn begins, ends, or both: corners of the motion fill a window where turns are brisk.
+
+    Parameters
+    ----------
+    windows : ndarray, shape (k, n, 3)
+        Rates (rad/s).
+
+    Returns
+    -------
+    ndarray of bool, shape (k,)
+    """
+    out = np.zeros(len(windows), dtype=bool)
+    for edge in (windows[:, :_EDGE], windows[:, -_EDGE:]):
+        change = windows - edge.mean(axis=1, keepdims=True)
+        # A turn goes to one side of where it began, or of where it ended; noise goes to both.
+        one_sided = np.abs(change.sum(axis=1)) > _ONE_SIDED * np.abs(change).sum(axis=1)
+        usual = np.median(np.abs(change), axis=(0, 1))
+        out |= (one_sided & (np.abs(change).max(axis=1) > _TURN_BEGINS * usual)).any(axis=1)
+    return out
