@@ -36,7 +36,7 @@ EXEMPT = {
             "imu_model motion settling timing"
         ),
         "core.estimation": (
-            "azimuth_check fit free_inertial handheld_fit holdout navigation_fit reference_fits "
+            "azimuth_check fit handheld_fit holdout navigation_fit reference_fits "
             "second_order_fit"
         ),
         "core.evidence": "consistency handheld_evidence information linear navigation_evidence signatures stop_misfit",
