@@ -118,6 +118,25 @@ def stamp_of(message: bytes) -> int:
     return sec * 1_000_000_000 + int.from_bytes(message[8:12], order)
 
 
+def by_stamp(raw: Sequence[bytes]) -> tuple[Stamps, list[bytes]]:
+    """Sort messages by the stamps of their headers.
+
+    Parameters
+    ----------
+    raw : sequence of bytes, length n
+
+    Returns
+    -------
+    stamp_ns : ndarray, shape (n,)
+        Ascending (ns).
+    messages : list of bytes, length n
+    """
+    messages = list(raw)
+    ns = np.fromiter(map(stamp_of, messages), np.int64, len(messages))
+    order = np.argsort(ns, kind="stable")
+    return ns[order], [messages[k] for k in order.tolist()]
+
+
 def stamped(message: bytes, stamp_ns: int) -> bytes:
     """Return the message with another stamp (ns) in its header."""
     order = _order(message)

@@ -199,9 +199,9 @@ def _run(
 def refit(fit: Navigator, seen: PreparedData, C_nb: Floats) -> Refit:
     """Fit a part of the recording, from the fit of the whole.
 
-    The coefficients move by little, so a few passes from the known ones do. Each pass leaves a share of the error of the
-    pass before, which two movements tell; passes end when what is left is below `CONVERGED` of a sigma. Where they do
-    not end, the estimator goes on by itself.
+    The coefficients move by little, so a few passes from the known ones do. Each pass leaves a share of the error of
+    the pass before, which two movements tell; passes end when what is left is below `CONVERGED` of a sigma. Where they
+    do not end, the estimator goes on by itself.
 
     Parameters
     ----------
