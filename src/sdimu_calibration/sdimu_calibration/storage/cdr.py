@@ -374,9 +374,11 @@ def decode_joint_positions(raw: Sequence[bytes], names: tuple[str, ...], first: 
     LayoutError
         When not all messages share a layout with one position an axis.
     """
-    if len(set(map(len, raw))) != 1:
+    messages = raw if isinstance(raw, RawMessages) else RawMessages(raw)
+    size = np.unique(np.concatenate([block.length for block in messages.blocks()]))
+    if len(size) != 1:
         raise LayoutError("lengths differ")
-    rows = np.frombuffer(b"".join(raw), np.uint8).reshape(len(raw), -1)
+    rows = np.concatenate([block.field(0, np.uint8, int(size[0])) for block in messages.blocks()])
     frame_id_length = int(rows[0, 12:16].copy().view("<u4")[0]) - 1
     if not 0 <= frame_id_length < rows.shape[1]:
         raise LayoutError("other layout")

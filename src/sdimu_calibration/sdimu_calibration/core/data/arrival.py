@@ -183,13 +183,16 @@ def in_order(raw: RawTest) -> Recording:
         When no sample can be used, or the clock of the stamps was set back.
     """
     arranged = arrange(raw.ns, raw.omega_ib_b, raw.f_ib_b, raw.where)
-    rows, notes = arranged.rows, [*arranged.notes]
-    start_ns = origin_ns(raw.ns[rows])
+    notes = [*arranged.notes]
+    # Samples that are all there and in order are not copied.
+    rows = arranged.rows if any(arranged.counts.values()) else slice(None)
+    ns = raw.ns[rows]
+    start_ns = origin_ns(ns)
     return Recording(
-        start_ns=start_ns, t=seconds(raw.ns[rows], start_ns),
+        start_ns=start_ns, t=seconds(ns, start_ns),
         omega_ib_b=raw.omega_ib_b[rows], f_ib_b=raw.f_ib_b[rows],
         phase=_phase(raw, start_ns, notes), temperature=_temperature(raw, start_ns, notes),
-        rejected=len(raw.ns) - len(rows), notes=tuple(notes),
+        rejected=len(raw.ns) - len(ns), notes=tuple(notes),
     )  # fmt: skip
 
 
