@@ -30,7 +30,7 @@ from sdimu_calibration.core.recording import DataError, Recording
 from sdimu_calibration.core.specification import ImuSpecification, Site
 
 FEWEST = 100
-"""Samples below which nothing can be recognised."""
+"""Number of samples below which nothing can be recognised: a second of them."""
 
 
 @dataclass(frozen=True)

@@ -16,20 +16,21 @@ from sdimu_calibration.core.compiled import compiled
 from sdimu_calibration.core.matrix3 import multiplied, rotation3, store
 
 WINDOW_S = 1.0
-"""Usual length: a hand turns by tens of degrees in it, and its tremor (10 Hz) averages out of a quarter of it."""
+"""Usual length (s): a hand turns by tens of degrees in it, and its tremor (10 Hz) averages out of a quarter of it."""
 _END = 8
-"""The direction at an edge is the mean over a window's length over this, before and after it."""
+"""Share of a window (one over this number) before and after an edge: its mean gives the direction there."""
 _GAP = 1.2
-"""A window this many times as long as its samples has a gap in it."""
+"""Length of a window as a multiple of its samples': a longer one has a gap in it."""
 
 _REST = 6.0
-"""At rest a reading differs from the usual one by less than so many sigma of the noise, learned from the windows."""
+"""Difference of a reading from the usual one (sigma of the learned noise): at rest it is less."""
 _TURNING_EARTH = 3.0
-"""The Earth's rate changes a reading by at most twice itself from attitude to attitude; mass unbalance adds to it."""
+"""Change of a reading from attitude to attitude, as a multiple of the Earth's rate: twice by the Earth, more by mass
+unbalance."""
 _MOVING = np.radians(1.0)
-"""No sensor is so noisy: what scatters more (rad/s) moves, and an IMU that always moves has no rests."""
+"""Largest scatter of a resting gyro (rad/s): what scatters more moves, and an IMU that always moves has no rests."""
 _MAD = 1.482602218505602
-"""From the median of |x| to the standard deviation of Gaussian noise."""
+"""Factor from the median of |x| to the standard deviation: of Gaussian noise."""
 
 
 @dataclass(frozen=True)
@@ -95,11 +96,21 @@ class Windows:
 
     @property
     def still(self) -> Bools:
-        """Windows at rest: the gyros read what they usually do, but for noise and Earth; the force does not turn."""
+        """Windows at rest, shape (k,): the gyros read what they usually do but for noise and Earth, the force stays."""
         return self.still_as(self.quiet)
 
     def still_as(self, quiet: Bools) -> Bools:
-        """Windows at rest, shape (k,); those of `quiet` (k,) show the usual reading of the gyros and its noise."""
+        """Windows at rest.
+
+        Parameters
+        ----------
+        quiet : ndarray of bool, shape (k,)
+            Windows that show the usual reading of the gyros and its noise.
+
+        Returns
+        -------
+        ndarray of bool, shape (k,)
+        """
         if not quiet.any():
             return np.zeros(len(self), dtype=bool)
         steps = np.diff(self.w_mean, axis=0)[quiet[1:] & quiet[:-1]]
@@ -115,7 +126,17 @@ _ROWS = ("start", "end", "first", "up_first", "up_last", "w_mean", "f_mean")
 
 
 def runs(flags: Bools) -> tuple[Ints, Ints]:
-    """First of each run of True, and one after its last."""
+    """Find runs of True.
+
+    Parameters
+    ----------
+    flags : ndarray of bool, shape (n,)
+
+    Returns
+    -------
+    first, last : ndarray of int, shape (k,)
+        First of each run, and one after its last.
+    """
     edges = np.diff(np.concatenate([[0], flags.astype(np.int64), [0]]))
     return np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
 
@@ -176,7 +197,7 @@ def _running_sum(x: Floats) -> tuple[Floats, Floats]:
 
 
 def turned(w: Floats, windows: Windows, chosen: Ints, factor: float) -> Floats:
-    """Rotation over windows as the gyros say it: C (k, 3, 3) from the axes at the end to those at the beginning.
+    """Rotation over windows as the gyros say it.
 
     Parameters
     ----------
@@ -186,6 +207,11 @@ def turned(w: Floats, windows: Windows, chosen: Ints, factor: float) -> Floats:
     chosen : ndarray of int, shape (k,)
     factor : float
         rad/s of one unit of `w`, with its sign.
+
+    Returns
+    -------
+    ndarray, shape (k, 3, 3)
+        From the axes at the end of a window to those at its beginning (dimensionless).
     """
     scale = factor * windows.interval_s
     return _rotations(np.ascontiguousarray(w), windows.first[chosen], windows.length, windows.rate_offset, scale)
