@@ -73,7 +73,7 @@ def cut_bag(source: Path, target: Path, first_s: float, last_s: float, *, replac
 
 def _between(ns: Ints, messages: list[bytes], low: int, high: int, holds: bool) -> tuple[Ints, list[bytes]]:
     """Messages between two stamps; of what holds until the next message also the last one before, from `low` on."""
-    first, last = (int(np.searchsorted(ns, edge, side=side)) for edge, side in ((low, "left"), (high, "right")))
+    first, last = int(np.searchsorted(ns, low)), int(np.searchsorted(ns, high, side="right"))
     if not holds or not first:
         return ns[first:last], messages[first:last]
     before = cdr.stamped(messages[first - 1], low)

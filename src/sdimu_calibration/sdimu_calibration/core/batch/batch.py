@@ -60,8 +60,8 @@ _NEAR = 1.0
 _LOOSE = (1e-2, 1.0)
 """Velocity and position sigma of the first stage (m/s, m): too wide to hold a wrong azimuth."""
 _ALIKE, _CREEPING, _LONGEST = 0.95, 0.5, 30.0
-"""Cosine between two steps, ratio of their sizes, largest factor of a stretch: steps that point alike and shrink by less
-than half creep, and are stretched."""
+"""Cosine between two steps, ratio of their sizes, largest factor of a stretch: steps that point alike and shrink by
+less than half creep, and are stretched."""
 
 
 @dataclass(frozen=True)

@@ -34,7 +34,7 @@ _OVERLAP = 3
 readings: one or two may be stragglers."""
 
 _WRONG_STAMPS = 0.2
-"""Share of samples with the stamp of another reading that is refused: the other stamps are then no sample times either."""
+"""Share of samples with the stamp of another reading that is refused: the others are then no sample times either."""
 
 
 class RawStatus(NamedTuple):

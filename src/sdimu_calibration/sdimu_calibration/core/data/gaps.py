@@ -42,7 +42,7 @@ _DIFFERENT = 6.0
 _LEAST_COMPARED_S = 3.0
 """Shortest reading on each side of a gap that is compared (s): a shorter one is noise."""
 _STILL_RAD_S2 = 1e-4
-"""Least angular acceleration reckoned with (rad/s^2): no acceleration in the data may mean that nothing was seen of it."""
+"""Least angular acceleration reckoned with (rad/s^2): where none is seen there may still be some."""
 _NEAR_S = 0.5
 """Time before and after a gap that says how steady a turn runs (s): ramps are longer."""
 _SHORT_S = 0.25
