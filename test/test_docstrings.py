@@ -21,12 +21,6 @@ UNIT = re.compile(r"\b(rad|m/s|deg|degC|Hz|SI|units?|dimensionless|whitened|norm
 EXEMPT = {
     f"{package}.{module}"
     for package, modules_of in {
-        "core.alignment": "prepared",
-        "core.batch": "batch classical",
-        "core.data": (
-            "arrival axes_and_units dwell_detection early_reading gaps intake phases resample "
-            "static_detection status_clock windows"
-        ),
         "core.diagnosis": (
             "advice bootstrap candidates coefficient_shifts diagnose found free_input_test "
             "ladder plan_seen rounds scan search verdict"
@@ -35,15 +29,9 @@ EXEMPT = {
             "accel_nonlinearity accelerometer_frame body_frame dead_band drift effect error_slope "
             "imu_model motion settling timing"
         ),
-        "core.estimation": (
-            "azimuth_check fit free_inertial handheld_fit holdout navigation_fit reference_fits "
-            "second_order_fit"
-        ),
+        "core.estimation": "azimuth_check fit handheld_fit holdout navigation_fit reference_fits second_order_fit",
         "core.evidence": "consistency handheld_evidence information linear navigation_evidence signatures stop_misfit",
-        "core": "expression front_door live matrix3 recording",
         "core.filter": "passes",
-        "core.handheld": "handheld handheld_data handheld_fit",
-        "core.noise": "rests",
         "core.second_order": "second_order_passes",
     }.items()
     for module in modules_of.split()

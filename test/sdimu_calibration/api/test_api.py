@@ -122,3 +122,12 @@ def test_a_handheld_fit_takes_no_assumed_site(bag):
         sdimu.calibrate(sdimu.open(bag), estimator="handheld")
     opened = sdimu.calibrate(sdimu.open(bag, handheld=True), estimator="handheld")
     assert opened.core.estimator == "handheld"
+
+
+def test_words_for_estimators_and_models_are_those_of_the_shell(bag):
+    opened = sdimu.open(bag, handheld=True)
+    given = sdimu.calibrate(opened, estimator="handheld")
+    for model in ("hand", "handheld"):
+        assert sdimu.calibrate(opened, model=model, estimator="hand").core.model == given.core.model
+    with pytest.raises(DataError, match="estimator by_hand: expected one of auto, filter"):
+        sdimu.calibrate(opened, estimator="by_hand")

@@ -25,7 +25,8 @@ from sdimu_calibration.core.progress import Progress, silent
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.specification import ImuSpecification
 from sdimu_calibration.storage.config import load_imu, load_plan, load_site
-from sdimu_calibration.storage.effect_file import extended_model, find_effects
+from sdimu_calibration.storage.effect_file import find_effects
+from sdimu_calibration.storage.model_choice import HANDHELD, named_estimator, named_model
 from sdimu_calibration.storage.opening import Source, open_test
 
 _ABLE = Abilities((math.radians(2.0), math.radians(10.0)), math.radians(20.0), (20.0, 40.0, 60.0, 80.0, 100.0, 130.0))
@@ -76,11 +77,11 @@ def calibrate(
     ----------
     test : PreparedTest
     model : str, optional
-        Name in config/model or path; ``baseline``, or ``hand`` for a handheld run.
+        Name in config/model or path; ``baseline``, or ``hand`` (also ``handheld``) for a handheld run.
     add : sequence of str
         Effects to add, as for `sdimu calibrate --add`.
     estimator : str
-        ``auto``, ``filter``, ``second-order``, ``handheld``, ``batch`` or ``classical``.
+        ``auto``, ``filter``, ``second-order``, ``handheld`` (or ``hand``), ``batch`` or ``classical``.
     progress : callable
         Called with a word and the fraction done.
 
@@ -89,10 +90,9 @@ def calibrate(
     DataError
         When the test, the model or the estimator cannot be used.
     """
-    given = extended_model(model or "baseline", list(add))
-    if model is None and (estimator == "handheld" or (estimator == AUTO and test.hides_earth_rate)):
-        given = extended_model("hand", list(add))
-    return CalibrationFit(solve(test, given, estimator, progress=progress))
+    wanted = named_estimator(estimator)
+    handheld = wanted == HANDHELD or (wanted == AUTO and test.hides_earth_rate)
+    return CalibrationFit(solve(test, named_model(model, add, handheld), wanted, progress=progress))
 
 
 def diagnose(
@@ -141,7 +141,7 @@ def predict(
         When a name is unknown.
     """
     chosen = load_plan(plan) if isinstance(plan, str) else plan
-    what = (chosen, load_site(site), load_imu(imu), extended_model(model, []))
+    what = (chosen, load_site(site), load_imu(imu), named_model(model, []))
     return predict_test(*what, bound=bound_covariance)
 
 
@@ -173,7 +173,7 @@ def plan(
         When a name is unknown.
     """
     first = load_plan(start) if isinstance(start, str) else start
-    asked = Question(load_site(site), load_imu(imu), extended_model(model, list(add)))
+    asked = Question(load_site(site), load_imu(imu), named_model(model, add))
     limits = {effect: slack * sigma for effect, sigma in bounds(first, asked).largest().items()}
     return search(first, asked, _ABLE, Goal(limits, minutes), tries, progress)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -30,6 +30,11 @@ from sdimu_calibration.cli.source_options import (
     TemperatureTopic,
     source,
 )
+
+if TYPE_CHECKING:
+    from sdimu_calibration.core.diagnosis.bootstrap import Null
+    from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary
+    from sdimu_calibration.core.progress import Progress
 
 NO_BOOTSTRAP = "--bootstrap: a handheld run learns its scatter, so there is no noise to draw; leave it out"
 
@@ -66,31 +71,28 @@ def diagnose(
     """Find what the model is missing; leaves diagnosis.json and report.html, and result.json of the model found."""
     from rich.console import Console
 
-    from sdimu_calibration.cli.diagnosis_text import print_summary
+    from sdimu_calibration.cli.diagnosis_text import line, print_summary
     from sdimu_calibration.cli.progress import bar
     from sdimu_calibration.core.diagnosis.bootstrap import bootstrap as repeat_on_noise
     from sdimu_calibration.core.diagnosis.diagnose import NOT_DIAGNOSABLE, climb
     from sdimu_calibration.core.diagnosis.summary import summarise
     from sdimu_calibration.core.estimation.solve import solve
     from sdimu_calibration.core.recording import DataError
-    from sdimu_calibration.report.page import write_report
-    from sdimu_calibration.report.report_extras import report_extras
-    from sdimu_calibration.storage.diagnosis_file import write_diagnosis
+    from sdimu_calibration.core.results import without_advice
     from sdimu_calibration.storage.effect_file import find_effects
-    from sdimu_calibration.storage.result_file import write_result
+    from sdimu_calibration.storage.model_choice import HANDHELD, named_estimator
 
     console = Console()
-    if estimator == "classical":
+    asked = HANDHELD if hand else named_estimator(estimator, "--estimator")
+    if asked == "classical":
         raise DataError(NOT_DIAGNOSABLE)
-    if bootstrap and (hand or estimator == "handheld"):
+    if bootstrap and asked == HANDHELD:
         raise DataError(NO_BOOTSTRAP)
     extra = [effect for text in attempt or [] for effect in find_effects(text)]
     origin = source(
         imu_topic, status_topic, joint_topic, temperature_topic, accel_unit, gyro_unit, accel_sign, gyro_sign
     )
-    test, wanted, chosen = opened(
-        console, bag, model, site, imu, add, origin, "handheld" if hand else estimator, noise
-    )
+    test, wanted, chosen = opened(console, bag, model, site, imu, add, origin, asked, noise)
     if bootstrap and test.hides_earth_rate and chosen == "auto":
         raise DataError(NO_BOOTSTRAP)
     notes = test.recording.notes
@@ -102,14 +104,24 @@ def diagnose(
     if bootstrap:
         with bar(console) as progress:
             null = repeat_on_noise(found, bootstrap, progress=progress)
-        console.print(f"bootstrap: {null.sentence}", soft_wrap=True, markup=False, highlight=False)
+        line(console, f"bootstrap: {null.sentence}")
     folder = out or default_folder(bag, "diagnosis")
-    result = found.after
-    write_diagnosis(folder / "diagnosis.json", summary, null)
-    write_result(folder / "result.json", result, found.verdict)
     with bar(console) as progress:
-        progress("navigation without aid", 0.5)
-        more = report_extras(found)
-    write_report(folder / "report.html", found.after, title=f"Diagnosis of {bag.name}", summary=summary, more=more)
-    tell(console, (*notes, *(note for note in result.notes if found.fit.learns_scatter and note not in notes)))
+        _write(folder, f"Diagnosis of {bag.name}", summary, null, progress)
+    more = without_advice(found.after.notes) if found.fit.learns_scatter else ()
+    tell(console, (*notes, *(note for note in more if note not in notes)))
     console.print(f"results in {folder}", soft_wrap=True)
+
+
+def _write(folder: Path, title: str, summary: DiagnosisSummary, null: Null | None, progress: Progress) -> None:
+    """Leave diagnosis.json, result.json and report.html."""
+    from sdimu_calibration.report.page import write_report
+    from sdimu_calibration.report.report_extras import report_extras
+    from sdimu_calibration.storage.diagnosis_file import write_diagnosis
+    from sdimu_calibration.storage.result_file import write_result
+
+    found = summary.diagnosis
+    write_diagnosis(folder / "diagnosis.json", summary, null)
+    write_result(folder / "result.json", found.after, found.verdict)
+    progress("navigation without aid", 0.5)
+    write_report(folder / "report.html", found.after, title=title, summary=summary, more=report_extras(found))

@@ -30,7 +30,6 @@ EstimatorOption = Annotated[
     str, typer.Option(help="filter, second-order, handheld, batch, classical; auto chooses one of the first three.")
 ]
 HandOption = Annotated[bool, typer.Option("--hand", help="Moved by hand: the same as --estimator handheld.")]
-_OLD_NAMES = {"hand": "handheld"}
 HANDHELD_CHOSEN = (
     "handheld: the gyros' white noise in the usual rest hides the Earth's rate, so nothing is navigated "
     "(--estimator filter forces navigation)"
@@ -55,27 +54,25 @@ def opened(
     DataError
         When an option names nothing, or the bag cannot be used.
     """
-    from sdimu_calibration.core.estimation.solve import AUTO, ESTIMATORS
+    from sdimu_calibration.core.estimation.solve import AUTO
     from sdimu_calibration.core.recording import DataError
     from sdimu_calibration.storage.config import load_imu, load_site
-    from sdimu_calibration.storage.effect_file import extended_model
+    from sdimu_calibration.storage.model_choice import HANDHELD, named_estimator, named_model
     from sdimu_calibration.storage.opening import open_test
 
-    wanted = _OLD_NAMES.get(estimator, estimator)
-    if wanted not in (AUTO, *ESTIMATORS):
-        raise DataError(f"--estimator {estimator}: expected one of {', '.join((AUTO, *ESTIMATORS))}")
+    wanted = named_estimator(estimator, "--estimator")
     if noise not in {None, "estimated"}:
         raise DataError(f"--noise {noise}: expected 'estimated' (or leave it out: the noise of --imu)")
     # A wrong name is reported before a long recording is read.
-    specification, given = load_imu(imu), extended_model(model or "baseline", add or [])
+    specification, given = load_imu(imu), named_model(model, add or [])
     if site is not None:
         load_site(site)
-    handheld = None if wanted == AUTO else wanted == "handheld"
+    handheld = None if wanted == AUTO else wanted == HANDHELD
     test = open_test(bag, site, specification, source, handheld, noise is not None)
-    if wanted == "handheld" or (wanted == AUTO and test.hides_earth_rate):
+    if wanted == HANDHELD or (wanted == AUTO and test.hides_earth_rate):
         if wanted == AUTO:
             console.print(HANDHELD_CHOSEN, soft_wrap=True)
-        given = extended_model(model or "hand", add or [])
+        given = named_model(model, add or [], handheld=True)
     return test, given, wanted
 
 

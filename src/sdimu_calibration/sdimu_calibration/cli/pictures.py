@@ -25,11 +25,11 @@ def pictures(
     from sdimu_calibration.report.pictures import write_pictures
     from sdimu_calibration.report.report_extras import report_extras
     from sdimu_calibration.storage.config import load_imu
-    from sdimu_calibration.storage.effect_file import extended_model
+    from sdimu_calibration.storage.model_choice import named_model
     from sdimu_calibration.storage.opening import open_test
 
     console = Console()
-    wanted = extended_model(model, [])
+    wanted = named_model(model, [])
     test = open_test(bag, site, load_imu(imu))
     with bar(console) as progress:
         found = climb(solve(test, wanted, progress=progress), progress=progress)

@@ -49,12 +49,12 @@ def plan(
     from sdimu_calibration.core.plan_search.bound import bounds
     from sdimu_calibration.core.plan_search.moves import Abilities
     from sdimu_calibration.storage.config import load_imu, load_plan, load_site
-    from sdimu_calibration.storage.effect_file import extended_model
+    from sdimu_calibration.storage.model_choice import named_model
     from sdimu_calibration.storage.plan_file import write_plan
 
     console = Console()
     start = load_plan(plan)
-    asked = Question(load_site(site), load_imu(imu), extended_model(model, add or []))
+    asked = Question(load_site(site), load_imu(imu), named_model(model, add or []))
     speeds = tuple(math.radians(v) for v in _numbers("--rates", rates))
     if tell:
         with bar(console) as progress:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
+from sdimu_calibration.cli.options import default_folder
 from sdimu_calibration.cli.source_options import (
     AccelSign,
     AccelUnit,
@@ -44,8 +45,6 @@ def replay(
 
     from rich.console import Console
 
-    from sdimu_calibration.cli.processes import Children, own_domain
-    from sdimu_calibration.core.recording import DataError
     from sdimu_calibration.report.table import rich_table, rows
     from sdimu_calibration.storage.bag_file import bag_parts
     from sdimu_calibration.storage.config import load_imu
@@ -58,33 +57,23 @@ def replay(
         imu_topic, status_topic, joint_topic, temperature_topic, accel_unit, gyro_unit, accel_sign, gyro_sign
     )
     opening_options(site, load_imu(imu), origin)
-    folder = out or bag.resolve().with_name(f"{bag.resolve().stem if bag.is_file() else bag.resolve().name}_replay")
-    result = folder / "result.json"
-    result.unlink(missing_ok=True)
-    (folder / "calibration.journal").unlink(missing_ok=True)
+    folder = out or default_folder(bag, "replay")
+    for old in ("result.json", "calibration.journal"):
+        (folder / old).unlink(missing_ok=True)
     console = Console()
     begun = time.monotonic()
-    with (
-        own_domain(folder / "log"),
-        Children(folder / "log") as children,
-        console.status("replaying") if console.is_terminal else Console(quiet=True).status(""),
-    ):
-        options = {
-            "site": site or "", "imu": imu, "model": model, "out": str(folder), "accel_unit": accel_unit or "",
-            "gyro_unit": gyro_unit or "", "accel_sign": accel_sign or 0, "gyro_sign": gyro_sign or 0,
-        }  # fmt: skip
-        children.start("calibration", "sdimu_calibration.nodes.calibration_node", options)
-        topics = {
-            "imu_topic": imu_topic, "status_topic": status_topic, "joint_topic": joint_topic,
-            "temperature_topic": temperature_topic,
-        }  # fmt: skip
-        player = {"bag": str(bag), "speed": speed, "consumers": 1} | {k: topic or "" for k, topic in topics.items()}
-        children.start("replay", "sdimu_calibration.nodes.replay_node", player)
-        while children.running():
-            if patience and time.monotonic() - begun > patience:
-                raise DataError(f"replay: not done after {patience:g} s; see {folder / 'log'}")
-            time.sleep(0.05)
-    calibration = read_result(result)
+    calibrating = {
+        "site": site or "", "imu": imu, "model": model, "out": str(folder), "accel_unit": accel_unit or "",
+        "gyro_unit": gyro_unit or "", "accel_sign": accel_sign or 0, "gyro_sign": gyro_sign or 0,
+    }  # fmt: skip
+    playing = {
+        "bag": str(bag), "speed": speed, "consumers": 1, "imu_topic": imu_topic or "",
+        "status_topic": status_topic or "", "joint_topic": joint_topic or "",
+        "temperature_topic": temperature_topic or "",
+    }  # fmt: skip
+    with console.status("replaying") if console.is_terminal else Console(quiet=True).status(""):
+        _play(folder / "log", calibrating, playing, patience)
+    calibration = read_result(folder / "result.json")
     wall = time.monotonic() - begun
     console.print(rich_table(rows(calibration), f"body frame: {calibration.body_frame}"), soft_wrap=True)
     duration, lost = calibration.data["duration_s"], calibration.data["lost"]
@@ -93,3 +82,20 @@ def replay(
         highlight=False,
     )
     console.print(f"results in {folder}", soft_wrap=True)
+
+
+def _play(log: Path, calibrating: dict[str, Any], playing: dict[str, Any], patience: float) -> None:
+    """Run the calibration node and the player until both have ended."""
+    import time
+
+    from sdimu_calibration.cli.processes import Children, own_domain
+    from sdimu_calibration.core.recording import DataError
+
+    begun = time.monotonic()
+    with own_domain(log), Children(log) as children:
+        children.start("calibration", "sdimu_calibration.nodes.calibration_node", calibrating)
+        children.start("replay", "sdimu_calibration.nodes.replay_node", playing)
+        while children.running():
+            if patience and time.monotonic() - begun > patience:
+                raise DataError(f"replay: not done after {patience:g} s; see {log}")
+            time.sleep(0.05)

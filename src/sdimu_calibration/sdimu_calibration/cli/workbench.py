@@ -53,13 +53,13 @@ def workbench(
     from sdimu_calibration.report.workbench.fit import FitSession
     from sdimu_calibration.report.workbench.recording_cache import RecordingCache, neighbours
     from sdimu_calibration.storage.config import load_imu, load_site
-    from sdimu_calibration.storage.effect_file import extended_model
+    from sdimu_calibration.storage.model_choice import named_model
     from sdimu_calibration.storage.opening import open_test
 
     with socket.socket() as probe:
         if probe.connect_ex((host, port)) == 0:
             raise DataError(f"port {port} is taken (choose another with --port)")
-    specification, wanted = load_imu(imu), extended_model(model, [])
+    specification, wanted = load_imu(imu), named_model(model, [])
     if site is not None:
         load_site(site)
     origin = source(

@@ -32,6 +32,7 @@ _OF_NUMBERS: dict[str, Callable[[Any], Any]] = {
 _ONE: dict[str, Callable[[Any], Any]] = {**_OF_NUMBERS, "abs": np.abs, "sqrt": np.sqrt, "sign": np.sign}
 _TWO: dict[str, Callable[[Any, Any], Any]] = {"min": np.minimum, "max": np.maximum}
 _LONGEST = 2000
+"""Number of characters of a formula at most: a longer one is no formula, and would nest too deep for the parser."""
 _JOINED = re.compile(r"(?<=[\w)])\s+(?=[A-Za-z(])")
 """A blank between two factors stands for a product, as in the equations that a diagnosis proposes."""
 

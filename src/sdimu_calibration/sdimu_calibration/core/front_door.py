@@ -18,6 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from sdimu_calibration.core.arrays import Bools, Floats
 from sdimu_calibration.core.data.arrival import IMU_TOPIC
 from sdimu_calibration.core.data.axes_and_units import Stated, recognise
 from sdimu_calibration.core.data.dejitter import dejittered
@@ -29,7 +30,7 @@ from sdimu_calibration.core.recording import DataError, Recording
 from sdimu_calibration.core.specification import ImuSpecification, Site
 
 FEWEST = 100
-"""Samples below which nothing can be recognised."""
+"""Number of samples below which nothing can be recognised: a second of them."""
 
 
 @dataclass(frozen=True)
@@ -106,13 +107,21 @@ def in_si(recording: Recording, stated: Stated, where: str = IMU_TOPIC) -> Recor
 
 def _dead(recording: Recording) -> str | None:
     """Name an axis that shows one number all the time, although the IMU is not a perfect one at rest."""
-    if not np.ptp(recording.f_ib_b, axis=0).any():
+    if _constant(recording.f_ib_b).all():
         return None
     for kind, values in (("angular_velocity", recording.omega_ib_b), ("linear_acceleration", recording.f_ib_b)):
-        for axis, x in zip("xyz", values.T, strict=True):
-            if x.min() == x.max():
-                return f"{kind}.{axis} is {x[0] + 0.0:.4g} in all {len(x)} samples: the axis is dead; check the driver"
+        for k in np.flatnonzero(_constant(values)):
+            return (
+                f"{kind}.{'xyz'[k]} is {values[0, k] + 0.0:.4g} in all {len(values)} samples: the axis is dead; check "
+                "the driver"
+            )
     return None
+
+
+def _constant(values: Floats) -> Bools:
+    """Axes of `values` (n, 3) that never change, shape (3,); the first samples tell it of most."""
+    constant = (values[:FEWEST] == values[0]).all(axis=0)
+    return np.asarray((values == values[0]).all(axis=0) if constant.any() else constant)
 
 
 def _with_temperature(recording: Recording) -> Recording:

@@ -35,10 +35,11 @@ from sdimu_calibration.core.rotation import quaternion
 from sdimu_calibration.core.specification import Model
 
 NS = 1_000_000_000
+"""Stamps of a second (ns): header stamps are integers."""
 
 NIS_CHANNELS = ("position", "velocity", "rate", "force")
 _FAR = 5.0
-"""Standard deviations of chi-square beyond which a channel contradicts its sigma."""
+"""Deviation of chi-square (its standard deviations) that is reported: beyond it a channel contradicts its sigma."""
 
 
 @dataclass(frozen=True)
@@ -138,10 +139,17 @@ class LiveCalibration:
         self._stop_nis = np.zeros((2, 4))  # sum and degrees of freedom at the present stop
 
     def add_samples(self, ns: Ints, omega_ib_b: Floats, f_ib_b: Floats) -> None:
-        """Take samples as the messages have them: header stamps (n,) ns, rates and specific forces (n, 3).
+        """Take samples as the messages have them.
 
         Samples that are not finite, or not later than the last one taken, are counted and do not reach the filter on
         the way; the end of the test sorts them in as the reader of bags does.
+
+        Parameters
+        ----------
+        ns : ndarray of int, shape (n,)
+            Header stamps (ns).
+        omega_ib_b, f_ib_b : ndarray, shape (n, 3)
+            Rates and specific forces, in the units of the messages.
         """
         self._intake.add_samples(ns, omega_ib_b, f_ib_b)
 

@@ -94,7 +94,17 @@ def orthonormal3(m: Matrix3) -> Matrix3:
 
 @compiled
 def sparse_product(A: Floats, B: Floats) -> Floats:
-    """Product ``A @ B`` that skips the zeros of A; shapes (m, n) and (n, q)."""
+    """Product ``A @ B`` that skips the zeros of A.
+
+    Parameters
+    ----------
+    A, B : ndarray, shapes (m, n) and (n, q)
+        Any units.
+
+    Returns
+    -------
+    ndarray, shape (m, q)
+    """
     out = np.zeros((A.shape[0], B.shape[1]))
     for i in range(A.shape[0]):
         for k in range(A.shape[1]):

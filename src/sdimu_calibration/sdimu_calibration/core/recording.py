@@ -9,7 +9,7 @@ import numpy as np
 from sdimu_calibration.core.arrays import Bools, Floats, Ints
 
 NOMINAL_FROM = 50
-"""Sample intervals that give the nominal one: the first ones, so that live and offline agree."""
+"""Number of sample intervals that give the nominal one: the first ones, so that live and offline agree."""
 UNNUMBERED = -1
 """Stop of a phase that has no number: stops are then counted."""
 
@@ -65,7 +65,15 @@ class PhaseLog:
 
 @dataclass(frozen=True)
 class TemperatureLog:
-    """IMU temperature: `t` (m,) seconds after `start_ns`, ascending; `value` (m,) in deg C."""
+    """IMU temperature.
+
+    Attributes
+    ----------
+    t : ndarray, shape (m,)
+        Seconds after `start_ns` (s), ascending.
+    value : ndarray, shape (m,)
+        deg C.
+    """
 
     t: Floats
     value: Floats
@@ -73,7 +81,16 @@ class TemperatureLog:
 
 @dataclass(frozen=True)
 class TableLog:
-    """Table axis angles: `t` (m,) s, `names` (k), `angle` (m, k) rad. Never used by the estimator."""
+    """Table axis angles; never used by the estimator.
+
+    Attributes
+    ----------
+    t : ndarray, shape (m,)
+        Seconds after `start_ns` (s).
+    names : tuple of str, length k
+    angle : ndarray, shape (m, k)
+        rad.
+    """
 
     t: Floats
     names: tuple[str, ...]
@@ -120,15 +137,38 @@ class Recording:
 
 
 def nominal_interval_ns(stamps_ns: Ints) -> int:
-    """Nominal sample interval (ns) of ascending stamps, shape (n,): the median of the first `NOMINAL_FROM`."""
+    """Nominal sample interval (ns): the median of the first `NOMINAL_FROM`.
+
+    Parameters
+    ----------
+    stamps_ns : ndarray of int, shape (n,)
+        Ascending.
+    """
     return round(float(np.median(np.diff(stamps_ns[: NOMINAL_FROM + 1]))))
 
 
 def origin_ns(stamps_ns: Ints) -> int:
-    """Stamp from which a recording counts its times: one nominal interval before the first sample."""
+    """Stamp from which a recording counts its times: one nominal interval before the first sample.
+
+    Parameters
+    ----------
+    stamps_ns : ndarray of int, shape (n,)
+        Ascending.
+    """
     return int(stamps_ns[0]) - nominal_interval_ns(stamps_ns)
 
 
 def seconds(stamps_ns: Ints, start_ns: int) -> Floats:
-    """Stamps (ns) as seconds after `start_ns`."""
+    """Count stamps from a start.
+
+    Parameters
+    ----------
+    stamps_ns : ndarray of int, shape (n,)
+    start_ns : int
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Seconds after `start_ns` (s).
+    """
     return np.asarray((stamps_ns - start_ns) * 1e-9, dtype=np.float64)

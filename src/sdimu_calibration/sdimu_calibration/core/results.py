@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import re
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -105,3 +106,12 @@ class Calibration:
     noise: tuple[NoiseTerm, ...] = ()
     drift_means: Mapping[str, float] = field(default_factory=dict)
     conditional_sigma: Floats | None = None
+
+
+_ADVICE = re.compile(r"[;:,](?: or)? run:? sdimu diagnose$")
+"""How a note of a fit ends that advises a diagnosis."""
+
+
+def without_advice(notes: Iterable[str]) -> tuple[str, ...]:
+    """Return the notes of a fit that was diagnosed: without the advice to diagnose it."""
+    return tuple(_ADVICE.sub("", note) for note in notes)

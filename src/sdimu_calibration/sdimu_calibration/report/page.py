@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from html import escape
 from pathlib import Path
 from typing import Any
 
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary
-from sdimu_calibration.core.results import Calibration
+from sdimu_calibration.core.results import Calibration, without_advice
 from sdimu_calibration.report import data, handheld_sections, sections, table
 from sdimu_calibration.report.drawing import html
 from sdimu_calibration.report.export import as_csv, as_yaml
@@ -94,7 +94,7 @@ def page(
         sections.verdict(summary) if summary else "",
         # Of a handheld run the ladder says it, in sigmas that models can be compared by.
         "" if handheld else f"<p>{_fit(calibration, summary is not None)}</p>",
-        _notes(calibration),
+        _notes(calibration.notes if summary is None else without_advice(calibration.notes)),
     ]
     return (
         '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
@@ -173,10 +173,8 @@ def _fit(calibration: Calibration, diagnosed: bool) -> str:
     return escape(" ".join(sentences))
 
 
-def _notes(calibration: Calibration) -> str:
-    if not calibration.notes:
-        return ""
-    return "<ul>" + "".join(f"<li>{prose(note)}</li>" for note in calibration.notes) + "</ul>"
+def _notes(notes: Sequence[str]) -> str:
+    return "<ul>" + "".join(f"<li>{prose(note)}</li>" for note in notes) + "</ul>" if notes else ""
 
 
 def _table(entries: list[table.Row]) -> str:

@@ -207,10 +207,15 @@ def _present(named: list[Path]) -> list[Path]:
     return named
 
 
+_LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+"""Ten times as fast as the loader in Python where PyYAML has it; both read the same."""
+
+
 def _metadata(folder: Path) -> Mapping[str, Any]:
     """Content of metadata.yaml, empty when there is none or it cannot be used."""
     try:
-        content = yaml.safe_load((folder / "metadata.yaml").read_text(encoding="utf-8"))
+        text = (folder / "metadata.yaml").read_text(encoding="utf-8")
+        content = yaml.load(text, Loader=_LOADER)
         information = content["rosbag2_bagfile_information"]
     except (FileNotFoundError, UnicodeDecodeError, yaml.YAMLError, TypeError, KeyError):
         return {}

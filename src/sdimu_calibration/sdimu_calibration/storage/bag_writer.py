@@ -81,13 +81,8 @@ class _Stream:
 
 
 def _write(path: Path, streams: list[_Stream], start_ns: int, replace: bool) -> None:
-    ns = np.concatenate([stream.ns for stream in streams]) + start_ns
-    # Stable: at the same stamp the status goes first, as it holds from that stamp on.
-    order = np.argsort(ns, kind="stable")
-    name = [stream.topic for stream in streams for _ in stream.encoded]
-    data = [message for stream in streams for message in stream.encoded]
     with McapBag(path, replace=replace) as bag:
         for stream in streams:
             bag.topic(stream.topic, stream.type_name)
-        for i, time_ns in zip(order.tolist(), ns[order].tolist(), strict=True):
-            bag.write(name[i], data[i], time_ns)
+        # At the same stamp the status goes first, as it holds from that stamp on.
+        bag.write_merged({stream.topic: (stream.ns + start_ns, stream.encoded) for stream in streams})

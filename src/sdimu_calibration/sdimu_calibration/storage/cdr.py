@@ -118,6 +118,25 @@ def stamp_of(message: bytes) -> int:
     return sec * 1_000_000_000 + int.from_bytes(message[8:12], order)
 
 
+def by_stamp(raw: Sequence[bytes]) -> tuple[Stamps, list[bytes]]:
+    """Sort messages by the stamps of their headers.
+
+    Parameters
+    ----------
+    raw : sequence of bytes, length n
+
+    Returns
+    -------
+    stamp_ns : ndarray, shape (n,)
+        Ascending (ns).
+    messages : list of bytes, length n
+    """
+    messages = list(raw)
+    ns = np.fromiter(map(stamp_of, messages), np.int64, len(messages))
+    order = np.argsort(ns, kind="stable")
+    return ns[order], [messages[k] for k in order.tolist()]
+
+
 def stamped(message: bytes, stamp_ns: int) -> bytes:
     """Return the message with another stamp (ns) in its header."""
     order = _order(message)
@@ -355,9 +374,11 @@ def decode_joint_positions(raw: Sequence[bytes], names: tuple[str, ...], first: 
     LayoutError
         When not all messages share a layout with one position an axis.
     """
-    if len(set(map(len, raw))) != 1:
+    messages = raw if isinstance(raw, RawMessages) else RawMessages(raw)
+    size = np.unique(np.concatenate([block.length for block in messages.blocks()]))
+    if len(size) != 1:
         raise LayoutError("lengths differ")
-    rows = np.frombuffer(b"".join(raw), np.uint8).reshape(len(raw), -1)
+    rows = np.concatenate([block.field(0, np.uint8, int(size[0])) for block in messages.blocks()])
     frame_id_length = int(rows[0, 12:16].copy().view("<u4")[0]) - 1
     if not 0 <= frame_id_length < rows.shape[1]:
         raise LayoutError("other layout")

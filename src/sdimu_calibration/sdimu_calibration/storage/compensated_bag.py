@@ -67,14 +67,15 @@ def write_compensated(
     interval = recording.interval_s
     heat = heat_since(recording.temperature, recording.t - 0.5 * interval, using.start_temperature, causal=False)
     largest = np.zeros(6)
-    copied = [(cdr.stamp_of(m), topic, m) for topic, content in others.items() for m in content.raw]
-    copied.sort(key=lambda entry: entry[0])
-    next_copy = 0
+    copied = {topic: cdr.by_stamp(content.raw) for topic, content in others.items()}
+    # A block takes what comes until its last sample, the last one all that is left.
+    edges = [*stamps[_BLOCK - 1 : -1 : _BLOCK].tolist(), max((int(ns[-1]) for ns, _ in copied.values()), default=0)]
+    places = {t: [0, *np.searchsorted(ns, edges, side="right").tolist()] for t, (ns, _) in copied.items()}
     with McapBag(target, replace=replace) as bag:
         bag.topic(COMPENSATED, cdr.IMU)
         for topic, content in others.items():
             bag.topic(topic, content.type_name)
-        for first in range(0, len(stamps), _BLOCK):
+        for block, first in enumerate(range(0, len(stamps), _BLOCK)):
             rows = slice(first, first + _BLOCK)
             done = compensate(
                 using, recording.t[rows], interval, recording.omega_ib_b[rows], recording.f_ib_b[rows],
@@ -83,14 +84,10 @@ def write_compensated(
             change = np.hstack([done.omega_ib_b - recording.omega_ib_b[rows], done.f_ib_b - recording.f_ib_b[rows]])
             largest = np.maximum(largest, np.abs(change).max(axis=0))
             encoded = encode_compensated(stamps[rows], done, frame_id)
-            for stamp, message in zip(stamps[rows].tolist(), encoded, strict=True):
-                # At the same stamp the status goes first, as it holds from that stamp on.
-                while next_copy < len(copied) and copied[next_copy][0] <= stamp:
-                    bag.write(copied[next_copy][1], copied[next_copy][2], copied[next_copy][0])
-                    next_copy += 1
-                bag.write(COMPENSATED, message, stamp)
+            due = {topic: slice(*places[topic][block : block + 2]) for topic in copied}
+            # At the same stamp the status goes first, as it holds from that stamp on.
+            before = {topic: (ns[due[topic]], messages[due[topic]]) for topic, (ns, messages) in copied.items()}
+            bag.write_merged(before | {COMPENSATED: (stamps[rows], encoded)})
             if progress is not None:
                 progress("compensate", min(1.0, (first + _BLOCK) / len(stamps)))
-        for stamp, topic, message in copied[next_copy:]:
-            bag.write(topic, message, stamp)
     return Written(len(stamps), float(largest[:3].max()), float(largest[3:].max()))

@@ -6,6 +6,9 @@ import math
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
+from sdimu_calibration.core.arrays import Ints
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage import cdr
 from sdimu_calibration.storage.bag_file import read_topics
@@ -47,33 +50,31 @@ def cut_bag(source: Path, target: Path, first_s: float, last_s: float, *, replac
     if not first_s < last_s:
         raise DataError(f"--from {first_s:g} --to {last_s:g}: nothing lies between these times (s)")
     found = read_topics(source, lambda _topic, kind: kind in _TAKEN)
-    stamped = {
-        topic: sorted(((cdr.stamp_of(m), m) for m in content.raw), key=lambda entry: entry[0])
-        for topic, content in found.items()
-    }
-    imu = [entries for topic, entries in stamped.items() if found[topic].type_name == cdr.IMU and entries]
+    ranked = sorted(found, key=lambda topic: _TAKEN.index(found[topic].type_name))
+    stamped = {topic: cdr.by_stamp(found[topic].raw) for topic in ranked}
+    imu = [ns for topic, (ns, _) in stamped.items() if found[topic].type_name == cdr.IMU and len(ns)]
     if not imu:
         raise DataError(f"{source}: no message of {cdr.IMU} is in it")
-    start = min(entries[0][0] for entries in imu)
-    end = max(entries[-1][0] for entries in imu)
+    start, end = min(int(ns[0]) for ns in imu), max(int(ns[-1]) for ns in imu)
     low = start + round(first_s * 1e9)
-    high = start + round(last_s * 1e9) if math.isfinite(last_s) else max(e[-1][0] for e in stamped.values() if e)
-    kept: list[tuple[int, int, str, bytes]] = []
-    for topic, entries in stamped.items():
-        rank = _TAKEN.index(found[topic].type_name)
-        inside = [(ns, m) for ns, m in entries if low <= ns <= high]
-        if found[topic].type_name == cdr.STATUS:
-            inside = [(low, cdr.stamped(m, low)) for ns, m in entries if ns < low][-1:] + inside
-        kept += [(ns, rank, topic, m) for ns, m in inside]
-    if not any(rank == _TAKEN.index(cdr.IMU) for _ns, rank, _topic, _m in kept):
+    high = start + round(last_s * 1e9) if math.isfinite(last_s) else np.iinfo(np.int64).max
+    kept = {topic: _between(*stamped[topic], low, high, found[topic].type_name == cdr.STATUS) for topic in ranked}
+    if not any(len(kept[topic][0]) for topic in ranked if found[topic].type_name == cdr.IMU):
         raise DataError(
             f"{source}: no sample between {first_s:g} and {last_s:g} s; it is {(end - start) * 1e-9:.1f} s long"
         )
-    kept.sort(key=lambda entry: entry[:2])
     with McapBag(target, replace=replace) as bag:
         for topic, content in found.items():
             bag.topic(topic, content.type_name)
-        for ns, _rank, topic, message in kept:
-            bag.write(topic, message, ns)
+        bag.write_merged(kept)
         counts = dict(bag.counts)
     return Part(counts, (end - start) * 1e-9)
+
+
+def _between(ns: Ints, messages: list[bytes], low: int, high: int, holds: bool) -> tuple[Ints, list[bytes]]:
+    """Messages between two stamps; of what holds until the next message also the last one before, from `low` on."""
+    first, last = int(np.searchsorted(ns, low)), int(np.searchsorted(ns, high, side="right"))
+    if not holds or not first:
+        return ns[first:last], messages[first:last]
+    before = cdr.stamped(messages[first - 1], low)
+    return np.append(np.int64(low), ns[first:last]), [before, *messages[first:last]]

@@ -15,12 +15,14 @@ from sdimu_calibration.core.recording import DataError
 def write_json(path: Path, content: Any) -> None:
     """Write `content`; numbers that are not finite become ``null``; the folder is made.
 
+    A list of numbers or words stands on one line, everything else one entry a line.
+
     The file is written beside its place and renamed, so that a reader never meets half of it.
     """
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     temporary = path.with_name(f".{path.name}.part")
-    temporary.write_text(json.dumps(_plain(content), allow_nan=False, indent=1) + "\n", encoding="utf-8")
+    temporary.write_text(_text(content, "\n") + "\n", encoding="utf-8")
     temporary.replace(path)
 
 
@@ -45,14 +47,26 @@ def read_json(path: Path, expected_format: str) -> dict[str, Any]:
     return content
 
 
-def _plain(content: Any) -> Any:
-    """Replace numpy by Python and non-finite numbers by None, all the way down."""
-    if isinstance(content, dict):
-        return {str(key): _plain(value) for key, value in content.items()}
-    if isinstance(content, list | tuple):
-        return [_plain(value) for value in content]
+def _text(content: Any, margin: str) -> str:
+    """JSON of `content`; `margin` begins each of its lines but the first."""
     if isinstance(content, np.ndarray):
-        return _plain(content.tolist())
-    if isinstance(content, np.generic):
-        content = content.item()
-    return None if isinstance(content, float) and not math.isfinite(content) else content
+        content = content.tolist()
+    deeper = margin + " "
+    if isinstance(content, dict) and content:
+        entries = [f"{json.dumps(str(key))}: {_text(value, deeper)}" for key, value in content.items()]
+        return f"{{{deeper}{f',{deeper}'.join(entries)}{margin}}}"
+    if isinstance(content, list | tuple):
+        if any(isinstance(value, dict | list | tuple | np.ndarray) for value in content):
+            return f"[{deeper}{f',{deeper}'.join(_text(value, deeper) for value in content)}{margin}]"
+        try:
+            return json.dumps(content, allow_nan=False)
+        except (TypeError, ValueError):
+            content = [_plain(value) for value in content]
+    return json.dumps(_plain(content), allow_nan=False)
+
+
+def _plain(value: Any) -> Any:
+    """Replace a number of numpy by one of Python, and one that is not finite by None."""
+    if isinstance(value, np.generic):
+        value = value.item()
+    return None if isinstance(value, float) and not math.isfinite(value) else value

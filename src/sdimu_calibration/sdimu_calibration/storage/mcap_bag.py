@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import shutil
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 
+import numpy as np
+
+from sdimu_calibration.core.arrays import Ints
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage.bag_metadata import FileEntry, TopicEntry, write_metadata
 from sdimu_calibration.storage.mcap_file import McapFile
@@ -103,6 +107,27 @@ class McapBag:
         if self._first_ns is None or log_time_ns < self._first_ns:
             self._first_ns = log_time_ns
         self._last_ns = max(self._last_ns, log_time_ns)
+
+    def write_merged(self, streams: Mapping[str, tuple[Ints, Sequence[bytes]]]) -> None:
+        """Append messages of several topics in the order of their times.
+
+        Parameters
+        ----------
+        streams : dict of str to (ndarray of int, shape (n,), sequence of bytes, length n)
+            Times (ns) and messages (CDR) of each topic; at the same time the first topic goes first.
+        """
+        times = [np.asarray(ns, np.int64) for ns, _ in streams.values()]
+        numbers = [self._topics[name].channel for name in streams]
+        data = [message for _, messages in streams.values() for message in messages]
+        if not data:
+            return
+        ns, channel = np.concatenate(times), np.repeat(numbers, [len(each) for each in times])
+        order = np.argsort(ns, kind="stable")
+        self._writer.messages(channel[order], [data[k] for k in order.tolist()], ns[order])
+        for name, each in zip(streams, times, strict=True):
+            self._topics[name].count += len(each)
+        self._first_ns = int(ns.min()) if self._first_ns is None else min(self._first_ns, int(ns.min()))
+        self._last_ns = max(self._last_ns, int(ns.max()))
 
     def flush(self) -> None:
         """Close the chunk and hand it to the system: what was written until now survives a kill."""

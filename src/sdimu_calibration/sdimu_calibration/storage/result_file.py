@@ -12,7 +12,7 @@ import numpy as np
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.noise_term import NoiseTerm
 from sdimu_calibration.core.recording import DataError, DataFault
-from sdimu_calibration.core.results import Calibration, History
+from sdimu_calibration.core.results import Calibration, History, without_advice
 from sdimu_calibration.storage.json_file import read_json, write_json
 
 FORMAT = "sdimu-result/1"
@@ -27,9 +27,10 @@ def write_result(path: Path, calibration: Calibration, verdict: str = "") -> Non
         File to make or replace; its folder is made too.
     calibration : Calibration
     verdict : str
-        Of a diagnosis, where one was made.
+        Of a diagnosis, where one was made; no note then advises one.
     """
     conditional = calibration.conditional_sigma
+    told = without_advice if verdict else tuple
     content = {
         "format": FORMAT,
         **({"verdict": verdict} if verdict else {}),
@@ -55,8 +56,8 @@ def write_result(path: Path, calibration: Calibration, verdict: str = "") -> Non
         "fit": dict(calibration.fit),
         "data": {**calibration.data, "faults": [asdict(fault) for fault in calibration.faults]},
         "noise": [asdict(term) | {"unit": term.unit} for term in calibration.noise],
-        "notes": list(calibration.notes),
-        "warnings": list(calibration.warnings),
+        "notes": told(calibration.notes),
+        "warnings": told(calibration.warnings),
         "history": {entry.name: getattr(calibration.history, entry.name).tolist() for entry in fields(History)},
     }
     write_json(path, content)

@@ -69,7 +69,6 @@ def summarise(
         statistics.nis_check(nis.sum(axis=1), dof.sum(axis=1)),
         statistics.lag_check(lag1, counts, CHANNELS),
     ]
-    units = {q.name: (q.unit, q.display_unit) for q in imu_model.build(model.effects, imu).parameters}
     z_low, z_high = statistics.rms_interval(n, p)
     return {
         "format": FORMAT,
@@ -84,32 +83,43 @@ def summarise(
             {"name": c.name, "value": c.value, "low": c.low, "high": c.high, "passed": c.passed} for c in checks
         ],
         "rms_z_interval": [z_low, z_high],
-        "coefficients": [
-            {
-                "name": name, "unit": units[name][0], "display_unit": units[name][1], "bias": found.bias[k],
-                "bias_error": found.bias_error[k], "rms": found.rms[k], "sigma": found.sigma[k],
-                "bound": found.bound[k], "rms_z": found.rms_z[k],
-            }
-            for k, name in enumerate(names)
-        ],
+        "coefficients": _coefficients(names, found, model, imu),
         "nees": {"dof": p, "values": nees},
         "nis": {
             "values": nis.sum(axis=1) / dof.sum(axis=1), "dof": dof.sum(axis=1),
             "by_kind": dict(zip(KINDS, _ratio(nis.sum(axis=0), dof.sum(axis=0)), strict=True)),
         },
-        "autocorrelation": [
-            {"channel": channel, "value": value, "standard_errors": score, "pairs": int(pairs)}
-            for channel, value, score, pairs in zip(
-                CHANNELS, _ratio(lag1.sum(axis=0), counts.sum(axis=0)), statistics.lag_scores(lag1, counts),
-                counts.sum(axis=0), strict=True,
-            )
-        ],
+        "autocorrelation": _autocorrelation(lag1, counts),
         "time": {
-            "wall_s_per_run": float(np.mean([row["wall_s"] for row in good])),
-            "cpu_s_per_run": float(np.mean([row["cpu_s"] for row in good])),
-            "passes": float(np.mean([row["passes"] for row in good])),
+            name: float(np.mean([row[key] for row in good]))
+            for name, key in (("wall_s_per_run", "wall_s"), ("cpu_s_per_run", "cpu_s"), ("passes", "passes"))
         },
     }  # fmt: skip
+
+
+def _coefficients(
+    names: Sequence[str], found: statistics.CoefficientStatistics, model: Model, imu: ImuSpecification
+) -> list[dict[str, Any]]:
+    """Errors of every coefficient, with its units."""
+    units = {q.name: (q.unit, q.display_unit) for q in imu_model.build(model.effects, imu).parameters}
+    return [
+        {
+            "name": name, "unit": units[name][0], "display_unit": units[name][1], "bias": found.bias[k],
+            "bias_error": found.bias_error[k], "rms": found.rms[k], "sigma": found.sigma[k],
+            "bound": found.bound[k], "rms_z": found.rms_z[k],
+        }
+        for k, name in enumerate(names)
+    ]  # fmt: skip
+
+
+def _autocorrelation(lag1: Floats, counts: Floats) -> list[dict[str, Any]]:
+    """Correlation of successive innovations of every channel."""
+    pairs = counts.sum(axis=0)
+    columns = (CHANNELS, _ratio(lag1.sum(axis=0), pairs), statistics.lag_scores(lag1, counts), pairs)
+    return [
+        {"channel": channel, "value": value, "standard_errors": score, "pairs": int(number)}
+        for channel, value, score, number in zip(*columns, strict=True)
+    ]
 
 
 def _ratio(top: Floats, below: Floats) -> list[float]:

@@ -31,9 +31,9 @@ from sdimu_calibration.core.recording import NOMINAL_FROM, DataError, DataFault,
 from sdimu_calibration.core.specification import ImuSpecification, Model, Site
 
 _LISTED = 40
-"""So many stops are listed one by one."""
+"""Number of stops that are listed one by one: more do not fit on a line."""
 ALIGN_S = 30.0
-"""At most this much of the first dwell levels and gyrocompasses (s)."""
+"""Longest part of the first dwell that levels and gyrocompasses (s): biases are constant over it."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,20 @@ class TestSetup:
 
 @dataclass(frozen=True)
 class PreparedData:
-    """A recording after reduction: cycles, epochs and their phases."""
+    """A recording after reduction: cycles, epochs and their phases.
+
+    Attributes
+    ----------
+    cycles : Cycles
+    epochs : Epochs
+    phases : Phases
+    kind : ndarray of int, shape (e,)
+        What each epoch measures (`measurement_kind`).
+    temperature : TemperatureLog or None
+    bridges : Bridges
+        What gaps in the data add to the noise.
+    faults : tuple of DataFault
+    """
 
     cycles: Cycles
     epochs: Epochs
@@ -83,12 +96,23 @@ def set_up(site: Site, imu: ImuSpecification, model: Model) -> TestSetup:
 
 
 def nominal_interval(t: Floats) -> float:
-    """Nominal sample interval (s) from the first stamps; live and offline use the same ones."""
+    """Nominal sample interval (s) from the first stamps; live and offline use the same ones.
+
+    Parameters
+    ----------
+    t : ndarray, shape (n,)
+        Stamps (s).
+    """
     return float(np.median(np.diff(t[: NOMINAL_FROM + 1])))
 
 
 def measurement_kinds(phases: Phases, every_epoch: bool) -> Ints:
-    """Say what each epoch measures: Zw and Zf in every used one, Zp and Zv after motion (or always)."""
+    """Say what each epoch measures: Zw and Zf in every used one, Zp and Zv after motion (or always).
+
+    Returns
+    -------
+    ndarray of int, shape (e,)
+    """
     kind = np.where(phases.used, SENSORS, SKIP).astype(np.int64)
     kind[phases.used if every_epoch else phases.first] = ALL
     return kind

@@ -52,14 +52,16 @@ from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.rotation import rotation_matrix
 
 CONVERGED = 1e-2
-"""Largest step of a coefficient in its sigma at which Gauss-Newton ends."""
+"""Largest step of a coefficient (sigma) at which Gauss-Newton ends: smaller ones change no report."""
 MOST_STEPS = 40
+"""Number of steps at most: a fit that needs more does not converge."""
 _NEAR = 1.0
-"""As `CONVERGED`, for the first stage."""
+"""Step (sigma) that ends the first stage: the second one begins near enough then."""
 _LOOSE = (1e-2, 1.0)
-"""Velocity and position sigma of the first stage (m/s, m)."""
+"""Velocity and position sigma of the first stage (m/s, m): too wide to hold a wrong azimuth."""
 _ALIKE, _CREEPING, _LONGEST = 0.95, 0.5, 30.0
-"""Steps creep when they point alike and shrink by less than half; they are stretched at most so far."""
+"""Cosine between two steps, ratio of their sizes, largest factor of a stretch: steps that point alike and shrink by
+less than half creep, and are stretched."""
 
 
 @dataclass(frozen=True)
@@ -91,7 +93,13 @@ class BatchSolution:
 
 
 def bound_covariance(prepared: PreparedData, setup: TestSetup, start: Alignment) -> Floats:
-    """Covariance (p, p), frame of the prior, that the data of a perfect recording hold."""
+    """Return the covariance that the data of a perfect recording hold.
+
+    Returns
+    -------
+    ndarray, shape (p, p)
+        SI, in the frame of the prior.
+    """
     point, where = _begin(prepared, setup, start.C_nb, np.zeros(len(setup.sensors.prior)))
     return _scaled(solve(_links(prepared, setup, start, where, point)[0]), setup)[1]
 

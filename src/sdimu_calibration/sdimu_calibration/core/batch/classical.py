@@ -88,7 +88,21 @@ def _gimbal_log(log: TableLog | None) -> TableLog:
 
 
 def table_attitude(log: TableLog, t: Floats, gimbals: tuple[str, str, str]) -> Floats:
-    """Attitude of the platform at times `t` (n,), shape (n, 3, 3): outer, then middle, then inner turn."""
+    """Attitude of the platform: outer, then middle, then inner turn.
+
+    Parameters
+    ----------
+    log : TableLog
+    t : ndarray, shape (n,)
+        Times (s).
+    gimbals : tuple of str
+        Axis letters of the outer, middle and inner gimbal.
+
+    Returns
+    -------
+    ndarray, shape (n, 3, 3)
+        Platform to table base (dimensionless).
+    """
     C = np.broadcast_to(np.eye(3), (len(t), 3, 3))
     for name, letter in zip(("outer", "middle", "inner"), gimbals, strict=True):
         # An encoder may count from -180 to 180 deg: between two readings it did not turn back by almost a whole turn.

@@ -46,6 +46,8 @@ _ABSENT = {
 }
 _CLOSE = 1e-13
 """Largest step at convergence, a share of 1 rad/s or 1 m/s^2 plus the value: a few hundred units of rounding."""
+_ROWS = 4096
+"""Number of samples whose covariances are worked out at once: they stay in the cache of the processor."""
 _MOST_STEPS = 80
 """Largest number of steps: converges to rounding where each step leaves at most 0.68 of the error."""
 
@@ -355,13 +357,18 @@ def compensate_recording(using: Compensator, recording: Recording) -> Compensate
 
 def _covariances(using: Compensator, values: Floats, interval_s: float) -> tuple[Floats, Floats]:
     """Covariances (n, 3, 3) of rate and force from regressor columns (n, m)."""
-    D = np.zeros((len(values), 6, len(using.coefficients)))
-    for k, (channel, parameter) in enumerate(zip(using.model.channel, using.model.parameter, strict=True)):
-        D[:, channel, parameter] += values[:, k]
-    D = using.inverse @ D
+    model, n = using.model, len(values)
+    P = using.covariance[np.ix_(model.parameter, model.parameter)]
+    weight = using.inverse[:, model.channel]
     white = using.inverse @ np.diag(using.noise / interval_s) @ using.inverse.T
-    blocks = []
-    for rows in (slice(0, 3), slice(3, 6)):
-        own = np.ascontiguousarray(D[:, rows])
-        blocks.append(own @ using.covariance @ own.transpose(0, 2, 1) + white[rows, rows])
-    return blocks[0], blocks[1]
+    out = np.empty((n, 6, 3))
+    for first in range(0, n, _ROWS):
+        rows = slice(first, first + _ROWS)
+        for block in (range(3), range(3, 6)):
+            own = [values[rows] * weight[i] for i in block]
+            spread = [X @ P for X in own]
+            for i in range(3):
+                for j in range(i + 1):
+                    both = np.einsum("nk,nk->n", spread[i], own[j]) + white[block[i], block[j]]
+                    out[rows, block[i], j] = out[rows, block[j], i] = both
+    return out[:, :3], out[:, 3:]

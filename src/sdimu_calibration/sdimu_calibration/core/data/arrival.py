@@ -26,17 +26,28 @@ Stamps = Ints
 
 IMU_TOPIC, STATUS_TOPIC, TEMPERATURE_TOPIC = "/imu/data_raw", "/rate_table/status", "/imu/temperature"
 _MINIMUM_SAMPLES = 2
+"""Number of samples at least: one has no interval."""
 _SAME_TIME = 0.5
-"""Two samples nearer than this many intervals are of the same time."""
+"""Distance (intervals) below which two samples are of the same time: neighbours are one interval apart."""
 _OVERLAP = 3
-"""So many samples in a row that arrive late, and find their time taken by other readings, mean a clock set back."""
+"""Number of samples in a row that mean a clock set back, when they arrive late and find their time taken by other
+readings: one or two may be stragglers."""
 
 _WRONG_STAMPS = 0.2
-"""Share of samples with the stamp of another reading from which the other stamps are no times of samples either."""
+"""Share of samples with the stamp of another reading that is refused: the others are then no sample times either."""
 
 
 class RawStatus(NamedTuple):
-    """Status messages: stamps (m,) ns, dwell (m,) bool, stop (m,) int (`UNNUMBERED` where the message names none)."""
+    """Status messages.
+
+    Attributes
+    ----------
+    ns : ndarray of int, shape (m,)
+        Stamps (ns).
+    dwell : ndarray of bool, shape (m,)
+    stop : ndarray of int, shape (m,)
+        `UNNUMBERED` where the message names none.
+    """
 
     ns: Ints
     dwell: Bools
@@ -44,7 +55,15 @@ class RawStatus(NamedTuple):
 
 
 class RawTemperature(NamedTuple):
-    """Temperatures: stamps (m,) ns, value (m,) deg C."""
+    """Temperatures.
+
+    Attributes
+    ----------
+    ns : ndarray of int, shape (m,)
+        Stamps (ns).
+    value : ndarray, shape (m,)
+        deg C.
+    """
 
     ns: Ints
     value: Floats
@@ -84,7 +103,7 @@ class Arranged:
 
     Attributes
     ----------
-    rows : ndarray of int
+    rows : ndarray of int, shape (m,)
         Indices in the order of their stamps.
     counts : dict of str to int
         ``not_finite``, ``out_of_order``, ``repeated`` (stamps that were there before).
@@ -183,13 +202,16 @@ def in_order(raw: RawTest) -> Recording:
         When no sample can be used, or the clock of the stamps was set back.
     """
     arranged = arrange(raw.ns, raw.omega_ib_b, raw.f_ib_b, raw.where)
-    rows, notes = arranged.rows, [*arranged.notes]
-    start_ns = origin_ns(raw.ns[rows])
+    notes = [*arranged.notes]
+    # Samples that are all there and in order are not copied.
+    rows = arranged.rows if any(arranged.counts.values()) else slice(None)
+    ns = raw.ns[rows]
+    start_ns = origin_ns(ns)
     return Recording(
-        start_ns=start_ns, t=seconds(raw.ns[rows], start_ns),
+        start_ns=start_ns, t=seconds(ns, start_ns),
         omega_ib_b=raw.omega_ib_b[rows], f_ib_b=raw.f_ib_b[rows],
         phase=_phase(raw, start_ns, notes), temperature=_temperature(raw, start_ns, notes),
-        rejected=len(raw.ns) - len(rows), notes=tuple(notes),
+        rejected=len(raw.ns) - len(ns), notes=tuple(notes),
     )  # fmt: skip
 
 

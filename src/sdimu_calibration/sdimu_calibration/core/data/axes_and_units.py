@@ -31,23 +31,24 @@ DEGREE = float(np.pi / 180.0)
 _NEAR_GRAVITY = 0.3
 """The median of |f| may differ from gravity by this share: nominal scale and bias of raw counts err so much."""
 _NO_GRAVITY = 0.2
-"""A median of |f| below this, in any unit, is that of a driver that has taken gravity away."""
+"""Median of |f| (m/s^2 or g) that is refused: below it the driver has taken gravity away."""
 _LENGTHS_S = (1.0, 4.0, 16.0, 64.0)
-"""Windows are as long as it takes to turn far enough: a hand turns in a second what a table turns in a minute."""
+"""Lengths of windows (s), tried in turn: a hand turns in a second what a table turns in a minute."""
 _FAR = np.radians(20.0)
-"""Far enough: well beyond what accelerations, misalignment and bias do to a direction."""
+"""Swing of the force (rad) that decides: well beyond what accelerations, misalignment and bias do to a direction."""
 _LEAST_SWING = np.radians(5.0)
-"""Turns by less, in the longest windows, say nothing."""
+"""Least swing (rad) in the longest windows: smaller turns say nothing."""
 _OTHERS = 2
 """A swing counts when so many others are as large: a single bump is no turn."""
 _LARGE = 0.25
-"""Windows whose swing is more than this share of the largest are turns."""
+"""Share of the largest swing: windows that swing by more are turns."""
 _NEARLY_ALL = 0.9
 """Share of the turns that must fit the axes: an IMU may turn about one of them in every tenth turn only."""
 _MOST = 200_000
-"""At most so many samples are looked at."""
+"""Number of samples at most: more decide nothing that these do not."""
 _FITS, _FAILS = 0.4, 2.0
-"""The right reading leaves less than this share of the swing, every other one more than so many times as much."""
+"""Share of the swing, and multiple of it: the right reading leaves less than the one, every other one more than the
+other times as much."""
 
 
 @dataclass(frozen=True)

@@ -21,14 +21,15 @@ from sdimu_calibration.core.specification import ImuSpecification
 _WIDE = float(np.radians(0.1))
 """A limit of rest beyond this (rad/s) may let a slow turn pass."""
 _WINDOW_S = 0.5
+"""Length of a window (s): long enough for a mean, short against a rest."""
 _SHORTEST_S = 2.0
-"""Rests that are shorter are a part of the turn."""
+"""Shortest rest (s): what is shorter is a part of the turn."""
 _REMEMBERED = 4096
-"""Windows from which a running test learns noise and usual reading: half an hour and more."""
+"""Number of windows from which a running test learns noise and usual reading: half an hour and more."""
 _BEGIN = 6
-"""Windows at the beginning of a running test that are taken for rest: three seconds."""
+"""Number of windows at the beginning of a running test that are taken for rest: three seconds."""
 _FEWEST_CALM = 20
-"""Windows at rest from which noise is learned to a fifth: ten seconds."""
+"""Number of windows at rest from which noise is learned: ten seconds give it to a fifth."""
 
 
 def specification_is_wide(imu: ImuSpecification) -> bool:
@@ -104,7 +105,15 @@ class GrowingDwells:
         self._decided_s = -np.inf
 
     def add(self, t: Floats, omega_ib_b: Floats, f_ib_b: Floats) -> None:
-        """Take samples: time (n,) s, ascending, rate and force (n, 3) in SI."""
+        """Take samples.
+
+        Parameters
+        ----------
+        t : ndarray, shape (n,)
+            Time (s), ascending.
+        omega_ib_b, f_ib_b : ndarray, shape (n, 3)
+            Rate and force (rad/s, m/s^2).
+        """
         t, w, f = (np.concatenate(pair) for pair in zip(self._rest, (t, omega_ib_b, f_ib_b), strict=True))
         # `cut_windows` leaves out the first of its windows, and here the first of each piece is the last one before it.
         whole = max((len(t) - self._side) // self._length - 1, 0)

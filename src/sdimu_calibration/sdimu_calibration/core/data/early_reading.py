@@ -11,11 +11,11 @@ from sdimu_calibration.core.recording import DataError
 _FIRST_S = 1.0
 """Time after the origin of the first attempt (s), and least time between two: the beat of the filter."""
 _GROWTH = 1.1
-"""Growth of the time from attempt to attempt: all attempts together look at each sample eleven times at most."""
+"""Factor on the time from attempt to attempt: all attempts together look at each sample eleven times at most."""
 _NOTE_S = 5.0
-"""Wait (s) from which a note says so."""
+"""Wait (s) from which a note says so: a shorter one nobody notices."""
 _TICK_S = 1e-9
-"""Resolution of stamps (s)."""
+"""Resolution of stamps (s): they are integers of ns."""
 
 
 class EarlyReading:
@@ -59,7 +59,7 @@ class EarlyReading:
 
         Returns
         -------
-        tuple of ndarray or None
+        (ndarray, ndarray, ndarray), shapes (n,), (n, 3) and (n, 3), or None
             The samples since the last answer: time (s), rate (rad/s), force (m/s^2); None while they wait.
         """
         if self.reading is None:

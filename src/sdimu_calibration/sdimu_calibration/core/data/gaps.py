@@ -30,20 +30,23 @@ from sdimu_calibration.core.navigation.strapdown import Cycles
 from sdimu_calibration.core.recording import DataError, DataFault
 
 GAP_SHARE = 0.1
-"""Uncertainty of an angle that was bridged by interpolation, as a share of it."""
+"""Uncertainty of a bridged angle, as a share of it: a turn need not run on evenly."""
 LINEAR_RAD = 1e-3
 """Attitude error (sigma) from which the linearised filter errs by more than its noise: g d^2 / 2 is 0.5 ug."""
 _LONG_S = 2.0
-"""From here on people must know of a gap at rest: long enough to switch an IMU off and on."""
+"""Length of a gap at rest (s) from which people must know of it: long enough to switch an IMU off and on."""
 _COMPARED_S = 20.0
+"""Longest reading on each side of a gap that is compared (s): biases hardly change over it."""
 _DIFFERENT = 6.0
-"""Sigmas by which readings before and after a gap at rest must differ to be called different."""
+"""Difference (sigma) from which readings before and after a gap at rest are called different: chance ends below."""
 _LEAST_COMPARED_S = 3.0
+"""Shortest reading on each side of a gap that is compared (s): a shorter one is noise."""
 _STILL_RAD_S2 = 1e-4
-"""Least angular acceleration reckoned with."""
+"""Least angular acceleration reckoned with (rad/s^2): where none is seen there may still be some."""
 _NEAR_S = 0.5
+"""Time before and after a gap that says how steady a turn runs (s): ramps are longer."""
 _SHORT_S = 0.25
-"""A turn that runs steady for half a second before and after so short a gap runs steady in it."""
+"""Length of a gap (s) that is taken for steady: a turn that runs steady before and after it has no time to change."""
 
 
 @dataclass(frozen=True)
@@ -133,7 +136,17 @@ def bridges(
 
 
 def weighed(found: Bridges, epochs: Epochs, t: Floats, excess: Floats) -> Bridges:
-    """Add noise beyond the usual at times `t` (k,) s, as `soundness.wild` gives it, to the epochs it falls into."""
+    """Add noise beyond the usual to the epochs it falls into.
+
+    Parameters
+    ----------
+    found : Bridges
+    epochs : Epochs
+    t : ndarray, shape (k,)
+        Times of the noise (s), as `sample_screening.wild` gives them.
+    excess : ndarray, shape (k,)
+        Variance beyond the usual one, over the usual one, times its length (s), as `sample_screening.wild` gives it.
+    """
     if not len(t):
         return found
     at = np.searchsorted(epochs.end, t)

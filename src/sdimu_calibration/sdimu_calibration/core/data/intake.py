@@ -17,7 +17,7 @@ from sdimu_calibration.core.recording import (
 )
 
 NEVER = -(2**62)
-"""A stamp before all others (ns)."""
+"""Stamp before all others (ns): where nothing has come yet."""
 
 
 class Intake:
@@ -46,7 +46,15 @@ class Intake:
         self._temperature_log: TemperatureLog | None = None
 
     def add_samples(self, ns: Ints, omega: Floats, force: Floats) -> None:
-        """Take samples: header stamps (n,) ns, rates and forces (n, 3) as the messages have them."""
+        """Take samples.
+
+        Parameters
+        ----------
+        ns : ndarray of int, shape (n,)
+            Header stamps (ns).
+        omega, force : ndarray, shape (n, 3)
+            In the units of the messages.
+        """
         block = (np.array(ns, dtype=np.int64), np.array(omega, dtype=float), np.array(force, dtype=float))
         self._arrived.append(block)
         self._queue.append(block)
@@ -73,7 +81,14 @@ class Intake:
         self._temperature_log = None
 
     def due(self, until_ns: int) -> tuple[Ints, Floats, Floats]:
-        """Hand over the samples up to a stamp: finite, each later than the one before; the others are counted."""
+        """Hand over the samples up to a stamp: finite, each later than the one before; the others are counted.
+
+        Returns
+        -------
+        ns : ndarray of int, shape (n,)
+        omega, force : ndarray, shape (n, 3)
+            In the units of the messages.
+        """
         parts, later = [], []
         for block in self._queue:
             now = block[0] <= until_ns

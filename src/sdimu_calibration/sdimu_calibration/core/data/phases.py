@@ -24,18 +24,18 @@ from sdimu_calibration.core.specification import ImuSpecification
 from sdimu_calibration.core.units import STANDARD_GRAVITY
 
 STALE_S = 2.5
-"""A status older than this says nothing any more (s); it is sent at every change and at 1 Hz."""
+"""Age from which a status says nothing any more (s): it is sent at every change and at 1 Hz."""
 _SIGMAS = 6.0
-"""The guard calls an IMU moving beyond this many sigma of what bias and noise can do at rest."""
+"""Limit of rest (sigma of what bias and noise can do): beyond it the guard calls an IMU moving."""
 
 _WHOLE_S = 1.5 * EPOCH_S
-"""A longer epoch has a gap in it: it is no measurement."""
+"""Longest epoch that measures (s): a longer one has a gap in it."""
 _DENIED = 0.1
 """Share of the rest that a status may call rotating unnoticed: its tables settle."""
 
 _LEAST_FORCE = 0.01 * STANDARD_GRAVITY
-"""An accelerometer may be this far off without the IMU being in motion: a force error that nobody specified must not
-throw away the stops that show it."""
+"""Least limit of the force at rest (m/s^2): a force error that nobody specified must not throw away the stops that show
+it."""
 
 
 @dataclass(frozen=True)
@@ -70,16 +70,22 @@ class PhaseState:
 
 @dataclass(frozen=True)
 class Phases:
-    """Phase of each epoch, arrays of length m.
+    """Phase of each epoch.
 
     Attributes
     ----------
-    dwell : table (or the IMU, where the table is silent) says rest and the IMU agrees
-    used : a measurement is taken
-    first : the first measurement after motion
-    stop : index of the stop
-    contradicted : the table says dwell while the IMU moves
-    denied : the table says rotating while the IMU rests
+    dwell : ndarray of bool, shape (m,)
+        Table (or the IMU, where the table is silent) says rest and the IMU agrees.
+    used : ndarray of bool, shape (m,)
+        A measurement is taken.
+    first : ndarray of bool, shape (m,)
+        The first measurement after motion.
+    stop : ndarray of int, shape (m,)
+        Index of the stop.
+    contradicted : ndarray of bool, shape (m,)
+        The table says dwell while the IMU moves.
+    denied : ndarray of bool, shape (m,)
+        The table says rotating while the IMU rests.
     """
 
     dwell: Bools
@@ -91,7 +97,14 @@ class Phases:
 
 
 def table_says(epochs: Epochs, log: PhaseLog | None) -> tuple[NDArray[np.int8], Ints]:
-    """Say what the status holds of each epoch: 1 dwell all through, 0 rotating in some, -1 nothing; and the stop."""
+    """Say what the status holds of each epoch.
+
+    Returns
+    -------
+    said : ndarray of int8, shape (m,)
+        1 dwell all through, 0 rotating in some, -1 nothing.
+    stop : ndarray of int, shape (m,)
+    """
     m = len(epochs)
     if log is None or not len(log.t):
         return np.full(m, -1, dtype=np.int8), np.full(m, -1, dtype=np.int64)
@@ -202,8 +215,9 @@ def without_early_motion(epochs: Epochs, log: PhaseLog | None, phases: Phases, g
 
 
 _GAUSS_MAD = 1.482602218505602
+"""Factor from the median of |x| to the standard deviation: of Gaussian noise."""
 _EARLY_SIGMAS = 5.0
-"""Deviation from the mean rate of its dwell at which the last second before a turn belongs to the turn."""
+"""Deviation from the mean rate of its dwell (sigma): beyond it the last second before a turn belongs to the turn."""
 
 
 def contradictions(epochs: Epochs, phases: Phases, log: PhaseLog | None, feels_turns: bool) -> tuple[DataFault, ...]:

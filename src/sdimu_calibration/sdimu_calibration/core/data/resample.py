@@ -11,11 +11,17 @@ Stamps = Ints
 _SAME = 0.1
 """Stamps that differ by less than this share of the interval are the same: jitter of whoever wrote them."""
 _GAP = 2.5
-"""An interval this many times the usual one is a gap, not jitter."""
+"""Interval, as a multiple of the usual one, that is a gap: jitter stays below."""
 
 
 def same_stamps(a: Stamps, b: Stamps) -> bool:
-    """Tell whether two lists of stamps (ns), shapes (n,) and (m,), are the same samples."""
+    """Tell whether two lists of stamps are the same samples.
+
+    Parameters
+    ----------
+    a, b : ndarray of int, shapes (n,) and (m,)
+        ns.
+    """
     if len(a) != len(b):
         return False
     interval = float(np.median(np.diff(a))) if len(a) > 1 else 0.0

@@ -24,17 +24,17 @@ from sdimu_calibration.core.specification import ImuSpecification
 WINDOW_S = 0.3
 """Length of a window (s): shorter than any rest worth having, longer than a swing of a trembling hand (0.1 s)."""
 SHORTEST_S = 0.4
-"""Shortest rest that is used (s), after half a window has been left out at both ends."""
+"""Shortest rest that is used (s): what half a window at both ends leaves of one that is worth having."""
 _QUIETEST = 0.1
-"""Share of all windows that is taken for rest when the noise is learned."""
+"""Share of all windows from which the noise is learned: the quietest ones are rests."""
 _SCATTER = 4.0
-"""Scatter (variance) of rest, as a multiple of that of the quietest windows."""
+"""Scatter (variance) of rest, as a multiple of that of the quietest windows: a hand makes more."""
 _DRIFT = np.radians(1.0)
 """Mean rates at rest may differ by so much (rad/s): what gravity and warmth do to the bias of a cheap gyro."""
 _HOLE = 3.0
-"""Sample intervals between two samples in which a hand may have moved."""
+"""Distance of two samples (intervals): in a longer one a hand may have moved."""
 _EARTH_SEEN = 3.0
-"""Sigmas of the gyros' white noise in a rest from which the Earth's rate is seen in it."""
+"""Ratio of the Earth's rate to the gyros' white noise in a rest: from here on it is seen."""
 _SAME_ATTITUDE = np.radians(1.0)
 """Angle between the specific forces of two rests (rad) below which they are pieces of one: a turn moves more."""
 _FRAGMENT_S = 3.0

@@ -11,19 +11,19 @@ from sdimu_calibration.core.data.windows import cut_windows
 from sdimu_calibration.core.recording import PhaseLog, Recording
 
 _STEP_S = 0.25
-"""Grid on which motion is compared."""
+"""Step of the grid on which motion is compared (s): finer than the status."""
 _AGREES = 0.6
-"""Correlation of motion and status from which they are of one test."""
+"""Least correlation of motion and status (1): from here on they are of one test."""
 _TOLERATED_S = 0.75
-"""A status is sent once a second; settling times and the guard by the IMU take care of less."""
+"""Offset of a status that is left as it is (s): it comes once a second, and the guard by the IMU takes care of less."""
 _AS_GOOD = 0.02
-"""Of shifts that agree nearly as well (plans repeat themselves) the smallest is taken."""
+"""Difference of correlation (1) of shifts that agree as well: plans repeat themselves, and the smallest is taken."""
 _NEAR_S = 5.0
-"""Changes of status and of motion further apart than this, after the coarse shift, are not the same event."""
+"""Distance of changes of status and of motion (s) after the coarse shift: further apart they are not the same event."""
 _TOGETHER_S = 0.6
-"""Distances that scatter by more (median deviation) are no offset of clocks: the status comes once a second."""
+"""Scatter of those distances (s, median deviation): more is no offset of clocks, as the status comes once a second."""
 _FEWEST = 3
-"""So many changes must agree."""
+"""Number of changes that must agree: fewer are chance."""
 
 
 def aligned(recording: Recording) -> Recording:

@@ -12,22 +12,25 @@ import numpy as np
 
 from sdimu_calibration.core import earth
 from sdimu_calibration.core.arrays import Bools, Floats, Ints
+from sdimu_calibration.core.compiled import compiled
+from sdimu_calibration.core.matrix3 import multiplied, rotation3, store
 
 WINDOW_S = 1.0
-"""Usual length: a hand turns by tens of degrees in it, and its tremor (10 Hz) averages out of a quarter of it."""
+"""Usual length (s): a hand turns by tens of degrees in it, and its tremor (10 Hz) averages out of a quarter of it."""
 _END = 8
-"""The direction at an edge is the mean over a window's length over this, before and after it."""
+"""Share of a window (one over this number) before and after an edge: its mean gives the direction there."""
 _GAP = 1.2
-"""A window this many times as long as its samples has a gap in it."""
+"""Length of a window as a multiple of its samples': a longer one has a gap in it."""
 
 _REST = 6.0
-"""At rest a reading differs from the usual one by less than so many sigma of the noise, learned from the windows."""
+"""Difference of a reading from the usual one (sigma of the learned noise): at rest it is less."""
 _TURNING_EARTH = 3.0
-"""The Earth's rate changes a reading by at most twice itself from attitude to attitude; mass unbalance adds to it."""
+"""Change of a reading from attitude to attitude, as a multiple of the Earth's rate: twice by the Earth, more by mass
+unbalance."""
 _MOVING = np.radians(1.0)
-"""No sensor is so noisy: what scatters more (rad/s) moves, and an IMU that always moves has no rests."""
+"""Largest scatter of a resting gyro (rad/s): what scatters more moves, and an IMU that always moves has no rests."""
 _MAD = 1.482602218505602
-"""From the median of |x| to the standard deviation of Gaussian noise."""
+"""Factor from the median of |x| to the standard deviation: of Gaussian noise."""
 
 
 @dataclass(frozen=True)
@@ -93,11 +96,21 @@ class Windows:
 
     @property
     def still(self) -> Bools:
-        """Windows at rest: the gyros read what they usually do, but for noise and Earth; the force does not turn."""
+        """Windows at rest, shape (k,): the gyros read what they usually do but for noise and Earth, the force stays."""
         return self.still_as(self.quiet)
 
     def still_as(self, quiet: Bools) -> Bools:
-        """Windows at rest, shape (k,); those of `quiet` (k,) show the usual reading of the gyros and its noise."""
+        """Windows at rest.
+
+        Parameters
+        ----------
+        quiet : ndarray of bool, shape (k,)
+            Windows that show the usual reading of the gyros and its noise.
+
+        Returns
+        -------
+        ndarray of bool, shape (k,)
+        """
         if not quiet.any():
             return np.zeros(len(self), dtype=bool)
         steps = np.diff(self.w_mean, axis=0)[quiet[1:] & quiet[:-1]]
@@ -113,7 +126,17 @@ _ROWS = ("start", "end", "first", "up_first", "up_last", "w_mean", "f_mean")
 
 
 def runs(flags: Bools) -> tuple[Ints, Ints]:
-    """First of each run of True, and one after its last."""
+    """Find runs of True.
+
+    Parameters
+    ----------
+    flags : ndarray of bool, shape (n,)
+
+    Returns
+    -------
+    first, last : ndarray of int, shape (k,)
+        First of each run, and one after its last.
+    """
     edges = np.diff(np.concatenate([[0], flags.astype(np.int64), [0]]))
     return np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
 
@@ -139,8 +162,7 @@ def cut_windows(
     first = np.arange(m, len(t) - m - q + 1, m)
     whole = t[np.minimum(first + m + q, len(t)) - 1] - t[first - q] < _GAP * (m + 2 * q) * dt
     first = first[whole]
-    offset_w, offset_f = w.mean(axis=0), f.mean(axis=0)
-    total_w, total_f = (_running_sum(x, offset) for x, offset in ((w, offset_w), (f, offset_f)))
+    (total_w, offset_w), (total_f, offset_f) = (_running_sum(np.ascontiguousarray(x)) for x in (w, f))
 
     def mean(total: Floats, offset: Floats, begin: Ints, end: Ints) -> Floats:
         return np.asarray((total[end] - total[begin]) / (end - begin)[:, None] + offset)
@@ -159,15 +181,23 @@ def samples_of(length_s: float, interval_s: float) -> tuple[int, int]:
     return m, max(m // _END, 1)
 
 
-def _running_sum(x: Floats, offset: Floats) -> Floats:
-    """Sum of ``x - offset`` up to each row of x (n, 3), shape (n + 1, 3)."""
-    out = np.zeros((len(x) + 1, 3))
-    np.cumsum(x - offset, axis=0, out=out[1:])
-    return out
+@compiled
+def _running_sum(x: Floats) -> tuple[Floats, Floats]:
+    """Sum of ``x - mean`` up to each row of x (n, 3), shape (n + 1, 3), and the mean (3,)."""
+    n, mean = len(x), np.zeros(3)
+    for i in range(n):
+        for k in range(3):
+            mean[k] += x[i, k]
+    mean /= n
+    out = np.zeros((n + 1, 3))
+    for i in range(n):
+        for k in range(3):
+            out[i + 1, k] = out[i, k] + (x[i, k] - mean[k])
+    return out, mean
 
 
 def turned(w: Floats, windows: Windows, chosen: Ints, factor: float) -> Floats:
-    """Rotation over windows as the gyros say it: C (k, 3, 3) from the axes at the end to those at the beginning.
+    """Rotation over windows as the gyros say it.
 
     Parameters
     ----------
@@ -177,32 +207,27 @@ def turned(w: Floats, windows: Windows, chosen: Ints, factor: float) -> Floats:
     chosen : ndarray of int, shape (k,)
     factor : float
         rad/s of one unit of `w`, with its sign.
+
+    Returns
+    -------
+    ndarray, shape (k, 3, 3)
+        From the axes at the end of a window to those at its beginning (dimensionless).
     """
-    rows = windows.first[chosen][:, None] + np.arange(windows.length)
-    q = _quaternion((w[rows] - windows.rate_offset) * (factor * windows.interval_s))
-    while q.shape[1] > 1:
-        q = _product(q[:, 0::2], q[:, 1::2])
-    return _matrix(q[:, 0])
+    scale = factor * windows.interval_s
+    return _rotations(np.ascontiguousarray(w), windows.first[chosen], windows.length, windows.rate_offset, scale)
 
 
-def _quaternion(vector: Floats) -> Floats:
-    """Rotation vectors (..., 3) to quaternions (..., 4), scalar first."""
-    angle = np.linalg.norm(vector, axis=-1, keepdims=True)
-    return np.concatenate([np.cos(0.5 * angle), 0.5 * np.sinc(angle / (2.0 * np.pi)) * vector], axis=-1)
-
-
-def _product(p: Floats, q: Floats) -> Floats:
-    s, v, r, u = p[..., :1], p[..., 1:], q[..., :1], q[..., 1:]
-    scalar = s * r - np.sum(v * u, axis=-1, keepdims=True)
-    return np.concatenate([scalar, s * u + r * v + np.cross(v, u)], axis=-1)
-
-
-def _matrix(q: Floats) -> Floats:
-    s, v = q[:, 0, None, None], q[:, 1:]
-    skew = np.zeros((len(q), 3, 3))
-    skew[:, [2, 0, 1], [1, 2, 0]] = v
-    skew -= skew.transpose(0, 2, 1).copy()
-    return np.asarray(np.eye(3) + 2.0 * s * skew + 2.0 * skew @ skew)
+@compiled
+def _rotations(w: Floats, first: Ints, length: int, offset: Floats, scale: float) -> Floats:
+    """Rotation over `length` samples from each of `first` (k,) on, each by ``scale (w - offset)``; shape (k, 3, 3)."""
+    out = np.empty((len(first), 3, 3))
+    for k in range(len(first)):
+        C = rotation3(0.0, 0.0, 0.0)
+        for i in range(first[k], first[k] + length):
+            x, y, z = scale * (w[i, 0] - offset[0]), scale * (w[i, 1] - offset[1]), scale * (w[i, 2] - offset[2])
+            C = multiplied(C, rotation3(x, y, z))
+        store(C, out[k])
+    return out
 
 
 def _unit(vector: Floats) -> Floats:

@@ -15,22 +15,26 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from sdimu_calibration.core import earth
-from sdimu_calibration.core.alignment.alignment import align, azimuth_of
-from sdimu_calibration.core.alignment.prepared import PreparedData, TestSetup
+from sdimu_calibration.core.alignment.alignment import Alignment, align, azimuth_of
+from sdimu_calibration.core.alignment.prepared import PreparedData, TestSetup, first_attitude
 from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.compiled import compiled
 from sdimu_calibration.core.estimation.holdout import WANTED_S, Segment, holdout_segments, part
 from sdimu_calibration.core.filter.filter_pass import COPY, NAV, PassInput, PassOutput, PassState, new_output, run_pass
-from sdimu_calibration.core.filter.passes import pass_input, pass_settings
+from sdimu_calibration.core.filter.passes import CONVERGED, Pass, one_pass, pass_input, pass_settings
 from sdimu_calibration.core.measurement_kind import SENSORS, SKIP
 from sdimu_calibration.core.navigation.strapdown import Cycles, navigate_cycle, velocity_increment
 from sdimu_calibration.core.rotation import rotation_vector
+from sdimu_calibration.core.second_order.second_order_passes import SecondOrderPass, firm_setup, second_order_pass
 
 NOTHING = "no compensation"
 _WIDE_LEVEL = 1e-2
 """Sigma of the level before levelling (rad): nothing is known."""
 _BLIND = 1.0
-"""Variance that makes a measured rate say nothing ((rad/s)^2)."""
+"""Variance of a measured rate ((rad/s)^2): so large that the rate says nothing."""
+_MOST_PASSES = 4
+"""Number of passes over a part from the fit of the whole: more than two or three mean that the fit is not near, and the
+estimator finds the way by itself."""
 
 
 @dataclass(frozen=True)
@@ -81,12 +85,20 @@ class Compensated(NamedTuple):
     """Cycles without the sensor errors of a fit, and how they change with its coefficients.
 
     Shapes: n cycles, m columns, q coefficients of the estimator.
+
+    Attributes
+    ----------
+    cycles : Cycles
+    values : ndarray, shape (n, m)
+        Regressors of the corrected cycles (SI).
+    channel, parameter : ndarray of int, shape (m,)
+        Channel that a column changes, and the coefficient it belongs to.
     """
 
     cycles: Cycles
-    values: Floats  # (n, m) regressors of the corrected cycles (SI)
-    channel: Ints  # (m,)
-    parameter: Ints  # (m,)
+    values: Floats
+    channel: Ints
+    parameter: Ints
 
 
 class Navigator(Protocol):
@@ -97,18 +109,57 @@ class Navigator(Protocol):
         """Site, IMU and sensor model, as the estimator has them."""
 
     @property
+    def last(self) -> Pass | SecondOrderPass:
+        """The last pass of the estimator."""
+
+    @property
     def estimate(self) -> Floats:
         """Coefficients of the estimator (SI), shape (q,)."""
 
     @property
     def estimate_covariance(self) -> Floats:
-        """Their covariance, shape (q, q)."""
+        """Covariance of `estimate` (SI), shape (q, q)."""
 
     def on(self, prepared: PreparedData, C_nb: Floats) -> Navigator:
-        """Fit the same model to a part of the recording that starts at attitude `C_nb` (3, 3)."""
+        """Fit the same model to a part of the recording.
+
+        Parameters
+        ----------
+        prepared : PreparedData
+        C_nb : ndarray, shape (3, 3)
+            Attitude at the start of the part (dimensionless).
+        """
 
     def compensated(self, prepared: PreparedData, estimate: Floats, C_start: Floats, end_of_fit: float) -> Compensated:
-        """Take the errors at `estimate` (q,) out of all cycles; the fit ended at `end_of_fit` (s)."""
+        """Take the errors of the sensors out of all cycles.
+
+        Parameters
+        ----------
+        prepared : PreparedData
+        estimate : ndarray, shape (q,)
+            Coefficients (SI).
+        C_start : ndarray, shape (3, 3)
+            Attitude at the start.
+        end_of_fit : float
+            Where the fit ended (s).
+        """
+
+
+@dataclass(frozen=True)
+class Refit:
+    """A fit to a part of the recording.
+
+    Attributes
+    ----------
+    fit : Navigator
+        Of the same model: how it takes errors out of samples.
+    estimate, covariance : ndarray, shapes (q,) and (q, q)
+        Coefficients of the estimator by the part alone (SI).
+    """
+
+    fit: Navigator
+    estimate: Floats
+    covariance: Floats
 
 
 def free_inertial_runs(
@@ -137,19 +188,62 @@ def free_inertial_runs(
 def _run(
     prepared: PreparedData, fits: Sequence[tuple[str, Navigator]], reference: PassOutput, segment: Segment
 ) -> FreeInertialRun:
-    first = segment.seen[0]
-    C_nb = reference.C_nb[max(first - 1, 0)]
     seen = part(prepared, *segment.seen)
-    again = [(name, fit.on(seen, C_nb)) for name, fit in fits]
-    drifts = [free_navigation(NOTHING, prepared, again[0][1], segment, reference, compensated=False)]
-    drifts += [free_navigation(name, prepared, fit, segment, reference) for name, fit in again]
+    drifts = [free_navigation(NOTHING, prepared, None, fits[0][1].setup, segment, reference)]
+    for name, fit in fits:
+        again = refit(fit, seen, fit.last.output.C_nb[max(segment.seen[0] - 1, 0)])
+        drifts.append(free_navigation(name, prepared, again, fit.setup, segment, reference))
     return FreeInertialRun(segment, tuple(drifts))
 
 
+def refit(fit: Navigator, seen: PreparedData, C_nb: Floats) -> Refit:
+    """Fit a part of the recording, from the fit of the whole.
+
+    The coefficients move by little, so a few passes from the known ones do. Each pass leaves a share of the error of
+    the pass before, which two movements tell; passes end when what is left is below `CONVERGED` of a sigma. Where they
+    do not end, the estimator goes on by itself.
+
+    Parameters
+    ----------
+    fit : Navigator
+        Of the whole recording.
+    seen : PreparedData
+        The part.
+    C_nb : ndarray, shape (3, 3)
+        Attitude at the start of the part (dimensionless), by the fit of the whole.
+
+    Raises
+    ------
+    DataError
+        When the part cannot be calibrated.
+    """
+    alignment = first_attitude(seen.epochs, seen.phases, fit.setup)
+    estimate, before = fit.estimate, np.inf
+    for count in range(_MOST_PASSES):
+        done = _one_pass(fit, seen, alignment, C_nb, estimate)
+        moved = float(np.max(np.abs(done.estimate - estimate) / np.sqrt(np.diag(done.covariance))))
+        # The first movement also holds what the part does not know of the whole: of at most a sigma, a share is left.
+        if count and moved**2 < CONVERGED * min(before, 1.0):
+            return Refit(fit, done.estimate, done.covariance)
+        estimate, C_nb, before = done.estimate, done.smoothed_start, moved
+    own = fit.on(seen, C_nb)
+    return Refit(own, own.estimate, own.estimate_covariance)
+
+
+def _one_pass(
+    fit: Navigator, seen: PreparedData, alignment: Alignment, C_nb: Floats, estimate: Floats
+) -> Pass | SecondOrderPass:
+    setup = fit.setup
+    if isinstance(fit.last, SecondOrderPass):
+        return second_order_pass(seen, firm_setup(setup), alignment, C_nb, estimate)
+    # What fades is known at the end of a pass, not at the start of the next one.
+    constant = setup.sensors.decay_rate == 0.0
+    return one_pass(seen, setup, alignment, np.ascontiguousarray(C_nb), estimate * constant, closed_loop=False)
+
+
 def free_navigation(
-    name: str, prepared: PreparedData, fit: Navigator, segment: Segment, reference: PassOutput,
-    compensated: bool = True,
-) -> Drift:  # fmt: skip
+    name: str, prepared: PreparedData, seen: Refit | None, setup: TestSetup, segment: Segment, reference: PassOutput
+) -> Drift:
     """Navigate a segment with the coefficients of a fit, or with none.
 
     Parameters
@@ -157,30 +251,34 @@ def free_navigation(
     name : str
     prepared : PreparedData
         Of the whole recording: some effects remember what was before the segment.
-    fit : Navigator
-        Of the rest of the recording.
+    seen : Refit or None
+        Of the rest of the recording; None navigates with the samples as they are.
+    setup : TestSetup
     segment : Segment
     reference : PassOutput
-    compensated : bool
+        Of a fit to the whole recording.
     """
-    estimate = fit.estimate if compensated else np.zeros_like(fit.estimate)
-    end_of_fit = float(prepared.epochs.end[segment.seen[1] - 1])
-    whole = fit.compensated(prepared, estimate, reference.C_nb[0].copy(), end_of_fit)
-    clean = part(replace(prepared, cycles=whole.cycles), segment.first, segment.last)
+    until = part(prepared, 0, segment.last)
+    cycles, terms = until.cycles, None
+    if seen is not None:
+        end_of_fit = float(prepared.epochs.end[segment.seen[1] - 1])
+        terms = seen.fit.compensated(until, seen.estimate, reference.C_nb[0].copy(), end_of_fit)
+        cycles = terms.cycles
+    clean = part(replace(until, cycles=cycles), segment.first, segment.last)
     levelling = segment.start - segment.first
     border = int(clean.epochs.last[levelling - 1])
-    C_start = _aligned(clean.cycles, border, fit.setup, reference.C_nb[segment.start - 1])
-    position, velocity, C_nb = _navigated(clean.cycles, border, clean.epochs.last[levelling:], fit.setup, C_start)
+    C_start = _aligned(clean.cycles, border, setup, reference.C_nb[segment.start - 1])
+    position, velocity, C_nb = _navigated(clean.cycles, border, clean.epochs.last[levelling:], setup, C_start)
     rows = slice(segment.start, segment.last)
     azimuth = [rotation_vector(C @ R.T)[2] for C, R in zip(C_nb, reference.C_nb[rows], strict=True)]
     at_start = rotation_vector(C_start @ reference.C_nb[segment.start - 1].T)[2]
     t = prepared.epochs.end[rows] - prepared.epochs.end[segment.start - 1]
     promised = np.full(len(t), np.nan)
-    if compensated:
-        begin, end = int(prepared.epochs.first[segment.first]), int(prepared.epochs.last[segment.last - 1])
-        terms = whole._replace(cycles=clean.cycles, values=np.ascontiguousarray(whole.values[begin:end]))
+    if seen is not None and terms is not None:
+        begin = int(prepared.epochs.first[segment.first])
+        terms = terms._replace(cycles=clean.cycles, values=np.ascontiguousarray(terms.values[begin:]))
         sigma_azimuth = float(reference.sigma[segment.start - 1, 8])
-        promised = _promised(clean, fit, terms, levelling, C_start, sigma_azimuth)
+        promised = _promised(clean, seen, terms, levelling, C_start, sigma_azimuth)
     return Drift(name, t, position, velocity, np.asarray(azimuth) - at_start, promised)
 
 
@@ -240,16 +338,16 @@ def _navigate(
 
 
 def _promised(
-    clean: PreparedData, fit: Navigator, terms: Compensated, levelling: int, C_start: Floats, sigma_azimuth: float
+    clean: PreparedData, seen: Refit, terms: Compensated, levelling: int, C_start: Floats, sigma_azimuth: float
 ) -> Floats:
     """One sigma of the horizontal distance (m) that the covariance of the fit gives at the end of each epoch, (k,).
 
     The filter of the fit levels by Zf alone, with everything it knows of the coefficients, and then measures nothing.
     """
-    setup, q = fit.setup, len(fit.estimate)
+    setup, q = seen.fit.setup, len(seen.estimate)
     s = NAV + q + COPY
     P = np.zeros((s, s))
-    P[NAV : NAV + q, NAV : NAV + q] = fit.estimate_covariance
+    P[NAV : NAV + q, NAV : NAV + q] = seen.covariance
     P[range(6, 9), range(6, 9)] = np.square([_WIDE_LEVEL, _WIDE_LEVEL, sigma_azimuth])
     settings = pass_settings(setup, closed_loop=False)._replace(extra_gyro=_BLIND)
     place = np.array([setup.site.latitude_rad, 0.0, setup.site.height_m])

@@ -38,16 +38,16 @@ from sdimu_calibration.core.specification import ImuSpecification, Site
 from sdimu_calibration.core.units import STANDARD_GRAVITY, from_si
 
 FEWEST_RESTS = 6
-"""Scale and bias of three accelerometers need as many attitudes."""
+"""Number of rests at least: scale and bias of three accelerometers need as many attitudes."""
 _UNKNOWN = 0.5
-"""A coefficient whose sigma stays above this share of its prior is not determined by the recording."""
+"""Share of the prior sigma above which a coefficient is called unknown: the recording has hardly told it."""
 _LEAST_NOISE = 0.01
-"""Learned noise is not believed below this share of the specification's."""
+"""Share of the specification's noise below which learned noise is not believed: a few rests may agree by chance."""
 _ROOM = 30.0
-"""What the IMU's file gives no prior for is taken so many times larger than its class has it: held back by a prior, an
-effect that was added would be learned as scatter."""
+"""Factor on the prior of the class where the IMU's file gives none: held back by a prior, an added effect would be
+learned as scatter."""
 _SEEN = 3.0
-"""Sigmas at which the Earth's rate is seen."""
+"""Ratio of the Earth's rate to its sigma: from here on it is seen."""
 
 
 

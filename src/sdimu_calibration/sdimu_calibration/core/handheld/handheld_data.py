@@ -89,7 +89,19 @@ def _sums(values: Floats, first: Ints, last: Ints) -> Floats:
 
 
 def seen_at_rest(run: HandheldRun, C_nb: Floats, rate_n: Floats, gravity: float) -> Motion:
-    """Make what a perfect IMU sees at the rests, with attitudes `C_nb` (k, 3, 3) and rate `rate_n` (3,)."""
+    """Make what a perfect IMU sees at the rests.
+
+    Parameters
+    ----------
+    run : HandheldRun
+        With k rests.
+    C_nb : ndarray, shape (k, 3, 3)
+        Attitudes (dimensionless).
+    rate_n : ndarray, shape (3,)
+        Earth's rate in the frame of the attitudes (rad/s).
+    gravity : float
+        m/s^2.
+    """
     k = len(run.t)
     heat, heat_rate = temperatures(run.temperature, run.t, causal=False)
     none = np.zeros((k, 3))
@@ -122,9 +134,22 @@ class Turns:
     weight: Floats
 
     def by_parameter(self, run: HandheldRun, values: Floats, terms: Sequence[tuple[int, int]], count: int) -> Floats:
-        """Change of the attitudes per unit of `count` parameters, shape (k - 1, 3, count).
+        """Change of the attitudes per unit of some parameters.
 
-        `values` are the regressors of `seen`; `terms` gives sensor axis and parameter of each of their columns.
+        Parameters
+        ----------
+        run : HandheldRun
+        values : ndarray, shape (n, m)
+            Regressors of `seen` (SI).
+        terms : sequence of (int, int), length m
+            Sensor axis and parameter of each column.
+        count : int
+            Number of parameters.
+
+        Returns
+        -------
+        ndarray, shape (k - 1, 3, count)
+            rad per unit of a parameter.
         """
         out = np.zeros((len(run.first), 3, count))
         for column, (channel, parameter) in enumerate(terms):
@@ -133,7 +158,19 @@ class Turns:
 
 
 def turns(run: HandheldRun, model: ImuModel, coefficients: Floats, C_nb: Floats, gravity: float) -> Turns:
-    """Integrate the gyros over every turn from the attitude of its rest, `C_nb` (k, 3, 3)."""
+    """Integrate the gyros over every turn from the attitude of its rest.
+
+    Parameters
+    ----------
+    run : HandheldRun
+    model : ImuModel
+    coefficients : ndarray, shape (p,)
+        At which the samples are corrected (SI).
+    C_nb : ndarray, shape (k, 3, 3)
+        Attitudes of the rests (dimensionless).
+    gravity : float
+        m/s^2.
+    """
     cycles = run.cycles
     none = np.zeros(len(cycles), dtype=bool)
     # Earth rate is below what the gyros know of themselves here: the table's rate and the body's are one.

@@ -29,17 +29,19 @@ from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.rotation import rotation_matrix, rotation_vector, skew
 
 CONVERGED = 1e-3
-"""Largest step of a coefficient in its sigma at which Gauss-Newton ends."""
+"""Largest step of a coefficient (sigma) at which Gauss-Newton ends: smaller ones change no report."""
 MOST_STEPS = 120
+"""Number of steps at most: sigmas that trade along a ridge take many."""
 _FREE = 8
-"""Steps after which the learned sigmas no longer go where they were learned, but at a pace of their own."""
+"""Number of steps after which each learned sigma has a pace of its own: until then it goes where it was learned."""
 _SLOWEST, _FASTEST, _FASTER = 0.5, 64.0, 1.5
-"""Pace of the learned sigmas: half where they swing, faster and faster where two of them trade along a ridge."""
+"""Factors of the pace of the learned sigmas: half where they swing, faster and faster where two trade along a ridge."""
 MOST_RESTS = 400
-"""The least squares is dense: a thousand unknowns take a second a step."""
+"""Number of rests at most: the least squares is dense, and a thousand unknowns take a second a step."""
 _HEADING = 1e-6
-"""Sigma that holds the free heading of the first rest (rad); it says nothing about any coefficient."""
+"""Sigma that holds the heading of the first rest (rad): the heading is free and says nothing about any coefficient."""
 _BISECTIONS = 50
+"""Number of halvings: to rounding."""
 
 FORCE, RATE, TURN = 0, 1, 2
 """The three kinds of equation."""
@@ -76,7 +78,19 @@ class FitPriors:
 
 @dataclass(frozen=True)
 class LinearisationPoint:
-    """Where the equations stand: coefficients (p,), attitudes (k, 3, 3), Earth rate (3,), learned sigmas (3,)."""
+    """Where the equations stand.
+
+    Attributes
+    ----------
+    coefficients : ndarray, shape (p,)
+        SI.
+    C_nb : ndarray, shape (k, 3, 3)
+        Attitudes of the rests (dimensionless).
+    earth : ndarray, shape (3,)
+        Earth's rate (rad/s).
+    extra : ndarray, shape (3,)
+        Learned sigmas of force (m/s^2), rate (rad/s) and turn (rad per rad of way).
+    """
 
     coefficients: Floats
     C_nb: Floats
@@ -97,8 +111,10 @@ class HandheldSolution:
     earth_sigma : ndarray, shape (3,)
         Sigma of the Earth's rate after the fit (rad/s).
     chi2, dof, log_likelihood, held_out_rms : float
-    residual : ndarray, shapes (k, 6), (k - 1, 3)
-        Of the rests (SI) and of the turns (rad).
+    rest_residual : ndarray, shape (k, 6)
+        Of the rests (SI), rates first.
+    turn_residual : ndarray, shape (k - 1, 3)
+        Of the turns (rad).
     steps : int
     """
 
@@ -171,10 +187,19 @@ def _moved(point: LinearisationPoint, step: Floats, scene: FitPriors) -> Lineari
 def equations(
     run: HandheldRun, scene: FitPriors, point: LinearisationPoint
 ) -> tuple[Floats, Floats, Ints]:
-    """Rows, residuals and kinds (-1 for priors, which come whitened).
+    """Make the equations about a point.
 
     Unknowns in this order: turns of the rests, coefficients, Earth rate. Equations in this order: six of each rest,
     three of each turn, priors.
+
+    Returns
+    -------
+    rows : ndarray, shape (m, u)
+        Change of each residual per unit of each unknown (SI).
+    residual : ndarray, shape (m,)
+        SI; of priors whitened.
+    kind : ndarray of int, shape (m,)
+        `FORCE`, `RATE` or `TURN`; -1 for priors.
     """
     k, q = len(run.t), len(scene.kept)
     model = scene.model
@@ -224,7 +249,22 @@ def _priors(scene: FitPriors, point: LinearisationPoint, width: int) -> tuple[Fl
 
 
 def row_sigmas(run: HandheldRun, scene: FitPriors, kind: Ints, extra: Floats) -> Floats:
-    """Sigma of every row."""
+    """Sigma of every equation.
+
+    Parameters
+    ----------
+    run : HandheldRun
+    scene : FitPriors
+    kind : ndarray of int, shape (m,)
+        As `equations` gives it.
+    extra : ndarray, shape (3,)
+        Learned sigmas, as of `LinearisationPoint`.
+
+    Returns
+    -------
+    ndarray, shape (m,)
+        In the units of the residuals (SI).
+    """
     white, more = _variances(run, scene, extra)
     return np.asarray(np.sqrt(_spread(run, kind, white + more)))
 

@@ -10,15 +10,15 @@ from sdimu_calibration.core.data.windows import runs
 from sdimu_calibration.core.recording import DataError, PhaseLog, Recording
 
 WINDOW_S = 1.0
-"""Length of a window (s), and what is left to settling at both ends of a rest."""
+"""Length of a window (s): as much is left to settling at both ends of a rest."""
 _FEWEST = 10
-"""Samples a window has at least."""
+"""Number of samples of a window at least: fewer give no mean."""
 _TURNING = float(np.radians(0.3))
 """Mean rate (rad/s) apart from that of rest that is a turn: below every table's, above every drift of a bias."""
 _MISSING = 1.5
-"""Sample intervals between two samples from which one is missing: an Allan deviation counts samples for time."""
+"""Distance of two samples (intervals) from which one is missing: an Allan deviation counts samples for time."""
 _SHORTEST = 8
-"""Windows that make a rest."""
+"""Number of windows that make a rest: fewer may be a slow part of a turn."""
 
 
 def rests(recording: Recording) -> tuple[slice, ...]:

@@ -53,6 +53,17 @@ def build(shelf: RecordingCache) -> Dash:
     app.layout = lambda: view.layout("Workbench", shelf.names)
     doing = TaskProgress()
     app.clientside_callback(_LARGE, Output("scale", "data"), Input("page", "data"))
+    _follow_clicks(app, shelf, doing)
+    _show_states(app, shelf, doing)
+    _search_candidates(app, shelf, doing)
+    _read_uploads(app)
+    _pack_exports(app, shelf, doing)
+    _show_progress(app, doing)
+    return app
+
+
+def _follow_clicks(app: Dash, shelf: RecordingCache, doing: TaskProgress) -> None:
+    """Turn clicks into states, each fitted before it is kept."""
 
     @app.callback(
         Output("state", "data"), Output("message", "children"),
@@ -76,6 +87,10 @@ def build(shelf: RecordingCache) -> Dash:
             return no_update, f"Not done: {_line(error)}"
         return wanted.as_json(), ""
 
+
+def _show_states(app: Dash, shelf: RecordingCache, doing: TaskProgress) -> None:
+    """Show a state: numbers, pictures and tables."""
+
     @app.callback(
         Output("title", "children"), Output("numbers", "children"), Output("heat", "figure"),
         Output("cell", "figure"), Output("ladder", "figure"), Output("added", "options"), Output("held", "options"),
@@ -95,6 +110,10 @@ def build(shelf: RecordingCache) -> Dash:
             bench = shelf.bench()
         return (*_shown(bench, now, now.recording or shelf.names[0], float(scale or 1), tell), now.as_json(), told)
 
+
+def _search_candidates(app: Dash, shelf: RecordingCache, doing: TaskProgress) -> None:
+    """Score the candidates of a state."""
+
     @app.callback(
         Output("verdict", "children"), Output("ranking", "figure"), Output("candidate", "options"),
         Input("shown", "data"), Kept("scale", "data"), Kept("page", "data"),
@@ -105,6 +124,10 @@ def build(shelf: RecordingCache) -> Dash:
         missing = shelf.bench(now.recording).missing(now.added, now.held, doing.teller(str(page)))
         picture = figures.enlarged(figures.ranking(missing.entries, missing.threshold), float(scale or 1))
         return view.verdict(missing), picture, view.options(missing.entries)
+
+
+def _read_uploads(app: Dash) -> None:
+    """Put the file of an own effect into the page."""
 
     @app.callback(
         Output("own", "value"), Output("message", "children", allow_duplicate=True),
@@ -123,6 +146,10 @@ def build(shelf: RecordingCache) -> Dash:
             return text, f"{name}: {_line(error)}"
         return text, ""
 
+
+def _pack_exports(app: Dash, shelf: RecordingCache, doing: TaskProgress) -> None:
+    """Send what is taken home."""
+
     @app.callback(
         Output("file", "data"), Output("message", "children", allow_duplicate=True),
         Input("export", "n_clicks"), Kept("state", "data"), Kept("page", "data"), running=_BUSY,
@@ -139,14 +166,16 @@ def build(shelf: RecordingCache) -> Dash:
             return no_update, f"Not done: {_line(error)}"
         return dcc.send_bytes(packed, "calibration.zip"), ""
 
+
+def _show_progress(app: Dash, doing: TaskProgress) -> None:
+    """Say what the server does for a page."""
+
     @app.callback(
         Output("busy", "children"), Input("tick", "n_intervals"), Kept("page", "data"), prevent_initial_call=True
     )
     def progress(_count: Any, page: Any) -> Any:
         word, share = doing.at(str(page))
         return [f"{word} \u2026", html.Progress(value=f"{share:.2f}", max="1")]
-
-    return app
 
 
 def _step(
