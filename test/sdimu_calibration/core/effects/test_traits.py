@@ -76,8 +76,9 @@ def test_the_gauge_is_what_a_turn_of_the_body_frame_changes_to_first_order():
 @pytest.mark.parametrize("name", EFFECTS)
 def test_what_holds_for_a_setup_or_a_recording_is_no_property_of_the_unit(name):
     effect = registry.get(name)
-    # Site and mount are seen through attitude or acceleration, a fault of the data by the rate of the table.
+    # Site and mount are seen through attitude or acceleration, a fault of the data by the rate of the table, its cables
+    # by the angle that it turned.
     if effect.scope in ("setup", "recording"):
-        assert reads(effect) & {"C_nb", "w_table", "alpha"}
+        assert reads(effect) & {"C_nb", "w_table", "alpha", "wound"}
     if effect.never_seen:
         assert effect.scope == "setup"
