@@ -171,8 +171,8 @@ NOT_OF_THE_MEAN = {
     "gyro_misalignment_asymmetry": 0.01,
     # Play is a kink where the sweep turns about; settled ones begin at the end of the turn, within a cycle.
     "accel_play": 0.01, "accel_creep": 0.1, "gyro_creep": 0.1,
-    # The next order is L^2/(4 w^2), and an axis sees 1 deg/h at some stop.
-    "gyro_lock_in": 0.2,
+    # The next order is L^2/(4 w^2), and up to a tenth for L^2 = 1.5 deg^2/h^2.
+    "gyro_lock_in": 0.1,
     # The full rate of the turn is the median over it, in a rate that a mount of a radian spreads over three axes.
     "gyro_lost_data": 0.01,
     # Second order of up to 7.5 mrad of latitude.

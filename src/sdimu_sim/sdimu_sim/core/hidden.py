@@ -117,8 +117,8 @@ _ROWS: tuple[Row, ...] = (
     Row("accel_rate_sensitivity_{i}{any}", "ug*s/deg", "k*wt{any}", drawn=False),
     Row("accel_relaxation_{i}", "ug/g", "k*(a{i} - y)", {"tau": "s"}, False, ("lag", "a{i}", "tau")),
     Row("accel_play_{i}", "ug", "k*(f{i} - y)/r", {"r": "g"}, False, ("play", "f{i}", "r")),
-    # Two coupled beams beat at sqrt(w^2 - L^2), k = L^2; dither leaves 0.75 deg/h of its own.
-    Row("gyro_lock_in_{i}", "deg^2/h^2", "w{i}*(sqrt(max(1 - k/(w{i}**2 + (0.75*deg/h)**2), 0)) - 1)", drawn=False),
+    # Two coupled beams beat at sqrt(w^2 - L^2), k = L^2; dither leaves 2 deg/h of its own.
+    Row("gyro_lock_in_{i}", "deg^2/h^2", "w{i}*(sqrt(max(1 - k/(w{i}**2 + (2*deg/h)**2), 0)) - 1)", drawn=False),
     *(
         row
         for (triad, unit, signal), sense in zip(_BOTH, ("turned", "leant"), strict=True)

@@ -10,28 +10,30 @@ from sdimu_calibration.core.effects.motion import Motion
 from sdimu_calibration.core.effects.registry import register
 from sdimu_calibration.core.units import to_si
 
-_FLOOR = to_si(0.75, "deg/h")
-"""Rate below which the dither smooths the lock-in (rad/s): a twentieth of Earth rate, so stops decide, not noise."""
+_FLOOR = to_si(2.0, "deg/h")
+"""Rate below which the dither smooths the lock-in (rad/s): an eighth of Earth rate, so that the first order holds
+at stops where an axis sees next to nothing of it."""
 
 
 def _pull(motion: Motion) -> Floats:
-    """First order in L^2 of ``sqrt(w^2 - L^2) sgn(w) - w``.
+    """First order in L^2 of ``sqrt(w^2 - L^2) sgn(w) - w``, with w^2 + s^2 for w^2 below the root.
 
     Source: Aronowitz, *The laser gyro* (1971), beat frequency of coupled beams. The next order is a share of
-    L^2/(4 w^2): 1 % where the rate is five times L.
+    L^2/(4 (w^2 + s^2)): 1 % where the rate is five times L, 6 % at rest for L = 1 deg/h.
     """
     return np.asarray(-0.5 * motion.w / (motion.w**2 + _FLOOR**2))
 
 
 LOCK_IN = register(
     family(
-        "gyro_lock_in", "gyro lock-in (ring laser)", "dw_i = sqrt(w_i^2 - L_i^2) sgn(w_i) - w_i = -k_i/(2 w_i), k = L^2",
-        per_axis_columns(GYRO, _pull), ("rad^2/s^2", "deg^2/h^2"), (0.3, 1, 10),
+        "gyro_lock_in", "gyro lock-in (ring laser)",
+        "dw_i = sqrt(w_i^2 - L_i^2) sgn(w_i) - w_i, about -k_i w_i/(2 (w_i^2 + s^2)), k = L^2, s = 2 deg/h",
+        per_axis_columns(GYRO, _pull), ("rad^2/s^2", "deg^2/h^2"), (1, 2, 10),
         positive=True,
         typical="RLG with dither L = 0.05-1 deg/h, others none",
         description="The rate is short by L^2/(2 w), L the lock-in rate that is left with dither: strongest at stops "
-        "where an axis sees a small part of Earth rate, nothing in turns. Holds to a few per cent while L is below a "
-        "quarter of the rates at the stops.",
+        "where an axis sees a small part of Earth rate, nothing in turns. The linear form holds to some per cent while "
+        "L is below 1 deg/h; a larger L comes out too large.",
         confused_with=("gyro_dead_band", "gyro_magnetic"),
     )
 )  # fmt: skip

@@ -34,7 +34,7 @@ def low_pass(motion: Motion, tau: float) -> Floats:
 def play(motion: Motion, band: float) -> Floats:
     """Force through a play (backlash) of half-width `band`: y follows a only once a pushes against an end.
 
-    Source: Krasnosel'skii & Pokrovskii, *Systems with Hysteresis* (1989), the operator of play. It starts in the middle.
+    Source: Krasnosel'skii & Pokrovskii, *Systems with Hysteresis* (1989), operator of play; it starts in the middle.
 
     Parameters
     ----------
