@@ -45,7 +45,7 @@ def creep(stem: str, tau: float, ratio: float = 2.0) -> Effect:
         needs_table=True,
         typical="gyro 0.01-0.1 deg/h with 5-200 s, accelerometer 1-20 ug",
         description="Wind-up of leads and suspension that decays after the turn. Turns of the other sense change its "
-        "sign, unlike settling.",
+        "sign; without them it is settling.",
         confused_with=(f"{stem}_bias_settling", f"{stem}_hysteresis", *alike),
         options={"tau": f"{tau:g} s"},
         with_options=lambda tau: creep(stem, tau),

@@ -33,7 +33,8 @@ LOCK_IN = register(
         typical="RLG with dither L = 0.05-1 deg/h, others none",
         description="The rate is short by L^2/(2 w), L the lock-in rate that is left with dither: strongest at stops "
         "where an axis sees a small part of Earth rate, nothing in turns. The linear form holds to some per cent while "
-        "L is below 1 deg/h; a larger L comes out too large.",
+        "L is below 1 deg/h; a larger L comes out too large. Where every stop is cardinal it is "
+        "one class with a dead band; stops between the axes tell them apart.",
         confused_with=("gyro_dead_band", "gyro_magnetic"),
     )
 )  # fmt: skip
