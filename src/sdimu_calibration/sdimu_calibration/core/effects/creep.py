@@ -42,7 +42,7 @@ def creep(stem: str, tau: float, ratio: float = 2.0) -> Effect:
     return family(
         f"{stem}_creep", f"{word} creep after a turn", f"{equation}, s: time since the turn ended",
         per_axis_columns(triad, column), units, _PRIOR[stem],
-        needs_table=True,
+        needs_table=True, wander_like=True,
         typical="gyro 0.01-0.1 deg/h with 5-200 s, accelerometer 1-20 ug",
         description="Wind-up of leads and suspension that decays after the turn. Turns of the other sense change its "
         "sign; without them it is settling.",

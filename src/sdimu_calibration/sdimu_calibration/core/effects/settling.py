@@ -31,6 +31,7 @@ def settling(stem: str, tau: float, ratio: float = 2.0) -> Effect:
         f"{stem}_bias_settling", f"{word} bias settling after each turn",
         f"d{letter}_i = k_i exp(-s/tau), s: time since the turn ended",
         per_axis_columns(triad, column), units, prior,
+        wander_like=True,
         typical="gyro 0.01-0.1 deg/h with 5-100 s, accelerometer 1-20 ug",
         description="Torquers heated by the rate (DTG), charge and stress that decay once the table stands.",
         confused_with=(f"{stem}_bias_in_motion", f"{stem}_bias_step", f"{stem}_creep", *alike),

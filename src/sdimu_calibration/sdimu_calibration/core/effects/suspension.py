@@ -22,7 +22,7 @@ def relaxation(tau: float, ratio: float = 2.0) -> Effect:
         "accel_relaxation", "accelerometer relaxation (viscoelastic suspension)",
         "df_i = k_i (a_i - y_i), tau dy_i/dt = a_i - y_i",
         per_axis_columns(ACCEL, lambda m: m.a - low_pass(m, tau)), ("m/s^2/g", "ug/g"), (20, 100, 1000),
-        needs_table=True,
+        needs_table=True, wander_like=True,
         typical="navigation 1-20, MEMS 50-1000 ug/g with 10-1000 s",
         description="Stress in glue and flexures that gives way after each change of the force. In proportion to that "
         "change, as settling after each turn is not.",
