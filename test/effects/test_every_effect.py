@@ -60,7 +60,7 @@ STEP_AT, TURN = 27.0, 2
 def of(name):
     """The effect, with what is fixed in it set to values that mean something in a test of two minutes."""
     effect = registry.get(name)
-    values = {"tau": 40.0, "t0": STEP_AT, "span": 80.0, "turn": TURN, "at": 23.0}
+    values = {"tau": 40.0, "t0": STEP_AT, "span": 80.0, "turn": TURN, "at": 23.0, "r": to_si(0.3, "g")}
     if effect.with_options is None:
         return effect
     return effect.with_options(**{key: values[key] for key in effect.options})
@@ -162,12 +162,17 @@ NOT_OF_THE_MEAN = {
     # Derivatives of the motion: a cycle of 0.1 s and its neighbours smooth the ramps of the rate.
     "gyro_acceleration_sensitivity": 0.2, "gyro_delay": 0.2, "accel_delay": 0.02, "accel_triad_delay": 0.02,
     "accel_size": 0.2, "lever_arm": 0.2, "gyro_bias_temperature_rate": 0.05, "accel_bias_temperature_rate": 0.05,
+    "gyro_scale_temperature_rate": 0.05, "accel_scale_temperature_rate": 0.05,
     # Switches: they change inside a cycle, and are softened where noise decides.
     "gyro_dead_band": 0.1, "gyro_hysteresis": 0.1, "accel_hysteresis": 0.1, "gyro_bias_in_motion": 0.1,
     "accel_bias_in_motion": 0.1, "accel_bias_asymmetry": 0.05,
     # Powers and kinks: the mean over a cycle of a ramp is not that of its mean.
     "gyro_scale_cubic": 0.01, "gyro_scale_quadratic": 0.01, "gyro_scale_asymmetry": 0.01, "gyro_anisoinertia": 0.01,
     "gyro_misalignment_asymmetry": 0.01,
+    # Play is a kink where the sweep turns about; settled ones begin at the end of the turn, within a cycle.
+    "accel_play": 0.01, "accel_creep": 0.1, "gyro_creep": 0.1,
+    # The next order is L^2/(4 w^2), and up to a tenth for L^2 = 1.5 deg^2/h^2.
+    "gyro_lock_in": 0.1,
     # The full rate of the turn is the median over it, in a rate that a mount of a radian spreads over three axes.
     "gyro_lost_data": 0.01,
     # Second order of up to 7.5 mrad of latitude.
@@ -176,7 +181,7 @@ NOT_OF_THE_MEAN = {
 """Share of the signal that regressors may miss because they are functions of a cycle's mean motion. For all others the
 second order of the coefficients and of half a cycle, 2e-3. A wrong sign or axis misses 100 %."""
 
-NOT_NEGATIVE = {"gyro_delay", "accel_delay", "accel_triad_delay", "gyro_dead_band"}
+NOT_NEGATIVE = {"gyro_delay", "accel_delay", "accel_triad_delay", "gyro_dead_band", "gyro_lock_in"}
 
 
 @pytest.mark.parametrize("name", EFFECTS)

@@ -131,7 +131,8 @@ def _motion() -> Motion:
     zeros = np.zeros((n, 3))
     return Motion(
         np.cumsum(dt), dt, three[0], 9.8 * three[1], np.broadcast_to(np.eye(3), (n, 3, 3)), three[2], zeros,
-        np.ones(n, dtype=bool), np.zeros(n), np.zeros(n), zeros, zeros, np.full(n, np.inf), np.zeros(3),
+        np.ones(n, dtype=bool), np.zeros(n), np.zeros(n), zeros, zeros, np.full(n, np.inf), np.zeros(3), zeros,
+        np.zeros((0, 4)),
     )  # fmt: skip
 
 

@@ -15,6 +15,7 @@ from sdimu_sim.core.coloured import ColouredNoise
 from sdimu_sim.core.equation import CONSTANTS
 from sdimu_sim.core.hidden import DIRECTIONS, LOST_AFTER_S, parse_effects
 from sdimu_sim.core.imu import Electronics, response
+from sdimu_sim.core.memory import memory
 from sdimu_sim.core.platform import PlatformMotion, mean_motion
 from sdimu_sim.core.samples import STILL_RAD_S, SampleClock, TrueSamples, Variables, in_body, rotated
 from sdimu_sim.core.temperature import TemperatureProfile
@@ -62,6 +63,11 @@ class ImuGenerator:
         self._coloured = ColouredNoise(truth.noise, self._clock.interval_s, seed)
         self._electronics = Electronics(truth, self._clock.interval_s, seed)
         self._variables = Variables(temperature)
+        self._memories = {
+            number: memory(term.memory[0], term.parameters[term.memory[2]], self._clock.interval_s)
+            for number, term in enumerate(self._hidden.terms)
+            if term.memory
+        }
         off = self._hidden.site
         self._gravity = gravity_of(site) - off.gravity
         self._omega_ie_n = earth.earth_rate(site.latitude_rad - off.latitude)
@@ -141,8 +147,11 @@ class ImuGenerator:
             if self._hidden.reads & DIRECTIONS:
                 pairs = (("n", self._direction(edges, 0)), ("e", self._direction(edges, 1)))
                 values |= {f"{name}{axis}": v[i] for name, v in pairs for i, axis in enumerate("xyz")}
-            for term in self._hidden.terms:
-                out[term.sensor] += term.expression.evaluate({**values, **term.parameters})
+            for number, term in enumerate(self._hidden.terms):
+                own: dict[str, Floats | float] = {**term.parameters}
+                if term.memory:
+                    own["y"] = self._memories[number](np.asarray(values[term.memory[1]]))
+                out[term.sensor] += term.expression.evaluate({**values, **own})
         self._coloured.add(out, np.abs(true.omega_nb).max(axis=0) > STILL_RAD_S)
         self._lose(out, true, edges)
         if not np.isfinite(out).all():

@@ -12,7 +12,6 @@ calibrator's regressors. Index letters: {i} the sensor's own axis, {j} and {k} t
 from __future__ import annotations
 
 import difflib
-import itertools
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from importlib.metadata import entry_points
@@ -22,6 +21,7 @@ from sdimu_calibration.core.effect_key import SENSORS, EffectKey, parse_key, rea
 from sdimu_calibration.core.recording import DataError
 from sdimu_sim.core.equation import CONSTANTS, read_equation
 from sdimu_sim.core.expression import Expression, parse_expression
+from sdimu_sim.core.hidden_row import Entry, Part, Row, expand
 from sdimu_sim.core.truth import COEFFICIENT_UNITS
 
 _XYZ = "xyz"
@@ -35,41 +35,18 @@ VARIABLES: tuple[str, ...] = (
     "dTdt",
     "moving",
     "since",
+    *(f"wound{i}" for i in _XYZ),
 )
 """True means over the sample: body rate w (rad/s), specific force a (f/g) and f (m/s^2), angular acceleration alpha
 (rad/s^2), rate of the table wt (rad/s), North, East and Down component of a body axis (n, e, d), magnetic field B (T),
 lever-arm tensor L (1/s^2), sign of the last turn about and of the last change of a along an axis (turned, leant), time
 t (s), temperature T (deg C), its change since the start dT (K) and rate dTdt (K/s), moving (1 while the table turns),
-time since the last turn ended (since; s, 0 in turns, very long before the first)."""
+time since the last turn ended (since; s, 0 in turns, very long before the first), angle turned since the start about a
+body axis (wound; rad)."""
 DIRECTIONS = frozenset(f"{v}{i}" for v in "ne" for i in _XYZ)
 """Variables that cost the generator a pass of their own."""
 
 TEMPERATURE_NAMES = frozenset({"T", "dT", "dTdt"})
-
-
-@dataclass(frozen=True)
-class Row:
-    """Family of effects.
-
-    Attributes
-    ----------
-    names : str
-        Coefficients, ``gyro_...`` or ``accel_...``, with index letters.
-    unit : str
-        Of the size k.
-    formula : str
-        rad/s or m/s^2, in `VARIABLES`, k and the options (SI).
-    options : mapping of str to str
-        Unit of each option.
-    drawn : bool
-        The campaign on hidden effects draws it; what came later is left out, so that a seed draws what it drew before.
-    """
-
-    names: str
-    unit: str
-    formula: str
-    options: Mapping[str, str] = field(default_factory=dict)
-    drawn: bool = True
 
 
 _BOTH = (("gyro", "deg/h", "w{i}"), ("accel", "ug", "g*a{i}"))
@@ -124,23 +101,37 @@ _ROWS: tuple[Row, ...] = (
     *(
         Row(f"gyro_mass_unbalance_ramp_{kind}{{i}}", "deg/h/g/h", f"k*t*a{{{kind}}}", drawn=False) for kind in "dq"
     ),
+    *(
+        Row(f"gyro_mass_unbalance_temperature_{kind}{{i}}", "deg/h/g/degC", f"k*dT*a{{{kind}}}", drawn=False)
+        for kind in "dq"
+    ),
+    # The triad is turned by the angle k about axis i: gravity moves from the second axis after it to the first.
+    *(
+        Row(f"accel_triad_{name}", unit, {"accel_{n}": f"-k*{angle}*f{{m}}", "accel_{m}": f"k*{angle}*f{{n}}"},
+            drawn=False)
+        for name, unit, angle in (
+            ("ramp_{i}", "arcsec/h", "t"), ("temperature_{i}", "arcsec/degC", "dT"),
+            ("flexure_{i}{any}", "arcsec/g", "a{any}"),
+        )
+    ),
+    Row("accel_rate_sensitivity_{i}{any}", "ug*s/deg", "k*wt{any}", drawn=False),
+    Row("accel_relaxation_{i}", "ug/g", "k*(a{i} - y)", {"tau": "s"}, False, ("lag", "a{i}", "tau")),
+    Row("accel_play_{i}", "ug", "k*(f{i} - y)/r", {"r": "g"}, False, ("play", "f{i}", "r")),
+    # Two coupled beams beat at sqrt(w^2 - L^2), k = L^2; dither leaves 2 deg/h of its own.
+    Row("gyro_lock_in_{i}", "deg^2/h^2", "w{i}*(sqrt(max(1 - k/(w{i}**2 + (2*deg/h)**2), 0)) - 1)", drawn=False),
+    *(
+        row
+        for (triad, unit, signal), sense in zip(_BOTH, ("turned", "leant"), strict=True)
+        for row in (
+            Row(f"{triad}_creep_{{i}}", unit, f"k*{sense}{{i}}*(1 - moving)*exp(-since/tau)", {"tau": "s"}, False),
+            Row(f"{triad}_bias_wrap_{{i}}{{any}}", unit, "k*wound{any}/(2*pi)", drawn=False),
+            Row(f"{triad}_scale_temperature_rate_{{i}}", "ppm*min/degC", f"k*dTdt*{signal}", drawn=False),
+        )
+    ),
 )  # fmt: skip
 
 
-def _expand(row: Row) -> Iterable[tuple[str, tuple[str, Row]]]:
-    """Every name of a family, with its sensor and its formula filled in."""
-    triad = row.names.split("_", 1)[0]
-    for i in _XYZ:
-        o, p = (a for a in _XYZ if a != i)
-        # Quadrature of the mass unbalance (doc/conventions.md): x with y, y with x, z with y.
-        quadrature = "x" if i == "y" else "y"
-        for j, whichever, pair in itertools.product(o + p, _XYZ, ("xy", "xz", "yz")):
-            letters = {"i": i, "j": j, "o": o, "p": p, "any": whichever, "pair": pair, "d": i, "q": quadrature}
-            filled = Row(row.names, row.unit, row.formula.format(**letters), row.options, row.drawn)
-            yield row.names.format(**letters), (f"{triad}_{i}", filled)
-
-
-_TABLE: dict[str, tuple[str, Row]] = {name: entry for row in _ROWS for name, entry in _expand(row)}
+_TABLE: dict[str, Entry] = {name: entry for row in _ROWS for name, entry in expand(row)}
 
 _DELAYS: dict[str, tuple[str, ...]] = {
     **{f"{triad}_delay": tuple(s for s in SENSORS if s.startswith(triad)) for triad in ("gyro", "accel")},
@@ -172,12 +163,15 @@ class Term:
         rad/s or m/s^2.
     parameters : mapping of str to float
         k and others, SI; constants for the expression.
+    memory : tuple of str
+        What `y` is in the expression, as in `Row`; empty where it remembers nothing.
     """
 
     name: str
     sensor: int
     expression: Expression
     parameters: dict[str, float]
+    memory: tuple[str, ...] = ()
 
 
 class Lost(NamedTuple):
@@ -245,11 +239,12 @@ def register_row(row: Row) -> None:
     DataError
         When one of its names is taken or its formula cannot be read.
     """
-    for name, (sensor, filled) in _expand(row):
-        if (name in _TABLE and _TABLE[name] != (sensor, filled)) or name in _UNITS:
+    for name, entry in expand(row):
+        if (name in _TABLE and _TABLE[name] != entry) or name in _UNITS:
             raise DataError(f"simulated effect '{name}' is there already")
-        parse_expression(filled.formula, (*VARIABLES, *CONSTANTS, "k", *filled.options))
-        _TABLE[name] = (sensor, filled)
+        for part in entry.parts:
+            _parsed(part, ("k", *row.options))
+        _TABLE[name] = entry
 
 
 ENTRY_POINTS = "sdimu_sim.effects"
@@ -295,24 +290,24 @@ def effect_names() -> tuple[str, ...]:
 def drawn_names() -> tuple[str, ...]:
     """Names that the campaign on hidden effects may draw."""
     delays = (name for name in _DELAYS if "triad" not in name)
-    return (*sorted(name for name, (_, row) in _TABLE.items() if row.drawn), *sorted(delays), _LOST)
+    return (*sorted(name for name, entry in _TABLE.items() if entry.row.drawn), *sorted(delays), _LOST)
 
 
 def size_unit(name: str) -> str:
     """Customary unit of the size of an effect of `effect_names`."""
-    return _TABLE[name][1].unit if name in _TABLE else _UNITS[name]
+    return _TABLE[name].row.unit if name in _TABLE else _UNITS[name]
 
 
 def one_sided(name: str) -> bool:
     """Whether the size of an effect cannot be negative: a sensor delays and loses, it does not foresee."""
-    return name in _DELAYS or name == _LOST or name.startswith("gyro_dead_band_")
+    return name in _DELAYS or name == _LOST or name.startswith(("gyro_dead_band_", "gyro_lock_in_"))
 
 
 def effect_example(name: str) -> str:
     """Return a key with a size that is read, with the unit people use; `name` is one of `effect_names`."""
     if name == _LOST:
         return f"{name}(turn=1, at=100 s)=10 ms"
-    options = {key: f"100 {unit}" for key, unit in _TABLE[name][1].options.items()} if name in _TABLE else {}
+    options = {key: f"100 {unit}" for key, unit in _TABLE[name].row.options.items()} if name in _TABLE else {}
     return str(EffectKey(name, options, f"1 {size_unit(name)}"))
 
 
@@ -374,7 +369,7 @@ def _take_named(key: EffectKey, found: _Found) -> None:
         raise DataError(f"unknown effect '{name}'{_suggestion(name)}")
     size = read_quantity(f"effect {name}", key.size, size_unit(name))
     if name in _TABLE:
-        found.terms.append(_named_term(key, size))
+        found.terms += _named_terms(key, size)
     elif name == _LOST:
         found.lost.append(_lost(key, size))
     else:
@@ -395,15 +390,20 @@ def _take_named(key: EffectKey, found: _Found) -> None:
         found.sizes[str(EffectKey(name, key.options)) if name in found.sizes else name] = size
 
 
-def _named_term(key: EffectKey, size: float) -> Term:
-    sensor, row = _TABLE[key.name]
+def _named_terms(key: EffectKey, size: float) -> list[Term]:
+    row, parts = _TABLE[key.name]
     options = read_options(key, row.options)
-    for name in ("tau", "span"):
+    for name in ("tau", "span", "r"):
         if options.get(name, 1.0) <= 0.0:
             raise DataError(f"effect {key.name}: {name} must be positive")
     values = {"k": size, **options}
-    formula = parse_expression(row.formula, (*VARIABLES, *CONSTANTS, *values))
-    return Term(key.name, SENSORS.index(sensor), formula, values)
+    return [
+        Term(key.name, SENSORS.index(part.sensor), _parsed(part, values), values, part.memory) for part in parts
+    ]  # fmt: skip
+
+
+def _parsed(part: Part, values: Iterable[str]) -> Expression:
+    return parse_expression(part.formula, (*VARIABLES, *CONSTANTS, *values, *(("y",) if part.memory else ())))
 
 
 def _lost(key: EffectKey, size: float) -> Lost:

@@ -112,6 +112,8 @@ class Variables:
         self._turned = np.zeros(3)
         self._leant = np.zeros(3)
         self._stood = -np.inf
+        self._angle = np.zeros(3)
+        self._reached = 0.0
 
     def of(self, true: TrueSamples, middle: Floats) -> dict[str, Floats | float]:
         """Variables of a block by the names of `sdimu_sim.core.hidden.VARIABLES`; `middle` (m,) mid-sample times."""
@@ -121,7 +123,7 @@ class Variables:
         turned, self._turned = _last_sign(wt, TURNED_RAD_S, self._turned)
         leant, self._leant = _last_sign(change, LEANT_PER_S, self._leant)
         groups = {"w": true.omega_ib, "a": a, "alpha": true.alpha, "wt": wt, "B": true.field}
-        groups |= {"turned": turned, "leant": leant, "f": true.f_ib, "d": true.down}
+        groups |= {"wound": self._wound(wt, middle), "turned": turned, "leant": leant, "f": true.f_ib, "d": true.down}
         values: dict[str, Floats | float] = {f"{n}{i}": v[k] for n, v in groups.items() for k, i in enumerate(_XYZ)}
         values |= {f"L{i}{j}": true.lever[k, n] for k, i in enumerate(_XYZ) for n, j in enumerate(_XYZ)}
         values["t"] = middle
@@ -136,6 +138,16 @@ class Variables:
             values["dT"] = values["T"] - self._temperature.value(np.zeros(1))
             values["dTdt"] = self._temperature.rate(middle)
         return values
+
+    def _wound(self, wt: Floats, middle: Floats) -> Floats:
+        """Angle turned about each body axis up to the middle of each sample (rad), (3, m)."""
+        if not len(middle):
+            return wt
+        # Samples touch each other: each is twice as long as from the end of the one before to its middle.
+        interval = 2.0 * (middle[0] - self._reached)
+        steps = np.cumsum(np.concatenate([self._angle[:, None], wt * interval], axis=1), axis=1)
+        self._angle, self._reached = steps[:, -1], float(middle[-1] + 0.5 * interval)
+        return np.asarray(steps[:, 1:] - 0.5 * interval * wt)
 
 
 def _last_sign(v: Floats, threshold: float, before: Floats) -> tuple[Floats, Floats]:

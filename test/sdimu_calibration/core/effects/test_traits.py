@@ -43,6 +43,13 @@ def test_a_drift_of_a_bias_is_a_function_of_time_alone(name):
     assert effect.bias_drift == (reads(effect) == {"t"})
 
 
+@pytest.mark.parametrize("name", EFFECTS)
+def test_what_a_wander_imitates_depends_on_the_motion_before(name):
+    effect = registry.get(name)
+    assert not effect.wander_like or reads(effect) & {"since_turn", "past", "wound"}
+    assert effect.wander_like or not reads(effect) & {"since_turn", "wound"}
+
+
 @pytest.mark.parametrize("name", [n for n in EFFECTS if Excitation.BOTH_SENSES in registry.get(n).excitation])
 def test_an_effect_that_needs_both_senses_is_even_in_the_rate(name):
     effect = registry.get(name)
@@ -76,8 +83,9 @@ def test_the_gauge_is_what_a_turn_of_the_body_frame_changes_to_first_order():
 @pytest.mark.parametrize("name", EFFECTS)
 def test_what_holds_for_a_setup_or_a_recording_is_no_property_of_the_unit(name):
     effect = registry.get(name)
-    # Site and mount are seen through attitude or acceleration, a fault of the data by the rate of the table.
+    # Site and mount are seen through attitude or acceleration, a fault of the data by the rate of the table, its cables
+    # by the angle that it turned.
     if effect.scope in ("setup", "recording"):
-        assert reads(effect) & {"C_nb", "w_table", "alpha"}
+        assert reads(effect) & {"C_nb", "w_table", "alpha", "wound"}
     if effect.never_seen:
         assert effect.scope == "setup"

@@ -22,7 +22,7 @@ from sdimu_calibration.core import earth
 from sdimu_calibration.core.alignment.prepared import PreparedData, TestSetup
 from sdimu_calibration.core.alignment.rest_means import layout
 from sdimu_calibration.core.arrays import Floats
-from sdimu_calibration.core.effects.motion import Motion
+from sdimu_calibration.core.effects.motion import NO_PAST, Motion
 from sdimu_calibration.core.navigation.track import MAGNETIC_FIELD, temperatures
 from sdimu_calibration.core.recording import DataError, TableLog
 
@@ -141,8 +141,9 @@ def reference_motion(prepared: PreparedData, setup: TestSetup, log: TableLog, gi
     alpha = np.gradient(w_table, c.t - 0.5 * c.dt, axis=0)
     never = np.full(len(w), np.inf)
     return Motion(
-        c.t, c.dt, w, f, middle, w_table, alpha, prepared.rest, heat, heat_rate, none, none, never, MAGNETIC_FIELD
-    )
+        c.t, c.dt, w, f, middle, w_table, alpha, prepared.rest, heat, heat_rate, none, none, never, MAGNETIC_FIELD,
+        none, NO_PAST,
+    )  # fmt: skip
 
 
 def _fit(prepared: PreparedData, setup: TestSetup, seen: Motion) -> tuple[Floats, Floats, float, int]:

@@ -43,6 +43,8 @@ _ABSENT = {
     "turned": "needs the history of turns",
     "leant": "needs the history of forces",
     "since_turn": "needs the history of turns",
+    "wound": "needs the history of turns",
+    "past": "needs the history of forces",
 }
 _CLOSE = 1e-13
 """Largest step at convergence, a share of 1 rad/s or 1 m/s^2 plus the value: a few hundred units of rounding."""

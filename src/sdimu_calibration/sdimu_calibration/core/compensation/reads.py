@@ -8,11 +8,11 @@ import numpy as np
 
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.effects.effect import Effect
-from sdimu_calibration.core.effects.motion import Motion
+from sdimu_calibration.core.effects.motion import NO_PAST, Motion
 
 FIELDS = (
     "w", "f", "t", "temperature", "temperature_rate", "alpha", "w_table", "rest", "C_nb", "magnetic_n", "turned",
-    "leant", "since_turn",
+    "leant", "since_turn", "wound", "past",
 )  # fmt: skip
 _ROWS = 2000
 """Number of rows of the random motion: enough to cross the thresholds of effects."""
@@ -55,7 +55,8 @@ def any_motion(rng: np.random.Generator) -> Motion:
     return Motion(
         np.linspace(1.0, _SPAN_S, n), np.full(n, _SPAN_S / n), any_of(n, 3), 10.0 * any_of(n, 3), C_nb, any_of(n, 3),
         any_of(n, 3), rng.random(n) < 0.5, 10.0 * any_of(n), 0.01 * any_of(n), np.sign(any_of(n, 3)),
-        np.sign(any_of(n, 3)), 100.0 * rng.random(n), 1e-5 * any_of(3),
+        np.sign(any_of(n, 3)), 100.0 * rng.random(n), 1e-5 * any_of(3), any_of(n, 3),
+        np.column_stack([rng.random(20), 10.0 * any_of(20, 3)]),
     )  # fmt: skip
 
 
@@ -80,4 +81,4 @@ def samples_motion(t: Floats, dt: Floats, w: Floats, f: Floats, heat: Floats, he
     C_nb = np.broadcast_to(np.eye(3), (n, 3, 3))
     rest = np.zeros(n, dtype=np.bool_)
     never = np.full(n, np.inf)
-    return Motion(t, dt, w, f, C_nb, none, none, rest, heat, heat_rate, none, none, never, np.zeros(3))
+    return Motion(t, dt, w, f, C_nb, none, none, rest, heat, heat_rate, none, none, never, np.zeros(3), none, NO_PAST)

@@ -40,8 +40,9 @@ truth was among them in every trial, and each costs tens of milliseconds."""
 _COST = 8.0
 """Log-likelihood (1) that an effect must bring: half the square of the usual threshold of a whole scan, 4.0."""
 _DRIFT_COST = 8.0
-"""Log-likelihood (1) that the drift of a bias must bring besides, where noise makes the same triad wander, and a fault
-of the recording in any noise: a wander has jumps and trends by itself, and the scan looks for them at every time."""
+"""Log-likelihood (1) that the drift of a bias, or a transient of one, must bring besides where noise makes the same
+triad wander, and a fault of the recording in any noise: a wander has jumps, trends and transients by itself, and the
+scan looks for them at every time and with every time constant."""
 _OWN_COST = 16.0
 """Log-likelihood (1) that an equation must bring besides: a wander has waves of any period and phase."""
 _UNKNOWN_COST = 6.0
@@ -93,7 +94,8 @@ class _Ground(Generic[E]):
         candidate = self.white.candidate(column)
         if candidate.family == "own":
             return _OWN_COST
-        return _DRIFT_COST if candidate.effect.bias_drift or candidate.effect.scope == "recording" else 0.0
+        effect = candidate.effect
+        return _DRIFT_COST if effect.bias_drift or effect.wander_like or effect.scope == "recording" else 0.0
 
     def cost(self, column: int, terms: Sequence[NoiseTerm], share: float = 1.0) -> float:
         """Likelihood that an effect must bring in noise of these terms; `share` of it where no wander is a rival."""

@@ -31,6 +31,7 @@ CROSS_COUPLING = register(
         description="Product of the forces along and across the input axis. Zero at cardinal stops; a velocity jump "
         "after "
         "turns that sweep the plane of both.",
+        confused_with=("accel_triad_flexure",),
     )
 )  # fmt: skip
 
@@ -40,7 +41,7 @@ CROSS_SQUARE = register(
         matrix_columns(ACCEL, _SQUARE, diagonal=False), ("m/s^2/g^2", "ug/g^2"), (10, 60, 1000),
         typical="navigation below 10, tactical 20-100, MEMS 200-2000 ug/g^2",
         description="Square of a force across the input axis. With the own-axis square the three sum to a bias.",
-        confused_with=("accel_quadratic", "accel_bias"),
+        confused_with=("accel_quadratic", "accel_bias", "accel_triad_flexure"),
     )
 )  # fmt: skip
 
@@ -51,5 +52,6 @@ CROSS_PRODUCT = register(
         excitation=frozenset({Excitation.OBLIQUE_STOPS}),
         typical="navigation below 10, tactical 20-100 ug/g^2",
         description="Product of both forces across the input axis; acts in turns about the input axis.",
+        confused_with=("accel_triad_flexure",),
     )
 )  # fmt: skip

@@ -26,6 +26,6 @@ DEAD_BAND = register(
         description="The gyro stands still below a rate and is short by it above. Its sign at stops where an axis "
         "points "
         "East-West hangs on noise.",
-        confused_with=("gyro_magnetic",),
+        confused_with=("gyro_magnetic", "gyro_lock_in"),
     )
 )  # fmt: skip

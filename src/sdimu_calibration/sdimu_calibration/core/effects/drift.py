@@ -74,7 +74,7 @@ def step(stem: str, t0: float, spacing: float = 60.0) -> Effect:
         scope="power-on", excitation=_OVER_TIME, bias_drift=True,
         typical="any size; after a shock, a power dip, a turn",
         description="Bias that changes at one moment. Scanned over the starts and ends of the turns.",
-        confused_with=(f"{stem}_bias_ramp", f"{stem}_bias_temperature_rate"),
+        confused_with=(f"{stem}_bias_ramp", f"{stem}_bias_temperature_rate", f"{stem}_bias_wrap"),
         options={"t0": f"{t0:g} s"},
         with_options=lambda t0: step(stem, t0),
         scan=lambda times: tuple(step(stem, round(start)) for _, start, _ in (*times.stops[1:], *times.turns[1:])),
@@ -104,7 +104,9 @@ def random_walk(stem: str, span: float) -> Effect:
         scope="power-on", excitation=_OVER_TIME, bias_drift=True,
         typical="see the Allan deviation",
         description="Slow wander, by its first four Karhunen-Loeve modes over the test.",
-        confused_with=(f"{stem}_bias_ramp", f"{stem}_bias_warm_up", f"{stem}_bias_temperature"),
+        confused_with=(
+            f"{stem}_bias_ramp", f"{stem}_bias_warm_up", f"{stem}_bias_temperature", f"{stem}_bias_wrap",
+        ),
         options={"span": f"{span:g} s"},
         with_options=lambda span: random_walk(stem, span),
         scan=lambda times: (random_walk(stem, round(times.duration)),),
@@ -120,7 +122,10 @@ def _ramp(stem: str) -> Effect:
         scope="power-on", excitation=_OVER_TIME, bias_drift=True,
         typical="accelerometer 1-20 ug/h",
         description="Bias that runs away at a constant rate.",
-        confused_with=(f"{stem}_bias_warm_up", f"{stem}_bias_temperature", f"{stem}_bias_random_walk"),
+        confused_with=(
+            f"{stem}_bias_warm_up", f"{stem}_bias_temperature", f"{stem}_bias_random_walk", f"{stem}_bias_wrap",
+            "accel_triad_ramp",
+        ),
     )  # fmt: skip
 
 
@@ -136,7 +141,7 @@ def _scale_ramp(stem: str, per_hour: tuple[float, float, float]) -> Effect:
         scope="power-on", excitation=_OVER_TIME,
         typical="as the temperature coefficient times the warm-up",
         description="Scale factor that runs away at a constant rate.",
-        confused_with=(f"{stem}_scale_temperature",),
+        confused_with=(f"{stem}_scale_temperature", f"{stem}_scale_temperature_rate"),
     )  # fmt: skip
 
 
@@ -163,7 +168,7 @@ MASS_UNBALANCE_RAMP = register(
         scope="power-on", excitation=_OVER_TIME,
         typical="DTG 0.005-0.05 deg/h/g/h",
         description="The rotor's centre of mass moves with the temperature of the suspension.",
-        confused_with=("gyro_bias_ramp",),
+        confused_with=("gyro_bias_ramp", "gyro_mass_unbalance_temperature"),
     )
 )  # fmt: skip
 

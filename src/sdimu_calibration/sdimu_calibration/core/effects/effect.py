@@ -106,6 +106,9 @@ class Effect:
         Motion without which a test does not show the effect.
     bias_drift : bool
         A change of a bias in time by itself: several in a row follow any drift and say nothing of its cause.
+    wander_like : bool
+        A transient after each turn, or a bias that the turns add up to: noise that makes a bias wander imitates it, so
+        in such noise it must show more clearly, as a drift must.
     positive : bool
         Of one sign by its nature: a stretch that was lost is no stretch that was gained.
     needs_table : bool
@@ -148,6 +151,7 @@ class Effect:
     scope: Scope = "unit"
     excitation: frozenset[Excitation] = frozenset()
     bias_drift: bool = False
+    wander_like: bool = False
     positive: bool = False
     needs_table: bool = False
     gauge: bool = False

@@ -8,7 +8,7 @@ import numpy as np
 
 from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.effects.imu_model import ImuModel
-from sdimu_calibration.core.effects.motion import Motion
+from sdimu_calibration.core.effects.motion import NO_PAST, Motion
 
 _STEP = (1e-9, 1e-6)
 """Steps of rate (rad/s) and force (m/s^2) for derivatives: below every threshold of an effect."""
@@ -33,7 +33,10 @@ def error_slope(model: ImuModel, seen: Motion, rows: slice | Ints, coefficients:
 
 
 def _at(seen: Motion, rows: slice | Ints) -> Motion:
-    """Rows of a motion."""
+    """Rows of a motion, without the past.
+
+    What an effect remembers is shifted with everything else then, and only a change of the present counts.
+    """
     n = len(seen.t)
-    columns = {f.name: getattr(seen, f.name) for f in fields(seen)}
+    columns = {f.name: getattr(seen, f.name) for f in fields(seen)} | {"past": NO_PAST}
     return Motion(**{name: v[rows] if len(v) == n else v for name, v in columns.items()})

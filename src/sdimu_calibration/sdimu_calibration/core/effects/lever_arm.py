@@ -18,7 +18,7 @@ SIZE = register(
         description="Each accelerometer has its own place. Grows with the square of the rate: fast turns show it. A "
         "common place "
         "of all three is a lever arm and moves only the position.",
-        confused_with=("accel_bias_in_motion",),
+        confused_with=("accel_bias_in_motion", "accel_rate_sensitivity"),
     )
 )  # fmt: skip
 

@@ -12,7 +12,7 @@ GYRO_MAGNETIC = register(
         needs="magnetic",
         typical="DTG 0.005-0.1, FOG 0.02-1 unshielded, RLG 0.002-0.05 deg/h/G",
         description="Drift in proportion to the Earth's field in the body frame.",
-        confused_with=("gyro_g_sensitivity", "gyro_dead_band", "gyro_misalignment"),
+        confused_with=("gyro_g_sensitivity", "gyro_dead_band", "gyro_lock_in", "gyro_misalignment"),
     )
 )  # fmt: skip
 

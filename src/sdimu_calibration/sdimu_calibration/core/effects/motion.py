@@ -13,6 +13,9 @@ from sdimu_calibration.core.units import STANDARD_GRAVITY
 _TURNING = np.radians(0.01)
 """Slower than any turn of a table, faster than the bias of a gyro that is worth calibrating on one (rad/s)."""
 
+NO_PAST = np.zeros((0, 4))
+"""Cycles before the first one (s, m/s^2), none: the IMU had stood as it stands in the first cycle."""
+
 
 @dataclass(frozen=True)
 class Motion:
@@ -42,6 +45,10 @@ class Motion:
         Time since the last turn ended (s); 0 in turns, infinite before the first.
     magnetic_n : ndarray, shape (3,)
         Magnetic field of the site in NED (T).
+    wound : ndarray, shape (n, 3)
+        Angle turned against the Earth about each body axis since the start, with its sign (rad).
+    past : ndarray, shape (m, 4)
+        Length (s) and specific force (m/s^2) of the cycles before the first one, where blocks follow each other.
     """
 
     t: Floats
@@ -58,6 +65,8 @@ class Motion:
     leant: Floats
     since_turn: Floats
     magnetic_n: Floats
+    wound: Floats
+    past: Floats
 
     @cached_property
     def a(self) -> Floats:

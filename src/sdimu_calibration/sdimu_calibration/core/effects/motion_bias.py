@@ -31,6 +31,6 @@ ACCEL_BIAS_IN_MOTION = register(
         per_axis_columns(ACCEL, _moving), ("m/s^2", "ug"), (20, 100, 1000),
         typical="10-50 ug/g^2rms times the level",
         description="Vibration of the drive rectified by the nonlinearity of the accelerometer.",
-        confused_with=("accel_size",),
+        confused_with=("accel_size", "accel_rate_sensitivity"),
     )
 )  # fmt: skip

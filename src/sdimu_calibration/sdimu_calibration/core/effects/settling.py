@@ -20,6 +20,7 @@ _SCAN_TAU_S = (4.0, 8.0, 16.0, 32.0, 64.0, 128.0)
 def settling(stem: str, tau: float, ratio: float = 2.0) -> Effect:
     """Transient of a bias after each turn with time constant `tau` (s), a factor `ratio` from the next ones tried."""
     triad, word, letter, units, prior = _TRIADS[stem]
+    alike = ("accel_relaxation",) if stem == "accel" else ()
 
     def column(motion: Motion) -> Floats:
         # In the turn itself it is another effect: bias in motion.
@@ -30,9 +31,10 @@ def settling(stem: str, tau: float, ratio: float = 2.0) -> Effect:
         f"{stem}_bias_settling", f"{word} bias settling after each turn",
         f"d{letter}_i = k_i exp(-s/tau), s: time since the turn ended",
         per_axis_columns(triad, column), units, prior,
+        wander_like=True,
         typical="gyro 0.01-0.1 deg/h with 5-100 s, accelerometer 1-20 ug",
         description="Torquers heated by the rate (DTG), charge and stress that decay once the table stands.",
-        confused_with=(f"{stem}_bias_in_motion", f"{stem}_bias_step"),
+        confused_with=(f"{stem}_bias_in_motion", f"{stem}_bias_step", f"{stem}_creep", *alike),
         options={"tau": f"{tau:g} s"},
         with_options=lambda tau: settling(stem, tau),
         scan=lambda _times: tuple(settling(stem, tau) for tau in _SCAN_TAU_S),

@@ -1,9 +1,10 @@
-"""Temperature: bias and scale factor that follow it, and bias that follows its rate."""
+"""Temperature: bias, scale factor and mass unbalance that follow it, bias and scale factor that follow its rate."""
 
 from __future__ import annotations
 
 from sdimu_calibration.core.arrays import Floats
-from sdimu_calibration.core.effects.effect import ACCEL, GYRO, Effect, Excitation, family, per_axis_columns
+from sdimu_calibration.core.effects.effect import ACCEL, GYRO, Effect, Excitation, family, per_axis_columns, pick
+from sdimu_calibration.core.effects.mass_unbalance import GYRO_MASS_UNBALANCE, TERMS
 from sdimu_calibration.core.effects.motion import Motion
 from sdimu_calibration.core.effects.registry import register
 
@@ -23,6 +24,7 @@ def _triad(
     rate: tuple[float, float, float], letter: str,
 ) -> tuple[Effect, Effect]:  # fmt: skip
     si, shown = unit
+    alike = ("accel_triad_temperature",) if stem == "accel" else ()
     by_temperature = register(
         family(
             f"{stem}_bias_temperature", f"{word} bias temperature coefficient", f"d{letter}_i = k_i (T - T0)",
@@ -32,7 +34,7 @@ def _triad(
             description="Slow; stops that repeat an orientation at another temperature decide. T0 is the temperature "
             "at the "
             "start.",
-            confused_with=(f"{stem}_bias_warm_up", f"{stem}_bias_ramp", f"{stem}_bias_random_walk"),
+            confused_with=(f"{stem}_bias_warm_up", f"{stem}_bias_ramp", f"{stem}_bias_random_walk", *alike),
         )
     )  # fmt: skip
     by_rate = register(
@@ -62,7 +64,7 @@ GYRO_SCALE_TEMPERATURE = register(
         needs="temperature", excitation=_OVER_TIME,
         typical="DTG 5-20, FOG 5-50, tactical 20-100 ppm/C",
         description="Seen in turns about the same axis at different temperatures.",
-        confused_with=("gyro_scale_ramp",),
+        confused_with=("gyro_scale_ramp", "gyro_scale_temperature_rate"),
     )
 )  # fmt: skip
 
@@ -73,6 +75,48 @@ ACCEL_SCALE_TEMPERATURE = register(
         needs="temperature", excitation=_OVER_TIME,
         typical="residual 0.5-5, raw 100-180 ppm/C",
         description="Seen where an axis carries gravity at different temperatures.",
-        confused_with=("accel_scale_ramp",),
+        confused_with=("accel_scale_ramp", "accel_scale_temperature_rate"),
+    )
+)  # fmt: skip
+
+GYRO_SCALE_TEMPERATURE_RATE = register(
+    family(
+        "gyro_scale_temperature_rate", "gyro scale-factor temperature-rate coefficient", "dw_i = k_i dT/dt w_i",
+        per_axis_columns(GYRO, lambda m: _rate(m) * m.w), ("s/K", "ppm*min/degC"), (20, 100, 500),
+        needs="temperature", excitation=_OVER_TIME,
+        typical="FOG 10-100, DTG 5-50 ppm/(C/min)",
+        description="Coil or torquer and its sensor of temperature warm up at different speeds.",
+        confused_with=("gyro_scale_temperature", "gyro_scale_ramp"),
+    )
+)  # fmt: skip
+
+ACCEL_SCALE_TEMPERATURE_RATE = register(
+    family(
+        "accel_scale_temperature_rate", "accelerometer scale-factor temperature-rate coefficient",
+        "df_i = k_i dT/dt f_i",
+        per_axis_columns(ACCEL, lambda m: _rate(m) * m.f), ("s/K", "ppm*min/degC"), (20, 100, 500),
+        needs="temperature", excitation=_OVER_TIME,
+        typical="5-50 ppm/(C/min)",
+        description="Magnet or electrodes and their sensor of temperature warm up at different speeds.",
+        confused_with=("accel_scale_temperature", "accel_scale_ramp"),
+    )
+)  # fmt: skip
+
+_UNBALANCE = GYRO_MASS_UNBALANCE.regressors
+
+MASS_UNBALANCE_TEMPERATURE = register(
+    family(
+        "gyro_mass_unbalance_temperature", "gyro mass-unbalance temperature coefficient",
+        "dw = (T - T0) (m'_d a_own + m'_q a_cross)",
+        {
+            name: (GYRO[i // 2], pick(lambda m: m.temperature[:, None] * _UNBALANCE(m), i))
+            for i, name in enumerate(TERMS)
+        },
+        ("rad/s/g/K", "deg/h/g/degC"), (0.01, 0.05, 0.5),
+        needs="temperature", excitation=_OVER_TIME,
+        typical="DTG 0.0005-0.005 deg/h/g/C",
+        description="The rotor's centre of mass moves with the temperature of the suspension: seen where an axis "
+        "carries gravity at different temperatures.",
+        confused_with=("gyro_mass_unbalance_ramp", "gyro_bias_temperature"),
     )
 )  # fmt: skip

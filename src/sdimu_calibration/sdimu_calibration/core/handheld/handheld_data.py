@@ -18,7 +18,7 @@ from sdimu_calibration.core.compiled import compiled
 from sdimu_calibration.core.data.gaps import GAP_SHARE
 from sdimu_calibration.core.data.static_detection import StaticIntervals
 from sdimu_calibration.core.effects.imu_model import ImuModel
-from sdimu_calibration.core.effects.motion import Motion
+from sdimu_calibration.core.effects.motion import NO_PAST, Motion
 from sdimu_calibration.core.matrix3 import elements, multiplied, orthonormal3, rotation3, store
 from sdimu_calibration.core.navigation.correct_cycles import correct_cycles
 from sdimu_calibration.core.navigation.strapdown import Cycles, Reducer
@@ -108,7 +108,7 @@ def seen_at_rest(run: HandheldRun, C_nb: Floats, rate_n: Floats, gravity: float)
     w = np.einsum("kij,i->kj", C_nb, rate_n)
     return Motion(
         run.t, run.seconds, w, -gravity * C_nb[:, 2, :], C_nb, none, none, np.ones(k, dtype=bool), heat, heat_rate,
-        none, none, np.full(k, np.inf), MAGNETIC_FIELD,
+        none, none, np.full(k, np.inf), MAGNETIC_FIELD, none, NO_PAST,
     )  # fmt: skip
 
 

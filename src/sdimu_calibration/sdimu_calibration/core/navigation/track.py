@@ -10,7 +10,7 @@ from sdimu_calibration.core import earth
 from sdimu_calibration.core.arrays import Bools, Floats
 from sdimu_calibration.core.compiled import compiled
 from sdimu_calibration.core.effects.imu_model import ImuModel
-from sdimu_calibration.core.effects.motion import Motion
+from sdimu_calibration.core.effects.motion import NO_PAST, Motion
 from sdimu_calibration.core.matrix3 import elements, multiplied, orthonormal3, rotation3, store
 from sdimu_calibration.core.navigation.strapdown import Cycles
 from sdimu_calibration.core.recording import TemperatureLog
@@ -140,17 +140,18 @@ def motion(
     C0 = C_start.copy()
     rounds = _COMPENSATIONS if np.any(coefficients) else 0
     earlier = _AtStart.of(before)
+    past = NO_PAST if before is None else np.vstack([before.past, np.column_stack([before.dt, before.f])])
     w_ie = earth.earth_rate(latitude)
     for done in range(rounds + 1):
         C = C0.copy()
         C_nb = _attitudes(C, w * dt[:, None], cycles.coning, dt, latitude)
-        w_seen, f_seen, w_table, turned, leant, since_turn = _seen(
+        w_seen, f_seen, w_table, turned, leant, since_turn, wound = _seen(
             C_nb, w, f, rest, cycles.t, dt, w_ie, gravity, predicted, earlier
         )
         alpha = _acceleration(w_table, rest, cycles, before, causal=not predicted)
         seen = Motion(
             cycles.t, dt, w_seen, f_seen, C_nb, w_table, alpha, rest, heat, heat_rate, turned, leant,
-            since_turn, magnetic_n,
+            since_turn, magnetic_n, wound, past,
         )  # fmt: skip
         if done < rounds:
             error = model.errors(model.regressors(seen), coefficients)
@@ -165,32 +166,37 @@ class _AtStart(NamedTuple):
     turned: Floats  # (3,)
     leant: Floats  # (3,)
     turn_end: float  # s
+    wound: Floats  # (3,), rad
 
     @staticmethod
     def of(before: Motion | None) -> _AtStart:
         """Nothing has turned yet where there is no block before."""
         if before is None:
-            return _AtStart(np.zeros(3), np.zeros(3), -np.inf)
+            return _AtStart(np.zeros(3), np.zeros(3), -np.inf, np.zeros(3))
         end = float(before.t[-1] - 0.5 * before.dt[-1] - before.since_turn[-1])
-        return _AtStart(before.turned[-1].copy(), before.leant[-1].copy(), end)
+        # The middle of the last cycle has been reached: the rest of that cycle is still to come.
+        wound = before.wound[-1] + 0.5 * before.dt[-1] * before.w_table[-1]
+        return _AtStart(before.turned[-1].copy(), before.leant[-1].copy(), end, wound)
 
 
 @compiled
 def _seen(
     C_nb: Floats, w: Floats, f: Floats, rest: Bools, t: Floats, dt: Floats, w_ie: Floats, gravity: float,
     predicted: bool, before: _AtStart,
-) -> tuple[Floats, Floats, Floats, Floats, Floats, Floats]:  # fmt: skip
+) -> tuple[Floats, Floats, Floats, Floats, Floats, Floats, Floats]:  # fmt: skip
     """Rate and force that effects see, the rate against the Earth, and what of past turns they remember.
 
     Returns
     -------
     w_seen, f_seen, w_table, turned, leant : ndarray, shape (n, 3)
     since_turn : ndarray, shape (n,)
+    wound : ndarray, shape (n, 3)
         All as in `Motion`.
     """
     n = len(t)
     w_seen, f_seen, w_table = np.empty((n, 3)), np.empty((n, 3)), np.empty((n, 3))
     turned, leant, since_turn = np.empty((n, 3)), np.empty((n, 3)), np.empty(n)
+    wound, angle = np.empty((n, 3)), before.wound.copy()
     last_turned, last_leant, end = before.turned.copy(), before.leant.copy(), before.turn_end
     for k in range(n):
         square = 0.0
@@ -208,11 +214,13 @@ def _seen(
             if abs(leaning) > _TURNING:
                 last_leant[i] = np.sign(leaning)
             turned[k, i], leant[k, i] = last_turned[i], last_leant[i]
+            wound[k, i] = angle[i] + 0.5 * dt[k] * w_table[k, i]
+            angle[i] += dt[k] * w_table[k, i]
         if square > _STANDING**2:
             end, since_turn[k] = t[k], 0.0
         else:
             since_turn[k] = t[k] - 0.5 * dt[k] - end
-    return w_seen, f_seen, w_table, turned, leant, since_turn
+    return w_seen, f_seen, w_table, turned, leant, since_turn, wound
 
 
 def _acceleration(
