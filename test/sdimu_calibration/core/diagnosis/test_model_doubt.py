@@ -40,7 +40,8 @@ def linear_model(truth: Floats, noise: float = 1.0) -> Bare:
     second = 0.5 * base[:, 1] + RNG.standard_normal(rows)
     third = second + 0.6 * base[:, 0] + 0.05 * RNG.standard_normal(rows)
     W = 0.2 * np.column_stack([base, first, second, third])
-    candidates = tuple(c for c in split(registry.get("accel_quadratic")))
+    names = ("accel_quadratic", "accel_cubic", "accel_bias_asymmetry")
+    candidates = tuple(split(registry.get(name))[0] for name in names)
     e = W @ truth + noise * RNG.standard_normal(rows)
     return Bare(
         e=e, W=W, stop=np.arange(rows) // 10, names=("a", "b", *(c.label for c in candidates)),

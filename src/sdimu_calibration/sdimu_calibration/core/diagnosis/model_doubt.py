@@ -123,7 +123,7 @@ def _alternatives(
     slope = -solved(J[np.ix_(known, known)] + np.diag(weight), J[np.ix_(known, allowed)])
     variance = 1.0 / (scanned.J[allowed] / scale**2 + evidence.prior[allowed - problem.p] ** -2.0)
     return _Alternatives(
-        problem.scores(scanned, scale)[allowed], scanned.d[allowed] / scale**2 * variance, variance, slope
+        problem.scores(scanned, scale, chosen)[allowed], scanned.d[allowed] / scale**2 * variance, variance, slope
     )
 
 

@@ -213,8 +213,8 @@ def _grown(ground: _Ground[E], state: _State) -> tuple[_Ground[E], _State | None
 def _best_addition(ground: _Ground[E], state: _State) -> tuple[int | None, tuple[NoiseTerm, ...]]:
     given, terms = ground.given(state.chosen), state.balance.terms
     noisy = ground.scanned(given, state.chosen, terms)
-    scores = ground.white.scores(noisy)
-    pool = _first(scores) | _first(ground.white.scores(ground.scanned(given, state.chosen, ())))
+    scores = ground.white.scores(noisy, beside=state.chosen)
+    pool = _first(scores) | _first(ground.white.scores(ground.scanned(given, state.chosen, ()), beside=state.chosen))
     best, best_score, best_terms = None, LOG_BAYES, terms
     for column in sorted(pool):
         weight = ground.white.known([column])[1][-1]
@@ -258,7 +258,8 @@ def _exchanged(ground: _Ground[E], state: _State) -> _State:
         before = state
         for column in before.chosen:
             others = [c for c in state.chosen if c != column]
-            scores = ground.white.scores(ground.scanned(ground.given(others), others, state.balance.terms))
+            scanned = ground.scanned(ground.given(others), others, state.balance.terms)
+            scores = ground.white.scores(scanned, beside=others)
             best = int(np.argmax(scores))
             if best != column and scores[best] > scores[column]:
                 other = ground.state([*others, best], state.balance.terms, more=False)
@@ -279,7 +280,7 @@ def _told(ground: _Ground[E], state: _State, white: Search[E]) -> Search[E]:
         chosen = state.chosen[:k]
         scanned = ground.scanned(ground.given(chosen), chosen, state.balance.terms)
         after = problem.held_out([*chosen, column], 1.0)
-        scores = problem.scores(scanned)
+        scores = problem.scores(scanned, beside=chosen)
         step = judged(problem, scanned, scores, chosen, column, ground.limit, before, after)
         steps.append(replace(step, accepted=True, reason=""))
         before = after

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Generic
 
 import numpy as np
@@ -42,6 +43,8 @@ _PROVEN = 30.0
 companions."""
 _OWN_ODDS = 6.0
 """Log odds that a registered effect has before an equation of which physics says nothing."""
+_KIN = 2.0
+"""Log odds (1) of an effect that acts on one axis as one that was found acts on another: they have one cause."""
 _SHARPER = 1.0
 """Gain of the log Bayes factor from which a time or time constant between those of the scan is worth its digits."""
 _KEEP = 3.0
@@ -180,15 +183,33 @@ class Problem(Generic[E]):
         tested = np.flatnonzero(np.isfinite(scanned.sigma))
         return threshold(self.evidence.information, self.evidence.model, self.evidence.weight, tested, alpha)
 
-    def scores(self, scanned: Scan, scale: float = 1.0) -> Floats:
-        """Log Bayes factor of every column against the model without it; -inf where not testable."""
+    @cached_property
+    def _kin(self) -> Ints:
+        """Number of the effect, with its time constant or the like, of each candidate."""
+        known: dict[tuple[str, ...], int] = {}
+        keys = [(c.family, *c.effect.options.values()) for c in self.evidence.candidates]
+        return np.array([known.setdefault(key, len(known)) for key in keys], dtype=np.int64)
+
+    def scores(self, scanned: Scan, scale: float = 1.0, beside: Sequence[int] = ()) -> Floats:
+        """Log posterior odds of every column against the model without it; -inf where not testable.
+
+        Parameters
+        ----------
+        scanned : Scan
+        scale : float
+            Residual noise over specified noise.
+        beside : sequence of int
+            Columns that were chosen.
+        """
         p = self.p
         J, d = scanned.J[p:] / scale**2, scanned.d[p:] / scale**2
         wide = 1.0 / (_WIDE * self.evidence.prior) ** 2
         with np.errstate(divide="ignore", invalid="ignore"):
             occam = np.where(wide > 0.0, 0.5 * np.log1p(J / wide), 0.0)
             score = 0.5 * d**2 / (J + wide) - occam
-        score = score - np.array([_OWN_ODDS if c.family == "own" else 0.0 for c in self.evidence.candidates])
+        own = np.array([c.family == "own" for c in self.evidence.candidates], dtype=bool)
+        kin = np.isin(self._kin, self._kin[np.array(beside, dtype=int) - p]) & ~own
+        score = score - _OWN_ODDS * own + _KIN * kin
         wrong = (d < 0.0) & np.array([c.effect.positive for c in self.evidence.candidates], dtype=bool)
         score = np.where(wrong, -np.inf, score)
         return np.concatenate([np.full(p, -np.inf), np.where(np.isfinite(scanned.sigma[p:]), score, -np.inf)])
@@ -226,7 +247,7 @@ def search(
     before = problem.held_out(chosen, 1.0)
     scanned = first
     while len(steps) < most and not (len(steps) >= _PATIENCE and patchwork(problem.candidate(c) for c in chosen)):
-        scores = problem.scores(scanned, scale)
+        scores = problem.scores(scanned, scale, chosen)
         above = np.where(np.abs(scanned.z) > limit, scores, -np.inf)
         best = int(np.argmax(above))
         if not np.isfinite(above[best]):
@@ -238,7 +259,7 @@ def search(
             problem = Problem(evidence.only(allowed))
             best = problem.p + len(allowed) - 1
             scanned = problem.scan(chosen, scale)
-            scores = problem.scores(scanned, scale)
+            scores = problem.scores(scanned, scale, chosen)
         trial = _polish(problem, [*chosen, best])
         after = problem.held_out(trial, 1.0)
         step = judged(problem, scanned, scores, chosen, best, limit, before, after)
@@ -262,7 +283,7 @@ def patchwork(chosen: Iterable[Candidate]) -> bool:
 def look_alikes(problem: Problem[E], chosen: Sequence[int], column: int, allowed: Ints, scale: float) -> list[int]:
     """Columns among `allowed` that the data cannot tell from a chosen one, all others chosen being in the model."""
     others = [c for c in chosen if c != column]
-    scores = problem.scores(problem.scan(others, scale), scale)
+    scores = problem.scores(problem.scan(others, scale), scale, others)
     outside = np.ones(len(scores), dtype=bool)
     outside[allowed] = False
     outside[column] = False
@@ -302,7 +323,7 @@ def _polish(problem: Problem[E], chosen: list[int]) -> list[int]:
         changed = False
         for place in range(len(chosen)):
             others = chosen[:place] + chosen[place + 1 :]
-            scores = problem.scores(problem.scan(others, 1.0))
+            scores = problem.scores(problem.scan(others, 1.0), beside=others)
             best = int(np.argmax(scores))
             if best != chosen[place] and scores[best] > scores[chosen[place]] + 1e-6:
                 chosen = [*others[:place], best, *others[place:]]
