@@ -95,17 +95,33 @@ def sentence(d: Diagnosis) -> str:
     if d.verdict == "class of effects":
         others = ", ".join(d.alike[:_LISTED])
         return f"One effect is missing: {names}, or what looks the same here ({others}); {rest}."
+    if len(d.chosen) > 1 and len(_families(d)) == 1:
+        return f"One effect is missing on {len(d.chosen)} axes: {names}; {rest}."
     return f"{'One effect is' if d.verdict == 'one effect' else 'Several effects are'} missing: {names}; {rest}."
 
 
-def _named(d: Diagnosis) -> str:
-    """Name what was found; of many the ones with the largest scores, and how many more."""
-    labels = [c.label for c in d.chosen]
-    if len(labels) <= _LISTED:
-        return " and ".join(labels)
+def _families(d: Diagnosis) -> list[list[Candidate]]:
+    """Group what was found by effect, time constants and the like included; the largest score first."""
     score = {step.label: abs(step.z) for step in d.found.steps}
-    largest = sorted(labels, key=lambda label: -score.get(label, 0.0))[:_LARGEST]
-    return f"{', '.join(largest)} and {len(labels) - _LARGEST} more"
+    groups: dict[tuple[str, ...], list[Candidate]] = {}
+    for candidate in sorted(d.chosen, key=lambda c: -score.get(c.label, 0.0)):
+        own = candidate.family == "own"
+        key = (candidate.label,) if own else (candidate.family, *candidate.effect.options.values())
+        groups.setdefault(key, []).append(candidate)
+    return list(groups.values())
+
+
+def _named(d: Diagnosis) -> str:
+    """Name what was found by families; of many the ones with the largest scores, and how many more."""
+    families = _families(d)
+    words = [
+        group[0].label if len(group) == 1 else f"{group[0].effect.title} ({', '.join(c.label for c in group)})"
+        for group in families
+    ]
+    if len(words) <= _LISTED:
+        return " and ".join(words)
+    more = sum(len(group) for group in families[_LARGEST:])
+    return f"{', '.join(words[:_LARGEST])} and {more} more"
 
 
 def _consistent(d: Diagnosis) -> str:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
+from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.estimation.fit import Fit
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.estimation.solve import AUTO, solve
@@ -14,6 +16,8 @@ from sdimu_calibration.core.recording import Recording
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.specification import ImuSpecification, Model, Site
 
+_ONE = 0.9995
+"""Correlation from which two coefficients are one: each then has thirty times the sigma it would have alone."""
 _TOLD = 1.2
 """Ratio of a sigma to the one if the model is right, from which a note reports it: less is seen in no use of it."""
 
@@ -35,7 +39,9 @@ def outcome(fit: Fit, held_out: bool = True) -> Calibration:
     statistics = fit.statistics()
     statistics["held_out_rms"] = fit.held_out_rms() if held_out else None
     parameters = fit.sensors.parameters
-    warnings = (*(f.text for f in fit.faults if f.grave), *fit.warnings(statistics))
+    covariance = fit.covariance
+    grave = (f.text for f in fit.faults if f.grave)
+    warnings = (*grave, *fit.warnings(statistics), *inseparable(fit.names, covariance))
     light = tuple(f.text for f in fit.faults if not f.grave)
     return Calibration(
         body_frame=fit.body_frame,
@@ -44,7 +50,7 @@ def outcome(fit: Fit, held_out: bool = True) -> Calibration:
         units=tuple(p.unit for p in parameters),
         display_units=tuple(p.display_unit for p in parameters),
         values=fit.values,
-        covariance=fit.covariance,
+        covariance=covariance,
         fit=statistics,
         data=fit.data_counts(),
         notes=(*fit.test.recording.notes, *fit.notes(), *light, *warnings),
@@ -56,6 +62,25 @@ def outcome(fit: Fit, held_out: bool = True) -> Calibration:
         noise=fit.noise_terms,
         drift_means=fit.drift_means,
     )
+
+
+def inseparable(names: Sequence[str], covariance: Floats) -> list[str]:
+    """Name the coefficients that the data do not tell from each other, one line for a pair.
+
+    Parameters
+    ----------
+    names : sequence of str, length p
+    covariance : ndarray, shape (p, p)
+        SI.
+    """
+    sigma = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    unit = np.divide(1.0, sigma, out=np.zeros_like(sigma), where=sigma > 0.0)
+    correlation = np.triu(np.abs(covariance * np.outer(unit, unit)), 1)
+    return [
+        f"{names[i]} and {names[j]} cannot be told from each other in this test (correlation "
+        f"{correlation[i, j]:.5f}): their sum is known, neither of them is; take one out of the model"
+        for i, j in np.argwhere(correlation > _ONE).tolist()
+    ]
 
 
 def doubted(result: Calibration, fit: Fit) -> Calibration:

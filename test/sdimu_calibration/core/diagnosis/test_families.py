@@ -1,0 +1,30 @@
+"""One cause that moves several axes is sought and told as one."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from sdimu_calibration.core.diagnosis.candidates import catalogue
+from sdimu_calibration.core.diagnosis.search import Problem
+
+
+@pytest.fixture(scope="module")
+def problem(bench):
+    fit = bench.fit()
+    return Problem(fit.evidence(catalogue(fit.timetable, set(fit.labels), has_temperature=False)))
+
+
+def test_an_axis_beside_another_of_the_same_effect_is_likelier_and_nothing_else_is(problem):
+    names = problem.evidence.names
+    first = names.index("gyro_bias_settling_x(tau=32 s)")
+    scanned = problem.scan([first])
+    beside, alone = problem.scores(scanned, beside=[first]), problem.scores(scanned)
+    moved = {names[i] for i in np.flatnonzero(beside > alone)}
+    assert moved == {"gyro_bias_settling_y(tau=32 s)", "gyro_bias_settling_z(tau=32 s)"}
+
+
+def test_a_triad_that_turns_is_told_as_one_effect_on_two_axes(bench):
+    found = bench.diagnosis(7, ("accel_triad_ramp_x=25 arcsec/h", "accel_triad_ramp_y=-30 arcsec/h"))
+    assert {c.label for c in found.chosen} == {"accel_triad_ramp_x", "accel_triad_ramp_y"}
+    assert found.sentence.startswith("One effect is missing on 2 axes: turn of the accelerometer triad with time (accel_")

@@ -1,0 +1,27 @@
+"""Coefficients that a test does not tell from each other are named."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from sdimu_calibration.core.estimation.outcome import inseparable, outcome
+from sdimu_calibration.core.estimation.solve import extend
+from sdimu_calibration.core.evidence.noise_kernels import constant_between
+
+
+def test_a_second_bias_is_told_with_the_one_it_is(bench):
+    prior = dict.fromkeys(["navigation", "tactical", "mems"], 1e-5)
+    always = replace(constant_between("the test", -1.0, 1e9), prior=prior).only(("gyro_x in the test",))
+    wider = outcome(extend(bench.fit(), [always]))
+    assert any(w.startswith("gyro_bias_x and gyro_x in the test cannot be told from each other") for w in wider.warnings)
+    assert not any("cannot be told" in w for w in outcome(bench.fit()).warnings)
+
+
+def test_coefficients_without_variance_are_not_compared():
+    covariance = np.array([[0.0, 0.0, 0.0], [0.0, 4.0, -1.0], [0.0, -1.0, 1.0]])
+    assert inseparable(("a", "b", "c"), covariance) == []
+    covariance[1, 2] = covariance[2, 1] = -1.9999
+    (line,) = inseparable(("a", "b", "c"), covariance)
+    assert line.startswith("b and c cannot be told from each other")
