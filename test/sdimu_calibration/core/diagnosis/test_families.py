@@ -27,4 +27,4 @@ def test_an_axis_beside_another_of_the_same_effect_is_likelier_and_nothing_else_
 def test_a_triad_that_turns_is_told_as_one_effect_on_two_axes(bench):
     found = bench.diagnosis(7, ("accel_triad_ramp_x=25 arcsec/h", "accel_triad_ramp_y=-30 arcsec/h"))
     assert {c.label for c in found.chosen} == {"accel_triad_ramp_x", "accel_triad_ramp_y"}
-    assert found.sentence.startswith("One effect is missing on 2 axes: turn of the accelerometer triad with time (accel_")
+    assert found.sentence.startswith("One effect is missing on 2 axes: turn of the accelerometer triad with time (")
