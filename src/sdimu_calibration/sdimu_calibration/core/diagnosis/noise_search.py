@@ -107,9 +107,10 @@ class _Ground(Generic[E]):
 
     def net(self, state: _State) -> float:
         """Likelihood of a state less what its effects and noise terms cost."""
-        imitators = [self.beside(c) for c in state.chosen if self.beside(c)]
-        # One step or ramp is as good as any effect; several of them follow what has another cause.
-        return state.balance.net - sum(self.cost(c, state.balance.terms) for c in state.chosen) - sum(imitators[1:])
+        imitators = {self.white.kin[c - self.white.p]: self.beside(c) for c in state.chosen if self.beside(c)}
+        # One step or ramp, of any number of sensors, is as good as any effect; several follow what has another cause.
+        several = sum(sorted(imitators.values())[1:])
+        return state.balance.net - sum(self.cost(c, state.balance.terms) for c in state.chosen) - several
 
     def given(self, chosen: Sequence[int]) -> Given:
         """Information on everything else with a choice in the model."""

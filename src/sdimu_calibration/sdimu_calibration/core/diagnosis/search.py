@@ -184,8 +184,8 @@ class Problem(Generic[E]):
         return threshold(self.evidence.information, self.evidence.model, self.evidence.weight, tested, alpha)
 
     @cached_property
-    def _kin(self) -> Ints:
-        """Number of the effect, with its time constant or the like, of each candidate."""
+    def kin(self) -> Ints:
+        """Number of the effect, with its time constant or the like, of each candidate, shape (q,)."""
         known: dict[tuple[str, ...], int] = {}
         keys = [(c.family, *c.effect.options.values()) for c in self.evidence.candidates]
         return np.array([known.setdefault(key, len(known)) for key in keys], dtype=np.int64)
@@ -208,7 +208,7 @@ class Problem(Generic[E]):
             occam = np.where(wide > 0.0, 0.5 * np.log1p(J / wide), 0.0)
             score = 0.5 * d**2 / (J + wide) - occam
         own = np.array([c.family == "own" for c in self.evidence.candidates], dtype=bool)
-        kin = np.isin(self._kin, self._kin[np.array(beside, dtype=int) - p]) & ~own
+        kin = np.isin(self.kin, self.kin[np.array(beside, dtype=int) - p]) & ~own
         score = score - _OWN_ODDS * own + _KIN * kin
         wrong = (d < 0.0) & np.array([c.effect.positive for c in self.evidence.candidates], dtype=bool)
         score = np.where(wrong, -np.inf, score)
