@@ -13,11 +13,19 @@ reads. ``omega_ib_b`` is the rate of b against i in b (rad/s), ``f_ib_b`` the sp
 from __future__ import annotations
 
 import os
+import sys
+import warnings
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 # The matrices here are small (tens to hundreds of rows): a second thread costs more than it brings, and on a busy
 # machine it waits for its core a hundred times longer than the work takes. Only holds if numpy is not loaded yet.
+if "numpy" in sys.modules and "OPENBLAS_NUM_THREADS" not in os.environ:
+    warnings.warn(
+        "numpy was imported before sdimu_calibration and uses several threads, which makes a diagnosis several times "
+        "slower: import sdimu_calibration first, or set OPENBLAS_NUM_THREADS=1",
+        RuntimeWarning, stacklevel=2,
+    )  # fmt: skip
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 if TYPE_CHECKING:

@@ -67,6 +67,16 @@ def open(  # noqa: A001 (as every library of files has it)
     return open_test(Path(bag), site, specification, source, handheld, measured_noise)
 
 
+def _expect(function: str, argument: str, value: object, kind: type, meant: str) -> None:
+    if not isinstance(value, kind):
+        raise DataError(f"{function}({argument}=...): expected {meant}, not {value!r:.60}")
+
+
+def _listed(texts: str | Sequence[str]) -> list[str]:
+    """Take one text for a list of it."""
+    return [texts] if isinstance(texts, str) else list(texts)
+
+
 def calibrate(
     test: PreparedTest, model: str | None = None, add: Sequence[str] = (), estimator: str = AUTO,
     progress: Progress = silent,
@@ -90,9 +100,10 @@ def calibrate(
     DataError
         When the test, the model or the estimator cannot be used.
     """
+    _expect("calibrate", "test", test, PreparedTest, "what open(...) returns")
     wanted = named_estimator(estimator)
     handheld = wanted == HANDHELD or (wanted == AUTO and test.hides_earth_rate)
-    return CalibrationFit(solve(test, named_model(model, add, handheld), wanted, progress=progress))
+    return CalibrationFit(solve(test, named_model(model, _listed(add), handheld), wanted, progress=progress))
 
 
 def diagnose(
@@ -115,7 +126,8 @@ def diagnose(
     DataError
         When an effect cannot be read, or an extended model cannot be fitted.
     """
-    extra = [effect for text in attempt for effect in find_effects(text)]
+    _expect("diagnose", "fit", fit, CalibrationFit, "what calibrate(...) returns")
+    extra = [effect for text in _listed(attempt) for effect in find_effects(text)]
     return FitDiagnosis(climb(fit.core, extra, progress, refits=refits))
 
 
@@ -127,6 +139,8 @@ def compare(*fits: CalibrationFit) -> Comparison:
     DataError
         When there are fewer than two, or they are of different recordings or body frames.
     """
+    for fit in fits:
+        _expect("compare", "fit", fit, CalibrationFit, "what calibrate(...) returns")
     return Comparison(fits)
 
 
@@ -194,5 +208,6 @@ def simulate(out: str | Path, **options: Any) -> Path:
     points = {point.name: point for point in entry_points(group="sdimu_calibration.verbs")}
     if "simulate" not in points:
         raise DataError("simulate: the package sdimu_sim is not installed")
-    points["simulate"].load()(out=Path(out), **options)
+    several = {key: _listed(options[key]) for key in ("effect", "noise") if options.get(key) is not None}
+    points["simulate"].load()(out=Path(out), **options | several)
     return Path(out)

@@ -27,7 +27,7 @@ def plan(
         list[str] | None, typer.Option(metavar="EFFECT", help="Effect that the plan should also show; may be repeated.")
     ] = None,
     minutes: Annotated[
-        float | None, typer.Option(help="Time available: the best sigmas in it. Without: the shortest plan.")
+        float | None, typer.Option(min=1.0, help="Time available: the best sigmas in it. Without: the shortest plan.")
     ] = None,
     limit: Annotated[list[str] | None, typer.Option(metavar="EFFECT=SIGMA", help=_LIMIT)] = None,
     slack: Annotated[float, typer.Option(min=0.01, help="Factor on the sigmas of --plan that are the limits.")] = 1.2,

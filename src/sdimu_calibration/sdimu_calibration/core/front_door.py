@@ -183,7 +183,8 @@ def _placed(recording: Recording, imu: ImuSpecification, options: OpeningOptions
         if may_turn and reversed_force(seen, site):
             notes.append(
                 "specific force is read with the opposite sign: as it stands the Earth turns the wrong way for the "
-                "latitude of the site"
+                "latitude of the site. If the site has the wrong sign of its latitude, correct it: all "
+                "accelerometer biases and mass unbalances are reversed otherwise; --accel-sign states the sense"
             )
             recording = replace(recording, f_ib_b=-recording.f_ib_b)
             seen = replace(seen, up_rate=-seen.up_rate)

@@ -223,7 +223,11 @@ def missing(
     known = [n for n in known if registry.get(n).needs != "temperature"]
     unknown = sorted(set(effect or ()) - set(registry.names()))
     if unknown:
-        raise DataError(f"--effect {unknown[0]}: no effect of the catalogue; sdimu effects lists them")
+        whole = [n for n in registry.names() if unknown[0] in {p.name for p in registry.get(n).parameters}]
+        raise DataError(
+            f"--effect {unknown[0]}: " + (f"a coefficient of {whole[0]}; name that" if whole
+                                          else "no effect of the catalogue; sdimu effects lists them")
+        )  # fmt: skip
     console, seeds, results = Console(), range(seed, seed + runs), {}
     for name in effect or known:
         with bar(console) as progress:

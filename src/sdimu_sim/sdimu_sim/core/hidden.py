@@ -105,9 +105,9 @@ _ROWS: tuple[Row, ...] = (
         Row(f"gyro_mass_unbalance_temperature_{kind}{{i}}", "deg/h/g/degC", f"k*dT*a{{{kind}}}", drawn=False)
         for kind in "dq"
     ),
-    # The triad is turned by the angle k about axis i: gravity moves from the second axis after it to the first.
+    # The triad is turned by the angle k about axis i: the next axis turns towards the one after it, that away from it.
     *(
-        Row(f"accel_triad_{name}", unit, {"accel_{n}": f"-k*{angle}*f{{m}}", "accel_{m}": f"k*{angle}*f{{n}}"},
+        Row(f"accel_triad_{name}", unit, {"accel_{n}": f"k*{angle}*f{{m}}", "accel_{m}": f"-k*{angle}*f{{n}}"},
             drawn=False)
         for name, unit, angle in (
             ("ramp_{i}", "arcsec/h", "t"), ("temperature_{i}", "arcsec/degC", "dT"),
@@ -374,9 +374,10 @@ def _take_named(key: EffectKey, found: _Found) -> None:
         found.lost.append(_lost(key, size))
     else:
         read_options(key, {})
+    if size < 0.0 and one_sided(name):
+        instead = " (delay the other triad instead)" if name in _DELAYS else ""
+        raise DataError(f"effect {name}: the size cannot be negative{instead}")
     if name in _DELAYS:
-        if size < 0.0:
-            raise DataError(f"effect {name}: a delay is not negative (delay the other triad instead)")
         for sensor in _DELAYS[name]:
             found.delay[sensor] += size
     elif name in _LEVER_ARM:

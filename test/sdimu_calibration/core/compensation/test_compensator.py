@@ -100,7 +100,9 @@ def test_a_variant_whose_key_is_in_the_result_is_compensated(make_result):
     using = compensator(result, IMU, same_start=True)
     assert using.left_out == ()
     assert len(using.coefficients) == 33
-    assert compensator(result, IMU).left_out == (f"{effect.key} (a function of time in the calibrated recording)",)
+    assert compensator(result, IMU).left_out == (
+        f"{effect.key} (a function of time in the calibrated recording; --same-start where this recording is that one)",
+    )
     t = np.array([10.0, 310.0])
     seen = samples_motion(t, 0.0 * t, np.zeros((2, 3)), np.zeros((2, 3)), 0.0 * t, 0.0 * t)
     warm_up = using.model.regressors(seen)[:, -3:]

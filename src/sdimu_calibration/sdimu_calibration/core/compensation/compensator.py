@@ -228,7 +228,7 @@ def _reason(effect: Effect, key: str, has_temperature: bool, start_known: bool, 
     if "temperature" in needed and not start_known:
         return "needs the temperature at the start of the calibrated recording, which the result does not say"
     if "t" in needed and not same_start:
-        return "a function of time in the calibrated recording"
+        return "a function of time in the calibrated recording; --same-start where this recording is that one"
     return ""
 
 

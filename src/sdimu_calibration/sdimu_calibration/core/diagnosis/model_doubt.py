@@ -5,13 +5,17 @@ diagnosis ends with: with one effect more, too small to be found; with another e
 that was found; and without one that was found at the threshold. Each moves the coefficients. Weighed with their
 posterior odds, the square of the move is what the covariance lacks:
 
-    C = C_0 + sum_m w_m (C_m - C_0 + D_m D_m'),   D_m = theta_m - theta_0
+    C = C_0 + sum_m w_m (V_m + D_m D_m'),   D_m = theta_m - theta_0
+
+V_m is what the uncertain size of the rival adds. What is added, and what takes the place of each find, are mixtures of
+their own: they are nearly independent.
 
 Source: J. Hoeting et al., "Bayesian model averaging: a tutorial", Statistical Science 14 (1999).
 """
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -70,23 +74,39 @@ def model_doubt(fit: Fit, evidence: LinearEvidence, chosen: Sequence[int], allow
         SI; the q coefficients of the model, then the sizes of what was found.
     """
     problem = Problem(evidence)
-    told = [*range(evidence.coefficients), *range(problem.p, problem.p + len(chosen))]
+    q, count = evidence.coefficients, len(chosen)
+    # Each parameter has its odds, however many time constants or moments of it are tried.
+    votes = _votes(problem, allowed)
+    rare = np.log(max(1.0, votes.sum()))
     is_chosen = np.isin(allowed, chosen)
     more = _alternatives(problem, chosen, allowed, scale)
-    open_ = np.isfinite(more.score) & ~is_chosen
-    # One effect that is missing is expected of a whole catalogue.
-    rare = np.log(max(1, sum(evidence.candidates[c - problem.p].family != "own" for c in allowed.tolist())))
-    weight = _shares(more.score - rare, open_)
+    weight = _shares(more.score + np.log(votes) - rare, np.isfinite(more.score) & ~is_chosen)
+    told = [*range(q), *range(problem.p, problem.p + count)]
     out = _spread(fit, evidence, allowed, more, weight, told)
     for number, column in enumerate(chosen):
         others = [c for c in chosen if c != column]
         rivals = _alternatives(problem, others, allowed, scale)
         place = int(np.flatnonzero(allowed == column)[0])
-        others_and_none = np.append(rivals.score, rare) - rivals.score[place]
-        open_ = np.append(np.isfinite(rivals.score) & ~is_chosen, np.isfinite(rivals.score[place]))
-        weight = _shares(others_and_none, open_)
-        out += _exchanged(fit, evidence, allowed, rivals, weight, (place, number), len(out))
+        own = rivals.score[place] + np.log(votes[place])
+        others_and_none = np.append(rivals.score + np.log(votes), rare) - own
+        weight = _shares(others_and_none, np.append(np.isfinite(rivals.score) & ~is_chosen, np.isfinite(own)))
+        rest = [k for k in range(q + count) if k != q + number]
+        told = [*range(q), *range(problem.p, problem.p + count - 1)]
+        out[np.ix_(rest, rest)] += _exchanged(fit, evidence, allowed, rivals, weight, place, told)
     return out
+
+
+def _votes(problem: Problem[LinearEvidence], allowed: Ints) -> Floats:
+    """Odds of each allowed column beside the other variants of its parameter.
+
+    Returns
+    -------
+    ndarray, shape (a,)
+    """
+    candidates = [problem.candidate(c) for c in allowed.tolist()]
+    names = [c.label if c.family == "own" else c.parameter.name for c in candidates]
+    count = Counter(names)
+    return np.array([1.0 / count[name] for name in names])
 
 
 def in_doubt(fit: Fit, final: Fit, evidence: LinearEvidence, chosen: Ints, free: Ints, scale: float) -> Fit:
@@ -122,9 +142,8 @@ def _alternatives(
     scanned = problem.scan(chosen, scale)
     slope = -solved(J[np.ix_(known, known)] + np.diag(weight), J[np.ix_(known, allowed)])
     variance = 1.0 / (scanned.J[allowed] / scale**2 + evidence.prior[allowed - problem.p] ** -2.0)
-    return _Alternatives(
-        problem.scores(scanned, scale, chosen)[allowed], scanned.d[allowed] / scale**2 * variance, variance, slope
-    )
+    score = problem.scores(scanned, scale, chosen, ratio=1.0)[allowed]
+    return _Alternatives(score, scanned.d[allowed] / scale**2 * variance, variance, slope)
 
 
 def _shares(log_odds: Floats, open_: Bools) -> Floats:
@@ -145,28 +164,21 @@ def _spread(
 
 
 def _exchanged(
-    fit: Fit, evidence: LinearEvidence, allowed: Ints, rivals: _Alternatives, weight: Floats,
-    where: tuple[int, int], size: int,
+    fit: Fit, evidence: LinearEvidence, allowed: Ints, rivals: _Alternatives, weight: Floats, place: int,
+    told: Sequence[int],
 ) -> Floats:  # fmt: skip
-    """Spread by other effects in the place of one, or none; (size, size).
+    """Spread by other effects in the place of one, or none; shape (len(told), len(told)).
 
-    The one is `where` among the allowed and the chosen; `weight` (a + 1,) is that of every allowed one, then of none.
+    The one is at `place` among the allowed; `weight` (a + 1,) is that of every allowed one, then of none. The variance
+    of the one stays in the covariance also where it is not there: a little too wide, and never indefinite.
     """
-    out, q = np.zeros((size, size)), evidence.coefficients
-    place, number = where
     at = np.append(np.flatnonzero(weight[:-1]), place)
-    S = rivals.slope[:q, at]
+    S = rivals.slope[told][:, at]
     _add_means(S, fit, evidence, allowed[at])
     moved = S * rivals.estimate[at]
-    apart, w = moved[:, :-1] - moved[:, -1:], weight[at[:-1]]
+    apart, w, S = moved[:, :-1] - moved[:, -1:], weight[at[:-1]], S[:, :-1]
     without = weight[-1] * np.outer(moved[:, -1], moved[:, -1])
-    own = rivals.slope[:q, place]
-    # Where the effect is not there, its own variance spreads nothing.
-    gone = own * (weight.sum() * rivals.variance[place])
-    S = S[:, :-1]
-    out[:q, :q] = (S * (w * rivals.variance[at[:-1]])) @ S.T + (apart * w) @ apart.T + without - np.outer(gone, own)
-    out[:q, q + number] = out[q + number, :q] = -gone
-    return out
+    return np.asarray((S * (w * rivals.variance[at[:-1]])) @ S.T + (apart * w) @ apart.T + without)
 
 
 def _add_means(S: Floats, fit: Fit, evidence: LinearEvidence, columns: Ints) -> None:

@@ -190,7 +190,7 @@ class Problem(Generic[E]):
         keys = [(c.family, *c.effect.options.values()) for c in self.evidence.candidates]
         return np.array([known.setdefault(key, len(known)) for key in keys], dtype=np.int64)
 
-    def scores(self, scanned: Scan, scale: float = 1.0, beside: Sequence[int] = ()) -> Floats:
+    def scores(self, scanned: Scan, scale: float = 1.0, beside: Sequence[int] = (), ratio: float = _WIDE) -> Floats:
         """Log posterior odds of every column against the model without it; -inf where not testable.
 
         Parameters
@@ -200,10 +200,12 @@ class Problem(Generic[E]):
             Residual noise over specified noise.
         beside : sequence of int
             Columns that were chosen.
+        ratio : float
+            Size that an effect may have, over the one-sigma size of physics.
         """
         p = self.p
         J, d = scanned.J[p:] / scale**2, scanned.d[p:] / scale**2
-        wide = 1.0 / (_WIDE * self.evidence.prior) ** 2
+        wide = 1.0 / (ratio * self.evidence.prior) ** 2
         with np.errstate(divide="ignore", invalid="ignore"):
             occam = np.where(wide > 0.0, 0.5 * np.log1p(J / wide), 0.0)
             score = 0.5 * d**2 / (J + wide) - occam

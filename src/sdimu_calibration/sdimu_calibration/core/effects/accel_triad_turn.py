@@ -1,7 +1,7 @@
 """The accelerometer triad turns as a whole against the gyro triad: with time, with temperature, under gravity.
 
-A triad turned by small angles e about the body axes senses ``f + e x f`` less the share that a turn of the frame takes
-away: df = sum_i e_i (unit vector_i x f), one angle on two accelerometers.
+A triad turned by small angles e about the body axes senses ``f - e x f``: df = -sum_i e_i (unit vector_i x f), one
+angle on two accelerometers. Signs are those of a misalignment: +e about x is +q_yx and +q_zx.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ _OVER_TIME = frozenset({Excitation.REPEATED_ATTITUDES})
 
 
 def _turned(f: Floats, size: Floats, i: int) -> Floats:
-    """``size (unit vector_i x f)`` on the two accelerometers after i in the circle x, y, z; shape (n, 2), m/s^2."""
-    return np.column_stack([-size * f[:, (i + 2) % 3], size * f[:, (i + 1) % 3]])
+    """``-size (unit vector_i x f)`` on the two accelerometers after i in the circle x, y, z; shape (n, 2), m/s^2."""
+    return np.column_stack([size * f[:, (i + 2) % 3], -size * f[:, (i + 1) % 3]])
 
 
 def _on_two(name: str, parts: tuple[str, ...], turn: tuple[int, ...], unit: tuple[str, str]) -> tuple[
@@ -53,7 +53,7 @@ def _whole(
 
 RAMP = register(
     _whole(
-        "accel_triad_ramp", "turn of the accelerometer triad with time", "df = t sum_i k_i (e_i x f)",
+        "accel_triad_ramp", "turn of the accelerometer triad with time", "df = -t sum_i k_i (e_i x f)",
         lambda m: m.t - 0.5 * m.dt, ("rad/s", "arcsec/h"), (5, 30, 300),
         "navigation 0.5-5, MEMS 10-300 arcsec/h",
         "Glue and frame between the two triads that give way, most while the unit warms up. The gyros see no such "
@@ -65,7 +65,7 @@ RAMP = register(
 TEMPERATURE = register(
     _whole(
         "accel_triad_temperature", "turn of the accelerometer triad with temperature",
-        "df = (T - T0) sum_i k_i (e_i x f)", lambda m: m.temperature, ("rad/K", "arcsec/degC"), (0.5, 3, 20),
+        "df = -(T - T0) sum_i k_i (e_i x f)", lambda m: m.temperature, ("rad/K", "arcsec/degC"), (0.5, 3, 20),
         "navigation 0.05-0.5, MEMS 1-20 arcsec/C",
         "The frame between the two triads expands unevenly. T0 is the temperature at the start.",
         ("accel_triad_ramp", "accel_bias_temperature"), "unit", "temperature",
@@ -82,7 +82,7 @@ FLEXURE = register(
     Effect(
         name=_FLEXURE,
         title="flexure between the triads under gravity",
-        equation="df = sum_ij k_ij a_j (e_i x f)",
+        equation="df = -sum_ij k_ij a_j (e_i x f)",
         parameters=_FLEXURE_PARAMETERS,
         terms=_FLEXURE_TERMS,
         regressors=lambda m: np.hstack([_turned(m.f, m.a[:, j], i) for i, j in _PAIRS]),
