@@ -120,7 +120,7 @@ def in_doubt(fit: Fit, final: Fit, evidence: LinearEvidence, chosen: Ints, free:
         In the noise that was found.
     chosen : ndarray of int, shape (k,)
         Columns of what was found.
-    free : ndarray of int
+    free : ndarray of int, shape (f,)
         Columns of the free inputs, which are no effects.
     scale : float
         Residual noise over specified noise.
@@ -174,7 +174,8 @@ def _exchanged(
     """
     at = np.append(np.flatnonzero(weight[:-1]), place)
     S = rivals.slope[told][:, at]
-    _add_means(S, fit, evidence, allowed[at])
+    if not evidence.candidates[allowed[place] - len(evidence.weight)].effect.shifts_bias:
+        _add_means(S, fit, evidence, allowed[at])
     moved = S * rivals.estimate[at]
     apart, w, S = moved[:, :-1] - moved[:, -1:], weight[at[:-1]], S[:, :-1]
     without = weight[-1] * np.outer(moved[:, -1], moved[:, -1])
@@ -182,12 +183,10 @@ def _exchanged(
 
 
 def _add_means(S: Floats, fit: Fit, evidence: LinearEvidence, columns: Ints) -> None:
-    """Turn the slope of the biases (k, a) into that of their means over the dwells, where a column is a drift."""
+    """Turn the slope of the biases (k, a) into that of their means over the dwells, where a column shifts a bias."""
     p = len(evidence.weight)
     for place, column in enumerate(columns.tolist()):
         effect = evidence.candidates[column - p].effect
-        if not effect.bias_drift:
-            continue
         name = bias.NAMES[effect.terms[0].channel]
-        if name in evidence.names:
+        if (effect.bias_drift or effect.shifts_bias) and name in evidence.names:
             S[evidence.names.index(name), place] += fit.dwell_means(effect)[0]

@@ -106,6 +106,8 @@ class Effect:
         Motion without which a test does not show the effect.
     bias_drift : bool
         A change of a bias in time by itself: several in a row follow any drift and say nothing of its cause.
+    shifts_bias : bool
+        A bias beside it is that where it is zero, and not the mean over the test: at the temperature of the start.
     wander_like : bool
         A transient after each turn, or a bias that the turns add up to: noise that makes a bias wander imitates it, so
         in such noise it must show more clearly, as a drift must.
@@ -151,6 +153,7 @@ class Effect:
     scope: Scope = "unit"
     excitation: frozenset[Excitation] = frozenset()
     bias_drift: bool = False
+    shifts_bias: bool = False
     wander_like: bool = False
     positive: bool = False
     needs_table: bool = False

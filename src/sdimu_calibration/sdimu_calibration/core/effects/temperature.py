@@ -29,7 +29,7 @@ def _triad(
         family(
             f"{stem}_bias_temperature", f"{word} bias temperature coefficient", f"d{letter}_i = k_i (T - T0)",
             per_axis_columns(triad, _change), (f"{si}/K", f"{shown}/degC"), bias,
-            needs="temperature", excitation=_OVER_TIME,
+            needs="temperature", excitation=_OVER_TIME, shifts_bias=True,
             typical="residual: gyro 0.002-0.1 deg/h/C, accelerometer 0.5-5 ug/C; raw 10-100 times more",
             description="Slow; stops that repeat an orientation at another temperature decide. T0 is the temperature "
             "at the "
@@ -41,7 +41,7 @@ def _triad(
         family(
             f"{stem}_bias_temperature_rate", f"{word} bias temperature-rate coefficient (Shupe)",
             f"d{letter}_i = k_i dT/dt", per_axis_columns(triad, _rate), (f"{si}*s/K", f"{shown}*min/degC"), rate,
-            needs="temperature", excitation=_OVER_TIME,
+            needs="temperature", excitation=_OVER_TIME, shifts_bias=True,
             typical="FOG 0.05-1 deg/h/(C/min), accelerometer 1-20 ug/(C/min)",
             description="Gradients inside the instrument: large while the temperature changes.",
             confused_with=(f"{stem}_bias_warm_up", f"{stem}_bias_step"),

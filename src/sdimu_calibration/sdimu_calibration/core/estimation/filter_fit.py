@@ -62,7 +62,13 @@ class FilterFit(NavigationFit):
 
     @cached_property
     def covariance(self) -> Floats:
-        """Covariance of `values`, shape (p, p)."""
+        """Covariance of `values`.
+
+        Returns
+        -------
+        ndarray, shape (p, p)
+            SI.
+        """
         J = body_frame.frame_jacobian(self.names, self.body_frame)
         return np.asarray(J @ self.settled_covariance @ J.T)
 
@@ -72,25 +78,54 @@ class FilterFit(NavigationFit):
         return known_pass(self.prepared, self.setup, self.last)
 
     def added_columns(self, count: int) -> Ints:
-        """Columns in `evidence` of the last `count` parameters of the model, shape (count,)."""
+        """Columns in `evidence` of the last `count` parameters of the model.
+
+        Returns
+        -------
+        ndarray of int, shape (count,)
+        """
         return np.arange(len(self.names) - count, len(self.names))
 
     def run_kinds(self, kind: Ints) -> PassOutput:
-        """Repeat the last pass with other kinds of measurement, shape (e,)."""
+        """Repeat the last pass with other kinds of measurement.
+
+        Parameters
+        ----------
+        kind : ndarray of int, shape (e,)
+            As in `measurement_kind`.
+        """
         state = PassState(*(v.copy() for v in self.last.start))
         output = new_output(len(kind), len(self.estimate), False, len(kind))
         run_pass(self.last.data._replace(kind=kind), pass_settings(self.setup, closed_loop=False), state, output)
         return output
 
     def on(self, prepared: PreparedData, C_nb: Floats) -> FilterFit:
-        """Fit the same model to a part of the recording that starts at attitude `C_nb` (3, 3)."""
+        """Fit the same model to a part of the recording.
+
+        Parameters
+        ----------
+        prepared : PreparedData
+        C_nb : ndarray, shape (3, 3)
+            Attitude at its start.
+        """
         constant = self.setup.sensors.decay_rate == 0.0
         begin = StartPoint(np.ascontiguousarray(C_nb), self.estimate * constant)
         solution = solve_filter(self.setup, prepared, begin, silent)
         return replace(self, prepared=prepared, solution=solution, noise=None)
 
     def compensated(self, prepared: PreparedData, estimate: Floats, C_start: Floats, end_of_fit: float) -> Compensated:
-        """Take the errors at `estimate` (p,) out of all cycles to first order; the fit ended at `end_of_fit` (s)."""
+        """Take the errors out of all cycles, to first order.
+
+        Parameters
+        ----------
+        prepared : PreparedData
+        estimate : ndarray, shape (p,)
+            Coefficients of the estimator (SI).
+        C_start : ndarray, shape (3, 3)
+            Attitude at the start.
+        end_of_fit : float
+            s.
+        """
         setup, sensors, cycles = self.setup, self.setup.sensors, prepared.cycles
         seen = motion(
             cycles, prepared.rest, sensors, estimate, C_start.copy(), setup.site.latitude_rad, setup.gravity,

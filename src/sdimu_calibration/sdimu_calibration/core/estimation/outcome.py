@@ -17,7 +17,7 @@ from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.specification import ImuSpecification, Model, Site
 
 _ONE = 0.9995
-"""Correlation from which two coefficients are one: each then has thirty times the sigma it would have alone."""
+"""Correlation (1) from which two coefficients are one: each then has thirty times the sigma it would have alone."""
 _TOLD = 1.2
 """Ratio of a sigma to the one if the model is right, from which a note reports it: less is seen in no use of it."""
 
