@@ -106,7 +106,7 @@ class FilterFit(NavigationFit):
         ----------
         prepared : PreparedData
         C_nb : ndarray, shape (3, 3)
-            Attitude at its start.
+            Direction cosines at its start (1).
         """
         constant = self.setup.sensors.decay_rate == 0.0
         begin = StartPoint(np.ascontiguousarray(C_nb), self.estimate * constant)
