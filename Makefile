@@ -10,6 +10,8 @@ NUMBER   := $(words $(PACKAGES))
 COLCON_TEST ?= rate_table_sim
 
 export PATH := $(CURDIR)/$(BIN):$(PATH)
+# Small matrices: a second thread of BLAS waits for its core longer than the work takes.
+export OPENBLAS_NUM_THREADS ?= 1
 
 setup: $(STAMP)
 

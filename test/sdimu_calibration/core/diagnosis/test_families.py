@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from sdimu_calibration.core.diagnosis.candidates import catalogue
+from sdimu_calibration.core.diagnosis.diagnose import climb
 from sdimu_calibration.core.diagnosis.search import Problem
 
 
@@ -24,7 +25,16 @@ def test_an_axis_beside_another_of_the_same_effect_is_likelier_and_nothing_else_
     assert moved == {"gyro_bias_settling_y(tau=32 s)", "gyro_bias_settling_z(tau=32 s)"}
 
 
+TURNED = ("accel_triad_ramp_x=25 arcsec/h", "accel_triad_ramp_y=-30 arcsec/h")
+
+
+def test_an_effect_that_is_not_to_be_tried_is_not_named_and_something_is_missing_all_the_same(bench):
+    found = climb(bench.fit(7, TURNED), without=("accel_triad_ramp",))
+    assert not any(c.family == "accel_triad_ramp" for c in found.chosen)
+    assert found.verdict != "consistent"
+
+
 def test_a_triad_that_turns_is_told_as_one_effect_on_two_axes(bench):
-    found = bench.diagnosis(7, ("accel_triad_ramp_x=25 arcsec/h", "accel_triad_ramp_y=-30 arcsec/h"))
+    found = bench.diagnosis(7, TURNED)
     assert {c.label for c in found.chosen} == {"accel_triad_ramp_x", "accel_triad_ramp_y"}
     assert found.sentence.startswith("One effect is missing on 2 axes: turn of the accelerometer triad with time (")
