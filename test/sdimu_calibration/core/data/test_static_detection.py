@@ -52,3 +52,43 @@ def test_a_hand_that_never_rests_is_told():
     w = np.sin(2.0 * np.pi * t[:, None] * (0.05 + 0.3 * t[:, None] / 20.0) + np.arange(3.0)) * np.exp(0.1 * t[:, None])
     with pytest.raises(DataError, match="no rest"):
         detect_static(Recording(0, t, 3.0 * w, np.cumsum(w, axis=0)))
+
+
+def _stand(jolt: np.ndarray, way: np.ndarray, seconds: float = 2.0) -> Recording:
+    """Two spells of 4 s on the bench about a gap with a jolt of `jolt` (m/s^2) and turning at `way` (rad/s), 100 Hz."""
+    rng = np.random.default_rng(3)
+    t = np.arange(1, round(100 * (8.0 + seconds)) + 1) * 0.01
+    w, f = GYRO * 10.0 * rng.standard_normal((len(t), 3)), ACCEL * 10.0 * rng.standard_normal((len(t), 3))
+    gap = slice(400, 400 + round(100 * seconds))
+    w[gap] += way
+    f += [0.0, 0.0, -9.8]
+    f[gap] += jolt
+    return Recording(0, t, w, f)
+
+
+def _wave(amplitude: float, seconds: float = 2.0) -> np.ndarray:
+    """A rate about x that comes back to the attitude that it left, shape (n, 3)."""
+    t = np.arange(round(100 * seconds)) * 0.01
+    return np.outer(amplitude * np.sin(2.0 * np.pi * t / seconds), [1.0, 0.0, 0.0])
+
+
+def test_a_jolt_does_not_cut_a_rest_in_two():
+    shake = np.random.default_rng(4).standard_normal((200, 3))
+    rests = detect_static(_stand(0.5 * shake, _wave(np.radians(0.5))))
+    assert len(rests) == 1
+    assert rests.last[0] - rests.first[0] > 900
+    # The noise is that of the rest, not of the jolt.
+    assert abs(rests.accel_white_noise / ACCEL - 1.0) < 0.3
+
+
+@pytest.mark.parametrize(
+    "jolt, way, seconds",
+    [
+        (0.0, np.radians(2.0) * np.array([0.0, 0.0, 1.0]), 2.0),  # turned about the vertical: the same force
+        (0.0, _wave(np.radians(30.0)), 2.0),  # lifted and put back
+        (1.0, np.zeros(3), 4.0),  # away for long
+    ],
+)
+def test_an_imu_that_was_moved_has_two_rests(jolt, way, seconds):
+    shake = jolt * np.random.default_rng(4).standard_normal((round(100 * seconds), 3))
+    assert len(detect_static(_stand(shake, way, seconds))) == 2

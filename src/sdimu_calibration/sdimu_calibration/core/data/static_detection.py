@@ -35,8 +35,11 @@ _HOLE = 3.0
 """Distance of two samples (intervals): in a longer one a hand may have moved."""
 _EARTH_SEEN = 3.0
 """Ratio of the Earth's rate to the gyros' white noise in a rest: from here on it is seen."""
-_SAME_ATTITUDE = np.radians(1.0)
-"""Angle between the specific forces of two rests (rad) below which they are pieces of one: a turn moves more."""
+_SAME_ATTITUDE = np.radians(0.3)
+"""Angle between two pieces of one rest (rad), by the forces and by the gyros: four sigmas of half a second of a noisy
+accelerometer; a turn that is worth making is longer."""
+_NUDGE = np.radians(1.0)
+"""Angle that the gyros may leave a rest by and come back (rad): longer, the mean force is that of other attitudes."""
 _FRAGMENT_S = 3.0
 """Gap between two pieces of one rest (s): what a jolt or a burst of noise takes."""
 _BLOCK_S = 0.5
@@ -82,9 +85,34 @@ def detect_static(recording: Recording) -> StaticIntervals:
     if not long.any():
         raise DataError("/imu/data_raw: no rest of half a second was found: put the IMU down between the turns")
     first, last = first[long], last[long]
-    return StaticIntervals(
-        first, last, _density(recording.omega_ib_b, first, last, dt), _density(recording.f_ib_b, first, last, dt)
-    )
+    gyro, accel = _density(recording.omega_ib_b, first, last, dt), _density(recording.f_ib_b, first, last, dt)
+    return StaticIntervals(*_joined(recording, first, last), gyro, accel)
+
+
+def _joined(recording: Recording, first: Ints, last: Ints) -> tuple[Ints, Ints]:
+    """Join the pieces of one rest that a jolt or a burst of noise cut.
+
+    Pieces are no rests of their own: the errors that the model leaves at an attitude are the same in all of them. The
+    mean over the whole rest, jolt included, is that of gravity, as the jolt begins and ends at the same attitude, at
+    rest.
+    """
+    cut = [not _one_rest(recording, (a, b), (c, d)) for a, b, c, d in zip(first, last, first[1:], last[1:])]
+    ends = np.array([*cut, True])
+    return first[np.append(True, ends[:-1])], last[ends]
+
+
+def _one_rest(recording: Recording, before: tuple[int, int], after: tuple[int, int]) -> bool:
+    """Decide whether the IMU stood at one attitude before and after a gap, and hardly left it in between."""
+    (a, b), (c, d) = before, after
+    if recording.t[c] - recording.t[b - 1] > _FRAGMENT_S:
+        return False
+    force = [recording.f_ib_b[at].mean(axis=0) for at in (slice(a, b), slice(c, d))]
+    unit = [f / np.linalg.norm(f) for f in force]
+    bias = np.concatenate([recording.omega_ib_b[a:b], recording.omega_ib_b[c:d]]).mean(axis=0)
+    step = np.diff(recording.t[b - 1 : c])[:, None]
+    way = np.linalg.norm(np.cumsum((recording.omega_ib_b[b:c] - bias) * step, axis=0), axis=1)
+    apart = max(float(np.linalg.norm(unit[1] - unit[0])), float(way[-1]) if len(way) else 0.0)
+    return apart < _SAME_ATTITUDE and float(way.max(initial=0.0)) < _NUDGE
 
 
 def hides_earth_rate(recording: Recording, imu: ImuSpecification) -> bool:
@@ -103,23 +131,13 @@ def hides_earth_rate(recording: Recording, imu: ImuSpecification) -> bool:
 
 
 def _usual_rest(recording: Recording, rests: StaticIntervals) -> float:
-    """Median length of a rest (s): of the dwells that the table states, else of rests with their fragments joined.
-
-    Where noise or a jolt cuts one rest in pieces, as many pieces as chance makes, the length of a piece means nothing.
-    """
+    """Median length of a rest (s): of the dwells that the table states, else of the rests found."""
     phase = recording.phase
     if phase is not None and phase.dwell.any():
         edge = np.diff(np.concatenate([[0], phase.dwell.astype(int), [0]]))
         begin, end = np.append(phase.t, recording.t[-1])[edge > 0], np.append(phase.t, recording.t[-1])[edge < 0]
         return float(np.median(end - begin))
-    mean = np.array([recording.f_ib_b[a:b].mean(axis=0) for a, b in zip(rests.first, rests.last, strict=True)])
-    unit = mean / np.linalg.norm(mean, axis=1, keepdims=True)
-    same = np.linalg.norm(np.diff(unit, axis=0), axis=1) < _SAME_ATTITUDE
-    near = (recording.t[rests.first[1:]] - recording.t[rests.last[:-1] - 1]) < _FRAGMENT_S
-    begins = np.append(True, ~(same & near))
-    first = recording.t[rests.first[begins]]
-    last = recording.t[rests.last[np.append(begins[1:], True)] - 1]
-    return float(np.median(last - first))
+    return float(np.median(recording.t[rests.last - 1] - recording.t[rests.first]))
 
 
 def still_samples(recording: Recording, width: int, turning: float, hole: float) -> Bools:
