@@ -4,7 +4,7 @@ Stamps are integers (ns) until `arrival.in_order` counts seconds from one origin
 
 1. samples by their stamps, each stamp once, every number finite (`data.arrival`)
 2. units and signs (`data.axes_and_units`), even stamps (`data.dejitter`), one clock (`data.status_clock`)
-3. white noise measured at rest, where the user asks for it (`noise`)
+3. white noise measured at rest, where the user asks for it; quantisation where the rests show it (`noise`)
 4. rests without a status (`data.dwell_detection`), latitude, gravity, sign of the force (`data.latitude_check`)
 
 What the data contradict or leave open is told in a note or refused with a question: never silently wrong. Samples that
@@ -26,6 +26,7 @@ from sdimu_calibration.core.data.dwell_detection import with_detected_dwells
 from sdimu_calibration.core.data.latitude_check import EarthRate, contradictions, observe_earth_rate, reversed_force
 from sdimu_calibration.core.data.static_detection import hides_earth_rate
 from sdimu_calibration.core.data.status_clock import aligned
+from sdimu_calibration.core.noise.quantisation import with_quantisation
 from sdimu_calibration.core.recording import DataError, Recording
 from sdimu_calibration.core.specification import ImuSpecification, Site
 
@@ -157,6 +158,9 @@ def open_test(recording: Recording, options: OpeningOptions, where: str = IMU_TO
     recording, imu = in_si(recording, options.stated, where), options.imu
     if options.measured_noise:
         recording, imu = _with_measured_noise(recording, imu)
+    else:
+        imu, note = with_quantisation(imu, recording)
+        recording = replace(recording, notes=(*recording.notes, note)) if note else recording
     handheld = hides_earth_rate(recording, imu) if options.handheld is None else options.handheld
     if handheld and options.assumed_site:
         return OpenedTest(recording, imu, None)

@@ -32,7 +32,7 @@ from sdimu_calibration.core.navigation.track import motion
 from sdimu_calibration.core.recording import DataError, PhaseLog, seconds
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.rotation import quaternion
-from sdimu_calibration.core.specification import Model
+from sdimu_calibration.core.specification import EPOCH_S, Model
 
 NS = 1_000_000_000
 """Stamps of a second (ns): header stamps are integers."""
@@ -114,7 +114,7 @@ class LiveCalibration:
 
     def __init__(self, options: OpeningOptions, model: Model) -> None:
         self.options = options
-        self.setup = set_up(options.site, options.imu, model)
+        self.setup = set_up(options.site, options.imu, model, EPOCH_S)
         self.notes: list[str] = []
         """What the caller should publish, such as what the filter waits for; the caller empties the list."""
         self._intake = Intake()

@@ -3,9 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
+
+EPOCH_S = 1.0
+"""Nominal length of an epoch (s): the paper's measurement rate is 1 Hz."""
+LONGEST_EPOCH_S = 20.0
+"""Longest epoch (s): the error dynamics of an epoch are expanded in its length; beyond half a minute that shows."""
 
 
 @dataclass(frozen=True)
@@ -46,6 +51,8 @@ class ImuSpecification:
         Angle random walk as a density (rad/s/sqrt(Hz)): the sigma of a 1 s mean.
     accel_white_noise : float
         Velocity random walk as a density (m/s^2/sqrt(Hz)).
+    gyro_quantisation, accel_quantisation : float
+        Sigma of the angle (rad) or velocity (m/s) that a sample keeps for the next one; 0 for an IMU that keeps none.
     gyro_bias_instability, accel_bias_instability : float
         Bias instability B of the data sheet (rad/s, m/s^2); 0 where it is not stated. Noise with a memory is learned
         from the recording; these say what to expect.
@@ -65,6 +72,42 @@ class ImuSpecification:
     prior_units: Mapping[str, str] = field(default_factory=dict)
     gyro_bias_instability: float = 0.0
     accel_bias_instability: float = 0.0
+    gyro_quantisation: float = 0.0
+    accel_quantisation: float = 0.0
+
+    @property
+    def epoch_s(self) -> float:
+        """Length of an epoch at rest (s) in which quantisation has a third of the variance of the mean, at most.
+
+        White noise gives a mean over T the variance N^2 / T, a residue Q gives it 2 Q^2 / T^2.
+        """
+        pairs = (
+            (self.gyro_quantisation, self.gyro_white_noise), (self.accel_quantisation, self.accel_white_noise),
+        )  # fmt: skip
+        ratio = max((q / n) ** 2 if n > 0.0 else 0.0 for q, n in pairs)
+        return float(np.clip(np.ceil(4.0 * ratio), EPOCH_S, LONGEST_EPOCH_S))
+
+    def with_noise_times(self, gyro: float, accel: float) -> ImuSpecification:
+        """Return the specification with white noise and quantisation of both triads times a factor."""
+        return replace(
+            self, gyro_white_noise=gyro * self.gyro_white_noise, gyro_quantisation=gyro * self.gyro_quantisation,
+            accel_white_noise=accel * self.accel_white_noise, accel_quantisation=accel * self.accel_quantisation,
+        )  # fmt: skip
+
+    def in_means_over(self, seconds: float) -> ImuSpecification:
+        """Return the specification whose white noise gives means over `seconds` their variance, quantisation included.
+
+        Parameters
+        ----------
+        seconds : float
+            Length of the means (s).
+        """
+        gyro = np.sqrt(self.gyro_white_noise**2 + 2.0 * self.gyro_quantisation**2 / seconds)
+        accel = np.sqrt(self.accel_white_noise**2 + 2.0 * self.accel_quantisation**2 / seconds)
+        return replace(
+            self, gyro_white_noise=float(gyro), accel_white_noise=float(accel),
+            gyro_quantisation=0.0, accel_quantisation=0.0,
+        )  # fmt: skip
 
 
 @dataclass(frozen=True)

@@ -82,7 +82,7 @@ def test_a_jolt_does_not_cut_a_rest_in_two():
 
 
 @pytest.mark.parametrize(
-    "jolt, way, seconds",
+    ("jolt", "way", "seconds"),
     [
         (0.0, np.radians(2.0) * np.array([0.0, 0.0, 1.0]), 2.0),  # turned about the vertical: the same force
         (0.0, _wave(np.radians(30.0)), 2.0),  # lifted and put back

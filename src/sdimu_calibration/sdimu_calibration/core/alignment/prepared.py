@@ -12,6 +12,7 @@ from sdimu_calibration.core.arrays import Bools, Floats, Ints
 from sdimu_calibration.core.data.dwell_detection import specification_is_wide
 from sdimu_calibration.core.data.epochs import Epochs, cut
 from sdimu_calibration.core.data.gaps import Bridges, bridges, judge, largest_acceleration, weighed
+from sdimu_calibration.core.data.long_epochs import long_epochs
 from sdimu_calibration.core.data.phases import (
     Phases,
     PhaseState,
@@ -28,7 +29,7 @@ from sdimu_calibration.core.measurement_kind import ALL, SENSORS, SKIP
 from sdimu_calibration.core.navigation.strapdown import Cycles, Reducer
 from sdimu_calibration.core.navigation.track import MAGNETIC_FIELD
 from sdimu_calibration.core.recording import NOMINAL_FROM, DataError, DataFault, Recording, TemperatureLog
-from sdimu_calibration.core.specification import ImuSpecification, Model, Site
+from sdimu_calibration.core.specification import EPOCH_S, ImuSpecification, Model, Site
 
 _LISTED = 40
 """Number of stops that are listed one by one: more do not fit on a line."""
@@ -38,7 +39,19 @@ ALIGN_S = 30.0
 
 @dataclass(frozen=True)
 class TestSetup:
-    """Everything a pass needs that is not data."""
+    """Everything a pass needs that is not data.
+
+    Attributes
+    ----------
+    site, imu, model : Site, ImuSpecification, Model
+        The white noise of `imu` is that of means over `epoch_s`, quantisation included.
+    sensors : ImuModel
+    limits : RestLimits
+    gravity : float
+        At the site (m/s^2).
+    epoch_s : float
+        Length of an epoch at rest (s).
+    """
 
     site: Site
     imu: ImuSpecification
@@ -46,6 +59,7 @@ class TestSetup:
     sensors: ImuModel
     limits: RestLimits
     gravity: float
+    epoch_s: float = EPOCH_S
 
     @property
     def magnetic_n(self) -> Floats:
@@ -85,14 +99,27 @@ class PreparedData:
         return np.repeat(self.phases.dwell, self.epochs.last - self.epochs.first)
 
 
-def set_up(site: Site, imu: ImuSpecification, model: Model) -> TestSetup:
-    """Check the options against each other and prepare what all passes share."""
+def set_up(site: Site, imu: ImuSpecification, model: Model, epoch_s: float | None = None) -> TestSetup:
+    """Check the options against each other and prepare what all passes share.
+
+    Parameters
+    ----------
+    site, imu, model : Site, ImuSpecification, Model
+    epoch_s : float, optional
+        Length of an epoch at rest (s); by default what the quantisation of the IMU asks for.
+
+    Raises
+    ------
+    DataError
+        When a noise is zero, or model and IMU do not fit together.
+    """
+    epoch_s = imu.epoch_s if epoch_s is None else epoch_s
     sensors = imu_model.build(model.effects, imu)
     for what, noise in (("gyro", imu.gyro_white_noise), ("accel", imu.accel_white_noise)):
         if not noise > 0.0:
             raise DataError(f"IMU '{imu.name}': noise.{what} is zero, and measurements are weighed by it: give it")
     gravity = site.gravity_m_s2 or float(earth.normal_gravity(site.latitude_rad, site.height_m))
-    return TestSetup(site, imu, model, sensors, rest_limits(imu), gravity)
+    return TestSetup(site, imu.in_means_over(epoch_s), model, sensors, rest_limits(imu), gravity, epoch_s)
 
 
 def nominal_interval(t: Floats) -> float:
@@ -143,7 +170,6 @@ def reduce(recording: Recording, setup: TestSetup, screened: bool = True) -> Pre
         raise DataError("/imu/data_raw: the recording is shorter than one second")
     phases = classify(epochs, recording.phase, setup.limits, setup.gravity, setup.model.settle_s, PhaseState())
     phases = without_early_motion(epochs, recording.phase, phases, setup.imu.gyro_white_noise)
-    kind = measurement_kinds(phases, setup.model.zero_velocity == "every_epoch")
     cycles = cycles[: int(epochs.last[-1])]
     found = bridges(cycles, epochs, phases.dwell, nominal, largest_acceleration(cycles), setup.gravity)
     at, excess, rough = wild(recording)
@@ -152,6 +178,9 @@ def reduce(recording: Recording, setup: TestSetup, screened: bool = True) -> Pre
     noise = (setup.imu.gyro_white_noise, setup.imu.accel_white_noise)
     lost = judge(cycles, epochs, phases, nominal, found, noise, unsound)
     faults = (*unsound, *lost, *contradictions(epochs, phases, recording.phase, not specification_is_wide(setup.imu)))
+    if setup.epoch_s > EPOCH_S:
+        epochs, phases, found = long_epochs(epochs, phases, found, setup.epoch_s)
+    kind = measurement_kinds(phases, setup.model.zero_velocity == "every_epoch")
     return PreparedData(cycles, epochs, phases, kind, recording.temperature, found, faults)
 
 
@@ -181,7 +210,7 @@ def first_attitude(epochs: Epochs, phases: Phases, setup: TestSetup) -> Alignmen
         )
     moving = np.flatnonzero(~phases.dwell)
     end = int(moving[0]) if len(moving) else len(phases.dwell)
-    rows = slice(0, max(1, min(end, int(ALIGN_S))))
+    rows = slice(0, max(1, min(end, int(np.searchsorted(epochs.end, epochs.start[0] + ALIGN_S + 1e-6)))))
     weight = (epochs.end - epochs.start)[rows]
     w_mean, f_mean = (
         (v[rows] * weight[:, None]).sum(axis=0) / weight.sum() for v in (epochs.w_mean, epochs.f_mean)

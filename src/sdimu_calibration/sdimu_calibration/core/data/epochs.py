@@ -9,9 +9,7 @@ import numpy as np
 from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.compiled import compiled
 from sdimu_calibration.core.navigation.strapdown import Cycles
-
-EPOCH_S = 1.0
-"""Nominal length (s): the paper's measurement rate is 1 Hz."""
+from sdimu_calibration.core.specification import EPOCH_S
 
 
 @dataclass(frozen=True)

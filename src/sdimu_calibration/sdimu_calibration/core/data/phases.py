@@ -14,13 +14,13 @@ from numpy.typing import NDArray
 
 from sdimu_calibration.core import earth
 from sdimu_calibration.core.arrays import Bools, Ints
-from sdimu_calibration.core.data.epochs import EPOCH_S, Epochs
+from sdimu_calibration.core.data.epochs import Epochs
 from sdimu_calibration.core.effects.bias import ACCEL_BIAS, GYRO_BIAS
 from sdimu_calibration.core.effects.mass_unbalance import GYRO_MASS_UNBALANCE
 from sdimu_calibration.core.effects.scale import ACCEL_SCALE
 from sdimu_calibration.core.navigation.strapdown import CYCLE_S
 from sdimu_calibration.core.recording import DataFault, PhaseLog
-from sdimu_calibration.core.specification import ImuSpecification
+from sdimu_calibration.core.specification import EPOCH_S, ImuSpecification
 from sdimu_calibration.core.units import STANDARD_GRAVITY
 
 STALE_S = 2.5
@@ -50,11 +50,12 @@ def rest_limits(imu: ImuSpecification) -> RestLimits:
     """Limits of rest from an IMU's specification."""
     prior = imu.prior
     bias = np.hypot(prior.get(GYRO_BIAS.name, 0.0), prior.get(GYRO_MASS_UNBALANCE.name, 0.0))
-    noise = imu.gyro_white_noise / np.sqrt(CYCLE_S)
+    seen = imu.in_means_over(CYCLE_S)
+    noise = seen.gyro_white_noise / np.sqrt(CYCLE_S)
     force = np.hypot(prior.get(ACCEL_BIAS.name, 0.0), STANDARD_GRAVITY * prior.get(ACCEL_SCALE.name, 0.0))
     return RestLimits(
         rate=earth.RATE + _SIGMAS * float(np.sqrt(3.0) * np.hypot(bias, noise)),
-        force=max(_LEAST_FORCE, _SIGMAS * float(np.hypot(force, imu.accel_white_noise))),
+        force=max(_LEAST_FORCE, _SIGMAS * float(np.hypot(force, imu.in_means_over(EPOCH_S).accel_white_noise))),
     )
 
 

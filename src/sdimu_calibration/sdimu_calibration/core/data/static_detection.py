@@ -96,7 +96,10 @@ def _joined(recording: Recording, first: Ints, last: Ints) -> tuple[Ints, Ints]:
     mean over the whole rest, jolt included, is that of gravity, as the jolt begins and ends at the same attitude, at
     rest.
     """
-    cut = [not _one_rest(recording, (a, b), (c, d)) for a, b, c, d in zip(first, last, first[1:], last[1:])]
+    cut = [
+        not _one_rest(recording, (a, b), (c, d))
+        for a, b, c, d in zip(first[:-1], last[:-1], first[1:], last[1:], strict=True)
+    ]
     ends = np.array([*cut, True])
     return first[np.append(True, ends[:-1])], last[ends]
 
@@ -112,7 +115,7 @@ def _one_rest(recording: Recording, before: tuple[int, int], after: tuple[int, i
     step = np.diff(recording.t[b - 1 : c])[:, None]
     way = np.linalg.norm(np.cumsum((recording.omega_ib_b[b:c] - bias) * step, axis=0), axis=1)
     apart = max(float(np.linalg.norm(unit[1] - unit[0])), float(way[-1]) if len(way) else 0.0)
-    return apart < _SAME_ATTITUDE and float(way.max(initial=0.0)) < _NUDGE
+    return bool(apart < _SAME_ATTITUDE and way.max(initial=0.0) < _NUDGE)
 
 
 def hides_earth_rate(recording: Recording, imu: ImuSpecification) -> bool:
@@ -186,10 +189,25 @@ def _moving(values: Floats, width: int) -> tuple[Floats, Floats]:
 
 def _like_the_quietest(scatter: Floats, values: Floats) -> Bools:
     """Windows that scatter as the quietest do, or less than the resolution of the sensor."""
-    steps = np.abs(np.diff(values, axis=0))
-    resolution = np.array([np.min(s[s > 0.0], initial=np.inf) for s in steps.T])
-    floor = float(np.sum(np.where(np.isfinite(resolution), resolution, 0.0) ** 2) / 12.0)
+    floor = float(np.sum(resolution(values) ** 2) / 12.0)
     return np.asarray(scatter <= max(_SCATTER * float(np.quantile(scatter, _QUIETEST)), floor))
+
+
+def resolution(values: Floats) -> Floats:
+    """Smallest step between neighbouring samples of each axis, shape (3,), in the unit of `values`.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n, 3)
+        Rate or force (rad/s or m/s^2).
+
+    Returns
+    -------
+    ndarray, shape (3,)
+        In the unit of `values`; zero for an axis that never changes.
+    """
+    steps = np.abs(np.diff(values, axis=0))
+    return np.array([np.min(s[s > 0.0], initial=np.inf) if s.any() else 0.0 for s in steps.T])
 
 
 def _density(values: Floats, first: Ints, last: Ints, dt: float) -> float:

@@ -302,12 +302,7 @@ def measured_noise(consistency: Consistency, fit: Fit) -> tuple[tuple[str, ...],
                 f"{triad} noise has heavy tails: kurtosis {noise.kurtosis:.1f} (3 is Gaussian), {share:.1f} % of the "
                 f"seconds are outliers, with them it is {noise.spread:.2f} times the specification"
             )
-    imu = fit.test.imu
-    return tuple(told), replace(
-        imu,
-        gyro_white_noise=imu.gyro_white_noise * scales["gyro"],
-        accel_white_noise=imu.accel_white_noise * scales["accel"],
-    )
+    return tuple(told), fit.test.imu.with_noise_times(**scales)
 
 
 def p_value(done: Round, consistency: Consistency, noise: bool) -> float:

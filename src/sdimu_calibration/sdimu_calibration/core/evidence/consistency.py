@@ -20,6 +20,10 @@ CHANNEL_NAMES = (
 _GAUSS_MAD = 1.482602218505602
 _LAGS = 20
 _OUTLIER = 4.0
+_EQUAL = 1e-6
+"""Relative difference of two differences that are the same number of pulses: rounding is smaller, noise larger."""
+_TIED = 0.05
+"""Share of differences that equal their median from which they are counts of pulses: noise gives one or two of all."""
 _LEAST_PAIRS = 50
 SLOW_S = 10
 """Seconds in a mean by which coloured noise is told from white."""
@@ -155,7 +159,11 @@ def triad_noise(prepared: PreparedData, means: Floats, density: float) -> Noise:
     length = epochs.end - epochs.start
     sigma = density * np.sqrt(1.0 / length[1:] + 1.0 / length[:-1])
     difference = ((means[1:] - means[:-1]) / sigma[:, None])[pair]
-    ratio = _GAUSS_MAD * float(np.median(np.abs(difference)))
+    size = np.abs(difference)
+    median = float(np.median(size))
+    # Means of pulses take few values, and their median jumps from one to the next.
+    counted = float(np.mean(np.abs(size - median) <= _EQUAL * median)) > _TIED
+    ratio = float(np.sqrt(np.mean(difference**2))) if counted else _GAUSS_MAD * median
     # An outlier differs from both its neighbours, to the same side.
     at = np.flatnonzero(pair)
     follows = at[1:] == at[:-1] + 1
@@ -171,7 +179,7 @@ def triad_noise(prepared: PreparedData, means: Floats, density: float) -> Noise:
 
 
 def _slow(prepared: PreparedData, means: Floats) -> float:
-    """Scatter (rms) of the differences of neighbouring means over `SLOW_S` seconds of one stop (Allan deviation)."""
+    """Scatter (rms) of the differences of neighbouring means over `SLOW_S` epochs of one stop, as of epochs of 1 s."""
     phases = prepared.phases
     steps = []
     for stop in np.unique(phases.stop[phases.used]):
@@ -179,7 +187,10 @@ def _slow(prepared: PreparedData, means: Floats) -> float:
         whole = len(rows) // SLOW_S
         steps.append(np.diff(rows[: whole * SLOW_S].reshape(whole, SLOW_S, 3).mean(axis=1), axis=0))
     found = np.concatenate(steps)
-    return float(np.sqrt(np.mean(found**2))) if len(found) >= _LEAST_PAIRS else float("nan")
+    if len(found) < _LEAST_PAIRS:
+        return float("nan")
+    length = float(np.median((prepared.epochs.end - prepared.epochs.start)[phases.used]))
+    return float(np.sqrt(np.mean(found**2) * length))
 
 
 def stop_means(standard: Floats, prepared: PreparedData) -> tuple[StopMean, ...]:

@@ -1,0 +1,141 @@
+"""Quantisation of an IMU that integrates: noise of the angle or velocity that does not add up.
+
+An IMU that counts pulses (a ring laser gyro, a pulse-rebalanced accelerometer) keeps what is less than a pulse for the
+next sample. The integral over any time is then wrong by the same residue Q, and the mean over T by sqrt(2) Q / T where
+white noise N gives N / sqrt(T). Dither and vibration of the base, whose angle is bounded too, look the same. An IMU
+file that states no quantisation describes means over a second wrongly by a factor of ten and more.
+
+The two-sample (Allan) variance of both is ``3 Q^2 / tau^2 + N^2 / tau`` (IEEE Std 952-1997, annex C). It is read at
+averaging times from a fifth of a second to three, between the filter of the sensor and the wander of the bias.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from sdimu_calibration.core.arrays import Floats, Ints
+from sdimu_calibration.core.data.static_detection import resolution, still_samples
+from sdimu_calibration.core.data.windows import runs
+from sdimu_calibration.core.recording import Recording
+from sdimu_calibration.core.specification import ImuSpecification
+from sdimu_calibration.core.units import from_si
+
+_TAU_S = (0.2, 0.4, 0.8, 1.6, 3.2)
+"""Averaging times (s) at which the variance is read."""
+_WINDOW_S = 1.0
+"""Length of the window (s) that decides on rest: as that of `rests`."""
+_TURNING = float(np.radians(0.3))
+"""Mean rate (rad/s) apart from that of rest that is a turn: as that of `rests`."""
+_MISSING = 1.5
+"""Distance of two samples (intervals) from which one is missing: the variance counts samples for time."""
+_PAIRS = 20
+"""Number of neighbouring means at an averaging time at least: the variance is then known to a third."""
+_SUSPECT = 1.1
+"""Ratio of the usual scatter of seconds to that of the specification from which rests are looked at: chance gives 1."""
+_MEDIAN_CHI2 = 2.366 / 3.0
+"""Median of a chi-square of three degrees of freedom, over its mean."""
+_MATTERS = 0.1
+"""Ratio of the variances of a one-second mean, by quantisation and by white noise, from which quantisation counts."""
+
+
+def with_quantisation(imu: ImuSpecification, recording: Recording) -> tuple[ImuSpecification, str]:
+    """Add the quantisation that the rests show to a specification that states none.
+
+    Parameters
+    ----------
+    imu : ImuSpecification
+    recording : Recording
+
+    Returns
+    -------
+    imu : ImuSpecification
+        The same object where the rests show no more than the specification says.
+    note : str
+        What was added; empty where nothing was.
+    """
+    stated = imu.gyro_quantisation > 0.0 or imu.accel_quantisation > 0.0
+    triads = (("gyro", recording.omega_ib_b, imu.gyro_white_noise), ("accel", recording.f_ib_b, imu.accel_white_noise))
+    if stated or not any(_suspect(values, recording.interval_s, noise) for _, values, noise in triads):
+        return imu, ""
+    size = max(round(_WINDOW_S / recording.interval_s), 2)
+    if len(recording.t) <= size:
+        return imu, ""
+    first, last = runs(still_samples(recording, size, _TURNING, _MISSING))
+    found = {
+        name: size_of_residue(values, first, last, recording.interval_s, noise) for name, values, noise in triads
+    }
+    if not any(found.values()):
+        return imu, ""
+    gyro, accel = found["gyro"], found["accel"]
+    parts = [f"gyro {from_si(gyro, 'arcsec'):.2g} arcsec"] if gyro else []
+    parts += [f"accelerometer {from_si(accel, 'mm/s'):.2g} mm/s"] if accel else []
+    note = (
+        f"means over a second scatter more than '{imu.name}' says and average out faster than white noise: "
+        f"quantisation or vibration of {' and '.join(parts)} (one sigma) is taken into account"
+    )
+    return replace(imu, gyro_quantisation=gyro, accel_quantisation=accel), note
+
+
+def size_of_residue(values: Floats, first: Ints, last: Ints, interval_s: float, white_noise: float) -> float:
+    """Residue Q of a triad where it matters, else zero.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n, 3)
+        Rate or force (rad/s or m/s^2).
+    first, last : ndarray of int, shape (k,)
+        Samples ``first:last`` of each rest.
+    interval_s : float
+        Sample interval (s).
+    white_noise : float
+        Density of the specification (rad/s/sqrt(Hz) or m/s^2/sqrt(Hz)).
+
+    Returns
+    -------
+    float
+        One sigma (rad or m/s), root mean square of the axes.
+    """
+    tau, variance = _two_sample(values, first, last, interval_s)
+    if len(tau) < 2:
+        return 0.0
+    from scipy.optimize import nnls  # noqa: PLC0415 (half a second that few tests need)
+
+    columns = np.column_stack([3.0 / tau**2, 1.0 / tau]) / variance[:, None]
+    scale = np.linalg.norm(columns, axis=0)
+    Q2 = float(nnls(columns / scale, np.ones(len(tau)))[0][0] / scale[0])
+    if 0.5 * _MATTERS * white_noise**2 >= Q2:
+        return 0.0
+    # A counter that sees hardly any rate may keep nearly the same residue all through a rest; its next one is another.
+    pulse = float(np.max(resolution(values))) * interval_s
+    return max(float(np.sqrt(Q2)), pulse / float(np.sqrt(12.0)))
+
+
+def _two_sample(values: Floats, first: Ints, last: Ints, interval_s: float) -> tuple[Floats, Floats]:
+    """Averaging times (k,) (s) and two-sample variance (k,), mean of the axes, of neighbouring means in the rests."""
+    tau, variance = [], []
+    for width in sorted({max(round(t / interval_s), 1) for t in _TAU_S}):
+        squares, count = 0.0, 0
+        for a, b in zip(first, last, strict=True):
+            blocks = (b - a) // width
+            if blocks > 1:
+                means = values[a : a + blocks * width].reshape(blocks, width, 3).mean(axis=1)
+                squares += float(np.sum(np.diff(means, axis=0) ** 2))
+                count += blocks - 1
+        if count >= _PAIRS and squares > 0.0:
+            tau.append(width * interval_s)
+            variance.append(0.5 * squares / (3 * count))
+    return np.array(tau), np.array(variance)
+
+
+def _suspect(values: Floats, interval_s: float, white_noise: float) -> bool:
+    """Whether the usual second scatters more than white noise of the specification makes it: most tests mostly rest."""
+    width = max(round(1.0 / interval_s), 1)
+    seconds = len(values) // width
+    if seconds < 2:
+        return False
+    means = values[: seconds * width].reshape(seconds, width, 3).mean(axis=1)
+    steps = np.sum(np.diff(means, axis=0) ** 2, axis=1)
+    variance = float(np.median(steps)) / (2.0 * 3.0 * _MEDIAN_CHI2)
+    return variance * width * interval_s > _SUSPECT**2 * white_noise**2
