@@ -25,10 +25,6 @@ EXEMPT = {
             "advice bootstrap candidates coefficient_shifts diagnose found free_input_test "
             "ladder plan_seen rounds scan search verdict"
         ),
-        "core.effects": (
-            "accel_nonlinearity accelerometer_frame body_frame dead_band drift effect error_slope "
-            "imu_model motion settling timing"
-        ),
         "core.estimation": "azimuth_check fit handheld_fit holdout navigation_fit reference_fits second_order_fit",
         "core.evidence": "consistency handheld_evidence information linear navigation_evidence signatures stop_misfit",
         "core.filter": "passes",

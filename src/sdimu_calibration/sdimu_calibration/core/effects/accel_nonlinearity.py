@@ -60,8 +60,8 @@ ODD_QUADRATIC = register(
     )
 )  # fmt: skip
 
-# The sign of a force changes within a turn in a time that no sensor resolves better than this.
 _SIGN_WIDTH = 1e-3
+"""Force over which the step of sgn is spread (g): a turn at 2 deg/s crosses it within one cycle of navigation."""
 
 BIAS_ASYMMETRY = register(
     family(

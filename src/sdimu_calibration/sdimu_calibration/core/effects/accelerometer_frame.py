@@ -26,7 +26,8 @@ FRAME = "accelerometer_triad"
 _OUTSIDE = ("gyro_g_sensitivity_xz", "gyro_g_sensitivity_yz", "gyro_g_sensitivity_zx")
 """Elements of the gyros' response to force that are no mass unbalance."""
 LARGE = 3e-3
-"""Prior of scale or misalignment from which errors count as large: its square is 9 ppm, the sigma of a good test."""
+"""Prior sigma of scale (1) or misalignment (rad) from which errors are large: its square is 9 ppm, the sigma of a good
+test."""
 
 
 @dataclass(frozen=True)
@@ -46,11 +47,33 @@ class AccelerometerFrameModel:
     place: Ints
 
     def values(self, inner: Floats) -> Floats:
-        """Give the parameters asked for, shape (..., p), of inner ones, shape (..., q)."""
+        """Read the parameters asked for out of the inner ones.
+
+        Parameters
+        ----------
+        inner : ndarray, shape (..., q)
+            SI, in the accelerometers' frame.
+
+        Returns
+        -------
+        ndarray, shape (..., p)
+            SI, in the same frame; zero where the frame pins one.
+        """
         return np.asarray(np.where(self.place >= 0, inner[..., np.maximum(self.place, 0)], 0.0))
 
     def covariance(self, inner: Floats) -> Floats:
-        """Give their covariance, shape (..., p, p)."""
+        """Read the covariance of the parameters asked for out of that of the inner ones.
+
+        Parameters
+        ----------
+        inner : ndarray, shape (..., q, q)
+            SI, in the accelerometers' frame.
+
+        Returns
+        -------
+        ndarray, shape (..., p, p)
+            SI; rows and columns of pinned parameters are zero.
+        """
         at, known = np.maximum(self.place, 0), self.place >= 0
         return np.asarray(inner[..., at[:, None], at] * np.outer(known, known))
 
@@ -65,8 +88,17 @@ def drifting(sensors: ImuModel, imu: ImuSpecification, gravity: float, duration:
     """Tell whether the gyros lose the attitude so far over the test that the square of that counts.
 
     An attitude wrong by a shows gravity too small by g a^2 / 2. It counts when this, at three sigma of the gyros' white
-    noise over `duration` (s), exceeds three sigma of the mean force. Effects that change at random are left to the
-    ordinary passes: samples are corrected at constants here.
+    noise over the test, exceeds three sigma of the mean force. Effects that change at random are left to the ordinary
+    passes, as samples are corrected at constants here: for them the answer is no.
+
+    Parameters
+    ----------
+    sensors : ImuModel
+    imu : ImuSpecification
+    gravity : float
+        m/s^2.
+    duration : float
+        Of the test (s).
     """
     if ((sensors.decay_rate > 0) | (sensors.drive > 0)).any():
         return False

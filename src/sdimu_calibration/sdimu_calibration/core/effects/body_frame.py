@@ -29,7 +29,7 @@ _MISALIGNMENT = {
 _UNBALANCE = {"dx": (0, 0), "qx": (0, 1), "dy": (1, 1), "qy": (1, 0), "dz": (2, 2), "qz": (2, 1)}
 _PINNED = ("xy", "xz", "yx")
 _STEP = 1e-5
-"""Of central differences, in SI of any coefficient: error 1e-10 by curvature, 1e-11 by rounding."""
+"""Step of central differences (SI of any coefficient): error 1e-10 by curvature, 1e-11 by rounding."""
 
 
 def _places(triad: str) -> dict[str, tuple[int, int, float]]:
@@ -63,16 +63,21 @@ def _turn_to_triad(M: Floats) -> Floats:
 def values_in_frame(names: Sequence[str], values: Floats, frame: str) -> Floats:
     """Coefficients in a named body frame.
 
+    With ``M_a.T = Q U`` (QR decomposition, diagonal of U positive) the turn R = Q' makes ``M_a R'`` lower triangular:
+    that is what `accelerometer_triad` asks for. Without all three pinned misalignments in the model nothing is turned.
+
     Parameters
     ----------
     names : sequence of str, length p
     values : ndarray, shape (p,)
         In the frame of the prior, SI.
     frame : str
+        One of `FRAMES`.
 
     Returns
     -------
     ndarray, shape (p,)
+        In `frame`, SI. Coefficients other than scale, misalignment and mass unbalance are as given.
 
     Raises
     ------
@@ -96,10 +101,27 @@ def values_in_frame(names: Sequence[str], values: Floats, frame: str) -> Floats:
 
 
 def frame_jacobian(names: Sequence[str], frame: str) -> Floats:
-    """First-order map of coefficient errors from the prior's frame to `frame`; shape (p, p).
+    """First-order map of coefficient errors from the prior's frame to another, about coefficients of zero.
 
     A turn of the body frame by a small angle t adds -[t x] to both error matrices; t is the combination of the
     pinned misalignments that makes them zero.
+
+    Parameters
+    ----------
+    names : sequence of str, length p
+    frame : str
+        One of `FRAMES`.
+
+    Returns
+    -------
+    ndarray, shape (p, p)
+        Change of each coefficient in `frame` (row) per change of each in the prior's frame (column), SI; the identity
+        where nothing turns.
+
+    Raises
+    ------
+    DataError
+        When the frame has no such name.
     """
     _check(frame)
     p = len(names)
@@ -118,10 +140,29 @@ def frame_jacobian(names: Sequence[str], frame: str) -> Floats:
 
 
 def jacobian_at(names: Sequence[str], values: Floats, frame: str) -> Floats:
-    """Differentiate `values_in_frame` at `values` (p,), shape (p, p), by central differences.
+    """Differentiate `values_in_frame` by central differences: `frame_jacobian` about coefficients that are not small.
 
     With misalignments of degrees the covariance must turn about the values themselves: about zero, the free turn of the
     prior's frame leaks into the scale factors and makes their sigmas many times too large.
+
+    Parameters
+    ----------
+    names : sequence of str, length p
+    values : ndarray, shape (p,)
+        In the frame of the prior, SI.
+    frame : str
+        One of `FRAMES`.
+
+    Returns
+    -------
+    ndarray, shape (p, p)
+        Change of each coefficient in `frame` (row) per change of each in the prior's frame (column), SI; rows of pinned
+        coefficients are zero.
+
+    Raises
+    ------
+    DataError
+        When the frame has no such name.
     """
     values = np.asarray(values, dtype=float)
     J = np.empty((len(values), len(values)))

@@ -10,8 +10,8 @@ from sdimu_calibration.core.effects.effect import GYRO, family, per_axis_columns
 from sdimu_calibration.core.effects.motion import Motion
 from sdimu_calibration.core.effects.registry import register
 
-# sgn(w) at a rate of a few per cent of Earth rate is decided by noise: the step is as wide as that.
 _WIDTH = 0.01 * earth.RATE
+"""Rate over which the step of sgn is spread (rad/s): at a few per cent of the Earth's rate noise decides the sign."""
 
 
 def _sign(motion: Motion) -> Floats:

@@ -28,7 +28,10 @@ _TRIADS = {
     "accel": (ACCEL, "accelerometer", "f", ("m/s^2", "ug"), (50, 200, 2000)),
 }
 _SCAN_TAU_S = (150.0, 300.0, 600.0, 1200.0, 2400.0)
+"""Time constants of warm-up that a scan tries (s): those of usual gyros, 300 to 1800 s, and beyond on both sides; a
+factor of two apart, as `Effect.nearer` finds those in between."""
 _MODES = 4
+"""Number of modes of a random walk: four hold 95 % of its variance."""
 _OVER_TIME = frozenset({Excitation.REPEATED_ATTITUDES})
 
 

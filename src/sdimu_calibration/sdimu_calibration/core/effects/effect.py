@@ -68,7 +68,15 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Term:
-    """One regressor column: which sensor axis (0-2 gyro, 3-5 accelerometer) and which parameter."""
+    """Where one regressor column acts.
+
+    Attributes
+    ----------
+    channel : int
+        Sensor axis that it changes: 0-2 gyro x, y, z; 3-5 accelerometer x, y, z.
+    parameter : int
+        Index of the parameter, in its effect, that it is multiplied with.
+    """
 
     channel: int
     parameter: int
@@ -107,12 +115,13 @@ class Effect:
     bias_drift : bool
         A change of a bias in time by itself: several in a row follow any drift and say nothing of its cause.
     shifts_bias : bool
-        A bias beside it is that where it is zero, and not the mean over the test: at the temperature of the start.
+        With it in the model, a bias is the one where its regressor is zero (for temperature: at the start), and no
+        longer the mean over the test.
     wander_like : bool
         A transient after each turn, or a bias that the turns add up to: noise that makes a bias wander imitates it, so
         in such noise it must show more clearly, as a drift must.
     positive : bool
-        Of one sign by its nature: a stretch that was lost is no stretch that was gained.
+        Its parameters cannot be negative: data may be lost in a turn, never gained.
     needs_table : bool
         Has no meaning handheld: no reference but gravity is known, and no turn is known better than the gyros tell it.
     gauge : bool
@@ -130,11 +139,12 @@ class Effect:
     options : mapping of str to str
         Fixed quantities that enter nonlinearly, such as ``{"tau": "1200 s"}``.
     with_options : callable or None
-        Options (SI, as keywords) to the effect with these options.
+        ``(**options in SI) -> Effect``: the effect with these options.
     scan : callable or None
-        Times of a test to the variants worth trying on it.
+        ``Timetable -> tuple of Effect``: the variants that are worth trying on a test.
     nearer : callable or None
-        Three variants: nearer by half on one side than the last ones were, itself, nearer on the other side.
+        ``() -> tuple of Effect``: the next variants of an interval search, half as far apart as those before. The
+        variant itself is in the middle.
     """
 
     name: str
@@ -259,7 +269,20 @@ def family(
 
 
 def pick(of: Callable[[Motion], Floats], *place: int) -> Column:
-    """Column at index `place` of ``of(motion)``, shape (n, ...)."""
+    """Make a column function that takes one component of a variable of the motion.
+
+    Parameters
+    ----------
+    of : callable
+        ``Motion -> ndarray, shape (n, ...)``, in the unit that the regressor has.
+    *place : int
+        Index of the component behind the first axis: ``i`` of a vector, ``i, j`` of a matrix.
+
+    Returns
+    -------
+    callable
+        ``Motion -> ndarray, shape (n,)``, in the same unit.
+    """
     index: Any = (slice(None), *place)
 
     def column(motion: Motion) -> Floats:
@@ -269,7 +292,20 @@ def pick(of: Callable[[Motion], Floats], *place: int) -> Column:
 
 
 def product(of: Callable[[Motion], Floats], i: int, other: Callable[[Motion], Floats], j: int) -> Column:
-    """Column i of ``of(motion)`` times column j of ``other(motion)``."""
+    """Make a column function that multiplies two components of the motion.
+
+    Parameters
+    ----------
+    of, other : callable
+        ``Motion -> ndarray, shape (n, 3)``; their units multiply.
+    i, j : int
+        Column of the first and of the second.
+
+    Returns
+    -------
+    callable
+        ``Motion -> ndarray, shape (n,)``.
+    """
 
     def column(motion: Motion) -> Floats:
         return np.asarray(of(motion)[:, i] * other(motion)[:, j])
@@ -278,14 +314,32 @@ def product(of: Callable[[Motion], Floats], i: int, other: Callable[[Motion], Fl
 
 
 def per_axis_columns(triad: tuple[int, ...], of: Callable[[Motion], Floats]) -> dict[str, tuple[int, Column]]:
-    """Columns x, y, z: each sensor sees its own column of ``of(motion)``, shape (n, 3)."""
+    """Columns x, y, z of `family`: each sensor of a triad sees the component along its own axis.
+
+    Parameters
+    ----------
+    triad : tuple of int
+        `GYRO` or `ACCEL`.
+    of : callable
+        ``Motion -> ndarray, shape (n, 3)``, in the unit that the regressor has.
+    """
     return {axis: (triad[i], pick(of, i)) for i, axis in enumerate(AXES)}
 
 
 def matrix_columns(
     triad: tuple[int, ...], of: Callable[[Motion], Floats], diagonal: bool = True
 ) -> dict[str, tuple[int, Column]]:
-    """Columns xx, xy ... zz: sensor i sees column j of ``of(motion)``, shape (n, 3)."""
+    """Columns xx, xy ... zz of `family`: in column ij sensor i sees the component along axis j.
+
+    Parameters
+    ----------
+    triad : tuple of int
+        `GYRO` or `ACCEL`.
+    of : callable
+        ``Motion -> ndarray, shape (n, 3)``, in the unit that the regressor has.
+    diagonal : bool
+        Whether xx, yy and zz are among them.
+    """
     return {
         AXES[i] + AXES[j]: (triad[i], pick(of, j))
         for i in range(3)

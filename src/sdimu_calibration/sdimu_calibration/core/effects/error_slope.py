@@ -15,10 +15,27 @@ _STEP = (1e-9, 1e-6)
 
 
 def error_slope(model: ImuModel, seen: Motion, rows: slice | Ints, coefficients: Floats) -> Floats:
-    """Change of the sensor errors per change of what the sensors see, shape (rows, 6, 6).
+    """Change of the sensor errors per change of what the sensors see, by forward differences.
 
     With errors of percents it is percents too, and Gauss-Newton needs it: the three rotations of the body frame, which
-    only priors hold, feel every inconsistency between the derivatives.
+    only priors hold, feel every inconsistency between the derivatives. At rest the rate of the table stays zero, as it
+    is known to be; in motion it changes with the body rate.
+
+    Parameters
+    ----------
+    model : ImuModel
+    seen : Motion
+        n cycles.
+    rows : slice or ndarray of int, shape (r,)
+        Cycles at which the slope is wanted.
+    coefficients : ndarray, shape (p,)
+        SI.
+
+    Returns
+    -------
+    ndarray, shape (r, 6, 6)
+        Change of the error of sensor axis i (row) per change of true rate or force j (column): 0-2 rate (rad/s), 3-5
+        force (m/s^2), in b.
     """
     at = _at(seen, rows)
     before = model.errors(model.regressors(at), coefficients)

@@ -37,7 +37,7 @@ class ImuModel:
     decay_rate : ndarray, shape (p,)
         1/s; zero for constants and random walks.
     drive : ndarray, shape (p,)
-        Variance added per second.
+        Variance that a random walk adds per second (SI^2/s); zero for all other parameters.
     """
 
     effects: tuple[Effect, ...]
@@ -55,7 +55,18 @@ class ImuModel:
         return tuple(p.name for p in self.parameters)
 
     def regressors(self, motion: Motion) -> Floats:
-        """Regressor columns of all effects; shape (n, m), SI."""
+        """Regressor columns of all effects.
+
+        Parameters
+        ----------
+        motion : Motion
+            n cycles.
+
+        Returns
+        -------
+        ndarray, shape (n, m)
+            Change of sensor axis `channel` (rad/s or m/s^2) per SI unit of parameter `parameter`.
+        """
         out = np.empty((len(motion.t), len(self.channel)))
         start = 0
         for effect in self.effects:
@@ -65,7 +76,20 @@ class ImuModel:
         return out
 
     def errors(self, values: Floats, coefficients: Floats) -> Floats:
-        """Sensor errors of regressors `values` (n, m) at `coefficients` (p,): rad/s and m/s^2, shape (n, 6)."""
+        """Sensor errors, measured minus true.
+
+        Parameters
+        ----------
+        values : ndarray, shape (n, m)
+            As `regressors` gives them.
+        coefficients : ndarray, shape (p,)
+            SI.
+
+        Returns
+        -------
+        ndarray, shape (n, 6)
+            Gyros (rad/s), then accelerometers (m/s^2), in b.
+        """
         return np.asarray(_errors(np.ascontiguousarray(values), self.channel, coefficients[self.parameter]))
 
 

@@ -11,7 +11,8 @@ from sdimu_calibration.core.arrays import Bools, Floats, Ints
 from sdimu_calibration.core.units import STANDARD_GRAVITY
 
 _TURNING = np.radians(0.01)
-"""Slower than any turn of a table, faster than the bias of a gyro that is worth calibrating on one (rad/s)."""
+"""Rate from which the table turns (rad/s): slower than any turn, faster than the bias of a gyro that is worth a rate
+table."""
 
 NO_PAST = np.zeros((0, 4))
 """Cycles before the first one (s, m/s^2), none: the IMU had stood as it stands in the first cycle."""
@@ -30,7 +31,7 @@ class Motion:
     f : ndarray, shape (n, 3)
         Mean specific force, in b (m/s^2).
     C_nb : ndarray, shape (n, 3, 3)
-        Attitude at the middle of the cycle.
+        Attitude at the middle of the cycle, b to n.
     w_table : ndarray, shape (n, 3)
         Mean body rate against the Earth, in b (rad/s); exactly zero at rest.
     alpha : ndarray, shape (n, 3)
@@ -70,41 +71,82 @@ class Motion:
 
     @cached_property
     def a(self) -> Floats:
-        """Specific force in units of standard gravity, shape (n, 3)."""
+        """Mean specific force.
+
+        Returns
+        -------
+        ndarray, shape (n, 3)
+            In b, in units of standard gravity (9.80665 m/s^2).
+        """
         return self.f / STANDARD_GRAVITY
 
     @cached_property
     def a_rate(self) -> Floats:
-        """Rate of change of `a` by turning under gravity, ``-w_table x a`` (1/s), shape (n, 3)."""
+        """Rate of change of `a` while the IMU turns under gravity, ``-w_table x a``.
+
+        Returns
+        -------
+        ndarray, shape (n, 3)
+            In b (1/s, as `a` is in units of standard gravity).
+        """
         return np.asarray(-np.cross(self.w_table, self.a))
 
     @cached_property
     def table_rate(self) -> Floats:
-        """Size of `w_table` (rad/s), shape (n,)."""
+        """Magnitude of `w_table`.
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            rad/s.
+        """
         return np.asarray(np.linalg.norm(self.w_table, axis=1))
 
     @cached_property
     def standing(self) -> Ints:
-        """Cycles in which the table does not turn at all."""
+        """Cycles in which the table does not turn at all.
+
+        Returns
+        -------
+        ndarray of int, shape (k,)
+            Rows with `table_rate` exactly zero, in ascending order.
+        """
         return np.flatnonzero(self.table_rate == 0.0)
 
     @cached_property
     def moving(self) -> Floats:
-        """1 while the table turns, 0 at rest, shape (n,).
+        """Indicator of motion: 1 while the table turns, 0 at rest.
 
-        The phase is known by the epoch only; within it the rate of the table says when a turn began.
+        `rest` is known by the epoch (1 s) only. Within an epoch the rate of the table says when a turn began or ended.
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            Dimensionless.
         """
         turning = np.sum(self.w_table**2, axis=1) > _TURNING**2
         return np.asarray((~self.rest & turning).astype(np.float64))
 
     @cached_property
     def field(self) -> Floats:
-        """Magnetic field in b (T), shape (n, 3)."""
+        """Magnetic field that the sensors see.
+
+        Returns
+        -------
+        ndarray, shape (n, 3)
+            In b, in the unit of `magnetic_n` (T).
+        """
         return np.asarray(np.einsum("kij,i->kj", self.C_nb, self.magnetic_n))
 
     @cached_property
     def lever(self) -> Floats:
-        """``[alpha x] + [w_table x]^2`` (1/s^2), shape (n, 3, 3): acceleration of a point at r is ``lever @ r``."""
+        """Acceleration per lever arm of a point fixed in the body, ``[alpha x] + [w_table x]^2``.
+
+        Returns
+        -------
+        ndarray, shape (n, 3, 3)
+            In b (1/s^2, SI): a point at r (m) accelerates by ``lever @ r`` (m/s^2) against the centre of rotation.
+        """
         w, d = self.w_table, self.alpha
         out = np.einsum("ki,kj->kij", w, w)
         out[:, range(3), range(3)] -= np.sum(w**2, axis=1)[:, None]

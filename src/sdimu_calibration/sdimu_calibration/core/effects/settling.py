@@ -14,7 +14,8 @@ _TRIADS = {
     "accel": (ACCEL, "accelerometer", "f", ("m/s^2", "ug"), (10, 50, 500)),
 }
 _SCAN_TAU_S = (4.0, 8.0, 16.0, 32.0, 64.0, 128.0)
-"""Longer ones than a dwell are a step in every turn, shorter ones are over before the first measurement."""
+"""Time constants that a scan tries (s): with one longer than a dwell the effect is a step at every turn, with a shorter
+one it is over before the first measurement."""
 
 
 def settling(stem: str, tau: float, ratio: float = 2.0) -> Effect:

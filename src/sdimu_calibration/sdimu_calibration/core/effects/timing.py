@@ -54,10 +54,19 @@ ACCEL_TRIAD_DELAY = register(
 
 
 def lost_data(turn: int, at: float, spacing: float = 15.0) -> Effect:
-    """Gyro data lost about the moment `at` (s) of a turn, `spacing` (s) from the next moments that are tried.
+    """Gyro data lost in a turn.
 
     An angle lost early in a turn bends the specific force for longer than one lost late, so the velocity after the turn
     tells the moment.
+
+    Parameters
+    ----------
+    turn : int
+        Number of the turn: it leads from stop ``turn - 1`` to stop ``turn``.
+    at : float
+        Moment of the loss, since the start of the recording (s).
+    spacing : float
+        Distance to the next moments that are tried (s).
     """
 
     def missing(motion: Motion) -> Floats:
@@ -91,7 +100,7 @@ def lost_data(turn: int, at: float, spacing: float = 15.0) -> Effect:
 
 
 _LOSS_S = 0.2
-"""Length of the stretch over which a loss is spread: two cycles of navigation."""
+"""Length of the stretch over which a loss is spread (s): two cycles of navigation, the step of all regressors."""
 
 
 def _full_rate(motion: Motion, at: float) -> Floats:
