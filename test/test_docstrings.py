@@ -27,8 +27,6 @@ EXEMPT = {
         ),
         "core.estimation": "azimuth_check fit handheld_fit holdout navigation_fit reference_fits second_order_fit",
         "core.evidence": "consistency handheld_evidence information linear navigation_evidence signatures stop_misfit",
-        "core.filter": "passes",
-        "core.second_order": "second_order_passes",
     }.items()
     for module in modules_of.split()
 }

@@ -33,24 +33,39 @@ from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.rotation import rotation_matrix, rotation_vector
 
 CONVERGED = 0.02
-"""Largest movement of a coefficient in its own sigma at which the passes end."""
+"""Largest movement of a coefficient (sigma) at which the passes end: smaller ones change no report."""
 MOST_PASSES = 16
+"""Number of passes at most: where the estimate still moves then, `_NEAR` tells slow from lost."""
 _LOOSE_VELOCITY = 1.0
+"""Sigma of Zv (m/s) while the passes find their place: too wide to say anything."""
 _LOOSE_POSITION = 100.0
-"""Sigmas of Zv (m/s) and Zp (m) while the passes find their place: too wide to say anything."""
+"""Sigma of Zp (m) while the passes find their place: too wide to say anything."""
 _FITS = 1.1
-"""Mean NIS of a first pass from which linearisation is not the trouble."""
+"""NIS per degree of freedom (1) up to which a first pass fits: above it linearisation may be the trouble."""
 _NEAR = 0.2
-"""Movement in sigma at which an estimate that ran out of passes is still one."""
+"""Movement of a coefficient (sigma) up to which an estimate that ran out of passes still is one: passes that contract
+slowly have no more than a fraction of a sigma to go."""
 _SETTLED = 0.1
-"""Movement in sigma at which position and velocity are taken in again."""
+"""Movement of a coefficient (sigma) at which position and velocity are taken in again: the azimuth is in its place."""
 SNAPSHOT_EPOCHS = 5
-"""The covariance of the coefficients is kept every so many epochs."""
+"""Number of epochs from one kept covariance of the coefficients to the next: it changes slowly, and is large."""
 
 
 @dataclass(frozen=True)
 class Pass:
-    """A finished pass: where it was linearised, where it ended."""
+    """A finished pass: where it was linearised, where it ended.
+
+    Attributes
+    ----------
+    C_start : ndarray, shape (3, 3)
+        Initial attitude about which it was linearised, b to n (dimensionless).
+    start, state : PassState
+        At the first sample, and after the last epoch.
+    output : PassOutput
+        One row an epoch.
+    data : PassInput
+    settings : PassSettings
+    """
 
     C_start: Floats
     start: PassState
@@ -66,13 +81,13 @@ class Pass:
 
     @property
     def estimate(self) -> Floats:
-        """Coefficients at the end, frame of the prior, shape (p,)."""
+        """Coefficients at the end (SI), frame of the prior, shape (p,)."""
         p = len(self.state.used)
         return np.asarray(self.state.used + self.state.x[NAV : NAV + p])
 
     @property
     def covariance(self) -> Floats:
-        """Their covariance, shape (p, p)."""
+        """Covariance of `estimate` (SI), shape (p, p)."""
         p = len(self.state.used)
         return np.asarray(self.state.P[NAV : NAV + p, NAV : NAV + p])
 
@@ -97,7 +112,20 @@ def pass_settings(setup: TestSetup, closed_loop: bool) -> PassSettings:
 
 
 def start_state(setup: TestSetup, start: Alignment, C_nb: Floats, reference: Floats) -> PassState:
-    """State at the first sample, linearised at attitude `C_nb` and coefficients `reference` (p,)."""
+    """State at the first sample.
+
+    Alignment and prior stay what they are; the state holds how far they lie from the point of linearisation.
+
+    Parameters
+    ----------
+    setup : TestSetup
+    start : Alignment
+        Mean and sigma of the initial attitude.
+    C_nb : ndarray, shape (3, 3)
+        Attitude about which the pass is linearised, b to n.
+    reference : ndarray, shape (p,)
+        Coefficients about which it is linearised (SI).
+    """
     p = len(setup.sensors.prior)
     s = NAV + p + COPY
     model = setup.model
@@ -119,7 +147,17 @@ def start_state(setup: TestSetup, start: Alignment, C_nb: Floats, reference: Flo
 def pass_input(
     prepared: PreparedData, values: Floats, channel: Ints, parameter: Ints
 ) -> PassInput:
-    """Put cycles, epochs and regressors together."""
+    """Put cycles, epochs and regressors together.
+
+    Parameters
+    ----------
+    prepared : PreparedData
+        n cycles.
+    values : ndarray, shape (n, m)
+        Regressors (SI).
+    channel, parameter : ndarray of int, shape (m,)
+        Sensor axis and coefficient of each regressor.
+    """
     c, e, b = prepared.cycles, prepared.epochs, prepared.bridges
     return PassInput(
         c.dt, c.alpha, c.upsilon, c.coning, c.sculling, e.first, e.last, b.white, b.angle, b.velocity, prepared.kind,
@@ -136,7 +174,28 @@ def one_pass(
     closed_loop: bool,
     keep: bool = False,
 ) -> Pass:
-    """Run one pass linearised at initial attitude `C_nb` and coefficients `reference`."""
+    """Run one pass.
+
+    Parameters
+    ----------
+    prepared, setup : PreparedData, TestSetup
+    start : Alignment
+        Mean and sigma of the initial attitude.
+    C_nb : ndarray, shape (3, 3)
+        Initial attitude about which the pass is linearised, b to n.
+    reference : ndarray, shape (p,)
+        Coefficients about which it is linearised (SI).
+    closed_loop : bool
+        Feed attitude and coefficients back after each measurement; the motion that the effects see is then taken from
+        compensated samples, and not predicted from the trajectory.
+    keep : bool
+        Keep the matrices of every epoch in the output.
+
+    Raises
+    ------
+    DataError
+        When an effect is not finite on this recording, or the filter diverges.
+    """
     sensors = setup.sensors
     seen = motion(
         prepared.cycles, prepared.rest, sensors, reference, C_nb.copy(), setup.site.latitude_rad, setup.gravity,
@@ -182,8 +241,13 @@ def refine(
     -------
     last : Pass
     passes : int
-        The number of all passes.
+        Number of all passes, the first one counted.
     converged : bool
+
+    Raises
+    ------
+    DataError
+        When the filter diverges.
     """
     last = first
     loose = replace(setup, model=replace(setup.model, velocity_sigma=_LOOSE_VELOCITY, position_sigma=_LOOSE_POSITION))
@@ -268,13 +332,14 @@ def widen_contradicted_priors(sensors: ImuModel, estimate: Floats, covariance: F
 
 
 _BEYOND = 3.0
-"""Prior sigmas beyond which an estimate contradicts its prior."""
+"""Size of an estimate (sigma of its prior) from which it contradicts the prior: chance ends there."""
 _PULL = 0.1
-"""Shift of an estimate by its prior, in its own sigma, that is worth repeating the passes."""
+"""Shift of an estimate by its prior (sigma of the estimate) from which the passes are repeated: less is not seen."""
 _ROOM = 10.0
 """New sigma of a contradicted prior, as a multiple of the estimate: it then says nothing."""
 MOST_WIDENINGS = 3
-"""Times that priors are widened and the passes repeated, at most."""
+"""Number of times at most that priors are widened and the passes repeated: a widened prior holds nothing back, so a
+next time is for coefficients that the first ones had hidden."""
 
 
 def solve(setup: TestSetup, prepared: PreparedData, begin: StartPoint | None, progress: Progress) -> Solution:

@@ -37,17 +37,21 @@ from sdimu_calibration.core.progress import Progress
 from sdimu_calibration.core.rotation import orthonormal, rotation_matrix, rotation_vector
 
 CONVERGED = 0.02
-"""Largest movement of a coefficient in its own sigma at which the passes end."""
+"""Largest movement of a coefficient (sigma) at which the passes end: smaller ones change no report."""
 MOST_PASSES = 30
+"""Number of passes at most: where the estimate still moves then, it does not converge."""
 _LOOSE = (1.0, 100.0)
-"""Sigmas of Zv (m/s) and Zp (m) until the coefficients move by less than `_NEAR` sigmas."""
+"""Sigmas of Zv (m/s) and Zp (m) in the first passes: too wide to hold a wrong azimuth."""
 _NEAR = 1.0
+"""Movement of a coefficient (sigma) from which Zv and Zp are taken in: the azimuth has found its place."""
 _FIRM = 0.05
 """Later sigmas of Zv and Zp at least, as a share of what white noise leaves in a motion of `_MOTION_S`: no less can be
 told from zero, and a covariance that falls by more than ten digits loses its symmetry."""
 _MOTION_S = 60.0
+"""Length of a usual turn (s): at 2 deg/s one of 90 deg takes 45 s, one of 180 deg 90 s."""
 _PIECE = 3
-"""Epochs of a stop between two shifts of the attitude to that of the stop."""
+"""Number of epochs of a stop between two shifts of the attitude to that of the stop: in more, a cheap gyro drifts so
+far that azimuth looks observable."""
 
 
 @dataclass(frozen=True)
@@ -57,16 +61,19 @@ class SecondOrderPass:
     Attributes
     ----------
     reference : ndarray, shape (q,)
-        Coefficients at which the samples were corrected.
+        Coefficients at which the samples were corrected (SI).
     C_start : ndarray, shape (3, 3)
+        Initial attitude about which the pass was linearised, b to n (dimensionless).
     start, state : PassState
-        The coefficients in them are deviations from the reference.
+        At the first sample, and after the last epoch; their coefficients are deviations from `reference`.
     output : PassOutput
-        Of all epochs; the covariances are those of the epochs `rows`.
-    rows : ndarray of int
+        Of all epochs; its covariances are those of the epochs `rows`.
+    rows : ndarray of int, shape (j,)
+        First epoch of each piece of the pass (`run_stops`).
     data : PassInput
+        Of the corrected samples.
     C_stop : ndarray, shape (k, 3, 3)
-        Where each stop was linearised.
+        Attitude about which each stop was linearised, b to n.
     where : Layout
         Of the stops.
     """
@@ -88,13 +95,13 @@ class SecondOrderPass:
 
     @property
     def estimate(self) -> Floats:
-        """Coefficients at the end, shape (q,)."""
+        """Coefficients at the end (SI), in the accelerometers' frame, shape (q,)."""
         q = len(self.reference)
         return np.asarray(self.reference + self.state.x[NAV : NAV + q])
 
     @property
     def covariance(self) -> Floats:
-        """Their covariance, shape (q, q)."""
+        """Covariance of `estimate` (SI), shape (q, q)."""
         q = len(self.reference)
         return np.asarray(self.state.P[NAV : NAV + q, NAV : NAV + q])
 
@@ -181,7 +188,16 @@ class Linearisation:
 
 
 def linearise(prepared: PreparedData, setup: TestSetup, C_nb: Floats, reference: Floats) -> Linearisation:
-    """Correct the samples at `reference` (q,) exactly and linearise there, from the initial attitude `C_nb` (3, 3)."""
+    """Correct the samples exactly and linearise there.
+
+    Parameters
+    ----------
+    prepared, setup : PreparedData, TestSetup
+    C_nb : ndarray, shape (3, 3)
+        Initial attitude, b to n.
+    reference : ndarray, shape (q,)
+        Coefficients whose errors are taken out of the samples (SI).
+    """
     sensors, site, where = setup.sensors, setup.site, layout(prepared)
     near = motion(
         prepared.cycles, prepared.rest, sensors, reference, C_nb.copy(), site.latitude_rad, setup.gravity,
@@ -198,7 +214,17 @@ def linearise(prepared: PreparedData, setup: TestSetup, C_nb: Floats, reference:
 def second_order_pass(
     prepared: PreparedData, setup: TestSetup, start: Alignment, C_nb: Floats, reference: Floats
 ) -> SecondOrderPass:
-    """Run one pass about samples corrected at `reference` (q,), from the initial attitude `C_nb` (3, 3).
+    """Run one pass about exactly corrected samples.
+
+    Parameters
+    ----------
+    prepared, setup : PreparedData, TestSetup
+    start : Alignment
+        Mean and sigma of the initial attitude.
+    C_nb : ndarray, shape (3, 3)
+        Initial attitude about which the pass is linearised, b to n.
+    reference : ndarray, shape (q,)
+        Coefficients at which the samples are corrected (SI).
 
     Raises
     ------
@@ -257,14 +283,33 @@ def run_stops(
     data: PassInput, setup: TestSetup, begin: PassState, prepared: PreparedData, where: Layout, C_stop: Floats,
     keep: bool = False,
 ) -> tuple[PassState, PassOutput, Ints]:
-    """Run a pass stop by stop, with each stop linearised at its own attitude.
+    """Run a pass piece by piece, with each stop linearised at its own attitude.
+
+    A piece is a motion, or at most `_PIECE` epochs of a stop.
+
+    Parameters
+    ----------
+    data : PassInput
+        Of corrected samples.
+    setup : TestSetup
+    begin : PassState
+        At the first sample; it is not changed.
+    prepared : PreparedData
+    where : Layout
+        k stops.
+    C_stop : ndarray, shape (k, 3, 3)
+        Attitude about which each stop is linearised, b to n (dimensionless).
+    keep : bool
+        Keep the matrices of every epoch in the output.
 
     Returns
     -------
     state : PassState
+        After the last epoch.
     output : PassOutput
-    rows : ndarray of int
-        Epochs whose covariance was kept.
+        Of all epochs.
+    rows : ndarray of int, shape (j,)
+        First epoch of each piece: those whose covariance was kept.
     """
     state = PassState(*(v.copy() for v in begin))
     settings = pass_settings(setup, closed_loop=False)
