@@ -26,7 +26,6 @@ EXEMPT = {
             "ladder plan_seen rounds scan search verdict"
         ),
         "core.estimation": "azimuth_check fit handheld_fit holdout navigation_fit reference_fits second_order_fit",
-        "core.evidence": "consistency handheld_evidence information linear navigation_evidence signatures stop_misfit",
     }.items()
     for module in modules_of.split()
 }

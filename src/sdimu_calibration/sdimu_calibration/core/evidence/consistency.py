@@ -18,15 +18,20 @@ CHANNEL_NAMES = (
     "gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z",
 )  # fmt: skip
 _GAUSS_MAD = 1.482602218505602
+"""Factor from the median of |x| to the standard deviation: of Gaussian noise."""
 _LAGS = 20
+"""Number of lags of the Ljung-Box test: the customary one; what is slower shows in `Noise.slow`."""
 _OUTLIER = 4.0
+"""Difference of neighbouring epochs (sigma of it) from which both may be outliers: Gaussian noise puts one in 16 000
+beyond it."""
 _EQUAL = 1e-6
 """Relative difference of two differences that are the same number of pulses: rounding is smaller, noise larger."""
 _TIED = 0.05
 """Share of differences that equal their median from which they are counts of pulses: noise gives one or two of all."""
 _LEAST_PAIRS = 50
+"""Number of neighbours, or of neighbouring means, at least: from fewer the noise is known no better than to 13 %."""
 SLOW_S = 10
-"""Seconds in a mean by which coloured noise is told from white."""
+"""Length of the means (s) by which coloured noise is told from white: long against an epoch, short against a dwell."""
 
 
 @dataclass(frozen=True)
@@ -46,8 +51,8 @@ class Noise:
     slow : float
         Scatter of neighbouring means over `SLOW_S` against that of seconds, 1 when the noise is white; NaN where the
         stops are too short to tell.
-    outliers : ndarray of int
-        Epochs that differ from both neighbours by more than four sigma of the difference.
+    outliers : ndarray of int, shape (o,)
+        Epochs that differ from both neighbours, to the same side, by more than four sigma of the difference.
     """
 
     ratio: float
@@ -77,7 +82,10 @@ class Consistency:
 
     Attributes
     ----------
-    nis_mean, nis_p_value : float
+    nis_mean : float
+        Normalised innovation squared per degree of freedom; 1 is right.
+    nis_p_value : float
+        Probability of a NIS as far from its mean, on either side, when the model is right.
     first_nis : float
         Mean NIS per degree of freedom at the first measurement of each stop: what the turns left.
     ljung_box_p : float
@@ -127,7 +135,21 @@ def check(output: PassOutput, prepared: PreparedData, imu: ImuSpecification) -> 
 
 
 def ljung_box(series: Floats) -> float:
-    """Smallest Ljung-Box p-value over the columns of `series` (n, c), corrected for their number."""
+    """Smallest p-value of the test for white noise over several series, times their number (Bonferroni).
+
+    Source: G. Ljung, G. Box, "On a measure of lack of fit in time series models", Biometrika 65 (1978):
+    ``n (n + 2) sum_k r_k^2 / (n - k)`` is chi-square with as many degrees of freedom as lags k.
+
+    Parameters
+    ----------
+    series : ndarray, shape (n, c)
+        One series a column, in any unit.
+
+    Returns
+    -------
+    float
+        1 where the series are too short to test.
+    """
     n, count = series.shape
     if n <= 2 * _LAGS:
         return 1.0
@@ -147,7 +169,8 @@ def triad_noise(prepared: PreparedData, means: Floats, density: float) -> Noise:
     ----------
     prepared : PreparedData
     means : ndarray, shape (e, 3)
-        Mean rate or force of each epoch, as measured; biases and slow effects cancel in the differences.
+        Mean rate (rad/s) or force (m/s^2) of each epoch, as measured; biases and slow effects cancel in the
+        differences.
     density : float
         Specified white noise (SI/sqrt(Hz)).
     """
@@ -194,7 +217,20 @@ def _slow(prepared: PreparedData, means: Floats) -> float:
 
 
 def stop_means(standard: Floats, prepared: PreparedData) -> tuple[StopMean, ...]:
-    """Mean over each stop times the root of its length, every channel; largest first."""
+    """Mean innovation of every channel at every stop, over its sigma; largest first.
+
+    Parameters
+    ----------
+    standard : ndarray, shape (e, 12)
+        Innovations over their sigmas (dimensionless); NaN where nothing was measured.
+    prepared : PreparedData
+        e epochs.
+
+    Returns
+    -------
+    tuple of StopMean
+        The mean over the m epochs of a stop, times the root of m.
+    """
     out = []
     for stop in np.unique(prepared.phases.stop[prepared.kind > 0]):
         rows = (prepared.phases.stop == stop) & (prepared.kind > 0)

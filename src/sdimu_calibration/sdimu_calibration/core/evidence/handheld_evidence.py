@@ -23,9 +23,10 @@ from sdimu_calibration.core.specification import ImuSpecification
 CHANNELS = (
     "gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z", "turn_north", "turn_east", "turn_down",
 )  # fmt: skip
-"""What is measured: rate and force at each rest, and the way to it (the heading of north is arbitrary)."""
+"""What is measured: rate and force at each rest, and the turn that led to it (the heading of north is arbitrary)."""
 _LARGEST = 30.0
-"""So many times what physics gives it an effect is never."""
+"""Factor on the one-sigma size that physics gives an effect: no sensor is worse, so what does not show at that size is
+not seen."""
 _ANY_ATTITUDE = 1.0
 """Sigma of the prior of an attitude (rad): none, but an attitude whose rows are left out stays finite."""
 
@@ -43,7 +44,7 @@ class HandheldEvidence(LinearEvidence):
         What a perfect IMU sees at the rests.
     gone : Turns
     sigma : ndarray, shape (N,)
-        Of each row (SI; rad for turns).
+        Sigma of each row before it was whitened (rad/s, m/s^2, rad for turns).
     """
 
     channel: Ints
@@ -54,11 +55,24 @@ class HandheldEvidence(LinearEvidence):
 
     @property
     def unpredictable(self) -> float:
-        """Without the way to a rest nothing says where it heads, and the last rest has no attitude at all."""
+        """As of every evidence; finite, as a rest that is left out takes the turn that led to it along.
+
+        Nothing says then where the rest heads, and the last rest has no attitude at all.
+        """
         return 1e4
 
     def signature(self, effects: Sequence[Effect]) -> Floats:
-        """Columns of all parameters of `effects`, shape (N, parameters)."""
+        """Signatures of all parameters of some effects; zero for what could not show, however bad the sensor.
+
+        Parameters
+        ----------
+        effects : sequence of Effect
+
+        Returns
+        -------
+        ndarray, shape (N, parameters)
+            Change of each whitened residual per SI unit of each parameter.
+        """
         if not effects:
             return np.zeros((len(self.e), 0))
         parts = [_signature(self.run, self.rests, self.gone, effect) for effect in effects]
@@ -130,7 +144,23 @@ def _signature(run: HandheldRun, rests: Motion, gone: Turns, effect: Effect) -> 
 
 
 def standardised(evidence: HandheldEvidence, chosen: Ints) -> Floats:
-    """Residual of every row over its own sigma, the model and `chosen` estimated; NaN where nothing is redundant."""
+    """Residual of every row over the sigma of the residual itself, with some candidates in the model.
+
+    ``r_i / sqrt(1 - w_i C w_i')``, w_i the row of W and C the covariance of the estimate: the statistic of W. Baarda,
+    *A testing procedure for use in geodetic networks* (1968).
+
+    Parameters
+    ----------
+    evidence : HandheldEvidence
+        N rows.
+    chosen : ndarray of int, shape (k,)
+        Columns of the candidates that are estimated with the model.
+
+    Returns
+    -------
+    ndarray, shape (N,)
+        Standard normal when the model is right (dimensionless); NaN where the other rows do not check a row.
+    """
     known = np.concatenate([evidence.model, chosen]).astype(np.int64)
     weight = np.concatenate([evidence.weight, np.zeros(len(chosen))])
     estimate, covariance = evidence.information.estimate(known, weight)
@@ -142,7 +172,14 @@ def standardised(evidence: HandheldEvidence, chosen: Ints) -> Floats:
 
 
 def places(evidence: HandheldEvidence, chosen: Ints) -> tuple[StopMean, ...]:
-    """Residuals with the columns `chosen` in the model, over their own sigmas, the largest first."""
+    """Say where a model fails: every residual over its own sigma, the largest first.
+
+    Parameters
+    ----------
+    evidence : HandheldEvidence
+    chosen : ndarray of int, shape (k,)
+        Columns of the candidates that are estimated with the model.
+    """
     values = standardised(evidence, chosen)
     rows = [
         StopMean(CHANNELS[c], int(s), float(v))
@@ -152,4 +189,4 @@ def places(evidence: HandheldEvidence, chosen: Ints) -> tuple[StopMean, ...]:
 
 
 _REDUNDANT = 1e-3
-"""Share of a row that the other rows check, below which its residual says nothing."""
+"""Share of a row that the other rows check, from which its residual counts: below it what is left of it is rounding."""

@@ -11,14 +11,14 @@ from sdimu_calibration.core.arrays import Floats, Ints
 
 @dataclass(frozen=True)
 class Information:
-    """What data say about parameters.
+    """What data say about parameters; whoever estimates some of them states their prior information beside it.
 
     Attributes
     ----------
     J : ndarray, shape (q, q)
-        Information (inverse covariance) matrix.
+        Information (inverse covariance) matrix, in inverse units (SI) of two parameters.
     d : ndarray, shape (q,)
-        Information vector; the estimate of parameter i alone is d_i / J_ii.
+        Information vector, in inverse units; the estimate of parameter i alone is d_i / J_ii.
     """
 
     J: Floats
@@ -27,9 +27,13 @@ class Information:
     def given(self, known: Ints, weight: Floats) -> Information:
         """Information on all parameters when those at `known` are estimated along with them.
 
+        With A = J[known, known] + diag(weight) and B = J[:, known] that is ``J - B A^-1 B'`` and
+        ``d - B A^-1 d[known]``.
+
         Parameters
         ----------
         known : ndarray of int, shape (k,)
+            Indices of parameters.
         weight : ndarray, shape (k,)
             Prior information of each (1/sigma^2), already in `d` where the prior mean is not zero.
 
@@ -49,7 +53,20 @@ class Information:
         return Information(0.5 * (J + J.T), d)
 
     def diagonal_given(self, known: Ints, weight: Floats) -> tuple[Floats, Floats]:
-        """Diagonal of J, and d, of `given` with the same arguments: all that a scan needs, for less."""
+        """Diagonal of J, and d, as `given` has them: all that a scan needs, for less.
+
+        Parameters
+        ----------
+        known : ndarray of int, shape (k,)
+            Indices of parameters.
+        weight : ndarray, shape (k,)
+            Prior information of each (1/sigma^2), as for `given`.
+
+        Returns
+        -------
+        J, d : ndarray, shape (q,)
+            In the units of the class; zero for the parameters at `known`.
+        """
         if not len(known):
             return np.diag(self.J).copy(), self.d.copy()
         B = self.J[:, known]
@@ -60,7 +77,21 @@ class Information:
         return J, d
 
     def estimate(self, chosen: Ints, weight: Floats) -> tuple[Floats, Floats]:
-        """Estimate and covariance of the parameters at `chosen`, with prior information `weight` each."""
+        """Estimate some parameters by least squares; all others are left out of the model.
+
+        Parameters
+        ----------
+        chosen : ndarray of int, shape (k,)
+            Indices of parameters.
+        weight : ndarray, shape (k,)
+            Prior information of each (1/sigma^2), as for `given`.
+
+        Returns
+        -------
+        estimate : ndarray, shape (k,)
+            SI.
+        covariance : ndarray, shape (k, k)
+        """
         A = self.J[np.ix_(chosen, chosen)] + np.diag(weight)
         scale = 1.0 / np.sqrt(np.diag(A))
         inverse = np.linalg.inv(A * np.outer(scale, scale)) * np.outer(scale, scale)
@@ -68,6 +99,18 @@ class Information:
 
 
 def solved(A: Floats, right: Floats) -> Floats:
-    """Solve ``A x = right`` for a symmetric A (k, k) whose units differ by many orders; right (k, m)."""
+    """Solve ``A X = right`` where the units of the unknowns differ by many orders.
+
+    Parameters
+    ----------
+    A : ndarray, shape (k, k)
+        Symmetric, with a positive diagonal; in any units.
+    right : ndarray, shape (k, m)
+
+    Returns
+    -------
+    ndarray, shape (k, m)
+        In the units of `right` over those of A.
+    """
     scale = 1.0 / np.sqrt(np.diag(A))
     return np.asarray(scale[:, None] * np.linalg.solve(A * np.outer(scale, scale), scale[:, None] * right))

@@ -36,9 +36,9 @@ class LinearEvidence(ABC):
     e : ndarray, shape (N,)
         Whitened residuals with all parameters at the calibration's values.
     W : ndarray, shape (N, p + q)
-        Signatures: p parameters of the model, then q candidates.
+        Signatures, whitened residual per SI unit: p parameters of the model, then q candidates.
     stop : ndarray of int, shape (N,)
-        Of each row: rows of one stop are left out together.
+        Number of the stop that each row belongs to: rows of one stop are left out together.
     names : tuple of str
         Of the p + q parameters.
     weight : ndarray, shape (p,)
@@ -76,15 +76,36 @@ class LinearEvidence(ABC):
 
     @abstractmethod
     def signature(self, effects: Sequence[Effect]) -> Floats:
-        """Columns of all parameters of `effects`, shape (N, parameters)."""
+        """Signatures of all parameters of some effects.
+
+        Parameters
+        ----------
+        effects : sequence of Effect
+
+        Returns
+        -------
+        ndarray, shape (N, parameters)
+            Change of each whitened residual per SI unit of each parameter, effect by effect.
+        """
 
     def constant_signature(self, cut: Stretches) -> Floats:
-        """Columns of a constant error of each sensor axis in each of s stretches, shape (N, 6 s)."""
+        """Signatures of a constant error of each sensor axis in each stretch.
+
+        Parameters
+        ----------
+        cut : Stretches
+            s stretches.
+
+        Returns
+        -------
+        ndarray, shape (N, 6 s)
+            Change of each whitened residual per rad/s or m/s^2; column ``6 stretch + axis``.
+        """
         return self.signature(stretch_effects(cut))
 
     @property
     def model(self) -> Ints:
-        """Indices of the model's own parameters."""
+        """Columns of the model's own parameters, shape (p,)."""
         return np.arange(len(self.weight))
 
     @property
@@ -94,7 +115,11 @@ class LinearEvidence(ABC):
 
     @cached_property
     def information(self) -> Information:
-        """Information on all parameters, the prior's pull on the model's in d."""
+        """Information on all parameters, ``J = W' S^-1 W`` with S the covariance of all noise.
+
+        J holds the data alone. d holds ``W' S^-1 e`` and, for the model's parameters, ``weight * shift``: the pull of
+        their prior.
+        """
         d = self.W.T @ self.residuals
         d[: len(self.weight)] += self.weight * self.shift
         return Information(self.W.T @ self.weighed(self.W), d)
@@ -105,14 +130,31 @@ class LinearEvidence(ABC):
         return self.weighed(self.e[:, None])[:, 0]
 
     def weighed(self, columns: Floats) -> Floats:
-        """Columns (N, k) weighed with the inverse covariance of all noise, ``I + noise noise'``, shape (N, k)."""
+        """Weigh columns with the inverse covariance of all noise, ``(I + noise noise')^-1``.
+
+        Parameters
+        ----------
+        columns : ndarray, shape (N, k)
+            In the units of W or e.
+
+        Returns
+        -------
+        ndarray, shape (N, k)
+            By the matrix inversion lemma, in the number of modes; in the same units.
+        """
         if not self.noise.size:
             return columns
         M = np.eye(self.noise.shape[1]) + self.noise.T @ self.noise
         return np.asarray(columns - self.noise @ np.linalg.solve(M, self.noise.T @ columns))
 
     def with_noise(self: E, modes: Floats) -> E:
-        """Return the evidence with other modes of noise with a memory, shape (N, r)."""
+        """Return the evidence with other modes of noise with a memory.
+
+        Parameters
+        ----------
+        modes : ndarray, shape (N, r)
+            Signatures of the modes in the whitened residuals, each of unit variance.
+        """
         return replace(self, noise=modes) if modes.size or self.noise.size else self
 
     def with_effects(self: E, effects: Sequence[Effect]) -> E:
@@ -132,7 +174,13 @@ class LinearEvidence(ABC):
         return wider
 
     def only(self: E, columns: Ints) -> E:
-        """Return the evidence with the model and the candidates at `columns` alone."""
+        """Return the evidence with the model and some of the candidates alone.
+
+        Parameters
+        ----------
+        columns : ndarray of int, shape (k,)
+            Columns of W that are candidates; they come in this order.
+        """
         p = len(self.weight)
         keep = np.concatenate([self.model, columns]).astype(np.int64)
         whole = np.array_equal(keep, np.arange(len(keep)))
@@ -202,7 +250,19 @@ class LinearEvidence(ABC):
 
 
 def candidate_priors(effects: Sequence[Effect], imu: ImuSpecification) -> tuple[tuple[Candidate, ...], Floats]:
-    """Candidates of all parameters of `effects`, and the one-sigma (SI) that the IMU gives each (inf where unknown)."""
+    """Split effects into candidates, one a parameter, with the size that physics gives each.
+
+    Parameters
+    ----------
+    effects : sequence of Effect
+    imu : ImuSpecification
+
+    Returns
+    -------
+    candidates : tuple of Candidate, length q
+    prior : ndarray, shape (q,)
+        One-sigma (SI): of the IMU's file, else of its grade; inf where neither has it.
+    """
     candidates = tuple(c for effect in effects for c in split(effect))
     sizes = [prior_size(c.effect, imu) for c in candidates]
     return candidates, np.array([np.inf if size is None else size for size in sizes])

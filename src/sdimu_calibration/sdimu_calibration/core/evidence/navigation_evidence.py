@@ -33,11 +33,12 @@ from sdimu_calibration.core.second_order.second_order_passes import (
 )
 
 _SHORTEST_DWELL_S = 3.0
-"""Dwells that are shorter (s) are part of a turn."""
+"""Shortest dwell (s): what is shorter is a part of the turn."""
 _BLOCK = 24
-"""Effects whose regressors are in memory at a time, in each thread."""
+"""Number of effects, or of stretches, that a thread works on at a time: the regressors of all would take hundreds of
+megabytes."""
 _THREADS = 2
-"""Threads: the cores of a small machine; more blocks at a time than there are caches for gain nothing."""
+"""Number of threads: the cores of a small machine; more blocks at a time than there are caches for gain nothing."""
 
 
 @dataclass(frozen=True)
@@ -90,11 +91,32 @@ class NavigationEvidence(LinearEvidence):
         return self.known.seen
 
     def signature(self, effects: Sequence[Effect]) -> Floats:
-        """Columns of all parameters of `effects`, shape (N, parameters)."""
+        """Signatures of all parameters of some effects.
+
+        Parameters
+        ----------
+        effects : sequence of Effect
+
+        Returns
+        -------
+        ndarray, shape (N, parameters)
+            Change of each whitened innovation per SI unit of each parameter.
+        """
         return columns(self.prepared, self.known, self.latitude, effects)
 
     def constant_signature(self, cut: Stretches) -> Floats:
-        """Columns of a constant error of each sensor axis in each of s stretches, shape (N, 6 s)."""
+        """Signatures of a constant error of each sensor axis in each stretch.
+
+        Parameters
+        ----------
+        cut : Stretches
+            s stretches.
+
+        Returns
+        -------
+        ndarray, shape (N, 6 s)
+            Change of each whitened innovation per rad/s or m/s^2; column ``6 stretch + axis``.
+        """
         return constant_columns(self.prepared, self.known, self.latitude, cut)
 
 
@@ -185,7 +207,21 @@ def navigation_evidence(
 
 
 def columns(prepared: PreparedData, known: KnownPass, latitude: float, effects: Sequence[Effect]) -> Floats:
-    """Signatures of all parameters of `effects` at a latitude (rad), shape (N, parameters)."""
+    """Signatures of all parameters of some effects, in parallel.
+
+    Parameters
+    ----------
+    prepared : PreparedData
+    known : KnownPass
+    latitude : float
+        Of the site (rad).
+    effects : sequence of Effect
+
+    Returns
+    -------
+    ndarray, shape (N, parameters)
+        Change of each whitened innovation per SI unit of each parameter; rows in the order of `measured_rows`.
+    """
     epochs, seen = prepared.epochs, known.seen
     blocks = [effects[start : start + _BLOCK] for start in range(0, len(effects), _BLOCK)]
     ends = np.cumsum([0, *(sum(len(effect.parameters) for effect in block) for block in blocks)])
@@ -205,7 +241,23 @@ def columns(prepared: PreparedData, known: KnownPass, latitude: float, effects: 
 
 
 def constant_columns(prepared: PreparedData, known: KnownPass, latitude: float, cut: Stretches) -> Floats:
-    """Signatures of a constant error of each sensor axis in each of s stretches, at a latitude (rad); (N, 6 s)."""
+    """Signatures of a constant error of each sensor axis in each stretch, in parallel.
+
+    Parameters
+    ----------
+    prepared : PreparedData
+    known : KnownPass
+    latitude : float
+        Of the site (rad).
+    cut : Stretches
+        s stretches.
+
+    Returns
+    -------
+    ndarray, shape (N, 6 s)
+        Change of each whitened innovation per rad/s or m/s^2; column ``6 stretch + axis``, rows in the order of
+        `measured_rows`.
+    """
     epochs, blocks = prepared.epochs, range(0, len(cut), _BLOCK)
     W = np.zeros((int(np.isfinite(known.output.normalised).sum()), 6 * len(cut)), order="F")
 

@@ -205,12 +205,20 @@ def constant_signatures(
 
     Parameters
     ----------
-    seen, first, last, kind, output, latitude, weight
-        As for `signatures`.
+    seen : Motion
+        Predicted motion, n cycles.
+    first, last, kind : ndarray of int, shape (e,)
+        Epochs, as in `filter_pass.PassInput`.
+    output : PassOutput
+        Of the pass with known coefficients, with its matrices kept.
     start, end : ndarray, shape (s,)
-        s; in the order of time.
+        Begin and end of each stretch (s), in the order of time.
+    latitude : float
+        Of the site (rad).
+    weight : ndarray, shape (n, 6, 6), or None
+        Change of corrected rate and force per change of the measured ones (SI); None is the identity.
     W : ndarray, shape (rows, 6 s)
-        Filled where a stretch has begun, zero before; column ``6 stretch + axis``.
+        Filled from the first stretch on, per rad/s or m/s^2, and left as it is before; column ``6 stretch + axis``.
     """
     _constant_signatures(
         seen.t, np.ascontiguousarray(seen.C_nb), np.ascontiguousarray(seen.f), seen.dt, first, last, kind,
@@ -224,6 +232,12 @@ def _or_none(weight: Floats | None) -> Floats:
 
 
 def measured_rows(output: PassOutput) -> tuple[Ints, Ints]:
-    """Epoch and channel (0-11: position, velocity, rate, force, three each) of every row."""
+    """Say which measurement each row of the signatures is, in the order of epochs and channels.
+
+    Returns
+    -------
+    epoch, channel : ndarray of int, shape (rows,)
+        Channels 0-11 are position, velocity, rate, force, three each.
+    """
     epoch, channel = np.nonzero(np.isfinite(output.normalised))
     return epoch.astype(np.int64), channel.astype(np.int64)

@@ -10,14 +10,14 @@ from sdimu_calibration.core.probability import normal_limit
 
 _KINDS = ("position", "velocity", "gyro", "accelerometer")
 _FALSE_ALARM = 1e-4
-"""Share of sound tests with a false alarm."""
+"""Share of sound tests with a false alarm: whoever is sent to look at a stop must find something there."""
 
 
 def stop_misfit(normalised: Floats, prepared: PreparedData) -> str | None:
     """Name the stop and kind of measurement that fits worst, if it is no chance.
 
     The whitened innovations of a right model are independent standard normals, so their sum over a stop divided by
-    the root of their number is one too. The largest of all stops and rows is judged against its own distribution.
+    the root of their number is one too. The largest of all stops and channels is judged with their number (Bonferroni).
 
     Parameters
     ----------
