@@ -25,7 +25,6 @@ EXEMPT = {
             "advice bootstrap candidates coefficient_shifts diagnose found free_input_test "
             "ladder plan_seen rounds scan search verdict"
         ),
-        "core.estimation": "azimuth_check fit handheld_fit holdout navigation_fit reference_fits second_order_fit",
     }.items()
     for module in modules_of.split()
 }

@@ -16,11 +16,13 @@ from sdimu_calibration.core.filter.filter_pass import NAV
 from sdimu_calibration.core.filter.passes import Solution
 
 _SIGMAS = 3.0
+"""Error of the azimuth (sigma) that is reckoned with: chance ends there."""
 _LEAST_ATTITUDES = 3
+"""Number of attitudes from which azimuth and gyro biases come apart: with fewer the sigmas themselves are bent."""
 _NO_HEADING_RAD = np.radians(1.0)
-"""An azimuth that is known no better is called not observable."""
+"""Error of the azimuth (rad) from which it is called not observable: a heading so wrong is of no use."""
 _SAME = np.cos(np.radians(10.0))
-"""Cosine of the rotation up to which two attitudes are one."""
+"""Cosine of a rotation (1) above which two attitudes are one: 10 deg are less than any step of a plan."""
 
 
 def azimuth_warning(solution: Solution) -> str | None:

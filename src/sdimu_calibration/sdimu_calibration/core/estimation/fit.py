@@ -35,9 +35,10 @@ class Start:
     coefficients : ndarray, shape (p,)
         SI, in the frame in which the estimator works.
     C_nb : ndarray, shape (3, 3) or (k, 3, 3)
-        Initial attitude, or that of every rest.
-    more : ndarray
-        Whatever else the estimator learned.
+        Initial attitude, or that of every rest; b to n.
+    more : ndarray, shape (m,)
+        Whatever else the estimator learned (SI): of a handheld run the Earth's rate in n, then the three sigmas of
+        `handheld_fit.LinearisationPoint.extra`; of all others nothing.
     """
 
     names: tuple[str, ...]
@@ -46,7 +47,17 @@ class Start:
     more: Floats
 
     def coefficients_of(self, names: Sequence[str]) -> Floats:
-        """Coefficients in the order of `names`; zero for a new one; shape (len(names),)."""
+        """Coefficients of another model, where this one has them.
+
+        Parameters
+        ----------
+        names : sequence of str, length q
+
+        Returns
+        -------
+        ndarray, shape (q,)
+            SI, in the order of `names`; zero for a coefficient that this fit had not.
+        """
         known = dict(zip(self.names, self.coefficients.tolist(), strict=True))
         return np.array([known.get(name, 0.0) for name in names])
 
@@ -122,7 +133,12 @@ class Fit(ABC):
 
     @abstractmethod
     def added_columns(self, count: int) -> Ints:
-        """Columns in `evidence` of the last `count` parameters of the model, shape (count,)."""
+        """Columns in `evidence` of the last `count` parameters of the model.
+
+        Returns
+        -------
+        ndarray of int, shape (count,)
+        """
 
     @abstractmethod
     def consistency(self, evidence: LinearEvidence | None = None) -> Consistency:
@@ -203,7 +219,13 @@ class Fit(ABC):
         return np.zeros(len(effect.terms))
 
     def with_doubt(self, doubt: Floats | None) -> Self:
-        """Return the fit with another covariance (q, q) that open models add."""
+        """Return the fit with another covariance that open models add.
+
+        Parameters
+        ----------
+        doubt : ndarray, shape (q, q), or None
+            As the attribute `doubt`.
+        """
         return replace(self, doubt=doubt)
 
     @property
@@ -217,6 +239,12 @@ class Fit(ABC):
         return frozenset(label for effect in self.sensors.effects for label in effect.labels)
 
     def size_in_sigmas(self, count: int) -> Floats:
-        """Size of the last `count` parameters, in their sigmas, shape (count,)."""
+        """Size of the last `count` parameters of the model.
+
+        Returns
+        -------
+        ndarray, shape (count,)
+            In units of their sigmas (1).
+        """
         last = slice(len(self.names) - count, None)
         return np.abs(self.values[last]) / np.sqrt(np.diag(self.covariance)[last])

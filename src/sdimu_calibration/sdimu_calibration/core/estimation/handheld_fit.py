@@ -98,7 +98,12 @@ class HandheldFit(Fit):
         return handheld_evidence(self.ready.run, self.priors, self.solution.point, effects, self.test.imu)
 
     def added_columns(self, count: int) -> Ints:
-        """Columns in `evidence` of the last `count` parameters of the model, shape (count,)."""
+        """Columns in `evidence` of the last `count` parameters of the model.
+
+        Returns
+        -------
+        ndarray of int, shape (count,)
+        """
         q = len(self.priors.kept)
         return np.arange(q - count, q)
 

@@ -18,14 +18,15 @@ from sdimu_calibration.core.data.phases import Phases
 from sdimu_calibration.core.recording import DataError
 
 WANTED_S = 600.0
-"""Length of the navigation (s)."""
+"""Length of the navigation that is wanted (s): errors of coefficients grow to metres in it."""
 LEAST_S = 60.0
-"""A shorter one says nothing."""
+"""Least length of the navigation (s): a shorter one says nothing."""
 LEVEL_S = 100.0
-"""At most this much of the dwell before it levels (s)."""
+"""Longest part of the dwell before it that levels (s): biases are constant over it."""
 _LEAST_LEVEL_S = 10.0
+"""Shortest rest that levels (s): a shorter one leaves the noise of the accelerometers in the tilt."""
 _KEPT = 0.5
-"""The fit keeps at least this share of the recording."""
+"""Share of the recording that the fit keeps at least: from less, its coefficients say little of those of the whole."""
 
 
 @dataclass(frozen=True)

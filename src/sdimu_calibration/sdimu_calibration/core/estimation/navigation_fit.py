@@ -45,11 +45,12 @@ from sdimu_calibration.core.second_order.second_order_passes import (
 )
 
 HELD_OUT_FOLDS = 3
-"""Interleaved groups of stops; each group is held out once."""
+"""Number of interleaved groups of stops, each held out once: two thirds of the stops are then in every fit."""
 _ABSURD = 1e3
-"""NIS per degree of freedom from which there is no fit at all: units, axes or site are wrong."""
+"""NIS per degree of freedom (1) from which there is no fit at all: units, axes or site are wrong."""
 _MISFIT = 1.2
-"""NIS per degree of freedom, and held-out error (sigma), from which a user is warned; 1 is right."""
+"""NIS per degree of freedom, and held-out error (sigma), from which a user is warned: 1 is right, and chance stays
+within a few per cent of it."""
 _OF_THE_PASSES = {"known", "timetable", "centring", "_drifts", "_share_of_rest"}
 """Cached properties that neither noise nor doubt changes."""
 NO_FIELD = (
@@ -58,7 +59,7 @@ NO_FIELD = (
 )
 """Note on an effect of magnetism without a stated field."""
 _OUTSIDE = 4.5
-"""Size of a coefficient in its stated sigma from which a user is warned."""
+"""Size of a coefficient (sigma of the specification) from which a user is warned: chance puts one in 150 000 there."""
 
 
 @dataclass(frozen=True)
@@ -97,15 +98,40 @@ class NavigationFit(Fit):
 
     @abstractmethod
     def run_kinds(self, kind: Ints) -> PassOutput:
-        """Repeat the last pass with other kinds of measurement, shape (e,)."""
+        """Repeat the last pass with other kinds of measurement.
+
+        Parameters
+        ----------
+        kind : ndarray of int, shape (e,)
+            As in `measurement_kind`.
+        """
 
     @abstractmethod
     def on(self, prepared: PreparedData, C_nb: Floats) -> Navigator:
-        """Fit the same model to a part of the recording that starts at attitude `C_nb` (3, 3)."""
+        """Fit the same model to a part of the recording.
+
+        Parameters
+        ----------
+        prepared : PreparedData
+            The part.
+        C_nb : ndarray, shape (3, 3)
+            Attitude at its start, b to n (dimensionless).
+        """
 
     @abstractmethod
     def compensated(self, prepared: PreparedData, estimate: Floats, C_start: Floats, end_of_fit: float) -> Compensated:
-        """Take the errors at `estimate` (q,) out of all cycles; the fit ended at `end_of_fit` (s)."""
+        """Take the errors of the sensors out of all cycles.
+
+        Parameters
+        ----------
+        prepared : PreparedData
+        estimate : ndarray, shape (q,)
+            Coefficients of the estimator (SI).
+        C_start : ndarray, shape (3, 3)
+            Attitude at the start, b to n.
+        end_of_fit : float
+            Where the fit ended (s): a coefficient that fades is known there.
+        """
 
     @property
     def estimate(self) -> Floats:
@@ -114,7 +140,10 @@ class NavigationFit(Fit):
 
     @property
     def settled(self) -> Floats:
-        """Coefficients of the estimator (SI) in the noise that was learned, biases as means; shape (q,)."""
+        """Coefficients of the estimator (SI) in the noise learned, biases as means over the dwells, shape (q,).
+
+        What is reported follows from these.
+        """
         return self.centring @ (self.estimate if self.noise is None else self.estimate + self.noise.deviation)
 
     @property
@@ -126,10 +155,16 @@ class NavigationFit(Fit):
 
     @cached_property
     def centring(self) -> Floats:
-        """Map from coefficients as the equations have them to biases as means over all dwells, shape (q, q).
+        """Map from the coefficients of the equations to those with biases as means over all dwells.
 
-        A bias beside a ramp is that at the start, beside a warm-up that at the end: which of them a test cannot tell
-        apart moves it by many sigmas. Its mean over the dwells is the same whatever drifts.
+        Beside a ramp the bias of the equations is the one at the start, beside a warm-up the one at the end. A test may
+        be unable to tell ramp from warm-up, and the bias then differs by many sigmas between them. Its mean over the
+        dwells is the same, whatever drifts.
+
+        Returns
+        -------
+        ndarray, shape (q, q)
+            SI; the identity, and in the row of each bias the mean regressor of its drifts.
         """
         names = self.setup.sensors.names
         T = np.eye(len(names))
@@ -160,11 +195,23 @@ class NavigationFit(Fit):
         return np.asarray(rest / rest.sum())
 
     def dwell_means(self, effect: Effect) -> Floats:
-        """Mean of the regressors (SI) of a drift of a bias over all dwells, shape (terms,)."""
+        """Mean of the regressors of a drift of a bias over all dwells.
+
+        Returns
+        -------
+        ndarray, shape (terms,)
+            SI.
+        """
         return np.asarray(self._share_of_rest @ effect.regressors(self.known.seen))
 
     def with_doubt(self, doubt: Floats | None) -> Self:
-        """Return the fit with another covariance (q, q) that open models add."""
+        """Return the fit with another covariance that open models add.
+
+        Parameters
+        ----------
+        doubt : ndarray, shape (q, q), or None
+            As the attribute `doubt` (SI).
+        """
         return self._with_passes(replace(self, doubt=doubt))
 
     def with_noise(self, noise: NoiseEstimate | None) -> Self:
@@ -228,7 +275,18 @@ class NavigationFit(Fit):
         return float(np.sqrt(total / count)) if count else None
 
     def predict(self, out: Bools) -> Floats:
-        """Whitened innovations (e, 12) of the last pass with the epochs `out` (e,) predicted but not taken."""
+        """Repeat the last pass with some epochs predicted but not taken.
+
+        Parameters
+        ----------
+        out : ndarray of bool, shape (e,)
+            Epochs that are not taken.
+
+        Returns
+        -------
+        ndarray, shape (e, 12)
+            Whitened innovations of all epochs (dimensionless); NaN where nothing was measured.
+        """
         kind = self.prepared.kind.copy()
         kind[out & (kind == SENSORS)] = HELD_SENSORS
         kind[out & (kind == ALL)] = HELD_ALL
@@ -336,7 +394,15 @@ def fit_statistics(output: PassOutput) -> dict[str, float | None]:
 
 
 def outside(sensors: ImuModel, estimate: Floats) -> list[str]:
-    """Name the coefficients of `estimate` (q,) beyond what the specification allows, the furthest first."""
+    """Name the coefficients beyond what the specification allows, one line each, the furthest first.
+
+    Parameters
+    ----------
+    sensors : ImuModel
+        q parameters.
+    estimate : ndarray, shape (q,)
+        SI.
+    """
     size = np.abs(estimate) / sensors.stated
     return [
         f"{sensors.names[i]} is {size[i]:.1f} times the sigma of the specification"

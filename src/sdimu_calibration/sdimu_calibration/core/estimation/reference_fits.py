@@ -80,7 +80,12 @@ class ReferenceFit(Fit):
         return self.about.evidence(effects)
 
     def added_columns(self, count: int) -> Ints:
-        """Columns in `evidence` of the last `count` parameters of the model, shape (count,)."""
+        """Columns in `evidence` of the last `count` parameters of the model.
+
+        Returns
+        -------
+        ndarray of int, shape (count,)
+        """
         return self.about.added_columns(count)
 
     def consistency(self, evidence: LinearEvidence | None = None) -> Consistency:

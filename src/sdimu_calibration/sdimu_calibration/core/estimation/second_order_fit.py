@@ -87,17 +87,41 @@ class SecondOrderFit(NavigationFit):
         return super().labels | {label for effect in self.setup.sensors.effects for label in effect.labels}
 
     def added_columns(self, count: int) -> Ints:
-        """Columns in `evidence` of the last `count` parameters of the model, shape (count,)."""
+        """Columns in `evidence`, which is that of the inner model, of the last `count` parameters of the model.
+
+        Returns
+        -------
+        ndarray of int, shape (count,)
+        """
         return self.frame_model.place[len(self.names) - count :]
 
     def run_kinds(self, kind: Ints) -> PassOutput:
-        """Repeat the last pass with other kinds of measurement, shape (e,)."""
+        """Repeat the last pass with other kinds of measurement.
+
+        Parameters
+        ----------
+        kind : ndarray of int, shape (e,)
+            As in `measurement_kind`.
+        """
         last = self.last
         data = last.data._replace(kind=kind)
         return run_stops(data, firm_setup(self.setup), last.start, self.prepared, last.where, last.C_stop)[1]
 
     def on(self, prepared: PreparedData, C_nb: Floats) -> SecondOrderFit:
-        """Fit the same model to a part of the recording that starts at attitude `C_nb` (3, 3)."""
+        """Fit the same model to a part of the recording.
+
+        Parameters
+        ----------
+        prepared : PreparedData
+            The part.
+        C_nb : ndarray, shape (3, 3)
+            Attitude at its start, b to n (dimensionless).
+
+        Raises
+        ------
+        DataError
+            When the part cannot be aligned, or the filter diverges.
+        """
         begin = StartPoint(np.ascontiguousarray(C_nb), self.estimate)
         alignment = first_attitude(prepared.epochs, prepared.phases, self.setup)
         last, count, converged = solve_second_order(self.setup, prepared, alignment, begin, silent)
@@ -106,7 +130,18 @@ class SecondOrderFit(NavigationFit):
         )
 
     def compensated(self, prepared: PreparedData, estimate: Floats, C_start: Floats, end_of_fit: float) -> Compensated:
-        """Take the errors at `estimate` (q,) out of all cycles exactly; constants, so `end_of_fit` does not matter."""
+        """Take the errors out of all cycles, exactly.
+
+        Parameters
+        ----------
+        prepared : PreparedData
+        estimate : ndarray, shape (q,)
+            Coefficients of the estimator (SI).
+        C_start : ndarray, shape (3, 3)
+            Attitude at the start, b to n.
+        end_of_fit : float
+            s; of no consequence here, as all coefficients are constants.
+        """
         del end_of_fit
         setup, sensors = self.setup, self.setup.sensors
         near = motion(

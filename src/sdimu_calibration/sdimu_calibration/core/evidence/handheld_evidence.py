@@ -55,9 +55,9 @@ class HandheldEvidence(LinearEvidence):
 
     @property
     def unpredictable(self) -> float:
-        """As of every evidence; finite, as a rest that is left out takes the turn that led to it along.
+        """As in `LinearEvidence`; finite here, because a rest is left out with the turn that leads to it.
 
-        Nothing says then where the rest heads, and the last rest has no attitude at all.
+        Without that turn nothing says where the rest heads, and the last rest has no attitude at all.
         """
         return 1e4
 
