@@ -18,18 +18,6 @@ SHAPE = re.compile(r"\bshapes? \(|\blength [a-z]\b")
 PURE_NUMBER = re.compile(r"(?i)\b(share|ratio|factor|multiple|number|percentile|weight|probability|count)s?\b")
 UNIT = re.compile(r"\b(rad|m/s|deg|degC|Hz|SI|units?|dimensionless|whitened|normalised|customary)\b|\((s|m|g|1)\)")
 
-EXEMPT = {
-    f"{package}.{module}"
-    for package, modules_of in {
-        "core.diagnosis": (
-            "advice bootstrap candidates coefficient_shifts diagnose found free_input_test "
-            "ladder plan_seen rounds scan search verdict"
-        ),
-    }.items()
-    for module in modules_of.split()
-}
-"""Modules whose docstrings are still to be written. The list only shrinks: take a module off when it is done."""
-
 
 @dataclass(frozen=True)
 class Documented:
@@ -161,15 +149,9 @@ def faults_of(path: Path) -> list[str]:
     return found + [f"{name}: {fault}" for name, doc in constants(path) for fault in faults_of_constant(doc)]
 
 
-@pytest.mark.parametrize("module", sorted(set(modules()) - EXEMPT))
+@pytest.mark.parametrize("module", sorted(modules()))
 def test_arrays_have_shape_and_unit_and_constants_a_reason(module):
     assert faults_of(modules()[module]) == []
-
-
-@pytest.mark.parametrize("module", sorted(EXEMPT))
-def test_a_module_is_exempt_only_while_it_has_to_be(module):
-    assert module in modules(), "this module is gone: take it off the list"
-    assert faults_of(modules()[module]), "this module is done: take it off the list"
 
 
 def test_what_is_missing_is_found(tmp_path):

@@ -18,7 +18,9 @@ from sdimu_calibration.core.effects import references, registry
 from sdimu_calibration.core.effects.effect import Excitation
 
 _SLOW_MINUTES = 20.0
+"""Length of the stay that is advised for a change with time (min): usual time constants of a warm-up lie within it."""
 _MOST_STAKES = 3
+"""Number of coefficients at stake that one sentence names: diagnosis.json has the rest."""
 
 
 @dataclass(frozen=True)

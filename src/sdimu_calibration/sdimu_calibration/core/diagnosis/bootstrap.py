@@ -29,12 +29,13 @@ class Null:
     false_finds : int
         Draws in which the search accepted something.
     largest : ndarray, shape (draws,)
-        Largest score of each draw.
+        Largest ``|z|`` of the first scan of each draw (1).
     threshold : float
-        That the search used.
+        Of the search in the recording (1).
     rms_z : float
-        Of all scores: one when they are calibrated.
-    remainder_p : ndarray, shape (draws,)
+        Of the first scans of all draws; 1 when the scores are calibrated.
+    free_input_p : ndarray, shape (draws,)
+        p-value of the free-input test of each draw, with nothing added; spread evenly over 0 to 1 when calibrated.
     """
 
     draws: int
@@ -60,8 +61,13 @@ def bootstrap(d: Diagnosis, draws: int, seed: int = 1, progress: Progress | None
     Parameters
     ----------
     d : Diagnosis
-    draws, seed : int
+        Its evidence says how effects and noise show in the test; its residuals are not used.
+    draws : int
+        How many times the search is repeated.
+    seed : int
+        Of the random numbers.
     progress : callable, optional
+        Called with a word and the fraction done.
     """
     columns = looked_at(d)
     evidence = d.evidence

@@ -27,10 +27,22 @@ from sdimu_calibration.core.evidence.candidate import OWN
 from sdimu_calibration.core.evidence.noise_kernels import constant_between
 
 _CYCLES = np.arange(1.0, 20.0, 0.5)
+"""Number of periods in a test: half a period apart, as `wave` is made finer about the best; up to one a stop of
+`kim18`."""
 
 
 def catalogue(times: Timetable, in_model: set[str], has_temperature: bool) -> list[Effect]:
-    """Every effect of the catalogue with the parameters that the model lacks, scans spread out over the test."""
+    """Every effect of the catalogue with the parameters that the model lacks.
+
+    Parameters
+    ----------
+    times : Timetable
+        Of the test: an effect with a time or a time constant comes in all variants that its scan makes for it.
+    in_model : set of str
+        Labels of the parameters that the model has.
+    has_temperature : bool
+        Whether the recording has a temperature; effects that need one are left out without.
+    """
     out: list[Effect] = []
     for name in registry.names():
         effect = registry.get(name)
@@ -91,7 +103,15 @@ def equations(has_temperature: bool) -> list[Effect]:
 
 
 def periodic(duration: float, all_cycles: Floats = _CYCLES) -> list[Effect]:
-    """Sine and cosine of time on every sensor, from one period a test to the Nyquist limit of the stops."""
+    """Sine and cosine of time on every sensor.
+
+    Parameters
+    ----------
+    duration : float
+        Of the test (s).
+    all_cycles : ndarray, shape (c,)
+        Numbers of periods in the test (1).
+    """
     out: list[Effect] = []
     for cycles in all_cycles:
         # The label holds the period as it is used: what is found can be added by its label.
@@ -133,7 +153,8 @@ def wave(period: float, lead: float, spacing: tuple[float, float] = (0.0, 0.0)) 
 
 _OVER_TIME = frozenset({Excitation.REPEATED_ATTITUDES})
 _LEAST_PHASE = 3.0
-"""Steps of the phase (deg) finer than this change less of an amplitude of twenty sigma than its noise."""
+"""Step of the phase (deg) at which the search for it ends: a finer one changes an amplitude of twenty sigma by less
+than its noise."""
 
 
 def own_equation(label: str) -> Effect | None:

@@ -12,7 +12,8 @@ from sdimu_calibration.core.effects import bias
 from sdimu_calibration.core.evidence.linear import E
 
 _MATTERS = 3.0
-"""A coefficient that differs by less than this many of its sigmas is right enough whichever member it is."""
+"""Difference of a coefficient (sigma) from which the choice matters: with less it is right enough whichever member it
+is."""
 
 
 @dataclass(frozen=True)

@@ -45,16 +45,19 @@ from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.specification import ImuSpecification, Model, Site
 
 STILL_WRONG = 1.25
-"""Held-out error (sigma; 1 is right) from which a model is not called explained, whatever it fits."""
+"""Held-out error (sigma) from which a model is not called explained: 1 is right, and an effect that only imitates the
+cause fits here and fails elsewhere."""
 NOISE_OFF = 0.05
-"""Deviation of the white noise from its specification, as a share, from which a note reports it."""
+"""Deviation of the white noise from its specification, as a share, from which it is reported and corrected: all sigmas
+go with it."""
 _KURTOSIS = 4.0
-"""Kurtosis of the differences of neighbouring seconds from which tails are heavy; Gaussian noise in a test of an hour
-stays below 3.3."""
+"""Kurtosis of the differences of neighbouring seconds (1) from which tails are heavy: Gaussian noise in a test of an
+hour stays below 3.3."""
 _MISFIT = 0.05
-"""Excess of the NIS below which sigmas are right enough."""
+"""Excess of the NIS per degree of freedom (1) up to which a model fits: its sigmas are then right to 2.5 %."""
 _MISFIT_SIGMAS = 5.0
-"""The same in standard deviations of the excess."""
+"""Excess of the NIS (standard deviations of it) up to which a model fits: in a short test chance goes beyond
+`_MISFIT`."""
 NOT_DIAGNOSABLE = (
     "the classical estimator gives coefficients in the axes of the table: a navigation about them shows the mount, and "
     "no missing effect; diagnose with another --estimator (in Python estimator=...)"
@@ -70,7 +73,7 @@ class Diagnosis:
     ----------
     verdict : str
         ``consistent``, ``noise model wrong``, ``one effect``, ``class of effects``, ``several effects``,
-        ``own equation``, ``unexplained``, ``data fault``.
+        ``own equation``, ``unexplained``, ``data fault``; of a `survey`: ``consistent`` or ``misfit``.
     sentence : str
         The verdict for people.
     adequate : bool
@@ -90,7 +93,7 @@ class Diagnosis:
         Of the catalogue, or of own equations where those explain it.
     evidence : LinearEvidence
     free_inputs_before, free_inputs_after : FreeInputTest
-    free : ndarray of int
+    free : ndarray of int, shape (f,)
         Columns of the free inputs in `evidence`.
     own : bool
         What was found are own equations, not registered effects.
@@ -306,7 +309,17 @@ def measured_noise(consistency: Consistency, fit: Fit) -> tuple[tuple[str, ...],
 
 
 def p_value(done: Round, consistency: Consistency, noise: bool) -> float:
-    """Bonferroni over the tests that can call a model inadequate."""
+    """Probability that a right model looks like this, by scan, free inputs and NIS (Bonferroni over the three).
+
+    Parameters
+    ----------
+    done : Round
+        Its first scan, and its free-input test with nothing added.
+    consistency : Consistency
+        Of the model as given.
+    noise : bool
+        Whether the NIS counts: the noise is not as specified, or something faster than a dwell is left.
+    """
     first = done.found.first
     largest = float(np.max(np.abs(first.z), initial=0.0))
     count = int(np.isfinite(first.sigma).sum())

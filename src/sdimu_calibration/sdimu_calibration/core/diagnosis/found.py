@@ -107,12 +107,24 @@ def _bayes(d: Diagnosis, k: int, linear: float) -> float:
 
 
 def looked_at(d: Diagnosis) -> Ints:
-    """Columns of the evidence that the search was allowed to choose: all candidates but the free inputs."""
+    """Columns of the evidence that the search was allowed to choose: all candidates but the free inputs.
+
+    Returns
+    -------
+    ndarray of int, shape (c,)
+        In ascending order.
+    """
     return np.setdiff1d(np.arange(len(d.evidence.weight), len(d.evidence.names)), d.free)
 
 
 def catalogue_columns(d: Diagnosis) -> Ints:
-    """Columns of the evidence that are the catalogue's, and effects of the user's own."""
+    """Columns of the evidence that hold effects of the catalogue or of the user, and no equations.
+
+    Returns
+    -------
+    ndarray of int, shape (c,)
+        In ascending order.
+    """
     p = len(d.evidence.weight)
     return np.array([i for i in looked_at(d) if d.evidence.candidates[i - p].family != "own"], dtype=np.int64)
 
@@ -167,7 +179,8 @@ def reach(d: Diagnosis) -> tuple[DetectableSize, ...]:
 
 
 _ROUNDING = 1e-9
-"""Share of information below which what is left of a signature is rounding."""
+"""Share of the information on a parameter that the model must leave: less is a difference of nearly equal numbers, and
+rounding."""
 
 
 def _partners(names: tuple[str, ...], J: Floats, weight: Floats, column: int) -> tuple[str, ...]:

@@ -11,8 +11,8 @@ from sdimu_calibration.core.evidence.information import Information
 from sdimu_calibration.core.probability import chi2_tail
 
 _TESTABLE = 1e-2
-"""Directions of which the model leaves less than this share of the information (a tenth of the signature) are not
-tested."""
+"""Share of the information on a direction that the model must leave for it to be tested: with less, the model makes its
+sigma more than ten times larger."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,26 @@ class FreeInputTest:
 
 
 def free_input_test(full: Information, known: Ints, weight: Floats, free: Ints, scale: float) -> FreeInputTest:
-    """Test the free inputs at `free` (f,) given the parameters at `known` (k,)."""
+    """Test whether a constant sensor error of its own in every dwell and turn explains more than chance.
+
+    Parameters
+    ----------
+    full : Information
+        On all columns of an evidence.
+    known : ndarray of int, shape (k,)
+        Columns of the model and of what was added to it.
+    weight : ndarray, shape (k,)
+        Prior information of each (1/sigma^2, SI).
+    free : ndarray of int, shape (f,)
+        Columns of the free inputs.
+    scale : float
+        Residual noise over specified noise.
+
+    Returns
+    -------
+    FreeInputTest
+        Its p-value is 1 where nothing is testable.
+    """
     given = full.given(known, weight)
     J, d = given.J[np.ix_(free, free)], given.d[free]
     unit = 1.0 / np.sqrt(np.maximum(np.diag(full.J)[free], 1e-300))

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from sdimu_calibration.core.diagnosis.rounds import Round
 
 MOVED = 2.0
-"""Change of a coefficient, in its sigma, from which it is listed."""
+"""Change of a coefficient (sigma) from which it is listed: chance makes smaller ones."""
 
 
 @dataclass(frozen=True)

@@ -10,10 +10,13 @@ from sdimu_calibration.core.effects.effect import AXES
 from sdimu_calibration.core.evidence.navigation_evidence import NavigationEvidence
 
 _SINGLE_AXIS = 0.9
-"""Least share of a turn about one body axis that makes it a turn about that axis."""
+"""Share of a turn about one body axis from which it is a turn about that axis: one about two axes at once has 0.71 of
+it about either."""
 _OBLIQUE = 0.35
-"""A stop with two components of gravity above this share leans: no axis is near the vertical or level plane."""
+"""Share of gravity along the second largest of the body axes from which a stop leans: 20 deg, more than any mount is
+off."""
 _RATES_DIFFER = 1.5
+"""Ratio of two rates from which they differ: measured rates of one command do not scatter by so much."""
 
 
 @dataclass(frozen=True)

@@ -32,19 +32,22 @@ from sdimu_calibration.core.progress import Progress
 from sdimu_calibration.core.recording import DataError
 
 UNEXPLAINED_P = 1e-3
-"""Probability of the free-input test below which what is left is not noise."""
+"""Probability of the free-input test below which what is left is not noise: one sound test in a thousand is there."""
 MOST_ROUNDS = 4
-"""Rounds at most, where a round may choose any number of effects."""
+"""Number of rounds at most, where a round may choose any number of effects: a choice that does not stand by then goes
+to and fro between effects that look alike."""
 MOST_GROWING_ROUNDS = 8
-"""Rounds at most, where a round adds one effect."""
+"""Number of rounds at most, where a round adds one effect: more than a run by hand can tell apart."""
 LEAST_SIGMAS = 3.0
-"""An effect smaller than this many of its sigmas, once it is in the fit, is dropped."""
+"""Size of an effect in the fit (sigma) below which it is dropped: chance ends there."""
 _OWN_GAIN = 3.0
-"""Likelihood by which equations must be better than the catalogue where noise takes what is left: odds of 20 to 1."""
+"""Log-likelihood (1) by which equations must be better than the catalogue where noise takes what is left: odds of 20
+to 1."""
 _PARALLEL = 1e-6
 """Share of its length by which a signature must differ from another to be its own: rounding is far below."""
 _MANY = 3
-"""Number of chosen catalogue terms from which one equation is tried in their place."""
+"""Number of chosen catalogue terms from which one equation is tried in their place: so many may be the parts of one
+cause."""
 
 
 @dataclass(frozen=True)
@@ -81,7 +84,7 @@ class Round:
     fit : Fit
         About which this round is linear: the model with what the last round chose.
     evidence : LinearEvidence
-    free : ndarray of int
+    free : ndarray of int, shape (f,)
         Columns of the free inputs in `evidence`.
     found : Search
     before, after : FreeInputTest
@@ -338,7 +341,18 @@ def candidates(request: Request, tried: Sequence[Candidate], own: bool) -> list[
 
 
 def left(evidence: LinearEvidence, chosen: Ints, free: Ints, scale: float) -> FreeInputTest:
-    """Free-input test with the chosen columns in the model."""
+    """Free-input test with some candidates in the model.
+
+    Parameters
+    ----------
+    evidence : LinearEvidence
+    chosen : ndarray of int, shape (k,)
+        Columns of the candidates.
+    free : ndarray of int, shape (f,)
+        Columns of the free inputs.
+    scale : float
+        Residual noise over specified noise.
+    """
     known = np.concatenate([evidence.model, chosen]).astype(np.int64)
     weight = np.concatenate([evidence.weight, np.zeros(len(chosen))])
     return free_input_test(evidence.information, known, weight, free, scale)

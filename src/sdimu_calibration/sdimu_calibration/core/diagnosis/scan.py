@@ -14,13 +14,17 @@ from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.evidence.information import Information
 
 TESTABLE = 0.02
-"""Share of a signature's length that must be left after the model's coefficients have taken theirs."""
+"""Share of a signature's length that the model's coefficients must leave: with less they make the sigma of the effect
+more than fifty times larger."""
 POWER_80 = 4.84
-"""Size of an effect, in its sigma, found with 80 % power: 0.84 above the usual threshold of a whole scan, 4.0."""
+"""Size of an effect (sigma) that is found with 80 % power: 0.84 above the usual threshold of a whole scan, 4.0."""
 INDISTINGUISHABLE = 3.0
-"""A log Bayes factor within this of the best (odds of 20 to 1) does not tell two candidates apart."""
+"""Difference of log Bayes factors (1) up to which two candidates are not told apart: odds of 20 to 1."""
 _DRAWS = 4000
+"""Number of draws of noise: at a false-alarm probability of 0.02, 80 of them are beyond the threshold, which is then
+right to a tenth of that probability."""
 _JITTER = 1e-6
+"""Variance added to that of every score (1): identical signatures have a singular correlation."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +42,8 @@ class Scan:
     smallest : ndarray, shape (q,)
         Minimal detectable size (SI).
     J, d : ndarray, shape (q,)
-        Information on each parameter, and its pull, given the model.
+        Information on each parameter (1/sigma^2, SI) and the information vector, given the model: the estimate is
+        d / J.
     """
 
     z: Floats
@@ -59,9 +64,9 @@ def scan(full: Information, known: Ints, weight: Floats, scale: float = 1.0) -> 
     known : ndarray of int, shape (k,)
         Model and effects already added.
     weight : ndarray, shape (k,)
-        Their prior information.
+        Prior information of each (1/sigma^2, SI).
     scale : float
-        Factor by which the noise is larger than the specification says.
+        Residual noise over specified noise.
     """
     return scored(*full.diagonal_given(known, weight), np.diag(full.J), known, scale)
 
@@ -72,12 +77,13 @@ def scored(J: Floats, d: Floats, J0: Floats, known: Ints, scale: float) -> Scan:
     Parameters
     ----------
     J, d : ndarray, shape (q,)
-        Information on each and its pull, the parameters at `known` (k,) estimated along.
+        Information on each (1/sigma^2, SI) and its information vector, the parameters at `known` estimated along.
     J0 : ndarray, shape (q,)
-        Information on each parameter alone.
+        Information on each parameter alone, in the unit of J.
     known : ndarray of int, shape (k,)
+        Parameters that are in the model, and hence not scored.
     scale : float
-        Factor by which the noise is larger than the specification says.
+        Residual noise over specified noise.
     """
     with np.errstate(divide="ignore", invalid="ignore"):
         retention = np.sqrt(np.maximum(J, 0.0) / J0)
@@ -99,12 +105,17 @@ def threshold(
 
     Parameters
     ----------
-    full, known, weight
-        As for `scan`.
+    full : Information
+    known : ndarray of int, shape (k,)
+        Model and effects already added.
+    weight : ndarray, shape (k,)
+        Prior information of each (1/sigma^2, SI).
     tested : ndarray of int, shape (t,)
         Columns that are tested.
     alpha : float
+        False-alarm probability of the whole scan.
     seed : int
+        Of the random numbers.
     """
     if not len(tested):
         return float("inf")
@@ -112,7 +123,6 @@ def threshold(
     place = np.arange(len(known))
     given = Information(full.J[np.ix_(cut, cut)], full.d[cut]).given(place, weight)
     C = correlation(given.J[len(known) :, len(known) :])
-    # The jitter stands for identical signatures, which make C singular.
     root = np.linalg.cholesky(C + _JITTER * np.eye(len(C)))
     rng = np.random.default_rng(seed)
     largest = np.abs(root @ rng.standard_normal((len(C), _DRAWS))).max(axis=0)
@@ -120,12 +130,36 @@ def threshold(
 
 
 def correlation(J: Floats) -> Floats:
-    """Correlation of signatures of which J is the information, shape (t, t)."""
+    """Correlation of signatures.
+
+    Parameters
+    ----------
+    J : ndarray, shape (t, t)
+        Information on their parameters, in any units; its diagonal is positive.
+
+    Returns
+    -------
+    ndarray, shape (t, t)
+        Dimensionless.
+    """
     s = 1.0 / np.sqrt(np.diag(J))
     return np.asarray(J * np.outer(s, s))
 
 
 def alike(scores: Floats, best: int) -> list[int]:
-    """Candidates that the data cannot tell from `best` by their log Bayes factors; the nearest first."""
+    """Candidates that the data cannot tell from one of them, the highest score first.
+
+    Parameters
+    ----------
+    scores : ndarray, shape (q,)
+        Log Bayes factor of each against the model without it (1); -inf where it does not count.
+    best : int
+        Index of the one.
+
+    Returns
+    -------
+    list of int
+        Indices, those that score better than the one among them.
+    """
     gap = scores[best] - scores
     return [int(i) for i in np.argsort(gap) if i != best and gap[i] < INDISTINGUISHABLE]

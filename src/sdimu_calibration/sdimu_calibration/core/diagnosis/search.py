@@ -1,10 +1,11 @@
 """Step by step: add the best candidate, look again, until nothing stands out of the noise.
 
-Orthogonal matching pursuit on the signatures: each step conditions on everything chosen so far; a chosen effect is
-exchanged when another explains the same better once the others are in, and dropped when the others took its place. A
-step must beat the noise of the whole scan (after which its time or time constant is looked for between those of the
-scan), be plausible in size (Bayes factor with the physical prior), and lower the
-error at stops that it has not seen.
+Orthogonal matching pursuit on the signatures: each step conditions on everything chosen so far. A chosen effect is
+exchanged when another explains the same better once the others are in, and dropped when the others took its place.
+
+A step must beat the noise of the whole scan, be plausible in size (Bayes factor with the physical prior), and lower the
+error at stops that it has not seen. Once it beats the noise, its time or time constant is looked for between those of
+the scan.
 """
 
 from __future__ import annotations
@@ -29,26 +30,28 @@ FALSE_ALARM = 0.02
 """Probability that pure noise puts one of all candidates over the threshold: what is bearable (5 %) with room for what
 is not pure noise; at 0.01 effects of 5 sigma were found in 73 % of 49 tests instead of three quarters."""
 MOST_STEPS = 40
-"""Steps at most: more than any sensor that is worth a calibration has effects."""
+"""Number of steps at most: more than any sensor that is worth a calibration has effects."""
 _PATIENCE = 6
-"""Steps after which a patchwork of drifts ends the search."""
+"""Number of steps from which a patchwork of drifts ends the search: before, other effects may take the drifts'
+place."""
 _PATCHES = 3
-"""Drifts of one bias that together follow any wander."""
+"""Number of drifts of one bias from which they are a patchwork: together they follow any wander."""
 LOG_BAYES = 3.0
-"""Least log Bayes factor of an accepted step ("strong" on Jeffreys' scale)."""
+"""Least log Bayes factor (1) of an accepted step: odds of 20 to 1, "strong" on Jeffreys' scale."""
 _WIDE = 3.0
-"""Physical priors are taken this much wider: a sensor may be out of its class."""
+"""Factor on the physical prior of a candidate: a sensor may be out of its class."""
 _PROVEN = 30.0
-"""Of a chosen effect much wider still: its size is the data's to say, and what a prior holds back of it looks like
-companions."""
+"""Factor on the physical prior of a chosen effect: its size is the data's to say, and what a prior holds back of it
+looks like companions."""
 _OWN_ODDS = 6.0
-"""Log odds that a registered effect has before an equation of which physics says nothing."""
+"""Log odds (1) that a registered effect has before an equation: physics says nothing of the equation."""
 _KIN = 2.0
 """Log odds (1) of an effect that acts on one axis as one that was found acts on another: they have one cause."""
 _SHARPER = 1.0
-"""Gain of the log Bayes factor from which a time or time constant between those of the scan is worth its digits."""
+"""Gain of the log Bayes factor (1) from which a time or time constant between those of the scan is taken: less is not
+worth its digits."""
 _KEEP = 3.0
-"""A chosen effect smaller than this many of its sigmas, with the others in, is dropped."""
+"""Size of a chosen effect (sigma), with the others in, below which it is dropped: they explain it."""
 
 
 @dataclass(frozen=True)
@@ -113,15 +116,15 @@ class Search(Generic[E]):
     ----------
     steps : tuple of Step
         Accepted ones first to last; a refused one ends the list.
-    chosen : ndarray of int
-        Columns of the whole evidence: accepted candidates, pruned.
+    chosen : ndarray of int, shape (k,)
+        Columns of `evidence` that were accepted and not taken out again.
     first : Scan
-        Before anything was added. Its columns: the model's, then the allowed ones.
+        Before anything was added: of the model's columns and the allowed ones; of all columns where noise was learned.
     threshold : float
         Of the first scan.
     scale : float
         Residual noise over specified noise at the end.
-    evidence : Evidence
+    evidence : LinearEvidence
         With the finer variants that were chosen behind the candidates it had, in the noise that was learned.
     noise : tuple of NoiseTerm
         Noise with a memory.
@@ -153,7 +156,22 @@ class Problem(Generic[E]):
         self.p = len(evidence.weight)
 
     def known(self, chosen: Sequence[int]) -> tuple[Ints, Floats, Floats]:
-        """Model and chosen columns, their prior information and prior mean about the calibration."""
+        """Parameters that are estimated when some candidates are in the model, with their priors.
+
+        Parameters
+        ----------
+        chosen : sequence of int, length k
+            Columns of the candidates.
+
+        Returns
+        -------
+        known : ndarray of int, shape (p + k,)
+            Columns of the model, then `chosen`.
+        weight : ndarray, shape (p + k,)
+            Prior information of each (1/sigma^2, SI); the prior of a candidate is wider by `_PROVEN`.
+        shift : ndarray, shape (p + k,)
+            Prior mean of each, less the calibration's value (SI).
+        """
         evidence = self.evidence
         prior = evidence.prior[np.array(chosen, dtype=int) - self.p] if len(chosen) else np.empty(0)
         weight = np.concatenate([evidence.weight, 1.0 / (_PROVEN * prior) ** 2])
@@ -174,7 +192,7 @@ class Problem(Generic[E]):
         return float(np.sqrt(max(1.0, misfit / max(1, len(residual) - len(known)))))
 
     def scan(self, chosen: Sequence[int], scale: float = 1.0) -> Scan:
-        """Score the allowed columns given the chosen ones."""
+        """Score all columns with the chosen ones in the model."""
         known, weight, _ = self.known(chosen)
         return scan(self.evidence.information, known, weight, scale)
 
@@ -185,23 +203,37 @@ class Problem(Generic[E]):
 
     @cached_property
     def kin(self) -> Ints:
-        """Number of the effect, with its time constant or the like, of each candidate, shape (q,)."""
+        """Cause of each candidate: candidates of one effect, with the same time constant or the like, share a number.
+
+        Returns
+        -------
+        ndarray of int, shape (q,)
+        """
         known: dict[tuple[str, ...], int] = {}
         keys = [(c.family, *c.effect.options.values()) for c in self.evidence.candidates]
         return np.array([known.setdefault(key, len(known)) for key in keys], dtype=np.int64)
 
     def scores(self, scanned: Scan, scale: float = 1.0, beside: Sequence[int] = (), ratio: float = _WIDE) -> Floats:
-        """Log posterior odds of every column against the model without it; -inf where not testable.
+        """Log posterior odds of every column against the model without it.
+
+        The Bayes factor of an effect of size N(0, s^2), with information J on it and information vector d, is
+        ``d^2 / (2 (J + s^-2)) - log(1 + J s^2) / 2``. To it come log odds for registered effects and for kin.
 
         Parameters
         ----------
         scanned : Scan
+            Of p + q columns.
         scale : float
             Residual noise over specified noise.
         beside : sequence of int
-            Columns that were chosen.
+            Columns that were chosen: their kin have better odds.
         ratio : float
-            Size that an effect may have, over the one-sigma size of physics.
+            s over the one-sigma size that physics gives the effect.
+
+        Returns
+        -------
+        ndarray, shape (p + q,)
+            Log odds (1); -inf for the model's columns, for what is not testable, and for a size of the wrong sign.
         """
         p = self.p
         J, d = scanned.J[p:] / scale**2, scanned.d[p:] / scale**2
@@ -230,7 +262,7 @@ def search(
     Parameters
     ----------
     evidence : LinearEvidence
-    allowed : ndarray of int
+    allowed : ndarray of int, shape (a,)
         Columns that may be chosen.
     alpha : float
         False-alarm probability of a whole scan.
@@ -283,7 +315,25 @@ def patchwork(chosen: Iterable[Candidate]) -> bool:
 
 
 def look_alikes(problem: Problem[E], chosen: Sequence[int], column: int, allowed: Ints, scale: float) -> list[int]:
-    """Columns among `allowed` that the data cannot tell from a chosen one, all others chosen being in the model."""
+    """Columns that the data cannot tell from a chosen one, all others chosen being in the model.
+
+    Parameters
+    ----------
+    problem : Problem
+    chosen : sequence of int
+        Columns of everything that was chosen.
+    column : int
+        The one of them.
+    allowed : ndarray of int, shape (a,)
+        Columns among which they are looked for.
+    scale : float
+        Residual noise over specified noise.
+
+    Returns
+    -------
+    list of int
+        Columns, the highest score first.
+    """
     others = [c for c in chosen if c != column]
     scores = problem.scores(problem.scan(others, scale), scale, others)
     outside = np.ones(len(scores), dtype=bool)
@@ -344,7 +394,24 @@ def judged(
     problem: Problem[E], scanned: Scan, scores: Floats, chosen: Sequence[int], best: int, limit: float,
     before: HeldOut, after: HeldOut,
 ) -> Step:  # fmt: skip
-    """Judge the addition of the column `best` to a choice; the scores are those before it."""
+    """Judge the addition of a column to a choice.
+
+    Parameters
+    ----------
+    problem : Problem
+    scanned : Scan
+        With the choice in the model, the column not.
+    scores : ndarray, shape (p + q,)
+        Log posterior odds by that scan (1), as of `Problem.scores`.
+    chosen : sequence of int
+        Columns of the choice.
+    best : int
+        The column.
+    limit : float
+        Threshold of the scan.
+    before, after : HeldOut
+        Prediction of stops left out without and with the column.
+    """
     evidence, p = problem.evidence, problem.p
     candidate = evidence.candidates[best - p]
     J, d = scanned.J[best], scanned.d[best]

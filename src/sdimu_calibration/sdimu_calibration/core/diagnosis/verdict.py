@@ -23,13 +23,14 @@ if TYPE_CHECKING:
     from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 
 _COLOURED = 1.2
-"""Scatter over ten seconds against white noise from which noise is called coloured: five sigma of fifty minutes."""
+"""Ratio of the scatter over ten seconds to that of white noise from which noise is coloured: five sigma of fifty
+minutes."""
 _ROUNDING = 1e-6
-"""A learned sigma (in its customary unit) below this is rounding."""
+"""Size of a learned sigma (customary unit) up to which it is written as zero: rounding leaves as much."""
 _LARGEST = 3
 """Number of effects that a sentence names where there are more than it lists: the table has the rest."""
 _LISTED = 4
-"""Effects that look the same are listed up to this number."""
+"""Number of effects, or of those that look the same as one, that a sentence lists: more do not fit into one."""
 
 
 @dataclass(frozen=True)
@@ -162,7 +163,14 @@ def error_falls(d: Diagnosis) -> str:
 
 
 def beyond(scatter: Sequence[float] | Floats) -> str:
-    """Say what is left beyond white noise: force (m/s^2), rate (rad/s) and turns (share of the angle), shape (3,)."""
+    """Say what is left beyond white noise.
+
+    Parameters
+    ----------
+    scatter : ndarray, shape (3,), or sequence of float
+        Learned sigmas of force (m/s^2), rate (rad/s) and turns (share of the angle), at the places `FORCE`, `RATE` and
+        `TURN`.
+    """
     force, rate = from_si(float(scatter[FORCE]), "ug"), float(np.degrees(scatter[RATE]))
     turns = 100.0 * float(scatter[TURN])
     return f"force {shown(force)} ug, rate {shown(rate)} deg/s, turns {shown(turns)} % of the angle"
