@@ -25,7 +25,15 @@ _MOST_STAKES = 3
 
 @dataclass(frozen=True)
 class Untestable:
-    """Why a group of effects could not have been seen, and what would show it."""
+    """Effects that could not have been seen, all for one reason.
+
+    Attributes
+    ----------
+    reason : str
+        Why not, and what would show them.
+    labels : tuple of str
+        What `sdimu calibrate --add` takes.
+    """
 
     reason: str
     labels: tuple[str, ...]

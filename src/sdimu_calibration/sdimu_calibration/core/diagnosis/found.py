@@ -184,7 +184,7 @@ rounding."""
 
 
 def _partners(names: tuple[str, ...], J: Floats, weight: Floats, column: int) -> tuple[str, ...]:
-    """Name the coefficients that take most of a signature, at most three."""
+    """Name the coefficients that take most of the signature at a column, at most three; J (q, q), prior weight (p,)."""
     p = len(weight)
     if J[column, column] <= 0.0:
         return ()

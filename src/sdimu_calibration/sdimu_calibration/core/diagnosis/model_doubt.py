@@ -137,6 +137,7 @@ def in_doubt(fit: Fit, final: Fit, evidence: LinearEvidence, chosen: Ints, free:
 def _alternatives(
     problem: Problem[LinearEvidence], chosen: Sequence[int], allowed: Ints, scale: float
 ) -> _Alternatives:
+    """Add every allowed column (a,) to a choice of k parameters, one at a time."""
     evidence, J = problem.evidence, problem.evidence.information.J
     known, weight, _ = problem.known(chosen)
     scanned = problem.scan(chosen, scale)

@@ -90,7 +90,7 @@ class _Ground(Generic[E]):
         return False
 
     def beside(self, column: int) -> float:
-        """Likelihood that an effect which a wander imitates must bring besides; 0 for every other."""
+        """Log-likelihood that an effect which a wander imitates must bring besides; 0 for every other."""
         candidate = self.white.candidate(column)
         if candidate.family == "own":
             return _OWN_COST
@@ -98,7 +98,10 @@ class _Ground(Generic[E]):
         return _DRIFT_COST if effect.bias_drift or effect.wander_like or effect.scope == "recording" else 0.0
 
     def cost(self, column: int, terms: Sequence[NoiseTerm], share: float = 1.0) -> float:
-        """Likelihood that an effect must bring in noise of these terms; `share` of it where no wander is a rival."""
+        """Log-likelihood that an effect must bring in noise of these terms.
+
+        `share` multiplies the part that every effect must bring, not the part of those that a wander imitates.
+        """
         effect = self.white.candidate(column).effect
         triads = {TRIADS[term.channel // 3] for term in effect.terms}
         rival = effect.scope == "recording" or any(term.triad in triads for term in terms)
@@ -106,7 +109,7 @@ class _Ground(Generic[E]):
         return share * (max(_COST, 0.5 * self.limit**2) + unknown) + (self.beside(column) if rival else 0.0)
 
     def net(self, state: _State) -> float:
-        """Likelihood of a state less what its effects and noise terms cost."""
+        """Log-likelihood of a state less what its effects and noise terms cost."""
         imitators = {self.white.kin[c - self.white.p]: self.beside(c) for c in state.chosen if self.beside(c)}
         # One step or ramp, of any number of sensors, is as good as any effect; several follow what has another cause.
         several = sum(sorted(imitators.values())[1:])

@@ -192,7 +192,7 @@ class Problem(Generic[E]):
         return float(np.sqrt(max(1.0, misfit / max(1, len(residual) - len(known)))))
 
     def scan(self, chosen: Sequence[int], scale: float = 1.0) -> Scan:
-        """Score all columns with the chosen ones in the model."""
+        """Score all columns with the chosen ones in the model; `scale` is the residual noise over the specified one."""
         known, weight, _ = self.known(chosen)
         return scan(self.evidence.information, known, weight, scale)
 
@@ -249,7 +249,7 @@ class Problem(Generic[E]):
         return np.concatenate([np.full(p, -np.inf), np.where(np.isfinite(scanned.sigma[p:]), score, -np.inf)])
 
     def held_out(self, chosen: Sequence[int], scale: float) -> HeldOut:
-        """Leave one stop out with the chosen columns in the model."""
+        """Predict each stop from the others with the chosen columns in the model; `scale` as for `scan`."""
         known, weight, shift = self.known(chosen)
         return predict(self.evidence, known, weight, shift, scale)
 

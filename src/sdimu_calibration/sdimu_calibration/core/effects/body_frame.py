@@ -40,6 +40,7 @@ def _places(triad: str) -> dict[str, tuple[int, int, float]]:
 
 
 def _matrix(places: dict[str, tuple[int, int, float]], names: Sequence[str], values: Floats) -> Floats:
+    """Error matrix (3, 3) of coefficients (p,): those without a name here are zero."""
     E = np.zeros((3, 3))
     for name, (row, column, sign) in places.items():
         if name in names:
@@ -48,6 +49,7 @@ def _matrix(places: dict[str, tuple[int, int, float]], names: Sequence[str], val
 
 
 def _read_back(E: Floats, places: dict[str, tuple[int, int, float]], names: Sequence[str], values: Floats) -> None:
+    """Put the elements of an error matrix (3, 3) into the coefficients (p,) that have a name here, in place."""
     for name, (row, column, sign) in places.items():
         if name in names:
             values[list(names).index(name)] = sign * E[row, column]

@@ -75,7 +75,14 @@ class Drift:
 
 @dataclass(frozen=True)
 class FreeInertialRun:
-    """Free navigations of one stretch: without compensation, then with each model."""
+    """Free navigations of one segment.
+
+    Attributes
+    ----------
+    segment : Segment
+    drifts : tuple of Drift
+        Without compensation, then with each model.
+    """
 
     segment: Segment
     drifts: tuple[Drift, ...]
@@ -233,6 +240,7 @@ def refit(fit: Navigator, seen: PreparedData, C_nb: Floats) -> Refit:
 def _one_pass(
     fit: Navigator, seen: PreparedData, alignment: Alignment, C_nb: Floats, estimate: Floats
 ) -> Pass | SecondOrderPass:
+    """Make one pass, of the kind that the fit makes, from an attitude (3, 3) and coefficients (q,)."""
     setup = fit.setup
     if isinstance(fit.last, SecondOrderPass):
         return second_order_pass(seen, firm_setup(setup), alignment, C_nb, estimate)

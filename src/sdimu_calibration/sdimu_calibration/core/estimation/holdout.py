@@ -83,6 +83,7 @@ def holdout_segments(prepared: PreparedData, wanted_s: float = WANTED_S) -> tupl
 
 
 def _at_end(prepared: PreparedData, ready: Bools, level: Floats, wanted_s: float) -> Segment | None:
+    """Segment at the end; `ready` (e,) says after which epochs one may begin, `level` (e,) how long it levels (s)."""
     end = prepared.epochs.end
     fits = ready & (end - level >= _KEPT * end[-1])
     late = np.flatnonzero(fits & (end <= end[-1] - wanted_s + 1e-6))
@@ -95,6 +96,7 @@ def _at_end(prepared: PreparedData, ready: Bools, level: Floats, wanted_s: float
 
 
 def _at_start(prepared: PreparedData, ready: Bools, level: Floats, wanted_s: float) -> Segment | None:
+    """Segment at the start, with the arguments of `_at_end`."""
     epochs, used = prepared.epochs, prepared.phases.used
     if not ready.any():
         return None
@@ -111,6 +113,7 @@ def _at_start(prepared: PreparedData, ready: Bools, level: Floats, wanted_s: flo
 
 
 def _level_from(prepared: PreparedData, at: int, level: Floats) -> int:
+    """First epoch that levels, of a navigation that begins after the epoch `at`; `level` (e,) in s."""
     return int(np.searchsorted(prepared.epochs.start, prepared.epochs.end[at] - level[at] - 1e-6))
 
 

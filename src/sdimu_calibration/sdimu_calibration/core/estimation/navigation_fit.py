@@ -376,6 +376,7 @@ class NavigationFit(Fit):
         return free_inertial_runs(self.prepared, [("model as given", self), *navigators], self.known.output)
 
     def _rows_of_history(self, rows: Ints, output: PassOutput, values: Floats, covariance: Floats) -> History:
+        """History at epochs (k,), with values (k, p) and covariance (k, p, p) in the frame of the report."""
         phases = self.prepared.phases
         return History(
             self.prepared.epochs.end[rows], values, np.sqrt(np.diagonal(covariance, axis1=1, axis2=2)),

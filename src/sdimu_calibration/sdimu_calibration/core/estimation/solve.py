@@ -91,7 +91,15 @@ def solve(
 
 @dataclass(frozen=True)
 class Choice:
-    """An estimator, and why it is the one."""
+    """An estimator, and why it is the one.
+
+    Attributes
+    ----------
+    estimator : str
+        One of `ESTIMATORS`.
+    reason : str
+        Part of a sentence for people.
+    """
 
     estimator: str
     reason: str

@@ -69,7 +69,16 @@ NO_NOISE = Noise(1.0, 1.0, 1.0, 3.0, np.empty(0, dtype=np.int64))
 
 @dataclass(frozen=True)
 class StopMean:
-    """Mean normalised innovation of a channel at a stop; standard normal when the model is right."""
+    """How far a channel is off at a stop.
+
+    Attributes
+    ----------
+    channel : str
+        One of `CHANNEL_NAMES`; of a handheld run one of `handheld_evidence.CHANNELS`.
+    stop : int
+    normalised_mean : float
+        Mean innovation over its sigma; standard normal when the model is right.
+    """
 
     channel: str
     stop: int
@@ -202,7 +211,10 @@ def triad_noise(prepared: PreparedData, means: Floats, density: float) -> Noise:
 
 
 def _slow(prepared: PreparedData, means: Floats) -> float:
-    """Scatter (rms) of the differences of neighbouring means over `SLOW_S` epochs of one stop, as of epochs of 1 s."""
+    """Scatter (rms) of the differences of neighbouring means over `SLOW_S` epochs, of one stop each, as of epochs of 1 s.
+
+    It is the Allan deviation times the root of two. `means` (e, 3) are those of the epochs.
+    """
     phases = prepared.phases
     steps = []
     for stop in np.unique(phases.stop[phases.used]):

@@ -43,7 +43,7 @@ def predict(evidence: LinearEvidence, chosen: Ints, weight: Floats, shift: Float
     weight, shift : ndarray, shape (k,)
         Prior information and prior mean of each, about the calibration's values.
     scale : float
-        Noise against specification.
+        Residual noise over specified noise.
     """
     W, e = evidence.W[:, chosen], evidence.e
     if evidence.noise.size:

@@ -161,7 +161,7 @@ class Balance:
 
     @property
     def net(self) -> float:
-        """Likelihood less what the noise terms cost."""
+        """Log-likelihood less what the noise terms cost."""
         return self.likelihood - LEAST_GAIN * len(self.terms)
 
 

@@ -56,10 +56,17 @@ class Stretches:
     def mode(self, kind: str, tau: float) -> Floats:
         """Square root R of the kernel of a kind of noise, ``kernel = RR'`` but for its small modes.
 
+        Parameters
+        ----------
+        kind : str
+            One of `KINDS`.
+        tau : float
+            Time constant of Markov noise (s).
+
         Returns
         -------
         ndarray, shape (n, r)
-            Unit of `kernel`, root.
+            In the root of the unit of `kernel`.
         """
         if (kind, tau) not in self._modes:
             values, vectors = np.linalg.eigh(kernel(kind, tau, self))
@@ -139,7 +146,10 @@ def kernel(kind: str, tau: float, cut: Stretches) -> Floats:
 
 
 def _walk(start: Floats, end: Floats) -> Floats:
-    """Covariance of the means of a random walk that starts at zero at t = 0."""
+    """Covariance (n, n) of the means of a random walk of unit density that is zero at t = 0 (s).
+
+    Of two stretches it is the middle of the earlier one, of one with itself its start and a third of its length.
+    """
     middle = 0.5 * (start + end)
     out = np.minimum.outer(middle, middle)
     np.fill_diagonal(out, start + (end - start) / 3.0)
@@ -147,7 +157,7 @@ def _walk(start: Floats, end: Floats) -> Floats:
 
 
 def _markov(start: Floats, end: Floats, tau: float) -> Floats:
-    """Covariance of the means of first-order Markov noise of unit variance."""
+    """Covariance (n, n) of the means of first-order Markov noise of unit variance: integrals of ``exp(-|t| / tau)``."""
     x = (end - start) / tau
     share = -np.expm1(-x) / x
     gap = np.maximum(start[None, :] - end[:, None], start[:, None] - end[None, :]) / tau

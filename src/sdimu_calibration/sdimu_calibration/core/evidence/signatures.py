@@ -64,7 +64,11 @@ def _responses(
 def _add_weighed_columns(
     values: Floats, channel: Ints, parameter: Ints, R: Floats, direct: Floats, G: Floats, D: Floats
 ) -> None:
-    """Do as `add_columns` does, where an error of one sensor axis shows in the corrected samples of all."""
+    """Do as `add_columns` does, where an error of one sensor axis shows in the corrected samples of all.
+
+    Of n cycles: regressors (n, m), with the sensor axis and parameter (m,) of each; R (n, 6, 9) and direct (n, 6, 6) of
+    `_responses`. Filled: G (9, q) and D (6, q), of the navigation and of the integrals of the sensors.
+    """
     G[:, :] = 0.0
     D[:, :] = 0.0
     g, d = np.empty(NAV), np.empty(6)
@@ -228,6 +232,7 @@ def constant_signatures(
 
 
 def _or_none(weight: Floats | None) -> Floats:
+    """Give weights to a compiled loop: (n, 6, 6), or (0, 6, 6) for the identity."""
     return np.zeros((0, 6, 6)) if weight is None else np.ascontiguousarray(weight)
 
 

@@ -268,7 +268,7 @@ def _stops(cycles: Cycles, where: Layout, C_nb: Floats, latitude: float) -> tupl
 def _predicted(
     clean: CorrectedCycles, prepared: PreparedData, where: Layout, track: Floats, setup: TestSetup
 ) -> Motion:
-    """Motion along the reference attitudes: without noise at the stops, by the corrected samples elsewhere."""
+    """Motion along reference attitudes (n, 3, 3): without noise at the stops, by the corrected samples elsewhere."""
     w_earth = np.einsum("kij,i->kj", track, earth.earth_rate(setup.site.latitude_rad))
     still = np.zeros(len(track), dtype=bool)
     for a, b in zip(where.stop_first, where.stop_last, strict=True):
