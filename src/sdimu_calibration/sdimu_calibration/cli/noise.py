@@ -22,7 +22,7 @@ def noise(
     from sdimu_calibration.cli.options import default_folder
     from sdimu_calibration.cli.progress import bar
     from sdimu_calibration.core.noise import allan, fit_terms, rests, white_noise
-    from sdimu_calibration.report.noise import CHANNELS, table, write_page
+    from sdimu_calibration.report.noise import CHANNELS, misfits, table, write_page
     from sdimu_calibration.storage.config import find_config
     from sdimu_calibration.storage.imu_file import write_measured_imu
     from sdimu_calibration.storage.opening import open_recording
@@ -45,12 +45,13 @@ def noise(
     seconds = sum(r.stop - r.start for r in rows) * recording.interval_s
     most = max(one.tau[-1] for one in deviations.values())
     words = [
-        f"{len(rows)} rests, {seconds:.0f} s in all, averaging times up to {most:.0f} s.",
+        f"{len(rows)} rest{'s' if len(rows) > 1 else ''}, {seconds:.0f} s in all, averaging times up to {most:.0f} s.",
+        *misfits(terms),
         *recording.notes,
     ]
     folder = out or default_folder(bag, "noise")
     write_page(folder / "noise.html", deviations, terms, f"Noise of {bag.name}", words)
-    write_measured_imu(folder / "imu.yaml", imu, measured, [f"Noise measured in {bag.name}: {words[0]}"])
+    write_measured_imu(folder / "imu.yaml", imu, measured, terms, [f"Noise measured in {bag.name}: {words[0]}"])
     console.print(table(terms))
     for word in words:
         console.print(f"note: {word}", soft_wrap=True, markup=False, highlight=False)

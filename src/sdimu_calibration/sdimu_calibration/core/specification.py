@@ -51,6 +51,8 @@ class ImuSpecification:
         Angle random walk as a density (rad/s/sqrt(Hz)): the sigma of a 1 s mean.
     accel_white_noise : float
         Velocity random walk as a density (m/s^2/sqrt(Hz)).
+    gyro_random_walk, accel_random_walk : float
+        Random walk of the bias (rad/s/sqrt(s), m/s^2/sqrt(s)); 0 where it is not stated. For programs that want it.
     gyro_quantisation, accel_quantisation : float
         Sigma of the angle (rad) or velocity (m/s) that a sample keeps for the next one; 0 for an IMU that keeps none.
     gyro_bias_instability, accel_bias_instability : float
@@ -72,6 +74,8 @@ class ImuSpecification:
     prior_units: Mapping[str, str] = field(default_factory=dict)
     gyro_bias_instability: float = 0.0
     accel_bias_instability: float = 0.0
+    gyro_random_walk: float = 0.0
+    accel_random_walk: float = 0.0
     gyro_quantisation: float = 0.0
     accel_quantisation: float = 0.0
 

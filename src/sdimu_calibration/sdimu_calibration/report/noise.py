@@ -48,6 +48,28 @@ def rows(found: Mapping[str, Terms]) -> list[tuple[str, ...]]:
     return out
 
 
+def misfits(found: Mapping[str, Terms]) -> list[str]:
+    """Say which channels the terms do not explain, and what makes such a deviation."""
+    out = []
+    for channel, terms in found.items():
+        if not terms.misfit:
+            continue
+        line = f"{channel}: the terms do not explain the Allan deviation; their sigmas allow for it"
+        if terms.worst_ratio > _STANDS_OUT:
+            line += (
+                f". At {terms.worst_s:.2g} s it is {terms.worst_ratio:.1f} times theirs, as a vibration or a base that "
+                f"rocks at {_PEAK / terms.worst_s:.2g} Hz makes it: record on a base at rest"
+            )
+        out.append(line)
+    return out
+
+
+_STANDS_OUT = 1.5
+"""Ratio of the deviation to that of the terms from which it is a peak: slopes between the terms' make less."""
+_PEAK = 0.371
+"""Frequency times averaging time at the peak of the Allan deviation: of a sine (IEEE Std 952, annex C)."""
+
+
 def table(found: Mapping[str, Terms]) -> Table:
     """Table of the terms for the terminal."""
     made = Table(*HEAD, pad_edge=False, title="terms of the Allan deviation, one sigma")
@@ -59,7 +81,7 @@ def table(found: Mapping[str, Terms]) -> Table:
 
 
 def figure(deviations: Mapping[str, Allan], found: Mapping[str, Terms]) -> Figure:
-    """Allan deviation of all channels with the fits, one panel a triad."""
+    """Allan deviation of all channels with the fits and the slopes of their terms, one panel a triad."""
     made = Figure(rows=1, cols=2, titles=("Gyros", "Accelerometers"), gap_x=0.12)
     for channel, one in deviations.items():
         triad, axis = channel.split("_")
@@ -67,19 +89,43 @@ def figure(deviations: Mapping[str, Allan], found: Mapping[str, Terms]) -> Figur
         factor = from_si(1.0, unit)
         error = {"type": "data", "array": factor * one.sigma, "thickness": 1, "width": 2}
         made.add(
-            "scatter", x=one.tau, y=factor * one.deviation, mode="markers", name=f"{channel} ({unit})", error_y=error,
+            "scatter", x=one.tau, y=factor * one.deviation, mode="markers", name=f"{axis}, measured", error_y=error,
             marker={"color": _INK[k], "symbol": ("circle", "square", "diamond")[k], "size": 6}, col=column,
+            legendgroup=axis, showlegend=triad == "gyro",
         )  # fmt: skip
         fine = np.geomspace(one.tau[0], one.tau[-1], 100)
         made.add(
-            "scatter", x=fine, y=factor * found[channel].deviation(fine), mode="lines", name=f"fit of {channel}",
+            "scatter", x=fine, y=factor * found[channel].deviation(fine), mode="lines", name=f"{axis}, terms",
             line={"color": _INK[k], "dash": _DASH[k], "width": 1.5}, hoverinfo="skip", col=column,
+            legendgroup=axis, showlegend=triad == "gyro",
         )  # fmt: skip
+    for column, triad in ((1, "gyro"), (2, "accel")):
+        _slopes(made, column, [d for c, d in deviations.items() if c.startswith(triad)], from_si(1.0, _SHOWN[triad]))
     made.x_axes(type="log", title="averaging time (s)", exponentformat="power")
     for column, triad in ((1, "gyro"), (2, "accel")):
         title = f"Allan deviation ({_SHOWN[triad]})"
         made.y_axes(type="log", title=title, exponentformat="power", col=column)
-    return lay_out(made, 520)
+    return lay_out(made, 560, showlegend=True, legend={"orientation": "h", "y": -0.18, "x": 0.5, "xanchor": "center"})
+
+
+def _slopes(made: Figure, column: int, deviations: Sequence[Allan], factor: float) -> None:
+    """Draw the slope of each term, from one point below the measured deviations on."""
+    low = float(np.log10(min(d.tau[0] for d in deviations)))
+    bottom = float(np.log10(factor * min(d.deviation.min() for d in deviations)))
+    for word, slope in _SLOPES:
+        x, y = low + _DECADE * np.array([0.0, 1.0]), bottom + _DECADE * np.array([0.0, slope])
+        made.add(
+            "scatter", x=10.0**x, y=10.0**y, mode="lines", line={"color": "#999", "width": 1}, hoverinfo="skip",
+            showlegend=False, col=column,
+        )  # fmt: skip
+        made.annotate(
+            word, x=float(x[1]), y=float(y[1]), xanchor="left", font={"size": 10, "color": "#666"}, col=column,
+        )  # fmt: skip
+
+
+_SLOPES = (("-1 quantisation", -1.0), ("-1/2 white", -0.5), ("0 instability", 0.0), ("+1/2 random walk", 0.5))
+_DECADE = 1.0
+"""Length of a line that shows a slope (decades): seen, and out of the way."""
 
 
 def write_page(
@@ -94,7 +140,8 @@ def write_page(
         f"<h1>{escape(title)}</h1>",
         *(f'<p class="quiet">{escape(word)}</p>' for word in words),
         "<h2>Allan deviation</h2>",
-        '<p class="quiet">Overlapping, pooled over the stretches; bars: one sigma; lines: the fitted terms.</p>',
+        '<p class="quiet">Overlapping, pooled over the stretches; bars: one sigma; lines: the terms; '
+        'grey: their slopes.</p>',
         html(figure(deviations, found), 1),
         "<h2>Terms</h2>",
         '<p class="quiet">Below three sigma only an upper limit is known. White noise is the angle or velocity random '

@@ -216,6 +216,8 @@ class _PlanFile(Schema):
 class _NoiseFile(Schema):
     gyro: Annotated[float, quantity("deg/h/sqrt(Hz)"), Field(ge=0)]
     accel: Annotated[float, quantity("ug/sqrt(Hz)"), Field(ge=0)]
+    gyro_random_walk: Annotated[float, quantity("deg/h/sqrt(h)"), Field(ge=0)] = 0.0
+    accel_random_walk: Annotated[float, quantity("ug/sqrt(h)"), Field(ge=0)] = 0.0
     gyro_quantisation: Annotated[float, quantity("arcsec"), Field(ge=0)] = 0.0
     accel_quantisation: Annotated[float, quantity("mm/s"), Field(ge=0)] = 0.0
     gyro_bias_instability: Annotated[float, quantity("deg/h"), Field(ge=0)] = 0.0
@@ -292,6 +294,8 @@ def load_imu(name_or_path: str | Path) -> ImuSpecification:
         prior={name: size for name, (size, _) in file.prior.items()},
         prior_units={name: unit for name, (_, unit) in file.prior.items()},
         grade=file.grade,
+        gyro_random_walk=file.noise.gyro_random_walk,
+        accel_random_walk=file.noise.accel_random_walk,
         gyro_quantisation=file.noise.gyro_quantisation,
         accel_quantisation=file.noise.accel_quantisation,
         gyro_bias_instability=file.noise.gyro_bias_instability,

@@ -2,19 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+import numpy as np
 import yaml
 
-from sdimu_calibration.core.noise import WhiteNoise
+from sdimu_calibration.core.noise import TERMS, Terms, WhiteNoise
 from sdimu_calibration.core.units import from_si
 from sdimu_calibration.storage.config import find_config, read_mapping
 
 GYRO_UNIT, ACCEL_UNIT = "deg/h/sqrt(Hz)", "ug/sqrt(Hz)"
+_LEAST = 0.1
+"""Ratio of the white noise written to that of means over a second, at least: an IMU has some beside its pulses."""
 
 
-def write_measured_imu(path: Path, base: str, measured: WhiteNoise, remarks: Sequence[str]) -> None:
+_MEMORY = {
+    "quantisation": ("quantisation", {"gyro": "arcsec", "accel": "mm/s"}),
+    "instability": ("bias_instability", {"gyro": "deg/h", "accel": "ug"}),
+    "random_walk": ("random_walk", {"gyro": "deg/h/sqrt(h)", "accel": "ug/sqrt(h)"}),
+}
+"""Keys of an IMU file: of the terms beside white noise, and their units by triad."""
+_SHORT = ("quantisation",)
+"""Terms that are believed where the terms do not explain the deviation: they show in times shorter than any rocking."""
+
+
+def write_measured_imu(
+    path: Path, base: str, measured: WhiteNoise, terms: Mapping[str, Terms], remarks: Sequence[str]
+) -> None:
     """Write an IMU file that ``--imu`` takes: grade and priors of `base`, the noise as measured.
 
     Parameters
@@ -24,6 +39,9 @@ def write_measured_imu(path: Path, base: str, measured: WhiteNoise, remarks: Seq
     base : str
         IMU by name or path.
     measured : WhiteNoise
+        The noise of means over a second: what is left of it without quantisation is written as white noise.
+    terms : mapping of str to Terms
+        By channel; of each triad the root mean square of the axes that show a term is written.
     remarks : sequence of str
         Comments for the head of the file.
 
@@ -34,12 +52,39 @@ def write_measured_imu(path: Path, base: str, measured: WhiteNoise, remarks: Seq
     """
     content = dict(read_mapping(find_config("imu", base)))
     content["name"] = path.stem
-    content["noise"] = {
-        "gyro": f"{from_si(measured.gyro, GYRO_UNIT):.5g} {GYRO_UNIT}",
-        "accel": f"{from_si(measured.accel, ACCEL_UNIT):.5g} {ACCEL_UNIT}",
-    }
+    noise = {}
+    for triad, unit, white in (("gyro", GYRO_UNIT, measured.gyro), ("accel", ACCEL_UNIT, measured.accel)):
+        found = memory_of(terms, triad)
+        # The Allan variance at a second holds both; a quantised mean of it is 3 Q^2.
+        rest = white**2 - 3.0 * found.get("quantisation", 0.0) ** 2
+        noise[triad] = f"{from_si(float(np.sqrt(max(rest, (_LEAST * white) ** 2))), unit):.5g} {unit}"
+        for term, size in found.items():
+            key, units = _MEMORY[term]
+            noise[f"{triad}_{key}"] = f"{from_si(size, units[triad]):.3g} {units[triad]}"
+    content["noise"] = noise
     lines = [f"# {remark}" for remark in remarks]
     lines.append(f"# Grade and priors are those of '{base}': they are not measured here.")
     text = yaml.safe_dump(content, sort_keys=False, allow_unicode=True)
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text("\n".join(lines) + "\n" + text, encoding="utf-8")
+
+
+def memory_of(terms: Mapping[str, Terms], triad: str) -> dict[str, float]:
+    """Sizes (SI) of the terms beside white noise that a triad shows, root mean square of its axes.
+
+    Parameters
+    ----------
+    terms : mapping of str to Terms
+        By channel.
+    triad : str
+        ``gyro`` or ``accel``.
+    """
+    axes = [t for channel, t in terms.items() if channel.startswith(triad)]
+    out = {}
+    for name in _MEMORY:
+        k = TERMS.index(name)
+        # A base that rocks looks like a wandering bias.
+        shown = [float(t.value[k]) if t.seen[k] and (not t.misfit or name in _SHORT) else 0.0 for t in axes]
+        if any(shown):
+            out[name] = float(np.sqrt(np.mean(np.square(shown))))
+    return out

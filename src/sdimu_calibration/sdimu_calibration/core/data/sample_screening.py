@@ -137,13 +137,33 @@ def _stuck(x: Floats) -> Ints:
     share = max(_repetition(same), 1.0 / n)
     if share > _REPEATS or _counts(x):
         return none
-    # n chances to begin, each further repetition as probable as `share`.
-    improbable = 1 + math.ceil(math.log(_FALSE_ALARM / n) / math.log(share))
     first, length = _runs(same)
+    known, share = _long_runs(length, share)
+    # n chances to begin, each further repetition as probable as `share`.
+    improbable = known + math.ceil(math.log(_FALSE_ALARM / n) / math.log(share))
     long = length >= max(improbable, 3)
     # The first number of a run is a measurement, the others repeat it.
     rows = [np.arange(f + 1, f + k) for f, k in zip(first[long], length[long], strict=True)]
     return np.concatenate(rows) if rows else none
+
+
+def _long_runs(length: Ints, share: float) -> tuple[int, float]:
+    """Length from which runs of one number get longer by chance, and the probability of each further repetition.
+
+    A coarse channel whose reading moves slowly (a base that rocks) repeats a number more often where it has repeated
+    it already: half of its longer runs go on for the median of what they have beyond `_LONGER`. A few runs that are
+    stuck do not move that median.
+    """
+    more = length[length > _LONGER] - _LONGER
+    if share < _COARSE or not len(more):
+        return 1, share
+    return _LONGER, max(share, 0.5 ** (1.0 / float(np.median(more))))
+
+
+_COARSE = 0.2
+"""Share of repeated numbers from which a channel is coarse: its counts are three sigmas of its noise and more."""
+_LONGER = 4
+"""Length of a run (samples) beyond which it says how runs go on: shorter ones are the noise between two counts."""
 
 
 def _counts(x: Floats) -> bool:

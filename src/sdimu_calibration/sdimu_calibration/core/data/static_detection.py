@@ -86,18 +86,31 @@ def detect_static(recording: Recording) -> StaticIntervals:
         raise DataError("/imu/data_raw: no rest of half a second was found: put the IMU down between the turns")
     first, last = first[long], last[long]
     gyro, accel = _density(recording.omega_ib_b, first, last, dt), _density(recording.f_ib_b, first, last, dt)
-    return StaticIntervals(*_joined(recording, first, last), gyro, accel)
+    return StaticIntervals(*joined(recording, first, last, _FRAGMENT_S), gyro, accel)
 
 
-def _joined(recording: Recording, first: Ints, last: Ints) -> tuple[Ints, Ints]:
-    """Join the pieces of one rest that a jolt or a burst of noise cut.
+def joined(recording: Recording, first: Ints, last: Ints, longest_s: float) -> tuple[Ints, Ints]:
+    """Join the pieces of one rest that a jolt, a burst of noise or a base that rocks cut.
 
     Pieces are no rests of their own: the errors that the model leaves at an attitude are the same in all of them. The
     mean over the whole rest, jolt included, is that of gravity, as the jolt begins and ends at the same attitude, at
     rest.
+
+    Parameters
+    ----------
+    recording : Recording
+    first, last : ndarray of int, shape (k,)
+        Samples ``first:last`` of each piece.
+    longest_s : float
+        Longest gap between two pieces (s).
+
+    Returns
+    -------
+    first, last : ndarray of int, shape (m,)
+        Of the rests.
     """
     cut = [
-        not _one_rest(recording, (a, b), (c, d))
+        recording.t[c] - recording.t[b - 1] > longest_s or not _one_rest(recording, (a, b), (c, d))
         for a, b, c, d in zip(first[:-1], last[:-1], first[1:], last[1:], strict=True)
     ]
     ends = np.array([*cut, True])
@@ -107,8 +120,6 @@ def _joined(recording: Recording, first: Ints, last: Ints) -> tuple[Ints, Ints]:
 def _one_rest(recording: Recording, before: tuple[int, int], after: tuple[int, int]) -> bool:
     """Decide whether the IMU stood at one attitude before and after a gap, and hardly left it in between."""
     (a, b), (c, d) = before, after
-    if recording.t[c] - recording.t[b - 1] > _FRAGMENT_S:
-        return False
     force = [recording.f_ib_b[at].mean(axis=0) for at in (slice(a, b), slice(c, d))]
     unit = [f / np.linalg.norm(f) for f in force]
     bias = np.concatenate([recording.omega_ib_b[a:b], recording.omega_ib_b[c:d]]).mean(axis=0)

@@ -211,9 +211,10 @@ def triad_noise(prepared: PreparedData, means: Floats, density: float) -> Noise:
 
 
 def _slow(prepared: PreparedData, means: Floats) -> float:
-    """Scatter (rms) of the differences of neighbouring means over `SLOW_S` epochs, of one stop each, as of epochs of 1 s.
+    """Scatter (rms) of the differences of neighbouring means over `SLOW_S` epochs, of one stop each.
 
-    It is the Allan deviation times the root of two. `means` (e, 3) are those of the epochs.
+    It is given as that of epochs of 1 s, and is the Allan deviation times the root of two. `means` (e, 3) are those of
+    the epochs.
     """
     phases = prepared.phases
     steps = []

@@ -261,9 +261,12 @@ def _best_size(J: Floats, d: Floats, cut: Stretches, term: NoiseTerm) -> NoiseTe
     fine = variance[at] * _FINE
     near = _gain(fine, values, y2)
     best = int(np.argmax(near))
-    inside = np.flatnonzero(gain > near[best] - _INTERVAL)
-    low = 0.0 if near[best] < _INTERVAL else float(np.sqrt(variance[max(inside[0] - 1, 0)]))
-    high = float(np.sqrt(variance[min(inside[-1] + 1, len(variance) - 1)]))
+    # Noise that stands far out is known better than the coarse grid is wide: both grids say how far its interval goes.
+    order = np.argsort(np.concatenate([variance, fine]))
+    both = np.concatenate([variance, fine])[order]
+    inside = np.flatnonzero(np.concatenate([gain, near])[order] > near[best] - _INTERVAL)
+    low = 0.0 if near[best] < _INTERVAL else float(np.sqrt(both[max(inside[0] - 1, 0)]))
+    high = float(np.sqrt(both[min(inside[-1] + 1, len(both) - 1)]))
     return replace(term, size=float(np.sqrt(fine[best])), low=low, high=high, gain=float(near[best]))
 
 

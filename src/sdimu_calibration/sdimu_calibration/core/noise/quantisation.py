@@ -23,21 +23,21 @@ from sdimu_calibration.core.specification import ImuSpecification
 from sdimu_calibration.core.units import from_si
 
 _TAU_S = (0.2, 0.4, 0.8, 1.6, 3.2)
-"""Averaging times (s) at which the variance is read."""
+"""Averaging times (s): beyond what a filter in the sensor smooths, below what its bias wanders."""
 _WINDOW_S = 1.0
-"""Length of the window (s) that decides on rest: as that of `rests`."""
+"""Length of a window (s): as that of `rests`, so that both find the same ones."""
 _TURNING = float(np.radians(0.3))
-"""Mean rate (rad/s) apart from that of rest that is a turn: as that of `rests`."""
+"""Deviation of the mean rate that is a turn (rad/s): as that of `rests`."""
 _MISSING = 1.5
-"""Distance of two samples (intervals) from which one is missing: the variance counts samples for time."""
+"""Distance of two samples from which one is missing (intervals): the variance counts samples for time."""
 _PAIRS = 20
 """Number of neighbouring means at an averaging time at least: the variance is then known to a third."""
 _SUSPECT = 1.1
 """Ratio of the usual scatter of seconds to that of the specification from which rests are looked at: chance gives 1."""
 _MEDIAN_CHI2 = 2.366 / 3.0
-"""Median of a chi-square of three degrees of freedom, over its mean."""
+"""Ratio of median to mean: of a chi-square of three degrees of freedom."""
 _MATTERS = 0.1
-"""Ratio of the variances of a one-second mean, by quantisation and by white noise, from which quantisation counts."""
+"""Ratio of quantisation to white noise in the variance of a one-second mean from which it counts: less is 5 %."""
 
 
 def with_quantisation(imu: ImuSpecification, recording: Recording) -> tuple[ImuSpecification, str]:

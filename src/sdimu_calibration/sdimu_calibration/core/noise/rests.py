@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from sdimu_calibration.core.arrays import Bools, Floats, Ints
-from sdimu_calibration.core.data.static_detection import still_samples
+from sdimu_calibration.core.data.static_detection import joined, still_samples
 from sdimu_calibration.core.data.windows import runs
 from sdimu_calibration.core.recording import DataError, PhaseLog, Recording
 
@@ -17,6 +19,8 @@ _TURNING = float(np.radians(0.3))
 """Mean rate (rad/s) apart from that of rest that is a turn: below every table's, above every drift of a bias."""
 _MISSING = 1.5
 """Distance of two samples (intervals) from which one is missing: an Allan deviation counts samples for time."""
+_WHOLE_S = 60.0
+"""Longest gap between two pieces of one rest (s): beyond it the drift of a cheap gyro hides a slow turn."""
 _SHORTEST = 8
 """Number of windows that make a rest: fewer may be a slow part of a turn."""
 
@@ -45,9 +49,13 @@ def rests(recording: Recording) -> tuple[slice, ...]:
     found: tuple[slice, ...] = ()
     if len(recording.t) > size:
         still = still_samples(recording, size, _TURNING, _MISSING) & _dwells(recording)
+        first, last = runs(still)
+        long = last - first >= 2 * size
+        if long.any():
+            first, last = joined(recording, first[long], last[long], _WHOLE_S)
         found = tuple(
             slice(int(a) + size, int(b) - size)
-            for a, b in zip(*runs(still), strict=True)
+            for a, b in _whole(recording, first, last)
             if b - a >= (_SHORTEST + 2) * size
         )
     if not found:
@@ -56,6 +64,14 @@ def rests(recording: Recording) -> tuple[slice, ...]:
             "still, an hour or more for its slow noise"
         )
     return found
+
+
+def _whole(recording: Recording, first: Ints, last: Ints) -> Iterator[tuple[int, int]]:
+    """Cut the rests again where samples are missing."""
+    holes = np.flatnonzero(np.diff(recording.t) > _MISSING * recording.interval_s) + 1
+    for a, b in zip(first, last, strict=True):
+        inside = holes[(holes > a) & (holes < b)]
+        yield from zip([int(a), *inside], [*inside, int(b)], strict=True)
 
 
 def _dwells(recording: Recording) -> Bools:

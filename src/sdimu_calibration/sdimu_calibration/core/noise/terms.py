@@ -8,11 +8,16 @@ non-negative least squares in which each variance has the weight of its standard
 averaging times share data, so the standard errors of the terms are the scatter of the same fit on simulated noise. A
 term that is absent still gets a positive value, because none may be negative, so the fit is repeated with only the
 terms that exceed their standard errors.
+
+Vibration, a base that rocks and filters in the sensor follow no slope of these. Where the terms do not explain the
+variances, each variance gets a relative error beyond its standard error, as large as makes the residuals what they are
+(Paule & Mandel, J. Res. NBS 87, 1982): long averaging times then count beside short ones, which are known to a
+thousandth, and the standard errors of the terms say what such terms are worth.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -26,6 +31,11 @@ _DRAWS = 24
 """Number of simulations: standard errors to 14 %."""
 _SEEN = 3.0
 """Least ratio of a term to its sigma at which it counts as seen: one false term in a thousand."""
+_EXPLAINED = 4.0
+"""Mean square of the residuals (sigma) from which the terms do not explain the variances: they share data, so chance
+makes it 1 to 3."""
+_HALVINGS = 40
+"""Number of halvings in the search for the relative error: to rounding."""
 _ROOM = 2.0
 """Multiple of sigma above the fit that bounds a term that is not seen: 97.7 % of a Gaussian."""
 
@@ -38,10 +48,17 @@ class Terms:
     ----------
     value, sigma : ndarray, shape (4,)
         Q (unit s), N (unit sqrt(s)), B (unit), K (unit/sqrt(s)), with the unit of the channel.
+    misfit : float
+        Relative error of the variances beyond their standard errors; 0 where the terms explain them.
+    worst_s, worst_ratio : float
+        Averaging time (s) at which the deviation exceeds that of the terms most, and by what factor.
     """
 
     value: Floats
     sigma: Floats
+    misfit: float = 0.0
+    worst_s: float = 0.0
+    worst_ratio: float = 1.0
 
     @property
     def seen(self) -> Bools:
@@ -102,26 +119,60 @@ def fit_terms(found: Allan, rng: np.random.Generator, draws: int = _DRAWS) -> Te
     -------
     Terms
     """
-    value = np.sqrt(_squares(found))
+    misfit = _misfit(found)
+    value = np.sqrt(_squares(found, misfit=misfit))
     again = [
         allan([drawn(value, n, found.interval_s, rng) for n in found.lengths], found.interval_s) for _ in range(draws)
     ]
-    sigma = _scatter(again, value, None)
+    if misfit:
+        # The terms of a channel that they do not explain are known as its deviation follows them.
+        again = [_disturbed(one, misfit, rng) for one in again]
+    sigma = _scatter(again, value, None, misfit)
     seen = value > _SEEN * sigma
-    alone = np.sqrt(_squares(found, seen))
-    return Terms(np.where(seen, alone, value), np.where(seen, _scatter(again, value, seen), sigma))
+    alone = np.sqrt(_squares(found, seen, misfit))
+    value = np.where(seen, alone, value)
+    ratio = found.deviation / np.maximum(np.sqrt(basis(found.tau) @ value**2), 1e-300)
+    worst = int(np.argmax(ratio))
+    return Terms(
+        value, np.where(seen, _scatter(again, value, seen, misfit), sigma),
+        misfit, float(found.tau[worst]), float(ratio[worst]),
+    )  # fmt: skip
 
 
-def _scatter(again: list[Allan], value: Floats, among: Bools | None) -> Floats:
+def _misfit(found: Allan) -> float:
+    """Relative error of the variances that explains what the terms leave over beyond standard errors; mostly 0."""
+    if not np.any(found.deviation):
+        return 0.0
+    error = 0.0
+    for _ in range(_ROUNDS):
+        fitted = basis(found.tau) @ _squares(found, misfit=error)
+        left = np.log(found.deviation**2 / np.maximum(fitted, 1e-300)) ** 2
+        if np.mean(left * found.freedom / 2.0) < _EXPLAINED:
+            return 0.0
+        low, high = 0.0, float(np.sqrt(left.max()))
+        for _halving in range(_HALVINGS):
+            error = 0.5 * (low + high)
+            excess = float(np.mean(left / (2.0 / found.freedom + error**2))) > 1.0
+            low, high = (error, high) if excess else (low, error)
+    return error
+
+
+def _disturbed(one: Allan, misfit: float, rng: np.random.Generator) -> Allan:
+    """Disturb the variances of a draw as those of the recording are."""
+    factor = np.exp(0.5 * misfit * rng.standard_normal(len(one.tau)))
+    return replace(one, deviation=one.deviation * factor)
+
+
+def _scatter(again: list[Allan], value: Floats, among: Bools | None, misfit: float = 0.0) -> Floats:
     """Scatter of the fits on draws about the terms `value` (4,) that they were drawn with."""
-    fits = np.array([np.sqrt(_squares(one, among)) for one in again])
+    fits = np.array([np.sqrt(_squares(one, among, misfit)) for one in again])
     if among is None:
         return np.asarray(np.sqrt(np.mean((fits - value) ** 2, axis=0)))
     # Fits without the terms that are left out have another mean.
     return np.asarray(fits.std(axis=0, ddof=1))
 
 
-def _squares(found: Allan, among: Bools | None = None) -> Floats:
+def _squares(found: Allan, among: Bools | None = None, misfit: float = 0.0) -> Floats:
     """Non-negative least squares for the squares of the terms `among`, the others zero."""
     from scipy.optimize import nnls  # noqa: PLC0415 (half a second that a calibration does not need)
 
@@ -133,7 +184,9 @@ def _squares(found: Allan, among: Bools | None = None) -> Floats:
     fitted = variance
     out = np.zeros(len(TERMS))
     for _ in range(_ROUNDS):
-        weight = np.sqrt(0.5 * found.freedom) / np.maximum(fitted, 1e-12 * variance.max())
+        # Beside what the terms do not explain a variance is known to its own size at best, not to that of the fit.
+        size = np.maximum(fitted, variance) if misfit else np.maximum(fitted, 1e-12 * variance.max())
+        weight = 1.0 / (size * np.sqrt(2.0 / found.freedom + misfit**2))
         rows = columns * weight[:, None]
         scale = np.maximum(np.linalg.norm(rows, axis=0), 1e-300)
         out = nnls(rows / scale, variance * weight)[0] / scale

@@ -43,13 +43,13 @@ def texts(source: Source) -> dict[str, str]:
     lines = comments(source, "#")
     lines += [
         "# Kalibr's names: accelerometers M = M_a; gyroscopes M C_gyro_i = M_g, A C_gyro_i = G. Its files have no",
-        "# biases: 'bias' is added. Random walks are not known from a calibration: set them before use in Kalibr.",
+        "# biases: 'bias' is added. Random walks are those of the IMU file; 0 is not known: set it before use.",
         "imu0:",
         "  model: scale-misalignment",
         f"  accelerometer_noise_density: {number(source.imu.accel_white_noise)}  # m/s^2/sqrt(Hz)",
-        "  accelerometer_random_walk: 0.0  # m/s^3/sqrt(Hz), not known",
+        f"  accelerometer_random_walk: {_walk(source.imu.accel_random_walk)}  # m/s^3/sqrt(Hz)",
         f"  gyroscope_noise_density: {number(source.imu.gyro_white_noise)}  # rad/s/sqrt(Hz)",
-        "  gyroscope_random_walk: 0.0  # rad/s^2/sqrt(Hz), not known",
+        f"  gyroscope_random_walk: {_walk(source.imu.gyro_random_walk)}  # rad/s^2/sqrt(Hz)",
         "  rostopic: /imu/data_raw",
         "  time_offset: 0.0",
         f"  update_rate: {number(source.rate_hz)}",
@@ -64,6 +64,10 @@ def texts(source: Source) -> dict[str, str]:
         f"    bias: {flow(linear.gyro_bias)}  # rad/s",
     ]
     return {"": "\n".join(lines) + "\n"}
+
+
+def _walk(value: float) -> str:
+    return number(value) if value else "0.0"
 
 
 def lower_and_rotation(matrix: Floats) -> tuple[Floats, Floats]:
