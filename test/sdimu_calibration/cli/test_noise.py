@@ -43,6 +43,25 @@ def test_the_file_written_is_an_imu_with_the_noise_of_the_recording(still: Path,
     assert "plotly" in page
 
 
+def test_pulses_and_wandering_bias_go_into_the_file(tmp_path: Path) -> None:
+    rng = np.random.default_rng(7)
+    n = round(2000.0 / DT)
+    pulse, walk = to_si(1.0, "arcsec"), to_si(20.0, "deg/h/sqrt(h)")
+    rate = GYRO / np.sqrt(DT) * rng.standard_normal((n, 3))
+    rate += to_si(10.0, "deg/h") + walk * np.sqrt(DT) * np.cumsum(rng.standard_normal((n, 3)), axis=0)
+    counted = np.diff(pulse * np.round(np.cumsum(rate * DT, axis=0) / pulse), axis=0, prepend=0.0) / DT
+    force = ACCEL / np.sqrt(DT) * rng.standard_normal((n, 3)) + np.array([0.0, 0.0, -9.8])
+    write_recording(
+        tmp_path / "still", start_ns=10**18, imu_ns=np.arange(1, n + 1) * round(DT * 1e9), omega_ib_b=counted,
+        f_ib_b=force,
+    )  # fmt: skip
+    noise(tmp_path / "still", out=tmp_path / "out")
+    found = load_imu(tmp_path / "out" / "imu.yaml")
+    assert found.gyro_quantisation == pytest.approx(pulse / np.sqrt(12.0), rel=0.1)
+    assert found.gyro_random_walk == pytest.approx(walk, rel=0.4)
+    assert found.accel_quantisation == 0.0
+
+
 def test_estimated_noise_replaces_that_of_the_specification_and_says_so(still: Path) -> None:
     recording = read_recording(still)
     imu, note = with_measured_noise(load_imu("dtg"), recording)

@@ -9,12 +9,11 @@ import numpy as np
 import yaml
 
 from sdimu_calibration.core.noise import TERMS, Terms, WhiteNoise
+from sdimu_calibration.core.noise.white import white_beside
 from sdimu_calibration.core.units import from_si
 from sdimu_calibration.storage.config import find_config, read_mapping
 
 GYRO_UNIT, ACCEL_UNIT = "deg/h/sqrt(Hz)", "ug/sqrt(Hz)"
-_LEAST = 0.1
-"""Ratio of the white noise written to that of means over a second, at least: an IMU has some beside its pulses."""
 
 
 _MEMORY = {
@@ -55,9 +54,7 @@ def write_measured_imu(
     noise = {}
     for triad, unit, white in (("gyro", GYRO_UNIT, measured.gyro), ("accel", ACCEL_UNIT, measured.accel)):
         found = memory_of(terms, triad)
-        # The Allan variance at a second holds both; a quantised mean of it is 3 Q^2.
-        rest = white**2 - 3.0 * found.get("quantisation", 0.0) ** 2
-        noise[triad] = f"{from_si(float(np.sqrt(max(rest, (_LEAST * white) ** 2))), unit):.5g} {unit}"
+        noise[triad] = f"{from_si(white_beside(white, found.get('quantisation', 0.0)), unit):.5g} {unit}"
         for term, size in found.items():
             key, units = _MEMORY[term]
             noise[f"{triad}_{key}"] = f"{from_si(size, units[triad]):.3g} {units[triad]}"

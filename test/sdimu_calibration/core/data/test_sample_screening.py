@@ -73,6 +73,20 @@ def test_a_counter_that_repeats_a_number_while_its_remainder_grows_is_not_stuck(
     assert len(sound(Recording(0, given.t, counted, given.f_ib_b))[0].t) == N
 
 
+def test_coarse_counts_on_a_base_that_rocks_are_not_stuck_and_a_stuck_one_is_found():
+    """Calm parts of the rocking repeat a number more often than the usual sample does."""
+    rng = np.random.default_rng(8)
+    at = np.arange(N)
+    sway = 1.25 * np.exp(1.0 * np.sin(at / 300.0)) * rng.standard_normal(N)
+    given = recording(rng, np.zeros((N, 6)))
+    counted = np.column_stack([1e-5 * np.round(sway), given.omega_ib_b[:, 1:]])
+    assert not [f for f in sound(Recording(0, given.t, counted, given.f_ib_b))[1] if f.kind == "stuck"]
+    counted[4000:4600, 0] = counted[4000, 0]
+    left, faults = sound(Recording(0, given.t, counted, given.f_ib_b))
+    assert 590 <= N - len(left.t) <= 620
+    assert "stuck" in {f.kind for f in faults}
+
+
 def brisk_turns(rng, steady):
     """Twelve turns with ramps of three samples, `steady` samples long between them, in noise of one."""
     rate = np.zeros(N)

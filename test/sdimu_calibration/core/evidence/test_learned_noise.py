@@ -81,6 +81,16 @@ def test_the_size_of_a_term_is_inside_its_interval(cut, kind, size):
     assert inside >= 0.75 * named
 
 
+def test_noise_far_above_white_noise_has_an_interval(cut):
+    """Known better than the grid of sizes is wide: the interval is narrow and holds the truth."""
+    many = [NoiseTerm(triad, "shift", 0.0, 3e2) for triad in ("gyro", "accel")]
+    found = [t for t in learn(drawn(cut, many, 5), cut) if t.kind == "shift"]
+    assert {t.triad for t in found} == {"gyro", "accel"}
+    for term in found:
+        assert 0.0 < term.low <= term.size <= term.high < 2.0 * term.low
+        assert term.low < 3e2 < term.high
+
+
 def test_white_noise_has_no_memory(cut):
     false = sum(bool(learn(drawn(cut, [], seed), cut)) for seed in range(100, 200))
     assert false <= 3

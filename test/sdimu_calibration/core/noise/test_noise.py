@@ -79,6 +79,35 @@ def test_a_jump_between_rests_does_not_enter():
     np.testing.assert_allclose(apart.deviation[: len(own[0])] ** 2, np.mean(own, axis=0), rtol=1e-9)
 
 
+def test_a_base_that_rocks_widens_the_terms_and_is_told():
+    """A sine of half a hertz over white noise and flicker: the terms that stand under it are not accused."""
+    rng = np.random.default_rng(12)
+    t = np.arange(40_000) * DT
+    quiet = white_and_walk(len(t), rng)
+    rocking = quiet + 0.2 * np.sin(2.0 * np.pi * 0.05 * t)
+    calm, fit = (fit_terms(allan([x], DT), np.random.default_rng(3), draws=8) for x in (quiet, rocking))
+    assert calm.misfit == 0.0
+    assert fit.misfit > 0.5
+    assert fit.worst_ratio > 2.0
+    # The peak of a sine is at 0.371 of its period.
+    assert 0.5 < fit.worst_s / (0.371 / 0.05) < 2.0
+    truth = np.array([0.0, N, 0.0, K])
+    assert (fit.value - 4.0 * fit.sigma < truth + 1e-12).all()
+
+
+def test_a_base_that_rocks_is_one_rest():
+    rng = np.random.default_rng(1)
+    n = round(400.0 / DT)
+    t = np.arange(1, n + 1) * DT
+    sway = np.radians(0.02) * np.sin(2.0 * np.pi * t / 11.0) * (1.0 + np.sin(2.0 * np.pi * t / 50.0))
+    omega = 1e-5 * rng.standard_normal((n, 3)) + np.gradient(sway, DT)[:, None]
+    force = 1e-3 * rng.standard_normal((n, 3)) + np.array([0.0, 0.0, -9.8])
+    found = rests(Recording(0, t, omega, force))
+    assert len(found) == 1
+    # The recording begins and ends in the wildest part of the sway.
+    assert found[0].stop - found[0].start > 0.85 * n
+
+
 def recording(rng: np.random.Generator, status: bool = False, noise: float = 1.0) -> Recording:
     """Rest 60 s, turn 20 s at 2 deg/s about the vertical (the force does not change), rest 60 s."""
     n = round(140.0 / DT)

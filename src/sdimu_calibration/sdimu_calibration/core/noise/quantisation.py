@@ -104,8 +104,8 @@ def size_of_residue(values: Floats, first: Ints, last: Ints, interval_s: float, 
 
     columns = np.column_stack([3.0 / tau**2, 1.0 / tau]) / variance[:, None]
     scale = np.linalg.norm(columns, axis=0)
-    Q2 = float(nnls(columns / scale, np.ones(len(tau)))[0][0] / scale[0])
-    if 0.5 * _MATTERS * white_noise**2 >= Q2:
+    Q2, N2 = (float(x) for x in nnls(columns / scale, np.ones(len(tau)))[0] / scale)
+    if 0.5 * _MATTERS * max(N2, white_noise**2) >= Q2:
         return 0.0
     # A counter that sees hardly any rate may keep nearly the same residue all through a rest; its next one is another.
     pulse = float(np.max(resolution(values))) * interval_s

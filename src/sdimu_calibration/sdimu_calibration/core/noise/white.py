@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sdimu_calibration.core.noise.allan import allan
+from sdimu_calibration.core.noise.quantisation import size_of_residue
 from sdimu_calibration.core.noise.rests import rests
 from sdimu_calibration.core.recording import DataError, Recording
 from sdimu_calibration.core.specification import ImuSpecification
@@ -19,6 +20,8 @@ from sdimu_calibration.core.units import from_si
 
 AT_S = 1.0
 """Averaging time at which the noise is read (s): the length of an epoch at rest."""
+_LEAST = 0.1
+"""Ratio of white noise to the deviation at a second, at least: an IMU has some noise beside its pulses."""
 
 
 @dataclass(frozen=True)
@@ -92,7 +95,13 @@ def with_measured_noise(imu: ImuSpecification, recording: Recording) -> tuple[Im
     DataError
         When there is no rest, or a sensor does not scatter at all.
     """
-    found = white_noise(recording)
+    rows = rests(recording)
+    found = white_noise(recording, rows)
+    first, last = np.array([r.start for r in rows]), np.array([r.stop for r in rows])
+    kept = [
+        size_of_residue(values, first, last, recording.interval_s, white)
+        for values, white in ((recording.omega_ib_b, found.gyro), (recording.f_ib_b, found.accel))
+    ]
     parts = []
     for word, here, sigma, told, unit in (
         ("gyro", found.gyro, found.gyro_sigma, imu.gyro_white_noise, "deg/h/sqrt(Hz)"),
@@ -100,5 +109,32 @@ def with_measured_noise(imu: ImuSpecification, recording: Recording) -> tuple[Im
     ):
         value, error, before = (from_si(v, unit) for v in (here, sigma, told))
         parts.append(f"{word} {value:.4g} +- {error:.2g} {unit} ({before:.4g} as specified)")
-    measured = replace(imu, gyro_white_noise=found.gyro, accel_white_noise=found.accel)
-    return measured, f"noise as measured in {found.rest_s:.0f} s of rest: {'; '.join(parts)}"
+    gyro, accel = (white_beside(white, Q) for white, Q in zip((found.gyro, found.accel), kept, strict=True))
+    note = f"noise as measured in {found.rest_s:.0f} s of rest: {'; '.join(parts)}"
+    if any(kept):
+        note += (
+            f"; of it quantisation {from_si(kept[0], 'arcsec'):.2g} arcsec and {from_si(kept[1], 'mm/s'):.2g} mm/s, "
+            "which averages out faster than white noise"
+        )
+    measured = replace(
+        imu, gyro_white_noise=gyro, accel_white_noise=accel, gyro_quantisation=kept[0], accel_quantisation=kept[1]
+    )
+    return measured, note
+
+
+def white_beside(at_a_second: float, residue: float) -> float:
+    """White noise that is left of the Allan deviation at a second beside quantisation.
+
+    Parameters
+    ----------
+    at_a_second : float
+        Allan deviation at 1 s (rad/s or m/s^2).
+    residue : float
+        Quantisation (rad or m/s).
+
+    Returns
+    -------
+    float
+        Density (rad/s/sqrt(Hz) or m/s^2/sqrt(Hz)); at least `_LEAST` of the deviation.
+    """
+    return float(np.sqrt(max(at_a_second**2 - 3.0 * residue**2, (_LEAST * at_a_second) ** 2)))

@@ -1,0 +1,91 @@
+"""Pulses are recognised in the rests, and an estimate knows what they do to means."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sdimu_calibration.core.diagnosis.diagnose import climb
+from sdimu_calibration.core.estimation.prepared_test import PreparedTest
+from sdimu_calibration.core.estimation.solve import solve
+from sdimu_calibration.core.front_door import OpeningOptions, open_test
+from sdimu_calibration.core.noise import with_measured_noise
+from sdimu_calibration.core.noise.quantisation import with_quantisation
+from sdimu_calibration.core.recording import Recording
+from sdimu_calibration.core.units import to_si
+from sdimu_calibration.storage.config import load_imu, load_model, load_plan
+from sdimu_sim.campaign.hidden_score import baseline_z
+from sdimu_sim.campaign.run import simulate
+from sdimu_sim.core.scenario import Scenario, imu_truth
+
+DT = 0.01
+PULSE = to_si(3.0, "arcsec")
+IMU = load_imu("rlg_navigation")
+
+
+def at_rest(pulse: float, times: float = 1.0, seconds: float = 400.0, seed: int = 1) -> Recording:
+    """An IMU at rest with white noise, `times` that of the specification, whose gyros count pulses."""
+    rng = np.random.default_rng(seed)
+    n = round(seconds / DT)
+    rate = np.array([5e-5, 3e-5, -4e-5]) + times * IMU.gyro_white_noise / np.sqrt(DT) * rng.standard_normal((n, 3))
+    if pulse:
+        angle = np.cumsum(rate, axis=0) * DT
+        rate = np.diff(pulse * np.round(angle / pulse), axis=0, prepend=0.0) / DT
+    force = IMU.accel_white_noise / np.sqrt(DT) * rng.standard_normal((n, 3)) + np.array([0.0, 0.0, -9.8])
+    return Recording(0, np.arange(1, n + 1) * DT, rate, force)
+
+
+def test_pulses_are_recognised():
+    imu, note = with_quantisation(IMU, at_rest(PULSE))
+    assert imu.gyro_quantisation == pytest.approx(PULSE / np.sqrt(12.0), rel=0.1)
+    assert imu.accel_quantisation == 0.0
+    assert "quantisation or vibration of gyro" in note
+
+
+@pytest.mark.parametrize("times", [1.0, 3.0])
+@pytest.mark.parametrize("seed", range(5))
+def test_white_noise_is_no_quantisation_even_where_the_specification_is_wrong(times, seed):
+    assert with_quantisation(IMU, at_rest(0.0, times, seed=seed)) == (IMU, "")
+
+
+def test_what_the_file_states_stands():
+    stated = replace(IMU, gyro_quantisation=1e-6)
+    assert with_quantisation(stated, at_rest(PULSE))[0] is stated
+
+
+def test_measured_noise_parts_pulses_from_white_noise():
+    found = with_measured_noise(load_imu("dtg"), at_rest(PULSE))[0]
+    assert found.gyro_quantisation == pytest.approx(PULSE / np.sqrt(12.0), rel=0.1)
+    # What is left of a variance that pulses double and more is known to a few tens of percent.
+    assert found.gyro_white_noise == pytest.approx(IMU.gyro_white_noise, rel=0.4)
+
+
+def test_a_mean_over_an_epoch_has_the_variance_of_both():
+    """Against the definition: the residue at both ends of the mean, and white noise in between."""
+    imu = replace(IMU, gyro_quantisation=PULSE)
+    T = imu.epoch_s
+    assert T == 20.0
+    variance = imu.in_means_over(T).gyro_white_noise ** 2 / T
+    assert variance == pytest.approx(IMU.gyro_white_noise**2 / T + 2.0 * (PULSE / T) ** 2)
+    assert IMU.epoch_s == 1.0
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_ring_laser_gyro_that_counts_is_calibrated(site, seed):
+    """Means over a second scatter eight times more than the file says: every dwell would count as motion."""
+    plan = load_plan("kim18")
+    extras = {"gyro_step_rad": PULSE, "accel_step_m_s": 1e-3}
+    scenario = Scenario(plan, IMU, site, rate_hz=50.0, seed=seed, extras=extras)
+    sensor = imu_truth(scenario)
+    recording = simulate(scenario, sensor)
+    test = PreparedTest(*open_test(recording, OpeningOptions(IMU, site)))
+    fit = solve(test, load_model("baseline"))
+    found = climb(fit)
+    assert found.verdict == "consistent", found.sentence
+    z = baseline_z(found.after, sensor)
+    # 27 coefficients, some held by their priors: the sigma of a mean over 20 s is up to 1.3 times that over a dwell.
+    assert 0.5 < np.sqrt(np.mean(np.square(z))) < 1.4
+    held = test.imu.in_means_over(fit.setup.epoch_s).gyro_white_noise
+    assert held < 3.0 * IMU.gyro_white_noise
