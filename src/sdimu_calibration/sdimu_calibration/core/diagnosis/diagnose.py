@@ -202,7 +202,7 @@ def climb(
     noise, imu = measured_noise(consistency, fit)
     stated = fit.test.imu
     if noise:
-        fit = solve(fit.test.with_noise(imu), fit.model, fit.estimator, progress=progress, learn=False)
+        fit = solve(fit.test.with_imu(imu), fit.model, fit.estimator, progress=progress, learn=False)
     fit = in_white_noise(fit)
     wander = None if fit.learns_scatter else Wander.of(fit.evidence())
     request = Request(fit, tuple(extra), alpha, wander, frozenset(without))

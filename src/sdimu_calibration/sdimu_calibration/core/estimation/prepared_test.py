@@ -44,8 +44,8 @@ class PreparedTest:
         """Hold stops out of all fits."""
         return replace(self, held_out=tuple(stops))
 
-    def with_noise(self, imu: ImuSpecification) -> PreparedTest:
-        """Take other white noise for the fits; phases and data faults stay as they were decided."""
+    def with_imu(self, imu: ImuSpecification) -> PreparedTest:
+        """Take other white noise or priors for the fits; phases and data faults stay as they were decided."""
         return replace(self, imu=imu)
 
     def data(self, setup: TestSetup) -> PreparedData:

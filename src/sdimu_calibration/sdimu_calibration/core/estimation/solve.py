@@ -22,7 +22,7 @@ from sdimu_calibration.core.alignment.prepared import PreparedData, TestSetup, f
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.batch.batch import solve_batch
 from sdimu_calibration.core.batch.classical import TABLE_FRAME, solve_classical
-from sdimu_calibration.core.effects import body_frame, imu_model
+from sdimu_calibration.core.effects import body_frame
 from sdimu_calibration.core.effects.accelerometer_frame import (
     FRAME,
     AccelerometerFrameModel,
@@ -35,6 +35,7 @@ from sdimu_calibration.core.effects.imu_model import ImuModel
 from sdimu_calibration.core.estimation.filter_fit import FilterFit
 from sdimu_calibration.core.estimation.fit import Fit, Start
 from sdimu_calibration.core.estimation.handheld_fit import HandheldFit
+from sdimu_calibration.core.estimation.handheld_solve import solve_handheld
 from sdimu_calibration.core.estimation.navigation_fit import NavigationFit
 from sdimu_calibration.core.estimation.noise_learning import with_noise_learned
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
@@ -43,8 +44,6 @@ from sdimu_calibration.core.estimation.second_order_fit import SecondOrderFit
 from sdimu_calibration.core.filter.filter_pass import NAV
 from sdimu_calibration.core.filter.passes import MOST_WIDENINGS, Solution, one_pass, widen_contradicted_priors
 from sdimu_calibration.core.filter.passes import solve as solve_filter
-from sdimu_calibration.core.handheld.handheld import first_linearisation, fit_priors
-from sdimu_calibration.core.handheld.handheld_fit import LinearisationPoint, fit_run
 from sdimu_calibration.core.progress import Progress, silent
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.second_order.second_order_passes import second_order_pass, solve_second_order
@@ -215,26 +214,6 @@ def _second_order(test: PreparedTest, model: Model, start: Start | None, progres
     )
 
 
-def _handheld(test: PreparedTest, model: Model, start: Start | None, progress: Progress) -> Fit:
-    if test.assumed_site:
-        raise DataError(
-            f"the test was opened for navigation at the assumed site {test.assumed_site}, and a handheld fit takes no "
-            "assumed site: in Python, state the site or open the test with open(..., handheld=True)"
-        )
-    progress("rests", 0.1)
-    sensors = imu_model.build(model.effects, test.imu)
-    ready = test.run
-    priors = fit_priors(sensors, test.imu, test.site, ready.rests)
-    progress("least squares", 0.3)
-    if start is None:
-        point = first_linearisation(ready.run, sensors, priors.gravity)
-    else:
-        point = LinearisationPoint(
-            start.coefficients_of(sensors.names), start.C_nb, start.more[:3].copy(), start.more[3:].copy()
-        )
-    return HandheldFit(test, model, sensors, ready, priors, fit_run(ready.run, priors, point))
-
-
 @dataclass(frozen=True)
 class _Reduced:
     """What both reference estimators begin with."""
@@ -319,7 +298,7 @@ def _navigation_about(
 ESTIMATORS: Mapping[str, Callable[[PreparedTest, Model, Start | None, Progress], Fit]] = {
     FilterFit.estimator: _filter,
     SecondOrderFit.estimator: _second_order,
-    HandheldFit.estimator: _handheld,
+    HandheldFit.estimator: solve_handheld,
     BatchFit.estimator: _batch,
     ClassicalFit.estimator: _classical,
 }

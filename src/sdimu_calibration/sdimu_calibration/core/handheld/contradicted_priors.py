@@ -1,0 +1,69 @@
+"""Priors of an IMU file that a handheld run contradicts.
+
+By hand the scatter is learned. A prior that is too tight therefore does not show as a misfit: what it keeps out of the
+coefficients is learned as scatter, and the sensor looks bad instead of the file. So the run is also fitted with the
+priors of an uncalibrated MEMS sensor, the widest that there are. What then is found beyond its own prior gets room, if
+the data become more probable by it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from sdimu_calibration.core.arrays import Floats
+from sdimu_calibration.core.effects.imu_model import ImuModel
+from sdimu_calibration.core.specification import ImuSpecification
+
+BEYOND = 3.0
+"""Size of a coefficient (sigma of its prior, and of itself) from which it contradicts the prior: chance stays below."""
+ROOM = 3.0
+"""Ratio of the new prior to the largest coefficient found: it then pulls by a tenth of its sigma and less."""
+GAIN = 5.0
+"""Ratio of likelihoods (logarithm), with wider priors to without, from which the file is wrong: odds of 150 to 1."""
+WIDEST = "mems"
+"""Grade with the widest priors."""
+
+
+def widest_priors(imu: ImuSpecification, sensors: ImuModel) -> ImuSpecification:
+    """Return the IMU with the priors of the widest grade for the effects of a model; the same object if none is wider.
+
+    Parameters
+    ----------
+    imu : ImuSpecification
+    sensors : ImuModel
+    """
+    wider = {
+        effect.family or effect.name: effect.prior[WIDEST]
+        for effect in sensors.effects
+        if imu.prior.get(effect.family or effect.name, np.inf) < effect.prior.get(WIDEST, 0.0)
+    }
+    return replace(imu, prior={**imu.prior, **wider}) if wider else imu
+
+
+def contradicted(imu: ImuSpecification, sensors: ImuModel, values: Floats, sigma: Floats) -> dict[str, float]:
+    """Say which priors coefficients contradict that were found with wider ones.
+
+    Parameters
+    ----------
+    imu : ImuSpecification
+        With the priors in question.
+    sensors : ImuModel
+    values, sigma : ndarray, shape (p,)
+        Coefficients found, and their sigmas (SI).
+
+    Returns
+    -------
+    dict of str to float
+        By effect the sigma (SI) that gives its coefficients room.
+    """
+    owner = np.array([e.family or e.name for e in sensors.effects for _ in e.parameters])
+    size = np.abs(values)
+    out = {}
+    for name in dict.fromkeys(owner.tolist()):
+        stated = imu.prior.get(name)
+        mine = (owner == name) & (size > BEYOND * sigma)
+        if stated is not None and mine.any() and size[mine].max() > BEYOND * stated:
+            out[name] = ROOM * float(size[mine].max())
+    return out
