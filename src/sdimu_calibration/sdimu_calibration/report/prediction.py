@@ -24,28 +24,29 @@ _DEFINED = 1e-6
 
 
 def coefficient_rows(prediction: Prediction) -> list[tuple[str, ...]]:
-    """Name, prior, sigma, bound, sigma over bound and unit of every coefficient, as text."""
+    """Name, prior, sigmas in white and in all noise, bound, sigma over bound and unit of every coefficient, as text."""
     rows: list[tuple[str, ...]] = []
     for k, name in enumerate(prediction.names):
         unit = prediction.display_units[k]
-        sigma, bound = prediction.sigma[k], prediction.bound[k]
+        sigma, bound, in_noise = prediction.sigma[k], prediction.bound[k], prediction.in_noise[k]
         defined = sigma < _DEFINED * prediction.prior[k]
         over = "" if defined or not np.isfinite(bound) else f"{sigma / bound:.2f}"
         rows.append((
             name, _short(from_si(prediction.prior[k], unit)),
             "0" if defined else _short(from_si(sigma, unit)),
+            "0" if defined else _short(from_si(in_noise, unit)),
             "0" if defined else _short(from_si(bound, unit)), over, unit,
         ))  # fmt: skip
     return rows
 
 
-COLUMNS = ("coefficient", "prior", "sigma", "bound", "sigma / bound", "unit")
+COLUMNS = ("coefficient", "prior", "sigma", "in its noise", "bound", "sigma / bound", "unit")
 
 
 def coefficient_table(prediction: Prediction) -> Table:
     """Table of every coefficient for the terminal."""
     table = Table(*COLUMNS, pad_edge=False, title=f"body frame: {prediction.body_frame}")
-    for column in table.columns[1:5]:
+    for column in table.columns[1:6]:
         column.justify = "right"
     effects = [effect_of(name, prediction.model) for name in prediction.names]
     for k, row in enumerate(coefficient_rows(prediction)):

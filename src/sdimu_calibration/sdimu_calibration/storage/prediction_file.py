@@ -14,15 +14,18 @@ FORMAT = "sdimu-prediction/1"
 
 def prediction_content(prediction: Prediction, about: Mapping[str, Any]) -> dict[str, Any]:
     """Put a prediction into plain data, SI; `about` says of what (plan, IMU, site, mount, noise)."""
-    columns = zip(prediction.names, prediction.sigma, prediction.bound, prediction.prior, prediction.units, strict=True)
+    columns = zip(
+        prediction.names, prediction.sigma, prediction.in_noise, prediction.bound, prediction.prior, prediction.units,
+        strict=True,
+    )  # fmt: skip
     return {
         "format": FORMAT,
         **about,
         "body_frame": prediction.body_frame,
         "duration_s": prediction.duration_s,
         "coefficients": [
-            {"name": name, "sigma": sigma, "bound": bound, "prior": prior, "unit": unit}
-            for name, sigma, bound, prior, unit in columns
+            {"name": name, "sigma": sigma, "sigma_in_noise": noisy, "bound": bound, "prior": prior, "unit": unit}
+            for name, sigma, noisy, bound, prior, unit in columns
         ],
         "unobservable": [found.text for found in prediction.unobservable],
         "covariance": prediction.covariance,

@@ -1,7 +1,8 @@
 """Covariance simulation: the sigmas of a test before it is run.
 
 The filter itself runs on the recording of a perfect IMU (`nominal`), so its covariance is to first order that of a real
-test. No noise is drawn and nothing is estimated.
+test. No noise is drawn and nothing is estimated. Noise with a memory that the IMU file states is put in
+afterwards (`stated_noise`).
 """
 
 from __future__ import annotations
@@ -15,12 +16,16 @@ from sdimu_calibration.core.alignment.alignment import Alignment
 from sdimu_calibration.core.alignment.prepared import PreparedData, TestSetup, first_attitude, reduce, set_up
 from sdimu_calibration.core.arrays import Bools, Floats
 from sdimu_calibration.core.effects import body_frame
+from sdimu_calibration.core.estimation.filter_fit import FilterFit
+from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.filter.filter_pass import NAV
-from sdimu_calibration.core.filter.passes import one_pass
+from sdimu_calibration.core.filter.passes import Solution, one_pass
 from sdimu_calibration.core.plan import Plan
 from sdimu_calibration.core.planning.noise_set import NoiseSet, apply
 from sdimu_calibration.core.planning.nominal import nominal_recording
 from sdimu_calibration.core.planning.observability import Combination, unobservable
+from sdimu_calibration.core.planning.stated_noise import covariance_in, stated_noise
+from sdimu_calibration.core.recording import Recording
 from sdimu_calibration.core.rotation import rotation_matrix
 from sdimu_calibration.core.specification import ImuSpecification, Model, Site
 
@@ -40,8 +45,10 @@ class Prediction:
     names, units, display_units : tuple of str, length p
     sigma : ndarray, shape (p,)
         At the end of the test, SI, in `body_frame`.
+    in_noise : ndarray, shape (p,)
+        The same with bias instability and random walk of the IMU file; as `sigma` where it states none.
     bound : ndarray, shape (p,)
-        Sigma that a batch of all data would reach.
+        Sigma that a batch of all data would reach in white noise.
     prior : ndarray, shape (p,)
     covariance : ndarray, shape (p, p)
     t : ndarray, shape (m,)
@@ -61,6 +68,7 @@ class Prediction:
     units: tuple[str, ...]
     display_units: tuple[str, ...]
     sigma: Floats
+    in_noise: Floats
     bound: Floats
     prior: Floats
     covariance: Floats
@@ -75,10 +83,15 @@ class Prediction:
 class Nominal:
     """Prepared perfect recording of a plan, shared by all covariance simulations of it."""
 
+    recording: Recording
     prepared: PreparedData
     setup: TestSetup
     start: Alignment
-    duration_s: float
+
+    @property
+    def duration_s(self) -> float:
+        """Length of the test (s)."""
+        return float(self.recording.t[-1])
 
 
 def prepare(
@@ -115,7 +128,7 @@ def prepare(
     sigma = start.filter_sigma
     if noise is not None:
         sigma = np.array([noise.level_sigma, noise.level_sigma, noise.azimuth_sigma])
-    return Nominal(prepared, setup, replace(start, C_nb=C_nb, filter_sigma=sigma), float(recording.t[-1]))
+    return Nominal(recording, prepared, setup, replace(start, C_nb=C_nb, filter_sigma=sigma))
 
 
 def predict(
@@ -166,6 +179,13 @@ def predict(
     variance = np.einsum("ij,kjl,il->ki", J, output.covariance[: len(rows)], J)
     covariance = J @ done.covariance @ J.T
     sigma = np.sqrt(np.diag(covariance))
+    terms = () if noise is not None else stated_noise(imu)
+    in_noise = sigma
+    if terms:
+        solution = Solution(setup, nominal.prepared, nominal.start, done, done, 1, converged=True)
+        test = PreparedTest(nominal.recording, imu, site)
+        fit = FilterFit(test, model, sensors, setup, nominal.prepared, nominal.start, solution)
+        in_noise = np.sqrt(np.diag(J @ covariance_in(fit, terms) @ J.T))
     limit = np.full(len(sigma), np.nan)
     if bound is not None:
         # The bound depends on the noise of this IMU, not on the noise set of the filter.
@@ -180,6 +200,7 @@ def predict(
         units=tuple(p.unit for p in sensors.parameters),
         display_units=tuple(p.display_unit for p in sensors.parameters),
         sigma=sigma,
+        in_noise=in_noise,
         bound=limit,
         prior=sensors.prior,
         covariance=covariance,
