@@ -57,7 +57,7 @@ def with_quantisation(imu: ImuSpecification, recording: Recording) -> tuple[ImuS
     """
     stated = imu.gyro_quantisation > 0.0 or imu.accel_quantisation > 0.0
     triads = (("gyro", recording.omega_ib_b, imu.gyro_white_noise), ("accel", recording.f_ib_b, imu.accel_white_noise))
-    if stated or not any(_suspect(values, recording.interval_s, noise) for _, values, noise in triads):
+    if stated or not _suspect(recording, imu):
         return imu, ""
     size = max(round(_WINDOW_S / recording.interval_s), 2)
     if len(recording.t) <= size:
@@ -100,11 +100,10 @@ def size_of_residue(values: Floats, first: Ints, last: Ints, interval_s: float, 
     tau, variance = _two_sample(values, first, last, interval_s)
     if len(tau) < 2:
         return 0.0
-    from scipy.optimize import nnls  # noqa: PLC0415 (half a second that few tests need)
-
     columns = np.column_stack([3.0 / tau**2, 1.0 / tau]) / variance[:, None]
-    scale = np.linalg.norm(columns, axis=0)
-    Q2, N2 = (float(x) for x in nnls(columns / scale, np.ones(len(tau)))[0] / scale)
+    Q2, N2 = (float(x) for x in np.linalg.lstsq(columns, np.ones(len(tau)), rcond=None)[0])
+    if N2 < 0.0:
+        Q2, N2 = float(columns[:, 0].sum() / (columns[:, 0] @ columns[:, 0])), 0.0
     if 0.5 * _MATTERS * max(N2, white_noise**2) >= Q2:
         return 0.0
     # A counter that sees hardly any rate may keep nearly the same residue all through a rest; its next one is another.
@@ -129,13 +128,23 @@ def _two_sample(values: Floats, first: Ints, last: Ints, interval_s: float) -> t
     return np.array(tau), np.array(variance)
 
 
-def _suspect(values: Floats, interval_s: float, white_noise: float) -> bool:
-    """Whether the usual second scatters more than white noise of the specification makes it: most tests mostly rest."""
-    width = max(round(1.0 / interval_s), 1)
-    seconds = len(values) // width
-    if seconds < 2:
+def _suspect(recording: Recording, imu: ImuSpecification) -> bool:
+    """Whether the means over seconds at rest scatter more than the white noise of the specification makes them."""
+    width = max(round(1.0 / recording.interval_s), 1)
+    seconds = len(recording.t) // width
+    if seconds < _PAIRS:
         return False
-    means = values[: seconds * width].reshape(seconds, width, 3).mean(axis=1)
-    steps = np.sum(np.diff(means, axis=0) ** 2, axis=1)
-    variance = float(np.median(steps)) / (2.0 * 3.0 * _MEDIAN_CHI2)
-    return variance * width * interval_s > _SUSPECT**2 * white_noise**2
+    rate, force = (
+        values[: seconds * width].reshape(seconds, width, 3).mean(axis=1)
+        for values in (recording.omega_ib_b, recording.f_ib_b)
+    )
+    still = np.max(np.abs(rate - np.median(rate, axis=0)), axis=1) < _TURNING
+    pair = still[1:] & still[:-1]
+    if pair.sum() < _PAIRS:
+        return False
+    for means, noise in ((rate, imu.gyro_white_noise), (force, imu.accel_white_noise)):
+        steps = np.sum(np.diff(means, axis=0)[pair] ** 2, axis=1)
+        variance = float(np.median(steps)) / (2.0 * 3.0 * _MEDIAN_CHI2)
+        if variance * width * recording.interval_s > _SUSPECT**2 * noise**2:
+            return True
+    return False
