@@ -285,5 +285,48 @@ def many(
     console.print(f"results in {out}", soft_wrap=True)
 
 
+@app.command()
+def hand(
+    out: Annotated[Path, typer.Option(help="Folder of runs and hand.json.")] = Path("out/study-hand"),
+    runs: Annotated[int, typer.Option("-n", min=1, help="Clean runs, and as many with a hidden effect.")] = 100,
+    seed: Annotated[int, typer.Option(help="First seed.")] = 69_001,
+    workers: Annotated[int, typer.Option(min=1, help="Processes.")] = 2,
+) -> None:
+    """Diagnose runs by hand of any grade and rate, with bias instability and rests that somebody nudges."""
+    from functools import partial
+
+    import numpy as np
+    from rich.box import SIMPLE
+    from rich.console import Console
+    from rich.table import Table
+
+    from sdimu_calibration.cli.progress import bar
+    from sdimu_calibration.storage.json_file import write_json
+    from sdimu_sim.campaign.campaign import run_campaign
+    from sdimu_sim.campaign.hand_run import IMUS, HandRun
+
+    console, seeds, results = Console(), range(seed, seed + runs), {}
+    for word, hidden in (("clean", False), ("hidden", True)):
+        with bar(console) as progress:
+            tell = partial(_named, progress, word)
+            results[word] = run_campaign(HandRun(hidden), seeds, out / word, workers=workers, progress=tell)
+    write_json(out / "hand.json", results)
+    headings = ("IMU file", "clean runs", "consistent", "RMS z", "hidden runs", "in a class", "first", "RMS z")
+    table = Table(*headings, box=SIMPLE)
+    for name in (*IMUS, "all"):
+        cells = []
+        for word, found in results.items():
+            rows = [r for r in found if "error" not in r and name in (r["imu"], "all")]
+            z = np.sqrt(sum(r["z2"] for r in rows) / max(1, sum(r["count"] for r in rows)))
+            said = ("in_class", "first") if word == "hidden" else ("consistent",)
+            hits = [sum(bool(r.get(s, r["verdict"] == s)) for r in rows) for s in said]
+            cells += [str(len(rows)), *map(str, hits), f"{z:.2f}"]
+        table.add_row(name, *cells)
+    console.print(table)
+    refused = [r["error"] for rows in results.values() for r in rows if "error" in r]
+    console.print(f"refused: {len(refused)}", *sorted(set(refused))[:5], sep="\n", markup=False)
+    console.print(f"results in {out}", soft_wrap=True)
+
+
 def _named(progress: Progress, name: str, word: str, share: float) -> None:
     progress(f"{name}: {word}", share)

@@ -26,6 +26,8 @@ _SWAY_HZ, _TREMOR_HZ = (1.0, 3.0), (8.0, 12.0)
 """Bands of arm and of physiological tremor (Elble & Koller, *Tremor*, 1990)."""
 _SWAY_RAD, _TREMOR_RAD = np.radians(3.0), np.radians(0.15)
 """Amplitudes: at most 30 and 10 deg/s."""
+_NUDGE_S, _NUDGE = 0.4, 0.1
+"""Length of a nudge (s), and its amplitudes as a share of those of a turn: tenths of a degree."""
 
 
 @dataclass(frozen=True)
@@ -48,6 +50,10 @@ class ByHand:
         Accelerometers from the wrist, in b: their force in a turn is not gravity's alone.
     effects : tuple of str
         Hidden effects, canonical keys with sizes.
+    noise : tuple of str
+        Noise with a memory, as of `Scenario`.
+    nudges : float
+        Share of the rests in which somebody nudges the IMU: it wobbles for a moment and comes back.
     """
 
     rests: int
@@ -59,6 +65,12 @@ class ByHand:
     turn_s: tuple[float, float] = (0.8, 2.5)
     lever_arm_m: tuple[float, float, float] = (0.12, -0.05, 0.2)
     effects: tuple[str, ...] = ()
+    noise: tuple[str, ...] = ()
+    nudges: float = 0.0
+
+    def with_effects(self, *effects: str) -> ByHand:
+        """Return the same run by a hand that holds an IMU with these hidden effects."""
+        return replace(self, effects=effects)
 
 
 def simulate_by_hand(run: ByHand) -> tuple[ImuSamples, Truth]:
@@ -79,6 +91,7 @@ def simulate_by_hand(run: ByHand) -> tuple[ImuSamples, Truth]:
             gyro_white_noise=run.imu.gyro_white_noise,
             accel_white_noise=run.imu.accel_white_noise,
             effects=run.effects,
+            noise=run.noise,
             lever_arm_m=run.lever_arm_m,
         )
     )
@@ -108,11 +121,21 @@ def by_hand_motion(run: ByHand) -> PlatformMotion:
     rates: list[Floats] = []
     for k in range(run.rests):
         rest = _grid(rng.uniform(*run.rest_s))
+        nudged = run.nudges > 0.0 and rng.random() < run.nudges
         # A rest needs its two ends only: between equal attitudes at rate zero the motion stands still.
-        times.append(np.array([t0, t0 + rest]))
-        turned.append(np.repeat(attitudes[k][None], 2, axis=0))
-        rates.append(np.zeros((2, 3)))
-        t0 += rest
+        for part in (0.5 * rest, 0.5 * rest) if nudged else (rest,):
+            times.append(np.array([t0, t0 + _grid(part)]))
+            turned.append(np.repeat(attitudes[k][None], 2, axis=0))
+            rates.append(np.zeros((2, 3)))
+            t0 = times[-1][1]
+            if nudged:
+                nudged = False
+                tau = np.arange(1, round(_NUDGE_S * _MOTION_HZ)) / round(_NUDGE_S * _MOTION_HZ)
+                q, w = _turn(attitudes[k], attitudes[k], tau, _NUDGE_S, rng, _NUDGE)
+                times.append(t0 + tau * _NUDGE_S)
+                turned.append(q)
+                rates.append(w)
+                t0 += _NUDGE_S
         if k + 1 < run.rests:
             length = _grid(rng.uniform(*run.turn_s))
             tau = np.arange(1, round(length * _MOTION_HZ)) / round(length * _MOTION_HZ)
@@ -135,12 +158,14 @@ def _random_quaternions(rng: np.random.Generator, number: int) -> Floats:
     return np.asarray(q / np.linalg.norm(q, axis=1)[:, None])
 
 
-def _turn(start: Floats, end: Floats, tau: Floats, length: float, rng: np.random.Generator) -> tuple[Floats, Floats]:
+def _turn(
+    start: Floats, end: Floats, tau: Floats, length: float, rng: np.random.Generator, sway_share: float = 1.0
+) -> tuple[Floats, Floats]:
     """Attitude (n, 4) and body rate (n, 3) of a turn at shares `tau` (n,) of its `length` (s)."""
     way = rotation_vector(quaternion_matrix(start).T @ quaternion_matrix(end))
     share = tau**3 * (10.0 - 15.0 * tau + 6.0 * tau**2)
     speed = 30.0 * tau**2 * (1.0 - tau) ** 2 / length
-    sway, sway_rate = _sway(tau, length, rng)
+    sway, sway_rate = (sway_share * part for part in _sway(tau, length, rng))
     # q = start * exp(share way) * exp(sway): the rate of the first turn is seen through the second.
     q = _product(_product(start, _exponential(share[:, None] * way)), _exponential(sway))
     return q, _turned_back(speed[:, None] * way, sway) + _body_rate(sway, sway_rate)

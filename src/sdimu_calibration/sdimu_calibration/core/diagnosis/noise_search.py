@@ -192,6 +192,44 @@ def search_with_noise(
     return _told(ground, max(states, key=lambda s: ground.net(s) - _DOUBT * ground.doubtful(s)), white)
 
 
+def imitated(found: Search[E], allowed: Ints, wander: Wander) -> Ints:
+    """Columns of drifts that stand for a wandering bias: noise with a memory explains as much as one that was chosen.
+
+    A run by hand learns its scatter as white noise, and a bias that wanders is then a step, a ramp or a transient of
+    some sensor to the search.
+
+    Parameters
+    ----------
+    found : Search
+        In white noise.
+    allowed : ndarray of int, shape (a,)
+        Columns that may be chosen.
+    wander : Wander
+        Of the same test.
+
+    Returns
+    -------
+    ndarray of int, shape (b,)
+        All drifts of the triads concerned.
+    """
+    ground = _Ground(found.evidence, allowed, wander, found.threshold, None)
+    chosen = found.chosen.tolist()
+    out: set[str] = set()
+    for column in chosen:
+        if not ground.beside(column):
+            continue
+        others = [c for c in chosen if c != column]
+        gain = ground.state(chosen).balance.net - ground.state(others).balance.net
+        if gain < ground.cost(column, ()) + _DOUBT:
+            out |= _triads(ground, column)
+    drifts = [c for c in allowed.tolist() if ground.beside(c) and _triads(ground, c) & out]
+    return np.array(drifts, dtype=np.int64)
+
+
+def _triads(ground: _Ground[E], column: int) -> set[str]:
+    return {TRIADS[term.channel // 3] for term in ground.white.candidate(column).effect.terms}
+
+
 def _settled(ground: _Ground[E], state: _State) -> tuple[_Ground[E], _State]:
     """Drop, add and exchange until nothing changes."""
     state = _pruned(ground, state)

@@ -18,7 +18,7 @@ import numpy as np
 from sdimu_calibration.core.arrays import Ints
 from sdimu_calibration.core.diagnosis.candidates import catalogue, equations, free_inputs, periodic
 from sdimu_calibration.core.diagnosis.free_input_test import FreeInputTest, free_input_test
-from sdimu_calibration.core.diagnosis.noise_search import search_with_noise
+from sdimu_calibration.core.diagnosis.noise_search import imitated, search_with_noise
 from sdimu_calibration.core.diagnosis.search import MOST_STEPS, Search, Step, search
 from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.estimation.fit import Fit
@@ -268,8 +268,9 @@ def run_round(
     evidence, free = _evidence(request, fit, tried, own, earlier)
     allowed = np.setdiff1d(np.arange(len(evidence.weight), len(evidence.names)), free)
     if request.wander is None:
-        most = len(tried) + 1 if request.base.learns_scatter else MOST_STEPS
-        return _round(fit, search(evidence, allowed, request.alpha, most), free)
+        if not request.base.learns_scatter:
+            return _round(fit, search(evidence, allowed, request.alpha, MOST_STEPS), free)
+        return _round(fit, _without_wander(evidence, allowed, request.alpha, len(tried) + 1), free)
     # Noise is a rival from the start; once effects were preferred to all of it, it need not be asked again.
     doubted = not tried or (earlier is not None and bool(earlier.found.noise))
     found = search_with_noise(
@@ -278,6 +279,18 @@ def run_round(
     )  # fmt: skip
     limits.setdefault(own, found.threshold)
     return _round(fit, found, free)
+
+
+def _without_wander(evidence: LinearEvidence, allowed: Ints, alpha: float, most: int) -> Search[LinearEvidence]:
+    """Search, and search again without the drifts of a triad whose bias only wanders."""
+    while True:
+        found = search(evidence, allowed, alpha, most)
+        if not any(found.evidence.candidates[c - len(evidence.weight)].effect.bias_drift for c in found.chosen):
+            return found
+        barred = imitated(found, allowed, Wander.of(evidence))
+        if not len(barred):
+            return found
+        allowed = np.setdiff1d(allowed, barred)
 
 
 def _evidence(

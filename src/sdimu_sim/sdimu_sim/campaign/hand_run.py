@@ -1,0 +1,99 @@
+"""One run of the study of runs by hand: any grade, rate and noise, rests that somebody nudges, with a hidden effect."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any
+from zlib import crc32
+
+import numpy as np
+
+from sdimu_calibration.core import earth
+from sdimu_calibration.core.diagnosis.diagnose import climb
+from sdimu_calibration.core.estimation.prepared_test import PreparedTest
+from sdimu_calibration.core.estimation.solve import solve
+from sdimu_calibration.core.front_door import OpeningOptions, open_test
+from sdimu_calibration.core.recording import PhaseLog
+from sdimu_calibration.core.specification import ImuSpecification, Site
+from sdimu_calibration.core.units import STANDARD_GRAVITY, from_si
+from sdimu_calibration.storage.config import load_imu, load_model
+from sdimu_sim.campaign.grade_run import LATITUDES_DEG, drawn_effect, scored_row
+from sdimu_sim.campaign.run import in_the_mean
+from sdimu_sim.core.by_hand import ByHand, against_gravity, by_hand_motion, by_hand_recording
+from sdimu_sim.core.truth import ImuTruth
+
+IMUS = ("mems_by_hand", "mems_consumer", "mems_industrial")
+"""IMU files that are drawn."""
+_RATES_HZ = (50.0, 100.0, 200.0, 400.0)
+"""Sample rates that are drawn (Hz)."""
+_RESTS = (20, 37)
+"""Least number of attitudes, and one more than the largest."""
+_NUDGES = 0.3
+"""Share of the rests that somebody nudges."""
+
+
+@dataclass(frozen=True)
+class HandRun:
+    """Simulate a run by hand with bias instability of the data sheet, open it as any recording, diagnose it.
+
+    Attributes
+    ----------
+    hidden : bool
+        Hide one effect of 10 to 30 sigma.
+    """
+
+    hidden: bool
+
+    def __call__(self, seed: int) -> dict[str, Any]:
+        """Run a seed: verdict, errors over sigma of the coefficients, whether the effect was named.
+
+        Raises
+        ------
+        DataError
+            When the run cannot be calibrated.
+        """
+        rng = np.random.default_rng(np.random.SeedSequence([seed, crc32(b"by hand")]))
+        name, rate, rests = str(rng.choice(IMUS)), float(rng.choice(_RATES_HZ)), int(rng.integers(*_RESTS))
+        imu = load_imu(name)
+        run = ByHand(
+            rests, imu, Site(math.radians(float(rng.choice(LATITUDES_DEG))), 0.0), seed=seed, rate_hz=rate,
+            noise=_stated_instability(imu), nudges=_NUDGES,
+        )  # fmt: skip
+        model = load_model("hand")
+        test, sensor = _opened(run)
+        fit, truth = solve(test, model), None
+        if self.hidden:
+            truth = drawn_effect(rng, fit)
+            test, sensor = _opened(run.with_effects(truth.text))
+            fit = solve(test, model)
+        found = climb(fit)
+        # From here on the truth is known; nothing before this line has seen it.
+        return scored_row(found, sensor, truth) | {
+            "imu": name, "rate_hz": rate, "attitudes": rests, "rests": len(test.run.rests),
+        }  # fmt: skip
+
+
+def _stated_instability(imu: ImuSpecification) -> tuple[str, ...]:
+    """Bias instability of an IMU file, as the simulator takes it."""
+    sizes = (("gyro", imu.gyro_bias_instability, "deg/h"), ("accel", imu.accel_bias_instability, "ug"))
+    return tuple(f"{triad}_noise_flicker={from_si(size, unit):.6g} {unit}" for triad, size, unit in sizes if size)
+
+
+def _opened(run: ByHand) -> tuple[PreparedTest, ImuTruth]:
+    recording, truth = by_hand_recording(run)
+    opened = open_test(recording, OpeningOptions(run.imu, run.site, "any"))
+    true_gravity = float(earth.normal_gravity(run.site.latitude_rad, run.site.height_m))
+    sensor = against_gravity(truth, STANDARD_GRAVITY, true_gravity).imu
+    return PreparedTest(*opened), in_the_mean(sensor, replace(recording, phase=_true_phases(run)), run.seed)
+
+
+def _true_phases(run: ByHand) -> PhaseLog:
+    """When the hand let go: over these times a bias that wanders is stated in the mean."""
+    motion = by_hand_motion(run)
+    still = np.asarray(~motion.omega_nt_t.any(axis=1), dtype=bool)
+    begin = np.flatnonzero(still[:-1] & still[1:])
+    return PhaseLog(
+        np.stack([motion.t[begin], motion.t[begin + 1]], axis=1).ravel(),
+        np.tile([True, False], len(begin)), np.repeat(np.arange(len(begin)), 2),
+    )  # fmt: skip
