@@ -210,20 +210,22 @@ def imitated(found: Search[E], allowed: Ints, wander: Wander) -> Ints:
     Returns
     -------
     ndarray of int, shape (b,)
-        All drifts of the triads concerned.
+        All drifts of the triads concerned, but for those that tell more than noise does.
     """
     ground = _Ground(found.evidence, allowed, wander, found.threshold, None)
     chosen = found.chosen.tolist()
     out: set[str] = set()
-    for column in chosen:
-        if not ground.beside(column):
-            continue
+    more: set[str] = set()
+    for column in filter(ground.beside, chosen):
         others = [c for c in chosen if c != column]
         gain = ground.state(chosen).balance.net - ground.state(others).balance.net
         if gain < ground.cost(column, ()) + _DOUBT:
             out |= _triads(ground, column)
+        else:
+            more.add(ground.white.candidate(column).parameter.name)
     drifts = [c for c in allowed.tolist() if ground.beside(c) and _triads(ground, c) & out]
-    return np.array(drifts, dtype=np.int64)
+    kept = [c for c in drifts if ground.white.candidate(c).parameter.name not in more]
+    return np.array(kept, dtype=np.int64)
 
 
 def _triads(ground: _Ground[E], column: int) -> set[str]:
