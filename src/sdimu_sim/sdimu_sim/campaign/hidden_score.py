@@ -107,8 +107,8 @@ def _judge(truth: Truth, found: Diagnosis, scanned: Scan, named: list[list[str]]
         "z": None, "error_sigmas": None,
     }  # fmt: skip
     if truth.family == OUTSIDE:
-        before, after = _signature_left(truth, found)
-        return row | {"share": 1.0 - after / before if before else None, "realised": abs(truth.value) * max(before, 0.0) ** 0.5}
+        before, after = (max(left, 0.0) for left in _signature_left(truth, found))
+        return row | {"share": 1.0 - after / before if before else None, "realised": abs(truth.value) * before**0.5}
     near = [k for k, x in enumerate(found.evidence.names) if same_effect(x, truth, stops)]
     if not near:
         return row
