@@ -36,7 +36,7 @@ _ABLE = Abilities((math.radians(2.0), math.radians(10.0)), math.radians(20.0), (
 def open(  # noqa: A001 (as every library of files has it)
     bag: str | Path,
     site: str | None = None,
-    imu: str | ImuSpecification = "dtg",
+    imu: str | ImuSpecification | None = None,
     source: Source | None = None,
     handheld: bool | None = None,
     measured_noise: bool = False,
@@ -49,12 +49,13 @@ def open(  # noqa: A001 (as every library of files has it)
         rosbag2 folder or .mcap file.
     site : str, optional
         Name in config/site or path; left out it is assumed, and a note says so. A handheld run needs none.
-    imu : str or ImuSpecification
-        Name in config/imu, path, or the specification itself.
+    imu : str or ImuSpecification, optional
+        Name in config/imu, path, or the specification itself; left out a class is proposed from the rests, and a note
+        says which.
     source : Source, optional
         Topics, units and senses, where they are not to be recognised.
     handheld : bool, optional
-        Moved by hand; None decides by the noise of the gyros.
+        Moved by hand; None decides by the turns and the noise of the gyros.
     measured_noise : bool
         White noise from the rests of the recording, not from `imu`.
 
@@ -102,7 +103,7 @@ def calibrate(
     """
     _expect("calibrate", "test", test, PreparedTest, "what open(...) returns")
     wanted = named_estimator(estimator)
-    handheld = wanted == HANDHELD or (wanted == AUTO and test.hides_earth_rate)
+    handheld = wanted == HANDHELD or (wanted == AUTO and bool(test.why_handheld))
     return CalibrationFit(solve(test, named_model(model, _listed(add), handheld), wanted, progress=progress))
 
 

@@ -36,7 +36,7 @@ def calibrate(
     bag: Annotated[Path, typer.Argument(metavar="BAG", help="rosbag2 folder or .mcap file.")],
     model: ModelOption = None,
     site: SiteOption = None,
-    imu: ImuOption = "dtg",
+    imu: ImuOption = None,
     add: Annotated[
         list[str] | None,
         typer.Option(

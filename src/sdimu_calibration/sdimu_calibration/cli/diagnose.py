@@ -43,7 +43,7 @@ def diagnose(
     bag: Annotated[Path, typer.Argument(metavar="BAG", help="rosbag2 folder or .mcap file.")],
     model: ModelOption = None,
     site: SiteOption = None,
-    imu: ImuOption = "dtg",
+    imu: ImuOption = None,
     add: Annotated[
         list[str] | None, typer.Option(metavar="EFFECT", help="Effect to add to the model: name or YAML file.")
     ] = None,
@@ -93,7 +93,7 @@ def diagnose(
         imu_topic, status_topic, joint_topic, temperature_topic, accel_unit, gyro_unit, accel_sign, gyro_sign
     )
     test, wanted, chosen = opened(console, bag, model, site, imu, add, origin, asked, noise)
-    if bootstrap and test.hides_earth_rate and chosen == "auto":
+    if bootstrap and chosen == "auto" and test.why_handheld:
         raise DataError(NO_BOOTSTRAP)
     notes = test.recording.notes
     with explained(console, notes), bar(console) as progress:

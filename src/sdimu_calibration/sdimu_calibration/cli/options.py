@@ -16,7 +16,9 @@ if TYPE_CHECKING:
     from sdimu_calibration.core.specification import Model
     from sdimu_calibration.storage.opening import Source
 
-ImuOption = Annotated[str, typer.Option(help="Specification of the IMU: name in config/imu or path.")]
+ImuOption = Annotated[
+    str | None, typer.Option(help="Specification of the IMU: name in config/imu or path; proposed when left out.")
+]
 SiteOption = Annotated[
     str | None, typer.Option(help="Where the test was: name in config/site or path; daejeon (handheld: none).")
 ]
@@ -30,14 +32,11 @@ EstimatorOption = Annotated[
     str, typer.Option(help="filter, second-order, handheld, batch, classical; auto chooses one of the first three.")
 ]
 HandOption = Annotated[bool, typer.Option("--hand", help="Moved by hand: the same as --estimator handheld.")]
-HANDHELD_CHOSEN = (
-    "handheld: the gyros' white noise in the usual rest hides the Earth's rate, so nothing is navigated "
-    "(--estimator filter forces navigation)"
-)
+HANDHELD_CHOSEN = "handheld: {why}, so nothing is navigated (--estimator filter forces navigation)"
 
 
 def opened(
-    console: Console, bag: Path, model: str | None, site: str | None, imu: str, add: list[str] | None,
+    console: Console, bag: Path, model: str | None, site: str | None, imu: str | None, add: list[str] | None,
     source: Source, estimator: str, noise: str | None,
 ) -> tuple[PreparedTest, Model, str]:  # fmt: skip
     """Open the test of a bag, read its model and check its estimator.
@@ -64,14 +63,14 @@ def opened(
     if noise not in {None, "estimated"}:
         raise DataError(f"--noise {noise}: expected 'estimated' (or leave it out: the noise of --imu)")
     # A wrong name is reported before a long recording is read.
-    specification, given = load_imu(imu), named_model(model, add or [])
+    specification, given = None if imu is None else load_imu(imu), named_model(model, add or [])
     if site is not None:
         load_site(site)
     handheld = None if wanted == AUTO else wanted == HANDHELD
     test = open_test(bag, site, specification, source, handheld, noise is not None)
-    if wanted == HANDHELD or (wanted == AUTO and test.hides_earth_rate):
+    if wanted == HANDHELD or (wanted == AUTO and test.why_handheld):
         if wanted == AUTO:
-            console.print(HANDHELD_CHOSEN, soft_wrap=True)
+            console.print(HANDHELD_CHOSEN.format(why=test.why_handheld), soft_wrap=True)
         given = named_model(model, add or [], handheld=True)
     return test, given, wanted
 

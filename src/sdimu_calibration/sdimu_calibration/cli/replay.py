@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from sdimu_calibration.cli.options import default_folder
+from sdimu_calibration.cli.options import ImuOption, default_folder
 from sdimu_calibration.cli.source_options import (
     AccelSign,
     AccelUnit,
@@ -27,7 +27,7 @@ def replay(
     site: Annotated[
         str | None, typer.Option(help="Where the test was: name in config/site or path; daejeon when left out.")
     ] = None,
-    imu: Annotated[str, typer.Option(help="Specification of the IMU: name in config/imu or path.")] = "dtg",
+    imu: ImuOption = None,
     speed: Annotated[float, typer.Option(help="Times real time; 0 is as fast as the calibration allows.")] = 0.0,
     out: Annotated[Path | None, typer.Option(help="Folder of the results; BAG_replay by default.")] = None,
     patience: Annotated[float, typer.Option(help="Longest time without an end (s); 0 waits for ever.")] = 0.0,
@@ -56,14 +56,14 @@ def replay(
     origin = source(
         imu_topic, status_topic, joint_topic, temperature_topic, accel_unit, gyro_unit, accel_sign, gyro_sign
     )
-    opening_options(site, load_imu(imu), origin)
+    opening_options(site, None if imu is None else load_imu(imu), origin)
     folder = out or default_folder(bag, "replay")
     for old in ("result.json", "calibration.journal"):
         (folder / old).unlink(missing_ok=True)
     console = Console()
     begun = time.monotonic()
     calibrating = {
-        "site": site or "", "imu": imu, "model": model, "out": str(folder), "accel_unit": accel_unit or "",
+        "site": site or "", "imu": imu or "", "model": model, "out": str(folder), "accel_unit": accel_unit or "",
         "gyro_unit": gyro_unit or "", "accel_sign": accel_sign or 0, "gyro_sign": gyro_sign or 0,
     }  # fmt: skip
     playing = {

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from sdimu_calibration.cli.options import ImuOption
 from sdimu_calibration.cli.source_options import (
     AccelSign,
     AccelUnit,
@@ -29,7 +30,7 @@ def workbench(
     site: Annotated[
         str | None, typer.Option(help="Where the test was: name in config/site or path; daejeon when left out.")
     ] = None,
-    imu: Annotated[str, typer.Option(help="Specification of the IMU: name in config/imu or path.")] = "dtg",
+    imu: ImuOption = None,
     host: Annotated[str, typer.Option(help="Address to listen on; others than this machine only when asked.")] = HOST,
     imu_topic: ImuTopic = None,
     status_topic: StatusTopic = None,
@@ -59,7 +60,7 @@ def workbench(
     with socket.socket() as probe:
         if probe.connect_ex((host, port)) == 0:
             raise DataError(f"port {port} is taken (choose another with --port)")
-    specification, wanted = load_imu(imu), named_model(model, [])
+    specification, wanted = None if imu is None else load_imu(imu), named_model(model, [])
     if site is not None:
         load_site(site)
     origin = source(
@@ -68,10 +69,10 @@ def workbench(
 
     def session(path: Path) -> FitSession:
         test = open_test(path, site, specification, origin)
-        if test.hides_earth_rate:
+        if test.why_handheld:
             raise DataError(
-                f"{path.name}: a handheld run, in which nothing is navigated: use sdimu diagnose {path.name} (its "
-                "report has the same figures), or --imu when the gyros are better than it says"
+                f"{path.name}: a handheld run, in which nothing is navigated ({test.why_handheld}): use sdimu diagnose "
+                f"{path.name} (its report has the same figures)"
             )
         return FitSession(test, wanted)
 

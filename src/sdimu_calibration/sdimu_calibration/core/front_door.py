@@ -21,10 +21,11 @@ import numpy as np
 from sdimu_calibration.core.arrays import Bools, Floats
 from sdimu_calibration.core.data.arrival import IMU_TOPIC
 from sdimu_calibration.core.data.axes_and_units import Stated, recognise
+from sdimu_calibration.core.data.by_hand import why_handheld
 from sdimu_calibration.core.data.dejitter import dejittered
 from sdimu_calibration.core.data.dwell_detection import with_detected_dwells
+from sdimu_calibration.core.data.imu_class import propose
 from sdimu_calibration.core.data.latitude_check import EarthRate, contradictions, observe_earth_rate, reversed_force
-from sdimu_calibration.core.data.static_detection import hides_earth_rate
 from sdimu_calibration.core.data.status_clock import aligned
 from sdimu_calibration.core.noise.quantisation import with_quantisation
 from sdimu_calibration.core.recording import DataError, Recording
@@ -47,9 +48,11 @@ class OpeningOptions:
     stated : Stated
         Units and signs; what is left out is recognised.
     handheld : bool or None
-        Whether the IMU is moved by hand; None decides by the noise of the gyros in the rests.
+        Whether the IMU is moved by hand; None decides by its turns and by the noise of the gyros in the rests.
     measured_noise : bool
         Replace the white noise of the specification by that of the rests.
+    classes : tuple of ImuSpecification
+        Where the user states no IMU: what to choose from, as for `imu_class.propose`; `imu` holds until then.
     """
 
     imu: ImuSpecification
@@ -58,6 +61,7 @@ class OpeningOptions:
     stated: Stated = field(default_factory=Stated)
     handheld: bool | None = None
     measured_noise: bool = False
+    classes: tuple[ImuSpecification, ...] = ()
 
 
 class OpenedTest(NamedTuple):
@@ -156,12 +160,15 @@ def open_test(recording: Recording, options: OpeningOptions, where: str = IMU_TO
         When the data cannot be used, or physics does not decide and the user has to.
     """
     recording, imu = in_si(recording, options.stated, where), options.imu
+    if options.classes:
+        imu, note = propose(recording, options.classes)
+        recording = replace(recording, notes=(*recording.notes, note))
     if options.measured_noise:
         recording, imu = _with_measured_noise(recording, imu)
     else:
         imu, note = with_quantisation(imu, recording)
         recording = replace(recording, notes=(*recording.notes, note)) if note else recording
-    handheld = hides_earth_rate(recording, imu) if options.handheld is None else options.handheld
+    handheld = bool(why_handheld(recording, imu)) if options.handheld is None else options.handheld
     if handheld and options.assumed_site:
         return OpenedTest(recording, imu, None)
     return OpenedTest(_placed(recording, imu, options), imu, options.site)

@@ -36,4 +36,5 @@ def declare_opening(node: Node) -> tuple[OpeningOptions, Topics]:
         accel_unit=text("accel_unit") or None, gyro_unit=text("gyro_unit") or None, accel_sign=sign("accel_sign"),
         gyro_sign=sign("gyro_sign"),
     )  # fmt: skip
-    return opening_options(text("site") or None, load_imu(text("imu", "dtg")), source), topics
+    imu = text("imu")
+    return opening_options(text("site") or None, load_imu(imu) if imu else None, source), topics

@@ -13,10 +13,13 @@ from sdimu_calibration.core.recording import DataError, Recording
 from sdimu_calibration.core.specification import ImuSpecification
 from sdimu_calibration.core.units import UnitError, parse_unit
 from sdimu_calibration.storage.bag_reader import read_recording
-from sdimu_calibration.storage.config import load_site
+from sdimu_calibration.storage.config import load_imu, load_site
 from sdimu_calibration.storage.topic_choice import TopicChoice
 
 DEFAULT_SITE = "daejeon"
+CLASSES = ("dtg", "fog_tactical", "mems_by_hand")
+"""IMU files to propose from where the user states none: one of each grade, that with the widest priors. A prior that is
+too tight misleads, one that is too wide costs little."""
 
 
 @dataclass(frozen=True)
@@ -69,18 +72,20 @@ def _factor(option: str, unit: str | None, expected: str) -> float | None:
 
 
 def opening_options(
-    site: str | None, imu: ImuSpecification, source: Source, handheld: bool | None = None, measured_noise: bool = False
-) -> OpeningOptions:
+    site: str | None, imu: ImuSpecification | None, source: Source, handheld: bool | None = None,
+    measured_noise: bool = False,
+) -> OpeningOptions:  # fmt: skip
     """Put what the user says of a test together; command line and live node use this one function.
 
     Parameters
     ----------
     site : str or None
         Name or path; None takes `DEFAULT_SITE`, which a note then says.
-    imu : ImuSpecification
+    imu : ImuSpecification or None
+        None proposes one of `CLASSES` from the rests, which a note then says.
     source : Source
     handheld : bool, optional
-        Moved by hand; None decides by the noise of the gyros.
+        Moved by hand; None decides by the turns and the noise of the gyros.
     measured_noise : bool
         Replace the white noise of the specification by that of the rests.
 
@@ -90,12 +95,15 @@ def opening_options(
         When there is no such site, or a unit or a sign is none.
     """
     assumed = DEFAULT_SITE if site is None else ""
-    return OpeningOptions(imu, load_site(site or DEFAULT_SITE), assumed, source.stated, handheld, measured_noise)
+    classes = tuple(map(load_imu, CLASSES)) if imu is None else ()
+    return OpeningOptions(
+        imu or classes[0], load_site(site or DEFAULT_SITE), assumed, source.stated, handheld, measured_noise, classes
+    )
 
 
 def open_test(
-    path: Path, site: str | None, imu: ImuSpecification, source: Source | None = None, handheld: bool | None = None,
-    measured_noise: bool = False,
+    path: Path, site: str | None, imu: ImuSpecification | None, source: Source | None = None,
+    handheld: bool | None = None, measured_noise: bool = False,
 ) -> PreparedTest:  # fmt: skip
     """Read a bag and make it ready for an estimator.
 

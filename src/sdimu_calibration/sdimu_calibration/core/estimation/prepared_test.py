@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from sdimu_calibration.core.alignment.prepared import PreparedData, TestSetup, reduce
-from sdimu_calibration.core.data.static_detection import hides_earth_rate
+from sdimu_calibration.core.data.by_hand import why_handheld
 from sdimu_calibration.core.handheld.handheld import PreparedRun, prepare_run
 from sdimu_calibration.core.measurement_kind import SKIP
 from sdimu_calibration.core.recording import DataError, Recording
@@ -62,9 +62,9 @@ class PreparedTest:
         return _masked(self._prepared[key], self.held_out)
 
     @cached_property
-    def hides_earth_rate(self) -> bool:
-        """Whether the gyros' white noise in the usual rest hides the Earth's rate: nothing can be navigated."""
-        return hides_earth_rate(self.recording, self.imu)
+    def why_handheld(self) -> str:
+        """Why nothing can be navigated in this test; empty where it can."""
+        return why_handheld(self.recording, self.imu)
 
     @property
     def run(self) -> PreparedRun:

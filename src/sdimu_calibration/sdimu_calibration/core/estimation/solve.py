@@ -2,12 +2,12 @@
 
 | estimator | chosen when |
 |---|---|
-| ``handheld`` | the gyros' white noise in the usual rest hides the Earth's rate: nothing can be navigated |
+| ``handheld`` | a hand turned the IMU, or the gyros' white noise in the usual rest hides the Earth's rate |
 | ``second-order`` | squares of errors count: by the priors of scale and misalignment, or by the drift of the attitude |
 | ``filter`` | otherwise |
 | ``batch``, ``classical`` | by request |
 
-The choice depends on the IMU file, the model and the length of the rests and of the test.
+The choice depends on the IMU file, the model, the turns, and the length of the rests and of the test.
 """
 
 from __future__ import annotations
@@ -112,8 +112,8 @@ def choose_estimator(test: PreparedTest, model: Model) -> Choice:
     DataError
         When model and IMU do not fit together.
     """
-    if test.hides_earth_rate:
-        return Choice(HandheldFit.estimator, "the gyros' white noise in the usual rest hides the Earth's rate")
+    if test.why_handheld:
+        return Choice(HandheldFit.estimator, test.why_handheld)
     setup = _setup(test, model)
     if _second_order_model(setup, float(test.recording.t[-1])) is None:
         return Choice(FilterFit.estimator, "errors are so small that their squares do not count")

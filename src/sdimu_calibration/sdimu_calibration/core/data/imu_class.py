@@ -1,0 +1,108 @@
+"""Which of some IMU files a recording is of, where nobody states one: told by the noise and the biases of its rests.
+
+Noise tells the grade of the gyros and no more. A file whose limits of rest the rests exceed is none of theirs:
+the next coarser one is taken. What is taken in place of the default has the priors of its grade and the noise of the
+rests.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from sdimu_calibration.core.data.phases import rest_limits
+from sdimu_calibration.core.data.static_detection import detect_static
+from sdimu_calibration.core.recording import DataError, Recording
+from sdimu_calibration.core.specification import ImuSpecification
+from sdimu_calibration.core.units import STANDARD_GRAVITY, from_si
+
+
+@dataclass(frozen=True)
+class RestsShown:
+    """What the rests show of an IMU.
+
+    Attributes
+    ----------
+    gyro_noise, accel_noise : float
+        White noise (rad/s/sqrt(Hz), m/s^2/sqrt(Hz)).
+    rate : float
+        Median size of the mean rate of a rest (rad/s): bias and Earth.
+    force_error : float
+        Median difference of the mean specific force of a rest from gravity (m/s^2).
+    """
+
+    gyro_noise: float
+    accel_noise: float
+    rate: float
+    force_error: float
+
+    def __str__(self) -> str:
+        """Return it in customary units."""
+        return (
+            f"noise {from_si(self.gyro_noise, 'deg/h/sqrt(Hz)'):.2g} deg/h/sqrt(Hz) and "
+            f"{from_si(self.accel_noise, 'ug/sqrt(Hz)'):.2g} ug/sqrt(Hz), mean rate "
+            f"{from_si(self.rate, 'deg/h'):.2g} deg/h, force {from_si(self.force_error, 'mg'):.2g} mg from gravity"
+        )
+
+    def fits(self, imu: ImuSpecification) -> bool:
+        """Whether an IMU of a specification may rest like this."""
+        limits = rest_limits(imu)
+        return self.rate < limits.rate and self.force_error < limits.force
+
+
+def shown_at_rest(recording: Recording) -> RestsShown | None:
+    """Look at the rests of a recording; None when there is none.
+
+    Parameters
+    ----------
+    recording : Recording
+        In SI.
+    """
+    try:
+        found = detect_static(recording)
+    except DataError:
+        return None
+    spans = list(zip(found.first.tolist(), found.last.tolist(), strict=True))
+    rate, force = (
+        np.linalg.norm([data[a:b].mean(axis=0) for a, b in spans], axis=1)
+        for data in (recording.omega_ib_b, recording.f_ib_b)
+    )
+    return RestsShown(
+        found.gyro_white_noise, found.accel_white_noise, float(np.median(rate)),
+        float(np.median(np.abs(force - STANDARD_GRAVITY))),
+    )  # fmt: skip
+
+
+def propose(recording: Recording, classes: Sequence[ImuSpecification]) -> tuple[ImuSpecification, str]:
+    """Choose the IMU file that a recording is probably of.
+
+    Parameters
+    ----------
+    recording : Recording
+        In SI.
+    classes : sequence of ImuSpecification
+        From the finest gyros to the coarsest, one of each grade; the first is taken where nothing tells.
+
+    Returns
+    -------
+    imu : ImuSpecification
+        One of `classes`; with the noise of the rests where it is not the first.
+    note : str
+        What was assumed, and why.
+    """
+    shown = shown_at_rest(recording)
+    if shown is None:
+        return classes[0], f"no --imu: {classes[0].name} is assumed; no rest shows what IMU it is"
+    # Half way between two grades, in the ratio of their noise.
+    borders = [np.sqrt(a.gyro_white_noise * b.gyro_white_noise) for a, b in pairwise(classes)]
+    grade = int(np.searchsorted(borders, shown.gyro_noise))
+    while grade < len(classes) - 1 and not shown.fits(classes[grade]):
+        grade += 1
+    imu = classes[grade]
+    note = f"no --imu: {imu.name} is assumed, as the rests show {shown}; state your own file if there is one"
+    if grade == 0:
+        return imu, note
+    return replace(imu, gyro_white_noise=shown.gyro_noise, accel_white_noise=shown.accel_noise), note

@@ -1,0 +1,100 @@
+"""A run by hand is recognised by its turns, and the IMU of a recording by its rests."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from sdimu_calibration.core.data.by_hand import moved_by_hand, why_handheld
+from sdimu_calibration.core.data.imu_class import propose, shown_at_rest
+from sdimu_calibration.core.front_door import OpeningOptions, open_test
+from sdimu_calibration.core.recording import PhaseLog
+from sdimu_calibration.storage.config import load_imu, load_plan, load_site
+from sdimu_calibration.storage.opening import CLASSES, Source, opening_options
+from sdimu_sim.core.by_hand import ByHand, by_hand_recording
+from sdimu_sim.core.scenario import Scenario, generate
+
+SITE = load_site("daejeon")
+FILES = tuple(map(load_imu, CLASSES))
+KIM18 = replace(load_plan("kim18"), dwell_s=(12.0,) * 19)
+# Turns so brisk that the table speeds up half of the way and slows down the other half.
+BRISK = replace(
+    KIM18, turns=tuple(replace(turn, rate_rad_s=np.radians(28.0)) for turn in KIM18.turns),
+    acceleration_rad_s2=np.radians(40.0),
+)  # fmt: skip
+
+
+@cache
+def by_hand(imu="mems_consumer", seed=3):
+    return by_hand_recording(ByHand(20, load_imu(imu), SITE, seed=seed))[0]
+
+
+@cache
+def on_table(imu="dtg", brisk=True):
+    plan = BRISK if brisk else KIM18
+    return replace(generate(Scenario(plan, load_imu(imu), SITE, rate_hz=50.0, seed=9))[0], phase=None)
+
+
+@pytest.mark.parametrize("imu", ["dtg", "fog_tactical", "mems_industrial", "mems_consumer"])
+def test_a_hand_and_a_table_are_told_apart_whatever_the_imu(imu):
+    assert moved_by_hand(by_hand(imu))
+    assert not moved_by_hand(on_table(imu))
+    assert not moved_by_hand(on_table(imu, brisk=False))
+
+
+def test_a_status_that_names_a_dwell_is_of_a_table():
+    recording = by_hand()
+    said = PhaseLog(np.array([0.0, 3.0]), np.array([True, False]), np.array([0, 0]))
+    assert not moved_by_hand(replace(recording, phase=said))
+
+
+def test_an_imu_that_never_turns_was_not_moved_by_hand():
+    recording = by_hand()
+    still = replace(recording, omega_ib_b=1e-4 * np.sin(np.arange(3 * len(recording.t)).reshape(-1, 3)))
+    assert not moved_by_hand(still)
+
+
+def test_a_good_imu_in_a_hand_is_not_navigated():
+    assert "axis of its turns" in why_handheld(by_hand("dtg"), load_imu("dtg"))
+    assert why_handheld(on_table("dtg"), load_imu("dtg")) == ""
+
+
+@pytest.mark.parametrize(
+    ("imu", "proposed"),
+    [
+        ("dtg", "dtg"), ("rlg_navigation", "dtg"), ("fog_tactical", "fog_tactical"),
+        ("mems_industrial", "mems_by_hand"), ("mems_consumer", "mems_by_hand"),
+    ],
+)  # fmt: skip
+def test_the_grade_of_the_gyros_is_that_of_their_noise(imu, proposed):
+    for recording in (by_hand(imu), on_table(imu)):
+        found, note = propose(recording, FILES)
+        assert found.name == proposed
+        assert note.startswith(f"no --imu: {proposed} is assumed")
+
+
+def test_a_bias_beyond_a_file_gives_the_next_coarser_one_with_the_noise_of_the_rests():
+    recording = on_table("dtg")
+    biased = replace(recording, omega_ib_b=recording.omega_ib_b + np.radians([0.3, 0.0, 0.0]))
+    found, _ = propose(biased, FILES)
+    assert found.name == "mems_by_hand"
+    assert found.gyro_white_noise == shown_at_rest(biased).gyro_noise
+    # 0.1 deg/h in the mean of a second, from a minute or so of rest.
+    assert found.gyro_white_noise == pytest.approx(load_imu("dtg").gyro_white_noise, rel=0.3)
+
+
+def test_a_run_by_hand_opens_without_any_option():
+    recording, imu, site = open_test(by_hand(), opening_options(None, None, Source()))
+    assert site is None
+    assert imu.name == "mems_by_hand"
+    assert any("no --imu" in note for note in recording.notes)
+
+
+def test_an_imu_that_was_stated_is_taken_as_it_is():
+    stated = load_imu("fog_tactical")
+    recording, imu, _ = open_test(on_table("dtg"), OpeningOptions(stated, SITE))
+    assert imu is stated
+    assert not any("--imu" in note and "assumed" in note for note in recording.notes)
