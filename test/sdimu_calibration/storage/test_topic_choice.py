@@ -14,6 +14,7 @@ from rosbags.typesys import Stores, get_typestore
 
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage import cdr
+from sdimu_calibration.storage.bag_info import read_info
 from sdimu_calibration.storage.bag_reader import read_recording
 from sdimu_calibration.storage.bag_writer import write_recording
 from sdimu_calibration.storage.mcap_bag import McapBag
@@ -154,8 +155,14 @@ def test_a_bag_of_ros_1_reads_the_same(tmp_path, small_test, method):
     assert np.array_equal(r.f_ib_b, small_test.f_ib_b)
     assert np.array_equal(r.omega_ib_b, small_test.omega_ib_b)
     assert np.abs(r.start_ns + r.t * 1e9 - START_NS - small_test.ns).max() <= 256  # a double of ns since 1970
+    content = read_info(path)
+    assert content.types == {"/imu": cdr.IMU}
+    assert content.counts == {"/imu": len(small_test.ns)}
+    assert content.first_ns == START_NS + small_test.ns[0]
     path.write_bytes(path.read_bytes()[:1000])
     assert "cannot be read" in refusal(path)
+    with pytest.raises(DataError, match="cannot be read"):
+        read_info(path)
 
 
 def test_a_bag_without_an_imu_says_so(tmp_path, bag):

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy.io import loadmat
-from scipy.io.matlab import MatReadError
+from scipy.io.matlab import MatlabOpaque, MatReadError
 
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.recording import DataError
@@ -26,6 +26,7 @@ class ArrayTable:
     def __init__(self, path: Path, arrays: Mapping[str, Any]) -> None:
         self.path = path
         self._arrays = {name: array for name, array in arrays.items() if not name.startswith("__")}
+        self._objects = [value[0] for value in self._arrays.values() if isinstance(value, MatlabOpaque)]
 
     def floats(self, columns: Sequence[int | str]) -> Floats:
         """Read columns as numbers, shape (n, k); one matrix may hold all of them, either way round.
@@ -59,6 +60,7 @@ class ArrayTable:
         match = _REFERENCE.fullmatch(str(column))
         value: Any = self._look_up(match.group(1)) if match else None
         if match is None or value is None:
+            self._refuse_object(str(column))
             there = ", ".join(sorted(self._arrays)) or "none"
             raise DataError(f"{self.path}: no variable '{column}' (there are: {there})")
         array = np.asarray(value)
@@ -72,6 +74,23 @@ class ArrayTable:
         if not 1 <= place <= array.shape[1]:
             raise DataError(f"{self.path}: variable {match.group(1)} has {array.shape[1]} columns, no column {place}")
         return array[:, place - 1 : place]
+
+    def _refuse_object(self, column: str) -> None:
+        """Say how numbers get out of an object of MATLAB: scipy reads its name and its class alone.
+
+        Raises
+        ------
+        DataError
+            When `column` is of one, or the file holds nothing else.
+        """
+        for entry in self._objects:
+            name, kind = (bytes(entry[field]).decode("utf-8", "replace") for field in ("s0", "s2"))
+            if column.split(".", maxsplit=1)[0] == name or len(self._objects) == len(self._arrays):
+                raise DataError(
+                    f"{self.path}: variable {name} is a MATLAB {kind}, which MATLAB alone can read; there: s = "
+                    f"table2struct(timetable2table({name}), 'ToScalar', true); s.Time = seconds(s.Time - s.Time(1)); "
+                    "save('numbers.mat', '-struct', 's', '-v7')"
+                )
 
     def _look_up(self, name: str) -> Any:
         first, *rest = name.split(".")

@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from rosbags.rosbag1 import Reader as Reader1
 from rosbags.rosbag2 import Reader
 
 from sdimu_calibration.core.recording import DataError
-from sdimu_calibration.storage.bag_file import bag_parts, check_magic
+from sdimu_calibration.storage.bag_file import ROS1, bag_parts, check_magic
 from sdimu_calibration.storage.mcap_walk import DamagedError, McapWalk
 
 
@@ -53,7 +54,7 @@ def read_info(path: Path) -> BagInfo:
         if part.suffix == ".mcap":
             _add_mcap(part, info)
         else:
-            _add_other(part, info)
+            _add_other(part, info, Reader1 if part.suffix == ROS1 else Reader)
     return info
 
 
@@ -75,9 +76,9 @@ def _add_mcap(part: Path, info: BagInfo) -> None:
         info.counts[channel.topic] = info.counts.get(channel.topic, 0) + counts.get(key, 0)
 
 
-def _add_other(part: Path, info: BagInfo) -> None:
+def _add_other(part: Path, info: BagInfo, kind: type[Reader] | type[Reader1]) -> None:
     try:
-        with Reader(part) as reader:
+        with kind(part) as reader:
             if reader.message_count:
                 info.extend(reader.start_time, reader.end_time - 1)
             for connection in reader.connections:

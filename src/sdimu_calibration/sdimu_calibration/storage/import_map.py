@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from datetime import datetime
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -18,16 +19,33 @@ ISO = "iso8601"
 NANOSECONDS = "ns"
 
 
-def unit_of(expected: str, *others: str) -> BeforeValidator:
-    """Take a unit of the dimension of `expected`, or one of the words `others`."""
+_TICK = re.compile(r"([1-9]\d*)\s*(\w+)")
+
+
+def unit_of(*expected: str) -> BeforeValidator:
+    """Take a unit of the dimension of one of `expected`."""
 
     def check(value: Any) -> str:
         text = str(value)
-        if text not in others and parse_unit(text).dimension != parse_unit(expected).dimension:
-            raise ValueError(f"'{text}' is the wrong unit (expected something like '{expected}')")
+        if all(parse_unit(text).dimension != parse_unit(unit).dimension for unit in expected):
+            raise ValueError(f"'{text}' is the wrong unit (expected something like '{expected[0]}')")
         return text
 
     return BeforeValidator(check)
+
+
+def tick(text: str) -> tuple[int, str]:
+    """Split a unit of time such as ``10ms`` into a whole number and the unit."""
+    match = _TICK.fullmatch(text)
+    return (int(match.group(1)), match.group(2)) if match else (1, text)
+
+
+def _time_unit(value: Any) -> str:
+    text = str(value)
+    name = tick(text)[1]
+    if text != ISO and name != NANOSECONDS and parse_unit(name).dimension != parse_unit("s").dimension:
+        raise ValueError(f"'{text}' is the wrong unit (expected something like 's', '10ms' or '{ISO}')")
+    return text
 
 
 def _three(value: Any) -> Any:
@@ -53,17 +71,21 @@ class TimeMap(Schema):
     column : int or str, optional
         Number from 1, heading, or variable.
     unit : str
-        Of time (s, ms, us, ns, min, h), or ``iso8601``.
+        Of time (s, ms, us, ns, min, h), a whole number of it (``10ms``), or ``iso8601``.
     start : datetime, optional
         The moment at which the column is zero (UTC unless it says otherwise); 1970 when it is left out.
     rate_hz : float, optional
         In place of a column: samples come at this rate.
+    counter : int or str, optional
+        Column that counts the samples: it is the clock, at `rate_hz` or at the rate that the times in `column` have in
+        the mean. What it leaves out is missing.
     """
 
     column: Column | None = None
-    unit: Annotated[str, unit_of("s", ISO, NANOSECONDS)] = "s"
+    unit: Annotated[str, BeforeValidator(_time_unit)] = "s"
     start: datetime | None = None
     rate_hz: float | None = Field(default=None, gt=0.0)
+    counter: Column | None = None
 
     @model_validator(mode="after")
     def _one_of_two(self) -> TimeMap:
@@ -74,6 +96,8 @@ class TimeMap(Schema):
 
 class SensorMap(Schema):
     """Three axes of one kind of sensor: value = sign * (raw - bias) / counts_per_unit, in `unit`.
+
+    A unit of angle, or of velocity, means increments over the interval of the samples.
 
     Attributes
     ----------
@@ -109,17 +133,22 @@ class SensorMap(Schema):
         """SI per raw count with its sign, shape (3,)."""
         return np.asarray(np.array(self.sign) * parse_unit(self.unit).factor / np.array(self.counts_per_unit), float)
 
+    @property
+    def increments(self) -> bool:
+        """Whether the numbers are what a sample adds to an angle or a velocity."""
+        return parse_unit(self.unit).dimension in {parse_unit("rad").dimension, parse_unit("m/s").dimension}
+
 
 class AccelMap(SensorMap):
     """Specific force."""
 
-    unit: Annotated[str, unit_of("m/s^2")]
+    unit: Annotated[str, unit_of("m/s^2", "m/s")]
 
 
 class GyroMap(SensorMap):
     """Body rate."""
 
-    unit: Annotated[str, unit_of("deg/s")]
+    unit: Annotated[str, unit_of("deg/s", "deg")]
 
 
 class TemperatureMap(Schema):
@@ -131,6 +160,25 @@ class TemperatureMap(Schema):
     time: Column | None = None
     counts_per_unit: float = 1.0
     bias: float = 0.0
+
+
+class BinaryMap(Schema):
+    """Numbers of one kind in a file, row after row, without anything else.
+
+    Attributes
+    ----------
+    type : str
+    columns : int
+        Numbers of a row.
+    big_endian : bool
+    skip_bytes : int
+        Before the first number.
+    """
+
+    type: Literal["float64", "float32", "int64", "int32", "int16"]
+    columns: int = Field(gt=0)
+    big_endian: bool = False
+    skip_bytes: int = Field(default=0, ge=0)
 
 
 class ImportMap(Schema):
@@ -147,6 +195,8 @@ class ImportMap(Schema):
         Decimal sign of a text file.
     skip_lines : int, optional
         Lines before the data of a text file, the last of them with the headings; recognised when left out.
+    binary : BinaryMap, optional
+        Of files that are neither text nor MAT nor NPZ.
     """
 
     format: Literal["sdimu-import/1"]
@@ -158,6 +208,7 @@ class ImportMap(Schema):
     delimiter: str | None = Field(default=None, min_length=1)
     decimal: Literal[".", ","] = "."
     skip_lines: int | None = Field(default=None, ge=0)
+    binary: BinaryMap | None = None
 
 
 def load_import_map(name_or_path: str | Path) -> ImportMap:

@@ -10,10 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sdimu_calibration.core.arrays import Floats, Ints
+from sdimu_calibration.core.data.bursts import find_bursts
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.units import parse_unit
 from sdimu_calibration.storage.array_table import ArrayTable
-from sdimu_calibration.storage.import_map import ISO, NANOSECONDS, TimeMap
+from sdimu_calibration.storage.import_map import ISO, NANOSECONDS, TimeMap, tick
 from sdimu_calibration.storage.text_table import TextTable
 
 Stamps = Ints
@@ -23,11 +24,15 @@ _DIGITS = {"s": 9, "ms": 6, "us": 3, "ns": 0}
 """Decimal places of a nanosecond in each unit."""
 _LONGEST = 19
 """Digits of a number of nanoseconds in 64 bits."""
+_NEAR_EDGE = 0.02
+"""Share of a power of two below it that a counter which ends there may not have reached: samples missing at its end."""
 _LARGEST_NS = 4e18
 """Times beyond this (the year 2096) do not fit a stamp."""
 
 
-def read_stamps(table: Table, column: int | str | None, time: TimeMap, samples: int) -> Stamps:
+def read_stamps(
+    table: Table, column: int | str | None, time: TimeMap, samples: int
+) -> tuple[Stamps, tuple[str, ...]]:
     """Read the stamps of a table.
 
     Parameters
@@ -41,14 +46,17 @@ def read_stamps(table: Table, column: int | str | None, time: TimeMap, samples: 
 
     Returns
     -------
-    ndarray of int64, shape (n,)
-        ns since 1970.
+    ns : ndarray of int64, shape (n,)
+        Since 1970 (ns).
+    notes : tuple of str
+        What the stamps are, where it is not what the file says.
 
     Raises
     ------
     DataError
         With line and column of the first time that is none, or lies before 1970.
     """
+    notes: tuple[str, ...] = ()
     if column is None:
         assert time.rate_hz is not None
         ns = np.rint(np.arange(1, samples + 1) * (1e9 / time.rate_hz)).astype(np.int64)
@@ -58,11 +66,72 @@ def read_stamps(table: Table, column: int | str | None, time: TimeMap, samples: 
         ns = _from_numbers(table, column, time.unit)
     if len(ns) != samples:
         raise DataError(f"{table.path}: {len(ns)} times for {samples} samples")
+    if time.counter is not None:
+        ns, notes = counted(table, time.counter, ns, time.rate_hz)
     ns = ns + _start_ns(time.start)
     if (ns < 0).any():
         row = int(np.argmax(ns < 0))
         raise DataError(f"{table.path}: {table.line_of(row)}, column {column}: a time before 1970; check time.start")
-    return np.asarray(ns, np.int64)
+    return np.asarray(ns, np.int64), (*notes, *(() if notes else _proposed(ns)))
+
+
+def _proposed(ns: Stamps) -> tuple[str, ...]:
+    """Say how stamps that are no sample times may be replaced."""
+    bursts = find_bursts(ns)
+    if bursts is None:
+        return ()
+    more = f"rate_hz: {bursts.rate_hz:.5g} in the map, or time.counter where the file counts its samples, says it"
+    return (f"{bursts}; {more}",)
+
+
+def counted(
+    table: Table, column: int | str, ns: Stamps, rate_hz: float | None
+) -> tuple[Stamps, tuple[str, ...]]:
+    """Make stamps of a counter of the samples.
+
+    Parameters
+    ----------
+    table : TextTable or ArrayTable
+    column : int or str
+        It may begin again at a power of two, or at its largest number, and count by more than one.
+    ns : ndarray of int64, shape (n,)
+        Times of the file (ns), for the rate and the beginning.
+    rate_hz : float or None
+        Of the samples; None takes that of `ns` in the mean.
+
+    Raises
+    ------
+    DataError
+        When the column does not count.
+    """
+    raw = table.floats([column])[:, 0]
+    whole = np.isfinite(raw) & (raw == np.rint(raw))
+    if len(raw) < 2 or not whole.all():
+        row = int(np.argmin(whole))
+        raise DataError(f"{table.path}: {table.line_of(row)}, column {column}: {raw[row]} is no count of a sample")
+    count, by = _unwrapped(raw.astype(np.int64))
+    if by < 1 or (np.diff(count) < 0).any():
+        raise DataError(f"{table.path}: column {column} does not count the samples; check time.counter in the map")
+    number = (count - count[0]) / by
+    if rate_hz is None:
+        interval = float(np.polyfit(number, (ns - ns[0]).astype(np.float64), 1)[0])
+    else:
+        interval = 1e9 / rate_hz
+    missing = int(number[-1]) + 1 - len(np.unique(count))
+    note = f"column {column} is the clock, at {1e9 / interval:.6g} Hz; by it {missing} samples are missing"
+    return np.asarray(ns[0] + np.rint(number * interval).astype(np.int64)), (note,)
+
+
+def _unwrapped(count: Stamps) -> tuple[Stamps, int]:
+    """Go on where a counter begins again, and say by how much it counts."""
+    step = np.diff(count)
+    falls = step < 0
+    by = int(np.median(step[~falls])) if not falls.all() else 0
+    largest = int(count.max())
+    # At a power of two, of which the last numbers may be missing, or at another number.
+    near = [edge for edge in (2**bits for bits in (8, 16, 32)) if 0 < edge - largest <= _NEAR_EDGE * edge]
+    edge = near[0] if near else largest + by
+    return np.asarray(count + np.concatenate([[0], np.cumsum(falls)]) * edge), by
 
 
 def _start_ns(start: datetime | None) -> int:
@@ -78,8 +147,9 @@ def _from_text(table: TextTable, column: int | str, unit: str) -> Stamps:
     cells = table.texts(column)
     if unit == ISO:
         return _dates(table, column, cells)
-    exact = _decimals(cells, _DIGITS[unit]) if unit in _DIGITS else None
-    return _scaled(table, column, table.floats([column])[:, 0], unit) if exact is None else exact
+    number, name = tick(unit)
+    exact = _decimals(cells, _DIGITS[name]) if name in _DIGITS else None
+    return _scaled(table, column, table.floats([column])[:, 0], unit) if exact is None else exact * number
 
 
 def _dates(table: TextTable, column: int | str, cells: NDArray[np.str_]) -> Stamps:
@@ -134,4 +204,5 @@ def _scaled(table: Table, column: int | str, values: Floats, unit: str) -> Stamp
 
 
 def _ns_per(unit: str) -> float:
-    return 1.0 if unit == NANOSECONDS else parse_unit(unit).factor * 1e9
+    number, name = tick(unit)
+    return number * (1.0 if name == NANOSECONDS else parse_unit(name).factor * 1e9)

@@ -2,23 +2,39 @@
 
 from __future__ import annotations
 
+import re
+from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.storage.novatel_log import HEADINGS, as_table, is_novatel
 
 _COMMENT = ("#", "%")
 _DELIMITERS = (";", "\t", ",")
+_WHOLE, _REAL = 1, 2
+_INTEGER = re.compile(r"[-+]?\d+")
+_Item = TypeVar("_Item")
 _SHOWN = 12
+_LOOKED_AT = 200
+"""Number of lines that say how many columns there are and how their numbers are written: a line more or less is no
+matter."""
+_MOST_HEADINGS = 10
+"""Number of numeric heading lines at most: what is longer is a table of its own."""
 
 
 class TextTable:
     """Columns of a text file, found by number (from 1) or by heading.
+
+    Attributes
+    ----------
+    notes : tuple of str
+        What was recognised and may be wrong.
 
     Parameters
     ----------
@@ -28,7 +44,8 @@ class TextTable:
     decimal : str
         ``.`` or ``,``.
     skip_lines : int, optional
-        Lines before the data; recognised when left out: blank, comment, or mostly not numbers.
+        Lines before the data; recognised when left out: blank, comment, mostly not numbers, of another number of
+        columns than most, or real numbers where the data are integers (and the other way round).
 
     Raises
     ------
@@ -44,13 +61,22 @@ class TextTable:
         try:
             self._lines = path.read_text(encoding="utf-8-sig").splitlines()
         except UnicodeDecodeError as error:
-            raise DataError(f"{path}: is not text (expected CSV in UTF-8, MAT or NPZ)") from error
+            raise DataError(
+                f"{path}: is not text (expected CSV in UTF-8, MAT or NPZ); for bare numbers state their "
+                "type and number in the map, such as binary: {type: float64, columns: 7}"
+            ) from error
         self._delimiter = delimiter
+        self.notes: tuple[str, ...] = ()
+        logged = is_novatel(self._lines)
+        if logged:
+            self._lines = as_table(self._lines)
         self._begin = self._first_line() if skip_lines is None else skip_lines
         if self._begin >= len(self._lines):
             raise DataError(f"{path}: no line of numbers in it")
         self._delimiter = delimiter or self._guess(self._lines[self._begin])
-        self.headings = self._find_headings()
+        if skip_lines is None:
+            self._leave_out_numeric_headings()
+        self.headings = list(HEADINGS) if logged else self._find_headings()
         self._width = len(self._cells(self._lines[self._begin]))
 
     def floats(self, columns: Sequence[int | str]) -> Floats:
@@ -62,7 +88,7 @@ class TextTable:
             With line and column of the first cell that is not a number.
         """
         places = [self._place(column) for column in columns]
-        lines = self._lines[self._begin :]
+        lines = self._data()
         if self._decimal == ",":
             lines = [line.replace(",", ".") for line in lines]
         try:
@@ -74,7 +100,7 @@ class TextTable:
     def texts(self, column: int | str) -> NDArray[np.str_]:
         """Read a column as it is written, shape (n,)."""
         place = self._place(column)
-        lines = self._lines[self._begin :]
+        lines = self._data()
         try:
             read = np.loadtxt(lines, usecols=[place], ndmin=1, dtype=str, **self._options())
         except (ValueError, IndexError) as error:
@@ -90,6 +116,10 @@ class TextTable:
             if count == row:
                 return f"line {number}"
         return f"row {row + 1}"
+
+    def _data(self) -> list[str]:
+        """Lines of data."""
+        return [line for line in self._lines[self._begin :] if not _skipped(line)]
 
     def _options(self) -> dict[str, Any]:
         return {"delimiter": self._delimiter, "comments": _COMMENT}
@@ -116,13 +146,47 @@ class TextTable:
         raise DataError(f"{self.path}: no column '{column}' ({known})")
 
     def _first_line(self) -> int:
+        width = self._usual_width()
         for number, line in enumerate(self._lines):
             if _skipped(line):
                 continue
             cells = self._cells(line, self._delimiter or self._guess(line))
-            if 2 * sum(_is_number(cell, self._decimal) for cell in cells) >= len(cells):
+            if len(cells) == width and 2 * sum(_is_number(cell, self._decimal) for cell in cells) >= len(cells):
                 return number
         return len(self._lines)
+
+    def _usual_width(self) -> int:
+        """Count the columns that most lines have."""
+        lines = _spread([line for line in self._lines if not _skipped(line)])
+        widths = Counter(len(self._cells(line, self._delimiter or self._guess(line))) for line in lines)
+        return widths.most_common(1)[0][0] if widths else 0
+
+    def _leave_out_numeric_headings(self) -> None:
+        """Begin behind the first lines when their numbers are written otherwise than those of the data."""
+        rows = [k for k in range(self._begin, len(self._lines)) if not _skipped(self._lines[k])]
+        first, rest = rows[:_MOST_HEADINGS], rows[_MOST_HEADINGS:]
+        if len(rest) < _LOOKED_AT:
+            return
+        forms = np.array([self._form(k) for k in _spread(rest)])
+        whole, real = (forms == _WHOLE).all(axis=0), (forms == _REAL).all(axis=0)
+        headings = [
+            k for k in first if (np.array(self._form(k)) == _REAL)[whole].any()
+            or (real.all() and (np.array(self._form(k)) == _WHOLE).all())
+        ]  # fmt: skip
+        if not headings:
+            return
+        self._begin = rows[rows.index(headings[-1]) + 1]
+        self.notes = (
+            f"{self.path}: lines up to {headings[-1] + 1} are headings in numbers, as they are written otherwise than "
+            "the lines below them; skip_lines in the map says it if not",
+        )
+
+    def _form(self, number: int) -> list[int]:
+        """How the numbers of a line are written."""
+        width = len(self._cells(self._lines[self._begin]))
+        cells = [*self._cells(self._lines[number]), *[""] * width][:width]
+        real = [_is_number(cell, self._decimal) and not _INTEGER.fullmatch(cell) for cell in cells]
+        return [_REAL if is_real else _WHOLE if cell else 0 for is_real, cell in zip(real, cells, strict=True)]
 
     def _find_headings(self) -> list[str]:
         """Read the headings off the last line with words before the data; none when the numbers do not match."""
@@ -152,6 +216,11 @@ class TextTable:
                 if numbers and not _is_number(cells[place], self._decimal):
                     return DataError(f"{self.path}: line {number}, column {column}: '{cells[place]}' is not a number")
         return DataError(f"{self.path}: cannot be read as a table (state delimiter and skip_lines in the map)")
+
+
+def _spread(items: list[_Item]) -> list[_Item]:
+    """Take some of many, from all over."""
+    return items[:: max(len(items) // _LOOKED_AT, 1)]
 
 
 def _skipped(line: str) -> bool:

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sdimu_calibration.core.arrays import Bools, Floats, Ints
+from sdimu_calibration.core.data.bursts import Bursts, find_bursts
 from sdimu_calibration.core.recording import (
     UNNUMBERED,
     DataError,
@@ -33,6 +34,9 @@ _OVERLAP = 3
 """Number of samples in a row that mean a clock set back, when they arrive late and find their time taken by other
 readings: one or two may be stragglers."""
 
+_COPIES = 0.5
+"""Share of the readings with one stamp that are those before once more, from which messages come twice: noise does not
+repeat itself."""
 _WRONG_STAMPS = 0.2
 """Share of samples with the stamp of another reading that is refused: the others are then no sample times either."""
 
@@ -201,11 +205,13 @@ def in_order(raw: RawTest) -> Recording:
     DataError
         When no sample can be used, or the clock of the stamps was set back.
     """
-    arranged = arrange(raw.ns, raw.omega_ib_b, raw.f_ib_b, raw.where)
-    notes = [*arranged.notes]
+    bursts = _bursts(raw)
+    stamps = raw.ns if bursts is None else bursts.ns
+    arranged = arrange(stamps, raw.omega_ib_b, raw.f_ib_b, raw.where)
+    notes = [*([] if bursts is None else [str(bursts)]), *arranged.notes]
     # Samples that are all there and in order are not copied.
     rows = arranged.rows if any(arranged.counts.values()) else slice(None)
-    ns = raw.ns[rows]
+    ns = stamps[rows]
     start_ns = origin_ns(ns)
     return Recording(
         start_ns=start_ns, t=seconds(ns, start_ns),
@@ -213,6 +219,17 @@ def in_order(raw: RawTest) -> Recording:
         phase=_phase(raw, start_ns, notes), temperature=_temperature(raw, start_ns, notes),
         rejected=len(raw.ns) - len(ns), notes=tuple(notes),
     )  # fmt: skip
+
+
+def _bursts(raw: RawTest) -> Bursts | None:
+    """Even stamps where they come in bursts of readings; messages that were sent twice are none."""
+    found = find_bursts(raw.ns)
+    if found is None:
+        return None
+    again = np.flatnonzero(np.diff(raw.ns) == 0)
+    copied = (raw.omega_ib_b[again + 1] == raw.omega_ib_b[again]).all(axis=1)
+    copied &= (raw.f_ib_b[again + 1] == raw.f_ib_b[again]).all(axis=1)
+    return None if len(again) and copied.mean() > _COPIES else found
 
 
 def _phase(raw: RawTest, start_ns: int, notes: list[str]) -> PhaseLog | None:
