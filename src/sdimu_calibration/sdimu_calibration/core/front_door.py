@@ -20,6 +20,7 @@ import numpy as np
 
 from sdimu_calibration.core.arrays import Bools, Floats
 from sdimu_calibration.core.data.arrival import IMU_TOPIC
+from sdimu_calibration.core.data.attitudes import one_attitude
 from sdimu_calibration.core.data.axes_and_units import Stated, recognise
 from sdimu_calibration.core.data.by_hand import why_handheld
 from sdimu_calibration.core.data.dejitter import dejittered
@@ -160,6 +161,11 @@ def open_test(recording: Recording, options: OpeningOptions, where: str = IMU_TO
         When the data cannot be used, or physics does not decide and the user has to.
     """
     recording, imu = in_si(recording, options.stated, where), options.imu
+    if one_attitude(recording):
+        raise DataError(
+            f"{where}: the IMU is in one attitude all the time, which shows sums of coefficients and none of them; turn "
+            "it between rests, or see sdimu noise for what a rest tells"
+        )
     if options.classes:
         imu, note = propose(recording, options.classes)
         recording = replace(recording, notes=(*recording.notes, note))
