@@ -32,6 +32,10 @@ from sdimu_calibration.core.noise.quantisation import with_quantisation
 from sdimu_calibration.core.recording import DataError, Recording
 from sdimu_calibration.core.specification import ImuSpecification, Site
 
+ONE_ATTITUDE = (
+    "the IMU is in one attitude all the time: that shows sums of coefficients, and hardly more of each than its file "
+    "says; turn it between rests (sdimu noise says what one rest tells)"
+)
 FEWEST = 100
 """Number of samples below which nothing can be recognised: a second of them."""
 
@@ -162,10 +166,7 @@ def open_test(recording: Recording, options: OpeningOptions, where: str = IMU_TO
     """
     recording, imu = in_si(recording, options.stated, where), options.imu
     if one_attitude(recording):
-        raise DataError(
-            f"{where}: the IMU is in one attitude all the time, which shows sums of coefficients and none of them; turn "
-            "it between rests, or see sdimu noise for what a rest tells"
-        )
+        recording = replace(recording, notes=(*recording.notes, ONE_ATTITUDE))
     if options.classes:
         imu, note = propose(recording, options.classes)
         recording = replace(recording, notes=(*recording.notes, note))

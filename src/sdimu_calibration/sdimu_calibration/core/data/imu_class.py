@@ -13,11 +13,17 @@ from itertools import pairwise
 
 import numpy as np
 
+from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.data.phases import rest_limits
 from sdimu_calibration.core.data.static_detection import detect_static
 from sdimu_calibration.core.recording import DataError, Recording
 from sdimu_calibration.core.specification import ImuSpecification
 from sdimu_calibration.core.units import STANDARD_GRAVITY, from_si
+
+_TAU_S = (2.0, 8.0)
+"""Averaging times (s) beside the half second of static detection: long enough for pulses of a ring laser gyro."""
+_FEWEST = 20
+"""Number of differences of neighbouring means at least: of three axes they give the noise to a tenth."""
 
 
 @dataclass(frozen=True)
@@ -70,10 +76,31 @@ def shown_at_rest(recording: Recording) -> RestsShown | None:
         np.linalg.norm([data[a:b].mean(axis=0) for a, b in spans], axis=1)
         for data in (recording.omega_ib_b, recording.f_ib_b)
     )
-    return RestsShown(
-        found.gyro_white_noise, found.accel_white_noise, float(np.median(rate)),
-        float(np.median(np.abs(force - STANDARD_GRAVITY))),
+    gyro, accel = (
+        min([usual, *_densities(data, spans, recording.interval_s)])
+        for data, usual in (
+            (recording.omega_ib_b, found.gyro_white_noise), (recording.f_ib_b, found.accel_white_noise),
+        )
     )  # fmt: skip
+    return RestsShown(gyro, accel, float(np.median(rate)), float(np.median(np.abs(force - STANDARD_GRAVITY))))
+
+
+def _densities(values: Floats, spans: Sequence[tuple[int, int]], interval_s: float) -> list[float]:
+    """Noise density of a triad by neighbouring means over each of `_TAU_S`, where there are enough of them.
+
+    Quantisation and vibration let it fall with the length of the means, a wandering bias lets it rise: the least one is
+    nearest to white noise.
+    """
+    out = []
+    for tau in _TAU_S:
+        width = max(round(tau / interval_s), 1)
+        steps = [
+            np.diff(values[a : a + (b - a) // width * width].reshape(-1, width, 3).mean(axis=1), axis=0)
+            for a, b in spans if b - a >= 2 * width
+        ]  # fmt: skip
+        if sum(map(len, steps)) >= _FEWEST:
+            out.append(float(np.sqrt(0.5 * np.mean(np.concatenate(steps) ** 2) * width * interval_s)))
+    return out
 
 
 def propose(recording: Recording, classes: Sequence[ImuSpecification]) -> tuple[ImuSpecification, str]:
