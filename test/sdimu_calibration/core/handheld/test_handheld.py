@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from sdimu_calibration.core.data.static_detection import hides_earth_rate
+from sdimu_calibration.core.data.static_detection import detect_static, hides_earth_rate
 from sdimu_calibration.core.estimation.outcome import calibrate
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.specification import ImuSpecification, Model
@@ -128,3 +128,39 @@ def test_few_rests_are_refused(site):
     recording, _ = by_hand_recording(ByHand(3, MEMS, site, seed=8))
     with pytest.raises(DataError, match="3 rests"):
         calibrate(recording, None, MEMS, MODEL, estimator="handheld")
+
+
+def without_turns(recording, which, gap_s=60.0):
+    """Take the motion out of some of the turns, as if each file ended before it, and put what follows `gap_s` later."""
+    rests = detect_static(recording)
+    keep, t = np.ones(len(recording.t), dtype=bool), recording.t.copy()
+    for i, (a, b) in enumerate(zip(rests.last[:-1], rests.first[1:], strict=True)):
+        if which(i):
+            keep[a:b] = False
+            t[b:] += gap_s
+    return replace(recording, t=t[keep], omega_ib_b=recording.omega_ib_b[keep], f_ib_b=recording.f_ib_b[keep])
+
+
+@pytest.mark.parametrize("every", [1, 3])
+def test_turns_that_nobody_saw_say_nothing_and_spoil_nothing(site, every):
+    total, dof = 0.0, 0
+    for seed in (11, 12, 13):
+        recording, truth = by_hand_recording(ByHand(24, MEMS, site, seed=seed))
+        found = calibrate(
+            without_turns(recording, lambda i: i % every == 0), None, MEMS, MODEL, estimator="handheld"
+        )
+        true = in_body_frame(
+            against_gravity(truth, STANDARD_GRAVITY, gravity_of(site)).imu.coefficients, found.body_frame
+        )
+        k = np.flatnonzero(np.diag(found.covariance))
+        error = np.array([found.values[i] - true[found.names[i]] for i in k])
+        s = np.sqrt(np.diag(found.covariance)[k])
+        P = found.covariance[np.ix_(k, k)] / np.outer(s, s)
+        total += float((error / s) @ np.linalg.solve(P, error / s))
+        dof += len(k)
+        assert any("turns have gaps in which anything may have happened" in note for note in found.notes)
+        sigma = dict(zip(found.names, np.sqrt(np.diag(found.covariance)), strict=True))
+        # Rests alone give the accelerometers; the scale factors of the gyros need turns.
+        assert sigma["accel_scale_x"] < 1e-3
+        assert (sigma["gyro_scale_x"] > 0.9 * MEMS.prior["gyro_scale"]) == (every == 1)
+    assert chi2.ppf(5e-4, dof) < total < chi2.ppf(1.0 - 5e-4, dof)

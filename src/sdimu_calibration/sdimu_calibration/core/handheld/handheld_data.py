@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sdimu_calibration.core.alignment.prepared import nominal_interval
-from sdimu_calibration.core.arrays import Floats, Ints
+from sdimu_calibration.core.arrays import Bools, Floats, Ints
 from sdimu_calibration.core.compiled import compiled
 from sdimu_calibration.core.data.gaps import GAP_SHARE
 from sdimu_calibration.core.data.static_detection import StaticIntervals
@@ -24,6 +24,11 @@ from sdimu_calibration.core.navigation.correct_cycles import correct_cycles
 from sdimu_calibration.core.navigation.strapdown import Cycles, Reducer
 from sdimu_calibration.core.navigation.track import MAGNETIC_FIELD, motion, temperatures
 from sdimu_calibration.core.recording import Recording, TemperatureLog
+
+_UNSEEN_S = 0.25
+"""Length of a gap (s) in a turn from which a hand may have done anything in it: it turns by 20 deg in that time."""
+_ANY_TURN = 10.0
+"""Sigma of the angle of such a turn (rad): more than an angle can be, so that its equation has no weight."""
 
 
 @dataclass(frozen=True)
@@ -56,6 +61,11 @@ class HandheldRun:
     gap: Floats
     temperature: TemperatureLog | None
 
+    @property
+    def unseen(self) -> Bools:
+        """Turns of which a part is missing that may be any motion, shape (k - 1,): they say nothing."""
+        return np.asarray(self.gap >= _ANY_TURN)
+
 
 def reduce_run(recording: Recording, rests: StaticIntervals) -> HandheldRun:
     """Take the means of the rests and the cycles of the turns.
@@ -63,7 +73,8 @@ def reduce_run(recording: Recording, rests: StaticIntervals) -> HandheldRun:
     A turn is cut at whole cycles, of a tenth of a second, inside the two rests that it joins; the means are taken
     between these cuts, so that no sample is used twice.
     """
-    cycles = Reducer(nominal_interval(recording.t)).add(recording.t, recording.omega_ib_b, recording.f_ib_b)
+    nominal = nominal_interval(recording.t)
+    cycles = Reducer(nominal).add(recording.t, recording.omega_ib_b, recording.f_ib_b)
     start = cycles.t - cycles.dt
     eps = 1e-9
     begin = np.searchsorted(start, recording.t[np.maximum(rests.first - 1, 0)] - eps)
@@ -74,10 +85,11 @@ def reduce_run(recording: Recording, rests: StaticIntervals) -> HandheldRun:
     part = total[end] - total[begin]
     first, last = end[:-1], begin[1:]
     angle = np.sqrt(np.sum(cycles.alpha**2, axis=1))
-    gap = np.sum(cycles.gap_angle**2, axis=1)
+    gap = GAP_SHARE**2 * np.sum(cycles.gap_angle**2, axis=1)
+    gap[cycles.lost * nominal > _UNSEEN_S] = _ANY_TURN**2
     return HandheldRun(
         0.5 * (start[begin] + cycles.t[end - 1]), part[:, 0], part[:, 1:] / part[:, :1], cycles, first, last,
-        _sums(cycles.dt, first, last), _sums(angle, first, last), GAP_SHARE * np.sqrt(_sums(gap, first, last)),
+        _sums(cycles.dt, first, last), _sums(angle, first, last), np.sqrt(_sums(gap, first, last)),
         recording.temperature,
     )  # fmt: skip
 

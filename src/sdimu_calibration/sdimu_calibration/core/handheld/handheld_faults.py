@@ -69,6 +69,9 @@ def _missing(run: HandheldRun) -> list[DataFault]:
         return []
     lost, t = int(run.cycles.lost.sum()), run.cycles.t[at]
     text = f"{lost} samples are missing by their stamps ({t[0]:.1f} to {t[-1]:.1f} s), bridged"
+    unseen = int(run.unseen.sum())
+    if unseen:
+        text += f"; {unseen} of {len(run.unseen)} turns have gaps in which anything may have happened, and say nothing"
     return [DataFault("gap", text, lost, float(t[0]), float(t[-1]))]
 
 

@@ -40,6 +40,8 @@ MOST_RESTS = 400
 """Number of rests at most: the least squares is dense, and a thousand unknowns take a second a step."""
 _HEADING = 1e-6
 """Sigma that holds the heading of the first rest (rad): the heading is free and says nothing about any coefficient."""
+_HEADING_STEP = 1e-3
+"""Sigma of a step of a heading that nothing tells (rad): small enough to hold it, large enough to invert."""
 _BISECTIONS = 50
 """Number of halvings: to rounding."""
 
@@ -146,7 +148,10 @@ def fit_run(run: HandheldRun, scene: FitPriors, start: LinearisationPoint) -> Ha
     change, pace = np.zeros(3), 1.0
     for steps in range(1, MOST_STEPS + 1):
         rows, residual, kind = equations(run, scene, point)
-        Q, R, white = _solve(rows, residual, row_sigmas(run, scene, kind, point.extra))
+        # A heading after a turn that nobody saw stays where it is: the Earth tells it so badly that no search for it
+        # ends, and what it is wrong by is learned as scatter of the rates.
+        sigma = np.where(_unseen(run, kind), _HEADING_STEP, row_sigmas(run, scene, kind, point.extra))
+        Q, R, white = _solve(rows, residual, sigma)
         step = np.asarray(-np.linalg.solve(R, Q.T @ white))
         extra = _learn(run, scene, kind, point.extra, rows, residual, step)
         moved = float(np.max(np.abs(R[-len(scene.kept) - 3 : -3] @ step)))
@@ -224,9 +229,13 @@ def equations(
         residual[at] = rest_residual[i]
     for i in range(k - 1):
         at = slice(6 * k + 3 * i, 6 * k + 3 * i + 3)
-        reached = rotation_matrix(-run.turn_s[i] * point.earth) @ gone.C_nb[i]
+        if run.unseen[i]:
+            # Only the next heading, which nothing tells, is kept from being none.
+            rows[at.stop - 1, [3 * i + 2, 3 * i + 5]] = -1.0, 1.0
+            continue
         rows[at, 3 * i : 3 * i + 3] = -np.eye(3)
         rows[at, 3 * i + 3 : 3 * i + 6] = np.eye(3)
+        reached = rotation_matrix(-run.turn_s[i] * point.earth) @ gone.C_nb[i]
         rows[at, 3 * k : 3 * k + q] = -gone.by_coefficient[i][:, scene.kept]
         rows[at, -3:] = run.turn_s[i] * np.eye(3)
         residual[at] = rotation_vector(point.C_nb[i + 1] @ reached.T)
@@ -293,6 +302,14 @@ def _spread(run: HandheldRun, kind: Ints, by_group: Floats) -> Floats:
     return out
 
 
+def _unseen(run: HandheldRun, kind: Ints) -> Bools:
+    """Rows of turns that say nothing, shape (m,)."""
+    k = len(run.t)
+    out = np.zeros(len(kind), dtype=bool)
+    out[6 * k : 9 * k - 3] = np.repeat(run.unseen, 3)
+    return out
+
+
 def _solve(rows: Floats, residual: Floats, sigma: Floats) -> tuple[Floats, Floats, Floats]:
     """QR of the whitened rows, and the whitened residual."""
     Q, R = np.linalg.qr(rows / sigma[:, None])
@@ -315,10 +332,13 @@ def _learn(
     left = residual + rows @ step
     sigma = row_sigmas(run, scene, kind, extra)
     Q = np.linalg.qr(rows / sigma[:, None])[0]
+    seen = ~_unseen(run, kind)
     free = 1.0 - np.sum(Q**2, axis=1)
     out = extra.copy()
     for which in (FORCE, RATE, TURN):
-        mine = kind == which
+        mine = (kind == which) & seen
+        if not mine.any():
+            continue
 
         def excess(
             value: float, which: int = which, mine: Bools = mine, target: float = float(free[mine].sum())
@@ -352,7 +372,7 @@ def _finish(run: HandheldRun, scene: FitPriors, point: LinearisationPoint, steps
     k, q = len(run.t), len(scene.kept)
     inverse = np.linalg.inv(R)
     covariance = inverse @ inverse.T
-    measured = kind >= 0
+    measured = (kind >= 0) & ~_unseen(run, kind)
     log = -float(np.sum(np.log(sigma[measured]))) - 0.5 * int(measured.sum()) * np.log(2.0 * np.pi)
     # The determinant of the priors too: without it a coefficient more would count by its unit.
     log += float(np.sum(np.log(np.diag(np.linalg.inv(np.linalg.cholesky(scene.prior))))))
