@@ -156,3 +156,18 @@ def test_a_real_recording_leaves_result_and_report(sdimu, recorded, tmp_path: Pa
     content = json.loads((tmp_path / "result.json").read_text())
     assert len(content["coefficients"]) == 30
     assert (tmp_path / "report.html").stat().st_size < 6e6
+
+
+def test_an_estimate_that_is_not_to_be_trusted_ends_with_3_and_says_why(sdimu, tmp_path):
+    plan = tmp_path / "two.yaml"
+    plan.write_text(
+        "format: sdimu-plan/1\nname: two\ndwell: 30 s\nrate: 9 deg/s\nacceleration: 20 deg/s^2\n"
+        "turns:\n  - {axis: Y, angle: 90 deg}\n"
+    )
+    bag = tmp_path / "bag"
+    assert sdimu("simulate", "--plan", plan, "--rate", 20, "--out", bag)[0] == 0
+    status, out, err = sdimu("calibrate", bag, "--out", tmp_path / "out")
+    assert status == 3
+    assert_one_line(err, "not to be trusted", "2 attitudes only")
+    assert "results in" in out
+    assert (tmp_path / "out" / "result.json").is_file()

@@ -44,6 +44,7 @@ class Messages:
     status: tuple | None
     temperature: tuple
     told: tuple[str, ...] = field(default=())
+    source: Source = field(default_factory=Source)
 
 
 def messages(imu):
@@ -62,7 +63,7 @@ def foreign_units(m):
 
 
 def negated_force(m):
-    return replace(m, f=-m.f, told=("specific force is read with the opposite sign",))
+    return replace(m, f=-m.f, source=Source(accel_sign=-1))
 
 
 def negated_rate(m):
@@ -131,7 +132,8 @@ def recorded(path, m):
 
 def live(m, imu, site="daejeon"):
     """A live calibration that has taken all messages in blocks of 20, and its estimates on the way."""
-    found = LiveCalibration(opening_options(site, load_imu(imu), Source()), load_model("baseline"))
+    options = opening_options(site, load_imu(imu), m.source if site else Source())
+    found = LiveCalibration(options, load_model("baseline"))
     estimates, entry, said = [], 0, [] if m.status is None else list(zip(*(c.tolist() for c in m.status), strict=True))
     for k in range(0, len(m.ns), 20):
         rows = slice(k, k + 20)
@@ -165,7 +167,7 @@ def equal(a, b):
 def test_live_end_and_bag_open_the_same_recording(case, tmp_path):
     m = case(messages("dtg"))
     ended = live(m, "dtg")[0].opened()
-    opened = open_test(recorded(tmp_path / "bag", m), "daejeon", load_imu("dtg"), handheld=False)
+    opened = open_test(recorded(tmp_path / "bag", m), "daejeon", load_imu("dtg"), m.source, handheld=False)
     equal(ended.recording, opened.recording)
     assert ended.recording.notes == opened.recording.notes
     assert (ended.imu, ended.site) == (opened.imu, opened.site)
@@ -189,7 +191,7 @@ def test_live_end_and_bag_give_the_same_coefficients(imu, cases, tmp_path):
         m = case(m)
     there, estimates = live(m, imu)
     ended = there.finish()
-    opened = open_test(recorded(tmp_path / "bag", m), "daejeon", load_imu(imu), handheld=False)
+    opened = open_test(recorded(tmp_path / "bag", m), "daejeon", load_imu(imu), m.source, handheld=False)
     offline = calibrate(opened.recording, opened.site, opened.imu, load_model("baseline"))
     np.testing.assert_array_equal(ended.values, offline.values)
     np.testing.assert_array_equal(ended.covariance, offline.covariance)

@@ -120,11 +120,13 @@ def test_a_place_that_contradicts_the_data_is_told(tmp_path):
     assert any("|f| at rest" in note for note in r.notes)
 
 
-def test_the_negative_of_the_force_is_turned_round_by_the_earth_unless_stated(tmp_path):
+def test_a_wrong_hemisphere_or_the_negative_of_the_force_is_asked_for_unless_stated(tmp_path):
     path = write(tmp_path / "b", f=-1.0)
-    turned = open_test(path, "daejeon", DTG).recording
+    with pytest.raises(DataError, match=r"latitude \+36\.4 deg: either the site is in the other hemisphere.*-1\)"):
+        open_test(path, "daejeon", DTG)
+    turned = open_test(path, "daejeon", DTG, Source(accel_sign=-1)).recording
     assert np.array_equal(turned.f_ib_b, simulated().f_ib_b)
-    assert "opposite sign" in turned.notes[-1]
+    assert turned.notes == ()
     left = open_test(path, "daejeon", DTG, Source(accel_sign=1)).recording
     assert np.array_equal(left.f_ib_b, -simulated().f_ib_b)
     assert any("--site" in note for note in left.notes)

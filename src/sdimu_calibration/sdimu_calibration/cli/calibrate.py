@@ -16,6 +16,7 @@ from sdimu_calibration.cli.options import (
     SiteOption,
     default_folder,
     explained,
+    leave,
     opened,
     tell,
 )
@@ -95,3 +96,4 @@ def calibrate(
     console.print(rich_table(rows(result, true), f"body frame: {result.body_frame}"), soft_wrap=True)
     tell(console, (*notes, *(note for note in result.notes if note not in notes)))
     console.print(f"results in {folder}", soft_wrap=True)
+    leave(result)

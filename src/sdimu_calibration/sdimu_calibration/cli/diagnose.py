@@ -16,6 +16,7 @@ from sdimu_calibration.cli.options import (
     SiteOption,
     default_folder,
     explained,
+    leave,
     opened,
     tell,
 )
@@ -111,6 +112,7 @@ def diagnose(
     more = without_advice(found.after.notes) if found.fit.learns_scatter else ()
     tell(console, (*notes, *(note for note in more if note not in notes)))
     console.print(f"results in {folder}", soft_wrap=True)
+    leave(found.after)
 
 
 def _write(folder: Path, title: str, summary: DiagnosisSummary, null: Null | None, progress: Progress) -> None:

@@ -84,7 +84,10 @@ def _root(
 
 
 def main() -> None:
-    """Run `sdimu`: exit 0 when done, 1 with one line when data or options are unusable, 2 on wrong usage."""
+    """Run `sdimu`: exit 0 when done, 1 with one line when data or options are unusable, 2 on wrong usage.
+
+    `options.leave` ends with 3 when all is done and the estimate is not to be trusted.
+    """
     try:
         app()
     except (DataError, UnitError) as error:

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from sdimu_calibration.core.estimation.prepared_test import PreparedTest
+    from sdimu_calibration.core.results import Calibration
     from sdimu_calibration.core.specification import Model
     from sdimu_calibration.storage.opening import Source
 
@@ -32,6 +33,8 @@ EstimatorOption = Annotated[
     str, typer.Option(help="filter, second-order, handheld, batch, classical; auto chooses one of the first three.")
 ]
 HandOption = Annotated[bool, typer.Option("--hand", help="Moved by hand: the same as --estimator handheld.")]
+NOT_TRUSTED = 3
+"""Exit status of a run that is done, and whose estimate is not to be trusted."""
 HANDHELD_CHOSEN = "handheld: {why}, so nothing is navigated (--estimator filter forces navigation)"
 
 
@@ -79,6 +82,14 @@ def tell(console: Console, notes: Iterable[str]) -> None:
     """Print notes, one line each."""
     for note in notes:
         console.print(f"note: {note}", soft_wrap=True, markup=False, highlight=False)
+
+
+def leave(result: Calibration) -> None:
+    """End with exit status 3 and a line on stderr for each reason when a result is not to be trusted."""
+    for line in result.not_to_be_trusted:
+        typer.echo(f"sdimu: not to be trusted: {line}", err=True)
+    if result.not_to_be_trusted:
+        raise typer.Exit(NOT_TRUSTED)
 
 
 @contextmanager

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from sdimu_calibration.cli.options import ImuOption, default_folder
+from sdimu_calibration.cli.options import ImuOption, default_folder, leave
 from sdimu_calibration.cli.source_options import (
     AccelSign,
     AccelUnit,
@@ -82,6 +82,7 @@ def replay(
         highlight=False,
     )
     console.print(f"results in {folder}", soft_wrap=True)
+    leave(calibration)
 
 
 def _play(log: Path, calibrating: dict[str, Any], playing: dict[str, Any], patience: float) -> None:

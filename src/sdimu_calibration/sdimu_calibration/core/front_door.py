@@ -178,7 +178,7 @@ def open_test(recording: Recording, options: OpeningOptions, where: str = IMU_TO
     handheld = bool(why_handheld(recording, imu)) if options.handheld is None else options.handheld
     if handheld and options.assumed_site:
         return OpenedTest(recording, imu, None)
-    return OpenedTest(_placed(recording, imu, options), imu, options.site)
+    return OpenedTest(_placed(recording, imu, options, where), imu, options.site)
 
 
 def _with_measured_noise(recording: Recording, imu: ImuSpecification) -> tuple[Recording, ImuSpecification]:
@@ -189,7 +189,7 @@ def _with_measured_noise(recording: Recording, imu: ImuSpecification) -> tuple[R
     return replace(recording, notes=(*recording.notes, note)), imu
 
 
-def _placed(recording: Recording, imu: ImuSpecification, options: OpeningOptions) -> Recording:
+def _placed(recording: Recording, imu: ImuSpecification, options: OpeningOptions, where: str) -> Recording:
     """Find rests that no status says, and compare the site with the Earth's rate and gravity in the data."""
     site, seen = options.site, None
     if len(recording.t) >= FEWEST:
@@ -197,15 +197,14 @@ def _placed(recording: Recording, imu: ImuSpecification, options: OpeningOptions
         seen = observe_earth_rate(recording.t, recording.omega_ib_b, recording.f_ib_b, imu)
     notes = [_assumed(options.assumed_site, site, seen)] if options.assumed_site else []
     if seen is not None:
-        may_turn = not options.assumed_site and options.stated.accel_sign is None
-        if may_turn and reversed_force(seen, site):
-            notes.append(
-                "specific force is read with the opposite sign: as it stands the Earth turns the wrong way for the "
-                "latitude of the site. If the site has the wrong sign of its latitude, correct it: all "
-                "accelerometer biases and mass unbalances are reversed otherwise; --accel-sign states the sense"
+        undecided = not options.assumed_site and options.stated.accel_sign is None
+        if undecided and reversed_force(seen, site):
+            raise DataError(
+                f"{where}: the Earth turns the wrong way about the specific force for latitude "
+                f"{np.degrees(site.latitude_rad):+.1f} deg: either the site is in the other hemisphere (correct the "
+                "sign of its latitude), or the negative of the force was recorded (--accel-sign -1); --accel-sign 1 "
+                "takes both as they are"
             )
-            recording = replace(recording, f_ib_b=-recording.f_ib_b)
-            seen = replace(seen, up_rate=-seen.up_rate)
         notes += contradictions(seen, site)
     return replace(recording, notes=(*recording.notes, *notes))
 

@@ -12,6 +12,9 @@ from sdimu_calibration.core.arrays import Bools, Floats, Ints
 from sdimu_calibration.core.noise_term import NoiseTerm
 from sdimu_calibration.core.recording import DataFault
 
+NOT_TRUSTED = "not to be trusted"
+"""Words of a warning that forbids to use an estimate."""
+
 
 @dataclass(frozen=True)
 class History:
@@ -106,6 +109,12 @@ class Calibration:
     noise: tuple[NoiseTerm, ...] = ()
     drift_means: Mapping[str, float] = field(default_factory=dict)
     conditional_sigma: Floats | None = None
+
+    @property
+    def not_to_be_trusted(self) -> tuple[str, ...]:
+        """Why the estimate must not be used as it stands, one line each; empty where nothing forbids it."""
+        grave = [fault.text for fault in self.faults if fault.grave]
+        return tuple(dict.fromkeys([*grave, *(line for line in self.warnings if NOT_TRUSTED in line)]))
 
 
 _ADVICE = re.compile(r"[;:,](?: or)? run:? sdimu diagnose$")

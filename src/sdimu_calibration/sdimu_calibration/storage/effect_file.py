@@ -72,7 +72,7 @@ def load_effect(path: Path) -> tuple[Effect, ...]:
     if file.name in registry.names():
         raise DataError(f"{path}: name: '{file.name}' is a registered effect (choose another)")
     try:
-        return _effects(file)
+        return tuple(replace(effect, file=str(path)) for effect in _effects(file))
     except (DataError, UnitError) as error:
         raise DataError(f"{path}: {error}") from error
 

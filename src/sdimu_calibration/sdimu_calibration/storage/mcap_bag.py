@@ -170,7 +170,7 @@ def _make_room(path: Path, replace: bool) -> None:
         if not (path / "metadata.yaml").is_file():
             raise DataError(f"{path}: the folder is not empty and not a bag; choose another one")
         if not replace:
-            raise DataError(f"{path}: a bag is already there; remove it or choose another folder")
+            raise DataError(f"{path}: a bag is already there; --replace replaces it, or choose another folder")
         shutil.rmtree(path)
     try:
         path.mkdir(parents=True, exist_ok=True)

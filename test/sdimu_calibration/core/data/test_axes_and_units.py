@@ -6,6 +6,7 @@ percents and degrees (seeds 31 to 36), every combination of units and signs.
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from functools import cache
 from itertools import product
@@ -17,7 +18,7 @@ from sdimu_calibration.core.data.axes_and_units import DEGREE, Stated, recognise
 from sdimu_calibration.core.plan import Plan
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.rotation import rotation_matrix
-from sdimu_calibration.core.units import STANDARD_GRAVITY
+from sdimu_calibration.core.units import STANDARD_GRAVITY, parse_unit
 from sdimu_calibration.storage.config import load_imu, load_plan, load_site
 from sdimu_sim.core.by_hand import ByHand, by_hand_recording
 from sdimu_sim.core.scenario import Scenario, generate
@@ -132,3 +133,20 @@ def test_a_recording_without_turns_says_that_the_gyros_are_not_checked():
 def test_a_slow_table_and_a_long_plan_are_recognised(seed):
     r, _ = generate(Scenario(KIM18, load_imu("dtg"), SITE, rate_hz=10.0, seed=seed))
     assert recognise(r.t, np.degrees(r.omega_ib_b), r.f_ib_b, Stated()).gyro == DEGREE
+
+
+@pytest.mark.parametrize(
+    ("factor", "unit"), [(1e3 / STANDARD_GRAVITY, "mg"), (1e6 / STANDARD_GRAVITY, "ug"), (1e3, "mm/s^2")]
+)
+def test_a_unit_is_advised_only_where_it_is_taken(factor, unit):
+    t, w, f = samples("table", 21)
+    assert f"--accel-unit {unit} makes it gravity" in refusal(t, w, f * factor)
+    assert recognise(t, w, f * factor, Stated(accel=parse_unit(unit).factor)).accel == parse_unit(unit).factor
+
+
+def test_counts_of_no_unit_are_told_with_the_map_that_reads_them():
+    t, w, f = samples("table", 21)
+    told = refusal(t, w, f * 41.5)
+    # Gravity is the standard one to a part in a thousand, |f| to the errors of the IMU.
+    assert re.search(r"of which 41\.[3-7]\d* are 1 m/s\^2 \(counts_per_unit", told)
+    assert "--accel-unit" not in told

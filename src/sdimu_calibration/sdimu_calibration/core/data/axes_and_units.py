@@ -25,11 +25,13 @@ import numpy as np
 from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.data.windows import Windows, cut_windows, turned
 from sdimu_calibration.core.recording import DataError
-from sdimu_calibration.core.units import STANDARD_GRAVITY
+from sdimu_calibration.core.units import STANDARD_GRAVITY, parse_unit
 
 DEGREE = float(np.pi / 180.0)
 _NEAR_GRAVITY = 0.3
 """The median of |f| may differ from gravity by this share: nominal scale and bias of raw counts err so much."""
+_OTHER_UNITS = ("mg", "ug", "cm/s^2", "mm/s^2")
+"""Units of force beside m/s^2 and g that drivers write."""
 _NO_GRAVITY = 0.2
 """Median of |f| (m/s^2 or g) that is refused: below it the driver has taken gravity away."""
 _LENGTHS_S = (1.0, 4.0, 16.0, 64.0)
@@ -132,9 +134,13 @@ def _accel_unit(f: Floats, stated: Stated) -> tuple[float, tuple[str, ...]]:
             f"linear_acceleration: the median of |f| is {size:.3g}: there is no gravity in it; record the IMU's raw "
             "specific force"
         )
+    fitting = [unit for unit in _OTHER_UNITS if _is_gravity(size * parse_unit(unit).factor)]
+    advice = f"--accel-unit {fitting[0]} makes it gravity" if fitting else (
+        f"no usual unit makes it gravity: raw counts, of which {size / STANDARD_GRAVITY:.4g} are 1 m/s^2 "
+        "(counts_per_unit in a map of sdimu import), or no rest"
+    )  # fmt: skip
     raise DataError(
-        f"linear_acceleration: the median of |f| is {size:.4g}, neither near 9.8 (m/s^2) nor near 1 (g); state its "
-        "unit, such as --accel-unit mg"
+        f"linear_acceleration: the median of |f| is {size:.4g}, neither near 9.8 (m/s^2) nor near 1 (g); {advice}"
     )
 
 

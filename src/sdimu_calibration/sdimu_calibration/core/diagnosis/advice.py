@@ -6,6 +6,7 @@ two rates, a product of forces stops between the axes, a change with time the sa
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,8 +15,9 @@ from sdimu_calibration.core.diagnosis.coefficient_shifts import CoefficientShift
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.diagnosis.found import DetectableSize, Found
 from sdimu_calibration.core.diagnosis.plan_seen import PlanSeen
-from sdimu_calibration.core.effects import references, registry
+from sdimu_calibration.core.effects import references, registry, selection
 from sdimu_calibration.core.effects.effect import Excitation
+from sdimu_calibration.core.recording import DataError
 
 _SLOW_MINUTES = 20.0
 """Length of the stay that is advised for a change with time (min): usual time constants of a warm-up lie within it."""
@@ -68,10 +70,6 @@ def reason(one: DetectableSize, plan: PlanSeen) -> str:
     return "the motion of this test does not excite it"
 
 
-_ONE_LINE = 3
-"""Number of found effects from which one line of advice adds them all: it can be pasted."""
-
-
 def advice(
     d: Diagnosis, found: tuple[Found, ...], reached: tuple[DetectableSize, ...], plan: PlanSeen
 ) -> tuple[str, ...]:
@@ -113,22 +111,41 @@ def _about_found(d: Diagnosis, found: tuple[Found, ...], plan: PlanSeen) -> list
             names = ", ".join(f.candidate.label for f in found)
             out.append(f"Try an equation of your own (--try FILE); nearest in this test: {names}.")
         return out
-    kept = [f.candidate.label for f in found if _belongs(f)]
-    if len(kept) > _ONE_LINE:
-        out.append(f"Keep what was found in the model: {' '.join(f'--add {quoted(label)}' for label in kept)}.")
+    out += keep([one for one in found if _belongs(one)])
     for one in found:
         label = one.candidate.label
         if one.candidate.family == references.LATITUDE.name:
             out.append(_about_latitude(one))
         elif one.candidate.effect.scope == "recording":
             out.append(f"{label} is a fault of this recording: record again and do not carry it over.")
-        elif len(kept) <= _ONE_LINE:
-            out.append(f"Keep {label} in the model: --add '{label}'.")
-        if one.alike:
-            out.append(separate(one, plan) + _calculated(one))
+    out += together([(one, separate(one, plan)) for one in found if one.alike])
+    for one in found:
+        out += [text] if one.alike and (text := _calculated(one)) else []
         if one.coefficient_shifts:
             out.append(_at_stake(one))
     return out
+
+
+def keep(found: Sequence[Found]) -> list[str]:
+    """Say in one line, which can be pasted, how what was found gets into the model; nothing for nothing."""
+    if not found:
+        return []
+    what = found[0].candidate.label if len(found) == 1 else "what was found"
+    return [f"Keep {what} in the model: {' '.join(f'--add {quoted(one.candidate.added)}' for one in found)}."]
+
+
+def together(asked: Sequence[tuple[Found, str]]) -> list[str]:
+    """Say what tells classes apart, one line for each thing to do.
+
+    Parameters
+    ----------
+    asked : sequence of (Found, str)
+        What was found, and what to do to tell it from what looks the same.
+    """
+    groups: dict[str, list[str]] = {}
+    for one, what in asked:
+        groups.setdefault(what, []).append(f"{one.candidate.label} from {', '.join(one.alike[:3])}")
+    return [f"To tell {', and '.join(pairs)}: {what}." for what, pairs in groups.items()]
 
 
 def _belongs(one: Found) -> bool:
@@ -165,34 +182,40 @@ def _about_latitude(one: Found) -> str:
 
 def separate(one: Found, plan: PlanSeen) -> str:
     """Name the next turn or stop that would tell a class apart, with minutes."""
-    label, others = one.candidate.label, ", ".join(one.alike[:3])
     dwell = max(plan.dwell_minutes, 1.0)
     needed = one.candidate.effect.excitation
-    head = f"To tell {label} from {others}: "
     if Excitation.TWO_RATES in needed and plan.one_rate():
         minutes = 2 * (dwell + 0.3)
-        return head + f"add a turn of 180 deg and back about that axis, level, at 10 deg/s ({minutes:.0f} min)."
+        return f"add a turn of 180 deg and back about that axis, level, at 10 deg/s ({minutes:.0f} min)"
     if Excitation.BOTH_SENSES in needed and plan.one_sided():
-        return head + f"add a turn of 180 deg about that axis in the other sense ({dwell + 1.5:.0f} min)."
+        return f"add a turn of 180 deg about that axis in the other sense ({dwell + 1.5:.0f} min)"
     if Excitation.REPEATED_ATTITUDES in needed:
-        return head + (
+        return (
             f"stay at the last stop for {_SLOW_MINUTES:.0f} min more, then repeat the first stop "
-            f"({dwell + 1.0:.0f} min)."
+            f"({dwell + 1.0:.0f} min)"
         )
     if Excitation.OBLIQUE_STOPS in needed:
-        return head + (
+        return (
             f"add two stops on the body diagonal, X +45 deg and Y -35.3 deg and back ({2 * (dwell + 0.6):.0f} min), "
-            "or run the plan 'recommended'."
+            "or run the plan 'recommended'"
         )
-    return head + f"repeat the turn that shows it in the other sense and at 10 deg/s ({2 * (dwell + 0.5):.0f} min)."
+    return f"repeat the turn that shows it in the other sense and at 10 deg/s ({2 * (dwell + 0.5):.0f} min)"
 
 
 def _calculated(one: Found) -> str:
     """Name the command that ranks all turns by what they tell, where it knows both effects."""
     names = (one.candidate.label, one.alike[0])
-    if any(":" in name for name in names):
+    if not all(map(_in_catalogue, names)):
         return ""
-    return " Ranked by calculation: sdimu plan --plan YOURS " + " ".join(f"--tell '{name}'" for name in names) + "."
+    return f"Turns ranked by what they tell: sdimu plan --plan YOURS {' '.join(f'--tell {quoted(n)}' for n in names)}."
+
+
+def _in_catalogue(name: str) -> bool:
+    try:
+        selection.resolve(name)
+    except DataError:
+        return False
+    return True
 
 
 def _about_plan(reached: tuple[DetectableSize, ...], plan: PlanSeen) -> list[str]:

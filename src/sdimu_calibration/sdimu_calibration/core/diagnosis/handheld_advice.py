@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from sdimu_calibration.core.diagnosis.advice import keep, together
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.diagnosis.found import Found
 from sdimu_calibration.core.effects.effect import Excitation
@@ -10,11 +11,11 @@ from sdimu_calibration.core.effects.effect import Excitation
 def handheld_advice(d: Diagnosis, found: tuple[Found, ...]) -> tuple[str, ...]:
     """Advise in sentences, the most useful first."""
     out = [f"Mend the recording first: {f.text}." for f in d.findings if f.grave]
+    out += keep(found)
+    out += together([(one, _more(one)) for one in found if one.alike])
     for one in found:
         label = one.candidate.label
-        out.append(f"Keep {label} in the model: --add '{label}'.")
         if one.alike:
-            out.append(f"To tell {label} from {', '.join(one.alike[:3])}: {_more(one)}.")
             out += [
                 f"Which it is matters: with {s.other} instead of {label}, {s.coefficient} moves by {s.sigmas:+.0f} of "
                 "its sigmas." for s in one.coefficient_shifts[:3]

@@ -145,6 +145,8 @@ class Effect:
     nearer : callable or None
         ``() -> tuple of Effect``: the next variants of an interval search, half as far apart as those before. The
         variant itself is in the middle.
+    file : str
+        Path of the effect file that it was read from; empty for all others.
     """
 
     name: str
@@ -175,6 +177,7 @@ class Effect:
     with_options: Callable[..., Effect] | None = None
     scan: Callable[[Timetable], tuple[Effect, ...]] | None = None
     nearer: Callable[[], tuple[Effect, ...]] | None = None
+    file: str = ""
 
     def only(self, names: tuple[str, ...]) -> Effect:
         """Return the effect with the named parameters alone."""

@@ -19,10 +19,10 @@ from sdimu_calibration.core.evidence.consistency import Consistency
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.noise_term import NoiseTerm
 from sdimu_calibration.core.recording import DataFault
-from sdimu_calibration.core.results import History, no_history
+from sdimu_calibration.core.results import NOT_TRUSTED, History, no_history
 from sdimu_calibration.core.specification import Model
 
-NOT_CONVERGED = "the passes did not converge: the estimate is not trustworthy; check --imu and --site"
+NOT_CONVERGED = f"the passes did not converge: the estimate is {NOT_TRUSTED}; check --imu and --site"
 
 
 @dataclass(frozen=True)

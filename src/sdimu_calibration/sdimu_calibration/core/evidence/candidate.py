@@ -21,7 +21,7 @@ class Candidate:
     family : str
         Registry name of the effect, or ``own`` for an equation that no registered effect has.
     label : str
-        What `sdimu calibrate --add` takes.
+        Canonical key of the parameter.
     """
 
     effect: Effect
@@ -32,6 +32,13 @@ class Candidate:
     def parameter(self) -> Parameter:
         """The parameter."""
         return self.effect.parameters[0]
+
+    @property
+    def added(self) -> str:
+        """What `sdimu calibrate --add` takes: the label, or the parameter of an effect file."""
+        if not self.effect.file:
+            return self.label
+        return f"{self.effect.file}:{self.parameter.name.removeprefix(f'{self.effect.family}_')}"
 
 
 def split(effect: Effect) -> list[Candidate]:

@@ -1,0 +1,69 @@
+"""What a line of advice tells to type works, and no line stands there twice."""
+
+from __future__ import annotations
+
+import shlex
+
+import pytest
+
+from sdimu_calibration.core.diagnosis.advice import keep, together
+from sdimu_calibration.core.diagnosis.found import Found
+from sdimu_calibration.core.effects import registry
+from sdimu_calibration.core.evidence.candidate import split
+from sdimu_calibration.storage.effect_file import find_effects
+
+MIX = """
+format: sdimu-effect/1
+name: odd_mix
+expressions:
+  accel_z: k1 * ax * wz
+  gyro_x: k2 * ex**2
+parameters:
+  k1: {unit: ug*s/deg/g, prior: 50 ug*s/deg/g}
+  k2: {unit: deg/h, prior: 0.1 deg/h}
+"""
+
+
+def found(candidate, alike=()):
+    return Found(candidate, 1.0, 0.1, 10.0, 50.0, 45.0, 1e-9, 1.0, 2.0, 1.0, tuple(alike), ())
+
+
+def added(line):
+    words = shlex.split(line.rstrip("."))
+    return [words[k + 1] for k, word in enumerate(words) if word == "--add"]
+
+
+@pytest.mark.parametrize("name", registry.names())
+def test_every_effect_of_the_catalogue_can_be_added_as_the_advice_says(name):
+    for candidate in split(registry.get(name)):
+        (text,) = added(keep([found(candidate)])[0])
+        assert [e.labels for e in find_effects(text)] == [candidate.effect.labels]
+
+
+def test_equations_can_be_added_as_the_advice_says():
+    (candidate,) = split(find_effects("gyro_x: ey^2")[0])
+    (text,) = added(keep([found(candidate)])[0])
+    assert find_effects(text)[0].labels == candidate.effect.labels
+
+
+def test_effects_of_a_file_can_be_added_as_the_advice_says(tmp_path):
+    path = tmp_path / "odd mix.yaml"
+    path.write_text(MIX)
+    candidates = [candidate for effect in find_effects(str(path)) for candidate in split(effect)]
+    (line,) = keep([found(candidate) for candidate in candidates])
+    assert line.startswith("Keep what was found in the model: ")
+    assert [find_effects(text)[0].labels for text in added(line)] == [c.effect.labels for c in candidates]
+
+
+def test_what_is_to_be_done_for_several_finds_is_said_once():
+    x, y, z = split(registry.get("accel_quadratic"))
+    asked = [(found(x, ["a"]), "turn it"), (found(y, ["b", "c"]), "turn it"), (found(z, ["d"]), "rest longer")]
+    assert together(asked) == [
+        "To tell accel_quadratic_x from a, and accel_quadratic_y from b, c: turn it.",
+        "To tell accel_quadratic_z from d: rest longer.",
+    ]
+
+
+def test_nothing_found_gives_no_advice():
+    assert keep([]) == []
+    assert together([]) == []
