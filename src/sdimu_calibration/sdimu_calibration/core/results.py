@@ -53,6 +53,32 @@ def no_history(p: int) -> History:
 
 
 @dataclass(frozen=True)
+class Rest:
+    """A rest of a run by hand, and what the fit leaves over there; residuals are measured less predicted.
+
+    Attributes
+    ----------
+    start_s, end_s : float
+        Seconds.
+    rate, force : tuple of three float
+        Residuals of the means, in the axes of the IMU (rad/s, m/s^2).
+    turn : tuple of three float
+        Residual of the turn to this rest, N, E, D (rad; the heading of north is arbitrary); NaN where nobody saw it.
+    rate_sigma, force_sigma, turn_sigma : float
+        What they scatter by an axis: white noise, and what was learned beyond it (rad/s, m/s^2, rad).
+    """
+
+    start_s: float
+    end_s: float
+    rate: tuple[float, float, float]
+    force: tuple[float, float, float]
+    turn: tuple[float, float, float]
+    rate_sigma: float
+    force_sigma: float
+    turn_sigma: float
+
+
+@dataclass(frozen=True)
 class Calibration:
     """A calibration result.
 
@@ -89,6 +115,8 @@ class Calibration:
         are those in the mean over the dwells: the bias in the equation is less by coefficient times mean.
     conditional_sigma : ndarray, shape (p,), or None
         Standard deviation (SI) if the model is right; None where `covariance` is that.
+    rests : tuple of Rest
+        Of a run by hand, in order; empty for all others.
     """
 
     body_frame: str
@@ -109,6 +137,7 @@ class Calibration:
     noise: tuple[NoiseTerm, ...] = ()
     drift_means: Mapping[str, float] = field(default_factory=dict)
     conditional_sigma: Floats | None = None
+    rests: tuple[Rest, ...] = ()
 
     @property
     def not_to_be_trusted(self) -> tuple[str, ...]:

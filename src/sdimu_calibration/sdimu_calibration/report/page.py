@@ -16,6 +16,7 @@ from sdimu_calibration.report.export import as_csv, as_yaml
 from sdimu_calibration.report.figures import sigma_history
 from sdimu_calibration.report.markup import Draw, prose, quiet, section
 from sdimu_calibration.report.report_extras import ReportExtras
+from sdimu_calibration.report.rests_section import rests_section
 from sdimu_calibration.report.style import SCRIPT, STYLE
 from sdimu_calibration.report.use_section import in_use
 
@@ -83,6 +84,7 @@ def page(
     handheld = summary is not None and summary.diagnosis.fit.learns_scatter
     parts = [] if summary is None else _evidence(summary, more, draw)
     parts.append(_coefficients(calibration, truth, reference))
+    parts += [rests_section(calibration.rests)] if calibration.rests else []
     parts += [] if summary is None or handheld else _residuals(summary.diagnosis, more, draw)
     if len(calibration.history.t):
         remark = quiet("Closed-loop pass. Grey: the table turns, no measurements.")

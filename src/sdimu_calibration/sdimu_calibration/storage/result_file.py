@@ -12,7 +12,7 @@ import numpy as np
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.noise_term import NoiseTerm
 from sdimu_calibration.core.recording import DataError, DataFault
-from sdimu_calibration.core.results import Calibration, History, without_advice
+from sdimu_calibration.core.results import Calibration, History, Rest, without_advice
 from sdimu_calibration.storage.json_file import read_json, write_json
 
 FORMAT = "sdimu-result/1"
@@ -56,6 +56,7 @@ def write_result(path: Path, calibration: Calibration, verdict: str = "") -> Non
         "fit": dict(calibration.fit),
         "data": {**calibration.data, "faults": [asdict(fault) for fault in calibration.faults]},
         "noise": [asdict(term) | {"unit": term.unit} for term in calibration.noise],
+        **({"rests": [asdict(rest) for rest in calibration.rests]} if calibration.rests else {}),
         "notes": told(calibration.notes),
         "warnings": told(calibration.warnings),
         "history": {entry.name: getattr(calibration.history, entry.name).tolist() for entry in fields(History)},
@@ -111,6 +112,7 @@ def _calibration(content: Mapping[str, Any]) -> Calibration:
         estimator_reason=str(content.get("estimator_reason", "")),
         noise=tuple(_term(entry) for entry in content.get("noise", ())),
         conditional_sigma=_conditional(coefficients),
+        rests=tuple(_rest(entry) for entry in content.get("rests", ())),
         drift_means={name: float(mean) for name, mean in content.get("drift_means", {}).items()},
     )
 
@@ -124,6 +126,15 @@ def _conditional(coefficients: Sequence[Mapping[str, Any]]) -> Floats | None:
 def _term(entry: Mapping[str, Any]) -> NoiseTerm:
     given = {key: value for key, value in entry.items() if key != "unit"}
     return NoiseTerm(**given | {"alike": tuple(given.get("alike", ()))})
+
+
+def _rest(entry: Mapping[str, Any]) -> Rest:
+    """Rest of a result; ``null`` is NaN."""
+
+    def number(value: Any) -> Any:
+        return tuple(map(number, value)) if isinstance(value, list) else float("nan") if value is None else float(value)
+
+    return Rest(**{key: number(value) for key, value in entry.items()})
 
 
 def _fault(entry: Mapping[str, Any]) -> DataFault:

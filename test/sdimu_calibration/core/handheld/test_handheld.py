@@ -164,3 +164,16 @@ def test_turns_that_nobody_saw_say_nothing_and_spoil_nothing(site, every):
         assert sigma["accel_scale_x"] < 1e-3
         assert (sigma["gyro_scale_x"] > 0.9 * MEMS.prior["gyro_scale"]) == (every == 1)
     assert chi2.ppf(5e-4, dof) < total < chi2.ppf(1.0 - 5e-4, dof)
+
+
+def test_rests_are_listed_and_their_residuals_in_sigmas_make_the_chi_square_of_the_fit(site):
+    recording, _ = by_hand_recording(ByHand(24, MEMS, site, seed=21))
+    found = calibrate(recording, None, MEMS, MODEL, estimator="handheld")
+    assert len(found.rests) == int(found.data["stops"]) == 24
+    assert all(a.end_s < b.start_s for a, b in zip(found.rests[:-1], found.rests[1:], strict=True))
+    assert np.isnan(found.rests[0].turn).all()
+    squares = [
+        np.sum(np.square(getattr(r, name)) / getattr(r, f"{name}_sigma") ** 2)
+        for r in found.rests for name in ("rate", "force", "turn") if np.isfinite(getattr(r, name)).all()
+    ]  # fmt: skip
+    assert np.sum(squares) == pytest.approx(found.fit["nis_mean"] * found.fit["nis_dof"], rel=1e-9)

@@ -19,7 +19,7 @@ from sdimu_calibration.core.evidence.consistency import Consistency
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.noise_term import NoiseTerm
 from sdimu_calibration.core.recording import DataFault
-from sdimu_calibration.core.results import NOT_TRUSTED, History, no_history
+from sdimu_calibration.core.results import NOT_TRUSTED, History, Rest, no_history
 from sdimu_calibration.core.specification import Model
 
 NOT_CONVERGED = f"the passes did not converge: the estimate is {NOT_TRUSTED}; check --imu and --site"
@@ -203,6 +203,10 @@ class Fit(ABC):
             When there is no fit at all.
         """
         del statistics
+        return ()
+
+    def rests(self) -> tuple[Rest, ...]:
+        """Rests of a run by hand with their residuals; none where stops are measured."""
         return ()
 
     def beyond_specification(self) -> list[str]:

@@ -24,8 +24,9 @@ from sdimu_calibration.core.evidence.handheld_evidence import (
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.handheld.handheld import PreparedRun, handheld_notes
 from sdimu_calibration.core.handheld.handheld_faults import data_faults
-from sdimu_calibration.core.handheld.handheld_fit import FitPriors, HandheldSolution
+from sdimu_calibration.core.handheld.handheld_fit import FitPriors, HandheldSolution, rests_with_residuals
 from sdimu_calibration.core.recording import DataError, DataFault
+from sdimu_calibration.core.results import Rest
 
 
 @dataclass(frozen=True)
@@ -146,6 +147,10 @@ class HandheldFit(Fit):
     def notes(self) -> tuple[str, ...]:
         """Say what was assumed, learned and not determined."""
         return tuple(handheld_notes(self.ready.run, self.priors, self.solution, self.test.site))
+
+    def rests(self) -> tuple[Rest, ...]:
+        """Rests with their residuals."""
+        return rests_with_residuals(self.ready.run, self.priors, self.solution)
 
     def free_inertial(self, rivals: Sequence[tuple[str, Fit]]) -> tuple[FreeInertialRun, ...]:
         """Refuse: a hand moves the IMU, so that its velocity and place are unknown.

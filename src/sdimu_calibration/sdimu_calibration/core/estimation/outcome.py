@@ -61,6 +61,7 @@ def outcome(fit: Fit, held_out: bool = True) -> Calibration:
         estimator_reason=fit.reason,
         noise=fit.noise_terms,
         drift_means=fit.drift_means,
+        rests=fit.rests(),
     )
 
 

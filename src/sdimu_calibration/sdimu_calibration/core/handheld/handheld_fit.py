@@ -26,6 +26,7 @@ from sdimu_calibration.core.effects.error_slope import error_slope
 from sdimu_calibration.core.effects.imu_model import ImuModel
 from sdimu_calibration.core.handheld.handheld_data import HandheldRun, seen_at_rest, turns
 from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.results import Rest
 from sdimu_calibration.core.rotation import rotation_matrix, rotation_vector, skew
 
 CONVERGED = 1e-3
@@ -389,6 +390,22 @@ def _finish(run: HandheldRun, scene: FitPriors, point: LinearisationPoint, steps
         rest_residual=residual[: 6 * k].reshape(k, 6),
         turn_residual=residual[6 * k : 9 * k - 3].reshape(k - 1, 3),
         steps=steps,
+    )
+
+
+def rests_with_residuals(run: HandheldRun, scene: FitPriors, found: HandheldSolution) -> tuple[Rest, ...]:
+    """List the rests with what the fit leaves over at each, and on the way to it."""
+    k = len(run.t)
+    white, more = _variances(run, scene, found.point.extra)
+    sigma = np.sqrt(white + more)
+    none = np.full((1, 3), np.nan)
+    turn = np.vstack([none, np.where(run.unseen[:, None], np.nan, found.turn_residual)])
+    turn_sigma = np.concatenate([[np.nan], np.where(run.unseen, np.nan, sigma[2 * k :])])
+    start, end = run.t - 0.5 * run.seconds, run.t + 0.5 * run.seconds
+    rows = np.column_stack([start, end, found.rest_residual, turn, sigma[:k], sigma[k : 2 * k], turn_sigma]).tolist()
+    return tuple(
+        Rest(a, b, (wx, wy, wz), (fx, fy, fz), (n, e, d), *sigmas)
+        for a, b, wx, wy, wz, fx, fy, fz, n, e, d, *sigmas in rows
     )
 
 
