@@ -87,9 +87,9 @@ class ArrayTable:
             name, kind = (bytes(entry[field]).decode("utf-8", "replace") for field in ("s0", "s2"))
             if column.split(".", maxsplit=1)[0] == name or len(self._objects) == len(self._arrays):
                 raise DataError(
-                    f"{self.path}: variable {name} is a MATLAB {kind}, which MATLAB alone can read; there: s = "
-                    f"table2struct(timetable2table({name}), 'ToScalar', true); s.Time = seconds(s.Time - s.Time(1)); "
-                    "save('numbers.mat', '-struct', 's', '-v7')"
+                    f"{self.path}: variable {name} is a MATLAB {kind}, which MATLAB alone can read; there: t = "
+                    f"{name}.Properties.RowTimes; s = struct('t', seconds(t - t(1)), 'data', {name}.Variables); "
+                    f"save('{name}_numbers.mat', '-struct', 's', '-v7'); the columns are then t, data[1], data[2], ..."
                 )
 
     def _look_up(self, name: str) -> Any:

@@ -8,10 +8,11 @@ from functools import cache
 import numpy as np
 import pytest
 
+from sdimu_calibration.core.data.attitudes import one_attitude, turned_unseen
 from sdimu_calibration.core.data.by_hand import moved_by_hand, why_handheld
 from sdimu_calibration.core.data.imu_class import propose, shown_at_rest
 from sdimu_calibration.core.front_door import OpeningOptions, open_test
-from sdimu_calibration.core.recording import PhaseLog
+from sdimu_calibration.core.recording import PhaseLog, Recording
 from sdimu_calibration.storage.config import load_imu, load_plan, load_site
 from sdimu_calibration.storage.opening import CLASSES, Source, opening_options
 from sdimu_sim.core.by_hand import ByHand, by_hand_recording
@@ -98,3 +99,40 @@ def test_an_imu_that_was_stated_is_taken_as_it_is():
     recording, imu, _ = open_test(on_table("dtg"), OpeningOptions(stated, SITE))
     assert imu is stated
     assert not any("--imu" in note and "assumed" in note for note in recording.notes)
+
+
+def pieces(angles_deg, pause_s=60.0):
+    """Rests of 10 s at tilts about x, with pauses between them."""
+    t, f = [], []
+    for k, angle in enumerate(np.radians(angles_deg)):
+        t.append(k * pause_s + np.arange(1, 501) * 0.02)
+        f.append(np.tile(9.8 * np.array([0.0, np.sin(angle), np.cos(angle)]), (500, 1)))
+    force = np.concatenate(f) + 0.01 * np.random.default_rng(2).standard_normal((500 * len(angles_deg), 3))
+    return Recording(0, np.concatenate(t), np.full_like(force, 1e-6), force)
+
+
+def test_attitudes_without_the_turns_between_them_are_not_navigated():
+    assert turned_unseen(pieces([0, 90, 180]))
+    assert not turned_unseen(pieces([0, 0.5, 0.2]))
+    assert not turned_unseen(pieces([0, 90, 180], pause_s=10.0))
+    assert not turned_unseen(by_hand())
+    assert not turned_unseen(on_table())
+    assert "no turn between" in why_handheld(pieces([0, 90, 180]), load_imu("dtg"))
+
+
+def test_one_attitude_is_told_from_a_turn_about_the_vertical():
+    assert one_attitude(pieces([0, 0.5, 0.2]))
+    assert not one_attitude(pieces([0, 90, 0]))
+    turned = pieces([0, 0, 0, 0], pause_s=10.0)
+    assert one_attitude(turned)
+    w = np.where(np.abs(turned.t - 20.0)[:, None] < 2.0, [0.0, 0.0, np.radians(20.0)], 0.0)
+    assert not one_attitude(replace(turned, omega_ib_b=w))
+
+
+def test_priors_of_a_proposal_allow_the_biases_of_the_rests():
+    recording = by_hand("mems_consumer")
+    biased = replace(recording, f_ib_b=recording.f_ib_b + np.array([0.9, 0.0, 0.0]))
+    found, note = propose(biased, FILES)
+    assert found.prior["accel_bias"] > 0.9
+    assert found.prior["accel_scale"] == FILES[-1].prior["accel_scale"]
+    assert "priors for such biases" in note

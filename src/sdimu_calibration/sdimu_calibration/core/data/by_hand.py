@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from sdimu_calibration.core.data.attitudes import turned_unseen
 from sdimu_calibration.core.data.static_detection import hides_earth_rate
 from sdimu_calibration.core.data.windows import cut_windows
 from sdimu_calibration.core.recording import Recording
@@ -38,6 +39,8 @@ def why_handheld(recording: Recording, imu: ImuSpecification) -> str:
     imu : ImuSpecification
         Its noise, beside that of the rests, decides whether the Earth's rate is seen.
     """
+    if turned_unseen(recording):
+        return "no turn between its attitudes is in the recording"
     if hides_earth_rate(recording, imu):
         return "the gyros' white noise in the usual rest hides the Earth's rate"
     if moved_by_hand(recording):

@@ -1,8 +1,8 @@
 """Which of some IMU files a recording is of, where nobody states one: told by the noise and the biases of its rests.
 
 Noise tells the grade of the gyros and no more. A file whose limits of rest the rests exceed is none of theirs:
-the next coarser one is taken. What is taken in place of the default has the priors of its grade and the noise of the
-rests.
+the next coarser one is taken. What is taken in place of the default has the priors of its grade, wider where the rests
+show larger biases, and the noise of the rests.
 """
 
 from __future__ import annotations
@@ -13,9 +13,11 @@ from itertools import pairwise
 
 import numpy as np
 
+from sdimu_calibration.core import earth
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.data.phases import rest_limits
 from sdimu_calibration.core.data.static_detection import detect_static
+from sdimu_calibration.core.effects.bias import ACCEL_BIAS, GYRO_BIAS
 from sdimu_calibration.core.recording import DataError, Recording
 from sdimu_calibration.core.specification import ImuSpecification
 from sdimu_calibration.core.units import STANDARD_GRAVITY, from_si
@@ -38,12 +40,15 @@ class RestsShown:
         Median size of the mean rate of a rest (rad/s): bias and Earth.
     force_error : float
         Median difference of the mean specific force of a rest from gravity (m/s^2).
+    largest_force_error : float
+        The largest of these differences (m/s^2).
     """
 
     gyro_noise: float
     accel_noise: float
     rate: float
     force_error: float
+    largest_force_error: float
 
     def __str__(self) -> str:
         """Return it in customary units."""
@@ -57,6 +62,18 @@ class RestsShown:
         """Whether an IMU of a specification may rest like this."""
         limits = rest_limits(imu)
         return self.rate < limits.rate and self.force_error < limits.force
+
+    def of_class(self, imu: ImuSpecification) -> ImuSpecification:
+        """Return a specification with this noise and with priors that allow these biases."""
+        seen = {
+            GYRO_BIAS.name: max(self.rate - earth.RATE, 0.0),
+            # A bias shows in |f| by its part along gravity.
+            ACCEL_BIAS.name: 2.0 * self.largest_force_error,
+        }
+        wider = {name: max(imu.prior.get(name, 0.0), size) for name, size in seen.items()}
+        return replace(
+            imu, gyro_white_noise=self.gyro_noise, accel_white_noise=self.accel_noise, prior={**imu.prior, **wider}
+        )
 
 
 def shown_at_rest(recording: Recording) -> RestsShown | None:
@@ -82,7 +99,8 @@ def shown_at_rest(recording: Recording) -> RestsShown | None:
             (recording.omega_ib_b, found.gyro_white_noise), (recording.f_ib_b, found.accel_white_noise),
         )
     )  # fmt: skip
-    return RestsShown(gyro, accel, float(np.median(rate)), float(np.median(np.abs(force - STANDARD_GRAVITY))))
+    error = np.abs(force - STANDARD_GRAVITY)
+    return RestsShown(gyro, accel, float(np.median(rate)), float(np.median(error)), float(error.max()))
 
 
 def _densities(values: Floats, spans: Sequence[tuple[int, int]], interval_s: float) -> list[float]:
@@ -116,7 +134,7 @@ def propose(recording: Recording, classes: Sequence[ImuSpecification]) -> tuple[
     Returns
     -------
     imu : ImuSpecification
-        One of `classes`; with the noise of the rests where it is not the first.
+        One of `classes`; with the noise and the biases of the rests where it is not the first.
     note : str
         What was assumed, and why.
     """
@@ -129,7 +147,8 @@ def propose(recording: Recording, classes: Sequence[ImuSpecification]) -> tuple[
     while grade < len(classes) - 1 and not shown.fits(classes[grade]):
         grade += 1
     imu = classes[grade]
-    note = f"no --imu: {imu.name} is assumed, as the rests show {shown}; state your own file if there is one"
+    with_what = "" if grade == 0 else " with this noise and priors for such biases"
+    note = f"no --imu: {imu.name} is assumed{with_what}, as the rests show {shown}; state your own file if there is one"
     if grade == 0:
         return imu, note
-    return replace(imu, gyro_white_noise=shown.gyro_noise, accel_white_noise=shown.accel_noise), note
+    return shown.of_class(imu), note
