@@ -95,6 +95,6 @@ def test_a_static_file_for_each_of_six_positions(sdimu, tmp_path):
         for name, true in ((f"accel_bias_{letter}", bias[k]), (f"accel_scale_{letter}", scale[k] - 1.0)):
             value, sigma = found[name]
             assert abs(value - true) < 4.0 * sigma
-        # Two positions on each axis: the bias is known to the tilt at which they miss it, times a misalignment of 2 deg.
+        # Two positions on each axis: the bias is known to the tilt that they miss it by, times 2 deg of misalignment.
         assert found[f"accel_bias_{letter}"][1] < 3e-3 * STANDARD_GRAVITY
     assert any(note.startswith("not determined") and "gyro_scale_x" in note for note in result.notes)

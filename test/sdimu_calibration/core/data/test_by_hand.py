@@ -121,8 +121,8 @@ def test_attitudes_without_the_turns_between_them_are_not_navigated():
 
 
 def test_one_attitude_is_told_from_a_turn_about_the_vertical():
-    assert one_attitude(pieces([0, 0.5, 0.2]))
-    assert not one_attitude(pieces([0, 90, 0]))
+    assert one_attitude(pieces([0, 0.5, 0.2, 0.4], pause_s=10.0))
+    assert not one_attitude(pieces([0, 90, 0, 90], pause_s=10.0))
     turned = pieces([0, 0, 0, 0], pause_s=10.0)
     assert one_attitude(turned)
     w = np.where(np.abs(turned.t - 20.0)[:, None] < 2.0, [0.0, 0.0, np.radians(20.0)], 0.0)
