@@ -14,6 +14,7 @@ from sdimu_calibration.cli.options import (
     ModelOption,
     NoiseOption,
     SiteOption,
+    WholeTurnsOption,
     default_folder,
     explained,
     leave,
@@ -50,6 +51,7 @@ def calibrate(
     truth: Annotated[Path | None, typer.Option(help="Truth of a simulation, to show the errors.")] = None,
     estimator: EstimatorOption = "auto",
     hand: HandOption = False,
+    whole_turns: WholeTurnsOption = None,
     imu_topic: ImuTopic = None,
     status_topic: StatusTopic = None,
     joint_topic: JointTopic = None,
@@ -81,7 +83,7 @@ def calibrate(
             "sdimu study mount", param_hint="--truth",
         )  # fmt: skip
     test, wanted, chosen = opened(
-        console, bag, model, site, imu, add, origin, "handheld" if hand else estimator, noise
+        console, bag, model, site, imu, add, origin, "handheld" if hand else estimator, noise, whole_turns
     )
     notes = test.recording.notes
     with explained(console, notes), bar(console) as progress:

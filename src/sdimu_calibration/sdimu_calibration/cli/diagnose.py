@@ -14,6 +14,7 @@ from sdimu_calibration.cli.options import (
     ModelOption,
     NoiseOption,
     SiteOption,
+    WholeTurnsOption,
     default_folder,
     explained,
     leave,
@@ -59,6 +60,7 @@ def diagnose(
     noise: NoiseOption = None,
     estimator: EstimatorOption = "auto",
     hand: HandOption = False,
+    whole_turns: WholeTurnsOption = None,
     out: Annotated[Path | None, typer.Option(help="Folder of the results; BAG_diagnosis by default.")] = None,
     imu_topic: ImuTopic = None,
     status_topic: StatusTopic = None,
@@ -93,7 +95,7 @@ def diagnose(
     origin = source(
         imu_topic, status_topic, joint_topic, temperature_topic, accel_unit, gyro_unit, accel_sign, gyro_sign
     )
-    test, wanted, chosen = opened(console, bag, model, site, imu, add, origin, asked, noise)
+    test, wanted, chosen = opened(console, bag, model, site, imu, add, origin, asked, noise, whole_turns)
     if bootstrap and chosen == "auto" and test.why_handheld:
         raise DataError(NO_BOOTSTRAP)
     notes = test.recording.notes

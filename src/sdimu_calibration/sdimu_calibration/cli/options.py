@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -32,6 +33,12 @@ NoiseOption = Annotated[
 EstimatorOption = Annotated[
     str, typer.Option(help="filter, second-order, handheld, batch, classical; auto chooses one of the first three.")
 ]
+WholeTurnsOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="ANGLE", help="By hand: turns of about 360 deg about the vertical are whole to this, such as 1 deg."
+    ),
+]
 HandOption = Annotated[bool, typer.Option("--hand", help="Moved by hand: the same as --estimator handheld.")]
 NOT_TRUSTED = 3
 """Exit status of a run that is done, and whose estimate is not to be trusted."""
@@ -40,7 +47,7 @@ HANDHELD_CHOSEN = "handheld: {why}, so nothing is navigated (--estimator filter 
 
 def opened(
     console: Console, bag: Path, model: str | None, site: str | None, imu: str | None, add: list[str] | None,
-    source: Source, estimator: str, noise: str | None,
+    source: Source, estimator: str, noise: str | None, whole_turns: str | None = None,
 ) -> tuple[PreparedTest, Model, str]:  # fmt: skip
     """Open the test of a bag, read its model and check its estimator.
 
@@ -58,6 +65,7 @@ def opened(
     """
     from sdimu_calibration.core.estimation.solve import AUTO
     from sdimu_calibration.core.recording import DataError
+    from sdimu_calibration.core.units import parse_quantity
     from sdimu_calibration.storage.config import load_imu, load_site
     from sdimu_calibration.storage.model_choice import HANDHELD, named_estimator, named_model
     from sdimu_calibration.storage.opening import open_test
@@ -65,6 +73,9 @@ def opened(
     wanted = named_estimator(estimator, "--estimator")
     if noise not in {None, "estimated"}:
         raise DataError(f"--noise {noise}: expected 'estimated' (or leave it out: the noise of --imu)")
+    whole = 0.0 if whole_turns is None else parse_quantity(whole_turns, "deg")
+    if whole < 0.0 or (whole_turns is not None and whole == 0.0):
+        raise DataError(f"--whole-turns {whole_turns}: expected an angle above zero")
     # A wrong name is reported before a long recording is read.
     specification, given = None if imu is None else load_imu(imu), named_model(model, add or [])
     if site is not None:
@@ -74,7 +85,9 @@ def opened(
     if wanted == HANDHELD or (wanted == AUTO and test.why_handheld):
         if wanted == AUTO:
             console.print(HANDHELD_CHOSEN.format(why=test.why_handheld), soft_wrap=True)
-        given = named_model(model, add or [], handheld=True)
+        return replace(test, whole_turns=whole), named_model(model, add or [], handheld=True), wanted
+    if whole:
+        raise DataError("--whole-turns is of runs by hand, and this one is navigated: leave it out, or state --hand")
     return test, given, wanted
 
 

@@ -31,6 +31,8 @@ class PreparedTest:
         Stops whose measurements no fit takes.
     assumed_site : str
         Name of the site where nobody stated one.
+    whole_turns : float
+        Of a run by hand: how well the IMU was put back after whole turns about the vertical (rad); 0 for none.
     """
 
     recording: Recording
@@ -38,6 +40,7 @@ class PreparedTest:
     site: Site | None = None
     held_out: tuple[int, ...] = ()
     assumed_site: str = ""
+    whole_turns: float = 0.0
     _prepared: dict[Any, Any] = field(default_factory=dict, repr=False, compare=False)
 
     def without_stops(self, stops: tuple[int, ...]) -> PreparedTest:
@@ -76,7 +79,7 @@ class PreparedTest:
             When there are too few rests.
         """
         if "run" not in self._prepared:
-            self._prepared["run"] = prepare_run(self.recording)
+            self._prepared["run"] = prepare_run(self.recording, self.whole_turns)
         done: PreparedRun = self._prepared["run"]
         return done
 

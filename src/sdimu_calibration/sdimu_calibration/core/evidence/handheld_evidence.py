@@ -24,6 +24,8 @@ CHANNELS = (
     "gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z", "turn_north", "turn_east", "turn_down",
 )  # fmt: skip
 """What is measured: rate and force at each rest, and the turn that led to it (the heading of north is arbitrary)."""
+_DOWN = len(CHANNELS) - 1
+"""Index of a channel (1): that of the heading, which a whole turn tells."""
 _LARGEST = 30.0
 """Factor on the one-sigma size that physics gives an effect: no sensor is worse, so what does not show at that size is
 not seen."""
@@ -109,13 +111,15 @@ def handheld_evidence(
     names = tuple(scene.model.names[i] for i in scene.kept)
     begun = HandheldEvidence(
         e=residual[data] / sigma[data], W=W,
-        stop=np.concatenate([np.repeat(np.arange(k), 6), np.repeat(np.arange(1, k), 3)]),
+        stop=np.concatenate([np.repeat(np.arange(k), 6), np.repeat(np.arange(1, k), 3), run.whole + 1]),
         names=(*names, *(f"Earth rate {i}" for i in range(3)), *(f"attitude {i // 3} {i % 3}" for i in range(3 * k))),
         weight=np.concatenate([1.0 / np.diag(scene.prior), scene.earth_sigma**-2, held]),
         shift=np.concatenate([-point.coefficients[scene.kept], scene.earth_mean - point.earth, np.zeros(3 * k)]),
         stated=np.concatenate([np.sqrt(np.diag(scene.prior)), scene.earth_sigma, held**-0.5]),
         candidates=(), prior=np.zeros(0), imu=imu, times=timetable(run), coefficients=q,
-        channel=np.concatenate([np.tile(np.arange(6), k), np.tile(np.arange(6, 9), k - 1)]),
+        channel=np.concatenate([
+            np.tile(np.arange(6), k), np.tile(np.arange(6, 9), k - 1), np.full(len(run.whole), _DOWN),
+        ]),
         run=run, rests=seen_at_rest(run, point.C_nb, point.earth, scene.gravity),
         gone=turns(run, scene.model, point.coefficients, point.C_nb, scene.gravity), sigma=sigma[data],
     )  # fmt: skip
@@ -140,7 +144,8 @@ def _signature(run: HandheldRun, rests: Motion, gone: Turns, effect: Effect) -> 
     terms = [(term.channel, term.parameter) for term in effect.terms]
     way = gone.by_parameter(run, effect.regressors(gone.seen), terms, count)
     # A turn's residual is the next attitude less the way of the gyros, the change of which is `way`.
-    return np.vstack([at_rest.reshape(-1, count), way.reshape(-1, count)])
+    # Whole turns are of the attitudes alone.
+    return np.vstack([at_rest.reshape(-1, count), way.reshape(-1, count), np.zeros((len(run.whole), count))])
 
 
 def standardised(evidence: HandheldEvidence, chosen: Ints) -> Floats:

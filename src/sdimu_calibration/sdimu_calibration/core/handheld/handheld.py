@@ -33,6 +33,7 @@ from sdimu_calibration.core.handheld.handheld_fit import (
     HandheldSolution,
     LinearisationPoint,
 )
+from sdimu_calibration.core.handheld.whole_turns import whole_turns, with_whole_turns
 from sdimu_calibration.core.recording import DataError, DataFault, Recording
 from sdimu_calibration.core.specification import ImuSpecification, Site
 from sdimu_calibration.core.units import STANDARD_GRAVITY, from_si
@@ -71,8 +72,14 @@ class PreparedRun:
     impossible: tuple[DataFault, ...]
 
 
-def prepare_run(recording: Recording) -> PreparedRun:
+def prepare_run(recording: Recording, whole_sigma: float = 0.0) -> PreparedRun:
     """Find the rests and reduce the recording to them and the turns between.
+
+    Parameters
+    ----------
+    recording : Recording
+    whole_sigma : float
+        How well the IMU was put back after whole turns about the vertical (rad); 0 where none is stated.
 
     Raises
     ------
@@ -86,7 +93,8 @@ def prepare_run(recording: Recording) -> PreparedRun:
             f"/imu/data_raw: {len(rests)} rests; a handheld calibration needs {FEWEST_RESTS} and more, "
             "in different attitudes"
         )
-    return PreparedRun(recording, rests, reduce_run(recording, rests), impossible)
+    run = reduce_run(recording, rests)
+    return PreparedRun(recording, rests, with_whole_turns(run, whole_sigma) if whole_sigma else run, impossible)
 
 
 def fit_priors(sensors: ImuModel, imu: ImuSpecification, site: Site | None, rests: StaticIntervals) -> FitPriors:
@@ -150,12 +158,27 @@ def handheld_notes(run: HandheldRun, scene: FitPriors, found: HandheldSolution, 
         _gravity_note(scene, site),
         _earth_note(found, site),
     ]
+    out += _whole_note(run)
     sigma = np.sqrt(np.diag(found.covariance))
     names = [scene.model.names[i] for i in scene.kept]
     unknown = [n for n, s, q in zip(names, sigma, np.sqrt(np.diag(scene.prior)), strict=True) if s > _UNKNOWN * q]
     if unknown:
         out.append(f"not determined by this recording: {', '.join(unknown)}")
     return out
+
+
+def _whole_note(run: HandheldRun) -> list[str]:
+    """Say which turns were taken for whole ones, or might be."""
+    if len(run.whole):
+        size = np.degrees(run.whole_sigma)
+        return [f"{len(run.whole)} turns are whole ones about the vertical, as stated, to {size:.2g} deg"]
+    found = whole_turns(run)
+    if not len(found):
+        return []
+    return [
+        f"{len(found)} turns are about the vertical by nearly a multiple of 360 deg, which gravity does not show: if "
+        "the IMU was put back where it was, say how well, such as --whole-turns '1 deg'"
+    ]
 
 
 def _gravity_note(scene: FitPriors, site: Site | None) -> str:

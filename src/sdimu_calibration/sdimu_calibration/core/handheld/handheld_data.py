@@ -8,7 +8,7 @@ slope of the errors: with errors of per cent both are needed.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -48,6 +48,10 @@ class HandheldRun:
     turn_s, path, gap : ndarray, shape (k - 1,)
         Duration (s), angle summed over all ways (rad), and uncertainty of bridged angle (rad) of each turn.
     temperature : TemperatureLog or None
+    whole : ndarray of int, shape (w,)
+        Turns that are stated to be whole ones about the vertical: `whole_turns`.
+    whole_sigma : float
+        How well the IMU was put back after them (rad, one sigma).
     """
 
     t: Floats
@@ -60,6 +64,8 @@ class HandheldRun:
     path: Floats
     gap: Floats
     temperature: TemperatureLog | None
+    whole: Ints = field(default_factory=lambda: np.empty(0, dtype=np.int64))
+    whole_sigma: float = 0.0
 
     @property
     def unseen(self) -> Bools:

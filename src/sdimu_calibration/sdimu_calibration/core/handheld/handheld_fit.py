@@ -41,13 +41,15 @@ MOST_RESTS = 400
 """Number of rests at most: the least squares is dense, and a thousand unknowns take a second a step."""
 _HEADING = 1e-6
 """Sigma that holds the heading of the first rest (rad): the heading is free and says nothing about any coefficient."""
+_SWINGS = 0.5
+"""Negative cosine of the angle between two steps (1) from which they swing: steps that settle go on or turn aside."""
 _HEADING_STEP = 1e-3
 """Sigma of a step of a heading that nothing tells (rad): small enough to hold it, large enough to invert."""
 _BISECTIONS = 50
 """Number of halvings: to rounding."""
 
-FORCE, RATE, TURN = 0, 1, 2
-"""The three kinds of equation."""
+FORCE, RATE, TURN, WHOLE = 0, 1, 2, 3
+"""The kinds of equation; the scatter of the first three is learned, that of whole turns is stated."""
 
 
 @dataclass(frozen=True)
@@ -146,7 +148,7 @@ def fit_run(run: HandheldRun, scene: FitPriors, start: LinearisationPoint) -> Ha
             f"/imu/data_raw: {len(run.t)} rests; a handheld run may have {MOST_RESTS}: cut the recording in parts"
         )
     point = start
-    change, pace = np.zeros(3), 1.0
+    change, pace, last = np.zeros(3), 1.0, np.zeros(0)
     for steps in range(1, MOST_STEPS + 1):
         rows, residual, kind = equations(run, scene, point)
         # A heading after a turn that nobody saw stays where it is: the Earth tells it so badly that no search for it
@@ -161,7 +163,10 @@ def fit_run(run: HandheldRun, scene: FitPriors, start: LinearisationPoint) -> Ha
         change, before = extra - point.extra, change
         pace = _pace(pace, change, before) if steps > _FREE else 1.0
         extra = np.maximum(point.extra + pace * change, 0.0)
-        point = _moved(replace(point, extra=extra), step, scene)
+        # What hardly anything determines swings about its place by squares of the errors: the middle is nearer.
+        half = steps > _FREE and float(step @ last) < -_SWINGS * float(np.linalg.norm(step) * np.linalg.norm(last))
+        last = step
+        point = _moved(replace(point, extra=extra), 0.5 * step if half else step, scene)
         if not np.isfinite(step).all():
             break
         if moved < CONVERGED and settled and steps > 2:
@@ -196,7 +201,7 @@ def equations(
     """Make the equations about a point.
 
     Unknowns in this order: turns of the rests, coefficients, Earth rate. Equations in this order: six of each rest,
-    three of each turn, priors.
+    three of each turn, one of each whole turn, priors.
 
     Returns
     -------
@@ -205,7 +210,7 @@ def equations(
     residual : ndarray, shape (m,)
         SI; of priors whitened.
     kind : ndarray of int, shape (m,)
-        `FORCE`, `RATE` or `TURN`; -1 for priors.
+        `FORCE`, `RATE`, `TURN` or `WHOLE`; -1 for priors.
     """
     k, q = len(run.t), len(scene.kept)
     model = scene.model
@@ -215,7 +220,7 @@ def equations(
     true = np.hstack([seen.w, seen.f])
     rest_residual = run.mean - true - model.errors(values, point.coefficients)
     gone = turns(run, model, point.coefficients, point.C_nb, scene.gravity)
-    rows = np.zeros((6 * k + 3 * (k - 1), 3 * k + q + 3))
+    rows = np.zeros((9 * k - 3 + len(run.whole), 3 * k + q + 3))
     residual = np.zeros(len(rows))
     design = np.zeros((k, 6, len(model.prior)))
     for column, (channel, parameter) in enumerate(zip(model.channel, model.parameter, strict=True)):
@@ -240,7 +245,13 @@ def equations(
         rows[at, 3 * k : 3 * k + q] = -gone.by_coefficient[i][:, scene.kept]
         rows[at, -3:] = run.turn_s[i] * np.eye(3)
         residual[at] = rotation_vector(point.C_nb[i + 1] @ reached.T)
-    kind = np.concatenate([np.tile([RATE] * 3 + [FORCE] * 3, k), np.full(3 * (k - 1), TURN), np.full(q + 4, -1)])
+    for row, i in enumerate(run.whole, start=9 * k - 3):
+        rows[row, [3 * i + 2, 3 * i + 5]] = -1.0, 1.0
+        residual[row] = rotation_vector(point.C_nb[i + 1] @ point.C_nb[i].T)[2]
+    kind = np.concatenate([
+        np.tile([RATE] * 3 + [FORCE] * 3, k), np.full(3 * (k - 1), TURN), np.full(len(run.whole), WHOLE),
+        np.full(q + 4, -1),
+    ])  # fmt: skip
     more, left = _priors(scene, point, rows.shape[1])
     return np.vstack([rows, more]), np.concatenate([residual, left]), kind
 
@@ -299,7 +310,8 @@ def _spread(run: HandheldRun, kind: Ints, by_group: Floats) -> Floats:
     out = np.ones(len(kind))
     at_rest = np.stack([by_group[:k], by_group[:k], by_group[:k], *[by_group[k : 2 * k]] * 3], axis=1)
     out[: 6 * k] = at_rest.ravel()
-    out[6 * k : 6 * k + 3 * (k - 1)] = np.repeat(by_group[2 * k :], 3)
+    out[6 * k : 9 * k - 3] = np.repeat(by_group[2 * k :], 3)
+    out[9 * k - 3 : 9 * k - 3 + len(run.whole)] = run.whole_sigma**2
     return out
 
 
