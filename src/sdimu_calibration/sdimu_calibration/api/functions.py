@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any
@@ -24,6 +25,7 @@ from sdimu_calibration.core.planning.predict import predict as predict_test
 from sdimu_calibration.core.progress import Progress, silent
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.specification import ImuSpecification
+from sdimu_calibration.core.units import parse_quantity
 from sdimu_calibration.storage.config import load_imu, load_plan, load_site
 from sdimu_calibration.storage.effect_file import find_effects
 from sdimu_calibration.storage.model_choice import HANDHELD, named_estimator, named_model
@@ -40,6 +42,7 @@ def open(  # noqa: A001 (as every library of files has it)
     source: Source | None = None,
     handheld: bool | None = None,
     measured_noise: bool = False,
+    whole_turns: str | None = None,
 ) -> PreparedTest:
     """Open a recording: read, brought to SI and one clock, with its site and the IMU's file.
 
@@ -58,6 +61,8 @@ def open(  # noqa: A001 (as every library of files has it)
         Moved by hand; None decides by the turns and the noise of the gyros.
     measured_noise : bool
         White noise from the rests of the recording, not from `imu`.
+    whole_turns : str, optional
+        By hand: turns of about 360 deg about the vertical are whole ones to this, such as ``1 deg``.
 
     Raises
     ------
@@ -65,7 +70,8 @@ def open(  # noqa: A001 (as every library of files has it)
         When the bag, the site or the IMU cannot be used.
     """
     specification = load_imu(imu) if isinstance(imu, str) else imu
-    return open_test(Path(bag), site, specification, source, handheld, measured_noise)
+    opened = open_test(Path(bag), site, specification, source, handheld, measured_noise)
+    return opened if whole_turns is None else replace(opened, whole_turns=parse_quantity(whole_turns, "deg"))
 
 
 def _expect(function: str, argument: str, value: object, kind: type, meant: str) -> None:
