@@ -13,6 +13,7 @@ import numpy as np
 
 from sdimu_calibration.core.arrays import Bools, Floats, Ints
 from sdimu_calibration.core.data.bursts import Bursts, find_bursts
+from sdimu_calibration.core.data.strays import stamp_text, strays
 from sdimu_calibration.core.recording import (
     UNNUMBERED,
     DataError,
@@ -216,7 +217,7 @@ def in_order(raw: RawTest) -> Recording:
     return Recording(
         start_ns=start_ns, t=seconds(ns, start_ns),
         omega_ib_b=raw.omega_ib_b[rows], f_ib_b=raw.f_ib_b[rows],
-        phase=_phase(raw, start_ns, notes), temperature=_temperature(raw, start_ns, notes),
+        phase=_phase(raw, ns, start_ns, notes), temperature=_temperature(raw, ns, start_ns, notes),
         rejected=len(raw.ns) - len(ns), notes=tuple(notes),
     )  # fmt: skip
 
@@ -232,10 +233,11 @@ def _bursts(raw: RawTest) -> Bursts | None:
     return None if len(again) and copied.mean() > _COPIES else found
 
 
-def _phase(raw: RawTest, start_ns: int, notes: list[str]) -> PhaseLog | None:
+def _phase(raw: RawTest, samples_ns: Ints, start_ns: int, notes: list[str]) -> PhaseLog | None:
     if raw.status is None or not len(raw.status.ns):
         return None
     order = np.argsort(raw.status.ns, kind="stable")
+    order = _without_strays(raw.status.ns, order, samples_ns, raw.status_topic, notes)
     dwell, stop = raw.status.dwell[order], raw.status.stop[order]
     if (stop == UNNUMBERED).any():
         notes.append(f"{raw.status_topic} does not always say the stop: stops are counted from the dwells")
@@ -243,7 +245,7 @@ def _phase(raw: RawTest, start_ns: int, notes: list[str]) -> PhaseLog | None:
     return PhaseLog(seconds(raw.status.ns[order], start_ns), dwell, stop.astype(np.int64))
 
 
-def _temperature(raw: RawTest, start_ns: int, notes: list[str]) -> TemperatureLog | None:
+def _temperature(raw: RawTest, samples_ns: Ints, start_ns: int, notes: list[str]) -> TemperatureLog | None:
     if raw.temperature is None:
         return None
     ns, value = raw.temperature
@@ -251,4 +253,14 @@ def _temperature(raw: RawTest, start_ns: int, notes: list[str]) -> TemperatureLo
     if len(chosen) < len(value):
         notes.append(f"{len(value) - len(chosen)} temperatures of {raw.temperature_topic} were not finite and dropped")
     chosen = chosen[np.unique(ns[chosen], return_index=True)[1]]
+    chosen = _without_strays(ns, chosen, samples_ns, raw.temperature_topic, notes)
     return TemperatureLog(seconds(ns[chosen], start_ns), value[chosen]) if len(chosen) else None
+
+
+def _without_strays(ns: Ints, order: Ints, samples_ns: Ints, topic: str, notes: list[str]) -> Ints:
+    """Leave messages of no time of the test out of `order`, rows of `ns` by their stamps, and say so."""
+    away = strays(ns[order], samples_ns)
+    if away.any():
+        first, count = stamp_text(int(ns[order][away][0])), np.count_nonzero(away)
+        notes.append(f"{topic}: {count} messages are of no time of the test (the first is stamped {first}): ignored")
+    return order[~away]

@@ -24,6 +24,8 @@ _TOGETHER_S = 0.6
 """Scatter of those distances (s, median deviation): more is no offset of clocks, as the status comes once a second."""
 _FEWEST = 3
 """Number of changes that must agree: fewer are chance."""
+_LONGEST = 2**22
+"""Length of the grid (steps) beyond which clocks are not compared: two weeks, and 0.3 GB for the transforms."""
 
 
 def aligned(recording: Recording) -> Recording:
@@ -42,6 +44,9 @@ def aligned(recording: Recording) -> Recording:
     if len(windows) < 4 or windows.still.all():
         return recording
     step = windows.length * windows.interval_s
+    if max(windows.end[-1] - windows.start[0], log.t[-1] - log.t[0]) > _LONGEST * step:
+        note = "samples or status extend over more than two weeks by their stamps: their clocks are not compared"
+        return replace(recording, notes=(*recording.notes, note))
     moving, begin = _on_grid(windows.end - 0.5 * step, ~windows.still, step)
     rotating = _status_on_grid(log, step)
     now, best, shift = _best_shift(moving, begin, rotating, float(log.t[0]), step)
@@ -97,7 +102,9 @@ def _refinement(t: Floats, moving: Bools, log: PhaseLog, shift: float) -> float:
     said = log.t[1:][log.dwell[1:] != log.dwell[:-1]] + shift
     if not len(felt) or not len(said):
         return 0.0
-    nearest = felt[np.argmin(np.abs(felt[None, :] - said[:, None]), axis=1)] - said
+    after = np.searchsorted(felt, said)
+    distance = np.stack([felt[np.maximum(after - 1, 0)], felt[np.minimum(after, len(felt) - 1)]]) - said
+    nearest = np.where(np.abs(distance[0]) <= np.abs(distance[1]), *distance)
     near = nearest[np.abs(nearest) < _NEAR_S]
     if len(near) < _FEWEST:
         return 0.0
