@@ -15,6 +15,7 @@ from rclpy.task import Future
 from sensor_msgs.msg import JointState
 
 from sdimu_calibration.nodes.credits import NS, to_ns
+from sdimu_calibration.storage.status_message import first_entry, phase_entry, stamp_ns
 
 # Watching must never hold up what is watched.
 GLANCE = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
@@ -79,12 +80,14 @@ class Monitor:
         self._context.try_shutdown()
 
     def _take_status(self, message: DiagnosticArray) -> None:
-        values = {entry.key: entry.value for entry in message.status[0].values}
-        stamp = to_ns(message.header.stamp)
+        entry = phase_entry(stamp_ns(message), *first_entry(message))
+        if entry is None:
+            return
+        stamp, dwell, stop = entry
         if self._start_ns is None:
             self._start_ns = stamp
-        self.progress.phase = values.get("phase", "")
-        self.progress.stop = int(values.get("stop", "0"))
+        self.progress.phase = "dwell" if dwell else "rotating"
+        self.progress.stop = max(stop, 0)
         self.progress.table_s = (stamp - self._start_ns) / NS
 
     def _take_coefficients(self, message: JointState) -> None:

@@ -18,7 +18,7 @@ from sdimu_calibration.storage import cdr
 from sdimu_calibration.storage.bag_file import raw_messages, read_topics
 from sdimu_calibration.storage.cdr import LayoutError, Stamps
 from sdimu_calibration.storage.raw_messages import RawMessages
-from sdimu_calibration.storage.status_message import phase_entry, phase_word, stamp_ns
+from sdimu_calibration.storage.status_message import phase_entry, phase_of, stamp_ns
 from sdimu_calibration.storage.topic_choice import KINDS, TopicChoice, choose
 from sdimu_calibration.storage.topics import Topics
 
@@ -86,7 +86,7 @@ def read_messages(
 
 
 def _is_phase(raw: bytes) -> bool:
-    return phase_word(*_status_entry(raw)) in {"dwell", "rotating"}
+    return phase_of(*_status_entry(raw)) is not None
 
 
 def _status_entry(raw: bytes) -> tuple[str, Mapping[str, str]]:
@@ -104,11 +104,11 @@ def _decoded_status(without_stamp: bytes) -> tuple[str, Mapping[str, str]]:
 
 
 def _status(raw: Sequence[bytes], topic: str, notes: list[str]) -> RawStatus | None:
-    """Phases in the order of arrival; a message without a phase is ignored."""
+    """Phases in the order of arrival; a message that says none is ignored."""
     found = (phase_entry(cdr.stamp_of(data), *_status_entry(data)) for data in raw)
     parsed = [entry for entry in found if entry is not None]
     if len(parsed) < len(raw):
-        notes.append(f"{len(raw) - len(parsed)} messages of {topic} had no phase and were ignored")
+        notes.append(f"{len(raw) - len(parsed)} messages of {topic} said neither dwell nor rotating: ignored")
     if not parsed:
         return None
     ns, dwell, stop = zip(*parsed, strict=True)

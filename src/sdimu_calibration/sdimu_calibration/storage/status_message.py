@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from typing import Any
 
 from sdimu_calibration.core.recording import UNNUMBERED
+
+PHASES = ("dwell", "rotating")
+"""All that a table says of itself; any other word says nothing."""
+_STOP = re.compile(r"[0-9]{1,9}")
+"""Number of a stop: digits that every program reads alike, and no more than fit into an integer."""
 
 
 def stamp_ns(message: Any) -> int:
@@ -21,18 +27,19 @@ def first_entry(message: Any) -> tuple[str, dict[str, str]]:
     return first.message, {entry.key: entry.value for entry in first.values}
 
 
-def phase_word(text: str, values: Mapping[str, str]) -> str:
-    """Phase in the text and values of a status, empty when there is none."""
-    return (values.get("phase") or text).strip().lower()
+def phase_of(text: str, values: Mapping[str, str]) -> str | None:
+    """Phase in the text and values of a status; None where they say neither ``dwell`` nor ``rotating``."""
+    word = (values.get("phase") or text).strip().lower()
+    return word if word in PHASES else None
 
 
 def phase_entry(ns: int, text: str, values: Mapping[str, str]) -> tuple[int, bool, int] | None:
     """Stamp (ns), True for dwell, stop (`UNNUMBERED` without one); None without a phase.
 
-    A phase of any other name than ``dwell`` is no dwell.
+    A word that is no phase says nothing: what was said before holds on, until it is too old (`phases.STALE_S`).
     """
-    phase = phase_word(text, values)
-    if not phase:
+    phase = phase_of(text, values)
+    if phase is None:
         return None
     stop = values.get("stop", "").strip()
-    return ns, phase == "dwell", int(stop) if stop.isdecimal() else UNNUMBERED
+    return ns, phase == "dwell", int(stop) if _STOP.fullmatch(stop) else UNNUMBERED
