@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from sdimu_calibration.core.data.intake import Intake
 from sdimu_calibration.core.estimation.outcome import calibrate
 from sdimu_calibration.core.front_door import OpeningOptions
 from sdimu_calibration.core.live import NS, LiveCalibration
@@ -91,6 +92,54 @@ def test_another_test_in_the_same_folder_begins_anew(tmp_path, later_s):
     give(alone, other)
     np.testing.assert_array_equal(successor.finish().values, alone.finish().values)
     assert successor.finish().data == alone.finish().data
+
+
+def test_a_resumed_test_may_go_on_for_longer_than_another_test_would_be_away(tmp_path, unbroken, monkeypatch):
+    monkeypatch.setattr("sdimu_calibration.nodes.feed.AWAY_S", 5.0)
+    raw = messages()
+    give(feed_of(tmp_path / "j"), raw[:1500])
+    successor = feed_of(tmp_path / "j")
+    give(successor, raw[1500:])
+    np.testing.assert_array_equal(successor.finish().values, unbroken.values)
+    assert successor.finish().data == unbroken.data
+
+
+def test_a_successor_takes_a_long_journal_second_by_second(tmp_path, monkeypatch):
+    """Not all at once: what waits for the filter does not grow with the journal."""
+    give(feed_of(tmp_path / "j"), messages())
+    waiting = []
+    due = Intake.due
+
+    def watched(self, until_ns):
+        waiting.append(sum(len(ns) for ns, _, _ in self._queue))
+        return due(self, until_ns)
+
+    monkeypatch.setattr(Intake, "due", watched)
+    feed_of(tmp_path / "j")
+    assert len(waiting) >= COUNT // 100 - 2
+    assert max(waiting) < 300
+
+
+@pytest.mark.parametrize("again", [0, 60])
+def test_what_is_known_again_is_bounded_and_enough(tmp_path, unbroken, monkeypatch, again):
+    monkeypatch.setattr("sdimu_calibration.nodes.remembered._REMEMBERED", 200)
+    raw = messages()
+    give(feed_of(tmp_path / "j"), raw[:3000])
+    successor = feed_of(tmp_path / "j")
+    assert len(successor._before._known.ns) <= 2 * 220
+    give(successor, raw[3000 - again :] if again else raw[1000:])
+    np.testing.assert_array_equal(successor.finish().values, unbroken.values)
+    assert successor.finish().data == unbroken.data
+
+
+def test_another_test_after_a_long_one_is_known_by_its_beginning(tmp_path, monkeypatch):
+    monkeypatch.setattr("sdimu_calibration.nodes.remembered._REMEMBERED", 200)
+    give(feed_of(tmp_path / "j"), messages())
+    other = messages(seed=2)
+    successor, alone = feed_of(tmp_path / "j"), feed_of(tmp_path / "k")
+    for feed in (successor, alone):
+        give(feed, other)
+    np.testing.assert_array_equal(successor.finish().values, alone.finish().values)
 
 
 @pytest.mark.ros

@@ -42,3 +42,20 @@ def test_without_a_publisher_the_imu_decides_once_discovery_had_its_time() -> No
     assert until == NEVER
     now = 90.1 + GREETING_S
     assert status.allows(FIRST, at(9.0), published=False, now=now, born=90.0) == (at(9.0), False)
+
+
+def test_a_status_of_another_time_neither_opens_nor_shuts_the_gate() -> None:
+    status = Companion()
+    year = 365 * 86_400 * NS
+    status.take(FIRST + year, now=99.0)  # before the first sample nobody knows better
+    for second in (7.0, 8.0):
+        status.take(at(second), 100.0, at(second))
+        for stray in (0, FIRST - year, FIRST + year):
+            status.take(stray, 100.0, at(second))
+    assert status.allows(FIRST, at(9.0), published=True, now=100.1, born=90.0) == (at(8.0), True)
+
+
+def test_a_status_whose_clock_is_far_behind_is_not_waited_for() -> None:
+    status = Companion()
+    status.take(at(7.0), now=100.0)
+    assert status.allows(FIRST, at(67.1), published=True, now=100.0, born=90.0) == (at(67.1), False)

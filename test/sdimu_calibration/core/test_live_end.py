@@ -115,8 +115,15 @@ def warm_another_day(m):
     return replace(m, temperature=(at - 86_400 * NS, value), told=("temperature has no time in common",))
 
 
+def stray_status(m):
+    """One status with a stamp of zero, one of a year ahead."""
+    at, dwell, stop = m.status
+    status = (np.concatenate([[0], at, [START + 365 * 86_400 * NS]]), np.r_[True, dwell, True], np.r_[3, stop, 3])
+    return replace(m, status=status, told=("2 messages are of no time of the test",))
+
+
 CASES = (
-    foreign_units, negated_force, negated_rate, jitter, bursts, other_clock, no_numbers, no_status,
+    stray_status, foreign_units, negated_force, negated_rate, jitter, bursts, other_clock, no_numbers, no_status,
     spikes_and_a_stuck_axis, torn, warm_another_day,
 )  # fmt: skip
 

@@ -7,6 +7,7 @@ samples decide (`early_reading`), without a status the rests so far (`GrowingDwe
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,12 +15,13 @@ import numpy as np
 from sdimu_calibration.core.alignment.alignment import Alignment
 from sdimu_calibration.core.alignment.prepared import ALIGN_S, first_attitude, measurement_kinds, set_up
 from sdimu_calibration.core.arrays import Floats, Ints
-from sdimu_calibration.core.data.arrival import in_order
+from sdimu_calibration.core.data.arrival import RawTest, in_order
 from sdimu_calibration.core.data.dwell_detection import GrowingDwells, specification_is_wide
 from sdimu_calibration.core.data.early_reading import EarlyReading
 from sdimu_calibration.core.data.epochs import Epochs, cut
 from sdimu_calibration.core.data.gaps import bridges, largest_acceleration
 from sdimu_calibration.core.data.intake import Intake
+from sdimu_calibration.core.data.kept_test import KeptTest
 from sdimu_calibration.core.data.phases import Phases, PhaseState, classify
 from sdimu_calibration.core.effects import body_frame
 from sdimu_calibration.core.effects.motion import Motion
@@ -28,8 +30,8 @@ from sdimu_calibration.core.filter.filter_pass import NAV, PassInput, PassState,
 from sdimu_calibration.core.filter.passes import pass_settings, start_state
 from sdimu_calibration.core.front_door import OpenedTest, OpeningOptions, open_test
 from sdimu_calibration.core.navigation.strapdown import Cycles, Reducer
-from sdimu_calibration.core.navigation.track import motion
-from sdimu_calibration.core.recording import DataError, PhaseLog, seconds
+from sdimu_calibration.core.navigation.track import TEMPERATURE_WINDOW_S, motion
+from sdimu_calibration.core.recording import NOMINAL_FROM, DataError, PhaseLog, seconds
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.rotation import quaternion
 from sdimu_calibration.core.specification import EPOCH_S, Model
@@ -118,6 +120,8 @@ class LiveCalibration:
         self.notes: list[str] = []
         """What the caller should publish, such as what the filter waits for; the caller empties the list."""
         self._intake = Intake()
+        self._kept: KeptTest | None = KeptTest()
+        self._raw: Callable[[], RawTest] = self._kept.raw
         self._reading = EarlyReading(options.stated)
         self._dwells: GrowingDwells | None = None
         self._second = 0  # whole seconds after the origin that are done
@@ -138,6 +142,10 @@ class LiveCalibration:
         self._nis_count = np.zeros(4)
         self._stop_nis = np.zeros((2, 4))  # sum and degrees of freedom at the present stop
 
+    def kept_by(self, raw: Callable[[], RawTest]) -> None:
+        """Keep nothing here: the caller keeps everything that comes, on a disk, and gives it back by `raw`."""
+        self._kept, self._raw = None, raw
+
     def add_samples(self, ns: Ints, omega_ib_b: Floats, f_ib_b: Floats) -> None:
         """Take samples as the messages have them.
 
@@ -151,21 +159,36 @@ class LiveCalibration:
         omega_ib_b, f_ib_b : ndarray, shape (n, 3)
             Rates and specific forces, in the units of the messages.
         """
-        self._intake.add_samples(ns, omega_ib_b, f_ib_b)
+        if self._kept is not None:
+            self._kept.samples(ns, omega_ib_b, f_ib_b)
+        if not self._idle:
+            self._intake.add_samples(ns, omega_ib_b, f_ib_b)
 
     def add_phase(self, ns: int, dwell: bool, stop: int) -> None:
         """Take a status of the table that holds from a stamp (ns) on; stop `UNNUMBERED` where it names none."""
-        self._intake.add_status(ns, dwell, stop)
+        if self._kept is not None:
+            self._kept.status(ns, dwell, stop)
+        if not self._idle:
+            self._intake.add_status(ns, dwell, stop)
 
     def add_temperature(self, ns: int, value: float) -> None:
         """Take an IMU temperature (deg C) at a stamp (ns)."""
-        self._intake.add_temperature(ns, value)
+        if self._kept is not None:
+            self._kept.temperature(ns, value)
+        if not self._idle:
+            self._intake.add_temperature(ns, value)
 
     @property
     def next_ns(self) -> int | None:
-        """Stamp (ns) at which the next whole second ends; None while too few samples have come to know the origin."""
-        origin_ns = self._intake.origin_ns
-        return None if origin_ns is None else origin_ns + (self._second + 1) * NS
+        """Stamp (ns) at which the next whole second ends that has samples, as far as they have come.
+
+        None while none wait, too few have come to know the origin, or the filter on the way has given up.
+        """
+        origin_ns, first_ns = self._intake.origin_ns, self._intake.first_ns
+        if origin_ns is None or first_ns is None:
+            return None
+        # Empty seconds are passed over: a stamp of another year would be millions of them.
+        return origin_ns + (max(self._second, (first_ns - origin_ns - 1) // NS) + 1) * NS
 
     def advance(self, until_ns: int, status_known: bool = True, *, final: bool = False) -> list[EpochEstimate]:
         """Process the whole seconds that end at or before a stamp (ns).
@@ -181,10 +204,10 @@ class LiveCalibration:
             that the filter on the way cannot use (they start in motion) leave it empty, with a note; the end decides.
         """
         estimates: list[EpochEstimate] = []
-        while (end_ns := self.next_ns) is not None and end_ns <= until_ns:
-            self._second += 1
-            estimates += self._advance(end_ns, float(self._second), status_known, final=False)
         origin_ns = self._intake.origin_ns
+        while origin_ns is not None and (end_ns := self.next_ns) is not None and end_ns <= until_ns:
+            self._second = (end_ns - origin_ns) // NS
+            estimates += self._advance(end_ns, float(self._second), status_known, final=False)
         if final and origin_ns is not None:
             estimates += self._advance(until_ns, (until_ns - origin_ns) * 1e-9, status_known, final=True)
         return estimates
@@ -192,12 +215,14 @@ class LiveCalibration:
     def _advance(self, until_ns: int, until_s: float, status_known: bool, final: bool) -> list[EpochEstimate]:
         origin_ns = self._intake.origin_ns
         assert origin_ns is not None
-        ns, omega, force = self._intake.due(until_ns)
         if self._idle:
             return []
+        ns, omega, force = self._intake.due(until_ns)
         samples = self._reading.read(seconds(ns, origin_ns), omega, force, until_s, final)
         self.notes += self._reading.notes
         self._reading.notes = []
+        if self._reading.gave_up:
+            self._stop()
         if samples is None:
             return []
         if self._reducer is None:
@@ -212,8 +237,13 @@ class LiveCalibration:
         except DataError as error:
             # The same samples may do at the end, when clocks are compared and the whole test is seen.
             self.notes.append(f"the filter on the way stops: {error}; the end of the test is calibrated all the same")
-            self._idle, self._pending, self._waiting = True, [], []
+            self._stop()
             return []
+
+    def _stop(self) -> None:
+        """Leave the rest to the end."""
+        self._idle, self._pending, self._waiting = True, [], []
+        self._intake.clear()
 
     def _phases(self, samples: tuple[Floats, Floats, Floats], status_known: bool) -> tuple[PhaseLog | None, float]:
         """Phases of the table, or as the samples show them, and the time up to which they are decided (s)."""
@@ -243,7 +273,10 @@ class LiveCalibration:
         DataError
             When there is too little of it, or physics does not decide and the user has to.
         """
-        return open_test(in_order(self._intake.raw()), self.options)
+        raw = self._raw()
+        if len(raw.ns) <= NOMINAL_FROM:
+            raise DataError("/imu/data_raw: too few samples have come to calibrate")
+        return open_test(in_order(raw), self.options)
 
     def _close_epochs(self, limit: float, log: PhaseLog | None) -> None:
         """Cut the pending cycles into epochs that end by `limit` and decide their phases."""
@@ -272,6 +305,9 @@ class LiveCalibration:
             for cycles, epochs, phases in self._waiting
             for k in range(len(epochs))
         ]
+        if self._waiting:
+            # The last one asks for no more than this of what lies before it.
+            self._intake.forget(float(self._waiting[-1][1].start[-1]) - TEMPERATURE_WINDOW_S)
         self._waiting = []
         return estimates
 

@@ -2,8 +2,9 @@
 
 Parameters: site, imu, model (names or paths), add (effects beyond the model's: names, equations or files, as for
 `sdimu calibrate --add`), accel_unit, gyro_unit, accel_sign, gyro_sign (of the messages; recognised when empty or 0),
-imu_topic, status_topic, temperature_topic, out (folder for result.json), stay (do not leave at the end of the stream),
-checkpoint (keep a journal in the folder of results; on by default).
+imu_topic, status_topic, temperature_topic, out (folder for result.json), stay (do not leave at the end of the stream:
+what comes after it belongs to the same test until ~/reset, and the next end is answered again), checkpoint (a successor
+can go on with the journal in the folder of results; on by default).
 Subscriptions (remap them at will): /imu/data_raw, /rate_table/status, /imu/temperature. Publications once a second of
 data: /calibration/coefficients, /calibration/covariance, /calibration/navigation, /diagnostics. Services: ~/save
 writes result.json from everything that has come, ~/reset forgets it.
@@ -77,12 +78,11 @@ class CalibrationNode:
         self._out = Path(str(declare("out", ".").value))
         self._stay = bool(declare("stay", False).value)
         _warm_up(self._options, self._model)
-        self._journal: Journal | None = None
-        if bool(declare("checkpoint", True).value):
-            # The text of an effect file too: its name says little of what it computes.
-            texts = [path.read_text() for path in map(Path, added) if path.suffix in SUFFIXES]
-            options = digest(self._options, load_model(model), added, texts)
-            self._journal = Journal(self._out / JOURNAL, options)
+        # The text of an effect file too: its name says little of what it computes.
+        texts = [path.read_text() for path in map(Path, added) if path.suffix in SUFFIXES]
+        options = digest(self._options, load_model(model), added, texts)
+        checkpoint = bool(declare("checkpoint", True).value)
+        self._journal = Journal(self._out / JOURNAL, options, lasting=checkpoint)
         self._feed = Feed(self._make, self._journal)
         resumed = self._feed.resumed_ns
         self._ended: float | None = None
@@ -110,13 +110,15 @@ class CalibrationNode:
         self._stream.ready()
 
     def close(self) -> None:
-        """Leave the journal to a successor, unless the test is over; result.json is written whole anyway."""
-        if self._journal is not None:
+        """Leave the journal to a successor, unless the test is over: then there is nothing to go on with."""
+        if self._departed is None:
             self._journal.close()
+        else:
+            self._journal.remove()
 
     def _catch_up(self, resumed_ns: int) -> None:
         """Bring the filter to where its predecessor was; what that published is not published again."""
-        count = sum(1 for _ in self._feed.process(True, False))
+        count = self._feed.resumed_s + sum(1 for _ in self._feed.process(True, False))
         self._stream.reached(resumed_ns, 0)
         self.node.get_logger().info(f"goes on after {count} s from {self._out / JOURNAL}")
 
@@ -124,6 +126,8 @@ class CalibrationNode:
         return LiveCalibration(self._options, self._model)
 
     def _take_imu(self, message: bytes) -> None:
+        if self._stay and self._departed is not None:
+            self._ended = self._departed = None  # the test goes on
         self._feed.take_imu(message)
         if self._feed.waiting >= BLOCK:
             self._work()
@@ -131,7 +135,8 @@ class CalibrationNode:
     def _take_status(self, message: DiagnosticArray) -> None:
         entry = phase_entry(stamp_ns(message), *first_entry(message))
         if entry is None:
-            self.node.get_logger().warning(f"{self._topics.status}: a message without a phase is ignored", once=True)
+            text = f"{self._topics.status}: a message that says neither dwell nor rotating is ignored"
+            self.node.get_logger().warning(text, once=True)
             return
         self._feed.take_status(*entry)
 
@@ -186,8 +191,8 @@ class CalibrationNode:
     def _tick(self) -> None:
         self._work()
         if self._ended is not None and self._departed is None:
-            said_ns = self._feed.status.latest_ns
-            complete = said_ns is None or said_ns >= self._feed.imu_ns - _NEARLY_NS
+            status = self._feed.status
+            complete = status.heard is None or (status.latest_ns or 0) >= self._feed.imu_ns - _NEARLY_NS
             if complete or time.monotonic() - self._ended > SETTLE_S:
                 self._conclude()
         if self._departed is not None and not self._stay and not self.done.done():
@@ -196,20 +201,20 @@ class CalibrationNode:
                 self.done.set_result(None)
 
     def _take_end(self) -> None:
-        self._ended = time.monotonic()
+        self._ended, self._departed = time.monotonic(), None
 
     def _conclude(self) -> None:
         """Calibrate on the whole test, publish that as the last word, and write it."""
         for estimate in self._feed.process(False, False, final=True):
             self._publish(estimate)
         self._tell_notes()
-        self._departed = time.monotonic()
         try:
             result = self._write_result()
-            self._end_journal()
         except DataError as error:
-            self._end_journal()
-            if not self.done.done():
+            self._departed = time.monotonic()
+            if self._stay:
+                self.node.get_logger().error(str(error))
+            elif not self.done.done():
                 self.done.set_exception(error)
             return
         stamp = self._feed.imu_ns
@@ -222,12 +227,6 @@ class CalibrationNode:
         write_result(self._out / "result.json", result)
         return result
 
-    def _end_journal(self) -> None:
-        """End the journal: what is complete, or cannot become better, is nothing to go on with."""
-        if self._journal is not None:
-            self._journal.remove()
-            self._journal = None
-
     def _answer_save(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         try:
             self._write_result()
@@ -237,9 +236,9 @@ class CalibrationNode:
         return response
 
     def _answer_reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        if self._journal is not None:
-            self._journal.restart()
+        self._journal.restart()
         self._feed = Feed(self._make, self._journal)
+        self._stream.restart()
         self._ended = self._departed = None
         self._first, self._last = {}, ""
         response.success = True

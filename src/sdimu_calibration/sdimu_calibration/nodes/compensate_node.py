@@ -24,6 +24,7 @@ from std_srvs.srv import Trigger
 
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.compensation import Compensator, compensate, compensator, heat_since
+from sdimu_calibration.core.data.recent_log import RecentLog
 from sdimu_calibration.core.recording import NOMINAL_FROM, DataError, TemperatureLog
 from sdimu_calibration.nodes.convert import NS
 from sdimu_calibration.nodes.credits import Consumer, Producer, to_ns
@@ -38,7 +39,7 @@ from sdimu_calibration.storage.result_file import read_result
 
 RAW, COMPENSATED, TEMPERATURE = "/imu/data_raw", "/imu/data", "/imu/temperature"
 FAREWELL_S = 10.0
-_REMEMBERED_S = 300.0
+_REMEMBERED_NS = 300 * NS
 """Temperatures older than this no longer matter for value or rate."""
 
 
@@ -61,7 +62,7 @@ class CompensateNode:
         self._stamps: list[int] = []
         self._interval = 0.0
         self._held: list[bytes] = []
-        self._heat: list[tuple[float, float]] = []
+        self._heat = RecentLog(1)
         self._departed: float | None = None
         self._using, self._frame = self._load()
         ticker = Ticker(self.node)
@@ -114,10 +115,10 @@ class CompensateNode:
         value = float(message.temperature)
         if not math.isfinite(value):
             return
-        now = to_ns(message.header.stamp) / NS
-        self._heat.append((now, value))
-        while self._heat[0][0] < now - _REMEMBERED_S:
-            del self._heat[0]
+        now = to_ns(message.header.stamp)
+        self._heat.add(now, value)
+        if self._heat.ns[0] < now - 2 * _REMEMBERED_NS:
+            self._heat.keep(self._heat.ns > now - _REMEMBERED_NS)
 
     def _take(self, message: bytes) -> None:
         self._held.append(message)
@@ -155,11 +156,11 @@ class CompensateNode:
         assert self._start_ns is not None
         t: Floats = (stamps - self._start_ns).astype(np.float64) * 1e-9
         heat = None
-        if self._using.start_temperature is not None and not self._heat:
+        if self._using.start_temperature is not None and not len(self._heat.ns):
             text = f"no {TEMPERATURE} yet: taken to be as at the start of the calibration"
             self.node.get_logger().warning(text, once=True)
-        if self._heat:
-            log = TemperatureLog(*np.array(self._heat).T)
+        if len(self._heat.ns):
+            log = TemperatureLog(self._heat.ns / NS, self._heat.values[:, 0])
             middle = stamps / NS - 0.5 * self._interval
             heat = heat_since(log, middle, self._using.start_temperature, causal=True)
         try:
@@ -171,9 +172,8 @@ class CompensateNode:
             self._out.publish(message, stamp)
 
     def _take_end(self) -> None:
-        if self._departed is None:
-            self._departed = time.monotonic()
-            self._out.end(self._stream.reached_ns)
+        self._departed = time.monotonic()
+        self._out.end(self._stream.reached_ns)
 
     def _leave(self) -> None:
         if self._departed is None or self._stay or self.done.done():

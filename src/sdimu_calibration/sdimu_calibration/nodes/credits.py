@@ -205,7 +205,7 @@ class Consumer:
     busy : callable
         True while samples are waiting inside the consumer; credits are then not repeated.
     on_end : callable or None
-        Called once, when everything up to the end of the stream has been reached.
+        Called when everything up to the end of a stream has been reached, once for each end.
     """
 
     def __init__(
@@ -268,8 +268,16 @@ class Consumer:
         self._check_end()
         self._grant()
 
+    def restart(self) -> None:
+        """Forget how far the stream had come: what follows is another one."""
+        self._reached_ns = self._count = 0
+        self._end_ns, self.ended = None, False
+        self._grant()
+
     def _take_end(self, message: Header) -> None:
-        self._end_ns = to_ns(message.stamp)
+        end_ns = to_ns(message.stamp)
+        self.ended = self.ended and end_ns == self._end_ns
+        self._end_ns = end_ns
         self._changed = time.monotonic()
         self._check_end()
 

@@ -9,21 +9,17 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 
-import numpy as np
-
-from sdimu_calibration.core.arrays import Bools
 from sdimu_calibration.core.data.intake import NEVER
 from sdimu_calibration.core.live import NS, EpochEstimate, LiveCalibration
 from sdimu_calibration.core.recording import NOMINAL_FROM, DataError
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.nodes.gate import Companion
+from sdimu_calibration.nodes.remembered import Remembered
 from sdimu_calibration.storage.cdr import LayoutError, decode_imu
 from sdimu_calibration.storage.journal import Journal, Samples, Status
 
 AWAY_S = 600.0
 """Samples that come so long after those of the journal are of another test."""
-_STRANGERS = 10
-"""More samples than these of a time that the journal has otherwise mean another test, too."""
 
 
 class Feed:
@@ -37,43 +33,46 @@ class Feed:
     make : callable
         Makes a `LiveCalibration`.
     journal : Journal, optional
-        Where everything is written; what is in it already comes first.
+        Where everything is written, instead of memory; what is in it already comes first.
     """
 
     def __init__(self, make: Callable[[], LiveCalibration], journal: Journal | None = None) -> None:
         self._make = make
         self._journal = journal
-        self._known: Samples | None = None
+        self._before: Remembered | None = None
+        self._unsure = False
         self._since: list[tuple[Callable[..., None], tuple[object, ...]]] = []
         self.resumed_ns = 0
+        self.resumed_s = 0
+        """Newest stamp (ns) of the journal, and number of seconds that the filter has done with it."""
         self._raw: list[bytes] = []
-        self._statuses: set[tuple[int, bool, int]] = set()
         self._live = make()
         self._born = time.monotonic()
         self._first_ns: int | None = None
         self.imu_ns = NEVER
         self.status = Companion()
         self.temperature = Companion()
-        if journal is not None and journal.before:
-            self._resume(journal)
+        if journal is not None:
+            self._live.kept_by(journal.raw)
+            if any(journal.before):
+                self._resume(journal)
 
     def _resume(self, journal: Journal) -> None:
-        """Take what the journal holds."""
-        parts = [record for record in journal.before if isinstance(record, Samples)]
-        for record in journal.before:
+        """Take what the journal holds, second by second as its author did."""
+        before = Remembered()
+        for record in journal.records():
             if isinstance(record, Samples):
+                before.add(record)
                 self._keep(record)
+                until, known = self.status.reaches(self.imu_ns, bool(journal.before.statuses))
+                self.resumed_s += sum(1 for _ in self._advance(until, known))
             elif isinstance(record, Status):
                 self._note_status(record.ns, record.dwell, record.stop)
             else:
                 self._note_temperature(record.ns, record.value)
-        if parts:
-            ns, omega, force = (
-                np.concatenate([getattr(part, name) for part in parts]) for name in Samples.__dataclass_fields__
-            )
-            order = np.argsort(ns, kind="stable")
-            self._known = Samples(ns[order], omega[order], force[order])
-            self.resumed_ns = int(ns.max())
+        before.settle()
+        self._before, self._unsure = before, True
+        self.resumed_ns = before.newest_ns
 
     def _forget(self) -> None:
         """Begin anew: what comes is of another test than the journal; what came since counts."""
@@ -86,23 +85,14 @@ class Feed:
             action(*arguments)
 
     def _is_another_test(self, samples: Samples) -> bool:
-        """Whether samples after a resumption contradict the journal."""
-        if self._known is None:
+        """Whether the first samples after a resumption contradict the journal."""
+        if self._before is None or not self._unsure:
             return False
-        if int(samples.ns.min()) - self.resumed_ns > AWAY_S * NS:
+        if int(samples.ns.min()) - self.resumed_ns > AWAY_S * NS or self._before.contradicted(samples):
             return True
-        return int(np.sum((samples.ns <= self.resumed_ns) & ~self._repeats(samples))) > _STRANGERS
-
-    def _repeats(self, samples: Samples) -> Bools:
-        """Which samples the journal has, number for number."""
-        if self._known is None:
-            return np.zeros(len(samples.ns), dtype=bool)
-        at = np.minimum(np.searchsorted(self._known.ns, samples.ns), len(self._known.ns) - 1)
-        return np.asarray(
-            (self._known.ns[at] == samples.ns)
-            & (self._known.omega_ib_b[at] == samples.omega_ib_b).all(axis=1)
-            & (self._known.f_ib_b[at] == samples.f_ib_b).all(axis=1)
-        )
+        if int(samples.ns.max()) > self.resumed_ns:
+            self._unsure, self._since = False, []
+        return False
 
     def take_imu(self, message: bytes) -> None:
         """Keep a raw sensor_msgs/Imu until `decode`."""
@@ -134,8 +124,8 @@ class Feed:
             self._forget()
             return self.decode()
         self._raw = []
-        if self._known is not None:
-            new = ~self._repeats(samples)
+        if self._before is not None:
+            new = ~self._before.repeats(samples)
             samples = Samples(ns[new], omega[new], force[new])
             if not new.any():
                 return self.imu_ns
@@ -154,28 +144,25 @@ class Feed:
         """Take a status that holds from `stamp_ns` on."""
         if self._journal is not None:
             self._journal.status(stamp_ns, dwell, stop)
-            if self._known is not None:
+            if self._unsure:
                 self._since.append((self.take_status, (stamp_ns, dwell, stop)))
         self._note_status(stamp_ns, dwell, stop)
 
     def _note_status(self, stamp_ns: int, dwell: bool, stop: int) -> None:
-        if (stamp_ns, dwell, stop) in self._statuses:
-            return
-        self._statuses.add((stamp_ns, dwell, stop))
         self._live.add_phase(stamp_ns, dwell, stop)
-        self.status.take(stamp_ns, time.monotonic())
+        self.status.take(stamp_ns, time.monotonic(), self.imu_ns)
 
     def take_temperature(self, stamp_ns: int, value: float) -> None:
         """Take a temperature (deg C)."""
         if self._journal is not None:
             self._journal.temperature(stamp_ns, value)
-            if self._known is not None:
+            if self._unsure:
                 self._since.append((self.take_temperature, (stamp_ns, value)))
         self._note_temperature(stamp_ns, value)
 
     def _note_temperature(self, stamp_ns: int, value: float) -> None:
         self._live.add_temperature(stamp_ns, value)
-        self.temperature.take(stamp_ns, time.monotonic())
+        self.temperature.take(stamp_ns, time.monotonic(), self.imu_ns)
 
     def process(
         self, status_published: bool, temperature_published: bool, *, final: bool = False
@@ -189,10 +176,13 @@ class Feed:
         until = min(until, warm)
         if final:
             until, known = self.imu_ns, self.status.latest_ns is not None
-        while (step := self._live.next_ns) is not None and step <= until:
-            yield from self._live.advance(step, known)
+        yield from self._advance(until, known)
         if final:
             yield from self._live.advance(until, known, final=True)
+
+    def _advance(self, until_ns: int, known: bool) -> Iterator[EpochEstimate]:
+        while (step := self._live.next_ns) is not None and step <= until_ns:
+            yield from self._live.advance(step, known)
 
     def notes(self) -> list[str]:
         """Return the notes since the last call, such as what the filter waits for."""

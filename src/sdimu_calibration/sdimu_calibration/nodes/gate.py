@@ -5,8 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from sdimu_calibration.core.data.intake import NEVER
+from sdimu_calibration.core.data.strays import FAR_NS
 
 LAPSE_DATA_NS = 10_000_000_000
+OTHER_CLOCK_NS = 60_000_000_000
+"""Distance behind the samples (ns) from which a topic is on another clock: nothing can wait for it."""
 LAPSE_WALL_S = 1.0
 GREETING_S = 2.0
 
@@ -18,7 +21,7 @@ class Companion:
     Attributes
     ----------
     latest_ns : int or None
-        Stamp of its newest message.
+        Newest stamp of its messages, but for those of no time of the test.
     heard : float or None
         Wall time at which that came.
     """
@@ -26,10 +29,13 @@ class Companion:
     latest_ns: int | None = None
     heard: float | None = None
 
-    def take(self, ns: int, now: float) -> None:
-        """Note a message of stamp `ns` that came at wall time `now`."""
-        self.latest_ns = ns if self.latest_ns is None else max(ns, self.latest_ns)
+    def take(self, ns: int, now: float, imu_ns: int = NEVER) -> None:
+        """Note a message of stamp `ns` that came at wall time `now`, when `imu_ns` was the newest sample."""
         self.heard = now
+        if _stray(ns, imu_ns):
+            return
+        stuck = self.latest_ns is None or _stray(self.latest_ns, imu_ns)
+        self.latest_ns = ns if stuck else max(ns, self.latest_ns or NEVER)
 
     def allows(self, first_ns: int, imu_ns: int, published: bool, now: float, born: float) -> tuple[int, bool]:
         """Stamp up to which this topic lets the IMU be processed, and whether the topic is known up to there.
@@ -58,5 +64,19 @@ class Companion:
         if imu_ns <= self.latest_ns:
             return imu_ns, True
         heard = self.heard if self.heard is not None else now
-        lapsed = imu_ns - self.latest_ns > LAPSE_DATA_NS and now - heard > LAPSE_WALL_S
+        behind = imu_ns - self.latest_ns
+        if behind > OTHER_CLOCK_NS:
+            return imu_ns, False
+        lapsed = behind > LAPSE_DATA_NS and now - heard > LAPSE_WALL_S
         return (imu_ns, False) if lapsed or not published else (self.latest_ns, True)
+
+    def reaches(self, imu_ns: int, speaks: bool) -> tuple[int, bool]:
+        """Answer as `allows` does, for messages of the past: whether the topic has any is known."""
+        if not speaks or (self.latest_ns is not None and imu_ns - self.latest_ns > LAPSE_DATA_NS):
+            return imu_ns, False
+        return min(imu_ns, NEVER if self.latest_ns is None else self.latest_ns), True
+
+
+def _stray(ns: int, imu_ns: int) -> bool:
+    """Whether a stamp is of no time of the test; nobody knows before there are samples."""
+    return imu_ns != NEVER and abs(ns - imu_ns) > FAR_NS

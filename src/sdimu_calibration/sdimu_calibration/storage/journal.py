@@ -3,20 +3,28 @@
 One append-only file: a line of JSON (format, digest of the options), then records of a kind (one byte), a length
 (four bytes) and their content. A kill leaves at most the last record cut, which is cut off on reading. What one
 ``write`` has handed to the system survives the death of the process, so nothing needs to wait for the disk.
+
+The journal is also where the samples of a running test are: a day at 200 Hz is a gigabyte, which no memory need hold
+before the end asks for it (`Journal.raw`).
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
+import os
 import struct
+import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sdimu_calibration.core.arrays import Floats, Ints
+from sdimu_calibration.core.data.arrival import RawTest
+from sdimu_calibration.storage.journal_walk import Counts, raw_test, walk
 
 Stamps = Ints
 
@@ -26,6 +34,8 @@ _STATUS = struct.Struct("<qqq")
 _TEMPERATURE = struct.Struct("<qd")
 _COLUMNS = 7
 """Doubles a sample: the stamp's bits, three rates, three forces."""
+_READ = 1 << 20
+"""Bytes that are read at once."""
 
 
 @dataclass(frozen=True)
@@ -70,37 +80,65 @@ class Journal:
     path : Path
     options : str
         Digest of the options that the data are used with.
+    lasting : bool
+        False for a file beside `path` that has no name: it ends with the process, and nobody goes on with it.
+
+    Attributes
+    ----------
+    before : Counts
+        What it held when it was opened.
     """
 
-    def __init__(self, path: Path, options: str) -> None:
+    def __init__(self, path: Path, options: str, *, lasting: bool = True) -> None:
         self._path = path
+        self._lasting = lasting
         self._header = json.dumps({"format": FORMAT, "options": options}).encode() + b"\n"
         path.parent.mkdir(parents=True, exist_ok=True)
-        self.before = tuple(self._recall())
         # Unbuffered: a record is with the system when the call returns.
-        self._file = path.open("ab", buffering=0)
-        if not self._file.tell():
-            self._file.write(self._header)
+        self._file = (
+            path.open("a+b", buffering=0)
+            if lasting
+            else tempfile.TemporaryFile("a+b", buffering=0, dir=path.parent)  # noqa: SIM115 (open as long as the node)
+        )
+        self.before = Counts(0, 0, 0)
+        self._before_end = len(self._header)
+        self._recall()
 
-    def _recall(self) -> Iterator[Record]:
-        """Read what is there and cut off a torn end; a file of other options is emptied."""
-        content = self._path.read_bytes() if self._path.is_file() else b""
-        at = len(self._header)
-        if not content.startswith(self._header):
-            self._path.unlink(missing_ok=True)
+    def _recall(self) -> None:
+        """Count what is there and cut off a torn end; a file of other options is emptied."""
+        if os.pread(self._file.fileno(), len(self._header), 0) != self._header:
+            self.restart()
             return
-        while at + _HEAD.size <= len(content):
-            kind, length = _HEAD.unpack_from(content, at)
-            end = at + _HEAD.size + length
-            if end > len(content):
-                break
-            yield _decoded(kind, content[at + _HEAD.size : end])
-            at = end
-        with self._path.open("r+b") as file:
-            file.truncate(at)
+        self._before_end, self.before = walk(self._content(), len(self._header))
+        self._file.truncate(self._before_end)
+
+    def _content(self) -> NDArray[np.uint8]:
+        return np.asarray(np.memmap(self._file, np.uint8, "r"))
+
+    def records(self) -> Iterator[Record]:
+        """Give what the journal held when it was opened, record by record."""
+        at, size = len(self._header), _READ
+        while at < self._before_end:
+            block = os.pread(self._file.fileno(), min(size, self._before_end - at), at)
+            place = 0
+            while place + _HEAD.size <= len(block):
+                kind, length = _HEAD.unpack_from(block, place)
+                end = place + _HEAD.size + length
+                if end > len(block):
+                    break
+                yield _decoded(kind, block[place + _HEAD.size : end])
+                place = end
+            at += place
+            size = _READ if place else _HEAD.size + length
+
+    def raw(self) -> RawTest:
+        """Everything that is in it, in the order of arrival."""
+        return raw_test(self._content(), len(self._header))
 
     def _append(self, kind: bytes, content: bytes) -> None:
-        self._file.write(_HEAD.pack(kind, len(content)) + content)
+        record = _HEAD.pack(kind, len(content)) + content
+        if self._file.write(record) != len(record):
+            raise OSError(f"{self._path}: the disk is full; make room, or name another folder by 'out'")
 
     def samples(self, ns: Stamps, omega_ib_b: Floats, f_ib_b: Floats) -> None:
         """Keep samples."""
@@ -116,14 +154,16 @@ class Journal:
 
     def restart(self) -> None:
         """Forget everything."""
-        self._file.truncate(0)
+        self._file.seek(0)
+        self._file.truncate()
         self._file.write(self._header)
-        self.before = ()
+        self.before, self._before_end = Counts(0, 0, 0), len(self._header)
 
     def remove(self) -> None:
         """End it: the test is over."""
         self._file.close()
-        self._path.unlink(missing_ok=True)
+        if self._lasting:
+            self._path.unlink(missing_ok=True)
 
     def close(self) -> None:
         """Leave it for a successor."""

@@ -47,6 +47,18 @@ def test_play_follows_behind_a_sweep_by_its_half_width_and_stands_still_within_i
 def test_a_block_that_knows_its_past_gives_what_the_whole_gives(of):
     whole = any_motion(np.random.default_rng(4))
     n = 700
-    cut = {name: getattr(whole, name)[n:] for name in ("t", "dt", "w", "f", "C_nb", "w_table")}
-    past = np.vstack([whole.past, np.column_stack([whole.dt[:n], whole.f[:n]])])
-    np.testing.assert_array_equal(of(replace(whole, **cut, past=past)), of(whole)[n:])
+    first, second = (
+        {name: getattr(whole, name)[rows] for name in ("t", "dt", "w", "f", "C_nb", "w_table")}
+        for rows in (slice(None, n), slice(n, None))
+    )
+    before = replace(whole, **first)
+    np.testing.assert_array_equal(of(before), of(whole)[:n])
+    np.testing.assert_array_equal(of(replace(whole, **second, past=before.left)), of(whole)[n:])
+
+
+def test_what_is_left_to_the_next_block_does_not_grow():
+    m = replace(motion_of(np.ones(5000)), past=NO_PAST)
+    low_pass(m, 3.0)
+    play(m, 0.4)
+    assert {y.shape for y in m.left.values()} == {(3,)}
+    assert len(m.left) == 2

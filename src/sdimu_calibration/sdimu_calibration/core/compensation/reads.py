@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -56,8 +57,24 @@ def any_motion(rng: np.random.Generator) -> Motion:
         np.linspace(1.0, _SPAN_S, n), np.full(n, _SPAN_S / n), any_of(n, 3), 10.0 * any_of(n, 3), C_nb, any_of(n, 3),
         any_of(n, 3), rng.random(n) < 0.5, 10.0 * any_of(n), 0.01 * any_of(n), np.sign(any_of(n, 3)),
         np.sign(any_of(n, 3)), 100.0 * rng.random(n), 1e-5 * any_of(3), any_of(n, 3),
-        np.column_stack([rng.random(20), 10.0 * any_of(20, 3)]),
+        _AnyMemory(any_of(3)),
     )  # fmt: skip
+
+
+class _AnyMemory(Mapping[tuple[str, float], Floats]):
+    """The same for whatever an effect may ask for, y (3,) in g."""
+
+    def __init__(self, y: Floats) -> None:
+        self._y = y
+
+    def __getitem__(self, _: tuple[str, float]) -> Floats:
+        return self._y
+
+    def __iter__(self) -> Iterator[tuple[str, float]]:
+        return iter(())
+
+    def __len__(self) -> int:
+        return 0
 
 
 def samples_motion(t: Floats, dt: Floats, w: Floats, f: Floats, heat: Floats, heat_rate: Floats) -> Motion:

@@ -14,6 +14,8 @@ _GROWTH = 1.1
 """Factor on the time from attempt to attempt: all attempts together look at each sample eleven times at most."""
 _NOTE_S = 5.0
 """Wait (s) from which a note says so: a shorter one nobody notices."""
+_HELD = 2_000_000
+"""Number of samples that wait for the decision at most, 0.1 GB: 2.8 hours at 200 Hz."""
 _TICK_S = 1e-9
 """Resolution of stamps (s): they are integers of ns."""
 
@@ -37,6 +39,8 @@ class EarlyReading:
         self._noted = False
         self.notes: list[str] = []
         """What the caller should publish; the caller empties the list."""
+        self.gave_up = False
+        """Too many samples have waited: the end of the test decides."""
         self.reading: Reading | None = None
         if stated.accel and stated.gyro and stated.gyro_sign:
             self.reading = Reading(stated.accel * (stated.accel_sign or 1), stated.gyro * stated.gyro_sign, ())
@@ -65,6 +69,7 @@ class EarlyReading:
         if self.reading is None:
             self._held.append((t, omega, force))
             if not self._decide(until_s, final):
+                self._give_up_in_time(until_s)
                 return None
             t, omega, force = (np.concatenate(part) for part in zip(*self._held, strict=True))
             self._held = []
@@ -78,6 +83,15 @@ class EarlyReading:
                 return True
             self._attempt_s = max(self._attempt_s + _FIRST_S, float(np.floor(_GROWTH * self._attempt_s)))
         return final and self._attempt(until_s, final=True)
+
+    def _give_up_in_time(self, at_s: float) -> None:
+        """Let go of samples that have waited for too long: memory is for the test, not for the filter on the way."""
+        if sum(len(t) for t, _, _ in self._held) > _HELD:
+            self.gave_up, self._held = True, []
+            self.notes.append(
+                f"no turn in {at_s:.0f} s: the filter on the way gives up; the end of the test is calibrated all the "
+                "same (--gyro-unit and --gyro-sign start it at once)"
+            )
 
     def _attempt(self, at_s: float, final: bool) -> bool:
         """Try to recognise from the samples up to a time (s)."""

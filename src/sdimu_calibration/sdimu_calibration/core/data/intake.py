@@ -1,14 +1,13 @@
-"""What a running test has brought: in the order of arrival for its end, by the second for the filter on the way."""
+"""What a running test brings, handed to the filter on the way second by second; what it has used is forgotten."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from sdimu_calibration.core.arrays import Bools, Floats, Ints
-from sdimu_calibration.core.data.arrival import RawStatus, RawTemperature, RawTest
+from sdimu_calibration.core.data.recent_log import RecentLog
 from sdimu_calibration.core.recording import (
     NOMINAL_FROM,
-    DataError,
     PhaseLog,
     TemperatureLog,
     nominal_interval_ns,
@@ -18,6 +17,8 @@ from sdimu_calibration.core.recording import (
 
 NEVER = -(2**62)
 """Stamp before all others (ns): where nothing has come yet."""
+_WAITING = 100 * NOMINAL_FROM
+"""Number of samples that wait for the origin at most: of more, those whose stamps ascend are enough."""
 
 
 class Intake:
@@ -31,19 +32,19 @@ class Intake:
         Nominal sample interval (s).
     taken, late, rejected : int
         Samples handed to the filter; not later than the newest one; not handed over at all.
+    has_status : bool
+        Whether the table has said anything.
     """
 
     def __init__(self) -> None:
         self.origin_ns: int | None = None
         self.interval_s = 0.0
         self.taken = self.late = self.rejected = 0
-        self._arrived: list[tuple[Ints, Floats, Floats]] = []
+        self.has_status = False
         self._queue: list[tuple[Ints, Floats, Floats]] = []
         self._newest_ns = NEVER
-        self._status: list[tuple[int, bool, int]] = []
-        self._temperature: list[tuple[int, float]] = []
-        self._phase_log: PhaseLog | None = None
-        self._temperature_log: TemperatureLog | None = None
+        self._status = RecentLog(2)
+        self._temperature = RecentLog(1)
 
     def add_samples(self, ns: Ints, omega: Floats, force: Floats) -> None:
         """Take samples.
@@ -55,9 +56,9 @@ class Intake:
         omega, force : ndarray, shape (n, 3)
             In the units of the messages.
         """
-        block = (np.array(ns, dtype=np.int64), np.array(omega, dtype=float), np.array(force, dtype=float))
-        self._arrived.append(block)
-        self._queue.append(block)
+        if len(ns):
+            block = (np.array(ns, dtype=np.int64), np.array(omega, dtype=float), np.array(force, dtype=float))
+            self._queue.append(block)
         if self.origin_ns is None:
             self._learn_origin()
 
@@ -65,20 +66,33 @@ class Intake:
         if sum(len(ns) for ns, _, _ in self._queue) <= NOMINAL_FROM:
             return
         ns, omega, force = (np.concatenate(part) for part in zip(*self._queue, strict=True))
-        usable = ns[_finite(omega, force) & _later(ns, _finite(omega, force), NEVER)]
-        if len(usable) > NOMINAL_FROM:
-            self.origin_ns = origin_ns(usable)
-            self.interval_s = nominal_interval_ns(usable) * 1e-9
+        finite = _finite(omega, force)
+        usable = finite & _later(ns, finite, NEVER)
+        if usable.sum() > NOMINAL_FROM:
+            self.origin_ns = origin_ns(ns[usable])
+            self.interval_s = nominal_interval_ns(ns[usable]) * 1e-9
+        elif len(ns) > _WAITING:
+            self._count(finite, usable)
+            self._queue = [(ns[usable], omega[usable], force[usable])] if usable.any() else []
 
     def add_status(self, ns: int, dwell: bool, stop: int) -> None:
         """Take a status that holds from a stamp on (stop `UNNUMBERED` where it names none)."""
-        self._status.append((ns, dwell, stop))
-        self._phase_log = None
+        self.has_status = True
+        self._status.add(ns, dwell, stop)
 
     def add_temperature(self, ns: int, value: float) -> None:
         """Take a temperature (deg C)."""
-        self._temperature.append((ns, value))
-        self._temperature_log = None
+        if np.isfinite(value):
+            self._temperature.add(ns, value)
+
+    @property
+    def first_ns(self) -> int | None:
+        """Stamp (ns) of the earliest sample that waits."""
+        return min((int(block[0].min()) for block in self._queue), default=None)
+
+    def clear(self) -> None:
+        """Forget everything: nobody takes it."""
+        self._queue, self._status, self._temperature = [], RecentLog(2), RecentLog(1)
 
     def due(self, until_ns: int) -> tuple[Ints, Floats, Floats]:
         """Hand over the samples up to a stamp: finite, each later than the one before; the others are counted.
@@ -101,59 +115,51 @@ class Intake:
             return np.empty(0, dtype=np.int64), np.empty((0, 3)), np.empty((0, 3))
         ns, omega, force = (np.concatenate(part) for part in zip(*parts, strict=True))
         finite = _finite(omega, force)
-        new = _later(ns, finite, self._newest_ns)
-        keep = finite & new
+        keep = finite & _later(ns, finite, self._newest_ns)
         self.taken += int(keep.sum())
-        self.rejected += int(np.sum(~keep))
-        self.late += int(np.sum(finite & ~new))
+        self._count(finite, keep)
         if keep.any():
             self._newest_ns = int(ns[keep][-1])
         return ns[keep], omega[keep], force[keep]
 
-    @property
-    def has_status(self) -> bool:
-        """Whether the table has said anything."""
-        return bool(self._status)
+    def _count(self, finite: Bools, keep: Bools) -> None:
+        """Count samples that are not kept."""
+        self.rejected += int(np.sum(~keep))
+        self.late += int(np.sum(finite & ~keep))
 
     def phase_log(self) -> PhaseLog | None:
-        """Phases so far, by their stamps."""
-        if not self._status or self.origin_ns is None:
+        """Phases so far, by their stamps; of those that were forgotten, the changes."""
+        if not len(self._status.ns) or self.origin_ns is None:
             return None
-        if self._phase_log is None:
-            ns, dwell, stop = zip(*sorted(self._status, key=lambda entry: entry[0]), strict=True)
-            self._phase_log = PhaseLog(
-                seconds(np.array(ns, np.int64), self.origin_ns), np.array(dwell), np.array(stop, np.int64)
-            )
-        return self._phase_log
+        dwell, stop = self._status.values.T
+        return PhaseLog(seconds(self._status.ns, self.origin_ns), dwell != 0.0, stop.astype(np.int64))
 
     def temperature_log(self) -> TemperatureLog | None:
-        """Temperatures so far, by their stamps."""
-        if self._temperature_log is None and self.origin_ns is not None:
-            entries = dict(sorted((ns, value) for ns, value in self._temperature if np.isfinite(value)))
-            if entries:
-                t = seconds(np.array(list(entries), np.int64), self.origin_ns)
-                self._temperature_log = TemperatureLog(t, np.array(list(entries.values())))
-        return self._temperature_log
+        """Temperatures by their stamps: the first one, and those that were not forgotten."""
+        if not len(self._temperature.ns) or self.origin_ns is None:
+            return None
+        return TemperatureLog(seconds(self._temperature.ns, self.origin_ns), self._temperature.values[:, 0].copy())
 
-    def raw(self) -> RawTest:
-        """Everything that has come, as it came: what the front door takes at the end of the test.
+    def forget(self, before_s: float) -> None:
+        """Forget what nobody asks for once the filter is beyond a time (s).
 
-        Raises
-        ------
-        DataError
-            When there is too little of it.
+        Of the status the changes stay, which tell whether its stops have numbers; of the temperature the first value,
+        from which all others count. What holds at `before_s` stays.
         """
-        if sum(len(ns) for ns, _, _ in self._arrived) <= NOMINAL_FROM:
-            raise DataError("/imu/data_raw: too few samples have come to calibrate")
-        ns, omega, force = (np.concatenate(part) for part in zip(*self._arrived, strict=True))
-        status = temperature = None
-        if self._status:
-            at, dwell, stop = zip(*self._status, strict=True)
-            status = RawStatus(np.array(at, np.int64), np.array(dwell), np.array(stop, np.int64))
-        if self._temperature:
-            at, value = zip(*self._temperature, strict=True)
-            temperature = RawTemperature(np.array(at, np.int64), np.array(value))
-        return RawTest(ns, omega, force, status, temperature)
+        assert self.origin_ns is not None
+        before_ns = self.origin_ns + round(before_s * 1e9)
+        status, temperature = self._status, self._temperature
+        if len(status.ns):
+            changes = np.concatenate([[True], (status.values[1:] != status.values[:-1]).any(axis=1)])
+            status.keep(changes | _from(status.ns, before_ns))
+        if len(temperature.ns):
+            first = np.arange(len(temperature.ns)) == 0
+            temperature.keep(first | _from(temperature.ns, before_ns))
+
+
+def _from(ns: Ints, before_ns: int) -> Bools:
+    """Rows from the one on that holds at a stamp (ns)."""
+    return np.asarray(np.arange(len(ns)) >= np.searchsorted(ns, before_ns, side="right") - 1)
 
 
 def _finite(omega: Floats, force: Floats) -> Bools:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from types import MappingProxyType
 
 import numpy as np
 
@@ -14,8 +16,10 @@ _TURNING = np.radians(0.01)
 """Rate from which the table turns (rad/s): slower than any turn, faster than the bias of a gyro that is worth a rate
 table."""
 
-NO_PAST = np.zeros((0, 4))
-"""Cycles before the first one (s, m/s^2), none: the IMU had stood as it stands in the first cycle."""
+Memory = Mapping[tuple[str, float], Floats]
+"""What a suspension remembers, shape (3,) in g, by its kind and parameter (`effects.memory`)."""
+NO_PAST: Memory = MappingProxyType({})
+"""Nothing is remembered: the IMU had stood as it stands in the first cycle."""
 
 
 @dataclass(frozen=True)
@@ -48,8 +52,8 @@ class Motion:
         Magnetic field of the site in NED (T).
     wound : ndarray, shape (n, 3)
         Angle turned against the Earth about each body axis since the start, with its sign (rad).
-    past : ndarray, shape (m, 4)
-        Length (s) and specific force (m/s^2) of the cycles before the first one, where blocks follow each other.
+    past : Memory
+        What the block before this one has left, where blocks follow each other.
     """
 
     t: Floats
@@ -67,7 +71,12 @@ class Motion:
     since_turn: Floats
     magnetic_n: Floats
     wound: Floats
-    past: Floats
+    past: Memory
+
+    @cached_property
+    def left(self) -> dict[tuple[str, float], Floats]:
+        """What is remembered at the end of this block; `effects.memory` fills it in when an effect asks for it."""
+        return {}
 
     @cached_property
     def a(self) -> Floats:

@@ -23,7 +23,7 @@ _STANDING = np.radians(0.01)
 """Rate below which the table stands (rad/s): above the bias of a gyro that is worth a rate table."""
 _TURNING = np.radians(0.5)
 """Body rate that counts as a turn (rad/s), and change of the force per g that counts as leaning (1/s): above biases."""
-_TEMPERATURE_WINDOW_S = 60.0
+TEMPERATURE_WINDOW_S = 60.0
 """Time over which the temperature rate is a mean (s): a shorter one differentiates the resolution of the sensor."""
 
 
@@ -83,7 +83,7 @@ def temperatures(log: TemperatureLog | None, t: Floats, causal: bool) -> tuple[F
     """
     if log is None or not len(log.t):
         return np.zeros(len(t)), np.zeros(len(t))
-    half = 0.5 * _TEMPERATURE_WINDOW_S
+    half = 0.5 * TEMPERATURE_WINDOW_S
     if causal:
         index = np.maximum(np.searchsorted(log.t, t + 1e-9, side="right") - 1, 0)
         before = np.maximum(np.searchsorted(log.t, t - 2.0 * half, side="right") - 1, 0)
@@ -140,7 +140,7 @@ def motion(
     C0 = C_start.copy()
     rounds = _COMPENSATIONS if np.any(coefficients) else 0
     earlier = _AtStart.of(before)
-    past = NO_PAST if before is None else np.vstack([before.past, np.column_stack([before.dt, before.f])])
+    past = NO_PAST if before is None else before.left
     w_ie = earth.earth_rate(latitude)
     for done in range(rounds + 1):
         C = C0.copy()

@@ -1,0 +1,108 @@
+"""A calibration node that stays: what comes after the end of a stream, and a second stream after ~/reset."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from sensor_msgs.msg import Imu
+from std_msgs.msg import Header
+from std_srvs.srv import Trigger
+
+from sdimu_calibration.nodes.credits import HISTORY, LATCHED, STREAM, header
+from sdimu_calibration.storage.cdr import encode_imu, encode_status
+from sdimu_calibration.storage.result_file import read_result
+
+from .conftest import CALIBRATION, FitSession
+
+pytestmark = pytest.mark.ros
+
+START = 1_700_000_000 * 10**9
+RATE = 100
+
+
+class Driver:
+    """An IMU at rest that says where its stream ends, without waiting for credits."""
+
+    def __init__(self) -> None:
+        self.context = Context()
+        rclpy.init(context=self.context)
+        self.node = Node("driver", context=self.context)
+        self.executor = SingleThreadedExecutor(context=self.context)
+        self.executor.add_node(self.node)
+        self.imu = self.node.create_publisher(Imu, "/imu/data_raw", STREAM)
+        self.status = self.node.create_publisher(DiagnosticArray, "/rate_table/status", HISTORY)
+        self.end = self.node.create_publisher(Header, "/imu/data_raw/end", LATCHED)
+
+    def close(self) -> None:
+        self.executor.shutdown()
+        self.node.destroy_node()
+        self.context.try_shutdown()
+
+    def wait_for_listeners(self) -> None:
+        begun = time.monotonic()
+        while not all(p.get_subscription_count() for p in (self.imu, self.status, self.end)):
+            assert time.monotonic() - begun < 120.0
+            time.sleep(0.05)
+
+    def send(self, first_s: int, seconds: int, *, end: bool) -> None:
+        rng = np.random.default_rng(first_s)
+        count = seconds * RATE
+        ns = START + first_s * 10**9 + (1 + np.arange(count, dtype=np.int64)) * (10**9 // RATE)
+        omega = 4e-5 + 1e-6 * rng.standard_normal((count, 3))
+        messages = encode_imu(ns, omega, [0.0, 0.0, -9.8] + 1e-3 * rng.standard_normal((count, 3)))
+        said = START + (first_s + np.arange(seconds + 1, dtype=np.int64)) * 10**9
+        for message in encode_status(said, np.ones(len(said), bool), np.zeros(len(said), np.int64)):
+            self.status.publish(message)
+        for message in messages:
+            self.imu.publish(message)
+        if end:
+            self.end.publish(header(int(ns[-1])))
+
+    def call(self, service: str) -> Trigger.Response:
+        client = self.node.create_client(Trigger, f"/calibration/{service}")
+        assert client.wait_for_service(20.0)
+        future = client.call_async(Trigger.Request())
+        self.executor.spin_until_future_complete(future, 60.0)
+        return future.result()
+
+
+def samples_in(folder: Path) -> int:
+    return read_result(folder).data["samples"] if (folder / "result.json").is_file() else 0
+
+
+@pytest.mark.parametrize("checkpoint", [True, False])
+def test_a_node_that_stays_takes_what_comes_after_an_end_and_begins_anew_on_request(
+    bench: FitSession, checkpoint: bool
+) -> None:
+    bench.children.start(
+        "calibration", CALIBRATION,
+        {"out": str(bench.folder), "stay": True, "checkpoint": checkpoint, "accel_unit": "m/s^2", "gyro_unit": "rad/s",
+         "accel_sign": 1, "gyro_sign": 1},
+    )  # fmt: skip
+    driver = Driver()
+    try:
+        driver.wait_for_listeners()
+        journal = bench.folder / "calibration.journal"
+        for first, expected in ((0, 4000), (40, 8000)):
+            driver.send(first, 40, end=True)
+            bench.wait(lambda expected=expected: samples_in(bench.folder) == expected, f"result of {expected}", 120.0)
+            assert bench.children.running()
+            assert journal.exists() == checkpoint
+        assert driver.call("save").success
+        assert samples_in(bench.folder) == 8000
+        assert driver.call("reset").success
+        driver.send(0, 50, end=True)
+        bench.wait(lambda: samples_in(bench.folder) == 5000, "result after the reset", 120.0)
+        assert bench.children.running()
+    finally:
+        driver.close()
+    assert bench.children.stop("calibration", 2) == 0
+    assert not journal.exists()
