@@ -85,6 +85,6 @@ def workbench(
         bench.missing((), (), progress)
     logging.getLogger("werkzeug").setLevel(logging.ERROR)
     # The address is printed when the port listens: a browser that follows it at once is not refused.
-    server = make_server(host, port, build(shelf).server, threaded=True)
+    server = make_server(host, port, build(shelf, host).server, threaded=True)
     console.print(f"workbench of {bag.name} at http://{host}:{port} (Ctrl-C ends it)", soft_wrap=True)
     server.serve_forever()

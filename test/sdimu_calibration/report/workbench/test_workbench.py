@@ -64,6 +64,9 @@ class Page:
         self.callbacks = self.client.get("/_dash-dependencies").get_json()
 
     def post(self, output: str, changed: str, **values: Any) -> dict[str, Any]:
+        return self.post_all(output, changed, **values)["response"]
+
+    def post_all(self, output: str, changed: str, **values: Any) -> dict[str, Any]:
         known = {"state.data": self.state, **{k.replace("__", "-").replace("_at_", "."): v for k, v in values.items()}}
         (callback,) = [c for c in self.callbacks if output in c["output"] and c["clientside_function"] is None]
         parts = [o.rsplit(".", 1) for o in callback["output"].strip(".").split("...")]
@@ -78,7 +81,7 @@ class Page:
         }  # fmt: skip
         done = self.client.post("/_dash-update-component", data=json.dumps(body), content_type="application/json")
         assert done.status_code == 200
-        return done.get_json()["response"]
+        return done.get_json()
 
     def click(self, changed: str, **values: Any) -> None:
         answer = self.post("state.data", changed, **values)

@@ -18,6 +18,7 @@ from sdimu_calibration.report.drawing import PRINT
 from sdimu_calibration.report.workbench import figures, tables, view
 from sdimu_calibration.report.workbench.export import archive
 from sdimu_calibration.report.workbench.fit import FitSession
+from sdimu_calibration.report.workbench.guard import LOOPBACK, guard, tell_error
 from sdimu_calibration.report.workbench.own_effect import named, read_effect
 from sdimu_calibration.report.workbench.recording_cache import RecordingCache
 from sdimu_calibration.report.workbench.state import State, from_json
@@ -46,9 +47,13 @@ _NOTHING = {
 _ARROW = "\N{BLACK RIGHT-POINTING TRIANGLE} "
 
 
-def build(shelf: RecordingCache) -> Dash:
-    """Make the application of a shelf of recordings."""
-    app = Dash("sdimu workbench", title="sdimu workbench", update_title="", serve_locally=True, assets_ignore=".*")
+def build(shelf: RecordingCache, host: str = LOOPBACK[0]) -> Dash:
+    """Make the application of a shelf of recordings, to be served at an address of this machine."""
+    app = Dash(
+        "sdimu workbench", title="sdimu workbench", update_title="", serve_locally=True, assets_ignore=".*",
+        on_error=tell_error,
+    )  # fmt: skip
+    guard(app.server, host)
     app.index_string = _PAGE.replace("STYLE", view.STYLE).replace("PRINT", PRINT)
     app.layout = lambda: view.layout("Workbench", shelf.names)
     doing = TaskProgress()
@@ -157,8 +162,8 @@ def _pack_exports(app: Dash, shelf: RecordingCache, doing: TaskProgress) -> None
     )  # fmt: skip
     def export(_clicks: Any, kept: Any, page: Any) -> tuple[Any, str]:
         now, tell = from_json(kept), doing.teller(str(page))
-        bench = shelf.bench(now.recording)
         try:
+            bench = shelf.bench(now.recording)
             final = bench.final(now.added, now.held, tell)
             tell("report", 0.8)
             packed = archive(bench.model, now.added, final, f"Workbench: {now.recording or shelf.names[0]}")
@@ -206,7 +211,7 @@ def _shown(bench: FitSession, now: State, recording: str, scale: float, tell: An
     """Everything that a state shows but the candidates, which come later."""
     rungs = [bench.fit(now.added[:k], now.held, tell) for k in range(len(now.added) + 1)]
     here, given = rungs[-1], rungs[0]
-    cell = now.cell or _worst(here.grid)
+    cell = now.cell if now.cell and _is_in(here.grid, *now.cell) else _worst(here.grid)
     names = ["model as given", *(f"+ {named(text)}" for text in now.added)]
     keys = [(now.added[:k], now.held) for k in range(len(now.added) + 1)]
     keys = [*now.seen, *(key for key in keys if key not in now.seen)]
@@ -234,6 +239,10 @@ _SENSORS = 6
 def _worst(grid: data.Grid) -> tuple[int, int]:
     row, column = np.unravel_index(np.nanargmax(np.abs(grid.value[_SENSORS:])), grid.value[_SENSORS:].shape)
     return int(row) + _SENSORS, int(grid.stops[column])
+
+
+def _is_in(grid: data.Grid, channel: int, stop: int) -> bool:
+    return 0 <= channel < len(grid.value) and stop in grid.stops
 
 
 def _line(error: Exception) -> str:

@@ -110,8 +110,9 @@ class FitSession:
         Raises
         ------
         DataError
-            When an effect cannot be read, or nothing is left to fit.
+            When an effect cannot be read, a stop is none of the recording, or nothing is left to fit.
         """
+        self._check(held)
         with self._lock:
             key = (added, held)
             if key not in self._fits:
@@ -120,6 +121,7 @@ class FitSession:
 
     def missing(self, added: tuple[str, ...], held: tuple[int, ...], tell: Tell = silent) -> Missing:
         """Score all candidates against a fit, without adding any."""
+        self._check(held)
         with self._lock:
             key = (added, held)
             if key not in self._missing:
@@ -135,10 +137,16 @@ class FitSession:
 
     def final(self, added: tuple[str, ...], held: tuple[int, ...], tell: Tell = silent) -> Diagnosis:
         """Fit once more from nothing, as `sdimu calibrate` does, so that it gives the same numbers."""
+        self._check(held)
         with self._lock:
             fit = solve(self.test.without_stops(held), self._extended(added), progress=tell)
             tell("candidates", 0.6)
             return survey(fit, outcome(fit))
+
+    def _check(self, held: tuple[int, ...]) -> None:
+        unknown = sorted(set(held) - set(self.stops)) if held else []
+        if unknown:
+            raise DataError(f"stop {unknown[0]} has no measurements in this recording")
 
     def _extended(self, added: tuple[str, ...]) -> Model:
         return with_effects(self.model, added_effects(self.model, added, self.test.imu))

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from sdimu_calibration.core.diagnosis.candidates import without
+from sdimu_calibration.core.effect_key import parse_key
 from sdimu_calibration.core.effects import imu_model
 from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.recording import DataError
@@ -39,9 +40,11 @@ def read_effect(text: str) -> tuple[Effect, ...]:
     Raises
     ------
     DataError
-        One line without the name of the temporary file.
+        One line without the name of the temporary file. A page names no files: those of the server are not its own.
     """
     if "\n" not in text.strip():
+        if parse_key(text.strip()).file:
+            raise DataError("an effect file is given by its text: use the button for files, or paste it")
         return find_effects(text.strip())
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "effect.yaml"

@@ -87,7 +87,7 @@ def from_json(kept: Any) -> State:
             _steps(kept.get("seen", ())),
             str(kept.get("recording", "")),
         )
-    except (AttributeError, TypeError, ValueError, IndexError):
+    except (AttributeError, TypeError, ValueError, IndexError, KeyError, OverflowError):
         return State()
 
 

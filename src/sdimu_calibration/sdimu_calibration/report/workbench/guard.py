@@ -1,0 +1,78 @@
+"""What the workbench answers: its own page on this machine, in requests of a page's size, and never with silence.
+
+A page of another site can reach a server on the loopback interface by a name that it lets point there (DNS rebinding).
+Its requests carry that name as Host: only names of this machine are answered.
+"""
+
+from __future__ import annotations
+
+import socket
+from urllib.parse import urlsplit
+
+import dash
+from flask import Flask, Response, abort, request
+from werkzeug.exceptions import HTTPException
+
+from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.units import UnitError
+
+LOOPBACK = ("127.0.0.1", "localhost", "::1")
+LARGEST = 1_000_000
+"""Largest body of a request (bytes): a hundred effects of one's own, each with all that was tried before it."""
+
+
+def guard(server: Flask, host: str) -> None:
+    """Answer only what is asked of this machine, by name, and what can be understood.
+
+    Parameters
+    ----------
+    server : Flask
+    host : str
+        Address that is listened on; another one than loopback is answered too, with the names of this machine.
+    """
+    names = {*LOOPBACK, *(() if host in LOOPBACK else _own_names(host))}
+    server.config["MAX_CONTENT_LENGTH"] = server.config["MAX_FORM_MEMORY_SIZE"] = LARGEST
+
+    @server.before_request
+    def refuse_strangers() -> None:
+        origin = request.headers.get("Origin")
+        asked = [f"//{request.headers.get('Host', '')}", *([origin] if origin else [])]
+        if not all(_name(address) in names for address in asked):
+            abort(403, "The workbench answers this machine only.")
+
+    @server.errorhandler(Exception)
+    def say(error: Exception) -> HTTPException | Response:
+        if isinstance(error, HTTPException):
+            return error
+        server.logger.error("a request could not be understood (%s)", type(error).__name__)
+        return Response("The request could not be understood.", 400, mimetype="text/plain")
+
+
+def tell_error(error: Exception) -> None:
+    """Say in the page what a callback could not do; the page stays as it is."""
+    why = " ".join(str(error).split())[:_LONGEST]
+    if not isinstance(error, (DataError, UnitError)):
+        dash.get_app().server.logger.error("a click could not be answered (%s: %s)", type(error).__name__, why)
+        why = "the page asked for something that there is not; reload it"
+    dash.set_props("message", {"children": f"Not done: {why}"})
+
+
+_LONGEST = 500
+"""Length of a message (characters): more is no message that anyone reads."""
+
+
+def _name(address: str) -> str | None:
+    """Host in an address, in small letters; None where there is none."""
+    try:
+        return urlsplit(address).hostname
+    except ValueError:
+        return None
+
+
+def _own_names(host: str) -> list[str]:
+    name = socket.gethostname().lower()
+    try:
+        addresses = socket.gethostbyname_ex(name)[2]
+    except OSError:
+        addresses = []
+    return [host, name, *addresses]
