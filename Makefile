@@ -1,8 +1,13 @@
-# make setup | demo | test | check | colcon | wheels | bench | study | docs | pictures | grades | campaigns : each does its own set-up and needs nothing before it.
+# make setup | demo | test | check | colcon | wheels | bench | study | docs | pictures | grades | campaigns | lock : each does its own set-up and needs nothing before it.
 PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
+PIP    := $(BIN)/python -m pip install -qq --disable-pip-version-check --no-deps
+SETUPS := $(wildcard src/*/setup.py)
+# What runs, and what tests, builds and campaigns need beside it; every file by its hash.
+RUN    := $(VENV)/.run
 STAMP  := $(VENV)/.installed
+TOOLS  := campaigns test build
 OUT    ?= out/demo
 PACKAGES := rate_table_sim sdimu_calibration sdimu_sim
 NUMBER   := $(words $(PACKAGES))
@@ -15,15 +20,18 @@ export OPENBLAS_NUM_THREADS ?= 1
 
 setup: $(STAMP)
 
-$(STAMP): requirements.lock src/sdimu_calibration/setup.py src/sdimu_sim/setup.py src/rate_table_sim/setup.py
+$(RUN): requirements/run.lock $(SETUPS)
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install -qq --disable-pip-version-check --no-deps -r requirements.lock
-	$(BIN)/python -m pip install -qq --disable-pip-version-check --no-deps --no-build-isolation --use-pep517 \
-	    -e src/sdimu_calibration -e src/rate_table_sim -e src/sdimu_sim
+	$(PIP) --require-hashes -r requirements/run.lock
+	$(PIP) --no-build-isolation --use-pep517 $(foreach package,$(PACKAGES),-e src/$(package))
+	touch $@
+
+$(STAMP): $(RUN) $(TOOLS:%=requirements/%.lock)
+	$(PIP) --require-hashes $(TOOLS:%=-r requirements/%.lock)
 	touch $@
 
 # A whole simulated test over DDS, from the table to report.html.
-demo: setup
+demo: $(RUN)
 	$(BIN)/sdimu run --out $(OUT)
 
 # Style, types and the direction of imports.
@@ -46,7 +54,7 @@ colcon: setup
 	    --pytest-args -q -m "not slow and not bench and not ros"
 
 # For a machine without a clone: pip install out/wheels/*.whl brings `sdimu`, its config files and what it needs to run.
-wheels: setup
+wheels: $(RUN)
 	work=$$(mktemp -d) && trap 'rm -rf "$$work"' EXIT && cp -r LICENSE config src "$$work" && rm -rf "$$work"/src/*/build && \
 	$(BIN)/python -m pip wheel -qq --disable-pip-version-check --no-deps --no-build-isolation -w out/wheels \
 	    $(foreach package,$(PACKAGES),"$$work/src/$(package)")
@@ -81,4 +89,8 @@ campaigns: setup
 	$(BIN)/sdimu monte-carlo -n 200 --out out/monte-carlo
 	$(BIN)/sdimu hidden-campaign -n 200 --out out/hidden-campaign
 
-.PHONY: setup demo check test colcon wheels bench study docs faults grades pictures campaigns
+# The lock files anew, from what is installed: after `.venv/bin/pip install` of something newer.
+lock: setup
+	$(BIN)/python requirements/lock.py
+
+.PHONY: setup demo check test colcon wheels bench study docs faults grades pictures campaigns lock

@@ -28,21 +28,25 @@ RUN_TIME = [
     "typer",
     "zstandard",
 ]
-DEVELOPMENT = [
-    "colcon-common-extensions",
-    "hypothesis",
-    "import-linter",
-    "mcap-ros2-support",
-    "mypy",
-    "numpydoc",
-    "playwright",
-    "pytest",
-    "pytest-timeout",
-    "pytest-xdist",
-    "ruff",
-    "setuptools",
-    "types-PyYAML",
-]
+EXTRAS = {
+    "test": [
+        "hypothesis",
+        "import-linter",
+        "mcap-ros2-support",
+        "mypy",
+        "numpydoc",
+        "packaging",
+        "pandas",
+        "playwright",
+        "psutil",
+        "pytest",
+        "pytest-timeout",
+        "pytest-xdist",
+        "ruff",
+        "types-PyYAML",
+    ],
+    "build": ["colcon-common-extensions"],
+}
 
 
 class BuildWithConfig(build_py):
@@ -81,7 +85,7 @@ setup(
     package_data={NAME: ["py.typed"]},
     cmdclass={"build_py": BuildWithConfig},
     install_requires=RUN_TIME,
-    extras_require={"dev": DEVELOPMENT},
+    extras_require=EXTRAS,
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),

@@ -19,8 +19,6 @@ setup(
     package_data={NAME: ["py.typed"]},
     install_requires=[
         "PyYAML",
-        "dask",
-        "distributed",
         "numpy>=2.0",
         "pydantic>=2",
         "rich",
@@ -29,6 +27,7 @@ setup(
         f"rate_table_sim=={VERSION}",
         f"sdimu_calibration=={VERSION}",
     ],
+    extras_require={"campaigns": ["dask", "distributed"]},
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),

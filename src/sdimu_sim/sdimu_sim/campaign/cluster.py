@@ -7,10 +7,13 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
-import dask
-from distributed import Client, LocalCluster, as_completed
-
 from sdimu_calibration.core.recording import DataError
+
+try:
+    import dask
+    from distributed import Client, LocalCluster, as_completed
+except ModuleNotFoundError as error:
+    raise DataError(f"many runs at once need {error.name}: pip install dask distributed") from error
 
 _ENVIRONMENT = {
     # One thread a worker: two libraries that each start a thread a core only wait for each other.

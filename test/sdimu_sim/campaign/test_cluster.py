@@ -1,0 +1,18 @@
+"""Campaigns without dask say what to install."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+
+import pytest
+
+from sdimu_calibration.core.recording import DataError
+
+
+@pytest.mark.parametrize("lacking", ["dask", "distributed"])
+def test_whoever_lacks_the_extra_is_told_so_in_one_line(monkeypatch, lacking):
+    monkeypatch.delitem(sys.modules, "sdimu_sim.campaign.cluster", raising=False)
+    monkeypatch.setitem(sys.modules, lacking, None)
+    with pytest.raises(DataError, match=f"need {lacking}: pip install dask distributed"):
+        importlib.import_module("sdimu_sim.campaign.cluster")

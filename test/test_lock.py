@@ -1,0 +1,51 @@
+"""The lock files: every file by its hash, every package once, all that setup.py asks for."""
+
+from __future__ import annotations
+
+import re
+from importlib.metadata import requires
+from pathlib import Path
+
+import pytest
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
+
+ROOT = Path(__file__).resolve().parents[1]
+FILES = ("run", "campaigns", "test", "build")
+EXTRAS = {"run": "", "campaigns": "campaigns", "test": "test", "build": "build"}
+OWN = ("sdimu-calibration", "rate-table-sim", "sdimu-sim")
+
+ENTRY = re.compile(r'[a-z0-9-]+==[\w.+!]+( ; python_version != "3\.\d+")?( +--hash=sha256:[0-9a-f]{64})+')
+
+
+def entries(name: str) -> list[str]:
+    """Each requirement with its hashes, in one line."""
+    text = (ROOT / "requirements" / f"{name}.lock").read_text(encoding="utf-8").replace("\\\n", " ")
+    return [line for line in text.splitlines() if line and not line.startswith("#")]
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_every_package_is_pinned_with_hashes(name):
+    for entry in entries(name):
+        assert ENTRY.fullmatch(entry)
+
+
+def test_no_package_is_in_two_files():
+    names = [entry.partition("==")[0] for name in FILES for entry in entries(name)]
+    assert len(names) == len(set(names))
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_what_setup_asks_for_is_in_its_file_or_in_what_always_runs(name):
+    there = {entry.partition("==")[0] for file in ("run", "campaigns", name) for entry in entries(file)}
+    for package in OWN:
+        for text in requires(package) or []:
+            one = Requirement(text)
+            extra = one.marker is not None and one.marker.evaluate({"extra": EXTRAS[name]})
+            if (one.marker is None) if name == "run" else extra:
+                assert canonicalize_name(one.name) in {*there, *OWN}, one
+
+
+def test_what_runs_brings_no_tools_of_tests_builds_or_campaigns():
+    running = {entry.partition("==")[0] for entry in entries("run")}
+    assert not running & {"dask", "distributed", "mypy", "ruff", "hypothesis", "playwright", "colcon-core", "pandas"}
