@@ -75,7 +75,13 @@ class Motion:
 
     @cached_property
     def left(self) -> dict[tuple[str, float], Floats]:
-        """What is remembered at the end of this block; `effects.memory` fills it in when an effect asks for it."""
+        """What is remembered at the end of this block; `effects.memory` fills it in when an effect asks for it.
+
+        Returns
+        -------
+        dict of ndarray, shape (3,)
+            As in `past` (g).
+        """
         return {}
 
     @cached_property
