@@ -61,7 +61,7 @@ def recover(bag: Bag) -> None:
     """Mend a bag that was cut while it was being written; the cut file stays as NAME.damaged."""
     from rich.console import Console
 
-    from sdimu_calibration.storage.recover import DAMAGED_SUFFIX
+    from sdimu_calibration.storage.bag_folder import DAMAGED_SUFFIX
     from sdimu_calibration.storage.recover import recover as mend
 
     console = Console()

@@ -72,6 +72,7 @@ def calibrate(
     from sdimu_calibration.report.table import rich_table, rows
     from sdimu_calibration.storage.reference_file import read_truth
     from sdimu_calibration.storage.result_file import write_result
+    from sdimu_calibration.storage.whole_file import written_together
 
     console = Console()
     origin = source(
@@ -93,8 +94,9 @@ def calibrate(
     taken = STANDARD_GRAVITY if test.site is None else None
     true = None if truth is None else read_truth(truth, result.body_frame, taken)
     folder = out or default_folder(bag)
-    write_result(folder / "result.json", result)
-    write_report(folder / "report.html", result, title=f"Calibration of {bag.name}", truth=true)
+    with written_together(folder) as part:
+        write_result(part / "result.json", result)
+        write_report(part / "report.html", result, title=f"Calibration of {bag.name}", truth=true)
     console.print(rich_table(rows(result, true), f"body frame: {result.body_frame}"), soft_wrap=True)
     tell(console, (*notes, *(note for note in result.notes if note not in notes)))
     console.print(f"results in {folder}", soft_wrap=True)

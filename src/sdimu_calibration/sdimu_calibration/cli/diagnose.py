@@ -123,9 +123,11 @@ def _write(folder: Path, title: str, summary: DiagnosisSummary, null: Null | Non
     from sdimu_calibration.report.report_extras import report_extras
     from sdimu_calibration.storage.diagnosis_file import write_diagnosis
     from sdimu_calibration.storage.result_file import write_result
+    from sdimu_calibration.storage.whole_file import written_together
 
     found = summary.diagnosis
-    write_diagnosis(folder / "diagnosis.json", summary, null)
-    write_result(folder / "result.json", found.after, found.verdict)
-    progress("navigation without aid", 0.5)
-    write_report(folder / "report.html", found.after, title=title, summary=summary, more=report_extras(found))
+    with written_together(folder) as part:
+        write_diagnosis(part / "diagnosis.json", summary, null)
+        write_result(part / "result.json", found.after, found.verdict)
+        progress("navigation without aid", 0.5)
+        write_report(part / "report.html", found.after, title=title, summary=summary, more=report_extras(found))

@@ -26,6 +26,7 @@ def noise(
     from sdimu_calibration.storage.config import find_config
     from sdimu_calibration.storage.imu_file import write_measured_imu
     from sdimu_calibration.storage.opening import open_recording
+    from sdimu_calibration.storage.whole_file import written_together
 
     find_config("imu", imu)  # errors in it are reported before the work
     recording = open_recording(bag)
@@ -50,8 +51,9 @@ def noise(
         *recording.notes,
     ]
     folder = out or default_folder(bag, "noise")
-    write_page(folder / "noise.html", deviations, terms, f"Noise of {bag.name}", words)
-    write_measured_imu(folder / "imu.yaml", imu, measured, terms, [f"Noise measured in {bag.name}: {words[0]}"])
+    with written_together(folder) as part:
+        write_page(part / "noise.html", deviations, terms, f"Noise of {bag.name}", words)
+        write_measured_imu(part / "imu.yaml", imu, measured, terms, [f"Noise measured in {bag.name}: {words[0]}"])
     console.print(table(terms))
     for word in words:
         console.print(f"note: {word}", soft_wrap=True, markup=False, highlight=False)

@@ -39,6 +39,7 @@ def predict(
     from sdimu_calibration.storage.config import load_imu, load_model, load_plan, load_site
     from sdimu_calibration.storage.noise_file import load_noise
     from sdimu_calibration.storage.prediction_file import write_prediction
+    from sdimu_calibration.storage.whole_file import written_together
 
     console = Console()
     what = load_plan(plan), load_site(site), load_imu(imu), load_model(model)
@@ -56,8 +57,9 @@ def predict(
     console.print(coefficient_table(prediction))
     for found in prediction.unobservable:
         console.print(f"not observable: {found.text}", soft_wrap=True, markup=False, highlight=False)
-    write_prediction(out / "prediction.json", prediction, about)
-    write_page(out / "prediction.html", prediction, about, published)
+    with written_together(out) as part:
+        write_prediction(part / "prediction.json", prediction, about)
+        write_page(part / "prediction.html", prediction, about, published)
     console.print(f"results in {out}", soft_wrap=True)
 
 

@@ -56,7 +56,7 @@ class RecorderNode:
         topics = [str(text) for text in self.node.declare_parameter("topics", list(TOPICS)).value]
         replace = bool(self.node.declare_parameter("replace", False).value)
         self._needed = [str(t) for t in self.node.declare_parameter("wait_for", [""]).value if t]
-        self._bag = McapBag(out, replace=replace)
+        self._bag = McapBag(out, replace=replace, live=True)
         self._born = self._latest = time.monotonic()
         self._ticker = Ticker(self.node)
         self._consumers = {name: Consumer(self.node, self._ticker, name) for name in STREAMS}

@@ -10,10 +10,10 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
-import yaml
 import zstandard
 
 from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.storage.bag_metadata import named_files, read_metadata
 from sdimu_calibration.storage.mcap_walk import MAGIC, DamagedError, McapWalk, Messages
 from sdimu_calibration.storage.raw_messages import Block, RawMessages
 
@@ -110,7 +110,7 @@ def read_topics(path: Path, takes: Takes) -> dict[str, TopicContent]:
 def _unpacked(path: Path) -> Iterator[tuple[list[Path], Unpack | None]]:
     """Yield files that the readers below can open, and how each message is packed in them; None when not at all."""
     parts = bag_parts(path)
-    information = _metadata(path) if path.is_dir() else {}
+    information = read_metadata(path) if path.is_dir() else {}
     mode = _mode(information)
     mcap = information.get("storage_identifier") == "mcap"
     if mode and information.get("compression_format") != _ZSTD:
@@ -178,7 +178,7 @@ def bag_parts(path: Path) -> list[Path]:
         if path.suffix not in _SUFFIXES:
             raise DataError(f"{path}: not a bag (expected a rosbag2 folder or a .mcap file)")
         return [path]
-    information = _metadata(path)
+    information = read_metadata(path)
     if _mode(information) or information.get("storage_identifier") == "sqlite3":
         return [path]
     named = _named(path, information)
@@ -192,12 +192,12 @@ def bag_parts(path: Path) -> list[Path]:
 
 def _mode(information: Mapping[str, Any]) -> str:
     """How a bag is packed: ``file``, ``message``, or nothing; "none" and "" mean the same."""
-    mode = str(information.get("compression_mode") or "").lower()
-    return mode if mode in {"file", "message"} else ""
+    mode = information.get("compression_mode")
+    return mode.lower() if isinstance(mode, str) and mode.lower() in {"file", "message"} else ""
 
 
 def _named(folder: Path, information: Mapping[str, Any]) -> list[Path]:
-    return [folder / Path(str(name)).name for name in information.get("relative_file_paths", [])]
+    return [folder / name for name in named_files(information)]
 
 
 def _present(named: list[Path]) -> list[Path]:
@@ -205,21 +205,6 @@ def _present(named: list[Path]) -> list[Path]:
     if gone is not None:
         raise DataError(f"{gone}: file is missing though the bag's metadata.yaml names it")
     return named
-
-
-_LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
-"""Ten times as fast as the loader in Python where PyYAML has it; both read the same."""
-
-
-def _metadata(folder: Path) -> Mapping[str, Any]:
-    """Content of metadata.yaml, empty when there is none or it cannot be used."""
-    try:
-        text = (folder / "metadata.yaml").read_text(encoding="utf-8")
-        content = yaml.load(text, Loader=_LOADER)
-        information = content["rosbag2_bagfile_information"]
-    except (FileNotFoundError, UnicodeDecodeError, yaml.YAMLError, TypeError, KeyError):
-        return {}
-    return information if isinstance(information, dict) else {}
 
 
 def _read_mcap(part: Path, bag: Path, takes: Takes, unpack: Unpack | None, content: dict[str, TopicContent]) -> None:

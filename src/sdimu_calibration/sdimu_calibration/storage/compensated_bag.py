@@ -12,6 +12,7 @@ from sdimu_calibration.core.compensation import Compensator, compensate, heat_si
 from sdimu_calibration.core.recording import Recording
 from sdimu_calibration.storage import cdr
 from sdimu_calibration.storage.bag_file import read_topics
+from sdimu_calibration.storage.bag_folder import check_apart, check_room
 from sdimu_calibration.storage.compensated_imu import encode_compensated
 from sdimu_calibration.storage.mcap_bag import McapBag
 
@@ -59,8 +60,10 @@ def write_compensated(
     Raises
     ------
     DataError
-        When something is in the way of the folder, or the errors cannot be inverted.
+        When something is in the way of the folder, such as the source itself, or the errors cannot be inverted.
     """
+    check_apart(source, target)
+    check_room(target, replace)
     # By type: the topics may have any name, and keep it.
     others = {t: c for t, c in read_topics(source, lambda _, kind: kind in _COPIED).items() if c.raw}
     stamps = recording.start_ns + np.rint(recording.t * 1e9).astype(np.int64)

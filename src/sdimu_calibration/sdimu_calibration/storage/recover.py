@@ -8,11 +8,11 @@ from pathlib import Path
 
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage.bag_file import bag_parts, check_magic
+from sdimu_calibration.storage.bag_folder import DAMAGED_SUFFIX
 from sdimu_calibration.storage.bag_metadata import FileEntry, TopicEntry, write_metadata
 from sdimu_calibration.storage.mcap_file import McapFile
 from sdimu_calibration.storage.mcap_walk import DamagedError, McapWalk
-
-DAMAGED_SUFFIX = ".damaged"
+from sdimu_calibration.storage.whole_file import beside, uninterrupted
 
 
 @dataclass
@@ -75,15 +75,16 @@ def recover(path: Path) -> tuple[Salvage, ...]:
 def _mend(part: Path) -> Salvage:
     """Rewrite one file, and put the copy in its place if it was damaged."""
     salvage = Salvage(part)
-    copy = part.with_suffix(".mcap.part")
+    copy = beside(part)
     try:
         with copy.open("wb") as stream:
             _copy(McapWalk(part), McapFile(stream), salvage)
         if salvage.damage and not any(salvage.counts.values()):
             raise DataError(f"{part}: no message is whole; nothing can be saved")
         if salvage.damage:
-            part.replace(part.with_name(part.name + DAMAGED_SUFFIX))
-            copy.replace(part)
+            with uninterrupted():
+                part.replace(part.with_name(part.name + DAMAGED_SUFFIX))
+                copy.replace(part)
     finally:
         copy.unlink(missing_ok=True)
     return salvage
