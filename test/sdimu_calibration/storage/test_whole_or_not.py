@@ -97,7 +97,7 @@ def test_a_link_to_a_bag_is_that_bag(bag, tmp_path):
     assert (tmp_path / "link").is_symlink()
 
 
-def test_a_bag_with_something_else_beside_it_is_not_replaced(bag, tmp_path, small_test):
+def test_a_bag_with_something_else_beside_it_is_not_replaced(bag, small_test):
     (bag / "notes.txt").write_text("the only copy")
     with pytest.raises(DataError, match=r"notes\.txt"):
         write_recording(

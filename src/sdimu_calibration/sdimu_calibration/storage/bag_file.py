@@ -5,17 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
-import zstandard
 
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage.bag_metadata import named_files, read_metadata
 from sdimu_calibration.storage.mcap_walk import MAGIC, DamagedError, McapWalk, Messages
 from sdimu_calibration.storage.raw_messages import Block, RawMessages
+from sdimu_calibration.storage.unpacking import Allowance, UnpackError, allowed, unpack_file
 
 ROS1 = ".bag"
 _PACKED = ".zstd"
@@ -119,7 +120,7 @@ def _unpacked(path: Path) -> Iterator[tuple[list[Path], Unpack | None]]:
         named = _named(path, information)
         parts = _present(named)
     if mode == "message" and mcap:
-        yield parts, zstandard.ZstdDecompressor().decompress
+        yield parts, partial(Allowance(allowed(path)).unpack, _ZSTD)
         return
     if not any(part.suffix in {_PACKED, ROS1} for part in parts):
         yield parts, None
@@ -136,10 +137,9 @@ def _opened(part: Path, folder: Path) -> Path:
         return part
     target = folder / part.stem
     try:
-        with part.open("rb") as packed, target.open("wb") as plain:
-            zstandard.ZstdDecompressor().copy_stream(packed, plain)
-    except zstandard.ZstdError as error:
-        raise DataError(f"{part}: cannot be unpacked ({_line(error)})") from error
+        unpack_file(part, target)
+    except UnpackError as error:
+        raise DataError(f"{part}: cannot be unpacked ({error})") from error
     return target
 
 
@@ -209,7 +209,7 @@ def _present(named: list[Path]) -> list[Path]:
 
 def _read_mcap(part: Path, bag: Path, takes: Takes, unpack: Unpack | None, content: dict[str, TopicContent]) -> None:
     check_magic(part)
-    walk = McapWalk(part)
+    walk = McapWalk(part, allowed(bag))
     targets: dict[int, RawMessages | None] = {}
     try:
         for block in walk.blocks():
@@ -221,10 +221,10 @@ def _read_mcap(part: Path, bag: Path, takes: Takes, unpack: Unpack | None, conte
                     _take(block, int(channel), unpack, target)
     except DamagedError as error:
         if bag not in {part.parent, part}:
-            raise DataError(f"{bag}: a file in it is cut short or damaged") from error
-        raise DataError(f"{part}: the file is cut short or damaged; run: sdimu bag recover {part}") from error
-    except zstandard.ZstdError as error:
-        raise DataError(f"{bag}: a message cannot be unpacked ({_line(error)})") from error
+            raise DataError(f"{bag}: a file in it is cut short or damaged ({error})") from error
+        raise DataError(f"{part}: the file is cut short or damaged ({error}); run: sdimu bag recover {part}") from error
+    except UnpackError as error:
+        raise DataError(f"{bag}: a message cannot be unpacked ({error})") from error
     for key, channel in walk.channels.items():
         # Topics that never had a message are not in any chunk that has one.
         content.setdefault(channel.topic, TopicContent(walk.type_name(key)))

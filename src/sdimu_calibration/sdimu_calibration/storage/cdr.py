@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sdimu_calibration.core.arrays import Bools, Floats, Ints
+from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage.raw_messages import RawMessages
 
 Stamps = Ints
@@ -112,26 +113,44 @@ def as_bytes(messages: NDArray[Any]) -> list[bytes]:
 
 
 def stamp_of(message: bytes) -> int:
-    """Stamp (ns) of the header with which a message begins, in the byte order that it names."""
+    """Stamp (ns) of the header with which a message begins, in the byte order that it names.
+
+    Raises
+    ------
+    LayoutError
+        When the message ends before its stamp does.
+    """
+    if len(message) < _STAMP_END:
+        raise LayoutError("message too short")
     order = _order(message)
     sec = int.from_bytes(message[4:8], order, signed=True)
     return sec * 1_000_000_000 + int.from_bytes(message[8:12], order)
 
 
-def by_stamp(raw: Sequence[bytes]) -> tuple[Stamps, list[bytes]]:
+def by_stamp(raw: Sequence[bytes], topic: str) -> tuple[Stamps, list[bytes]]:
     """Sort messages by the stamps of their headers.
 
     Parameters
     ----------
     raw : sequence of bytes, length n
+    topic : str
+        For the message to the user.
 
     Returns
     -------
     stamp_ns : ndarray, shape (n,)
         Ascending (ns).
     messages : list of bytes, length n
+
+    Raises
+    ------
+    DataError
+        When a message is too short for a stamp.
     """
     messages = list(raw)
+    if any(len(message) < _STAMP_END for message in messages):
+        number = 1 + next(k for k, message in enumerate(messages) if len(message) < _STAMP_END)
+        raise DataError(f"{topic}: message {number} has no stamp: the bag is damaged")
     ns = np.fromiter(map(stamp_of, messages), np.int64, len(messages))
     order = np.argsort(ns, kind="stable")
     return ns[order], [messages[k] for k in order.tolist()]

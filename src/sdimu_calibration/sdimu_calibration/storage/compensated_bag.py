@@ -70,7 +70,7 @@ def write_compensated(
     interval = recording.interval_s
     heat = heat_since(recording.temperature, recording.t - 0.5 * interval, using.start_temperature, causal=False)
     largest = np.zeros(6)
-    copied = {topic: cdr.by_stamp(content.raw) for topic, content in others.items()}
+    copied = {topic: cdr.by_stamp(content.raw, topic) for topic, content in others.items()}
     # A block takes what comes until its last sample, the last one all that is left.
     edges = [*stamps[_BLOCK - 1 : -1 : _BLOCK].tolist(), max((int(ns[-1]) for ns, _ in copied.values()), default=0)]
     places = {t: [0, *np.searchsorted(ns, edges, side="right").tolist()] for t, (ns, _) in copied.items()}

@@ -55,7 +55,7 @@ def cut_bag(source: Path, target: Path, first_s: float, last_s: float, *, replac
         raise DataError(f"--from {first_s:g} --to {last_s:g}: nothing lies between these times (s)")
     found = read_topics(source, lambda _topic, kind: kind in _TAKEN)
     ranked = sorted(found, key=lambda topic: _TAKEN.index(found[topic].type_name))
-    stamped = {topic: cdr.by_stamp(found[topic].raw) for topic in ranked}
+    stamped = {topic: cdr.by_stamp(found[topic].raw, topic) for topic in ranked}
     imu = [ns for topic, (ns, _) in stamped.items() if found[topic].type_name == cdr.IMU and len(ns)]
     if not imu:
         raise DataError(f"{source}: no message of {cdr.IMU} is in it")
