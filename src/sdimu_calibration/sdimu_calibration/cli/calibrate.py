@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from sdimu_calibration.cli.console import plain
 from sdimu_calibration.cli.options import (
     EstimatorOption,
     HandOption,
@@ -62,8 +63,6 @@ def calibrate(
     gyro_sign: GyroSign = None,
 ) -> None:
     """Estimate the coefficients from a recording; leaves result.json and report.html."""
-    from rich.console import Console
-
     from sdimu_calibration.cli.progress import bar
     from sdimu_calibration.core.estimation.outcome import outcome
     from sdimu_calibration.core.estimation.solve import solve
@@ -74,7 +73,7 @@ def calibrate(
     from sdimu_calibration.storage.result_file import write_result
     from sdimu_calibration.storage.whole_file import written_together
 
-    console = Console()
+    console = plain()
     origin = source(
         imu_topic, status_topic, joint_topic, temperature_topic, accel_unit, gyro_unit, accel_sign, gyro_sign
     )

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from sdimu_calibration.cli.console import plain
 from sdimu_calibration.cli.options import (
     EstimatorOption,
     HandOption,
@@ -72,8 +73,6 @@ def diagnose(
     gyro_sign: GyroSign = None,
 ) -> None:
     """Find what the model is missing; leaves diagnosis.json and report.html, and result.json of the model found."""
-    from rich.console import Console
-
     from sdimu_calibration.cli.diagnosis_text import line, print_summary
     from sdimu_calibration.cli.progress import bar
     from sdimu_calibration.core.diagnosis.bootstrap import bootstrap as repeat_on_noise
@@ -85,7 +84,7 @@ def diagnose(
     from sdimu_calibration.storage.effect_file import find_effects
     from sdimu_calibration.storage.model_choice import HANDHELD, named_estimator
 
-    console = Console()
+    console = plain()
     asked = HANDHELD if hand else named_estimator(estimator, "--estimator")
     if asked == "classical":
         raise DataError(NOT_DIAGNOSABLE)

@@ -16,6 +16,7 @@ import typer
 from typer.core import TyperGroup
 from typer.main import get_command
 
+from sdimu_calibration.core.plain_text import one_line
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.units import UnitError
 
@@ -99,7 +100,7 @@ def main() -> None:
 
 
 def _complain(text: str) -> int:
-    sys.stderr.write("sdimu: " + " ".join(text.split()) + "\n")
+    sys.stderr.write(f"sdimu: {one_line(text)}\n")
     return 1
 
 

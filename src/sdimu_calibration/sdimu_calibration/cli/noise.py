@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from sdimu_calibration.cli.console import plain
+
 
 def noise(
     bag: Annotated[Path, typer.Argument(metavar="BAG", help="rosbag2 folder or .mcap file.")],
@@ -17,7 +19,6 @@ def noise(
 ) -> None:
     """Find the noise terms from the rests of a recording; leaves noise.html and imu.yaml for --imu."""
     import numpy as np
-    from rich.console import Console
 
     from sdimu_calibration.cli.options import default_folder
     from sdimu_calibration.cli.progress import bar
@@ -35,7 +36,7 @@ def noise(
         rows = (max(rows, key=lambda r: r.stop - r.start),)
     data = np.hstack([recording.omega_ib_b, recording.f_ib_b])
     rng = np.random.default_rng(seed)
-    console = Console()
+    console = plain()
     deviations, terms = {}, {}
     with bar(console) as progress:
         for k, channel in enumerate(CHANNELS):

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from sdimu_calibration.cli.console import plain
 from sdimu_calibration.core.recording import DataError
 
 if TYPE_CHECKING:
@@ -31,8 +32,6 @@ def predict(
     out: Annotated[Path, typer.Option(help="Folder of the results.")] = Path("out/predict"),
 ) -> None:
     """Simulate the covariance of a test; leaves prediction.json and prediction.html."""
-    from rich.console import Console
-
     from sdimu_calibration.core.batch.batch import bound_covariance
     from sdimu_calibration.core.planning.predict import predict as simulate
     from sdimu_calibration.report.prediction import coefficient_table, published_table, write_page
@@ -41,7 +40,7 @@ def predict(
     from sdimu_calibration.storage.prediction_file import write_prediction
     from sdimu_calibration.storage.whole_file import written_together
 
-    console = Console()
+    console = plain()
     what = load_plan(plan), load_site(site), load_imu(imu), load_model(model)
     assumed = None if noise is None else load_noise(noise)
     printed = _published(assumed)

@@ -13,6 +13,7 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 from rich.console import Console
 
+from sdimu_calibration.core.plain_text import one_line
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.nodes.stopping import asked_to_stop, watch_signals
 
@@ -53,7 +54,7 @@ def run_node(make: Callable[[], Spinnable], args: Sequence[str] | None = None) -
     except KeyboardInterrupt:
         pass
     except (DataError, OSError) as error:
-        Console(stderr=True, soft_wrap=True, markup=False, highlight=False).print(str(error))
+        Console(stderr=True, soft_wrap=True, markup=False, highlight=False).print(one_line(str(error)))
         status = 1
     finally:
         if shell is not None:

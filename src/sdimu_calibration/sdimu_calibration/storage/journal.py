@@ -1,8 +1,9 @@
 """What a live calibration has taken, written before it is acknowledged: a killed node goes on from here.
 
-One append-only file: a line of JSON (format, digest of the options), then records of a kind (one byte), a length
-(four bytes) and their content. A kill leaves at most the last record cut, which is cut off on reading. What one
-``write`` has handed to the system survives the death of the process, so nothing needs to wait for the disk.
+One append-only file: a line of JSON (format, digest of the options), then records of a kind (one byte), a length, a
+checksum (four bytes each) and their content. A kill leaves at most the last record cut; reading goes as far as records
+are whole, and cuts off the rest. What one ``write`` has handed to the system survives the death of the process, so
+nothing needs to wait for the disk.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from __future__ import annotations
 import hashlib
 import json
 import struct
+import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,8 +22,8 @@ from sdimu_calibration.core.arrays import Floats, Ints
 
 Stamps = Ints
 
-FORMAT = "sdimu-journal/1"
-_HEAD = struct.Struct("<cI")
+FORMAT = "sdimu-journal/2"
+_HEAD = struct.Struct("<cII")
 _STATUS = struct.Struct("<qqq")
 _TEMPERATURE = struct.Struct("<qd")
 _COLUMNS = 7
@@ -70,12 +72,20 @@ class Journal:
     path : Path
     options : str
         Digest of the options that the data are used with.
+
+    Attributes
+    ----------
+    before : tuple of Record
+        What a predecessor left.
+    cut_bytes : int
+        Bytes behind the last whole record of it, which are gone.
     """
 
     def __init__(self, path: Path, options: str) -> None:
         self._path = path
         self._header = json.dumps({"format": FORMAT, "options": options}).encode() + b"\n"
         path.parent.mkdir(parents=True, exist_ok=True)
+        self.cut_bytes = 0
         self.before = tuple(self._recall())
         # Unbuffered: a record is with the system when the call returns.
         self._file = path.open("ab", buffering=0)
@@ -90,17 +100,19 @@ class Journal:
             self._path.unlink(missing_ok=True)
             return
         while at + _HEAD.size <= len(content):
-            kind, length = _HEAD.unpack_from(content, at)
+            kind, length, checksum = _HEAD.unpack_from(content, at)
             end = at + _HEAD.size + length
-            if end > len(content):
+            record = content[at + _HEAD.size : end]
+            if end > len(content) or zlib.crc32(kind + record) != checksum:
                 break
-            yield _decoded(kind, content[at + _HEAD.size : end])
+            yield _decoded(kind, record)
             at = end
+        self.cut_bytes = len(content) - at
         with self._path.open("r+b") as file:
             file.truncate(at)
 
     def _append(self, kind: bytes, content: bytes) -> None:
-        self._file.write(_HEAD.pack(kind, len(content)) + content)
+        self._file.write(_HEAD.pack(kind, len(content), zlib.crc32(kind + content)) + content)
 
     def samples(self, ns: Stamps, omega_ib_b: Floats, f_ib_b: Floats) -> None:
         """Keep samples."""

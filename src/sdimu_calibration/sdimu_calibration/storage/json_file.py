@@ -34,7 +34,8 @@ def read_json(path: Path, expected_format: str) -> dict[str, Any]:
         content = json.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError as error:
         raise DataError(f"{path}: no such file") from error
-    except (UnicodeDecodeError, json.JSONDecodeError) as error:
+    except (ValueError, RecursionError) as error:
+        # JSON, text, and numbers of more digits than Python reads.
         raise DataError(f"{path}: not a JSON file ({error})") from error
     found = content.get("format") if isinstance(content, dict) else None
     if not isinstance(content, dict) or found != expected_format:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from sdimu_calibration.core.plain_text import one_line
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage import cdr
 from sdimu_calibration.storage.bag_file import TopicContent, absent, check_filled, check_type
@@ -93,13 +94,13 @@ def _found(path: Path, content: Mapping[str, TopicContent], kind: str, is_phase:
     if kind == "imu" and not candidates:
         raise DataError(absent(path, {t: e.type_name for t, e in content.items()}, own, KINDS[kind]))
     if len(candidates) == 1:
-        notes.append(f"{candidates[0]} is taken for {own}: the only topic of its kind")
+        notes.append(one_line(f"{candidates[0]} is taken for {own}: the only topic of its kind"))
         return candidates[0]
     if candidates:
         listed = ", ".join(f"{t} ({_extent(content[t].raw)})" for t in sorted(candidates))
         if kind in _OPTION:
             raise DataError(f"{path}: which is the topic of the {kind}? {_OPTION[kind]} one of: {listed}")
-        notes.append(f"several topics of {KINDS[kind]} and none was asked for; not used: {listed}")
+        notes.append(one_line(f"several topics of {KINDS[kind]} and none was asked for; not used: {listed}"))
     return own
 
 

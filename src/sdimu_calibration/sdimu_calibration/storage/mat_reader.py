@@ -1,0 +1,59 @@
+"""Program that turns a MAT file into plain arrays (NPZ), in a process of its own: see `array_table.read_mat`.
+
+Arguments: the MAT file, the file to write, and the bytes of memory that may be taken. It imports nothing of this
+package, so that it starts fast.
+"""
+
+from __future__ import annotations
+
+import resource
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+PREFIX = "="
+"""Before the names in the file that is written."""
+
+
+def main() -> None:
+    """Read, flatten, write; one line on stderr and exit 1 when it cannot be read."""
+    from scipy.io import loadmat  # noqa: PLC0415 (the module is imported by those who start it)
+
+    source, target, most = sys.argv[1:]
+    _bound(int(most))
+    try:
+        content = loadmat(source, squeeze_me=True, struct_as_record=False)
+        arrays: dict[str, NDArray[Any]] = {}
+        for name, value in content.items():
+            _flatten(name, value, arrays)
+        # A name may be anything, that of an argument too.
+        np.savez(target, **{PREFIX + name: array for name, array in arrays.items()})  # type: ignore[arg-type]
+    except Exception as error:  # scipy answers damage with errors of every kind
+        sys.stderr.write(f"{' '.join(str(error).split()) or type(error).__name__}\n")
+        sys.exit(1)
+
+
+def _bound(most: int) -> None:
+    """Bound the memory (bytes) beyond what the process has already."""
+    pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0])
+    limit = pages * resource.getpagesize() + 2 * most
+    resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+
+
+def _flatten(name: str, value: Any, arrays: dict[str, NDArray[Any]]) -> None:
+    """Name the fields of structures ``struct.field``; what is not numbers keeps its name and nothing else."""
+    fields = getattr(value, "_fieldnames", None)
+    if fields is not None:
+        for field in fields:
+            _flatten(f"{name}.{field}", getattr(value, field, None), arrays)
+        return
+    array = np.asarray(value)
+    arrays[name] = array if array.dtype.kind in "iuf" else np.empty(0, "U1")
+
+
+if __name__ == "__main__":
+    main()
