@@ -34,9 +34,9 @@ _TWO: dict[str, Callable[[Any, Any], Any]] = {"min": np.minimum, "max": np.maxim
 _LONGEST = 2000
 """Number of characters of a formula at most: a longer one is no formula, and would nest too deep for the parser."""
 _LARGEST = 1e300
-"""A number beyond it overflows at the first product."""
+"""Size (1) of a number in a formula at most: one beyond it overflows at the first product."""
 _LARGEST_POWER = 12
-"""Power of a quantity with a unit: a higher one is a slip."""
+"""Power (1) of a quantity with a unit at most: a higher one is a slip."""
 _JOINED = re.compile(r"(?<=[\w)])\s+(?=[A-Za-z(])")
 """A blank between two factors stands for a product, as in the equations that a diagnosis proposes."""
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 LONGEST_LINE = 500
-"""Characters of a line shown to a user: six lines of a terminal; more hides what it says."""
+"""Number of characters of a line shown to a user: six lines of a terminal; more hides what it says."""
 _TAIL = 160
-"""Characters kept of the end of a line that is too long: what to do stands there."""
+"""Number of characters kept of the end of a line that is too long: what to do stands there."""
 
 
 def printable(text: str) -> str:

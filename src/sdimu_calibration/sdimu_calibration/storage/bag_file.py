@@ -35,9 +35,15 @@ class TopicContent:
 
 Takes = Callable[[str, str], bool]
 """Whether the messages of a topic (name, type) are wanted."""
+Keep = Callable[[str], RawMessages]
+"""What the messages of a topic of some type go into."""
+TargetOf = Callable[[str, str], RawMessages | None]
+"""Where the messages of a topic (name, type) go; None when they are not wanted."""
 
 
-def raw_messages(path: Path, wanted: Mapping[str, str], required: str) -> dict[str, RawMessages]:
+def raw_messages(
+    path: Path, wanted: Mapping[str, str], required: str, kept: Keep = lambda _: RawMessages()
+) -> dict[str, RawMessages]:
     """Read the CDR bytes of the messages of some topics.
 
     Parameters
@@ -49,6 +55,8 @@ def raw_messages(path: Path, wanted: Mapping[str, str], required: str) -> dict[s
         unless it is `required`.
     required : str
         The topic that must be there with at least one message.
+    kept : callable
+        Makes what the messages of a topic go into, from its type.
 
     Returns
     -------
@@ -65,7 +73,7 @@ def raw_messages(path: Path, wanted: Mapping[str, str], required: str) -> dict[s
         check_type(path, topic, type_name, wanted)
         return topic in wanted
 
-    found = read_topics(path, takes)
+    found = read_topics(path, takes, kept)
     if required not in found:
         raise DataError(absent(path, {t: c.type_name for t, c in found.items()}, required, wanted[required]))
     check_filled(path, required, found[required].raw)
@@ -78,7 +86,7 @@ def check_filled(path: Path, topic: str, raw: RawMessages) -> None:
         raise DataError(f"{path}: topic {topic} has no messages; record the bag while the IMU is running")
 
 
-def read_topics(path: Path, takes: Takes) -> dict[str, TopicContent]:
+def read_topics(path: Path, takes: Takes, kept: Keep = lambda _: RawMessages()) -> dict[str, TopicContent]:
     """Read the messages of the topics that are wanted; the others come without messages.
 
     Parameters
@@ -87,6 +95,8 @@ def read_topics(path: Path, takes: Takes) -> dict[str, TopicContent]:
         rosbag2 folder, .mcap or .db3 file (packed by zstd or not), ROS 1 bag.
     takes : callable
         Asked with name and type of every topic.
+    kept : callable
+        Makes what the messages of a topic go into, from its type.
 
     Returns
     -------
@@ -98,12 +108,19 @@ def read_topics(path: Path, takes: Takes) -> dict[str, TopicContent]:
         When the bag cannot be read.
     """
     content: dict[str, TopicContent] = {}
+
+    def target(topic: str, type_name: str) -> RawMessages | None:
+        """Where the messages of a topic go; None when they are not wanted."""
+        wanted = takes(topic, type_name)
+        entry = content.setdefault(topic, TopicContent(type_name, kept(type_name)))
+        return entry.raw if wanted else None
+
     with _unpacked(path) as (parts, unpack):
         for part in parts:
             if part.suffix == ".mcap":
-                _read_mcap(part, path, takes, unpack, content)
+                _read_mcap(part, path, target, unpack, content)
             else:
-                _read_with_rosbags(part, path, takes, content)
+                _read_with_rosbags(part, path, target, content)
     return content
 
 
@@ -207,14 +224,16 @@ def _present(named: list[Path]) -> list[Path]:
     return named
 
 
-def _read_mcap(part: Path, bag: Path, takes: Takes, unpack: Unpack | None, content: dict[str, TopicContent]) -> None:
+def _read_mcap(
+    part: Path, bag: Path, target_of: TargetOf, unpack: Unpack | None, content: dict[str, TopicContent]
+) -> None:
     check_magic(part)
     walk = McapWalk(part, allowed(bag))
     targets: dict[int, RawMessages | None] = {}
     try:
         for block in walk.blocks():
             for channel in walk.channels.keys() - targets.keys():
-                targets[channel] = _target(walk.channels[channel].topic, walk.type_name(channel), takes, content)
+                targets[channel] = target_of(walk.channels[channel].topic, walk.type_name(channel))
             for channel in np.unique(block.channel):
                 target = targets[int(channel)]
                 if target is not None:
@@ -241,13 +260,6 @@ def _take(block: Messages, channel: int, unpack: Unpack | None, target: RawMessa
         target.append(unpack(block.content[start : start + length]))
 
 
-def _target(topic: str, type_name: str, takes: Takes, content: dict[str, TopicContent]) -> RawMessages | None:
-    """Where the messages of a topic go; None when they are not wanted."""
-    wanted = takes(topic, type_name)
-    entry = content.setdefault(topic, TopicContent(type_name))
-    return entry.raw if wanted else None
-
-
 def check_magic(part: Path) -> None:
     """Raise DataError unless the file begins as an MCAP file."""
     with part.open("rb") as stream:
@@ -258,12 +270,12 @@ def check_magic(part: Path) -> None:
         raise DataError(f"{part}: not an MCAP file")
 
 
-def _read_with_rosbags(part: Path, bag: Path, takes: Takes, content: dict[str, TopicContent]) -> None:
+def _read_with_rosbags(part: Path, bag: Path, target_of: TargetOf, content: dict[str, TopicContent]) -> None:
     from rosbags.rosbag2 import Reader  # noqa: PLC0415 (slow to load, and most bags are MCAP)
 
     try:
         with Reader(part) as reader:
-            targets = {c.topic: _target(c.topic, c.msgtype, takes, content) for c in reader.connections}
+            targets = {c.topic: target_of(c.topic, c.msgtype) for c in reader.connections}
             chosen = [c for c in reader.connections if targets[c.topic] is not None]
             for connection, _, raw in reader.messages(chosen) if chosen else ():
                 content[connection.topic].raw.append(raw)

@@ -15,8 +15,9 @@ from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.data.arrival import RawStatus, RawTemperature, RawTest, in_order
 from sdimu_calibration.core.recording import DataError, Recording, TableLog, seconds
 from sdimu_calibration.storage import cdr
-from sdimu_calibration.storage.bag_file import raw_messages, read_topics
+from sdimu_calibration.storage.bag_file import Keep, raw_messages, read_topics
 from sdimu_calibration.storage.cdr import LayoutError, Stamps
+from sdimu_calibration.storage.imu_messages import ImuMessages
 from sdimu_calibration.storage.raw_messages import RawMessages
 from sdimu_calibration.storage.status_message import phase_entry, phase_word, stamp_ns
 from sdimu_calibration.storage.topic_choice import KINDS, TopicChoice, choose
@@ -51,7 +52,7 @@ def read_recording(path: Path, topics: Topics | TopicChoice | None = None) -> Re
     """
     path = Path(path)
     notes: list[str] = []
-    topics, raw = read_messages(path, topics, notes)
+    topics, raw = read_messages(path, topics, notes, _kept)
     imu_topic = f"{path}: {topics.imu}"
     ns, omega_ib_b, f_ib_b = _imu(raw[topics.imu], imu_topic)
     recording = in_order(
@@ -67,9 +68,11 @@ def read_recording(path: Path, topics: Topics | TopicChoice | None = None) -> Re
 
 
 def read_messages(
-    path: Path, topics: Topics | TopicChoice | None, notes: list[str]
+    path: Path, topics: Topics | TopicChoice | None, notes: list[str], kept: Keep = lambda _: RawMessages()
 ) -> tuple[Topics, dict[str, RawMessages]]:
     """Read the messages of the topics of a test; `notes` gets what was chosen by type.
+
+    What they go into is made by `kept`, from the type of the topic.
 
     Returns
     -------
@@ -84,8 +87,8 @@ def read_messages(
     """
     if isinstance(topics, Topics):
         wanted = {getattr(topics, kind): type_name for kind, type_name in KINDS.items()}
-        return topics, raw_messages(path, wanted, required=topics.imu)
-    content = read_topics(path, lambda _, type_name: type_name in KINDS.values())
+        return topics, raw_messages(path, wanted, topics.imu, kept)
+    content = read_topics(path, lambda _, type_name: type_name in KINDS.values(), kept)
     chosen = choose(path, content, topics or TopicChoice(), _is_phase, notes)
     return chosen, {t: content[t].raw for t in vars(chosen).values() if t in content}
 
@@ -153,12 +156,17 @@ def _table(raw: Sequence[bytes], start_ns: int, topic: str, notes: list[str]) ->
     return TableLog(seconds(ns[chosen], start_ns), names, angle[chosen])
 
 
-def _imu(raw: Sequence[bytes], where: str) -> tuple[Stamps, Floats, Floats]:
-    try:
-        return cdr.decode_imu(raw)
-    except LayoutError:
-        ns, values = _one_by_one(raw, cdr.IMU, _imu_values, where)
+def _kept(type_name: str) -> RawMessages:
+    return ImuMessages() if type_name == cdr.IMU else RawMessages()
+
+
+def _imu(raw: RawMessages, where: str) -> tuple[Stamps, Floats, Floats]:
+    def one_by_one(messages: Sequence[bytes]) -> tuple[Stamps, Floats, Floats]:
+        ns, values = _one_by_one(messages, cdr.IMU, _imu_values, where)
         return ns, values[:, :3], values[:, 3:]
+
+    assert isinstance(raw, ImuMessages)
+    return raw.samples(one_by_one)
 
 
 def _imu_values(message: Any) -> list[float]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,6 +12,7 @@ from sdimu_calibration.core.plain_text import one_line
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage import cdr
 from sdimu_calibration.storage.bag_file import TopicContent, absent, check_filled, check_type
+from sdimu_calibration.storage.raw_messages import RawMessages
 from sdimu_calibration.storage.topics import Topics
 
 _OWN = Topics()
@@ -104,9 +105,9 @@ def _found(path: Path, content: Mapping[str, TopicContent], kind: str, is_phase:
     return own
 
 
-def _extent(raw: Sequence[bytes]) -> str:
+def _extent(raw: RawMessages) -> str:
     """Say how many messages there are, and their rate by header.stamp."""
-    stamps = [_stamp_ns(message) for message in (raw[0], raw[-1])]
+    stamps = [_stamp_ns(message) for message in raw.ends()]
     span = (stamps[1] - stamps[0]) * 1e-9
     rate = f", {(len(raw) - 1) / span:.4g} Hz" if span > 0.0 else ""
     return f"{len(raw)} messages{rate}"
