@@ -53,7 +53,8 @@ def cut_bag(source: Path, target: Path, first_s: float, last_s: float, *, replac
     check_room(target, replace)
     if not first_s < last_s:
         raise DataError(f"--from {first_s:g} --to {last_s:g}: nothing lies between these times (s)")
-    found = read_topics(source, lambda _topic, kind: kind in _TAKEN)
+    every = read_topics(source, lambda _topic, kind: kind in _TAKEN)
+    found = {topic: content for topic, content in every.items() if content.type_name in _TAKEN}
     ranked = sorted(found, key=lambda topic: _TAKEN.index(found[topic].type_name))
     stamped = {topic: cdr.by_stamp(found[topic].raw, topic) for topic in ranked}
     imu = [ns for topic, (ns, _) in stamped.items() if found[topic].type_name == cdr.IMU and len(ns)]
