@@ -14,9 +14,9 @@ EXTREMES = tuple(value.to_bytes(8, "little") for value in (0, 1, 22, 2**31 - 1, 
 WORDS = (
     "", "null", "true", "nan", "inf", "-1", "0", "1e400", "-1e-400", "9" * 400, "9" * 5000, "1" * 30, "٣", "½",
     "!!int x", "!!float y", "!!python/object:os.system x", "2024-99-99", "2024-01-01", "*a", "&a [*a]", "[" * 60,
-    "{" * 60, "[[1, 2], [3]]", "{a: {b: c}}", "ax**(1/0)", "k**k", "1/0", "sin(", "__import__('os')", "\x1b[2J", "\u202e", "\x00",
-    "a\tb", "\r\n", "deg/h/h/h", "deg^99", "1 deg/s", "5 parsec", "../../x", "-", "?", "#", ": :", "'", '"', "|",
-    "%YAML 9",
+    "{" * 60, "[[1, 2], [3]]", "{a: {b: c}}", "ax**(1/0)", "k**k", "1/0", "sin(", "__import__('os')", "\x1b[2J",
+    "\u202e", "\x00", "a\tb", "\r\n", "deg/h/h/h", "deg^99", "1 deg/s", "5 parsec", "../../x", "-", "?", "#", ": :",
+    "'", '"', "|", "%YAML 9",
 )  # fmt: skip
 """What stands in files of people who err, and of people who attack."""
 VALUES: tuple[Any, ...] = (

@@ -88,15 +88,26 @@ class RecorderNode:
 
         def take(message: bytes) -> None:
             at = stamp(message)
-            write(name, message, at)
+            try:
+                write(name, message, at)
+            except DataError as error:
+                self._fail(error)
             self._latest = time.monotonic()
             if consumer is not None:
                 consumer.reached(at)
 
         return take
 
+    def _fail(self, error: DataError) -> None:
+        """Leave with an error; raised in a callback it would come out as a trace of the executor."""
+        if not self.done.done():
+            self.done.set_exception(error)
+
     def _tick(self) -> None:
-        self._bag.flush()
+        try:
+            self._bag.flush()
+        except DataError as error:
+            self._fail(error)
         now = time.monotonic()
         if now - self._born > PEERS_PATIENCE_S or all(self.node.count_publishers(t) for t in self._needed):
             for consumer in self._consumers.values():

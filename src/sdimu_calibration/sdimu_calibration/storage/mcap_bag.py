@@ -62,6 +62,7 @@ class McapBag:
         self._schemas: dict[str, int] = {}
         self._first_ns: int | None = None
         self._last_ns = 0
+        self._failed = False
         with self._told():
             self._folder.mkdir(parents=True)
             if live:
@@ -155,8 +156,14 @@ class McapBag:
             self._writer.flush()
 
     def close(self) -> None:
-        """Finish the bag and put it in its place; a second call does nothing."""
+        """Finish the bag and put it in its place; a second call does nothing.
+
+        A live bag that the system has refused to write stays as it is: what came before can be mended.
+        """
         if self._stream.closed:
+            return
+        if self._failed:
+            self.abandon()
             return
         with self._told():
             try:
@@ -193,6 +200,7 @@ class McapBag:
         try:
             yield
         except OSError as error:
+            self._failed = True
             live = "; what came before can be mended: sdimu bag recover" if self._folder == self.path else ""
             raise DataError(f"{self.path}: the bag cannot be written ({error.strerror or error}){live}") from error
 
