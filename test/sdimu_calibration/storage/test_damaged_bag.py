@@ -13,6 +13,8 @@ import numpy as np
 import pytest
 import zstandard
 from mcap.reader import make_reader
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
+from rosbags.typesys import Stores, get_typestore
 
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage import cdr
@@ -267,3 +269,17 @@ def test_messages_without_a_common_layout_are_read_where_they_stand(tmp_path):
     first = cdr.encode_imu(np.array([10**9]), np.full((1, 3), 2.0), np.ones((1, 3)))[0]
     recording = read_recording(imu_file(tmp_path / "x.mcap", first, big.tobytes()))
     assert recording.omega_ib_b[:, 0].tolist() == [0.0, 2.0]
+
+
+@pytest.mark.parametrize("plugin", [StoragePlugin.MCAP, StoragePlugin.SQLITE3])
+@pytest.mark.parametrize("mode", [CompressionMode.MESSAGE, CompressionMode.FILE])
+def test_a_packed_bag_unpacks_to_what_it_may(tmp_path, plugin, mode, monkeypatch):
+    monkeypatch.setattr("sdimu_calibration.storage.unpacking.BASE_BYTES", 1 << 20)
+    writer = Writer(tmp_path / "b", version=9, storage_plugin=plugin)
+    writer.set_compression(mode, CompressionFormat.ZSTD)
+    with writer:
+        connection = writer.add_connection("/imu/data_raw", cdr.IMU, typestore=get_typestore(Stores.ROS2_JAZZY))
+        for k in range(8):
+            writer.write(connection, k, bytes(4 << 20))
+    with pytest.raises(DataError, match="unpack"):
+        read_recording(tmp_path / "b")

@@ -120,7 +120,7 @@ def read_topics(path: Path, takes: Takes, kept: Keep = lambda _: RawMessages()) 
             if part.suffix == ".mcap":
                 _read_mcap(part, path, target, unpack, content)
             else:
-                _read_with_rosbags(part, path, target, content)
+                _read_with_rosbags(part, path, target, unpack, content)
     return content
 
 
@@ -130,13 +130,12 @@ def _unpacked(path: Path) -> Iterator[tuple[list[Path], Unpack | None]]:
     parts = bag_parts(path)
     information = read_metadata(path) if path.is_dir() else {}
     mode = _mode(information)
-    mcap = information.get("storage_identifier") == "mcap"
     if mode and information.get("compression_format") != _ZSTD:
         raise DataError(f"{path}: compressed by {information.get('compression_format')}, which cannot be read")
-    if mode and mcap:
-        named = _named(path, information)
-        parts = _present(named)
-    if mode == "message" and mcap:
+    if mode:
+        # Unpacked here, within bounds: the reader of folders knows none.
+        parts = _present(_named(path, information))
+    if mode == "message":
         yield parts, partial(Allowance(allowed(path)).unpack, _ZSTD)
         return
     if not any(part.suffix in {_PACKED, ROS1} for part in parts):
@@ -270,7 +269,9 @@ def check_magic(part: Path) -> None:
         raise DataError(f"{part}: not an MCAP file")
 
 
-def _read_with_rosbags(part: Path, bag: Path, target_of: TargetOf, content: dict[str, TopicContent]) -> None:
+def _read_with_rosbags(
+    part: Path, bag: Path, target_of: TargetOf, unpack: Unpack | None, content: dict[str, TopicContent]
+) -> None:
     from rosbags.rosbag2 import Reader  # noqa: PLC0415 (slow to load, and most bags are MCAP)
 
     try:
@@ -278,7 +279,9 @@ def _read_with_rosbags(part: Path, bag: Path, target_of: TargetOf, content: dict
             targets = {c.topic: target_of(c.topic, c.msgtype) for c in reader.connections}
             chosen = [c for c in reader.connections if targets[c.topic] is not None]
             for connection, _, raw in reader.messages(chosen) if chosen else ():
-                content[connection.topic].raw.append(raw)
+                if not isinstance(raw, bytes | memoryview):
+                    raise DataError(f"{bag}: a message of {connection.topic} is no bytes: the bag is damaged")
+                content[connection.topic].raw.append(bytes(raw) if unpack is None else unpack(bytes(raw)))
     except (DataError, PermissionError):
         raise
     except Exception as error:
