@@ -46,6 +46,9 @@ from .mutators import Random, damaged_bytes, damaged_json, damaged_text
 
 SAMPLES = 400
 CHUNK, DATA_END, FOOTER = 6, 15, 2
+STAMPS = ((0, 0), (-1, 0), (2**31 - 1, 999_999_999), (-(2**31), 0), (1_700_000_000, 2**32 - 1), (1_700_000_000, 5))
+"""Seconds and nanoseconds of a stamp."""
+NUMBERS = (float("nan"), float("inf"), -float("inf"), 1e300, -1e300, 5e-324, 0.0, 1e10)
 
 
 @dataclass(frozen=True)
@@ -189,6 +192,26 @@ def damaged_payloads(content: bytes, rng: Random) -> bytes:
         elif kind in {3, 4} and rng.random() < 0.1:
             body = damaged_bytes(body, rng)
         out += struct.pack("<BQ", kind, len(body)) + body
+        at += 9 + length
+    return repacked(bytes(out), checksum=True)
+
+
+def damaged_values(content: bytes, rng: Random) -> bytes:
+    """Put extreme stamps, numbers and bytes of text into messages whose lengths stay as they are."""
+    out, at = bytearray(content), 0
+    share = 10.0 ** rng.uniform(-3.0, -0.5)
+    while at < len(content):
+        kind, length = struct.unpack_from("<BQ", content, at)
+        if kind == 5 and rng.random() < share:
+            first = at + 31
+            kind_of = int(rng.integers(3))
+            if kind_of == 0:
+                struct.pack_into("<iI", out, first + 4, *STAMPS[int(rng.integers(len(STAMPS)))])
+            elif kind_of == 1 and length > 22 + 300:
+                place = first + length - 22 - 8 * int(rng.integers(1, 38))
+                struct.pack_into("<d", out, place, NUMBERS[int(rng.integers(len(NUMBERS)))])
+            else:
+                out[first + int(rng.integers(12, length - 22))] = int(rng.integers(256))
         at += 9 + length
     return repacked(bytes(out), checksum=True)
 
@@ -376,6 +399,7 @@ FORMATS: dict[str, Format] = {
     "bag": Format("x_0.mcap", make_bag, damaged_bytes, read_bag, same_bag),
     "bag, right checksums": Format("x_0.mcap", make_records, damaged_messages, read_foreign),
     "bag, right records": Format("x_0.mcap", make_records, damaged_payloads, read_foreign),
+    "bag, right layouts": Format("x_0.mcap", make_records, damaged_values, read_foreign),
     "bag, SQLite": Format("x.db3", make_sqlite, damaged_bytes, read_file_bag),
     "metadata.yaml": Format("metadata.yaml", make_metadata, damaged_text, read_metadata_bag, lambda a, b: a == b),
     "CSV": Format("x.csv", make_csv, damaged_text, nothing(read_table)),

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 import zstandard
 from mcap.reader import make_reader
+from rosbags.rosbag1 import Writer as Writer1
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 
@@ -283,3 +284,28 @@ def test_a_packed_bag_unpacks_to_what_it_may(tmp_path, plugin, mode, monkeypatch
             writer.write(connection, k, bytes(4 << 20))
     with pytest.raises(DataError, match="unpack"):
         read_recording(tmp_path / "b")
+
+
+@pytest.mark.parametrize("kind", ["zstd", "zstd without its size", "lz4", ""])
+def test_chunks_of_every_kind_read_the_same(tmp_path, kind):
+    samples = cdr.encode_imu(np.arange(1, 60) * 10**7, np.full((59, 3), 2.0), np.ones((59, 3)))
+    body = schema(1, cdr.IMU) + channel(1, 1, "/imu/data_raw") + b"".join(message(1, data) for data in samples)
+    pack = {
+        "": lambda data: data, "lz4": lz4.frame.compress, "zstd": zstandard.compress,
+        "zstd without its size": zstandard.ZstdCompressor(write_content_size=False).compress,
+    }[kind]  # fmt: skip
+    recording = read_recording(write_raw(tmp_path / "x.mcap", body, kind[:4], pack(body)))
+    assert recording.omega_ib_b.tolist() == [[2.0] * 3] * 59
+
+
+def test_a_bag_of_ros_1_unpacks_to_what_it_may(tmp_path, monkeypatch):
+    monkeypatch.setattr("sdimu_calibration.storage.unpacking.BASE_BYTES", 1 << 20)
+    types = get_typestore(Stores.ROS1_NOETIC)
+    writer = Writer1(tmp_path / "x.bag")
+    writer.set_compression(Writer1.CompressionFormat.BZ2)
+    with writer:
+        connection = writer.add_connection("/imu", cdr.IMU, typestore=types)
+        for k in range(8):
+            writer.write(connection, k, bytes(4 << 20))
+    with pytest.raises(DataError, match=r"x\.bag: the bag cannot be read"):
+        read_recording(tmp_path / "x.bag")

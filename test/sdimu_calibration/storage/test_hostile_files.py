@@ -221,7 +221,7 @@ def test_an_npz_unpacks_to_what_it_may(tmp_path):
 
 def mat_bomb(path):
     """Write a MAT file of version 5 with one compressed matrix of zeros."""
-    count = 64 << 20
+    count = 16 << 20
     head = struct.pack("<IIIIIIiiII", 6, 8, 6, 0, 5, 8, 1, count // 8, 1, 1) + b"t\0\0\0\0\0\0\0"
     head += struct.pack("<II", 9, count)
     packer = zlib.compressobj()
@@ -233,8 +233,8 @@ def mat_bomb(path):
 
 def test_a_mat_file_gets_the_memory_that_it_may(tmp_path, monkeypatch):
     path = mat_bomb(tmp_path / "a.mat")
-    assert len(read_mat(path)._array("t")) == 8 << 20
-    monkeypatch.setattr(unpacking, "BASE_BYTES", 8 << 20)
+    assert len(read_mat(path)._array("t")) == 2 << 20
+    monkeypatch.setattr(unpacking, "BASE_BYTES", 4 << 20)
     assert "not a MAT file that can be read" in refusal(read_mat, path)
 
 

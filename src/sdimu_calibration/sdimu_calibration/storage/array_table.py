@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import os
 import re
-import subprocess
-import sys
 import zipfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -17,12 +14,12 @@ from numpy.typing import NDArray
 
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.recording import DataError
-from sdimu_calibration.storage import mat_reader
+from sdimu_calibration.storage.mat_reader import PREFIX
+from sdimu_calibration.storage.own_process import run
 from sdimu_calibration.storage.unpacking import allowed
 
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 _HDF5_AT = 512
-_MAT_READER = Path(mat_reader.__file__)
 _PATIENCE_S = 120.0
 """Time (s) that a MAT file may take: a gigabyte takes ten."""
 _REFERENCE = re.compile(r"([A-Za-z_]\w*(?:\.\w+)*)(?:\[(\d+)\])?")
@@ -111,8 +108,8 @@ def read_npz(path: Path) -> ArrayTable:
     try:
         with zipfile.ZipFile(path) as packed:
             size = sum(entry.file_size for entry in packed.infolist())
-        if size > allowed(path):
-            raise DataError(f"{path}: unpacks to {size} bytes, more than {allowed(path)}")
+        if size > _most(path):
+            raise DataError(f"{path}: unpacks to {size} bytes, more than {_most(path)}")
         with np.load(path, allow_pickle=False) as content:
             return ArrayTable(path, {name: _shaped(content[name]) for name in content.files})
     except (DataError, PermissionError):
@@ -120,6 +117,11 @@ def read_npz(path: Path) -> ArrayTable:
     except Exception as error:
         # numpy answers damage with errors of zipfile, zlib, struct, ast, tokenize, and of the memory.
         raise DataError(f"{path}: not a file of numpy arrays (NPZ) that can be read") from error
+
+
+def _most(path: Path) -> int:
+    """Bytes that a file may unpack to; on their way to samples they are there up to four times."""
+    return allowed(path) // 4
 
 
 def _shaped(array: Any) -> NDArray[Any]:
@@ -148,18 +150,9 @@ def read_mat(path: Path) -> ArrayTable | None:
         return None
     with TemporaryDirectory(prefix="sdimu-") as folder:
         plain = Path(folder) / "plain.npz"
-        command = [sys.executable, str(_MAT_READER), str(path), str(plain), str(allowed(path))]
-        environment = os.environ | {"OPENBLAS_NUM_THREADS": "1"}
-        try:
-            done = subprocess.run(command, capture_output=True, text=True, errors="replace", check=False,
-                                  timeout=_PATIENCE_S, env=environment)  # fmt: skip
-        except subprocess.TimeoutExpired as error:
-            raise DataError(f"{path}: not a MAT file that can be read in {_PATIENCE_S:.0f} s") from error
-        if done.returncode:
-            said = done.stderr.strip().rpartition("\n")[2] or f"its reader ended with {done.returncode}"
-            raise DataError(f"{path}: not a MAT file that can be read ({said})")
+        run("mat_reader.py", path, plain, _most(path), _PATIENCE_S, "not a MAT file that can be read")
         with np.load(plain, allow_pickle=False) as content:
-            return ArrayTable(path, {name.removeprefix(mat_reader.PREFIX): content[name] for name in content.files})
+            return ArrayTable(path, {name.removeprefix(PREFIX): content[name] for name in content.files})
 
 
 def _is_text(head: bytes) -> bool:

@@ -15,6 +15,7 @@ import numpy as np
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage.bag_metadata import named_files, read_metadata
 from sdimu_calibration.storage.mcap_walk import MAGIC, DamagedError, McapWalk, Messages
+from sdimu_calibration.storage.own_process import run
 from sdimu_calibration.storage.raw_messages import Block, RawMessages
 from sdimu_calibration.storage.unpacking import Allowance, UnpackError, allowed, unpack_file
 
@@ -22,6 +23,8 @@ ROS1 = ".bag"
 _PACKED = ".zstd"
 _SUFFIXES = (".mcap", ".db3", _PACKED, ROS1)
 _ZSTD = "zstd"
+_PATIENCE_S = 3600.0
+"""Time (s) that the conversion of a bag of ROS 1 may take: a gigabyte takes minutes."""
 Unpack = Callable[[bytes], bytes]
 
 
@@ -160,18 +163,8 @@ def _opened(part: Path, folder: Path) -> Path:
 
 
 def _from_ros1(part: Path, target: Path) -> Path:
-    """Convert a bag of ROS 1 to one of ROS 2: the standard messages differ in nothing that is used here."""
-    from rosbags.convert.converter import convert  # noqa: PLC0415 (slow to load, and bags of ROS 1 are rare)
-    from rosbags.typesys import Stores, get_typestore  # noqa: PLC0415
-
-    typestore = get_typestore(Stores.ROS2_JAZZY)
-    kinds = ["sensor_msgs/msg/Imu", "sensor_msgs/msg/JointState", "sensor_msgs/msg/Temperature"]
-    kinds.append("diagnostic_msgs/msg/DiagnosticArray")
-    try:
-        convert([part], target, "sqlite3", 9, None, "", None, typestore, [], [], [], kinds)
-    except Exception as error:
-        # rosbags answers damage with errors of its own, of struct and of the decompressors.
-        raise DataError(f"{part}: the bag cannot be read ({_line(error)})") from error
+    """Convert a bag of ROS 1 to one of ROS 2."""
+    run("ros1_converter.py", part, target, allowed(part), _PATIENCE_S, "the bag cannot be read")
     if not target.is_dir():
         raise DataError(f"{part}: no topic of sensor_msgs/Imu in the bag")
     return target

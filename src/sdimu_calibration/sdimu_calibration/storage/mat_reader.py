@@ -1,14 +1,11 @@
-"""Program that turns a MAT file into plain arrays (NPZ), in a process of its own: see `array_table.read_mat`.
+"""Program that turns a MAT file into plain arrays (NPZ), in a process of its own: see `own_process`.
 
-Arguments: the MAT file, the file to write, and the bytes of memory that may be taken. It imports nothing of this
-package, so that it starts fast.
+Arguments: the MAT file, and the file to write.
 """
 
 from __future__ import annotations
 
-import resource
 import sys
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -22,8 +19,7 @@ def main() -> None:
     """Read, flatten, write; one line on stderr and exit 1 when it cannot be read."""
     from scipy.io import loadmat  # noqa: PLC0415 (the module is imported by those who start it)
 
-    source, target, most = sys.argv[1:]
-    _bound(int(most))
+    source, target = sys.argv[1:]
     try:
         content = loadmat(source, squeeze_me=True, struct_as_record=False)
         arrays: dict[str, NDArray[Any]] = {}
@@ -34,14 +30,6 @@ def main() -> None:
     except Exception as error:  # scipy answers damage with errors of every kind
         sys.stderr.write(f"{' '.join(str(error).split()) or type(error).__name__}\n")
         sys.exit(1)
-
-
-def _bound(most: int) -> None:
-    """Bound the memory (bytes) beyond what the process has already."""
-    pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0])
-    limit = pages * resource.getpagesize() + 2 * most
-    resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
 
 
 def _flatten(name: str, value: Any, arrays: dict[str, NDArray[Any]]) -> None:

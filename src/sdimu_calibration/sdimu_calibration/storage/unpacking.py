@@ -84,27 +84,33 @@ def unpacked(compression: str, data: bytes, most: int) -> bytes:
 def _zstd(data: bytes, most: int) -> bytes:
     try:
         # The size that the data state is believed by the library: it would be allocated before anything is read.
-        if zstandard.frame_content_size(data) > most:
+        size = zstandard.frame_content_size(data)
+        if size > most:
             raise UnpackError(f"unpacks to more than {most} bytes")
-        pieces, count = [], 0
-        with zstandard.ZstdDecompressor().stream_reader(BytesIO(data)) as stream:
-            while count <= most and (piece := stream.read(_PIECE)):
-                pieces.append(piece)
-                count += len(piece)
+        if size >= 0:
+            return bytes(zstandard.ZstdDecompressor().decompress(data))
+        # One buffer that grows: pieces to be joined would be there twice.
+        out = BytesIO()
+        with zstandard.ZstdDecompressor().stream_reader(data) as stream:
+            while out.tell() <= most and (piece := stream.read(_PIECE)):
+                out.write(piece)
     except zstandard.ZstdError as error:
         raise UnpackError(str(error)) from error
-    return _within(b"".join(pieces), most)
+    return _within(out.getvalue(), most)
 
 
 def _lz4(data: bytes, most: int) -> bytes:
-    frame = LZ4FrameDecompressor()
+    frame, out, piece = LZ4FrameDecompressor(), BytesIO(), data
     try:
-        out = frame.decompress(data, max_length=most)
+        while not frame.eof and out.tell() <= most:
+            piece = frame.decompress(piece, max_length=_PIECE)
+            if not piece and frame.needs_input:
+                raise UnpackError("lz4 data are cut short")
+            out.write(piece)
+            piece = b""
     except RuntimeError as error:
         raise UnpackError(str(error)) from error
-    if not frame.eof:
-        raise UnpackError(f"lz4 data are cut short, or unpack to more than {most} bytes")
-    return bytes(out)
+    return _within(out.getvalue(), most)
 
 
 def _within(data: bytes, most: int) -> bytes:
