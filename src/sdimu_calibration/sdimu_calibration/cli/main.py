@@ -95,6 +95,8 @@ def main() -> None:
         sys.exit(_complain(str(error)))
     except OSError as error:
         sys.exit(_complain(f"{error.filename or 'system'}: {error.strerror or error}"))
+    except MemoryError:
+        sys.exit(_complain("not enough memory for this recording; take a part of it with: sdimu bag cut"))
     except KeyboardInterrupt:
         sys.exit(130)
 
