@@ -309,3 +309,14 @@ def test_a_bag_of_ros_1_unpacks_to_what_it_may(tmp_path, monkeypatch):
             writer.write(connection, k, bytes(4 << 20))
     with pytest.raises(DataError, match=r"x\.bag: the bag cannot be read"):
         read_recording(tmp_path / "x.bag")
+
+
+def test_joint_states_without_axes_are_left_out_and_noted(bag):
+    extra = cdr.as_bytes(cdr.Layout("rate_table").count(0).count(0).count(0).count(0).rows(np.array([5, 6])))
+    body = schema(1, cdr.IMU) + channel(1, 1, "/imu/data_raw") + schema(2, cdr.JOINT_STATE)
+    body += channel(2, 2, "/rate_table/joint_states")
+    imu = cdr.encode_imu(np.array([1, 2]) * 10**7, np.zeros((2, 3)), np.ones((2, 3)))
+    body += b"".join(message(1, data) for data in imu) + b"".join(message(2, data) for data in extra)
+    recording = read_recording(write_raw(bag / "x.mcap", body))
+    assert recording.table is None
+    assert any("joint_states" in note for note in recording.notes)

@@ -149,7 +149,7 @@ def _table(raw: Sequence[bytes], start_ns: int, topic: str, notes: list[str]) ->
         except ValueError:
             notes.append(f"{topic} changes its axes on the way and was ignored")
             return None
-    if angle.ndim != 2 or angle.shape[1] != len(names):
+    if not names or angle.ndim != 2 or angle.shape[1] != len(names):
         notes.append(f"{topic} has no angle for every axis and was ignored")
         return None
     _, chosen = np.unique(ns, return_index=True)

@@ -403,8 +403,8 @@ def decode_joint_positions(raw: Sequence[bytes], names: tuple[str, ...], first: 
     """
     messages = raw if isinstance(raw, RawMessages) else RawMessages(raw)
     size = np.unique(np.concatenate([block.length for block in messages.blocks()]))
-    if len(size) != 1:
-        raise LayoutError("lengths differ")
+    if len(size) != 1 or not names:
+        raise LayoutError("lengths differ, or there are no axes")
     rows = np.concatenate([block.field(0, np.uint8, int(size[0])) for block in messages.blocks()])
     frame_id_length = int(rows[0, 12:16].copy().view("<u4")[0]) - 1
     if not 0 <= frame_id_length < rows.shape[1]:

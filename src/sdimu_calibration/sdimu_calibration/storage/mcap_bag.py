@@ -118,9 +118,10 @@ class McapBag:
         data : bytes
             The message in CDR, with its 4-byte encapsulation header.
         log_time_ns : int
-            Time (ns) under which it is filed: the stamp in its header, where it has one.
+            Time (ns) under which it is filed: the stamp in its header, where it has one; 0 for one before 1970, which
+            the format cannot say.
         """
-        topic = self._topics[name]
+        topic, log_time_ns = self._topics[name], max(log_time_ns, 0)
         with self._told():
             self._writer.message(topic.channel, data, log_time_ns)
         topic.count += 1
@@ -134,7 +135,8 @@ class McapBag:
         Parameters
         ----------
         streams : dict of str to (ndarray of int, shape (n,), sequence of bytes, length n)
-            Times (ns) and messages (CDR) of each topic; at the same time the first topic goes first.
+            Times (ns) and messages (CDR) of each topic, filed as by `write`; at the same time the first topic goes
+            first.
         """
         times = [np.asarray(ns, np.int64) for ns, _ in streams.values()]
         numbers = [self._topics[name].channel for name in streams]
@@ -143,6 +145,7 @@ class McapBag:
             return
         ns, channel = np.concatenate(times), np.repeat(numbers, [len(each) for each in times])
         order = np.argsort(ns, kind="stable")
+        ns = np.maximum(ns, 0)
         with self._told():
             self._writer.messages(channel[order], [data[k] for k in order.tolist()], ns[order])
         for name, each in zip(streams, times, strict=True):
