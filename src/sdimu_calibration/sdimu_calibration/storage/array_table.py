@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.recording import DataError
-from sdimu_calibration.storage.mat_reader import PREFIX
+from sdimu_calibration.storage.mat_reader import OBJECT, PREFIX
 from sdimu_calibration.storage.own_process import run
 from sdimu_calibration.storage.unpacking import allowed
 
@@ -152,7 +152,9 @@ def read_mat(path: Path) -> ArrayTable | None:
         plain = Path(folder) / "plain.npz"
         run("mat_reader.py", path, plain, _most(path), _PATIENCE_S, "not a MAT file that can be read")
         with np.load(plain, allow_pickle=False) as content:
-            return ArrayTable(path, {name.removeprefix(PREFIX): content[name] for name in content.files})
+            arrays = {name.removeprefix(PREFIX): content[name] for name in content.files}
+    objects = {name.removeprefix(OBJECT): str(arrays.pop(name)) for name in list(arrays) if name.startswith(OBJECT)}
+    return ArrayTable(path, arrays, objects)
 
 
 def _is_text(head: bytes) -> bool:

@@ -13,11 +13,14 @@ from numpy.typing import NDArray
 
 PREFIX = "="
 """Before the names in the file that is written."""
+OBJECT = "@"
+"""Before the names of objects of MATLAB, whose class is what is written."""
 
 
 def main() -> None:
     """Read, flatten, write; one line on stderr and exit 1 when it cannot be read."""
     from scipy.io import loadmat  # noqa: PLC0415 (the module is imported by those who start it)
+    from scipy.io.matlab import MatlabOpaque  # noqa: PLC0415
 
     source, target = sys.argv[1:]
     try:
@@ -25,6 +28,10 @@ def main() -> None:
         arrays: dict[str, NDArray[Any]] = {}
         for name, value in content.items():
             _flatten(name, value, arrays)
+            if isinstance(value, MatlabOpaque):
+                # Of an object of MATLAB scipy reads its name and its class alone.
+                words = [bytes(value[0][field]).decode("utf-8", "replace") for field in ("s0", "s2")]
+                arrays[OBJECT + words[0]] = np.array(words[1])
         # A name may be anything, that of an argument too.
         np.savez(target, **{PREFIX + name: array for name, array in arrays.items()})  # type: ignore[arg-type]
     except Exception as error:  # scipy answers damage with errors of every kind

@@ -290,7 +290,6 @@ def hand(
 
     import numpy as np
     from rich.box import SIMPLE
-    from rich.console import Console
     from rich.table import Table
 
     from sdimu_calibration.cli.progress import bar
@@ -298,7 +297,7 @@ def hand(
     from sdimu_sim.campaign.campaign import run_campaign
     from sdimu_sim.campaign.hand_run import IMUS, HandRun
 
-    console, seeds, results = Console(), range(seed, seed + runs), {}
+    console, seeds, results = plain(), range(seed, seed + runs), {}
     for word, hidden in (("clean", False), ("hidden", True)):
         with bar(console) as progress:
             tell = partial(_named, progress, word)
