@@ -1,4 +1,4 @@
-# make setup | demo | test | check | colcon | wheels | bench | study | docs | pictures | grades | campaigns | lock : each does its own set-up and needs nothing before it.
+# make setup | demo | test | check | colcon | wheels | bench | study | mutations | docs | pictures | grades | campaigns | lock : each does its own set-up and needs nothing before it.
 PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
@@ -67,6 +67,10 @@ bench: setup
 study: setup
 	$(BIN)/python -m pytest -n 2 -m slow --timeout 0
 
+# Quarter of an hour: 14,000 damaged files of every format; SDIMU_MUTATIONS=N for N of each.
+mutations: setup
+	$(BIN)/python -m pytest test/mutation -m slow -s --timeout 0
+
 # The pages that are made from code and runs. The campaigns take hours; they go on where they stood.
 docs: setup
 	$(BIN)/sdimu effects --markdown > doc/effects.md
@@ -93,4 +97,4 @@ campaigns: setup
 lock: setup
 	$(BIN)/python requirements/lock.py
 
-.PHONY: setup demo check test colcon wheels bench study docs faults grades pictures campaigns lock
+.PHONY: setup demo check test colcon wheels bench study mutations docs faults grades pictures campaigns lock

@@ -14,6 +14,7 @@ RUN_TIME = [
     "AllanTools",
     "PyYAML",
     "dash",
+    "lz4",
     "matplotlib",
     "mcap",
     "numba",

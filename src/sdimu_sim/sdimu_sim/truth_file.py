@@ -12,6 +12,7 @@ from pydantic import Field
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.specification import Site
 from sdimu_calibration.storage.config import Schema, read_yaml
+from sdimu_calibration.storage.whole_file import write_whole
 from sdimu_sim.core.hidden import parse_effects
 from sdimu_sim.core.truth import ImuTruth, Truth, in_body_frame
 
@@ -100,8 +101,7 @@ def write_truth(path: Path, truth: Truth) -> None:
             "accel_limit_m_s2": _finite(imu.accel_limit_m_s2),
         },
     }
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(yaml.dump(content, Dumper=_Exact, sort_keys=False, allow_unicode=True), encoding="utf-8")
+    write_whole(path, yaml.dump(content, Dumper=_Exact, sort_keys=False, allow_unicode=True))
 
 
 def read_truth(path: Path) -> Truth:

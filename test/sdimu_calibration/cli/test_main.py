@@ -100,6 +100,16 @@ def test_an_error_of_the_system_names_the_file(sdimu, monkeypatch):
     assert_one_line(err, "out/result.json", "No space left")
 
 
+def test_a_lack_of_memory_says_what_to_do(sdimu, monkeypatch):
+    def full(*_: object) -> None:
+        raise MemoryError("Unable to allocate 63.3 GiB")
+
+    monkeypatch.setattr(cli, "app", full)
+    status, _, err = sdimu()
+    assert status == 1
+    assert_one_line(err, "sdimu bag cut")
+
+
 def test_an_interrupt_exits_130(sdimu, monkeypatch):
     def interrupted(*_: object) -> None:
         raise KeyboardInterrupt

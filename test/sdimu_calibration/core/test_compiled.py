@@ -3,7 +3,12 @@
 from __future__ import annotations
 
 import ast
+import os
+import subprocess
+import sys
 from pathlib import Path
+
+import pytest
 
 import sdimu_calibration.core
 
@@ -47,3 +52,39 @@ def test_whatever_compiled_functions_take_from_the_core_is_part_of_the_key_of_th
             # Names of array types stand in annotations only, which are not compiled.
             if name in used and origin.name != "arrays.py":
                 assert origin in files, f"{file.name} compiles {name} of {origin.name} into its functions"
+
+
+LOOP = """
+from sdimu_calibration.core.compiled import compiled
+
+@compiled
+def triangle(n):
+    total = 0
+    for k in range(n):
+        total += k
+    return total
+
+print(triangle(10), sum(triangle.stats.cache_hits.values()))
+"""
+
+
+@pytest.mark.parametrize("kind", ["nbi", "nbc"])
+def test_a_damaged_cache_is_compiled_anew(tmp_path, kind):
+    script = tmp_path / "loop.py"
+    script.write_text(LOOP)
+    environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path / "cache"), "PYTHONPATH": os.pathsep.join(sys.path)}
+
+    def run():
+        done = subprocess.run([sys.executable, script], env=environment, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stderr
+        return done.stdout.split()
+
+    assert run() == ["45", "0"]
+    assert run() == ["45", "1"]
+    (file,) = (tmp_path / "cache").rglob(f"*.{kind}")
+    content = bytearray(file.read_bytes())
+    for place in range(16, len(content), 64):
+        content[place] ^= 0xFF
+    file.write_bytes(content)
+    assert run() == ["45", "0"]
+    assert run() == ["45", "1"]

@@ -121,3 +121,16 @@ def test_a_folder_of_other_things_is_never_replaced(tmp_path):
 def test_an_unknown_type_names_the_package_to_install(tmp_path: Path):
     with McapBag(tmp_path / "b") as bag, pytest.raises(DataError, match="no_such_msgs"):
         bag.topic("/x", "no_such_msgs/msg/Thing")
+
+
+def test_a_stamp_before_1970_is_kept_and_filed_at_the_beginning(tmp_path: Path):
+    ns = np.array([-3, -1, 2]) * 500_000_000
+    encoded = cdr.encode_imu(ns, np.arange(9.0).reshape(3, 3), np.ones((3, 3)))
+    with McapBag(tmp_path / "b") as bag:
+        bag.topic("/imu", cdr.IMU)
+        bag.write("/imu", encoded[0], int(ns[0]))
+        bag.write_merged({"/imu": (ns[1:], encoded[1:])})
+    with Reader(tmp_path / "b") as reader:
+        found = [(t, raw) for _, t, raw in reader.messages()]
+    assert [t for t, _ in found] == [0, 0, 1_000_000_000]
+    assert cdr.decode_imu([raw for _, raw in found])[0].tolist() == ns.tolist()

@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 
 from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.storage import cdr
 from sdimu_calibration.storage.bag_reader import read_recording
 from sdimu_calibration.storage.bag_writer import write_recording
 from sdimu_calibration.storage.cut_bag import cut_bag
+from sdimu_calibration.storage.mcap_bag import McapBag
 
 START = 1_700_000_000_000_000_000
 N = 1000
@@ -50,3 +52,13 @@ def test_times_that_hold_nothing_are_refused_with_the_length(bag, tmp_path):
     with pytest.raises(DataError, match="nothing lies between"):
         cut_bag(bag, tmp_path / "part", 8.0, 4.0)
     assert not (tmp_path / "part").exists()
+
+
+def test_topics_that_the_calibration_does_not_read_are_left_out(tmp_path):
+    with McapBag(tmp_path / "bag") as bag:
+        bag.topic("/cmd_vel", "geometry_msgs/msg/Twist")
+        bag.topic("/imu/data_raw", cdr.IMU)
+        ns = (np.arange(N) + 1) * 10_000_000
+        bag.write_merged({"/imu/data_raw": (ns, cdr.encode_imu(ns, np.zeros((N, 3)), np.ones((N, 3))))})
+        bag.write("/cmd_vel", bytes(52), 5)
+    assert cut_bag(tmp_path / "bag", tmp_path / "part", 1.0, 2.0).counts == {"/imu/data_raw": 101}

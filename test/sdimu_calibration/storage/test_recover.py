@@ -24,7 +24,7 @@ KILLED = """
     from sdimu_calibration.storage.mcap_bag import McapBag
 
     ns = (np.arange(1000) + 1) * 10_000_000
-    bag = McapBag(Path(sys.argv[1]))
+    bag = McapBag(Path(sys.argv[1]), live=True)
     bag.topic("/imu/data_raw", cdr.IMU)
     for i, raw in enumerate(cdr.encode_imu(ns, np.zeros((1000, 3)), np.ones((1000, 3)))):
         bag.write("/imu/data_raw", raw, int(ns[i]))

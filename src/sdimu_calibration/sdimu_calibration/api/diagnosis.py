@@ -21,6 +21,7 @@ from sdimu_calibration.report.page import write_report
 from sdimu_calibration.report.report_extras import report_extras
 from sdimu_calibration.storage.diagnosis_file import write_diagnosis
 from sdimu_calibration.storage.result_file import write_result
+from sdimu_calibration.storage.whole_file import written_together
 
 
 class FitDiagnosis:
@@ -100,12 +101,13 @@ class FitDiagnosis:
     def save(self, folder: str | Path) -> Path:
         """Write diagnosis.json, result.json and report.html into a folder, as `sdimu diagnose` does."""
         folder = Path(folder)
-        write_diagnosis(folder / "diagnosis.json", self.summary)
-        write_result(folder / "result.json", self.core.after, self.core.verdict)
-        write_report(
-            folder / "report.html", self.core.after, title="Diagnosis", summary=self.summary,
-            more=report_extras(self.core),
-        )  # fmt: skip
+        with written_together(folder) as part:
+            write_diagnosis(part / "diagnosis.json", self.summary)
+            write_result(part / "result.json", self.core.after, self.core.verdict)
+            write_report(
+                part / "report.html", self.core.after, title="Diagnosis", summary=self.summary,
+                more=report_extras(self.core),
+            )  # fmt: skip
         return folder
 
     def __repr__(self) -> str:

@@ -26,6 +26,7 @@ from sdimu_calibration.report.page import write_report
 from sdimu_calibration.report.table import cells, headings, rich_table, rows
 from sdimu_calibration.storage.effect_file import find_effects
 from sdimu_calibration.storage.result_file import write_result
+from sdimu_calibration.storage.whole_file import written_together
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -183,8 +184,9 @@ class CalibrationFit:
     def save(self, folder: str | Path) -> Path:
         """Write result.json and report.html into a folder, as `sdimu calibrate` does."""
         folder = Path(folder)
-        write_result(folder / "result.json", self.result)
-        write_report(folder / "report.html", self.result, title="Calibration")
+        with written_together(folder) as part:
+            write_result(part / "result.json", self.result)
+            write_report(part / "report.html", self.result, title="Calibration")
         return folder
 
 

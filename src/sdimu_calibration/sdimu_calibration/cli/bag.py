@@ -8,6 +8,9 @@ from typing import Annotated
 
 import typer
 
+from sdimu_calibration.cli.console import plain
+from sdimu_calibration.core.plain_text import one_line
+
 app = typer.Typer(
     help="Look into a recording, take a part of it, or mend one that was cut short.", no_args_is_help=True
 )
@@ -18,7 +21,6 @@ Bag = Annotated[Path, typer.Argument(metavar="BAG", help="rosbag2 folder or .mca
 @app.command()
 def info(bag: Bag) -> None:
     """Show topics, types and counts."""
-    from rich.console import Console
     from rich.table import Table
 
     from sdimu_calibration.storage.bag_info import read_info
@@ -27,8 +29,8 @@ def info(bag: Bag) -> None:
     table = Table("topic", "type", "messages", pad_edge=False)
     table.columns[2].justify = "right"
     for topic, type_name in sorted(content.types.items()):
-        table.add_row(topic, type_name, str(content.counts[topic]))
-    console = Console()
+        table.add_row(one_line(topic), one_line(type_name), str(content.counts[topic]))
+    console = plain()
     console.print(table)
     console.print(f"{(content.last_ns - content.first_ns) * 1e-9:.1f} s from {content.first_ns * 1e-9:.3f} s")
     for part in content.damaged:
@@ -44,14 +46,12 @@ def cut(
     replace: Annotated[bool, typer.Option(help="Delete what is there.")] = False,
 ) -> None:
     """Take a part of a recording: what comes before a power cycle, or after a push against the table."""
-    from rich.console import Console
-
     from sdimu_calibration.storage.cut_bag import cut_bag
 
     part = cut_bag(bag, out, first, last, replace=replace)
-    kept = ", ".join(f"{topic} {count}" for topic, count in sorted(part.counts.items()))
+    kept = ", ".join(f"{one_line(topic)} {count}" for topic, count in sorted(part.counts.items()))
     end = "the end" if math.isinf(last) else f"{last:g} s"
-    console = Console()
+    console = plain()
     console.print(f"{out}: {first:g} s to {end} of {part.whole_s:.1f} s", soft_wrap=True)
     console.print(f"  {kept}", soft_wrap=True)
 
@@ -59,15 +59,13 @@ def cut(
 @app.command()
 def recover(bag: Bag) -> None:
     """Mend a bag that was cut while it was being written; the cut file stays as NAME.damaged."""
-    from rich.console import Console
-
-    from sdimu_calibration.storage.recover import DAMAGED_SUFFIX
+    from sdimu_calibration.storage.bag_folder import DAMAGED_SUFFIX
     from sdimu_calibration.storage.recover import recover as mend
 
-    console = Console()
+    console = plain()
     for salvage in mend(bag):
         seconds = (salvage.last_ns - salvage.first_ns) * 1e-9
-        saved = ", ".join(f"{topic} {count}" for topic, count in sorted(salvage.counts.items()))
+        saved = ", ".join(f"{one_line(topic)} {count}" for topic, count in sorted(salvage.counts.items()))
         state = f"mended, was cut ({salvage.damage})" if salvage.damage else "whole, left as it is"
         console.print(f"{salvage.path}: {state}", soft_wrap=True)
         console.print(f"  {seconds:.1f} s: {saved}", soft_wrap=True)

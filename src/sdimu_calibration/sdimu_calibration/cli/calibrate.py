@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from sdimu_calibration.cli.console import plain
 from sdimu_calibration.cli.options import (
     EstimatorOption,
     HandOption,
@@ -62,8 +63,6 @@ def calibrate(
     gyro_sign: GyroSign = None,
 ) -> None:
     """Estimate the coefficients from a recording; leaves result.json and report.html."""
-    from rich.console import Console
-
     from sdimu_calibration.cli.progress import bar
     from sdimu_calibration.core.estimation.outcome import outcome
     from sdimu_calibration.core.estimation.solve import solve
@@ -72,8 +71,9 @@ def calibrate(
     from sdimu_calibration.report.table import rich_table, rows
     from sdimu_calibration.storage.reference_file import read_truth
     from sdimu_calibration.storage.result_file import write_result
+    from sdimu_calibration.storage.whole_file import written_together
 
-    console = Console()
+    console = plain()
     origin = source(
         imu_topic, status_topic, joint_topic, temperature_topic, accel_unit, gyro_unit, accel_sign, gyro_sign
     )
@@ -93,8 +93,9 @@ def calibrate(
     taken = STANDARD_GRAVITY if test.site is None else None
     true = None if truth is None else read_truth(truth, result.body_frame, taken)
     folder = out or default_folder(bag)
-    write_result(folder / "result.json", result)
-    write_report(folder / "report.html", result, title=f"Calibration of {bag.name}", truth=true)
+    with written_together(folder) as part:
+        write_result(part / "result.json", result)
+        write_report(part / "report.html", result, title=f"Calibration of {bag.name}", truth=true)
     console.print(rich_table(rows(result, true), f"body frame: {result.body_frame}"), soft_wrap=True)
     tell(console, (*notes, *(note for note in result.notes if note not in notes)))
     console.print(f"results in {folder}", soft_wrap=True)

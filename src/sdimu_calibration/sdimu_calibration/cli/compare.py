@@ -7,13 +7,13 @@ from typing import Annotated, Any
 
 import typer
 
+from sdimu_calibration.cli.console import plain
+
 
 def compare(
     folders: Annotated[list[Path], typer.Argument(metavar="DIR DIR ...", help="Folders with result.json.")],
 ) -> None:
     """Show how far the error fell with each model; folders of one recording, simplest model first."""
-    from rich.console import Console
-
     from sdimu_calibration.cli.wide_table import print_table
     from sdimu_calibration.core.recording import DataError
     from sdimu_calibration.report.comparison import HEADINGS, OTHER_SCALE, comparison, other_scale
@@ -23,7 +23,7 @@ def compare(
         raise DataError("compare: give at least two folders with a result.json each")
     results = [read_result(folder) for folder in folders]
     lines = comparison([str(folder) for folder in folders], results)
-    console = Console()
+    console = plain()
     if other_scale(results):
         console.print(OTHER_SCALE)
     short = [[folder.name, *line[1:]] for folder, line in zip(folders, lines, strict=True)]

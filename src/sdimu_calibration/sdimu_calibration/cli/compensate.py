@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from sdimu_calibration.cli.console import plain
+
 
 def compensate(
     bag: Annotated[Path, typer.Argument(metavar="BAG", help="rosbag2 folder or .mcap file.")],
@@ -27,8 +29,6 @@ def compensate(
     replace: Annotated[bool, typer.Option("--replace", help="Overwrite the bag if it exists.")] = False,
 ) -> None:
     """Take the errors out of a recording: /imu/data_raw to /imu/data with covariances."""
-    from rich.console import Console
-
     from sdimu_calibration.cli.progress import bar
     from sdimu_calibration.core.compensation import compensator
     from sdimu_calibration.core.units import from_si
@@ -39,7 +39,7 @@ def compensate(
     from sdimu_calibration.storage.effect_file import effects_of_result
     from sdimu_calibration.storage.result_file import read_result
 
-    console = Console()
+    console = plain()
     calibration = read_result(result)
     own = effects_of_result(calibration.model, effect or [])
     specification = load_imu(imu)

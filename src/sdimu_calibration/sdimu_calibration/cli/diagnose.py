@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from sdimu_calibration.cli.console import plain
 from sdimu_calibration.cli.options import (
     EstimatorOption,
     HandOption,
@@ -72,8 +73,6 @@ def diagnose(
     gyro_sign: GyroSign = None,
 ) -> None:
     """Find what the model is missing; leaves diagnosis.json and report.html, and result.json of the model found."""
-    from rich.console import Console
-
     from sdimu_calibration.cli.diagnosis_text import line, print_summary
     from sdimu_calibration.cli.progress import bar
     from sdimu_calibration.core.diagnosis.bootstrap import bootstrap as repeat_on_noise
@@ -85,7 +84,7 @@ def diagnose(
     from sdimu_calibration.storage.effect_file import find_effects
     from sdimu_calibration.storage.model_choice import HANDHELD, named_estimator
 
-    console = Console()
+    console = plain()
     asked = HANDHELD if hand else named_estimator(estimator, "--estimator")
     if asked == "classical":
         raise DataError(NOT_DIAGNOSABLE)
@@ -123,9 +122,11 @@ def _write(folder: Path, title: str, summary: DiagnosisSummary, null: Null | Non
     from sdimu_calibration.report.report_extras import report_extras
     from sdimu_calibration.storage.diagnosis_file import write_diagnosis
     from sdimu_calibration.storage.result_file import write_result
+    from sdimu_calibration.storage.whole_file import written_together
 
     found = summary.diagnosis
-    write_diagnosis(folder / "diagnosis.json", summary, null)
-    write_result(folder / "result.json", found.after, found.verdict)
-    progress("navigation without aid", 0.5)
-    write_report(folder / "report.html", found.after, title=title, summary=summary, more=report_extras(found))
+    with written_together(folder) as part:
+        write_diagnosis(part / "diagnosis.json", summary, null)
+        write_result(part / "result.json", found.after, found.verdict)
+        progress("navigation without aid", 0.5)
+        write_report(part / "report.html", found.after, title=title, summary=summary, more=report_extras(found))

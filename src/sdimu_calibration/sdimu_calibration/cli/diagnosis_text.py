@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from sdimu_calibration.cli.wide_table import print_table
 from sdimu_calibration.core.diagnosis.verdict import beyond
+from sdimu_calibration.core.plain_text import one_line
 from sdimu_calibration.core.units import UnitError, from_si
 
 if TYPE_CHECKING:
@@ -47,7 +48,7 @@ def amount(value: float, unit: str, digits: int = 3) -> str:
 
 def line(console: Console, text: str) -> None:
     """Print a line as it is: no markup, no wrapping."""
-    console.print(text, soft_wrap=True, markup=False, highlight=False)
+    console.print(one_line(text, None), soft_wrap=True, highlight=False)
 
 
 def _where(console: Console, summary: DiagnosisSummary) -> None:

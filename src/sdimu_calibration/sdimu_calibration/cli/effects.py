@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from sdimu_calibration.cli.console import plain
+
 if TYPE_CHECKING:
     from rich.table import Table
 
@@ -17,8 +19,6 @@ def effects(
     markdown: Annotated[bool, typer.Option("--markdown", help="Print the page of the documentation.")] = False,
 ) -> None:
     """Show the catalogue: equation, unit, typical size, what an effect is confused with."""
-    from rich.console import Console
-
     from sdimu_calibration.report.catalogue import grouped, page
     from sdimu_calibration.storage.effect_file import register_plugins
 
@@ -26,7 +26,7 @@ def effects(
         typer.echo(page(), nl=False)
         return
     register_plugins()
-    console = Console()
+    console = plain()
     if name is None:
         for title, found in grouped():
             console.print(_table(title, found))

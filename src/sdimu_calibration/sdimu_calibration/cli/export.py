@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from sdimu_calibration.cli.console import plain
+
 
 def export(
     result: Annotated[Path, typer.Argument(metavar="RESULT", help="result.json of a calibration, or its folder.")],
@@ -22,8 +24,6 @@ def export(
     ] = None,
 ) -> None:
     """Write a result as matrices, Kalibr YAML, imu_tk files, a C header, YAML or CSV."""
-    from rich.console import Console
-
     from sdimu_calibration.storage.config import load_imu
     from sdimu_calibration.storage.effect_file import effects_of_result
     from sdimu_calibration.storage.export import FORMS
@@ -35,7 +35,7 @@ def export(
     folder = result if result.is_dir() else result.parent
     name = FORMS[form].file_name if form in FORMS else ""
     done = write(form, out or folder / name, calibration, load_imu(imu), own, rate)
-    console = Console()
+    console = plain()
     for text in done.missing:
         console.print(f"not in the file: {text}", soft_wrap=True, markup=False, highlight=False)
     if form == "kalibr":

@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from sdimu_calibration.cli.console import plain
+
 
 def import_files(
     files: Annotated[
@@ -22,12 +24,11 @@ def import_files(
     from contextlib import nullcontext
 
     import numpy as np
-    from rich.console import Console
 
     from sdimu_calibration.storage.import_map import load_import_map
     from sdimu_calibration.storage.importer import read_files, write_imported
 
-    console = Console()
+    console = plain()
     described = load_import_map(chart)
     with console.status("importing") if console.is_terminal else nullcontext():
         found = read_files(files, described)

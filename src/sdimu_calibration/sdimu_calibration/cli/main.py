@@ -16,6 +16,7 @@ import typer
 from typer.core import TyperGroup
 from typer.main import get_command
 
+from sdimu_calibration.core.plain_text import one_line
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.units import UnitError
 
@@ -94,12 +95,14 @@ def main() -> None:
         sys.exit(_complain(str(error)))
     except OSError as error:
         sys.exit(_complain(f"{error.filename or 'system'}: {error.strerror or error}"))
+    except MemoryError:
+        sys.exit(_complain("not enough memory for this recording; take a part of it with: sdimu bag cut"))
     except KeyboardInterrupt:
         sys.exit(130)
 
 
 def _complain(text: str) -> int:
-    sys.stderr.write("sdimu: " + " ".join(text.split()) + "\n")
+    sys.stderr.write(f"sdimu: {one_line(text)}\n")
     return 1
 
 

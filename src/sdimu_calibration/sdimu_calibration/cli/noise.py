@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from sdimu_calibration.cli.console import plain
+
 
 def noise(
     bag: Annotated[Path, typer.Argument(metavar="BAG", help="rosbag2 folder or .mcap file.")],
@@ -17,7 +19,6 @@ def noise(
 ) -> None:
     """Find the noise terms from the rests of a recording; leaves noise.html and imu.yaml for --imu."""
     import numpy as np
-    from rich.console import Console
 
     from sdimu_calibration.cli.options import default_folder
     from sdimu_calibration.cli.progress import bar
@@ -26,6 +27,7 @@ def noise(
     from sdimu_calibration.storage.config import find_config
     from sdimu_calibration.storage.imu_file import write_measured_imu
     from sdimu_calibration.storage.opening import open_recording
+    from sdimu_calibration.storage.whole_file import written_together
 
     find_config("imu", imu)  # errors in it are reported before the work
     recording = open_recording(bag)
@@ -34,7 +36,7 @@ def noise(
         rows = (max(rows, key=lambda r: r.stop - r.start),)
     data = np.hstack([recording.omega_ib_b, recording.f_ib_b])
     rng = np.random.default_rng(seed)
-    console = Console()
+    console = plain()
     deviations, terms = {}, {}
     with bar(console) as progress:
         for k, channel in enumerate(CHANNELS):
@@ -50,8 +52,9 @@ def noise(
         *recording.notes,
     ]
     folder = out or default_folder(bag, "noise")
-    write_page(folder / "noise.html", deviations, terms, f"Noise of {bag.name}", words)
-    write_measured_imu(folder / "imu.yaml", imu, measured, terms, [f"Noise measured in {bag.name}: {words[0]}"])
+    with written_together(folder) as part:
+        write_page(part / "noise.html", deviations, terms, f"Noise of {bag.name}", words)
+        write_measured_imu(part / "imu.yaml", imu, measured, terms, [f"Noise measured in {bag.name}: {words[0]}"])
     console.print(table(terms))
     for word in words:
         console.print(f"note: {word}", soft_wrap=True, markup=False, highlight=False)

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from sdimu_calibration.core.plain_text import one_line
+
 if TYPE_CHECKING:
     from rich.console import Console
 
@@ -94,7 +96,7 @@ def opened(
 def tell(console: Console, notes: Iterable[str]) -> None:
     """Print notes, one line each."""
     for note in notes:
-        console.print(f"note: {note}", soft_wrap=True, markup=False, highlight=False)
+        console.print(one_line(f"note: {note}", None), soft_wrap=True, highlight=False)
 
 
 def leave(result: Calibration) -> None:

@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from sdimu_calibration.cli.console import plain
+
 
 def pictures(
     bag: Annotated[Path, typer.Argument(metavar="BAG", help="rosbag2 folder or .mcap file.")],
@@ -16,8 +18,6 @@ def pictures(
     out: Annotated[Path | None, typer.Option(help="Folder of the pictures; BAG_pictures by default.")] = None,
 ) -> None:
     """Draw a diagnosis as PNG files: heat map before and after, candidates, ladder, drift in use."""
-    from rich.console import Console
-
     from sdimu_calibration.cli.options import default_folder
     from sdimu_calibration.cli.progress import bar
     from sdimu_calibration.core.diagnosis.diagnose import climb
@@ -28,7 +28,7 @@ def pictures(
     from sdimu_calibration.storage.model_choice import named_model
     from sdimu_calibration.storage.opening import open_test
 
-    console = Console()
+    console = plain()
     wanted = named_model(model, [])
     test = open_test(bag, site, load_imu(imu))
     with bar(console) as progress:

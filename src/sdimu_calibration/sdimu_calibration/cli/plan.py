@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from sdimu_calibration.cli.console import plain
+
 if TYPE_CHECKING:
     from rich.table import Table
 
@@ -42,8 +44,6 @@ def plan(
     out: Annotated[Path, typer.Option(help="Plan file to write.")] = Path("out/plan/found.yaml"),
 ) -> None:
     """Search for a plan with the bound of the data; leaves a plan file for --plan."""
-    from rich.console import Console
-
     from sdimu_calibration.cli.progress import bar
     from sdimu_calibration.core.plan_search import Goal, Question, next_turn, search
     from sdimu_calibration.core.plan_search.bound import bounds
@@ -52,7 +52,7 @@ def plan(
     from sdimu_calibration.storage.model_choice import named_model
     from sdimu_calibration.storage.plan_file import write_plan
 
-    console = Console()
+    console = plain()
     start = load_plan(plan)
     asked = Question(load_site(site), load_imu(imu), named_model(model, add or []))
     speeds = tuple(math.radians(v) for v in _numbers("--rates", rates))

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from sdimu_calibration.cli.console import plain
 from sdimu_calibration.core.recording import DataError
 
 if TYPE_CHECKING:
@@ -31,16 +32,15 @@ def predict(
     out: Annotated[Path, typer.Option(help="Folder of the results.")] = Path("out/predict"),
 ) -> None:
     """Simulate the covariance of a test; leaves prediction.json and prediction.html."""
-    from rich.console import Console
-
     from sdimu_calibration.core.batch.batch import bound_covariance
     from sdimu_calibration.core.planning.predict import predict as simulate
     from sdimu_calibration.report.prediction import coefficient_table, published_table, write_page
     from sdimu_calibration.storage.config import load_imu, load_model, load_plan, load_site
     from sdimu_calibration.storage.noise_file import load_noise
     from sdimu_calibration.storage.prediction_file import write_prediction
+    from sdimu_calibration.storage.whole_file import written_together
 
-    console = Console()
+    console = plain()
     what = load_plan(plan), load_site(site), load_imu(imu), load_model(model)
     assumed = None if noise is None else load_noise(noise)
     printed = _published(assumed)
@@ -56,8 +56,9 @@ def predict(
     console.print(coefficient_table(prediction))
     for found in prediction.unobservable:
         console.print(f"not observable: {found.text}", soft_wrap=True, markup=False, highlight=False)
-    write_prediction(out / "prediction.json", prediction, about)
-    write_page(out / "prediction.html", prediction, about, published)
+    with written_together(out) as part:
+        write_prediction(part / "prediction.json", prediction, about)
+        write_page(part / "prediction.html", prediction, about, published)
     console.print(f"results in {out}", soft_wrap=True)
 
 

@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
+from sdimu_calibration.cli.console import plain
 from sdimu_calibration.cli.options import ImuOption, default_folder, leave
 from sdimu_calibration.cli.source_options import (
     AccelSign,
@@ -43,8 +44,6 @@ def replay(
     """Play a recording into the live calibration node; leaves result.json."""
     import time
 
-    from rich.console import Console
-
     from sdimu_calibration.report.table import rich_table, rows
     from sdimu_calibration.storage.bag_file import bag_parts
     from sdimu_calibration.storage.config import load_imu
@@ -60,7 +59,7 @@ def replay(
     folder = out or default_folder(bag, "replay")
     for old in ("result.json", "calibration.journal"):
         (folder / old).unlink(missing_ok=True)
-    console = Console()
+    console = plain()
     begun = time.monotonic()
     calibrating = {
         "site": site or "", "imu": imu or "", "model": model, "out": str(folder), "accel_unit": accel_unit or "",
@@ -71,7 +70,7 @@ def replay(
         "status_topic": status_topic or "", "joint_topic": joint_topic or "",
         "temperature_topic": temperature_topic or "",
     }  # fmt: skip
-    with console.status("replaying") if console.is_terminal else Console(quiet=True).status(""):
+    with console.status("replaying") if console.is_terminal else plain(quiet=True).status(""):
         _play(folder / "log", calibrating, playing, patience)
     calibration = read_result(folder / "result.json")
     wall = time.monotonic() - begun

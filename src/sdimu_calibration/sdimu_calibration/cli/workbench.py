@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from sdimu_calibration.cli.console import plain
 from sdimu_calibration.cli.options import ImuOption
 from sdimu_calibration.cli.source_options import (
     AccelSign,
@@ -45,7 +46,6 @@ def workbench(
     import logging
     import socket
 
-    from rich.console import Console
     from werkzeug.serving import make_server
 
     from sdimu_calibration.cli.progress import bar
@@ -77,8 +77,8 @@ def workbench(
         return FitSession(test, wanted)
 
     shelf = RecordingCache(neighbours(bag), session)
-    console = Console()
-    with bar(Console(stderr=True)) as progress:
+    console = plain()
+    with bar(plain(stderr=True)) as progress:
         progress("reading", 0.0)
         bench = shelf.bench()
         bench.fit((), (), progress)

@@ -4,16 +4,55 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Callable
+import zlib
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import cache
+from io import BytesIO
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
 import numba
+from numba.core.caching import IndexDataCacheFile
 
 F = TypeVar("F", bound=Callable[..., Any])
 
 _CORE = Path(__file__).parent
+
+
+class _Checked(IndexDataCacheFile):  # type: ignore[misc]
+    """Numba's cache on disk, with a checksum at the end of each file: what is damaged is compiled anew.
+
+    Damaged machine code ends the process without a word. Pickle stops reading before the checksum.
+    """
+
+    def _load_index(self) -> Any:
+        return super()._load_index() if _is_whole(self._index_path) else {}
+
+    def _load_data(self, name: str) -> Any:
+        if not _is_whole(self._data_path(name)):
+            # To numba a file that has gone: it compiles.
+            raise FileNotFoundError(name)
+        return super()._load_data(name)
+
+    @contextmanager
+    def _open_for_write(self, filepath: str) -> Iterator[BytesIO]:
+        content = BytesIO()
+        yield content
+        with super()._open_for_write(filepath) as file:
+            file.write(content.getvalue() + _mark(content.getvalue()))
+
+
+def _mark(content: bytes) -> bytes:
+    return b"sum:" + zlib.crc32(content).to_bytes(4, "little")
+
+
+def _is_whole(path: str) -> bool:
+    try:
+        content = Path(path).read_bytes()
+    except OSError:
+        return False
+    return content[-8:] == _mark(content[:-8])
 
 
 @cache
@@ -41,4 +80,9 @@ def compiled(function: F) -> F:
         # A room of the core has no sources besides those of the core: they are read once for all rooms.
         sources = _CORE if folder.is_relative_to(_CORE) else folder
         numba.config.CACHE_DIR = str(place / f"numba-{_sources_digest(sources)}")
-    return cast(F, numba.njit(cache=True, nogil=True, error_model="numpy")(function))
+    compiled_one = numba.njit(cache=True, nogil=True, error_model="numpy")(function)
+    cache = getattr(compiled_one, "_cache", None)
+    if cache is not None:
+        stamp = cache._impl.locator.get_source_stamp()
+        cache._cache_file = _Checked(cache.cache_path, cache._impl.filename_base, stamp)
+    return cast(F, compiled_one)

@@ -33,6 +33,10 @@ _ONE: dict[str, Callable[[Any], Any]] = {**_OF_NUMBERS, "abs": np.abs, "sqrt": n
 _TWO: dict[str, Callable[[Any, Any], Any]] = {"min": np.minimum, "max": np.maximum}
 _LONGEST = 2000
 """Number of characters of a formula at most: a longer one is no formula, and would nest too deep for the parser."""
+_LARGEST = 1e300
+"""Size (1) of a number in a formula at most: one beyond it overflows at the first product."""
+_LARGEST_POWER = 12
+"""Power (1) of a quantity with a unit at most: a higher one is a slip."""
 _JOINED = re.compile(r"(?<=[\w)])\s+(?=[A-Za-z(])")
 """A blank between two factors stands for a product, as in the equations that a diagnosis proposes."""
 
@@ -150,6 +154,8 @@ def parse_expression(text: str, known: frozenset[str]) -> Expression:
 
 def _check(node: ast.expr, text: str, known: frozenset[str], names: set[str]) -> None:
     if isinstance(node, ast.Constant) and type(node.value) in (int, float):
+        if abs(node.value) > _LARGEST:  # type: ignore[arg-type]
+            raise DataError(f"a number in '{text}' is larger than any quantity")
         return
     if isinstance(node, ast.Name):
         if node.id not in known:
@@ -235,7 +241,11 @@ def _of_power(node: ast.BinOp, base: Dimension, exponent: Dimension) -> Dimensio
         return {}
     if any(isinstance(part, ast.Name) for part in ast.walk(node.right)):
         raise DataError(f"'{ast.unparse(node)}': the power of {written(base)} must be a constant")
-    power = Fraction(float(_evaluate(node.right, {}))).limit_denominator(12)
+    with np.errstate(all="ignore"):
+        value = float(_evaluate(node.right, {}))
+    if not abs(value) <= _LARGEST_POWER:
+        raise DataError(f"'{ast.unparse(node)}': the power of {written(base)} must be {_LARGEST_POWER} at most")
+    power = Fraction(value).limit_denominator(12)
     return {n: p * power for n, p in base.items() if p * power}
 
 

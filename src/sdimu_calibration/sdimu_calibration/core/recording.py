@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from sdimu_calibration.core.arrays import Bools, Floats, Ints
+from sdimu_calibration.core.plain_text import one_line
 
 NOMINAL_FROM = 50
 """Number of sample intervals that give the nominal one: the first ones, so that live and offline agree."""
@@ -15,7 +16,10 @@ UNNUMBERED = -1
 
 
 class DataError(ValueError):
-    """Data or options that cannot be used; its text is the one line shown to the user."""
+    """Data or options that cannot be used; its text is the one line shown to the user, whatever names are in it."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__(one_line(text))
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,8 @@ import re
 from dataclasses import dataclass
 from fractions import Fraction
 
+from sdimu_calibration.core.plain_text import one_line
+
 STANDARD_GRAVITY = 9.80665
 """Standard gravity (m/s^2): the size of the unit g (CGPM 1901)."""
 
@@ -55,7 +57,10 @@ _NAMED: dict[str, tuple[float, dict[str, int]]] = {
 
 
 class UnitError(ValueError):
-    """A unit that cannot be read, or a quantity of the wrong dimension."""
+    """A unit that cannot be read, or a quantity of the wrong dimension; its text is one line for the user."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__(one_line(text))
 
 
 @dataclass(frozen=True)
@@ -104,7 +109,7 @@ def parse_unit(text: str) -> Unit:
             power /= 2
         name, _, exponent = (root.group(1) if root else token).partition("^")
         if exponent:
-            if not re.fullmatch(r"-?\d+", exponent):
+            if not re.fullmatch(r"-?[0-9]{1,2}", exponent):
                 raise UnitError(f"cannot read the power in unit '{text}'")
             power *= int(exponent)
         if name not in _NAMED:
@@ -159,4 +164,7 @@ def parse_quantity(text: str | float, expected: str) -> float:
     unit = parse_unit(written or "1")
     if unit.dimension != wanted.dimension:
         raise UnitError(f"'{text}' has the wrong unit (expected something like '1 {expected}')")
-    return float(match.group(1)) * unit.factor
+    value = float(match.group(1)) * unit.factor
+    if not math.isfinite(value):
+        raise UnitError(f"'{text}' is larger than any number can be")
+    return value

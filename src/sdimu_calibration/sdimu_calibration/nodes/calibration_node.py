@@ -53,6 +53,7 @@ from sdimu_calibration.storage.effect_file import SUFFIXES, extended_model
 from sdimu_calibration.storage.journal import Journal, digest
 from sdimu_calibration.storage.result_file import write_result
 from sdimu_calibration.storage.status_message import first_entry, phase_entry, stamp_ns
+from sdimu_calibration.storage.whole_file import written_together
 
 JOURNAL = "calibration.journal"
 BLOCK = 20
@@ -224,7 +225,8 @@ class CalibrationNode:
 
     def _write_result(self) -> Calibration:
         result = self._feed.finish()
-        write_result(self._out / "result.json", result)
+        with written_together(self._out) as part:
+            write_result(part / "result.json", result)
         return result
 
     def _answer_save(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:

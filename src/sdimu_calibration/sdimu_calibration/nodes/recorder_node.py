@@ -56,7 +56,7 @@ class RecorderNode:
         topics = [str(text) for text in self.node.declare_parameter("topics", list(TOPICS)).value]
         replace = bool(self.node.declare_parameter("replace", False).value)
         self._needed = [str(t) for t in self.node.declare_parameter("wait_for", [""]).value if t]
-        self._bag = McapBag(out, replace=replace)
+        self._bag = McapBag(out, replace=replace, live=True)
         self._born = self._latest = time.monotonic()
         self._ticker = Ticker(self.node)
         self._consumers = {name: Consumer(self.node, self._ticker, name) for name in STREAMS}
@@ -88,15 +88,26 @@ class RecorderNode:
 
         def take(message: bytes) -> None:
             at = stamp(message)
-            write(name, message, at)
+            try:
+                write(name, message, at)
+            except DataError as error:
+                self._fail(error)
             self._latest = time.monotonic()
             if consumer is not None:
                 consumer.reached(at)
 
         return take
 
+    def _fail(self, error: DataError) -> None:
+        """Leave with an error; raised in a callback it would come out as a trace of the executor."""
+        if not self.done.done():
+            self.done.set_exception(error)
+
     def _tick(self) -> None:
-        self._bag.flush()
+        try:
+            self._bag.flush()
+        except DataError as error:
+            self._fail(error)
         now = time.monotonic()
         if now - self._born > PEERS_PATIENCE_S or all(self.node.count_publishers(t) for t in self._needed):
             for consumer in self._consumers.values():

@@ -13,6 +13,7 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 from rich.console import Console
 
+from sdimu_calibration.core.plain_text import one_line
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.nodes.stopping import asked_to_stop, watch_signals
 
@@ -53,10 +54,25 @@ def run_node(make: Callable[[], Spinnable], args: Sequence[str] | None = None) -
     except KeyboardInterrupt:
         pass
     except (DataError, OSError) as error:
-        Console(stderr=True, soft_wrap=True, markup=False, highlight=False).print(str(error))
+        _say(error)
         status = 1
     finally:
         if shell is not None:
-            shell.close()
+            status = max(status, _close(shell, quiet=status > 0))
         rclpy.try_shutdown()
     sys.exit(status)
+
+
+def _close(shell: Spinnable, quiet: bool) -> int:
+    """Close a node; 1 when it cannot leave its files complete, which is said unless an error was said before."""
+    try:
+        shell.close()
+    except (DataError, OSError) as error:
+        if not quiet:
+            _say(error)
+        return 1
+    return 0
+
+
+def _say(error: Exception) -> None:
+    Console(stderr=True, soft_wrap=True, markup=False, highlight=False).print(one_line(str(error)))

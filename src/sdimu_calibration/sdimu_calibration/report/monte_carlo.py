@@ -19,6 +19,7 @@ from sdimu_calibration.core.units import from_si
 from sdimu_calibration.report.drawing import BAND, Figure, html, lay_out
 from sdimu_calibration.report.style import STYLE
 from sdimu_calibration.storage.json_file import read_json
+from sdimu_calibration.storage.whole_file import write_whole
 
 FORMAT = "sdimu-monte-carlo/1"
 
@@ -78,9 +79,7 @@ def write_page(path: Path, data: Path) -> None:
         When `data` is no such file.
     """
     text = page(read_json(data, FORMAT))
-    temporary = path.with_name(f".{path.name}.part")
-    temporary.write_text(text, encoding="utf-8")
-    temporary.replace(path)
+    write_whole(path, text)
 
 
 def page(content: Mapping[str, Any]) -> str:

@@ -13,6 +13,7 @@ from sdimu_calibration.core.units import from_si
 from sdimu_calibration.report.drawing import Figure, html, lay_out
 from sdimu_calibration.report.groups import title
 from sdimu_calibration.report.style import STYLE
+from sdimu_calibration.storage.whole_file import write_whole
 
 _DASHES = ("solid", "dash", "dot")
 _COLOURS = ("#0b5394", "#b45f06", "#38761d")
@@ -46,8 +47,6 @@ def figure(content: Mapping[str, Any], units: Mapping[str, str]) -> Figure:
 
 def write_page(path: Path, content: Mapping[str, Any], units: Mapping[str, str]) -> None:
     """Write the page: one file that needs no network."""
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
     drawn = html(figure(content, units), 1)
     text = (
         f"{len(content['seeds'])} IMUs, each tested at every mount (the same angle about all axes). RMS over IMUs "
@@ -60,6 +59,4 @@ def write_page(path: Path, content: Mapping[str, Any], units: Mapping[str, str])
         f'<style>{STYLE}</style></head><body>\n<h1>{heading}</h1><p class="quiet">{escape(text)}</p>'
         f"{drawn}\n</body></html>\n"
     )
-    temporary = path.with_name(f".{path.name}.part")
-    temporary.write_text(page, encoding="utf-8")
-    temporary.replace(path)
+    write_whole(path, page)

@@ -13,6 +13,7 @@ from sdimu_calibration.core.noise import TERMS, Allan, Terms
 from sdimu_calibration.core.units import from_si
 from sdimu_calibration.report.drawing import Figure, html, lay_out
 from sdimu_calibration.report.style import STYLE
+from sdimu_calibration.storage.whole_file import write_whole
 
 CHANNELS = ("gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z")
 UNITS = {
@@ -132,8 +133,6 @@ def write_page(
     path: Path, deviations: Mapping[str, Allan], found: Mapping[str, Terms], title: str, words: Sequence[str]
 ) -> None:
     """Write the page: one file that needs no network; `words` are sentences for its head."""
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
     head = "".join(f"<th>{escape(word)}</th>" for word in HEAD)
     lines = "".join("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in rows(found))
     body = [
@@ -148,10 +147,8 @@ def write_page(
         'walk: 60 deg/h/sqrt(Hz) are 1 deg/sqrt(h). The random walk of the bias is the rate random walk.</p>',
         f"<table><thead><tr>{head}</tr></thead><tbody>{lines}</tbody></table>",
     ]
-    temporary = path.with_name(f".{path.name}.part")
-    temporary.write_text(
+    write_whole(
+        path,
         f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><title>{escape(title)}</title>'
         f"<style>{STYLE}</style></head><body>\n" + "\n".join(body) + "\n</body></html>\n",
-        encoding="utf-8",
     )
-    temporary.replace(path)

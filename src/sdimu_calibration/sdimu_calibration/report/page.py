@@ -19,6 +19,7 @@ from sdimu_calibration.report.report_extras import ReportExtras
 from sdimu_calibration.report.rests_section import rests_section
 from sdimu_calibration.report.style import SCRIPT, STYLE
 from sdimu_calibration.report.use_section import in_use
+from sdimu_calibration.storage.whole_file import write_whole
 
 _TEXT_COLUMNS = frozenset({"coefficient", "unit"})
 
@@ -52,11 +53,7 @@ def write_report(
     more : ReportExtras, optional
         What to show besides the diagnosis: table angles, drift in use.
     """
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f".{path.name}.part")
-    temporary.write_text(page(calibration, title, truth, reference, summary, more), encoding="utf-8")
-    temporary.replace(path)
+    write_whole(path, page(calibration, title, truth, reference, summary, more))
 
 
 class _Drawing:

@@ -18,6 +18,7 @@ from sdimu_calibration.report.drawing import html
 from sdimu_calibration.report.figures import sigma_history
 from sdimu_calibration.report.groups import effect_of, groups
 from sdimu_calibration.report.style import STYLE
+from sdimu_calibration.storage.whole_file import write_whole
 
 _DEFINED = 1e-6
 """A sigma below this share of the prior is rounding: the body frame makes the coefficient zero."""
@@ -105,11 +106,7 @@ def write_page(
     published : (columns, rows), optional
         Table beside published values.
     """
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f".{path.name}.part")
-    temporary.write_text(page(prediction, about, published), encoding="utf-8")
-    temporary.replace(path)
+    write_whole(path, page(prediction, about, published))
 
 
 def page(

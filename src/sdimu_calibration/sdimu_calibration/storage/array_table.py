@@ -3,30 +3,35 @@
 from __future__ import annotations
 
 import re
+import zipfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.io import loadmat
-from scipy.io.matlab import MatlabOpaque, MatReadError
 
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.storage.mat_reader import OBJECT, PREFIX
+from sdimu_calibration.storage.own_process import run
+from sdimu_calibration.storage.unpacking import allowed
 
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 _HDF5_AT = 512
+_PATIENCE_S = 120.0
+"""Time (s) that a MAT file may take: a gigabyte takes ten."""
 _REFERENCE = re.compile(r"([A-Za-z_]\w*(?:\.\w+)*)(?:\[(\d+)\])?")
 
 
 class ArrayTable:
     """Columns of a file of arrays: ``name``, ``struct.name``, or ``name[2]`` for the second column of a matrix."""
 
-    def __init__(self, path: Path, arrays: Mapping[str, Any]) -> None:
+    def __init__(self, path: Path, arrays: Mapping[str, Any], objects: Mapping[str, str] | None = None) -> None:
         self.path = path
         self._arrays = {name: array for name, array in arrays.items() if not name.startswith("__")}
-        self._objects = [value[0] for value in self._arrays.values() if isinstance(value, MatlabOpaque)]
+        self._objects = dict(objects or {})
 
     def floats(self, columns: Sequence[int | str]) -> Floats:
         """Read columns as numbers, shape (n, k); one matrix may hold all of them, either way round.
@@ -58,7 +63,7 @@ class ArrayTable:
     def _array(self, column: int | str) -> NDArray[Any]:
         """Return a variable, or one column of it, as a matrix with samples in its rows."""
         match = _REFERENCE.fullmatch(str(column))
-        value: Any = self._look_up(match.group(1)) if match else None
+        value: Any = self._arrays.get(match.group(1)) if match else None
         if match is None or value is None:
             self._refuse_object(str(column))
             there = ", ".join(sorted(self._arrays)) or "none"
@@ -83,21 +88,13 @@ class ArrayTable:
         DataError
             When `column` is of one, or the file holds nothing else.
         """
-        for entry in self._objects:
-            name, kind = (bytes(entry[field]).decode("utf-8", "replace") for field in ("s0", "s2"))
+        for name, kind in self._objects.items():
             if column.split(".", maxsplit=1)[0] == name or len(self._objects) == len(self._arrays):
                 raise DataError(
                     f"{self.path}: variable {name} is a MATLAB {kind}, which MATLAB alone can read; there: t = "
                     f"{name}.Properties.RowTimes; s = struct('t', seconds(t - t(1)), 'data', {name}.Variables); "
                     f"save('{name}_numbers.mat', '-struct', 's', '-v7'); the columns are then t, data[1], data[2], ..."
                 )
-
-    def _look_up(self, name: str) -> Any:
-        first, *rest = name.split(".")
-        value = self._arrays.get(first)
-        for part in rest:
-            value = getattr(value, part, None)
-        return value
 
 
 def read_npz(path: Path) -> ArrayTable:
@@ -106,17 +103,37 @@ def read_npz(path: Path) -> ArrayTable:
     Raises
     ------
     DataError
-        When it is none.
+        When it is none, or unpacks to more than it may.
     """
     try:
+        with zipfile.ZipFile(path) as packed:
+            size = sum(entry.file_size for entry in packed.infolist())
+        if size > _most(path):
+            raise DataError(f"{path}: unpacks to {size} bytes, more than {_most(path)}")
         with np.load(path, allow_pickle=False) as content:
-            return ArrayTable(path, dict(content))
-    except (ValueError, OSError, EOFError, TypeError) as error:
-        raise DataError(f"{path}: not a file of numpy arrays (NPZ)") from error
+            return ArrayTable(path, {name: _shaped(content[name]) for name in content.files})
+    except (DataError, PermissionError):
+        raise
+    except Exception as error:
+        # numpy answers damage with errors of zipfile, zlib, struct, ast, tokenize, and of the memory.
+        raise DataError(f"{path}: not a file of numpy arrays (NPZ) that can be read") from error
+
+
+def _most(path: Path) -> int:
+    """Bytes that a file may unpack to; on their way to samples they are there up to four times."""
+    return allowed(path) // 4
+
+
+def _shaped(array: Any) -> NDArray[Any]:
+    """Return an array of numbers; bytes of a file that is none of numpy are no variable."""
+    return np.asarray(array) if isinstance(array, np.ndarray) else np.empty(0)
 
 
 def read_mat(path: Path) -> ArrayTable | None:
     """Read a MAT file of version 4 to 7; None when it is a matrix written as text.
+
+    The reader of scipy trusts what the file says of itself; it works in a process of its own, which may end as it
+    likes and gets the memory that the file may unpack to.
 
     Raises
     ------
@@ -131,10 +148,13 @@ def read_mat(path: Path) -> ArrayTable | None:
         raise DataError(f"{path}: is a MAT file of version 7.3; save it in MATLAB with '-v7'")
     if _is_text(head):
         return None
-    try:
-        return ArrayTable(path, loadmat(path, squeeze_me=True, struct_as_record=False))
-    except (MatReadError, NotImplementedError, ValueError, TypeError, OSError, IndexError) as error:
-        raise DataError(f"{path}: not a MAT file that can be read ({error})") from error
+    with TemporaryDirectory(prefix="sdimu-") as folder:
+        plain = Path(folder) / "plain.npz"
+        run("mat_reader.py", path, plain, _most(path), _PATIENCE_S, "not a MAT file that can be read")
+        with np.load(plain, allow_pickle=False) as content:
+            arrays = {name.removeprefix(PREFIX): content[name] for name in content.files}
+    objects = {name.removeprefix(OBJECT): str(arrays.pop(name)) for name in list(arrays) if name.startswith(OBJECT)}
+    return ArrayTable(path, arrays, objects)
 
 
 def _is_text(head: bytes) -> bool:

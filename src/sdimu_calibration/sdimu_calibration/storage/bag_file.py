@@ -5,22 +5,26 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
-import yaml
-import zstandard
 
 from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.storage.bag_metadata import named_files, read_metadata
 from sdimu_calibration.storage.mcap_walk import MAGIC, DamagedError, McapWalk, Messages
+from sdimu_calibration.storage.own_process import run
 from sdimu_calibration.storage.raw_messages import Block, RawMessages
+from sdimu_calibration.storage.unpacking import Allowance, UnpackError, allowed, unpack_file
 
 ROS1 = ".bag"
 _PACKED = ".zstd"
 _SUFFIXES = (".mcap", ".db3", _PACKED, ROS1)
 _ZSTD = "zstd"
+_PATIENCE_S = 3600.0
+"""Time (s) that the conversion of a bag of ROS 1 may take: a gigabyte takes minutes."""
 Unpack = Callable[[bytes], bytes]
 
 
@@ -34,9 +38,15 @@ class TopicContent:
 
 Takes = Callable[[str, str], bool]
 """Whether the messages of a topic (name, type) are wanted."""
+Keep = Callable[[str], RawMessages]
+"""What the messages of a topic of some type go into."""
+TargetOf = Callable[[str, str], RawMessages | None]
+"""Where the messages of a topic (name, type) go; None when they are not wanted."""
 
 
-def raw_messages(path: Path, wanted: Mapping[str, str], required: str) -> dict[str, RawMessages]:
+def raw_messages(
+    path: Path, wanted: Mapping[str, str], required: str, kept: Keep = lambda _: RawMessages()
+) -> dict[str, RawMessages]:
     """Read the CDR bytes of the messages of some topics.
 
     Parameters
@@ -48,6 +58,8 @@ def raw_messages(path: Path, wanted: Mapping[str, str], required: str) -> dict[s
         unless it is `required`.
     required : str
         The topic that must be there with at least one message.
+    kept : callable
+        Makes what the messages of a topic go into, from its type.
 
     Returns
     -------
@@ -64,7 +76,7 @@ def raw_messages(path: Path, wanted: Mapping[str, str], required: str) -> dict[s
         check_type(path, topic, type_name, wanted)
         return topic in wanted
 
-    found = read_topics(path, takes)
+    found = read_topics(path, takes, kept)
     if required not in found:
         raise DataError(absent(path, {t: c.type_name for t, c in found.items()}, required, wanted[required]))
     check_filled(path, required, found[required].raw)
@@ -77,7 +89,7 @@ def check_filled(path: Path, topic: str, raw: RawMessages) -> None:
         raise DataError(f"{path}: topic {topic} has no messages; record the bag while the IMU is running")
 
 
-def read_topics(path: Path, takes: Takes) -> dict[str, TopicContent]:
+def read_topics(path: Path, takes: Takes, kept: Keep = lambda _: RawMessages()) -> dict[str, TopicContent]:
     """Read the messages of the topics that are wanted; the others come without messages.
 
     Parameters
@@ -86,6 +98,8 @@ def read_topics(path: Path, takes: Takes) -> dict[str, TopicContent]:
         rosbag2 folder, .mcap or .db3 file (packed by zstd or not), ROS 1 bag.
     takes : callable
         Asked with name and type of every topic.
+    kept : callable
+        Makes what the messages of a topic go into, from its type.
 
     Returns
     -------
@@ -97,12 +111,19 @@ def read_topics(path: Path, takes: Takes) -> dict[str, TopicContent]:
         When the bag cannot be read.
     """
     content: dict[str, TopicContent] = {}
+
+    def target(topic: str, type_name: str) -> RawMessages | None:
+        """Where the messages of a topic go; None when they are not wanted."""
+        wanted = takes(topic, type_name)
+        entry = content.setdefault(topic, TopicContent(type_name, kept(type_name)))
+        return entry.raw if wanted else None
+
     with _unpacked(path) as (parts, unpack):
         for part in parts:
             if part.suffix == ".mcap":
-                _read_mcap(part, path, takes, unpack, content)
+                _read_mcap(part, path, target, unpack, content)
             else:
-                _read_with_rosbags(part, path, takes, content)
+                _read_with_rosbags(part, path, target, unpack, content)
     return content
 
 
@@ -110,16 +131,15 @@ def read_topics(path: Path, takes: Takes) -> dict[str, TopicContent]:
 def _unpacked(path: Path) -> Iterator[tuple[list[Path], Unpack | None]]:
     """Yield files that the readers below can open, and how each message is packed in them; None when not at all."""
     parts = bag_parts(path)
-    information = _metadata(path) if path.is_dir() else {}
+    information = read_metadata(path) if path.is_dir() else {}
     mode = _mode(information)
-    mcap = information.get("storage_identifier") == "mcap"
     if mode and information.get("compression_format") != _ZSTD:
         raise DataError(f"{path}: compressed by {information.get('compression_format')}, which cannot be read")
-    if mode and mcap:
-        named = _named(path, information)
-        parts = _present(named)
-    if mode == "message" and mcap:
-        yield parts, zstandard.ZstdDecompressor().decompress
+    if mode:
+        # Unpacked here, within bounds: the reader of folders knows none.
+        parts = _present(_named(path, information))
+    if mode == "message":
+        yield parts, partial(Allowance(allowed(path)).unpack, _ZSTD)
         return
     if not any(part.suffix in {_PACKED, ROS1} for part in parts):
         yield parts, None
@@ -136,26 +156,15 @@ def _opened(part: Path, folder: Path) -> Path:
         return part
     target = folder / part.stem
     try:
-        with part.open("rb") as packed, target.open("wb") as plain:
-            zstandard.ZstdDecompressor().copy_stream(packed, plain)
-    except zstandard.ZstdError as error:
-        raise DataError(f"{part}: cannot be unpacked ({_line(error)})") from error
+        unpack_file(part, target)
+    except UnpackError as error:
+        raise DataError(f"{part}: cannot be unpacked ({error})") from error
     return target
 
 
 def _from_ros1(part: Path, target: Path) -> Path:
-    """Convert a bag of ROS 1 to one of ROS 2: the standard messages differ in nothing that is used here."""
-    from rosbags.convert.converter import convert  # noqa: PLC0415 (slow to load, and bags of ROS 1 are rare)
-    from rosbags.typesys import Stores, get_typestore  # noqa: PLC0415
-
-    typestore = get_typestore(Stores.ROS2_JAZZY)
-    kinds = ["sensor_msgs/msg/Imu", "sensor_msgs/msg/JointState", "sensor_msgs/msg/Temperature"]
-    kinds.append("diagnostic_msgs/msg/DiagnosticArray")
-    try:
-        convert([part], target, "sqlite3", 9, None, "", None, typestore, [], [], [], kinds)
-    except Exception as error:
-        # rosbags answers damage with errors of its own, of struct and of the decompressors.
-        raise DataError(f"{part}: the bag cannot be read ({_line(error)})") from error
+    """Convert a bag of ROS 1 to one of ROS 2."""
+    run("ros1_converter.py", part, target, allowed(part), _PATIENCE_S, "the bag cannot be read")
     if not target.is_dir():
         raise DataError(f"{part}: no topic of sensor_msgs/Imu in the bag")
     return target
@@ -178,7 +187,7 @@ def bag_parts(path: Path) -> list[Path]:
         if path.suffix not in _SUFFIXES:
             raise DataError(f"{path}: not a bag (expected a rosbag2 folder or a .mcap file)")
         return [path]
-    information = _metadata(path)
+    information = read_metadata(path)
     if _mode(information) or information.get("storage_identifier") == "sqlite3":
         return [path]
     named = _named(path, information)
@@ -192,12 +201,12 @@ def bag_parts(path: Path) -> list[Path]:
 
 def _mode(information: Mapping[str, Any]) -> str:
     """How a bag is packed: ``file``, ``message``, or nothing; "none" and "" mean the same."""
-    mode = str(information.get("compression_mode") or "").lower()
-    return mode if mode in {"file", "message"} else ""
+    mode = information.get("compression_mode")
+    return mode.lower() if isinstance(mode, str) and mode.lower() in {"file", "message"} else ""
 
 
 def _named(folder: Path, information: Mapping[str, Any]) -> list[Path]:
-    return [folder / Path(str(name)).name for name in information.get("relative_file_paths", [])]
+    return [folder / name for name in named_files(information)]
 
 
 def _present(named: list[Path]) -> list[Path]:
@@ -207,39 +216,26 @@ def _present(named: list[Path]) -> list[Path]:
     return named
 
 
-_LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
-"""Ten times as fast as the loader in Python where PyYAML has it; both read the same."""
-
-
-def _metadata(folder: Path) -> Mapping[str, Any]:
-    """Content of metadata.yaml, empty when there is none or it cannot be used."""
-    try:
-        text = (folder / "metadata.yaml").read_text(encoding="utf-8")
-        content = yaml.load(text, Loader=_LOADER)
-        information = content["rosbag2_bagfile_information"]
-    except (FileNotFoundError, UnicodeDecodeError, yaml.YAMLError, TypeError, KeyError):
-        return {}
-    return information if isinstance(information, dict) else {}
-
-
-def _read_mcap(part: Path, bag: Path, takes: Takes, unpack: Unpack | None, content: dict[str, TopicContent]) -> None:
+def _read_mcap(
+    part: Path, bag: Path, target_of: TargetOf, unpack: Unpack | None, content: dict[str, TopicContent]
+) -> None:
     check_magic(part)
-    walk = McapWalk(part)
+    walk = McapWalk(part, allowed(bag))
     targets: dict[int, RawMessages | None] = {}
     try:
         for block in walk.blocks():
             for channel in walk.channels.keys() - targets.keys():
-                targets[channel] = _target(walk.channels[channel].topic, walk.type_name(channel), takes, content)
+                targets[channel] = target_of(walk.channels[channel].topic, walk.type_name(channel))
             for channel in np.unique(block.channel):
                 target = targets[int(channel)]
                 if target is not None:
                     _take(block, int(channel), unpack, target)
     except DamagedError as error:
         if bag not in {part.parent, part}:
-            raise DataError(f"{bag}: a file in it is cut short or damaged") from error
-        raise DataError(f"{part}: the file is cut short or damaged; run: sdimu bag recover {part}") from error
-    except zstandard.ZstdError as error:
-        raise DataError(f"{bag}: a message cannot be unpacked ({_line(error)})") from error
+            raise DataError(f"{bag}: a file in it is cut short or damaged ({error})") from error
+        raise DataError(f"{part}: the file is cut short or damaged ({error}); run: sdimu bag recover {part}") from error
+    except UnpackError as error:
+        raise DataError(f"{bag}: a message cannot be unpacked ({error})") from error
     for key, channel in walk.channels.items():
         # Topics that never had a message are not in any chunk that has one.
         content.setdefault(channel.topic, TopicContent(walk.type_name(key)))
@@ -256,13 +252,6 @@ def _take(block: Messages, channel: int, unpack: Unpack | None, target: RawMessa
         target.append(unpack(block.content[start : start + length]))
 
 
-def _target(topic: str, type_name: str, takes: Takes, content: dict[str, TopicContent]) -> RawMessages | None:
-    """Where the messages of a topic go; None when they are not wanted."""
-    wanted = takes(topic, type_name)
-    entry = content.setdefault(topic, TopicContent(type_name))
-    return entry.raw if wanted else None
-
-
 def check_magic(part: Path) -> None:
     """Raise DataError unless the file begins as an MCAP file."""
     with part.open("rb") as stream:
@@ -273,15 +262,19 @@ def check_magic(part: Path) -> None:
         raise DataError(f"{part}: not an MCAP file")
 
 
-def _read_with_rosbags(part: Path, bag: Path, takes: Takes, content: dict[str, TopicContent]) -> None:
+def _read_with_rosbags(
+    part: Path, bag: Path, target_of: TargetOf, unpack: Unpack | None, content: dict[str, TopicContent]
+) -> None:
     from rosbags.rosbag2 import Reader  # noqa: PLC0415 (slow to load, and most bags are MCAP)
 
     try:
         with Reader(part) as reader:
-            targets = {c.topic: _target(c.topic, c.msgtype, takes, content) for c in reader.connections}
+            targets = {c.topic: target_of(c.topic, c.msgtype) for c in reader.connections}
             chosen = [c for c in reader.connections if targets[c.topic] is not None]
             for connection, _, raw in reader.messages(chosen) if chosen else ():
-                content[connection.topic].raw.append(raw)
+                if not isinstance(raw, bytes | memoryview):
+                    raise DataError(f"{bag}: a message of {connection.topic} is no bytes: the bag is damaged")
+                content[connection.topic].raw.append(bytes(raw) if unpack is None else unpack(bytes(raw)))
     except (DataError, PermissionError):
         raise
     except Exception as error:

@@ -13,14 +13,18 @@ import numpy as np
 
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.data.arrival import RawStatus, RawTemperature, RawTest, in_order
-from sdimu_calibration.core.recording import Recording, TableLog, seconds
+from sdimu_calibration.core.recording import DataError, Recording, TableLog, seconds
 from sdimu_calibration.storage import cdr
-from sdimu_calibration.storage.bag_file import raw_messages, read_topics
+from sdimu_calibration.storage.bag_file import Keep, raw_messages, read_topics
 from sdimu_calibration.storage.cdr import LayoutError, Stamps
+from sdimu_calibration.storage.imu_messages import ImuMessages
 from sdimu_calibration.storage.raw_messages import RawMessages
 from sdimu_calibration.storage.status_message import phase_entry, phase_of, stamp_ns
 from sdimu_calibration.storage.topic_choice import KINDS, TopicChoice, choose
 from sdimu_calibration.storage.topics import Topics
+
+_WITH_STAMP = 12
+"""Bytes of a message that has a stamp, at least."""
 
 
 def read_recording(path: Path, topics: Topics | TopicChoice | None = None) -> Recording:
@@ -48,13 +52,15 @@ def read_recording(path: Path, topics: Topics | TopicChoice | None = None) -> Re
     """
     path = Path(path)
     notes: list[str] = []
-    topics, raw = read_messages(path, topics, notes)
-    ns, omega_ib_b, f_ib_b = _imu(raw[topics.imu])
+    topics, raw = read_messages(path, topics, notes, _kept)
+    imu_topic = f"{path}: {topics.imu}"
+    ns, omega_ib_b, f_ib_b = _imu(raw[topics.imu], imu_topic)
     recording = in_order(
         RawTest(
             ns, omega_ib_b, f_ib_b,
-            _status(raw.get(topics.status, []), topics.status, notes), _temperature(raw.get(topics.temperature, [])),
-            f"{path}: {topics.imu}", topics.status, topics.temperature,
+            _status(raw.get(topics.status, []), topics.status, notes),
+            _temperature(raw.get(topics.temperature, []), f"{path}: {topics.temperature}"),
+            imu_topic, topics.status, topics.temperature,
         )
     )  # fmt: skip
     table = _table(raw.get(topics.joint_states, []), recording.start_ns, topics.joint_states, notes)
@@ -62,9 +68,11 @@ def read_recording(path: Path, topics: Topics | TopicChoice | None = None) -> Re
 
 
 def read_messages(
-    path: Path, topics: Topics | TopicChoice | None, notes: list[str]
+    path: Path, topics: Topics | TopicChoice | None, notes: list[str], kept: Keep = lambda _: RawMessages()
 ) -> tuple[Topics, dict[str, RawMessages]]:
     """Read the messages of the topics of a test; `notes` gets what was chosen by type.
+
+    What they go into is made by `kept`, from the type of the topic.
 
     Returns
     -------
@@ -79,8 +87,8 @@ def read_messages(
     """
     if isinstance(topics, Topics):
         wanted = {getattr(topics, kind): type_name for kind, type_name in KINDS.items()}
-        return topics, raw_messages(path, wanted, required=topics.imu)
-    content = read_topics(path, lambda _, type_name: type_name in KINDS.values())
+        return topics, raw_messages(path, wanted, topics.imu, kept)
+    content = read_topics(path, lambda _, type_name: type_name in KINDS.values(), kept)
     chosen = choose(path, content, topics or TopicChoice(), _is_phase, notes)
     return chosen, {t: content[t].raw for t in vars(chosen).values() if t in content}
 
@@ -105,7 +113,7 @@ def _decoded_status(without_stamp: bytes) -> tuple[str, Mapping[str, str]]:
 
 def _status(raw: Sequence[bytes], topic: str, notes: list[str]) -> RawStatus | None:
     """Phases in the order of arrival; a message that says none is ignored."""
-    found = (phase_entry(cdr.stamp_of(data), *_status_entry(data)) for data in raw)
+    found = (phase_entry(cdr.stamp_of(data), *_status_entry(data)) for data in raw if len(data) >= _WITH_STAMP)
     parsed = [entry for entry in found if entry is not None]
     if len(parsed) < len(raw):
         notes.append(f"{len(raw) - len(parsed)} messages of {topic} said neither dwell nor rotating: ignored")
@@ -115,14 +123,14 @@ def _status(raw: Sequence[bytes], topic: str, notes: list[str]) -> RawStatus | N
     return RawStatus(np.array(ns, np.int64), np.array(dwell), np.array(stop, np.int64))
 
 
-def _temperature(raw: Sequence[bytes]) -> RawTemperature | None:
+def _temperature(raw: Sequence[bytes], where: str) -> RawTemperature | None:
     if not raw:
         return None
     try:
         ns, values = cdr.decode_doubles(raw, 2)
         return RawTemperature(ns, values[:, 0])
     except LayoutError:
-        return RawTemperature(*_one_by_one(raw, cdr.TEMPERATURE, lambda message: message.temperature))
+        return RawTemperature(*_one_by_one(raw, cdr.TEMPERATURE, lambda message: message.temperature, where))
 
 
 def _table(raw: Sequence[bytes], start_ns: int, topic: str, notes: list[str]) -> TableLog | None:
@@ -137,23 +145,28 @@ def _table(raw: Sequence[bytes], start_ns: int, topic: str, notes: list[str]) ->
         ns, angle = cdr.decode_joint_positions(raw, names, first)
     except LayoutError:
         try:
-            ns, angle = _one_by_one(raw, cdr.JOINT_STATE, lambda message: message.position)
+            ns, angle = _one_by_one(raw, cdr.JOINT_STATE, lambda message: message.position, topic)
         except ValueError:
             notes.append(f"{topic} changes its axes on the way and was ignored")
             return None
-    if angle.ndim != 2 or angle.shape[1] != len(names):
+    if not names or angle.ndim != 2 or angle.shape[1] != len(names):
         notes.append(f"{topic} has no angle for every axis and was ignored")
         return None
     _, chosen = np.unique(ns, return_index=True)
     return TableLog(seconds(ns[chosen], start_ns), names, angle[chosen])
 
 
-def _imu(raw: Sequence[bytes]) -> tuple[Stamps, Floats, Floats]:
-    try:
-        return cdr.decode_imu(raw)
-    except LayoutError:
-        ns, values = _one_by_one(raw, cdr.IMU, _imu_values)
+def _kept(type_name: str) -> RawMessages:
+    return ImuMessages() if type_name == cdr.IMU else RawMessages()
+
+
+def _imu(raw: RawMessages, where: str) -> tuple[Stamps, Floats, Floats]:
+    def one_by_one(messages: Sequence[bytes]) -> tuple[Stamps, Floats, Floats]:
+        ns, values = _one_by_one(messages, cdr.IMU, _imu_values, where)
         return ns, values[:, :3], values[:, 3:]
+
+    assert isinstance(raw, ImuMessages)
+    return raw.samples(one_by_one)
 
 
 def _imu_values(message: Any) -> list[float]:
@@ -161,15 +174,27 @@ def _imu_values(message: Any) -> list[float]:
     return [rate.x, rate.y, rate.z, force.x, force.y, force.z]
 
 
-def _one_by_one(raw: Sequence[bytes], type_name: str, values: Callable[[Any], Any]) -> tuple[Stamps, Floats]:
-    """Decode messages that share no layout; slow, and right for every encoding rosbags knows."""
-    messages = [_message(data, type_name) for data in raw]
+def _one_by_one(
+    raw: Sequence[bytes], type_name: str, values: Callable[[Any], Any], where: str
+) -> tuple[Stamps, Floats]:
+    """Decode messages that share no layout; slow, and right for every encoding rosbags knows.
+
+    Raises
+    ------
+    DataError
+        With the number of the first message that cannot be read; `where` says of which topic.
+    """
+    messages = [_message(data, type_name, f"{where}: message {k}") for k, data in enumerate(raw, 1)]
     stamps = np.array([stamp_ns(message) for message in messages], np.int64)
     return stamps, np.array([values(message) for message in messages], float)
 
 
-def _message(raw: bytes, type_name: str) -> Any:
-    return _typestore().deserialize_cdr(raw, type_name)
+def _message(raw: bytes, type_name: str, where: str) -> Any:
+    try:
+        return _typestore().deserialize_cdr(raw, type_name)
+    except Exception as error:
+        # rosbags answers damage with errors of its own, of struct, of numpy and of the decoder of text.
+        raise DataError(f"{where} cannot be read: the bag is damaged ({error})") from error
 
 
 @cache

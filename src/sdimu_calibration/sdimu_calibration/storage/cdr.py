@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sdimu_calibration.core.arrays import Bools, Floats, Ints
-from sdimu_calibration.storage.raw_messages import RawMessages
+from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.storage.raw_messages import Block, RawMessages
 
 Stamps = Ints
 Rows = NDArray[np.uint8]
@@ -29,8 +30,6 @@ _ENCAPSULATION = b"\x00\x01\x00\x00"
 _STAMP_END = 12
 # Places among the 37 doubles of an Imu message: orientation 4, covariance 9, rate 3, covariance 9, force 3, ...
 _IMU_DOUBLES, _RATE, _FORCE = 37, slice(13, 16), slice(25, 28)
-
-
 class LayoutError(ValueError):
     """Messages that do not share a layout; they must be decoded one by one."""
 
@@ -112,26 +111,44 @@ def as_bytes(messages: NDArray[Any]) -> list[bytes]:
 
 
 def stamp_of(message: bytes) -> int:
-    """Stamp (ns) of the header with which a message begins, in the byte order that it names."""
+    """Stamp (ns) of the header with which a message begins, in the byte order that it names.
+
+    Raises
+    ------
+    LayoutError
+        When the message ends before its stamp does.
+    """
+    if len(message) < _STAMP_END:
+        raise LayoutError("message too short")
     order = _order(message)
     sec = int.from_bytes(message[4:8], order, signed=True)
     return sec * 1_000_000_000 + int.from_bytes(message[8:12], order)
 
 
-def by_stamp(raw: Sequence[bytes]) -> tuple[Stamps, list[bytes]]:
+def by_stamp(raw: Sequence[bytes], topic: str) -> tuple[Stamps, list[bytes]]:
     """Sort messages by the stamps of their headers.
 
     Parameters
     ----------
     raw : sequence of bytes, length n
+    topic : str
+        For the message to the user.
 
     Returns
     -------
     stamp_ns : ndarray, shape (n,)
         Ascending (ns).
     messages : list of bytes, length n
+
+    Raises
+    ------
+    DataError
+        When a message is too short for a stamp.
     """
     messages = list(raw)
+    if any(len(message) < _STAMP_END for message in messages):
+        number = 1 + next(k for k, message in enumerate(messages) if len(message) < _STAMP_END)
+        raise DataError(f"{topic}: message {number} has no stamp: the bag is damaged")
     ns = np.fromiter(map(stamp_of, messages), np.int64, len(messages))
     order = np.argsort(ns, kind="stable")
     return ns[order], [messages[k] for k in order.tolist()]
@@ -269,19 +286,29 @@ def decode_doubles(raw: Sequence[bytes], number: int) -> tuple[Stamps, Floats]:
 def _decode_parts(raw: Sequence[bytes], number: int, parts: Sequence[slice]) -> tuple[Stamps, list[Floats]]:
     """Decode stamps (n,) and some of the doubles: one array (n, k) for each of `parts`."""
     messages = raw if isinstance(raw, RawMessages) else RawMessages(raw)
-    stamps = [np.empty(0, np.int64)]
-    values = [[np.empty((0, part.stop - part.start)) for part in parts]]
-    for block in messages.blocks():
-        start = block.length - 8 * number
-        if (start < _STAMP_END + 4).any():
-            raise LayoutError("message too short")
-        text = 12 + block.field(12, "<u4")[:, 0].astype(np.int64)
-        if (block.field(1, np.uint8) != 1).any() or (4 + text + -text % 8 != start).any():
-            raise LayoutError("other layout")
-        second, nanosecond = block.field(4, "<i4")[:, 0], block.field(8, "<u4")[:, 0]
-        stamps.append(second * np.int64(1_000_000_000) + nanosecond)
-        values.append([block.field(start + 8 * part.start, "<f8", part.stop - part.start) for part in parts])
-    return np.concatenate(stamps), [np.concatenate(columns) for columns in zip(*values, strict=True)]
+    found = [_decode_block(block, number, parts) for block in messages.blocks()]
+    empty = [np.empty((0, part.stop - part.start)) for part in parts]
+    values = zip(empty, *(columns for _, columns in found), strict=True)
+    return np.concatenate([np.empty(0, np.int64), *(ns for ns, _ in found)]), [np.concatenate(v) for v in values]
+
+
+def decode_imu_block(block: Block) -> tuple[Stamps, Floats, Floats]:
+    """Decode the sensor_msgs/Imu of one block; as `decode_imu`."""
+    stamp_ns, (omega, force) = _decode_block(block, _IMU_DOUBLES, (_RATE, _FORCE))
+    return stamp_ns, omega, force
+
+
+def _decode_block(block: Block, number: int, parts: Sequence[slice]) -> tuple[Stamps, list[Floats]]:
+    """Decode the messages of one block, as `_decode_parts`."""
+    start = block.length - 8 * number
+    if (start < _STAMP_END + 4).any():
+        raise LayoutError("message too short")
+    text = 12 + block.field(12, "<u4")[:, 0].astype(np.int64)
+    if (block.field(1, np.uint8) != 1).any() or (4 + text + -text % 8 != start).any():
+        raise LayoutError("other layout")
+    second, nanosecond = block.field(4, "<i4")[:, 0], block.field(8, "<u4")[:, 0]
+    columns = [block.field(start + 8 * part.start, "<f8", part.stop - part.start) for part in parts]
+    return second * np.int64(1_000_000_000) + nanosecond, columns
 
 
 class _Cursor:
@@ -376,8 +403,8 @@ def decode_joint_positions(raw: Sequence[bytes], names: tuple[str, ...], first: 
     """
     messages = raw if isinstance(raw, RawMessages) else RawMessages(raw)
     size = np.unique(np.concatenate([block.length for block in messages.blocks()]))
-    if len(size) != 1:
-        raise LayoutError("lengths differ")
+    if len(size) != 1 or not names:
+        raise LayoutError("lengths differ, or there are no axes")
     rows = np.concatenate([block.field(0, np.uint8, int(size[0])) for block in messages.blocks()])
     frame_id_length = int(rows[0, 12:16].copy().view("<u4")[0]) - 1
     if not 0 <= frame_id_length < rows.shape[1]:

@@ -12,6 +12,7 @@ from sdimu_calibration.core.compensation import Compensator, compensate, heat_si
 from sdimu_calibration.core.recording import Recording
 from sdimu_calibration.storage import cdr
 from sdimu_calibration.storage.bag_file import read_topics
+from sdimu_calibration.storage.bag_folder import check_apart, check_room
 from sdimu_calibration.storage.compensated_imu import encode_compensated
 from sdimu_calibration.storage.mcap_bag import McapBag
 
@@ -59,15 +60,17 @@ def write_compensated(
     Raises
     ------
     DataError
-        When something is in the way of the folder, or the errors cannot be inverted.
+        When something is in the way of the folder, such as the source itself, or the errors cannot be inverted.
     """
+    check_apart(source, target)
+    check_room(target, replace)
     # By type: the topics may have any name, and keep it.
     others = {t: c for t, c in read_topics(source, lambda _, kind: kind in _COPIED).items() if c.raw}
     stamps = recording.start_ns + np.rint(recording.t * 1e9).astype(np.int64)
     interval = recording.interval_s
     heat = heat_since(recording.temperature, recording.t - 0.5 * interval, using.start_temperature, causal=False)
     largest = np.zeros(6)
-    copied = {topic: cdr.by_stamp(content.raw) for topic, content in others.items()}
+    copied = {topic: cdr.by_stamp(content.raw, topic) for topic, content in others.items()}
     # A block takes what comes until its last sample, the last one all that is left.
     edges = [*stamps[_BLOCK - 1 : -1 : _BLOCK].tolist(), max((int(ns[-1]) for ns, _ in copied.values()), default=0)]
     places = {t: [0, *np.searchsorted(ns, edges, side="right").tolist()] for t, (ns, _) in copied.items()}

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import os
 import re
+import reprlib
 from collections.abc import Hashable, Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar, get_args
@@ -26,6 +27,12 @@ CONFIG_VARIABLE = "SDIMU_CONFIG"
 
 LONGEST_PLAN_S = 7.0 * 86400.0
 """A plan beyond a week is one with a wrong unit; its samples would not fit into the memory."""
+
+LONGEST_FILE = 1 << 20
+"""Bytes of a configuration at most: reading YAML takes ten seconds a megabyte."""
+
+DEEPEST = 32
+"""Lists in lists and keys under keys at most: a configuration needs five."""
 
 _PACKAGE = Path(__file__).resolve().parents[1]
 _REPOSITORY = _PACKAGE.parents[2]
@@ -114,20 +121,40 @@ def find_config(kind: str, name_or_path: str | Path) -> Path:
 
 
 class _UniqueKeys(yaml.SafeLoader):
-    """YAML of plain values in which a key written twice is an error, not a silent choice."""
+    """YAML of plain values: a key written twice is an error, and so is what can nest without end."""
+
+    _depth = 0
+
+    def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
+        mark = self.peek_event().start_mark  # type: ignore[no-untyped-call]
+        if self.check_event(yaml.AliasEvent):
+            raise yaml.composer.ComposerError(None, None, "aliases (*name) are not read, write it out", mark)
+        if self._depth > DEEPEST:
+            raise yaml.composer.ComposerError(None, None, f"nested more than {DEEPEST} deep", mark)
+        self._depth += 1
+        node = super().compose_node(parent, index)
+        self._depth -= 1
+        return node
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Hashable, Any]:
-        keys = [self.construct_object(k, deep=True) for k, _ in node.value]
-        for key in keys:
-            if keys.count(key) > 1:
+        seen: set[Hashable] = set()
+        for key_node, _ in node.value:
+            key = self.construct_object(key_node, deep=True)
+            if isinstance(key, Hashable) and key in seen:
                 raise yaml.constructor.ConstructorError(None, None, f"key '{key}' is there twice", node.start_mark)
+            if isinstance(key, Hashable):
+                seen.add(key)
         return super().construct_mapping(node, deep)
 
 
 def read_mapping(path: Path) -> dict[str, Any]:
     """Content of a YAML file that holds keys and values; DataError with file and line otherwise."""
     try:
+        if path.stat().st_size > LONGEST_FILE:
+            raise DataError(f"{path}: longer than {LONGEST_FILE} bytes, which no configuration is")
         data = yaml.load(path.read_text(encoding="utf-8"), Loader=_UniqueKeys)
+    except DataError:
+        raise
     except OSError as error:
         raise DataError(f"{path}: cannot be read ({error.strerror})") from error
     except UnicodeDecodeError as error:
@@ -137,6 +164,9 @@ def read_mapping(path: Path) -> dict[str, Any]:
         where = f" line {mark.line + 1}:" if mark else ""
         what = getattr(error, "problem", None) or "cannot be read"
         raise DataError(f"{path}:{where} not valid YAML: {what}") from error
+    except Exception as error:
+        # What text makes of a number or a date that is none: errors of int(), of datetime, of the stack.
+        raise DataError(f"{path}: not valid YAML: {error or type(error).__name__}") from error
     if not isinstance(data, dict):
         raise DataError(f"{path}: expected 'key: value' lines, found {'nothing' if data is None else 'something else'}")
     return data
@@ -183,7 +213,7 @@ def _message(error: Any, schema: type[BaseModel]) -> str:
         return "missing key"
     text = str(error["msg"]).removeprefix("Value error, ")
     text = text[:1].lower() + text[1:] if kind != "value_error" else text
-    return text if kind == "value_error" else f"{text} (found: {found!r})"
+    return text if kind == "value_error" else f"{text} (found: {reprlib.repr(found)})"
 
 
 def _known_keys(schema: type[BaseModel], loc: tuple[Any, ...]) -> list[str]:

@@ -12,6 +12,7 @@ from sdimu_calibration.core.arrays import Ints
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage import cdr
 from sdimu_calibration.storage.bag_file import read_topics
+from sdimu_calibration.storage.bag_folder import check_apart, check_room
 from sdimu_calibration.storage.mcap_bag import McapBag
 
 _TAKEN = (cdr.STATUS, cdr.IMU, cdr.JOINT_STATE, cdr.TEMPERATURE)
@@ -45,13 +46,17 @@ def cut_bag(source: Path, target: Path, first_s: float, last_s: float, *, replac
     Raises
     ------
     DataError
-        When there is no IMU in the bag, no sample between the times, or something in the way of the folder.
+        When there is no IMU in the bag, no sample between the times, or something in the way of the folder, such as
+        the source itself.
     """
+    check_apart(source, target)
+    check_room(target, replace)
     if not first_s < last_s:
         raise DataError(f"--from {first_s:g} --to {last_s:g}: nothing lies between these times (s)")
-    found = read_topics(source, lambda _topic, kind: kind in _TAKEN)
+    every = read_topics(source, lambda _topic, kind: kind in _TAKEN)
+    found = {topic: content for topic, content in every.items() if content.type_name in _TAKEN}
     ranked = sorted(found, key=lambda topic: _TAKEN.index(found[topic].type_name))
-    stamped = {topic: cdr.by_stamp(found[topic].raw) for topic in ranked}
+    stamped = {topic: cdr.by_stamp(found[topic].raw, topic) for topic in ranked}
     imu = [ns for topic, (ns, _) in stamped.items() if found[topic].type_name == cdr.IMU and len(ns)]
     if not imu:
         raise DataError(f"{source}: no message of {cdr.IMU} is in it")

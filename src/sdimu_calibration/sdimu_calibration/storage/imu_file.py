@@ -12,6 +12,7 @@ from sdimu_calibration.core.noise import TERMS, Terms, WhiteNoise
 from sdimu_calibration.core.noise.white import white_beside
 from sdimu_calibration.core.units import from_si
 from sdimu_calibration.storage.config import find_config, read_mapping
+from sdimu_calibration.storage.whole_file import write_whole
 
 GYRO_UNIT, ACCEL_UNIT = "deg/h/sqrt(Hz)", "ug/sqrt(Hz)"
 
@@ -62,8 +63,7 @@ def write_measured_imu(
     lines = [f"# {remark}" for remark in remarks]
     lines.append(f"# Grade and priors are those of '{base}': they are not measured here.")
     text = yaml.safe_dump(content, sort_keys=False, allow_unicode=True)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text("\n".join(lines) + "\n" + text, encoding="utf-8")
+    write_whole(path, "\n".join(lines) + "\n" + text)
 
 
 def memory_of(terms: Mapping[str, Terms], triad: str) -> dict[str, float]:

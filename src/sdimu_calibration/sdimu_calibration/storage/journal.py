@@ -1,8 +1,9 @@
 """What a live calibration has taken, written before it is acknowledged: a killed node goes on from here.
 
-One append-only file: a line of JSON (format, digest of the options), then records of a kind (one byte), a length
-(four bytes) and their content. A kill leaves at most the last record cut, which is cut off on reading. What one
-``write`` has handed to the system survives the death of the process, so nothing needs to wait for the disk.
+One append-only file: a line of JSON (format, digest of the options), then records of a kind (one byte), a length, a
+checksum (four bytes each) and their content. A kill leaves at most the last record cut; reading goes as far as records
+are whole, and cuts off the rest. What one ``write`` has handed to the system survives the death of the process, so
+nothing needs to wait for the disk.
 
 The journal is also where the samples of a running test are: a day at 200 Hz is a gigabyte, which no memory need hold
 before the end asks for it (`Journal.raw`).
@@ -15,6 +16,7 @@ import json
 import os
 import struct
 import tempfile
+import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -28,8 +30,8 @@ from sdimu_calibration.storage.journal_walk import Counts, raw_test, walk
 
 Stamps = Ints
 
-FORMAT = "sdimu-journal/1"
-_HEAD = struct.Struct("<cI")
+FORMAT = "sdimu-journal/2"
+_HEAD = struct.Struct("<cII")
 _STATUS = struct.Struct("<qqq")
 _TEMPERATURE = struct.Struct("<qd")
 _COLUMNS = 7
@@ -87,6 +89,8 @@ class Journal:
     ----------
     before : Counts
         What it held when it was opened.
+    cut_bytes : int
+        Bytes behind the last whole record of a predecessor, which are gone.
     """
 
     def __init__(self, path: Path, options: str, *, lasting: bool = True) -> None:
@@ -100,7 +104,7 @@ class Journal:
             if lasting
             else tempfile.TemporaryFile("a+b", buffering=0, dir=path.parent)  # noqa: SIM115 (open as long as the node)
         )
-        self.before = Counts(0, 0, 0)
+        self.before, self.cut_bytes = Counts(0, 0, 0), 0
         self._before_end = len(self._header)
         self._recall()
 
@@ -109,7 +113,10 @@ class Journal:
         if os.pread(self._file.fileno(), len(self._header), 0) != self._header:
             self.restart()
             return
-        self._before_end, self.before = walk(self._content(), len(self._header))
+        content = self._content()
+        self._before_end, self.before = walk(content, len(self._header))
+        self.cut_bytes = len(content) - self._before_end
+        del content
         self._file.truncate(self._before_end)
 
     def _content(self) -> NDArray[np.uint8]:
@@ -122,7 +129,7 @@ class Journal:
             block = os.pread(self._file.fileno(), min(size, self._before_end - at), at)
             place = 0
             while place + _HEAD.size <= len(block):
-                kind, length = _HEAD.unpack_from(block, place)
+                kind, length, _ = _HEAD.unpack_from(block, place)
                 end = place + _HEAD.size + length
                 if end > len(block):
                     break
@@ -136,7 +143,7 @@ class Journal:
         return raw_test(self._content(), len(self._header))
 
     def _append(self, kind: bytes, content: bytes) -> None:
-        record = _HEAD.pack(kind, len(content)) + content
+        record = _HEAD.pack(kind, len(content), zlib.crc32(kind + content)) + content
         if self._file.write(record) != len(record):
             raise OSError(f"{self._path}: the disk is full; make room, or name another folder by 'out'")
 

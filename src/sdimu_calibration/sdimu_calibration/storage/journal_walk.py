@@ -12,8 +12,8 @@ from sdimu_calibration.core.data.arrival import RawStatus, RawTemperature, RawTe
 
 Bytes = NDArray[np.uint8]
 
-HEAD = 5
-"""Bytes of the head of a record: kind, and length of the content (little-endian)."""
+HEAD = 9
+"""Bytes of the head of a record: kind, length of the content, CRC-32 of kind and content (little-endian)."""
 SAMPLE, STATUS, TEMPERATURE = 56, 24, 16
 """Bytes of a sample (stamp, three rates, three forces), of a status (stamp, dwell, stop), of a temperature (stamp,
 value)."""
@@ -45,11 +45,40 @@ def _length(content: Bytes, at: int) -> int:
 
 
 @compiled
+def _table() -> NDArray[np.uint32]:
+    """Remainders of all bytes by the polynomial of CRC-32 (as of `zlib.crc32`), shape (256,)."""
+    out = np.empty(256, dtype=np.uint32)
+    for byte in range(256):
+        rest = np.uint32(byte)
+        for _ in range(8):
+            low = rest & np.uint32(1)
+            rest = rest >> np.uint32(1)
+            if low:
+                rest = rest ^ np.uint32(0xEDB88320)
+        out[byte] = rest
+    return out
+
+
+@compiled
+def _whole(content: Bytes, at: int, length: int, table: NDArray[np.uint32]) -> bool:
+    """Whether the record at `at` is as it was written."""
+    rest = np.uint32(0xFFFFFFFF)
+    rest = table[(rest ^ np.uint32(content[at])) & np.uint32(0xFF)] ^ (rest >> np.uint32(8))
+    for k in range(at + HEAD, at + HEAD + length):
+        rest = table[(rest ^ np.uint32(content[k])) & np.uint32(0xFF)] ^ (rest >> np.uint32(8))
+    written = 0
+    for k in range(4):
+        written += int(content[at + 5 + k]) << (8 * k)
+    return int(rest ^ np.uint32(0xFFFFFFFF)) == written
+
+
+@compiled
 def _walk(content: Bytes, at: int) -> tuple[int, int, int, int]:
     samples, statuses, temperatures = 0, 0, 0
+    table = _table()
     while True:
         length = _length(content, at)
-        if length < 0:
+        if length < 0 or not _whole(content, at, length, table):
             return at, samples, statuses, temperatures
         if content[at] == _I:
             samples += length // SAMPLE

@@ -10,20 +10,15 @@ from typing import Any
 import numpy as np
 
 from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.storage.whole_file import write_whole
 
 
 def write_json(path: Path, content: Any) -> None:
-    """Write `content`; numbers that are not finite become ``null``; the folder is made.
+    """Write `content`, whole or not at all; numbers that are not finite become ``null``; the folder is made.
 
     A list of numbers or words stands on one line, everything else one entry a line.
-
-    The file is written beside its place and renamed, so that a reader never meets half of it.
     """
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f".{path.name}.part")
-    temporary.write_text(_text(content, "\n") + "\n", encoding="utf-8")
-    temporary.replace(path)
+    write_whole(path, _text(content, "\n") + "\n")
 
 
 def read_json(path: Path, expected_format: str) -> dict[str, Any]:
@@ -39,7 +34,8 @@ def read_json(path: Path, expected_format: str) -> dict[str, Any]:
         content = json.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError as error:
         raise DataError(f"{path}: no such file") from error
-    except (UnicodeDecodeError, json.JSONDecodeError) as error:
+    except (ValueError, RecursionError) as error:
+        # JSON, text, and numbers of more digits than Python reads.
         raise DataError(f"{path}: not a JSON file ({error})") from error
     found = content.get("format") if isinstance(content, dict) else None
     if not isinstance(content, dict) or found != expected_format:

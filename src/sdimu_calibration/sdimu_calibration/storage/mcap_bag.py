@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -12,9 +13,11 @@ import numpy as np
 
 from sdimu_calibration.core.arrays import Ints
 from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.storage.bag_folder import check_room, put_in_place
 from sdimu_calibration.storage.bag_metadata import FileEntry, TopicEntry, write_metadata
 from sdimu_calibration.storage.mcap_file import McapFile
 from sdimu_calibration.storage.message_definition import definition, type_hash
+from sdimu_calibration.storage.whole_file import beside
 
 # No profile: every player takes its defaults.
 _OFFERED_QOS = "[]"
@@ -30,8 +33,9 @@ class _Topic:
 class McapBag:
     """Writer of one bag; messages are CDR bytes.
 
-    A metadata.yaml is there from the start, so that a bag cut by a crash is still a folder that
-    `sdimu bag recover` can mend; `close` writes the final one.
+    A bag is written beside its place and put there by `close`: a part of one never looks whole. As a context, an
+    exception leaves nothing, and what was in its place stays. A live recording is written in its place instead, with
+    a metadata.yaml from the start: cut by a crash it is still a folder that `sdimu bag recover` can mend.
 
     Parameters
     ----------
@@ -39,24 +43,39 @@ class McapBag:
         Folder to make.
     replace : bool
         Delete a bag that is already there.
+    live : bool
+        Write in place.
 
     Raises
     ------
     DataError
-        When the folder exists and is not to be replaced, or holds something else than a bag.
+        When the folder exists and is not to be replaced, holds something else than a bag, or cannot be written.
     """
 
-    def __init__(self, path: Path, *, replace: bool = False) -> None:
+    def __init__(self, path: Path, *, replace: bool = False, live: bool = False) -> None:
         self.path = Path(path)
-        _make_room(self.path, replace)
+        check_room(self.path, replace)
+        self._replace = replace
+        self._folder = beside(self.path)
         self._file_name = f"{self.path.name}_0.mcap"
         self._topics: dict[str, _Topic] = {}
         self._schemas: dict[str, int] = {}
         self._first_ns: int | None = None
         self._last_ns = 0
-        self._stream = (self.path / self._file_name).open("wb")
-        self._writer = McapFile(self._stream)
-        self._write_metadata()
+        self._failed = False
+        with self._told():
+            self._folder.mkdir(parents=True)
+            if live:
+                put_in_place(self._folder, self.path, replace)
+                self._folder = self.path
+            self._stream = (self._folder / self._file_name).open("wb")
+        try:
+            with self._told():
+                self._writer = McapFile(self._stream)
+            self._write_metadata()
+        except BaseException:
+            self.abandon()
+            raise
 
     def topic(self, name: str, type_name: str) -> int:
         """Announce a topic; announcing it again with the same type does nothing.
@@ -99,10 +118,12 @@ class McapBag:
         data : bytes
             The message in CDR, with its 4-byte encapsulation header.
         log_time_ns : int
-            Time (ns) under which it is filed: the stamp in its header, where it has one.
+            Time (ns) under which it is filed: the stamp in its header, where it has one; 0 for one before 1970, which
+            the format cannot say.
         """
-        topic = self._topics[name]
-        self._writer.message(topic.channel, data, log_time_ns)
+        topic, log_time_ns = self._topics[name], max(log_time_ns, 0)
+        with self._told():
+            self._writer.message(topic.channel, data, log_time_ns)
         topic.count += 1
         if self._first_ns is None or log_time_ns < self._first_ns:
             self._first_ns = log_time_ns
@@ -114,7 +135,8 @@ class McapBag:
         Parameters
         ----------
         streams : dict of str to (ndarray of int, shape (n,), sequence of bytes, length n)
-            Times (ns) and messages (CDR) of each topic; at the same time the first topic goes first.
+            Times (ns) and messages (CDR) of each topic, filed as by `write`; at the same time the first topic goes
+            first.
         """
         times = [np.asarray(ns, np.int64) for ns, _ in streams.values()]
         numbers = [self._topics[name].channel for name in streams]
@@ -123,7 +145,9 @@ class McapBag:
             return
         ns, channel = np.concatenate(times), np.repeat(numbers, [len(each) for each in times])
         order = np.argsort(ns, kind="stable")
-        self._writer.messages(channel[order], [data[k] for k in order.tolist()], ns[order])
+        ns = np.maximum(ns, 0)
+        with self._told():
+            self._writer.messages(channel[order], [data[k] for k in order.tolist()], ns[order])
         for name, each in zip(streams, times, strict=True):
             self._topics[name].count += len(each)
         self._first_ns = int(ns.min()) if self._first_ns is None else min(self._first_ns, int(ns.min()))
@@ -131,15 +155,35 @@ class McapBag:
 
     def flush(self) -> None:
         """Close the chunk and hand it to the system: what was written until now survives a kill."""
-        self._writer.flush()
+        with self._told():
+            self._writer.flush()
 
     def close(self) -> None:
-        """Finish the file and write the final metadata.yaml; a second call does nothing."""
+        """Finish the bag and put it in its place; a second call does nothing.
+
+        A live bag that the system has refused to write stays as it is: what came before can be mended.
+        """
         if self._stream.closed:
             return
-        self._writer.finish()
-        self._stream.close()
+        if self._failed:
+            self.abandon()
+            return
+        with self._told():
+            try:
+                self._writer.finish()
+            finally:
+                self._stream.close()
         self._write_metadata()
+        with self._told():
+            if self._folder != self.path:
+                put_in_place(self._folder, self.path, self._replace)
+
+    def abandon(self) -> None:
+        """Leave nothing of the bag; a live one stays as it is, cut."""
+        with suppress(OSError):
+            self._stream.close()
+        if self._folder != self.path:
+            shutil.rmtree(self._folder, ignore_errors=True)
 
     def __enter__(self) -> McapBag:
         return self
@@ -147,7 +191,21 @@ class McapBag:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self.close()
+        try:
+            if kind is None:
+                self.close()
+        finally:
+            self.abandon()
+
+    @contextmanager
+    def _told(self) -> Iterator[None]:
+        """Say which bag it is that the system refuses to write."""
+        try:
+            yield
+        except OSError as error:
+            self._failed = True
+            live = "; what came before can be mended: sdimu bag recover" if self._folder == self.path else ""
+            raise DataError(f"{self.path}: the bag cannot be written ({error.strerror or error}){live}") from error
 
     @property
     def counts(self) -> dict[str, int]:
@@ -161,18 +219,5 @@ class McapBag:
             TopicEntry(name, topic.type_name, topic.count, type_hash(topic.type_name), _OFFERED_QOS)
             for name, topic in self._topics.items()
         ]
-        write_metadata(self.path, [file], topics)
-
-
-def _make_room(path: Path, replace: bool) -> None:
-    """Make the folder; an old bag goes only when asked to, anything else never."""
-    if path.is_dir() and any(path.iterdir()):
-        if not (path / "metadata.yaml").is_file():
-            raise DataError(f"{path}: the folder is not empty and not a bag; choose another one")
-        if not replace:
-            raise DataError(f"{path}: a bag is already there; --replace replaces it, or choose another folder")
-        shutil.rmtree(path)
-    try:
-        path.mkdir(parents=True, exist_ok=True)
-    except (FileExistsError, NotADirectoryError) as error:
-        raise DataError(f"{path}: a file is in the way of the bag folder; choose another one") from error
+        with self._told():
+            write_metadata(self._folder, [file], topics)

@@ -42,7 +42,7 @@ class McapFile:
 
     def __init__(self, stream: BinaryIO) -> None:
         self._stream = stream
-        self._position = 0
+        self._position = self._checksum = 0
         self._schemas: list[records.Schema] = []
         self._channels: list[records.Channel] = []
         self._counts: list[int] = []
@@ -121,7 +121,7 @@ class McapFile:
     def finish(self) -> None:
         """Write summary and footer."""
         self._close_chunk()
-        self._put(_record(records.DataEnd(data_section_crc=0)))
+        self._put(_record(records.DataEnd(data_section_crc=self._checksum)))
         summary_start = self._position
         groups = [self._schemas, self._channels, [self._statistics()], self._chunks]
         summary, offsets = b"", b""
@@ -152,6 +152,7 @@ class McapFile:
     def _put(self, data: bytes) -> None:
         self._stream.write(data)
         self._position += len(data)
+        self._checksum = zlib.crc32(data, self._checksum)
 
     def _close_chunk(self) -> None:
         """Write the chunk in progress and its message indices; schemas alone wait for a message."""

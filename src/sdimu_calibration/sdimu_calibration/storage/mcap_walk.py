@@ -15,20 +15,23 @@ from pathlib import Path
 from typing import BinaryIO
 
 import numpy as np
-from mcap.data_stream import ReadDataStream
-from mcap.records import Channel, Chunk, Header, Schema
-from mcap.stream_reader import StreamReader, get_chunk_data_stream
+from mcap.records import Channel, Header, Schema
+from mcap.stream_reader import StreamReader
 from numpy.typing import NDArray
 
 from sdimu_calibration.core.arrays import Ints
 from sdimu_calibration.core.compiled import compiled
+from sdimu_calibration.storage.unpacking import Allowance, allowed
 
 MAGIC = b"\x89MCAP0\r\n"
 
 _HEAD = struct.Struct("<BQ")
+_CHUNK_HEAD = struct.Struct("<QQQII")
 _HEADER, _FOOTER, _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK = 1, 2, 3, 4, 5, 6
+_STATISTICS, _DATA_END = 11, 15
 _LARGEST = 1 << 32
 """Bytes of a record beyond which its length is taken for damage."""
+_PIECE = 1 << 20
 
 
 class DamagedError(Exception):
@@ -74,34 +77,75 @@ def _number(content: NDArray[np.uint8], start: int, size: int) -> int:
 
 @compiled
 def _records(content: NDArray[np.uint8], found: Ints) -> int:
-    """Fill a row (kind, channel, time, start, length) of `found` for each record; return their number, -1 on damage.
+    """Fill a row (kind, channel, time, start, length) of `found` for each message, schema and channel.
 
-    `start` and `length` are of the bytes of a message, of the whole record otherwise.
+    `start` and `length` are of the bytes of a message, of the whole record otherwise. Without rows they are counted.
+    Returns their number, -1 on damage.
     """
     count, start, size = 0, 0, content.shape[0]
     while start < size:
         if start + 9 > size:
             return -1
         kind, length = content[start], _number(content, start + 1, 8)
-        if length < 0 or length > size - start - 9:
+        if length < 0 or length > size - start - 9 or (kind == _MESSAGE and length < 22):
             return -1
-        found[count, 0] = kind
-        found[count, 3] = start
-        found[count, 4] = 9 + length
-        if kind == _MESSAGE:
-            if length < 22:
-                return -1
-            found[count, 1] = _number(content, start + 9, 2)
-            found[count, 2] = _number(content, start + 15, 8)
-            found[count, 3] = start + 31
-            found[count, 4] = length - 22
-        count += 1
+        if kind in (_MESSAGE, _SCHEMA, _CHANNEL):
+            if count < found.shape[0]:
+                found[count, 0] = kind
+                found[count, 3] = start
+                found[count, 4] = 9 + length
+                if kind == _MESSAGE:
+                    found[count, 1] = _number(content, start + 9, 2)
+                    found[count, 2] = _number(content, start + 15, 8)
+                    found[count, 3] = start + 31
+                    found[count, 4] = length - 22
+            count += 1
         start += 9 + length
     return count
 
 
+class _Source:
+    """A file read from front to back, with a checksum of what has passed since it was last asked for."""
+
+    def __init__(self, stream: BinaryIO, size: int) -> None:
+        self._stream = stream
+        self._size = size
+        self.checksum = 0
+        self.sound = True
+
+    def read(self, count: int) -> bytes:
+        """Read `count` bytes."""
+        if count > self._size - self._stream.tell():
+            raise DamagedError("the file ends inside a record")
+        data = self._stream.read(count)
+        self.checksum = zlib.crc32(data, self.checksum)
+        return data
+
+    def skip(self, count: int) -> None:
+        """Pass over `count` bytes."""
+        while count:
+            count -= len(self.read(min(count, _PIECE)))
+
+    def back(self, count: int) -> None:
+        """Take `count` bytes back: the checksum is lost."""
+        self._stream.seek(-count, SEEK_CUR)
+        self.sound = False
+
+    def check(self, expected: int, what: str) -> None:
+        """Raise DamagedError unless the checksum is as the file says; zero says nothing. Begin a new one."""
+        if expected and self.sound and expected != self.checksum:
+            raise DamagedError(f"checksum of the {what} does not match")
+        self.checksum = 0
+
+
 class McapWalk:
-    """Walk over the messages of an MCAP file.
+    """Walk over the messages of an MCAP file, once.
+
+    Parameters
+    ----------
+    path : Path
+    most : int, optional
+        Bytes that its chunks may unpack to; by the size of the file when left out.
 
     Attributes
     ----------
@@ -113,14 +157,15 @@ class McapWalk:
         Those met until now.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, most: int | None = None) -> None:
         self.path = path
         self.profile = ""
         self.channels: dict[int, Channel] = {}
         self.schemas: dict[int, Schema] = {}
+        self._allowance = Allowance(allowed(path) if most is None else most)
 
     def type_name(self, channel: int) -> str:
-        """Type of the messages of a channel, such as ``sensor_msgs/msg/Imu``."""
+        """Type of the messages of a channel, such as ``sensor_msgs/msg/Imu``; empty where nothing says it."""
         schema = self.schemas.get(self.channels[channel].schema_id)
         return str(schema.name) if schema is not None else ""
 
@@ -141,46 +186,80 @@ class McapWalk:
                 raise DamagedError(str(error) or type(error).__name__) from error
 
     def _blocks(self, stream: BinaryIO) -> Iterator[Messages]:
-        size = self.path.stat().st_size
-        if stream.read(len(MAGIC)) != MAGIC:
+        source = _Source(stream, self.path.stat().st_size)
+        count, expected, damage = 0, None, ""
+        if source.read(len(MAGIC)) != MAGIC:
             raise DamagedError("not an MCAP file")
         while True:
-            head = stream.read(_HEAD.size)
+            before = source.checksum
+            head = source.read(_HEAD.size)
             kind, length = _HEAD.unpack(head)
-            if length > min(_LARGEST, size - stream.tell()):
-                raise DamagedError("the file ends inside a record")
             if kind in {_HEADER, _SCHEMA, _CHANNEL}:
-                self._register(head + stream.read(length))
-            elif kind == _CHUNK:
-                yield self._messages(Chunk.read(ReadDataStream(BytesIO(stream.read(length)))))
-            elif kind == _MESSAGE:
-                yield self._found(head + stream.read(length))
+                self._register(head + source.read(length))
+            elif kind in {_CHUNK, _MESSAGE}:
+                record = source.read(length)
+                content, beyond = self._unpacked(record) if kind == _CHUNK else (head + record, 0)
+                if beyond:
+                    # What a wrong length took in are records of their own.
+                    source.back(beyond)
+                    damage = damage or "a chunk is shorter than its record says"
+                block = self._found(content)
+                count += len(block)
+                yield block
+            elif kind == _STATISTICS:
+                (expected,) = struct.unpack_from("<Q", source.read(length))
+            elif kind == _DATA_END:
+                (checksum,) = struct.unpack_from("<I", source.read(length))
+                source.checksum = before
+                source.check(checksum, "data")
             elif kind == _FOOTER:
-                stream.seek(length, SEEK_CUR)
-                if stream.read(len(MAGIC)) != MAGIC:
+                source.read(16)
+                before = source.checksum
+                (checksum,) = struct.unpack_from("<I", source.read(length - 16))
+                source.checksum = before
+                source.check(checksum, "summary")
+                if source.read(len(MAGIC)) != MAGIC:
                     raise DamagedError("the file ends without its magic")
-                return
+                break
             else:
-                stream.seek(length, SEEK_CUR)
+                source.skip(length)
+        if expected is not None and expected != count:
+            damage = damage or f"{count} messages are in the file, its statistics say {expected}"
+        if damage:
+            raise DamagedError(damage)
 
-    def _messages(self, chunk: Chunk) -> Messages:
-        stream, size = get_chunk_data_stream(chunk)
-        content = stream.read(size)
-        if size != chunk.uncompressed_size or (chunk.uncompressed_crc not in {0, zlib.crc32(content)}):
+    def _unpacked(self, record: bytes) -> tuple[bytes, int]:
+        """Return the records of a chunk, and how many bytes of its own record lie beyond it."""
+        _, _, size, checksum, name_length = _CHUNK_HEAD.unpack_from(record)
+        at = _CHUNK_HEAD.size + name_length
+        compression = record[_CHUNK_HEAD.size : at].decode()
+        (length,) = struct.unpack_from("<Q", record, at)
+        beyond = len(record) - at - 8 - length
+        if beyond < 0:
+            raise DamagedError("a chunk is longer than its record")
+        content = self._allowance.unpack(compression, record[at + 8 : at + 8 + length], size)
+        if size != len(content) or checksum not in {0, zlib.crc32(content)}:
             raise DamagedError("checksum of a chunk does not match")
-        return self._found(content)
+        return content, beyond
 
     def _found(self, content: bytes) -> Messages:
         """Find the messages among records; register schemas and channels."""
-        rows = np.empty((len(content) // _HEAD.size + 1, 5), np.int64)
-        count = _records(np.frombuffer(content, np.uint8), rows)
+        data = np.frombuffer(content, np.uint8)
+        count = _records(data, np.empty((0, 5), np.int64))
         if count < 0:
             raise DamagedError("a record is longer than its chunk")
-        kind, channel, time_ns, start, length = rows[:count].T
-        for k in np.flatnonzero((kind == _SCHEMA) | (kind == _CHANNEL)):
+        rows = np.empty((count, 5), np.int64)
+        _records(data, rows)
+        kind, channel, time_ns, start, length = rows.T
+        for k in np.flatnonzero(kind != _MESSAGE):
             self._register(content[start[k] : start[k] + length[k]])
         chosen = kind == _MESSAGE
-        return Messages(content, channel[chosen], time_ns[chosen], start[chosen], length[chosen])
+        found = Messages(content, channel[chosen], time_ns[chosen], start[chosen], length[chosen])
+        if not np.isin(found.channel, list(self.channels)).all():
+            raise DamagedError("a message is of a channel that nothing describes")
+        if (found.time_ns < 0).any():
+            raise DamagedError("a message was logged after the year 2262")
+        return found
 
     def _register(self, record: bytes) -> None:
         reader = StreamReader(BytesIO(record), skip_magic=True)

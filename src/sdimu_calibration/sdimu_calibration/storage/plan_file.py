@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from sdimu_calibration.core.plan import Plan
+from sdimu_calibration.storage.whole_file import write_whole
 
 
 def write_plan(path: Path, plan: Plan, remarks: Sequence[str] = ()) -> None:
@@ -22,8 +23,7 @@ def write_plan(path: Path, plan: Plan, remarks: Sequence[str] = ()) -> None:
         lines.append(
             f"  - {{axis: {turn.axis}, angle: {angle} deg, rate: {speed} deg/s, dwell: {_number(dwell)} s}}"
         )
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    write_whole(path, "\n".join(lines) + "\n")
 
 
 def _number(value: float) -> str:

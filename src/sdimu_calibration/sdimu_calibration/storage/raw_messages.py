@@ -47,6 +47,16 @@ class Block:
         return np.asarray(fields[self.start + place].view(dtype).reshape(-1, count))
 
 
+    def alone(self) -> Block:
+        """Return the same messages in a buffer of their own: this one keeps that of a whole chunk alive."""
+        if (self.length == self.length[0]).all():
+            content = self.field(0, np.uint8, int(self.length[0])).tobytes() if self.length[0] else b""
+        else:
+            places = zip(self.start.tolist(), self.length.tolist(), strict=True)
+            content = b"".join(self.buffer[start : start + length] for start, length in places)
+        return Block(content, np.cumsum(self.length) - self.length, self.length)
+
+
 class RawMessages(Sequence[bytes]):
     """Messages (CDR bytes) of one topic in the order of the bag.
 
@@ -68,7 +78,13 @@ class RawMessages(Sequence[bytes]):
     def extend(self, block: Block) -> None:
         """Append the messages of a block."""
         self._close()
+        if 2 * int(block.length.sum()) < len(block.buffer):
+            block = block.alone()
         self._add(block)
+
+    def ends(self) -> tuple[bytes, bytes]:
+        """First and last message."""
+        return self[0], self[-1]
 
     def blocks(self) -> list[Block]:
         """All messages, in order."""

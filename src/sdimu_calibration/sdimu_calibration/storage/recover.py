@@ -6,13 +6,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from mcap.records import Schema
+
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage.bag_file import bag_parts, check_magic
+from sdimu_calibration.storage.bag_folder import DAMAGED_SUFFIX
 from sdimu_calibration.storage.bag_metadata import FileEntry, TopicEntry, write_metadata
 from sdimu_calibration.storage.mcap_file import McapFile
 from sdimu_calibration.storage.mcap_walk import DamagedError, McapWalk
+from sdimu_calibration.storage.whole_file import beside, uninterrupted
 
-DAMAGED_SUFFIX = ".damaged"
+_NO_SCHEMA = Schema(0, b"", "", "")
+"""Of a channel whose schema is not in the file."""
 
 
 @dataclass
@@ -75,15 +80,16 @@ def recover(path: Path) -> tuple[Salvage, ...]:
 def _mend(part: Path) -> Salvage:
     """Rewrite one file, and put the copy in its place if it was damaged."""
     salvage = Salvage(part)
-    copy = part.with_suffix(".mcap.part")
+    copy = beside(part)
     try:
         with copy.open("wb") as stream:
             _copy(McapWalk(part), McapFile(stream), salvage)
         if salvage.damage and not any(salvage.counts.values()):
             raise DataError(f"{part}: no message is whole; nothing can be saved")
         if salvage.damage:
-            part.replace(part.with_name(part.name + DAMAGED_SUFFIX))
-            copy.replace(part)
+            with uninterrupted():
+                part.replace(part.with_name(part.name + DAMAGED_SUFFIX))
+                copy.replace(part)
     finally:
         copy.unlink(missing_ok=True)
     return salvage
@@ -108,11 +114,12 @@ def _copy(walk: McapWalk, target: McapFile, salvage: Salvage) -> None:
 
 def _copy_channel(walk: McapWalk, channel: int, target: McapFile, salvage: Salvage) -> int:
     old = walk.channels[channel]
-    schema = walk.schemas[old.schema_id]
+    schema = walk.schemas.get(old.schema_id, _NO_SCHEMA)
     salvage.counts.setdefault(old.topic, 0)
     qos = old.metadata.get("offered_qos_profiles", "")
     salvage.topics[old.topic] = TopicEntry(old.topic, schema.name, 0, old.metadata.get("topic_type_hash", ""), qos)
-    return target.channel(old.topic, target.schema(schema.name, schema.data, schema.encoding), old.metadata)
+    number = target.schema(schema.name, schema.data, schema.encoding) if schema.name else 0
+    return target.channel(old.topic, number, old.metadata)
 
 
 def _rebuild_metadata(folder: Path, salvages: Sequence[Salvage]) -> None:

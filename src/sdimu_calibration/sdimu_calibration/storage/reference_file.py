@@ -139,4 +139,7 @@ def _number(path: Path, name: str, value: Any) -> float:
         value = value.get("value")
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise DataError(f"{path}: {name}: expected a number in SI")
-    return float(value)
+    try:
+        return float(value)
+    except OverflowError as error:
+        raise DataError(f"{path}: {name}: larger than any number can be") from error

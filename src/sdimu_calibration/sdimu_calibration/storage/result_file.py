@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import reprlib
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, fields
 from pathlib import Path
@@ -11,6 +12,7 @@ import numpy as np
 
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.noise_term import NoiseTerm
+from sdimu_calibration.core.plain_text import one_line
 from sdimu_calibration.core.recording import DataError, DataFault
 from sdimu_calibration.core.results import Calibration, History, Rest, without_advice
 from sdimu_calibration.storage.json_file import read_json, write_json
@@ -86,30 +88,41 @@ def read_result(path: Path) -> Calibration:
     content = read_json(path, FORMAT)
     try:
         return _calibration(content)
-    except (KeyError, TypeError, ValueError) as error:
+    except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
         raise DataError(f"{path}: not a complete {FORMAT} file ({type(error).__name__}: {error})") from error
+
+
+def _word(value: Any) -> str:
+    """Return a name or a unit: text without anything that a terminal or a file would obey."""
+    if not isinstance(value, str) or not value.isprintable():
+        raise ValueError(f"{reprlib.repr(value)} is no name or unit")
+    return value
+
+
+def _said(values: Sequence[Any]) -> tuple[str, ...]:
+    return tuple(one_line(str(value), None) for value in values)
 
 
 def _calibration(content: Mapping[str, Any]) -> Calibration:
     coefficients = content["coefficients"]
     number = len(coefficients)
     return Calibration(
-        body_frame=content["body_frame"],
-        model=tuple(content["model"]),
-        names=tuple(c["name"] for c in coefficients),
-        units=tuple(c["unit"] for c in coefficients),
+        body_frame=_word(content["body_frame"]),
+        model=tuple(map(_word, content["model"])),
+        names=tuple(_word(c["name"]) for c in coefficients),
+        units=tuple(_word(c["unit"]) for c in coefficients),
         # Files written by others need not carry display units: then people see SI.
-        display_units=tuple(c.get("display_unit", c["unit"]) for c in coefficients),
+        display_units=tuple(_word(c.get("display_unit", c["unit"])) for c in coefficients),
         values=_array([c["value"] for c in coefficients], (number,)),
         covariance=_array(content["covariance"], (number, number)),
         fit=dict(content["fit"]),
         data={key: value for key, value in content["data"].items() if key != "faults"},
-        notes=tuple(content.get("notes", ())),
+        notes=_said(content.get("notes", ())),
         history=_history(content.get("history") or {}, number),
-        warnings=tuple(content.get("warnings", ())),
+        warnings=_said(content.get("warnings", ())),
         faults=tuple(_fault(entry) for entry in content["data"].get("faults", ())),
-        estimator=str(content.get("estimator", "")),
-        estimator_reason=str(content.get("estimator_reason", "")),
+        estimator=one_line(str(content.get("estimator", ""))),
+        estimator_reason=one_line(str(content.get("estimator_reason", ""))),
         noise=tuple(_term(entry) for entry in content.get("noise", ())),
         conditional_sigma=_conditional(coefficients),
         rests=tuple(_rest(entry) for entry in content.get("rests", ())),

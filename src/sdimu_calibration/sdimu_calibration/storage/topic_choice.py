@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from sdimu_calibration.core.plain_text import one_line
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage import cdr
 from sdimu_calibration.storage.bag_file import TopicContent, absent, check_filled, check_type
+from sdimu_calibration.storage.raw_messages import RawMessages
 from sdimu_calibration.storage.topics import Topics
 
 _OWN = Topics()
@@ -93,19 +95,19 @@ def _found(path: Path, content: Mapping[str, TopicContent], kind: str, is_phase:
     if kind == "imu" and not candidates:
         raise DataError(absent(path, {t: e.type_name for t, e in content.items()}, own, KINDS[kind]))
     if len(candidates) == 1:
-        notes.append(f"{candidates[0]} is taken for {own}: the only topic of its kind")
+        notes.append(one_line(f"{candidates[0]} is taken for {own}: the only topic of its kind"))
         return candidates[0]
     if candidates:
         listed = ", ".join(f"{t} ({_extent(content[t].raw)})" for t in sorted(candidates))
         if kind in _OPTION:
             raise DataError(f"{path}: which is the topic of the {kind}? {_OPTION[kind]} one of: {listed}")
-        notes.append(f"several topics of {KINDS[kind]} and none was asked for; not used: {listed}")
+        notes.append(one_line(f"several topics of {KINDS[kind]} and none was asked for; not used: {listed}"))
     return own
 
 
-def _extent(raw: Sequence[bytes]) -> str:
+def _extent(raw: RawMessages) -> str:
     """Say how many messages there are, and their rate by header.stamp."""
-    stamps = [_stamp_ns(message) for message in (raw[0], raw[-1])]
+    stamps = [_stamp_ns(message) for message in raw.ends()]
     span = (stamps[1] - stamps[0]) * 1e-9
     rate = f", {(len(raw) - 1) / span:.4g} Hz" if span > 0.0 else ""
     return f"{len(raw)} messages{rate}"

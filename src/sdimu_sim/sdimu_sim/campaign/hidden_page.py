@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from sdimu_calibration.storage.json_file import read_json
+from sdimu_calibration.storage.whole_file import write_whole
 from sdimu_sim.campaign.hidden_summary import FORMAT
 
 _HEAD = """# Proof on hidden effects
@@ -32,8 +33,7 @@ def write_page(path: Path, data: Path) -> None:
     data : Path
         Of `summarise`.
     """
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(page(read_json(data, FORMAT)), encoding="utf-8")
+    write_whole(path, page(read_json(data, FORMAT)))
 
 
 def page(summary: Mapping[str, Any]) -> str:

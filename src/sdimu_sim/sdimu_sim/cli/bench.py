@@ -9,6 +9,8 @@ from typing import Annotated, Any
 
 import typer
 
+from sdimu_calibration.cli.console import plain
+
 
 def bench(
     plan: Annotated[str, typer.Option(help="Test plan: name in config/plan or path.")] = "kim18",
@@ -17,8 +19,8 @@ def bench(
 ) -> None:
     """Time the parts of a calibration on a simulated test, after a first run that compiles."""
     from rich.box import SIMPLE_HEAD
-    from rich.console import Console
     from rich.table import Table
+
 
     with TemporaryDirectory() as folder:
         lines = [
@@ -32,7 +34,7 @@ def bench(
         table.add_column(column, justify="left" if column == "what" else "right", min_width=width)
     for line in lines:
         table.add_row(*line)
-    Console().print(table, soft_wrap=True)
+    plain().print(table, soft_wrap=True)
 
 
 def measure(plan: str, rate: float, repeats: int, folder: Path) -> list[tuple[str, float, float, int, str]]:

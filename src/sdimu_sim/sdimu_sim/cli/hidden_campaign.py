@@ -8,6 +8,8 @@ from typing import Annotated
 
 import typer
 
+from sdimu_calibration.cli.console import plain
+
 _KIND = "Kind of draw: weak, strong, pair, clean, outside or noise; repeatable; all of them without it."
 _SCHEDULER = "Address of a dask scheduler (tcp://host:8786); without it: processes on this machine."
 
@@ -26,8 +28,6 @@ def hidden_campaign(
 ) -> None:
     """Hide effects at random, diagnose the recordings blindly, and score the findings by name."""
     # Inside the function: the help of `sdimu` must not wait for numerical libraries.
-    from rich.console import Console
-
     from sdimu_calibration.cli.progress import bar
     from sdimu_calibration.storage.config import load_imu, load_model
     from sdimu_calibration.storage.json_file import write_json
@@ -40,7 +40,7 @@ def hidden_campaign(
 
     kinds = tuple(kind or KINDS)
     check_options(kinds, KINDS, number, seed)
-    console = Console()
+    console = plain()
     specification, baseline = load_imu(imu), load_model(model)
     with bar(console) as progress:
         tables = []

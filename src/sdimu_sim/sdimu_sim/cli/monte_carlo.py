@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from sdimu_calibration.cli.console import plain
 from sdimu_calibration.core.recording import DataError
 from sdimu_sim.cli.simulate import EFFECT
 
@@ -38,7 +39,6 @@ def monte_carlo(
 ) -> None:
     """Simulate and calibrate many tests: bias, RMS against sigma and bound, NEES, NIS."""
     # Inside the function: the help of `sdimu` must not wait for numerical libraries.
-    from rich.console import Console
 
     from rate_table_sim.table_file import load_table
     from sdimu_calibration.cli.progress import bar
@@ -67,7 +67,7 @@ def monte_carlo(
     )
     work = CalibrationRun(scenario, load_model(model))
     check_options(work, number, seed)
-    console = Console()
+    console = plain()
     with bar(console) as progress:
         rows = run_campaign(work, range(seed, seed + number), out, scheduler, progress, workers)
     bound = plan_bound(work, range(seed, seed + number))

@@ -175,6 +175,7 @@ def _report(console: Console, out: Path, site: str, imu: str, model: str, plan: 
     from sdimu_calibration.storage.opening import open_test
     from sdimu_calibration.storage.reference_file import read_reference, read_truth
     from sdimu_calibration.storage.result_file import read_result
+    from sdimu_calibration.storage.whole_file import written_together
 
     result = read_result(out / "result.json")
     truth = read_truth(out / "truth.yaml", result.body_frame)
@@ -182,12 +183,13 @@ def _report(console: Console, out: Path, site: str, imu: str, model: str, plan: 
         test = open_test(out / "bag", site, load_imu(imu))
         diagnosis = climb(solve(test, extended_model(model, ())))
         summary, more = summarise(diagnosis), report_extras(diagnosis)
-    write_diagnosis(out / "diagnosis.json", summary)
     title = f"Simulated test: plan {plan}, model {model}"
-    write_report(
-        out / "report.html", result, title=title, truth=truth, reference=read_reference(), summary=summary,
-        more=more,
-    )  # fmt: skip
+    with written_together(out) as part:
+        write_diagnosis(part / "diagnosis.json", summary)
+        write_report(
+            part / "report.html", result, title=title, truth=truth, reference=read_reference(), summary=summary,
+            more=more,
+        )  # fmt: skip
     shown = rich_table(rows(result, truth, read_reference()), f"body frame: {result.body_frame}")
     console.print(shown, soft_wrap=True)
     console.print(diagnosis.sentence, soft_wrap=True, highlight=False)

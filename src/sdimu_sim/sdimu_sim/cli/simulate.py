@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from sdimu_calibration.cli.console import plain
 from sdimu_calibration.core.recording import DataError
 
 EFFECT = "Hide an effect: what --add takes, =SIZE, such as 'accel_quadratic_x=20 ug/g^2'; repeatable."
@@ -41,8 +42,6 @@ def simulate(
 ) -> None:
     """Simulate a whole test into a bag, with the truth in a separate file."""
     # Inside the function: the help of `sdimu` must not wait for numerical libraries.
-    from rich.console import Console
-
     from rate_table_sim.table_file import load_table
     from sdimu_calibration.storage.config import load_imu, load_plan, load_site
     from sdimu_sim.bag_file import write_test
@@ -62,7 +61,7 @@ def simulate(
         write_by_hand(out, samples, replace=replace)
         write_truth(truth_path, true)
         text = f"{out}: {len(samples.t)} samples, {samples.t[-1]:.0f} s handheld; truth in {truth_path}"
-        Console().print(text, soft_wrap=True)
+        plain().print(text, soft_wrap=True)
         return
     scenario = Scenario(
         plan=load_plan(plan),
@@ -81,7 +80,7 @@ def simulate(
     write_test(out, scenario, test, replace=replace)
     write_truth(truth_path, test.truth)
     count = len(test.samples.t)
-    Console().print(f"{out}: {count} samples, {test.motion.t[-1]:.0f} s; truth in {truth_path}", soft_wrap=True)
+    plain().print(f"{out}: {count} samples, {test.motion.t[-1]:.0f} s; truth in {truth_path}", soft_wrap=True)
 
 
 def mount_rad(text: str) -> tuple[float, float, float]:

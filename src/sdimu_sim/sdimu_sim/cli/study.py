@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from sdimu_calibration.cli.console import plain
+
 if TYPE_CHECKING:
     from sdimu_calibration.core.progress import Progress
 
@@ -31,7 +33,6 @@ def mount(
     """Draw error against mount misalignment for the filter and the classical estimator."""
     # Inside the function: the help of `sdimu` must not wait for numerical libraries.
     from rich.box import SIMPLE
-    from rich.console import Console
     from rich.table import Table
 
     from sdimu_calibration.cli.progress import bar
@@ -43,7 +44,7 @@ def mount(
     from sdimu_sim.campaign.mount_study import mount_study
     from sdimu_sim.core.scenario import Scenario
 
-    console = Console()
+    console = plain()
     wanted, specification = load_model(model), load_imu(imu)
     scenario = Scenario(load_plan(plan), specification, load_site(site))
     mounts = [float(m) for m in range(largest + 1)]
@@ -72,7 +73,6 @@ def faults(
 ) -> None:
     """Spoil tests with every kind of fault at five sizes: none may end silently wrong. Exit status 1 if one does."""
     from rich.box import SIMPLE
-    from rich.console import Console
     from rich.table import Table
 
     from sdimu_calibration.cli.progress import bar
@@ -89,7 +89,7 @@ def faults(
     unknown = sorted(set(only or ()) - set(known))
     if unknown:
         raise DataError(f"--only {unknown[0]}: expected one of {', '.join(known)}")
-    console = Console()
+    console = plain()
     scenario = Scenario(hurried(load_plan(plan)), load_imu(imu), load_site(site))
     chosen = [known[name] for name in only] if only else list(FAULTS)
     with bar(console) as progress:
@@ -122,8 +122,6 @@ def grades(
     """Diagnose clean tests and tests with one hidden effect of every IMU file."""
     from functools import partial
 
-    from rich.console import Console
-
     from sdimu_calibration.cli.progress import bar
     from sdimu_calibration.storage.config import config_folder
     from sdimu_calibration.storage.json_file import write_json
@@ -132,7 +130,7 @@ def grades(
     from sdimu_sim.campaign.grade_run import HANDHELD, PLANS, GradeRun, choice
 
     names = imu or sorted(path.stem for path in (config_folder() / "imu").glob("*.yaml"))
-    console, seeds = Console(), range(seed, seed + runs)
+    console, seeds = plain(), range(seed, seed + runs)
     clean, hidden, choices = {}, {}, {}
     for name in names:
         with bar(console) as progress:
@@ -163,8 +161,6 @@ def noise(
     """Diagnose tests in noise with a memory: are terms named with their size, do the sigmas hold."""
     from functools import partial
 
-    from rich.console import Console
-
     from sdimu_calibration.cli.progress import bar
     from sdimu_calibration.core.recording import DataError
     from sdimu_calibration.storage.config import config_folder
@@ -180,7 +176,7 @@ def noise(
     if unknown:
         raise DataError(f"--kind {unknown[0]}: expected one of {', '.join(known)}")
     names = imu or sorted(p.stem for p in (config_folder() / "imu").glob("*.yaml") if p.stem != HANDHELD)
-    console, seeds = Console(), range(seed, seed + runs)
+    console, seeds = plain(), range(seed, seed + runs)
     results = {}
     for name in names:
         for one in kind or known:
@@ -207,8 +203,6 @@ def missing(
     """Diagnose tests as if the catalogue lacked what is hidden in them: is that seen, do the sigmas hold."""
     from functools import partial
 
-    from rich.console import Console
-
     from sdimu_calibration.cli.progress import bar
     from sdimu_calibration.core.effects import registry
     from sdimu_calibration.core.recording import DataError
@@ -228,7 +222,7 @@ def missing(
             f"--effect {unknown[0]}: " + (f"a coefficient of {whole[0]}; name that" if whole
                                           else "no effect of the catalogue; sdimu effects lists them")
         )  # fmt: skip
-    console, seeds, results = Console(), range(seed, seed + runs), {}
+    console, seeds, results = plain(), range(seed, seed + runs), {}
     for name in effect or known:
         with bar(console) as progress:
             tell = partial(_named, progress, name)
@@ -253,7 +247,6 @@ def many(
 
     import numpy as np
     from rich.box import SIMPLE
-    from rich.console import Console
     from rich.table import Table
 
     from sdimu_calibration.cli.progress import bar
@@ -261,7 +254,7 @@ def many(
     from sdimu_sim.campaign.campaign import run_campaign
     from sdimu_sim.campaign.many_run import ManyRun
 
-    console, seeds, results = Console(), range(seed, seed + runs), {}
+    console, seeds, results = plain(), range(seed, seed + runs), {}
     for name in imu or ["dtg", "rlg_navigation"]:
         with bar(console) as progress:
             tell = partial(_named, progress, name)
@@ -297,7 +290,6 @@ def hand(
 
     import numpy as np
     from rich.box import SIMPLE
-    from rich.console import Console
     from rich.table import Table
 
     from sdimu_calibration.cli.progress import bar
@@ -305,7 +297,7 @@ def hand(
     from sdimu_sim.campaign.campaign import run_campaign
     from sdimu_sim.campaign.hand_run import IMUS, HandRun
 
-    console, seeds, results = Console(), range(seed, seed + runs), {}
+    console, seeds, results = plain(), range(seed, seed + runs), {}
     for word, hidden in (("clean", False), ("hidden", True)):
         with bar(console) as progress:
             tell = partial(_named, progress, word)

@@ -44,13 +44,13 @@ class Epochs:
 
 
 @compiled
-def _ends(t: Floats, dt: Floats, nominal: float) -> Ints:
-    """Return the index after the last cycle of each whole epoch."""
+def _ends(t: Floats, dt: Floats, nominal: float, length: float) -> Ints:
+    """Return the index after the last cycle of each whole epoch of `length` (s)."""
     ends = np.empty(t.shape[0], dtype=np.int64)
     count = 0
     start = 0
     for k in range(t.shape[0]):
-        boundary = (np.floor((t[start] - dt[start] + 0.5 * nominal) / EPOCH_S) + 1.0) * EPOCH_S
+        boundary = (np.floor((t[start] - dt[start] + 0.5 * nominal) / length) + 1.0) * length
         if t[k] >= boundary - 0.5 * nominal:
             ends[count] = k + 1
             count += 1
@@ -64,7 +64,7 @@ def cut(cycles: Cycles, nominal_s: float) -> Epochs:
     An epoch ends with the first cycle that reaches the next whole second after its start, so cutting
     goes on where an earlier call stopped when it is given the cycles that were left.
     """
-    last = _ends(cycles.t, cycles.dt, nominal_s)
+    last = _ends(cycles.t, cycles.dt, nominal_s, EPOCH_S)
     first = np.concatenate([[0], last[:-1]]).astype(np.int64) if len(last) else last
     used = slice(0, int(last[-1]) if len(last) else 0)
     rate = np.sqrt(np.sum((cycles.alpha[used] / cycles.dt[used, None]) ** 2, axis=1))

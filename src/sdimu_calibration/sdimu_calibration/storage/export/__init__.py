@@ -13,6 +13,7 @@ from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.specification import ImuSpecification
 from sdimu_calibration.storage.export import c_header, csv_table, imu_tk, kalibr, matrices, yaml_file
 from sdimu_calibration.storage.export.shared import Source
+from sdimu_calibration.storage.whole_file import write_whole
 
 
 class Form(NamedTuple):
@@ -74,10 +75,9 @@ def export(
     linear = linear_model(calibration, own)
     missing = FORMS[form].cannot_hold(linear)
     source = Source(calibration, linear, imu, rate_hz, tuple(missing))
-    path.parent.mkdir(parents=True, exist_ok=True)
     files = []
     for addition, text in FORMS[form].write(source).items():
         file = path.with_name(f"{path.stem}{addition}{path.suffix}")
-        file.write_text(text, encoding="utf-8")
+        write_whole(file, text)
         files.append(file)
     return Exported(tuple(files), tuple(missing))

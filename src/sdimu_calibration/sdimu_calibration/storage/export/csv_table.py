@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import csv
+import io
+
 import numpy as np
 
 from sdimu_calibration.core.compensation import LinearModel
@@ -12,9 +15,11 @@ def texts(source: Source) -> dict[str, str]:
     """Return the text of the file."""
     c = source.calibration
     sigma = np.sqrt(np.diag(c.covariance))
-    lines = ["name,value,sigma,unit"]
-    lines += [f"{n},{number(c.values[k])},{number(sigma[k])},{c.units[k]}" for k, n in enumerate(c.names)]
-    return {"": "\n".join(lines) + "\n"}
+    text = io.StringIO()
+    table = csv.writer(text, lineterminator="\n")
+    table.writerow(["name", "value", "sigma", "unit"])
+    table.writerows([n, number(c.values[k]), number(sigma[k]), c.units[k]] for k, n in enumerate(c.names))
+    return {"": text.getvalue()}
 
 
 def cannot_hold(linear: LinearModel) -> list[str]:  # noqa: ARG001 (every form has one)

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.compensation import LinearModel
+from sdimu_calibration.core.plain_text import one_line
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.specification import ImuSpecification
 
@@ -50,7 +51,8 @@ def comments(source: Source, mark: str) -> list[str]:
         *EQUATION,
     ]
     lines += [f"NOT IN THIS FILE: {text}" for text in source.missing]
-    return [f"{mark} {line}" for line in lines]
+    # Names come from a file: they must neither begin a line of their own nor end a comment of C.
+    return [f"{mark} {one_line(line, None).replace('*/', '* /')}" for line in lines]
 
 
 def bent(linear: LinearModel) -> list[str]:

@@ -1,0 +1,37 @@
+"""Text from elsewhere made fit to be shown: one line, no control characters, not endless."""
+
+from __future__ import annotations
+
+LONGEST_LINE = 500
+"""Number of characters of a line shown to a user: six lines of a terminal; more hides what it says."""
+_TAIL = 160
+"""Number of characters kept of the end of a line that is too long: what to do stands there."""
+
+
+def printable(text: str) -> str:
+    """Write every character that a terminal would obey, not show, as ``ascii`` does."""
+    if text.isprintable():
+        return text
+    return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
+
+
+def one_line(text: str, longest: int | None = LONGEST_LINE) -> str:
+    """Write a text on one line of printable characters.
+
+    Parameters
+    ----------
+    text : str
+    longest : int or None
+        Characters beyond which the middle is left out; None keeps all.
+
+    Returns
+    -------
+    str
+    """
+    # A text of megabytes is cut before its characters are looked at.
+    if longest is not None and len(text) > 8 * longest:
+        text = text[: 4 * longest] + text[-4 * longest :]
+    line = printable(" ".join(text.split()))
+    if longest is None or len(line) <= longest:
+        return line
+    return f"{line[: longest - _TAIL - 5]} ... {line[-_TAIL:]}"

@@ -1,0 +1,103 @@
+"""Files that are whole or not there at all, and files of one run that belong together."""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import secrets
+import shutil
+import signal
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+RESULT = "result.json"
+COMPANIONS = ("report.html", "diagnosis.json")
+"""Files that speak of the result.json beside them: those of an earlier run go when a new one comes."""
+
+
+def beside(path: Path) -> Path:
+    """Name of a hidden file or folder beside `path` that nobody else takes, on the same file system."""
+    return path.with_name(f".{path.name}.{os.getpid()}-{secrets.token_hex(4)}.part")
+
+
+def write_whole(path: Path, text: str) -> None:
+    """Write a text file beside its place and rename it: a reader never meets half of it; its folder is made too.
+
+    Parameters
+    ----------
+    path : Path
+        File to make or replace.
+    text : str
+    """
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    temporary = beside(path)
+    try:
+        temporary.write_text(text, encoding="utf-8")
+        temporary.replace(path)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+@contextmanager
+def written_together(folder: Path) -> Iterator[Path]:
+    """Yield a folder to write the files of one run into; they come into `folder` together, or not at all.
+
+    Two runs into one folder leave the files of the one or of the other, never some of each.
+
+    Parameters
+    ----------
+    folder : Path
+        Made when it is not there. Files of other names stay; with a new result the `COMPANIONS` of the old one go.
+
+    Yields
+    ------
+    Path
+        Empty folder inside `folder`.
+    """
+    folder = Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    part = beside(folder / "run")
+    part.mkdir()
+    try:
+        yield part
+        with _locked(folder), uninterrupted():
+            files = sorted(part.iterdir(), key=lambda file: file.name in COMPANIONS)
+            # First what speaks of the old result: a kill in between leaves a result alone, never a foreign report.
+            for name in COMPANIONS if (part / RESULT).is_file() else ():
+                (folder / name).unlink(missing_ok=True)
+            for file in files:
+                file.replace(folder / file.name)
+    finally:
+        shutil.rmtree(part, ignore_errors=True)
+
+
+@contextmanager
+def _locked(folder: Path) -> Iterator[None]:
+    """Hold the folder against every other process that asks."""
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        # A file system without locks still has the renames close together.
+        with suppress(OSError):
+            fcntl.flock(handle, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(handle)
+
+
+@contextmanager
+def uninterrupted() -> Iterator[None]:
+    """Keep Ctrl-C waiting until some renames are done."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    came: list[int] = []
+    before = signal.signal(signal.SIGINT, lambda number, _: came.append(number))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+        if came:
+            signal.raise_signal(signal.SIGINT)
