@@ -10,6 +10,8 @@ from zlib import crc32
 import numpy as np
 
 from sdimu_calibration.core import earth
+from sdimu_calibration.core.arrays import Floats
+from sdimu_calibration.core.data.arrival import RawTest, in_order
 from sdimu_calibration.core.diagnosis.diagnose import climb
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.estimation.solve import solve
@@ -21,9 +23,9 @@ from sdimu_calibration.storage.config import load_imu, load_model
 from sdimu_sim.campaign.grade_run import LATITUDES_DEG, drawn_effect, scored_row
 from sdimu_sim.campaign.run import in_the_mean
 from sdimu_sim.core.by_hand import ByHand, against_gravity, by_hand_motion, by_hand_recording
-from sdimu_sim.core.truth import ImuTruth
+from sdimu_sim.core.truth import ImuTruth, child_rng
 
-IMUS = ("mems_by_hand", "mems_consumer", "mems_industrial")
+IMUS = ("mems_by_hand", "mems_consumer", "mems_industrial", "fog_tactical")
 """IMU files that are drawn."""
 _RATES_HZ = (50.0, 100.0, 200.0, 400.0)
 """Sample rates that are drawn (Hz)."""
@@ -31,6 +33,9 @@ _RESTS = (20, 37)
 """Least number of attitudes, and one more than the largest."""
 _NUDGES = 0.3
 """Share of the rests that somebody nudges."""
+_BURSTS, _PACKET, _LATE_S = 0.5, (8, 25), 0.004
+"""Share of the runs whose samples arrive in packets; least size of a packet (samples) and one more than the largest;
+mean delay of a packet (s)."""
 
 
 @dataclass(frozen=True)
@@ -60,17 +65,18 @@ class HandRun:
             rests, imu, Site(math.radians(float(rng.choice(LATITUDES_DEG))), 0.0), seed=seed, rate_hz=rate,
             noise=_stated_instability(imu), nudges=_NUDGES,
         )  # fmt: skip
+        packet = int(rng.integers(*_PACKET)) if rng.random() < _BURSTS else 1
         model = load_model("hand")
-        test, sensor = _opened(run)
+        test, sensor = _opened(run, packet)
         fit, truth = solve(test, model), None
         if self.hidden:
             truth = drawn_effect(rng, fit)
-            test, sensor = _opened(run.with_effects(truth.text))
+            test, sensor = _opened(run.with_effects(truth.text), packet)
             fit = solve(test, model)
         found = climb(fit)
         # From here on the truth is known; nothing before this line has seen it.
         return scored_row(found, sensor, truth) | {
-            "imu": name, "rate_hz": rate, "attitudes": rests, "rests": len(test.run.rests),
+            "imu": name, "rate_hz": rate, "attitudes": rests, "rests": len(test.run.rests), "packet": packet,
         }  # fmt: skip
 
 
@@ -80,12 +86,24 @@ def _stated_instability(imu: ImuSpecification) -> tuple[str, ...]:
     return tuple(f"{triad}_noise_flicker={from_si(size, unit):.6g} {unit}" for triad, size, unit in sizes if size)
 
 
-def _opened(run: ByHand) -> tuple[PreparedTest, ImuTruth]:
+def _opened(run: ByHand, packet: int) -> tuple[PreparedTest, ImuTruth]:
+    """Open what arrives by a link that sends `packet` samples at once."""
     recording, truth = by_hand_recording(run)
-    opened = open_test(recording, OpeningOptions(run.imu, run.site, "any"))
+    ns = recording.start_ns + np.rint(1e9 * _arrival(recording.t, packet, run.seed)).astype(np.int64)
+    arrived = in_order(RawTest(ns, recording.omega_ib_b, recording.f_ib_b))
+    opened = open_test(arrived, OpeningOptions(run.imu, run.site, "any"))
     true_gravity = float(earth.normal_gravity(run.site.latitude_rad, run.site.height_m))
     sensor = against_gravity(truth, STANDARD_GRAVITY, true_gravity).imu
     return PreparedTest(*opened), in_the_mean(sensor, replace(recording, phase=_true_phases(run)), run.seed)
+
+
+def _arrival(t: Floats, packet: int, seed: int) -> Floats:
+    """Moments at which samples arrive: those of a packet together, once its last one is there and the link free."""
+    if packet == 1:
+        return t
+    last = t[np.minimum((np.arange(len(t)) // packet + 1) * packet, len(t)) - 1]
+    late = child_rng(seed, "link").exponential(_LATE_S, -(-len(t) // packet))
+    return np.asarray(np.maximum.accumulate(last + np.repeat(late, packet)[: len(t)]))
 
 
 def _true_phases(run: ByHand) -> PhaseLog:
