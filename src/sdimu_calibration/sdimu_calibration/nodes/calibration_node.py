@@ -212,8 +212,9 @@ class CalibrationNode:
         try:
             result = self._write_result()
         except DataError as error:
-            self._departed = time.monotonic()
+            # The journal stays: it is all that there is of a test whose result could not be made.
             if self._stay:
+                self._departed = time.monotonic()
                 self.node.get_logger().error(str(error))
             elif not self.done.done():
                 self.done.set_exception(error)

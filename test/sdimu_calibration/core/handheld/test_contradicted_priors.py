@@ -57,3 +57,12 @@ def test_one_prior_that_is_too_tight_is_the_one_that_is_widened(site):
     fit, _ = fitted(site, 5, tight)
     changed = {k for k in tight.prior if fit.test.imu.prior[k] != tight.prior[k]}
     assert changed == {"accel_bias"}
+
+
+def test_a_prior_of_the_grade_that_the_file_does_not_name_is_widened_too(site):
+    """A response to force of 0.2 deg/s/g is nothing that a navigation-grade gyro has; its file does not speak of it."""
+    run = ByHand(26, TRUE, site, seed=5, effects=("gyro_g_sensitivity_xy=0.2 deg/s/g",))
+    fit = solve(PreparedTest(by_hand_recording(run)[0], load_imu("dtg")), MODEL, "handheld")
+    assert "gyro_g_sensitivity" in told(fit)[0]
+    k = fit.names.index("gyro_g_sensitivity_xy")
+    assert abs(fit.values[k] / np.radians(0.2) - 1.0) < 0.2

@@ -95,6 +95,14 @@ def test_a_base_that_rocks_widens_the_terms_and_is_told():
     assert (fit.value - 4.0 * fit.sigma < truth + 1e-12).all()
 
 
+def test_a_deviation_of_nothing_at_one_averaging_time_is_fitted():
+    """A reading that toggles between two codes averages to the same at every even number of samples."""
+    toggling = np.resize([0.0, 1e-4], 16_000)
+    with np.errstate(divide="ignore"):
+        found = fit_terms(allan([toggling], DT), np.random.default_rng(3), draws=4)
+    assert np.isfinite(found.value).all()
+
+
 def test_a_base_that_rocks_is_one_rest():
     rng = np.random.default_rng(1)
     n = round(400.0 / DT)

@@ -68,6 +68,8 @@ class Compensator:
         ``inv(A)`` of the module's equation; rates first.
     noise : ndarray, shape (6,)
         White-noise power of each channel (SI^2/Hz).
+    residue : ndarray, shape (6,)
+        Variance that quantisation adds to the integral of a sample (SI^2 s^2): twice the square of the residue.
     body_frame : str
     left_out : tuple of str
         Effects that are not compensated, each with its reason.
@@ -80,6 +82,7 @@ class Compensator:
     covariance: Floats
     inverse: Floats
     noise: Floats
+    residue: Floats
     body_frame: str
     left_out: tuple[str, ...]
     start_temperature: float | None = None
@@ -193,9 +196,10 @@ def compensator(
     T = _origin(model, calibration.drift_means)
     values, covariance = T @ values, T @ covariance @ T.T
     power: Floats = np.repeat(np.array([imu.gyro_white_noise**2, imu.accel_white_noise**2]), 3)
+    residue: Floats = 2.0 * np.repeat(np.array([imu.gyro_quantisation**2, imu.accel_quantisation**2]), 3)
     inverse: Floats = np.asarray(np.linalg.inv(slope_at_nought(model, values)), dtype=np.float64)
     return Compensator(
-        model, values, covariance, inverse, power, calibration.body_frame, tuple(left),
+        model, values, covariance, inverse, power, residue, calibration.body_frame, tuple(left),
         start if any("temperature" in reads(effect) for effect in taken) else None,
     )  # fmt: skip
 
@@ -362,7 +366,7 @@ def _covariances(using: Compensator, values: Floats, interval_s: float) -> tuple
     model, n = using.model, len(values)
     P = using.covariance[np.ix_(model.parameter, model.parameter)]
     weight = using.inverse[:, model.channel]
-    white = using.inverse @ np.diag(using.noise / interval_s) @ using.inverse.T
+    white = using.inverse @ np.diag(using.noise / interval_s + using.residue / interval_s**2) @ using.inverse.T
     out = np.empty((n, 6, 3))
     for first in range(0, n, _ROWS):
         rows = slice(first, first + _ROWS)

@@ -34,7 +34,7 @@ def reads(effect: Effect) -> frozenset[str]:
     """
     rng = np.random.default_rng(3)
     one, other = any_motion(rng), any_motion(rng)
-    other = replace(other, t=0.6 * one.t + 7.0, rest=~one.rest)
+    other = replace(other, t=0.6 * one.t + 7.0, rest=~one.rest, past=_AnyMemory(-one.past["", 0.0]))
     before = effect.regressors(one)
     return frozenset(
         name for name in FIELDS if not np.array_equal(effect.regressors(_changed(one, other, name)), before)
@@ -57,7 +57,8 @@ def any_motion(rng: np.random.Generator) -> Motion:
         np.linspace(1.0, _SPAN_S, n), np.full(n, _SPAN_S / n), any_of(n, 3), 10.0 * any_of(n, 3), C_nb, any_of(n, 3),
         any_of(n, 3), rng.random(n) < 0.5, 10.0 * any_of(n), 0.01 * any_of(n), np.sign(any_of(n, 3)),
         np.sign(any_of(n, 3)), 100.0 * rng.random(n), 1e-5 * any_of(3), any_of(n, 3),
-        _AnyMemory(any_of(3)),
+        # Far beyond any force: play forgets all but the side from which it was drawn.
+        _AnyMemory(1e3 * any_of(3)),
     )  # fmt: skip
 
 

@@ -50,7 +50,12 @@ def solve_handheld(test: PreparedTest, model: Model, start: Start | None, progre
         fit: HandheldFit | None = _fit(test, model, None, progress)
     except DataError:
         fit = None
-    free = _fit(test.with_imu(wide), model, None, progress)
+    try:
+        free = _fit(test.with_imu(wide), model, None, progress)
+    except DataError:
+        if fit is None:
+            raise
+        return fit
     beyond = contradicted(test.imu, free.sensors, free.values, np.sqrt(np.diag(free.covariance)))
     if not beyond:
         return _fit(test, model, None, progress) if fit is None else fit
@@ -63,11 +68,12 @@ def solve_handheld(test: PreparedTest, model: Model, start: Start | None, progre
 
 def _told(roomy: PreparedTest, test: PreparedTest, sensors: ImuModel, wider: Mapping[str, float]) -> PreparedTest:
     """Note which priors of the IMU file the data contradict."""
-    units = {effect.family or effect.name: effect.parameters[0].display_unit for effect in sensors.effects}
-    parts = [
-        f"{name} {from_si(test.imu.prior[name], units[name]):.3g} -> {from_si(size, units[name]):.2g} {units[name]}"
-        for name, size in wider.items()
-    ]
+    parts = []
+    for effect in sensors.effects:
+        name, unit = effect.family or effect.name, effect.parameters[0].display_unit
+        before = imu_model.prior_size(effect, test.imu)
+        if name in wider and before is not None:
+            parts.append(f"{name} {from_si(before, unit):.3g} -> {from_si(wider[name], unit):.2g} {unit}")
     note = (
         f"the data contradict priors of IMU '{test.imu.name}', which are widened: {', '.join(parts)}; if the IMU is of "
         "another class, name its file (--imu)"

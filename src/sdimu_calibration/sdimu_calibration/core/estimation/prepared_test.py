@@ -13,7 +13,10 @@ from sdimu_calibration.core.data.by_hand import why_handheld
 from sdimu_calibration.core.handheld.handheld import PreparedRun, prepare_run
 from sdimu_calibration.core.measurement_kind import SKIP
 from sdimu_calibration.core.recording import DataError, Recording
-from sdimu_calibration.core.specification import ImuSpecification, Site
+from sdimu_calibration.core.specification import EPOCH_S, ImuSpecification, Site
+
+_SETTLING_S = 1.0
+"""Time that settling takes from a dwell (s): as models have it by default; no part of an epoch."""
 
 
 @dataclass(frozen=True)
@@ -68,6 +71,18 @@ class PreparedTest:
     def why_handheld(self) -> str:
         """Why nothing can be navigated in this test; empty where it can."""
         return why_handheld(self.recording, self.imu)
+
+    @property
+    def epoch_s(self) -> float:
+        """Length of an epoch at rest (s): what quantisation asks for, and no longer than the usual dwell."""
+        wanted, log = self.imu.epoch_s, self.recording.phase
+        if wanted <= EPOCH_S or log is None:
+            return wanted
+        edge = np.diff(np.concatenate([[0], np.asarray(log.dwell, dtype=np.int8), [0]]))
+        until = np.append(log.t, self.recording.t[-1])
+        dwells = until[edge < 0] - until[edge > 0]
+        usual = float(np.median(dwells)) - _SETTLING_S if len(dwells) else wanted
+        return max(min(usual, wanted), EPOCH_S)
 
     @property
     def run(self) -> PreparedRun:

@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from sdimu_calibration.core.arrays import Floats
-from sdimu_calibration.core.effects.imu_model import ImuModel
+from sdimu_calibration.core.effects.imu_model import ImuModel, prior_size
 from sdimu_calibration.core.specification import ImuSpecification
 
 BEYOND = 3.0
@@ -37,13 +37,13 @@ def widest_priors(imu: ImuSpecification, sensors: ImuModel) -> ImuSpecification:
     wider = {
         effect.family or effect.name: effect.prior[WIDEST]
         for effect in sensors.effects
-        if imu.prior.get(effect.family or effect.name, np.inf) < effect.prior.get(WIDEST, 0.0)
+        if (prior_size(effect, imu) or np.inf) < effect.prior.get(WIDEST, 0.0)
     }
     return replace(imu, prior={**imu.prior, **wider}) if wider else imu
 
 
 def contradicted(imu: ImuSpecification, sensors: ImuModel, values: Floats, sigma: Floats) -> dict[str, float]:
-    """Say which priors coefficients contradict that were found with wider ones.
+    """Say which priors, of the file or of its grade, coefficients contradict that were found with wider ones.
 
     Parameters
     ----------
@@ -61,8 +61,8 @@ def contradicted(imu: ImuSpecification, sensors: ImuModel, values: Floats, sigma
     owner = np.array([e.family or e.name for e in sensors.effects for _ in e.parameters])
     size = np.abs(values)
     out = {}
-    for name in dict.fromkeys(owner.tolist()):
-        stated = imu.prior.get(name)
+    stated_sizes = {e.family or e.name: prior_size(e, imu) for e in sensors.effects}
+    for name, stated in stated_sizes.items():
         mine = (owner == name) & (size > BEYOND * sigma)
         if stated is not None and mine.any() and size[mine].max() > BEYOND * stated:
             out[name] = ROOM * float(size[mine].max())

@@ -147,7 +147,7 @@ def _misfit(found: Allan) -> float:
     for _ in range(_ROUNDS):
         fitted = basis(found.tau) @ _squares(found, misfit=error)
         left = np.log(found.deviation**2 / np.maximum(fitted, 1e-300)) ** 2
-        if np.mean(left * found.freedom / 2.0) < _EXPLAINED:
+        if not np.isfinite(left).all() or np.mean(left * found.freedom / 2.0) < _EXPLAINED:
             return 0.0
         low, high = 0.0, float(np.sqrt(left.max()))
         for _halving in range(_HALVINGS):
