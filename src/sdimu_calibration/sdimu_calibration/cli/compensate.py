@@ -14,7 +14,10 @@ def compensate(
     bag: Annotated[Path, typer.Argument(metavar="BAG", help="rosbag2 folder or .mcap file.")],
     result: Annotated[Path, typer.Option(help="result.json of a calibration, or its folder.")],
     out: Annotated[Path, typer.Option(help="Bag (folder) to write: /imu/data and the other topics of BAG.")],
-    imu: Annotated[str, typer.Option(help="IMU whose white noise goes into the covariances: name or path.")] = "dtg",
+    imu: Annotated[
+        str | None,
+        typer.Option(help="IMU whose noise goes into the covariances: name or path; dtg (by hand: mems_by_hand)."),
+    ] = None,
     effect: Annotated[
         list[str] | None,
         typer.Option(metavar="FILE", help="Effect of your own (YAML) that the result has; may be repeated."),
@@ -29,6 +32,7 @@ def compensate(
     replace: Annotated[bool, typer.Option("--replace", help="Overwrite the bag if it exists.")] = False,
 ) -> None:
     """Take the errors out of a recording: /imu/data_raw to /imu/data with covariances."""
+    from sdimu_calibration.cli.options import imu_of
     from sdimu_calibration.cli.progress import bar
     from sdimu_calibration.core.compensation import compensator
     from sdimu_calibration.core.units import from_si
@@ -42,7 +46,8 @@ def compensate(
     console = plain()
     calibration = read_result(result)
     own = effects_of_result(calibration.model, effect or [])
-    specification = load_imu(imu)
+    chosen, whose = imu_of(calibration, imu)
+    specification = load_imu(chosen)
     recording = read_recording(bag)
     using = compensator(
         calibration, specification, own=own, has_temperature=recording.temperature is not None,
@@ -60,4 +65,4 @@ def compensate(
         f"{out}: {done.samples} samples in frame {frame}; changed by up to {rate:.4g} deg/h and {force:.4g} ug",
         soft_wrap=True, highlight=False,
     )  # fmt: skip
-    console.print(f"noise in the covariances is that of '{imu}' (--imu)", soft_wrap=True, markup=False, highlight=False)
+    console.print(f"noise in the covariances is that of {whose}", soft_wrap=True, markup=False, highlight=False)

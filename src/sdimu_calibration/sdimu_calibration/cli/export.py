@@ -16,7 +16,10 @@ def export(
         str, typer.Option("--format", help="matrices, kalibr, imu_tk, c-header, yaml or csv.")
     ] = "matrices",
     out: Annotated[Path | None, typer.Option(help="File to write; beside the result by default.")] = None,
-    imu: Annotated[str, typer.Option(help="IMU whose white noise goes into the kalibr form: name or path.")] = "dtg",
+    imu: Annotated[
+        str | None,
+        typer.Option(help="IMU whose noise goes into the kalibr form: name or path; dtg (by hand: mems_by_hand)."),
+    ] = None,
     rate: Annotated[float, typer.Option(help="Sample rate for the kalibr form (Hz).")] = 100.0,
     effect: Annotated[
         list[str] | None,
@@ -24,6 +27,7 @@ def export(
     ] = None,
 ) -> None:
     """Write a result as matrices, Kalibr YAML, imu_tk files, a C header, YAML or CSV."""
+    from sdimu_calibration.cli.options import imu_of
     from sdimu_calibration.storage.config import load_imu
     from sdimu_calibration.storage.effect_file import effects_of_result
     from sdimu_calibration.storage.export import FORMS
@@ -34,10 +38,11 @@ def export(
     own = effects_of_result(calibration.model, effect or [])
     folder = result if result.is_dir() else result.parent
     name = FORMS[form].file_name if form in FORMS else ""
-    done = write(form, out or folder / name, calibration, load_imu(imu), own, rate)
+    chosen, whose = imu_of(calibration, imu)
+    done = write(form, out or folder / name, calibration, load_imu(chosen), own, rate)
     console = plain()
     for text in done.missing:
         console.print(f"not in the file: {text}", soft_wrap=True, markup=False, highlight=False)
     if form == "kalibr":
-        console.print(f"noise densities are those of '{imu}' (--imu)", soft_wrap=True, markup=False, highlight=False)
+        console.print(f"noise densities are those of {whose}", soft_wrap=True, markup=False, highlight=False)
     console.print(f"body frame: {calibration.body_frame}; {' '.join(map(str, done.files))}", soft_wrap=True)

@@ -119,6 +119,18 @@ def explained(console: Console, notes: Iterable[str]) -> Iterator[None]:
         raise
 
 
+def imu_of(result: Calibration, imu: str | None) -> tuple[str, str]:
+    """Name the IMU file whose noise goes with a result, and say where the name is from.
+
+    A result does not hold the noise of its IMU. A run by hand is one of a cheap sensor; the default of the table would
+    say thousands of times less noise.
+    """
+    if imu is not None:
+        return imu, f"'{imu}' (--imu)"
+    name = "mems_by_hand" if result.estimator == "handheld" else "dtg"
+    return name, f"'{name}', as no --imu is given: state your own"
+
+
 def default_folder(bag: Path, what: str = "calibration") -> Path:
     """Folder of the results of a bag: beside it, its stem with ``_calibration``."""
     bag = bag.resolve()
