@@ -66,6 +66,14 @@ class PhaseLog:
     dwell: Bools
     stop: Ints
 
+    def usual_dwell_s(self, until_s: float) -> float | None:
+        """Median length of a dwell (s) in a recording that ends at `until_s`; None where there is no dwell."""
+        edge = np.diff(np.concatenate([[0], np.asarray(self.dwell, dtype=np.int8), [0]]))
+        if not edge.any():
+            return None
+        until = np.append(self.t, until_s)
+        return float(np.median(until[edge < 0] - until[edge > 0]))
+
 
 @dataclass(frozen=True)
 class TemperatureLog:

@@ -28,7 +28,7 @@ STOP = [0] * 10 + [1] * 4 + [2] * 2
 FIRST = [0] * 10 + [1] + [0] * 5
 
 
-def test_stops_are_cut_into_pieces_of_at_least_the_length():
+def test_stops_are_cut_into_equal_pieces_of_about_the_length():
     epochs, phases, _ = long_epochs(*made(USED, STOP, FIRST), 3.0)
     length = (epochs.end - epochs.start)[phases.used]
     assert length.tolist() == [3.0, 4.0, 4.0, 2.0]

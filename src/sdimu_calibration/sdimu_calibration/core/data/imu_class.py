@@ -16,7 +16,7 @@ import numpy as np
 from sdimu_calibration.core import earth
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.data.phases import rest_limits
-from sdimu_calibration.core.data.static_detection import detect_static
+from sdimu_calibration.core.data.static_detection import StaticIntervals, detect_static, two_sample_variance
 from sdimu_calibration.core.effects.bias import ACCEL_BIAS, GYRO_BIAS
 from sdimu_calibration.core.recording import DataError, Recording
 from sdimu_calibration.core.specification import ImuSpecification
@@ -88,13 +88,12 @@ def shown_at_rest(recording: Recording) -> RestsShown | None:
         found = detect_static(recording)
     except DataError:
         return None
-    spans = list(zip(found.first.tolist(), found.last.tolist(), strict=True))
     rate, force = (
-        np.linalg.norm([data[a:b].mean(axis=0) for a, b in spans], axis=1)
+        np.linalg.norm([data[a:b].mean(axis=0) for a, b in zip(found.first, found.last, strict=True)], axis=1)
         for data in (recording.omega_ib_b, recording.f_ib_b)
     )
     gyro, accel = (
-        min([usual, *_densities(data, spans, recording.interval_s)])
+        min([usual, *_densities(data, found, recording.interval_s)])
         for data, usual in (
             (recording.omega_ib_b, found.gyro_white_noise), (recording.f_ib_b, found.accel_white_noise),
         )
@@ -103,7 +102,7 @@ def shown_at_rest(recording: Recording) -> RestsShown | None:
     return RestsShown(gyro, accel, float(np.median(rate)), float(np.median(error)), float(error.max()))
 
 
-def _densities(values: Floats, spans: Sequence[tuple[int, int]], interval_s: float) -> list[float]:
+def _densities(values: Floats, rests: StaticIntervals, interval_s: float) -> list[float]:
     """Noise density of a triad by neighbouring means over each of `_TAU_S`, where there are enough of them.
 
     Quantisation and vibration let it fall with the length of the means, a wandering bias lets it rise: the least one is
@@ -112,12 +111,9 @@ def _densities(values: Floats, spans: Sequence[tuple[int, int]], interval_s: flo
     out = []
     for tau in _TAU_S:
         width = max(round(tau / interval_s), 1)
-        steps = [
-            np.diff(values[a : a + (b - a) // width * width].reshape(-1, width, 3).mean(axis=1), axis=0)
-            for a, b in spans if b - a >= 2 * width
-        ]  # fmt: skip
-        if sum(map(len, steps)) >= _FEWEST:
-            out.append(float(np.sqrt(0.5 * np.mean(np.concatenate(steps) ** 2) * width * interval_s)))
+        variance, count = two_sample_variance(values, rests.first, rests.last, width)
+        if count >= _FEWEST:
+            out.append(float(np.sqrt(variance * width * interval_s)))
     return out
 
 

@@ -24,7 +24,7 @@ def long_epochs(
     epochs, phases, bridges : Epochs, Phases, Bridges
         Of e epochs.
     seconds : float
-        Length of a joined epoch at least (s); a stop that is shorter becomes one epoch.
+        Length of a joined epoch (s), half of it more or less; the pieces of a stop are equal.
 
     Returns
     -------
@@ -64,6 +64,6 @@ def _begins(epochs: Epochs, phases: Phases, seconds: float) -> Ints:
     edge[1:] = ~used[1:] | ~used[:-1] | (phases.stop[1:] != phases.stop[:-1]) | phases.first[1:]
     starts = np.flatnonzero(edge)
     for a, b in zip(starts, np.append(starts[1:], len(used)), strict=True):
-        pieces = max(int((epochs.end[b - 1] - epochs.start[a]) / seconds + 1e-6), 1)
+        pieces = max(round((epochs.end[b - 1] - epochs.start[a]) / seconds), 1)
         edge[a + np.arange(1, pieces) * (b - a) // pieces] = True
     return np.flatnonzero(edge)

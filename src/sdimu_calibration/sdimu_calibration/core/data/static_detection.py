@@ -42,6 +42,8 @@ _NUDGE = np.radians(1.0)
 """Angle that the gyros may leave a rest by and come back (rad): longer, the mean force is that of other attitudes."""
 _FRAGMENT_S = 3.0
 """Gap between two pieces of one rest (s): what a jolt or a burst of noise takes."""
+_FEWEST = 10
+"""Number of pairs of neighbouring means at least: of three axes they give the noise to an eighth."""
 _BLOCK_S = 0.5
 """Noise is learned from the differences of means over so much (s): slow enough for what a filter in the sensor does."""
 
@@ -146,11 +148,9 @@ def hides_earth_rate(recording: Recording, imu: ImuSpecification) -> bool:
 
 def _usual_rest(recording: Recording, rests: StaticIntervals) -> float:
     """Median length of a rest (s): of the dwells that the table states, else of the rests found."""
-    phase = recording.phase
-    if phase is not None and phase.dwell.any():
-        edge = np.diff(np.concatenate([[0], phase.dwell.astype(int), [0]]))
-        begin, end = np.append(phase.t, recording.t[-1])[edge > 0], np.append(phase.t, recording.t[-1])[edge < 0]
-        return float(np.median(end - begin))
+    stated = None if recording.phase is None else recording.phase.usual_dwell_s(float(recording.t[-1]))
+    if stated is not None:
+        return stated
     return float(np.median(recording.t[rests.last - 1] - recording.t[rests.first]))
 
 
@@ -221,17 +221,38 @@ def resolution(values: Floats) -> Floats:
     return np.array([np.min(s[s > 0.0], initial=np.inf) if s.any() else 0.0 for s in steps.T])
 
 
+def two_sample_variance(values: Floats, first: Ints, last: Ints, width: int) -> tuple[float, int]:
+    """Half the mean square of the differences of neighbouring means in the rests: the Allan variance, not overlapping.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n, 3)
+        Rate or force (rad/s or m/s^2).
+    first, last : ndarray of int, shape (k,)
+        Samples ``first:last`` of each rest.
+    width : int
+        Samples of a mean.
+
+    Returns
+    -------
+    variance : float
+        Mean of the axes (square of the unit of `values`); 0 where there is no pair.
+    count : int
+        Number of pairs of neighbours.
+    """
+    squares, count = 0.0, 0
+    for a, b in zip(first, last, strict=True):
+        means = values[a : a + (b - a) // width * width].reshape(-1, width, 3).mean(axis=1)
+        squares += float(np.sum(np.diff(means, axis=0) ** 2))
+        count += max(len(means) - 1, 0)
+    return 0.5 * squares / max(3 * count, 1), count
+
+
 def _density(values: Floats, first: Ints, last: Ints, dt: float) -> float:
     """White-noise density of a triad from successive block means of the rests (two-sample variance)."""
     width = max(round(_BLOCK_S / dt), 1)
-    squares, count = 0.0, 0
-    for a, b in zip(first, last, strict=True):
-        blocks = (b - a) // width
-        if blocks > 1:
-            means = values[a : a + blocks * width].reshape(blocks, width, 3).mean(axis=1)
-            squares += float(np.sum(np.diff(means, axis=0) ** 2))
-            count += 3 * (blocks - 1)
-    if count >= 30:
-        return float(np.sqrt(0.5 * squares / count * width * dt))
+    variance, count = two_sample_variance(values, first, last, width)
+    if count >= _FEWEST:
+        return float(np.sqrt(variance * width * dt))
     within = [np.var(values[a:b], axis=0, ddof=1) for a, b in zip(first, last, strict=True)]
     return float(np.sqrt(np.mean(within) * dt))

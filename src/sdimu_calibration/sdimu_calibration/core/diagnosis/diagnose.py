@@ -42,7 +42,7 @@ from sdimu_calibration.core.probability import normal_tail
 from sdimu_calibration.core.progress import Progress, silent
 from sdimu_calibration.core.recording import DataError, Recording
 from sdimu_calibration.core.results import Calibration
-from sdimu_calibration.core.specification import ImuSpecification, Model, Site
+from sdimu_calibration.core.specification import EPOCH_S, ImuSpecification, Model, Site
 
 STILL_WRONG = 1.25
 """Held-out error (sigma) from which a model is not called explained: 1 is right, and an effect that only imitates the
@@ -221,7 +221,9 @@ def climb(
     # What was added must also predict: an effect that only mimics the missing one fits here and fails elsewhere.
     # The free inputs are constant in a dwell and in a turn; what changes within one shows in the NIS alone.
     # Noise that is faster than a stretch is learned by what it leaves from stretch to stretch; within, it stays.
-    excess = 0.0 if fit.learns_scatter or done.found.noise else misfit(after, consistency, stated, imu)
+    # Neighbouring epochs say what the noise is, but for a sensor that counts pulses.
+    judged = not (fit.learns_scatter or done.found.noise or stated.epoch_s > EPOCH_S)
+    excess = misfit(after, consistency, stated, imu) if judged else 0.0
     loud = excess > largest_misfit(float(after.fit["nis_dof"] or 1.0))
     still = not fit.learns_scatter and _held_out(after) > STILL_WRONG
     # Wrong samples in turns leave noise that looks drawn anew in each turn.

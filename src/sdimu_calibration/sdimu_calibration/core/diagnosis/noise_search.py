@@ -192,7 +192,7 @@ def search_with_noise(
     return _told(ground, max(states, key=lambda s: ground.net(s) - _DOUBT * ground.doubtful(s)), white)
 
 
-def imitated(found: Search[E], allowed: Ints, wander: Wander) -> Ints:
+def imitated(found: Search[E], allowed: Ints) -> Ints:
     """Columns of drifts that stand for a wandering bias: noise with a memory explains as much as one that was chosen.
 
     A run by hand learns its scatter as white noise, and a bias that wanders is then a step, a ramp or a transient of
@@ -204,28 +204,31 @@ def imitated(found: Search[E], allowed: Ints, wander: Wander) -> Ints:
         In white noise.
     allowed : ndarray of int, shape (a,)
         Columns that may be chosen.
-    wander : Wander
-        Of the same test.
 
     Returns
     -------
     ndarray of int, shape (b,)
         All drifts of the triads concerned, but for those that tell more than noise does.
     """
-    ground = _Ground(found.evidence, allowed, wander, found.threshold, None)
-    chosen = found.chosen.tolist()
+    problem, chosen = Problem(found.evidence), found.chosen.tolist()
+
+    def drifts(columns: Sequence[int]) -> list[int]:
+        return [c for c in columns if problem.candidate(c).effect.bias_drift]
+
+    if not drifts(chosen):
+        return np.empty(0, dtype=np.int64)
+    ground = _Ground(found.evidence, allowed, Wander.of(found.evidence), found.threshold, None)
     out: set[str] = set()
     more: set[str] = set()
-    for column in filter(ground.beside, chosen):
+    for column in drifts(chosen):
         others = [c for c in chosen if c != column]
         gain = ground.state(chosen).balance.net - ground.state(others).balance.net
         if gain < ground.cost(column, ()) + _DOUBT:
             out |= _triads(ground, column)
         else:
             more.add(ground.white.candidate(column).parameter.name)
-    drifts = [c for c in allowed.tolist() if ground.beside(c) and _triads(ground, c) & out]
-    kept = [c for c in drifts if ground.white.candidate(c).parameter.name not in more]
-    return np.array(kept, dtype=np.int64)
+    barred = [c for c in drifts(allowed.tolist()) if _triads(ground, c) & out]
+    return np.array([c for c in barred if problem.candidate(c).parameter.name not in more], dtype=np.int64)
 
 
 def _triads(ground: _Ground[E], column: int) -> set[str]:

@@ -285,9 +285,7 @@ def _without_wander(evidence: LinearEvidence, allowed: Ints, alpha: float, most:
     """Search, and search again without the drifts of a triad whose bias only wanders."""
     while True:
         found = search(evidence, allowed, alpha, most)
-        if not any(found.evidence.candidates[c - len(evidence.weight)].effect.bias_drift for c in found.chosen):
-            return found
-        barred = imitated(found, allowed, Wander.of(evidence))
+        barred = imitated(found, allowed)
         if not len(barred):
             return found
         allowed = np.setdiff1d(allowed, barred)

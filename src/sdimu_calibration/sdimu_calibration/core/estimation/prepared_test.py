@@ -15,9 +15,6 @@ from sdimu_calibration.core.measurement_kind import SKIP
 from sdimu_calibration.core.recording import DataError, Recording
 from sdimu_calibration.core.specification import EPOCH_S, ImuSpecification, Site
 
-_SETTLING_S = 1.0
-"""Time that settling takes from a dwell (s): as models have it by default; no part of an epoch."""
-
 
 @dataclass(frozen=True)
 class PreparedTest:
@@ -62,7 +59,7 @@ class PreparedTest:
         DataError
             When there are too few samples, or the stops that are left give no attitude.
         """
-        key = (setup.model.settle_s, setup.model.zero_velocity)
+        key = (setup.model.settle_s, setup.model.zero_velocity, setup.epoch_s)
         if key not in self._prepared:
             self._prepared[key] = reduce(self.recording, setup)
         return _masked(self._prepared[key], self.held_out)
@@ -72,17 +69,17 @@ class PreparedTest:
         """Why nothing can be navigated in this test; empty where it can."""
         return why_handheld(self.recording, self.imu)
 
-    @property
-    def epoch_s(self) -> float:
-        """Length of an epoch at rest (s): what quantisation asks for, and no longer than the usual dwell."""
+    def epoch_s(self, settle_s: float) -> float:
+        """Length of an epoch at rest (s): what quantisation asks for, and no longer than the usual dwell.
+
+        Parameters
+        ----------
+        settle_s : float
+            What settling takes from a dwell (s).
+        """
         wanted, log = self.imu.epoch_s, self.recording.phase
-        if wanted <= EPOCH_S or log is None:
-            return wanted
-        edge = np.diff(np.concatenate([[0], np.asarray(log.dwell, dtype=np.int8), [0]]))
-        until = np.append(log.t, self.recording.t[-1])
-        dwells = until[edge < 0] - until[edge > 0]
-        usual = float(np.median(dwells)) - _SETTLING_S if len(dwells) else wanted
-        return max(min(usual, wanted), EPOCH_S)
+        usual = None if log is None else log.usual_dwell_s(float(self.recording.t[-1]))
+        return wanted if usual is None else max(min(usual - settle_s, wanted), EPOCH_S)
 
     @property
     def run(self) -> PreparedRun:

@@ -162,7 +162,7 @@ def _setup(test: PreparedTest, model: Model) -> TestSetup:
             "no site: the navigation needs the latitude and height of the test; state the site (--site, in Python "
             "open(..., site=...))"
         )
-    return set_up(test.site, test.imu, model, test.epoch_s)
+    return set_up(test.site, test.imu, model, test.epoch_s(model.settle_s))
 
 
 def _second_order_model(setup: TestSetup, duration: float) -> AccelerometerFrameModel | None:

@@ -11,7 +11,7 @@ from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.filter.filter_pass import PassOutput
 from sdimu_calibration.core.measurement_kind import SKIP
 from sdimu_calibration.core.probability import chi2_head, chi2_tail
-from sdimu_calibration.core.specification import ImuSpecification
+from sdimu_calibration.core.specification import EPOCH_S, ImuSpecification
 
 CHANNEL_NAMES = (
     "position_n", "position_e", "position_d", "velocity_n", "velocity_e", "velocity_d",
@@ -28,6 +28,8 @@ _EQUAL = 1e-6
 """Relative difference of two differences that are the same number of pulses: rounding is smaller, noise larger."""
 _TIED = 0.05
 """Share of differences that equal their median from which they are counts of pulses: noise gives one or two of all."""
+_ONE_EPOCH = 1.5
+"""Ratio of the usual epoch at rest to the nominal one from which epochs are long ones: missing samples make 1.1."""
 _LEAST_PAIRS = 50
 """Number of neighbours, or of neighbouring means, at least: from fewer the noise is known no better than to 13 %."""
 SLOW_S = 10
@@ -64,7 +66,7 @@ class Noise:
 
 
 NO_NOISE = Noise(1.0, 1.0, 1.0, 3.0, np.empty(0, dtype=np.int64))
-"""Where there are too few neighbours to measure the noise: as specified."""
+"""Where there are too few neighbours to measure the noise, or they say nothing of it: as specified."""
 
 
 @dataclass(frozen=True)
@@ -186,9 +188,11 @@ def triad_noise(prepared: PreparedData, means: Floats, density: float) -> Noise:
     epochs = prepared.epochs
     good = prepared.phases.used
     pair = good[1:] & good[:-1] & (prepared.phases.stop[1:] == prepared.phases.stop[:-1])
-    if pair.sum() < _LEAST_PAIRS:
-        return NO_NOISE
     length = epochs.end - epochs.start
+    # Longer epochs are those of a sensor that counts pulses: neighbours share the residue between them, and may differ
+    # by much less, or more, than all of them do from what is predicted.
+    if pair.sum() < _LEAST_PAIRS or np.median(length[good]) > _ONE_EPOCH * EPOCH_S:
+        return NO_NOISE
     sigma = density * np.sqrt(1.0 / length[1:] + 1.0 / length[:-1])
     difference = ((means[1:] - means[:-1]) / sigma[:, None])[pair]
     size = np.abs(difference)
@@ -211,10 +215,9 @@ def triad_noise(prepared: PreparedData, means: Floats, density: float) -> Noise:
 
 
 def _slow(prepared: PreparedData, means: Floats) -> float:
-    """Scatter (rms) of the differences of neighbouring means over `SLOW_S` epochs, of one stop each.
+    """Scatter (rms) of the differences of neighbouring means over `SLOW_S` seconds, of one stop each.
 
-    It is given as that of epochs of 1 s, and is the Allan deviation times the root of two. `means` (e, 3) are those of
-    the epochs.
+    It is the Allan deviation times the root of two. `means` (e, 3) are those of the epochs.
     """
     phases = prepared.phases
     steps = []
@@ -225,8 +228,7 @@ def _slow(prepared: PreparedData, means: Floats) -> float:
     found = np.concatenate(steps)
     if len(found) < _LEAST_PAIRS:
         return float("nan")
-    length = float(np.median((prepared.epochs.end - prepared.epochs.start)[phases.used]))
-    return float(np.sqrt(np.mean(found**2) * length))
+    return float(np.sqrt(np.mean(found**2)))
 
 
 def stop_means(standard: Floats, prepared: PreparedData) -> tuple[StopMean, ...]:

@@ -16,20 +16,15 @@ from dataclasses import replace
 import numpy as np
 
 from sdimu_calibration.core.arrays import Floats, Ints
-from sdimu_calibration.core.data.static_detection import resolution, still_samples
+from sdimu_calibration.core.data.static_detection import resolution, two_sample_variance
 from sdimu_calibration.core.data.windows import runs
+from sdimu_calibration.core.noise.rests import TURNING, at_rest
 from sdimu_calibration.core.recording import Recording
 from sdimu_calibration.core.specification import ImuSpecification
 from sdimu_calibration.core.units import from_si
 
 _TAU_S = (0.2, 0.4, 0.8, 1.6, 3.2)
 """Averaging times (s): beyond what a filter in the sensor smooths, below what its bias wanders."""
-_WINDOW_S = 1.0
-"""Length of a window (s): as that of `rests`, so that both find the same ones."""
-_TURNING = float(np.radians(0.3))
-"""Deviation of the mean rate that is a turn (rad/s): as that of `rests`."""
-_MISSING = 1.5
-"""Distance of two samples from which one is missing (intervals): the variance counts samples for time."""
 _PAIRS = 20
 """Number of neighbouring means at an averaging time at least: the variance is then known to a third."""
 _SUSPECT = 1.1
@@ -59,10 +54,7 @@ def with_quantisation(imu: ImuSpecification, recording: Recording) -> tuple[ImuS
     triads = (("gyro", recording.omega_ib_b, imu.gyro_white_noise), ("accel", recording.f_ib_b, imu.accel_white_noise))
     if stated or not _suspect(recording, imu):
         return imu, ""
-    size = max(round(_WINDOW_S / recording.interval_s), 2)
-    if len(recording.t) <= size:
-        return imu, ""
-    first, last = runs(still_samples(recording, size, _TURNING, _MISSING))
+    first, last = runs(at_rest(recording))
     found = {
         name: size_of_residue(values, first, last, recording.interval_s, noise) for name, values, noise in triads
     }
@@ -115,16 +107,10 @@ def _two_sample(values: Floats, first: Ints, last: Ints, interval_s: float) -> t
     """Averaging times (k,) (s) and two-sample variance (k,), mean of the axes, of neighbouring means in the rests."""
     tau, variance = [], []
     for width in sorted({max(round(t / interval_s), 1) for t in _TAU_S}):
-        squares, count = 0.0, 0
-        for a, b in zip(first, last, strict=True):
-            blocks = (b - a) // width
-            if blocks > 1:
-                means = values[a : a + blocks * width].reshape(blocks, width, 3).mean(axis=1)
-                squares += float(np.sum(np.diff(means, axis=0) ** 2))
-                count += blocks - 1
-        if count >= _PAIRS and squares > 0.0:
+        found, count = two_sample_variance(values, first, last, width)
+        if count >= _PAIRS and found > 0.0:
             tau.append(width * interval_s)
-            variance.append(0.5 * squares / (3 * count))
+            variance.append(found)
     return np.array(tau), np.array(variance)
 
 
@@ -138,7 +124,7 @@ def _suspect(recording: Recording, imu: ImuSpecification) -> bool:
         values[: seconds * width].reshape(seconds, width, 3).mean(axis=1)
         for values in (recording.omega_ib_b, recording.f_ib_b)
     )
-    still = np.max(np.abs(rate - np.median(rate, axis=0)), axis=1) < _TURNING
+    still = np.max(np.abs(rate - np.median(rate, axis=0)), axis=1) < TURNING
     pair = still[1:] & still[:-1]
     if pair.sum() < _PAIRS:
         return False

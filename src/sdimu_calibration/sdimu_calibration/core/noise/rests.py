@@ -15,7 +15,7 @@ WINDOW_S = 1.0
 """Length of a window (s): as much is left to settling at both ends of a rest."""
 _FEWEST = 10
 """Number of samples of a window at least: fewer give no mean."""
-_TURNING = float(np.radians(0.3))
+TURNING = float(np.radians(0.3))
 """Mean rate (rad/s) apart from that of rest that is a turn: below every table's, above every drift of a bias."""
 _MISSING = 1.5
 """Distance of two samples (intervals) from which one is missing: an Allan deviation counts samples for time."""
@@ -45,25 +45,44 @@ def rests(recording: Recording) -> tuple[slice, ...]:
     DataError
         When there is no rest.
     """
-    size = max(round(WINDOW_S / recording.interval_s), _FEWEST)
-    found: tuple[slice, ...] = ()
-    if len(recording.t) > size:
-        still = still_samples(recording, size, _TURNING, _MISSING) & _dwells(recording)
-        first, last = runs(still)
-        long = last - first >= 2 * size
-        if long.any():
-            first, last = joined(recording, first[long], last[long], _WHOLE_S)
-        found = tuple(
-            slice(int(a) + size, int(b) - size)
-            for a, b in _whole(recording, first, last)
-            if b - a >= (_SHORTEST + 2) * size
-        )
+    size = _window(recording)
+    first, last = runs(at_rest(recording))
+    long = last - first >= 2 * size
+    if long.any():
+        first, last = joined(recording, first[long], last[long], _WHOLE_S)
+    found = tuple(
+        slice(int(a) + size, int(b) - size)
+        for a, b in _whole(recording, first, last)
+        if b - a >= (_SHORTEST + 2) * size
+    )
     if not found:
         raise DataError(
             f"/imu/data_raw: no rest of {_SHORTEST + 2} s in {recording.t[-1]:.0f} s; record the IMU while it stands "
             "still, an hour or more for its slow noise"
         )
     return found
+
+
+def at_rest(recording: Recording) -> Bools:
+    """Find the samples about which the IMU rests for a second, and the table dwells where it says anything.
+
+    Parameters
+    ----------
+    recording : Recording
+
+    Returns
+    -------
+    ndarray of bool, shape (n,)
+    """
+    size = _window(recording)
+    if len(recording.t) <= size:
+        return np.zeros(len(recording.t), dtype=bool)
+    return still_samples(recording, size, TURNING, _MISSING) & _dwells(recording)
+
+
+def _window(recording: Recording) -> int:
+    """Return the number of samples of a window."""
+    return max(round(WINDOW_S / recording.interval_s), _FEWEST)
 
 
 def _whole(recording: Recording, first: Ints, last: Ints) -> Iterator[tuple[int, int]]:
