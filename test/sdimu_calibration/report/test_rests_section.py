@@ -37,7 +37,8 @@ def test_the_page_lists_rests_with_residuals_in_units_and_sigmas():
     assert "Rests and their residuals" in text
     row = text.split("<td>60.0</td><td>64.5</td>")[1].split("</tr>")[0]
     # 1 mg of force on one axis is 9.8 mm/s^2: of 1 mm/s^2 sigma, RMS of three axes 5.66; one arcmin is 2.9 of 1e-4 rad.
-    assert row == (
-        "<td>0  0  1e+03</td><td>5.66</td><td>61.9  0  0</td><td>0.87</td><td>1  0  0</td><td>1.68</td>"
+    # Two digits of each sigma: 102 ug, 41 deg/h, .34 arcmin.
+    assert row.replace("\N{EM SPACE}", " ") == (
+        "<td>0 0 1000</td><td>5.66</td><td>62 0 0</td><td>0.87</td><td>1.00 0.00 0.00</td><td>1.68</td>"
     )
     assert "Rests and their residuals" not in page(PLAIN, "on a table")

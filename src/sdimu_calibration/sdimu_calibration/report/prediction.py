@@ -127,7 +127,8 @@ def page(
             '<p class="quiet">In brackets: as printed.</p>',
         ]
     figure = html(sigma_history(as_history(prediction)), 1)
-    parts += ["<h2>Sigma of every coefficient against time</h2>", '<p class="quiet">Grey: the table turns.</p>', figure]
+    told = '<p class="quiet">In white noise. Grey: the table turns.</p>'
+    parts += ["<h2>Sigma of every coefficient against time</h2>", told, figure]
     parts += ["<h2>At the end</h2>", _html_table(COLUMNS, coefficient_rows(prediction))]
     parts += ["<h2>Not observable</h2>", _unobservable(prediction)]
     return (

@@ -9,6 +9,7 @@ import numpy as np
 from sdimu_calibration.core.results import Rest
 from sdimu_calibration.core.units import from_si
 from sdimu_calibration.report.markup import grid, quiet, section
+from sdimu_calibration.report.table import as_far
 
 _COLUMNS = (
     "rest", "from (s)", "to (s)", "force x y z (ug)", "in sigmas", "rate x y z (deg/h)", "in sigmas",
@@ -37,6 +38,7 @@ def _row(number: int, rest: Rest) -> list[str]:
         (rest.turn, rest.turn_sigma, "arcmin"),
     ):  # fmt: skip
         seen = bool(np.isfinite(residual).all())
-        out.append("  ".join(f"{from_si(value, unit):.3g}" for value in residual) if seen else "")
+        shown = as_far([from_si(value, unit) for value in residual], from_si(sigma, unit)) if seen else []
+        out.append("\N{EM SPACE}".join(shown))
         out.append(f"{np.sqrt(np.mean(np.square(residual))) / sigma:.2f}" if seen and sigma > 0.0 else "")
     return out
