@@ -79,6 +79,123 @@ class Rest:
 
 
 @dataclass(frozen=True)
+class TurnOn:
+    """Scatter of the coefficients of an effect from power-on to power-on.
+
+    Attributes
+    ----------
+    effect : str
+    sigma, low, high : float
+        Standard deviation and bounds of its 95 % interval (SI); `low` is 0 where the data do not show any scatter.
+    power_ons : int
+        Number of power-ons that were seen.
+    unit, display_unit : str
+    """
+
+    effect: str
+    sigma: float
+    low: float
+    high: float
+    power_ons: int
+    unit: str = ""
+    display_unit: str = ""
+
+
+@dataclass(frozen=True)
+class SetRecording:
+    """One recording of a set.
+
+    Attributes
+    ----------
+    name, serial, power_on : str
+    start_ns : int
+        Stamp of its start.
+    temperature_degc : float
+        Mean; NaN where it is not recorded.
+    duration_s, samples, nis : float
+        Length (s), number of samples, mean normalised innovation squared (1).
+    values, sigma : ndarray, shape (p,)
+        Of its own fit (SI), in the order of the coefficients of the set; NaN where it has none.
+    deviate : ndarray, shape (p,)
+        Its deviation from the joint estimate over the sigma of that (1); NaN where it says nothing.
+    """
+
+    name: str
+    serial: str
+    power_on: str
+    start_ns: int
+    temperature_degc: float
+    duration_s: float
+    samples: float
+    nis: float
+    values: Floats
+    sigma: Floats
+    deviate: Floats
+
+
+@dataclass(frozen=True)
+class PowerOnDeviation:
+    """Deviation of a coefficient in one power-on from its mean over all power-ons that might be.
+
+    Attributes
+    ----------
+    power_on, name : str
+    value, sigma : float
+        SI.
+    """
+
+    power_on: str
+    name: str
+    value: float
+    sigma: float
+
+
+@dataclass(frozen=True)
+class SetTrend:
+    """A coefficient that follows something from recording to recording.
+
+    Attributes
+    ----------
+    name, covariate : str
+    slope, sigma : float
+        SI per unit of the covariate.
+    p_value : float
+        All coefficients and covariates counted.
+    """
+
+    name: str
+    covariate: str
+    slope: float
+    sigma: float
+    p_value: float
+
+
+@dataclass(frozen=True)
+class SetSummary:
+    """What a joint fit says beyond the coefficients.
+
+    Attributes
+    ----------
+    recordings : tuple of SetRecording
+    turn_on : tuple of TurnOn
+    deviations : tuple of PowerOnDeviation
+    scatter_p : ndarray, shape (p,)
+        Probability that a constant coefficient scatters as far from recording to recording; NaN where none sees it.
+    trends : tuple of SetTrend
+        The least probable first.
+    left_out : tuple of (str, str)
+        Recordings that could not be used, and why.
+    """
+
+    recordings: tuple[SetRecording, ...]
+    turn_on: tuple[TurnOn, ...]
+    deviations: tuple[PowerOnDeviation, ...]
+    scatter_p: Floats
+    trends: tuple[SetTrend, ...]
+    left_out: tuple[tuple[str, str], ...] = ()
+
+
+@dataclass(frozen=True)
 class Calibration:
     """A calibration result.
 
@@ -117,6 +234,8 @@ class Calibration:
         Standard deviation (SI) if the model is right; None where `covariance` is that.
     rests : tuple of Rest
         Of a run by hand, in order; empty for all others.
+    of_set : SetSummary or None
+        Of a joint fit of several recordings.
     """
 
     body_frame: str
@@ -138,6 +257,7 @@ class Calibration:
     drift_means: Mapping[str, float] = field(default_factory=dict)
     conditional_sigma: Floats | None = None
     rests: tuple[Rest, ...] = ()
+    of_set: SetSummary | None = None
 
     @property
     def not_to_be_trusted(self) -> tuple[str, ...]:

@@ -58,7 +58,7 @@ class FilterFit(NavigationFit):
     @property
     def values(self) -> Floats:
         """Coefficients (SI) in `body_frame`, shape (p,)."""
-        return body_frame.values_in_frame(self.names, self.settled, self.body_frame)
+        return self.reported_values(self.settled)
 
     @cached_property
     def covariance(self) -> Floats:
@@ -69,8 +69,38 @@ class FilterFit(NavigationFit):
         ndarray, shape (p, p)
             SI.
         """
+        return self.reported_covariance(self.settled_covariance)
+
+    def reported_values(self, settled: Floats) -> Floats:
+        """Bring coefficients into `body_frame`.
+
+        Parameters
+        ----------
+        settled : ndarray, shape (q,)
+            In the order of the coefficients of `evidence` (SI).
+
+        Returns
+        -------
+        ndarray, shape (p,)
+            In the order of `names` (SI).
+        """
+        return body_frame.values_in_frame(self.names, settled, self.body_frame)
+
+    def reported_covariance(self, settled: Floats) -> Floats:
+        """Bring a covariance of coefficients into `body_frame`.
+
+        Parameters
+        ----------
+        settled : ndarray, shape (q, q)
+            Of the coefficients of `evidence` (SI).
+
+        Returns
+        -------
+        ndarray, shape (p, p)
+            Of the coefficients of `names` (SI).
+        """
         J = body_frame.frame_jacobian(self.names, self.body_frame)
-        return np.asarray(J @ self.settled_covariance @ J.T)
+        return np.asarray(J @ settled @ J.T)
 
     @cached_property
     def known(self) -> KnownPass:

@@ -114,6 +114,36 @@ class Fit(ABC):
     def covariance(self) -> Floats:
         """Covariance of `values`, shape (p, p)."""
 
+    @abstractmethod
+    def reported_values(self, settled: Floats) -> Floats:
+        """Bring coefficients of the estimator into `body_frame`.
+
+        Parameters
+        ----------
+        settled : ndarray, shape (q,)
+            In the order of the coefficients of `evidence` (SI).
+
+        Returns
+        -------
+        ndarray, shape (p,)
+            In the order of `names` (SI).
+        """
+
+    @abstractmethod
+    def reported_covariance(self, settled: Floats) -> Floats:
+        """Bring a covariance of the estimator's coefficients into `body_frame`.
+
+        Parameters
+        ----------
+        settled : ndarray, shape (q, q)
+            Of the coefficients of `evidence` (SI).
+
+        Returns
+        -------
+        ndarray, shape (p, p)
+            Of the coefficients of `names` (SI).
+        """
+
     @property
     @abstractmethod
     def converged(self) -> bool:

@@ -61,9 +61,41 @@ class HandheldFit(Fit):
     @property
     def covariance(self) -> Floats:
         """Covariance of `values`, shape (p, p); zero for what the frame pins."""
-        out = np.zeros((len(self.names), len(self.names)))
         C = self.solution.covariance
-        out[np.ix_(self.priors.kept, self.priors.kept)] = C if self.doubt is None else C + self.doubt
+        return self.reported_covariance(C if self.doubt is None else C + self.doubt)
+
+    def reported_values(self, settled: Floats) -> Floats:
+        """Put the coefficients that are fitted among all; zero for what is pinned.
+
+        Parameters
+        ----------
+        settled : ndarray, shape (q,)
+            In the order of the coefficients of `evidence` (SI).
+
+        Returns
+        -------
+        ndarray, shape (p,)
+            In the order of `names` (SI).
+        """
+        out = np.zeros(len(self.names))
+        out[self.priors.kept] = settled
+        return out
+
+    def reported_covariance(self, settled: Floats) -> Floats:
+        """Put a covariance of what is fitted among all; zero for what is pinned.
+
+        Parameters
+        ----------
+        settled : ndarray, shape (q, q)
+            Of the coefficients of `evidence` (SI).
+
+        Returns
+        -------
+        ndarray, shape (p, p)
+            Of the coefficients of `names` (SI).
+        """
+        out = np.zeros((len(self.names), len(self.names)))
+        out[np.ix_(self.priors.kept, self.priors.kept)] = settled
         return out
 
     @property

@@ -57,6 +57,36 @@ class ReferenceFit(Fit):
         """Covariance of `values`, shape (p, p)."""
         return self.coefficient_covariance
 
+    def reported_values(self, settled: Floats) -> Floats:
+        """Bring coefficients of the navigation about this fit into its frame.
+
+        Parameters
+        ----------
+        settled : ndarray, shape (q,)
+            In the order of the coefficients of `evidence` (SI).
+
+        Returns
+        -------
+        ndarray, shape (p,)
+            In the order of `names` (SI).
+        """
+        return self.about.reported_values(settled)
+
+    def reported_covariance(self, settled: Floats) -> Floats:
+        """Bring a covariance of the navigation about this fit into its frame.
+
+        Parameters
+        ----------
+        settled : ndarray, shape (q, q)
+            Of the coefficients of `evidence` (SI).
+
+        Returns
+        -------
+        ndarray, shape (p, p)
+            Of the coefficients of `names` (SI).
+        """
+        return self.about.reported_covariance(settled)
+
     @property
     def converged(self) -> bool:
         """True: a least squares that does not converge is refused."""

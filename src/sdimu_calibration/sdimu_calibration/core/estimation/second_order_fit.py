@@ -69,12 +69,42 @@ class SecondOrderFit(NavigationFit):
     @property
     def values(self) -> Floats:
         """Coefficients (SI) in `body_frame`, shape (p,)."""
-        return self.frame_model.values(self.settled)
+        return self.reported_values(self.settled)
 
     @property
     def covariance(self) -> Floats:
         """Covariance of `values`, shape (p, p)."""
-        return self.frame_model.covariance(self.settled_covariance)
+        return self.reported_covariance(self.settled_covariance)
+
+    def reported_values(self, settled: Floats) -> Floats:
+        """Read the coefficients asked for out of those of the estimator.
+
+        Parameters
+        ----------
+        settled : ndarray, shape (q,)
+            In the order of the coefficients of `evidence` (SI).
+
+        Returns
+        -------
+        ndarray, shape (p,)
+            In the order of `names` (SI).
+        """
+        return self.frame_model.values(settled)
+
+    def reported_covariance(self, settled: Floats) -> Floats:
+        """Read a covariance out of that of the estimator.
+
+        Parameters
+        ----------
+        settled : ndarray, shape (q, q)
+            Of the coefficients of `evidence` (SI).
+
+        Returns
+        -------
+        ndarray, shape (p, p)
+            Of the coefficients of `names` (SI).
+        """
+        return self.frame_model.covariance(settled)
 
     @cached_property
     def known(self) -> KnownPass:

@@ -16,6 +16,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import cast
 
+import numpy as np
+
 from sdimu_calibration.core.alignment.alignment import Alignment
 from sdimu_calibration.core.alignment.coarse_alignment import StartPoint
 from sdimu_calibration.core.alignment.prepared import PreparedData, TestSetup, first_attitude, set_up
@@ -50,6 +52,11 @@ from sdimu_calibration.core.second_order.second_order_passes import second_order
 from sdimu_calibration.core.specification import Model
 
 AUTO = "auto"
+NO_FRAME = (
+    "the second-order estimator needs all misalignments of the accelerometers in the model (accel_misalignment): add "
+    "the effect, or choose the estimator 'filter'"
+)
+"""Why a model cannot be fitted in the frame of the accelerometers."""
 
 
 def solve(
@@ -148,7 +155,7 @@ def extend(
     return replace(wider, reason=fit.reason)
 
 
-def with_effects(model: Model, effects: Sequence[Effect]) -> Model:
+def with_effects(model: Model, effects: Sequence[Effect | str]) -> Model:
     """Return the model with more effects.
 
     A model names its effects; one that no registry knows stands for itself, as `imu_model.build` takes it.
@@ -191,10 +198,7 @@ def _second_order(test: PreparedTest, model: Model, start: Start | None, progres
     setup = _setup(test, model)
     frame_model = accelerometer_frame_model(setup.sensors, setup.imu)
     if frame_model is None:
-        raise DataError(
-            "the second-order estimator needs all misalignments of the accelerometers in the model "
-            "(accel_misalignment): add the effect, or choose the estimator 'filter'"
-        )
+        raise DataError(NO_FRAME)
     progress("reduce", 0.0)
     prepared = test.data(setup)
     inner = replace(setup, sensors=frame_model.inner)
@@ -267,6 +271,39 @@ def _classical(test: PreparedTest, model: Model, _start: Start | None, progress:
     turned = body_frame.values_in_frame(setup.sensors.names, found.values, FRAME)
     about = _navigation_about(test, model, begun, None, begun.alignment.C_nb, turned)
     return ClassicalFit(test, model, setup.sensors, TABLE_FRAME, found.values, found.covariance, summary, about)
+
+
+def fit_about(
+    test: PreparedTest, model: Model, estimator: str, coefficients: Mapping[str, float], start: Start | None = None
+) -> NavigationFit:
+    """Navigate about coefficients that another estimate gives; nothing but the attitude is fitted.
+
+    Parameters
+    ----------
+    test : PreparedTest
+    model : Model
+    estimator : str
+        ``filter`` or ``second-order``.
+    coefficients : mapping of str to float
+        Of the estimator (SI), by name; zero where it has none.
+    start : Start, optional
+        Gives the attitude at the start where it is known.
+
+    Raises
+    ------
+    DataError
+        When the filter diverges about them.
+    """
+    begun = _reduced(test, model, silent)
+    frame_model = None
+    if estimator == SecondOrderFit.estimator:
+        frame_model = accelerometer_frame_model(begun.setup.sensors, begun.setup.imu)
+        if frame_model is None:
+            raise DataError(NO_FRAME)
+        begun = replace(begun, setup=replace(begun.setup, sensors=frame_model.inner))
+    values = np.array([coefficients.get(name, 0.0) for name in begun.setup.sensors.names])
+    C_nb = begun.alignment.C_nb if start is None else start.C_nb
+    return _navigation_about(test, model, begun, frame_model, C_nb, values)
 
 
 def _navigation_about(

@@ -1,0 +1,1 @@
+"""Several recordings of one IMU as one least squares (decision 0012)."""

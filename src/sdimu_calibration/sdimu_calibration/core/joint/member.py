@@ -1,0 +1,215 @@
+"""The work on one recording of a set: open, fit, linearise about the estimate of the set, reduce."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from sdimu_calibration.core.arrays import Floats
+from sdimu_calibration.core.diagnosis.candidates import catalogue
+from sdimu_calibration.core.diagnosis.diagnose import measured_noise
+from sdimu_calibration.core.effects import selection
+from sdimu_calibration.core.effects.effect import Effect, Timetable
+from sdimu_calibration.core.estimation.fit import Fit, Start
+from sdimu_calibration.core.estimation.noise_estimate import told
+from sdimu_calibration.core.estimation.noise_learning import with_noise_learned
+from sdimu_calibration.core.estimation.prepared_test import PreparedTest
+from sdimu_calibration.core.estimation.solve import AUTO, fit_about, solve
+from sdimu_calibration.core.joint.reduction import Reduction, reduced
+from sdimu_calibration.core.joint.scope import is_local, tagged
+from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.specification import ImuSpecification, Model
+
+
+@dataclass(frozen=True)
+class Member:
+    """A recording of a set.
+
+    Attributes
+    ----------
+    name : str
+        What the user calls the recording; no other of the set has it.
+    open : callable
+        ``() -> PreparedTest``; it can be sent to another process.
+    serial, power_on : str
+        Of the unit, and from which switching-on; empty power-on: one of its own.
+    """
+
+    name: str
+    open: Callable[[], PreparedTest]
+    serial: str = ""
+    power_on: str = ""
+
+
+@dataclass(frozen=True)
+class Job:
+    """What is to be done with a recording.
+
+    Attributes
+    ----------
+    member : Member
+    model : Model
+        With the effects that were found in all recordings.
+    estimator : str
+    local : tuple of str
+        Keys of effects of this recording alone, in the model behind the others.
+    candidates : tuple of str or Effect
+        Effects whose signatures are wanted.
+    with_local : bool
+        Also those of effects that are of one recording.
+    about : mapping of str to float or None
+        Coefficients of the estimator (SI), by name, about which the rows are linear; None is the recording's own fit.
+    before : Report or None
+        Of the same recording: its noise and attitude are taken.
+    """
+
+    member: Member
+    model: Model
+    estimator: str = AUTO
+    local: tuple[str, ...] = ()
+    candidates: tuple[str | Effect, ...] = ()
+    with_local: bool = False
+    about: Mapping[str, float] | None = None
+    before: Report | None = None
+
+
+@dataclass(frozen=True)
+class Report:
+    """What a recording says.
+
+    Attributes
+    ----------
+    name, serial, power_on : str
+        Of the member.
+    reduction : Reduction
+        Coefficients and candidates of this recording alone have its name behind theirs.
+    estimator, reason : str
+        And why it was taken.
+    imu : ImuSpecification
+        With the noise that the recording shows.
+    start : Start
+        Where the fit ended.
+    start_ns : int
+    times : Timetable
+    temperature_degc : float
+        Mean; NaN where it is not recorded.
+    data, statistics : mapping
+        As in a result.
+    names : tuple of str, length p
+        Coefficients as reported.
+    values, sigma : ndarray, shape (p,)
+        Of the recording's own fit (SI), in the frame of the report; empty for a fit about given coefficients.
+    notes : tuple of str
+    warnings : tuple of str
+    """
+
+    name: str
+    serial: str
+    power_on: str
+    reduction: Reduction
+    estimator: str
+    reason: str
+    imu: ImuSpecification
+    start: Start
+    start_ns: int
+    times: Timetable
+    temperature_degc: float
+    data: Mapping[str, float]
+    statistics: Mapping[str, float | None]
+    names: tuple[str, ...]
+    values: Floats
+    sigma: Floats
+    notes: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = field(default=())
+
+    @property
+    def has_temperature(self) -> bool:
+        """Whether the recording has a temperature."""
+        return bool(np.isfinite(self.temperature_degc))
+
+
+def run(job: Job) -> Report:
+    """Do a job.
+
+    Raises
+    ------
+    DataError
+        When the recording cannot be used; it names the recording.
+    """
+    try:
+        return _report(job, fitted(job))
+    except DataError as error:
+        raise DataError(f"{job.member.name}: {error}") from error
+
+
+def fitted(job: Job) -> Fit:
+    """Fit the recording of a job.
+
+    Raises
+    ------
+    DataError
+        When the recording cannot be used.
+    """
+    test = job.member.open()
+    model = replace(job.model, effects=(*job.model.effects, *job.local))
+    if job.before is not None:
+        test = test.with_imu(job.before.imu)
+    if job.about is None or test.why_handheld:
+        # A run by hand is fitted anew: its attitudes are parameters, and a least squares about others is no nearer.
+        return _own(test, model, job)
+    start = job.before.start if job.before is not None else None
+    fit = fit_about(test, model, job.estimator, _untagged(job.about, job.member.name), start)
+    return with_noise_learned(fit)
+
+
+def _own(test: PreparedTest, model: Model, job: Job) -> Fit:
+    """Fit the recording by itself, in the white noise that it shows."""
+    fit = solve(test, model, job.estimator)
+    noise, imu = measured_noise(fit.consistency(), fit)
+    if not noise or job.before is not None:
+        return fit
+    return replace(solve(test.with_imu(imu), model, fit.estimator), reason=fit.reason)
+
+
+def _untagged(about: Mapping[str, float], name: str) -> dict[str, float]:
+    """Coefficients of this recording alone by the names that its model has for them."""
+    end = tagged("", name)
+    return {key.removesuffix(end): value for key, value in about.items()}
+
+
+def _report(job: Job, fit: Fit) -> Report:
+    name, recording = job.member.name, fit.test.recording
+    shared = [selection.resolve(e) if isinstance(e, str) else e for e in job.candidates]
+    own = _local_candidates(fit) if job.with_local else []
+    found = reduced(fit.evidence([*shared, *own]), fit.noise_terms)
+    log = recording.temperature
+    return Report(
+        name, job.member.serial, job.member.power_on, _named(found, job, shared), fit.estimator,
+        fit.reason, fit.test.imu, fit.start, recording.start_ns, fit.timetable,
+        float("nan") if log is None or not len(log.t) else float(np.mean(log.value)),
+        fit.data_counts(), fit.statistics(), fit.names,
+        fit.values if job.about is None else np.empty(0),
+        np.sqrt(np.diag(fit.covariance)) if job.about is None else np.empty(0),
+        (*recording.notes, *(told(term) for term in fit.noise_terms)), tuple(f.text for f in fit.faults if f.grave),
+    )  # fmt: skip
+
+
+def _local_candidates(fit: Fit) -> list[Effect]:
+    """Effects of one recording or power-on that its model lacks."""
+    return [e for e in catalogue(fit.timetable, set(fit.labels), fit.has_temperature) if is_local(e)]
+
+
+def _named(found: Reduction, job: Job, shared: Sequence[Effect]) -> Reduction:
+    """Put the name of the recording behind what is of the recording alone."""
+    name = job.member.name
+    local = {p for key in job.local for p in _parameter_names(key)}
+    count = sum(len(effect.parameters) for effect in shared)
+    labels = tuple(label if k < count else tagged(label, name) for k, label in enumerate(found.labels))
+    return replace(found, names=tuple(tagged(n, name) if n in local else n for n in found.names), labels=labels)
+
+
+def _parameter_names(key: str) -> tuple[str, ...]:
+    effect = selection.resolve(key)
+    return (*(p.name for p in effect.parameters), *effect.labels)

@@ -1,0 +1,156 @@
+"""What one recording says of an IMU: the rows of its least squares, compressed to as many as there are parameters.
+
+With whitened residuals and signatures ``[W e]`` and ``Q`` orthogonal, the rows of ``Q' [W e]`` have white noise again.
+As many rows as W has independent columns hold all information on the parameters; nothing explains what is left of
+e.
+
+Source: G. Bierman, *Factorization Methods for Discrete Sequential Estimation* (1977), chapter IV (data equations).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from sdimu_calibration.core.arrays import Floats
+from sdimu_calibration.core.evidence.learned_noise import Wander
+from sdimu_calibration.core.evidence.linear import LinearEvidence
+from sdimu_calibration.core.noise_term import NoiseTerm
+
+_ROUNDING = 1e-12
+"""Ratio of an eigenvalue of the information, in units of the columns, to the largest from which it counts: below is
+rounding of sums over 1e5 rows."""
+
+
+@dataclass(frozen=True)
+class Reduction:
+    """Rows ``y = A theta + white noise`` of one recording, linear about a point.
+
+    Attributes
+    ----------
+    names : tuple of str, length p
+        Coefficients of the estimator.
+    labels : tuple of str, length q
+        Parameters of effects that the model lacks.
+    A : ndarray, shape (k, p + q)
+        Change of each row (1) per SI unit of each parameter.
+    y : ndarray, shape (k,)
+        Rows with all parameters at zero (1).
+    point : ndarray, shape (p,)
+        Coefficients (SI) about which the rows are linear.
+    weight : ndarray, shape (p,)
+        Prior information of the coefficients (1/SI^2), prior mean zero; not among the rows.
+    rows : int
+        Number of measurements that were compressed.
+    unexplained : float
+        Sum of squares (1) that no parameter explains.
+    """
+
+    names: tuple[str, ...]
+    labels: tuple[str, ...]
+    A: Floats
+    y: Floats
+    point: Floats
+    weight: Floats
+    rows: int
+    unexplained: float
+
+
+def reduced(evidence: LinearEvidence, terms: tuple[NoiseTerm, ...] = ()) -> Reduction:
+    """Compress an evidence.
+
+    Parameters
+    ----------
+    evidence : LinearEvidence
+        N rows, in white noise; parameters behind its first `coefficients` are eliminated with their priors.
+    terms : tuple of NoiseTerm
+        Noise with a memory that was learned in the recording.
+    """
+    p, own = evidence.coefficients, len(evidence.weight)
+    columns = whitened(np.column_stack([evidence.W, evidence.e]), evidence, terms)
+    if own > p:
+        columns = _without(columns, p, evidence.weight[p:], evidence.shift[p:])
+    W, e = columns[:, :-1], columns[:, -1]
+    A, y = compressed(W, e)
+    point = -evidence.shift[:p]
+    return Reduction(
+        evidence.names[:p], evidence.names[own:], A, y + A[:, :p] @ point, point, evidence.weight[:p],
+        len(evidence.e), float(e @ e - y @ y),
+    )  # fmt: skip
+
+
+def compressed(W: Floats, e: Floats) -> tuple[Floats, Floats]:
+    """Compress rows to as many as the rank of the signatures.
+
+    With ``D W' W D = V diag(s^2) V'``, D the inverse lengths of the columns, the rows are ``diag(s) V' D^-1`` and
+    ``diag(1/s) V' D W' e``.
+
+    Parameters
+    ----------
+    W : ndarray, shape (N, m)
+        Signatures, in white noise (1 per SI unit).
+    e : ndarray, shape (N,)
+
+    Returns
+    -------
+    A : ndarray, shape (k, m)
+    y : ndarray, shape (k,)
+        In the units of W and e.
+    """
+    length = np.sqrt(np.einsum("ij,ij->j", W, W))
+    unit = np.divide(1.0, length, out=np.zeros_like(length), where=length > 0.0)
+    squares, V = np.linalg.eigh(W.T @ W * np.outer(unit, unit))
+    seen = squares > _ROUNDING * squares[-1]
+    V, size = V[:, seen], np.sqrt(squares[seen])
+    return np.ascontiguousarray((size[:, None] * V.T) * length), (V.T @ (unit * (W.T @ e))) / size
+
+
+def _without(columns: Floats, p: int, weight: Floats, shift: Floats) -> Floats:
+    """Eliminate parameters behind the first p, with their priors, from rows ``[W e]`` by QR decomposition."""
+    count = len(weight)
+    prior = np.zeros((count, columns.shape[1]))
+    prior[:, p : p + count] = np.diag(np.sqrt(weight))
+    prior[:, -1] = np.sqrt(weight) * shift
+    order = np.concatenate([np.arange(p, p + count), np.arange(p), np.arange(p + count, columns.shape[1])])
+    R = np.asarray(np.linalg.qr(np.vstack([columns, prior])[:, order], mode="r"), dtype=np.float64)
+    return R[count:, count:]
+
+
+def whitened(columns: Floats, evidence: LinearEvidence, terms: tuple[NoiseTerm, ...]) -> Floats:
+    """Whiten columns in noise with a memory.
+
+    Parameters
+    ----------
+    columns : ndarray, shape (N, m)
+        In the white noise of the evidence.
+    evidence : LinearEvidence
+        N rows.
+    terms : tuple of NoiseTerm
+
+    Returns
+    -------
+    ndarray, shape (N, m)
+        ``S^-1/2 columns``, in the same units; S is the covariance of all noise.
+    """
+    if not terms:
+        return columns
+    return unit_noise(Wander.of(evidence).modes(terms).columns, columns)
+
+
+def unit_noise(modes: Floats, columns: Floats) -> Floats:
+    """Multiply with ``(I + modes modes')^-1/2``.
+
+    Parameters
+    ----------
+    modes : ndarray, shape (N, r)
+        Signatures of modes of unit variance.
+    columns : ndarray, shape (N, m)
+
+    Returns
+    -------
+    ndarray, shape (N, m)
+        In the units of `columns`.
+    """
+    U, size, _ = np.linalg.svd(modes, full_matrices=False)
+    return np.asarray(columns - U @ ((1.0 - 1.0 / np.sqrt(1.0 + size**2))[:, None] * (U.T @ columns)))

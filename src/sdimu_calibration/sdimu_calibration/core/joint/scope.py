@@ -1,0 +1,33 @@
+"""What is common to all recordings of a unit, and what is of one power-on or one recording."""
+
+from __future__ import annotations
+
+from sdimu_calibration.core.effects.effect import Effect
+
+OF_RECORDING = "@"
+"""Stands between a coefficient of one recording alone and the name of the recording."""
+
+
+def tagged(label: str, recording: str) -> str:
+    """Put the name of a recording behind a coefficient that is of this recording alone."""
+    return f"{label}{OF_RECORDING}{recording}"
+
+
+def split_tag(label: str) -> tuple[str, str]:
+    """Part a coefficient from the recording that it is of; empty where it is of all."""
+    name, _, recording = label.partition(OF_RECORDING)
+    return name, recording
+
+
+_OF_ONE_TIME = {"t0", "span", "turn"}
+"""Options of effects that happen at one time of one recording."""
+
+
+def is_local(effect: Effect) -> bool:
+    """Whether an effect may be in one recording and not in the next: a fault of the data, a drift of a power-on."""
+    return effect.scope in {"recording", "power-on"} and not effect.random_walk
+
+
+def is_shared(effect: Effect) -> bool:
+    """Whether an effect may be the same in all recordings: neither a fault of the data nor an event."""
+    return effect.scope != "recording" and not _OF_ONE_TIME & effect.options.keys()

@@ -1,0 +1,136 @@
+"""The evidence of a set: rows of all power-ons, whitened with what power-ons are allowed to differ by.
+
+It is a `LinearEvidence` like that of one recording, so the same search works on it; what is left out to test a
+prediction is a whole power-on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from sdimu_calibration.core.arrays import Floats
+from sdimu_calibration.core.effects.effect import Effect
+from sdimu_calibration.core.evidence.candidate import Candidate
+from sdimu_calibration.core.evidence.held_out import HeldOut, predict
+from sdimu_calibration.core.evidence.linear import LinearEvidence, candidate_priors
+from sdimu_calibration.core.joint.combine import Rows, spread_out, stacked
+from sdimu_calibration.core.joint.reduction import compressed, unit_noise
+from sdimu_calibration.core.joint.set_fit import SetFit, columns_of, power_on, prior_weight
+
+MOST_FOLDS = 50
+"""Number of folds of power-ons at most: each is left out once, and more folds predict no better."""
+
+
+@dataclass(frozen=True)
+class SetEvidence(LinearEvidence):
+    """Evidence of a set about its joint estimate; rows of one fold have one stop."""
+
+    def signature(self, effects: Sequence[Effect]) -> Floats:
+        """Refuse: signatures come with the reductions of the recordings.
+
+        Returns
+        -------
+        ndarray, shape (N, parameters)
+            Never: per SI unit.
+
+        Raises
+        ------
+        NotImplementedError
+            Always.
+        """
+        raise NotImplementedError(f"signatures of {len(effects)} effects come with the reductions")
+
+
+def set_evidence(fit: SetFit, candidates: Sequence[Candidate], local: Sequence[Candidate] = ()) -> SetEvidence:
+    """Put the rows of all recordings together.
+
+    Parameters
+    ----------
+    fit : SetFit
+        Its reports have the signatures of the candidates.
+    candidates : sequence of Candidate
+        The same in all recordings.
+    local : sequence of Candidate
+        Of single recordings, by labels with the name of the recording.
+    """
+    tried = [replace(c, effect=replace(c.effect, nearer=None)) for c in (*candidates, *local)]
+    names = (*fit.names, *(c.label for c in tried))
+    P = len(fit.names)
+    folds = [_white(fit, members, names) for members in _folds(fit)]
+    A, y = np.vstack([f.A for f in folds]), np.concatenate([f.y for f in folds])
+    imu = fit.reports[0].imu
+    _, prior = candidate_priors([c.effect for c in tried], imu)
+    weight = prior_weight(fit.reports, fit.names)
+    return SetEvidence(
+        e=y - A[:, :P] @ fit.estimate.values, W=A,
+        stop=np.repeat(np.arange(len(folds)), [len(f.y) for f in folds]), names=names, weight=weight,
+        shift=-fit.estimate.values, stated=1.0 / np.sqrt(weight), candidates=tuple(tried), prior=prior, imu=imu,
+        times=fit.reports[0].times, coefficients=P,
+    )  # fmt: skip
+
+
+def _folds(fit: SetFit) -> list[list[list[int]]]:
+    """Folds of power-ons of recordings: by power-on where several were made, else each recording a fold."""
+    if len(fit.power_ons) == 1:
+        return [[[k]] for k in range(len(fit.reports))]
+    groups = [[k for k, r in enumerate(fit.reports) if power_on(r) == name] for name in fit.power_ons]
+    count = min(len(groups), MOST_FOLDS)
+    return [groups[fold::count] for fold in range(count)]
+
+
+def _white(fit: SetFit, groups: Sequence[Sequence[int]], names: Sequence[str]) -> Rows:
+    """Rows of some power-ons in white noise, compressed to as many as there are parameters."""
+    done = [_of_power_on(fit, members, names) for members in groups]
+    rows = stacked(done)
+    return rows if len(rows.y) <= len(names) else Rows(*compressed(rows.A, rows.y))
+
+
+def _of_power_on(fit: SetFit, members: Sequence[int], names: Sequence[str]) -> Rows:
+    return white_power_on(fit, members, names, [np.zeros((len(fit.reports[k].reduction.y), 0)) for k in members])[0]
+
+
+def white_power_on(
+    fit: SetFit, members: Sequence[int], names: Sequence[str], own: Sequence[Floats]
+) -> tuple[Rows, list[Floats]]:
+    """Rows of one power-on in white noise: what it may differ by is part of the noise.
+
+    Parameters
+    ----------
+    fit : SetFit
+    members : sequence of int
+        Places of its recordings among the reports.
+    names : sequence of str, length P
+        Parameters of the rows.
+    own : sequence of ndarray, shape (k, m)
+        Of each recording, columns that are zero in the rows of all others (per SI unit).
+
+    Returns
+    -------
+    rows : Rows
+        Of all recordings of the power-on, one below the other.
+    own : list of ndarray, shape (sum of k, m)
+        The columns in them.
+    """
+    rows = stacked([spread_out(fit.reports[k].reduction, names) for k in members])
+    ends = np.cumsum([0, *(len(columns) for columns in own)])
+    wide = [np.zeros((len(rows.y), columns.shape[1])) for columns in own]
+    for k, columns in enumerate(own):
+        wide[k][ends[k] : ends[k + 1]] = columns
+    if not fit.turn_on:
+        return rows, wide
+    components = columns_of(fit.varying, fit.names)
+    modes = np.hstack([rows.A[:, c.columns] * t for c, t in zip(components, fit.tau, strict=True)])
+    white = unit_noise(modes, np.column_stack([*wide, rows.A, rows.y]))
+    parts = np.split(white, np.cumsum([*(columns.shape[1] for columns in wide), len(names)]), axis=1)
+    return Rows(parts[-2], parts[-1][:, 0]), parts[:-2]
+
+
+def held_out(fit: SetFit) -> HeldOut | None:
+    """Predict every power-on from the others, every recording where there is one; None for a single one."""
+    evidence = set_evidence(fit, ())
+    if len(np.unique(evidence.stop)) < 2:
+        return None
+    return predict(evidence, evidence.model, evidence.weight, evidence.shift)

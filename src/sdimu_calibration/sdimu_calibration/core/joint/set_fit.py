@@ -1,0 +1,343 @@
+"""A joint fit of all recordings of a set, linearised again about its own estimate until it stands."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+
+from sdimu_calibration.core.arrays import Floats, Ints
+from sdimu_calibration.core.effects.selection import resolve
+from sdimu_calibration.core.estimation.handheld_fit import HandheldFit
+from sdimu_calibration.core.estimation.second_order_fit import SecondOrderFit
+from sdimu_calibration.core.estimation.solve import AUTO
+from sdimu_calibration.core.joint.combine import (
+    Combination,
+    Component,
+    JointEstimate,
+    Rows,
+    spread_out,
+    stacked,
+)
+from sdimu_calibration.core.joint.member import Job, Member, Report
+from sdimu_calibration.core.joint.scope import split_tag
+from sdimu_calibration.core.joint.turn_on import turn_on_scatter
+from sdimu_calibration.core.progress import Progress, silent
+from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.results import TurnOn
+from sdimu_calibration.core.specification import Model
+
+Run = Callable[[Sequence[Job]], Sequence[Report | DataError]]
+"""Does jobs, in any process; in the order of the jobs a report, or why there is none."""
+_FAR = 5.0
+"""Distance of the joint estimate from where a recording was linearised (sigmas of that recording alone) from which it
+is linearised again, where squares of errors do not count: the rows then change by less than their rounding."""
+_NEAR = 2.0
+"""The same where squares count (sigmas of the joint estimate): what is left of the squares is then below the sigma."""
+SCOPES = ("unit", "power-on")
+"""Scopes that a set can give an effect of its model."""
+_MOST_ROUNDS = 4
+"""Number of linearisations at most: the second already moves the estimate by less than a sigma."""
+
+
+@dataclass(frozen=True)
+class SetFit:
+    """A joint fit.
+
+    Attributes
+    ----------
+    members : tuple of Member
+        Those that could be used.
+    model : Model
+    local : mapping of str to tuple of str
+        By recording, the keys of effects of this recording alone.
+    varying : mapping of str to tuple of str
+        Effects that differ from power-on to power-on, with their coefficients.
+    reports : tuple of Report
+    names : tuple of str, length P
+        Coefficients of the estimator, then those of single recordings.
+    estimate : JointEstimate
+    turn_on : tuple of TurnOn
+        Empty with one power-on.
+    left_out : tuple of (str, str)
+        Recordings that could not be used, and why.
+    """
+
+    members: tuple[Member, ...]
+    model: Model
+    local: Mapping[str, tuple[str, ...]]
+    varying: Mapping[str, tuple[str, ...]]
+    reports: tuple[Report, ...]
+    names: tuple[str, ...]
+    estimate: JointEstimate
+    turn_on: tuple[TurnOn, ...]
+    left_out: tuple[tuple[str, str], ...] = ()
+
+    @cached_property
+    def power_ons(self) -> tuple[str, ...]:
+        """Names of the power-ons, in the order of their first recordings."""
+        return tuple(dict.fromkeys(map(power_on, self.reports)))
+
+    @property
+    def tau(self) -> Floats:
+        """Sigma of each component that varies.
+
+        Returns
+        -------
+        ndarray, shape (c,)
+            SI.
+        """
+        return np.array([t.sigma for t in self.turn_on])
+
+    @property
+    def varying_names(self) -> tuple[str, ...]:
+        """Coefficients that vary, in the order of the columns of `estimate.deviation`."""
+        return tuple(n for effect in self.varying.values() for n in effect) if self.turn_on else ()
+
+    def values_of(self, report: Report) -> dict[str, float]:
+        """Coefficients (SI) of the estimator in one recording, deviations of its power-on included, by name."""
+        values = dict(zip(self.names, self.estimate.values.tolist(), strict=True))
+        row = self.power_ons.index(power_on(report))
+        for name, deviation in zip(self.varying_names, self.estimate.deviation[row].tolist(), strict=True):
+            values[name] += deviation
+        return {name: v for name, v in values.items() if split_tag(name)[1] in {"", report.name}}
+
+
+def power_on(report: Report) -> str:
+    """Power-on of a recording; its own where none is stated."""
+    return report.power_on or f"that of {report.name}"
+
+
+@dataclass(frozen=True)
+class SetOptions:
+    """How a set is to be fitted.
+
+    Attributes
+    ----------
+    model : Model
+    estimator : str
+    local : mapping of str to tuple of str
+        By recording, keys of effects in it alone.
+    scopes : mapping of str to str
+        ``unit`` or ``power-on`` for effects whose scope is not that of their trait.
+    """
+
+    model: Model
+    estimator: str = AUTO
+    local: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    scopes: Mapping[str, str] = field(default_factory=dict)
+
+
+def fit_set(
+    members: Sequence[Member], options: SetOptions, run: Run, before: SetFit | None = None, progress: Progress = silent
+) -> SetFit:
+    """Fit all recordings of a set together.
+
+    Parameters
+    ----------
+    members : sequence of Member
+        Recordings of one unit.
+    options : SetOptions
+    run : callable
+        Does the jobs.
+    before : SetFit, optional
+        Of the same members with nearly the same model: the recordings are linearised about it.
+    progress : callable
+
+    Raises
+    ------
+    DataError
+        When the recordings are of several units, or none can be used.
+    """
+    check_members(members)
+    progress("recordings", 0.1)
+    jobs = [job_of(member, options, before) for member in members]
+    done = run(jobs)
+    left = {job.member.name: str(d) for job, d in zip(jobs, done, strict=True) if isinstance(d, DataError)}
+    reports = [d for d in done if not isinstance(d, DataError)]
+    if not reports:
+        raise DataError(f"no recording of the set can be used: {next(iter(left.values()))}")
+    reports = _one_estimator(members, options, reports, run)
+    fit = _combined(members, options, reports)
+    for turn in range(_MOST_ROUNDS):
+        progress("joint fit", 0.5 + 0.1 * turn)
+        again = [m for m in members if m.name in left or _moved(fit, m.name)]
+        if not again:
+            break
+        fresh = run([job_of(member, options, fit, estimator=reports[0].estimator) for member in again])
+        came = {m.name: d for m, d in zip(again, fresh, strict=True) if not isinstance(d, DataError)}
+        lost = {m.name: str(d) for m, d in zip(again, fresh, strict=True) if isinstance(d, DataError)}
+        stuck = set(lost) <= set(left) and not came
+        left = lost
+        kept = {r.name: _with_own(came.get(r.name, r), r) for r in fit.reports}
+        reports = [kept.get(m.name) or came[m.name] for m in members if m.name in kept or m.name in came]
+        fit = _combined(members, options, reports)
+        if stuck:
+            break
+    return replace(fit, left_out=tuple(left.items()))
+
+
+def check_members(members: Sequence[Member]) -> None:
+    """Refuse recordings that are no set.
+
+    Raises
+    ------
+    DataError
+        When a name stands twice, or the recordings are of several units.
+    """
+    names = [m.name for m in members]
+    for name in names:
+        if names.count(name) > 1:
+            raise DataError(f"two recordings of the set are called '{name}': give them different names")
+    serials = sorted({m.serial for m in members if m.serial})
+    if len(serials) > 1:
+        raise DataError(
+            f"the recordings are of several units ({', '.join(serials)}): a joint fit is of one; calibrate each by "
+            "itself, then compare them with sdimu fleet"
+        )
+
+
+def job_of(member: Member, options: SetOptions, about: SetFit | None, estimator: str = "") -> Job:
+    """Make the job of a recording.
+
+    Parameters
+    ----------
+    member : Member
+    options : SetOptions
+    about : SetFit or None
+        Estimate about which the recording is linearised; None is its own fit.
+    estimator : str
+        In place of that of the options.
+    """
+    local = tuple(options.local.get(member.name, ()))
+    if about is None:
+        return Job(member, options.model, estimator or options.estimator, local)
+    report = next((r for r in about.reports if r.name == member.name), None)
+    if report is not None:
+        return Job(member, options.model, report.estimator, local, about=about.values_of(report), before=report)
+    values = dict(zip(about.names, about.estimate.values.tolist(), strict=True))
+    return Job(member, options.model, estimator or about.reports[0].estimator, local, about=values)
+
+
+def _with_own(fresh: Report, old: Report) -> Report:
+    """Keep the values of a recording's own fit beside rows about other coefficients."""
+    return fresh if len(fresh.values) else replace(fresh, values=old.values, sigma=old.sigma)
+
+
+def _one_estimator(
+    members: Sequence[Member], options: SetOptions, reports: Sequence[Report], run: Run
+) -> list[Report]:
+    """Repeat the recordings of the filter by second-order passes where others need them: one frame for all."""
+    kinds = {r.estimator for r in reports}
+    if len(kinds) == 1 or kinds <= {HandheldFit.estimator, SecondOrderFit.estimator}:
+        return list(reports)
+    by_name = {m.name: m for m in members}
+    wanted = [r for r in reports if r.estimator not in {HandheldFit.estimator, SecondOrderFit.estimator}]
+    fresh = run([job_of(by_name[r.name], options, None, SecondOrderFit.estimator) for r in wanted])
+    for report in fresh:
+        if isinstance(report, DataError):
+            raise report
+    new = {r.name: r for r in fresh if isinstance(r, Report)}
+    return [new.get(r.name, r) for r in reports]
+
+
+def joint_names(reports: Sequence[Report]) -> tuple[str, ...]:
+    """Coefficients that all recordings share, in their order, then those of single recordings."""
+    names = dict.fromkeys(n for r in reports for n in r.reduction.names)
+    shared = [n for n in names if not split_tag(n)[1]]
+    return (*shared, *(n for n in names if split_tag(n)[1]))
+
+
+def prior_weight(reports: Sequence[Report], names: Sequence[str]) -> Floats:
+    """Prior information of the coefficients: the least that a recording takes.
+
+    Returns
+    -------
+    ndarray, shape (P,)
+        1/SI^2.
+    """
+    least: dict[str, float] = {}
+    for report in reports:
+        for name, weight in zip(report.reduction.names, report.reduction.weight.tolist(), strict=True):
+            least[name] = min(weight, least.get(name, np.inf))
+    return np.array([least[name] for name in names])
+
+
+def varying_effects(model: Model, scopes: Mapping[str, str], names: Sequence[str]) -> dict[str, tuple[str, ...]]:
+    """Effects of the model that differ from power-on to power-on, with their coefficients.
+
+    Parameters
+    ----------
+    model : Model
+    scopes : mapping of str to str
+        Scopes by name of effect, in place of those of their traits.
+    names : sequence of str
+        Coefficients that the estimator has.
+
+    Raises
+    ------
+    DataError
+        When a scope is none, or of an effect that the model lacks.
+    """
+    effects = {e.family or e.name: e for e in (resolve(e) if isinstance(e, str) else e for e in model.effects)}
+    for name, scope in scopes.items():
+        if name not in effects or scope not in SCOPES:
+            raise DataError(
+                f"scope of '{name}': '{scope}': expected one of {', '.join(SCOPES)}, and an effect of the model "
+                f"({', '.join(effects)})"
+            )
+    varying = {
+        name: tuple(p.name for p in effect.parameters if p.name in names)
+        for name, effect in effects.items() if scopes.get(name, effect.scope) == "power-on"
+    }  # fmt: skip
+    return {name: own for name, own in varying.items() if own}
+
+
+def grouped_rows(reports: Sequence[Report], names: Sequence[str]) -> list[Rows]:
+    """Rows of every power-on in the parameters of the set, in the order of their first recordings."""
+    groups: dict[str, list[Rows]] = {}
+    for report in reports:
+        groups.setdefault(power_on(report), []).append(spread_out(report.reduction, names))
+    return [stacked(rows) for rows in groups.values()]
+
+
+def columns_of(varying: Mapping[str, tuple[str, ...]], names: Sequence[str]) -> list[Component]:
+    """Components of the random effects at their places among the parameters of the set."""
+
+    def places(own: Sequence[str]) -> Ints:
+        return np.array([list(names).index(n) for n in own], dtype=np.int64)
+
+    return [Component(effect, places(own)) for effect, own in varying.items()]
+
+
+def _combined(members: Sequence[Member], options: SetOptions, reports: Sequence[Report]) -> SetFit:
+    names = joint_names(reports)
+    varying = varying_effects(options.model, options.scopes, names)
+    groups = grouped_rows(reports, names)
+    components = columns_of(varying, names) if len(groups) > 1 else []
+    combined = Combination(groups, prior_weight(reports, names), components)
+    turn_on = turn_on_scatter(combined)
+    estimate = combined.estimate(np.array([t.sigma for t in turn_on]))
+    used = {r.name for r in reports}
+    return SetFit(
+        tuple(m for m in members if m.name in used), options.model, dict(options.local), varying, tuple(reports), names,
+        estimate, turn_on,
+    )  # fmt: skip
+
+
+def _moved(fit: SetFit, name: str) -> bool:
+    """Whether a recording was linearised too far from the joint estimate."""
+    report = next((r for r in fit.reports if r.name == name), None)
+    if report is None or report.estimator == HandheldFit.estimator:
+        return False
+    values, own = fit.values_of(report), report.reduction
+    far = np.abs(np.array([values[n] for n in own.names]) - own.point)
+    if report.estimator == SecondOrderFit.estimator:
+        places = [fit.names.index(n) for n in own.names]
+        sigma = np.sqrt(np.diag(fit.estimate.covariance)[places])
+        return bool(np.any(far > _NEAR * sigma))
+    p = len(own.names)
+    sigma = np.sqrt(np.diag(Combination([Rows(own.A[:, :p], own.y)], own.weight, []).estimate(np.empty(0)).covariance))
+    return bool(np.any(far > _FAR * sigma))

@@ -1,0 +1,170 @@
+"""From a joint fit to the result that is written, shown and used."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from sdimu_calibration.core.arrays import Floats
+from sdimu_calibration.core.estimation.fit import Fit
+from sdimu_calibration.core.estimation.navigation_fit import NavigationFit
+from sdimu_calibration.core.estimation.outcome import inseparable
+from sdimu_calibration.core.joint.member import Report, fitted
+from sdimu_calibration.core.joint.set_evidence import held_out
+from sdimu_calibration.core.joint.set_fit import SetFit, SetOptions, job_of
+from sdimu_calibration.core.joint.variation import Variation, variation
+from sdimu_calibration.core.results import (
+    Calibration,
+    PowerOnDeviation,
+    SetRecording,
+    SetSummary,
+    TurnOn,
+    no_history,
+)
+from sdimu_calibration.core.units import from_si
+
+SCATTERS = 1e-3
+"""Probability (1) below which a coefficient is told to differ from recording to recording: one set in a thousand does
+so by chance."""
+
+
+def set_outcome(fit: SetFit) -> Calibration:
+    """Put the result of a joint fit together.
+
+    Coefficients are those of the unit, a bias its mean over all power-ons that might be. What differs from power-on to
+    power-on and from recording to recording stands in `of_set`.
+
+    Parameters
+    ----------
+    fit : SetFit
+
+    Raises
+    ------
+    DataError
+        When the recording that gives the frame of the report cannot be opened again.
+    """
+    base = base_fit(fit)
+    values, covariance = _reported(fit, base)
+    varied = variation(fit)
+    predicted = held_out(fit)
+    dof = sum(float(r.statistics["nis_dof"] or 0.0) for r in fit.reports)
+    nis = sum(float(r.statistics["nis_mean"] or 0.0) * float(r.statistics["nis_dof"] or 0.0) for r in fit.reports)
+    parameters = base.sensors.parameters
+    names = tuple(p.name for p in parameters)
+    warnings = (*_warnings(fit, varied, names), *inseparable(names, covariance))
+    return Calibration(
+        body_frame=base.body_frame, model=tuple(e.key for e in base.sensors.effects), names=names,
+        units=tuple(p.unit for p in parameters), display_units=tuple(p.display_unit for p in parameters),
+        values=values, covariance=covariance,
+        fit={
+            "log_likelihood": fit.estimate.log_likelihood, "nis_mean": nis / max(dof, 1.0), "nis_dof": dof,
+            "held_out_rms": None if predicted is None else predicted.rms,
+            "passes": max(float(r.statistics["passes"] or 0.0) for r in fit.reports),
+        },
+        data=_data(fit.reports, base), notes=(*_notes(fit, base), *warnings), history=no_history(len(names)),
+        warnings=warnings, estimator=base.estimator, estimator_reason=fit.reports[0].reason,
+        drift_means=base.drift_means, of_set=_summary(fit, varied, names, base),
+    )  # fmt: skip
+
+
+def base_fit(fit: SetFit) -> Fit:
+    """Fit of one recording about the joint estimate: it gives the names and the frame of the report."""
+    by_name = {m.name: m for m in fit.members}
+    report = max(fit.reports, key=lambda r: (len(r.times.stops), r.name))
+    job = job_of(by_name[report.name], SetOptions(fit.model), fit)
+    return fitted(replace(job, about=fit.values_of(report), before=report))
+
+
+def _reported(fit: SetFit, base: Fit) -> tuple[Floats, Floats]:
+    """Values and covariance of what all recordings share, in the frame of the report."""
+    names = base.evidence().names[: base.evidence().coefficients]
+    places = [fit.names.index(n) for n in names]
+    values, covariance = fit.estimate.values[places], fit.estimate.covariance[np.ix_(places, places)]
+    if isinstance(base, NavigationFit):
+        T = base.centring
+        values, covariance = T @ values, T @ covariance @ T.T
+    return base.reported_values(values), base.reported_covariance(covariance)
+
+
+def _data(reports: Sequence[Report], base: Fit) -> dict[str, float]:
+    """Entries of the data section: sums over the recordings."""
+    summed = {
+        key: float(sum(r.data.get(key, 0.0) for r in reports))
+        for key in ("samples", "lost", "rejected", "contradicted_s", "duration_s", "stops")
+    }
+    start = base.data_counts().get("start_temperature_degc")
+    return {"recordings": float(len(reports)), **summed} | ({} if start is None else {"start_temperature_degc": start})
+
+
+def _notes(fit: SetFit, base: Fit) -> tuple[str, ...]:
+    told = [f"{name} is left out: {why}" for name, why in fit.left_out]
+    of_one = [f"in {name} alone: {key}" for name, keys in fit.local.items() for key in keys]
+    scatter = [_scatter(t) for t in with_units(fit, base)]
+    return (*told, *of_one, *scatter, *(f"{r.name}: {note}" for r in fit.reports for note in r.notes))
+
+
+def _scatter(t: TurnOn) -> str:
+    size, low, high = (f"{from_si(v, t.display_unit):.3g}" for v in (t.sigma, t.low, t.high))
+    return (
+        f"{t.effect} differs from power-on to power-on by {size} ({low} to {high}, 95 %) {t.display_unit} in "
+        f"{t.power_ons} power-ons; the value given is the mean over all power-ons that might be"
+    )
+
+
+def with_units(fit: SetFit, base: Fit) -> list[TurnOn]:
+    """Scatter of each effect from power-on to power-on, with the units of its coefficients."""
+    by_name = {p.name: p for p in base.sensors.parameters}
+    first = [by_name[names[0]] for names in fit.varying.values()] if fit.turn_on else []
+    return [
+        replace(t, unit=p.unit, display_unit=p.display_unit) for t, p in zip(fit.turn_on, first, strict=True)
+    ]
+
+
+def _warnings(fit: SetFit, varied: Variation, names: Sequence[str]) -> tuple[str, ...]:
+    """Coefficients that differ between recordings by more than chance, and what is wrong with the data."""
+    odd = [
+        (p, name) for name, p in zip(varied.names, varied.p_value.tolist(), strict=True)
+        if name in names and p * len(names) < SCATTERS
+    ]  # fmt: skip
+    trends = {t.name: t for t in varied.trends if t.p_value < SCATTERS}
+    lines = [
+        f"{name} is not the same in all recordings (p {p:.1g})"
+        + (f"; it follows {trends[name].covariate}" if name in trends else "") + "; run: sdimu diagnose"
+        for p, name in sorted(odd)
+    ]
+    return (*lines, *(f"{r.name}: {text}" for r in fit.reports for text in r.warnings))
+
+
+def _summary(fit: SetFit, varied: Variation, names: Sequence[str], base: Fit) -> SetSummary:
+    where = {name: k for k, name in enumerate(varied.names)}
+
+    def in_order(row: Floats) -> Floats:
+        return np.array([row[where[n]] if n in where else np.nan for n in names])
+
+    recordings = tuple(
+        SetRecording(
+            r.name, r.serial, r.power_on, r.start_ns, r.temperature_degc, r.data.get("duration_s", float("nan")),
+            r.data.get("samples", float("nan")), float(r.statistics["nis_mean"] or 0.0),
+            *_own(r, names), in_order(varied.z[k]),
+        )
+        for k, r in enumerate(fit.reports)
+    )  # fmt: skip
+    deviations = tuple(
+        PowerOnDeviation(power_on, name, float(value), float(sigma))
+        for power_on, row, sigmas in zip(
+            fit.power_ons, fit.estimate.deviation, fit.estimate.deviation_sigma, strict=True
+        )
+        for name, value, sigma in zip(fit.varying_names, row, sigmas, strict=True)
+    )
+    return SetSummary(
+        recordings, tuple(with_units(fit, base)), deviations, in_order(varied.p_value), varied.trends, fit.left_out
+    )
+
+
+def _own(report: Report, names: Sequence[str]) -> tuple[Floats, Floats]:
+    """Values and sigmas of a recording's own fit in the order of the set."""
+    known = dict(zip(report.names, zip(report.values, report.sigma, strict=False), strict=False))
+    pairs = np.array([known.get(n, (np.nan, np.nan)) for n in names])
+    return pairs[:, 0], pairs[:, 1]

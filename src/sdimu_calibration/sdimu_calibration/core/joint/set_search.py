@@ -1,0 +1,320 @@
+"""What does the model of a set miss? The search of one recording, on the evidence of all of them.
+
+An effect that is the same in all recordings is sought in the joint evidence: what each of them shows adds up. A fault
+of the data, or a drift of one power-on, is also sought in every recording by itself, given the joint estimate, with a
+threshold that counts all recordings.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from sdimu_calibration.core.arrays import Floats, Ints
+from sdimu_calibration.core.diagnosis.candidates import catalogue, without
+from sdimu_calibration.core.diagnosis.search import FALSE_ALARM, LOG_BAYES, Problem, Search, look_alikes, search
+from sdimu_calibration.core.effects import selection
+from sdimu_calibration.core.effects.effect import Effect
+from sdimu_calibration.core.effects.imu_model import prior_size
+from sdimu_calibration.core.estimation.handheld_fit import HandheldFit
+from sdimu_calibration.core.estimation.solve import with_effects
+from sdimu_calibration.core.evidence.candidate import OWN, Candidate, split
+from sdimu_calibration.core.joint.member import Job, Member, Report
+from sdimu_calibration.core.joint.scope import is_shared, split_tag
+from sdimu_calibration.core.joint.set_evidence import SetEvidence, set_evidence, white_power_on
+from sdimu_calibration.core.joint.set_fit import Run, SetFit, SetOptions, fit_set, power_on
+from sdimu_calibration.core.probability import normal_limit
+from sdimu_calibration.core.progress import Progress, silent
+from sdimu_calibration.core.recording import DataError
+
+_MOST_ROUNDS = 6
+"""Number of rounds at most: one finds nearly everything, one sharpens it, the others find what stood behind it."""
+_KEEP = 3.0
+"""Size of an effect in the joint fit (sigma) below which it is dropped: chance ends there."""
+_WIDE = 3.0
+"""Factor on the physical prior of a candidate (1): a sensor may be out of its class, as in the search of one
+recording."""
+
+
+@dataclass(frozen=True)
+class LocalFind:
+    """An effect of one recording.
+
+    Attributes
+    ----------
+    recording, key : str
+    z : float
+        Score given the joint estimate.
+    """
+
+    recording: str
+    key: str
+    z: float
+
+
+@dataclass(frozen=True)
+class SetSearch:
+    """What was found in a set.
+
+    Attributes
+    ----------
+    before, after : SetFit
+        With the model as given, and with what was found.
+    chosen : tuple of Candidate
+        Effects in all recordings, in the order in which they were found.
+    z : tuple of float
+        Score of each when it was found.
+    alike : mapping
+        By label, what the set cannot tell from it.
+    local : tuple of LocalFind
+    threshold : float
+        Score that noise reaches in a scan of the joint evidence.
+    first : Search
+        Of the first round: its scan and its refused step, if there is one.
+    """
+
+    before: SetFit
+    after: SetFit
+    chosen: tuple[Candidate, ...]
+    z: tuple[float, ...]
+    alike: dict[str, tuple[str, ...]]
+    local: tuple[LocalFind, ...]
+    threshold: float
+    first: Search[SetEvidence]
+
+
+def search_set(
+    members: Sequence[Member], options: SetOptions, run: Run, extra: Sequence[Effect] = (),
+    progress: Progress = silent, alpha: float = FALSE_ALARM,
+) -> SetSearch:  # fmt: skip
+    """Find what the model of a set misses.
+
+    Parameters
+    ----------
+    members : sequence of Member
+        At least two.
+    options : SetOptions
+    run : callable
+        Does the jobs.
+    extra : sequence of Effect
+        The user's own effects, tried with the catalogue.
+    progress : callable
+    alpha : float
+        False-alarm probability of a whole scan.
+
+    Raises
+    ------
+    DataError
+        When the set cannot be fitted.
+    """
+    before = fit = fit_set(members, options, run, progress=progress)
+    chosen: dict[str, Candidate] = {}
+    scores: dict[str, float] = {}
+    alike: dict[str, tuple[str, ...]] = {}
+    local: list[LocalFind] = []
+    finer: list[Effect] = []
+    first: Search[SetEvidence] | None = None
+    for turn in range(_MOST_ROUNDS):
+        progress("candidates", min(0.9, 0.4 + 0.1 * turn))
+        effects = _candidates(fit, extra, finer)
+        full = _gathered(fit, effects, run)
+        evidence = set_evidence(full, [c for effect in effects for c in split(effect)])
+        p = len(evidence.weight)
+        found = search(evidence, np.arange(p, len(evidence.names)), alpha)
+        first = first or found
+        new = [evidence.candidates[i - p] for i in found.chosen]
+        odd = _odd_one(full, evidence, found.chosen, alpha)
+        nearer = _nearer(new, finer)
+        if nearer and not odd:
+            finer = nearer
+            continue
+        finer = []
+        if not new and not odd:
+            break
+        scores |= {s.label: s.z for s in found.steps if s.accepted}
+        alike |= _alike(evidence, found)
+        if odd:
+            local.append(odd)
+            own = {**options.local, odd.recording: (*options.local.get(odd.recording, ()), odd.key)}
+            options = replace(options, local=own)
+        else:
+            chosen |= {c.label: c for c in new}
+            options = replace(options, model=with_effects(options.model, [_as_named(c) for c in new]))
+        fit = fit_set(members, options, run, fit, progress)
+    if first is None:
+        raise AssertionError("a search has one round at least")
+    fit, kept = _without_small(members, options, run, fit, chosen, progress)
+    return SetSearch(
+        before, fit, tuple(kept.values()), tuple(scores.get(label, float("nan")) for label in kept), alike,
+        tuple(local), first.threshold, first,
+    )  # fmt: skip
+
+
+def _as_named(candidate: Candidate) -> str | Effect:
+    """Name an effect of the catalogue; one of the user's own stands for itself."""
+    known = candidate.family != "own" and not candidate.effect.file
+    return candidate.label if known else candidate.effect  # type: ignore[return-value]
+
+
+def _candidates(fit: SetFit, extra: Sequence[Effect], finer: Sequence[Effect]) -> list[Effect]:
+    """Effects that all recordings may lack, without the parameters that the model has."""
+    report = max(fit.reports, key=lambda r: len(r.times.stops))
+    heat = all(r.has_temperature for r in fit.reports)
+    have = {label for e in fit.model.effects for label in (selection.resolve(e) if isinstance(e, str) else e).labels}
+    have |= set(fit.names)
+    effects = [*extra, *(e for e in catalogue(report.times, have, heat) if is_shared(e)), *finer]
+    if any(r.estimator == HandheldFit.estimator for r in fit.reports):
+        effects = [e for e in effects if not (e.needs_table or e.random_walk or e.decay_s)]
+    found: list[Effect] = []
+    for effect in effects:
+        lacking = without(effect, have)
+        have |= {label for e in lacking for label in e.labels}
+        found += lacking
+    return found
+
+
+def _gathered(fit: SetFit, tried: Sequence[Effect], run: Run) -> SetFit:
+    """Return the fit with the signatures of effects in its reports."""
+    effects = tuple(e if e.file or e.title == OWN else e.key for e in tried)
+    jobs = [
+        Job(
+            member, fit.model, report.estimator, tuple(fit.local.get(member.name, ())), effects, True,
+            fit.values_of(report), report,
+        )
+        for member, report in zip(fit.members, fit.reports, strict=True)
+    ]  # fmt: skip
+    done = run(jobs)
+    reports: list[Report] = []
+    for old, fresh in zip(fit.reports, done, strict=True):
+        if isinstance(fresh, DataError):
+            raise fresh
+        reports.append(replace(fresh, values=old.values, sigma=old.sigma))
+    return replace(fit, reports=tuple(reports))
+
+
+def _nearer(new: Sequence[Candidate], tried: Sequence[Effect]) -> list[Effect]:
+    """Variants between those of the scan, about what was found; none where they were tried."""
+    if tried:
+        return []
+    variants: list[Effect] = []
+    for candidate in new:
+        effect = selection.resolve(candidate.label) if not candidate.effect.file else candidate.effect
+        for _ in range(2):
+            if effect.nearer is None:
+                break
+            around = effect.nearer()
+            variants += [v.only((candidate.parameter.name,)) for v in around if v.variant != effect.variant]
+            effect = around[len(around) // 2]
+    return variants
+
+
+def _alike(evidence: SetEvidence, found: Search[SetEvidence]) -> dict[str, tuple[str, ...]]:
+    """Name what the set cannot tell from each effect that was found, all others being in the model."""
+    problem, chosen = Problem(evidence), [int(c) for c in found.chosen]
+    allowed = np.arange(problem.p, len(evidence.names))
+    return {
+        evidence.names[c]: tuple(
+            evidence.names[i] for i in look_alikes(problem, chosen, c, allowed, found.scale)
+            if not _same_effect(evidence, c, i)
+        )
+        for c in chosen
+    }  # fmt: skip
+
+
+def _same_effect(evidence: SetEvidence, one: int, other: int) -> bool:
+    """Whether two columns are one coefficient with another time constant."""
+    p = len(evidence.weight)
+    first, second = evidence.candidates[one - p], evidence.candidates[other - p]
+    return first.family == second.family and first.parameter.name == second.parameter.name
+
+
+def _odd_one(fit: SetFit, evidence: SetEvidence, chosen: Ints, alpha: float) -> LocalFind | None:
+    """Find the effect of one recording that stands out most, given the joint estimate with what was chosen."""
+    known, weight, _ = Problem(evidence).known([int(c) for c in chosen])
+    estimate, covariance = evidence.information.estimate(known, weight)
+    names = [evidence.names[k] for k in known]
+    values = estimate + np.concatenate([fit.estimate.values, np.zeros(len(chosen))])
+    count = sum(len(_local_labels(r)) for r in fit.reports)
+    if not count:
+        return None
+    limit = normal_limit(0.5 * alpha / count)
+    best: tuple[float, LocalFind] | None = None
+    for name in fit.power_ons:
+        members = [k for k, r in enumerate(fit.reports) if power_on(r) == name]
+        for k, z, odds in _local_scores(fit, members, names, values, covariance):
+            report = fit.reports[k]
+            top = int(np.argmax(np.where((np.abs(z) > limit) & (odds > LOG_BAYES), odds, -np.inf)))
+            if np.abs(z[top]) > limit and odds[top] > LOG_BAYES and (best is None or odds[top] > best[0]):
+                key, recording = split_tag(_local_labels(report)[top])
+                best = (float(odds[top]), LocalFind(recording, key, float(z[top])))
+    return None if best is None else best[1]
+
+
+def _local_labels(report: Report) -> list[str]:
+    return [label for label in report.reduction.labels if split_tag(label)[1]]
+
+
+def _local_scores(
+    fit: SetFit, members: Sequence[int], names: Sequence[str], values: Floats, covariance: Floats
+) -> list[tuple[int, Floats, Floats]]:
+    """Score and log Bayes factor of every local candidate of the recordings of a power-on."""
+    own = []
+    for k in members:
+        r = fit.reports[k].reduction
+        places = [len(r.names) + i for i, label in enumerate(r.labels) if split_tag(label)[1]]
+        own.append(r.A[:, places])
+    rows, columns = white_power_on(fit, members, names, own)
+    left = rows.y - rows.A @ values
+    out = []
+    for k, a in zip(members, columns, strict=True):
+        if not a.shape[1]:
+            continue
+        across = a.T @ rows.A
+        alone = np.sum(a**2, axis=0)
+        J = alone - np.einsum("mp,pq,mq->m", across, covariance, across)
+        d = a.T @ left
+        seen = np.greater(J, 1e-3 * alone) & (alone > 0.0)
+        prior = np.array([_prior(label, fit.reports[k]) for label in _local_labels(fit.reports[k])])
+        with np.errstate(divide="ignore", invalid="ignore"):
+            wide = 1.0 / (_WIDE * prior) ** 2
+            z = np.where(seen, d / np.sqrt(J), 0.0)
+            odds = np.where(seen, 0.5 * d**2 / (J + wide) - 0.5 * np.log1p(J / wide), -np.inf)
+        out.append((k, z, odds))
+    return out
+
+
+def _prior(label: str, report: Report) -> float:
+    size = prior_size(selection.resolve(split_tag(label)[0]), report.imu)
+    return float("inf") if size is None else size
+
+
+def _without_small(
+    members: Sequence[Member], options: SetOptions, run: Run, fit: SetFit, chosen: dict[str, Candidate],
+    progress: Progress,
+) -> tuple[SetFit, dict[str, Candidate]]:  # fmt: skip
+    """Drop the weakest of what was found while it is small in the joint fit."""
+    while chosen:
+        sigma = np.sqrt(np.diag(fit.estimate.covariance))
+        size = {
+            label: float(np.abs(fit.estimate.values[k]) / sigma[k])
+            for label, c in chosen.items() if (k := _place(fit.names, c)) >= 0
+        }  # fmt: skip
+        weakest = min(size, key=lambda label: size[label])
+        if size[weakest] >= _KEEP:
+            break
+        dropped = chosen[weakest]
+        chosen = {label: c for label, c in chosen.items() if label != weakest}
+        effects = tuple(e for e in options.model.effects if e != _as_named(dropped))
+        options = replace(options, model=replace(options.model, effects=effects))
+        fit = fit_set(members, options, run, fit, progress)
+    return fit, chosen
+
+
+def _place(names: Sequence[str], candidate: Candidate) -> int:
+    """Place of a coefficient that was found among those of a fit; -1 where it is not there."""
+    for name in (candidate.parameter.name, candidate.label):
+        if name in names:
+            return list(names).index(name)
+    return -1

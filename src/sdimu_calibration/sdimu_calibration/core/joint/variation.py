@@ -1,0 +1,153 @@
+"""Which coefficient differs in which recording, and what its changes follow.
+
+A recording r might have its own value of coefficient c: a column ``A_r,c`` that is zero in the rows of all other
+recordings. Its score test given the joint estimate says how far it is from that of the others; the K scores of one
+coefficient together are chi-square with K - 1 degrees of freedom, and their sum weighed with a covariate (temperature,
+date) tests whether the coefficient follows it. Deviations that power-ons are allowed are part of the noise.
+
+Source: C. R. Rao, "Large sample tests of statistical hypotheses ...", Proc. Cambridge Phil. Soc. 44 (1948).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from sdimu_calibration.core.arrays import Bools, Floats
+from sdimu_calibration.core.joint.combine import spread_out
+from sdimu_calibration.core.joint.member import Report
+from sdimu_calibration.core.joint.scope import split_tag
+from sdimu_calibration.core.joint.set_evidence import white_power_on
+from sdimu_calibration.core.joint.set_fit import SetFit, power_on
+from sdimu_calibration.core.probability import chi2_tail, normal_tail
+from sdimu_calibration.core.results import SetTrend
+
+_SEEN = 0.02
+"""Share of the length of a column (1) that the joint estimate must leave: with less a recording says nothing of it."""
+_RANK = 1e-6
+"""Ratio of an eigenvalue to the largest from which it counts: below is rounding."""
+
+
+@dataclass(frozen=True)
+class Variation:
+    """Coefficients of K recordings beside their joint estimate.
+
+    Attributes
+    ----------
+    names : tuple of str, length p
+    recordings : tuple of str, length K
+    z : ndarray, shape (K, p)
+        Deviation of the recording over its sigma; NaN where the recording says nothing of the coefficient.
+    deviation : ndarray, shape (K, p)
+        The same (SI): what the recording would add to the joint value.
+    p_value : ndarray, shape (p,)
+        Probability that coefficients that are constant scatter so far.
+    trends : tuple of SetTrend
+        The likeliest covariate of each coefficient, the least probable first.
+    """
+
+    names: tuple[str, ...]
+    recordings: tuple[str, ...]
+    z: Floats
+    deviation: Floats
+    p_value: Floats
+    trends: tuple[SetTrend, ...]
+
+    @property
+    def overall(self) -> float:
+        """Probability that the largest scatter of all coefficients is chance (Bonferroni)."""
+        seen = self.p_value[np.isfinite(self.p_value)]
+        return float(min(1.0, len(seen) * seen.min())) if len(seen) else 1.0
+
+
+@dataclass(frozen=True)
+class _Scores:
+    """Scores of every recording: gram (p, K, K) given the joint estimate, alone (K, p), d (K, p)."""
+
+    gram: Floats
+    alone: Floats
+    d: Floats
+
+
+def variation(fit: SetFit) -> Variation:
+    """Test every coefficient in every recording."""
+    shared = [n for n in fit.names if not split_tag(n)[1]]
+    scores = _scores(fit, len(shared))
+    own = np.diagonal(scores.gram, axis1=1, axis2=2).T
+    with np.errstate(divide="ignore", invalid="ignore"):
+        seen = own > _SEEN**2 * scores.alone
+        z = np.where(seen, scores.d / np.sqrt(own), np.nan)
+        deviation = np.where(seen, scores.d / own, np.nan)
+    p_value = np.array([_scatter(scores.gram[c], scores.d[:, c], seen[:, c]) for c in range(len(shared))])
+    return Variation(
+        tuple(shared), tuple(r.name for r in fit.reports), z, deviation, p_value, _trends(fit, shared, scores)
+    )
+
+
+def _scores(fit: SetFit, p: int) -> _Scores:
+    theta, P = fit.estimate.values, fit.estimate.covariance
+    K = len(fit.reports)
+    d, X = np.zeros((K, p)), np.zeros((K, p, len(fit.names)))
+    within = np.zeros((p, K, K))
+    for group in fit.power_ons:
+        members = [k for k, r in enumerate(fit.reports) if power_on(r) == group]
+        own = [spread_out(fit.reports[k].reduction, fit.names[:p]).A for k in members]
+        rows, columns = white_power_on(fit, members, fit.names, own)
+        a = np.stack(columns, axis=1)
+        d[members] = np.einsum("kmp,k->mp", a, rows.y - rows.A @ theta)
+        X[members] = np.einsum("kmp,kq->mpq", a, rows.A)
+        within[np.ix_(range(p), members, members)] = np.einsum("kmp,knp->pmn", a, a)
+    gram = within - np.einsum("mpq,qr,npr->pmn", X, P, X)
+    return _Scores(gram, np.diagonal(within, axis1=1, axis2=2).T.copy(), d)
+
+
+def _scatter(gram: Floats, d: Floats, seen: Bools) -> float:
+    """Probability of the scores of one coefficient; NaN where fewer than two recordings see it."""
+    if seen.sum() < 2:
+        return float("nan")
+    unit = 1.0 / np.sqrt(np.diag(gram)[seen])
+    values, vectors = np.linalg.eigh(gram[np.ix_(seen, seen)] * np.outer(unit, unit))
+    counts = values > _RANK * values[-1]
+    along = vectors[:, counts].T @ (d[seen] * unit)
+    return chi2_tail(float(np.sum(along**2 / values[counts])), float(counts.sum()))
+
+
+def covariates(reports: Sequence[Report]) -> Mapping[str, Floats]:
+    """List what coefficients may follow, of that what differs between the recordings.
+
+    Returns
+    -------
+    mapping of str to ndarray, shape (K,)
+        One number a recording, in the unit that the name says.
+    """
+    days = np.array([r.start_ns for r in reports], dtype=np.float64) / 86400e9
+    order = np.argsort(np.argsort(days, kind="stable"), kind="stable").astype(np.float64)
+    all_of = {
+        "temperature (degC)": np.array([r.temperature_degc for r in reports]), "date (d)": days - days.min(),
+        "order": order,
+    }  # fmt: skip
+    return {name: x for name, x in all_of.items() if np.isfinite(x).all() and np.ptp(x) > 0.0}
+
+
+def _trends(fit: SetFit, names: Sequence[str], scores: _Scores) -> tuple[SetTrend, ...]:
+    known = covariates(fit.reports)
+    found: list[SetTrend] = []
+    for c, name in enumerate(names):
+        best: SetTrend | None = None
+        for covariate, x in known.items():
+            centred = x - x.mean()
+            J = float(centred @ scores.gram[c] @ centred)
+            alone = float(centred**2 @ scores.alone[:, c])
+            if _SEEN**2 * alone >= J:
+                continue
+            z = float(centred @ scores.d[:, c]) / np.sqrt(J)
+            p = min(1.0, 2.0 * normal_tail(abs(z)) * len(names) * len(known))
+            trend = SetTrend(name, covariate, z / np.sqrt(J), 1.0 / np.sqrt(J), p)
+            # Of two that tell the same, the first: a temperature says more than an order.
+            if best is None or trend.p_value < best.p_value:
+                best = trend
+        if best is not None:
+            found.append(best)
+    return tuple(sorted(found, key=lambda t: t.p_value))
