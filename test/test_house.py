@@ -81,7 +81,7 @@ def test_every_package_declares_itself_as_ament_python():
         assert "<build_type>ament_python</build_type>" in manifest.read_text()
         assert (manifest.parent / "resource" / manifest.parent.name).is_file()
 
-_NAMED_IN = ("core/effects/", "core/hidden.py", "core/truth.py")
+_NAMED_IN = ("core/effects/", "core/hidden.py", "core/truth.py", "core/true_coefficients.py")
 """Where effects have their names: the registry, and the truth of the simulator."""
 _OTHER_WORDS = {"temperature_rate", "random_walk"}
 """A field of `Motion`, and a term of the Allan deviation."""

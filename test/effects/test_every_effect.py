@@ -60,7 +60,8 @@ STEP_AT, TURN = 27.0, 2
 def of(name):
     """The effect, with what is fixed in it set to values that mean something in a test of two minutes."""
     effect = registry.get(name)
-    values = {"tau": 40.0, "t0": STEP_AT, "span": 80.0, "turn": TURN, "at": 23.0, "r": to_si(0.3, "g")}
+    values = {"tau": 40.0, "t0": STEP_AT, "span": 80.0, "turn": TURN, "at": 23.0, "r": to_si(0.3, "g"),
+              "threshold": to_si(5.0, "degC/min")}
     if effect.with_options is None:
         return effect
     return effect.with_options(**{key: values[key] for key in effect.options})
@@ -163,6 +164,8 @@ NOT_OF_THE_MEAN = {
     "gyro_acceleration_sensitivity": 0.2, "gyro_delay": 0.2, "accel_delay": 0.02, "accel_triad_delay": 0.02,
     "accel_size": 0.2, "lever_arm": 0.2, "gyro_bias_temperature_rate": 0.05, "accel_bias_temperature_rate": 0.05,
     "gyro_scale_temperature_rate": 0.05, "accel_scale_temperature_rate": 0.05,
+    "gyro_bias_temperature_hysteresis": 0.05, "accel_bias_temperature_hysteresis": 0.05,
+    "gyro_scale_temperature_hysteresis": 0.05, "accel_scale_temperature_hysteresis": 0.05,
     # Switches: they change inside a cycle, and are softened where noise decides.
     "gyro_dead_band": 0.1, "gyro_hysteresis": 0.1, "accel_hysteresis": 0.1, "gyro_bias_in_motion": 0.1,
     "accel_bias_in_motion": 0.1, "accel_bias_asymmetry": 0.05,

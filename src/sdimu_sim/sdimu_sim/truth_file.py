@@ -13,8 +13,8 @@ from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.specification import Site
 from sdimu_calibration.storage.config import Schema, read_yaml
 from sdimu_calibration.storage.whole_file import write_whole
-from sdimu_sim.core.hidden import parse_effects
-from sdimu_sim.core.truth import ImuTruth, Truth, in_body_frame
+from sdimu_sim.core.true_coefficients import true_coefficients
+from sdimu_sim.core.truth import ImuTruth, Truth
 
 _Vector = tuple[float, float, float]
 
@@ -70,7 +70,6 @@ def write_truth(path: Path, truth: Truth) -> None:
         When the file cannot be written.
     """
     imu = truth.imu
-    hidden = dict(parse_effects(imu.effects).sizes)
     content: dict[str, Any] = {
         "format": "sdimu-truth/1",
         "plan": truth.plan,
@@ -81,8 +80,8 @@ def write_truth(path: Path, truth: Truth) -> None:
             "height_m": truth.site.height_m,
             "gravity_m_s2": truth.site.gravity_m_s2,
         },
-        "coefficients": in_body_frame(imu.coefficients, "prior") | hidden,
-        "coefficients_accelerometer_triad": in_body_frame(imu.coefficients, "accelerometer_triad") | hidden,
+        "coefficients": true_coefficients(imu, "prior"),
+        "coefficients_accelerometer_triad": true_coefficients(imu, "accelerometer_triad"),
         "as_built": {name: float(value) for name, value in imu.coefficients.items()},
         "mount_rad": [float(v) for v in imu.mount_rad],
         "noise": {

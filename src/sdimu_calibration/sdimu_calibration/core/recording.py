@@ -85,10 +85,19 @@ class TemperatureLog:
         Seconds after `start_ns` (s), ascending.
     value : ndarray, shape (m,)
         deg C.
+    reference_degc : float or None
+        Temperature T0 from which effects count (deg C): the same for recordings that share coefficients; None: the
+        first value.
     """
 
     t: Floats
     value: Floats
+    reference_degc: float | None = None
+
+    @property
+    def origin_degc(self) -> float:
+        """Temperature T0 from which effects count (deg C)."""
+        return float(self.value[0]) if self.reference_degc is None else self.reference_degc
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,9 @@ from sdimu_calibration.core.recording import DataFault
 
 NOT_TRUSTED = "not to be trusted"
 """Words of a warning that forbids to use an estimate."""
+START_TEMPERATURE = "start_temperature_degc"
+"""Key in the data section: temperature T0 from which temperature effects count (deg C), that at the start if no other
+was stated."""
 
 
 @dataclass(frozen=True)

@@ -157,7 +157,7 @@ class CompensateNode:
         t: Floats = (stamps - self._start_ns).astype(np.float64) * 1e-9
         heat = None
         if self._using.start_temperature is not None and not len(self._heat.ns):
-            text = f"no {TEMPERATURE} yet: taken to be as at the start of the calibration"
+            text = f"no {TEMPERATURE} yet: taken to be the one from which the coefficients count"
             self.node.get_logger().warning(text, once=True)
         if len(self._heat.ns):
             log = TemperatureLog(self._heat.ns / NS, self._heat.values[:, 0])

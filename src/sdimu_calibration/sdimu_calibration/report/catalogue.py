@@ -49,6 +49,8 @@ def facts(effect: Effect) -> list[str]:
         out.append("part of the turn of the body frame, which no measurement shows")
     if effect.needs or effect.needs_table:
         out.append("needs: " + ", ".join(n for n in (effect.needs, "a table" if effect.needs_table else "") if n))
+    if effect.tried_in == "set":
+        out.append("tried unasked only where several recordings are diagnosed together")
     if effect.confused_with:
         out.append(f"confused with: {', '.join(effect.confused_with)}")
     return out
@@ -77,7 +79,9 @@ def _entry(effect: Effect) -> str:
     if effect.typical:
         lines.append(f"- typical: {effect.typical}")
     if effect.options:
-        lines.append("- options, scanned by a diagnosis: " + ", ".join(effect.options))
+        stated = ", ".join(f"{name} ({value} where none is stated)" for name, value in effect.options.items())
+        scanned = ", ".join(effect.options)
+        lines.append(f"- options, scanned by a diagnosis: {scanned}" if effect.scan else f"- options: {stated}")
     return "\n".join([*lines, *(f"- {fact}" for fact in facts(effect))]) + "\n"
 
 

@@ -17,11 +17,11 @@ from sdimu_calibration.core.plan import Plan
 from sdimu_calibration.core.recording import DataError, PhaseLog, Recording
 from sdimu_calibration.core.specification import Model
 from sdimu_sim.core.generator import simulate_imu
-from sdimu_sim.core.hidden import parse_effects
 from sdimu_sim.core.mean_bias import mean_bias
 from sdimu_sim.core.platform import PlatformMotion
 from sdimu_sim.core.scenario import Scenario, imu_truth, temperature_log
-from sdimu_sim.core.truth import ImuTruth, in_body_frame
+from sdimu_sim.core.true_coefficients import true_coefficients
+from sdimu_sim.core.truth import ImuTruth
 
 KINDS = ("position", "velocity", "rate", "force")
 """Kinds of measurement, three rows each."""
@@ -113,7 +113,7 @@ def _table_motion(plan: Plan, table: TableSpecification) -> TableMotion:
 
 def true_values(sensor: ImuTruth, names: tuple[str, ...], frame: str) -> Floats:
     """Truth of the estimated coefficients by name, shape (p,); what the simulator does not have is zero."""
-    truth = in_body_frame(sensor.coefficients, frame) | dict(parse_effects(sensor.effects).sizes)
+    truth = true_coefficients(sensor, frame)
     return np.array([truth.get(name, 0.0) for name in names])
 
 

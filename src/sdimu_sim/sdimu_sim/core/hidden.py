@@ -51,6 +51,28 @@ TEMPERATURE_NAMES = frozenset({"T", "dT", "dTdt"})
 
 _BOTH = (("gyro", "deg/h", "w{i}"), ("accel", "ug", "g*a{i}"))
 
+
+
+def _by_temperature(word: str, per: str, power: str) -> list[Row]:
+    """Rows of one power of the temperature: bias, scale factor, mass unbalance, and the axes that turn.
+
+    An axis i that turns about the next one (n) moves away from the one before (m); about that one it moves towards n.
+    """
+    rows = [
+        Row(f"gyro_mass_unbalance_{word}_{kind}{{i}}", f"deg/h/g/{per}", f"k*{power}*a{{{kind}}}", drawn=False)
+        for kind in "dq"
+    ]
+    for triad, unit, signal in _BOTH:
+        vector = signal.replace("{i}", "")
+        rows += [
+            Row(f"{triad}_bias_{word}_{{i}}", f"{unit}/{per}", f"k*{power}", drawn=power == "dT"),
+            Row(f"{triad}_scale_{word}_{{i}}", f"ppm/{per}", f"k*{power}*{signal}", drawn=power == "dT"),
+            Row(f"{triad}_misalignment_{word}_{{i}}{{n}}", f"arcsec/{per}", f"-k*{power}*{vector}{{m}}", drawn=False),
+            Row(f"{triad}_misalignment_{word}_{{i}}{{m}}", f"arcsec/{per}", f"k*{power}*{vector}{{n}}", drawn=False),
+        ]
+    return rows
+
+
 _ROWS: tuple[Row, ...] = (
     Row("accel_quadratic_{i}", "ug/g^2", "k*a{i}**2"),
     Row("accel_cubic_{i}", "ug/g^3", "k*a{i}**3"),
@@ -80,14 +102,12 @@ _ROWS: tuple[Row, ...] = (
         row
         for triad, unit, signal in _BOTH
         for row in (
-            Row(f"{triad}_bias_temperature_{{i}}", f"{unit}/degC", "k*dT"),
             Row(f"{triad}_bias_temperature_rate_{{i}}", f"{unit}*s/degC", "k*dTdt"),
             Row(f"{triad}_bias_warm_up_{{i}}", unit, "k*exp(-t/tau)", {"tau": "s"}),
             Row(f"{triad}_bias_ramp_{{i}}", f"{unit}/h", "k*t"),
             Row(f"{triad}_bias_step_{{i}}", unit, "k*(1 + sign(t - t0))/2", {"t0": "s"}),
             Row(f"{triad}_bias_in_motion_{{i}}", unit, "k*moving"),
             Row(f"{triad}_bias_settling_{{i}}", unit, "k*(1 - moving)*exp(-since/tau)", {"tau": "s"}),
-            Row(f"{triad}_scale_temperature_{{i}}", "ppm/degC", f"k*dT*{signal}"),
             Row(f"{triad}_scale_ramp_{{i}}", "ppm/h", f"k*t*{signal}"),
             # The first four modes of a random walk (Karhunen-Loeve): a size each.
             *(
@@ -102,8 +122,12 @@ _ROWS: tuple[Row, ...] = (
         Row(f"gyro_mass_unbalance_ramp_{kind}{{i}}", "deg/h/g/h", f"k*t*a{{{kind}}}", drawn=False) for kind in "dq"
     ),
     *(
-        Row(f"gyro_mass_unbalance_temperature_{kind}{{i}}", "deg/h/g/degC", f"k*dT*a{{{kind}}}", drawn=False)
-        for kind in "dq"
+        row
+        for word, per, power in (
+            ("temperature", "degC", "dT"), ("temperature_squared", "degC^2", "dT**2"),
+            ("temperature_cubed", "degC^3", "dT**3"),
+        )
+        for row in _by_temperature(word, per, power)
     ),
     # The triad is turned by the angle k about axis i: the next axis turns towards the one after it, that away from it.
     *(
@@ -126,6 +150,11 @@ _ROWS: tuple[Row, ...] = (
             Row(f"{triad}_creep_{{i}}", unit, f"k*{sense}{{i}}*(1 - moving)*exp(-since/tau)", {"tau": "s"}, False),
             Row(f"{triad}_bias_wrap_{{i}}{{any}}", unit, "k*wound{any}/(2*pi)", drawn=False),
             Row(f"{triad}_scale_temperature_rate_{{i}}", "ppm*min/degC", f"k*dTdt*{signal}", drawn=False),
+            # Heating and cooling go along the two sides of a loop.
+            Row(f"{triad}_bias_temperature_hysteresis_{{i}}", unit, "k*tanh(dTdt/threshold)",
+                {"threshold": "degC/min"}, drawn=False),
+            Row(f"{triad}_scale_temperature_hysteresis_{{i}}", "ppm", f"k*tanh(dTdt/threshold)*{signal}",
+                {"threshold": "degC/min"}, drawn=False),
         )
     ),
 )  # fmt: skip
@@ -394,7 +423,7 @@ def _take_named(key: EffectKey, found: _Found) -> None:
 def _named_terms(key: EffectKey, size: float) -> list[Term]:
     row, parts = _TABLE[key.name]
     options = read_options(key, row.options)
-    for name in ("tau", "span", "r"):
+    for name in ("tau", "span", "r", "threshold"):
         if options.get(name, 1.0) <= 0.0:
             raise DataError(f"effect {key.name}: {name} must be positive")
     values = {"k": size, **options}

@@ -200,18 +200,23 @@ def in_body_frame(coefficients: Mapping[str, float], frame: str) -> dict[str, fl
     if frame not in ("prior", "accelerometer_triad"):
         raise DataError(f"unknown body frame '{frame}' (expected accelerometer_triad or prior)")
     gyro, accel = input_axes("gyro", coefficients), input_axes("accel", coefficients)
-    R = _triad_rotation(accel) if frame == "accelerometer_triad" else np.eye(3)
+    R = triad_rotation(accel) if frame == "accelerometer_triad" else np.eye(3)
     unbalance = unbalance_matrix(coefficients) @ R.T
     found = {name: float(coefficients.get(name, 0.0)) for name in COEFFICIENTS if "_bias_" in name}
-    found |= _elements("gyro", gyro @ R.T) | _elements("accel", accel @ R.T)
-    found |= {f"gyro_mass_unbalance_{part}": float(unbalance[place]) for part, place in _UNBALANCE.items()}
+    found |= elements("gyro", gyro @ R.T) | elements("accel", accel @ R.T)
+    found |= unbalance_elements(unbalance)
     if frame == "accelerometer_triad":
         # Zero by the definition of the frame; the factorisation leaves 1e-19.
         found |= dict.fromkeys(("accel_misalignment_xy", "accel_misalignment_xz", "accel_misalignment_yx"), 0.0)
     return {name: found[name] for name in COEFFICIENTS}
 
 
-def _triad_rotation(M: Floats) -> Floats:
+def unbalance_elements(matrix: Floats) -> dict[str, float]:
+    """Mass unbalance by name of its matrix (3, 3); what a turn moves outside the six terms is left out."""
+    return {f"gyro_mass_unbalance_{part}": float(matrix[place]) for part, place in _UNBALANCE.items()}
+
+
+def triad_rotation(M: Floats) -> Floats:
     """R with ``M @ R.T`` lower triangular, positive diagonal: v_triad = R v_b."""
     Q, upper = np.linalg.qr(M.T)
     sign = np.sign(np.diag(upper))
@@ -219,7 +224,7 @@ def _triad_rotation(M: Floats) -> Floats:
     return rotation
 
 
-def _elements(triad: str, M: Floats) -> dict[str, float]:
+def elements(triad: str, M: Floats) -> dict[str, float]:
     """Scale and misalignments of ``M = I + E`` in the signs of the error equations."""
     found = {f"{triad}_scale_{own}": float(M[i, i] - 1.0) for i, own in enumerate(_XYZ)}
     for pair in _PAIRS:

@@ -9,6 +9,7 @@ import pytest
 
 import sdimu_calibration.core.effects  # noqa: F401  (fills the registry)
 from sdimu_calibration.core.compensation.reads import any_motion, reads
+from sdimu_calibration.core.diagnosis.candidates import catalogue
 from sdimu_calibration.core.effects import body_frame, registry
 from sdimu_calibration.core.effects.effect import Excitation, Timetable
 from sdimu_calibration.core.effects.selection import resolve
@@ -69,6 +70,28 @@ def test_an_effect_that_needs_oblique_stops_is_bias_and_scale_or_nothing_at_card
     affine = np.column_stack([np.ones(6), cardinal, np.abs(cardinal)])
     left = values - affine @ np.linalg.lstsq(affine, values, rcond=None)[0]
     np.testing.assert_allclose(left, 0.0, atol=1e-9 * max(1.0, np.abs(values).max()))
+
+
+def test_a_diagnosis_of_one_recording_does_not_try_what_only_a_set_tells_apart():
+    alone = {e.name for e in catalogue(TIMES, set(), has_temperature=True)}
+    together = {e.name for e in catalogue(TIMES, set(), has_temperature=True, of_a_set=True)}
+    of_sets = {name for name in EFFECTS if registry.get(name).tried_in == "set"}
+    assert together - alone == of_sets
+    assert not {e.name for e in catalogue(TIMES, set(), has_temperature=False, of_a_set=True)} & of_sets
+    # Seven effects of the baseline: both misalignments in first power, all in second and third; four of hysteresis.
+    assert len(of_sets) == 2 + 7 + 7 + 4
+    assert all(registry.get(name).needs == "temperature" for name in of_sets)
+
+
+@pytest.mark.parametrize("name", [n for n in EFFECTS if n.endswith(("_temperature_squared", "_temperature_cubed"))])
+def test_powers_of_the_temperature_are_products_of_the_linear_effect(name):
+    effect = registry.get(name)
+    linear = registry.get(name.rpartition("_")[0])
+    motion = any_motion(np.random.default_rng(2))
+    times = 1 if name.endswith("_squared") else 2
+    expected = linear.regressors(motion) * motion.temperature[:, None] ** times
+    np.testing.assert_allclose(effect.regressors(motion), expected, rtol=1e-12)
+    assert [t.channel for t in effect.terms] == [t.channel for t in linear.terms]
 
 
 def test_the_gauge_is_what_a_turn_of_the_body_frame_changes_to_first_order():

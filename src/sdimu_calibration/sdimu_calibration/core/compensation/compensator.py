@@ -16,7 +16,7 @@ next; a ROS message has no field for that.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -29,11 +29,9 @@ from sdimu_calibration.core.effects.imu_model import ImuModel
 from sdimu_calibration.core.effects.motion import Motion
 from sdimu_calibration.core.navigation.track import temperatures
 from sdimu_calibration.core.recording import DataError, Recording, TemperatureLog
-from sdimu_calibration.core.results import Calibration
+from sdimu_calibration.core.results import START_TEMPERATURE, Calibration
 from sdimu_calibration.core.specification import ImuSpecification
 
-START_TEMPERATURE = "start_temperature_degc"
-"""Key in the data section of a result: temperature from which temperature effects count (deg C)."""
 _ABSENT = {
     "alpha": "needs the angular acceleration",
     "w_table": "needs the rate against the Earth, which only the table test knows",
@@ -161,7 +159,8 @@ def compensator(
     same_start : bool
         The samples count time from the same event as the calibrated recording (power-on): functions of time hold.
     start_temperature : float, optional
-        Temperature at the start of the calibrated recording (deg C), where the result does not state it.
+        Temperature from which the coefficients count (deg C), where the result does not state it: that at the start of
+        the calibrated recording.
 
     Returns
     -------
@@ -272,7 +271,7 @@ def heat_since(log: TemperatureLog | None, t: Floats, start_degc: float | None, 
     t : ndarray, shape (n,)
         s.
     start_degc : float or None
-        Temperature from which the difference counts (deg C); None for the first of the log.
+        Temperature from which the difference counts (deg C); None for the origin of the log.
     causal : bool
         Use only what was measured up to t.
 
@@ -281,10 +280,8 @@ def heat_since(log: TemperatureLog | None, t: Floats, start_degc: float | None, 
     temperature, rate : ndarray, shape (n,)
         K, K/s.
     """
-    heat, rate = temperatures(log, t, causal)
-    if log is not None and len(log.t) and start_degc is not None:
-        heat = heat + (float(log.value[0]) - start_degc)
-    return heat, rate
+    about = log if log is None or start_degc is None else replace(log, reference_degc=start_degc)
+    return temperatures(about, t, causal)
 
 
 def compensate(

@@ -88,7 +88,7 @@ def samples_motion(t: Floats, dt: Floats, w: Floats, f: Floats, heat: Floats, he
     w, f : ndarray, shape (n, 3)
         Body rate (rad/s) and specific force (m/s^2).
     heat, heat_rate : ndarray, shape (n,)
-        Temperature since the start of the calibrated recording (K) and its rate (K/s).
+        Temperature above the one from which the coefficients count (K) and its rate (K/s).
 
     Returns
     -------

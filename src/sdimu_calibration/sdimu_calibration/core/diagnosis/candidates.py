@@ -31,7 +31,7 @@ _CYCLES = np.arange(1.0, 20.0, 0.5)
 `kim18`."""
 
 
-def catalogue(times: Timetable, in_model: set[str], has_temperature: bool) -> list[Effect]:
+def catalogue(times: Timetable, in_model: set[str], has_temperature: bool, of_a_set: bool = False) -> list[Effect]:
     """Every effect of the catalogue with the parameters that the model lacks.
 
     Parameters
@@ -42,11 +42,13 @@ def catalogue(times: Timetable, in_model: set[str], has_temperature: bool) -> li
         Labels of the parameters that the model has.
     has_temperature : bool
         Whether the recording has a temperature; effects that need one are left out without.
+    of_a_set : bool
+        Also those that are tried only where several recordings are diagnosed together.
     """
     out: list[Effect] = []
     for name in registry.names():
         effect = registry.get(name)
-        if effect.needs == "temperature" and not has_temperature:
+        if (effect.needs == "temperature" and not has_temperature) or (effect.tried_in == "set" and not of_a_set):
             continue
         variants = effect.scan(times) if effect.scan else (effect,)
         for variant in variants:

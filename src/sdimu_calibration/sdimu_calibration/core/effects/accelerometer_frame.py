@@ -3,7 +3,7 @@
 Turning the body frame changes no measurement (`body_frame`). With errors of arcminutes the priors hold that free turn
 and nobody feels it. With errors of degrees it is the end of every iteration: the strong rows of the data cancel along
 the turn only as well as the derivatives are right, and what does not cancel outweighs the priors. So here the turn is
-no unknown: q_xy = q_xz = q_yx = 0 leave the model.
+no unknown: q_xy = q_xz = q_yx = 0 leave the model, and so do their polynomials of the temperature.
 
 What the turn takes along must be put back. Six of nine elements of the gyros' response to force are mass unbalance in
 the frame in which the sensor was built; in the turned frame the other three are products of unbalance and
@@ -12,6 +12,7 @@ misalignment. They become parameters of that size, estimated and not reported, a
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -25,6 +26,8 @@ from sdimu_calibration.core.specification import ImuSpecification
 FRAME = "accelerometer_triad"
 _OUTSIDE = ("gyro_g_sensitivity_xz", "gyro_g_sensitivity_yz", "gyro_g_sensitivity_zx")
 """Elements of the gyros' response to force that are no mass unbalance."""
+_SCALE_OR_ANGLE = re.compile("_(scale|misalignment)_")
+"""Coefficients whose squares count; those of temperature, rate or time have other units, which say nothing of size."""
 LARGE = 3e-3
 """Prior sigma of scale (1) or misalignment (rad) from which errors are large: its square is 9 ppm, the sigma of a good
 test."""
@@ -80,7 +83,7 @@ class AccelerometerFrameModel:
 
 def squares_count(sensors: ImuModel) -> bool:
     """Tell whether the specification lets errors be so large that their squares count."""
-    linear = [i for i, n in enumerate(sensors.names) if "_scale_" in n or "_misalignment_" in n]
+    linear = [i for i, p in enumerate(sensors.parameters) if p.unit in ("1", "rad") and _SCALE_OR_ANGLE.search(p.name)]
     return bool(linear) and float(np.max(sensors.prior[linear])) > LARGE
 
 
@@ -108,8 +111,8 @@ def drifting(sensors: ImuModel, imu: ImuSpecification, gravity: float, duration:
 
 def accelerometer_frame_model(asked: ImuModel, imu: ImuSpecification) -> AccelerometerFrameModel | None:
     """Put a model into the accelerometers' frame; None where it cannot turn because not all misalignments are in it."""
-    pinned = set(body_frame.pinned_names())
-    if not pinned <= set(asked.names):
+    pinned = set(body_frame.pinned_in(asked.names))
+    if not pinned:
         return None
     effects: list[Effect] = []
     for effect in asked.effects:

@@ -7,16 +7,22 @@ sensors themselves define (doc/conventions.md).
 Values turn exactly: with the matrices M_a = I + scale + misalignment, M_g likewise and the mass unbalance G, a body
 frame turned by R has M_a R', M_g R', G R'. The covariance turns to first order, which for misalignments of
 arcminutes is right to 1e-3 of a sigma.
+
+With misalignments that are polynomials of the temperature the frame is that of the accelerometers at every temperature:
+``M_a(T) R(T)'`` is lower triangular. It turns against the case while the temperature changes, and the gyros see that
+turn as a bias that follows the rate of the temperature. R(T) is taken to first order in the change with temperature:
+its square is that of arcseconds.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.rotation import skew
 
 FRAMES = ("accelerometer_triad", "prior")
 
@@ -28,15 +34,24 @@ _MISALIGNMENT = {
 }  # fmt: skip
 _UNBALANCE = {"dx": (0, 0), "qx": (0, 1), "dy": (1, 1), "qy": (1, 0), "dz": (2, 2), "qz": (2, 1)}
 _PINNED = ("xy", "xz", "yx")
+_BY_TEMPERATURE = ("_temperature", "_temperature_squared", "_temperature_cubed")
+"""Powers of the temperature, as they stand in the names of coefficients."""
+_SEEN_AS_BIAS = "gyro_bias_temperature_rate"
+"""How gyros see a frame that turns in proportion to the temperature."""
 _STEP = 1e-5
 """Step of central differences (SI of any coefficient): error 1e-10 by curvature, 1e-11 by rounding."""
 
 
-def _places(triad: str) -> dict[str, tuple[int, int, float]]:
-    """Coefficient name -> place and sign in the error matrix of a triad (``gyro`` or ``accel``)."""
-    places = {f"{triad}_scale_{a}": (i, i, 1.0) for i, a in enumerate("xyz")}
-    places.update({f"{triad}_misalignment_{pair}": place for pair, place in _MISALIGNMENT.items()})
+def _places(triad: str, power: str = "") -> dict[str, tuple[int, int, float]]:
+    """Coefficient name -> place and sign in the error matrix of a triad (``gyro`` or ``accel``), or a power of it."""
+    places = {f"{triad}_scale{power}_{a}": (i, i, 1.0) for i, a in enumerate("xyz")}
+    places.update({f"{triad}_misalignment{power}_{pair}": place for pair, place in _MISALIGNMENT.items()})
     return places
+
+
+def _unbalance_places(power: str = "") -> dict[str, tuple[int, int, float]]:
+    """Coefficient name -> place in the matrix of the mass unbalance, or a power of it."""
+    return {f"gyro_mass_unbalance{power}_{k}": (row, column, 1.0) for k, (row, column) in _UNBALANCE.items()}
 
 
 def _matrix(places: dict[str, tuple[int, int, float]], names: Sequence[str], values: Floats) -> Floats:
@@ -79,7 +94,8 @@ def values_in_frame(names: Sequence[str], values: Floats, frame: str) -> Floats:
     Returns
     -------
     ndarray, shape (p,)
-        In `frame`, SI. Coefficients other than scale, misalignment and mass unbalance are as given.
+        In `frame`, SI. Coefficients other than scale, misalignment and mass unbalance, their polynomials, and what the
+        gyros see of a frame that turns with the temperature are as given.
 
     Raises
     ------
@@ -87,19 +103,46 @@ def values_in_frame(names: Sequence[str], values: Floats, frame: str) -> Floats:
         When the frame has no such name.
     """
     _check(frame)
-    out = np.array(values, dtype=float)
+    given = np.asarray(values, dtype=float)
+    out = np.array(given)
     if frame == "prior" or not set(pinned_names()) <= set(names):
         return out
-    places = _places("accel")
-    M_a = np.eye(3) + _matrix(places, names, out)
-    R = _turn_to_triad(M_a)
+    R = _turn_to_triad(np.eye(3) + _matrix(_places("accel"), names, given))
     for triad in ("accel", "gyro"):
         places = _places(triad)
-        M = np.eye(3) + _matrix(places, names, np.asarray(values, dtype=float))
+        M = np.eye(3) + _matrix(places, names, given)
         _read_back(M @ R.T - np.eye(3), places, names, out)
-    unbalance = {f"gyro_mass_unbalance_{k}": (r, c, 1.0) for k, (r, c) in _UNBALANCE.items()}
-    _read_back(_matrix(unbalance, names, np.asarray(values, dtype=float)) @ R.T, unbalance, names, out)
+    unbalance = _unbalance_places()
+    _read_back(_matrix(unbalance, names, given) @ R.T, unbalance, names, out)
+    for power in _turning_powers(names):
+        _turn_power(power, names, given, R, out)
     return out
+
+
+def _turn_power(power: str, names: Sequence[str], given: Floats, R: Floats, out: Floats) -> None:
+    """Put the coefficients (p,) of a power of the temperature into the accelerometers' frame, in place in `out`.
+
+    ``R(T)' = R' (I + [theta x] (T - T0)^n)`` with the theta that leaves the power's part of ``M_a(T) R(T)'`` lower
+    triangular. `out` has the parts that do not depend on temperature in that frame already.
+    """
+    M_a, M_g = (np.eye(3) + _matrix(_places(triad), names, out) for triad in ("accel", "gyro"))
+    moved = _matrix(_places("accel", power), names, given) @ R.T
+    crosses = [skew(axis) for axis in np.eye(3)]
+    upper = np.triu_indices(3, 1)
+    columns = np.column_stack([(M_a @ C)[upper] for C in crosses])
+    theta: Floats = -np.linalg.solve(columns, moved[upper]).astype(np.float64)
+    turn = skew(theta)
+    unbalance = _unbalance_places()
+    for places, constant in (
+        (_places("accel", power), M_a), (_places("gyro", power), M_g),
+        (_unbalance_places(power), _matrix(unbalance, names, out)),
+    ):  # fmt: skip
+        _read_back(_matrix(places, names, given) @ R.T + constant @ turn, places, names, out)
+    if power == _BY_TEMPERATURE[0]:
+        for i, seen in enumerate(M_g @ theta):
+            name = f"{_SEEN_AS_BIAS}_{'xyz'[i]}"
+            if name in names:
+                out[list(names).index(name)] -= seen
 
 
 def frame_jacobian(names: Sequence[str], frame: str) -> Floats:
@@ -131,14 +174,27 @@ def frame_jacobian(names: Sequence[str], frame: str) -> Floats:
     if frame == "prior" or not set(pinned_names()) <= set(names):
         return T
     index = {n: i for i, n in enumerate(names)}
-    turns = np.zeros((p, 3))
+    out = T.copy()
+    for power in ("", *_turning_powers(names)):
+        turns = _turns(power, index)
+        pinned = [index[n] for n in _pinned(power)]
+        out -= turns @ np.linalg.inv(turns[pinned]) @ T[pinned]
+    return out
+
+
+def _turns(power: str, index: Mapping[str, int]) -> Floats:
+    """Change of every coefficient (p,) per small turn of the body frame about its axes, or per power of it, (p, 3)."""
+    turns = np.zeros((len(index), 3))
     for triad in ("accel", "gyro"):
-        for name, (row, column, sign) in _places(triad).items():
+        for name, (row, column, sign) in _places(triad, power).items():
             if name in index and row != column:
                 for k in range(3):
                     turns[index[name], k] = -sign * _levi_civita(row, column, k)
-    pinned = [index[n] for n in pinned_names()]
-    return np.asarray(T - turns @ np.linalg.inv(turns[pinned]) @ T[pinned])
+    if power == _BY_TEMPERATURE[0]:
+        for k, axis in enumerate("xyz"):
+            if f"{_SEEN_AS_BIAS}_{axis}" in index:
+                turns[index[f"{_SEEN_AS_BIAS}_{axis}"], k] = 1.0
+    return turns
 
 
 def jacobian_at(names: Sequence[str], values: Floats, frame: str) -> Floats:
@@ -173,8 +229,8 @@ def jacobian_at(names: Sequence[str], values: Floats, frame: str) -> Floats:
         step[j] = _STEP
         ahead = values_in_frame(names, values + step, frame)
         J[:, j] = (ahead - values_in_frame(names, values - step, frame)) / (2.0 * _STEP)
-    if frame != "prior" and set(pinned_names()) <= set(names):
-        J[[list(names).index(name) for name in pinned_names()]] = 0.0  # by definition; rounding leaves 1e-11
+    if pinned_in(names, frame):
+        J[[list(names).index(name) for name in pinned_in(names, frame)]] = 0.0  # by definition; rounding leaves 1e-11
     return J
 
 
@@ -185,7 +241,39 @@ def _levi_civita(row: int, column: int, k: int) -> float:
 
 def pinned_names(frame: str = FRAMES[0]) -> tuple[str, ...]:
     """Coefficients that a body frame makes zero by definition."""
-    return () if frame == "prior" else tuple(f"accel_misalignment_{pair}" for pair in _PINNED)
+    return () if frame == "prior" else _pinned("")
+
+
+def pinned_in(names: Sequence[str], frame: str = FRAMES[0]) -> tuple[str, ...]:
+    """Coefficients of a model that a body frame makes zero by definition, powers of the temperature with them.
+
+    None where the model cannot turn: it has not all of `pinned_names`.
+
+    Parameters
+    ----------
+    names : sequence of str, length p
+        Of the model.
+    frame : str
+        One of `FRAMES`.
+    """
+    if frame == "prior" or not set(pinned_names()) <= set(names):
+        return ()
+    return tuple(name for power in ("", *_turning_powers(names)) for name in _pinned(power))
+
+
+def _pinned(power: str) -> tuple[str, ...]:
+    return tuple(f"accel_misalignment{power}_{pair}" for pair in _PINNED)
+
+
+def _turning_powers(names: Sequence[str]) -> tuple[str, ...]:
+    """Find the powers of the temperature with which a common turn of both triads is free.
+
+    Where the model holds the gyros' axes still, those of the accelerometers turn against them: nothing is free then.
+    """
+    return tuple(
+        power for power in _BY_TEMPERATURE
+        if {*_pinned(power), *(f"gyro_misalignment{power}_{pair}" for pair in _MISALIGNMENT)} <= set(names)
+    )  # fmt: skip
 
 
 def _check(frame: str) -> None:

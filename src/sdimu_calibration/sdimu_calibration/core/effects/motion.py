@@ -43,7 +43,7 @@ class Motion:
     rest : ndarray of bool, shape (n,)
         True where the table stands still.
     temperature, temperature_rate : ndarray, shape (n,)
-        Change since the start (K) and rate (K/s); zero where no temperature is recorded.
+        T - T0 (K) and rate (K/s); zero where no temperature is recorded. T0 is `TemperatureLog.origin_degc`.
     turned, leant : ndarray, shape (n, 3)
         Sign of the last turn about each axis, and of the last change of specific force along it; 0 before the first.
     since_turn : ndarray, shape (n,)

@@ -18,11 +18,21 @@ from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.evidence.consistency import Consistency
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.noise_term import NoiseTerm
-from sdimu_calibration.core.recording import DataFault
-from sdimu_calibration.core.results import NOT_TRUSTED, History, Rest, no_history
+from sdimu_calibration.core.recording import DataFault, TemperatureLog
+from sdimu_calibration.core.results import NOT_TRUSTED, START_TEMPERATURE, History, Rest, no_history
 from sdimu_calibration.core.specification import Model
 
 NOT_CONVERGED = f"the passes did not converge: the estimate is {NOT_TRUSTED}; check --imu and --site"
+
+
+def temperature_counts(log: TemperatureLog | None) -> dict[str, float]:
+    """Make the entries of a temperature in the data section of a result: who uses the result needs to know T0.
+
+    Parameters
+    ----------
+    log : TemperatureLog or None
+    """
+    return {} if log is None or not len(log.t) else {START_TEMPERATURE: log.origin_degc}
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ import numpy as np
 from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.effects.accelerometer_frame import FRAME
 from sdimu_calibration.core.effects.effect import Effect, Timetable
-from sdimu_calibration.core.estimation.fit import Fit, Start
+from sdimu_calibration.core.estimation.fit import Fit, Start, temperature_counts
 from sdimu_calibration.core.estimation.free_inertial import FreeInertialRun
 from sdimu_calibration.core.estimation.navigation_fit import checksum
 from sdimu_calibration.core.evidence.consistency import NO_NOISE, Consistency
@@ -163,9 +163,8 @@ class HandheldFit(Fit):
 
     def data_counts(self) -> dict[str, float]:
         """Entries of the data section of a result."""
-        recording, log = self.ready.recording, self.ready.recording.temperature
-        start = {} if log is None or not len(log.t) else {"start_temperature_degc": float(log.value[0])}
-        return start | {
+        recording = self.ready.recording
+        return temperature_counts(recording.temperature) | {
             "samples": float(len(recording.t)),
             "checksum": checksum(recording.t, recording.omega_ib_b, recording.f_ib_b),
             "lost": float(self.ready.run.cycles.lost.sum()),

@@ -17,7 +17,7 @@ from sdimu_calibration.core.arrays import Bools, Floats, Ints
 from sdimu_calibration.core.effects import bias
 from sdimu_calibration.core.effects.effect import Effect, Timetable
 from sdimu_calibration.core.effects.imu_model import ImuModel
-from sdimu_calibration.core.estimation.fit import NOT_CONVERGED, Fit, Start
+from sdimu_calibration.core.estimation.fit import NOT_CONVERGED, Fit, Start, temperature_counts
 from sdimu_calibration.core.estimation.free_inertial import (
     Compensated,
     FreeInertialRun,
@@ -314,10 +314,7 @@ class NavigationFit(Fit):
     def data_counts(self) -> dict[str, float]:
         """Entries of the data section of a result."""
         recording, phases, epochs = self.test.recording, self.prepared.phases, self.prepared.epochs
-        log = recording.temperature
-        # Temperature effects count from the start of this recording; who uses the result needs to know from where.
-        start = {} if log is None or not len(log.t) else {"start_temperature_degc": float(log.value[0])}
-        return start | {
+        return temperature_counts(recording.temperature) | {
             "samples": float(len(recording.t)),
             "checksum": checksum(recording.t, recording.omega_ib_b, recording.f_ib_b),
             "lost": float(self.prepared.cycles.lost.sum()),

@@ -66,7 +66,7 @@ def integrate(C_nb: Floats, cycles: Cycles, latitude: float) -> Floats:
 
 
 def temperatures(log: TemperatureLog | None, t: Floats, causal: bool) -> tuple[Floats, Floats]:
-    """Temperature since the start (K) and its rate (K/s) at times `t`.
+    """Temperature above the origin of the log (K) and its rate (K/s) at times `t`.
 
     Parameters
     ----------
@@ -88,10 +88,10 @@ def temperatures(log: TemperatureLog | None, t: Floats, causal: bool) -> tuple[F
         index = np.maximum(np.searchsorted(log.t, t + 1e-9, side="right") - 1, 0)
         before = np.maximum(np.searchsorted(log.t, t - 2.0 * half, side="right") - 1, 0)
         span = np.maximum(log.t[index] - log.t[before], half)
-        return log.value[index] - log.value[0], (log.value[index] - log.value[before]) / span
+        return log.value[index] - log.origin_degc, (log.value[index] - log.value[before]) / span
     low, high = np.maximum(t - half, log.t[0]), np.minimum(t + half, log.t[-1])
     rise = np.interp(high, log.t, log.value) - np.interp(low, log.t, log.value)
-    return np.interp(t, log.t, log.value) - log.value[0], rise / np.maximum(high - low, 1e-3)
+    return np.interp(t, log.t, log.value) - log.origin_degc, rise / np.maximum(high - low, 1e-3)
 
 
 def motion(
