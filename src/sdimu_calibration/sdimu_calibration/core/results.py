@@ -14,6 +14,8 @@ from sdimu_calibration.core.recording import DataFault
 
 NOT_TRUSTED = "not to be trusted"
 """Words of a warning that forbids to use an estimate."""
+NO_AXES = (float("nan"),) * 3
+"""Three axes without a number."""
 
 
 @dataclass(frozen=True)
@@ -66,6 +68,9 @@ class Rest:
         Residual of the turn to this rest, N, E, D (rad; the heading of north is arbitrary); NaN where nobody saw it.
     rate_sigma, force_sigma, turn_sigma : float
         What they scatter by an axis: white noise, and what was learned beyond it (rad/s, m/s^2, rad).
+    ahead, ahead_sigma : tuple of three float
+        Error of the force predicted from everything but itself, and what it scatters by (m/s^2); NaN in results of
+        before.
     """
 
     start_s: float
@@ -76,6 +81,8 @@ class Rest:
     rate_sigma: float
     force_sigma: float
     turn_sigma: float
+    ahead: tuple[float, float, float] = NO_AXES
+    ahead_sigma: tuple[float, float, float] = NO_AXES
 
 
 @dataclass(frozen=True)
