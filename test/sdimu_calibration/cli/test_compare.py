@@ -10,7 +10,9 @@ import pytest
 
 from sdimu_calibration.cli import main as cli
 from sdimu_calibration.core.diagnosis.ladder import moved_coefficients
-from sdimu_calibration.core.results import Calibration, History
+from sdimu_calibration.core.noise_term import NoiseTerm
+from sdimu_calibration.core.results import Calibration, History, Rest
+from sdimu_calibration.core.units import to_si
 from sdimu_calibration.storage.result_file import write_result
 
 _NONE = np.empty(0)
@@ -83,6 +85,46 @@ def test_another_site_or_noise_is_told_because_likelihoods_change_with_it(run):
     status, out, _ = run(FIRST, replace(SECOND, data={**FIRST.data, "conditions": 8.0}))
     assert status == 0
     assert "not with one site" in out
+
+
+def by_hand(result, scatter, error):
+    """A result by hand whose forces ahead err by `error`, three times what it learned them to scatter by: `scatter`."""
+    rests = [
+        Rest(0.0, 1.0, (0.0,) * 3, (0.0,) * 3, (0.0,) * 3, 1.0, 1.0, 1.0, (error, -error, error), (scatter,) * 3)
+        for _ in range(6)
+    ]
+    fit = {**result.fit, "held_out_rms": error / scatter}
+    return replace(result, estimator="handheld", rests=tuple(rests), fit=fit)
+
+
+def test_held_out_errors_by_hand_are_in_one_scale(run):
+    """Both are one of their own scatter: only in one scale the second is seen to be four times better."""
+    _, out, _ = run(by_hand(FIRST, 8e-3, 8e-3), by_hand(SECOND, 2e-3, 2e-3))
+    before, after = (next(text for text in out.splitlines() if f"run{k}" in text) for k in (0, 1))
+    assert "4.000" in before
+    assert "1.000" in after
+    assert "in sigmas of the last model" in out
+    assert "in sigmas of the last model" not in run(FIRST, SECOND)[1]
+
+
+def test_results_of_before_that_do_not_say_it_have_no_error_by_hand(run):
+    old = replace(by_hand(FIRST, 8e-3, 8e-3), rests=())
+    before = next(text for text in run(old, by_hand(SECOND, 2e-3, 2e-3))[1].splitlines() if "run0" in text)
+    assert " nan" in before
+
+
+def test_a_run_by_hand_and_a_navigated_one_are_told_apart(run):
+    assert "neither log-likelihoods nor held-out errors compare" in run(by_hand(FIRST, 1e-3, 1e-3), SECOND)[1]
+
+
+def test_noise_that_was_learned_has_a_column(run):
+    assert "noise learned" not in run(FIRST, SECOND)[1]
+    flicker = NoiseTerm("gyro", "flicker", size=to_si(0.018, "deg/h"), low=1e-9, high=1e-6)
+    _, out, _ = run(FIRST, replace(SECOND, noise=(flicker,)))
+    assert "noise learned" in out
+    before, after = (next(text for text in out.splitlines() if f"run{k}" in text) for k in (0, 1))
+    assert "none" in before
+    assert "gyro bias instability (flicker) 0.018 deg/h" in after
 
 
 def test_one_folder_is_not_enough(run):

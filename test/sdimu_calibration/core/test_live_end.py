@@ -11,7 +11,7 @@ import pytest
 from sdimu_calibration.core.estimation.outcome import calibrate
 from sdimu_calibration.core.live import NS, LiveCalibration
 from sdimu_calibration.core.plan import Plan
-from sdimu_calibration.core.recording import UNNUMBERED
+from sdimu_calibration.core.recording import UNNUMBERED, DataError
 from sdimu_calibration.storage.bag_writer import write_recording
 from sdimu_calibration.storage.config import load_imu, load_model, load_plan, load_site
 from sdimu_calibration.storage.opening import Source, open_test, opening_options
@@ -211,14 +211,13 @@ def test_live_end_and_bag_give_the_same_coefficients(imu, cases, tmp_path):
         assert sum(e.used for e in estimates) > 0.5 * sum(SHORT.dwell_s)
 
 
-def test_an_assumed_site_leaves_the_sign_of_the_force_live_and_offline(tmp_path):
+def test_an_assumed_site_that_the_data_exclude_is_refused_live_and_offline(tmp_path):
     m = negated_force(messages("dtg"))
-    ended = live(m, "dtg", site=None)[0].opened()
-    opened = open_test(recorded(tmp_path / "bag", m), None, load_imu("dtg"), handheld=False)
-    equal(ended.recording, opened.recording)
-    np.testing.assert_array_equal(ended.recording.f_ib_b, m.f)
-    assert ended.recording.notes == opened.recording.notes
-    assert "is assumed" in ended.recording.notes[0]
+    said = r"no site was stated, and the assumed one \(daejeon\).*--accel-sign -1 would fit"
+    with pytest.raises(DataError, match=said):
+        live(m, "dtg", site=None)[0].opened()
+    with pytest.raises(DataError, match=said):
+        open_test(recorded(tmp_path / "bag", m), None, load_imu("dtg"), handheld=False)
 
 
 def test_without_a_status_a_wide_specification_does_not_let_turns_pass_on_the_way():

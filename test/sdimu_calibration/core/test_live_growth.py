@@ -99,6 +99,28 @@ def test_temperatures_that_are_forgotten_are_missed_by_nobody(hours):
     np.testing.assert_array_equal(hours.live._state.used, whole.live._state.used)
 
 
+@pytest.mark.parametrize("started", [False, True])
+def test_statuses_of_hours_without_samples_leave_the_changes(hours, started):
+    """A table that speaks at 200 Hz while the IMU is silent, from the start or in the middle of a test."""
+    live = hours.live
+    if started:
+        hours.run(60)
+    begin = START + 60 * NS
+    for k in range(300_000):
+        live.add_phase(begin + k * NS // 200, k // 20_000 % 2 == 0, k // 40_000)
+    assert len(live._intake._status.ns) < 40_000
+    # A sixth of a second late: it holds where it belongs.
+    live.add_phase(begin + 300_000 * NS // 200 - NS // 6, False, 99)
+    samples = np.tile([0.0, 0.0, -9.8], (RATE * 3, 1))
+    live.add_samples(begin + (1 + np.arange(len(samples), dtype=np.int64)) * (NS // RATE), 0.0 * samples, samples)
+    log = live._intake.phase_log()
+    first = (begin - live._intake.origin_ns) / NS
+    change = np.flatnonzero((np.diff(log.stop) != 0) | np.diff(log.dwell)) + 1
+    change = change[log.t[change] > first]
+    expected = [*(100.0 * np.arange(1, 15)), 1500.0 - 1.0 / 6.0, 1500.0 - 32.0 / 200.0]
+    np.testing.assert_allclose(log.t[change] - first, expected, atol=0.006)
+
+
 def test_a_sample_of_another_year_is_no_wait_of_a_year(hours):
     hours.run(60)
     hours.live.add_samples(np.array([START + 365 * 86_400 * NS]), np.zeros((1, 3)), np.array([[0.0, 0.0, -9.8]]))

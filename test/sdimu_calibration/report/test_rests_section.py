@@ -13,8 +13,11 @@ from sdimu_calibration.storage.result_file import read_result, write_result
 NONE = (float("nan"),) * 3
 RESTS = (
     Rest(0.2, 51.7, (1e-4, 2e-4, -3e-5), (1e-3, -2e-3, 4e-3), NONE, 2e-4, 1e-3, float("nan")),
-    Rest(60.0, 64.5, (3e-4, 0.0, 0.0), (0.0, 0.0, 9.80665e-3), (2.9088820866572158e-4, 0.0, 0.0), 2e-4, 1e-3, 1e-4),
-)
+    Rest(
+        60.0, 64.5, (3e-4, 0.0, 0.0), (0.0, 0.0, 9.80665e-3), (2.9088820866572158e-4, 0.0, 0.0), 2e-4, 1e-3, 1e-4,
+        (0.0, 1e-3, 1.1e-2), (1.1e-3, 1.2e-3, 1.3e-3),
+    ),
+)  # fmt: skip
 PLAIN = Calibration(
     "prior", ("gyro_bias",), ("gyro_bias_x",), ("rad/s",), ("deg/h",), np.zeros(1), np.eye(1), {}, {}, (), no_history(1)
 )
@@ -26,7 +29,8 @@ def test_rests_come_back_from_a_result_file(tmp_path):
     read = read_result(tmp_path).rests
     assert read[1] == RESTS[1]
     assert np.isnan(read[0].turn).all()
-    assert replace(read[0], turn=NONE, turn_sigma=0.0) == replace(RESTS[0], turn=NONE, turn_sigma=0.0)
+    unknown = {"turn": NONE, "turn_sigma": 0.0, "ahead": NONE, "ahead_sigma": NONE}
+    assert replace(read[0], **unknown) == replace(RESTS[0], **unknown)
     write_result(tmp_path / "result.json", PLAIN)
     assert read_result(tmp_path).rests == ()
     assert '"rests"' not in (tmp_path / "result.json").read_text()

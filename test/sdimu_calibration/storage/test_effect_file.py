@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.metadata
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -141,8 +142,17 @@ def test_an_absent_file_is_told_by_its_name(tmp_path):
         find_effects(str(tmp_path / "nowhere.yaml"))
 
 
+@pytest.mark.parametrize(("model", "added"), [
+    ("baseline", ["gyro_bias"]), ("baseline", ["accel_scale_y"]), ("hand", ["gyro_g_sensitivity_xx"]),
+    ("baseline", ["accel_quadratic", "accel_quadratic_z"]), ("baseline", ["gyro_x: ey^2", "gyro_x: ey^2"]),
+])  # fmt: skip
+def test_adding_what_a_model_has_is_refused(model, added):
+    with pytest.raises(DataError, match=re.escape(f"'{added[-1]}' is in the model already")):
+        extended_model(model, added)
+
+
 def test_what_a_model_has_is_not_added_twice():
-    model = extended_model("baseline", ["accel_quadratic_x", "accel_quadratic", "gyro_bias"])
+    model = extended_model("baseline", ["accel_quadratic_x", "accel_quadratic"])
     names = [p.name for e in model.effects for p in e.parameters]
     assert len(names) == len(set(names)) == 33
     # Every added effect has a name that `--add` reads back.

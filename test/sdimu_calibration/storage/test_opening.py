@@ -11,6 +11,7 @@ import pytest
 
 from sdimu_calibration.core.plan import Plan
 from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.specification import Site
 from sdimu_calibration.storage.bag_writer import write_recording
 from sdimu_calibration.storage.config import load_imu, load_plan, load_site
 from sdimu_calibration.storage.opening import Source, open_recording, open_test
@@ -31,11 +32,15 @@ HURRIED = Plan(
 
 @cache
 def simulated():
-    return generate(Scenario(HURRIED, DTG, load_site("daejeon"), rate_hz=20.0, seed=71))[0]
+    return recorded_at(36.4)
 
 
-def write(path, w=1.0, f=1.0, late_s=0.0, warm_at_s=0.0, topics=None):
-    r = simulated()
+def recorded_at(latitude_deg):
+    return generate(Scenario(HURRIED, DTG, Site(np.radians(latitude_deg)), rate_hz=20.0, seed=71))[0]
+
+
+def write(path, w=1.0, f=1.0, late_s=0.0, warm_at_s=0.0, topics=None, r=None):
+    r = r or simulated()
 
     def ns(t):
         return np.rint(t * 1e9).astype(np.int64)
@@ -106,8 +111,21 @@ def test_a_place_that_nobody_stated_is_named_with_what_the_data_say(tmp_path):
     assert opened.site == load_site("daejeon")
     (note,) = opened.recording.notes
     assert "no --site: daejeon is assumed" in note
-    assert re.search(r"that of latitude \d+ \+- \d+ deg", note)
+    assert re.search(r"that of latitude \S+ \+- \S+ deg", note)
     assert open_test(path, "daejeon", DTG).recording.notes == ()
+
+
+def test_an_assumed_place_that_the_data_exclude_is_refused_and_yours_is_asked_for(tmp_path):
+    path = write(tmp_path / "b", r=recorded_at(54.0))
+    with pytest.raises(DataError) as refused:
+        open_test(path, None, DTG)
+    told = str(refused.value)
+    latitude, sigma = map(float, re.search(r"latitude (\S+) \+- (\S+) deg", told).groups())
+    assert abs(latitude - 54.0) < 4.0 * sigma
+    for words in (str(path), "daejeon", "36.4 deg", "--site", "latitude_deg"):
+        assert words in told
+    (tmp_path / "here.yaml").write_text("format: sdimu-site/1\nlatitude_deg: 54\nheight_m: 0\n")
+    assert open_test(path, str(tmp_path / "here.yaml"), DTG).recording.notes == ()
 
 
 def test_a_place_that_contradicts_the_data_is_told(tmp_path):
@@ -130,8 +148,9 @@ def test_a_wrong_hemisphere_or_the_negative_of_the_force_is_asked_for_unless_sta
     left = open_test(path, "daejeon", DTG, Source(accel_sign=1)).recording
     assert np.array_equal(left.f_ib_b, -simulated().f_ib_b)
     assert any("--site" in note for note in left.notes)
-    # Without a stated place the sign is not guessed from an assumed one.
-    assert np.array_equal(open_test(path, None, DTG).recording.f_ib_b, -simulated().f_ib_b)
+    # Without a stated place the sign is not guessed from an assumed one: both are asked for.
+    with pytest.raises(DataError, match=r"no site was stated.*daejeon.*sign of the force \(--accel-sign -1 would fit"):
+        open_test(path, None, DTG)
     assert np.array_equal(open_recording(path, Source(accel_sign=-1)).f_ib_b, simulated().f_ib_b)
 
 

@@ -122,6 +122,9 @@ def test_compressed_bags_read_the_same(tmp_path, small_test, plugin, mode):
         for raw, ns in zip(encoded, small_test.ns.tolist(), strict=True):
             writer.write(connection, ns + START_NS, raw)
     assert np.array_equal(read_recording(tmp_path / "b").omega_ib_b, small_test.omega_ib_b)
+    content = read_info(tmp_path / "b")
+    assert content.counts == {"/imu/data_raw": len(small_test.ns)}
+    assert content.first_ns == START_NS + small_test.ns[0]
 
 
 def test_a_packed_file_reads_alone_and_says_when_it_is_no_such_file(bag, small_test):
@@ -129,8 +132,13 @@ def test_a_packed_file_reads_alone_and_says_when_it_is_no_such_file(bag, small_t
     packed = bag / "alone.mcap.zstd"
     packed.write_bytes(zstandard.compress(plain.read_bytes()))
     assert np.array_equal(read_recording(packed).f_ib_b, small_test.f_ib_b)
+    assert read_info(packed) == read_info(plain)
+    packed.write_bytes(zstandard.compress(plain.read_bytes()[:-100]))
+    assert read_info(packed).damaged == [packed]
     packed.write_bytes(b"something else")
     assert "cannot be unpacked" in refusal(packed)
+    with pytest.raises(DataError, match="cannot be unpacked"):
+        read_info(packed)
 
 
 @pytest.mark.parametrize("method", [None, Writer1.CompressionFormat.LZ4, Writer1.CompressionFormat.BZ2])

@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.table import Table
 
 from sdimu_calibration.api.fit import CalibrationFit
-from sdimu_calibration.report.comparison import HEADINGS, OTHER_SCALE, comparison, other_scale
+from sdimu_calibration.report.comparison import comparison, headings, remarks
 
 _WIDTH = 140
 """Columns of the table."""
@@ -22,25 +22,32 @@ class Comparison:
     Attributes
     ----------
     rows : list of list of str
-        One a model: model, log-likelihood, difference to the one before, NIS, held-out error, coefficients that moved.
+        One a model, in the order of `headings`.
+    headings : tuple of str
+        Model, noise learned (where any was), log-likelihood, difference to the one before, NIS, held-out error,
+        coefficients that moved.
+    remarks : tuple of str
+        What the columns mean, and where they do not compare.
     """
 
     def __init__(self, fits: Sequence[CalibrationFit]) -> None:
         results = [fit.result for fit in fits]
         self.rows = comparison([f"model {k}" for k in range(1, len(fits) + 1)], results)
-        self._note = OTHER_SCALE if other_scale(results) else ""
+        self.headings, self.remarks = headings(results), remarks(results)
 
     def __repr__(self) -> str:
         """Table of the models."""
-        table = Table(*HEADINGS)
+        table = Table(*self.headings)
         for row in self.rows:
             table.add_row(*row)
         text = io.StringIO()
         Console(file=text, width=_WIDTH, color_system=None).print(table)
-        return text.getvalue() + self._note
+        return "\n".join([text.getvalue().rstrip("\n"), *self.remarks])
 
     def _repr_html_(self) -> str:
         """Table of the models as HTML."""
         lines = "".join("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in self.rows)
-        head = "".join(f"<th>{escape(text)}</th>" for text in HEADINGS)
-        return f"<table><tr>{head}</tr>{lines}</table><p>{escape(self._note)}</p>"
+        head = "".join(f"<th>{escape(text)}</th>" for text in self.headings)
+        return f"<table><tr>{head}</tr>{lines}</table>" + "".join(
+            f"<p>{escape(remark)}</p>" for remark in self.remarks
+        )

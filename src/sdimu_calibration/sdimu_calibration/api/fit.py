@@ -24,7 +24,7 @@ from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.report.page import write_report
 from sdimu_calibration.report.table import cells, headings, rich_table, rows
-from sdimu_calibration.storage.effect_file import find_effects
+from sdimu_calibration.storage.effect_file import find_effects, new_parts
 from sdimu_calibration.storage.result_file import write_result
 from sdimu_calibration.storage.whole_file import written_together
 
@@ -191,12 +191,8 @@ class CalibrationFit:
 
 
 def _effects(effect: str | Effect | Candidate, fit: Fit) -> Sequence[Effect]:
-    """Effects that are meant; refused when the model has all their parameters."""
+    """Effects that are meant, without what the model has."""
     if isinstance(effect, str):
-        meant: Sequence[Effect] = find_effects(effect)
-    else:
-        meant = (effect if isinstance(effect, Effect) else effect.effect,)
-    new = [e for e in meant if not set(e.labels) <= fit.labels]
-    if not new:
-        raise DataError(f"'{effect if isinstance(effect, str) else meant[0].name}' is in the model already")
-    return new
+        return new_parts(find_effects(effect), fit.sensors.effects, effect)
+    meant = effect if isinstance(effect, Effect) else effect.effect
+    return new_parts((meant,), fit.sensors.effects, meant.name)

@@ -16,7 +16,7 @@ def compare(
     """Show how far the error fell with each model; folders of one recording, simplest model first."""
     from sdimu_calibration.cli.wide_table import print_table
     from sdimu_calibration.core.recording import DataError
-    from sdimu_calibration.report.comparison import HEADINGS, OTHER_SCALE, comparison, other_scale
+    from sdimu_calibration.report.comparison import comparison, headings, remarks
     from sdimu_calibration.storage.result_file import read_result
 
     if len(folders) < 2:
@@ -24,10 +24,11 @@ def compare(
     results = [read_result(folder) for folder in folders]
     lines = comparison([str(folder) for folder in folders], results)
     console = plain()
-    if other_scale(results):
-        console.print(OTHER_SCALE)
+    for remark in remarks(results):
+        console.print(remark, soft_wrap=True, highlight=False)
     short = [[folder.name, *line[1:]] for folder, line in zip(folders, lines, strict=True)]
-    print_table(console, ("folder", *HEADINGS[1:]), short, left=2)
+    columns = headings(results)
+    print_table(console, ("folder", *columns[1:]), short, left=columns.index("log-likelihood"))
     for folder in folders:
         verdict = _verdict(folder)
         if verdict:

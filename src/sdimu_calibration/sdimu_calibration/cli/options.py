@@ -69,6 +69,7 @@ def opened(
     from sdimu_calibration.core.recording import DataError
     from sdimu_calibration.core.units import parse_quantity
     from sdimu_calibration.storage.config import load_imu, load_site
+    from sdimu_calibration.storage.effect_file import find_effects
     from sdimu_calibration.storage.model_choice import HANDHELD, named_estimator, named_model
     from sdimu_calibration.storage.opening import open_test
 
@@ -78,8 +79,11 @@ def opened(
     whole = 0.0 if whole_turns is None else parse_quantity(whole_turns, "deg")
     if whole < 0.0 or (whole_turns is not None and whole == 0.0):
         raise DataError(f"--whole-turns {whole_turns}: expected an angle above zero")
-    # A wrong name is reported before a long recording is read.
-    specification, given = None if imu is None else load_imu(imu), named_model(model, add or [])
+    # A wrong name is reported before a long recording is read; which model it is added to, the recording may decide.
+    specification = None if imu is None else load_imu(imu)
+    named_model(model, [])
+    for text in add or []:
+        find_effects(text)
     if site is not None:
         load_site(site)
     handheld = None if wanted == AUTO else wanted == HANDHELD
@@ -90,7 +94,7 @@ def opened(
         return replace(test, whole_turns=whole), named_model(model, add or [], handheld=True), wanted
     if whole:
         raise DataError("--whole-turns is of runs by hand, and this one is navigated: leave it out, or state --hand")
-    return test, given, wanted
+    return test, named_model(model, add or []), wanted
 
 
 def tell(console: Console, notes: Iterable[str]) -> None:

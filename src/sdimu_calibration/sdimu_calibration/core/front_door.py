@@ -26,7 +26,7 @@ from sdimu_calibration.core.data.by_hand import why_handheld
 from sdimu_calibration.core.data.dejitter import dejittered
 from sdimu_calibration.core.data.dwell_detection import with_detected_dwells
 from sdimu_calibration.core.data.imu_class import propose
-from sdimu_calibration.core.data.latitude_check import EarthRate, contradictions, observe_earth_rate, reversed_force
+from sdimu_calibration.core.data.latitude_check import assumption, contradictions, observe_earth_rate, reversed_force
 from sdimu_calibration.core.data.status_clock import aligned
 from sdimu_calibration.core.noise.quantisation import with_quantisation
 from sdimu_calibration.core.recording import DataError, Recording
@@ -195,9 +195,10 @@ def _placed(recording: Recording, imu: ImuSpecification, options: OpeningOptions
     if len(recording.t) >= FEWEST:
         recording = with_detected_dwells(recording, imu)
         seen = observe_earth_rate(recording.t, recording.omega_ib_b, recording.f_ib_b, imu)
-    notes = [_assumed(options.assumed_site, site, seen)] if options.assumed_site else []
+    assumed = options.assumed_site
+    notes = [assumption(assumed, site, seen, where)] if assumed else []
     if seen is not None:
-        undecided = not options.assumed_site and options.stated.accel_sign is None
+        undecided = not assumed and options.stated.accel_sign is None
         if undecided and reversed_force(seen, site):
             raise DataError(
                 f"{where}: the Earth turns the wrong way about the specific force for latitude "
@@ -207,14 +208,3 @@ def _placed(recording: Recording, imu: ImuSpecification, options: OpeningOptions
             )
         notes += contradictions(seen, site)
     return replace(recording, notes=(*recording.notes, *notes))
-
-
-def _assumed(name: str, site: Site, seen: EarthRate | None) -> str:
-    text = (
-        f"no --site: {name} is assumed (latitude {np.degrees(site.latitude_rad):.1f} deg, height "
-        f"{site.height_m:.0f} m)"
-    )
-    if seen is None or not seen.seen:
-        return f"{text}; the data do not show the Earth's rate well enough to say the latitude"
-    latitude, sigma = np.degrees(seen.latitude)
-    return f"{text}; the Earth's rate in the data is that of latitude {latitude:.0f} +- {sigma:.0f} deg"

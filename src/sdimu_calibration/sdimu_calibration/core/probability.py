@@ -1,4 +1,4 @@
-"""Tail probabilities of the normal and the chi-square distribution.
+"""Tail probabilities of the normal, the chi-square and Student's distribution.
 
 Functions of scipy.special, loaded when one is asked for: `scipy.stats` has the same behind a second of imports.
 """
@@ -31,3 +31,10 @@ def chi2_head(x: float, dof: float) -> float:
     from scipy.special import chdtr  # noqa: PLC0415
 
     return float(chdtr(dof, x))
+
+
+def student_limit(p: float, dof: float) -> float:
+    """Give the number that Student's t with `dof` degrees of freedom exceeds with probability `p`."""
+    from scipy.special import stdtrit  # noqa: PLC0415
+
+    return -float(stdtrit(dof, p))

@@ -22,6 +22,10 @@ class DataError(ValueError):
         super().__init__(one_line(text))
 
 
+class DivergedError(DataError):
+    """An estimate that did not end in numbers: the data and what was stated of them do not fit."""
+
+
 @dataclass(frozen=True)
 class DataFault:
     """Something wrong with the data that is no physics of the sensor.

@@ -17,6 +17,8 @@ NOT_TRUSTED = "not to be trusted"
 START_TEMPERATURE = "start_temperature_degc"
 """Key in the data section: temperature T0 from which temperature effects count (deg C), that at the start if no other
 was stated."""
+NO_AXES = (float("nan"),) * 3
+"""Three axes without a number."""
 
 
 @dataclass(frozen=True)
@@ -69,6 +71,9 @@ class Rest:
         Residual of the turn to this rest, N, E, D (rad; the heading of north is arbitrary); NaN where nobody saw it.
     rate_sigma, force_sigma, turn_sigma : float
         What they scatter by an axis: white noise, and what was learned beyond it (rad/s, m/s^2, rad).
+    ahead, ahead_sigma : tuple of three float
+        Error of the force predicted from everything but itself, and what it scatters by (m/s^2); NaN in results of
+        before.
     """
 
     start_s: float
@@ -79,6 +84,8 @@ class Rest:
     rate_sigma: float
     force_sigma: float
     turn_sigma: float
+    ahead: tuple[float, float, float] = NO_AXES
+    ahead_sigma: tuple[float, float, float] = NO_AXES
 
 
 @dataclass(frozen=True)

@@ -4,19 +4,32 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from sdimu_calibration.core.diagnosis.ladder import moved_coefficients, number
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.results import Calibration
+from sdimu_calibration.core.units import from_si
 
-HEADINGS = ("name", "model", "log-likelihood", "difference", "nis", "held-out", "moved by more than 2 sigma")
-OTHER_SCALE = (
-    "not with one site and one noise specification: log-likelihoods and NIS are of different scales"
+_HEADINGS = ("name", "model", "log-likelihood", "difference", "nis", "held-out", "moved by more than 2 sigma")
+_NOISE = "noise learned"
+_OTHER_SCALE = "not with one site and one noise specification: log-likelihoods and NIS are of different scales"
+_BY_HAND = (
+    "held-out: the force of each rest by hand predicted from everything else, in sigmas of the last model; every model "
+    "learns a scatter of its own, in which its NIS and its own held-out error are near 1"
 )
+_TWO_KINDS = "some by hand and some navigated: neither log-likelihoods nor held-out errors compare"
 _MOST_MOVED = 6
 
 
+def headings(results: Sequence[Calibration]) -> tuple[str, ...]:
+    """Columns of `comparison`; that of noise where a result learned any."""
+    learned = any(result.noise for result in results)
+    return (*_HEADINGS[:2], _NOISE, *_HEADINGS[2:]) if learned else _HEADINGS
+
+
 def comparison(names: Sequence[str], results: Sequence[Calibration]) -> list[list[str]]:
-    """Rows of `HEADINGS`, one a result, each against the one before it.
+    """Rows of `headings`, one a result, each against the one before it.
 
     Parameters
     ----------
@@ -32,14 +45,46 @@ def comparison(names: Sequence[str], results: Sequence[Calibration]) -> list[lis
     if len(results) < 2:
         raise DataError("compare: give at least two results of one recording")
     _check_same_data(names, results)
+    held_out = _held_out(results)
+    lines = [
+        _row(names[k], result, results[k - 1] if k else None, held_out[k]) for k, result in enumerate(results)
+    ]
+    if _NOISE in headings(results):
+        for line, result in zip(lines, results, strict=True):
+            line.insert(2, _noise(result))
+    return lines
+
+
+def remarks(results: Sequence[Calibration]) -> tuple[str, ...]:
+    """Say what the columns mean and where they do not compare, one line each."""
+    by_hand = [_is_by_hand(result) for result in results]
+    return (
+        *([_OTHER_SCALE] if any(_differ(result, results[0], "conditions") for result in results[1:]) else []),
+        *([_BY_HAND] if all(by_hand) else [_TWO_KINDS] if any(by_hand) else []),
+    )
+
+
+def _is_by_hand(result: Calibration) -> bool:
+    return result.estimator == "handheld"
+
+
+def _held_out(results: Sequence[Calibration]) -> list[float]:
+    """Held-out error of each result; by hand in one scale for all, that of the last."""
+    if not all(map(_is_by_hand, results)):
+        return [number(result.fit.get("held_out_rms")) for result in results]
+    scale = np.array([rest.ahead_sigma for rest in results[-1].rests])
     return [
-        _row(names[k], result, results[k - 1] if k else None) for k, result in enumerate(results)
+        float(np.sqrt(np.mean((np.array([rest.ahead for rest in result.rests]) / scale) ** 2)))
+        if 0 < len(result.rests) == len(scale) else float("nan")
+        for result in results
     ]
 
 
-def other_scale(results: Sequence[Calibration]) -> bool:
-    """Whether the results are of different sites or noise specifications."""
-    return any(_differ(result, results[0], "conditions") for result in results[1:])
+def _noise(result: Calibration) -> str:
+    """Noise with a memory that was learned, in words with sizes."""
+    return ", ".join(
+        f"{term.words} {from_si(term.size, term.display_unit):.2g} {term.display_unit}" for term in result.noise
+    ) or "none"
 
 
 def _check_same_data(names: Sequence[str], results: Sequence[Calibration]) -> None:
@@ -59,8 +104,8 @@ def _differ(a: Calibration, b: Calibration, key: str) -> bool:
     return key in a.data and key in b.data and a.data[key] != b.data[key]
 
 
-def _row(name: str, result: Calibration, before: Calibration | None) -> list[str]:
-    likelihood, nis, held_out = (number(result.fit.get(k)) for k in ("log_likelihood", "nis_mean", "held_out_rms"))
+def _row(name: str, result: Calibration, before: Calibration | None, held_out: float) -> list[str]:
+    likelihood, nis = (number(result.fit.get(k)) for k in ("log_likelihood", "nis_mean"))
     if before is None:
         model, difference, moved = f"{len(result.model)} effects", "", ""
     else:

@@ -118,7 +118,7 @@ def read_topics(path: Path, takes: Takes, kept: Keep = lambda _: RawMessages()) 
         entry = content.setdefault(topic, TopicContent(type_name, kept(type_name)))
         return entry.raw if wanted else None
 
-    with _unpacked(path) as (parts, unpack):
+    with unpacked_parts(path) as (parts, unpack):
         for part in parts:
             if part.suffix == ".mcap":
                 _read_mcap(part, path, target, unpack, content)
@@ -128,8 +128,16 @@ def read_topics(path: Path, takes: Takes, kept: Keep = lambda _: RawMessages()) 
 
 
 @contextmanager
-def _unpacked(path: Path) -> Iterator[tuple[list[Path], Unpack | None]]:
-    """Yield files that the readers below can open, and how each message is packed in them; None when not at all."""
+def unpacked_parts(path: Path) -> Iterator[tuple[list[Path], Unpack | None]]:
+    """Yield files that the readers below can open, and how each message is packed in them; None when not at all.
+
+    Those that were packed as files are there while the context lasts.
+
+    Raises
+    ------
+    DataError
+        When there is nothing of a bag at `path`, or it cannot be unpacked.
+    """
     parts = bag_parts(path)
     information = read_metadata(path) if path.is_dir() else {}
     mode = _mode(information)

@@ -9,7 +9,7 @@ from rosbags.rosbag1 import Reader as Reader1
 from rosbags.rosbag2 import Reader
 
 from sdimu_calibration.core.recording import DataError
-from sdimu_calibration.storage.bag_file import ROS1, bag_parts, check_magic
+from sdimu_calibration.storage.bag_file import ROS1, check_magic, unpacked_parts
 from sdimu_calibration.storage.mcap_walk import DamagedError, McapWalk
 
 
@@ -26,7 +26,7 @@ class BagInfo:
     first_ns, last_ns : int
         First and last log time (ns); 0 without messages.
     damaged : list of Path
-        Files that end before their footer.
+        Files that end before their footer; the bag itself where they are packed in it.
     """
 
     types: dict[str, str] = field(default_factory=dict)
@@ -47,18 +47,23 @@ def read_info(path: Path) -> BagInfo:
     Raises
     ------
     DataError
-        When there is no bag at `path`.
+        When there is no bag at `path`, or it cannot be unpacked.
     """
-    info = BagInfo()
-    for part in bag_parts(Path(path)):
-        if part.suffix == ".mcap":
-            _add_mcap(part, info)
-        else:
-            _add_other(part, info, Reader1 if part.suffix == ROS1 else Reader)
+    info, path = BagInfo(), Path(path)
+    if path.is_file() and path.suffix == ROS1:
+        # Its counts are there without the conversion that a reader of messages makes.
+        _add_other(path, info, Reader1)
+        return info
+    with unpacked_parts(path) as (parts, _):
+        for part in parts:
+            if part.suffix == ".mcap":
+                _add_mcap(part, path, info)
+            else:
+                _add_other(part, info, Reader)
     return info
 
 
-def _add_mcap(part: Path, info: BagInfo) -> None:
+def _add_mcap(part: Path, bag: Path, info: BagInfo) -> None:
     check_magic(part)
     walk = McapWalk(part)
     counts: dict[int, int] = {}
@@ -70,7 +75,7 @@ def _add_mcap(part: Path, info: BagInfo) -> None:
             for channel, _, _ in block:
                 counts[channel] = counts.get(channel, 0) + 1
     except DamagedError:
-        info.damaged.append(part)
+        info.damaged.append(part if bag in {part.parent, part} else bag)
     for key, channel in walk.channels.items():
         info.types[channel.topic] = walk.type_name(key)
         info.counts[channel.topic] = info.counts.get(channel.topic, 0) + counts.get(key, 0)

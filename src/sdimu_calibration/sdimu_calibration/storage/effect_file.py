@@ -143,7 +143,7 @@ def _equation(sensor: str, formula: str) -> Effect:
 
 
 def extended_model(name: str, added: Sequence[str]) -> Model:
-    """Read a model and add effects to it; what it has already is not added twice.
+    """Read a model and add effects to it; what it has of one already is not added twice.
 
     Parameters
     ----------
@@ -155,14 +155,15 @@ def extended_model(name: str, added: Sequence[str]) -> Model:
     Raises
     ------
     DataError
-        When the model or an effect is unknown or cannot be read.
+        When the model or an effect is unknown or cannot be read, or the model has an effect already.
     """
     model = load_model(name)
     folder = find_config("model", name).parent
     effects: list[Effect] = []
-    for text in (*(_beside(folder, text) for text in model.effects), *added):
-        for effect in find_effects(text):
-            _append(effects, effect)
+    for text in model.effects:
+        effects += _parts(find_effects(_beside(folder, text)), effects)
+    for text in added:
+        effects += new_parts(find_effects(text), effects, text)
     # A model names its effects; `imu_model.build` takes an effect itself as well.
     return replace(model, effects=cast("tuple[str, ...]", tuple(effects)))
 
@@ -173,14 +174,38 @@ def _beside(folder: Path, text: str) -> str:
     return str(folder / text) if file and (folder / file[0]).is_file() else text
 
 
-def _append(effects: list[Effect], effect: Effect) -> None:
-    have = {label for e in effects for label in e.labels}
-    for part in without(effect, have):
-        if len(part.parameters) in (1, len(effect.parameters)):
-            effects.append(part if len(part.parameters) < len(effect.parameters) else effect)
-        else:
-            # One by one, because a name of several joined could not be read back from a result.
-            effects += [effect.only((p.name,)) for p in part.parameters]
+def new_parts(effects: Sequence[Effect], model: Sequence[Effect], name: str) -> list[Effect]:
+    """Return of some effects what a model does not have yet.
+
+    Parameters
+    ----------
+    effects, model : sequence of Effect
+    name : str
+        Of what is added, for the error.
+
+    Raises
+    ------
+    DataError
+        When the model has all of it.
+    """
+    new = _parts(effects, model)
+    if not new:
+        raise DataError(f"'{name}' is in the model already")
+    return new
+
+
+def _parts(effects: Sequence[Effect], model: Sequence[Effect]) -> list[Effect]:
+    have = {label for e in model for label in e.labels}
+    new: list[Effect] = []
+    for effect in effects:
+        for part in without(effect, have):
+            if len(part.parameters) in (1, len(effect.parameters)):
+                new.append(part if len(part.parameters) < len(effect.parameters) else effect)
+            else:
+                # One by one, because a name of several joined could not be read back from a result.
+                new += [effect.only((p.name,)) for p in part.parameters]
+        have.update(effect.labels)
+    return new
 
 
 def register_plugins() -> tuple[str, ...]:

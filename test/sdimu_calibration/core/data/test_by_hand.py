@@ -12,7 +12,8 @@ from sdimu_calibration.core.data.attitudes import one_attitude, turned_unseen
 from sdimu_calibration.core.data.by_hand import moved_by_hand, why_handheld
 from sdimu_calibration.core.data.imu_class import propose, shown_at_rest
 from sdimu_calibration.core.front_door import OpeningOptions, open_test
-from sdimu_calibration.core.recording import PhaseLog, Recording
+from sdimu_calibration.core.handheld.handheld import prepare_run
+from sdimu_calibration.core.recording import DataError, PhaseLog, Recording
 from sdimu_calibration.storage.config import load_imu, load_plan, load_site
 from sdimu_calibration.storage.opening import CLASSES, Source, opening_options
 from sdimu_sim.core.by_hand import ByHand, by_hand_recording
@@ -118,6 +119,13 @@ def test_attitudes_without_the_turns_between_them_are_not_navigated():
     assert not turned_unseen(by_hand())
     assert not turned_unseen(on_table())
     assert "no turn between" in why_handheld(pieces([0, 90, 180]), load_imu("dtg"))
+
+
+def test_two_attitudes_without_their_turn_are_refused_with_what_would_help():
+    with pytest.raises(DataError, match=r"2 rests in different attitudes, and no turn.*sdimu bag cut"):
+        prepare_run(pieces([0, 90]))
+    with pytest.raises(DataError, match="1 rest; a handheld calibration needs 6 and more"):
+        prepare_run(pieces([0]))
 
 
 def test_one_attitude_is_told_from_a_turn_about_the_vertical():

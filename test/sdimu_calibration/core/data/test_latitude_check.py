@@ -10,7 +10,7 @@ import pytest
 from scipy.stats import chi2
 
 from sdimu_calibration.core import earth
-from sdimu_calibration.core.data.latitude_check import contradictions, observe_earth_rate, reversed_force
+from sdimu_calibration.core.data.latitude_check import EarthRate, contradictions, observe_earth_rate, reversed_force
 from sdimu_calibration.core.plan import Plan
 from sdimu_calibration.core.specification import Site
 from sdimu_calibration.storage.config import load_imu, load_plan
@@ -53,6 +53,20 @@ def test_the_right_place_is_never_contradicted():
     for latitude in LATITUDES:
         for seed in SEEDS:
             assert contradictions(seen(latitude, seed), Site(np.radians(latitude))) == ()
+
+
+def test_a_sigma_of_few_rests_raises_no_more_false_alarms_than_one_of_many():
+    # Two degrees of freedom, of six rests: four times such a sigma is exceeded in 5.7 % of all draws.
+    rng = np.random.default_rng(8)
+    sigma = 0.02 * earth.RATE
+    drawn = zip(rng.standard_normal(3000), rng.chisquare(2.0, 3000), strict=True)
+    alarms = [
+        EarthRate(sigma * z, sigma * np.sqrt(c / 2.0), 9.8, 0.01, 6, 2.0).excludes(Site(0.0)) for z, c in drawn
+    ]
+    assert np.mean(alarms) < 0.002
+    many = EarthRate(5.0 * sigma, sigma, 9.8, 0.01, 600, 596.0)
+    assert many.excludes(Site(0.0))
+    assert not replace(many, up_dof=2.0).excludes(Site(0.0))
 
 
 @pytest.mark.parametrize("seed", SEEDS)

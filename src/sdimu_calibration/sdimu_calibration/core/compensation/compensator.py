@@ -189,11 +189,12 @@ def compensator(
         raise DataError(f"nothing of this result can be compensated: {'; '.join(left)}")
     values = np.array(calibration.values[kept], dtype=float)
     covariance = np.array(calibration.covariance[np.ix_(kept, kept)], dtype=float)
-    if not (np.isfinite(values).all() and np.isfinite(covariance).all()):
-        raise DataError("the result has a coefficient or covariance that is not a number")
     model = imu_model.build(taken, imu)
     T = _origin(model, calibration.drift_means)
-    values, covariance = T @ values, T @ covariance @ T.T
+    with np.errstate(over="ignore", invalid="ignore"):
+        values, covariance = T @ values, T @ covariance @ T.T
+    if not (np.isfinite(values).all() and np.isfinite(covariance).all()):
+        raise DataError("the result has a coefficient or covariance that is not a number")
     power: Floats = np.repeat(np.array([imu.gyro_white_noise**2, imu.accel_white_noise**2]), 3)
     residue: Floats = 2.0 * np.repeat(np.array([imu.gyro_quantisation**2, imu.accel_quantisation**2]), 3)
     inverse: Floats = np.asarray(np.linalg.inv(slope_at_nought(model, values)), dtype=np.float64)

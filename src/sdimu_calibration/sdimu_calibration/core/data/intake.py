@@ -19,6 +19,9 @@ NEVER = -(2**62)
 """Stamp before all others (ns): where nothing has come yet."""
 _WAITING = 100 * NOMINAL_FROM
 """Number of samples that wait for the origin at most: of more, those whose stamps ascend are enough."""
+_REPEATED = 16_384
+"""Number of the latest statuses that are kept even where they repeat the one before: one that comes late finds its
+place among them. 82 s at 200 Hz."""
 
 
 class Intake:
@@ -43,7 +46,7 @@ class Intake:
         self.has_status = False
         self._queue: list[tuple[Ints, Floats, Floats]] = []
         self._newest_ns = NEVER
-        self._status = RecentLog(2)
+        self._status, self._status_full = RecentLog(2), 2 * _REPEATED
         self._temperature = RecentLog(1)
 
     def add_samples(self, ns: Ints, omega: Floats, force: Floats) -> None:
@@ -79,6 +82,16 @@ class Intake:
         """Take a status that holds from a stamp on (stop `UNNUMBERED` where it names none)."""
         self.has_status = True
         self._status.add(ns, dwell, stop)
+        # The filter forgets what it has used; while no samples come it uses nothing.
+        if len(self._status.ns) > self._status_full:
+            self._keep_status(len(self._status.ns) - _REPEATED)
+            self._status_full = max(2 * _REPEATED, 2 * len(self._status.ns))
+
+    def _keep_status(self, first: int) -> None:
+        """Forget the statuses before a row that repeat the one before them."""
+        status = self._status
+        changes = np.concatenate([[True], (status.values[1:] != status.values[:-1]).any(axis=1)])
+        status.keep(changes | (np.arange(len(changes)) >= first))
 
     def add_temperature(self, ns: int, value: float) -> None:
         """Take a temperature (deg C)."""
@@ -148,18 +161,17 @@ class Intake:
         """
         assert self.origin_ns is not None
         before_ns = self.origin_ns + round(before_s * 1e9)
-        status, temperature = self._status, self._temperature
-        if len(status.ns):
-            changes = np.concatenate([[True], (status.values[1:] != status.values[:-1]).any(axis=1)])
-            status.keep(changes | _from(status.ns, before_ns))
+        temperature = self._temperature
+        if len(self._status.ns):
+            self._keep_status(_holding(self._status.ns, before_ns))
         if len(temperature.ns):
-            first = np.arange(len(temperature.ns)) == 0
-            temperature.keep(first | _from(temperature.ns, before_ns))
+            row = np.arange(len(temperature.ns))
+            temperature.keep((row == 0) | (row >= _holding(temperature.ns, before_ns)))
 
 
-def _from(ns: Ints, before_ns: int) -> Bools:
-    """Rows from the one on that holds at a stamp (ns)."""
-    return np.asarray(np.arange(len(ns)) >= np.searchsorted(ns, before_ns, side="right") - 1)
+def _holding(ns: Ints, at_ns: int) -> int:
+    """Row that holds at a stamp (ns); -1 before the first."""
+    return int(np.searchsorted(ns, at_ns, side="right")) - 1
 
 
 def _finite(omega: Floats, force: Floats) -> Bools:

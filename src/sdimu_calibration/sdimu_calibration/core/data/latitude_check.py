@@ -19,6 +19,8 @@ from sdimu_calibration.core.data.windows import Windows, cut_windows
 from sdimu_calibration.core.effects.bias import ACCEL_BIAS
 from sdimu_calibration.core.effects.mass_unbalance import GYRO_MASS_UNBALANCE
 from sdimu_calibration.core.effects.scale import ACCEL_SCALE
+from sdimu_calibration.core.probability import normal_tail, student_limit
+from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.specification import ImuSpecification, Site
 from sdimu_calibration.core.units import STANDARD_GRAVITY
 
@@ -27,7 +29,8 @@ _FEWEST_STOPS = 6
 _SEEN = 0.15
 """Largest sigma of an observed vertical Earth rate, a share of the Earth rate: 9 deg of latitude at the equator."""
 _SIGMAS = 4.0
-"""Ratio of a difference to its sigma from which a site contradicts the data: one false alarm in 16,000."""
+"""Ratio of a difference to its sigma from which a site contradicts the data: one false alarm in 16,000. That of few
+rests, whose scatter is not well known, has the same probability by Student's t."""
 
 
 @dataclass(frozen=True)
@@ -42,6 +45,8 @@ class EarthRate:
         Median of |f| at rest and what bias and scale factor may do to it (m/s^2).
     stops : int
         Rests that were used.
+    up_dof : float
+        Degrees of freedom of `up_sigma` (1): a scatter of few rests is not well known.
     """
 
     up_rate: float
@@ -49,6 +54,7 @@ class EarthRate:
     gravity: float
     gravity_sigma: float
     stops: int
+    up_dof: float
 
     @property
     def seen(self) -> bool:
@@ -62,6 +68,12 @@ class EarthRate:
         # Near the poles the sine says little: never claim more than its sigma allows at its far end.
         cosine = float(np.sqrt(max(1.0 - sine**2, 2.0 * self.up_sigma / earth.RATE)))
         return float(np.arcsin(sine)), self.up_sigma / earth.RATE / cosine
+
+    def excludes(self, site: Site, sign: float = 1.0) -> bool:
+        """Whether the data were not taken at the latitude of a site, the force times `sign` pointing up."""
+        expected = earth.RATE * float(np.sin(site.latitude_rad))
+        limit = student_limit(normal_tail(_SIGMAS), self.up_dof) * self.up_sigma
+        return self.seen and abs(sign * self.up_rate - expected) > limit
 
 
 def observe_earth_rate(t: Floats, omega_ib_b: Floats, f_ib_b: Floats, imu: ImuSpecification) -> EarthRate | None:
@@ -90,21 +102,15 @@ def observe_earth_rate(t: Floats, omega_ib_b: Floats, f_ib_b: Floats, imu: ImuSp
     force = np.linalg.norm(mean[:, 3:], axis=1)
     gravity_sigma = np.hypot(prior.get(ACCEL_BIAS.name, 0.0), STANDARD_GRAVITY * prior.get(ACCEL_SCALE.name, 0.0))
     unbalance = prior.get(GYRO_MASS_UNBALANCE.name, 0.0)
-    up_rate, up_sigma = _vertical_rate(mean[:, :3], mean[:, 3:] / force[:, None], unbalance)
-    return EarthRate(up_rate, up_sigma, float(np.median(force)), float(gravity_sigma), len(rests))
+    up_rate, up_sigma, up_dof = _vertical_rate(mean[:, :3], mean[:, 3:] / force[:, None], unbalance)
+    return EarthRate(up_rate, up_sigma, float(np.median(force)), float(gravity_sigma), len(rests), up_dof)
 
 
 def contradictions(seen: EarthRate, site: Site) -> tuple[str, ...]:
     """Say in what a stated place is not where the data were taken, one line each."""
     lines = []
-    expected = earth.RATE * np.sin(site.latitude_rad)
-    if seen.seen and abs(seen.up_rate - expected) > _SIGMAS * seen.up_sigma:
-        latitude, sigma = np.degrees(seen.latitude)
-        lines.append(
-            f"the Earth's rate in the data is that of latitude {latitude:.1f} +- {sigma:.1f} deg, the site is at "
-            f"{np.degrees(site.latitude_rad):.1f} deg: check --site"
-            + (", or the sign of the force (--accel-sign -1 would fit)" if reversed_force(seen, site) else "")
-        )
+    if seen.excludes(site):
+        lines.append(f"{latitude_in_data(seen)}, the site is at {_latitude(site)}: check --site{or_sign(seen, site)}")
     gravity = site.gravity_m_s2 or float(earth.normal_gravity(site.latitude_rad, site.height_m))
     if abs(seen.gravity - gravity) > _SIGMAS * seen.gravity_sigma:
         lines.append(
@@ -119,9 +125,52 @@ def reversed_force(seen: EarthRate, site: Site) -> bool:
 
     Decided only where the latitude that was stated fits then, and does not as it stands.
     """
-    expected = earth.RATE * float(np.sin(site.latitude_rad))
-    as_is, other = (abs(sign * seen.up_rate - expected) / seen.up_sigma for sign in (1.0, -1.0))
-    return bool(seen.seen and as_is > _SIGMAS and other < _SIGMAS)
+    return seen.excludes(site) and not seen.excludes(site, -1.0)
+
+
+def assumption(name: str, site: Site, seen: EarthRate | None, where: str) -> str:
+    """Say that a site was assumed, and which latitude the data show.
+
+    Parameters
+    ----------
+    name : str
+        Of the site.
+    site : Site
+    seen : EarthRate or None
+    where : str
+        File or topic, for errors.
+
+    Raises
+    ------
+    DataError
+        When the data exclude the site: an estimate would put the difference into the sensors, or diverge.
+    """
+    if seen is not None and seen.excludes(site):
+        raise DataError(
+            f"{where}: {latitude_in_data(seen)}; no site was stated, and the assumed one ({name}) is at "
+            f"{_latitude(site)}: state yours{or_sign(seen, site)}. --site takes a name in config/site or a YAML file "
+            "with the lines 'format: sdimu-site/1', 'latitude_deg: ...' and 'height_m: ...' (Python: open(..., "
+            "site=...); node: parameter site)"
+        )
+    text = f"no --site: {name} is assumed (latitude {_latitude(site)}, height {site.height_m:.0f} m)"
+    if seen is None or not seen.seen:
+        return f"{text}; the data do not show the Earth's rate well enough to say the latitude"
+    return f"{text}; {latitude_in_data(seen)}"
+
+
+def latitude_in_data(seen: EarthRate) -> str:
+    """Say the latitude that the rests show."""
+    latitude, sigma = np.degrees(seen.latitude)
+    return f"the Earth's rate in the data is that of latitude {latitude:.1f} +- {sigma:.1f} deg"
+
+
+def or_sign(seen: EarthRate, site: Site) -> str:
+    """Advise to turn the sign of the force where that would fit; else nothing."""
+    return ", or the sign of the force (--accel-sign -1 would fit)" if reversed_force(seen, site) else ""
+
+
+def _latitude(site: Site) -> str:
+    return f"{np.degrees(site.latitude_rad):.1f} deg"
 
 
 def _rests(windows: Windows) -> list[Ints]:
@@ -133,18 +182,21 @@ def _rests(windows: Windows) -> list[Ints]:
     return [run[1:-1] for run in runs if len(run) > 2]
 
 
-def _vertical_rate(w: Floats, up: Floats, unbalance: float) -> tuple[float, float]:
-    """Least squares of u . omega = u . b + c: c and its sigma; NaN and inf when the stops cannot tell.
+def _vertical_rate(w: Floats, up: Floats, unbalance: float) -> tuple[float, float, float]:
+    """Least squares of u . omega = u . b + c: c, its sigma and degrees of freedom; NaN and inf where stops cannot tell.
 
-    Mass unbalance along the input axes adds the mean of three of its coefficients to c: it is no noise.
+    Mass unbalance along the input axes adds the mean of three of its coefficients to c: it is no noise, and its prior
+    is known. The degrees of freedom of the sum are those of Welch and Satterthwaite.
     """
+    untold = float("nan"), float("inf"), 1.0
     if len(w) < _FEWEST_STOPS:
-        return float("nan"), float("inf")
+        return untold
     design = np.column_stack([up, np.ones(len(up))])
     y = np.sum(w * up, axis=1)
     if np.linalg.matrix_rank(design, tol=1e-2) < 4:
-        return float("nan"), float("inf")
+        return untold
     x, *_ = np.linalg.lstsq(design, y)
-    scatter = float(np.sum((y - design @ x) ** 2)) / (len(y) - 4)
-    variance = scatter * float(np.linalg.inv(design.T @ design)[3, 3]) + unbalance**2 / 3.0
-    return float(x[3]), float(np.sqrt(variance))
+    dof = len(y) - 4
+    scatter = float(np.sum((y - design @ x) ** 2)) / dof * float(np.linalg.inv(design.T @ design)[3, 3])
+    variance = scatter + unbalance**2 / 3.0
+    return float(x[3]), float(np.sqrt(variance)), dof * (variance / max(scatter, 1e-6 * variance)) ** 2

@@ -124,7 +124,7 @@ class HandheldFit(Fit):
 
     def held_out_rms(self) -> float | None:
         """RMS of the normalised errors of the forces at each rest, predicted from everything else."""
-        return self.solution.held_out_rms
+        return self.solution.ahead.rms
 
     def evidence(self, effects: Sequence[Effect] = ()) -> HandheldEvidence:
         """Residuals of rests and turns about this fit, and the signatures of its parameters and those of `effects`."""

@@ -47,7 +47,7 @@ from sdimu_calibration.core.filter.filter_pass import NAV
 from sdimu_calibration.core.filter.passes import MOST_WIDENINGS, Solution, one_pass, widen_contradicted_priors
 from sdimu_calibration.core.filter.passes import solve as solve_filter
 from sdimu_calibration.core.progress import Progress, silent
-from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.recording import DataError, DivergedError
 from sdimu_calibration.core.second_order.second_order_passes import second_order_pass, solve_second_order
 from sdimu_calibration.core.specification import Model
 
@@ -91,7 +91,12 @@ def solve(
     choice = choose_estimator(test, model) if estimator == AUTO else Choice(estimator, "by request")
     if choice.estimator not in ESTIMATORS:
         raise DataError(f"estimator '{estimator}': expected one of {', '.join((AUTO, *ESTIMATORS))}")
-    fit = replace(ESTIMATORS[choice.estimator](test, model, start, progress), reason=choice.reason)
+    try:
+        fit = replace(ESTIMATORS[choice.estimator](test, model, start, progress), reason=choice.reason)
+    except DivergedError as error:
+        if not test.assumed_site:
+            raise
+        raise DivergedError(f"{error} (no site was stated: {test.assumed_site} was assumed)") from error
     return with_noise_learned(fit) if learn else fit
 
 

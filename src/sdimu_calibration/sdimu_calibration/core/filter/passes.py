@@ -29,7 +29,7 @@ from sdimu_calibration.core.filter.filter_pass import (
 )
 from sdimu_calibration.core.navigation.track import motion
 from sdimu_calibration.core.progress import Progress
-from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.recording import DataError, DivergedError
 from sdimu_calibration.core.rotation import rotation_matrix, rotation_vector
 
 CONVERGED = 0.02
@@ -219,11 +219,11 @@ def check_finite(state: PassState) -> None:
 
     Raises
     ------
-    DataError
+    DivergedError
         When the filter diverged.
     """
     if not (np.isfinite(state.x).all() and np.isfinite(state.P).all() and (np.diag(state.P) >= 0.0).all()):
-        raise DataError(
+        raise DivergedError(
             "the filter diverged: the recording contradicts the IMU's specification; check --imu and --site"
         )
 

@@ -19,6 +19,7 @@ import numpy as np
 from sdimu_calibration.core import earth
 from sdimu_calibration.core.alignment.alignment import levelled
 from sdimu_calibration.core.arrays import Bools
+from sdimu_calibration.core.data.attitudes import turned_unseen
 from sdimu_calibration.core.data.static_detection import StaticIntervals, detect_static
 from sdimu_calibration.core.effects import body_frame
 from sdimu_calibration.core.effects.bias import GYRO_BIAS
@@ -89,12 +90,20 @@ def prepare_run(recording: Recording, whole_sigma: float = 0.0) -> PreparedRun:
     recording, impossible = without_impossible(recording)
     rests = detect_static(recording)
     if len(rests) < FEWEST_RESTS:
-        raise DataError(
-            f"/imu/data_raw: {len(rests)} rests; a handheld calibration needs {FEWEST_RESTS} and more, "
-            "in different attitudes"
-        )
+        raise DataError(_too_few(recording, len(rests)))
     run = reduce_run(recording, rests)
     return PreparedRun(recording, rests, with_whole_turns(run, whole_sigma) if whole_sigma else run, impossible)
+
+
+def _too_few(recording: Recording, count: int) -> str:
+    rests = f"/imu/data_raw: {count} rest{'s' if count > 1 else ''}"
+    if not turned_unseen(recording):
+        return f"{rests}; a handheld calibration needs {FEWEST_RESTS} and more, in different attitudes"
+    return (
+        f"{rests} in different attitudes, and no turn between them is recorded: a handheld calibration needs "
+        f"{FEWEST_RESTS} rests and more, a navigated one the turns. Record on while the IMU is turned, add attitudes, or "
+        "calibrate each part as a test of its own (sdimu bag cut), which tells only sums of coefficients"
+    )
 
 
 def fit_priors(sensors: ImuModel, imu: ImuSpecification, site: Site | None, rests: StaticIntervals) -> FitPriors:

@@ -24,6 +24,7 @@ import numpy as np
 from sdimu_calibration.core.arrays import Bools, Floats, Ints
 from sdimu_calibration.core.effects.error_slope import error_slope
 from sdimu_calibration.core.effects.imu_model import ImuModel
+from sdimu_calibration.core.handheld.forces_ahead import ForcesAhead, forces_ahead
 from sdimu_calibration.core.handheld.handheld_data import HandheldRun, seen_at_rest, turns
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.results import Rest
@@ -115,7 +116,8 @@ class HandheldSolution:
         Of the kept coefficients.
     earth_sigma : ndarray, shape (3,)
         Sigma of the Earth's rate after the fit (rad/s).
-    chi2, dof, log_likelihood, held_out_rms : float
+    chi2, dof, log_likelihood : float
+    ahead : ForcesAhead
     rest_residual : ndarray, shape (k, 6)
         Of the rests (SI), rates first.
     turn_residual : ndarray, shape (k - 1, 3)
@@ -129,7 +131,7 @@ class HandheldSolution:
     chi2: float
     dof: float
     log_likelihood: float
-    held_out_rms: float
+    ahead: ForcesAhead
     rest_residual: Floats
     turn_residual: Floats
     steps: int
@@ -398,7 +400,7 @@ def _finish(run: HandheldRun, scene: FitPriors, point: LinearisationPoint, steps
         chi2=float(np.sum(white[measured] ** 2)),
         dof=float(free[measured].sum()),
         log_likelihood=log - 0.5 * float(white @ white),
-        held_out_rms=_held_out(Q, white, k),
+        ahead=forces_ahead(Q, white, sigma, k),
         rest_residual=residual[: 6 * k].reshape(k, 6),
         turn_residual=residual[6 * k : 9 * k - 3].reshape(k - 1, 3),
         steps=steps,
@@ -414,21 +416,11 @@ def rests_with_residuals(run: HandheldRun, scene: FitPriors, found: HandheldSolu
     turn = np.vstack([none, np.where(run.unseen[:, None], np.nan, found.turn_residual)])
     turn_sigma = np.concatenate([[np.nan], np.where(run.unseen, np.nan, sigma[2 * k :])])
     start, end = run.t - 0.5 * run.seconds, run.t + 0.5 * run.seconds
-    rows = np.column_stack([start, end, found.rest_residual, turn, sigma[:k], sigma[k : 2 * k], turn_sigma]).tolist()
+    numbers = np.column_stack([start, end, found.rest_residual, turn, sigma[:k], sigma[k : 2 * k], turn_sigma])
+    ahead = zip(found.ahead.error.tolist(), found.ahead.sigma.tolist(), strict=True)
     return tuple(
-        Rest(a, b, (wx, wy, wz), (fx, fy, fz), (n, e, d), *sigmas)
-        for a, b, wx, wy, wz, fx, fy, fz, n, e, d, *sigmas in rows
+        Rest(a, b, (wx, wy, wz), (fx, fy, fz), (n, e, d), *sigmas, tuple(error), tuple(scatter))
+        for (a, b, wx, wy, wz, fx, fy, fz, n, e, d, *sigmas), (error, scatter) in zip(
+            numbers.tolist(), ahead, strict=True
+        )
     )
-
-
-def _held_out(Q: Floats, white: Floats, k: int) -> float:
-    """RMS of normalised errors of the forces at each rest, predicted from everything but themselves.
-
-    Leaving rows out of a least squares needs no new fit: with H their part of the hat matrix the prediction error is
-    ``(I - H)^-1 e`` with covariance ``(I - H)^-1`` (Belsley, Kuh & Welsch, *Regression Diagnostics*, section 2.1).
-    """
-    total = 0.0
-    for i in range(k):
-        at = slice(6 * i + 3, 6 * i + 6)
-        total += float(white[at] @ np.linalg.solve(np.eye(3) - Q[at] @ Q[at].T, white[at]))
-    return float(np.sqrt(total / (3 * k)))

@@ -6,13 +6,12 @@ import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
-from sdimu_calibration.core.diagnosis.candidates import without
 from sdimu_calibration.core.effect_key import parse_key
 from sdimu_calibration.core.effects import imu_model
 from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.specification import ImuSpecification, Model
-from sdimu_calibration.storage.effect_file import find_effects, load_effect
+from sdimu_calibration.storage.effect_file import find_effects, load_effect, new_parts
 
 
 def added_effects(model: Model, added: Sequence[str], imu: ImuSpecification) -> tuple[Effect, ...]:
@@ -26,11 +25,7 @@ def added_effects(model: Model, added: Sequence[str], imu: ImuSpecification) -> 
     effects = list(imu_model.build(model.effects, imu).effects)
     given = len(effects)
     for text in added:
-        have = {label for e in effects for label in e.labels}
-        new = [part for effect in read_effect(text) for part in without(effect, have)]
-        if not new:
-            raise DataError(f"'{named(text)}' is in the model already")
-        effects += new
+        effects += new_parts(read_effect(text), effects, named(text))
     return tuple(effects[given:])
 
 

@@ -1,0 +1,27 @@
+"""A force predicted from everything but itself is that of a least squares without it."""
+
+import numpy as np
+
+from sdimu_calibration.core.handheld.forces_ahead import forces_ahead
+
+
+def test_it_is_what_a_fit_without_the_rest_predicts():
+    rng = np.random.default_rng(5)
+    k, u = 7, 5
+    m = 6 * k + 4
+    rows, residual, sigma = rng.standard_normal((m, u)), rng.standard_normal(m), rng.uniform(0.5, 2.0, m)
+    Q, R = np.linalg.qr(rows / sigma[:, None])
+    step = -np.linalg.solve(R, Q.T @ (residual / sigma))
+    found = forces_ahead(Q, (residual + rows @ step) / sigma, sigma, k)
+    total = 0.0
+    for i in range(k):
+        at = np.arange(6 * i + 3, 6 * i + 6)
+        other = np.setdiff1d(np.arange(m), at)
+        part = rows[other] / sigma[other, None]
+        P = np.linalg.inv(part.T @ part)
+        error = residual[at] - rows[at] @ (P @ part.T @ (residual[other] / sigma[other]))
+        C = np.diag(sigma[at] ** 2) + rows[at] @ P @ rows[at].T
+        np.testing.assert_allclose(found.error[i], error, rtol=1e-10)
+        np.testing.assert_allclose(found.sigma[i], np.sqrt(np.diag(C)), rtol=1e-10)
+        total += error @ np.linalg.solve(C, error)
+    np.testing.assert_allclose(found.rms, np.sqrt(total / (3 * k)), rtol=1e-10)
