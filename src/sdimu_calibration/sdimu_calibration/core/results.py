@@ -10,6 +10,7 @@ import numpy as np
 
 from sdimu_calibration.core.arrays import Bools, Floats, Ints
 from sdimu_calibration.core.noise_term import NoiseTerm
+from sdimu_calibration.core.origin import Origin
 from sdimu_calibration.core.recording import DataFault
 
 NOT_TRUSTED = "not to be trusted"
@@ -117,6 +118,8 @@ class Calibration:
         Standard deviation (SI) if the model is right; None where `covariance` is that.
     rests : tuple of Rest
         Of a run by hand, in order; empty for all others.
+    origin : Origin
+        Which unit, when, at which temperature, from which recording.
     """
 
     body_frame: str
@@ -138,6 +141,7 @@ class Calibration:
     drift_means: Mapping[str, float] = field(default_factory=dict)
     conditional_sigma: Floats | None = None
     rests: tuple[Rest, ...] = ()
+    origin: Origin = field(default_factory=Origin)
 
     @property
     def not_to_be_trusted(self) -> tuple[str, ...]:
