@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -13,8 +14,11 @@ from sdimu_sim.core.generator import ImuSamples
 from sdimu_sim.core.scenario import DEFAULT_START_NS, Scenario, SimulatedTest, table_log_rows, temperature_log
 
 
-def write_test(path: Path, scenario: Scenario, test: SimulatedTest, *, replace: bool = False) -> None:
-    """Write a simulated test to a rosbag2 folder.
+def write_test(
+    path: Path, scenario: Scenario, test: SimulatedTest, *, replace: bool = False,
+    custom: Mapping[str, str] | None = None,
+) -> None:  # fmt: skip
+    """Write a simulated test to a rosbag2 folder; `custom` is what its metadata says of the unit.
 
     Raises
     ------
@@ -35,10 +39,13 @@ def write_test(path: Path, scenario: Scenario, test: SimulatedTest, *, replace: 
         joint_states=(_nanoseconds(motion.t[rows]), motion.names, motion.encoder_angle[rows], motion.rate[rows]),
         temperature=None if heat is None else (_nanoseconds(heat.t), heat.value),
         replace=replace,
+        custom=custom,
     )
 
 
-def write_by_hand(path: Path, samples: ImuSamples, *, replace: bool = False) -> None:
+def write_by_hand(
+    path: Path, samples: ImuSamples, *, replace: bool = False, custom: Mapping[str, str] | None = None
+) -> None:
     """Write a handheld run to a rosbag2 folder: samples of the IMU and nothing else.
 
     Raises
@@ -53,6 +60,7 @@ def write_by_hand(path: Path, samples: ImuSamples, *, replace: bool = False) -> 
         omega_ib_b=samples.omega_ib_b,
         f_ib_b=samples.f_ib_b,
         replace=replace,
+        custom=custom,
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -14,6 +15,8 @@ from sdimu_calibration.cli.options import (
     ImuOption,
     ModelOption,
     NoiseOption,
+    PowerOnOption,
+    SerialOption,
     SiteOption,
     WholeTurnsOption,
     default_folder,
@@ -53,6 +56,8 @@ def calibrate(
     estimator: EstimatorOption = "auto",
     hand: HandOption = False,
     whole_turns: WholeTurnsOption = None,
+    serial: SerialOption = None,
+    power_on: PowerOnOption = None,
     imu_topic: ImuTopic = None,
     status_topic: StatusTopic = None,
     joint_topic: JointTopic = None,
@@ -85,6 +90,7 @@ def calibrate(
     test, wanted, chosen = opened(
         console, bag, model, site, imu, add, origin, "handheld" if hand else estimator, noise, whole_turns
     )
+    test = replace(test, origin=test.origin.stated(serial, power_on))
     notes = test.recording.notes
     with explained(console, notes), bar(console) as progress:
         result = outcome(solve(test, wanted, chosen, progress=progress))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -14,6 +15,8 @@ from sdimu_calibration.cli.options import (
     ImuOption,
     ModelOption,
     NoiseOption,
+    PowerOnOption,
+    SerialOption,
     SiteOption,
     WholeTurnsOption,
     default_folder,
@@ -62,6 +65,8 @@ def diagnose(
     estimator: EstimatorOption = "auto",
     hand: HandOption = False,
     whole_turns: WholeTurnsOption = None,
+    serial: SerialOption = None,
+    power_on: PowerOnOption = None,
     out: Annotated[Path | None, typer.Option(help="Folder of the results; BAG_diagnosis by default.")] = None,
     imu_topic: ImuTopic = None,
     status_topic: StatusTopic = None,
@@ -95,6 +100,7 @@ def diagnose(
         imu_topic, status_topic, joint_topic, temperature_topic, accel_unit, gyro_unit, accel_sign, gyro_sign
     )
     test, wanted, chosen = opened(console, bag, model, site, imu, add, origin, asked, noise, whole_turns)
+    test = replace(test, origin=test.origin.stated(serial, power_on))
     if bootstrap and chosen == "auto" and test.why_handheld:
         raise DataError(NO_BOOTSTRAP)
     notes = test.recording.notes

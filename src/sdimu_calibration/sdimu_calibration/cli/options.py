@@ -41,6 +41,12 @@ WholeTurnsOption = Annotated[
         metavar="ANGLE", help="By hand: turns of about 360 deg about the vertical are whole to this, such as 1 deg."
     ),
 ]
+SerialOption = Annotated[
+    str | None, typer.Option(metavar="NUMBER", help="Serial number of the unit; taken from the bag where it says it.")
+]
+PowerOnOption = Annotated[
+    str | None, typer.Option(metavar="NAME", help="Which switch-on of the unit; taken from the bag where it says it.")
+]
 HandOption = Annotated[bool, typer.Option("--hand", help="Moved by hand: the same as --estimator handheld.")]
 NOT_TRUSTED = 3
 """Exit status of a run that is done, and whose estimate is not to be trusted."""

@@ -10,6 +10,7 @@ import numpy as np
 
 from sdimu_calibration.core.arrays import Bools, Floats, Ints
 from sdimu_calibration.core.noise_term import NoiseTerm
+from sdimu_calibration.core.origin import Origin
 from sdimu_calibration.core.recording import DataFault
 
 NOT_TRUSTED = "not to be trusted"
@@ -246,6 +247,8 @@ class Calibration:
         Of a run by hand, in order; empty for all others.
     of_set : SetSummary or None
         Of a joint fit of several recordings.
+    origin : Origin
+        Which unit, when, at which temperature, from which recording.
     """
 
     body_frame: str
@@ -268,6 +271,7 @@ class Calibration:
     conditional_sigma: Floats | None = None
     rests: tuple[Rest, ...] = ()
     of_set: SetSummary | None = None
+    origin: Origin = field(default_factory=Origin)
 
     @property
     def not_to_be_trusted(self) -> tuple[str, ...]:

@@ -151,6 +151,7 @@ def _summary(calibration: Calibration) -> str:
     words = [
         f"{counts['duration_s'] / 60.0:.1f} min" if "duration_s" in counts else "",
         *(f"{counts[key]:.0f} {key}" for key in ("stops", "samples", "lost", "rejected") if key in counts),
+        *calibration.origin.words,
         f"{len(calibration.names)} coefficients of {len(calibration.model)} effects",
     ]
     return escape(" · ".join(word for word in words if word))

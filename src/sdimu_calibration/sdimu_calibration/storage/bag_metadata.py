@@ -39,7 +39,9 @@ class FileEntry:
     count: int
 
 
-def write_metadata(folder: Path, files: Sequence[FileEntry], topics: Sequence[TopicEntry]) -> None:
+def write_metadata(
+    folder: Path, files: Sequence[FileEntry], topics: Sequence[TopicEntry], custom: Mapping[str, str] | None = None
+) -> None:
     """Write metadata.yaml into `folder`, whole or not at all.
 
     Parameters
@@ -48,6 +50,8 @@ def write_metadata(folder: Path, files: Sequence[FileEntry], topics: Sequence[To
     files : sequence of FileEntry
         In the order in which they are to be read.
     topics : sequence of TopicEntry
+    custom : mapping of str to str, optional
+        What the user says of the recording.
     """
     filled = [file for file in files if file.count] or list(files)
     whole = FileEntry(
@@ -62,7 +66,7 @@ def write_metadata(folder: Path, files: Sequence[FileEntry], topics: Sequence[To
         "compression_format": "",
         "compression_mode": "",
         "files": [{"path": file.name, **_span(file)} for file in files],
-        "custom_data": None,
+        "custom_data": dict(custom) if custom else None,
         "ros_distro": "jazzy",
     }
     text = yaml.dump({"rosbag2_bagfile_information": content}, Dumper=_PlainDumper, sort_keys=False)
@@ -78,6 +82,12 @@ def read_metadata(folder: Path) -> Mapping[str, Any]:
         # PyYAML answers damage with errors of its own, of int(), of datetime and of the stack.
         return {}
     return information if isinstance(information, dict) else {}
+
+
+def custom_data(path: Path) -> dict[str, str]:
+    """Return what the user said of a recording when it was made; empty where nothing is said or `path` is no folder."""
+    said = read_metadata(path).get("custom_data") if path.is_dir() else None
+    return {str(key): str(value) for key, value in said.items()} if isinstance(said, dict) else {}
 
 
 def named_files(information: Mapping[str, Any]) -> list[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -26,6 +27,7 @@ def write_recording(
     temperature: tuple[Stamps, Floats] | None = None,
     topics: Topics | None = None,
     replace: bool = False,
+    custom: Mapping[str, str] | None = None,
 ) -> None:
     """Write a test to a bag, all messages in the order of their stamps.
 
@@ -48,6 +50,8 @@ def write_recording(
     topics : Topics, optional
     replace : bool
         Delete a bag that is already there.
+    custom : mapping of str to str, optional
+        What the user says of the recording: ``serial``, ``power_on``.
 
     Raises
     ------
@@ -67,7 +71,7 @@ def write_recording(
         ns, value = temperature
         encoded = cdr.encode_temperature(ns + start_ns, value)
         streams.append(_Stream(topics.temperature, cdr.TEMPERATURE, ns, encoded))
-    _write(path, streams, start_ns, replace)
+    _write(path, streams, start_ns, replace, custom)
 
 
 class _Stream:
@@ -80,8 +84,10 @@ class _Stream:
         self.encoded = encoded
 
 
-def _write(path: Path, streams: list[_Stream], start_ns: int, replace: bool) -> None:
-    with McapBag(path, replace=replace) as bag:
+def _write(
+    path: Path, streams: list[_Stream], start_ns: int, replace: bool, custom: Mapping[str, str] | None
+) -> None:
+    with McapBag(path, replace=replace, custom=custom) as bag:
         for stream in streams:
             bag.topic(stream.topic, stream.type_name)
         # At the same stamp the status goes first, as it holds from that stamp on.

@@ -13,6 +13,7 @@ from sdimu_calibration.core.recording import Recording
 from sdimu_calibration.storage import cdr
 from sdimu_calibration.storage.bag_file import read_topics
 from sdimu_calibration.storage.bag_folder import check_apart, check_room
+from sdimu_calibration.storage.bag_metadata import custom_data
 from sdimu_calibration.storage.compensated_imu import encode_compensated
 from sdimu_calibration.storage.mcap_bag import McapBag
 
@@ -74,7 +75,7 @@ def write_compensated(
     # A block takes what comes until its last sample, the last one all that is left.
     edges = [*stamps[_BLOCK - 1 : -1 : _BLOCK].tolist(), max((int(ns[-1]) for ns, _ in copied.values()), default=0)]
     places = {t: [0, *np.searchsorted(ns, edges, side="right").tolist()] for t, (ns, _) in copied.items()}
-    with McapBag(target, replace=replace) as bag:
+    with McapBag(target, replace=replace, custom=custom_data(source)) as bag:
         bag.topic(COMPENSATED, cdr.IMU)
         for topic, content in others.items():
             bag.topic(topic, content.type_name)

@@ -13,6 +13,7 @@ from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage import cdr
 from sdimu_calibration.storage.bag_file import read_topics
 from sdimu_calibration.storage.bag_folder import check_apart, check_room
+from sdimu_calibration.storage.bag_metadata import custom_data
 from sdimu_calibration.storage.mcap_bag import McapBag
 
 _TAKEN = (cdr.STATUS, cdr.IMU, cdr.JOINT_STATE, cdr.TEMPERATURE)
@@ -68,7 +69,7 @@ def cut_bag(source: Path, target: Path, first_s: float, last_s: float, *, replac
         raise DataError(
             f"{source}: no sample between {first_s:g} and {last_s:g} s; it is {(end - start) * 1e-9:.1f} s long"
         )
-    with McapBag(target, replace=replace) as bag:
+    with McapBag(target, replace=replace, custom=custom_data(source)) as bag:
         for topic, content in found.items():
             bag.topic(topic, content.type_name)
         bag.write_merged(kept)

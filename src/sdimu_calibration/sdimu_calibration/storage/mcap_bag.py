@@ -45,6 +45,8 @@ class McapBag:
         Delete a bag that is already there.
     live : bool
         Write in place.
+    custom : mapping of str to str, optional
+        What the user says of the recording, for its metadata.
 
     Raises
     ------
@@ -52,10 +54,13 @@ class McapBag:
         When the folder exists and is not to be replaced, holds something else than a bag, or cannot be written.
     """
 
-    def __init__(self, path: Path, *, replace: bool = False, live: bool = False) -> None:
+    def __init__(
+        self, path: Path, *, replace: bool = False, live: bool = False, custom: Mapping[str, str] | None = None
+    ) -> None:
         self.path = Path(path)
         check_room(self.path, replace)
         self._replace = replace
+        self._custom = custom
         self._folder = beside(self.path)
         self._file_name = f"{self.path.name}_0.mcap"
         self._topics: dict[str, _Topic] = {}
@@ -220,4 +225,4 @@ class McapBag:
             for name, topic in self._topics.items()
         ]
         with self._told():
-            write_metadata(self._folder, [file], topics)
+            write_metadata(self._folder, [file], topics, self._custom)

@@ -9,9 +9,12 @@ from sdimu_calibration.core.data.axes_and_units import Stated
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.front_door import OpeningOptions, in_si
 from sdimu_calibration.core.front_door import open_test as open_recorded
+from sdimu_calibration.core.origin import Origin
+from sdimu_calibration.core.plain_text import one_line
 from sdimu_calibration.core.recording import DataError, Recording
 from sdimu_calibration.core.specification import ImuSpecification
 from sdimu_calibration.core.units import UnitError, parse_unit
+from sdimu_calibration.storage.bag_metadata import custom_data
 from sdimu_calibration.storage.bag_reader import read_recording
 from sdimu_calibration.storage.config import load_imu, load_site
 from sdimu_calibration.storage.topic_choice import TopicChoice
@@ -128,7 +131,18 @@ def open_test(
     source = source or Source()
     options = opening_options(site, imu, source, handheld, measured_noise)
     opened = open_recorded(read_recording(path, source.topics), options, str(path))
-    return PreparedTest(*opened, assumed_site=options.assumed_site if opened.site else "")
+    assumed = options.assumed_site if opened.site else ""
+    origin = said_of(Path(path), (site or DEFAULT_SITE) if opened.site else "")
+    return PreparedTest(*opened, assumed_site=assumed, origin=origin)
+
+
+def said_of(path: Path, site: str) -> Origin:
+    """Give unit and power-on as the bag says them, with its name and that of the site."""
+    said = custom_data(path)
+    return Origin(
+        serial=one_line(said.get("serial", "")), power_on=one_line(said.get("power_on", "")),
+        recording=one_line(Path(path).resolve().name), site=one_line(Path(site).stem),
+    )  # fmt: skip
 
 
 def open_recording(path: Path, source: Source | None = None) -> Recording:

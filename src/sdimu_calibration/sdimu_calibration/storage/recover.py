@@ -11,7 +11,7 @@ from mcap.records import Schema
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage.bag_file import bag_parts, check_magic
 from sdimu_calibration.storage.bag_folder import DAMAGED_SUFFIX
-from sdimu_calibration.storage.bag_metadata import FileEntry, TopicEntry, write_metadata
+from sdimu_calibration.storage.bag_metadata import FileEntry, TopicEntry, custom_data, write_metadata
 from sdimu_calibration.storage.mcap_file import McapFile
 from sdimu_calibration.storage.mcap_walk import DamagedError, McapWalk
 from sdimu_calibration.storage.whole_file import beside, uninterrupted
@@ -135,4 +135,4 @@ def _rebuild_metadata(folder: Path, salvages: Sequence[Salvage]) -> None:
         )
         for name, entry in entries.items()
     ]
-    write_metadata(folder, files, topics)
+    write_metadata(folder, files, topics, custom_data(folder))

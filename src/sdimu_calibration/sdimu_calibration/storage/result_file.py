@@ -12,6 +12,7 @@ import numpy as np
 
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.noise_term import NoiseTerm
+from sdimu_calibration.core.origin import Origin
 from sdimu_calibration.core.plain_text import one_line
 from sdimu_calibration.core.recording import DataError, DataFault
 from sdimu_calibration.core.results import Calibration, History, Rest, without_advice
@@ -36,6 +37,7 @@ def write_result(path: Path, calibration: Calibration, verdict: str = "") -> Non
     content = {
         "format": FORMAT,
         **({"verdict": verdict} if verdict else {}),
+        "origin": asdict(calibration.origin),
         "estimator": calibration.estimator,
         "estimator_reason": calibration.estimator_reason,
         "body_frame": calibration.body_frame,
@@ -126,8 +128,21 @@ def _calibration(content: Mapping[str, Any]) -> Calibration:
         noise=tuple(_term(entry) for entry in content.get("noise", ())),
         conditional_sigma=_conditional(coefficients),
         rests=tuple(_rest(entry) for entry in content.get("rests", ())),
+        origin=_origin(content.get("origin", {})),
         drift_means={name: float(mean) for name, mean in content.get("drift_means", {}).items()},
     )
+
+
+def _origin(entry: Mapping[str, Any]) -> Origin:
+    """Origin of a result; empty in older files, NaN for ``null``."""
+
+    def read(name: str, default: Any) -> Any:
+        value = entry.get(name, default)
+        if isinstance(default, str):
+            return one_line(str(value))
+        return default if value is None else type(default)(value)
+
+    return Origin(**{each.name: read(each.name, each.default) for each in fields(Origin)})
 
 
 def _conditional(coefficients: Sequence[Mapping[str, Any]]) -> Floats | None:

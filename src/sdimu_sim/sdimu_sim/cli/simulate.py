@@ -38,6 +38,8 @@ def simulate(
     by_hand: Annotated[
         int | None, typer.Option(metavar="N", help="No table: a hand puts the IMU into N random attitudes.")
     ] = None,
+    serial: Annotated[str, typer.Option(help="Serial number of the unit, kept in the bag's metadata.")] = "",
+    power_on: Annotated[str, typer.Option(help="Which switch-on of the unit, kept likewise.")] = "",
     replace: Annotated[bool, typer.Option("--replace", help="Overwrite the bag if it exists.")] = False,
 ) -> None:
     """Simulate a whole test into a bag, with the truth in a separate file."""
@@ -50,6 +52,7 @@ def simulate(
     from sdimu_sim.temperature_file import load_temperature
     from sdimu_sim.truth_file import write_truth
 
+    custom = {key: text for key, text in (("serial", serial), ("power_on", power_on)) if text}
     effects = simulated_effects(effect or ())
     truth_path = truth or out.with_name(f"{out.name}.truth.yaml")
     if by_hand is not None:
@@ -58,7 +61,7 @@ def simulate(
 
         run = ByHand(by_hand, load_imu(imu or "mems_by_hand"), load_site(site), seed, rate, effects=effects)
         samples, true = simulate_by_hand(run)
-        write_by_hand(out, samples, replace=replace)
+        write_by_hand(out, samples, replace=replace, custom=custom)
         write_truth(truth_path, true)
         text = f"{out}: {len(samples.t)} samples, {samples.t[-1]:.0f} s handheld; truth in {truth_path}"
         plain().print(text, soft_wrap=True)
@@ -77,7 +80,7 @@ def simulate(
         temperature=None if temperature is None else load_temperature(temperature),
     )
     test = simulate_test(scenario)
-    write_test(out, scenario, test, replace=replace)
+    write_test(out, scenario, test, replace=replace, custom=custom)
     write_truth(truth_path, test.truth)
     count = len(test.samples.t)
     plain().print(f"{out}: {count} samples, {test.motion.t[-1]:.0f} s; truth in {truth_path}", soft_wrap=True)

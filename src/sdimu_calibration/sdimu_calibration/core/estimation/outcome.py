@@ -11,6 +11,7 @@ from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.estimation.fit import Fit
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.estimation.solve import AUTO, solve
+from sdimu_calibration.core.origin import measured
 from sdimu_calibration.core.progress import Progress, silent
 from sdimu_calibration.core.recording import Recording
 from sdimu_calibration.core.results import Calibration
@@ -62,6 +63,7 @@ def outcome(fit: Fit, held_out: bool = True) -> Calibration:
         noise=fit.noise_terms,
         drift_means=fit.drift_means,
         rests=fit.rests(),
+        origin=measured(fit.test.origin, fit.test.recording, fit.test.imu.name),
     )
 
 

@@ -12,6 +12,7 @@ from sdimu_calibration.core.alignment.prepared import PreparedData, TestSetup, r
 from sdimu_calibration.core.data.by_hand import why_handheld
 from sdimu_calibration.core.handheld.handheld import PreparedRun, prepare_run
 from sdimu_calibration.core.measurement_kind import SKIP
+from sdimu_calibration.core.origin import Origin
 from sdimu_calibration.core.recording import DataError, Recording
 from sdimu_calibration.core.specification import EPOCH_S, ImuSpecification, Site
 
@@ -33,6 +34,8 @@ class PreparedTest:
         Name of the site where nobody stated one.
     whole_turns : float
         Of a run by hand: how well the IMU was put back after whole turns about the vertical (rad); 0 for none.
+    origin : Origin
+        What the bag and the user say of the unit; an outcome adds what the recording says.
     """
 
     recording: Recording
@@ -41,6 +44,7 @@ class PreparedTest:
     held_out: tuple[int, ...] = ()
     assumed_site: str = ""
     whole_turns: float = 0.0
+    origin: Origin = field(default_factory=Origin)
     _prepared: dict[Any, Any] = field(default_factory=dict, repr=False, compare=False)
 
     def without_stops(self, stops: tuple[int, ...]) -> PreparedTest:
