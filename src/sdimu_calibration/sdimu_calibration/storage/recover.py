@@ -68,7 +68,7 @@ def recover(path: Path) -> tuple[Salvage, ...]:
     parts = bag_parts(Path(path))
     for part in parts:
         if part.suffix != ".mcap":
-            raise DataError(f"{part}: only MCAP files can be mended; unpack a packed one first (zstd -d FILE.mcap.zstd)")
+            raise DataError(f"{part}: only MCAP files can be mended; unpack a packed one first (zstd -d FILE)")
         check_magic(part)
     salvages = tuple(_mend(part) for part in parts)
     folder = parts[0].parent

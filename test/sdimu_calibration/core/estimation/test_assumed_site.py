@@ -14,7 +14,9 @@ def diverge(*_):
     raise DivergedError("the filter diverged")
 
 
-@pytest.mark.parametrize(("assumed", "said"), [("daejeon", r"\(no site was stated: daejeon was assumed\)$"), ("", "d$")])
+@pytest.mark.parametrize(
+    ("assumed", "said"), [("daejeon", r"\(no site was stated: daejeon was assumed\)$"), ("", "d$")]
+)
 def test_a_filter_that_diverges_names_the_site_that_was_assumed(bench, monkeypatch, assumed, said):
     fit = bench.fit()
     monkeypatch.setattr(room, "ESTIMATORS", {"filter": diverge})

@@ -419,8 +419,8 @@ def rests_with_residuals(run: HandheldRun, scene: FitPriors, found: HandheldSolu
     numbers = np.column_stack([start, end, found.rest_residual, turn, sigma[:k], sigma[k : 2 * k], turn_sigma])
     ahead = zip(found.ahead.error.tolist(), found.ahead.sigma.tolist(), strict=True)
     return tuple(
-        Rest(a, b, (wx, wy, wz), (fx, fy, fz), (n, e, d), *sigmas, tuple(error), tuple(scatter))
-        for (a, b, wx, wy, wz, fx, fy, fz, n, e, d, *sigmas), (error, scatter) in zip(
+        Rest(a, b, (wx, wy, wz), (fx, fy, fz), (n, e, d), rate, force, way, (ex, ey, ez), (sx, sy, sz))
+        for (a, b, wx, wy, wz, fx, fy, fz, n, e, d, rate, force, way), ((ex, ey, ez), (sx, sy, sz)) in zip(
             numbers.tolist(), ahead, strict=True
         )
     )
