@@ -7,7 +7,7 @@ import os
 import psutil
 import pytest
 
-from sdimu_sim.campaign.cluster import _client
+from sdimu_calibration.storage.cluster import _client
 
 from .conftest import CALIBRATION, FitSession
 

@@ -136,7 +136,7 @@ def test_progress_counts_runs_and_failures(square, tmp_path):
 
 
 def test_no_scheduler_at_the_address_is_said_in_one_line(square, tmp_path, monkeypatch):
-    monkeypatch.setattr("sdimu_sim.campaign.cluster._ANSWER_S", 1)
+    monkeypatch.setattr("sdimu_calibration.storage.cluster._ANSWER_S", 1)
     with pytest.raises(DataError, match="no dask scheduler answers"):
         run_campaign(square, range(2), tmp_path / "out", "tcp://127.0.0.1:9")
 

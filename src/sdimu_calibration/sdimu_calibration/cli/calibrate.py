@@ -25,6 +25,18 @@ from sdimu_calibration.cli.options import (
     opened,
     tell,
 )
+from sdimu_calibration.cli.set_run import (
+    WORKERS,
+    Bags,
+    ReferenceOption,
+    SchedulerOption,
+    SetOption,
+    SetRequest,
+    WorkersOption,
+    calibrate_together,
+    refuse_for_sets,
+    single,
+)
 from sdimu_calibration.cli.source_options import (
     AccelSign,
     AccelUnit,
@@ -39,7 +51,7 @@ from sdimu_calibration.cli.source_options import (
 
 
 def calibrate(
-    bag: Annotated[Path, typer.Argument(metavar="BAG", help="rosbag2 folder or .mcap file.")],
+    bags: Bags = None,
     model: ModelOption = None,
     site: SiteOption = None,
     imu: ImuOption = None,
@@ -58,6 +70,10 @@ def calibrate(
     whole_turns: WholeTurnsOption = None,
     serial: SerialOption = None,
     power_on: PowerOnOption = None,
+    set_file: SetOption = None,
+    reference_temperature: ReferenceOption = None,
+    workers: WorkersOption = WORKERS,
+    scheduler: SchedulerOption = None,
     imu_topic: ImuTopic = None,
     status_topic: StatusTopic = None,
     joint_topic: JointTopic = None,
@@ -87,8 +103,17 @@ def calibrate(
             "the classical estimator answers in the table's axes, in which no truth is kept: leave it out, or see "
             "sdimu study mount", param_hint="--truth",
         )  # fmt: skip
+    asked = "handheld" if hand else estimator
+    bag = single(bags, set_file)
+    if bag is None:
+        refuse_for_sets(truth=truth, whole_turns=whole_turns, power_on=power_on)
+        calibrate_together(SetRequest(
+            bags or [], set_file, model, site, imu, add or [], origin, asked, noise, out, workers,
+            scheduler, serial, reference_temperature,
+        ))  # fmt: skip
+        return
     test, wanted, chosen = opened(
-        console, bag, model, site, imu, add, origin, "handheld" if hand else estimator, noise, whole_turns
+        console, bag, model, site, imu, add, origin, asked, noise, whole_turns
     )
     test = replace(test, origin=test.origin.stated(serial, power_on))
     notes = test.recording.notes

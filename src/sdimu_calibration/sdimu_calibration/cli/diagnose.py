@@ -25,6 +25,18 @@ from sdimu_calibration.cli.options import (
     opened,
     tell,
 )
+from sdimu_calibration.cli.set_run import (
+    WORKERS,
+    Bags,
+    ReferenceOption,
+    SchedulerOption,
+    SetOption,
+    SetRequest,
+    WorkersOption,
+    diagnose_together,
+    refuse_for_sets,
+    single,
+)
 from sdimu_calibration.cli.source_options import (
     AccelSign,
     AccelUnit,
@@ -46,7 +58,7 @@ NO_BOOTSTRAP = "--bootstrap: a handheld run learns its scatter, so there is no n
 
 
 def diagnose(
-    bag: Annotated[Path, typer.Argument(metavar="BAG", help="rosbag2 folder or .mcap file.")],
+    bags: Bags = None,
     model: ModelOption = None,
     site: SiteOption = None,
     imu: ImuOption = None,
@@ -68,6 +80,10 @@ def diagnose(
     serial: SerialOption = None,
     power_on: PowerOnOption = None,
     out: Annotated[Path | None, typer.Option(help="Folder of the results; BAG_diagnosis by default.")] = None,
+    set_file: SetOption = None,
+    reference_temperature: ReferenceOption = None,
+    workers: WorkersOption = WORKERS,
+    scheduler: SchedulerOption = None,
     imu_topic: ImuTopic = None,
     status_topic: StatusTopic = None,
     joint_topic: JointTopic = None,
@@ -99,6 +115,14 @@ def diagnose(
     origin = source(
         imu_topic, status_topic, joint_topic, temperature_topic, accel_unit, gyro_unit, accel_sign, gyro_sign
     )
+    bag = single(bags, set_file)
+    if bag is None:
+        refuse_for_sets(bootstrap=bootstrap, grow=grow, whole_turns=whole_turns, power_on=power_on)
+        diagnose_together(SetRequest(
+            bags or [], set_file, model, site, imu, add or [], origin, asked, noise, out, workers, scheduler, serial,
+            reference_temperature,
+        ), extra)  # fmt: skip
+        return
     test, wanted, chosen = opened(console, bag, model, site, imu, add, origin, asked, noise, whole_turns)
     test = replace(test, origin=test.origin.stated(serial, power_on))
     if bootstrap and chosen == "auto" and test.why_handheld:

@@ -38,6 +38,7 @@ _VERBS = {
     "workbench": "sdimu_calibration.cli.workbench:workbench",
     "pictures": "sdimu_calibration.cli.pictures:pictures",
     "bag": "sdimu_calibration.cli.bag:app",
+    "set": "sdimu_calibration.cli.set_files:app",
 }
 
 

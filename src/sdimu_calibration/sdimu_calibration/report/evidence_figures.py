@@ -27,18 +27,37 @@ _LIMIT = {"dash": "dash", "color": "#222", "width": 1.5}
 
 def heat_map(grid: data.Grid, channels: Sequence[str] = CHANNEL_NAMES) -> Figure:
     """Normalised residual means, channel by stop: number and sign in each cell, colour besides."""
-    numbered = len(grid.stops) <= _MOST_NUMBERED
-    text = [[cell(v) if numbered else _sign(v) for v in row] for row in grid.value]
+    return deviates([str(s) for s in grid.stops], channels, grid.value, "stop", "channel", 440)
+
+
+def deviates(
+    columns: Sequence[str], lines: Sequence[str], value: Floats, column: str, line: str, height: int
+) -> Figure:
+    """Heat map of deviates: number and sign in each cell, colour besides.
+
+    Parameters
+    ----------
+    columns, lines : sequence of str, lengths n and m
+        What stands below the map and on its left.
+    value : ndarray, shape (m, n)
+        In sigma; NaN where nothing is known.
+    column, line : str
+        What a column and a line is.
+    height : int
+        Pixels.
+    """
+    numbered = len(columns) <= _MOST_NUMBERED
+    text = [[cell(v) if numbered else _sign(v) for v in row] for row in value]
     figure = Figure()
     figure.add(
-        "heatmap", x=[str(s) for s in grid.stops], y=[c.replace("_", " ") for c in channels], z=grid.value,
+        "heatmap", x=list(columns), y=[c.replace("_", " ") for c in lines], z=value,
         text=text, texttemplate="%{text}", textfont={"size": 12}, zmin=-_FULL, zmax=_FULL, colorscale=DIVERGING,
         xgap=2, ygap=2, colorbar={"title": {"text": _ABOVE.format("sigma"), "side": "top"}, "thickness": 12},
-        hovertemplate="%{y} at stop %{x}: %{z:+.1f} sigma<extra></extra>",
+        hovertemplate=f"%{{y}} at {column} %{{x}}: %{{z:+.1f}} sigma<extra></extra>",
     )  # fmt: skip
-    figure.x_axes(title="stop", type="category", showgrid=False, ticks="")
-    figure.y_axes(autorange="reversed", ticks="", title="channel")
-    return lay_out(figure, 440, margin={"l": 120, "r": 20, "t": 40, "b": 55})
+    figure.x_axes(title=column, type="category", showgrid=False, ticks="")
+    figure.y_axes(autorange="reversed", ticks="", title=line)
+    return lay_out(figure, height, margin={"l": 120 if line == "channel" else 190, "r": 20, "t": 40, "b": 55})
 
 
 def cell(value: float) -> str:

@@ -17,6 +17,7 @@ from sdimu_calibration.report.figures import sigma_history
 from sdimu_calibration.report.markup import Draw, prose, quiet, section
 from sdimu_calibration.report.report_extras import ReportExtras
 from sdimu_calibration.report.rests_section import rests_section
+from sdimu_calibration.report.set_sections import set_sections
 from sdimu_calibration.report.style import SCRIPT, STYLE
 from sdimu_calibration.report.use_section import in_use
 from sdimu_calibration.storage.whole_file import write_whole
@@ -33,6 +34,7 @@ def write_report(
     reference: Mapping[str, float] | None = None,
     summary: DiagnosisSummary | None = None,
     more: ReportExtras | None = None,
+    lead: str = "",
 ) -> None:
     """Write report.html.
 
@@ -52,8 +54,10 @@ def write_report(
         Adds the verdict, what is missing, where it fails, and how the error falls.
     more : ReportExtras, optional
         What to show besides the diagnosis: table angles, drift in use.
+    lead : str
+        Sentence that stands first on the page of a set.
     """
-    write_whole(path, page(calibration, title, truth, reference, summary, more))
+    write_whole(path, page(calibration, title, truth, reference, summary, more, lead))
 
 
 class _Drawing:
@@ -74,12 +78,14 @@ def page(
     reference: Mapping[str, float] | None = None,
     summary: DiagnosisSummary | None = None,
     more: ReportExtras | None = None,
+    lead: str = "",
 ) -> str:
     """Make the page as HTML text; parameters as in `write_report`."""
     draw = _Drawing()
     more = more or ReportExtras()
     handheld = summary is not None and summary.diagnosis.fit.learns_scatter
     parts = [] if summary is None else _evidence(summary, more, draw)
+    parts += [] if calibration.of_set is None else set_sections(calibration, calibration.of_set, draw)
     parts.append(_coefficients(calibration, truth, reference))
     parts += [rests_section(calibration.rests)] if calibration.rests else []
     parts += [] if summary is None or handheld else _residuals(summary.diagnosis, more, draw)
@@ -91,6 +97,7 @@ def page(
         f"<h1>{escape(title)}</h1>",
         f'<p class="quiet">{_summary(calibration)}</p>',
         sections.verdict(summary) if summary else "",
+        f"<p><b>{prose(lead)}</b></p>" if lead else "",
         # Of a handheld run the ladder says it, in sigmas that models can be compared by.
         "" if handheld else f"<p>{_fit(calibration, summary is not None)}</p>",
         _notes(calibration.notes if summary is None else without_advice(calibration.notes)),
@@ -165,7 +172,10 @@ def _fit(calibration: Calibration, diagnosed: bool) -> str:
     if nis is not None and dof:
         sentences.append(f"Squared innovations are {nis:.3f} times what the noise explains ({dof:.0f} in number).")
     if held_out is not None:
-        sentences.append(f"Stops that the fit has not seen are predicted to {held_out:.2f} sigma (RMS); 1 is right.")
+        left_out = "Stops" if calibration.of_set is None else "Recordings"
+        sentences.append(
+            f"{left_out} that the fit has not seen are predicted to {held_out:.2f} sigma (RMS); 1 is right."
+        )
     if not sentences:
         return "Fit: not computed."
     if not diagnosed:

@@ -16,6 +16,7 @@ from sdimu_calibration.core.origin import Origin
 from sdimu_calibration.core.plain_text import one_line
 from sdimu_calibration.core.recording import DataError, DataFault
 from sdimu_calibration.core.results import Calibration, History, Rest, without_advice
+from sdimu_calibration.storage import set_result_file
 from sdimu_calibration.storage.json_file import read_json, write_json
 
 FORMAT = "sdimu-result/1"
@@ -61,6 +62,7 @@ def write_result(path: Path, calibration: Calibration, verdict: str = "") -> Non
         "data": {**calibration.data, "faults": [asdict(fault) for fault in calibration.faults]},
         "noise": [asdict(term) | {"unit": term.unit} for term in calibration.noise],
         **({"rests": [asdict(rest) for rest in calibration.rests]} if calibration.rests else {}),
+        **({} if calibration.of_set is None else set_result_file.as_plain(calibration.of_set)),
         "notes": told(calibration.notes),
         "warnings": told(calibration.warnings),
         "history": {entry.name: getattr(calibration.history, entry.name).tolist() for entry in fields(History)},
@@ -129,6 +131,7 @@ def _calibration(content: Mapping[str, Any]) -> Calibration:
         conditional_sigma=_conditional(coefficients),
         rests=tuple(_rest(entry) for entry in content.get("rests", ())),
         origin=_origin(content.get("origin", {})),
+        of_set=set_result_file.from_plain(content, number),
         drift_means={name: float(mean) for name, mean in content.get("drift_means", {}).items()},
     )
 

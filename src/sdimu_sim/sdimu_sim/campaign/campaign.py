@@ -10,7 +10,7 @@ from typing import Any
 
 from sdimu_calibration.core.progress import silent
 from sdimu_calibration.core.recording import DataError
-from sdimu_sim.campaign.cluster import cluster
+from sdimu_calibration.storage.cluster import cluster
 from sdimu_sim.campaign.shards import Row, Shards
 
 Work = Callable[[int], dict[str, Any]]

@@ -32,7 +32,7 @@ class Member:
     name : str
         What the user calls the recording; no other of the set has it.
     open : callable
-        ``() -> PreparedTest``; it can be sent to another process.
+        ``() -> PreparedTest``; another process can call it too.
     serial, power_on : str
         Of the unit, and from which switching-on; empty power-on: one of its own.
     """
@@ -61,8 +61,10 @@ class Job:
         Also those of effects that are of one recording.
     about : mapping of str to float or None
         Coefficients of the estimator (SI), by name, about which the rows are linear; None is the recording's own fit.
-    before : Report or None
-        Of the same recording: its noise and attitude are taken.
+    imu : ImuSpecification or None
+        With the noise that the recording shows, where it is known.
+    start : Start or None
+        Where an earlier fit of the recording ended: gives the attitude.
     """
 
     member: Member
@@ -72,7 +74,8 @@ class Job:
     candidates: tuple[str | Effect, ...] = ()
     with_local: bool = False
     about: Mapping[str, float] | None = None
-    before: Report | None = None
+    imu: ImuSpecification | None = None
+    start: Start | None = None
 
 
 @dataclass(frozen=True)
@@ -154,13 +157,12 @@ def fitted(job: Job) -> Fit:
     """
     test = job.member.open()
     model = replace(job.model, effects=(*job.model.effects, *job.local))
-    if job.before is not None:
-        test = test.with_imu(job.before.imu)
+    if job.imu is not None:
+        test = test.with_imu(job.imu)
     if job.about is None or test.why_handheld:
         # A run by hand is fitted anew: its attitudes are parameters, and a least squares about others is no nearer.
         return _own(test, model, job)
-    start = job.before.start if job.before is not None else None
-    fit = fit_about(test, model, job.estimator, _untagged(job.about, job.member.name), start)
+    fit = fit_about(test, model, job.estimator, _untagged(job.about, job.member.name), job.start)
     return with_noise_learned(fit)
 
 
@@ -168,7 +170,7 @@ def _own(test: PreparedTest, model: Model, job: Job) -> Fit:
     """Fit the recording by itself, in the white noise that it shows."""
     fit = solve(test, model, job.estimator)
     noise, imu = measured_noise(fit.consistency(), fit)
-    if not noise or job.before is not None:
+    if not noise or job.imu is not None:
         return fit
     return replace(solve(test.with_imu(imu), model, fit.estimator), reason=fit.reason)
 

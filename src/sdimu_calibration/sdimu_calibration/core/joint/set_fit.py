@@ -216,7 +216,10 @@ def job_of(member: Member, options: SetOptions, about: SetFit | None, estimator:
         return Job(member, options.model, estimator or options.estimator, local)
     report = next((r for r in about.reports if r.name == member.name), None)
     if report is not None:
-        return Job(member, options.model, report.estimator, local, about=about.values_of(report), before=report)
+        return Job(
+            member, options.model, report.estimator, local, (), False, about.values_of(report),
+            report.imu, report.start,
+        )
     values = dict(zip(about.names, about.estimate.values.tolist(), strict=True))
     return Job(member, options.model, estimator or about.reports[0].estimator, local, about=values)
 

@@ -16,6 +16,7 @@ from sdimu_calibration.core.joint.set_evidence import held_out
 from sdimu_calibration.core.joint.set_fit import SetFit, SetOptions, job_of
 from sdimu_calibration.core.joint.variation import Variation, variation
 from sdimu_calibration.core.results import (
+    START_TEMPERATURE,
     Calibration,
     PowerOnDeviation,
     SetRecording,
@@ -74,7 +75,7 @@ def base_fit(fit: SetFit) -> Fit:
     by_name = {m.name: m for m in fit.members}
     report = max(fit.reports, key=lambda r: (len(r.times.stops), r.name))
     job = job_of(by_name[report.name], SetOptions(fit.model), fit)
-    return fitted(replace(job, about=fit.values_of(report), before=report))
+    return fitted(job)
 
 
 def _reported(fit: SetFit, base: Fit) -> tuple[Floats, Floats]:
@@ -94,8 +95,8 @@ def _data(reports: Sequence[Report], base: Fit) -> dict[str, float]:
         key: float(sum(r.data.get(key, 0.0) for r in reports))
         for key in ("samples", "lost", "rejected", "contradicted_s", "duration_s", "stops")
     }
-    start = base.data_counts().get("start_temperature_degc")
-    return {"recordings": float(len(reports)), **summed} | ({} if start is None else {"start_temperature_degc": start})
+    start = base.data_counts().get(START_TEMPERATURE)
+    return {"recordings": float(len(reports)), **summed} | ({} if start is None else {START_TEMPERATURE: start})
 
 
 def _notes(fit: SetFit, base: Fit) -> tuple[str, ...]:

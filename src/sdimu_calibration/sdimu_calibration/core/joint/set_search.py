@@ -181,7 +181,7 @@ def _gathered(fit: SetFit, tried: Sequence[Effect], run: Run) -> SetFit:
     jobs = [
         Job(
             member, fit.model, report.estimator, tuple(fit.local.get(member.name, ())), effects, True,
-            fit.values_of(report), report,
+            fit.values_of(report), report.imu, report.start,
         )
         for member, report in zip(fit.members, fit.reports, strict=True)
     ]  # fmt: skip

@@ -12,7 +12,7 @@ from sdimu_calibration.core.recording import DataError
 
 @pytest.mark.parametrize("lacking", ["dask", "distributed"])
 def test_whoever_lacks_the_extra_is_told_so_in_one_line(monkeypatch, lacking):
-    monkeypatch.delitem(sys.modules, "sdimu_sim.campaign.cluster", raising=False)
+    monkeypatch.delitem(sys.modules, "sdimu_calibration.storage.cluster", raising=False)
     monkeypatch.setitem(sys.modules, lacking, None)
     with pytest.raises(DataError, match=f"need {lacking}: pip install dask distributed"):
-        importlib.import_module("sdimu_sim.campaign.cluster")
+        importlib.import_module("sdimu_calibration.storage.cluster")

@@ -1,0 +1,220 @@
+"""A joint fit or diagnosis of several bags: what `sdimu calibrate` and `sdimu diagnose` do with more than one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from sdimu_calibration.cli.console import plain
+from sdimu_calibration.cli.options import leave, tell
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from sdimu_calibration.core.effects.effect import Effect
+    from sdimu_calibration.core.joint.member import Member
+    from sdimu_calibration.core.joint.set_fit import Run, SetOptions
+    from sdimu_calibration.core.progress import Progress
+    from sdimu_calibration.core.results import Calibration
+    from sdimu_calibration.storage.opening import Source
+
+_PANEL = "Several recordings of one unit"
+Bags = Annotated[
+    list[Path] | None,
+    typer.Argument(metavar="BAG...", help="rosbag2 folder or .mcap file; several are fitted together as one unit."),
+]
+SetOption = Annotated[
+    Path | None,
+    typer.Option("--set", metavar="FILE", help="Set of recordings (sdimu set init).", rich_help_panel=_PANEL),
+]
+WorkersOption = Annotated[
+    int, typer.Option(min=1, help="Processes that read recordings of a set.", rich_help_panel=_PANEL)
+]
+SchedulerOption = Annotated[
+    str | None, typer.Option(metavar="ADDRESS", help="dask scheduler that reads them instead.", rich_help_panel=_PANEL)
+]
+ReferenceOption = Annotated[
+    str | None,
+    typer.Option(
+        "--reference-temperature", metavar="T", help="From which temperature effects of a set count, such as 20 degC.",
+        rich_help_panel=_PANEL,
+    ),
+]  # fmt: skip
+WORKERS = 2
+"""Number of processes by default: the cores of a small machine."""
+
+
+@dataclass(frozen=True)
+class SetRequest:
+    """What the user asks of a set; entries as the options of the same names.
+
+    Attributes
+    ----------
+    bags : sequence of Path
+    file : Path or None
+    model, site, imu, estimator, noise, out, scheduler, serial, reference
+    add : list of str
+    source : Source
+    workers : int
+    """
+
+    bags: Sequence[Path]
+    file: Path | None
+    model: str | None
+    site: str | None
+    imu: str | None
+    add: Sequence[str]
+    source: Source
+    estimator: str
+    noise: str | None
+    out: Path | None
+    workers: int
+    scheduler: str | None
+    serial: str | None
+    reference: str | None
+
+
+def single(bags: list[Path] | None, file: Path | None) -> Path | None:
+    """Return the only bag; None where several are to be fitted together.
+
+    Raises
+    ------
+    BadParameter
+        When there is no bag, or bags stand beside a set file.
+    """
+    if file is not None and bags:
+        raise typer.BadParameter("the file names the bags of its set: leave the bags out", param_hint="--set")
+    if file is None and not bags:
+        raise typer.BadParameter("name a bag, several bags of one unit, or --set FILE", param_hint="BAG")
+    return bags[0] if file is None and bags is not None and len(bags) == 1 else None
+
+
+def refuse_for_sets(**options: object) -> None:
+    """Refuse options that are of one recording.
+
+    Raises
+    ------
+    BadParameter
+        When one of them is stated.
+    """
+    for name, value in options.items():
+        if value:
+            raise typer.BadParameter(
+                "is of one recording: state it for each (--set FILE), or leave it out",
+                param_hint=f"--{name.replace('_', '-')}",
+            )
+
+
+def calibrate_together(asked: SetRequest) -> None:
+    """Fit all recordings together; leaves result.json and report.html."""
+    from sdimu_calibration.core.joint.set_fit import fit_set
+    from sdimu_calibration.core.joint.set_result import set_outcome
+    from sdimu_calibration.report.page import write_report
+    from sdimu_calibration.storage.result_file import write_result
+    from sdimu_calibration.storage.whole_file import written_together
+
+    console = plain()
+    with _begun(console, asked) as (members, options, run, progress):
+        result = _with_serial(set_outcome(fit_set(members, options, run, progress=progress)), members)
+        progress("done", 1.0)
+    folder = _folder(asked, "calibration")
+    with written_together(folder) as part:
+        write_result(part / "result.json", result)
+        write_report(part / "report.html", result, title=_title(asked, "Calibration"))
+    _show(console, result)
+    console.print(f"results in {folder}", soft_wrap=True)
+    leave(result)
+
+
+def diagnose_together(asked: SetRequest, extra: Sequence[Effect]) -> None:
+    """Find what the model of a set misses; leaves set.json, result.json and report.html."""
+    from sdimu_calibration.core.joint.set_diagnosis import diagnose_set
+    from sdimu_calibration.report.page import write_report
+    from sdimu_calibration.storage.result_file import write_result
+    from sdimu_calibration.storage.set_result_file import write_set_diagnosis
+    from sdimu_calibration.storage.whole_file import written_together
+
+    console = plain()
+    with _begun(console, asked) as (members, options, run, progress):
+        found = diagnose_set(members, options, run, extra, progress)
+        progress("done", 1.0)
+    after = _with_serial(found.after, members)
+    folder = _folder(asked, "diagnosis")
+    with written_together(folder) as part:
+        write_set_diagnosis(part / "set.json", found)
+        write_result(part / "result.json", after, found.verdict)
+        write_report(part / "report.html", after, title=_title(asked, "Diagnosis"), lead=found.sentence)
+    _show(console, after)
+    console.print(f"{found.verdict}: {found.sentence}", soft_wrap=True, highlight=False)
+    for line in found.advice:
+        console.print(f"advice: {line}", soft_wrap=True, highlight=False)
+    console.print(f"results in {folder}", soft_wrap=True)
+    leave(after)
+
+
+@contextmanager
+def _begun(
+    console: Console, asked: SetRequest
+) -> Iterator[tuple[tuple[Member, ...], SetOptions, Run, Progress]]:
+    """Members, options and runner of what is asked, with a bar that shows the recordings that are done."""
+    from sdimu_calibration.cli.progress import bar
+    from sdimu_calibration.core.joint.set_fit import SetOptions
+    from sdimu_calibration.core.units import parse_quantity
+    from sdimu_calibration.storage.model_choice import HANDHELD, named_estimator, named_model
+    from sdimu_calibration.storage.recording_set import BagSource, load_set, set_of
+    from sdimu_calibration.storage.set_work import set_runner
+
+    estimator = named_estimator(asked.estimator, "--estimator")
+    reference = None if asked.reference is None else parse_quantity(asked.reference, "degC")
+    handheld = None if estimator == "auto" else estimator == HANDHELD
+    like = BagSource(
+        Path(), asked.site, asked.imu, asked.source, handheld, asked.noise is not None, reference,
+    )  # fmt: skip
+    wanted = set_of(asked.bags, like) if asked.file is None else load_set(asked.file, like)
+    serial = asked.serial
+    members = tuple(m if serial is None else replace(m, serial=serial) for m in wanted.members)
+    chosen = estimator if estimator != "auto" else wanted.estimator
+    by_hand = chosen == HANDHELD or (chosen == "auto" and bool(wanted.members[0].open().why_handheld))
+    model = named_model(asked.model or wanted.model, asked.add, handheld=by_hand)
+    options = SetOptions(model, chosen, scopes=wanted.scopes)
+    with bar(console) as progress:
+        def told(done: int, of: int) -> None:
+            progress(f"recordings {done} of {of}", done / of)
+
+        kept = _folder(asked, "evidence")
+        with set_runner(len(members), asked.workers, kept, asked.scheduler, told) as run:
+            yield members, options, run, progress
+
+
+def _folder(asked: SetRequest, what: str) -> Path:
+    """Folder of results: --out, or beside the first bag or the set file."""
+    if what != "evidence" and asked.out is not None:
+        return asked.out
+    first = (asked.file or asked.bags[0]).resolve()
+    return first.with_name(f"{first.stem if asked.file else first.name}_set_{what}")
+
+
+def _title(asked: SetRequest, word: str) -> str:
+    count = f"{len(asked.bags)} recordings" if asked.file is None else asked.file.name
+    return f"{word} of {count}"
+
+
+def _with_serial(result: Calibration, members: Sequence[Member]) -> Calibration:
+    serial = next((m.serial for m in members if m.serial), "")
+    return replace(result, origin=replace(result.origin, serial=serial))
+
+
+def _show(console: Console, result: Calibration) -> None:
+    """Print the table, the power-ons and what the user should know."""
+    from sdimu_calibration.report.table import rich_table, rows
+
+    count = len(result.of_set.recordings) if result.of_set else 0
+    console.print(
+        rich_table(rows(result), f"{count} recordings together, body frame: {result.body_frame}"), soft_wrap=True
+    )
+    tell(console, result.notes)

@@ -1,0 +1,194 @@
+"""The verdict on a set: a word that programs read, a sentence for people, and every effect that was found."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from sdimu_calibration.core.effects.effect import Effect
+from sdimu_calibration.core.effects.selection import resolve
+from sdimu_calibration.core.joint.member import Member
+from sdimu_calibration.core.joint.scope import tagged
+from sdimu_calibration.core.joint.set_fit import Run, SetOptions
+from sdimu_calibration.core.joint.set_result import SCATTERS, set_outcome
+from sdimu_calibration.core.joint.set_search import SetSearch, search_set
+from sdimu_calibration.core.progress import Progress, silent
+from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.results import Calibration
+from sdimu_calibration.core.units import from_si
+
+_STILL_WRONG = 1.25
+"""Held-out error (sigma) from which a model is not called explained, as for one recording: 1 is right."""
+_LISTED = 4
+"""Number of effects that a sentence names: the table has the rest."""
+
+
+@dataclass(frozen=True)
+class SetFinding:
+    """An effect that was found.
+
+    Attributes
+    ----------
+    label, title : str
+    recording : str
+        The only one that shows it; empty where all do.
+    value, sigma : float
+        SI, of the joint fit with everything that was found.
+    z : float
+        Score when it was found.
+    unit, display_unit : str
+    alike : tuple of str
+        What the set cannot tell from it.
+    """
+
+    label: str
+    title: str
+    recording: str
+    value: float
+    sigma: float
+    z: float
+    unit: str
+    display_unit: str
+    alike: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class SetDiagnosis:
+    """What was found in a set.
+
+    Attributes
+    ----------
+    verdict : str
+        ``consistent``, ``one effect``, ``class of effects``, ``several effects``, ``data fault``, ``unexplained``.
+    sentence : str
+    findings : tuple of SetFinding
+    before, after : Calibration
+        With the model as given, and with what was found.
+    threshold : float
+        Score that noise reaches in a scan.
+    advice : tuple of str
+    """
+
+    verdict: str
+    sentence: str
+    findings: tuple[SetFinding, ...]
+    before: Calibration
+    after: Calibration
+    threshold: float
+    advice: tuple[str, ...]
+
+
+def diagnose_set(
+    members: Sequence[Member], options: SetOptions, run: Run, extra: Sequence[Effect] = (), progress: Progress = silent
+) -> SetDiagnosis:
+    """Find what the model of a set misses; parameters as for `search_set`.
+
+    Raises
+    ------
+    DataError
+        When the set cannot be fitted, or holds one recording.
+    """
+    if len(members) < 2:
+        raise DataError("a set of one recording: diagnose it by itself (sdimu diagnose BAG)")
+    found = search_set(members, options, run, extra, progress)
+    progress("report", 0.95)
+    before = set_outcome(found.before)
+    after = before if found.after is found.before else set_outcome(found.after)
+    findings = _findings(found)
+    word = _verdict(findings, after)
+    return SetDiagnosis(
+        word, _sentence(word, findings, before, after), findings, before, after, found.threshold,
+        _advice(word, findings),
+    )  # fmt: skip
+
+
+def _findings(found: SetSearch) -> tuple[SetFinding, ...]:
+    values, sigma = found.after.estimate.values, np.sqrt(np.diag(found.after.estimate.covariance))
+    names = list(found.after.names)
+    shared = [
+        (c.label, c.effect.title, "", names.index(c.parameter.name if c.parameter.name in names else c.label), z,
+         c.parameter, found.alike.get(c.label, ()))
+        for c, z in zip(found.chosen, found.z, strict=True)
+    ]  # fmt: skip
+    own = []
+    for find in found.local:
+        effect = resolve(find.key)
+        parameter = effect.parameters[0]
+        called = {tagged(name, find.recording) for name in (parameter.name, find.key)}
+        place = next(k for k, name in enumerate(names) if name in called)
+        own.append((find.key, effect.title, find.recording, place, find.z, parameter, ()))
+    return tuple(
+        SetFinding(
+            label, title, recording, float(values[k]), float(sigma[k]), float(z), p.unit, p.display_unit, tuple(alike)
+        )
+        for label, title, recording, k, z, p, alike in (*shared, *own)
+    )
+
+
+def _verdict(findings: Sequence[SetFinding], after: Calibration) -> str:
+    shared = [f for f in findings if not f.recording]
+    left = _scatter(after) < SCATTERS or (after.fit["held_out_rms"] or 0.0) > _STILL_WRONG
+    if left:
+        return "unexplained"
+    if len(shared) > 1:
+        return "several effects"
+    if shared:
+        return "class of effects" if shared[0].alike else "one effect"
+    return "data fault" if findings else "consistent"
+
+
+def _scatter(result: Calibration) -> float:
+    """Probability that the scatter of coefficients from recording to recording is chance, all counted."""
+    if result.of_set is None:
+        return 1.0
+    seen = result.of_set.scatter_p[np.isfinite(result.of_set.scatter_p)]
+    return float(min(1.0, len(seen) * seen.min())) if len(seen) else 1.0
+
+
+def _sentence(word: str, findings: Sequence[SetFinding], before: Calibration, after: Calibration) -> str:
+    told = [_named(f) for f in findings]
+    names = " and ".join(told[:_LISTED]) + (f" and {len(told) - _LISTED} more" if len(told) > _LISTED else "")
+    if word == "consistent":
+        return "The model explains all recordings together: nothing stands out of the noise."
+    if word == "data fault":
+        return f"All recordings agree but for {names}."
+    if word == "unexplained":
+        most = f" Found, but not all: {names}." if names else ""
+        return f"Something differs between the recordings that no effect of the catalogue explains.{most}{_odd(after)}"
+    falls = f"error at recordings held out: {_rms(before)} -> {_rms(after)}"
+    if word == "class of effects":
+        others = ", ".join(findings[0].alike[:_LISTED])
+        return f"One effect is missing: {names}, or what looks the same in these recordings ({others}); {falls}."
+    return f"{'One effect is' if word == 'one effect' else 'Several effects are'} missing: {names}; {falls}."
+
+
+def _named(f: SetFinding) -> str:
+    size = f"{from_si(f.value, f.display_unit):.3g} +- {from_si(f.sigma, f.display_unit):.2g} {f.display_unit}"
+    return f"{f.label} ({size})" + (f" in {f.recording} alone" if f.recording else "")
+
+
+def _odd(result: Calibration) -> str:
+    lines = [line for line in result.warnings if "not the same in all" in line]
+    return f" {lines[0].split('; run:')[0]}." if lines else ""
+
+
+def _rms(result: Calibration) -> str:
+    value = result.fit["held_out_rms"]
+    return "-" if value is None else f"{value:.3f}"
+
+
+def _advice(word: str, findings: Sequence[SetFinding]) -> tuple[str, ...]:
+    out = []
+    for f in findings:
+        if f.recording:
+            out.append(f"look what happened in {f.recording}, or leave it out of the set: {f.label}")
+        elif f.alike:
+            out.append(
+                f"a recording in which {f.label} and {f.alike[0]} differ tells them apart: sdimu plan --tell "
+                f"{f.label} --tell {f.alike[0]} shows the turn"
+            )
+    if word == "unexplained":
+        out.append("diagnose the recordings one by one (sdimu diagnose BAG), the one with the largest deviates first")
+    return tuple(out)

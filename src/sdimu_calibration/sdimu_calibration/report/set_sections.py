@@ -1,0 +1,100 @@
+"""What a joint fit of several recordings says beyond its coefficients, as HTML text."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime
+
+import numpy as np
+
+from sdimu_calibration.core.results import Calibration, SetRecording, SetSummary
+from sdimu_calibration.core.units import from_si
+from sdimu_calibration.report.evidence_figures import deviates
+from sdimu_calibration.report.groups import is_free
+from sdimu_calibration.report.markup import Draw, grid, quiet, section
+from sdimu_calibration.report.table import with_sigma
+
+_TRENDS = 8
+"""Number of trends that are listed: the others are further inside chance."""
+
+
+def set_sections(calibration: Calibration, of_set: SetSummary, draw: Draw) -> list[str]:
+    """List the recordings, what differs between them, and what it follows."""
+    return [
+        _recordings(of_set), _deviates(calibration, of_set, draw), *_turn_on(calibration, of_set),
+        *_trends(calibration, of_set),
+    ]  # fmt: skip
+
+
+def _recordings(of_set: SetSummary) -> str:
+    columns = ("recording", "power-on", "start (UTC)", "length (min)", "temperature (degC)", "NIS", "largest deviate")
+    left = [f"{name} is left out: {why}." for name, why in of_set.left_out]
+    return section(
+        "Recordings", grid(columns, [_line(r) for r in of_set.recordings], {0, 1, 2}), *(quiet(text) for text in left)
+    )
+
+
+def _line(r: SetRecording) -> list[str]:
+    began = datetime.fromtimestamp(r.start_ns * 1e-9, UTC).strftime("%Y-%m-%d %H:%M") if r.start_ns else ""
+    seen = r.deviate[np.isfinite(r.deviate)]
+    return [
+        r.name, r.power_on or "its own", began, f"{r.duration_s / 60.0:.1f}",
+        "" if np.isnan(r.temperature_degc) else f"{r.temperature_degc:.1f}", f"{r.nis:.3f}",
+        f"{np.abs(seen).max():.1f}" if len(seen) else "",
+    ]  # fmt: skip
+
+
+def _deviates(calibration: Calibration, of_set: SetSummary, draw: Draw) -> str:
+    shown = [k for k in range(len(calibration.names)) if is_free(calibration, k)]
+    value = np.array([r.deviate[shown] for r in of_set.recordings]).T
+    figure = deviates(
+        [r.name for r in of_set.recordings], [calibration.names[k] for k in shown], value, "recording",
+        "coefficient", 120 + 20 * len(shown),
+    )  # fmt: skip
+    return section(
+        "Every coefficient in every recording",
+        quiet(
+            "How far the recording puts the coefficient from the joint estimate, over the sigma of that. What "
+            "power-ons are allowed to differ by is part of the sigma. Empty: the recording says nothing of it."
+        ),
+        draw(figure),
+    )
+
+
+def _turn_on(calibration: Calibration, of_set: SetSummary) -> list[str]:
+    if not of_set.turn_on:
+        return []
+    rows = [
+        [t.effect, *(f"{from_si(v, t.display_unit):.3g}" for v in (t.sigma, t.low, t.high)), t.display_unit,
+         f"{t.power_ons:.0f}"]
+        for t in of_set.turn_on
+    ]  # fmt: skip
+    units = dict(zip(calibration.names, calibration.display_units, strict=True))
+    own = [
+        [d.power_on, d.name, with_sigma(from_si(d.value, unit), from_si(d.sigma, unit), unit)]
+        for d in of_set.deviations if (unit := units.get(d.name))
+    ]
+    return [
+        section(
+            "From power-on to power-on",
+            grid(("effect", "sigma", "low", "high", "unit", "power-ons"), rows, {0, 4}),
+            quiet("Standard deviation by restricted likelihood, bounds of its 95 % interval."),
+            grid(("power-on", "coefficient", "deviation"), own, {0, 1}),
+        )
+    ]
+
+
+def _trends(calibration: Calibration, of_set: SetSummary) -> list[str]:
+    units = dict(zip(calibration.names, calibration.display_units, strict=True))
+    rows = [
+        [t.name, t.covariate, with_sigma(from_si(t.slope, unit), from_si(t.sigma, unit), unit), f"{t.p_value:.2g}"]
+        for t in of_set.trends[:_TRENDS] if (unit := units.get(t.name))
+    ]  # fmt: skip
+    if not rows:
+        return []
+    return [
+        section(
+            "What the coefficients follow",
+            grid(("coefficient", "with", "change per unit", "p"), rows, {0, 1}),
+            quiet("p: probability of such a slope by chance, all coefficients and covariates counted."),
+        )
+    ]

@@ -1,0 +1,215 @@
+"""Sets of recordings (format ``sdimu-set/1``): which bags are of one unit, and what is known of each."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+from pathlib import Path
+from typing import Annotated, Literal
+
+import yaml
+from pydantic import Field
+
+from sdimu_calibration.core.estimation.prepared_test import PreparedTest
+from sdimu_calibration.core.joint.member import Member
+from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.storage.bag_metadata import METADATA, custom_data
+from sdimu_calibration.storage.config import Schema, load_imu, quantity, read_yaml
+from sdimu_calibration.storage.opening import Source, open_test
+from sdimu_calibration.storage.whole_file import write_whole
+
+_KEPT_OPEN = 2
+"""Number of recordings that a process keeps in memory: linearising again follows soon in small sets."""
+
+
+@dataclass(frozen=True)
+class BagSource:
+    """Opens a bag of a set; another process can do so too.
+
+    Attributes
+    ----------
+    bag : Path
+    site, imu : str or None
+        As the options of the same names.
+    source : Source
+    handheld : bool or None
+    measured_noise : bool
+    reference_degc : float or None
+        Temperature from which temperature effects count (deg C); None is that at the start of the recording.
+    """
+
+    bag: Path
+    site: str | None = None
+    imu: str | None = None
+    source: Source = field(default_factory=Source)
+    handheld: bool | None = None
+    measured_noise: bool = False
+    reference_degc: float | None = None
+
+    def __call__(self) -> PreparedTest:
+        """Open the bag.
+
+        Raises
+        ------
+        DataError
+            When the bag or an option cannot be used.
+        """
+        return _opened(self)
+
+
+@lru_cache(maxsize=_KEPT_OPEN)
+def _opened(of: BagSource) -> PreparedTest:
+    imu = None if of.imu is None else load_imu(of.imu)
+    test = open_test(of.bag, of.site, imu, of.source, of.handheld, of.measured_noise)
+    log = test.recording.temperature
+    if log is None or of.reference_degc is None:
+        return test
+    about = replace(test.recording, temperature=replace(log, reference_degc=of.reference_degc))
+    return replace(test, recording=about)
+
+
+@dataclass(frozen=True)
+class RecordingSet:
+    """A set as it is written.
+
+    Attributes
+    ----------
+    members : tuple of Member
+        Each opens a `BagSource`.
+    model : str or None
+        Name or path.
+    estimator : str
+    scopes : mapping of str to str
+    """
+
+    members: tuple[Member, ...]
+    model: str | None = None
+    estimator: str = "auto"
+    scopes: Mapping[str, str] = field(default_factory=dict)
+
+
+class _Entry(Schema):
+    bag: str
+    name: str = ""
+    serial: str | int = ""
+    power_on: str | int = ""
+    imu: str | None = None
+    site: str | None = None
+
+
+class _SetFile(Schema):
+    format: Literal["sdimu-set/1"] = "sdimu-set/1"
+    serial: str | int = ""
+    imu: str | None = None
+    site: str | None = None
+    model: str | None = None
+    estimator: str = "auto"
+    reference_temperature: Annotated[float, quantity("degC")] | None = None
+    scopes: Annotated[dict[str, Literal["unit", "power-on"]], Field(default_factory=dict)]
+    recordings: Annotated[list[_Entry], Field(min_length=1)]
+
+
+def load_set(path: Path, like: BagSource) -> RecordingSet:
+    """Read a set.
+
+    Parameters
+    ----------
+    path : Path
+        Bags are named from its folder.
+    like : BagSource
+        What the user states for all recordings; the file's own site and IMU come before it.
+
+    Raises
+    ------
+    DataError
+        When the file is missing or wrong; one line with file and key.
+    """
+    path = Path(path)
+    file = read_yaml(path, _SetFile)
+    members = []
+    for entry in file.recordings:
+        bag = (path.parent / entry.bag).resolve()
+        source = replace(
+            like, bag=bag, site=entry.site or file.site or like.site, imu=entry.imu or file.imu or like.imu,
+            reference_degc=like.reference_degc if file.reference_temperature is None else file.reference_temperature,
+        )  # fmt: skip
+        serial = str(entry.serial) or str(file.serial)
+        members.append(_member(source, entry.name or bag.name, serial, str(entry.power_on)))
+    return RecordingSet(tuple(members), file.model, file.estimator, file.scopes)
+
+
+def set_of(bags: Sequence[Path], like: BagSource) -> RecordingSet:
+    """Make a set of bags; power-on and serial are those that the bags say.
+
+    Parameters
+    ----------
+    bags : sequence of Path
+    like : BagSource
+        What the user states for all of them.
+    """
+    names = [bag.resolve().name for bag in bags]
+    unique = len(set(names)) == len(names)
+    members = [
+        _member(replace(like, bag=bag.resolve()), name if unique else str(bag), "", "")
+        for bag, name in zip(bags, names, strict=True)
+    ]
+    return RecordingSet(tuple(members))
+
+
+def _member(source: BagSource, name: str, serial: str, power_on: str) -> Member:
+    if not source.bag.exists():
+        raise DataError(f"{source.bag}: no such bag (recording '{name}' of the set)")
+    said = custom_data(source.bag)
+    return Member(name, source, serial or said.get("serial", ""), power_on or said.get("power_on", ""))
+
+
+def bags_below(folder: Path) -> list[Path]:
+    """Bags in a folder and the folders in it, in the order of their names.
+
+    Raises
+    ------
+    DataError
+        When there is none.
+    """
+    folder = Path(folder)
+    found = {path.parent for path in folder.rglob(METADATA)}
+    found |= {path for path in folder.rglob("*.mcap") if path.parent not in found}
+    if not found:
+        raise DataError(f"{folder}: no bag in it (a folder with {METADATA}, or an .mcap file)")
+    return sorted(found)
+
+
+def write_set(path: Path, bags: Sequence[Path]) -> None:
+    """Write a first set file of bags, with what they say of unit and power-on, for the user to complete.
+
+    Parameters
+    ----------
+    path : Path
+        File to make; bags are named from its folder.
+    bags : sequence of Path
+
+    Raises
+    ------
+    DataError
+        When the file is there already.
+    """
+    path = Path(path)
+    if path.exists():
+        raise DataError(f"{path}: the file is there already; choose another --out, or edit it")
+    base = path.resolve().parent
+    entries = []
+    for bag in bags:
+        said = custom_data(bag)
+        place = bag.resolve()
+        shown = place.relative_to(base) if place.is_relative_to(base) else place
+        entries.append({"bag": str(shown), "power_on": said.get("power_on", ""), "serial": said.get("serial", "")})
+    content = {"format": "sdimu-set/1", "recordings": entries}
+    write_whole(path, _HEADER + yaml.safe_dump(content, sort_keys=False))
+
+
+_HEADER = """\
+# Recordings of one unit. Those with the same power_on share their biases; one without has a power-on of its own.
+# For all recordings, or for one: serial, imu, site. For all: model, estimator, reference_temperature (such as 20 degC),
+# scopes (effect: unit or power-on).
+"""

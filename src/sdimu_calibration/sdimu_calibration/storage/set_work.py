@@ -1,0 +1,179 @@
+"""Where the recordings of a set are worked on: in this process, in several, or on a dask cluster; nothing twice.
+
+What a recording says is kept by a number that follows from its bytes and from everything that was asked, so that a
+tenth recording costs one, and a run that was killed goes on where it was.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from contextlib import contextmanager
+from dataclasses import replace
+from functools import lru_cache
+from importlib.metadata import version
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+from sdimu_calibration.core.joint.member import Job, Report, run
+from sdimu_calibration.core.joint.set_fit import Run
+from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.storage.config import load_imu, load_site
+from sdimu_calibration.storage.opening import DEFAULT_SITE
+from sdimu_calibration.storage.recording_set import BagSource
+from sdimu_calibration.storage.reduction_file import read_report, write_report
+
+FEW = 3
+"""Number of recordings up to which one process is faster: starting another takes as long as two recordings."""
+_PART = 16
+"""Number of recordings after which reports are written: what a kill may cost."""
+_BLOCK = 1 << 20
+"""Bytes that are read at a time for a checksum."""
+
+Told = Callable[[int, int], None]
+
+
+@contextmanager
+def set_runner(
+    count: int, workers: int, kept: Path | None, scheduler: str | None = None, told: Told | None = None
+) -> Iterator[Run]:
+    """Give the function that does the jobs of a set.
+
+    Parameters
+    ----------
+    count : int
+        Number of recordings.
+    workers : int
+        Number of processes of this machine; with one, or few recordings, the work is done here.
+    kept : Path or None
+        Folder in which reports are kept.
+    scheduler : str, optional
+        Address of a dask scheduler that does the work instead; its workers read the bags by the same paths.
+    told : callable, optional
+        Called with the number of jobs done and of all.
+
+    Raises
+    ------
+    DataError
+        When no scheduler answers.
+    """
+    if scheduler is not None:
+        from sdimu_calibration.storage.cluster import cluster  # noqa: PLC0415 (dask is for those who name a scheduler)
+
+        with cluster(scheduler, workers) as on_cluster:
+            yield _kept(lambda jobs: _from_cluster(on_cluster, jobs, told), kept)
+        return
+    if workers < 2 or count <= FEW:
+        yield _kept(lambda jobs: _here(jobs, told), kept)
+        return
+    with ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_one_thread) as pool:
+        yield _kept(lambda jobs: _in_pool(pool, jobs, told), kept)
+
+
+def _one_thread() -> None:
+    """Let a worker take one core: two that each take all wait for each other."""
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):
+        os.environ[name] = "1"
+
+
+def _tried(job: Job) -> Report | DataError:
+    try:
+        return run(job)
+    except DataError as error:
+        return error
+
+
+def _here(jobs: Sequence[Job], told: Told | None) -> list[Report | DataError]:
+    done: list[Report | DataError] = []
+    for job in jobs:
+        done.append(_tried(job))
+        if told:
+            told(len(done), len(jobs))
+    return done
+
+
+def _in_pool(pool: ProcessPoolExecutor, jobs: Sequence[Job], told: Told | None) -> list[Report | DataError]:
+    if any(not isinstance(e, str) for job in jobs for e in (*job.candidates, *job.model.effects)):
+        # An effect of the user's own is a function, which no other process knows.
+        return _here(jobs, told)
+    places = {pool.submit(_tried, job): k for k, job in enumerate(jobs)}
+    found: dict[int, Report | DataError] = {}
+    for future in as_completed(places):
+        found[places[future]] = future.result()
+        if told:
+            told(len(found), len(jobs))
+    return [found[k] for k in range(len(jobs))]
+
+
+def _from_cluster(on_cluster: Any, jobs: Sequence[Job], told: Told | None) -> list[Report | DataError]:
+    found: dict[str, Report | DataError] = {}
+    for job, result in on_cluster(_tried, jobs):
+        # The text of an error stands for a job whose worker was lost.
+        found[job.member.name] = DataError(f"{job.member.name}: {result}") if isinstance(result, str) else result
+        if told:
+            told(len(found), len(jobs))
+    return [found[job.member.name] for job in jobs]
+
+
+def _kept(work: Callable[[Sequence[Job]], Sequence[Report | DataError]], folder: Path | None) -> Run:
+    """Do the jobs of which no report is kept."""
+    if folder is None:
+        return work
+
+    def do(jobs: Sequence[Job]) -> list[Report | DataError]:
+        places = [folder / f"{number}.npz" if (number := job_number(job)) else None for job in jobs]
+        found: list[Report | DataError | None] = [None if place is None else read_report(place) for place in places]
+        for part in _parts([k for k, report in enumerate(found) if report is None]):
+            for k, fresh in zip(part, work([jobs[k] for k in part]), strict=True):
+                place = places[k]
+                if place is not None and not isinstance(fresh, DataError):
+                    write_report(place, fresh)
+                found[k] = fresh
+        return [
+            replace(done, serial=job.member.serial, power_on=job.member.power_on) if isinstance(done, Report) else done
+            for done, job in zip(found, jobs, strict=True) if done is not None
+        ]  # fmt: skip
+
+    return do
+
+
+def _parts(places: Sequence[int]) -> list[Sequence[int]]:
+    return [places[k : k + _PART] for k in range(0, len(places), _PART)]
+
+
+def job_number(job: Job) -> str:
+    """Give a job a number: another one for other bytes of the bag, another question or another program.
+
+    Returns
+    -------
+    str
+        Empty for a job with effects that have no name.
+    """
+    source = job.member.open
+    effects = (*job.model.effects, *job.candidates)
+    if not isinstance(source, BagSource) or any(not isinstance(e, str) for e in effects):
+        return ""
+    asked = (
+        version("sdimu_calibration"), bag_checksum(source.bag), job.member.name,
+        None if source.imu is None else load_imu(source.imu), load_site(source.site or DEFAULT_SITE), source.site,
+        source.source, source.handheld, source.measured_noise, source.reference_degc, job.model, job.estimator,
+        job.local, job.candidates, job.with_local, None if job.about is None else sorted(job.about.items()), job.imu,
+        None if job.start is None else (job.start.C_nb.tobytes(), job.start.coefficients.tobytes()),
+    )  # fmt: skip
+    return hashlib.sha256(repr(asked).encode()).hexdigest()[:40]
+
+
+@lru_cache(maxsize=4096)
+def bag_checksum(bag: Path) -> str:
+    """SHA-256 of all files of a bag."""
+    total = hashlib.sha256()
+    files = sorted(p for p in bag.iterdir() if p.is_file()) if bag.is_dir() else [bag]
+    for path in files:
+        total.update(path.name.encode())
+        with path.open("rb") as file:
+            while block := file.read(_BLOCK):
+                total.update(block)
+    return total.hexdigest()
