@@ -28,7 +28,7 @@ def write_test(
     motion = test.motion
     t, dwell, stop = phase_changes(motion)
     rows = table_log_rows(motion)
-    heat = temperature_log(scenario.temperature, float(motion.t[-1]))
+    heat = temperature_log(scenario, float(motion.t[-1]))
     write_recording(
         path,
         start_ns=scenario.start_ns,

@@ -51,6 +51,7 @@ class _TruthFile(Schema):
     noise: _NoiseFile
     effects: tuple[str, ...] = ()
     mean_bias: dict[str, float] = Field(default_factory=dict)
+    reference_degc: float | None = None
     lever_arm_m: _Vector = (0.0, 0.0, 0.0)
     magnetic_field_t: _Vector
     electronics: _ElectronicsFile = _ElectronicsFile()
@@ -91,6 +92,7 @@ def write_truth(path: Path, truth: Truth) -> None:
         },
         "effects": list(imu.effects),
         "mean_bias": {name: float(value) for name, value in truth.mean_bias.items()},
+        "reference_degc": truth.reference_degc,
         "lever_arm_m": [float(v) for v in imu.lever_arm_m],
         "magnetic_field_t": [float(v) for v in imu.magnetic_field],
         "electronics": {
@@ -130,7 +132,7 @@ def read_truth(path: Path) -> Truth:
         accel_limit_m_s2=math.inf if limits.accel_limit_m_s2 is None else limits.accel_limit_m_s2,
     )
     site = Site(math.radians(file.site.latitude_deg), file.site.height_m, file.site.gravity_m_s2)
-    return Truth(imu, site, file.seed, file.rate_hz, file.plan, file.mean_bias)
+    return Truth(imu, site, file.seed, file.rate_hz, file.plan, file.mean_bias, file.reference_degc)
 
 
 class _Exact(yaml.SafeDumper):

@@ -21,6 +21,9 @@ def export(
         typer.Option(help="IMU whose noise goes into the kalibr form: name or path; dtg (by hand: mems_by_hand)."),
     ] = None,
     rate: Annotated[float, typer.Option(help="Sample rate for the kalibr form (Hz).")] = 100.0,
+    temperature: Annotated[
+        float | None, typer.Option(metavar="DEGC", help="Temperature at which matrices and biases are stated.")
+    ] = None,
     effect: Annotated[
         list[str] | None,
         typer.Option(metavar="FILE", help="Effect of your own (YAML) that the result has; may be repeated."),
@@ -39,7 +42,7 @@ def export(
     folder = result if result.is_dir() else result.parent
     name = FORMS[form].file_name if form in FORMS else ""
     chosen, whose = imu_of(calibration, imu)
-    done = write(form, out or folder / name, calibration, load_imu(chosen), own, rate)
+    done = write(form, out or folder / name, calibration, load_imu(chosen), own, rate, temperature)
     console = plain()
     for text in done.missing:
         console.print(f"not in the file: {text}", soft_wrap=True, markup=False, highlight=False)

@@ -102,7 +102,7 @@ def simulate(scenario: Scenario, sensor: ImuTruth) -> Recording:
     samples = simulate_imu(platform, sensor, scenario.site, scenario.rate_hz, scenario.seed, scenario.temperature)
     return Recording(
         scenario.start_ns, samples.t, samples.omega_ib_b, samples.f_ib_b, PhaseLog(*phase_changes(motion)),
-        temperature_log(scenario.temperature, float(motion.t[-1])),
+        temperature_log(scenario, float(motion.t[-1])),
     )  # fmt: skip
 
 

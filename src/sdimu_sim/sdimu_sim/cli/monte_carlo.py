@@ -10,7 +10,7 @@ import typer
 
 from sdimu_calibration.cli.console import plain
 from sdimu_calibration.core.recording import DataError
-from sdimu_sim.cli.simulate import EFFECT
+from sdimu_sim.cli.simulate import EFFECT, TEMPERATURE
 
 if TYPE_CHECKING:
     from sdimu_sim.campaign.run import CalibrationRun
@@ -33,7 +33,7 @@ def monte_carlo(
     mount: Annotated[str | None, typer.Option(help="Rotation of the IMU on the table: 'X,Y,Z' (deg).")] = None,
     mount_max: Annotated[float, typer.Option(help="Without --mount: drawn up to this about every axis (deg).")] = 3.0,
     effect: Annotated[list[str] | None, typer.Option(help=EFFECT)] = None,
-    temperature: Annotated[str | None, typer.Option(help="Temperature profile: name or path.")] = None,
+    temperature: Annotated[str | None, typer.Option(help=TEMPERATURE)] = None,
     scheduler: Annotated[str | None, typer.Option(help=_SCHEDULER)] = None,
     workers: Annotated[int, typer.Option(help="Local processes.")] = 2,
 ) -> None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from sdimu_sim.cli.simulate import EFFECT
+from sdimu_sim.cli.simulate import EFFECT, TEMPERATURE
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -32,7 +32,7 @@ def run(
     mount: Annotated[str | None, typer.Option(help="Rotation of the IMU on the table: 'X,Y,Z' (deg).")] = None,
     mount_max: Annotated[float, typer.Option(help="Without --mount: drawn up to this about every axis (deg).")] = 3.0,
     effect: Annotated[list[str] | None, typer.Option(help=EFFECT)] = None,
-    temperature: Annotated[str | None, typer.Option(help="Temperature profile: name or path.")] = None,
+    temperature: Annotated[str | None, typer.Option(help=TEMPERATURE)] = None,
     out: Annotated[Path, typer.Option(help="Folder of the results.")] = Path("out/run"),
 ) -> None:
     """Run a whole simulated test over ROS 2: table, IMU, calibration and recorder, each its own process."""

@@ -17,6 +17,7 @@ NOISE = (
     "Noise with a memory: gyro_noise_KIND=SIZE or accel_noise_KIND=SIZE, KIND random_walk, flicker, markov(tau=300 s), "
     "stop, turn or shift; repeatable."
 )
+TEMPERATURE = "Temperature: profile (name or path), or that of a soak, such as '-20 degC'."
 
 
 def simulate(
@@ -33,7 +34,7 @@ def simulate(
     mount_max: Annotated[float, typer.Option(help="Without --mount: drawn up to this about every axis (deg).")] = 3.0,
     effect: Annotated[list[str] | None, typer.Option(help=EFFECT)] = None,
     noise: Annotated[list[str] | None, typer.Option(help=NOISE)] = None,
-    temperature: Annotated[str | None, typer.Option(help="Temperature profile: name or path.")] = None,
+    temperature: Annotated[str | None, typer.Option(help=TEMPERATURE)] = None,
     truth: Annotated[Path | None, typer.Option(help="Truth file; default: OUT.truth.yaml beside the bag.")] = None,
     by_hand: Annotated[
         int | None, typer.Option(metavar="N", help="No table: a hand puts the IMU into N random attitudes.")

@@ -40,7 +40,7 @@ VARIABLES: tuple[str, ...] = (
 """True means over the sample: body rate w (rad/s), specific force a (f/g) and f (m/s^2), angular acceleration alpha
 (rad/s^2), rate of the table wt (rad/s), North, East and Down component of a body axis (n, e, d), magnetic field B (T),
 lever-arm tensor L (1/s^2), sign of the last turn about and of the last change of a along an axis (turned, leant), time
-t (s), temperature T (deg C), its change since the start dT (K) and rate dTdt (K/s), moving (1 while the table turns),
+t (s), temperature of the sensors T (deg C), T - T0 as dT (K) and rate dTdt (K/s), moving (1 while the table turns),
 time since the last turn ended (since; s, 0 in turns, very long before the first), angle turned since the start about a
 body axis (wound; rad)."""
 DIRECTIONS = frozenset(f"{v}{i}" for v in "ne" for i in _XYZ)

@@ -134,9 +134,9 @@ class Variables:
         self._stood = float(end[-1]) if len(end) else self._stood
         values["since"] = np.minimum(np.where(values["moving"] > 0.0, 0.0, middle - end), NEVER_S)
         if self._temperature:
-            values["T"] = self._temperature.value(middle)
-            values["dT"] = values["T"] - self._temperature.value(np.zeros(1))
-            values["dTdt"] = self._temperature.rate(middle)
+            values["T"] = self._temperature.sensor_value(middle)
+            values["dT"] = values["T"] - self._temperature.origin_degc
+            values["dTdt"] = self._temperature.sensor_rate(middle)
         return values
 
     def _wound(self, wt: Floats, middle: Floats) -> Floats:

@@ -16,7 +16,7 @@ from sdimu_sim.core.hidden import canonical, parse_effects
 from sdimu_sim.core.mean_bias import mean_bias
 from sdimu_sim.core.platform import PlatformMotion
 from sdimu_sim.core.samples import SampleClock
-from sdimu_sim.core.temperature import TemperatureProfile
+from sdimu_sim.core.temperature import TemperatureProfile, Thermometer
 from sdimu_sim.core.truth import DEFAULT_MAGNETIC_FIELD, ImuTruth, Truth, draw_coefficients, draw_mount
 
 DEFAULT_START_NS = 1_700_000_000 * 10**9
@@ -64,6 +64,11 @@ class Scenario:
     coefficients: Mapping[str, float] | None = None
     extras: Mapping[str, object] = field(default_factory=dict)
     start_ns: int = DEFAULT_START_NS
+
+    @property
+    def reference_degc(self) -> float | None:
+        """Temperature T0 for which the coefficients are stated (deg C); None without a temperature."""
+        return None if self.temperature is None else self.temperature.origin_degc
 
 
 def imu_truth(scenario: Scenario) -> ImuTruth:
@@ -122,7 +127,9 @@ def simulate_test(scenario: Scenario) -> SimulatedTest:
     samples = simulate_imu(platform, imu, scenario.site, scenario.rate_hz, scenario.seed, scenario.temperature)
     interval = SampleClock(scenario.rate_hz).interval_s
     mean = mean_bias(imu, samples.t, PhaseLog(*phase_changes(motion)), interval, scenario.seed)
-    truth = Truth(imu, scenario.site, scenario.seed, scenario.rate_hz, scenario.plan.name, mean)
+    truth = Truth(
+        imu, scenario.site, scenario.seed, scenario.rate_hz, scenario.plan.name, mean, scenario.reference_degc
+    )
     return SimulatedTest(motion, samples, truth)
 
 
@@ -142,18 +149,18 @@ def generate(scenario: Scenario) -> tuple[Recording, Truth]:
         omega_ib_b=test.samples.omega_ib_b,
         f_ib_b=test.samples.f_ib_b,
         phase=PhaseLog(t, dwell, stop),
-        temperature=temperature_log(scenario.temperature, float(test.motion.t[-1])),
+        temperature=temperature_log(scenario, float(test.motion.t[-1])),
         table=_table_log(test.motion),
     )
     return recording, test.truth
 
 
-def temperature_log(profile: TemperatureProfile | None, until_s: float) -> TemperatureLog | None:
-    """Sample a temperature profile at 1 Hz, from 0 to a time (s)."""
-    if profile is None:
+def temperature_log(scenario: Scenario, until_s: float) -> TemperatureLog | None:
+    """Read the thermometer at 1 Hz, from 0 to a time (s)."""
+    if scenario.temperature is None:
         return None
     t = np.arange(int(until_s + 1e-9) + 1, dtype=np.float64)
-    return TemperatureLog(t, profile.value(t))
+    return TemperatureLog(t, Thermometer(scenario.temperature, scenario.seed).read(t))
 
 
 def table_log_rows(motion: TableMotion) -> slice:

@@ -100,6 +100,8 @@ class Truth:
     plan: str
     mean_bias: Mapping[str, float] = field(default_factory=dict)
     """Biases in the mean over the dwells (SI), where they drift or wander."""
+    reference_degc: float | None = None
+    """Temperature T0 for which the coefficients are stated (deg C); None without a temperature."""
 
 
 def child_rng(seed: int, name: str) -> np.random.Generator:

@@ -33,6 +33,7 @@ from sdimu_sim.cli.simulate import mount_rad
 from sdimu_sim.core.generator import ImuGenerator
 from sdimu_sim.core.platform import PlatformMotion
 from sdimu_sim.core.scenario import Scenario, imu_truth
+from sdimu_sim.core.temperature import Thermometer
 from sdimu_sim.core.truth import Truth
 from sdimu_sim.temperature_file import load_temperature
 from sdimu_sim.truth_file import write_truth
@@ -60,14 +61,18 @@ class SdimuNode:
         patience_s = float(declare("patience_s", 0.0).value)
         stream = PATIENT if patience_s > 0.0 else STREAM
         self._frame = str(declare("frame_id", "imu_link").value)
-        self._profile = scenario.temperature
         self._rate_hz = scenario.rate_hz
+        profile = scenario.temperature
+        self._thermometer = None if profile is None else Thermometer(profile, scenario.seed)
         imu = imu_truth(scenario)
         self._variance = (imu.gyro_white_noise**2 * self._rate_hz, imu.accel_white_noise**2 * self._rate_hz)
-        self._generator = ImuGenerator(imu, scenario.site, self._rate_hz, scenario.seed, self._profile)
-        _warm_up(ImuGenerator(imu, scenario.site, self._rate_hz, scenario.seed, self._profile))
+        self._generator = ImuGenerator(imu, scenario.site, self._rate_hz, scenario.seed, profile)
+        _warm_up(ImuGenerator(imu, scenario.site, self._rate_hz, scenario.seed, profile))
         if truth_file:
-            truth = Truth(imu, scenario.site, scenario.seed, self._rate_hz, scenario.plan.name)
+            truth = Truth(
+                imu, scenario.site, scenario.seed, self._rate_hz, scenario.plan.name,
+                reference_degc=scenario.reference_degc,
+            )  # fmt: skip
             write_truth(Path(truth_file), truth)
 
         self._ready: deque[tuple[int, Any, Any]] = deque()  # stamp, publisher, message: in the order of stamps
@@ -82,7 +87,7 @@ class SdimuNode:
             patience_s=patience_s,
         )  # fmt: skip
         # Without a profile there must be no publisher: the calibrator would wait for it.
-        if self._profile is not None:
+        if self._thermometer is not None:
             self._temperature = self.node.create_publisher(Temperature, "/imu/temperature", stream)
         self._place = self._transforms()
         # A message of motion is a block: each one is acknowledged.
@@ -138,12 +143,12 @@ class SdimuNode:
 
     def _temperatures(self, until_s: float) -> list[tuple[int, Any, Any]]:
         """Temperatures at 1 Hz up to a time."""
-        if self._profile is None:
+        if self._thermometer is None:
             return []
         seconds = np.arange(self._next_temperature, int(until_s + 1e-9) + 1)
         self._next_temperature += len(seconds)
         entries = []
-        for second, value in zip(seconds.tolist(), self._profile.value(seconds.astype(float)).tolist(), strict=True):
+        for second, value in zip(seconds.tolist(), self._thermometer.read(seconds.astype(float)).tolist(), strict=True):
             stamp = self._start_ns + second * NS
             message = Temperature(header=header(stamp, self._frame), temperature=value)
             entries.append((stamp, self._temperature, message))

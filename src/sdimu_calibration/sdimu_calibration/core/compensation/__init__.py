@@ -12,12 +12,14 @@ from sdimu_calibration.core.compensation.compensator import (
     heat_since,
     resolved,
 )
-from sdimu_calibration.core.compensation.linear import LinearModel, linear_model
+from sdimu_calibration.core.compensation.linear import Factor, LinearModel, Part, linear_model
 
 __all__ = [
     "Compensated",
     "Compensator",
+    "Factor",
     "LinearModel",
+    "Part",
     "compensate",
     "compensate_recording",
     "compensator",

@@ -48,6 +48,7 @@ def export(
     imu: ImuSpecification,
     own: Sequence[Effect] = (),
     rate_hz: float = 100.0,
+    temperature_degc: float | None = None,
 ) -> Exported:
     """Write a result in a form.
 
@@ -64,15 +65,20 @@ def export(
         Effects of the result that are in no catalogue.
     rate_hz : float
         Sample rate, where the form has a place for it.
+    temperature_degc : float, optional
+        Temperature at which matrices and biases are stated (deg C); that from which the coefficients count by default.
 
     Raises
     ------
     DataError
-        When there is no such form, or the result does not fit its effects.
+        When there is no such form, the result does not fit its effects, or does not say from which temperature its
+        coefficients count.
     """
     if form not in FORMS:
         raise DataError(f"--format {form}: expected one of {', '.join(FORMS)}")
     linear = linear_model(calibration, own)
+    if temperature_degc is not None:
+        linear = linear.at(temperature_degc)
     missing = FORMS[form].cannot_hold(linear)
     source = Source(calibration, linear, imu, rate_hz, tuple(missing))
     files = []

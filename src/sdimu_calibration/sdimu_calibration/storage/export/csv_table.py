@@ -8,6 +8,7 @@ import io
 import numpy as np
 
 from sdimu_calibration.core.compensation import LinearModel
+from sdimu_calibration.core.results import START_TEMPERATURE
 from sdimu_calibration.storage.export.shared import Source, number
 
 
@@ -19,6 +20,9 @@ def texts(source: Source) -> dict[str, str]:
     table = csv.writer(text, lineterminator="\n")
     table.writerow(["name", "value", "sigma", "unit"])
     table.writerows([n, number(c.values[k]), number(sigma[k]), c.units[k]] for k, n in enumerate(c.names))
+    start = c.data.get(START_TEMPERATURE)
+    if source.linear.of_temperature and start is not None:
+        table.writerow([START_TEMPERATURE, number(start), number(0.0), "degC"])
     return {"": text.getvalue()}
 
 

@@ -17,7 +17,7 @@ import numpy as np
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.compensation import LinearModel
 from sdimu_calibration.core.recording import DataError
-from sdimu_calibration.storage.export.shared import Source, bent, comments, flow, number
+from sdimu_calibration.storage.export.shared import Source, bent, comments, flow, number, warm
 
 _TRIANGULAR = 1e-12
 """Largest number above the diagonal that is rounding."""
@@ -80,7 +80,7 @@ def lower_and_rotation(matrix: Floats) -> tuple[Floats, Floats]:
 
 def cannot_hold(linear: LinearModel) -> list[str]:
     """Say what is left out."""
-    return bent(linear)
+    return bent(linear) + warm(linear)
 
 
 def _block(name: str, matrix: Floats) -> list[str]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from sdimu_calibration.core.compensation import LinearModel
-from sdimu_calibration.storage.export.shared import Source, bent, comments, row
+from sdimu_calibration.storage.export.shared import Source, bent, comments, row, warm
 
 
 def texts(source: Source) -> dict[str, str]:
@@ -18,4 +18,4 @@ def texts(source: Source) -> dict[str, str]:
 
 def cannot_hold(linear: LinearModel) -> list[str]:
     """Say what is left out."""
-    return bent(linear)
+    return bent(linear) + warm(linear)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from sdimu_calibration.core.arrays import Floats
-from sdimu_calibration.core.compensation import LinearModel
+from sdimu_calibration.core.compensation import Factor, LinearModel, Part
 from sdimu_calibration.core.plain_text import one_line
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.specification import ImuSpecification
@@ -50,9 +50,35 @@ def comments(source: Source, mark: str) -> list[str]:
         f"Body frame: {source.linear.body_frame}.",
         *EQUATION,
     ]
+    if source.linear.parts and source.linear.temperature_degc is not None:
+        lines.append(f"M, G and b are those at the temperature T0 = {source.linear.temperature_degc:g} degC.")
     lines += [f"NOT IN THIS FILE: {text}" for text in source.missing]
     # Names come from a file: they must neither begin a line of their own nor end a comment of C.
     return [f"{mark} {one_line(line, None).replace('*/', '* /')}" for line in lines]
+
+
+def by_temperature(linear: LinearModel) -> dict[Factor, Part]:
+    """Parts that follow the temperature, of a result that says from which temperature they count; else none."""
+    return {} if linear.temperature_degc is None else dict(linear.parts)
+
+
+def factor_text(factor: Factor, difference: str = "(T - T0)") -> str:
+    """Write what a part is multiplied by."""
+    power = difference + (f"^{factor.power}" if factor.power > 1 else "") if factor.power else ""
+    return " ".join(word for word in (power, "dT/dt" if factor.rate_power else "") if word)
+
+
+def warm(linear: LinearModel) -> list[str]:
+    """Say that a form has no place for what follows the temperature: one line, or none."""
+    if not linear.parts:
+        return []
+    names = ", ".join(linear.of_temperature)
+    if linear.temperature_degc is None:
+        return [f"{names} (the result does not say from which temperature they count)"]
+    return [
+        f"{names} (the numbers hold at {linear.temperature_degc:g} degC; --temperature states another, and the forms "
+        "c-header and yaml hold the polynomial)"
+    ]
 
 
 def bent(linear: LinearModel) -> list[str]:
