@@ -2,10 +2,14 @@
 
 import math
 
+import numpy as np
 import pytest
 
+from sdimu_calibration.core.alignment.prepared import set_up
 from sdimu_calibration.core.effects.imu_model import build
-from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.estimation.prepared_test import PreparedTest
+from sdimu_calibration.core.estimation.solve import solve
+from sdimu_calibration.core.recording import DataError, Recording
 from sdimu_calibration.storage.config import config_folder, find_config, load_imu, load_model, load_plan, load_site
 
 PLAN = """
@@ -160,3 +164,16 @@ def test_a_copy_that_is_installed_reads_the_files_that_it_brings(tmp_path, monke
 def test_of_a_file_of_another_kind_the_format_is_told_and_not_its_keys(tmp_path):
     with pytest.raises(DataError, match=r"mine.yaml: format: .*'sdimu-effect/1'"):
         load_plan(written(tmp_path, "format: sdimu-effect/1\nname: bent\nexpressions: {}\n"))
+
+
+@pytest.mark.parametrize("prior", ["gyro_bias", "accel_quadratic"])
+def test_a_prior_of_zero_is_refused_by_every_estimate(tmp_path, prior):
+    """Of a coefficient of the model, and of one that a diagnosis would try."""
+    size = {"gyro_bias": "0 deg/h", "accel_quadratic": "0 ug/g^2"}[prior]
+    whole = IMU.replace("gyro_bias: 1 deg/h, ", "")
+    imu = load_imu(written(tmp_path, whole.replace("prior: {", f"prior: {{{prior}: {size}, ")))
+    message = rf"prior\.{prior}: 0 leaves nothing to estimate"
+    with pytest.raises(DataError, match=message):
+        set_up(load_site("daejeon"), imu, load_model("baseline"))
+    with pytest.raises(DataError, match=message):
+        solve(PreparedTest(Recording(0, np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3))), imu), load_model("hand"), "handheld")

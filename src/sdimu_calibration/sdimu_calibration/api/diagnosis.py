@@ -110,11 +110,15 @@ class FitDiagnosis:
             )  # fmt: skip
         return folder
 
+    def _told(self) -> list[str]:
+        """Coefficients that are one in this test, and advice, one line each."""
+        return [*self.core.after.inseparable, *(f"advice: {text}" for text in self.advice)]
+
     def __repr__(self) -> str:
         """Sentence and advice."""
-        return "\n".join([f"{self.verdict}: {self.core.sentence}", *(f"advice: {text}" for text in self.advice)])
+        return "\n".join([f"{self.verdict}: {self.core.sentence}", *self._told()])
 
     def _repr_html_(self) -> str:
         """Sentence and advice as HTML."""
-        listed = "".join(f"<li>{escape(text)}</li>" for text in self.advice)
+        listed = "".join(f"<li>{escape(text)}</li>" for text in self._told())
         return f"<p><b>{escape(self.verdict)}.</b> {escape(self.core.sentence)}</p><ul>{listed}</ul>"

@@ -124,7 +124,7 @@ class CalibrationFit:
         fit = self.result.fit
         held_out = fit["held_out_rms"]
         shown = "" if held_out is None else f", held-out error {held_out:.3f}"
-        return f"NIS {fit['nis_mean']:.3f}{shown} (1 is right)"
+        return "; ".join([f"NIS {fit['nis_mean']:.3f}{shown} (1 is right)", *self.result.inseparable])
 
     def to_dataframe(self) -> pd.DataFrame:
         """Coefficients as a table: name, value, sigma, unit (customary).

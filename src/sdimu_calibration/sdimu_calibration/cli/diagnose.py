@@ -140,7 +140,7 @@ def diagnose(
     folder = out or default_folder(bag, "diagnosis")
     with bar(console) as progress:
         _write(folder, f"Diagnosis of {bag.name}", summary, null, progress)
-    more = without_advice(found.after.notes) if found.fit.learns_scatter else ()
+    more = without_advice(found.after.notes) if found.fit.learns_scatter else found.after.inseparable
     tell(console, (*notes, *(note for note in more if note not in notes)))
     console.print(f"results in {folder}", soft_wrap=True)
     leave(found.after)

@@ -18,6 +18,8 @@ NOT_TRUSTED = "not to be trusted"
 START_TEMPERATURE = "start_temperature_degc"
 """Key in the data section: temperature T0 from which temperature effects count (deg C), that at the start if no other
 was stated."""
+INSEPARABLE = "cannot be told from each other"
+"""Words of a warning that two coefficients are one in a test."""
 NO_AXES = (float("nan"),) * 3
 """Three axes without a number."""
 
@@ -278,6 +280,11 @@ class Calibration:
         """Why the estimate must not be used as it stands, one line each; empty where nothing forbids it."""
         grave = [fault.text for fault in self.faults if fault.grave]
         return tuple(dict.fromkeys([*grave, *(line for line in self.warnings if NOT_TRUSTED in line)]))
+
+    @property
+    def inseparable(self) -> tuple[str, ...]:
+        """Pairs of coefficients that are one in this test, one line each."""
+        return tuple(line for line in self.warnings if INSEPARABLE in line)
 
 
 _ADVICE = re.compile(r"[;:,](?: or)? run:? sdimu diagnose$")

@@ -6,6 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from sdimu_calibration.api.fit import CalibrationFit
+from sdimu_calibration.api.functions import diagnose
 from sdimu_calibration.core.estimation.outcome import inseparable, outcome
 from sdimu_calibration.core.estimation.solve import extend
 from sdimu_calibration.core.evidence.noise_kernels import constant_between
@@ -25,3 +27,9 @@ def test_coefficients_without_variance_are_not_compared():
     covariance[1, 2] = covariance[2, 1] = -1.9999
     (line,) = inseparable(("a", "b", "c"), covariance)
     assert line.startswith("b and c cannot be told from each other")
+
+
+def test_a_fit_and_a_diagnosis_in_python_show_the_pair(bench):
+    fit = CalibrationFit(bench.fit()).add("gyro_x: 1")
+    assert "gyro_bias_x and gyro_x: 1 cannot be told" in repr(fit)
+    assert "gyro_bias_x and gyro_x: 1 cannot be told" in repr(diagnose(fit))

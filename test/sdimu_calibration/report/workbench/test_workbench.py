@@ -18,6 +18,7 @@ from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.report.workbench.app import build
 from sdimu_calibration.report.workbench.fit import FitSession
 from sdimu_calibration.report.workbench.recording_cache import RecordingCache, neighbours
+from sdimu_calibration.report.workbench.view import numbers
 from sdimu_calibration.storage.config import load_imu, load_model, load_site
 from sdimu_calibration.storage.effect_file import extended_model
 
@@ -186,6 +187,12 @@ def test_held_out_stops_are_predicted_not_fitted(bench):
     # Errors of the coefficients are common to a stop: some 24 independent numbers, an RMS that scatters by 14 %.
     assert held.at_held == pytest.approx(1.0, abs=3 * 0.14)
     assert bench.fit((), (5, 9)).at_held > held.at_held
+
+
+def test_a_coefficient_that_is_another_one_is_told(bench):
+    given = bench.fit((), ())
+    assert "gyro_bias_x and gyro_x: 1 cannot be told from each other" in numbers(bench.fit(("gyro_x: 1",), ()), given)
+    assert "cannot be told" not in numbers(given, given)
 
 
 def test_the_first_stop_cannot_be_held_out(bench):

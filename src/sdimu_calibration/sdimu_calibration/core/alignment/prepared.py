@@ -111,9 +111,10 @@ def set_up(site: Site, imu: ImuSpecification, model: Model, epoch_s: float | Non
     Raises
     ------
     DataError
-        When a noise is zero, or model and IMU do not fit together.
+        When a noise or a prior is zero, or model and IMU do not fit together.
     """
     epoch_s = imu.epoch_s if epoch_s is None else epoch_s
+    imu.check_priors()
     sensors = imu_model.build(model.effects, imu)
     for what, noise in (("gyro", imu.gyro_white_noise), ("accel", imu.accel_white_noise)):
         if not noise > 0.0:

@@ -42,6 +42,7 @@ def solve_handheld(test: PreparedTest, model: Model, start: Start | None, progre
             f"the test was opened for navigation at the assumed site {test.assumed_site}, and a handheld fit takes no "
             "assumed site: in Python, state the site or open the test with open(..., handheld=True)"
         )
+    test.imu.check_priors()
     progress("rests", 0.1)
     wide = widest_priors(test.imu, imu_model.build(model.effects, test.imu))
     if start is not None or wide is test.imu:

@@ -14,7 +14,7 @@ from sdimu_calibration.core.estimation.solve import AUTO, solve
 from sdimu_calibration.core.origin import measured
 from sdimu_calibration.core.progress import Progress, silent
 from sdimu_calibration.core.recording import Recording
-from sdimu_calibration.core.results import Calibration
+from sdimu_calibration.core.results import INSEPARABLE, Calibration
 from sdimu_calibration.core.specification import ImuSpecification, Model, Site
 
 _ONE = 0.9995
@@ -80,7 +80,7 @@ def inseparable(names: Sequence[str], covariance: Floats) -> list[str]:
     unit = np.divide(1.0, sigma, out=np.zeros_like(sigma), where=sigma > 0.0)
     correlation = np.triu(np.abs(covariance * np.outer(unit, unit)), 1)
     return [
-        f"{names[i]} and {names[j]} cannot be told from each other in this test (correlation "
+        f"{names[i]} and {names[j]} {INSEPARABLE} in this test (correlation "
         f"{correlation[i, j]:.5f}): their sum is known, neither of them is; take one out of the model"
         for i, j in np.argwhere(correlation > _ONE).tolist()
     ]

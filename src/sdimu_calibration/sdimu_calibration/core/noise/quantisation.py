@@ -11,6 +11,7 @@ averaging times from a fifth of a second to three, between the filter of the sen
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -36,7 +37,7 @@ _MATTERS = 0.1
 
 
 def with_quantisation(imu: ImuSpecification, recording: Recording) -> tuple[ImuSpecification, str]:
-    """Add the quantisation that the rests show to a specification that states none.
+    """Add the quantisation that the rests show to a specification, for a triad of which it states none.
 
     Parameters
     ----------
@@ -50,24 +51,30 @@ def with_quantisation(imu: ImuSpecification, recording: Recording) -> tuple[ImuS
     note : str
         What was added; empty where nothing was.
     """
-    stated = imu.gyro_quantisation > 0.0 or imu.accel_quantisation > 0.0
-    triads = (("gyro", recording.omega_ib_b, imu.gyro_white_noise), ("accel", recording.f_ib_b, imu.accel_white_noise))
-    if stated or not _suspect(recording, imu):
+    stated = {"gyro_quantisation": imu.gyro_quantisation, "accel_quantisation": imu.accel_quantisation}
+    white = {"gyro_quantisation": imu.gyro_white_noise, "accel_quantisation": imu.accel_white_noise}
+    values = {"gyro_quantisation": recording.omega_ib_b, "accel_quantisation": recording.f_ib_b}
+    asked = [name for name, size in stated.items() if not size > 0.0]
+    if not asked or not _suspect(recording, [(values[name], white[name]) for name in asked]):
         return imu, ""
     first, last = runs(at_rest(recording))
     found = {
-        name: size_of_residue(values, first, last, recording.interval_s, noise) for name, values, noise in triads
+        name: size_of_residue(values[name], first, last, recording.interval_s, white[name]) for name in asked
     }
     if not any(found.values()):
         return imu, ""
-    gyro, accel = found["gyro"], found["accel"]
-    parts = [f"gyro {from_si(gyro, 'arcsec'):.2g} arcsec"] if gyro else []
-    parts += [f"accelerometer {from_si(accel, 'mm/s'):.2g} mm/s"] if accel else []
     note = (
         f"means over a second scatter more than '{imu.name}' says and average out faster than white noise: "
-        f"quantisation or vibration of {' and '.join(parts)} (one sigma) is taken into account"
+        f"quantisation or vibration of {in_words(**found)} (one sigma) is taken into account"
     )
-    return replace(imu, gyro_quantisation=gyro, accel_quantisation=accel), note
+    return replace(imu, **found), note
+
+
+def in_words(gyro_quantisation: float = 0.0, accel_quantisation: float = 0.0) -> str:
+    """Say what each triad keeps for the next sample (rad, m/s), as people read it; nothing of one that keeps none."""
+    parts = [f"gyro {from_si(gyro_quantisation, 'arcsec'):.2g} arcsec"] if gyro_quantisation else []
+    parts += [f"accelerometer {from_si(accel_quantisation, 'mm/s'):.2g} mm/s"] if accel_quantisation else []
+    return " and ".join(parts)
 
 
 def size_of_residue(values: Floats, first: Ints, last: Ints, interval_s: float, white_noise: float) -> float:
@@ -114,22 +121,23 @@ def _two_sample(values: Floats, first: Ints, last: Ints, interval_s: float) -> t
     return np.array(tau), np.array(variance)
 
 
-def _suspect(recording: Recording, imu: ImuSpecification) -> bool:
-    """Whether the means over seconds at rest scatter more than the white noise of the specification makes them."""
+def _suspect(recording: Recording, triads: Sequence[tuple[Floats, float]]) -> bool:
+    """Whether the means over seconds at rest scatter more than white noise makes them: samples and density of each."""
     width = max(round(1.0 / recording.interval_s), 1)
     seconds = len(recording.t) // width
     if seconds < _PAIRS:
         return False
-    rate, force = (
-        values[: seconds * width].reshape(seconds, width, 3).mean(axis=1)
-        for values in (recording.omega_ib_b, recording.f_ib_b)
-    )
+
+    def means(values: Floats) -> Floats:
+        return np.asarray(values[: seconds * width].reshape(seconds, width, 3).mean(axis=1))
+
+    rate = means(recording.omega_ib_b)
     still = np.max(np.abs(rate - np.median(rate, axis=0)), axis=1) < TURNING
     pair = still[1:] & still[:-1]
     if pair.sum() < _PAIRS:
         return False
-    for means, noise in ((rate, imu.gyro_white_noise), (force, imu.accel_white_noise)):
-        steps = np.sum(np.diff(means, axis=0)[pair] ** 2, axis=1)
+    for values, noise in triads:
+        steps = np.sum(np.diff(means(values), axis=0)[pair] ** 2, axis=1)
         variance = float(np.median(steps)) / (2.0 * 3.0 * _MEDIAN_CHI2)
         if variance * width * recording.interval_s > _SUSPECT**2 * noise**2:
             return True

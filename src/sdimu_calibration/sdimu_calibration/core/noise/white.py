@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sdimu_calibration.core.noise.allan import allan
-from sdimu_calibration.core.noise.quantisation import size_of_residue
+from sdimu_calibration.core.noise.quantisation import in_words, size_of_residue
 from sdimu_calibration.core.noise.rests import rests
 from sdimu_calibration.core.recording import DataError, Recording
 from sdimu_calibration.core.specification import ImuSpecification
@@ -112,10 +112,7 @@ def with_measured_noise(imu: ImuSpecification, recording: Recording) -> tuple[Im
     gyro, accel = (white_beside(white, Q) for white, Q in zip((found.gyro, found.accel), kept, strict=True))
     note = f"noise as measured in {found.rest_s:.0f} s of rest: {'; '.join(parts)}"
     if any(kept):
-        note += (
-            f"; of it quantisation {from_si(kept[0], 'arcsec'):.2g} arcsec and {from_si(kept[1], 'mm/s'):.2g} mm/s, "
-            "which averages out faster than white noise"
-        )
+        note += f"; of it quantisation of {in_words(*kept)}, which averages out faster than white noise"
     measured = replace(
         imu, gyro_white_noise=gyro, accel_white_noise=accel, gyro_quantisation=kept[0], accel_quantisation=kept[1]
     )

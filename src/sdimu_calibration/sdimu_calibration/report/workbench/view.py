@@ -140,4 +140,5 @@ def numbers(fitted: Fitted, given: Fitted) -> str:
     fell = "" if fitted is given else f"{given.held_out:.3f} \N{RIGHTWARDS ARROW} "
     held = "" if fitted.at_held is None else f"; at the stops held out {fitted.at_held:.3f}"
     nis = fitted.calibration.fit["nis_mean"]
-    return f"Held-out RMS {fell}{fitted.held_out:.3f} sigma{held}; mean squared innovation {nis:.3f}. 1 is right."
+    errors = f"Held-out RMS {fell}{fitted.held_out:.3f} sigma{held}; mean squared innovation {nis:.3f}. 1 is right."
+    return " ".join([errors, *(f"{line}." for line in fitted.calibration.inseparable)])
