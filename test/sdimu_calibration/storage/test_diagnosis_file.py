@@ -57,6 +57,15 @@ def test_the_hidden_effect_is_in_the_file_in_si(told):
     assert first["held_out_rms_after"] < first["held_out_rms_before"]
 
 
+def test_every_candidate_is_there_alone_for_the_sum_over_units(told):
+    alone = content(told)["alone"]
+    assert len({len(alone[key]) for key in ("labels", "units", "estimates", "sigmas")}) == 1
+    k = alone["labels"].index("accel_quadratic_x")
+    assert alone["units"][k] == "m/s^2/g^2"
+    # Its sigma takes the misfit of the other stops for noise.
+    assert abs(alone["estimates"][k] - to_si(150, "ug/g^2")) < 4.0 * alone["sigmas"][k]
+
+
 def test_places_are_ordered_by_how_far_they_are_off(told):
     sizes = [abs(w["normalised_mean"]) for w in content(told)["where"]]
     assert sizes == sorted(sizes, reverse=True)

@@ -35,6 +35,7 @@ _VERBS = {
     "plan": "sdimu_calibration.cli.plan:plan",
     "noise": "sdimu_calibration.cli.noise:noise",
     "export": "sdimu_calibration.cli.export:export",
+    "fleet": "sdimu_calibration.cli.fleet:fleet",
     "workbench": "sdimu_calibration.cli.workbench:workbench",
     "pictures": "sdimu_calibration.cli.pictures:pictures",
     "bag": "sdimu_calibration.cli.bag:app",

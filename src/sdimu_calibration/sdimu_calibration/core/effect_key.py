@@ -162,3 +162,13 @@ def read_quantity(what: str, text: str, unit: str) -> float:
 def sized(key: str, value: float, unit: str) -> str:
     """Write a key with its size: `value` (SI) in `unit`, to the last digit."""
     return f"{key}={float(from_si(value, unit))!r} {unit}"
+
+
+def effect_of(name: str, model: Sequence[str]) -> str:
+    """Find the effect of a coefficient: the longest effect name that `name` begins with, or `name` itself.
+
+    What stands in brackets behind an effect (a time constant) is no part of its coefficients' names.
+    """
+    stems = {effect: effect.partition("(")[0] for effect in model}
+    fits = [effect for effect, stem in stems.items() if name == stem or name.startswith(f"{stem}_")]
+    return max(fits, key=len) if fits else name

@@ -33,6 +33,20 @@ def chi2_head(x: float, dof: float) -> float:
     return float(chdtr(dof, x))
 
 
+def chi2_limit(p: float, dof: float) -> float:
+    """Give the number that chi-square with `dof` degrees of freedom exceeds with probability `p`."""
+    from scipy.special import chdtri  # noqa: PLC0415
+
+    return float(chdtri(dof, p))
+
+
+def student_tail(t: float, dof: float) -> float:
+    """Probability that Student's t with `dof` degrees of freedom exceeds `t`."""
+    from scipy.special import stdtr  # noqa: PLC0415
+
+    return float(stdtr(dof, -t))
+
+
 def student_limit(p: float, dof: float) -> float:
     """Give the number that Student's t with `dof` degrees of freedom exceeds with probability `p`."""
     from scipy.special import stdtrit  # noqa: PLC0415

@@ -9,7 +9,7 @@ import numpy as np
 
 from sdimu_calibration.core.arrays import Bools, Floats, Ints
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
-from sdimu_calibration.core.diagnosis.scan import Scan, scan
+from sdimu_calibration.core.diagnosis.scan import Scan, scale_of, scan
 from sdimu_calibration.core.evidence.consistency import CHANNEL_NAMES, Consistency, StopMean
 from sdimu_calibration.core.evidence.handheld_evidence import CHANNELS as HANDHELD_CHANNELS
 from sdimu_calibration.core.evidence.linear import LinearEvidence
@@ -172,7 +172,7 @@ def scored(diagnosis: Diagnosis) -> list[Scored]:
     """Every candidate of catalogue and own equations that was tried, largest score first."""
     evidence = diagnosis.navigation
     p, free = len(evidence.weight), set(diagnosis.free.tolist())
-    first = scan(evidence.information, evidence.model, evidence.weight, _first_scale(diagnosis.found.first))
+    first = scan(evidence.information, evidence.model, evidence.weight, scale_of(diagnosis.found.first))
     last = first if not len(diagnosis.found.chosen) else scan(
         evidence.information, *added(diagnosis), diagnosis.found.scale
     )  # fmt: skip
@@ -196,15 +196,6 @@ def best_variants(entries: Sequence[Scored]) -> list[Scored]:
         if entry.z and (entry.chosen or name not in best):
             best[name] = entry
     return sorted(best.values(), key=lambda row: -abs(row.z))
-
-
-def _first_scale(first: Scan) -> float:
-    """Noise over specification that the first scan took, misfit and all."""
-    testable = np.flatnonzero(np.isfinite(first.sigma))
-    if not len(testable):
-        return 1.0
-    one = testable[0]
-    return float(first.sigma[one] * np.sqrt(first.J[one]))
 
 
 def _scored(evidence: LinearEvidence, index: int, first: Scan, last: Scan, chosen: bool) -> Scored:

@@ -6,20 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from sdimu_calibration.core.effect_key import effect_of
 from sdimu_calibration.core.results import Calibration
 
 _FRAME_SHARE = 1e-6
 """A sigma below this share of the effect's largest is rounding: the body frame makes the coefficient zero."""
-
-
-def effect_of(name: str, model: Sequence[str]) -> str:
-    """Find the effect of a coefficient: the longest effect name that `name` begins with, or `name` itself.
-
-    What stands in brackets behind an effect (a time constant) is no part of its coefficients' names.
-    """
-    stems = {effect: effect.partition("(")[0] for effect in model}
-    fits = [effect for effect, stem in stems.items() if name == stem or name.startswith(f"{stem}_")]
-    return max(fits, key=len) if fits else name
 
 
 def groups(names: Sequence[str], model: Sequence[str]) -> dict[str, list[int]]:

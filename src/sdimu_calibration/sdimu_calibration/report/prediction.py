@@ -11,12 +11,13 @@ import numpy as np
 from rich.box import SIMPLE
 from rich.table import Table
 
+from sdimu_calibration.core.effect_key import effect_of
 from sdimu_calibration.core.planning.predict import Prediction
 from sdimu_calibration.core.results import Calibration, History
 from sdimu_calibration.core.units import from_si
 from sdimu_calibration.report.drawing import html
 from sdimu_calibration.report.figures import sigma_history
-from sdimu_calibration.report.groups import effect_of, groups
+from sdimu_calibration.report.groups import groups
 from sdimu_calibration.report.style import STYLE
 from sdimu_calibration.storage.whole_file import write_whole
 

@@ -10,9 +10,10 @@ import numpy as np
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
+from sdimu_calibration.core.effect_key import effect_of
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.units import from_si
-from sdimu_calibration.report.groups import effect_of, is_free
+from sdimu_calibration.report.groups import is_free
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ from sdimu_calibration.core.diagnosis.found import DetectableSize, Found
 from sdimu_calibration.core.diagnosis.free_input_test import FreeInputTest
 from sdimu_calibration.core.diagnosis.ladder import Rung
 from sdimu_calibration.core.diagnosis.plan_seen import PlanSeen
+from sdimu_calibration.core.diagnosis.scan import scale_of, scan
 from sdimu_calibration.core.diagnosis.search import Step
 from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary
 from sdimu_calibration.core.evidence.consistency import Noise
@@ -90,12 +91,31 @@ def content(summary: DiagnosisSummary) -> dict[str, Any]:
             "before": _free_inputs(d.free_inputs_before),
             "after": _free_inputs(d.free_inputs_after),
         },
+        "alone": _alone(d),
         "fit": {"before": fit_of(d.before), "after": fit_of(d.after)},
         "ladder": [step_of(s) for s in d.found.steps],
         "grown": [_rung(r) for r in d.rungs],
         "plan": _plan(summary.plan),
         "not_testable": [reach_of(r) | {"reason": _reason(summary, r)} for r in summary.reached if not r.testable],
         "smallest_detectable": [reach_of(r) for r in summary.reached if r.testable],
+    }  # fmt: skip
+
+
+def _alone(d: Diagnosis) -> dict[str, Any]:
+    """Give every candidate of the catalogue alone beside the given model, however small: many units make it large."""
+    evidence, free = d.evidence, set(d.free.tolist())
+    first = scan(evidence.information, evidence.model, evidence.weight, scale_of(d.found.first))
+    p = len(evidence.weight)
+    shown = [
+        (evidence.candidates[k - p], k) for k in range(p, len(evidence.names))
+        if k not in free and np.isfinite(first.sigma[k]) and evidence.candidates[k - p].family != "own"
+    ]
+    return {
+        "labels": [candidate.label for candidate, _ in shown],
+        "units": [candidate.parameter.unit for candidate, _ in shown],
+        "display_units": [candidate.parameter.display_unit for candidate, _ in shown],
+        "estimates": [float(first.estimate[k]) for _, k in shown],
+        "sigmas": [float(first.sigma[k]) for _, k in shown],
     }  # fmt: skip
 
 

@@ -95,6 +95,15 @@ def scored(J: Floats, d: Floats, J0: Floats, known: Ints, scale: float) -> Scan:
     return Scan(z, estimate, sigma, np.nan_to_num(retention), POWER_80 * sigma, J, d)
 
 
+def scale_of(done: Scan) -> float:
+    """Residual noise over specified noise that a scan took, misfit and all."""
+    testable = np.flatnonzero(np.isfinite(done.sigma))
+    if not len(testable):
+        return 1.0
+    one = testable[0]
+    return float(done.sigma[one] * np.sqrt(done.J[one]))
+
+
 def threshold(
     full: Information, known: Ints, weight: Floats, tested: Ints, alpha: float, seed: int = 1
 ) -> float:  # fmt: skip

@@ -1,0 +1,51 @@
+"""`sdimu fleet`: many units of one type."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from sdimu_calibration.cli.console import plain
+
+
+def fleet(
+    folders: Annotated[list[Path], typer.Argument(metavar="FOLDER ...", help="Every result.json below is taken.")],
+    priors: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Write an IMU file with the priors of the population.")
+    ] = None,
+    imu: Annotated[
+        str | None, typer.Option(help="IMU whose noise and grade go into --priors; that of the results by default.")
+    ] = None,
+    out: Annotated[Path | None, typer.Option(help="Folder of the pages; FOLDER by default.")] = None,
+) -> None:
+    """Compare all units of a type: mean and spread, who is out, what is common; leaves fleet.json and fleet.html."""
+    from sdimu_calibration.cli.wide_table import print_table
+    from sdimu_calibration.core.fleet.study import study
+    from sdimu_calibration.report.fleet import tables
+    from sdimu_calibration.report.fleet.page import display_units, headline, write_page
+    from sdimu_calibration.storage.fleet_file import write_fleet, write_priors
+    from sdimu_calibration.storage.fleet_folder import as_measured, candidates, gather
+    from sdimu_calibration.storage.whole_file import written_together
+
+    console = plain()
+    gathered = gather(folders)
+    for line in gathered.apart:
+        console.print(f"set apart: {line}", soft_wrap=True, highlight=False)
+    alone = candidates(gathered.given)
+    done = study(as_measured(gathered.entries), gathered.entries[0].result.model, alone)
+    units = display_units(gathered, alone)
+    console.print(headline(gathered, done), soft_wrap=True, highlight=False)
+    print_table(console, tables.HEADINGS, tables.rows(done, units), left=2)
+    for line in tables.sentences(done, units):
+        console.print(line, soft_wrap=True, highlight=False)
+    folder = out or (folders[0] if folders[0].is_dir() else folders[0].parent)
+    with written_together(folder) as part:
+        write_fleet(part / "fleet.json", gathered, done)
+        write_page(part / "fleet.html", gathered, done, alone, f"Fleet of {folders[0].resolve().name}")
+    if priors is not None:
+        base = imu or gathered.entries[0].result.origin.imu
+        written = write_priors(priors, base, gathered, done)
+        console.print(f"priors of {len(written)} effects in {priors}; use: --imu {priors}", soft_wrap=True)
+    console.print(f"fleet.json and fleet.html in {folder}", soft_wrap=True, highlight=False)

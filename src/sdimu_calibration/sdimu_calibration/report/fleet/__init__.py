@@ -1,0 +1,1 @@
+"""Pages of many results: the fleet and the data sheet."""

@@ -1,0 +1,216 @@
+"""Results below a folder, sorted into what fits together and what stands apart."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sdimu_calibration.core.fleet.population import Measured, measured
+from sdimu_calibration.core.fleet.study import Candidates
+from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.results import Calibration
+from sdimu_calibration.storage.diagnosis_file import read_diagnosis
+from sdimu_calibration.storage.result_file import read_result
+from sdimu_calibration.storage.whole_file import RESULT
+
+DIAGNOSIS = "diagnosis.json"
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A result of a folder.
+
+    Attributes
+    ----------
+    name : str
+        Folder of the result, as seen from the folder that was asked for.
+    path : Path
+        Its folder.
+    result : Calibration
+    diagnosis : mapping or None
+        Content of diagnosis.json beside it.
+    """
+
+    name: str
+    path: Path
+    result: Calibration
+    diagnosis: dict[str, Any] | None
+
+    @property
+    def unit(self) -> str:
+        """Serial number; the name where nobody said one, so that it is a unit of its own."""
+        return self.result.origin.serial or self.name
+
+    @property
+    def kind(self) -> tuple[str, tuple[str, ...], str]:
+        """What must agree in a fleet: IMU, model (effects, sorted) and body frame."""
+        return self.result.origin.imu, tuple(sorted(self.result.model)), self.result.body_frame
+
+
+@dataclass(frozen=True)
+class Gathered:
+    """What a folder holds.
+
+    Attributes
+    ----------
+    entries : tuple of Entry
+        Of the type that most results are of, in the order of their dates.
+    apart : tuple of str
+        One line for every result that does not fit.
+    given : tuple of Entry
+        Results with diagnosis.json, of the IMU and body frame of `entries`, one a recording, whatever was found.
+    """
+
+    entries: tuple[Entry, ...]
+    apart: tuple[str, ...]
+    given: tuple[Entry, ...]
+
+
+def gather(folders: Sequence[Path]) -> Gathered:
+    """Find every result.json below some folders, and take those that fit together.
+
+    Parameters
+    ----------
+    folders : sequence of Path
+        Folders, or result.json files.
+
+    Raises
+    ------
+    DataError
+        When there is no result, or none that can be used.
+    """
+    apart: list[str] = []
+    usable = [entry for name, path in _found(folders) if (entry := _read(name, path, apart)) is not None]
+    if not usable:
+        why = f" ({apart[0]})" if apart else ""
+        raise DataError(f"{folders[0]}: no result.json that can be used below it{why}; make some: sdimu calibrate BAG")
+    kinds = [entry.kind for entry in usable]
+    main = max(dict.fromkeys(kinds), key=kinds.count)
+    entries: list[Entry] = []
+    for entry in sorted(usable, key=lambda e: (e.result.origin.start_ns, e.name)):
+        reason = _misfit(entry, main) or _repeats(entry, entries)
+        if reason:
+            apart.append(f"{entry.name}: {reason}")
+        else:
+            entries.append(entry)
+    return Gathered(tuple(entries), tuple(apart), _given(usable, main))
+
+
+def _given(usable: Sequence[Entry], main: tuple[str, tuple[str, ...], str]) -> tuple[Entry, ...]:
+    """Diagnosed results of an IMU and frame that began with the most usual model, one a recording."""
+    diagnosed = [e for e in usable if e.diagnosis is not None and (e.kind[0], e.kind[2]) == (main[0], main[2])]
+    models = [tuple((e.diagnosis or {}).get("fit", {}).get("before", {}).get("model", ())) for e in diagnosed]
+    usual = max(dict.fromkeys(models), key=models.count, default=())
+    out: list[Entry] = []
+    for entry, model in zip(diagnosed, models, strict=True):
+        if model == usual and not _repeats(entry, out):
+            out.append(entry)
+    return tuple(out)
+
+
+def _found(folders: Sequence[Path]) -> list[tuple[str, Path]]:
+    """Name and path of each result below some folders."""
+    out: dict[Path, str] = {}
+    for folder in folders:
+        if not folder.exists():
+            raise DataError(f"{folder}: no such file or folder")
+        for path in [folder] if folder.is_file() else sorted(folder.rglob(RESULT)):
+            inner = path.parent.relative_to(folder) if folder.is_dir() else Path(path.parent.name)
+            out.setdefault(path.resolve(), str(inner) if str(inner) != "." else folder.resolve().name)
+    return [(name, path) for path, name in out.items()]
+
+
+def _read(name: str, path: Path, apart: list[str]) -> Entry | None:
+    """Read a result; None, and a line in `apart`, where it must not be used."""
+    try:
+        result = read_result(path)
+        beside = path.parent / DIAGNOSIS
+        entry = Entry(name, path.parent, result, read_diagnosis(beside) if beside.is_file() else None)
+    except DataError as error:
+        apart.append(str(error))
+        return None
+    if result.not_to_be_trusted:
+        apart.append(f"{name}: not to be trusted: {result.not_to_be_trusted[0]}")
+        return None
+    if not (np.isfinite(result.values).all() and np.isfinite(np.diag(result.covariance)).all()):
+        apart.append(f"{name}: has a value or a covariance that is no number")
+        return None
+    return entry
+
+
+def _misfit(entry: Entry, main: tuple[str, tuple[str, ...], str]) -> str:
+    """Why a result does not fit to those of a kind; empty where it does."""
+    (imu, model, frame), (mine, own, my_frame) = main, entry.kind
+    if my_frame != frame:
+        return f"body frame is {my_frame}, of the others it is {frame}: calibrate with a model of that body_frame"
+    if mine != imu:
+        return f"IMU file is {mine or 'not known'}, of the others it is {imu or 'not known'}: state one --imu for all"
+    if own != model:
+        more, less = sorted({*own} - {*model}), sorted({*model} - {*own})
+        change = ", ".join([*(f"+ {name}" for name in more), *(f"- {name}" for name in less)])
+        return f"other model ({change}): calibrate all with one model (--model, --add)"
+    return ""
+
+
+def _repeats(entry: Entry, before: Sequence[Entry]) -> str:
+    """Which result is of the same recording; empty where none is."""
+    mine = entry.result
+    for other in before:
+        its = other.result
+        if mine.origin.start_ns and (
+            (mine.origin.start_ns, mine.data.get("samples"), mine.origin.serial, mine.origin.recording)
+            == (its.origin.start_ns, its.data.get("samples"), its.origin.serial, its.origin.recording)
+        ):
+            return f"is of the recording of {other.name}, which is counted"
+    return ""
+
+
+def as_measured(entries: Sequence[Entry]) -> Measured:
+    """Put results of one type into arrays, coefficients in the order of the first.
+
+    Raises
+    ------
+    DataError
+        When a coefficient is missing in one of them, or a number is not finite.
+    """
+    names = entries[0].result.names
+    values, covariances = [], []
+    for entry in entries:
+        result = entry.result
+        if sorted(result.names) != sorted(names):
+            raise DataError(f"{entry.name}: has other coefficients than {entries[0].name}")
+        order = [result.names.index(name) for name in names]
+        values.append(result.values[order])
+        covariances.append(result.covariance[np.ix_(order, order)])
+    starts = [entry.result.origin.start_ns for entry in entries]
+    dates = np.array([1e-9 * ns if ns else np.nan for ns in starts])
+    return measured(names, np.array(values), np.array(covariances), [entry.unit for entry in entries], dates)
+
+
+def candidates(entries: Sequence[Entry]) -> Candidates:
+    """Take the candidates alone from the diagnoses of units, one row a unit."""
+    known: dict[str, str] = {}
+    rows: dict[str, dict[str, list[tuple[float, float]]]] = {}
+    for entry in entries:
+        alone = (entry.diagnosis or {}).get("alone") or {}
+        columns = [alone.get(key, []) for key in ("labels", "display_units", "estimates", "sigmas")]
+        for label, unit, estimate, sigma in zip(*columns, strict=False):
+            if known.setdefault(str(label), str(unit)) == str(unit) and estimate is not None and sigma:
+                rows.setdefault(entry.unit, {}).setdefault(label, []).append((float(estimate), float(sigma)))
+    names = tuple(known)
+    table = np.full((2, len(rows), len(names)), np.nan)
+    for r, row in enumerate(rows.values()):
+        for k, name in enumerate(names):
+            if name in row:
+                table[:, r, k] = _mean(row[name])
+    return Candidates(names, tuple(known.values()), table[0], table[1])
+
+
+def _mean(pairs: Sequence[tuple[float, float]]) -> tuple[float, float]:
+    """Weighted mean of estimates and its sigma."""
+    weights = np.array([1.0 / sigma**2 for _, sigma in pairs])
+    return float(weights @ np.array([value for value, _ in pairs]) / weights.sum()), float(1.0 / np.sqrt(weights.sum()))
