@@ -176,4 +176,8 @@ def test_a_prior_of_zero_is_refused_by_every_estimate(tmp_path, prior):
     with pytest.raises(DataError, match=message):
         set_up(load_site("daejeon"), imu, load_model("baseline"))
     with pytest.raises(DataError, match=message):
-        solve(PreparedTest(Recording(0, np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3))), imu), load_model("hand"), "handheld")
+        solve(
+            PreparedTest(Recording(0, np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3))), imu),
+            load_model("hand"),
+            "handheld",
+        )

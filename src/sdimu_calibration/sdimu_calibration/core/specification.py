@@ -103,8 +103,8 @@ class ImuSpecification:
         for name, size in self.prior.items():
             if not size > 0.0:
                 raise DataError(
-                    f"IMU '{self.name}': prior.{name}: {size:g} leaves nothing to estimate (state one sigma above zero; "
-                    "without the line the prior is that of the grade)"
+                    f"IMU '{self.name}': prior.{name}: {size:g} leaves nothing to estimate (state one sigma above "
+                    "zero; without the line the prior is that of the grade)"
                 )
 
     def with_noise_times(self, gyro: float, accel: float) -> ImuSpecification:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -10,6 +11,7 @@ import typer
 
 from sdimu_calibration.cli.console import plain
 from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.units import parse_quantity
 
 EFFECT = "Hide an effect: what --add takes, =SIZE, such as 'accel_quadratic_x=20 ug/g^2'; repeatable."
 
@@ -19,6 +21,10 @@ NOISE = (
 )
 TEMPERATURE = "Temperature: profile (name or path), or that of a soak, such as '-20 degC'."
 
+TURN_ON = (
+    "Draw the biases of this power-on about those of the unit: gyro_bias='0.01 deg/h', accel_bias='20 ug'; repeatable."
+)
+
 
 def simulate(
     out: Annotated[Path, typer.Option(help="Bag (folder) to write.")],
@@ -27,6 +33,8 @@ def simulate(
         str | None, typer.Option(help="IMU that gives the true errors their size; dtg (handheld: mems_by_hand).")
     ] = None,
     site: Annotated[str, typer.Option(help="Site.")] = "daejeon",
+    unit: Annotated[int | None, typer.Option(help="Seed of the coefficients alone: recordings of one unit.")] = None,
+    turn_on: Annotated[list[str] | None, typer.Option(metavar="GROUP=SIGMA", help=TURN_ON)] = None,
     table: Annotated[str, typer.Option(help="Rate table.")] = "ideal",
     rate: Annotated[float, typer.Option(help="Sample rate of the IMU (Hz), 10 to 1000.")] = 100.0,
     seed: Annotated[int, typer.Option(help="Of coefficients, mount and noise.")] = 1,
@@ -74,6 +82,8 @@ def simulate(
         table=load_table(table),
         rate_hz=rate,
         seed=seed,
+        unit=unit,
+        turn_on=turn_on_sigmas(turn_on or ()),
         mount_rad=None if mount is None else mount_rad(mount),
         mount_max_rad=math.radians(mount_max),
         effects=effects,
@@ -85,6 +95,18 @@ def simulate(
     write_truth(truth_path, test.truth)
     count = len(test.samples.t)
     plain().print(f"{out}: {count} samples, {test.motion.t[-1]:.0f} s; truth in {truth_path}", soft_wrap=True)
+
+
+def turn_on_sigmas(texts: Sequence[str]) -> dict[str, float]:
+    """Read ``gyro_bias='0.01 deg/h'`` and the like into SI."""
+    units = {"gyro_bias": "deg/h", "accel_bias": "ug"}
+    out = {}
+    for text in texts:
+        group, equals, size = text.partition("=")
+        if not equals or group not in units:
+            raise DataError(f"--turn-on '{text}': expected gyro_bias='0.01 deg/h' or accel_bias='20 ug'")
+        out[group] = parse_quantity(size, units[group])
+    return out
 
 
 def mount_rad(text: str) -> tuple[float, float, float]:

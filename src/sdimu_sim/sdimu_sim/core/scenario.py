@@ -17,7 +17,7 @@ from sdimu_sim.core.mean_bias import mean_bias
 from sdimu_sim.core.platform import PlatformMotion
 from sdimu_sim.core.samples import SampleClock
 from sdimu_sim.core.temperature import TemperatureProfile, Thermometer
-from sdimu_sim.core.truth import DEFAULT_MAGNETIC_FIELD, ImuTruth, Truth, draw_coefficients, draw_mount
+from sdimu_sim.core.truth import DEFAULT_MAGNETIC_FIELD, ImuTruth, Truth, draw_coefficients, draw_mount, turned_on
 
 DEFAULT_START_NS = 1_700_000_000 * 10**9
 TABLE_LOG_HZ = 10.0
@@ -44,6 +44,10 @@ class Scenario:
     temperature : TemperatureProfile or None
     coefficients : mapping of str to float or None
         As built, SI; None draws them from the IMU's specification.
+    unit : int or None
+        Seed of the coefficients in place of `seed`: scenarios of one unit have the same.
+    turn_on : mapping of str to float
+        By group of coefficients, such as ``gyro_bias``, the sigma (SI) by which each of them differs in this power-on.
     extras : mapping
         Other attributes of `ImuTruth` (lever arm, quantisation ...).
     start_ns : int
@@ -62,6 +66,8 @@ class Scenario:
     noise: tuple[str, ...] = ()
     temperature: TemperatureProfile | None = None
     coefficients: Mapping[str, float] | None = None
+    unit: int | None = None
+    turn_on: Mapping[str, float] = field(default_factory=dict)
     extras: Mapping[str, object] = field(default_factory=dict)
     start_ns: int = DEFAULT_START_NS
 
@@ -75,9 +81,7 @@ def imu_truth(scenario: Scenario) -> ImuTruth:
     """Draw or take over the true sensor of a scenario."""
     mount = scenario.mount_rad
     truth = ImuTruth(
-        coefficients=draw_coefficients(scenario.imu, scenario.seed)
-        if scenario.coefficients is None
-        else dict(scenario.coefficients),
+        coefficients=_coefficients(scenario),
         mount_rad=draw_mount(scenario.mount_max_rad, scenario.seed) if mount is None else mount,
         gyro_white_noise=scenario.imu.gyro_white_noise,
         accel_white_noise=scenario.imu.accel_white_noise,
@@ -86,6 +90,13 @@ def imu_truth(scenario: Scenario) -> ImuTruth:
         magnetic_field=scenario.site.magnetic_field_t or DEFAULT_MAGNETIC_FIELD,
     )
     return with_hidden(replace(truth, **scenario.extras))  # type: ignore[arg-type]
+
+
+def _coefficients(scenario: Scenario) -> dict[str, float]:
+    """Coefficients in this power-on: those of the unit, and what it was switched on with."""
+    seed = scenario.seed if scenario.unit is None else scenario.unit
+    of_unit = draw_coefficients(scenario.imu, seed) if scenario.coefficients is None else dict(scenario.coefficients)
+    return turned_on(of_unit, scenario.turn_on, scenario.seed)
 
 
 def with_hidden(truth: ImuTruth) -> ImuTruth:

@@ -121,6 +121,33 @@ def draw_coefficients(imu: ImuSpecification, seed: int) -> dict[str, float]:
     }
 
 
+def turned_on(coefficients: Mapping[str, float], sigma: Mapping[str, float], seed: int) -> dict[str, float]:
+    """Draw how coefficients of a unit differ in one power-on.
+
+    Parameters
+    ----------
+    coefficients : mapping of str to float
+        Of the unit (SI).
+    sigma : mapping of str to float
+        By group, such as ``gyro_bias``, how far each of its coefficients differs (SI).
+    seed : int
+        Of the power-on.
+
+    Raises
+    ------
+    DataError
+        When there is no such group.
+    """
+    out = dict(coefficients)
+    for group, size in sigma.items():
+        if group not in _GROUPS:
+            raise DataError(f"turn-on of '{group}': expected one of {', '.join(_GROUPS)}")
+        for part in _GROUPS[group]:
+            name = f"{group}_{part}"
+            out[name] = out.get(name, 0.0) + size * float(child_rng(seed, f"turn-on {name}").standard_normal())
+    return out
+
+
 def draw_mount(limit_rad: float, seed: int) -> tuple[float, float, float]:
     """Draw a mount rotation vector, uniform up to a limit about every axis (rad)."""
     x, y, z = child_rng(seed, "mount").uniform(-limit_rad, limit_rad, 3)

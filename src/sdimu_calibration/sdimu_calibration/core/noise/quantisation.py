@@ -67,7 +67,9 @@ def with_quantisation(imu: ImuSpecification, recording: Recording) -> tuple[ImuS
         f"means over a second scatter more than '{imu.name}' says and average out faster than white noise: "
         f"quantisation or vibration of {in_words(**found)} (one sigma) is taken into account"
     )
-    return replace(imu, **found), note
+    gyro = found.get("gyro_quantisation", imu.gyro_quantisation)
+    accel = found.get("accel_quantisation", imu.accel_quantisation)
+    return replace(imu, gyro_quantisation=gyro, accel_quantisation=accel), note
 
 
 def in_words(gyro_quantisation: float = 0.0, accel_quantisation: float = 0.0) -> str:
