@@ -99,7 +99,9 @@ def simulate(
 
 def turn_on_sigmas(texts: Sequence[str]) -> dict[str, float]:
     """Read ``gyro_bias='0.01 deg/h'`` and the like into SI."""
-    units = {"gyro_bias": "deg/h", "accel_bias": "ug"}
+    from sdimu_sim.core.truth import COEFFICIENT_UNITS
+
+    units = {name.rpartition("_")[0]: unit for name, unit in COEFFICIENT_UNITS.items()}
     out = {}
     for text in texts:
         group, equals, size = text.partition("=")
