@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from sdimu_calibration.core.effects.effect import Effect
+from sdimu_calibration.core.evidence.candidate import OWN
 
 OF_RECORDING = "@"
 """Stands between a coefficient of one recording alone and the name of the recording."""
@@ -31,3 +32,8 @@ def is_local(effect: Effect) -> bool:
 def is_shared(effect: Effect) -> bool:
     """Whether an effect may be the same in all recordings: neither a fault of the data nor an event."""
     return effect.scope != "recording" and not _OF_ONE_TIME & effect.options.keys()
+
+
+def by_name(effect: Effect | str) -> Effect | str:
+    """Name an effect of the catalogue, so that another process knows it; one of the user's own stands for itself."""
+    return effect if isinstance(effect, str) or effect.file or effect.title == OWN else effect.key

@@ -12,7 +12,7 @@ from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.effects.selection import resolve
 from sdimu_calibration.core.estimation.handheld_fit import HandheldFit
 from sdimu_calibration.core.estimation.second_order_fit import SecondOrderFit
-from sdimu_calibration.core.estimation.solve import AUTO
+from sdimu_calibration.core.estimation.solve import AUTO, with_effects
 from sdimu_calibration.core.joint.combine import (
     Combination,
     Component,
@@ -22,7 +22,7 @@ from sdimu_calibration.core.joint.combine import (
     stacked,
 )
 from sdimu_calibration.core.joint.member import Job, Member, Report
-from sdimu_calibration.core.joint.scope import split_tag
+from sdimu_calibration.core.joint.scope import by_name, split_tag
 from sdimu_calibration.core.joint.turn_on import turn_on_scatter
 from sdimu_calibration.core.progress import Progress, silent
 from sdimu_calibration.core.recording import DataError
@@ -152,6 +152,8 @@ def fit_set(
         When the recordings are of several units, or none can be used.
     """
     check_members(members)
+    bare = replace(options.model, effects=())
+    options = replace(options, model=with_effects(bare, [by_name(e) for e in options.model.effects]))
     progress("recordings", 0.1)
     jobs = [job_of(member, options, before) for member in members]
     done = run(jobs)

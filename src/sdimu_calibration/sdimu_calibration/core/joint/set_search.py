@@ -20,9 +20,9 @@ from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.effects.imu_model import prior_size
 from sdimu_calibration.core.estimation.handheld_fit import HandheldFit
 from sdimu_calibration.core.estimation.solve import with_effects
-from sdimu_calibration.core.evidence.candidate import OWN, Candidate, split
+from sdimu_calibration.core.evidence.candidate import Candidate, split
 from sdimu_calibration.core.joint.member import Job, Member, Report
-from sdimu_calibration.core.joint.scope import is_shared, split_tag
+from sdimu_calibration.core.joint.scope import by_name, is_shared, split_tag
 from sdimu_calibration.core.joint.set_evidence import SetEvidence, set_evidence, white_power_on
 from sdimu_calibration.core.joint.set_fit import Run, SetFit, SetOptions, fit_set, power_on
 from sdimu_calibration.core.probability import normal_limit
@@ -141,7 +141,7 @@ def search_set(
             options = replace(options, local=own)
         else:
             chosen |= {c.label: c for c in new}
-            options = replace(options, model=with_effects(options.model, [_as_named(c) for c in new]))
+            options = replace(options, model=with_effects(options.model, [by_name(c.effect) for c in new]))
         fit = fit_set(members, options, run, fit, progress)
     if first is None:
         raise AssertionError("a search has one round at least")
@@ -150,12 +150,6 @@ def search_set(
         before, fit, tuple(kept.values()), tuple(scores.get(label, float("nan")) for label in kept), alike,
         tuple(local), first.threshold, first,
     )  # fmt: skip
-
-
-def _as_named(candidate: Candidate) -> str | Effect:
-    """Name an effect of the catalogue; one of the user's own stands for itself."""
-    known = candidate.family != "own" and not candidate.effect.file
-    return candidate.label if known else candidate.effect  # type: ignore[return-value]
 
 
 def _candidates(fit: SetFit, extra: Sequence[Effect], finer: Sequence[Effect]) -> list[Effect]:
@@ -177,7 +171,7 @@ def _candidates(fit: SetFit, extra: Sequence[Effect], finer: Sequence[Effect]) -
 
 def _gathered(fit: SetFit, tried: Sequence[Effect], run: Run) -> SetFit:
     """Return the fit with the signatures of effects in its reports."""
-    effects = tuple(e if e.file or e.title == OWN else e.key for e in tried)
+    effects = tuple(map(by_name, tried))
     jobs = [
         Job(
             member, fit.model, report.estimator, tuple(fit.local.get(member.name, ())), effects, True,
@@ -306,7 +300,7 @@ def _without_small(
             break
         dropped = chosen[weakest]
         chosen = {label: c for label, c in chosen.items() if label != weakest}
-        effects = tuple(e for e in options.model.effects if e != _as_named(dropped))
+        effects = tuple(e for e in options.model.effects if e != by_name(dropped.effect))
         options = replace(options, model=replace(options.model, effects=effects))
         fit = fit_set(members, options, run, fit, progress)
     return fit, chosen
