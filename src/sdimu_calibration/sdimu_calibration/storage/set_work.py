@@ -18,7 +18,7 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
-from sdimu_calibration.core.joint.member import Job, Report, run
+from sdimu_calibration.core.joint.member import Job, Report, tried
 from sdimu_calibration.core.joint.set_fit import Run
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage.config import load_imu, load_site
@@ -79,17 +79,10 @@ def _one_thread() -> None:
         os.environ[name] = "1"
 
 
-def _tried(job: Job) -> Report | DataError:
-    try:
-        return run(job)
-    except DataError as error:
-        return error
-
-
 def _here(jobs: Sequence[Job], told: Told | None) -> list[Report | DataError]:
     done: list[Report | DataError] = []
     for job in jobs:
-        done.append(_tried(job))
+        done.append(tried(job))
         if told:
             told(len(done), len(jobs))
     return done
@@ -99,7 +92,7 @@ def _in_pool(pool: ProcessPoolExecutor, jobs: Sequence[Job], told: Told | None) 
     if any(not isinstance(e, str) for job in jobs for e in (*job.candidates, *job.model.effects)):
         # An effect of the user's own is a function, which no other process knows.
         return _here(jobs, told)
-    places = {pool.submit(_tried, job): k for k, job in enumerate(jobs)}
+    places = {pool.submit(tried, job): k for k, job in enumerate(jobs)}
     found: dict[int, Report | DataError] = {}
     for future in as_completed(places):
         found[places[future]] = future.result()
@@ -110,7 +103,7 @@ def _in_pool(pool: ProcessPoolExecutor, jobs: Sequence[Job], told: Told | None) 
 
 def _from_cluster(on_cluster: Any, jobs: Sequence[Job], told: Told | None) -> list[Report | DataError]:
     found: dict[str, Report | DataError] = {}
-    for job, result in on_cluster(_tried, jobs):
+    for job, result in on_cluster(tried, jobs):
         # The text of an error stands for a job whose worker was lost.
         found[job.member.name] = DataError(f"{job.member.name}: {result}") if isinstance(result, str) else result
         if told:

@@ -279,6 +279,44 @@ def many(
 
 
 @app.command()
+def sets(
+    out: Annotated[Path, typer.Option(help="Folder of runs and sets.json.")] = Path("out/study-sets"),
+    runs: Annotated[int, typer.Option("-n", min=1, help="Sets of each kind.")] = 20,
+    seed: Annotated[int, typer.Option(help="First seed.")] = 71_001,
+    kind: Annotated[list[str] | None, typer.Option(help="weak, clean, class, turn-on; repeatable. All.")] = None,
+    imu: Annotated[str, typer.Option(help="IMU file.")] = "dtg",
+    workers: Annotated[int, typer.Option(min=1, help="Processes.")] = 2,
+) -> None:
+    """Fit and diagnose sets of recordings of one unit."""
+    from functools import partial
+
+    from rich.box import SIMPLE
+    from rich.table import Table
+
+    from sdimu_calibration.cli.progress import bar
+    from sdimu_calibration.core.recording import DataError
+    from sdimu_calibration.storage.json_file import write_json
+    from sdimu_sim.campaign.campaign import run_campaign
+    from sdimu_sim.campaign.set_page import headings, line
+    from sdimu_sim.campaign.set_run import KINDS, SetRun
+
+    unknown = [k for k in kind or [] if k not in KINDS]
+    if unknown:
+        raise DataError(f"--kind {unknown[0]}: expected one of {', '.join(KINDS)}")
+    console, seeds, results = plain(), range(seed, seed + runs), {}
+    for name in kind or KINDS:
+        with bar(console) as progress:
+            tell = partial(_named, progress, name)
+            results[name] = run_campaign(SetRun(name, imu), seeds, out / name, workers=workers, progress=tell)
+    write_json(out / "sets.json", results)
+    table = Table(*headings(), box=SIMPLE)
+    for name, rows in results.items():
+        table.add_row(*line(name, rows))
+    console.print(table)
+    console.print(f"results in {out}", soft_wrap=True)
+
+
+@app.command()
 def hand(
     out: Annotated[Path, typer.Option(help="Folder of runs and hand.json.")] = Path("out/study-hand"),
     runs: Annotated[int, typer.Option("-n", min=1, help="Clean runs, and as many with a hidden effect.")] = 100,

@@ -147,6 +147,14 @@ def run(job: Job) -> Report:
         raise DataError(f"{job.member.name}: {error}") from error
 
 
+def tried(job: Job) -> Report | DataError:
+    """Do a job; give the reason where the recording cannot be used."""
+    try:
+        return run(job)
+    except DataError as error:
+        return error
+
+
 def fitted(job: Job) -> Fit:
     """Fit the recording of a job.
 
