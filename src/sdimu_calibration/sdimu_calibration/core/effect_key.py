@@ -169,6 +169,5 @@ def effect_of(name: str, model: Sequence[str]) -> str:
 
     What stands in brackets behind an effect (a time constant) is no part of its coefficients' names.
     """
-    stems = {effect: effect.partition("(")[0] for effect in model}
-    fits = [effect for effect, stem in stems.items() if name == stem or name.startswith(f"{stem}_")]
+    fits = [effect for effect in model if f"{name}_".startswith(f"{effect.partition('(')[0]}_")]
     return max(fits, key=len) if fits else name

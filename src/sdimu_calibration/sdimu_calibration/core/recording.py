@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -155,7 +156,7 @@ class Recording:
     rejected: int = 0
     notes: tuple[str, ...] = field(default=())
 
-    @property
+    @cached_property
     def interval_s(self) -> float:
         """Nominal sample interval (s): the median of the stamp differences."""
         return float(np.median(np.diff(self.t)))

@@ -14,6 +14,7 @@ import math
 import re
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import lru_cache
 
 from sdimu_calibration.core.plain_text import one_line
 
@@ -82,6 +83,7 @@ class Unit:
     dimension: tuple[tuple[str, Fraction], ...]
 
 
+@lru_cache(maxsize=1024)
 def parse_unit(text: str) -> Unit:
     """Read a unit such as ``deg/h/sqrt(Hz)``.
 

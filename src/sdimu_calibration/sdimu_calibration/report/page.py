@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from html import escape
 from pathlib import Path
 from typing import Any
@@ -84,11 +85,12 @@ def page(
     draw = _Drawing()
     more = more or ReportExtras()
     handheld = summary is not None and summary.diagnosis.fit.learns_scatter
-    parts = [] if summary is None else _evidence(summary, more, draw)
+    shown = None if summary is None or handheld else _Shown.of(summary.diagnosis)
+    parts = [] if summary is None else _evidence(summary, shown, more, draw)
     parts += [] if calibration.of_set is None else set_sections(calibration, calibration.of_set, draw)
     parts.append(_coefficients(calibration, truth, reference))
     parts += [rests_section(calibration.rests)] if calibration.rests else []
-    parts += [] if summary is None or handheld else _residuals(summary.diagnosis, more, draw)
+    parts += [] if summary is None or shown is None else _residuals(summary.diagnosis, shown, more, draw)
     if len(calibration.history.t):
         remark = quiet("Closed-loop pass. Grey: the table turns, no measurements.")
         parts.append(section("Sigma of every coefficient against time", remark, draw(sigma_history(calibration))))
@@ -111,25 +113,37 @@ def page(
     )  # fmt: skip
 
 
-def _evidence(summary: DiagnosisSummary, more: ReportExtras, draw: Draw) -> list[str]:
+@dataclass(frozen=True)
+class _Shown:
+    """Numbers of a diagnosis by navigation that several parts of the page show."""
+
+    candidates: list[data.Scored]
+    residuals: data.Residuals
+
+    @classmethod
+    def of(cls, diagnosis: Diagnosis) -> _Shown:
+        return cls(data.scored(diagnosis), data.residuals(diagnosis))
+
+
+def _evidence(summary: DiagnosisSummary, shown: _Shown | None, more: ReportExtras, draw: Draw) -> list[str]:
     """Tell what is missing and where it shows."""
     diagnosis = summary.diagnosis
-    if diagnosis.fit.learns_scatter:
+    if shown is None:
         return handheld_sections.evidence(summary, draw)
     return [
         sections.ladder(diagnosis, draw),
         sections.refits(diagnosis.rungs),
-        sections.missing(diagnosis, data.scored(diagnosis), draw),
-        sections.where(diagnosis, data.residuals(diagnosis), draw),
+        sections.missing(diagnosis, shown.candidates, draw),
+        sections.where(diagnosis, shown.residuals, draw),
         in_use(more, draw),
     ]
 
 
-def _residuals(diagnosis: Diagnosis, more: ReportExtras, draw: Draw) -> list[str]:
+def _residuals(diagnosis: Diagnosis, shown: _Shown, more: ReportExtras, draw: Draw) -> list[str]:
     """Show the data themselves, and tell what they could have shown."""
     return [
-        sections.residuals(diagnosis, data.residuals(diagnosis), more, draw),
-        sections.smallest(data.scored(diagnosis)),
+        sections.residuals(diagnosis, shown.residuals, more, draw),
+        sections.smallest(shown.candidates),
     ]
 
 

@@ -45,20 +45,33 @@ def read_json(path: Path, expected_format: str) -> dict[str, Any]:
 
 def _text(content: Any, margin: str) -> str:
     """JSON of `content`; `margin` begins each of its lines but the first."""
-    if isinstance(content, np.ndarray):
-        content = content.tolist()
     deeper = margin + " "
     if isinstance(content, dict) and content:
-        entries = [f"{json.dumps(str(key))}: {_text(value, deeper)}" for key, value in content.items()]
+        entries = [f"{_line(str(key))}: {_text(value, deeper)}" for key, value in content.items()]
         return f"{{{deeper}{f',{deeper}'.join(entries)}{margin}}}"
-    if isinstance(content, list | tuple):
-        if any(isinstance(value, dict | list | tuple | np.ndarray) for value in content):
-            return f"[{deeper}{f',{deeper}'.join(_text(value, deeper) for value in content)}{margin}]"
-        try:
-            return json.dumps(content, allow_nan=False)
-        except (TypeError, ValueError):
-            content = [_plain(value) for value in content]
-    return json.dumps(_plain(content), allow_nan=False)
+    if _is_table(content):
+        return f"[{deeper}{f',{deeper}'.join(_text(value, deeper) for value in content)}{margin}]"
+    return _line(content.tolist() if isinstance(content, np.ndarray) else content)
+
+
+def _is_table(content: Any) -> bool:
+    """Whether there are lists or objects among the entries of a list."""
+    if isinstance(content, np.ndarray):
+        return content.ndim > 1 and len(content) > 0
+    return isinstance(content, list | tuple) and any(isinstance(value, _NESTED) for value in content)
+
+
+_NESTED = (dict, list, tuple, np.ndarray)
+_STRICT = json.JSONEncoder(allow_nan=False)
+
+
+def _line(content: Any) -> str:
+    """JSON on one line."""
+    try:
+        return _STRICT.encode(content)
+    except (TypeError, ValueError):
+        plain = [_plain(value) for value in content] if isinstance(content, list | tuple) else _plain(content)
+        return _STRICT.encode(plain)
 
 
 def _plain(value: Any) -> Any:

@@ -195,8 +195,15 @@ def _noiseless(x: Floats) -> bool:
     """Whether a channel has no noise to speak of, as a perfect simulation: what repeats in it is no fault."""
     if len(x) < 3:
         return True
-    second = np.abs(x[1:-1] - 0.5 * (x[:-2] + x[2:]))
-    return float(np.median(second)) < _PERFECT * float(np.abs(x).max())
+    second, limit = _bend(x), _PERFECT * float(np.abs(x).max())
+    # Counting is quicker than a median, which only a tie needs.
+    below = 2 * int(np.count_nonzero(second < limit))
+    return below > len(second) if below != len(second) else float(np.median(second)) < limit
+
+
+def _bend(x: Floats) -> Floats:
+    """Distance of each sample but the first and the last from the line between its neighbours."""
+    return np.asarray(np.abs(x[1:-1] - 0.5 * (x[:-2] + x[2:])))
 
 
 def _spikes(x: Floats) -> Ints:
@@ -206,18 +213,21 @@ def _spikes(x: Floats) -> Ints:
         return rows[:0]
     # One spike may hide another beside it: what is left is looked through again.
     for _round in range(_ROUNDS):
-        at = np.union1d(_stand_out(x[rows], 1), _stand_out(x[rows], 2))
+        left = x if len(rows) == len(x) else x[rows]
+        size = np.concatenate([[0.0], _bend(left), [0.0]])
+        sigma = _GAUSS_MAD * float(np.median(size))
+        at = np.union1d(_stand_out(left, size, sigma, 1), _stand_out(left, size, sigma, 2))
         if not len(at):
             break
         rows = np.delete(rows, at)
     return np.setdiff1d(np.arange(len(x)), rows, assume_unique=True)
 
 
-def _stand_out(x: Floats, width: int) -> Ints:
-    """Find `width` neighbouring samples that all stand off the line between the samples before and after them."""
-    size = np.zeros_like(x)
-    size[1:-1] = np.abs(x[1:-1] - 0.5 * (x[:-2] + x[2:]))
-    sigma = _GAUSS_MAD * float(np.median(size))
+def _stand_out(x: Floats, size: Floats, sigma: float, width: int) -> Ints:
+    """Find `width` neighbouring samples that all stand off the line between the samples before and after them.
+
+    `size` (n,) is that distance of each sample alone, `sigma` what it usually is.
+    """
     if sigma == 0.0:
         return np.empty(0, dtype=np.int64)
     last = len(x) - width - 1

@@ -34,7 +34,6 @@ from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.estimation.solve import AUTO, solve
 from sdimu_calibration.core.evidence.candidate import Candidate
 from sdimu_calibration.core.evidence.consistency import Consistency
-from sdimu_calibration.core.evidence.learned_noise import Wander
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.evidence.navigation_evidence import NavigationEvidence
 from sdimu_calibration.core.noise_term import DRAWN
@@ -204,7 +203,7 @@ def climb(
     if noise:
         fit = solve(fit.test.with_imu(imu), fit.model, fit.estimator, progress=progress, learn=False)
     fit = in_white_noise(fit)
-    wander = None if fit.learns_scatter else Wander.of(fit.evidence())
+    wander = None if fit.learns_scatter else fit.wander
     request = Request(fit, tuple(extra), alpha, wander, frozenset(without))
     done = search_until_stable(request, progress)
     final = in_doubt(fit, done.fit, done.evidence, done.found.chosen, done.free, done.found.scale)

@@ -55,26 +55,25 @@ def _unbalance_places(power: str = "") -> dict[str, tuple[int, int, float]]:
 
 
 def _matrix(places: dict[str, tuple[int, int, float]], names: Sequence[str], values: Floats) -> Floats:
-    """Error matrix (3, 3) of coefficients (p,): those without a name here are zero."""
-    E = np.zeros((3, 3))
+    """Error matrices (..., 3, 3) of coefficients (..., p): those without a name here are zero."""
+    E = np.zeros((*values.shape[:-1], 3, 3))
     for name, (row, column, sign) in places.items():
         if name in names:
-            E[row, column] = sign * values[list(names).index(name)]
+            E[..., row, column] = sign * values[..., names.index(name)]
     return E
 
 
 def _read_back(E: Floats, places: dict[str, tuple[int, int, float]], names: Sequence[str], values: Floats) -> None:
-    """Put the elements of an error matrix (3, 3) into the coefficients (p,) that have a name here, in place."""
+    """Put the elements of error matrices (..., 3, 3) into the coefficients (..., p) that have a name here, in place."""
     for name, (row, column, sign) in places.items():
         if name in names:
-            values[list(names).index(name)] = sign * E[row, column]
+            values[..., names.index(name)] = sign * E[..., row, column]
 
 
-def _turn_to_triad(M: Floats) -> Floats:
-    """Rotation R for which ``M @ R.T`` is lower triangular with a positive diagonal."""
-    Q, U = np.linalg.qr(M.T)
-    sign = np.sign(np.diag(U))
-    return np.asarray((Q * sign).T)
+def _turned_to_triad(M: Floats) -> Floats:
+    """Transpose R' of the rotation for which ``M R'`` (..., 3, 3) is lower triangular with a positive diagonal."""
+    Q, U = np.linalg.qr(np.swapaxes(M, -1, -2))
+    return np.asarray(Q * np.sign(np.diagonal(U, axis1=-2, axis2=-1))[..., None, :])
 
 
 def values_in_frame(names: Sequence[str], values: Floats, frame: str) -> Floats:
@@ -86,14 +85,14 @@ def values_in_frame(names: Sequence[str], values: Floats, frame: str) -> Floats:
     Parameters
     ----------
     names : sequence of str, length p
-    values : ndarray, shape (p,)
+    values : ndarray, shape (..., p)
         In the frame of the prior, SI.
     frame : str
         One of `FRAMES`.
 
     Returns
     -------
-    ndarray, shape (p,)
+    ndarray, shape (..., p)
         In `frame`, SI. Coefficients other than scale, misalignment and mass unbalance, their polynomials, and what the
         gyros see of a frame that turns with the temperature are as given.
 
@@ -104,45 +103,44 @@ def values_in_frame(names: Sequence[str], values: Floats, frame: str) -> Floats:
     """
     _check(frame)
     given = np.asarray(values, dtype=float)
-    out = np.array(given)
+    out = given.copy()
     if frame == "prior" or not set(pinned_names()) <= set(names):
         return out
-    R = _turn_to_triad(np.eye(3) + _matrix(_places("accel"), names, given))
+    back = _turned_to_triad(np.eye(3) + _matrix(_places("accel"), names, given))
     for triad in ("accel", "gyro"):
         places = _places(triad)
-        M = np.eye(3) + _matrix(places, names, given)
-        _read_back(M @ R.T - np.eye(3), places, names, out)
+        _read_back((np.eye(3) + _matrix(places, names, given)) @ back - np.eye(3), places, names, out)
     unbalance = _unbalance_places()
-    _read_back(_matrix(unbalance, names, given) @ R.T, unbalance, names, out)
+    _read_back(_matrix(unbalance, names, given) @ back, unbalance, names, out)
     for power in _turning_powers(names):
-        _turn_power(power, names, given, R, out)
+        _turn_power(power, names, given, back, out)
     return out
 
 
-def _turn_power(power: str, names: Sequence[str], given: Floats, R: Floats, out: Floats) -> None:
-    """Put the coefficients (p,) of a power of the temperature into the accelerometers' frame, in place in `out`.
+def _turn_power(power: str, names: Sequence[str], given: Floats, back: Floats, out: Floats) -> None:
+    """Put the coefficients (..., p) of a power of the temperature into the accelerometers' frame, in place in `out`.
 
     ``R(T)' = R' (I + [theta x] (T - T0)^n)`` with the theta that leaves the power's part of ``M_a(T) R(T)'`` lower
     triangular. `out` has the parts that do not depend on temperature in that frame already.
     """
     M_a, M_g = (np.eye(3) + _matrix(_places(triad), names, out) for triad in ("accel", "gyro"))
-    moved = _matrix(_places("accel", power), names, given) @ R.T
-    crosses = [skew(axis) for axis in np.eye(3)]
-    upper = np.triu_indices(3, 1)
-    columns = np.column_stack([(M_a @ C)[upper] for C in crosses])
-    theta: Floats = -np.linalg.solve(columns, moved[upper]).astype(np.float64)
-    turn = skew(theta)
+    moved = _matrix(_places("accel", power), names, given) @ back
+    crosses = np.array([skew(axis) for axis in np.eye(3)])
+    row, column = np.triu_indices(3, 1)
+    columns = np.stack([(M_a @ C)[..., row, column] for C in crosses], axis=-1)
+    theta = -np.linalg.solve(columns, moved[..., row, column][..., None])[..., 0]
+    turn = np.einsum("...k,kij->...ij", theta, crosses)
     unbalance = _unbalance_places()
     for places, constant in (
         (_places("accel", power), M_a), (_places("gyro", power), M_g),
         (_unbalance_places(power), _matrix(unbalance, names, out)),
     ):  # fmt: skip
-        _read_back(_matrix(places, names, given) @ R.T + constant @ turn, places, names, out)
+        _read_back(_matrix(places, names, given) @ back + constant @ turn, places, names, out)
     if power == _BY_TEMPERATURE[0]:
-        for i, seen in enumerate(M_g @ theta):
-            name = f"{_SEEN_AS_BIAS}_{'xyz'[i]}"
-            if name in names:
-                out[list(names).index(name)] -= seen
+        seen = np.einsum("...ij,...j->...i", M_g, theta)
+        for i, axis in enumerate("xyz"):
+            if f"{_SEEN_AS_BIAS}_{axis}" in names:
+                out[..., list(names).index(f"{_SEEN_AS_BIAS}_{axis}")] -= seen[..., i]
 
 
 def frame_jacobian(names: Sequence[str], frame: str) -> Floats:
@@ -223,12 +221,9 @@ def jacobian_at(names: Sequence[str], values: Floats, frame: str) -> Floats:
         When the frame has no such name.
     """
     values = np.asarray(values, dtype=float)
-    J = np.empty((len(values), len(values)))
-    for j in range(len(values)):
-        step = np.zeros(len(values))
-        step[j] = _STEP
-        ahead = values_in_frame(names, values + step, frame)
-        J[:, j] = (ahead - values_in_frame(names, values - step, frame)) / (2.0 * _STEP)
+    steps = _STEP * np.eye(len(values))
+    ahead, behind = (values_in_frame(names, values + sign * steps, frame) for sign in (1.0, -1.0))
+    J = (ahead - behind).T / (2.0 * _STEP)
     if pinned_in(names, frame):
         J[[list(names).index(name) for name in pinned_in(names, frame)]] = 0.0  # by definition; rounding leaves 1e-11
     return J

@@ -36,7 +36,7 @@ _OVER_TIME = frozenset({Excitation.REPEATED_ATTITUDES})
 
 
 def _columns(values: Floats) -> Floats:
-    return values[:, None].repeat(3, axis=1)
+    return np.broadcast_to(values[:, None], (len(values), 3))
 
 
 def _time(motion: Motion) -> Floats:

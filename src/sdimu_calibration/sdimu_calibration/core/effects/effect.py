@@ -7,7 +7,7 @@ making several of them.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from typing import Any, Literal
@@ -195,7 +195,7 @@ class Effect:
             family=self.family or self.name,
             parameters=tuple(self.parameters[i] for i in kept),
             terms=tuple(Term(self.terms[c].channel, kept.index(self.terms[c].parameter)) for c in columns),
-            regressors=lambda motion: whole(motion)[:, columns],
+            regressors=whole.only(columns) if isinstance(whole, _Columns) else lambda motion: whole(motion)[:, columns],
         )
 
     @property
@@ -237,6 +237,19 @@ class Timetable:
 Column = Callable[[Motion], Floats]
 
 
+@dataclass(frozen=True)
+class _Columns:
+    """Regressors (n, m) that are made column by column, so that a few of them cost a few."""
+
+    functions: tuple[Column, ...]
+
+    def __call__(self, motion: Motion) -> Floats:
+        return np.column_stack([f(motion) for f in self.functions])
+
+    def only(self, columns: Sequence[int]) -> _Columns:
+        return _Columns(tuple(self.functions[c] for c in columns))
+
+
 def family(
     stem: str,
     title: str,
@@ -260,7 +273,6 @@ def family(
     more
         Other attributes of `Effect`.
     """
-    functions = [column for _, column in columns.values()]
     si, display = units
     factor = to_si(1.0, display)
     return Effect(
@@ -269,7 +281,7 @@ def family(
         equation=equation,
         parameters=tuple(Parameter(f"{stem}_{suffix}", si, display) for suffix in columns),
         terms=tuple(Term(channel, i) for i, (channel, _) in enumerate(columns.values())),
-        regressors=lambda motion: np.column_stack([f(motion) for f in functions]),
+        regressors=_Columns(tuple(column for _, column in columns.values())),
         prior=dict(zip(("navigation", "tactical", "mems"), (factor * v for v in prior), strict=True)),
         **more,
     )

@@ -173,9 +173,7 @@ class FilterFit(NavigationFit):
         out = self.solution.first.output
         J = body_frame.frame_jacobian(self.names, self.body_frame)
         rows = np.arange(0, len(self.prepared.epochs), out.stride)
-        values = np.array(
-            [body_frame.values_in_frame(self.names, self.centring @ v, self.body_frame) for v in out.estimate[rows]]
-        )
+        values = body_frame.values_in_frame(self.names, out.estimate[rows] @ self.centring.T, self.body_frame)
         J = J @ self.centring
         return self._rows_of_history(rows, out, values, J @ out.covariance[: len(rows)] @ J.T)
 

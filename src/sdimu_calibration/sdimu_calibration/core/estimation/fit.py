@@ -16,6 +16,7 @@ from sdimu_calibration.core.effects.imu_model import ImuModel
 from sdimu_calibration.core.estimation.free_inertial import FreeInertialRun
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.evidence.consistency import Consistency
+from sdimu_calibration.core.evidence.learned_noise import Wander
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.noise_term import NoiseTerm
 from sdimu_calibration.core.recording import DataFault, TemperatureLog
@@ -271,6 +272,11 @@ class Fit(ABC):
             As the attribute `doubt`.
         """
         return replace(self, doubt=doubt)
+
+    @cached_property
+    def wander(self) -> Wander:
+        """How wandering biases of the sensors would show in the test."""
+        return Wander.of(self.evidence())
 
     @property
     def has_temperature(self) -> bool:

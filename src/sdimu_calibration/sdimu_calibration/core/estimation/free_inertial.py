@@ -26,6 +26,7 @@ from sdimu_calibration.core.measurement_kind import SENSORS, SKIP
 from sdimu_calibration.core.navigation.strapdown import Cycles, navigate_cycle, velocity_increment
 from sdimu_calibration.core.rotation import rotation_vector
 from sdimu_calibration.core.second_order.second_order_passes import SecondOrderPass, firm_setup, second_order_pass
+from sdimu_calibration.core.side_by_side import side_by_side
 
 NOTHING = "no compensation"
 _WIDE_LEVEL = 1e-2
@@ -189,7 +190,8 @@ def free_inertial_runs(
     DataError
         When there is no such segment, or the rest of the recording cannot be calibrated.
     """
-    return tuple(_run(prepared, fits, reference, segment) for segment in holdout_segments(prepared, wanted_s))
+    segments = holdout_segments(prepared, wanted_s)
+    return tuple(side_by_side(lambda segment: _run(prepared, fits, reference, segment), segments))
 
 
 def _run(
@@ -225,28 +227,33 @@ def refit(fit: Navigator, seen: PreparedData, C_nb: Floats) -> Refit:
         When the part cannot be calibrated.
     """
     alignment = first_attitude(seen.epochs, seen.phases, fit.setup)
-    estimate, before = fit.estimate, np.inf
+    estimate, before, near = fit.estimate, np.inf, None
     for count in range(_MOST_PASSES):
-        done = _one_pass(fit, seen, alignment, C_nb, estimate)
+        done = _one_pass(fit, seen, alignment, C_nb, estimate, near)
         moved = float(np.max(np.abs(done.estimate - estimate) / np.sqrt(np.diag(done.covariance))))
         # The first movement also holds what the part does not know of the whole: of at most a sigma, a share is left.
         if count and moved**2 < CONVERGED * min(before, 1.0):
             return Refit(fit, done.estimate, done.covariance)
-        estimate, C_nb, before = done.estimate, done.smoothed_start, moved
+        estimate, C_nb, before, near = done.estimate, done.smoothed_start, moved, done.data.values
     own = fit.on(seen, C_nb)
     return Refit(own, own.estimate, own.estimate_covariance)
 
 
 def _one_pass(
-    fit: Navigator, seen: PreparedData, alignment: Alignment, C_nb: Floats, estimate: Floats
+    fit: Navigator, seen: PreparedData, alignment: Alignment, C_nb: Floats, estimate: Floats, near: Floats | None
 ) -> Pass | SecondOrderPass:
-    """Make one pass, of the kind that the fit makes, from an attitude (3, 3) and coefficients (q,)."""
+    """Make one pass, of the kind that the fit makes, from an attitude (3, 3) and coefficients (q,).
+
+    `near` (n, m) are the regressors of the pass before, where there is one.
+    """
     setup = fit.setup
     if isinstance(fit.last, SecondOrderPass):
         return second_order_pass(seen, firm_setup(setup), alignment, C_nb, estimate)
     # What fades is known at the end of a pass, not at the start of the next one.
     constant = setup.sensors.decay_rate == 0.0
-    return one_pass(seen, setup, alignment, np.ascontiguousarray(C_nb), estimate * constant, closed_loop=False)
+    return one_pass(
+        seen, setup, alignment, np.ascontiguousarray(C_nb), estimate * constant, closed_loop=False, near=near
+    )
 
 
 def free_navigation(

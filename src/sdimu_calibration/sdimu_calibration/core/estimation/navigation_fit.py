@@ -43,6 +43,7 @@ from sdimu_calibration.core.results import History
 from sdimu_calibration.core.second_order.second_order_passes import (
     SecondOrderPass,
 )
+from sdimu_calibration.core.side_by_side import side_by_side
 
 HELD_OUT_FOLDS = 3
 """Number of interleaved groups of stops, each held out once: two thirds of the stops are then in every fit."""
@@ -51,7 +52,7 @@ _ABSURD = 1e3
 _MISFIT = 1.2
 """NIS per degree of freedom, and held-out error (sigma), from which a user is warned: 1 is right, and chance stays
 within a few per cent of it."""
-_OF_THE_PASSES = {"known", "timetable", "centring", "_drifts", "_share_of_rest"}
+_OF_THE_PASSES = {"known", "timetable", "wander", "centring", "_drifts", "_share_of_rest"}
 """Cached properties that neither noise nor doubt changes."""
 NO_FIELD = (
     "the site states no magnetic field: that of mid-northern latitudes is assumed; state magnetic_field_nt (north, "
@@ -265,14 +266,11 @@ class NavigationFit(Fit):
         `HELD_OUT_FOLDS` interleaved groups. None when there are fewer than two stops.
         """
         stops = np.unique(self.prepared.phases.stop[self.prepared.kind > 0])
-        total, count = 0.0, 0
-        for fold in range(HELD_OUT_FOLDS):
-            out = np.isin(self.prepared.phases.stop, stops[1:][fold::HELD_OUT_FOLDS]) & (self.prepared.kind > 0)
-            if out.any():
-                white = self.predict(out)[out]
-                total += float(np.nansum(white**2))
-                count += int(np.isfinite(white).sum())
-        return float(np.sqrt(total / count)) if count else None
+        folds = [np.isin(self.prepared.phases.stop, stops[1:][fold::HELD_OUT_FOLDS]) for fold in range(HELD_OUT_FOLDS)]
+        left_out = [fold & (self.prepared.kind > 0) for fold in folds]
+        errors = side_by_side(lambda out: self.predict(out)[out], [out for out in left_out if out.any()])
+        count = sum(int(np.isfinite(white).sum()) for white in errors)
+        return float(np.sqrt(sum(float(np.nansum(white**2)) for white in errors) / count)) if count else None
 
     def predict(self, out: Bools) -> Floats:
         """Repeat the last pass with some epochs predicted but not taken.

@@ -38,8 +38,7 @@ def with_noise_learned(fit: F) -> F:
     """
     if not isinstance(fit, NavigationFit) or not suspected(fit):
         return fit
-    evidence = fit.evidence()
-    wander = Wander.of(evidence)
+    evidence, wander = fit.evidence(), fit.wander
     found = balance(Joint.of(evidence, wander).given(evidence.model, evidence.weight).noise, wander)
     return in_noise(fit, evidence, wander, found.terms)
 

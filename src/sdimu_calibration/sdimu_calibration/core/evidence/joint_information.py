@@ -54,7 +54,7 @@ class Joint:
         """Information on the columns of the evidence, then on the wander, in white noise."""
         W, U, e = self.evidence.W, self.wander.U, self.evidence.e
         own, n = self.evidence.information, len(self.across)
-        across = np.vstack([self.across, W[:, n:].T @ U])
+        across = np.vstack([self.across, self.wander.across(W[:, n:])])
         J = np.block([[own.J, across], [across.T, self.wander.square]])
         return Information(J, np.concatenate([own.d, U.T @ e]))
 

@@ -26,6 +26,7 @@ from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.evidence.noise_kernels import Stretches, stretches
 from sdimu_calibration.core.noise_term import FLICKER, KINDS, MARKOV, RANDOM_WALK, SHIFT, STOP, TRIADS, TURN, NoiseTerm
+from sdimu_calibration.core.side_by_side import side_by_side
 
 LEAST_GAIN = 5.0
 """Least gain of the log-likelihood (1) by a noise term: of 16 terms tried on white noise, one in two hundred tests
@@ -46,6 +47,8 @@ _FINE = np.logspace(-0.12, 0.12, 49)
 """Factors about the best variance of the grid: a hundredth of the width of its likelihood."""
 _INTERVAL = 1.92
 """Fall of the log-likelihood (1) at the bounds of a 95 % interval: half of chi-square with one degree of freedom."""
+_BLOCK = 60
+"""Number of columns that are multiplied at a time: of a hundred stretches a tenth, which begin at nearly one time."""
 _SHORTEST_TAU = 0.2
 """Ratio of the shortest time constant that is tried to a stretch: faster noise is white from stretch to stretch."""
 _TAUS = 8
@@ -92,7 +95,35 @@ class Wander:
         ndarray, shape (6 n, 6 n)
             Inverse squares of the units (SI) of the errors.
         """
-        return np.asarray(self.U.T @ self.U)
+        out = np.empty((self.U.shape[1], self.U.shape[1]))
+        for columns, since in self._blocks:
+            out[columns, : columns.stop] = self.U[since:, columns].T @ self.U[since:, : columns.stop]
+            out[: columns.stop, columns] = out[columns, : columns.stop].T
+        return out
+
+    def across(self, W: Floats) -> Floats:
+        """Information across parameters and the mean errors, ``W'U``.
+
+        Parameters
+        ----------
+        W : ndarray, shape (N, q)
+            Signatures of the parameters.
+
+        Returns
+        -------
+        ndarray, shape (q, 6 n)
+            Inverse products of the units (SI) of parameters and errors.
+        """
+        out = np.empty((W.shape[1], self.U.shape[1]))
+        for columns, since in self._blocks:
+            out[:, columns] = W[since:].T @ self.U[since:, columns]
+        return out
+
+    @cached_property
+    def _blocks(self) -> list[tuple[slice, int]]:
+        """Columns in the order of time, and the first row in which each block of them shows: none shows before."""
+        places = [slice(k, min(k + _BLOCK, self.U.shape[1])) for k in range(0, self.U.shape[1], _BLOCK)]
+        return [(place, int(np.argmax(self.U[:, place].any(axis=1)))) for place in places]
 
     @classmethod
     def of(cls, evidence: LinearEvidence) -> Wander:
@@ -166,7 +197,10 @@ def learn(information: NoiseInformation, cut: Stretches, start: Sequence[NoiseTe
     tried = _kinds(cut)
     while True:
         given = {triad: _given(information, cut, terms, triad) for triad in TRIADS}
-        options = [_best_size(*given[t.triad], cut, t) for t in tried if _room(terms, t)]
+        options = [
+            size for triad in TRIADS
+            for size in _best_sizes(*given[triad], cut, [t for t in tried if t.triad == triad and _room(terms, t)])
+        ]  # fmt: skip
         best = max(options, key=lambda t: t.gain, default=None)
         if best is None or best.gain < LEAST_GAIN:
             return _tuned(information, cut, terms)
@@ -180,7 +214,8 @@ def _tuned(information: NoiseInformation, cut: Stretches, terms: Sequence[NoiseT
         if not term.tau:
             continue
         given = _given(information, cut, [t for t in out if t is not term], term.triad)
-        near = [_best_size(*given, cut, replace(term, tau=float(f"{term.tau * k:.3g}"))) for k in _TUNING]
+        tried = [replace(term, tau=float(f"{term.tau * k:.3g}")) for k in _TUNING]
+        near = _best_sizes(*given, cut, tried)
         best = max(near, key=lambda t: t.gain)
         likely = [t for t in near if t.gain > best.gain - _INTERVAL]
         out[place] = replace(best, low=min(t.low for t in likely), high=max(t.high for t in likely))
@@ -192,7 +227,8 @@ def with_alike(information: NoiseInformation, cut: Stretches, terms: Sequence[No
     out = []
     for term in terms:
         given = _given(information, cut, [t for t in terms if t is not term], term.triad)
-        others = [_best_size(*given, cut, t) for t in _kinds(cut) if t.triad == term.triad and t.kind != term.kind]
+        tried = [t for t in _kinds(cut) if t.triad == term.triad and t.kind != term.kind]
+        others = _best_sizes(*given, cut, tried)
         near = {t.kind for t in others if t.gain > term.gain - _INDISTINGUISHABLE}
         out.append(replace(term, alike=tuple(kind for kind in KINDS if kind in near)))
     return tuple(out)
@@ -240,6 +276,11 @@ def likelihood(information: NoiseInformation, cut: Stretches, terms: Sequence[No
 def _alone(information: NoiseInformation, cut: Stretches, others: Sequence[NoiseTerm], term: NoiseTerm) -> NoiseTerm:
     """Best size of one term, the others standing; with its interval, and the gain over doing without it."""
     return _best_size(*_given(information, cut, others, term.triad), cut, term)
+
+
+def _best_sizes(J: Floats, d: Floats, cut: Stretches, terms: Sequence[NoiseTerm]) -> list[NoiseTerm]:
+    """Best size of each of some terms alone."""
+    return side_by_side(lambda term: _best_size(J, d, cut, term), terms)
 
 
 def _best_size(J: Floats, d: Floats, cut: Stretches, term: NoiseTerm) -> NoiseTerm:

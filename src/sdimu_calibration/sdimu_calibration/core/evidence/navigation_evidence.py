@@ -8,7 +8,6 @@ are corrected exactly, and an effect shows in corrected samples through the inve
 from __future__ import annotations
 
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -31,14 +30,13 @@ from sdimu_calibration.core.second_order.second_order_passes import (
     linearise,
     run_linearised,
 )
+from sdimu_calibration.core.side_by_side import side_by_side
 
 _SHORTEST_DWELL_S = 3.0
 """Shortest dwell (s): what is shorter is a part of the turn."""
-_BLOCK = 24
+_BLOCK = 48
 """Number of effects, or of stretches, that a thread works on at a time: the regressors of all would take hundreds of
 megabytes."""
-_THREADS = 2
-"""Number of threads: the cores of a small machine; more blocks at a time than there are caches for gain nothing."""
 
 
 @dataclass(frozen=True)
@@ -149,6 +147,7 @@ def known_pass(prepared: PreparedData, setup: TestSetup, finished: Pass) -> Know
     seen = motion(
         prepared.cycles, prepared.rest, setup.sensors, finished.estimate, finished.C_start.copy(),
         setup.site.latitude_rad, setup.gravity, prepared.temperature, predicted=True, magnetic_n=setup.magnetic_n,
+        near=finished.data.values,
     )  # fmt: skip
     return KnownPass(output, seen, None)
 
@@ -235,8 +234,7 @@ def columns(prepared: PreparedData, known: KnownPass, latitude: float, effects: 
         )  # fmt: skip
 
     # The recursion of one column knows nothing of the others, and compiled loops run beside each other.
-    with ThreadPoolExecutor(_THREADS) as pool:
-        list(pool.map(fill, range(len(blocks))))
+    side_by_side(fill, range(len(blocks)))
     return W
 
 
@@ -268,8 +266,7 @@ def constant_columns(prepared: PreparedData, known: KnownPass, latitude: float, 
             latitude, known.weight, W[:, 6 * part.start : 6 * part.stop],
         )  # fmt: skip
 
-    with ThreadPoolExecutor(_THREADS) as pool:
-        list(pool.map(fill, blocks))
+    side_by_side(fill, blocks)
     return W
 
 

@@ -173,6 +173,7 @@ def one_pass(
     reference: Floats,
     closed_loop: bool,
     keep: bool = False,
+    near: Floats | None = None,
 ) -> Pass:
     """Run one pass.
 
@@ -190,6 +191,8 @@ def one_pass(
         compensated samples, and not predicted from the trajectory.
     keep : bool
         Keep the matrices of every epoch in the output.
+    near : ndarray, shape (n, m), optional
+        Regressors of a pass about nearly the same coefficients.
 
     Raises
     ------
@@ -199,7 +202,7 @@ def one_pass(
     sensors = setup.sensors
     seen = motion(
         prepared.cycles, prepared.rest, sensors, reference, C_nb.copy(), setup.site.latitude_rad, setup.gravity,
-        prepared.temperature, predicted=not closed_loop, magnetic_n=setup.magnetic_n,
+        prepared.temperature, predicted=not closed_loop, magnetic_n=setup.magnetic_n, near=near,
     )  # fmt: skip
     values = sensors.regressors(seen)
     if not np.isfinite(values).all():
@@ -258,7 +261,9 @@ def refine(
         progress("passes", min(0.95, 0.3 + 0.1 * (count - 1)))
         reference = last.estimate * (setup.sensors.decay_rate == 0.0)
         use = loose if settling else setup
-        new = one_pass(prepared, use, start, last.smoothed_start, reference, closed_loop=False)
+        new = one_pass(
+            prepared, use, start, last.smoothed_start, reference, closed_loop=False, near=last.data.values
+        )
         moved = np.max(np.abs(new.estimate - last.estimate) / np.sqrt(np.diag(new.covariance)))
         last = new
         if settling:

@@ -16,7 +16,9 @@ from sdimu_calibration.core.navigation.strapdown import Cycles
 from sdimu_calibration.core.recording import TemperatureLog
 
 _COMPENSATIONS = 3
-"""Number of rounds of compensation: each leaves an error smaller by a factor of the size of the sensor errors."""
+"""Number of rounds of compensation at most: each leaves an error smaller by the size of the sensor errors."""
+_SAME = np.array([1e-13] * 3 + [1e-11] * 3)
+"""Change of the sensor errors (rad/s, m/s^2) that is none: a millionth of what the best biases are known to."""
 MAGNETIC_FIELD = np.array([30.0e-6, -4.5e-6, 40.0e-6])
 """Magnetic field in NED (T) where the site gives none: size and dip of mid-northern latitudes."""
 _STANDING = np.radians(0.01)
@@ -106,6 +108,7 @@ def motion(
     predicted: bool,
     before: Motion | None = None,
     magnetic_n: Floats = MAGNETIC_FIELD,
+    near: Floats | None = None,
 ) -> Motion:
     """Motion of each cycle, as the effects see it.
 
@@ -128,6 +131,8 @@ def motion(
         Motion of the block before this one, where blocks follow each other.
     magnetic_n : ndarray, shape (3,)
         Magnetic field in NED (T).
+    near : ndarray, shape (n, m), optional
+        Regressors along nearly the same motion: the compensation begins with them.
 
     Returns
     -------
@@ -136,14 +141,15 @@ def motion(
     dt = cycles.dt
     w_measured, f_measured = cycles.alpha / dt[:, None], cycles.upsilon / dt[:, None]
     heat, heat_rate = temperatures(temperature, cycles.t - 0.5 * dt, causal=not predicted)
-    w, f = w_measured, f_measured
     C0 = C_start.copy()
     rounds = _COMPENSATIONS if np.any(coefficients) else 0
+    error = model.errors(near, coefficients) if rounds and near is not None else np.zeros((len(dt), 6))
     earlier = _AtStart.of(before)
     past = NO_PAST if before is None else before.left
     w_ie = earth.earth_rate(latitude)
     for done in range(rounds + 1):
         C = C0.copy()
+        w, f = w_measured - error[:, :3], f_measured - error[:, 3:]
         C_nb = _attitudes(C, w * dt[:, None], cycles.coning, dt, latitude)
         w_seen, f_seen, w_table, turned, leant, since_turn, wound = _seen(
             C_nb, w, f, rest, cycles.t, dt, w_ie, gravity, predicted, earlier
@@ -153,9 +159,11 @@ def motion(
             cycles.t, dt, w_seen, f_seen, C_nb, w_table, alpha, rest, heat, heat_rate, turned, leant,
             since_turn, magnetic_n, wound, past,
         )  # fmt: skip
-        if done < rounds:
-            error = model.errors(model.regressors(seen), coefficients)
-            w, f = w_measured - error[:, :3], f_measured - error[:, 3:]
+        if done == rounds:
+            break
+        taken, error = error, model.errors(model.regressors(seen), coefficients)
+        if (np.abs(error - taken) <= _SAME).all():
+            break
     C_start[:, :] = C
     return seen
 
