@@ -15,15 +15,15 @@ from rclpy.context import Context
 from rclpy.experimental import EventsExecutor
 from rclpy.node import Node
 from rclpy.task import Future
-from sensor_msgs.msg import Imu
+from sensor_msgs.msg import Imu, Temperature
 from std_srvs.srv import Trigger
 
 from sdimu_calibration.core.compensation import compensate, compensator
-from sdimu_calibration.core.effects import registry
+from sdimu_calibration.core.effects import imu_model, registry
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.results import Calibration, no_history
 from sdimu_calibration.nodes.convert import encode_imu
-from sdimu_calibration.nodes.credits import STREAM, to_ns
+from sdimu_calibration.nodes.credits import STREAM, header, to_ns
 from sdimu_calibration.storage.config import load_imu, load_model
 from sdimu_calibration.storage.result_file import write_result
 
@@ -36,16 +36,17 @@ START_NS = 1_700_000_000 * 10**9
 PATIENCE_S = 60.0
 
 
-def drawn(seed: int) -> Calibration:
-    """Draw a result of the baseline from the specification of the default IMU."""
+def drawn(seed: int, *more: str, **data: float) -> Calibration:
+    """Draw a result of the baseline and more effects from the specification of the default IMU."""
     imu, rng = load_imu("dtg"), np.random.default_rng(seed)
-    effects = [registry.get(name) for name in load_model("baseline").effects]
+    effects = [registry.get(name) for name in (*load_model("baseline").effects, *more)]
     parameters = [p for e in effects for p in e.parameters]
-    sigma = np.array([imu.prior[e.name] for e in effects for _ in e.parameters])
+    sigma = np.array([imu_model.prior_size(e, imu) for e in effects for _ in e.parameters])
+    n = len(parameters)
     return Calibration(
         "accelerometer_triad", tuple(e.name for e in effects), tuple(p.name for p in parameters),
         tuple(p.unit for p in parameters), tuple(p.display_unit for p in parameters),
-        sigma * rng.standard_normal(30), np.diag((0.01 * sigma) ** 2), {}, {}, (), no_history(30),
+        sigma * rng.standard_normal(n), np.diag((0.01 * sigma) ** 2), {}, dict(data), (), no_history(n),
     )  # fmt: skip
 
 
@@ -60,6 +61,7 @@ class Rig:
         self.executor.add_node(self.node)
         self.out: dict[int, Imu] = {}
         self.raw = self.node.create_publisher(Imu, "/imu/data_raw", STREAM)
+        self.heat = self.node.create_publisher(Temperature, "/imu/temperature", STREAM)
         self.listener = self.node.create_subscription(Imu, "/imu/data", self._take, STREAM)
         self.reload = self.node.create_client(Trigger, "/compensate/reload")
         self.set = self.node.create_client(SetParameters, "/compensate/set_parameters")
@@ -145,6 +147,40 @@ def test_the_node_compensates_as_the_core_does_and_keeps_a_good_result(bench: Fi
             )
             assert found.header.frame_id == "imu_accelerometer_triad"
             assert found.orientation_covariance[0] == -1.0
+
+
+def test_the_node_follows_the_temperature_by_its_polynomial(bench: FitSession, rig: Rig) -> None:
+    warm = ("gyro_scale_temperature", "gyro_bias_temperature_squared", "accel_misalignment_temperature_cubed",
+            "accel_bias_temperature_rate")  # fmt: skip
+    result = drawn(4, *warm, start_temperature_degc=25.0)
+    write_result(bench.folder / "warm" / "result.json", result)
+    given = {"result": str(bench.folder / "warm")}
+    bench.children.start("compensate", "sdimu_calibration.nodes.compensate_node", given)
+    rng = np.random.default_rng(5)
+    n, degc = 20, (-20.0, -16.0)
+    omega, force = rng.standard_normal((n, 3)), 10.0 * rng.standard_normal((n, 3))
+    stamps = START_NS + INTERVAL_NS * np.arange(1, n + 1)
+    messages = encode_imu(stamps, omega, force, "imu_link", 0.0, 0.0)
+    rig.spin_until(lambda: rig.raw.get_subscription_count() > 0, "the node listens")
+    rig.spin_until(lambda: rig.heat.get_subscription_count() > 0, "the node listens to the temperature")
+    rig.spin_until(lambda: rig.node.count_publishers("/imu/data") > 0, "the node offers")
+    rig.executor.spin_until_future_complete(Future(), 1.0)  # both ends of a match are not made at once
+    # A minute apart, so that the rate is their difference over it.
+    for at, value in zip((START_NS - 60 * 10**9, START_NS), degc, strict=True):
+        rig.heat.publish(Temperature(header=header(at, "imu_link"), temperature=value))
+    rig.executor.spin_until_future_complete(Future(), 0.5)  # another topic: nothing orders it before the samples
+    for message in messages:
+        rig.raw.publish(message)
+    rig.spin_until(lambda: int(stamps[-1]) in rig.out, "samples come back")
+
+    using = compensator(result, load_imu("dtg"), has_temperature=True)
+    assert not using.left_out
+    heat = (np.full(n, degc[1] - 25.0), np.full(n, (degc[1] - degc[0]) / 60.0))
+    expected = compensate(using, np.arange(1, n + 1) * 0.01, 0.01, omega, force, heat)
+    for k, stamp in enumerate(stamps.tolist()):
+        rate, acceleration = rig.out[stamp].angular_velocity, rig.out[stamp].linear_acceleration
+        np.testing.assert_allclose([rate.x, rate.y, rate.z], expected.omega_ib_b[k], rtol=1e-12)
+        np.testing.assert_allclose([acceleration.x, acceleration.y, acceleration.z], expected.f_ib_b[k], rtol=1e-12)
 
 
 def test_the_node_leaves_with_one_line_when_its_first_result_is_no_good(bench: FitSession) -> None:

@@ -57,7 +57,8 @@ def compensate(
     with bar(console) as progress:
         done = write_compensated(bag, recording, using, out, frame, replace=replace, progress=progress)
     rate, force = from_si(done.largest_rate, "deg/h"), from_si(done.largest_force, "ug")
-    for note in recording.notes:
+    beyond = "" if recording.temperature is None else using.beyond(recording.temperature.value)
+    for note in (*recording.notes, *filter(None, [beyond])):
         console.print(f"note: {note}", soft_wrap=True, markup=False, highlight=False)
     for reason in using.left_out:
         console.print(f"not compensated: {reason}", soft_wrap=True, markup=False, highlight=False)

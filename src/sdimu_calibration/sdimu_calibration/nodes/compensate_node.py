@@ -161,6 +161,9 @@ class CompensateNode:
             self.node.get_logger().warning(text, once=True)
         if len(self._heat.ns):
             log = TemperatureLog(self._heat.ns / NS, self._heat.values[:, 0])
+            beyond = self._using.beyond(log.value[-1:])
+            if beyond:
+                self.node.get_logger().warning(beyond, throttle_duration_sec=60.0)
             middle = stamps / NS - 0.5 * self._interval
             heat = heat_since(log, middle, self._using.start_temperature, causal=True)
         try:

@@ -10,6 +10,7 @@ import pytest
 from sdimu_calibration.core.compensation import compensate, compensator, heat_since, linear_model
 from sdimu_calibration.core.compensation.reads import reads, samples_motion
 from sdimu_calibration.core.effects import registry, selection
+from sdimu_calibration.core.origin import Origin
 from sdimu_calibration.core.recording import DataError, TemperatureLog
 from sdimu_calibration.core.specification import ImuSpecification
 from sdimu_calibration.core.units import to_si
@@ -92,6 +93,34 @@ def test_temperature_counts_from_the_start_of_the_calibrated_recording(make_resu
     cold = compensate(using, t, DT, omega, force)
     moved = (cold.f_ib_b - warm.f_ib_b) @ linear_model(result).accel.T
     np.testing.assert_allclose(moved, np.broadcast_to(10.0 * result.values[-3:], moved.shape), rtol=1e-9)
+
+
+def test_temperatures_far_from_those_of_the_calibration_are_told(make_result):
+    result = make_result((*BASELINE, "accel_scale_temperature_squared"), start_temperature_degc=25.0)
+    result = replace(result, origin=Origin(temperature_low_degc=-10.0, temperature_high_degc=40.0))
+    using = compensator(result, IMU, has_temperature=True)
+    assert using.beyond(np.array([-12.0, 43.0])) == ""
+    assert "-30.0 to 20.0 degC" in using.beyond(np.array([-30.0, 20.0]))
+    assert "-10.0 to 40.0 degC" in using.beyond(np.array([60.0]))
+    # Nothing that follows the temperature, or nobody who says where it was: nothing to tell.
+    plain = replace(make_result(BASELINE, start_temperature_degc=25.0), origin=result.origin)
+    assert compensator(plain, IMU, has_temperature=True).beyond(np.array([99.0])) == ""
+    unknown = compensator(replace(result, origin=Origin()), IMU, has_temperature=True)
+    assert unknown.beyond(np.array([99.0])) == ""
+
+
+@pytest.mark.parametrize("name", [n for n in registry.names() if reads(registry.get(n)) >= {"temperature"}])
+def test_what_follows_the_temperature_is_undone_at_any(make_result, name):
+    result = make_result((*BASELINE, name), size=0.2, start_temperature_degc=25.0)
+    omega, force, t = motions()
+    heat, rate = np.linspace(-40.0, 40.0, len(t)), np.full(len(t), 0.02)
+    using = compensator(result, IMU, has_temperature=True)
+    assert not using.left_out
+    seen = samples_motion(t, 0.0 * t + DT, omega, force, heat, rate)
+    error = using.model.errors(using.model.regressors(seen), result.values)
+    done = compensate(using, t, DT, omega + error[:, :3], force + error[:, 3:], (heat, rate))
+    np.testing.assert_allclose(done.omega_ib_b, omega, atol=ROUNDING)
+    np.testing.assert_allclose(done.f_ib_b, force, atol=ROUNDING)
 
 
 def test_a_variant_whose_key_is_in_the_result_is_compensated(make_result):

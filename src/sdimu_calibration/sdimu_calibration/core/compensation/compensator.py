@@ -44,6 +44,9 @@ _ABSENT = {
     "wound": "needs the history of turns",
     "past": "needs the history of forces",
 }
+_MARGIN_K = 5.0
+"""Distance from the temperatures of the calibration (K) up to which its coefficients are taken to hold: a tenth of the
+range in which an IMU is used."""
 _CLOSE = 1e-13
 """Largest step at convergence, a share of 1 rad/s or 1 m/s^2 plus the value: a few hundred units of rounding."""
 _ROWS = 4096
@@ -73,6 +76,8 @@ class Compensator:
         Effects that are not compensated, each with its reason.
     start_temperature : float or None
         Temperature from which the coefficients count (deg C); None where none of them depends on it.
+    temperature_range : (float, float) or None
+        Lowest and highest temperature of the calibration (deg C); None where nothing depends on it, or nobody said.
     """
 
     model: ImuModel
@@ -84,6 +89,25 @@ class Compensator:
     body_frame: str
     left_out: tuple[str, ...]
     start_temperature: float | None = None
+    temperature_range: tuple[float, float] | None = None
+
+    def beyond(self, degc: Floats) -> str:
+        """Say that temperatures are far from those of the calibration, where polynomials are a guess; else nothing.
+
+        Parameters
+        ----------
+        degc : ndarray, shape (n,)
+            deg C.
+        """
+        if self.temperature_range is None or not len(degc):
+            return ""
+        (low, high), coldest, warmest = self.temperature_range, float(np.min(degc)), float(np.max(degc))
+        if coldest >= low - _MARGIN_K and warmest <= high + _MARGIN_K:
+            return ""
+        return (
+            f"temperatures of {coldest:.1f} to {warmest:.1f} degC; the calibration knows {low:.1f} to {high:.1f} degC, "
+            "and its temperature coefficients are a guess beyond"
+        )
 
 
 @dataclass(frozen=True)
@@ -198,9 +222,11 @@ def compensator(
     power: Floats = np.repeat(np.array([imu.gyro_white_noise**2, imu.accel_white_noise**2]), 3)
     residue: Floats = 2.0 * np.repeat(np.array([imu.gyro_quantisation**2, imu.accel_quantisation**2]), 3)
     inverse: Floats = np.asarray(np.linalg.inv(slope_at_nought(model, values)), dtype=np.float64)
+    warm = any("temperature" in reads(effect) for effect in taken)
+    known = (calibration.origin.temperature_low_degc, calibration.origin.temperature_high_degc)
     return Compensator(
         model, values, covariance, inverse, power, residue, calibration.body_frame, tuple(left),
-        start if any("temperature" in reads(effect) for effect in taken) else None,
+        start if warm else None, known if warm and np.isfinite(known).all() else None,
     )  # fmt: skip
 
 

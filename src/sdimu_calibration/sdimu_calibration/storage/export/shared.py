@@ -52,6 +52,9 @@ def comments(source: Source, mark: str) -> list[str]:
     ]
     if source.linear.parts and source.linear.temperature_degc is not None:
         lines.append(f"M, G and b are those at the temperature T0 = {source.linear.temperature_degc:g} degC.")
+        low, high = source.calibration.origin.temperature_low_degc, source.calibration.origin.temperature_high_degc
+        if low <= high:
+            lines.append(f"The calibration knows temperatures of {low:.1f} to {high:.1f} degC; beyond is a guess.")
     lines += [f"NOT IN THIS FILE: {text}" for text in source.missing]
     # Names come from a file: they must neither begin a line of their own nor end a comment of C.
     return [f"{mark} {one_line(line, None).replace('*/', '* /')}" for line in lines]
