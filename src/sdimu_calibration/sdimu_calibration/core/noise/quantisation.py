@@ -67,7 +67,8 @@ def with_quantisation(imu: ImuSpecification, recording: Recording) -> tuple[ImuS
         f"means over a second scatter more than '{imu.name}' says and average out faster than white noise: "
         f"quantisation or vibration of {in_words(**found)} (one sigma) is taken into account"
     )
-    return replace(imu, **found), note
+    gyro, accel = (stated | found).values()
+    return replace(imu, gyro_quantisation=gyro, accel_quantisation=accel), note
 
 
 def in_words(gyro_quantisation: float = 0.0, accel_quantisation: float = 0.0) -> str:
