@@ -175,9 +175,6 @@ def test_a_prior_of_zero_is_refused_by_every_estimate(tmp_path, prior):
     message = rf"prior\.{prior}: 0 leaves nothing to estimate"
     with pytest.raises(DataError, match=message):
         set_up(load_site("daejeon"), imu, load_model("baseline"))
+    nothing = Recording(0, np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3)))
     with pytest.raises(DataError, match=message):
-        solve(
-            PreparedTest(Recording(0, np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3))), imu),
-            load_model("hand"),
-            "handheld",
-        )
+        solve(PreparedTest(nothing, imu), load_model("hand"), "handheld")

@@ -51,7 +51,8 @@ def open(  # noqa: A001 (as every library of files has it)
     bag : str or Path
         rosbag2 folder or .mcap file.
     site : str, optional
-        Name in config/site or path; left out it is assumed, and a note says so. A handheld run needs none.
+        Name in config/site or path; left out it is assumed, and a note says so; refused where the latitude in the
+        data excludes it. A handheld run needs none.
     imu : str or ImuSpecification, optional
         Name in config/imu, path, or the specification itself; left out a class is proposed from the rests, and a note
         says which.

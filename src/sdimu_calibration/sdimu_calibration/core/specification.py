@@ -7,8 +7,6 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from sdimu_calibration.core.recording import DataError
-
 EPOCH_S = 1.0
 """Nominal length of an epoch (s): the paper's measurement rate is 1 Hz."""
 LONGEST_EPOCH_S = 10.0
@@ -92,20 +90,6 @@ class ImuSpecification:
         )  # fmt: skip
         ratio = max((q / n) ** 2 if n > 0.0 else 0.0 for q, n in pairs)
         return float(np.clip(np.ceil(4.0 * ratio), EPOCH_S, LONGEST_EPOCH_S))
-
-    def check_priors(self) -> None:
-        """Refuse a prior of zero: it leaves nothing to estimate, and nothing to weigh a candidate by.
-
-        Raises
-        ------
-        DataError
-        """
-        for name, size in self.prior.items():
-            if not size > 0.0:
-                raise DataError(
-                    f"IMU '{self.name}': prior.{name}: {size:g} leaves nothing to estimate (state one sigma above "
-                    "zero; without the line the prior is that of the grade)"
-                )
 
     def with_noise_times(self, gyro: float, accel: float) -> ImuSpecification:
         """Return the specification with white noise and quantisation of both triads times a factor."""

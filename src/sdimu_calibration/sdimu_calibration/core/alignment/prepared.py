@@ -114,13 +114,29 @@ def set_up(site: Site, imu: ImuSpecification, model: Model, epoch_s: float | Non
         When a noise or a prior is zero, or model and IMU do not fit together.
     """
     epoch_s = imu.epoch_s if epoch_s is None else epoch_s
-    imu.check_priors()
+    check_priors(imu)
     sensors = imu_model.build(model.effects, imu)
     for what, noise in (("gyro", imu.gyro_white_noise), ("accel", imu.accel_white_noise)):
         if not noise > 0.0:
             raise DataError(f"IMU '{imu.name}': noise.{what} is zero, and measurements are weighed by it: give it")
     gravity = site.gravity_m_s2 or float(earth.normal_gravity(site.latitude_rad, site.height_m))
     return TestSetup(site, imu.in_means_over(epoch_s), model, sensors, rest_limits(imu), gravity, epoch_s)
+
+
+def check_priors(imu: ImuSpecification) -> None:
+    """Refuse a prior of zero: it leaves nothing to estimate, and nothing to weigh a candidate by.
+
+    Raises
+    ------
+    DataError
+        When there is one.
+    """
+    for name, size in imu.prior.items():
+        if not size > 0.0:
+            raise DataError(
+                f"IMU '{imu.name}': prior.{name}: {size:g} leaves nothing to estimate (state one sigma above zero; "
+                "without the line the prior is that of the grade)"
+            )
 
 
 def nominal_interval(t: Floats) -> float:

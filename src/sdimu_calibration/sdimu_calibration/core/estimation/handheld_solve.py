@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from sdimu_calibration.core.alignment.prepared import check_priors
 from sdimu_calibration.core.effects import imu_model
 from sdimu_calibration.core.effects.imu_model import ImuModel
 from sdimu_calibration.core.estimation.fit import Start
@@ -42,7 +43,7 @@ def solve_handheld(test: PreparedTest, model: Model, start: Start | None, progre
             f"the test was opened for navigation at the assumed site {test.assumed_site}, and a handheld fit takes no "
             "assumed site: in Python, state the site or open the test with open(..., handheld=True)"
         )
-    test.imu.check_priors()
+    check_priors(test.imu)
     progress("rests", 0.1)
     wide = widest_priors(test.imu, imu_model.build(model.effects, test.imu))
     if start is not None or wide is test.imu:

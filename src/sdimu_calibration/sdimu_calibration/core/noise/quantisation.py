@@ -67,8 +67,7 @@ def with_quantisation(imu: ImuSpecification, recording: Recording) -> tuple[ImuS
         f"means over a second scatter more than '{imu.name}' says and average out faster than white noise: "
         f"quantisation or vibration of {in_words(**found)} (one sigma) is taken into account"
     )
-    gyro = found.get("gyro_quantisation", imu.gyro_quantisation)
-    accel = found.get("accel_quantisation", imu.accel_quantisation)
+    gyro, accel = (stated | found).values()
     return replace(imu, gyro_quantisation=gyro, accel_quantisation=accel), note
 
 
