@@ -235,8 +235,8 @@ def _repeatability(term: str, effect: Effect, samples: Sequence[Sample]) -> Line
     if joint:
         best, unit = max(joint, key=lambda pair: pair[0].power_ons)
         return replace(
-            empty, value=best.sigma, low=best.low, high=best.high, of=unit, recordings=best.power_ons, units=1,
-            condition=conditions(samples), method=f"joint fit over {best.power_ons} power-ons",
+            empty, value=best.sigma, low=best.low, high=best.high, of=unit, recordings=int(best.power_ons), units=1,
+            condition=conditions(samples), method=f"joint fit over {int(best.power_ons)} power-ons",
         )  # fmt: skip
     rows = _one_a_power_on(_rows([effect], samples))
     groups = rows.groups
