@@ -35,6 +35,12 @@ def test_the_bag_says_of_which_unit_and_power_on_it_is(bag):
     assert said_of(bag, "config/site/daejeon.yaml") == Origin("SN 17", "3", recording="bag", site="daejeon")
 
 
+def test_a_serial_of_digits_keeps_its_zeros(bag):
+    path = bag / "metadata.yaml"
+    path.write_text(path.read_text().replace("serial: SN 17", "serial: 007"))
+    assert said_of(bag, "").serial == "007"
+
+
 def test_a_part_and_a_mended_bag_say_the_same(bag, tmp_path):
     cut_bag(bag, tmp_path / "part", 2.0, 5.0)
     recover(bag)

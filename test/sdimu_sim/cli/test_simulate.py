@@ -6,6 +6,7 @@ import typer
 from typer.testing import CliRunner
 
 from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.storage.bag_metadata import custom_data
 from sdimu_calibration.storage.bag_reader import read_recording
 from sdimu_calibration.storage.config import load_imu, load_plan, load_site
 from sdimu_sim.cli.simulate import mount_rad, simulate
@@ -63,3 +64,8 @@ def test_an_unknown_effect_leaves_no_bag(run, tmp_path):
     with pytest.raises(DataError, match="unknown effect"):
         run("--effect", "nothing=1")
     assert not (tmp_path / "bag").exists()
+
+
+def test_the_bag_says_of_which_unit_and_power_on_it_is(run, tmp_path):
+    assert run("--serial", "SN9", "--power-on", "2").exit_code == 0
+    assert custom_data(tmp_path / "bag") == {"serial": "SN9", "power_on": "2"}

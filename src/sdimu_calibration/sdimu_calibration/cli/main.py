@@ -34,6 +34,7 @@ _VERBS = {
     "compensate": "sdimu_calibration.cli.compensate:compensate",
     "plan": "sdimu_calibration.cli.plan:plan",
     "noise": "sdimu_calibration.cli.noise:noise",
+    "datasheet": "sdimu_calibration.cli.datasheet:datasheet",
     "export": "sdimu_calibration.cli.export:export",
     "fleet": "sdimu_calibration.cli.fleet:fleet",
     "workbench": "sdimu_calibration.cli.workbench:workbench",

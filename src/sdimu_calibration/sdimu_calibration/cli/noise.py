@@ -17,7 +17,7 @@ def noise(
     seed: Annotated[int, typer.Option(help="Of the draws behind the standard errors.")] = 1,
     out: Annotated[Path | None, typer.Option(help="Folder of the results; BAG_noise by default.")] = None,
 ) -> None:
-    """Find the noise terms from the rests of a recording; leaves noise.html and imu.yaml for --imu."""
+    """Find the noise terms from the rests of a recording; leaves noise.html, noise.json, imu.yaml for --imu."""
     import numpy as np
 
     from sdimu_calibration.cli.options import default_folder
@@ -26,6 +26,7 @@ def noise(
     from sdimu_calibration.report.noise import CHANNELS, misfits, table, write_page
     from sdimu_calibration.storage.config import find_config
     from sdimu_calibration.storage.imu_file import write_measured_imu
+    from sdimu_calibration.storage.noise_terms_file import write_noise_terms
     from sdimu_calibration.storage.opening import open_recording
     from sdimu_calibration.storage.whole_file import written_together
 
@@ -53,6 +54,7 @@ def noise(
     ]
     folder = out or default_folder(bag, "noise")
     with written_together(folder) as part:
+        write_noise_terms(part / "noise.json", bag.resolve().name, seconds, terms)
         write_page(part / "noise.html", deviations, terms, f"Noise of {bag.name}", words)
         write_measured_imu(part / "imu.yaml", imu, measured, terms, [f"Noise measured in {bag.name}: {words[0]}"])
     console.print(table(terms))

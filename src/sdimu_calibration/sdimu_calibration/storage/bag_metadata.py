@@ -16,6 +16,8 @@ METADATA = "metadata.yaml"
 _ALIAS = re.compile(r"[&*]\w")
 _LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 """Ten times as fast as the loader in Python where PyYAML has it; both read the same."""
+_WORDS = getattr(yaml, "CBaseLoader", yaml.BaseLoader)
+"""Reads every value as the text that it is."""
 
 
 @dataclass(frozen=True)
@@ -73,10 +75,10 @@ def write_metadata(
     write_whole(folder / METADATA, text)
 
 
-def read_metadata(folder: Path) -> Mapping[str, Any]:
+def read_metadata(folder: Path, loader: Any = _LOADER) -> Mapping[str, Any]:
     """Content of metadata.yaml, empty when there is none or it cannot be used."""
     try:
-        content = yaml.load((folder / METADATA).read_text(encoding="utf-8"), Loader=_LOADER)
+        content = yaml.load((folder / METADATA).read_text(encoding="utf-8"), Loader=loader)
         information = content["rosbag2_bagfile_information"]
     except Exception:
         # PyYAML answers damage with errors of its own, of int(), of datetime and of the stack.
@@ -86,8 +88,9 @@ def read_metadata(folder: Path) -> Mapping[str, Any]:
 
 def custom_data(path: Path) -> dict[str, str]:
     """Return what the user said of a recording when it was made; empty where nothing is said or `path` is no folder."""
-    said = read_metadata(path).get("custom_data") if path.is_dir() else None
-    return {str(key): str(value) for key, value in said.items()} if isinstance(said, dict) else {}
+    # As words: rosbag2 writes a serial number 007 without quotes.
+    said = read_metadata(path, _WORDS).get("custom_data") if path.is_dir() else None
+    return {str(key): value for key, value in said.items() if isinstance(value, str)} if isinstance(said, dict) else {}
 
 
 def named_files(information: Mapping[str, Any]) -> list[str]:

@@ -70,13 +70,15 @@ class Gathered:
     given: tuple[Entry, ...]
 
 
-def gather(folders: Sequence[Path]) -> Gathered:
+def gather(folders: Sequence[Path], one_model: bool = True) -> Gathered:
     """Find every result.json below some folders, and take those that fit together.
 
     Parameters
     ----------
     folders : sequence of Path
         Folders, or result.json files.
+    one_model : bool
+        Set results of other models apart, not those of other IMU files and body frames alone.
 
     Raises
     ------
@@ -88,11 +90,11 @@ def gather(folders: Sequence[Path]) -> Gathered:
     if not usable:
         why = f" ({apart[0]})" if apart else ""
         raise DataError(f"{folders[0]}: no result.json that can be used below it{why}; make some: sdimu calibrate BAG")
-    kinds = [entry.kind for entry in usable]
+    kinds = [entry.kind if one_model else (entry.kind[0], (), entry.kind[2]) for entry in usable]
     main = max(dict.fromkeys(kinds), key=kinds.count)
     entries: list[Entry] = []
     for entry in sorted(usable, key=lambda e: (e.result.origin.start_ns, e.name)):
-        reason = _misfit(entry, main) or _repeats(entry, entries)
+        reason = _misfit(entry, main, one_model) or _repeats(entry, entries)
         if reason:
             apart.append(f"{entry.name}: {reason}")
         else:
@@ -142,14 +144,14 @@ def _read(name: str, path: Path, apart: list[str]) -> Entry | None:
     return entry
 
 
-def _misfit(entry: Entry, main: tuple[str, tuple[str, ...], str]) -> str:
+def _misfit(entry: Entry, main: tuple[str, tuple[str, ...], str], one_model: bool) -> str:
     """Why a result does not fit to those of a kind; empty where it does."""
     (imu, model, frame), (mine, own, my_frame) = main, entry.kind
     if my_frame != frame:
         return f"body frame is {my_frame}, of the others it is {frame}: calibrate with a model of that body_frame"
     if mine != imu:
         return f"IMU file is {mine or 'not known'}, of the others it is {imu or 'not known'}: state one --imu for all"
-    if own != model:
+    if one_model and own != model:
         more, less = sorted({*own} - {*model}), sorted({*model} - {*own})
         change = ", ".join([*(f"+ {name}" for name in more), *(f"- {name}" for name in less)])
         return f"other model ({change}): calibrate all with one model (--model, --add)"

@@ -27,6 +27,7 @@ CROSS_COUPLING = register(
         "accel_cross_coupling", "accelerometer cross-coupling Kip, Kio", "df_i = K_ij a_i a_j",
         _COUPLING, ("m/s^2/g^2", "ug/g^2"), (20, 100, 1500),
         excitation=frozenset({Excitation.OBLIQUE_STOPS}),
+        sheet="cross-axis nonlinearity",
         typical="navigation 5-30, tactical 50-200, MEMS 500-3000 ug/g^2",
         description="Product of the forces along and across the input axis. Zero at cardinal stops; a velocity jump "
         "after "

@@ -19,6 +19,7 @@ GYRO_BIAS = register(
     Effect(
         name="gyro_bias",
         title="gyro bias (g-insensitive drift)",
+        sheet="bias",
         equation="dw_i = b_i",
         parameters=per_axis("gyro_bias", "rad/s", "deg/h"),
         terms=own_axis(GYRO),
@@ -36,6 +37,7 @@ ACCEL_BIAS = register(
     Effect(
         name="accel_bias",
         title="accelerometer bias",
+        sheet="bias",
         equation="df_i = B_i",
         parameters=per_axis("accel_bias", "m/s^2", "ug"),
         terms=own_axis(ACCEL),

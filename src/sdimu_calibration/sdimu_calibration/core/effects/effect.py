@@ -148,6 +148,8 @@ class Effect:
     nearer : callable or None
         ``() -> tuple of Effect``: the next variants of an interval search, half as far apart as those before. The
         variant itself is in the middle.
+    sheet : str
+        Term of a data sheet, without the triad, under which its coefficients are quoted; empty: none.
     file : str
         Path of the effect file that it was read from; empty for all others.
     """
@@ -181,6 +183,7 @@ class Effect:
     with_options: Callable[..., Effect] | None = None
     scan: Callable[[Timetable], tuple[Effect, ...]] | None = None
     nearer: Callable[[], tuple[Effect, ...]] | None = None
+    sheet: str = ""
     file: str = ""
 
     def only(self, names: tuple[str, ...]) -> Effect:
@@ -197,6 +200,12 @@ class Effect:
             terms=tuple(Term(self.terms[c].channel, kept.index(self.terms[c].parameter)) for c in columns),
             regressors=whole.only(columns) if isinstance(whole, _Columns) else lambda motion: whole(motion)[:, columns],
         )
+
+    @property
+    def sheet_term(self) -> str:
+        """Term of a data sheet with its triad, such as ``gyro scale-factor error``; empty: none."""
+        triad = "gyro" if self.terms[0].channel in GYRO else "accelerometer"
+        return f"{triad} {self.sheet}" if self.sheet else ""
 
     @property
     def key(self) -> str:

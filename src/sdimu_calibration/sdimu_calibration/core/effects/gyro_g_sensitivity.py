@@ -18,6 +18,7 @@ G_SENSITIVITY = register(
     family(
         "gyro_g_sensitivity", "gyro g-sensitivity, full matrix", "dw_i = D_ij a_j",
         matrix_columns(GYRO, lambda m: m.a), ("rad/s/g", "deg/h/g"), (0.3, 1, 50),
+        sheet="g-sensitivity",
         typical="DTG spin axis 0.05-0.5, optical below 0.1, tactical 0.1-1, MEMS 1-100 deg/h/g",
         description="Drift in proportion to force along any axis. Six of nine are the mass unbalance of the "
         "baseline; those of the "
@@ -30,6 +31,7 @@ G_SQUARED = register(
     family(
         "gyro_g_squared", "gyro g-squared drift (anisoelastic), squares", "dw_i = D_ijj a_j^2",
         matrix_columns(GYRO, lambda m: m.a**2), ("rad/s/g^2", "deg/h/g^2"), (0.03, 0.1, 3),
+        sheet="g-squared sensitivity",
         typical="DTG 0.005-0.05, tactical 0.05-0.2, MEMS 0.1-3 deg/h/g^2",
         description="Suspension of unequal stiffness. The three squares of one gyro sum to a bias.",
         confused_with=("gyro_bias", "gyro_g_dependent_scale"),
@@ -45,6 +47,7 @@ G_PRODUCT = register(
         },
         ("rad/s/g^2", "deg/h/g^2"), (0.03, 0.1, 3),
         excitation=frozenset({Excitation.OBLIQUE_STOPS}),
+        sheet="g-squared sensitivity",
         typical="DTG 0.005-0.05, tactical 0.05-0.2, MEMS 0.1-3 deg/h/g^2",
         description="Zero at cardinal stops; little time in turns. Stops at 45 deg make it visible.",
         confused_with=("gyro_misalignment_asymmetry",),

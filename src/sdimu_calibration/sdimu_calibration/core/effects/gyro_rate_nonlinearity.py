@@ -27,6 +27,7 @@ SCALE_ASYMMETRY = register(
         "gyro_scale_asymmetry", "gyro scale-factor asymmetry", "dw_i = k_i |w_i|",
         per_axis_columns(GYRO, lambda m: np.abs(m.w)), ("1", "ppm"), (25, 100, 500),
         excitation=frozenset({Excitation.BOTH_SENSES, Excitation.TWO_RATES}),
+        sheet="scale-factor asymmetry",
         typical="DTG 5-50, FOG 1-20, tactical 20-200, MEMS 50-1000 ppm",
         description="Different scale factors for both senses of turn. Needs turns of both signs; at one rate the "
         "same as the "
@@ -40,6 +41,7 @@ SCALE_QUADRATIC = register(
         "gyro_scale_quadratic", "gyro scale-factor nonlinearity, second order", "dw_i = k_i w_i^2",
         per_axis_columns(GYRO, lambda m: m.w**2), ("s/rad", "ppm*s/deg"), (10, 50, 200),
         excitation=frozenset({Excitation.BOTH_SENSES, Excitation.TWO_RATES}),
+        sheet="scale-factor nonlinearity, second order",
         typical="5-100 ppm of full scale",
         description="Grows with the square of the rate. Two rates separate it from the asymmetry.",
         confused_with=("gyro_scale_asymmetry",),
@@ -51,6 +53,7 @@ SCALE_CUBIC = register(
         "gyro_scale_cubic", "gyro scale-factor nonlinearity, third order", "dw_i = k_i w_i^3",
         per_axis_columns(GYRO, lambda m: m.w**3), ("s^2/rad^2", "ppm*s^2/deg^2"), (5, 25, 100),
         excitation=frozenset({Excitation.TWO_RATES}),
+        sheet="scale-factor nonlinearity, third order",
         typical="5-100 ppm of full scale",
         description="At one rate the same as the scale factor.",
         confused_with=("gyro_scale",),

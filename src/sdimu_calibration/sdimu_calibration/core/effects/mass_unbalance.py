@@ -25,6 +25,7 @@ GYRO_MASS_UNBALANCE = register(
     Effect(
         name="gyro_mass_unbalance",
         title="gyro mass unbalance (g-sensitive drift)",
+        sheet="g-sensitivity",
         equation="dw_x = m_dx a_x + m_qx a_y; dw_y = m_dy a_y + m_qy a_x; dw_z = m_dz a_z + m_qz a_y; a = f/g",
         parameters=tuple(Parameter(f"gyro_mass_unbalance_{t}", "rad/s/g", "deg/h/g") for t in TERMS),
         terms=tuple(Term(GYRO[i // 2], i) for i in range(6)),

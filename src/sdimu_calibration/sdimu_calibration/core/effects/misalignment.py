@@ -41,6 +41,7 @@ GYRO_MISALIGNMENT = register(
     Effect(
         name="gyro_misalignment",
         title="gyro input-axis misalignment",
+        sheet="input-axis misalignment",
         equation="dw_x = -p_xy w_z + p_xz w_y; dw_y = p_yx w_z - p_yz w_x; dw_z = -p_zx w_y + p_zy w_x",
         parameters=tuple(Parameter(f"gyro_misalignment_{p}", "rad", "arcmin") for p in PAIRS),
         terms=_terms(GYRO),
@@ -58,6 +59,7 @@ ACCEL_MISALIGNMENT = register(
     Effect(
         name="accel_misalignment",
         title="accelerometer input-axis misalignment",
+        sheet="input-axis misalignment",
         equation="df_x = -q_xy f_z + q_xz f_y; df_y = q_yx f_z - q_yz f_x; df_z = -q_zx f_y + q_zy f_x",
         parameters=tuple(Parameter(f"accel_misalignment_{p}", "rad", "arcmin") for p in PAIRS),
         terms=_terms(ACCEL),

@@ -12,6 +12,7 @@ GYRO_SCALE = register(
     Effect(
         name="gyro_scale",
         title="gyro scale-factor error",
+        sheet="scale-factor error",
         equation="dw_i = T_i w_i",
         parameters=per_axis("gyro_scale", "1", "ppm"),
         terms=own_axis(GYRO),
@@ -27,6 +28,7 @@ ACCEL_SCALE = register(
     Effect(
         name="accel_scale",
         title="accelerometer scale-factor error",
+        sheet="scale-factor error",
         equation="df_i = K_i f_i",
         parameters=per_axis("accel_scale", "1", "ppm"),
         terms=own_axis(ACCEL),

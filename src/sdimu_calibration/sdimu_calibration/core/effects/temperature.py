@@ -30,6 +30,7 @@ def _triad(
             f"{stem}_bias_temperature", f"{word} bias temperature coefficient", f"d{letter}_i = k_i (T - T0)",
             per_axis_columns(triad, _change), (f"{si}/K", f"{shown}/degC"), bias,
             needs="temperature", excitation=_OVER_TIME, shifts_bias=True,
+            sheet="bias temperature coefficient",
             typical="residual: gyro 0.002-0.1 deg/h/C, accelerometer 0.5-5 ug/C; raw 10-100 times more",
             description="Slow; stops that repeat an orientation at another temperature decide. T0 is the temperature "
             "at the "
@@ -42,6 +43,7 @@ def _triad(
             f"{stem}_bias_temperature_rate", f"{word} bias temperature-rate coefficient (Shupe)",
             f"d{letter}_i = k_i dT/dt", per_axis_columns(triad, _rate), (f"{si}*s/K", f"{shown}*min/degC"), rate,
             needs="temperature", excitation=_OVER_TIME, shifts_bias=True,
+            sheet="bias temperature-rate coefficient",
             typical="FOG 0.05-1 deg/h/(C/min), accelerometer 1-20 ug/(C/min)",
             description="Gradients inside the instrument: large while the temperature changes.",
             confused_with=(f"{stem}_bias_warm_up", f"{stem}_bias_step"),
@@ -62,6 +64,7 @@ GYRO_SCALE_TEMPERATURE = register(
         "gyro_scale_temperature", "gyro scale-factor temperature coefficient", "dw_i = k_i (T - T0) w_i",
         per_axis_columns(GYRO, lambda m: _change(m) * m.w), ("1/K", "ppm/degC"), (20, 50, 100),
         needs="temperature", excitation=_OVER_TIME,
+        sheet="scale-factor temperature coefficient",
         typical="DTG 5-20, FOG 5-50, tactical 20-100 ppm/C",
         description="Seen in turns about the same axis at different temperatures.",
         confused_with=("gyro_scale_ramp", "gyro_scale_temperature_rate"),
@@ -73,6 +76,7 @@ ACCEL_SCALE_TEMPERATURE = register(
         "accel_scale_temperature", "accelerometer scale-factor temperature coefficient", "df_i = k_i (T - T0) f_i",
         per_axis_columns(ACCEL, lambda m: _change(m) * m.f), ("1/K", "ppm/degC"), (5, 50, 200),
         needs="temperature", excitation=_OVER_TIME,
+        sheet="scale-factor temperature coefficient",
         typical="residual 0.5-5, raw 100-180 ppm/C",
         description="Seen where an axis carries gravity at different temperatures.",
         confused_with=("accel_scale_ramp", "accel_scale_temperature_rate"),
@@ -114,6 +118,7 @@ MASS_UNBALANCE_TEMPERATURE = register(
         },
         ("rad/s/g/K", "deg/h/g/degC"), (0.01, 0.05, 0.5),
         needs="temperature", excitation=_OVER_TIME,
+        sheet="g-sensitivity temperature coefficient",
         typical="DTG 0.0005-0.005 deg/h/g/C",
         description="The rotor's centre of mass moves with the temperature of the suspension: seen where an axis "
         "carries gravity at different temperatures.",

@@ -15,6 +15,7 @@ from sdimu_calibration.core.joint.member import Report, fitted
 from sdimu_calibration.core.joint.set_evidence import held_out
 from sdimu_calibration.core.joint.set_fit import SetFit, SetOptions, job_of
 from sdimu_calibration.core.joint.variation import Variation, variation
+from sdimu_calibration.core.origin import Origin, measured
 from sdimu_calibration.core.results import (
     START_TEMPERATURE,
     Calibration,
@@ -66,7 +67,7 @@ def set_outcome(fit: SetFit) -> Calibration:
         },
         data=_data(fit.reports, base), notes=(*_notes(fit, base), *warnings), history=no_history(len(names)),
         warnings=warnings, estimator=base.estimator, estimator_reason=fit.reports[0].reason,
-        drift_means=base.drift_means, of_set=_summary(fit, varied, names, base),
+        drift_means=base.drift_means, of_set=_summary(fit, varied, names, base), origin=_origin(fit, base),
     )  # fmt: skip
 
 
@@ -97,6 +98,21 @@ def _data(reports: Sequence[Report], base: Fit) -> dict[str, float]:
     }
     start = base.data_counts().get(START_TEMPERATURE)
     return {"recordings": float(len(reports)), **summed} | ({} if start is None else {START_TEMPERATURE: start})
+
+
+def _origin(fit: SetFit, base: Fit) -> Origin:
+    """Say which unit a set is of, from when on, at which temperatures; rate and site are those of one recording."""
+    own = measured(base.test.origin, base.test.recording, base.test.imu.name)
+    serials = {r.serial for r in fit.reports if r.serial}
+    heat = np.array([r.temperature_degc for r in fit.reports])
+    heat = heat[np.isfinite(heat)]
+    mean, low, high = (heat.mean(), heat.min(), heat.max()) if len(heat) else (np.nan,) * 3
+    return replace(
+        own, serial=serials.pop() if len(serials) == 1 else own.serial, power_on="", recording="",
+        start_ns=min(r.start_ns for r in fit.reports), temperature_degc=float(mean),
+        temperature_low_degc=float(np.fmin(low, own.temperature_low_degc)),
+        temperature_high_degc=float(np.fmax(high, own.temperature_high_degc)),
+    )  # fmt: skip
 
 
 def _notes(fit: SetFit, base: Fit) -> tuple[str, ...]:

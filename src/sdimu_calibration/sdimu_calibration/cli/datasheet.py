@@ -1,0 +1,90 @@
+"""`sdimu datasheet`: what was measured in the terms of data sheets, and the certificate of one unit."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from sdimu_calibration.cli.console import plain
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from sdimu_calibration.storage.fleet_folder import Entry
+
+
+def datasheet(
+    folders: Annotated[list[Path], typer.Argument(metavar="FOLDER ...", help="Every result.json below is taken.")],
+    limits: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="YAML with the largest size of each term: pass or fail.")
+    ] = None,
+    noise: Annotated[
+        list[Path] | None,
+        typer.Option(metavar="FILE", help="noise.json of sdimu noise (or its folder), or an IMU file; repeatable."),
+    ] = None,
+    certificate: Annotated[bool, typer.Option("--certificate", help="Of one unit: --serial, with hashes.")] = False,
+    serial: Annotated[str | None, typer.Option(help="Results of this unit alone.")] = None,
+    operator: Annotated[str, typer.Option(help="Who made the test, for the certificate.")] = "",
+    plan: Annotated[str, typer.Option(help="Test plan, for the conditions.")] = "",
+    recording: Annotated[
+        list[Path] | None, typer.Option(metavar="BAG", help="Recording to hash that is not beside its result.")
+    ] = None,
+    out: Annotated[Path | None, typer.Option(help="Folder of the pages; FOLDER by default.")] = None,
+) -> None:
+    """Make a data sheet from results; leaves datasheet.json and datasheet.html (prints on A4)."""
+    from datetime import UTC, datetime
+    from importlib.metadata import version
+
+    from sdimu_calibration.cli.wide_table import print_table
+    from sdimu_calibration.core.fleet import datasheet as core
+    from sdimu_calibration.report.fleet.sheet import HEADINGS, rows, write_page
+    from sdimu_calibration.storage.datasheet_file import Certificate, hashed, write_datasheet
+    from sdimu_calibration.storage.fleet_folder import gather
+    from sdimu_calibration.storage.limits_file import read_limits
+    from sdimu_calibration.storage.noise_terms_file import read_noise_terms
+    from sdimu_calibration.storage.whole_file import written_together
+
+    console = plain()
+    allowed = {} if limits is None else read_limits(limits, core.known_terms())
+    rests = [read_noise_terms(path) for path in noise or _noise_below(folders)]
+    gathered = gather(folders, one_model=False)
+    for line in gathered.apart:
+        console.print(f"set apart: {line}", soft_wrap=True, highlight=False)
+    entries = _of_unit(gathered.entries, serial, certificate)
+    lines = core.datasheet([core.Sample(entry.unit, entry.result) for entry in entries], rests)
+    lines = tuple(line.against(allowed[line.term]) if line.term in allowed else line for line in lines)
+    about = Certificate(
+        serial=entries[0].unit if certificate else serial or "", date=datetime.now(UTC).strftime("%Y-%m-%d"),
+        operator=operator, plan=plan, version=version("sdimu_calibration"),
+        recordings=hashed(entries, recording or []) if certificate else (),
+    )  # fmt: skip
+    print_table(console, HEADINGS, rows(lines, short=True), left=1)
+    folder = out or (folders[0] if folders[0].is_dir() else folders[0].parent)
+    with written_together(folder) as part:
+        write_datasheet(part / "datasheet.json", lines, about, entries)
+        write_page(part / "datasheet.html", lines, about, entries, certificate)
+    for name, digest in about.recordings:
+        if not digest:
+            console.print(f"note: {name} was not found, so it has no hash: --recording BAG", soft_wrap=True)
+    console.print(f"datasheet.json and datasheet.html in {folder}", soft_wrap=True, highlight=False)
+
+
+def _noise_below(folders: Sequence[Path]) -> list[Path]:
+    """Every noise.json below the folders."""
+    from sdimu_calibration.storage.noise_terms_file import NAME
+
+    return [path for folder in folders if folder.is_dir() for path in sorted(folder.rglob(NAME))]
+
+
+def _of_unit(entries: tuple[Entry, ...], serial: str | None, certificate: bool) -> tuple[Entry, ...]:
+    """Take the results of one unit, where one is named or a certificate needs one."""
+    from sdimu_calibration.core.recording import DataError
+
+    units = list(dict.fromkeys(entry.unit for entry in entries))
+    if serial is not None and serial not in units:
+        raise DataError(f"--serial {serial}: no result of it (there are: {', '.join(units)})")
+    if certificate and serial is None and len(units) > 1:
+        raise DataError(f"--certificate: is of one unit; choose one with --serial (there are: {', '.join(units)})")
+    return tuple(entry for entry in entries if serial in {None, entry.unit})

@@ -1,0 +1,70 @@
+"""The lines of a data sheet: what was measured, how well, and what it says against a limit."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+PASS, FAIL, UNDECIDED, NOT_MEASURED = "pass", "fail", "undecided", "not measured"
+"""What a line says against a limit."""
+
+
+@dataclass(frozen=True)
+class Line:
+    """One term of a data sheet.
+
+    Attributes
+    ----------
+    term : str
+        Such as ``gyro scale-factor error``.
+    unit, display_unit : str
+        SI, and as people read it.
+    value : float
+        Largest size over axes and units (SI); NaN: not measured.
+    low, high : float
+        Its interval at 95 % (SI); NaN where the source says none.
+    rms : float
+        Root mean square over axes and units (SI); NaN where that has no meaning.
+    of : str
+        Coefficient and unit with the largest size.
+    recordings, units : int
+        How many it is from.
+    method : str
+        How it was found.
+    condition : str
+        Site, temperatures, rates.
+    missing : str
+        What would measure it; empty where it was measured.
+    limit : float
+        Largest size allowed (SI); NaN without a limit.
+    """
+
+    term: str
+    unit: str
+    display_unit: str
+    value: float = math.nan
+    low: float = math.nan
+    high: float = math.nan
+    rms: float = math.nan
+    of: str = ""
+    recordings: int = 0
+    units: int = 0
+    method: str = ""
+    condition: str = ""
+    missing: str = ""
+    limit: float = math.nan
+
+    @property
+    def verdict(self) -> str:
+        """Say whether the limit is kept: only if the whole interval is inside; empty without a limit."""
+        if math.isnan(self.limit):
+            return ""
+        if math.isnan(self.value):
+            return NOT_MEASURED
+        if self.high <= self.limit:
+            return PASS
+        return FAIL if self.low > self.limit else UNDECIDED
+
+    def against(self, limit: float) -> Line:
+        """Return the line with a limit (SI)."""
+        return replace(self, limit=limit)

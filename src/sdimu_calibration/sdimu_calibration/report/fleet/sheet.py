@@ -1,0 +1,192 @@
+"""datasheet.html: a page for a screen and for A4."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from datetime import UTC, datetime
+from html import escape
+from pathlib import Path
+
+from sdimu_calibration.core.fleet.sheet import FAIL, PASS, Line
+from sdimu_calibration.core.units import from_si
+from sdimu_calibration.report.fleet.tables import three
+from sdimu_calibration.report.markup import grid, prose, quiet, section
+from sdimu_calibration.report.style import SCRIPT, STYLE
+from sdimu_calibration.report.table import cells
+from sdimu_calibration.report.table import rows as coefficient_rows
+from sdimu_calibration.storage.datasheet_file import Certificate
+from sdimu_calibration.storage.fleet_folder import Entry
+from sdimu_calibration.storage.whole_file import write_whole
+
+HEADINGS = ("term", "value", "95 %", "unit", "n", "limit", "verdict")
+_COEFFICIENTS = ("coefficient", "estimate", "sigma", "unit")
+_SHEET_STYLE = """
+table.sheet td { white-space: normal; vertical-align: top; } table.sheet td.number { white-space: nowrap; }
+td.pass { color: #0b5394; font-weight: bold; } td.fail { color: #b45f06; font-weight: bold; }
+td.undecided { font-weight: bold; } tr.group td { border-top: 2px solid #222; font-weight: bold; text-align: left; }
+code { font-size: .8em; overflow-wrap: anywhere; } .sign { display: flex; gap: 4em; margin-top: 4em; }
+.sign div { border-top: 1px solid #222; flex: 1; padding-top: .3em; break-inside: avoid; }
+"""
+
+
+def rows(lines: Sequence[Line], short: bool = False) -> list[list[str]]:
+    """Rows of `HEADINGS`; `short` leaves what was not measured and has no limit out."""
+    return [_row(line) for line in lines if not short or math.isfinite(line.value) or math.isfinite(line.limit)]
+
+
+def _row(line: Line) -> list[str]:
+    unit = line.display_unit
+    bounds = f"{_size(line.low, unit)}..{_size(line.high, unit)}" if math.isfinite(line.high) else ""
+    value = _size(line.value, unit) if math.isfinite(line.value) else ""
+    limit = _size(line.limit, unit) if math.isfinite(line.limit) else ""
+    return [line.term, value, bounds, unit, str(line.recordings or ""), limit, line.verdict]
+
+
+def _size(value: float, unit: str) -> str:
+    return three(from_si(value, unit))
+
+
+def write_page(
+    path: Path, lines: Sequence[Line], about: Certificate, entries: Sequence[Entry], certificate: bool
+) -> None:
+    """Write datasheet.html.
+
+    Parameters
+    ----------
+    path : Path
+        File to make or replace; its folder is made too.
+    lines : sequence of Line
+    about : Certificate
+    entries : sequence of Entry
+        The results that it is made of.
+    certificate : bool
+        Of one unit: with its coefficients, the hashes of its recordings and room for signatures.
+    """
+    imu = entries[0].result.origin.imu or "IMU"
+    title = f"Calibration certificate: {imu}, {about.serial}" if certificate else f"Data sheet: {imu}"
+    parts = [
+        _table(lines),
+        _coefficients(entries) if certificate else "",
+        _recordings(about, entries),
+        _missing(lines),
+        _signatures(about) if certificate else "",
+    ]
+    write_whole(
+        path,
+        '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">'
+        f"<title>{escape(title)}</title><style>{STYLE}{_SHEET_STYLE}</style></head><body>\n"
+        f"<h1>{escape(title)}</h1>{_head(about, entries)}{_conditions(lines)}{_verdict(lines)}\n"
+        + "\n".join(part for part in parts if part) + f"\n<script>{SCRIPT}</script></body></html>\n",
+    )  # fmt: skip
+
+
+def _head(about: Certificate, entries: Sequence[Entry]) -> str:
+    units = len({entry.unit for entry in entries})
+    words = [
+        ("serial", about.serial), ("date", about.date), ("operator", about.operator), ("plan", about.plan),
+        ("results", f"{len(entries)} of {units} unit{'s' if units > 1 else ''}"),
+        ("body frame", entries[0].result.body_frame.replace("_", " ")), ("program", f"sdimu {about.version}"),
+    ]  # fmt: skip
+    return quiet(" \N{MIDDLE DOT} ".join(f"{key} {value}" for key, value in words if value))
+
+
+def _same_conditions(lines: Sequence[Line]) -> str:
+    """Conditions that all lines have; empty where they differ."""
+    found = {line.condition for line in lines if line.condition}
+    return found.pop() if len(found) == 1 else ""
+
+
+def _conditions(lines: Sequence[Line]) -> str:
+    same = _same_conditions(lines)
+    return quiet(f"Test conditions: {same}.") if same else ""
+
+
+def _verdict(lines: Sequence[Line]) -> str:
+    judged = [line for line in lines if line.verdict]
+    if not judged:
+        return ""
+    failed = [line.term for line in judged if line.verdict == FAIL]
+    open_ = [line.term for line in judged if line.verdict not in {PASS, FAIL}]
+    if failed:
+        text = f"Fail: {', '.join(failed)}."
+    elif open_:
+        text = f"Undecided: {', '.join(open_)}."
+    else:
+        text = f"Pass: all {len(judged)} limits."
+    return f'<div class="verdict {"bad" if failed or open_ else "good"}">{escape(text)}</div>'
+
+
+def _table(lines: Sequence[Line]) -> str:
+    """Lines that were measured or have a limit, gyros first."""
+    heads = ("term", "value", "95 % interval", "unit", "rms", "n", "limit", "verdict", "how and where")
+    body, same = [], _same_conditions(lines)
+    shown = [line for line in lines if math.isfinite(line.value) or math.isfinite(line.limit)]
+    for triad in ("gyro", "accelerometer"):
+        own = [line for line in shown if line.term.startswith(f"{triad} ")]
+        if own:
+            body.append(f'<tr class="group"><td colspan="{len(heads)}">{triad}s</td></tr>')
+        body += [_line(line if line.condition != same else replace(line, condition=""), triad) for line in own]
+    head = "".join(f'<th class="text">{escape(word)}</th>' for word in heads)
+    text = (
+        "Value: the largest over axes and units, with its 95 % interval (all axes together); rms: over axes and units; "
+        "n: recordings. Pass: the whole interval is inside the limit; undecided: it straddles it."
+    )
+    return section(
+        "What was measured", quiet(text),
+        f'<table class="sheet"><thead><tr>{head}</tr></thead><tbody>{"".join(body)}</tbody></table>',
+    )  # fmt: skip
+
+
+def _line(line: Line, triad: str) -> str:
+    _, value, bounds, unit, number, limit, verdict = _row(line)
+    rms = _size(line.rms, line.display_unit) if math.isfinite(line.rms) else ""
+    how = "; ".join(word for word in (line.of, line.method, line.condition, line.missing) if word)
+    texts = [(line.term.removeprefix(f"{triad} "), "text"), (value, "number"),
+             (bounds.replace("..", " to "), "number"), (unit, "text number"), (rms, "number"), (number, "number"),
+             (limit, "number"), (verdict, verdict.split(" ")[0]), (how, "text quiet")]  # fmt: skip
+    return "<tr>" + "".join(f'<td class="{kind}">{escape(text)}</td>' for text, kind in texts) + "</tr>"
+
+
+def _missing(lines: Sequence[Line]) -> str:
+    """Say what was not measured, and what would measure it."""
+    out = [line for line in lines if not math.isfinite(line.value) and not math.isfinite(line.limit)]
+    if not out:
+        return ""
+    return section("Not measured", grid(("term", "what would"), [[line.term, line.missing] for line in out], {0, 1}))
+
+
+def _coefficients(entries: Sequence[Entry]) -> str:
+    """Coefficients of the last result, as it stands in the compensation."""
+    last = entries[-1]
+    table = [cells(row, list(_COEFFICIENTS)) for row in coefficient_rows(last.result)]
+    return section(
+        "Coefficients", quiet(f"Of {last.name}, one sigma; what compensation takes out."),
+        grid(_COEFFICIENTS, table, {0, 3}),
+    )  # fmt: skip
+
+
+def _recordings(about: Certificate, entries: Sequence[Entry]) -> str:
+    lines = [
+        [entry.name, entry.unit, origin.power_on, _date(origin.start_ns), origin.recording,
+         "" if math.isnan(origin.temperature_degc) else f"{origin.temperature_degc:.1f}"]
+        for entry in entries for origin in (entry.result.origin,)
+    ]  # fmt: skip
+    table = grid(("result", "unit", "power-on", "start (UTC)", "recording", "deg C"), lines, {0, 1, 2, 3, 4})
+    hashes = "".join(
+        f"<li>{escape(name)}<br><code>{digest or 'not found, no hash'}</code></li>"
+        for name, digest in about.recordings
+    )
+    return section("Results", table, f"<h2>SHA-256 of the recordings</h2><ul>{hashes}</ul>" if hashes else "")
+
+
+def _date(start_ns: int) -> str:
+    return datetime.fromtimestamp(1e-9 * start_ns, UTC).strftime("%Y-%m-%d %H:%M") if start_ns else ""
+
+
+def _signatures(about: Certificate) -> str:
+    return (
+        f'<div class="sign"><div>{prose(about.operator) or "operator"}</div><div>date</div><div>checked</div></div>'
+    )

@@ -1,0 +1,61 @@
+"""Pages of many results, in Chromium: they draw without errors, the table sorts, the certificate fits on A4."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import pytest
+
+from sdimu_calibration.cli.datasheet import datasheet
+from sdimu_calibration.cli.fleet import fleet
+
+SHEET_PX = 703
+"""Width of A4 less the margins of the pages (186 mm) at 96 dots an inch."""
+
+
+@pytest.fixture
+def opened(browser: Any) -> Any:
+    page = browser.new_page(viewport={"width": 1300, "height": 1000})
+    page.faults = []
+    page.on("pageerror", lambda error: page.faults.append(str(error)))
+    page.on("console", lambda message: page.faults.append(message.text) if message.type == "error" else None)
+    yield page
+    page.close()
+
+
+def test_the_fleet_draws_and_sorts_by_the_heading_that_is_clicked(batch, opened):
+    folder = batch(units=6, out=2)
+    fleet([folder])
+    opened.goto(f"file://{folder / 'fleet.html'}")
+    opened.wait_for_function("document.querySelectorAll('.js-plotly-plot').length >= 5", timeout=60_000)
+    heading = opened.locator("thead th", has_text="spread").first
+    heading.click()
+    column = opened.evaluate("head => Array.from(head.parentNode.children).indexOf(head)", heading.element_handle())
+    table = opened.locator("table").first
+
+    def shown() -> list[float]:
+        rows = table.locator("tbody tr")
+        return [float(rows.nth(k).locator("td").nth(column).inner_text()) for k in range(rows.count())]
+
+    rising = shown()
+    assert rising == sorted(rising)
+    assert heading.get_attribute("aria-sort") == "ascending"
+    heading.click()
+    assert shown() == rising[::-1]
+    assert opened.faults == []
+
+
+def test_the_certificate_prints_on_a4_and_nothing_is_cut(batch, opened):
+    folder = batch(units=1, each=3)
+    datasheet([folder], certificate=True, operator="A. Person")
+    opened.set_viewport_size({"width": SHEET_PX, "height": 1000})
+    opened.emulate_media(media="print")
+    opened.goto(f"file://{folder / 'datasheet.html'}")
+    assert opened.evaluate("document.documentElement.scrollWidth") <= SHEET_PX
+    paper = opened.pdf(prefer_css_page_size=True)
+    sheets = re.findall(rb"/MediaBox\s*\[0 0 ([\d.]+) ([\d.]+)\]", paper)
+    assert sheets
+    # 210 by 297 mm in points.
+    assert all(abs(float(w) - 595.3) < 1.0 and abs(float(h) - 841.9) < 1.0 for w, h in sheets)
+    assert opened.faults == []

@@ -1,0 +1,115 @@
+"""`sdimu datasheet`: a data sheet and the certificate of one unit."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+
+import numpy as np
+import pytest
+
+from sdimu_calibration.cli.datasheet import datasheet
+from sdimu_calibration.core.fleet.datasheet import known_terms
+from sdimu_calibration.core.noise import Terms
+from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.units import to_si
+from sdimu_calibration.storage.limits_file import read_limits
+from sdimu_calibration.storage.noise_terms_file import read_noise_terms, write_noise_terms
+
+
+def written(folder):
+    return {line["term"]: line for line in json.loads((folder / "datasheet.json").read_text())["lines"]}
+
+
+def test_limits_are_judged_in_the_file_on_the_page_and_in_the_terminal(batch, tmp_path, capsys):
+    folder = batch(units=3, each=3)
+    limits = tmp_path / "limits.yaml"
+    limits.write_text(
+        "format: sdimu-limits/1\nlimits:\n  gyro bias: 100 deg/h\n  gyro scale-factor error: 1 ppm\n"
+        "  gyro scale-factor asymmetry: 10 ppm\n"
+    )
+    datasheet([folder], limits=limits)
+    lines = written(folder)
+    assert lines["gyro bias"]["verdict"] == "pass"
+    assert lines["gyro bias"]["limit"] == pytest.approx(to_si(100, "deg/h"))
+    assert lines["gyro scale-factor error"]["verdict"] == "fail"
+    assert lines["gyro scale-factor asymmetry"]["verdict"] == "not measured"
+    assert lines["gyro bias repeatability"]["recordings"] == 9
+    page = (folder / "datasheet.html").read_text()
+    assert "Fail: gyro scale-factor error." in page
+    assert "size: A4" in page
+    told = capsys.readouterr().out
+    assert "pass" in told
+    assert "fail" in told
+
+
+def test_the_certificate_is_of_one_unit_with_the_hashes_of_its_recordings(batch, tmp_path, capsys):
+    folder = batch(units=3, each=2)
+    (folder / "bag_1_0").mkdir()
+    (folder / "bag_1_0" / "bag.mcap").write_bytes(b"samples")
+    elsewhere = tmp_path / "elsewhere" / "bag_1_1"
+    elsewhere.mkdir(parents=True)
+    (elsewhere / "bag.mcap").write_bytes(b"more samples")
+    datasheet([folder], certificate=True, serial="SN1", operator="A. Person", plan="kim18", out=tmp_path / "out")
+    assert "bag_1_1 was not found" in capsys.readouterr().out
+    datasheet(
+        [folder], certificate=True, serial="SN1", operator="A. Person", plan="kim18", recording=[elsewhere],
+        out=tmp_path / "out",
+    )  # fmt: skip
+    content = json.loads((tmp_path / "out" / "datasheet.json").read_text())
+    assert (content["serial"], content["operator"], content["plan"]) == ("SN1", "A. Person", "kim18")
+    assert {one["file"]: one["sha256"] for one in content["recordings"]} == {
+        "bag_1_0/bag.mcap": hashlib.sha256(b"samples").hexdigest(),
+        "bag_1_1/bag.mcap": hashlib.sha256(b"more samples").hexdigest(),
+    }
+    assert {one["unit"] for one in content["results"]} == {"SN1"}
+    page = (tmp_path / "out" / "datasheet.html").read_text()
+    assert hashlib.sha256(b"samples").hexdigest() in page
+    assert "A. Person" in page
+    assert "gyro_bias_x" in page
+
+
+def test_noise_of_a_recording_at_rest_comes_back_and_into_the_sheet(batch):
+    folder = batch(units=1)
+    terms = {
+        f"{triad}_{axis}": Terms(np.array([0.0, 2e-7, 3e-8, 0.0]), np.array([1e-9, 2e-9, 1e-9, 1e-10]))
+        for triad in ("gyro", "accel") for axis in "xyz"
+    }  # fmt: skip
+    write_noise_terms(folder / "still_noise" / "noise.json", "still", 3600.0, terms)
+    again = read_noise_terms(folder / "still_noise")
+    assert all(np.array_equal(again.terms[c].value, terms[c].value) for c in terms)
+    datasheet([folder])
+    line = written(folder)["gyro angle random walk"]
+    assert line["low"] < line["value"] == 2e-7 < line["high"]
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("limits:\n  gyro bais: 1 deg/h\n", "did you mean 'gyro bias'"),
+        ("limits:\n  gyro bias: 1 ug\n", "wrong unit"),
+        ("limits:\n  gyro bias: 1\n", "no unit"),
+        ("limits:\n  gyro bias: -1 deg/h\n", "not above zero"),
+        ("limits: {}\n", "names no term"),
+        ("limit:\n  gyro bias: 1 deg/h\n", "limit"),
+    ],
+)
+def test_limits_that_cannot_be_read_are_one_clear_error(text, words, tmp_path):
+    path = tmp_path / "limits.yaml"
+    path.write_text(text)
+    with pytest.raises(DataError, match=words):
+        read_limits(path, known_terms())
+
+
+def test_a_limit_may_be_in_any_unit_of_its_kind(tmp_path):
+    path = tmp_path / "limits.yaml"
+    path.write_text("limits:\n  gyro angle random walk: 60 deg/h/sqrt(Hz)\n")
+    assert read_limits(path, known_terms())["gyro angle random walk"] == pytest.approx(to_si(1.0, "deg/sqrt(h)"))
+
+
+def test_a_certificate_without_a_unit_is_refused_with_the_units_there_are(batch):
+    folder = batch(units=3)
+    with pytest.raises(DataError, match=r"SN0, SN1, SN2"):
+        datasheet([folder], certificate=True)
+    with pytest.raises(DataError, match="no result of it"):
+        datasheet([folder], serial="X")
