@@ -94,6 +94,19 @@ def test_another_test_in_the_same_folder_begins_anew(tmp_path, later_s):
     assert successor.finish().data == alone.finish().data
 
 
+def test_statuses_of_hours_before_another_test_do_not_pile_up(tmp_path, monkeypatch):
+    monkeypatch.setattr("sdimu_calibration.nodes.feed._SINCE", 50)
+    give(feed_of(tmp_path / "j"), messages()[:1500])
+    other = messages(seed=2, start=START + 20_000 * NS)
+    successor, alone = feed_of(tmp_path / "j"), feed_of(tmp_path / "k")
+    for k in range(1000):
+        successor.take_status(START + (18_000 + k) * NS, True, 0)
+    assert len(successor._since) == 50
+    for feed in (successor, alone):
+        give(feed, other)
+    np.testing.assert_array_equal(successor.finish().values, alone.finish().values)
+
+
 def test_a_resumed_test_may_go_on_for_longer_than_another_test_would_be_away(tmp_path, unbroken, monkeypatch):
     monkeypatch.setattr("sdimu_calibration.nodes.feed.AWAY_S", 5.0)
     raw = messages()

@@ -7,6 +7,7 @@ on with it: what its predecessor took is taken again in the same order, and what
 from __future__ import annotations
 
 import time
+from collections import deque
 from collections.abc import Callable, Iterator
 
 from sdimu_calibration.core.data.intake import NEVER
@@ -20,6 +21,9 @@ from sdimu_calibration.storage.journal import Journal, Samples, Status
 
 AWAY_S = 600.0
 """Samples that come so long after those of the journal are of another test."""
+_SINCE = 100_000
+"""Number of messages that are kept until samples say of which test they are, the last ones: four minutes of status and
+temperature at 200 Hz each, which repeat what held before them."""
 
 
 class Feed:
@@ -41,7 +45,7 @@ class Feed:
         self._journal = journal
         self._before: Remembered | None = None
         self._unsure = False
-        self._since: list[tuple[Callable[..., None], tuple[object, ...]]] = []
+        self._since: deque[tuple[Callable[..., None], tuple[object, ...]]] = deque(maxlen=_SINCE)
         self.resumed_ns = 0
         self.resumed_s = 0
         """Newest stamp (ns) of the journal, and number of seconds that the filter has done with it."""
@@ -91,7 +95,8 @@ class Feed:
         if int(samples.ns.min()) - self.resumed_ns > AWAY_S * NS or self._before.contradicted(samples):
             return True
         if int(samples.ns.max()) > self.resumed_ns:
-            self._unsure, self._since = False, []
+            self._unsure = False
+            self._since.clear()
         return False
 
     def take_imu(self, message: bytes) -> None:

@@ -102,7 +102,7 @@ def _too_few(recording: Recording, count: int) -> str:
     return (
         f"{rests} in different attitudes, and no turn between them is recorded: a handheld calibration needs "
         f"{FEWEST_RESTS} rests and more, a navigated one the turns. Record on while the IMU is turned, add attitudes, "
-        "or calibrate each part as a test of its own (sdimu bag cut), which tells only sums of coefficients"
+        "or part the attitudes (sdimu bag cut) and calibrate them as a set: sdimu calibrate A B ..."
     )
 
 
