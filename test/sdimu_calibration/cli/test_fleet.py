@@ -12,6 +12,7 @@ from sdimu_calibration.cli.fleet import fleet
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.units import to_si
 from sdimu_calibration.storage.config import load_imu
+from sdimu_calibration.storage.correlation_text import packed, unpacked
 from sdimu_calibration.storage.fleet_folder import candidates, gather
 from sdimu_calibration.storage.json_file import write_json
 from sdimu_calibration.storage.result_file import read_result, write_result
@@ -98,7 +99,7 @@ def test_an_effect_too_weak_for_one_unit_is_found_in_their_diagnoses(batch, caps
             "alone": {
                 "labels": labels, "units": ["m/s^2/g^2"] * 3 + ["m/s^2/g^3"] * 3,
                 "display_units": ["ug/g^2"] * 3 + ["ug/g^3"] * 3,
-                "estimates": estimates.tolist(), "sigmas": [unit] * 6,
+                "estimates": estimates.tolist(), "sigmas": [unit] * 6, "correlations": packed(np.eye(6)),
             },
         })  # fmt: skip
     alone = candidates(gather([folder]).given)
@@ -108,3 +109,17 @@ def test_an_effect_too_weak_for_one_unit_is_found_in_their_diagnoses(batch, caps
     found = json.loads((tmp_path / "pages" / "fleet.json").read_text())["common_effects"]
     assert [one["name"] for one in found if one["named"]] == ["accel_quadratic_y"]
     assert abs(found[0]["mean"] - 2.0 * unit) < 4.0 * found[0]["mean_sigma"]
+
+
+def test_correlations_come_back_to_a_half_step():
+    rng = np.random.default_rng(5)
+    W = rng.standard_normal((30, 7))
+    J = W.T @ W
+    unit = 1.0 / np.sqrt(np.diag(J))
+    again = unpacked(packed(J), 7)
+    assert np.abs(again / 127.0 - J * np.outer(unit, unit)).max() <= 0.5 / 127.0 + 1e-12
+
+
+@pytest.mark.parametrize("text", ["", "not base64!", "AAAA"])
+def test_correlations_that_are_none_are_none(text):
+    assert unpacked(text, 7) is None

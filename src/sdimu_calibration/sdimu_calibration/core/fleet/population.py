@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sdimu_calibration.core.arrays import Floats
-from sdimu_calibration.core.fleet.reml import RandomEffect, random_effect
+from sdimu_calibration.core.fleet.reml import RandomEffect, random_effect, spread_and_mean
 from sdimu_calibration.core.probability import student_tail
 from sdimu_calibration.core.recording import DataError
 
@@ -247,10 +247,10 @@ def deviates_from_others(values: Floats, sigmas: Floats) -> tuple[Floats, Floats
     deviates, p_values = np.zeros(len(values)), np.ones(len(values))
     for k in range(len(values)):
         others = np.arange(len(values)) != k
-        rest = random_effect(values[others], sigmas[others])
-        sigma = math.sqrt(rest.spread**2 + sigmas[k] ** 2 + 1.0 / np.sum(1.0 / (rest.spread**2 + sigmas[others] ** 2)))
-        deviates[k] = (values[k] - rest.mean) / sigma
-        p_values[k] = 2.0 * student_tail(abs(float(deviates[k])), rest.dof)
+        spread, mean = spread_and_mean(values[others], sigmas[others])
+        of_mean = 1.0 / np.sum(1.0 / (spread**2 + sigmas[others] ** 2))
+        deviates[k] = (values[k] - mean) / math.sqrt(spread**2 + sigmas[k] ** 2 + of_mean)
+        p_values[k] = 2.0 * student_tail(abs(float(deviates[k])), len(values) - 2)
     return deviates, p_values
 
 
