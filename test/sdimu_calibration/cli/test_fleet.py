@@ -10,6 +10,7 @@ import pytest
 
 from sdimu_calibration.cli.fleet import fleet
 from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.results import SetRecording, SetSummary
 from sdimu_calibration.core.units import to_si
 from sdimu_calibration.storage.config import load_imu
 from sdimu_calibration.storage.correlation_text import packed, unpacked
@@ -66,6 +67,29 @@ def test_what_does_not_fit_is_set_apart_with_a_line_each(batch, capsys):
     for word in ("body frame is prior", "IMU file is fog_tactical", "+ accel_quadratic", "is of the recording of",
                  "not to be trusted", "not a JSON file"):  # fmt: skip
         assert sum(word in line for line in told) == 1, word
+
+
+def test_a_recording_counts_once_where_a_joint_result_has_it(batch):
+    folder = batch(units=3)
+    one = read_result(folder / "unit1_0")
+    origin, none = one.origin, np.full(len(one.names), np.nan)
+    recording = SetRecording(
+        "bag", origin.serial, origin.power_on, origin.start_ns, 21.0, 60.0, one.data["samples"], 1.0, none, none, none
+    )
+    of_set = SetSummary((recording,), (), (), none, ())
+    joint = replace(one, origin=replace(origin, power_on="", recording=""), of_set=of_set)
+    write_result(folder / "joint" / "result.json", joint)
+    found = gather([folder])
+    assert {entry.name for entry in found.entries} == {"unit0_0", "joint", "unit2_0"}
+    assert found.apart == ("unit1_0: its recording is one of the set joint, which is counted",)
+
+
+@pytest.mark.parametrize("alone", [[], {"labels": 3}, {"labels": ["a"], "display_units": ["ppm"], "estimates": ["x"]}])
+def test_a_diagnosis_that_says_nothing_readable_says_nothing(batch, alone):
+    folder = batch(units=3)
+    for path in folder.rglob("result.json"):
+        write_json(path.with_name("diagnosis.json"), {"format": "sdimu-diagnosis/1", "fit": 5, "alone": alone})
+    assert candidates(gather([folder]).given).names == ()
 
 
 def test_units_without_serial_are_units_of_their_own(batch):

@@ -97,7 +97,7 @@ def gather(folders: Sequence[Path], one_model: bool = True) -> Gathered:
     main = max(dict.fromkeys(kinds), key=kinds.count)
     entries: list[Entry] = []
     for entry in sorted(usable, key=lambda e: (e.result.origin.start_ns, e.name)):
-        reason = _misfit(entry, main, one_model) or _repeats(entry, entries)
+        reason = _misfit(entry, main, one_model) or _repeats(entry, entries) or _part_of_set(entry, usable)
         if reason:
             apart.append(f"{entry.name}: {reason}")
         else:
@@ -108,13 +108,21 @@ def gather(folders: Sequence[Path], one_model: bool = True) -> Gathered:
 def _given(usable: Sequence[Entry], main: tuple[str, tuple[str, ...], str]) -> tuple[Entry, ...]:
     """Diagnosed results of an IMU and frame that began with the most usual model, one a recording."""
     diagnosed = [e for e in usable if e.diagnosis is not None and (e.kind[0], e.kind[2]) == (main[0], main[2])]
-    models = [tuple((e.diagnosis or {}).get("fit", {}).get("before", {}).get("model", ())) for e in diagnosed]
+    models = [_model_before(e) for e in diagnosed]
     usual = max(dict.fromkeys(models), key=models.count, default=())
     out: list[Entry] = []
     for entry, model in zip(diagnosed, models, strict=True):
         if model == usual and not _repeats(entry, out):
             out.append(entry)
     return tuple(out)
+
+
+def _model_before(entry: Entry) -> tuple[str, ...]:
+    """Model that a diagnosis began with; empty where the file does not say it."""
+    try:
+        return tuple(map(str, (entry.diagnosis or {})["fit"]["before"]["model"]))
+    except (KeyError, TypeError):
+        return ()
 
 
 def _found(folders: Sequence[Path]) -> list[tuple[str, Path]]:
@@ -171,6 +179,19 @@ def _repeats(entry: Entry, before: Sequence[Entry]) -> str:
             == (its.origin.start_ns, its.data.get("samples"), its.origin.serial, its.origin.recording)
         ):
             return f"is of the recording of {other.name}, which is counted"
+    return ""
+
+
+def _part_of_set(entry: Entry, every: Sequence[Entry]) -> str:
+    """Which joint result has the recording of a result; empty where none has."""
+    origin, samples = entry.result.origin, entry.result.data.get("samples")
+    if entry.result.of_set is not None or not origin.start_ns:
+        return ""
+    mine = (origin.serial, origin.power_on, origin.start_ns, samples)
+    for other in every:
+        of_set = other.result.of_set
+        if of_set and mine in {(r.serial, r.power_on, r.start_ns, r.samples) for r in of_set.recordings}:
+            return f"its recording is one of the set {other.name}, which is counted"
     return ""
 
 
@@ -236,7 +257,7 @@ def _alone(content: Any) -> _Alone | None:
         correlations = unpacked(content["correlations"], len(labels))
     except (KeyError, TypeError, ValueError):
         return None
-    if correlations is None or not len(labels) == len(units) == len(estimates) == len(sigmas):
+    if correlations is None or not len({*labels}) == len(units) == len(estimates) == len(sigmas):
         return None
     return _Alone(labels, units, estimates, sigmas, correlations)
 
@@ -245,8 +266,9 @@ def _mean(found: Sequence[_Alone], names: Mapping[str, int]) -> Floats:
     """Weighted means of the estimates of a unit and their sigmas, shape (2, k); NaN where none knows an effect."""
     weight, total = np.zeros(len(names)), np.zeros(len(names))
     for one in found:
-        places = [names[label] for label in one.labels]
-        weight[places] += one.sigmas**-2.0
-        total[places] += one.estimates * one.sigmas**-2.0
+        known = np.flatnonzero(np.isfinite(one.estimates) & np.isfinite(one.sigmas) & (one.sigmas > 0.0))
+        places = [names[one.labels[k]] for k in known.tolist()]
+        weight[places] += one.sigmas[known] ** -2.0
+        total[places] += one.estimates[known] * one.sigmas[known] ** -2.0
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.array([total / weight, np.where(weight > 0.0, 1.0 / np.sqrt(weight), np.nan)])
