@@ -255,7 +255,7 @@ def _alone(content: Any) -> _Alone | None:
         labels, units = (tuple(map(str, content[key])) for key in ("labels", "display_units"))
         estimates, sigmas = (np.array(content[key], float) for key in ("estimates", "sigmas"))
         correlations = unpacked(content["correlations"], len(labels))
-    except (KeyError, TypeError, ValueError):
+    except (KeyError, TypeError, ValueError, OverflowError):
         return None
     if correlations is None or not len({*labels}) == len(units) == len(estimates) == len(sigmas):
         return None
