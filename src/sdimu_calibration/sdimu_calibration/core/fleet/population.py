@@ -179,16 +179,15 @@ def population(fleet: Measured) -> Population:
     return Population(units, found, _out(units, found))
 
 
-def without_those_out(fleet: Measured, people: Population) -> Population:
-    """Estimate the population again without the units that are out; the same where none is, or too few are left."""
+def without_those_out(fleet: Measured, people: Population) -> Measured:
+    """Leave the results of units that are out; the same fleet where none is, or too few are left."""
     out = {one.unit for one in people.out}
     kept = [k for k, serial in enumerate(fleet.serials) if serial not in out]
     if not out or len(people.units) - len(out) < FEWEST_UNITS:
-        return people
-    left = Measured(
+        return fleet
+    return Measured(
         fleet.names, fleet.values[kept], fleet.sigmas[kept], tuple(fleet.serials[k] for k in kept), fleet.dates_s[kept]
     )
-    return population(left)
 
 
 def _coefficient(fleet: Measured, k: int) -> Coefficient:

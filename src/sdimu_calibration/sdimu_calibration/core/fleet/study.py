@@ -47,6 +47,7 @@ class Study:
     inside : Population
         Without the units that are out: what priors and control limits are of.
     slopes : tuple of Trend
+        Of the units that are not out.
     common : tuple of CommonEffect
         Effects beyond the baseline, smallest probability first.
     """
@@ -77,7 +78,8 @@ def study(fleet: Measured, model: Sequence[str], candidates: Candidates) -> Stud
         When there are too few units.
     """
     people = population(fleet)
-    inside = without_those_out(fleet, people)
+    left = without_those_out(fleet, people)
+    inside = people if left is fleet else population(left)
     own = [one for one in people.coefficients if _beyond_baseline(effect_of(one.name, model))]
     found = common_effects(
         candidates.names, candidates.estimates, candidates.sigmas, correlations=candidates.correlations
@@ -86,7 +88,7 @@ def study(fleet: Measured, model: Sequence[str], candidates: Candidates) -> Stud
         values, sigmas = np.array([one.values for one in own]).T, np.array([one.sigmas for one in own]).T
         modelled = common_effects([one.name for one in own], values, sigmas)
         found = (*modelled, *(one for one in found if one.name not in {m.name for m in modelled}))
-    return Study(fleet, people, inside, trends(fleet), found)
+    return Study(fleet, people, inside, trends(left), found)
 
 
 def _beyond_baseline(name: str) -> bool:
