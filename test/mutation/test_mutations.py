@@ -17,7 +17,11 @@ from sdimu_calibration.core.plain_text import LONGEST_LINE
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.units import UnitError
 
-from .formats import FORMATS, Format
+from .fleet_formats import FLEET_FORMATS
+from .formats import FORMATS as OTHERS
+from .formats import Format
+
+FORMATS = OTHERS | FLEET_FORMATS
 
 LONGEST_S = 10.0
 """Time (s) of one case beyond which it hangs: the slowest sound file takes one."""

@@ -10,8 +10,10 @@ import pytest
 
 from sdimu_calibration.cli.fleet import fleet
 from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.results import SetRecording, SetSummary
 from sdimu_calibration.core.units import to_si
 from sdimu_calibration.storage.config import load_imu
+from sdimu_calibration.storage.correlation_text import packed, unpacked
 from sdimu_calibration.storage.fleet_folder import candidates, gather
 from sdimu_calibration.storage.json_file import write_json
 from sdimu_calibration.storage.result_file import read_result, write_result
@@ -67,6 +69,29 @@ def test_what_does_not_fit_is_set_apart_with_a_line_each(batch, capsys):
         assert sum(word in line for line in told) == 1, word
 
 
+def test_a_recording_counts_once_where_a_joint_result_has_it(batch):
+    folder = batch(units=3)
+    one = read_result(folder / "unit1_0")
+    origin, none = one.origin, np.full(len(one.names), np.nan)
+    recording = SetRecording(
+        "bag", origin.serial, origin.power_on, origin.start_ns, 21.0, 60.0, one.data["samples"], 1.0, none, none, none
+    )
+    of_set = SetSummary((recording,), (), (), none, ())
+    joint = replace(one, origin=replace(origin, power_on="", recording=""), of_set=of_set)
+    write_result(folder / "joint" / "result.json", joint)
+    found = gather([folder])
+    assert {entry.name for entry in found.entries} == {"unit0_0", "joint", "unit2_0"}
+    assert found.apart == ("unit1_0: its recording is one of the set joint, which is counted",)
+
+
+@pytest.mark.parametrize("alone", [[], {"labels": 3}, {"labels": ["a"], "display_units": ["ppm"], "estimates": ["x"]}])
+def test_a_diagnosis_that_says_nothing_readable_says_nothing(batch, alone):
+    folder = batch(units=3)
+    for path in folder.rglob("result.json"):
+        write_json(path.with_name("diagnosis.json"), {"format": "sdimu-diagnosis/1", "fit": 5, "alone": alone})
+    assert candidates(gather([folder]).given).names == ()
+
+
 def test_units_without_serial_are_units_of_their_own(batch):
     folder = batch(units=4)
     for path in folder.rglob("result.json"):
@@ -98,7 +123,7 @@ def test_an_effect_too_weak_for_one_unit_is_found_in_their_diagnoses(batch, caps
             "alone": {
                 "labels": labels, "units": ["m/s^2/g^2"] * 3 + ["m/s^2/g^3"] * 3,
                 "display_units": ["ug/g^2"] * 3 + ["ug/g^3"] * 3,
-                "estimates": estimates.tolist(), "sigmas": [unit] * 6,
+                "estimates": estimates.tolist(), "sigmas": [unit] * 6, "correlations": packed(np.eye(6)),
             },
         })  # fmt: skip
     alone = candidates(gather([folder]).given)
@@ -108,3 +133,17 @@ def test_an_effect_too_weak_for_one_unit_is_found_in_their_diagnoses(batch, caps
     found = json.loads((tmp_path / "pages" / "fleet.json").read_text())["common_effects"]
     assert [one["name"] for one in found if one["named"]] == ["accel_quadratic_y"]
     assert abs(found[0]["mean"] - 2.0 * unit) < 4.0 * found[0]["mean_sigma"]
+
+
+def test_correlations_come_back_to_a_half_step():
+    rng = np.random.default_rng(5)
+    W = rng.standard_normal((30, 7))
+    J = W.T @ W
+    unit = 1.0 / np.sqrt(np.diag(J))
+    again = unpacked(packed(J), 7)
+    assert np.abs(again / 127.0 - J * np.outer(unit, unit)).max() <= 0.5 / 127.0 + 1e-12
+
+
+@pytest.mark.parametrize("text", ["", "not base64!", "AAAA"])
+def test_correlations_that_are_none_are_none(text):
+    assert unpacked(text, 7) is None

@@ -13,6 +13,7 @@ from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.specification import Site
 from sdimu_calibration.core.units import to_si
 from sdimu_calibration.storage.config import load_imu, load_model, load_plan
+from sdimu_calibration.storage.correlation_text import unpacked
 from sdimu_calibration.storage.diagnosis_file import content, read_diagnosis, write_diagnosis
 from sdimu_sim.core.scenario import Scenario, generate
 
@@ -60,6 +61,7 @@ def test_the_hidden_effect_is_in_the_file_in_si(told):
 def test_every_candidate_is_there_alone_for_the_sum_over_units(told):
     alone = content(told)["alone"]
     assert len({len(alone[key]) for key in ("labels", "units", "estimates", "sigmas")}) == 1
+    assert unpacked(alone["correlations"], len(alone["labels"])) is not None
     k = alone["labels"].index("accel_quadratic_x")
     assert alone["units"][k] == "m/s^2/g^2"
     # Its sigma takes the misfit of the other stops for noise.

@@ -20,6 +20,7 @@ from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary
 from sdimu_calibration.core.evidence.consistency import Noise
 from sdimu_calibration.core.handheld.handheld_fit import FORCE, RATE, TURN
 from sdimu_calibration.core.results import Calibration
+from sdimu_calibration.storage.correlation_text import packed
 from sdimu_calibration.storage.json_file import read_json, write_json
 
 FORMAT = "sdimu-diagnosis/1"
@@ -105,6 +106,7 @@ def _alone(d: Diagnosis) -> dict[str, Any]:
     """Give every candidate of the catalogue alone beside the given model, however small: many units make it large."""
     evidence, free = d.evidence, set(d.free.tolist())
     first = scan(evidence.information, evidence.model, evidence.weight, scale_of(d.found.first))
+    J = evidence.information.given(evidence.model, evidence.weight).J
     p = len(evidence.weight)
     shown = [
         (evidence.candidates[k - p], k) for k in range(p, len(evidence.names))
@@ -116,6 +118,7 @@ def _alone(d: Diagnosis) -> dict[str, Any]:
         "display_units": [candidate.parameter.display_unit for candidate, _ in shown],
         "estimates": [float(first.estimate[k]) for _, k in shown],
         "sigmas": [float(first.sigma[k]) for _, k in shown],
+        "correlations": packed(J[np.ix_(*[[k for _, k in shown]] * 2)]),
     }  # fmt: skip
 
 

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from sdimu_calibration.core.arrays import Floats
+from sdimu_calibration.core.fleet.common import Bytes
 from sdimu_calibration.core.fleet.population import Measured, measured
 from sdimu_calibration.core.fleet.study import Candidates
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.results import Calibration
+from sdimu_calibration.storage.correlation_text import unpacked
 from sdimu_calibration.storage.diagnosis_file import read_diagnosis
 from sdimu_calibration.storage.result_file import read_result
 from sdimu_calibration.storage.whole_file import RESULT
@@ -94,7 +97,7 @@ def gather(folders: Sequence[Path], one_model: bool = True) -> Gathered:
     main = max(dict.fromkeys(kinds), key=kinds.count)
     entries: list[Entry] = []
     for entry in sorted(usable, key=lambda e: (e.result.origin.start_ns, e.name)):
-        reason = _misfit(entry, main, one_model) or _repeats(entry, entries)
+        reason = _misfit(entry, main, one_model) or _repeats(entry, entries) or _part_of_set(entry, usable)
         if reason:
             apart.append(f"{entry.name}: {reason}")
         else:
@@ -105,13 +108,21 @@ def gather(folders: Sequence[Path], one_model: bool = True) -> Gathered:
 def _given(usable: Sequence[Entry], main: tuple[str, tuple[str, ...], str]) -> tuple[Entry, ...]:
     """Diagnosed results of an IMU and frame that began with the most usual model, one a recording."""
     diagnosed = [e for e in usable if e.diagnosis is not None and (e.kind[0], e.kind[2]) == (main[0], main[2])]
-    models = [tuple((e.diagnosis or {}).get("fit", {}).get("before", {}).get("model", ())) for e in diagnosed]
+    models = [_model_before(e) for e in diagnosed]
     usual = max(dict.fromkeys(models), key=models.count, default=())
     out: list[Entry] = []
     for entry, model in zip(diagnosed, models, strict=True):
         if model == usual and not _repeats(entry, out):
             out.append(entry)
     return tuple(out)
+
+
+def _model_before(entry: Entry) -> tuple[str, ...]:
+    """Model that a diagnosis began with; empty where the file does not say it."""
+    try:
+        return tuple(map(str, (entry.diagnosis or {})["fit"]["before"]["model"]))
+    except (KeyError, TypeError):
+        return ()
 
 
 def _found(folders: Sequence[Path]) -> list[tuple[str, Path]]:
@@ -171,6 +182,19 @@ def _repeats(entry: Entry, before: Sequence[Entry]) -> str:
     return ""
 
 
+def _part_of_set(entry: Entry, every: Sequence[Entry]) -> str:
+    """Which joint result has the recording of a result; empty where none has."""
+    origin, samples = entry.result.origin, entry.result.data.get("samples")
+    if entry.result.of_set is not None or not origin.start_ns:
+        return ""
+    mine = (origin.serial, origin.power_on, origin.start_ns, samples)
+    for other in every:
+        of_set = other.result.of_set
+        if of_set and mine in {(r.serial, r.power_on, r.start_ns, r.samples) for r in of_set.recordings}:
+            return f"its recording is one of the set {other.name}, which is counted"
+    return ""
+
+
 def as_measured(entries: Sequence[Entry]) -> Measured:
     """Put results of one type into arrays, coefficients in the order of the first.
 
@@ -196,23 +220,55 @@ def as_measured(entries: Sequence[Entry]) -> Measured:
 def candidates(entries: Sequence[Entry]) -> Candidates:
     """Take the candidates alone from the diagnoses of units, one row a unit."""
     known: dict[str, str] = {}
-    rows: dict[str, dict[str, list[tuple[float, float]]]] = {}
+    units: dict[str, list[_Alone]] = {}
     for entry in entries:
-        alone = (entry.diagnosis or {}).get("alone") or {}
-        columns = [alone.get(key, []) for key in ("labels", "display_units", "estimates", "sigmas")]
-        for label, unit, estimate, sigma in zip(*columns, strict=False):
-            if known.setdefault(str(label), str(unit)) == str(unit) and estimate is not None and sigma:
-                rows.setdefault(entry.unit, {}).setdefault(label, []).append((float(estimate), float(sigma)))
-    names = tuple(known)
-    table = np.full((2, len(rows), len(names)), np.nan)
-    for r, row in enumerate(rows.values()):
-        for k, name in enumerate(names):
-            if name in row:
-                table[:, r, k] = _mean(row[name])
-    return Candidates(names, tuple(known.values()), table[0], table[1])
+        alone = _alone((entry.diagnosis or {}).get("alone"))
+        if alone is not None:
+            for label, unit in zip(alone.labels, alone.units, strict=True):
+                known.setdefault(label, unit)
+            units.setdefault(entry.unit, []).append(alone)
+    names = {name: k for k, name in enumerate(known)}
+    table = np.full((2, len(units), len(names)), np.nan)
+    between = np.zeros((len(units), len(names), len(names)), np.int8)
+    for row, found in enumerate(units.values()):
+        table[:, row] = _mean(found, names)
+        # Of the first: recordings of one plan have the same.
+        places = [names[label] for label in found[0].labels]
+        between[np.ix_([row], places, places)] = found[0].correlations
+    return Candidates(tuple(known), tuple(known.values()), table[0], table[1], between)
 
 
-def _mean(pairs: Sequence[tuple[float, float]]) -> tuple[float, float]:
-    """Weighted mean of estimates and its sigma."""
-    weights = np.array([1.0 / sigma**2 for _, sigma in pairs])
-    return float(weights @ np.array([value for value, _ in pairs]) / weights.sum()), float(1.0 / np.sqrt(weights.sum()))
+@dataclass(frozen=True)
+class _Alone:
+    """Entry ``alone`` of a diagnosis."""
+
+    labels: tuple[str, ...]
+    units: tuple[str, ...]
+    estimates: Floats
+    sigmas: Floats
+    correlations: Bytes
+
+
+def _alone(content: Any) -> _Alone | None:
+    """Read the entry; None where there is none that is whole, as in older files."""
+    try:
+        labels, units = (tuple(map(str, content[key])) for key in ("labels", "display_units"))
+        estimates, sigmas = (np.array(content[key], float) for key in ("estimates", "sigmas"))
+        correlations = unpacked(content["correlations"], len(labels))
+    except (KeyError, TypeError, ValueError, OverflowError):
+        return None
+    if correlations is None or not len({*labels}) == len(units) == len(estimates) == len(sigmas):
+        return None
+    return _Alone(labels, units, estimates, sigmas, correlations)
+
+
+def _mean(found: Sequence[_Alone], names: Mapping[str, int]) -> Floats:
+    """Weighted means of the estimates of a unit and their sigmas, shape (2, k); NaN where none knows an effect."""
+    weight, total = np.zeros(len(names)), np.zeros(len(names))
+    for one in found:
+        known = np.flatnonzero(np.isfinite(one.estimates) & np.isfinite(one.sigmas) & (one.sigmas > 0.0))
+        places = [names[one.labels[k]] for k in known.tolist()]
+        weight[places] += one.sigmas[known] ** -2.0
+        total[places] += one.estimates[known] * one.sigmas[known] ** -2.0
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.array([total / weight, np.where(weight > 0.0, 1.0 / np.sqrt(weight), np.nan)])

@@ -57,7 +57,7 @@ def read_noise_terms(path: Path) -> NoiseOfUnit:
             str(channel): Terms(_four(one["value"]), _four(one["sigma"]), float(one["misfit"]))
             for channel, one in content["channels"].items()
         })  # fmt: skip
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
+    except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
         raise DataError(f"{path}: not a complete {FORMAT} file ({type(error).__name__}: {error})") from error
 
 

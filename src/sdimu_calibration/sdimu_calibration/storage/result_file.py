@@ -20,6 +20,8 @@ from sdimu_calibration.storage import set_result_file
 from sdimu_calibration.storage.json_file import read_json, write_json
 
 FORMAT = "sdimu-result/1"
+_LATEST_NS = 2**63
+"""A stamp of 64 bits ends there."""
 
 
 def write_result(path: Path, calibration: Calibration, verdict: str = "") -> None:
@@ -145,7 +147,10 @@ def _origin(entry: Mapping[str, Any]) -> Origin:
             return one_line(str(value))
         return default if value is None else type(default)(value)
 
-    return Origin(**{each.name: read(each.name, each.default) for each in fields(Origin)})
+    found = Origin(**{each.name: read(each.name, each.default) for each in fields(Origin)})
+    if not 0 <= found.start_ns < _LATEST_NS:
+        raise ValueError(f"origin.start_ns is {reprlib.repr(found.start_ns)}, which is no stamp")
+    return found
 
 
 def _conditional(coefficients: Sequence[Mapping[str, Any]]) -> Floats | None:

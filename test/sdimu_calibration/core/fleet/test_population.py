@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sdimu_calibration.core.fleet.common import adjusted, common_effects
+from sdimu_calibration.core.fleet.common import adjusted, common_effects, given
 from sdimu_calibration.core.fleet.population import FALSE_ALARM, Measured, measured, population
 from sdimu_calibration.core.fleet.priors import population_priors
 from sdimu_calibration.core.fleet.trends import AGE, PRODUCTION, YEAR_S, trends
@@ -109,6 +109,42 @@ def test_pure_noise_exceeds_its_probability_no_more_often_than_stated(m):
     result = common_effects([str(k) for k in range(2000)], estimates, np.ones((m, 2000)))
     share = np.mean([e.p_value < 0.05 for e in result])
     assert share <= 0.05 + 2.0 * np.sqrt(0.05 * 0.95 / 2000)
+
+
+def test_what_only_resembles_the_effect_of_a_type_is_not_named_with_it():
+    # Candidates 1 to 5 have a half of the signature of candidate 0, candidate 6 all but a tenth of it.
+    mix = np.eye(8)
+    mix[1:6, 0], mix[6, 0] = 0.6, 3.0
+    root = mix / np.linalg.norm(mix, axis=1, keepdims=True)
+    correlation = root @ root.T
+    kept = np.rint(127 * np.repeat(correlation[None], 12, axis=0)).astype(np.int8)
+    seeds, right, others = 40, 0, 0
+    for seed in range(seeds):
+        rng = np.random.default_rng(seed)
+        z = rng.standard_normal((12, 8)) @ root.T + 3.0 * correlation[0]
+        alone = common_effects([str(k) for k in range(8)], z, np.ones((12, 8)))
+        result = common_effects([str(k) for k in range(8)], z, np.ones((12, 8)), correlations=kept)
+        named = [e for e in result if e.named]
+        right += named[0].name == "0" or "0" in named[0].alike
+        others += len(named) > 1
+        assert sum(e.named for e in alone) > 3
+    assert right >= 0.95 * seeds
+    assert others <= 0.05 * seeds + 2.0 * np.sqrt(0.05 * seeds)
+
+
+def test_an_effect_is_estimated_along_as_least_squares_does():
+    rng = np.random.default_rng(8)
+    W = rng.standard_normal((50, 3)) + rng.standard_normal((50, 1))
+    e = W @ np.array([1.0, -2.0, 0.5]) + rng.standard_normal(50)
+    J = W.T @ W
+    sigma = 1.0 / np.sqrt(np.diag(J))
+    kept = np.rint(127 * J * np.outer(sigma, sigma)).astype(np.int8)[None]
+    value, error = given((W.T @ e / np.diag(J))[None], sigma[None], kept, [0])
+    both = W[:, [0, 2]]
+    covariance = np.linalg.inv(both.T @ both)
+    assert value[0, 2] == pytest.approx((covariance @ both.T @ e)[1], abs=0.1 * error[0, 2])
+    assert error[0, 2] == pytest.approx(np.sqrt(covariance[1, 1]), rel=0.02)
+    assert np.isnan(value[0, 0])
 
 
 def test_units_that_cannot_show_an_effect_are_not_counted():

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sdimu_calibration.core.arrays import Floats
-from sdimu_calibration.core.fleet.reml import RandomEffect, random_effect
+from sdimu_calibration.core.fleet.reml import RandomEffect, random_effect, spread_and_mean
 from sdimu_calibration.core.probability import student_tail
 from sdimu_calibration.core.recording import DataError
 
@@ -179,16 +179,15 @@ def population(fleet: Measured) -> Population:
     return Population(units, found, _out(units, found))
 
 
-def without_those_out(fleet: Measured, people: Population) -> Population:
-    """Estimate the population again without the units that are out; the same where none is, or too few are left."""
+def without_those_out(fleet: Measured, people: Population) -> Measured:
+    """Leave the results of units that are out; the same fleet where none is, or too few are left."""
     out = {one.unit for one in people.out}
     kept = [k for k, serial in enumerate(fleet.serials) if serial not in out]
     if not out or len(people.units) - len(out) < FEWEST_UNITS:
-        return people
-    left = Measured(
+        return fleet
+    return Measured(
         fleet.names, fleet.values[kept], fleet.sigmas[kept], tuple(fleet.serials[k] for k in kept), fleet.dates_s[kept]
     )
-    return population(left)
 
 
 def _coefficient(fleet: Measured, k: int) -> Coefficient:
@@ -247,10 +246,10 @@ def deviates_from_others(values: Floats, sigmas: Floats) -> tuple[Floats, Floats
     deviates, p_values = np.zeros(len(values)), np.ones(len(values))
     for k in range(len(values)):
         others = np.arange(len(values)) != k
-        rest = random_effect(values[others], sigmas[others])
-        sigma = math.sqrt(rest.spread**2 + sigmas[k] ** 2 + 1.0 / np.sum(1.0 / (rest.spread**2 + sigmas[others] ** 2)))
-        deviates[k] = (values[k] - rest.mean) / sigma
-        p_values[k] = 2.0 * student_tail(abs(float(deviates[k])), rest.dof)
+        spread, mean = spread_and_mean(values[others], sigmas[others])
+        of_mean = 1.0 / np.sum(1.0 / (spread**2 + sigmas[others] ** 2))
+        deviates[k] = (values[k] - mean) / math.sqrt(spread**2 + sigmas[k] ** 2 + of_mean)
+        p_values[k] = 2.0 * student_tail(abs(float(deviates[k])), len(values) - 2)
     return deviates, p_values
 
 

@@ -114,6 +114,47 @@ def random_effect(
     DataError
         When fewer values are left than a variance needs, or an error is not a number above zero.
     """
+    problem = _problem(values, sigmas, groups, x)
+    fit, unit, dof, tau2 = problem.fit, problem.unit, problem.dof, problem.tau2
+    found, none = fit(np.array([tau2])), fit(np.zeros(1))
+    low, high = (_crossing(fit, chi2_limit(p, dof)) for p in (0.5 * (1.0 - LEVEL), 0.5 * (1.0 + LEVEL)))
+    scale = float(found.q[0]) / dof
+    return RandomEffect(
+        spread=unit * math.sqrt(tau2), low=unit * math.sqrt(low), high=unit * math.sqrt(max(high, tau2)), dof=dof,
+        q=float(none.q[0]), p_value=chi2_tail(float(none.q[0]), dof), mean=unit * float(found.mean[0]),
+        mean_sigma=unit * math.sqrt(scale * float(found.mean_variance[0])), slope=unit * float(found.slope[0]),
+        slope_sigma=unit * math.sqrt(scale * float(found.slope_variance[0])),
+    )  # fmt: skip
+
+
+def spread_and_mean(values: Floats, sigmas: Floats) -> tuple[float, float]:
+    """Spread and weighted mean of one group, without intervals, for less.
+
+    Parameters
+    ----------
+    values, sigmas : ndarray, shape (n,)
+        As for `random_effect`, in one unit.
+
+    Raises
+    ------
+    DataError
+        As `random_effect`.
+    """
+    problem = _problem(values, sigmas, None, None)
+    mean = float(problem.fit(np.array([problem.tau2])).mean[0])
+    return problem.unit * math.sqrt(problem.tau2), problem.unit * mean
+
+
+class _Problem(NamedTuple):
+    """Fit as a function of the variance, in a unit of its own, and the variance of the highest likelihood."""
+
+    fit: Callable[[Floats], _Fitted]
+    unit: float
+    dof: int
+    tau2: float
+
+
+def _problem(values: Floats, sigmas: Floats, groups: Sequence[str] | None, x: Floats | None) -> _Problem:
     if not np.isfinite(values).all() or not (np.isfinite(sigmas) & (sigmas > 0.0)).all():
         raise DataError("values of several results: every value and every sigma must be a number, sigma above zero")
     labels = np.zeros(len(values), dtype=np.int64) if groups is None else np.unique(groups, return_inverse=True)[1]
@@ -126,15 +167,7 @@ def random_effect(
     member = np.equal.outer(labels, np.arange(number)).astype(float)
     fit = partial(_fit, values=values / unit, errors=(sigmas / unit) ** 2, member=member, x=x)
     tau2 = best_variance(lambda tau2: fit(tau2).likelihood, float(np.ptp(values / unit)) ** 2)
-    found, none = fit(np.array([tau2])), fit(np.zeros(1))
-    low, high = (_crossing(fit, chi2_limit(p, dof)) for p in (0.5 * (1.0 - LEVEL), 0.5 * (1.0 + LEVEL)))
-    scale = float(found.q[0]) / dof
-    return RandomEffect(
-        spread=unit * math.sqrt(tau2), low=unit * math.sqrt(low), high=unit * math.sqrt(max(high, tau2)), dof=dof,
-        q=float(none.q[0]), p_value=chi2_tail(float(none.q[0]), dof), mean=unit * float(found.mean[0]),
-        mean_sigma=unit * math.sqrt(scale * float(found.mean_variance[0])), slope=unit * float(found.slope[0]),
-        slope_sigma=unit * math.sqrt(scale * float(found.slope_variance[0])),
-    )  # fmt: skip
+    return _Problem(fit, unit, dof, tau2)
 
 
 def _fit(tau2: Floats, values: Floats, errors: Floats, member: Floats, x: Floats | None) -> _Fitted:

@@ -11,7 +11,7 @@ from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.effect_key import effect_of
 from sdimu_calibration.core.effects import registry
 from sdimu_calibration.core.effects.effect import BASELINE
-from sdimu_calibration.core.fleet.common import CommonEffect, common_effects
+from sdimu_calibration.core.fleet.common import Bytes, CommonEffect, common_effects
 from sdimu_calibration.core.fleet.population import Measured, Population, population, without_those_out
 from sdimu_calibration.core.fleet.trends import Trend, trends
 
@@ -25,12 +25,15 @@ class Candidates:
     names, display_units : tuple of str, length k
     estimates, sigmas : ndarray, shape (m, k)
         SI, one row a unit; NaN where it does not know an effect.
+    correlations : ndarray of int, shape (m, k, k)
+        Of the estimates in each unit, times `common.STEPS`.
     """
 
     names: tuple[str, ...]
     display_units: tuple[str, ...]
     estimates: Floats
     sigmas: Floats
+    correlations: Bytes
 
 
 @dataclass(frozen=True)
@@ -44,6 +47,7 @@ class Study:
     inside : Population
         Without the units that are out: what priors and control limits are of.
     slopes : tuple of Trend
+        Of the units that are not out.
     common : tuple of CommonEffect
         Effects beyond the baseline, smallest probability first.
     """
@@ -74,26 +78,19 @@ def study(fleet: Measured, model: Sequence[str], candidates: Candidates) -> Stud
         When there are too few units.
     """
     people = population(fleet)
+    left = without_those_out(fleet, people)
+    inside = people if left is fleet else population(left)
     own = [one for one in people.coefficients if _beyond_baseline(effect_of(one.name, model))]
-    rest = [k for k, name in enumerate(candidates.names) if name not in {one.name for one in own}]
-    names = [one.name for one in own] + [candidates.names[k] for k in rest]
-    rows = max(len(people.units), len(candidates.estimates))
-    estimates, sigmas = (
-        np.hstack([_padded([getattr(one, of) for one in own], rows), _padded(table[:, rest].T, rows)])
-        for of, table in (("values", candidates.estimates), ("sigmas", candidates.sigmas))
+    found = common_effects(
+        candidates.names, candidates.estimates, candidates.sigmas, correlations=candidates.correlations
     )
-    inside = without_those_out(fleet, people)
-    return Study(fleet, people, inside, trends(fleet), common_effects(names, estimates, sigmas))
+    if own:
+        values, sigmas = np.array([one.values for one in own]).T, np.array([one.sigmas for one in own]).T
+        modelled = common_effects([one.name for one in own], values, sigmas)
+        found = (*modelled, *(one for one in found if one.name not in {m.name for m in modelled}))
+    return Study(fleet, people, inside, trends(left), found)
 
 
 def _beyond_baseline(name: str) -> bool:
     effect = registry.find(name.partition("(")[0])
     return effect is None or effect.group != BASELINE
-
-
-def _padded(columns: Sequence[Floats] | Floats, rows: int) -> Floats:
-    """Columns as a table (rows, columns), with NaN below those that are shorter."""
-    out = np.full((rows, len(columns)), np.nan)
-    for k, column in enumerate(columns):
-        out[: len(column), k] = column
-    return out

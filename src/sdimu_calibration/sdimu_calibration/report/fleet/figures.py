@@ -20,6 +20,9 @@ _LARGEST = 6.0
 _PANELS = 3
 """Number of control charts side by side: as the axes of a triad."""
 
+_MARGIN = 0.08
+"""Share of the height of a chart beyond limits and values: they are seen to lie inside."""
+
 
 def heat_map(done: Study) -> Figure:
     """Deviate of every unit in every coefficient from the population of the others."""
@@ -78,9 +81,13 @@ def _panel(
     figure.shape("line", y0=mean, y1=mean, line={"color": AFTER, "width": 1}, opacity=1, **place)
     for limit in limits:
         figure.shape("line", y0=limit, y1=limit, line={"color": BEFORE, "width": 1, "dash": "dash"}, opacity=1, **place)
-    error = {"type": "data", "array": factor * fleet.sigmas[:, k], "thickness": 1, "width": 2}
+    # Limits are no traces: by itself the axis ends at them.
+    value, sigma = factor * fleet.values[:, k], factor * fleet.sigmas[:, k]
+    low, high = min(limits[0], float((value - sigma).min())), max(limits[1], float((value + sigma).max()))
+    figure.y_axes(range=[low - _MARGIN * (high - low), high + _MARGIN * (high - low)], **place)
+    error = {"type": "data", "array": sigma, "thickness": 1, "width": 2}
     figure.add(
-        "scatter", x=list(x), y=factor * fleet.values[:, k], mode="markers", error_y=error, text=list(fleet.serials),
+        "scatter", x=list(x), y=value, mode="markers", error_y=error, text=list(fleet.serials),
         marker={"color": "#222", "size": 6}, hovertemplate="%{text}<br>%{x}<br>%{y:.4g} " + unit + "<extra></extra>",
         **place,
     )  # fmt: skip

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from sdimu_calibration.core.fleet.common import CommonEffect
 from sdimu_calibration.core.fleet.population import Coefficient
 from sdimu_calibration.core.fleet.study import Study
 from sdimu_calibration.core.units import from_si
 from sdimu_calibration.report.table import as_far
 
 HEADINGS = ("coefficient", "unit", "mean", "+-", "spread", "95 %", "within", "p", "out")
-COMMON_HEADINGS = ("effect", "unit", "units", "mean", "+-", "spread", "largest z", "p", "q", "named")
+COMMON_HEADINGS = ("effect", "unit", "units", "mean", "+-", "spread", "largest z", "p", "q", "named, or looks the same")
 TREND_HEADINGS = ("coefficient", "change", "a year", "+-", "unit", "p", "q", "named")
 _NOTHING_VARIES = "0"
+_ALIKE = 4
+"""Effects that look the same which are listed: fleet.json has all."""
 
 
 def rows(done: Study, units: Mapping[str, str]) -> list[list[str]]:
@@ -49,10 +52,16 @@ def common_rows(done: Study, units: Mapping[str, str], most: int) -> list[list[s
             *as_far([from_si(v, units[one.name]) for v in (one.mean, one.mean_sigma)],
                     from_si(one.mean_sigma, units[one.name])),
             three(from_si(one.spread, units[one.name])), f"{one.largest_z:.1f}", probability(one.p_value),
-            probability(one.q_value), "yes" if one.named else "",
+            probability(one.q_value), _named(one),
         ]
         for k, one in enumerate(done.common) if one.named or k < most
     ]  # fmt: skip
+
+
+def _named(one: CommonEffect) -> str:
+    if not one.named:
+        return ""
+    return f"yes; or {', '.join(one.alike[:_ALIKE])}" if one.alike else "yes"
 
 
 def trend_rows(done: Study, units: Mapping[str, str], most: int) -> list[list[str]]:
@@ -81,7 +90,8 @@ def sentences(done: Study, units: Mapping[str, str]) -> list[str]:
     told += [
         f"Common to the type: {one.name}, mean {from_si(one.mean, units[one.name]):+.3g} and spread "
         f"{from_si(one.spread, units[one.name]):.2g} {units[one.name]} over {one.units} units; largest in one unit "
-        f"{one.largest_z:.1f} sigma."
+        f"{one.largest_z:.1f} sigma"
+        + (f"; looks the same: {', '.join(one.alike[:_ALIKE])}." if one.alike else ".")
         for one in done.common if one.named
     ]  # fmt: skip
     told += [
