@@ -13,7 +13,7 @@ def test_the_profiles_that_come_along_load():
     ramp = load_temperature("ramp")
     # 110 degC at 2.5 degC/min, after three minutes.
     assert ramp.knots == ((0.0, -40.0), (180.0, -40.0), (180.0 + 44.0 * 60.0, pytest.approx(70.0)))
-    assert ramp.sensor_lag_s == 30.0
+    assert ramp.reference_degc == 25.0
     cycle = load_temperature("cycle")
     t = np.array([180.0 + 600.0, cycle.knots[-1][0] - 600.0])
     assert cycle.value(t)[0] == pytest.approx(cycle.value(t)[1])

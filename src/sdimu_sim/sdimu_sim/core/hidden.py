@@ -33,6 +33,7 @@ VARIABLES: tuple[str, ...] = (
     "T",
     "dT",
     "dTdt",
+    "slow",
     "moving",
     "since",
     *(f"wound{i}" for i in _XYZ),
@@ -40,13 +41,13 @@ VARIABLES: tuple[str, ...] = (
 """True means over the sample: body rate w (rad/s), specific force a (f/g) and f (m/s^2), angular acceleration alpha
 (rad/s^2), rate of the table wt (rad/s), North, East and Down component of a body axis (n, e, d), magnetic field B (T),
 lever-arm tensor L (1/s^2), sign of the last turn about and of the last change of a along an axis (turned, leant), time
-t (s), temperature of the sensors T (deg C), T - T0 as dT (K) and rate dTdt (K/s), moving (1 while the table turns),
-time since the last turn ended (since; s, 0 in turns, very long before the first), angle turned since the start about a
-body axis (wound; rad)."""
+t (s), temperature of the sensors T (deg C), T - T0 as dT (K), rate dTdt and its mean over a minute slow (K/s), moving
+(1 while the table turns), time since the last turn ended (since; s, 0 in turns, very long before the first), angle
+turned since the start about a body axis (wound; rad)."""
 DIRECTIONS = frozenset(f"{v}{i}" for v in "ne" for i in _XYZ)
 """Variables that cost the generator a pass of their own."""
 
-TEMPERATURE_NAMES = frozenset({"T", "dT", "dTdt"})
+TEMPERATURE_NAMES = frozenset({"T", "dT", "dTdt", "slow"})
 
 
 _BOTH = (("gyro", "deg/h", "w{i}"), ("accel", "ug", "g*a{i}"))
@@ -151,9 +152,9 @@ _ROWS: tuple[Row, ...] = (
             Row(f"{triad}_bias_wrap_{{i}}{{any}}", unit, "k*wound{any}/(2*pi)", drawn=False),
             Row(f"{triad}_scale_temperature_rate_{{i}}", "ppm*min/degC", f"k*dTdt*{signal}", drawn=False),
             # Heating and cooling go along the two sides of a loop.
-            Row(f"{triad}_bias_temperature_hysteresis_{{i}}", unit, "k*tanh(dTdt/threshold)",
+            Row(f"{triad}_bias_temperature_hysteresis_{{i}}", unit, "k*tanh(slow/threshold)",
                 {"threshold": "degC/min"}, drawn=False),
-            Row(f"{triad}_scale_temperature_hysteresis_{{i}}", "ppm", f"k*tanh(dTdt/threshold)*{signal}",
+            Row(f"{triad}_scale_temperature_hysteresis_{{i}}", "ppm", f"k*tanh(slow/threshold)*{signal}",
                 {"threshold": "degC/min"}, drawn=False),
         )
     ),

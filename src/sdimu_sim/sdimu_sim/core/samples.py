@@ -16,6 +16,8 @@ _XYZ = "xyz"
 
 STILL_RAD_S = 1e-9
 """Below this mean rate the table stands: far above rounding (1e-14), far below any turn."""
+SLOW_S = 60.0
+"""Time over which the rate of the temperature is a mean where heating is told from cooling (s)."""
 NEVER_S = 1e9
 """Time since the last turn where there was none."""
 TURNED_RAD_S = np.radians(0.5)
@@ -137,6 +139,10 @@ class Variables:
             values["T"] = self._temperature.sensor_value(middle)
             values["dT"] = values["T"] - self._temperature.origin_degc
             values["dTdt"] = self._temperature.sensor_rate(middle)
+            # Material creeps: what tells heating from cooling is the rate over the minute about now.
+            before, after = np.maximum(middle - 0.5 * SLOW_S, 0.0), middle + 0.5 * SLOW_S
+            rise = self._temperature.sensor_value(after) - self._temperature.sensor_value(before)
+            values["slow"] = rise / (after - before)
         return values
 
     def _wound(self, wt: Floats, middle: Floats) -> Floats:

@@ -167,11 +167,12 @@ def generate(scenario: Scenario) -> tuple[Recording, Truth]:
 
 
 def temperature_log(scenario: Scenario, until_s: float) -> TemperatureLog | None:
-    """Read the thermometer at 1 Hz, from 0 to a time (s)."""
+    """Read the thermometer at 1 Hz, from 0 to a time (s); its reference is the one that the profile states, if any."""
     if scenario.temperature is None:
         return None
     t = np.arange(int(until_s + 1e-9) + 1, dtype=np.float64)
-    return TemperatureLog(t, Thermometer(scenario.temperature, scenario.seed).read(t))
+    profile = scenario.temperature
+    return TemperatureLog(t, Thermometer(profile, scenario.seed).read(t), profile.reference_degc)
 
 
 def table_log_rows(motion: TableMotion) -> slice:

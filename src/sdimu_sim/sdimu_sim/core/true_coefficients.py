@@ -114,6 +114,6 @@ def _named(name: str, power: str) -> str:
 def _power_of(values: Floats, order: int) -> Floats:
     """Coefficient of one power of the temperature in values at `_SPAN_K`, shape (k, ...)."""
     flat = values.reshape(len(values), -1)
-    # Two orders more than are stated take what the turn adds beyond them.
-    found = np.polynomial.polynomial.polyfit(_SPAN_K, flat, len(_POWERS) + 2)
+    # Orders beyond those that are stated take what the turn adds there.
+    found = np.polynomial.polynomial.polyfit(_SPAN_K, flat, len(_POWERS) + 5)
     return np.asarray(found[order].reshape(values.shape[1:]))

@@ -32,7 +32,7 @@ def test_a_lag_is_seen_as_a_rate_coefficient_of_minus_the_lag_times_the_temperat
         )
     )  # fmt: skip
     assert truth.reference_degc == 20.0
-    recording = replace(recording, temperature=replace(recording.temperature, reference_degc=truth.reference_degc))
+    assert recording.temperature.origin_degc == 20.0
     model = load_model("baseline")
     kinds = ("gyro_bias_temperature", "accel_bias_temperature")
     model = replace(model, effects=(*model.effects, *kinds, *(f"{kind}_rate" for kind in kinds)))

@@ -3,7 +3,8 @@
 Turning the body frame changes no measurement (`body_frame`). With errors of arcminutes the priors hold that free turn
 and nobody feels it. With errors of degrees it is the end of every iteration: the strong rows of the data cancel along
 the turn only as well as the derivatives are right, and what does not cancel outweighs the priors. So here the turn is
-no unknown: q_xy = q_xz = q_yx = 0 leave the model, and so do their polynomials of the temperature.
+no unknown: q_xy = q_xz = q_yx = 0 leave the model. Their polynomials of the temperature stay: the turn that they leave
+free is small, and what is reported is turned to the frame at every temperature.
 
 What the turn takes along must be put back. Six of nine elements of the gyros' response to force are mass unbalance in
 the frame in which the sensor was built; in the turned frame the other three are products of unbalance and
@@ -62,15 +63,21 @@ class AccelerometerFrameModel:
         ndarray, shape (..., p)
             SI, in the same frame; zero where the frame pins one.
         """
+        return body_frame.at_every_temperature(self.asked.names, self._at_start(inner))
+
+    def _at_start(self, inner: Floats) -> Floats:
+        """Read the parameters asked for in the frame at T0."""
         return np.asarray(np.where(self.place >= 0, inner[..., np.maximum(self.place, 0)], 0.0))
 
-    def covariance(self, inner: Floats) -> Floats:
+    def covariance(self, inner: Floats, about: Floats) -> Floats:
         """Read the covariance of the parameters asked for out of that of the inner ones.
 
         Parameters
         ----------
         inner : ndarray, shape (..., q, q)
             SI, in the accelerometers' frame.
+        about : ndarray, shape (q,)
+            The parameters themselves: covariances turn about them.
 
         Returns
         -------
@@ -78,7 +85,9 @@ class AccelerometerFrameModel:
             SI; rows and columns of pinned parameters are zero.
         """
         at, known = np.maximum(self.place, 0), self.place >= 0
-        return np.asarray(inner[..., at[:, None], at] * np.outer(known, known))
+        P = inner[..., at[:, None], at] * np.outer(known, known)
+        J = body_frame.temperature_jacobian(self.asked.names, self._at_start(about))
+        return np.asarray(J @ P @ J.T)
 
 
 def squares_count(sensors: ImuModel) -> bool:
@@ -111,8 +120,8 @@ def drifting(sensors: ImuModel, imu: ImuSpecification, gravity: float, duration:
 
 def accelerometer_frame_model(asked: ImuModel, imu: ImuSpecification) -> AccelerometerFrameModel | None:
     """Put a model into the accelerometers' frame; None where it cannot turn because not all misalignments are in it."""
-    pinned = set(body_frame.pinned_in(asked.names))
-    if not pinned:
+    pinned = set(body_frame.pinned_names())
+    if not pinned <= set(asked.names):
         return None
     effects: list[Effect] = []
     for effect in asked.effects:
@@ -138,5 +147,5 @@ def _turned_prior(asked: ImuModel) -> Floats:
 
     The data say a thousand times more than these priors, so that only their size matters.
     """
-    J = body_frame.frame_jacobian(asked.names, FRAME)
+    J = body_frame.frame_jacobian(asked.names, FRAME, by_temperature=False)
     return np.asarray(np.sqrt(np.diag(J @ np.diag(asked.prior**2) @ J.T)))

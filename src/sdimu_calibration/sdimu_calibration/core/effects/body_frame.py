@@ -10,13 +10,13 @@ arcminutes is right to 1e-3 of a sigma.
 
 With misalignments that are polynomials of the temperature the frame is that of the accelerometers at every temperature:
 ``M_a(T) R(T)'`` is lower triangular. It turns against the case while the temperature changes, and the gyros see that
-turn as a bias that follows the rate of the temperature. R(T) is taken to first order in the change with temperature:
-its square is that of arcseconds.
+turn as a bias that follows the rate of the temperature. Estimators work in the frame at T0, where nothing but the prior
+holds that turn, and no square of it is lost; what they report is turned.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
@@ -113,37 +113,112 @@ def values_in_frame(names: Sequence[str], values: Floats, frame: str) -> Floats:
     unbalance = _unbalance_places()
     _read_back(_matrix(unbalance, names, given) @ back, unbalance, names, out)
     for power in _turning_powers(names):
-        _turn_power(power, names, given, back, out)
+        for places in (_places("accel", power), _places("gyro", power), _unbalance_places(power)):
+            _read_back(_matrix(places, names, given) @ back, places, names, out)
+    return at_every_temperature(names, out)
+
+
+def at_every_temperature(names: Sequence[str], values: Floats) -> Floats:
+    """Go from the accelerometers' frame at T0 to that at every temperature.
+
+    ``R(T)' = exp([theta(T) x])``, theta a polynomial of T - T0, so that ``M_a(T) R(T)'`` is lower triangular in every
+    power of the model. Without the misalignments of both triads in a power, theta has not that power.
+
+    Parameters
+    ----------
+    names : sequence of str, length p
+    values : ndarray, shape (..., p)
+        In the accelerometers' frame at T0 (SI).
+
+    Returns
+    -------
+    ndarray, shape (..., p)
+        SI; the given ones where the model has no turn with the temperature.
+    """
+    turning = _turning_powers(names)
+    given = np.asarray(values, dtype=float)
+    out = given.copy()
+    if not turning:
+        return out
+    powers = ("", *_BY_TEMPERATURE)
+    groups = [
+        [_places("accel", power) for power in powers], [_places("gyro", power) for power in powers],
+        [_unbalance_places(power) for power in powers],
+    ]  # fmt: skip
+    parts = [[_matrix(places, names, given) for places in group] for group in groups]
+    for triad in (0, 1):
+        parts[triad][0] = np.eye(3) + parts[triad][0]
+    theta = np.zeros((len(powers), *given.shape[:-1], 3))
+    turns = [np.broadcast_to(np.eye(3), parts[0][0].shape)]
+    for k, power in enumerate(_BY_TEMPERATURE, start=1):
+        turns.append(_products(theta, k))
+        if power in turning:
+            theta[k] = _pinning(parts[0][0], _of_power(parts[0], turns, k))
+            turns[k] = turns[k] + _cross(theta[k])
+        for group, part in zip(groups, parts, strict=True):
+            _read_back(_of_power(part, turns, k), group[k], names, out)
+    seen = np.einsum("...ij,...j->...i", parts[1][0], theta[1])
+    for i, axis in enumerate("xyz"):
+        if f"{_SEEN_AS_BIAS}_{axis}" in names:
+            out[..., names.index(f"{_SEEN_AS_BIAS}_{axis}")] -= seen[..., i]
     return out
 
 
-def _turn_power(power: str, names: Sequence[str], given: Floats, back: Floats, out: Floats) -> None:
-    """Put the coefficients (..., p) of a power of the temperature into the accelerometers' frame, in place in `out`.
+def _cross(theta: Floats) -> Floats:
+    """Cross-product matrices (..., 3, 3) of vectors (..., 3)."""
+    return np.asarray(np.einsum("...k,kij->...ij", theta, np.array([skew(axis) for axis in np.eye(3)])))
 
-    ``R(T)' = R' (I + [theta x] (T - T0)^n)`` with the theta that leaves the power's part of ``M_a(T) R(T)'`` lower
-    triangular. `out` has the parts that do not depend on temperature in that frame already.
-    """
-    M_a, M_g = (np.eye(3) + _matrix(_places(triad), names, out) for triad in ("accel", "gyro"))
-    moved = _matrix(_places("accel", power), names, given) @ back
-    crosses = np.array([skew(axis) for axis in np.eye(3)])
+
+def _products(theta: Floats, k: int) -> Floats:
+    """Power k of ``exp([theta(T) x])`` without what is linear in theta_k, (..., 3, 3); theta (4, ..., 3) by power."""
+    one, two = _cross(theta[1]), _cross(theta[2])
+    if k == 1:
+        return np.zeros_like(one)
+    return np.asarray(0.5 * one @ one if k == 2 else 0.5 * (one @ two + two @ one) + one @ one @ one / 6.0)
+
+
+def _of_power(part: Sequence[Floats], turns: Sequence[Floats], k: int) -> Floats:
+    """Power k of the product of two polynomials, (..., 3, 3)."""
+    return np.asarray(sum(part[k - j] @ turns[j] for j in range(k + 1)))
+
+
+def _pinning(constant: Floats, moved: Floats) -> Floats:
+    """Return the theta (..., 3) for which ``moved + constant [theta x]`` (..., 3, 3) is lower triangular."""
     row, column = np.triu_indices(3, 1)
-    columns = np.stack([(M_a @ C)[..., row, column] for C in crosses], axis=-1)
-    theta = -np.linalg.solve(columns, moved[..., row, column][..., None])[..., 0]
-    turn = np.einsum("...k,kij->...ij", theta, crosses)
-    unbalance = _unbalance_places()
-    for places, constant in (
-        (_places("accel", power), M_a), (_places("gyro", power), M_g),
-        (_unbalance_places(power), _matrix(unbalance, names, out)),
-    ):  # fmt: skip
-        _read_back(_matrix(places, names, given) @ back + constant @ turn, places, names, out)
-    if power == _BY_TEMPERATURE[0]:
-        seen = np.einsum("...ij,...j->...i", M_g, theta)
-        for i, axis in enumerate("xyz"):
-            if f"{_SEEN_AS_BIAS}_{axis}" in names:
-                out[..., list(names).index(f"{_SEEN_AS_BIAS}_{axis}")] -= seen[..., i]
+    columns = np.stack([(constant @ skew(axis))[..., row, column] for axis in np.eye(3)], axis=-1)
+    return np.asarray(-np.linalg.solve(columns, moved[..., row, column][..., None])[..., 0])
 
 
-def frame_jacobian(names: Sequence[str], frame: str) -> Floats:
+def temperature_jacobian(names: Sequence[str], values: Floats) -> Floats:
+    """Differentiate `at_every_temperature` by central differences.
+
+    Parameters
+    ----------
+    names : sequence of str, length p
+    values : ndarray, shape (p,)
+        In the accelerometers' frame at T0 (SI).
+
+    Returns
+    -------
+    ndarray, shape (p, p)
+        Rows of pinned coefficients are zero; the identity where nothing turns with the temperature.
+    """
+    powers = _turning_powers(names)
+    if not powers:
+        return np.eye(len(values))
+    J = _differences(lambda rows: at_every_temperature(names, rows), values)
+    J[[names.index(name) for power in powers for name in _pinned(power)]] = 0.0
+    return J
+
+
+def _differences(of: Callable[[Floats], Floats], values: Floats) -> Floats:
+    """Central differences of a map of rows (k, p), at values (p,), shape (p, p)."""
+    steps = _STEP * np.eye(len(values))
+    ahead, behind = (of(np.asarray(values, dtype=float) + sign * steps) for sign in (1.0, -1.0))
+    return np.asarray((ahead - behind).T / (2.0 * _STEP))
+
+
+def frame_jacobian(names: Sequence[str], frame: str, by_temperature: bool = True) -> Floats:
     """First-order map of coefficient errors from the prior's frame to another, about coefficients of zero.
 
     A turn of the body frame by a small angle t adds -[t x] to both error matrices; t is the combination of the
@@ -154,6 +229,8 @@ def frame_jacobian(names: Sequence[str], frame: str) -> Floats:
     names : sequence of str, length p
     frame : str
         One of `FRAMES`.
+    by_temperature : bool
+        The frame at every temperature; else that at T0.
 
     Returns
     -------
@@ -173,7 +250,7 @@ def frame_jacobian(names: Sequence[str], frame: str) -> Floats:
         return T
     index = {n: i for i, n in enumerate(names)}
     out = T.copy()
-    for power in ("", *_turning_powers(names)):
+    for power in ("", *(_turning_powers(names) if by_temperature else ())):
         turns = _turns(power, index)
         pinned = [index[n] for n in _pinned(power)]
         out -= turns @ np.linalg.inv(turns[pinned]) @ T[pinned]
@@ -220,10 +297,7 @@ def jacobian_at(names: Sequence[str], values: Floats, frame: str) -> Floats:
     DataError
         When the frame has no such name.
     """
-    values = np.asarray(values, dtype=float)
-    steps = _STEP * np.eye(len(values))
-    ahead, behind = (values_in_frame(names, values + sign * steps, frame) for sign in (1.0, -1.0))
-    J = (ahead - behind).T / (2.0 * _STEP)
+    J = _differences(lambda rows: values_in_frame(names, rows, frame), values)
     if pinned_in(names, frame):
         J[[list(names).index(name) for name in pinned_in(names, frame)]] = 0.0  # by definition; rounding leaves 1e-11
     return J

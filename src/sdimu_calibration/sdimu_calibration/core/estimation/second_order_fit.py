@@ -104,7 +104,7 @@ class SecondOrderFit(NavigationFit):
         ndarray, shape (p, p)
             Of the coefficients of `names` (SI).
         """
-        return self.frame_model.covariance(settled)
+        return self.frame_model.covariance(settled, self.settled)
 
     @cached_property
     def known(self) -> KnownPass:
@@ -187,7 +187,8 @@ class SecondOrderFit(NavigationFit):
         rows, out = self.last.rows, self.last.output
         T = self.centring
         values = self.frame_model.values((self.last.reference + out.estimate[rows]) @ T.T)
-        return self._rows_of_history(rows, out, values, self.frame_model.covariance(T @ out.covariance @ T.T))
+        covariance = self.frame_model.covariance(T @ out.covariance @ T.T, self.settled)
+        return self._rows_of_history(rows, out, values, covariance)
 
     def notes(self) -> tuple[str, ...]:
         """List the stops that were found; say how many passes were made."""

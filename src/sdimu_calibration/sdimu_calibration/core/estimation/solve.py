@@ -252,7 +252,7 @@ def _batch(test: PreparedTest, model: Model, _start: Start | None, progress: Pro
         covariance = J @ found.covariance @ J.T
     else:
         frame, values = FRAME, frame_model.values(found.coefficients)
-        covariance = frame_model.covariance(found.covariance)
+        covariance = frame_model.covariance(found.covariance, found.coefficients)
     summary: dict[str, float | None] = {
         "log_likelihood": found.log_evidence, "nis_mean": found.chi2 / max(found.dof, 1),
         "nis_dof": float(found.dof), "passes": float(found.steps),
