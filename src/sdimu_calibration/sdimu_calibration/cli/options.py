@@ -5,9 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
-from importlib import import_module
 from pathlib import Path
-from threading import Thread
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -52,8 +50,6 @@ PowerOnOption = Annotated[
 HandOption = Annotated[bool, typer.Option("--hand", help="Moved by hand: the same as --estimator handheld.")]
 NOT_TRUSTED = 3
 """Exit status of a run that is done, and whose estimate is not to be trusted."""
-_NEEDED_LATER = ("numba.np.arraymath", "scipy.special")
-"""Modules of which the estimate needs a few functions, and which take 0.2 s to load; the first brings BLAS along."""
 HANDHELD_CHOSEN = "handheld: {why}, so nothing is navigated (--estimator filter forces navigation)"
 
 
@@ -97,8 +93,6 @@ def opened(
     if site is not None:
         load_site(site)
     handheld = None if wanted == AUTO else wanted == HANDHELD
-    # Unpacking and screening leave the other core idle.
-    Thread(target=lambda: [import_module(name) for name in _NEEDED_LATER]).start()
     test = open_test(bag, site, specification, source, handheld, noise is not None)
     if wanted == HANDHELD or (wanted == AUTO and test.why_handheld):
         if wanted == AUTO:
