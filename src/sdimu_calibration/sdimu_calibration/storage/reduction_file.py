@@ -14,6 +14,7 @@ from sdimu_calibration.core.effects.effect import Timetable
 from sdimu_calibration.core.estimation.fit import Start
 from sdimu_calibration.core.joint.member import Report
 from sdimu_calibration.core.joint.reduction import Reduction
+from sdimu_calibration.core.noise_term import NoiseTerm
 from sdimu_calibration.core.specification import ImuSpecification
 from sdimu_calibration.storage.whole_file import beside
 
@@ -32,7 +33,8 @@ def write_report(path: Path, report: Report) -> None:
         "start_names": start.names, "start_ns": report.start_ns, "temperature_degc": report.temperature_degc,
         "duration": report.times.duration, "stops": report.times.stops, "turns": report.times.turns,
         "data": dict(report.data), "statistics": dict(report.statistics), "reported": report.names,
-        "notes": report.notes, "warnings": report.warnings,
+        "notes": report.notes, "warnings": report.warnings, "heading_rad": report.heading_rad,
+        "noise": [vars(term) for term in report.noise], "widened": report.widened,
     }  # fmt: skip
     part = beside(path)
     try:
@@ -76,7 +78,12 @@ def _report(words: dict[str, Any], arrays: dict[str, Any]) -> Report | None:
         words["name"], "", "", reduction, words["estimator"], words["reason"], ImuSpecification(**words["imu"]), start,
         int(words["start_ns"]), times, math.nan if heat is None else float(heat), words["data"], words["statistics"],
         tuple(words["reported"]), arrays["values"], arrays["sigma"], tuple(words["notes"]), tuple(words["warnings"]),
+        float(words["heading_rad"]), tuple(_term(entry) for entry in words["noise"]), bool(words["widened"]),
     )  # fmt: skip
+
+
+def _term(entry: dict[str, Any]) -> NoiseTerm:
+    return NoiseTerm(**(entry | {"alike": tuple(entry["alike"])}))
 
 
 def _spans(rows: list[list[float]]) -> tuple[tuple[int, float, float], ...]:

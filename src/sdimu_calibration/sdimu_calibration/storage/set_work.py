@@ -153,7 +153,8 @@ def job_number(job: Job) -> str:
         version("sdimu_calibration"), bag_checksum(source.bag), job.member.name,
         None if source.imu is None else load_imu(source.imu), load_site(source.site or DEFAULT_SITE), source.site,
         source.source, source.handheld, source.measured_noise, source.reference_degc, job.model, job.estimator,
-        job.local, job.candidates, job.with_local, None if job.about is None else sorted(job.about.items()), job.imu,
+        job.local, job.candidates, job.with_local, job.noise, job.imu,
+        None if job.about is None else sorted(job.about.items()),
         None if job.start is None else (job.start.C_nb.tobytes(), job.start.coefficients.tobytes()),
     )  # fmt: skip
     return hashlib.sha256(repr(asked).encode()).hexdigest()[:40]

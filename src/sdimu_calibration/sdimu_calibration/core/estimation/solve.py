@@ -308,7 +308,10 @@ def fit_about(
         begun = replace(begun, setup=replace(begun.setup, sensors=frame_model.inner))
     values = np.array([coefficients.get(name, 0.0) for name in begun.setup.sensors.names])
     C_nb = begun.alignment.C_nb if start is None else start.C_nb
-    return _navigation_about(test, model, begun, frame_model, C_nb, values)
+    sensors = begun.setup.sensors
+    known = replace(begun, setup=replace(begun.setup, sensors=replace(sensors, prior=np.zeros(len(sensors.prior)))))
+    fit = _navigation_about(test, model, known, frame_model, C_nb, values)
+    return replace(fit, setup=begun.setup)
 
 
 def _navigation_about(

@@ -124,7 +124,7 @@ def start_state(setup: TestSetup, start: Alignment, C_nb: Floats, reference: Flo
     C_nb : ndarray, shape (3, 3)
         Attitude about which the pass is linearised, b to n.
     reference : ndarray, shape (p,)
-        Coefficients about which it is linearised (SI).
+        Coefficients about which it is linearised (SI); one with a prior of zero is known to be the reference.
     """
     p = len(setup.sensors.prior)
     s = NAV + p + COPY
@@ -139,7 +139,7 @@ def start_state(setup: TestSetup, start: Alignment, C_nb: Floats, reference: Flo
     P[range(NAV, NAV + p), range(NAV, NAV + p)] = setup.sensors.prior**2
     shift = rotation_vector(C_nb @ start.C_nb.T)
     x[6:9] = x[NAV + p :] = -shift
-    x[NAV : NAV + p] = -reference
+    x[NAV : NAV + p] = np.where(setup.sensors.prior > 0.0, -reference, 0.0)
     position = np.array([setup.site.latitude_rad, 0.0, setup.site.height_m])
     return PassState(x, P, C_nb.copy(), np.zeros(3), position, reference.copy())
 

@@ -13,14 +13,21 @@ from sdimu_calibration.core.diagnosis.diagnose import measured_noise
 from sdimu_calibration.core.effects import selection
 from sdimu_calibration.core.effects.effect import Effect, Timetable
 from sdimu_calibration.core.estimation.fit import Fit, Start
+from sdimu_calibration.core.estimation.navigation_fit import NavigationFit
 from sdimu_calibration.core.estimation.noise_estimate import told
-from sdimu_calibration.core.estimation.noise_learning import with_noise_learned
+from sdimu_calibration.core.estimation.noise_learning import in_noise, with_noise_learned
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.estimation.solve import AUTO, fit_about, solve
+from sdimu_calibration.core.evidence.learned_noise import Wander
 from sdimu_calibration.core.joint.reduction import Reduction, reduced
 from sdimu_calibration.core.joint.scope import is_local, tagged
+from sdimu_calibration.core.noise_term import NoiseTerm
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.specification import ImuSpecification, Model
+
+_HEADING = 1e-3
+"""Heading sigma (rad) from which a recording alone does not know its heading: five sigmas of it change how a
+coefficient shows by half a percent."""
 
 
 @dataclass(frozen=True)
@@ -65,6 +72,8 @@ class Job:
         With the noise that the recording shows, where it is known.
     start : Start or None
         Where an earlier fit of the recording ended: gives the attitude.
+    noise : tuple of NoiseTerm or None
+        Noise with a memory, where it is known; None learns it.
     """
 
     member: Member
@@ -76,6 +85,7 @@ class Job:
     about: Mapping[str, float] | None = None
     imu: ImuSpecification | None = None
     start: Start | None = None
+    noise: tuple[NoiseTerm, ...] | None = None
 
 
 @dataclass(frozen=True)
@@ -106,6 +116,12 @@ class Report:
         Of the recording's own fit (SI), in the frame of the report; empty for a fit about given coefficients.
     notes : tuple of str
     warnings : tuple of str
+    heading_rad : float
+        Sigma of the heading at the end of the recording's own fit (rad); 0 where none is estimated.
+    noise : tuple of NoiseTerm
+        Noise with a memory that was learned.
+    widened : bool
+        The recording alone contradicts priors of the IMU file.
     """
 
     name: str
@@ -126,6 +142,14 @@ class Report:
     sigma: Floats
     notes: tuple[str, ...] = ()
     warnings: tuple[str, ...] = field(default=())
+    heading_rad: float = 0.0
+    noise: tuple[NoiseTerm, ...] = ()
+    widened: bool = False
+
+    @property
+    def stands_alone(self) -> bool:
+        """Whether the recording's own fit is a place about which the recording is linear."""
+        return len(self.values) > 0 and self.heading_rad < _HEADING and not self.widened
 
     @property
     def has_temperature(self) -> bool:
@@ -171,7 +195,10 @@ def fitted(job: Job) -> Fit:
         # A run by hand is fitted anew: its attitudes are parameters, and a least squares about others is no nearer.
         return _own(test, model, job)
     fit = fit_about(test, model, job.estimator, _untagged(job.about, job.member.name), job.start)
-    return with_noise_learned(fit)
+    if job.noise is None:
+        return with_noise_learned(fit)
+    evidence = fit.evidence()
+    return in_noise(fit, evidence, Wander.of(evidence), job.noise) if job.noise else fit
 
 
 def _own(test: PreparedTest, model: Model, job: Job) -> Fit:
@@ -203,7 +230,23 @@ def _report(job: Job, fit: Fit) -> Report:
         fit.values if job.about is None else np.empty(0),
         np.sqrt(np.diag(fit.covariance)) if job.about is None else np.empty(0),
         (*recording.notes, *(told(term) for term in fit.noise_terms)), tuple(f.text for f in fit.faults if f.grave),
+        _heading(fit), fit.noise_terms,
+        _widened(fit),
     )  # fmt: skip
+
+
+def _heading(fit: Fit) -> float:
+    """Sigma of the heading at the end (rad); 0 where none is estimated."""
+    sigma = fit.history().attitude_sigma
+    return float(sigma[-1, 2]) if len(sigma) else 0.0
+
+
+def _widened(fit: Fit) -> bool:
+    """Whether a fit widened priors that its data contradict."""
+    if not isinstance(fit, NavigationFit):
+        return False
+    sensors = fit.setup.sensors
+    return bool(np.any(sensors.prior > sensors.stated))
 
 
 def _local_candidates(fit: Fit) -> list[Effect]:

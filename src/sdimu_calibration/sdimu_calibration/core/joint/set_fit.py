@@ -35,11 +35,13 @@ _FAR = 5.0
 """Distance of the joint estimate from where a recording was linearised (sigmas of that recording alone) from which it
 is linearised again, where squares of errors do not count: the rows then change by less than their rounding."""
 _NEAR = 2.0
-"""The same where squares count (sigmas of the joint estimate): what is left of the squares is then below the sigma."""
+"""The same where squares count, or a recording does not know its heading (sigmas of the joint estimate): what is left
+of the squares is then below the sigma."""
 SCOPES = ("unit", "power-on")
 """Scopes that a set can give an effect of its model."""
-_MOST_ROUNDS = 4
-"""Number of linearisations at most: the second already moves the estimate by less than a sigma."""
+_MOST_ROUNDS = 6
+"""Number of linearisations at most: where recordings know their heading the second already moves the estimate by less
+than a sigma."""
 
 
 @dataclass(frozen=True)
@@ -158,22 +160,28 @@ def fit_set(
     jobs = [job_of(member, options, before) for member in members]
     done = run(jobs)
     left = {job.member.name: str(d) for job, d in zip(jobs, done, strict=True) if isinstance(d, DataError)}
-    reports = [d for d in done if not isinstance(d, DataError)]
+    earlier = {r.name: r for r in (before.reports if before else ())}
+    reports = [with_own(d, earlier.get(d.name)) for d in done if not isinstance(d, DataError)]
     if not reports:
         raise DataError(f"no recording of the set can be used: {next(iter(left.values()))}")
     reports = _one_estimator(members, options, reports, run)
+    firm = [r for r in reports if r.stands_alone]
+    if firm and before is None:
+        # Where a recording alone may end is no place to linearise it; what the others know of the unit is.
+        left |= {r.name: "" for r in reports if not r.stands_alone}
+        reports = firm
     fit = _combined(members, options, reports)
     for turn in range(_MOST_ROUNDS):
         progress("joint fit", 0.5 + 0.1 * turn)
         again = [m for m in members if m.name in left or _moved(fit, m.name)]
         if not again:
             break
-        fresh = run([job_of(member, options, fit, estimator=reports[0].estimator) for member in again])
+        fresh = run([job_of(member, options, fit, reports[0].estimator, learn=False) for member in again])
         came = {m.name: d for m, d in zip(again, fresh, strict=True) if not isinstance(d, DataError)}
         lost = {m.name: str(d) for m, d in zip(again, fresh, strict=True) if isinstance(d, DataError)}
         stuck = set(lost) <= set(left) and not came
         left = lost
-        kept = {r.name: _with_own(came.get(r.name, r), r) for r in fit.reports}
+        kept = {r.name: with_own(came.get(r.name, r), r) for r in fit.reports}
         reports = [kept.get(m.name) or came[m.name] for m in members if m.name in kept or m.name in came]
         fit = _combined(members, options, reports)
         if stuck:
@@ -201,7 +209,9 @@ def check_members(members: Sequence[Member]) -> None:
         )
 
 
-def job_of(member: Member, options: SetOptions, about: SetFit | None, estimator: str = "") -> Job:
+def job_of(
+    member: Member, options: SetOptions, about: SetFit | None, estimator: str = "", learn: bool = True
+) -> Job:
     """Make the job of a recording.
 
     Parameters
@@ -212,6 +222,9 @@ def job_of(member: Member, options: SetOptions, about: SetFit | None, estimator:
         Estimate about which the recording is linearised; None is its own fit.
     estimator : str
         In place of that of the options.
+    learn : bool
+        Learn the noise anew; else that of the report is kept, as about a point that is still wrong the noise would
+        take up what the point leaves.
     """
     local = tuple(options.local.get(member.name, ()))
     if about is None:
@@ -220,15 +233,22 @@ def job_of(member: Member, options: SetOptions, about: SetFit | None, estimator:
     if report is not None:
         return Job(
             member, options.model, report.estimator, local, (), False, about.values_of(report),
-            report.imu, report.start,
+            report.imu, report.start, None if learn else report.noise,
         )
     values = dict(zip(about.names, about.estimate.values.tolist(), strict=True))
-    return Job(member, options.model, estimator or about.reports[0].estimator, local, about=values)
+    return Job(member, options.model, estimator or about.reports[0].estimator, local, about=values, noise=())
 
 
-def _with_own(fresh: Report, old: Report) -> Report:
-    """Keep the values of a recording's own fit beside rows about other coefficients."""
-    return fresh if len(fresh.values) else replace(fresh, values=old.values, sigma=old.sigma)
+def with_own(fresh: Report, old: Report | None) -> Report:
+    """Keep what a recording's own fit says beside rows about other coefficients: its values, and priors it widened."""
+    if old is None or len(fresh.values):
+        return fresh
+    known = dict(zip(old.reduction.names, old.reduction.weight.tolist(), strict=True))
+    pairs = zip(fresh.reduction.names, fresh.reduction.weight.tolist(), strict=True)
+    rows = replace(fresh.reduction, weight=np.array([known.get(name, weight) for name, weight in pairs]))
+    return replace(
+        fresh, reduction=rows, values=old.values, sigma=old.sigma, heading_rad=old.heading_rad, widened=old.widened
+    )
 
 
 def _one_estimator(
@@ -339,7 +359,7 @@ def _moved(fit: SetFit, name: str) -> bool:
         return False
     values, own = fit.values_of(report), report.reduction
     far = np.abs(np.array([values[n] for n in own.names]) - own.point)
-    if report.estimator == SecondOrderFit.estimator:
+    if report.estimator == SecondOrderFit.estimator or not report.stands_alone:
         places = [fit.names.index(n) for n in own.names]
         sigma = np.sqrt(np.diag(fit.estimate.covariance)[places])
         return bool(np.any(far > _NEAR * sigma))

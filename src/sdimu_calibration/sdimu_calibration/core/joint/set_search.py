@@ -24,7 +24,7 @@ from sdimu_calibration.core.evidence.candidate import Candidate, split
 from sdimu_calibration.core.joint.member import Job, Member, Report
 from sdimu_calibration.core.joint.scope import by_name, is_shared, split_tag
 from sdimu_calibration.core.joint.set_evidence import SetEvidence, set_evidence, white_power_on
-from sdimu_calibration.core.joint.set_fit import Run, SetFit, SetOptions, fit_set, power_on
+from sdimu_calibration.core.joint.set_fit import Run, SetFit, SetOptions, fit_set, power_on, with_own
 from sdimu_calibration.core.probability import normal_limit
 from sdimu_calibration.core.progress import Progress, silent
 from sdimu_calibration.core.recording import DataError
@@ -125,12 +125,13 @@ def search_set(
         found = search(evidence, np.arange(p, len(evidence.names)), alpha)
         first = first or found
         new = [evidence.candidates[i - p] for i in found.chosen]
-        odd = _odd_one(full, evidence, found.chosen, alpha)
         nearer = _nearer(new, finer)
-        if nearer and not odd:
+        if nearer:
             finer = nearer
             continue
         finer = []
+        # What all recordings show comes first: in one of them alone a drift may look the same.
+        odd = None if new else _odd_one(full, evidence, found.chosen, alpha)
         if not new and not odd:
             break
         scores |= {s.label: s.z for s in found.steps if s.accepted}
@@ -158,7 +159,7 @@ def _candidates(fit: SetFit, extra: Sequence[Effect], finer: Sequence[Effect]) -
     heat = all(r.has_temperature for r in fit.reports)
     have = {label for e in fit.model.effects for label in (selection.resolve(e) if isinstance(e, str) else e).labels}
     have |= set(fit.names)
-    effects = [*extra, *(e for e in catalogue(report.times, have, heat) if is_shared(e)), *finer]
+    effects = [*extra, *(e for e in catalogue(report.times, have, heat, of_a_set=True) if is_shared(e)), *finer]
     if any(r.estimator == HandheldFit.estimator for r in fit.reports):
         effects = [e for e in effects if not (e.needs_table or e.random_walk or e.decay_s)]
     found: list[Effect] = []
@@ -175,7 +176,7 @@ def _gathered(fit: SetFit, tried: Sequence[Effect], run: Run) -> SetFit:
     jobs = [
         Job(
             member, fit.model, report.estimator, tuple(fit.local.get(member.name, ())), effects, True,
-            fit.values_of(report), report.imu, report.start,
+            fit.values_of(report), report.imu, report.start, report.noise,
         )
         for member, report in zip(fit.members, fit.reports, strict=True)
     ]  # fmt: skip
@@ -184,7 +185,7 @@ def _gathered(fit: SetFit, tried: Sequence[Effect], run: Run) -> SetFit:
     for old, fresh in zip(fit.reports, done, strict=True):
         if isinstance(fresh, DataError):
             raise fresh
-        reports.append(replace(fresh, values=old.values, sigma=old.sigma))
+        reports.append(with_own(fresh, old))
     return replace(fit, reports=tuple(reports))
 
 
