@@ -26,7 +26,7 @@ _OF_ONE_TIME = {"t0", "span", "turn"}
 
 def is_local(effect: Effect) -> bool:
     """Whether an effect may be in one recording and not in the next: a fault of the data, a drift of a power-on."""
-    return effect.scope in {"recording", "power-on"} and not effect.random_walk
+    return effect.scope in {"recording", "power-on"} and "span" not in effect.options
 
 
 def is_shared(effect: Effect) -> bool:

@@ -23,7 +23,7 @@ from sdimu_calibration.core.joint.combine import (
 )
 from sdimu_calibration.core.joint.member import Job, Member, Report
 from sdimu_calibration.core.joint.scope import by_name, split_tag
-from sdimu_calibration.core.joint.turn_on import turn_on_scatter
+from sdimu_calibration.core.joint.turn_on import in_scatter, turn_on_scatter
 from sdimu_calibration.core.progress import Progress, silent
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.results import TurnOn
@@ -340,16 +340,35 @@ def columns_of(varying: Mapping[str, tuple[str, ...]], names: Sequence[str]) -> 
 def _combined(members: Sequence[Member], options: SetOptions, reports: Sequence[Report]) -> SetFit:
     names = joint_names(reports)
     varying = varying_effects(options.model, options.scopes, names)
-    groups = grouped_rows(reports, names)
-    components = columns_of(varying, names) if len(groups) > 1 else []
-    combined = Combination(groups, prior_weight(reports, names), components)
-    turn_on = turn_on_scatter(combined)
-    estimate = combined.estimate(np.array([t.sigma for t in turn_on]))
+    estimate, turn_on = _estimated(reports, names, varying)
     used = {r.name for r in reports}
     return SetFit(
         tuple(m for m in members if m.name in used), options.model, dict(options.local), varying, tuple(reports), names,
         estimate, turn_on,
     )  # fmt: skip
+
+
+def _estimated(
+    reports: Sequence[Report], names: Sequence[str], varying: Mapping[str, tuple[str, ...]]
+) -> tuple[JointEstimate, tuple[TurnOn, ...]]:
+    groups = grouped_rows(reports, names)
+    components = columns_of(varying, names) if len(groups) > 1 else []
+    combined = Combination(groups, prior_weight(reports, names), components)
+    turn_on = turn_on_scatter(combined)
+    return in_scatter(combined, turn_on), turn_on
+
+
+def with_reports(fit: SetFit, reports: Sequence[Report]) -> SetFit:
+    """Return the fit to other rows of the same recordings.
+
+    Parameters
+    ----------
+    fit : SetFit
+    reports : sequence of Report
+        In the order of its own.
+    """
+    estimate, turn_on = _estimated(reports, fit.names, fit.varying)
+    return replace(fit, reports=tuple(reports), estimate=estimate, turn_on=turn_on)
 
 
 def _moved(fit: SetFit, name: str) -> bool:

@@ -7,7 +7,7 @@ threshold that counts all recordings.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -24,13 +24,19 @@ from sdimu_calibration.core.evidence.candidate import Candidate, split
 from sdimu_calibration.core.joint.member import Job, Member, Report
 from sdimu_calibration.core.joint.scope import by_name, is_shared, split_tag
 from sdimu_calibration.core.joint.set_evidence import SetEvidence, set_evidence, white_power_on
-from sdimu_calibration.core.joint.set_fit import Run, SetFit, SetOptions, fit_set, power_on, with_own
+from sdimu_calibration.core.joint.set_fit import Run, SetFit, SetOptions, fit_set, power_on, with_own, with_reports
 from sdimu_calibration.core.probability import normal_limit
 from sdimu_calibration.core.progress import Progress, silent
 from sdimu_calibration.core.recording import DataError
 
-_MOST_ROUNDS = 6
-"""Number of rounds at most: one finds nearly everything, one sharpens it, the others find what stood behind it."""
+_MOST_ROUNDS = 20
+"""Number of rounds at most: strong effects take one each, with one more that sharpens it; the others come together."""
+_STRONG = 20.0
+"""Score (1) from which an effect is put into the fit before others are sought: what its linear model leaves of it, some
+percent, would be taken for them."""
+_FAILS = 1.3
+"""Mean squared innovation of a recording over that of noise (1) from which the same holds: deviations of the power-ons
+take up so much of a strong effect that its score is small."""
 _KEEP = 3.0
 """Size of an effect in the joint fit (sigma) below which it is dropped: chance ends there."""
 _WIDE = 3.0
@@ -122,7 +128,10 @@ def search_set(
         full = _gathered(fit, effects, run)
         evidence = set_evidence(full, [c for effect in effects for c in split(effect)])
         p = len(evidence.weight)
-        found = search(evidence, np.arange(p, len(evidence.names)), alpha)
+        everything = np.arange(p, len(evidence.names))
+        found = search(evidence, everything, alpha)
+        if len(found.steps) > 1 and _far_off(full, found):
+            found = search(evidence, everything, alpha, most=1)
         first = first or found
         new = [evidence.candidates[i - p] for i in found.chosen]
         nearer = _nearer(new, finer)
@@ -133,9 +142,9 @@ def search_set(
         # What all recordings show comes first: in one of them alone a drift may look the same.
         odd = None if new else _odd_one(full, evidence, found.chosen, alpha)
         if not new and not odd:
+            alike = _alike(evidence, chosen)
             break
         scores |= {s.label: s.z for s in found.steps if s.accepted}
-        alike |= _alike(evidence, found)
         if odd:
             local.append(odd)
             own = {**options.local, odd.recording: (*options.local.get(odd.recording, ()), odd.key)}
@@ -151,6 +160,12 @@ def search_set(
         before, fit, tuple(kept.values()), tuple(scores.get(label, float("nan")) for label in kept), alike,
         tuple(local), first.threshold, first,
     )  # fmt: skip
+
+
+def _far_off(fit: SetFit, found: Search[SetEvidence]) -> bool:
+    """Whether what was found first is so strong that the others may be what its linear model leaves."""
+    worst = max(float(r.statistics["nis_mean"] or 0.0) for r in fit.reports)
+    return abs(found.steps[0].z) > _STRONG or worst > _FAILS
 
 
 def _candidates(fit: SetFit, extra: Sequence[Effect], finer: Sequence[Effect]) -> list[Effect]:
@@ -186,7 +201,8 @@ def _gathered(fit: SetFit, tried: Sequence[Effect], run: Run) -> SetFit:
         if isinstance(fresh, DataError):
             raise fresh
         reports.append(with_own(fresh, old))
-    return replace(fit, reports=tuple(reports))
+    # The search looks at what is left of these rows, not of those before.
+    return with_reports(fit, reports)
 
 
 def _nearer(new: Sequence[Candidate], tried: Sequence[Effect]) -> list[Effect]:
@@ -205,16 +221,23 @@ def _nearer(new: Sequence[Candidate], tried: Sequence[Effect]) -> list[Effect]:
     return variants
 
 
-def _alike(evidence: SetEvidence, found: Search[SetEvidence]) -> dict[str, tuple[str, ...]]:
-    """Name what the set cannot tell from each effect that was found, all others being in the model."""
-    problem, chosen = Problem(evidence), [int(c) for c in found.chosen]
-    allowed = np.arange(problem.p, len(evidence.names))
+def _alike(evidence: SetEvidence, found: Mapping[str, Candidate]) -> dict[str, tuple[str, ...]]:
+    """Name what the set cannot tell from each effect that was found, all others being in the model.
+
+    It is asked where the model has all of them: before, a strong effect hides what tells another one apart.
+    """
+    tried = [replace(c, effect=replace(c.effect, nearer=None)) for c in found.values()]
+    columns = np.array([_place(evidence.names, c) for c in tried], dtype=np.int64)
+    open_again = evidence.as_candidates(columns, tried)
+    problem = Problem(open_again)
+    chosen = list(range(problem.p, problem.p + len(tried)))
+    allowed = np.arange(problem.p, len(open_again.names))
     return {
-        evidence.names[c]: tuple(
-            evidence.names[i] for i in look_alikes(problem, chosen, c, allowed, found.scale)
-            if not _same_effect(evidence, c, i)
+        label: tuple(
+            open_again.names[i] for i in look_alikes(problem, chosen, c, allowed, problem.scale(chosen))
+            if not _same_effect(open_again, c, i)
         )
-        for c in chosen
+        for label, c in zip(found, chosen, strict=True)
     }  # fmt: skip
 
 

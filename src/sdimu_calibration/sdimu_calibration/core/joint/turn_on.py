@@ -6,10 +6,13 @@ Thompson, "A likelihood approach to meta-analysis with random effects", Statisti
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
+
 import numpy as np
 
 from sdimu_calibration.core.arrays import Floats
-from sdimu_calibration.core.joint.combine import Combination
+from sdimu_calibration.core.joint.combine import Combination, JointEstimate
 from sdimu_calibration.core.results import TurnOn
 
 _FALL = 1.92
@@ -18,6 +21,10 @@ _SMALLEST, _LARGEST = 1e-3, 1e6
 """Range of the sigma over the resolution of one power-on (1): below, nothing is seen of it; no IMU is beyond."""
 _GRID = 37
 """Number of sigmas of the first look at the range: four a decade, so that no top of the likelihood lies between."""
+_OPEN = 30
+"""Number of sigmas over which the scatter is averaged: its likelihood is wider than three of their steps."""
+_WIDEST = 3.0
+"""Largest of these sigmas over the upper bound of the interval (1): beyond it the likelihood is nothing."""
 _SWEEPS = 4
 """Number of times that all components are optimised in turn: they hardly depend on each other."""
 
@@ -38,10 +45,55 @@ def turn_on_scatter(combined: Combination) -> tuple[TurnOn, ...]:
     return tuple(_with_interval(combined, tau, k, scale[k]) for k in range(len(tau)))
 
 
-def _profile(combined: Combination, tau: Floats, k: int, size: float) -> float:
+def in_scatter(combined: Combination, found: Sequence[TurnOn]) -> JointEstimate:
+    """Estimate all parameters, their sigmas with what is not known of the scatter.
+
+    With few power-ons the scatter is known to a factor: values and covariance are the mean over the sigmas that the
+    data leave open, each weighed with its likelihood (flat prior of sigma: A. Gelman, "Prior distributions for variance
+    parameters in hierarchical models", Bayesian Analysis 1, 2006).
+
+    Parameters
+    ----------
+    combined : Combination
+    found : sequence of TurnOn
+        Of its components.
+    """
+    tau = np.array([t.sigma for t in found])
+    best = combined.estimate(tau)
+    more, spread = np.zeros_like(best.covariance), best.deviation_sigma**2
+    for k, one in enumerate(found):
+        grid, weight = _open_sigmas(combined, tau, k, one)
+        each = [combined.estimate(_with(tau, k, size)) for size in grid]
+        mean = sum(w * e.values for w, e in zip(weight, each, strict=True))
+        more += sum(
+            w * (e.covariance - best.covariance + np.outer(e.values - mean, e.values - mean))
+            for w, e in zip(weight, each, strict=True)
+        )
+        middle = sum(w * e.deviation for w, e in zip(weight, each, strict=True))
+        spread = spread - best.deviation_sigma**2 + sum(
+            w * (e.deviation_sigma**2 + (e.deviation - middle) ** 2) for w, e in zip(weight, each, strict=True)
+        )
+    return replace(best, covariance=best.covariance + more, deviation_sigma=np.sqrt(spread))
+
+
+def _open_sigmas(combined: Combination, tau: Floats, k: int, found: TurnOn) -> tuple[Floats, Floats]:
+    """Sigmas (SI) of one component that the data leave open, and the weight of each."""
+    if not np.isfinite(found.high):
+        return tau[k : k + 1], np.ones(1)
+    grid = (np.arange(_OPEN) + 0.5) * _WIDEST * found.high / _OPEN
+    likelihood = np.array([_profile(combined, tau, k, size) for size in grid])
+    weight = np.exp(likelihood - likelihood.max())
+    return grid, weight / weight.sum()
+
+
+def _with(tau: Floats, k: int, size: float) -> Floats:
     trial = tau.copy()
     trial[k] = size
-    return combined.log_likelihood(trial)
+    return trial
+
+
+def _profile(combined: Combination, tau: Floats, k: int, size: float) -> float:
+    return combined.log_likelihood(_with(tau, k, size))
 
 
 def _best(combined: Combination, tau: Floats, k: int, scale: float) -> float:
