@@ -39,6 +39,9 @@ _FAILS = 1.3
 take up so much of a strong effect that its score is small."""
 _KEEP = 3.0
 """Size of an effect in the joint fit (sigma) below which it is dropped: chance ends there."""
+_ACCUSED = 1e-3
+"""Probability that noise puts one candidate of one recording over its threshold: a recording that is accused is looked
+at again, and no other recording can speak for it."""
 _WIDE = 3.0
 """Factor on the physical prior of a candidate (1): a sensor may be out of its class, as in the search of one
 recording."""
@@ -140,7 +143,7 @@ def search_set(
             continue
         finer = []
         # What all recordings show comes first: in one of them alone a drift may look the same.
-        odd = None if new else _odd_one(full, evidence, found.chosen, alpha)
+        odd = None if new else _odd_one(full, evidence, found.chosen)
         if not new and not odd:
             alike = _alike(evidence, chosen)
             break
@@ -248,7 +251,7 @@ def _same_effect(evidence: SetEvidence, one: int, other: int) -> bool:
     return first.family == second.family and first.parameter.name == second.parameter.name
 
 
-def _odd_one(fit: SetFit, evidence: SetEvidence, chosen: Ints, alpha: float) -> LocalFind | None:
+def _odd_one(fit: SetFit, evidence: SetEvidence, chosen: Ints) -> LocalFind | None:
     """Find the effect of one recording that stands out most, given the joint estimate with what was chosen."""
     known, weight, _ = Problem(evidence).known([int(c) for c in chosen])
     estimate, covariance = evidence.information.estimate(known, weight)
@@ -257,7 +260,7 @@ def _odd_one(fit: SetFit, evidence: SetEvidence, chosen: Ints, alpha: float) -> 
     count = sum(len(_local_labels(r)) for r in fit.reports)
     if not count:
         return None
-    limit = normal_limit(0.5 * alpha / count)
+    limit = normal_limit(0.5 * _ACCUSED / count)
     best: tuple[float, LocalFind] | None = None
     for name in fit.power_ons:
         members = [k for k, r in enumerate(fit.reports) if power_on(r) == name]

@@ -1,0 +1,87 @@
+"""Small sets of recordings of one unit, simulated."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from sdimu_calibration.core.estimation.prepared_test import PreparedTest
+from sdimu_calibration.core.joint.member import Job, Member, Report, tried
+from sdimu_calibration.core.joint.set_fit import SetOptions
+from sdimu_calibration.core.plan import Plan
+from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.specification import Site
+from sdimu_calibration.storage.config import load_imu, load_model, load_plan
+from sdimu_sim.campaign.run import simulate
+from sdimu_sim.core.scenario import Scenario, imu_truth
+from sdimu_sim.core.truth import draw_coefficients, turned_on
+
+SITE = Site(latitude_rad=float(np.radians(36.4)), height_m=80.0)
+IMU = load_imu("dtg")
+
+
+class InMemory:
+    """Opens a test that is in memory."""
+
+    def __init__(self, test: PreparedTest) -> None:
+        self.test = test
+
+    def __call__(self) -> PreparedTest:
+        return self.test
+
+
+@dataclass(frozen=True)
+class UnitSet:
+    """Recordings of one unit, and its true coefficients: those of the mean over all power-ons."""
+
+    members: tuple[Member, ...]
+    truth: Mapping[str, float]
+
+
+def short(name: str = "recommended", stops: int = 20, dwell_s: float = 30.0) -> Plan:
+    plan = load_plan(name)
+    stops = min(stops, len(plan.dwell_s))
+    return replace(plan, dwell_s=(dwell_s,) * stops, turns=plan.turns[: stops - 1])
+
+
+@cache
+def _recorded(
+    seed: int, number: int, plan: Plan, effects: tuple[str, ...], shift: tuple[tuple[str, float], ...],
+    mount: tuple[float, float, float] | None,
+) -> PreparedTest:  # fmt: skip
+    own = turned_on(draw_coefficients(IMU, seed), {"gyro_bias": 5e-8, "accel_bias": 2e-4}, 1000 * seed + number)
+    own |= {name: own[name] + size for name, size in shift}
+    scenario = Scenario(
+        plan, IMU, SITE, rate_hz=10.0, seed=1000 * seed + number, coefficients=own, effects=effects, mount_rad=mount,
+        start_ns=(1_700_000_000 + 86_400 * number) * 10**9,
+    )  # fmt: skip
+    return PreparedTest(simulate(scenario, imu_truth(scenario)), IMU, SITE)
+
+
+def unit_set(
+    seed: int, plans: Sequence[Plan], effects: tuple[str, ...] = (),
+    shift: Mapping[int, Mapping[str, float]] | None = None,
+) -> UnitSet:  # fmt: skip
+    members = []
+    for k, plan in enumerate(plans):
+        own = tuple((shift or {}).get(k, {}).items())
+        members.append(Member(f"r{k}", InMemory(_recorded(seed, k, plan, effects, own, None))))
+    return UnitSet(tuple(members), draw_coefficients(IMU, seed))
+
+
+def here(jobs: Sequence[Job]) -> list[Report | DataError]:
+    return [tried(job) for job in jobs]
+
+
+@pytest.fixture
+def options() -> SetOptions:
+    return SetOptions(load_model("baseline"))
+
+
+@pytest.fixture
+def run() -> Callable[[Sequence[Job]], list[Report | DataError]]:
+    return here

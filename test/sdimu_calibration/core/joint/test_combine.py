@@ -1,0 +1,96 @@
+"""The joint least squares against one that has every deviation as a parameter, and against the density of the data."""
+
+import numpy as np
+import pytest
+
+from sdimu_calibration.core.joint.combine import Combination, Component, Rows
+from sdimu_calibration.core.joint.turn_on import in_scatter, turn_on_scatter
+
+P, V = 6, 2
+"""Parameters, of which the first two vary."""
+UNIT = np.array([1e-7, 1e-7, 1e-4, 1e-3, 1.0, 10.0])
+
+
+def a_set(seed: int, groups: int, tau: float, rows: int = 25):
+    """Data equations of power-ons whose first coefficients differ by `tau` units."""
+    rng = np.random.default_rng(seed)
+    theta = UNIT * rng.normal(size=P)
+    made, deviations = [], []
+    for _ in range(groups):
+        own = np.zeros(P)
+        own[:V] = tau * UNIT[:V] * rng.normal(size=V)
+        A = 10.0 * rng.normal(size=(rows, P)) / UNIT
+        made.append(Rows(A, A @ (theta + own) + rng.normal(size=rows)))
+        deviations.append(own[:V])
+    weight = np.full(P, 1e-2) / UNIT**2
+    return theta, np.array(deviations), Combination(made, weight, [Component("b", np.arange(V))]), made, weight
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_estimate_is_that_of_all_parameters_and_deviations_at_once(seed):
+    _, _, combined, groups, weight = a_set(seed, 4, 0.5)
+    tau = 0.3e-7
+    found = combined.estimate(np.array([tau]))
+    size = P + V * len(groups)
+    J, d = np.zeros((size, size)), np.zeros(size)
+    for g, rows in enumerate(groups):
+        wide = np.zeros((len(rows.y), size))
+        wide[:, :P] = rows.A
+        wide[:, P + V * g : P + V * (g + 1)] = rows.A[:, :V]
+        J += wide.T @ wide
+        d += wide.T @ rows.y
+    J += np.diag(np.concatenate([weight, np.full(V * len(groups), tau**-2)]))
+    scale = np.concatenate([UNIT, np.full(V * len(groups), 1e-7)])
+    C = np.linalg.inv(J * np.outer(scale, scale)) * np.outer(scale, scale)
+    dense = C @ d
+    np.testing.assert_allclose(found.values / UNIT, dense[:P] / UNIT, atol=1e-9)
+    np.testing.assert_allclose(found.covariance / np.outer(UNIT, UNIT), C[:P, :P] / np.outer(UNIT, UNIT), atol=1e-9)
+    np.testing.assert_allclose(found.deviation.ravel() * 1e7, dense[P:] * 1e7, atol=1e-7)
+    np.testing.assert_allclose(found.deviation_sigma.ravel() * 1e7, np.sqrt(np.diag(C)[P:]) * 1e7, atol=1e-7)
+
+
+def test_likelihood_is_the_density_of_the_data():
+    _, _, combined, groups, weight = a_set(3, 3, 0.5)
+
+    def density(tau: float) -> float:
+        blocks = [rows.A for rows in groups]
+        A, y = np.vstack(blocks), np.concatenate([rows.y for rows in groups])
+        S = A @ np.diag(1.0 / weight) @ A.T + np.eye(len(y))
+        start = 0
+        for block in blocks:
+            end = start + len(block)
+            S[start:end, start:end] += tau**2 * block[:, :V] @ block[:, :V].T
+            start = end
+        return -0.5 * (np.linalg.slogdet(S)[1] + y @ np.linalg.solve(S, y))
+
+    sizes = [1e-9, 2e-8, 1e-7]
+    ours = [combined.log_likelihood(np.array([tau])) for tau in sizes]
+    np.testing.assert_allclose(np.diff(ours), np.diff([density(tau) for tau in sizes]), rtol=1e-6)
+
+
+def test_intervals_of_the_scatter_hold_it():
+    # 200 sets of eight power-ons, two coefficients: 95 % of the intervals should, 90 to 99 % may by chance.
+    tau, inside, none = 0.5, 0, 0
+    for seed in range(200):
+        _, _, combined, _, _ = a_set(seed, 8, tau)
+        found = turn_on_scatter(combined)[0]
+        inside += found.low <= tau * UNIT[0] <= found.high
+    for seed in range(50):
+        _, _, combined, _, _ = a_set(1000 + seed, 8, 0.0)
+        none += turn_on_scatter(combined)[0].low == 0.0
+    assert 180 <= inside <= 198
+    assert none >= 45
+
+
+@pytest.mark.parametrize(("groups", "least"), [(3, 0.6), (8, 0.8)])
+def test_errors_are_as_large_as_their_sigmas(groups, least):
+    # With few power-ons the sigma is that of Student's t, whose tails make it larger than most errors.
+    z, own = [], []
+    for seed in range(150):
+        theta, deviations, combined, _, _ = a_set(seed, groups, 2.0)
+        found = in_scatter(combined, turn_on_scatter(combined))
+        z.append((found.values - theta) / np.sqrt(np.diag(found.covariance)))
+        own.append((found.deviation - deviations) / found.deviation_sigma)
+    rms = np.sqrt(np.mean(np.square(z), axis=0))
+    assert np.all((rms > least) & (rms < 1.2)), rms
+    assert least < np.sqrt(np.mean(np.square(own))) < 1.2

@@ -1,0 +1,127 @@
+"""A joint fit of simulated recordings: against all rows at once, with one attitude each, and in bad company."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sdimu_calibration.core.joint.member import Member, run
+from sdimu_calibration.core.joint.set_fit import SetOptions, fit_set, job_of
+from sdimu_calibration.core.joint.set_result import set_outcome
+from sdimu_calibration.core.joint.variation import variation
+from sdimu_calibration.core.plan import Plan
+from sdimu_calibration.core.recording import DataError
+from sdimu_sim.campaign.hidden_score import baseline_z
+from sdimu_sim.core.truth import ImuTruth
+
+from .conftest import InMemory, _recorded, here, short, unit_set
+
+
+def errors(result, truth):
+    return baseline_z(result, ImuTruth(coefficients=dict(truth)))
+
+
+def test_the_set_is_the_least_squares_of_all_rows(options):
+    some = unit_set(5, [short()] * 3)
+    fit = fit_set(some.members, replace(options, scopes={"gyro_bias": "unit", "accel_bias": "unit"}), here)
+    J, d = 0.0, 0.0
+    for member in fit.members:
+        report = next(r for r in fit.reports if r.name == member.name)
+        own = run(job_of(member, SetOptions(fit.model), None))
+        assert report.reduction.names == own.reduction.names
+        rows = report.reduction
+        J, d = J + rows.A.T @ rows.A, d + rows.A.T @ rows.y
+        assert rows.rows > 20 * len(rows.y)
+    weight = fit.reports[0].reduction.weight
+    unit = 1.0 / np.sqrt(np.diag(J) + weight)
+    dense = unit * np.linalg.solve((J + np.diag(weight)) * np.outer(unit, unit), unit * d)
+    sigma = np.sqrt(np.diag(fit.estimate.covariance))
+    assert np.abs((dense - fit.estimate.values) / sigma).max() < 1e-4
+
+
+def test_errors_of_a_set_are_those_its_sigmas_say(options):
+    z = []
+    for seed in (1, 2, 3):
+        some = unit_set(seed, [short()] * 4)
+        result = set_outcome(fit_set(some.members, options, here))
+        assert {t.effect for t in result.of_set.turn_on} == {"gyro_bias", "accel_bias"}
+        assert not result.warnings
+        z.append(errors(result, some.truth))
+    rms = float(np.sqrt(np.mean(np.square(z))))
+    assert 0.75 < rms < 1.25
+    assert np.abs(z).max() < 4.5
+
+
+def test_more_recordings_know_more(options):
+    some = unit_set(7, [short()] * 4)
+    two, four = (set_outcome(fit_set(some.members[:k], options, here)) for k in (2, 4))
+    shared = [k for k, name in enumerate(four.names) if "bias" not in name and four.covariance[k, k] > 0.0]
+    ratio = np.sqrt(np.diag(four.covariance)[shared] / np.diag(two.covariance)[shared])
+    assert np.all(ratio < 0.8)
+
+
+def test_six_attitudes_in_six_files_are_a_test(options):
+    # None of them knows its heading, or any coefficient by itself; together they know eleven.
+    turns = np.array([(0, 0, 0), (1, 0, 0), (2, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0)]) * np.pi / 2
+    still = Plan("still", (200.0,), (), 0.3)
+    members = tuple(
+        Member(f"a{k}", InMemory(_recorded(9, k, still, (), (), tuple(map(float, turn)))), power_on="1")
+        for k, turn in enumerate(turns)
+    )
+    fit = fit_set(members, options, here)
+    result = set_outcome(fit)
+    assert not fit.left_out
+    sigma = dict(zip(result.names, np.sqrt(np.diag(result.covariance)), strict=True))
+    for axis in "xyz":
+        assert sigma[f"accel_scale_{axis}"] < 5e-6
+        assert sigma[f"accel_bias_{axis}"] < 5e-5
+        assert sigma[f"gyro_bias_{axis}"] < 1e-7
+
+
+def test_a_recording_that_cannot_be_read_is_left_out_and_told(options):
+    some = unit_set(11, [short()] * 2)
+
+    def broken():
+        raise DataError("no samples")
+
+    fit = fit_set((*some.members, Member("bad", broken)), options, here)
+    assert [name for name, _ in fit.left_out] == ["bad"]
+    result = set_outcome(fit)
+    assert any("bad is left out: bad: no samples" in note for note in result.notes)
+
+
+def test_several_units_are_no_set(options):
+    some = unit_set(11, [short()] * 2)
+    with pytest.raises(DataError, match=r"several units \(SN1, SN2\).*sdimu fleet"):
+        fit_set([replace(m, serial=f"SN{k + 1}") for k, m in enumerate(some.members)], options, here)
+    with pytest.raises(DataError, match="two recordings of the set are called 'r0'"):
+        fit_set([some.members[0]] * 2, options, here)
+
+
+def test_a_coefficient_that_changed_in_one_recording_is_pointed_out(options):
+    some = unit_set(13, [short()] * 4, shift={2: {"gyro_scale_z": 20e-6}})
+    varied = variation(fit_set(some.members, options, here))
+    k = varied.names.index("gyro_scale_z")
+    assert np.argmax(np.abs(varied.z[:, k])) == 2
+    assert varied.p_value[k] < 1e-6
+    others = [p for name, p in zip(varied.names, varied.p_value, strict=True) if name != "gyro_scale_z"]
+    assert np.nanmin(others) > 1e-5
+
+
+def test_a_coefficient_that_follows_the_date_is_told(options):
+    some = unit_set(17, [short()] * 5, shift={k: {"accel_scale_x": 8e-6 * k} for k in range(5)})
+    result = set_outcome(fit_set(some.members, options, here))
+    first = result.of_set.trends[0]
+    assert (first.name, first.covariate) == ("accel_scale_x", "date (d)")
+    assert first.slope == pytest.approx(8e-6, abs=4.0 * first.sigma)
+    assert any("accel_scale_x is not the same in all recordings" in line for line in result.warnings)
+
+
+def test_a_clean_set_scatters_as_chance_does(options):
+    smallest = []
+    for seed in (21, 22, 23, 24):
+        some = unit_set(seed, [short()] * 3)
+        smallest.append(variation(fit_set(some.members, options, here)).overall)
+    assert min(smallest) > 0.01

@@ -1,0 +1,147 @@
+"""Set files, the work on their bags, and what is kept of it."""
+
+from __future__ import annotations
+
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sdimu_calibration.core.joint.member import run
+from sdimu_calibration.core.joint.set_fit import SetOptions, fit_set, job_of
+from sdimu_calibration.core.joint.set_result import set_outcome
+from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.storage.config import load_imu, load_plan, load_site
+from sdimu_calibration.storage.model_choice import named_model
+from sdimu_calibration.storage.recording_set import BagSource, bags_below, load_set, set_of, write_set
+from sdimu_calibration.storage.reduction_file import read_report, write_report
+from sdimu_calibration.storage.result_file import read_result, write_result
+from sdimu_calibration.storage.set_work import job_number, set_runner
+from sdimu_sim.bag_file import write_test
+from sdimu_sim.core.scenario import Scenario, simulate_test
+
+LIKE = BagSource(Path(), "daejeon", "dtg")
+OPTIONS = SetOptions(named_model(None, []))
+
+
+@pytest.fixture(scope="module")
+def bags(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("bags")
+    plan = load_plan("recommended")
+    plan = replace(plan, dwell_s=(20.0,) * 12, turns=plan.turns[:11])
+    for k in (1, 2):
+        scenario = Scenario(
+            plan, load_imu("dtg"), load_site("daejeon"), rate_hz=10.0, seed=k, unit=1, turn_on={"gyro_bias": 5e-8}
+        )
+        write_test(folder / f"run{k}", scenario, simulate_test(scenario), custom={"serial": "SN1", "power_on": str(k)})
+    return folder
+
+
+def test_a_first_set_file_is_read_back(bags):
+    path = bags / "set.yaml"
+    path.unlink(missing_ok=True)
+    write_set(path, bags_below(bags))
+    found = load_set(path, LIKE)
+    assert [m.name for m in found.members] == ["run1", "run2"]
+    assert [m.power_on for m in found.members] == ["1", "2"]
+    assert {m.serial for m in found.members} == {"SN1"}
+    with pytest.raises(DataError, match="is there already"):
+        write_set(path, bags_below(bags))
+
+
+def test_bags_say_unit_and_power_on(bags):
+    found = set_of([bags / "run1", bags / "run2"], LIKE)
+    assert [(m.serial, m.power_on) for m in found.members] == [("SN1", "1"), ("SN1", "2")]
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("format: sdimu-set/1\nrecordings: []\n", "recordings"),
+        ("format: sdimu-set/1\nrecordings:\n- bag: nowhere\n", r"nowhere: no such bag \(recording 'nowhere' of"),
+        ("format: sdimu-set/1\nscopes: {gyro_scale: always}\nrecordings:\n- bag: run1\n", "scopes"),
+        ("format: sdimu-set/1\nreference_temperature: 20 m\nrecordings:\n- bag: run1\n", "reference_temperature"),
+    ],
+)
+def test_a_wrong_set_file_is_refused_in_one_line(bags, text, message):
+    path = bags / "wrong.yaml"
+    path.write_text(text)
+    with pytest.raises(DataError, match=message) as error:
+        load_set(path, LIKE)
+    assert "\n" not in str(error.value)
+
+
+def test_no_bag_below_a_folder(tmp_path):
+    with pytest.raises(DataError, match="no bag in it"):
+        bags_below(tmp_path)
+
+
+def test_what_was_done_is_not_done_again(bags, tmp_path):
+    members = set_of([bags / "run1", bags / "run2"], LIKE).members
+    done: list[tuple[int, int]] = []
+    with set_runner(2, 1, tmp_path, told=lambda k, n: done.append((k, n))) as work:
+        first = fit_set(members, OPTIONS, work)
+    assert done
+    done.clear()
+    with set_runner(2, 1, tmp_path, told=lambda k, n: done.append((k, n))) as work:
+        again = fit_set(members, OPTIONS, work)
+    assert not done
+    np.testing.assert_array_equal(first.estimate.values, again.estimate.values)
+    np.testing.assert_array_equal(first.estimate.covariance, again.estimate.covariance)
+    # A file that was damaged is made again.
+    for path in tmp_path.glob("*.npz"):
+        path.write_bytes(path.read_bytes()[:1000])
+    with set_runner(2, 1, tmp_path, told=lambda k, n: done.append((k, n))) as work:
+        fit_set(members, OPTIONS, work)
+    assert done
+
+
+def test_other_bytes_are_another_job(bags, tmp_path):
+    copy = tmp_path / "run1"
+    shutil.copytree(bags / "run1", copy)
+    one, other = (set_of([path], LIKE).members[0] for path in (bags / "run1", copy))
+    options = replace(OPTIONS, model=replace(OPTIONS.model, effects=("gyro_bias", "accel_bias")))
+    assert job_number(job_of(one, options, None)) == job_number(job_of(other, options, None))
+    with (copy / "metadata.yaml").open("a") as file:
+        file.write("\n")
+    changed = set_of([copy], replace(LIKE, measured_noise=True)).members[0]
+    assert job_number(job_of(one, options, None)) != job_number(job_of(changed, options, None))
+
+
+def test_a_report_is_read_back(bags, tmp_path):
+    report = run(job_of(set_of([bags / "run1"], LIKE).members[0], OPTIONS, None))
+    write_report(tmp_path / "one.npz", report)
+    back = read_report(tmp_path / "one.npz")
+    assert back is not None
+    for name in ("A", "y", "point", "weight"):
+        np.testing.assert_array_equal(getattr(back.reduction, name), getattr(report.reduction, name))
+    assert back.times == report.times
+    assert back.imu == report.imu
+    assert (back.names, back.estimator, back.heading_rad) == (report.names, report.estimator, report.heading_rad)
+    assert read_report(tmp_path / "none.npz") is None
+
+
+def test_processes_give_the_same_digits(bags):
+    members = set_of([bags / "run1", bags / "run2"], LIKE).members
+    many = [replace(m, name=f"{m.name} {k}") for k in range(2) for m in members]
+    with set_runner(4, 2, None) as work:
+        pool = fit_set(many, OPTIONS, work)
+    with set_runner(4, 1, None) as work:
+        here = fit_set(many, OPTIONS, work)
+    np.testing.assert_array_equal(pool.estimate.values, here.estimate.values)
+
+
+def test_a_result_of_a_set_is_read_back(bags, tmp_path):
+    members = set_of([bags / "run1", bags / "run2"], LIKE).members
+    with set_runner(2, 1, None) as work:
+        result = set_outcome(fit_set(members, OPTIONS, work))
+    write_result(tmp_path / "result.json", result)
+    back = read_result(tmp_path / "result.json")
+    assert back.of_set is not None
+    assert back.of_set.turn_on == result.of_set.turn_on
+    assert back.of_set.deviations == result.of_set.deviations
+    for one, other in zip(back.of_set.recordings, result.of_set.recordings, strict=True):
+        np.testing.assert_array_equal(one.deviate, other.deviate)
+        assert (one.name, one.start_ns, one.power_on) == (other.name, other.start_ns, other.power_on)
