@@ -39,6 +39,9 @@ _FAILS = 1.3
 take up so much of a strong effect that its score is small."""
 _KEEP = 3.0
 """Size of an effect in the joint fit (sigma) below which it is dropped: chance ends there."""
+_DOUBLE = 0.995
+"""Correlation of two columns (1) from which one of them already is the other: they differ by a tenth of their
+length."""
 _ACCUSED = 1e-3
 """Probability that noise puts one candidate of one recording over its threshold: a recording that is accused is looked
 at again, and no other recording can speak for it."""
@@ -121,7 +124,6 @@ def search_set(
     before = fit = fit_set(members, options, run, progress=progress)
     chosen: dict[str, Candidate] = {}
     scores: dict[str, float] = {}
-    alike: dict[str, tuple[str, ...]] = {}
     local: list[LocalFind] = []
     finer: list[Effect] = []
     first: Search[SetEvidence] | None = None
@@ -130,11 +132,10 @@ def search_set(
         effects = _candidates(fit, extra, finer)
         full = _gathered(fit, effects, run)
         evidence = set_evidence(full, [c for effect in effects for c in split(effect)])
-        p = len(evidence.weight)
-        everything = np.arange(p, len(evidence.names))
-        found = search(evidence, everything, alpha)
+        p, single = len(evidence.weight), _singles(evidence)
+        found = search(evidence, single, alpha)
         if len(found.steps) > 1 and _far_off(full, found):
-            found = search(evidence, everything, alpha, most=1)
+            found = search(evidence, single, alpha, most=1)
         first = first or found
         new = [evidence.candidates[i - p] for i in found.chosen]
         nearer = _nearer(new, finer)
@@ -145,7 +146,6 @@ def search_set(
         # What all recordings show comes first: in one of them alone a drift may look the same.
         odd = None if new else _odd_one(full, evidence, found.chosen)
         if not new and not odd:
-            alike = _alike(evidence, chosen)
             break
         scores |= {s.label: s.z for s in found.steps if s.accepted}
         if odd:
@@ -159,10 +159,31 @@ def search_set(
     if first is None:
         raise AssertionError("a search has one round at least")
     fit, kept = _without_small(members, options, run, fit, chosen, progress)
+    alike: dict[str, tuple[str, ...]] = {}
+    if kept:
+        effects = _candidates(fit, extra, [])
+        full = _gathered(fit, effects, run)
+        alike = _alike(set_evidence(full, [c for effect in effects for c in split(effect)]), kept)
     return SetSearch(
         before, fit, tuple(kept.values()), tuple(scores.get(label, float("nan")) for label in kept), alike,
         tuple(local), first.threshold, first,
     )  # fmt: skip
+
+
+def _singles(evidence: SetEvidence) -> Ints:
+    """Columns of the candidates without those of sets that another one already is: three soaks tell no third power."""
+    p = len(evidence.weight)
+    J = evidence.information.J[p:, p:]
+    unit = 1.0 / np.sqrt(np.maximum(np.diag(J), 1e-300))
+    likeness = np.abs(J * np.outer(unit, unit))
+    of_sets = np.array([c.effect.tried_in == "set" for c in evidence.candidates], dtype=bool)
+    # Those of sets come behind all others they may be, the powers in their order.
+    order = np.concatenate([np.flatnonzero(~of_sets), np.flatnonzero(of_sets)])
+    kept: list[int] = []
+    for k in order.tolist():
+        if not of_sets[k] or not kept or likeness[k, kept].max() < _DOUBLE:
+            kept.append(k)
+    return np.array(sorted(kept), dtype=np.int64) + p
 
 
 def _far_off(fit: SetFit, found: Search[SetEvidence]) -> bool:
@@ -234,7 +255,7 @@ def _alike(evidence: SetEvidence, found: Mapping[str, Candidate]) -> dict[str, t
     open_again = evidence.as_candidates(columns, tried)
     problem = Problem(open_again)
     chosen = list(range(problem.p, problem.p + len(tried)))
-    allowed = np.arange(problem.p, len(open_again.names))
+    allowed = np.union1d(_singles(open_again), chosen).astype(np.int64)
     return {
         label: tuple(
             open_again.names[i] for i in look_alikes(problem, chosen, c, allowed, problem.scale(chosen))
