@@ -33,6 +33,7 @@ from sdimu_calibration.cli.set_run import (
     SetOption,
     SetRequest,
     WorkersOption,
+    about_reference,
     calibrate_together,
     refuse_for_sets,
     single,
@@ -115,7 +116,7 @@ def calibrate(
     test, wanted, chosen = opened(
         console, bag, model, site, imu, add, origin, asked, noise, whole_turns
     )
-    test = replace(test, origin=test.origin.stated(serial, power_on))
+    test = about_reference(replace(test, origin=test.origin.stated(serial, power_on)), reference_temperature)
     notes = test.recording.notes
     with explained(console, notes), bar(console) as progress:
         result = outcome(solve(test, wanted, chosen, progress=progress))

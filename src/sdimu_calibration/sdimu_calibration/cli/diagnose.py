@@ -33,6 +33,7 @@ from sdimu_calibration.cli.set_run import (
     SetOption,
     SetRequest,
     WorkersOption,
+    about_reference,
     diagnose_together,
     refuse_for_sets,
     single,
@@ -124,7 +125,7 @@ def diagnose(
         ), extra)  # fmt: skip
         return
     test, wanted, chosen = opened(console, bag, model, site, imu, add, origin, asked, noise, whole_turns)
-    test = replace(test, origin=test.origin.stated(serial, power_on))
+    test = about_reference(replace(test, origin=test.origin.stated(serial, power_on)), reference_temperature)
     if bootstrap and chosen == "auto" and test.why_handheld:
         raise DataError(NO_BOOTSTRAP)
     notes = test.recording.notes

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from sdimu_calibration.core.effects.effect import Effect
+    from sdimu_calibration.core.estimation.prepared_test import PreparedTest
     from sdimu_calibration.core.joint.member import Member
     from sdimu_calibration.core.joint.set_fit import Run, SetOptions
     from sdimu_calibration.core.progress import Progress
@@ -41,7 +42,7 @@ SchedulerOption = Annotated[
 ReferenceOption = Annotated[
     str | None,
     typer.Option(
-        "--reference-temperature", metavar="T", help="From which temperature effects of a set count, such as 20 degC.",
+        "--reference-temperature", metavar="T", help="From which temperature effects count, such as 20 degC.",
         rich_help_panel=_PANEL,
     ),
 ]  # fmt: skip
@@ -92,6 +93,14 @@ def single(bags: list[Path] | None, file: Path | None) -> Path | None:
     if file is None and not bags:
         raise typer.BadParameter("name a bag, several bags of one unit, or --set FILE", param_hint="BAG")
     return bags[0] if file is None and bags is not None and len(bags) == 1 else None
+
+
+def about_reference(test: PreparedTest, reference: str | None) -> PreparedTest:
+    """Let the temperature effects of a single recording count from ``--reference-temperature``."""
+    from sdimu_calibration.core.units import parse_quantity
+    from sdimu_calibration.storage.recording_set import counted_from
+
+    return test if reference is None else counted_from(test, parse_quantity(reference, "degC"))
 
 
 def refuse_for_sets(**options: object) -> None:

@@ -101,7 +101,7 @@ def page(
         sections.verdict(summary) if summary else "",
         f"<p><b>{prose(lead)}</b></p>" if lead else "",
         # Of a handheld run the ladder says it, in sigmas that models can be compared by.
-        "" if handheld else f"<p>{_fit(calibration, summary is not None)}</p>",
+        "" if handheld else f"<p>{_fit(calibration, summary is not None or bool(lead))}</p>",
         _notes(calibration.notes if summary is None else without_advice(calibration.notes)),
     ]
     return (

@@ -62,11 +62,15 @@ class BagSource:
 def _opened(of: BagSource) -> PreparedTest:
     imu = None if of.imu is None else load_imu(of.imu)
     test = open_test(of.bag, of.site, imu, of.source, of.handheld, of.measured_noise)
+    return counted_from(test, of.reference_degc)
+
+
+def counted_from(test: PreparedTest, degc: float | None) -> PreparedTest:
+    """Let temperature effects count from a temperature (deg C); from that at the start where None is given."""
     log = test.recording.temperature
-    if log is None or of.reference_degc is None:
+    if log is None or degc is None:
         return test
-    about = replace(test.recording, temperature=replace(log, reference_degc=of.reference_degc))
-    return replace(test, recording=about)
+    return replace(test, recording=replace(test.recording, temperature=replace(log, reference_degc=degc)))
 
 
 @dataclass(frozen=True)
