@@ -82,7 +82,7 @@ def measured(origin: Origin, recording: Recording, imu: str) -> Origin:
     heat = (math.nan,) * 3 if log is None else (log.value.mean(), log.value.min(), log.value.max())
     mean, low, high = map(float, heat)
     return replace(
-        origin, start_ns=recording.start_ns, temperature_degc=mean, temperature_low_degc=low,
+        origin, start_ns=max(recording.start_ns, 0), temperature_degc=mean, temperature_low_degc=low,
         temperature_high_degc=high, rate_rad_s=_largest_rate(recording.omega_ib_b, recording.interval_s), imu=imu,
     )  # fmt: skip
 
