@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import lru_cache
 
 import numpy as np
 import pytest
@@ -48,7 +48,7 @@ def short(name: str = "recommended", stops: int = 20, dwell_s: float = 30.0) -> 
     return replace(plan, dwell_s=(dwell_s,) * stops, turns=plan.turns[: stops - 1])
 
 
-@cache
+@lru_cache(maxsize=8)
 def _recorded(
     seed: int, number: int, plan: Plan, effects: tuple[str, ...], shift: tuple[tuple[str, float], ...],
     mount: tuple[float, float, float] | None,
