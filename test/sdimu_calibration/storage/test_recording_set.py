@@ -145,3 +145,28 @@ def test_a_result_of_a_set_is_read_back(bags, tmp_path):
     for one, other in zip(back.of_set.recordings, result.of_set.recordings, strict=True):
         np.testing.assert_array_equal(one.deviate, other.deviate)
         assert (one.name, one.start_ns, one.power_on) == (other.name, other.start_ns, other.power_on)
+
+
+def test_names_of_a_first_set_file_are_different(bags, tmp_path):
+    for day in ("a", "b"):
+        shutil.copytree(bags / "run1", tmp_path / day / "run")
+    write_set(tmp_path / "set.yaml", bags_below(tmp_path))
+    assert [m.name for m in load_set(tmp_path / "set.yaml", LIKE).members] == ["a/run", "b/run"]
+
+
+def test_the_estimator_of_a_set_file_opens_its_bags(bags, tmp_path):
+    path = tmp_path / "set.yaml"
+    path.write_text(f"estimator: hand\nrecordings:\n- bag: {bags / 'run1'}\n")
+    found = load_set(path, replace(LIKE, handheld=None))
+    assert (found.estimator, found.members[0].open.handheld) == ("handheld", True)
+    path.write_text(f"estimator: best\nrecordings:\n- bag: {bags / 'run1'}\n")
+    with pytest.raises(DataError, match="estimator best: expected one of"):
+        load_set(path, LIKE)
+
+
+def test_a_recording_that_stands_twice_is_refused_and_a_folder_that_cannot_be_written_is_not(bags, tmp_path):
+    (tmp_path / "again").symlink_to(bags / "run1")
+    kept = tmp_path / "kept"
+    kept.write_text("")
+    with set_runner(2, 1, kept) as work, pytest.raises(DataError, match="are the same recording"):
+        fit_set(set_of([bags / "run1", tmp_path / "again"], LIKE).members, OPTIONS, work)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -12,6 +12,7 @@ import typer
 
 from sdimu_calibration.cli.console import plain
 from sdimu_calibration.cli.options import leave, tell
+from sdimu_calibration.core.recording import DataError
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -114,7 +115,8 @@ def refuse_for_sets(**options: object) -> None:
     for name, value in options.items():
         if value:
             raise typer.BadParameter(
-                "is of one recording: state it for each (--set FILE), or leave it out",
+                "is of one recording: state it for each in the set file (--set)" if name == "power_on"
+                else "is of one recording: run it with that bag alone, or leave it out",
                 param_hint=f"--{name.replace('_', '-')}",
             )
 
@@ -188,7 +190,7 @@ def _begun(
     serial = asked.serial
     members = tuple(m if serial is None else replace(m, serial=serial) for m in wanted.members)
     chosen = estimator if estimator != "auto" else wanted.estimator
-    by_hand = chosen == HANDHELD or (chosen == "auto" and bool(wanted.members[0].open().why_handheld))
+    by_hand = chosen == HANDHELD or (chosen == "auto" and _moved_by_hand(members))
     model = named_model(asked.model or wanted.model, asked.add, handheld=by_hand)
     options = SetOptions(model, chosen, scopes=wanted.scopes)
     with bar(console) as progress:
@@ -198,6 +200,14 @@ def _begun(
         kept = _folder(asked, "evidence")
         with set_runner(len(members), asked.workers, kept, asked.scheduler, told) as run:
             yield members, options, run, progress
+
+
+def _moved_by_hand(members: Sequence[Member]) -> bool:
+    """Whether the first recording that can be opened was moved by hand; fitting tells of those that cannot."""
+    for member in members:
+        with suppress(DataError):
+            return bool(member.open().why_handheld)
+    return False
 
 
 def _folder(asked: SetRequest, what: str) -> Path:

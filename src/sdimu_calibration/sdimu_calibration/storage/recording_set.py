@@ -12,10 +12,12 @@ import yaml
 from pydantic import Field
 
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
+from sdimu_calibration.core.estimation.solve import AUTO
 from sdimu_calibration.core.joint.member import Member
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage.bag_metadata import METADATA, custom_data
 from sdimu_calibration.storage.config import Schema, load_imu, quantity, read_yaml
+from sdimu_calibration.storage.model_choice import HANDHELD, named_estimator
 from sdimu_calibration.storage.opening import Source, open_test
 from sdimu_calibration.storage.whole_file import write_whole
 
@@ -131,6 +133,9 @@ def load_set(path: Path, like: BagSource) -> RecordingSet:
     """
     path = Path(path)
     file = read_yaml(path, _SetFile)
+    estimator = named_estimator(file.estimator, f"{path}: estimator")
+    if like.handheld is None and estimator != AUTO:
+        like = replace(like, handheld=estimator == HANDHELD)
     members = []
     for entry in file.recordings:
         bag = (path.parent / entry.bag).resolve()
@@ -140,7 +145,7 @@ def load_set(path: Path, like: BagSource) -> RecordingSet:
         )  # fmt: skip
         serial = str(entry.serial) or str(file.serial)
         members.append(_member(source, entry.name or bag.name, serial, str(entry.power_on)))
-    return RecordingSet(tuple(members), file.model, file.estimator, file.scopes)
+    return RecordingSet(tuple(members), file.model, estimator, file.scopes)
 
 
 def set_of(bags: Sequence[Path], like: BagSource) -> RecordingSet:
@@ -203,11 +208,14 @@ def write_set(path: Path, bags: Sequence[Path]) -> None:
         raise DataError(f"{path}: the file is there already; choose another --out, or edit it")
     base = path.resolve().parent
     entries = []
-    for bag in bags:
+    names = [bag.resolve().name for bag in bags]
+    for bag, name in zip(bags, names, strict=True):
         said = custom_data(bag)
         place = bag.resolve()
         shown = place.relative_to(base) if place.is_relative_to(base) else place
-        entries.append({"bag": str(shown), "power_on": said.get("power_on", ""), "serial": said.get("serial", "")})
+        called = {"name": str(shown)} if names.count(name) > 1 else {}
+        known = {"power_on": said.get("power_on", ""), "serial": said.get("serial", "")}
+        entries.append({"bag": str(shown), **called, **known})
     content = {"format": "sdimu-set/1", "recordings": entries}
     write_whole(path, _HEADER + yaml.safe_dump(content, sort_keys=False))
 

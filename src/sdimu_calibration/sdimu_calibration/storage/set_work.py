@@ -10,7 +10,7 @@ import hashlib
 import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from functools import lru_cache
 from importlib.metadata import version
@@ -22,7 +22,7 @@ from sdimu_calibration.core.joint.member import Job, Report, tried
 from sdimu_calibration.core.joint.set_fit import Run
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage.config import load_imu, load_site
-from sdimu_calibration.storage.opening import DEFAULT_SITE
+from sdimu_calibration.storage.opening import CLASSES, DEFAULT_SITE
 from sdimu_calibration.storage.recording_set import BagSource
 from sdimu_calibration.storage.reduction_file import read_report, write_report
 
@@ -123,7 +123,9 @@ def _kept(work: Callable[[Sequence[Job]], Sequence[Report | DataError]], folder:
             for k, fresh in zip(part, work([jobs[k] for k in part]), strict=True):
                 place = places[k]
                 if place is not None and not isinstance(fresh, DataError):
-                    write_report(place, fresh)
+                    # A folder that cannot be written (a mounted archive) costs the time of another run, no result.
+                    with suppress(OSError):
+                        write_report(place, fresh)
                 found[k] = fresh
         return [
             replace(done, serial=job.member.serial, power_on=job.member.power_on) if isinstance(done, Report) else done
@@ -151,11 +153,14 @@ def job_number(job: Job) -> str:
         return ""
     asked = (
         version("sdimu_calibration"), bag_checksum(source.bag), job.member.name,
-        None if source.imu is None else load_imu(source.imu), load_site(source.site or DEFAULT_SITE), source.site,
+        tuple(map(load_imu, CLASSES if source.imu is None else (source.imu,))),
+        load_site(source.site or DEFAULT_SITE), source.site,
         source.source, source.handheld, source.measured_noise, source.reference_degc, job.model, job.estimator,
         job.local, job.candidates, job.with_local, job.noise, job.imu,
         None if job.about is None else sorted(job.about.items()),
-        None if job.start is None else (job.start.C_nb.tobytes(), job.start.coefficients.tobytes()),
+        None if job.start is None else (
+            job.start.names, job.start.coefficients.tobytes(), job.start.C_nb.tobytes(), job.start.more.tobytes()
+        ),
     )  # fmt: skip
     return hashlib.sha256(repr(asked).encode()).hexdigest()[:40]
 

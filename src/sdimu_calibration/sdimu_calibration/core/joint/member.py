@@ -13,6 +13,7 @@ from sdimu_calibration.core.diagnosis.diagnose import measured_noise
 from sdimu_calibration.core.effects import selection
 from sdimu_calibration.core.effects.effect import Effect, Timetable
 from sdimu_calibration.core.estimation.fit import Fit, Start
+from sdimu_calibration.core.estimation.handheld_fit import HandheldFit
 from sdimu_calibration.core.estimation.navigation_fit import NavigationFit
 from sdimu_calibration.core.estimation.noise_estimate import told
 from sdimu_calibration.core.estimation.noise_learning import in_noise, with_noise_learned
@@ -191,7 +192,7 @@ def fitted(job: Job) -> Fit:
     model = replace(job.model, effects=(*job.model.effects, *job.local))
     if job.imu is not None:
         test = test.with_imu(job.imu)
-    if job.about is None or test.why_handheld:
+    if job.about is None or test.why_handheld or job.estimator == HandheldFit.estimator:
         # A run by hand is fitted anew: its attitudes are parameters, and a least squares about others is no nearer.
         return _own(test, model, job)
     fit = fit_about(test, model, job.estimator, _untagged(job.about, job.member.name), job.start)

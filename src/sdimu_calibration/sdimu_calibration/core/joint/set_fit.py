@@ -151,7 +151,7 @@ def fit_set(
     Raises
     ------
     DataError
-        When the recordings are of several units, or none can be used.
+        When the recordings are of several units, one stands twice, or none can be used.
     """
     check_members(members)
     bare = replace(options.model, effects=())
@@ -159,11 +159,13 @@ def fit_set(
     progress("recordings", 0.1)
     jobs = [job_of(member, options, before) for member in members]
     done = run(jobs)
-    left = {job.member.name: str(d) for job, d in zip(jobs, done, strict=True) if isinstance(d, DataError)}
+    left = {job.member.name: _why(job.member, d) for job, d in zip(jobs, done, strict=True) if isinstance(d, DataError)}
     earlier = {r.name: r for r in (before.reports if before else ())}
     reports = [with_own(d, earlier.get(d.name)) for d in done if not isinstance(d, DataError)]
     if not reports:
-        raise DataError(f"no recording of the set can be used: {next(iter(left.values()))}")
+        first, why = next(iter(left.items()))
+        raise DataError(f"no recording of the set can be used: {first}: {why}")
+    _check_different(reports)
     reports = _one_estimator(members, options, reports, run)
     firm = [r for r in reports if r.stands_alone]
     if firm and before is None:
@@ -178,7 +180,7 @@ def fit_set(
             break
         fresh = run([job_of(member, options, fit, reports[0].estimator, learn=False) for member in again])
         came = {m.name: d for m, d in zip(again, fresh, strict=True) if not isinstance(d, DataError)}
-        lost = {m.name: str(d) for m, d in zip(again, fresh, strict=True) if isinstance(d, DataError)}
+        lost = {m.name: _why(m, d) for m, d in zip(again, fresh, strict=True) if isinstance(d, DataError)}
         stuck = set(lost) <= set(left) and not came
         left = lost
         kept = {r.name: with_own(came.get(r.name, r), r) for r in fit.reports}
@@ -207,6 +209,26 @@ def check_members(members: Sequence[Member]) -> None:
             f"the recordings are of several units ({', '.join(serials)}): a joint fit is of one; calibrate each by "
             "itself, then compare them with sdimu fleet"
         )
+
+
+def _why(member: Member, error: DataError) -> str:
+    """Say why a recording cannot be used, without its name."""
+    return str(error).removeprefix(f"{member.name}: ")
+
+
+def _check_different(reports: Sequence[Report]) -> None:
+    """Refuse a recording that stands twice, by another path or as a copy: it would count as two that agree.
+
+    Raises
+    ------
+    DataError
+        When two recordings start at the same time and have the same own fit.
+    """
+    seen: dict[tuple[int, bytes], str] = {}
+    for report in reports:
+        first = seen.setdefault((report.start_ns, report.values.tobytes()), report.name)
+        if first != report.name and len(report.values):
+            raise DataError(f"'{first}' and '{report.name}' are the same recording: name it once")
 
 
 def job_of(
