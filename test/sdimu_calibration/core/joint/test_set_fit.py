@@ -125,3 +125,12 @@ def test_a_clean_set_scatters_as_chance_does(options):
         some = unit_set(seed, [short()] * 3)
         smallest.append(variation(fit_set(some.members, options, here)).overall)
     assert min(smallest) > 0.01
+
+
+def test_what_is_open_of_the_scatter_hides_no_deviate(options):
+    some = unit_set(6, [short(stops=12)] * 2)
+    varied = variation(fit_set(some.members, options, here))
+    biases = [k for k, name in enumerate(varied.names) if "bias" in name]
+    assert np.isfinite(varied.z[:, biases]).all()
+    # Two recordings differ from their mean by the same.
+    assert varied.z[0, biases] == pytest.approx(-varied.z[1, biases], abs=0.2)

@@ -20,7 +20,7 @@ from sdimu_calibration.core.joint.combine import spread_out
 from sdimu_calibration.core.joint.member import Report
 from sdimu_calibration.core.joint.scope import split_tag
 from sdimu_calibration.core.joint.set_evidence import white_power_on
-from sdimu_calibration.core.joint.set_fit import SetFit, power_on
+from sdimu_calibration.core.joint.set_fit import SetFit, power_on, prior_weight
 from sdimu_calibration.core.probability import chi2_tail, normal_tail
 from sdimu_calibration.core.results import SetTrend
 
@@ -87,9 +87,10 @@ def variation(fit: SetFit) -> Variation:
 
 
 def _scores(fit: SetFit, p: int) -> _Scores:
-    theta, P = fit.estimate.values, fit.estimate.covariance
+    theta = fit.estimate.values
     K = len(fit.reports)
     d, X = np.zeros((K, p)), np.zeros((K, p, len(fit.names)))
+    J = np.diag(prior_weight(fit.reports, fit.names))
     within = np.zeros((p, K, K))
     for group in fit.power_ons:
         members = [k for k, r in enumerate(fit.reports) if power_on(r) == group]
@@ -99,6 +100,11 @@ def _scores(fit: SetFit, p: int) -> _Scores:
         d[members] = np.einsum("kmp,k->mp", a, rows.y - rows.A @ theta)
         X[members] = np.einsum("kmp,kq->mpq", a, rows.A)
         within[np.ix_(range(p), members, members)] = np.einsum("kmp,knp->pmn", a, a)
+        J += rows.A.T @ rows.A
+    # The rows are white in the scatter that is likeliest: so is this covariance. That of the estimate is wider by what
+    # few power-ons leave open of the scatter, and would take more from the scores than the joint estimate does.
+    unit = 1.0 / np.sqrt(np.diag(J))
+    P = np.linalg.inv(J * np.outer(unit, unit)) * np.outer(unit, unit)
     gram = within - np.einsum("mpq,qr,npr->pmn", X, P, X)
     return _Scores(gram, np.diagonal(within, axis1=1, axis2=2).T.copy(), d)
 
