@@ -30,9 +30,11 @@ def test_the_same_step_twice_is_refused() -> None:
         build([STEPS[0], STEPS[0]], load_imu("dtg"))
 
 
-def test_both_steps_that_are_added_are_in_the_model_and_the_same_one_is_there_once() -> None:
-    effects = extended_model("baseline", [*STEPS, STEPS[1], "accel_quadratic_x"]).effects
+def test_both_steps_that_are_added_are_in_the_model_and_the_same_one_again_is_refused() -> None:
+    effects = extended_model("baseline", [*STEPS, "accel_quadratic_x"]).effects
     assert build(effects, load_imu("dtg")).names[-3:] == NAMES
+    with pytest.raises(DataError, match=r"gyro_bias_step_y\(t0=.*is in the model already"):
+        extended_model("baseline", [*STEPS, STEPS[1]])
 
 
 def test_a_step_in_the_model_leaves_other_steps_to_be_found() -> None:

@@ -89,7 +89,7 @@ def test_a_recording_that_cannot_be_read_is_left_out_and_told(options):
     fit = fit_set((*some.members, Member("bad", broken)), options, here)
     assert [name for name, _ in fit.left_out] == ["bad"]
     result = set_outcome(fit)
-    assert any("bad is left out: bad: no samples" in note for note in result.notes)
+    assert any("bad is left out: no samples" in note for note in result.notes)
 
 
 def test_several_units_are_no_set(options):

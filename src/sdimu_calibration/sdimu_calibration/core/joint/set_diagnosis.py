@@ -130,7 +130,8 @@ def _findings(found: SetSearch) -> tuple[SetFinding, ...]:
 def _verdict(findings: Sequence[SetFinding], after: Calibration) -> str:
     shared = [f for f in findings if not f.recording]
     left = _scatter(after) < SCATTERS or (after.fit["held_out_rms"] or 0.0) > _STILL_WRONG
-    if left:
+    # A fault leaves traces in its recording that are no physics of the unit.
+    if left and (shared or not findings):
         return "unexplained"
     if len(shared) > 1:
         return "several effects"
