@@ -211,9 +211,9 @@ def _moved_by_hand(members: Sequence[Member]) -> bool:
 
 
 def _folder(asked: SetRequest, what: str) -> Path:
-    """Folder of results: --out, or beside the first bag or the set file."""
-    if what != "evidence" and asked.out is not None:
-        return asked.out
+    """Folder of results: --out, or beside the first bag or the set file; that of evidence inside --out."""
+    if asked.out is not None:
+        return asked.out / what if what == "evidence" else asked.out
     first = (asked.file or asked.bags[0]).resolve()
     return first.with_name(f"{first.stem if asked.file else first.name}_set_{what}")
 

@@ -140,7 +140,8 @@ def load_set(path: Path, like: BagSource) -> RecordingSet:
     for entry in file.recordings:
         bag = (path.parent / entry.bag).resolve()
         source = replace(
-            like, bag=bag, site=entry.site or file.site or like.site, imu=entry.imu or file.imu or like.imu,
+            like, bag=bag, site=_named(path.parent, entry.site or file.site) or like.site,
+            imu=_named(path.parent, entry.imu or file.imu) or like.imu,
             reference_degc=like.reference_degc if file.reference_temperature is None else file.reference_temperature,
         )  # fmt: skip
         serial = str(entry.serial) or str(file.serial)
@@ -164,6 +165,12 @@ def set_of(bags: Sequence[Path], like: BagSource) -> RecordingSet:
         for bag, name in zip(bags, names, strict=True)
     ]
     return RecordingSet(tuple(members))
+
+
+def _named(folder: Path, word: str | None) -> str | None:
+    """Return a name of a configuration as it is; a path as seen from the folder of the set file."""
+    beside = None if word is None else folder / word
+    return str(beside.resolve()) if beside is not None and beside.is_file() else word
 
 
 def _member(source: BagSource, name: str, serial: str, power_on: str) -> Member:

@@ -7,13 +7,11 @@ tenth recording costs one, and a run that was killed goes on where it was.
 from __future__ import annotations
 
 import hashlib
-import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from functools import lru_cache
-from importlib.metadata import version
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
@@ -32,6 +30,8 @@ _PART = 16
 """Number of recordings after which reports are written: what a kill may cost."""
 _BLOCK = 1 << 20
 """Bytes that are read at a time for a checksum."""
+_SOURCES = Path(__file__).resolve().parents[1]
+"""Folder of the package."""
 
 Told = Callable[[int, int], None]
 
@@ -69,14 +69,8 @@ def set_runner(
     if workers < 2 or count <= FEW:
         yield _kept(lambda jobs: _here(jobs, told), kept)
         return
-    with ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_one_thread) as pool:
+    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
         yield _kept(lambda jobs: _in_pool(pool, jobs, told), kept)
-
-
-def _one_thread() -> None:
-    """Let a worker take one core: two that each take all wait for each other."""
-    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):
-        os.environ[name] = "1"
 
 
 def _here(jobs: Sequence[Job], told: Told | None) -> list[Report | DataError]:
@@ -152,7 +146,7 @@ def job_number(job: Job) -> str:
     if not isinstance(source, BagSource) or any(not isinstance(e, str) for e in effects):
         return ""
     asked = (
-        version("sdimu_calibration"), bag_checksum(source.bag), job.member.name,
+        _program(), bag_checksum(source.bag), job.member.name,
         tuple(map(load_imu, CLASSES if source.imu is None else (source.imu,))),
         load_site(source.site or DEFAULT_SITE), source.site,
         source.source, source.handheld, source.measured_noise, source.reference_degc, job.model, job.estimator,
@@ -163,6 +157,15 @@ def job_number(job: Job) -> str:
         ),
     )  # fmt: skip
     return hashlib.sha256(repr(asked).encode()).hexdigest()[:40]
+
+
+@lru_cache(maxsize=1)
+def _program() -> str:
+    """SHA-256 of the sources that make a report: another program may answer the same question otherwise."""
+    total = hashlib.sha256()
+    for path in sorted(_SOURCES.rglob("*.py")):
+        total.update(path.read_bytes())
+    return total.hexdigest()
 
 
 @lru_cache(maxsize=4096)

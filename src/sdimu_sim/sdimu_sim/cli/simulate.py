@@ -5,13 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from sdimu_calibration.cli.console import plain
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.units import parse_quantity
+
+if TYPE_CHECKING:
+    from sdimu_sim.core.by_hand import ByHand
 
 EFFECT = "Hide an effect: what --add takes, =SIZE, such as 'accel_quadratic_x=20 ug/g^2'; repeatable."
 
@@ -65,15 +68,10 @@ def simulate(
     effects = simulated_effects(effect or ())
     truth_path = truth or out.with_name(f"{out.name}.truth.yaml")
     if by_hand is not None:
-        from sdimu_sim.bag_file import write_by_hand
-        from sdimu_sim.core.by_hand import ByHand, simulate_by_hand
+        from sdimu_sim.core.by_hand import ByHand
 
         run = ByHand(by_hand, load_imu(imu or "mems_by_hand"), load_site(site), seed, rate, effects=effects)
-        samples, true = simulate_by_hand(run)
-        write_by_hand(out, samples, replace=replace, custom=custom)
-        write_truth(truth_path, true)
-        text = f"{out}: {len(samples.t)} samples, {samples.t[-1]:.0f} s handheld; truth in {truth_path}"
-        plain().print(text, soft_wrap=True)
+        _by_hand(run, out, truth_path, custom, replace)
         return
     scenario = Scenario(
         plan=load_plan(plan),
@@ -95,6 +93,20 @@ def simulate(
     write_truth(truth_path, test.truth)
     count = len(test.samples.t)
     plain().print(f"{out}: {count} samples, {test.motion.t[-1]:.0f} s; truth in {truth_path}", soft_wrap=True)
+
+
+def _by_hand(run: ByHand, out: Path, truth_path: Path, custom: dict[str, str], replace: bool) -> None:
+    """Write a run by hand and its truth."""
+    from sdimu_sim.bag_file import write_by_hand
+    from sdimu_sim.core.by_hand import simulate_by_hand
+    from sdimu_sim.truth_file import write_truth
+
+    samples, true = simulate_by_hand(run)
+    write_by_hand(out, samples, replace=replace, custom=custom)
+    write_truth(truth_path, true)
+    plain().print(
+        f"{out}: {len(samples.t)} samples, {samples.t[-1]:.0f} s handheld; truth in {truth_path}", soft_wrap=True
+    )
 
 
 def turn_on_sigmas(texts: Sequence[str]) -> dict[str, float]:

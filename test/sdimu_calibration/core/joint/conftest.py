@@ -48,12 +48,17 @@ def short(name: str = "recommended", stops: int = 20, dwell_s: float = 30.0) -> 
     return replace(plan, dwell_s=(dwell_s,) * stops, turns=plan.turns[: stops - 1])
 
 
+def switched_on(seed: int, power_on: int) -> dict[str, float]:
+    """True coefficients of a unit in one of its power-ons."""
+    return turned_on(draw_coefficients(IMU, seed), {"gyro_bias": 5e-8, "accel_bias": 2e-4}, 1000 * seed + power_on)
+
+
 @lru_cache(maxsize=8)
 def _recorded(
     seed: int, number: int, plan: Plan, effects: tuple[str, ...], shift: tuple[tuple[str, float], ...],
-    mount: tuple[float, float, float] | None,
+    mount: tuple[float, float, float] | None, power_on: int,
 ) -> PreparedTest:  # fmt: skip
-    own = turned_on(draw_coefficients(IMU, seed), {"gyro_bias": 5e-8, "accel_bias": 2e-4}, 1000 * seed + number)
+    own = switched_on(seed, power_on)
     own |= {name: own[name] + size for name, size in shift}
     scenario = Scenario(
         plan, IMU, SITE, rate_hz=10.0, seed=1000 * seed + number, coefficients=own, effects=effects, mount_rad=mount,
@@ -69,7 +74,7 @@ def unit_set(
     members = []
     for k, plan in enumerate(plans):
         own = tuple((shift or {}).get(k, {}).items())
-        members.append(Member(f"r{k}", InMemory(_recorded(seed, k, plan, effects, own, None))))
+        members.append(Member(f"r{k}", InMemory(_recorded(seed, k, plan, effects, own, None, k))))
     return UnitSet(tuple(members), draw_coefficients(IMU, seed))
 
 

@@ -167,10 +167,11 @@ def fit_set(
         raise DataError(f"no recording of the set can be used: {first}: {why}")
     _check_different(reports)
     reports = _one_estimator(members, options, reports, run)
-    firm = [r for r in reports if r.stands_alone]
+    firm, late = [r for r in reports if r.stands_alone], {}
     if firm and before is None:
         # Where a recording alone may end is no place to linearise it; what the others know of the unit is.
-        left |= {r.name: "" for r in reports if not r.stands_alone}
+        late = {r.name: r for r in reports if not r.stands_alone}
+        left |= dict.fromkeys(late, "")
         reports = firm
     fit = _combined(members, options, reports)
     for turn in range(_MOST_ROUNDS):
@@ -178,7 +179,8 @@ def fit_set(
         again = [m for m in members if m.name in left or _moved(fit, m.name)]
         if not again:
             break
-        fresh = run([job_of(member, options, fit, reports[0].estimator, learn=False) for member in again])
+        jobs = [job_of(member, options, fit, reports[0].estimator, learn=False) for member in again]
+        fresh = run([replace(j, imu=late[j.member.name].imu) if j.member.name in late else j for j in jobs])
         came = {m.name: d for m, d in zip(again, fresh, strict=True) if not isinstance(d, DataError)}
         lost = {m.name: _why(m, d) for m, d in zip(again, fresh, strict=True) if isinstance(d, DataError)}
         stuck = set(lost) <= set(left) and not came
@@ -188,7 +190,16 @@ def fit_set(
         fit = _combined(members, options, reports)
         if stuck:
             break
-    return replace(fit, left_out=tuple(left.items()))
+    late = {name: r for name, r in late.items() if name not in left}
+    return replace(_noise_of(late, fit, options, run) if late else fit, left_out=tuple(left.items()))
+
+
+def _noise_of(late: Mapping[str, Report], fit: SetFit, options: SetOptions, run: Run) -> SetFit:
+    """Learn the noise of recordings that were linearised about what the others know, now that this stands."""
+    members = [m for m in fit.members if m.name in late]
+    done = run([job_of(m, options, fit) for m in members])
+    fresh = {m.name: d for m, d in zip(members, done, strict=True) if not isinstance(d, DataError)}
+    return with_reports(fit, [with_own(fresh.get(r.name, r), r) for r in fit.reports])
 
 
 def check_members(members: Sequence[Member]) -> None:

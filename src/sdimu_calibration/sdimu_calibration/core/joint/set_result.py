@@ -116,10 +116,11 @@ def _origin(fit: SetFit, base: Fit) -> Origin:
 
 
 def _notes(fit: SetFit, base: Fit) -> tuple[str, ...]:
-    told = [f"{name} is left out: {why}" for name, why in fit.left_out]
     of_one = [f"in {name} alone: {key}" for name, keys in fit.local.items() for key in keys]
     scatter = [_scatter(t) for t in with_units(fit, base)]
-    return (*told, *of_one, *scatter, *(f"{r.name}: {note}" for r in fit.reports for note in r.notes))
+    files = sorted({r.imu.name for r in fit.reports})
+    mixed = [f"the recordings state different IMUs ({', '.join(files)}): a set is of one unit"] if files[1:] else []
+    return (*mixed, *of_one, *scatter, *(f"{r.name}: {note}" for r in fit.reports for note in r.notes))
 
 
 def _scatter(t: TurnOn) -> str:
@@ -151,7 +152,8 @@ def _warnings(fit: SetFit, varied: Variation, names: Sequence[str]) -> tuple[str
         + (f"; it follows {trends[name].covariate}" if name in trends else "") + "; run: sdimu diagnose"
         for p, name in sorted(odd)
     ]
-    return (*lines, *(f"{r.name}: {text}" for r in fit.reports for text in r.warnings))
+    left_out = [f"{name} is left out: {why}" for name, why in fit.left_out]
+    return (*left_out, *lines, *(f"{r.name}: {text}" for r in fit.reports for text in r.warnings))
 
 
 def _summary(fit: SetFit, varied: Variation, names: Sequence[str], base: Fit) -> SetSummary:
