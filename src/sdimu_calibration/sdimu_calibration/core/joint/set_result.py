@@ -55,7 +55,9 @@ def set_outcome(fit: SetFit) -> Calibration:
     nis = sum(float(r.statistics["nis_mean"] or 0.0) * float(r.statistics["nis_dof"] or 0.0) for r in fit.reports)
     parameters = base.sensors.parameters
     names = tuple(p.name for p in parameters)
-    warnings = (*_warnings(fit, varied, names), *inseparable(names, covariance))
+    # What the frame of the report pins differs in no recording.
+    free = tuple(name for name, variance in zip(names, np.diag(covariance), strict=True) if variance > 0.0)
+    warnings = (*_warnings(fit, varied, free), *inseparable(names, covariance))
     return Calibration(
         body_frame=base.body_frame, model=tuple(e.key for e in base.sensors.effects), names=names,
         units=tuple(p.unit for p in parameters), display_units=tuple(p.display_unit for p in parameters),
