@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from sdimu_calibration.core.diagnosis.diagnose import diagnose
-from sdimu_calibration.core.diagnosis.rounds import Request, candidates
+from sdimu_calibration.core.diagnosis.ground import Request, candidates
 from sdimu_calibration.core.diagnosis.scan import POWER_80
 from sdimu_calibration.core.diagnosis.search import FALSE_ALARM
 from sdimu_calibration.core.diagnosis.summary import summarise

@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from sdimu_calibration.core.diagnosis.rounds import Request, drop_companions, mark_dropped, search_until_stable
+from sdimu_calibration.core.diagnosis.ground import Request
+from sdimu_calibration.core.diagnosis.rounds import drop_companions, mark_dropped, search_until_stable
 from sdimu_calibration.core.diagnosis.search import FALSE_ALARM
 from sdimu_calibration.core.progress import silent
 

@@ -13,15 +13,10 @@ import numpy as np
 
 from sdimu_calibration.core.arrays import Ints
 from sdimu_calibration.core.diagnosis.free_input_test import FreeInputTest
+from sdimu_calibration.core.diagnosis.ground import Request
 from sdimu_calibration.core.diagnosis.ladder import Rung, ladder
 from sdimu_calibration.core.diagnosis.model_doubt import in_doubt
-from sdimu_calibration.core.diagnosis.rounds import (
-    UNEXPLAINED_P,
-    Request,
-    Round,
-    in_found_noise,
-    search_until_stable,
-)
+from sdimu_calibration.core.diagnosis.rounds import UNEXPLAINED_P, Round, in_found_noise, search_until_stable
 from sdimu_calibration.core.diagnosis.screen import Finding, screen
 from sdimu_calibration.core.diagnosis.search import FALSE_ALARM, MOST_STEPS, Problem, Search, look_alikes, patchwork
 from sdimu_calibration.core.diagnosis.verdict import Verdict, sentence, verdict

@@ -1,8 +1,9 @@
 """The one search: fit, take the evidence, choose, fit again about the choice, until the choice stands.
 
 A large effect that is not in the model bends the fit about which everything is linear, and the error of that looks like
-small companions of the effect. So each round fits with what the last one chose, takes the evidence there, and starts
-the search afresh: what was chosen is one candidate among the others.
+small companions of the effect. So the strong effects come first, alone, and the signatures of all others are taken
+about the fit that has them. Each round then fits with what the last one chose, takes the evidence there, and starts the
+search afresh: what was chosen is one candidate among the others.
 
 Where the estimator learns the scatter of its own run (handheld), a missing effect is learned as scatter. There the
 choice grows by one effect a round, because each addition lets the scatter fall and shows what it hid.
@@ -16,20 +17,23 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sdimu_calibration.core.arrays import Ints
-from sdimu_calibration.core.diagnosis.candidates import catalogue, equations, free_inputs, periodic
 from sdimu_calibration.core.diagnosis.free_input_test import FreeInputTest, free_input_test
+from sdimu_calibration.core.diagnosis.ground import (
+    Ground,
+    Request,
+    extended,
+    fresh_ground,
+    next_ground,
+    strong_first,
+)
 from sdimu_calibration.core.diagnosis.noise_search import imitated, search_with_noise
 from sdimu_calibration.core.diagnosis.search import MOST_STEPS, Search, Step, search
-from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.estimation.fit import Fit
 from sdimu_calibration.core.estimation.noise_learning import in_noise
-from sdimu_calibration.core.estimation.solve import extend
-from sdimu_calibration.core.evidence.candidate import Candidate, split
-from sdimu_calibration.core.evidence.learned_noise import Wander
+from sdimu_calibration.core.evidence.candidate import Candidate
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.noise_term import NoiseTerm
 from sdimu_calibration.core.progress import Progress
-from sdimu_calibration.core.recording import DataError
 
 UNEXPLAINED_P = 1e-3
 """Probability of the free-input test below which what is left is not noise: one sound test in a thousand is there."""
@@ -43,36 +47,9 @@ LEAST_SIGMAS = 3.0
 _OWN_GAIN = 3.0
 """Log-likelihood (1) by which equations must be better than the catalogue where noise takes what is left: odds of 20
 to 1."""
-_PARALLEL = 1e-6
-"""Share of its length by which a signature must differ from another to be its own: rounding is far below."""
 _MANY = 3
 """Number of chosen catalogue terms from which one equation is tried in their place: so many may be the parts of one
 cause."""
-
-
-@dataclass(frozen=True)
-class Request:
-    """What is searched for.
-
-    Attributes
-    ----------
-    base : Fit
-        With the model as given.
-    extra : tuple of Effect
-        The user's own effects, candidates like those of the catalogue.
-    alpha : float
-        False-alarm probability of a whole scan.
-    wander : Wander or None
-        How wandering biases would show in the test; None where the estimator learns scatter instead.
-    without : frozenset of str
-        Registry names of effects that are not tried.
-    """
-
-    base: Fit
-    extra: tuple[Effect, ...]
-    alpha: float
-    wander: Wander | None = None
-    without: frozenset[str] = frozenset()
 
 
 @dataclass(frozen=True)
@@ -122,48 +99,37 @@ def search_until_stable(request: Request, progress: Progress) -> Round:
     """
     base = request.base
     growing = base.learns_scatter
-    tried: tuple[Candidate, ...] = ()
-    fit, own, asked = base, False, False
+    ground = fresh_ground(request, base, (), False) if growing else strong_first(request, progress)
+    own, asked = False, False
     limits: dict[bool, float] = {}
     done: Round | None = None
     steps: tuple[Step, ...] = ()
     seen = {frozenset[str]()}
     for turn in range(MOST_GROWING_ROUNDS if growing else MOST_ROUNDS):
         progress("candidates", min(0.8, 0.4 + 0.1 * turn))
-        done = run_round(request, fit, tried, own, limits, done)
+        # Noise is a rival from the start; once effects were preferred to all of it, it need not be asked again.
+        done = run_round(request, ground, own, limits, done, done is None or bool(done.found.noise))
         if done.wants_equations and not own and not asked:
             asked = True
             progress("equations", min(0.8, 0.45 + 0.1 * turn))
-            wide = run_round(request, fit, tried, True, limits, done)
+            wider = next_ground(request, ground.fit, ground.tried, True, done.found, ground.free)
+            wide = run_round(request, wider, True, limits, done, turn == 0 or bool(done.found.noise))
             if prefer(wide, done):
                 done, own = wide, True
         labels = frozenset(c.label for c in done.chosen)
         new = tuple(s for s in done.found.steps if s.label not in {old.label for old in steps})
         steps = (*steps, *new) if growing else done.found.steps
-        if labels == {c.label for c in tried} or (growing and labels in seen):
+        if labels == {c.label for c in ground.tried} or (growing and labels in seen):
             break
         seen.add(labels)
-        trial = _with(request, done.chosen, progress)
-        if growing and len(labels) <= len(tried) and not _likelier(trial, fit):
-            done = _with_choice(done, tried)
+        trial = extended(request, done.chosen, progress)
+        if growing and len(labels) <= len(ground.tried) and not _likelier(trial, ground.fit):
+            done = _with_choice(done, ground.tried)
             break
-        tried, fit = done.chosen, trial
+        ground = next_ground(request, trial, done.chosen, own, done.found, ground.free)
     if done is None:
         raise AssertionError("a search has one round at least")
     return drop_companions(request, replace(done, found=replace(done.found, steps=steps)), progress)
-
-
-def _with(request: Request, chosen: Sequence[Candidate], progress: Progress) -> Fit:
-    """Fit the model with what a round chose; name the choice where the estimator cannot fit it."""
-    base = request.base
-    try:
-        return extend(base, [c.effect for c in chosen], progress=progress, learn=False)
-    except DataError as error:
-        names = " and ".join(c.label for c in chosen)
-        raise DataError(
-            f"the search chose {names}, and the {base.estimator} estimator cannot fit it ({error}); diagnose with "
-            "another --estimator"
-        ) from error
 
 
 def _likelier(one: Fit, other: Fit) -> bool:
@@ -213,7 +179,7 @@ def _with_chosen(request: Request, done: Round, progress: Progress) -> Fit:
     fitted = [label for effect in done.fit.sensors.effects[len(base.sensors.effects) :] for label in effect.labels]
     if fitted == added:
         return done.fit
-    return _with(request, done.chosen, progress) if added else base
+    return extended(request, done.chosen, progress) if added else base
 
 
 def mark_dropped(steps: Sequence[Step], kept: set[str], small: set[str]) -> tuple[Step, ...]:
@@ -247,38 +213,35 @@ def prefer(wide: Round, done: Round) -> bool:
 
 
 def run_round(
-    request: Request, fit: Fit, tried: Sequence[Candidate], own: bool, limits: dict[bool, float], earlier: Round | None
+    request: Request, ground: Ground, own: bool, limits: dict[bool, float], earlier: Round | None, doubted: bool
 ) -> Round:
-    """Collect the evidence about a fit, with what it tried as candidates, and search it.
+    """Search the evidence about a fit.
 
     Parameters
     ----------
     request : Request
-    fit : Fit
-        The model as given with `tried`.
-    tried : sequence of Candidate
+    ground : Ground
     own : bool
-        Also try equations that are not in the catalogue.
+        Whether equations that are not in the catalogue are among its candidates.
     limits : dict of bool to float
         Thresholds of scans without and with equations, filled as they become known: the columns of all rounds are the
         same but for finer variants, and so is the threshold.
     earlier : Round, optional
         The round before.
+    doubted : bool
+        Ask whether noise alone explains what effects explain.
     """
-    evidence, free = _evidence(request, fit, tried, own, earlier)
-    allowed = np.setdiff1d(np.arange(len(evidence.weight), len(evidence.names)), free)
+    evidence, allowed = ground.evidence, ground.allowed
     if request.wander is None:
         if not request.base.learns_scatter:
-            return _round(fit, search(evidence, allowed, request.alpha, MOST_STEPS), free)
-        return _round(fit, _without_wander(evidence, allowed, request.alpha, len(tried) + 1), free)
-    # Noise is a rival from the start; once effects were preferred to all of it, it need not be asked again.
-    doubted = not tried or (earlier is not None and bool(earlier.found.noise))
+            return _round(ground, search(evidence, allowed, request.alpha, MOST_STEPS))
+        return _round(ground, _without_wander(evidence, allowed, request.alpha, len(ground.tried) + 1))
     found = search_with_noise(
         evidence, allowed, request.wander, request.alpha, limits.get(own), doubted,
         earlier.found.joint if earlier else None,
     )  # fmt: skip
     limits.setdefault(own, found.threshold)
-    return _round(fit, found, free)
+    return _round(ground, found)
 
 
 def _without_wander(evidence: LinearEvidence, allowed: Ints, alpha: float, most: int) -> Search[LinearEvidence]:
@@ -291,64 +254,13 @@ def _without_wander(evidence: LinearEvidence, allowed: Ints, alpha: float, most:
         allowed = np.setdiff1d(allowed, barred)
 
 
-def _evidence(
-    request: Request, fit: Fit, tried: Sequence[Candidate], own: bool, earlier: Round | None
-) -> tuple[LinearEvidence, Ints]:
-    """Evidence about a fit, with what it tried as candidates, and the columns of the free inputs in it."""
-    base, columns = request.base, fit.added_columns(len(tried))
-    if earlier is None or base.learns_scatter:
-        free = free_inputs(base.timetable) if base.free_inputs_testable else []
-        known = candidates(request, tried, own)
-        evidence = fit.evidence([*known, *free]).as_candidates(columns, tried)
-        count = len(evidence.names)
-        return evidence, np.arange(count - sum(len(effect.parameters) for effect in free), count)
-    before = earlier.found.evidence if earlier.found.white is None else earlier.found.white
-    evidence = before.about(fit.evidence(), columns, tried)
-    if not own or any(c.family == "own" for c in evidence.candidates):
-        return evidence, earlier.free
-    more = _untried(candidates(request, (), own), frozenset(evidence.names))
-    return _without_doubles(evidence, more), earlier.free
-
-
-def _without_doubles(evidence: LinearEvidence, equations: Sequence[Effect]) -> LinearEvidence:
-    """Add equations, but those that a registered effect already is: the catalogue has the word."""
-    n, p = len(evidence.names), len(evidence.weight)
-    wider = evidence.with_effects(equations)
-    size = np.sqrt(np.maximum(np.diag(wider.information.J), 1e-300))
-    alike = np.abs(wider.information.J[n:, p:n]) / np.outer(size[n:], size[p:n])
-    single = np.flatnonzero(alike.max(axis=1, initial=0.0) < 1.0 - _PARALLEL) + n
-    return wider.only(np.concatenate([np.arange(p, n), single]))
-
-
-def _round(fit: Fit, found: Search[LinearEvidence], free: Ints) -> Round:
+def _round(ground: Ground, found: Search[LinearEvidence]) -> Round:
+    fit, free = ground.fit, ground.free
     evidence, nothing = found.evidence, np.empty(0, dtype=np.int64)
     return Round(
         fit, evidence, free, found,
         left(evidence, nothing, free, found.scale), left(evidence, found.chosen, free, found.scale),
     )  # fmt: skip
-
-
-def candidates(request: Request, tried: Sequence[Candidate], own: bool) -> list[Effect]:
-    """Effects that a fit may lack: the user's, the catalogue, equations; without those tried or in the model.
-
-    Parameters
-    ----------
-    request : Request
-    tried : sequence of Candidate
-    own : bool
-        Equations and sines of time too.
-    """
-    base = request.base
-    times, has_temperature = base.timetable, base.has_temperature
-    more = [*equations(has_temperature), *periodic(times.duration)] if own else []
-    known = [*request.extra, *catalogue(times, set(base.labels), has_temperature), *more]
-    known = [e for e in known if (e.family or e.name) not in request.without]
-    if base.learns_scatter:
-        known = [
-            e for e in known
-            if not e.needs_table and not e.random_walk and e.decay_s is None
-        ]  # fmt: skip
-    return _untried(known, {c.label for c in tried} | base.labels)
 
 
 def left(evidence: LinearEvidence, chosen: Ints, free: Ints, scale: float) -> FreeInputTest:
@@ -369,11 +281,3 @@ def left(evidence: LinearEvidence, chosen: Ints, free: Ints, scale: float) -> Fr
     return free_input_test(evidence.information, known, weight, free, scale)
 
 
-def _untried(effects: Sequence[Effect], have: set[str] | frozenset[str]) -> list[Effect]:
-    """Effects without the parameters, by label, that `have` holds."""
-    out = []
-    for effect in effects:
-        names = tuple(c.parameter.name for c in split(effect) if c.label not in have)
-        if names:
-            out.append(effect.only(names) if len(names) < len(effect.parameters) else effect)
-    return out
