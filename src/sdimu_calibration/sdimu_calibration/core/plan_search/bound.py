@@ -8,8 +8,10 @@ import numpy as np
 
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.batch.batch import bound_covariance
-from sdimu_calibration.core.effects import body_frame
+from sdimu_calibration.core.effects import body_frame, imu_model
+from sdimu_calibration.core.effects.imu_model import ImuModel
 from sdimu_calibration.core.plan import Plan
+from sdimu_calibration.core.plan_search.known import Known, together
 from sdimu_calibration.core.planning.predict import prepare
 from sdimu_calibration.core.specification import ImuSpecification, Model, Site
 
@@ -19,16 +21,27 @@ _FIXED = 1e-6
 
 @dataclass(frozen=True)
 class Question:
-    """Site, IMU, and the model whose effects a plan has to determine."""
+    """What a plan has to determine.
+
+    Attributes
+    ----------
+    site : Site
+    imu : ImuSpecification
+    model : Model
+        Its effects are to be determined.
+    known : Known or None
+        What earlier data know of the unit.
+    """
 
     site: Site
     imu: ImuSpecification
     model: Model
+    known: Known | None = None
 
 
 @dataclass(frozen=True)
 class Bounds:
-    """Sigmas that a plan reaches.
+    """Sigmas that a plan reaches, what was known before it counted.
 
     Attributes
     ----------
@@ -59,6 +72,12 @@ class Bounds:
                 out[effect] = max(out.get(effect, 0.0), float(sigma))
         return out
 
+    @property
+    def spread(self) -> float:
+        """Geometric mean of the sigmas along the principal axes of the covariance over those of the priors (1)."""
+        scaled = self.covariance / np.outer(self.prior, self.prior)
+        return float(np.exp(0.5 * np.linalg.slogdet(scaled)[1] / len(self.prior)))
+
 
 def bounds(plan: Plan, asked: Question) -> Bounds:
     """Compute the sigmas that a plan reaches.
@@ -79,7 +98,18 @@ def bounds(plan: Plan, asked: Question) -> Bounds:
     """
     nominal = prepare(plan, asked.site, asked.imu, asked.model, None, None)
     sensors = nominal.setup.sensors
-    covariance = bound_covariance(nominal.prepared, nominal.setup, nominal.start)
+    alone = bound_covariance(nominal.prepared, nominal.setup, nominal.start)
+    covariance = alone if asked.known is None else together(asked.known, sensors.names, sensors.prior, alone)
+    return _bounds(sensors, asked, covariance)
+
+
+def already(asked: Question) -> Bounds:
+    """Give the sigmas before a plan is run: what is known already, or the priors."""
+    sensors = imu_model.build(asked.model.effects, asked.imu)
+    return _bounds(sensors, asked, together(asked.known, sensors.names, sensors.prior, None))
+
+
+def _bounds(sensors: ImuModel, asked: Question, covariance: Floats) -> Bounds:
     J = body_frame.frame_jacobian(sensors.names, asked.model.body_frame)
     effects = [e.family or e.name for e in sensors.effects for _ in e.parameters]
     return Bounds(

@@ -28,7 +28,8 @@ class Goal:
     Attributes
     ----------
     limits : mapping of str to float
-        Largest sigma allowed by effect (SI).
+        Largest sigma allowed by effect (SI). Empty: the plan that tells most of all coefficients together
+        (`Bounds.spread`), in the time available.
     minutes : float or None
         Time available, in which the worst ratio of sigma to limit is minimised; None minimises the time.
     """
@@ -39,7 +40,10 @@ class Goal:
 
 @dataclass(frozen=True)
 class Found:
-    """A plan, its bounds, its worst ratio of sigma to limit, and the number of plans evaluated to find it."""
+    """A plan, its bounds, its worst ratio of sigma to limit, and the number of plans evaluated to find it.
+
+    Where there is no limit, `worst` is the spread of its bounds.
+    """
 
     plan: Plan
     bounds: Bounds
@@ -81,8 +85,11 @@ def search(
     Raises
     ------
     DataError
-        When the start cannot be evaluated, or a limit names an effect that is not in the model.
+        When the start cannot be evaluated, a limit names an effect that is not in the model, or there is neither a
+        limit nor a time.
     """
+    if not goal.limits and goal.minutes is None:
+        raise DataError("a plan needs a goal: state limits, or the minutes available")
     first = bounds(start, asked)
     unknown = sorted(goal.limits.keys() - first.largest().keys())
     if unknown:
@@ -129,6 +136,8 @@ def search(
 
 
 def _worst(told: Bounds, goal: Goal) -> float:
+    if not goal.limits:
+        return told.spread
     largest = told.largest()
     return max(largest[effect] / limit for effect, limit in goal.limits.items())
 
