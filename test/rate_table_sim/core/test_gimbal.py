@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 
-from rate_table_sim.core.gimbal import assign_turns, gimbal_axes, gimbal_motion
+from rate_table_sim.core.gimbal import gimbal_axes, gimbal_motion
 from rate_table_sim.core.specification import Imperfections
 from sdimu_calibration.core.plan import Plan, Turn
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.rotation import quaternion_matrix, skew
+from sdimu_calibration.core.table.gimbals import assign_turns
 
 ARCSEC = np.pi / 180 / 3600
 BAD = Imperfections(400 * ARCSEC, -900 * ARCSEC, 200 * ARCSEC, -350 * ARCSEC, wobble_rad=600 * ARCSEC)

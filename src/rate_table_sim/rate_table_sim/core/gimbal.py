@@ -1,27 +1,16 @@
-"""Gimbal geometry: where the axes point, and which of them makes a turn about a platform axis."""
+"""Gimbal geometry: where the axes point, and how the platform turns with them."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rate_table_sim.core.specification import AXES, Imperfections
+from rate_table_sim.core.specification import Imperfections
 from sdimu_calibration.core.compiled import compiled
-from sdimu_calibration.core.plan import Plan
-from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.rotation import cross, rotation_matrix
+from sdimu_calibration.core.table.gimbals import unit
 
 Floats = NDArray[np.float64]
-
-_PARALLEL = 1e-9
-"""Largest angle (rad) between a gimbal axis and the platform axis it is taken to turn about."""
-
-
-def unit(letter: str) -> Floats:
-    """Return the unit vector, shape (3,), of an axis letter."""
-    vector = np.zeros(3)
-    vector[AXES.index(letter)] = 1.0
-    return vector
 
 
 def gimbal_axes(axes: tuple[str, str, str], errors: Imperfections) -> Floats:
@@ -30,80 +19,6 @@ def gimbal_axes(axes: tuple[str, str, str], errors: Imperfections) -> Floats:
     lean_middle = rotation_matrix(-errors.outer_middle_nonorthogonality_rad * cross(outer, middle))
     lean_inner = rotation_matrix(-errors.middle_inner_nonorthogonality_rad * cross(middle, inner))
     return np.array([outer, lean_middle @ middle, lean_inner @ inner])
-
-
-def assign_turns(plan: Plan, axes: tuple[str, str, str]) -> tuple[tuple[int, float], ...]:
-    """Which gimbal axis makes each turn, and in which sense.
-
-    A turn about a platform axis is a turn of one gimbal axis only while that axis is parallel or antiparallel
-    to it. Where two are, the choice decides what is possible later, so the choices are searched.
-
-    Parameters
-    ----------
-    plan : Plan
-    axes : tuple of str
-        Axis letters of outer, middle and inner axis at zero angles.
-
-    Returns
-    -------
-    tuple of (int, float)
-        Gimbal axis (0 outer, 1 middle, 2 inner) and sign, one per turn.
-
-    Raises
-    ------
-    DataError
-        When no choice allows a turn; it names the furthest one that could be reached.
-    """
-    dead_ends: set[tuple[int, tuple[float, ...]]] = set()
-    furthest = 0
-    choice: list[tuple[int, float]] = []
-    angles = [np.zeros(3)]
-    untried = [_parallel_axes(plan, 0, angles[0], axes)]
-    while len(choice) < len(plan.turns):
-        number = len(choice)
-        furthest = max(furthest, number)
-        if not untried[-1]:
-            dead_ends.add((number, _state(angles[-1])))
-            if not choice:
-                turn = plan.turns[furthest]
-                raise DataError(
-                    f"turn {furthest + 1} of plan {plan.name}: no gimbal axis is along {turn.axis} there "
-                    f"(the table turns {', '.join(axes)}; use --table free, or axes: free in the table's file)"
-                )
-            untried.pop()
-            angles.pop()
-            choice.pop()
-            continue
-        k, sign = untried[-1].pop()
-        after = angles[-1].copy()
-        after[k] += sign * plan.turns[number].angle_rad
-        if (number + 1, _state(after)) in dead_ends:
-            continue
-        choice.append((k, sign))
-        angles.append(after)
-        untried.append(_parallel_axes(plan, number + 1, after, axes))
-    return tuple(choice)
-
-
-def _state(angles: Floats) -> tuple[float, ...]:
-    # Angles a full turn apart give the same directions.
-    return tuple(np.round(np.concatenate([np.cos(angles), np.sin(angles)]), 6) + 0.0)
-
-
-def _parallel_axes(plan: Plan, number: int, angles: Floats, axes: tuple[str, str, str]) -> list[tuple[int, float]]:
-    """Gimbal axes along the platform axis of turn `number`, with sense; the innermost is last, to be tried first."""
-    if number >= len(plan.turns):
-        return []
-    wanted = unit(plan.turns[number].axis)
-    outer, middle, inner = (unit(a) for a in axes)
-    C_inner = rotation_matrix(angles[2] * inner)
-    C_middle = rotation_matrix(angles[1] * middle)
-    along = (C_inner.T @ (C_middle.T @ outer), C_inner.T @ middle, inner)
-    return [
-        (k, float(np.sign(axis @ wanted)))
-        for k, axis in enumerate(along)
-        if np.linalg.norm(np.cross(axis, wanted)) < _PARALLEL
-    ]
 
 
 @compiled

@@ -9,18 +9,12 @@ from zlib import crc32
 import numpy as np
 from numpy.typing import NDArray
 
-from rate_table_sim.core.gimbal import (
-    assign_turns,
-    gimbal_axes,
-    gimbal_motion,
-    quaternion_product,
-    turn_quaternion,
-    unit,
-)
+from rate_table_sim.core.gimbal import gimbal_axes, gimbal_motion, quaternion_product, turn_quaternion
 from rate_table_sim.core.profile import trapezoid
 from rate_table_sim.core.specification import AXES, Imperfections, TableSpecification
 from sdimu_calibration.core.plan import Plan
 from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.table.gimbals import assign_turns, unit
 
 Floats = NDArray[np.float64]
 

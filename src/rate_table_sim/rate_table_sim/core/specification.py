@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from sdimu_calibration.core.table.description import AxisLimits
+
 AXES = ("X", "Y", "Z")
 
 
@@ -50,14 +52,22 @@ class TableSpecification:
     sample_rate_hz : float
         Rate of the motion samples and grid of all profile breakpoints.
     imperfections : Imperfections
+    limits : tuple of AxisLimits
+        What goals may ask of each axis; a plan states its own acceleration.
+    joints : tuple of str
+        Names of the three joints in messages; None for those of the axes.
     """
 
     name: str = "ideal"
     axes: tuple[str, str, str] | None = ("Y", "Z", "X")
     sample_rate_hz: float = 100.0
     imperfections: Imperfections = field(default_factory=Imperfections)
+    limits: tuple[AxisLimits, AxisLimits, AxisLimits] = (AxisLimits(), AxisLimits(), AxisLimits())
+    joints: tuple[str, str, str] | None = None
 
     @property
     def axis_names(self) -> tuple[str, str, str]:
         """Names of the three columns of angle and rate."""
+        if self.joints is not None:
+            return self.joints
         return ("outer", "middle", "inner") if self.axes else ("x", "y", "z")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from rclpy.node import Node
 
 from rate_table_sim.core import TableMotion, TableSpecification
-from rate_table_sim.core.gimbal import unit
+from sdimu_calibration.core.table.gimbals import unit
 from sdimu_calibration.nodes.credits import HISTORY, LATCHED
 from sdimu_calibration.nodes.transform_type import transform_class
 from sdimu_calibration.nodes.transforms import (
