@@ -335,7 +335,8 @@ def look_alikes(problem: Problem[E], chosen: Sequence[int], column: int, allowed
         Columns, the highest score first.
     """
     others = [c for c in chosen if c != column]
-    scores = problem.scores(problem.scan(others, scale), scale, others)
+    # What else was found says which is the likelier cause, not what the data tell apart.
+    scores = problem.scores(problem.scan(others, scale), scale)
     outside = np.ones(len(scores), dtype=bool)
     outside[allowed] = False
     outside[column] = False
