@@ -10,7 +10,7 @@ from typing import Any
 from sdimu_calibration.api.fit import CalibrationFit
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.diagnosis.found import Found
-from sdimu_calibration.core.diagnosis.search import Problem
+from sdimu_calibration.core.diagnosis.problem import Problem
 from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary, summarise
 from sdimu_calibration.core.evidence.candidate import Candidate
 from sdimu_calibration.core.evidence.navigation_evidence import NavigationEvidence

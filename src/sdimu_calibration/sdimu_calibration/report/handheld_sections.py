@@ -6,7 +6,7 @@ import numpy as np
 
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.diagnosis.ladder import Rung
-from sdimu_calibration.core.diagnosis.search import Problem
+from sdimu_calibration.core.diagnosis.problem import Problem
 from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary
 from sdimu_calibration.core.diagnosis.verdict import shown
 from sdimu_calibration.core.evidence.handheld_evidence import HandheldEvidence, places

@@ -7,7 +7,7 @@ import pytest
 
 from sdimu_calibration.core.diagnosis.coefficient_shifts import coefficient_shifts
 from sdimu_calibration.core.diagnosis.found import found_effects
-from sdimu_calibration.core.diagnosis.search import Problem
+from sdimu_calibration.core.diagnosis.problem import Problem
 from sdimu_calibration.core.estimation.solve import extend
 
 _HIDDEN = ("accel_scale_asymmetry_z=60 ppm",)

@@ -7,7 +7,7 @@ import pytest
 
 from sdimu_calibration.core.diagnosis.candidates import catalogue
 from sdimu_calibration.core.diagnosis.diagnose import climb
-from sdimu_calibration.core.diagnosis.search import Problem
+from sdimu_calibration.core.diagnosis.problem import Problem
 
 
 @pytest.fixture(scope="module")

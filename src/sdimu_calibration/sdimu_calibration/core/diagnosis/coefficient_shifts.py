@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sdimu_calibration.core.diagnosis.search import Problem
+from sdimu_calibration.core.diagnosis.problem import Problem
 from sdimu_calibration.core.effects import bias
 from sdimu_calibration.core.evidence.linear import E
 

@@ -16,9 +16,10 @@ from sdimu_calibration.core.diagnosis.free_input_test import FreeInputTest
 from sdimu_calibration.core.diagnosis.ground import Request
 from sdimu_calibration.core.diagnosis.ladder import Rung, ladder
 from sdimu_calibration.core.diagnosis.model_doubt import in_doubt
+from sdimu_calibration.core.diagnosis.problem import Problem
 from sdimu_calibration.core.diagnosis.rounds import UNEXPLAINED_P, Round, in_found_noise, search_until_stable
 from sdimu_calibration.core.diagnosis.screen import Finding, screen
-from sdimu_calibration.core.diagnosis.search import FALSE_ALARM, MOST_STEPS, Problem, Search, look_alikes, patchwork
+from sdimu_calibration.core.diagnosis.search import FALSE_ALARM, MOST_STEPS, Search, look_alikes, patchwork
 from sdimu_calibration.core.diagnosis.verdict import Verdict, sentence, verdict
 from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.estimation.fit import NOT_CONVERGED, Fit

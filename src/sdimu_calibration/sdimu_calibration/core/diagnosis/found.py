@@ -10,8 +10,9 @@ from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.diagnosis.coefficient_shifts import CoefficientShift, coefficient_shifts
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.diagnosis.free_input_test import free_input_test
+from sdimu_calibration.core.diagnosis.problem import Problem
 from sdimu_calibration.core.diagnosis.scan import POWER_80, scan
-from sdimu_calibration.core.diagnosis.search import Problem, look_alikes
+from sdimu_calibration.core.diagnosis.search import look_alikes
 from sdimu_calibration.core.evidence.candidate import Candidate
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.probability import normal_tail

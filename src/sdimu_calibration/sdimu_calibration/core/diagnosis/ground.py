@@ -13,7 +13,8 @@ import numpy as np
 
 from sdimu_calibration.core.arrays import Ints
 from sdimu_calibration.core.diagnosis.candidates import catalogue, equations, free_inputs, periodic
-from sdimu_calibration.core.diagnosis.search import MOST_STEPS, Problem, Search, search
+from sdimu_calibration.core.diagnosis.problem import Problem
+from sdimu_calibration.core.diagnosis.search import MOST_STEPS, Search, search
 from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.estimation.fit import Fit
 from sdimu_calibration.core.estimation.solve import extend

@@ -15,14 +15,13 @@ Source: J. Hoeting et al., "Bayesian model averaging: a tutorial", Statistical S
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from sdimu_calibration.core.arrays import Bools, Floats, Ints
-from sdimu_calibration.core.diagnosis.search import Problem
+from sdimu_calibration.core.diagnosis.problem import Problem
 from sdimu_calibration.core.effects import bias
 from sdimu_calibration.core.estimation.fit import Fit
 from sdimu_calibration.core.evidence.information import solved
@@ -76,8 +75,9 @@ def model_doubt(fit: Fit, evidence: LinearEvidence, chosen: Sequence[int], allow
     problem = Problem(evidence)
     q, count = evidence.coefficients, len(chosen)
     # Each parameter has its odds, however many time constants or moments of it are tried.
-    votes = _votes(problem, allowed)
-    rare = np.log(max(1.0, votes.sum()))
+    votes = np.exp(-problem.log_variants[allowed - problem.p])
+    # A sensor that has k effects of the catalogue is likelier to have one more: Laplace's rule, (k + 1) to the catalogue.
+    rare = np.log(max(1.0, votes.sum() / (1 + count)))
     is_chosen = np.isin(allowed, chosen)
     more = _alternatives(problem, chosen, allowed, scale)
     weight = _shares(more.score + np.log(votes) - rare, np.isfinite(more.score) & ~is_chosen)
@@ -94,19 +94,6 @@ def model_doubt(fit: Fit, evidence: LinearEvidence, chosen: Sequence[int], allow
         told = [*range(q), *range(problem.p, problem.p + count - 1)]
         out[np.ix_(rest, rest)] += _exchanged(fit, evidence, allowed, rivals, weight, place, told)
     return out
-
-
-def _votes(problem: Problem[LinearEvidence], allowed: Ints) -> Floats:
-    """Odds of each allowed column beside the other variants of its parameter.
-
-    Returns
-    -------
-    ndarray, shape (a,)
-    """
-    candidates = [problem.candidate(c) for c in allowed.tolist()]
-    names = [c.label if c.family == "own" else c.parameter.name for c in candidates]
-    count = Counter(names)
-    return np.array([1.0 / count[name] for name in names])
 
 
 def in_doubt(fit: Fit, final: Fit, evidence: LinearEvidence, chosen: Ints, free: Ints, scale: float) -> Fit:

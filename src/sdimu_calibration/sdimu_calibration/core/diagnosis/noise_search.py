@@ -17,12 +17,12 @@ from typing import Generic
 import numpy as np
 
 from sdimu_calibration.core.arrays import Ints
+from sdimu_calibration.core.diagnosis.problem import Problem
 from sdimu_calibration.core.diagnosis.scan import Scan, scored
 from sdimu_calibration.core.diagnosis.search import (
     FALSE_ALARM,
     LOG_BAYES,
     MOST_STEPS,
-    Problem,
     Search,
     Step,
     judged,

@@ -12,16 +12,16 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
 from typing import Generic
 
 import numpy as np
 
 from sdimu_calibration.core.arrays import Floats, Ints
-from sdimu_calibration.core.diagnosis.scan import Scan, alike, scan, threshold
+from sdimu_calibration.core.diagnosis.problem import Problem
+from sdimu_calibration.core.diagnosis.scan import Scan, alike
 from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.evidence.candidate import Candidate
-from sdimu_calibration.core.evidence.held_out import HeldOut, gain, predict
+from sdimu_calibration.core.evidence.held_out import HeldOut, gain
 from sdimu_calibration.core.evidence.joint_information import Joint
 from sdimu_calibration.core.evidence.linear import E
 from sdimu_calibration.core.noise_term import NoiseTerm
@@ -38,15 +38,6 @@ _PATCHES = 3
 """Number of drifts of one bias from which they are a patchwork: together they follow any wander."""
 LOG_BAYES = 3.0
 """Least log Bayes factor (1) of an accepted step: odds of 20 to 1, "strong" on Jeffreys' scale."""
-_WIDE = 3.0
-"""Factor on the physical prior of a candidate: a sensor may be out of its class."""
-_PROVEN = 30.0
-"""Factor on the physical prior of a chosen effect: its size is the data's to say, and what a prior holds back of it
-looks like companions."""
-_OWN_ODDS = 6.0
-"""Log odds (1) that a registered effect has before an equation: physics says nothing of the equation."""
-_KIN = 2.0
-"""Log odds (1) of an effect that acts on one axis as one that was found acts on another: they have one cause."""
 _SHARPER = 1.0
 """Gain of the log Bayes factor (1) from which a time or time constant between those of the scan is taken: less is not
 worth its digits."""
@@ -148,112 +139,6 @@ class Search(Generic[E]):
     joint: Joint | None = None
 
 
-class Problem(Generic[E]):
-    """Evidence with the bookkeeping of priors for any set of chosen columns."""
-
-    def __init__(self, evidence: E) -> None:
-        self.evidence = evidence
-        self.p = len(evidence.weight)
-
-    def known(self, chosen: Sequence[int]) -> tuple[Ints, Floats, Floats]:
-        """Parameters that are estimated when some candidates are in the model, with their priors.
-
-        Parameters
-        ----------
-        chosen : sequence of int, length k
-            Columns of the candidates.
-
-        Returns
-        -------
-        known : ndarray of int, shape (p + k,)
-            Columns of the model, then `chosen`.
-        weight : ndarray, shape (p + k,)
-            Prior information of each (1/sigma^2, SI); the prior of a candidate is wider by `_PROVEN`.
-        shift : ndarray, shape (p + k,)
-            Prior mean of each, less the calibration's value (SI).
-        """
-        evidence = self.evidence
-        prior = evidence.prior[np.array(chosen, dtype=int) - self.p] if len(chosen) else np.empty(0)
-        weight = np.concatenate([evidence.weight, 1.0 / (_PROVEN * prior) ** 2])
-        shift = np.concatenate([evidence.shift, np.zeros(len(chosen))])
-        return np.concatenate([evidence.model, np.array(chosen, dtype=np.int64)]).astype(np.int64), weight, shift
-
-    def candidate(self, column: int) -> Candidate:
-        """Return the candidate at a column."""
-        return self.evidence.candidates[column - self.p]
-
-    def scale(self, chosen: Sequence[int]) -> float:
-        """Residual noise over specified noise, at least 1."""
-        known, weight, _ = self.known(chosen)
-        information = self.evidence.information
-        estimate, _ = information.estimate(known, weight)
-        residual = self.evidence.e - self.evidence.W[:, known] @ estimate
-        misfit = float(residual @ self.evidence.weighed(residual[:, None])[:, 0])
-        return float(np.sqrt(max(1.0, misfit / max(1, len(residual) - len(known)))))
-
-    def scan(self, chosen: Sequence[int], scale: float = 1.0) -> Scan:
-        """Score all columns with the chosen ones in the model; `scale` is the residual noise over the specified one."""
-        known, weight, _ = self.known(chosen)
-        return scan(self.evidence.information, known, weight, scale)
-
-    def threshold(self, scanned: Scan, alpha: float) -> float:
-        """Size of the largest score of a scan with nothing chosen that pure noise exceeds with probability `alpha`."""
-        tested = np.flatnonzero(np.isfinite(scanned.sigma))
-        return threshold(self.evidence.information, self.evidence.model, self.evidence.weight, tested, alpha)
-
-    @cached_property
-    def kin(self) -> Ints:
-        """Cause of each candidate: candidates of one effect, with the same time constant or the like, share a number.
-
-        Returns
-        -------
-        ndarray of int, shape (q,)
-        """
-        known: dict[tuple[str, ...], int] = {}
-        keys = [(c.family, *c.effect.options.values()) for c in self.evidence.candidates]
-        return np.array([known.setdefault(key, len(known)) for key in keys], dtype=np.int64)
-
-    def scores(self, scanned: Scan, scale: float = 1.0, beside: Sequence[int] = (), ratio: float = _WIDE) -> Floats:
-        """Log posterior odds of every column against the model without it.
-
-        The Bayes factor of an effect of size N(0, s^2), with information J on it and information vector d, is
-        ``d^2 / (2 (J + s^-2)) - log(1 + J s^2) / 2``. To it come log odds for registered effects and for kin.
-
-        Parameters
-        ----------
-        scanned : Scan
-            Of p + q columns.
-        scale : float
-            Residual noise over specified noise.
-        beside : sequence of int
-            Columns that were chosen: their kin have better odds.
-        ratio : float
-            s over the one-sigma size that physics gives the effect.
-
-        Returns
-        -------
-        ndarray, shape (p + q,)
-            Log odds (1); -inf for the model's columns, for what is not testable, and for a size of the wrong sign.
-        """
-        p = self.p
-        J, d = scanned.J[p:] / scale**2, scanned.d[p:] / scale**2
-        wide = 1.0 / (ratio * self.evidence.prior) ** 2
-        with np.errstate(divide="ignore", invalid="ignore"):
-            occam = np.where(wide > 0.0, 0.5 * np.log1p(J / wide), 0.0)
-            score = 0.5 * d**2 / (J + wide) - occam
-        own = np.array([c.family == "own" for c in self.evidence.candidates], dtype=bool)
-        kin = np.isin(self.kin, self.kin[np.array(beside, dtype=int) - p]) & ~own
-        score = score - _OWN_ODDS * own + _KIN * kin
-        wrong = (d < 0.0) & np.array([c.effect.positive for c in self.evidence.candidates], dtype=bool)
-        score = np.where(wrong, -np.inf, score)
-        return np.concatenate([np.full(p, -np.inf), np.where(np.isfinite(scanned.sigma[p:]), score, -np.inf)])
-
-    def held_out(self, chosen: Sequence[int], scale: float) -> HeldOut:
-        """Predict each stop from the others with the chosen columns in the model; `scale` as for `scan`."""
-        known, weight, shift = self.known(chosen)
-        return predict(self.evidence, known, weight, shift, scale)
-
-
 def search(
     evidence: E, allowed: Ints, alpha: float = FALSE_ALARM, most: int = MOST_STEPS, limit: float | None = None
 ) -> Search[E]:
@@ -282,7 +167,7 @@ def search(
     scanned = first
     while len(steps) < most and not (len(steps) >= _PATIENCE and patchwork(problem.candidate(c) for c in chosen)):
         scores = problem.scores(scanned, scale, chosen)
-        above = np.where(np.abs(scanned.z) > limit, scores, -np.inf)
+        above = np.where(np.abs(scanned.z) > limit, scores - problem.odds_against, -np.inf)
         best = int(np.argmax(above))
         if not np.isfinite(above[best]):
             break
@@ -376,7 +261,7 @@ def _polish(problem: Problem[E], chosen: list[int]) -> list[int]:
         changed = False
         for place in range(len(chosen)):
             others = chosen[:place] + chosen[place + 1 :]
-            scores = problem.scores(problem.scan(others, 1.0), beside=others)
+            scores = problem.scores(problem.scan(others, 1.0), beside=others) - problem.odds_against
             best = int(np.argmax(scores))
             if best != chosen[place] and scores[best] > scores[chosen[place]] + 1e-6:
                 chosen = [*others[:place], best, *others[place:]]

@@ -8,8 +8,9 @@ from sdimu_calibration.core.arrays import Ints
 from sdimu_calibration.core.diagnosis.candidates import free_inputs
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.diagnosis.ground import Request, candidates
+from sdimu_calibration.core.diagnosis.problem import Problem
 from sdimu_calibration.core.diagnosis.rounds import UNEXPLAINED_P, left
-from sdimu_calibration.core.diagnosis.search import FALSE_ALARM, Problem, Search
+from sdimu_calibration.core.diagnosis.search import FALSE_ALARM, Search
 from sdimu_calibration.core.estimation.fit import Fit
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.results import Calibration

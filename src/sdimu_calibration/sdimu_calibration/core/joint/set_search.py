@@ -14,7 +14,8 @@ import numpy as np
 
 from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.diagnosis.candidates import catalogue, without
-from sdimu_calibration.core.diagnosis.search import FALSE_ALARM, LOG_BAYES, Problem, Search, look_alikes, search
+from sdimu_calibration.core.diagnosis.problem import Problem
+from sdimu_calibration.core.diagnosis.search import FALSE_ALARM, LOG_BAYES, Search, look_alikes, search
 from sdimu_calibration.core.effects import selection
 from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.effects.imu_model import prior_size

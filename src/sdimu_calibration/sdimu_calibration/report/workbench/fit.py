@@ -15,7 +15,7 @@ import numpy as np
 
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.diagnosis.free_input_test import FreeInputTest
-from sdimu_calibration.core.diagnosis.search import Problem
+from sdimu_calibration.core.diagnosis.problem import Problem
 from sdimu_calibration.core.diagnosis.survey import survey
 from sdimu_calibration.core.estimation.fit import Fit, Start
 from sdimu_calibration.core.estimation.navigation_fit import NavigationFit
