@@ -33,11 +33,9 @@ class TableFrames:
     ----------
     node : rclpy.node.Node
     table : TableSpecification
-    motion : TableMotion
     """
 
-    def __init__(self, node: Node, table: TableSpecification, motion: TableMotion) -> None:
-        self._motion = motion
+    def __init__(self, node: Node, table: TableSpecification) -> None:
         self._axes = None if table.axes is None else [unit(letter) for letter in table.axes]
         chain = [(BASE, PLATFORM)] if table.axes is None else [
             *zip((BASE, *_AXES[:2]), _AXES, strict=True), (_AXES[2], PLATFORM),
@@ -59,17 +57,17 @@ class TableFrames:
             fixed = TransformMessage([(SITE, NED), (NED, BASE)])
             self._static.publish(fixed.encode(stamp_ns, [NED_IN_ENU, IDENTITY]))
 
-    def send(self, stamp_ns: int, k: int) -> None:
-        """Say how the axes stand at sample `k` of the motion: always while they move, seldom at rest."""
-        moves = bool(self._motion.rate[k].any())
+    def send(self, stamp_ns: int, motion: TableMotion, k: int) -> None:
+        """Say how the axes stand at sample `k` of a block of motion: always while they move, seldom at rest."""
+        moves = bool(motion.rate[k].any())
         self._count += 1
         if self._publisher is None or not (moves or self._moved or self._count % _AT_REST == 0):
             return
         self._moved = moves
         if self._axes is None:
-            rotations = [self._motion.q_nt[k]]
+            rotations = [motion.q_nt[k]]
         else:
-            angles = self._motion.encoder_angle[k]
+            angles = motion.encoder_angle[k]
             rotations = [about(axis, angle) for axis, angle in zip(self._axes, angles, strict=True)]
             rotations.append(IDENTITY)
         self._publisher.publish(self._message.encode(stamp_ns, rotations))

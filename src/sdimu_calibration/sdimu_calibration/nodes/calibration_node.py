@@ -1,13 +1,11 @@
 """Node that calibrates while the test runs.
 
-Parameters: site, imu, model (names or paths), add (effects beyond the model's: names, equations or files, as for
-`sdimu calibrate --add`), accel_unit, gyro_unit, accel_sign, gyro_sign (of the messages; recognised when empty or 0),
-imu_topic, status_topic, temperature_topic, out (folder for result.json), stay (do not leave at the end of the stream:
-what comes after it belongs to the same test until ~/reset, and the next end is answered again), checkpoint (a successor
-can go on with the journal in the folder of results; on by default).
-Subscriptions (remap them at will): /imu/data_raw, /rate_table/status, /imu/temperature. Publications once a second of
-data: /calibration/coefficients, /calibration/covariance, /calibration/navigation, /diagnostics. Services: ~/save
-writes result.json from everything that has come, ~/reset forgets it.
+Parameters: `ros2 param describe` tells them. With `stay`, what comes after the end of a stream belongs to the same test
+until ~/reset, and the next end is answered again.
+Subscriptions (relative, remap them at will): imu/data_raw, rate_table/status, imu/temperature. Publications once a
+second of data: calibration/coefficients, calibration/covariance, calibration/navigation, /diagnostics; every ten
+seconds calibration/estimates, each coefficient with its sigma in customary units. Services: ~/save writes result.json
+from everything that has come, ~/reset forgets it.
 
 A header stamp decides what happens, never the order of arrival. At the end of the stream the whole test is opened and
 calibrated once more as `sdimu calibrate` does it; the last coefficients and covariance are that result. On the way
@@ -43,8 +41,10 @@ from sdimu_calibration.core.specification import Model
 from sdimu_calibration.nodes import calibration_messages as messages
 from sdimu_calibration.nodes.credits import STREAM, Consumer, Producer, publish
 from sdimu_calibration.nodes.feed import Feed
+from sdimu_calibration.nodes.heartbeat import Heartbeat
 from sdimu_calibration.nodes.listening import Listener
-from sdimu_calibration.nodes.opening_parameters import declare_opening
+from sdimu_calibration.nodes.opening_parameters import declare_frames, declare_opening
+from sdimu_calibration.nodes.parameters import Declare
 from sdimu_calibration.nodes.spinning import run_node
 from sdimu_calibration.nodes.ticking import Ticker
 from sdimu_calibration.report.progress_text import falling, light, sigma_words
@@ -70,19 +70,20 @@ class CalibrationNode:
     def __init__(self) -> None:
         self.node = Node("calibration")
         self.done = Future()
-        declare = self.node.declare_parameter
+        declare = Declare(self.node)
         self._options, self._topics = declare_opening(self.node)
-        model = str(declare("model", "baseline").value)
-        # An empty string keeps the parameter's type when nothing is added.
-        added = [str(effect) for effect in declare("add", [""]).value if effect]
+        model = declare.text("model", "baseline", "model to estimate: name in config/model or path")
+        added = declare.texts("add", [], "effects beyond the model's: names, equations or files")
         self._model = extended_model(model, added)
-        self._out = Path(str(declare("out", ".").value))
-        self._stay = bool(declare("stay", False).value)
+        self._out = Path(declare.text("out", ".", "folder of result.json and of the journal"))
+        self._stay = declare.flag("stay", False, "do not leave at the end of the stream")
         _warm_up(self._options, self._model)
         # The text of an effect file too: its name says little of what it computes.
         texts = [path.read_text() for path in map(Path, added) if path.suffix in SUFFIXES]
         options = digest(self._options, load_model(model), added, texts)
-        checkpoint = bool(declare("checkpoint", True).value)
+        checkpoint = declare.flag("checkpoint", True, "keep a journal with which a successor goes on")
+        self._frames = declare_frames(declare)
+        beat_s = declare.number("heartbeat_s", 1.0, "wall time between heartbeats (s); 0: none", least=0.0)
         self._journal = Journal(self._out / JOURNAL, options, lasting=checkpoint)
         self._feed = Feed(self._make, self._journal)
         resumed = self._feed.resumed_ns
@@ -93,9 +94,10 @@ class CalibrationNode:
 
         ticker = Ticker(self.node)
         node = self.node
-        self._coefficients = Producer(node, ticker, JointState, "/calibration/coefficients")
-        self._covariance = node.create_publisher(Float64MultiArray, "/calibration/covariance", STREAM)
-        self._navigation = node.create_publisher(Odometry, "/calibration/navigation", STREAM)
+        self._coefficients = Producer(node, ticker, JointState, "calibration/coefficients")
+        self._covariance = node.create_publisher(Float64MultiArray, "calibration/covariance", STREAM)
+        self._navigation = node.create_publisher(Odometry, "calibration/navigation", STREAM)
+        self._estimates = node.create_publisher(DiagnosticArray, "calibration/estimates", STREAM)
         self._diagnostics = node.create_publisher(DiagnosticArray, "/diagnostics", STREAM)
         self._save = node.create_service(Trigger, "~/save", self._answer_save)
         self._reset = node.create_service(Trigger, "~/reset", self._answer_reset)
@@ -108,6 +110,7 @@ class CalibrationNode:
         if resumed:
             self._catch_up(resumed)
         ticker.every(0.05, self._tick)
+        self._heartbeat = Heartbeat(node, ticker, self._diagnostics, beat_s, lambda: self._feed.imu_ns)
         self._stream.ready()
 
     def close(self) -> None:
@@ -161,15 +164,17 @@ class CalibrationNode:
 
     def _publish(self, e: EpochEstimate) -> None:
         self._publish_coefficients(e.ns, e.body_frame, e.names, e.coefficients, e.covariance)
-        publish(self._navigation, messages.navigation(e.ns, e))
-        publish(self._diagnostics, messages.diagnostics(e.ns, e))
+        publish(self._navigation, messages.navigation(e.ns, e, *self._frames))
+        publish(self._diagnostics, messages.diagnostics(e.ns, e, self._heartbeat.name))
+        if e.ns // NS % messages.ESTIMATES_EVERY_S == 0:
+            publish(self._estimates, messages.estimates(e.ns, e.names, e.coefficients, e.covariance, e.display_units))
         self._tell(e)
 
     def _tell_notes(self) -> None:
         """Log and publish what the filter on the way waits for, recognised or gave up."""
         for note in self._feed.notes():
             self.node.get_logger().warning(note)
-            publish(self._diagnostics, messages.notice(self._feed.imu_ns, note))
+            publish(self._diagnostics, messages.notice(self._feed.imu_ns, note, self._heartbeat.name))
 
     def _tell(self, e: EpochEstimate) -> None:
         """Log one line at the end of each stop: how far the sigmas have fallen, and the innovations."""
@@ -220,6 +225,8 @@ class CalibrationNode:
                 self.done.set_exception(error)
             return
         stamp = self._feed.imu_ns
+        units = result.display_units
+        publish(self._estimates, messages.estimates(stamp, result.names, result.values, result.covariance, units))
         self._publish_coefficients(stamp, result.body_frame, result.names, result.values, result.covariance)
         self._coefficients.end(stamp)
         self._departed = time.monotonic()

@@ -1,4 +1,4 @@
-"""Node that takes the errors out of samples: /imu/data_raw to /imu/data.
+"""Node that takes the errors out of samples: imu/data_raw to imu/data.
 
 Parameters: result (result.json or its folder), imu (name or path: its white noise goes into the covariances), effects
 (YAML files of effects of one's own that the result has), frame_id (imu_ and the body frame by default), same_start
@@ -17,6 +17,7 @@ import time
 from pathlib import Path
 
 import numpy as np
+from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.node import Node
 from rclpy.task import Future
 from sensor_msgs.msg import Imu, Temperature
@@ -29,6 +30,7 @@ from sdimu_calibration.core.recording import NOMINAL_FROM, DataError, Temperatur
 from sdimu_calibration.nodes.convert import NS
 from sdimu_calibration.nodes.credits import Consumer, Producer, to_ns
 from sdimu_calibration.nodes.listening import Listener
+from sdimu_calibration.nodes.parameters import Declare
 from sdimu_calibration.nodes.spinning import run_node
 from sdimu_calibration.nodes.ticking import Ticker
 from sdimu_calibration.storage.cdr import LayoutError, Stamps, decode_imu
@@ -37,8 +39,11 @@ from sdimu_calibration.storage.config import load_imu
 from sdimu_calibration.storage.effect_file import effects_of_result
 from sdimu_calibration.storage.result_file import read_result
 
-RAW, COMPENSATED, TEMPERATURE = "/imu/data_raw", "/imu/data", "/imu/temperature"
+RAW, COMPENSATED, TEMPERATURE = "imu/data_raw", "imu/data", "imu/temperature"
 FAREWELL_S = 10.0
+START_TEMPERATURE = ParameterDescriptor(
+    description="temperature from which changes count (deg C), where the result does not say it; NaN: as it says"
+)
 _REMEMBERED_NS = 300 * NS
 """Temperatures older than this no longer matter for value or rate."""
 
@@ -49,15 +54,15 @@ class CompensateNode:
     def __init__(self) -> None:
         self.node = Node("compensate")
         self.done = Future()
-        declare = self.node.declare_parameter
-        declare("result", "")
-        declare("imu", "dtg")
-        # An empty string keeps the parameter's type when nothing is listed.
-        declare("effects", [""])
-        declare("frame_id", "")
-        declare("same_start", False)
-        declare("start_temperature", math.nan)
-        self._stay = bool(declare("stay", False).value)
+        declare = Declare(self.node)
+        # All but the last are live: ~/reload looks at them again.
+        declare.text("result", "", "result.json or its folder", live=True)
+        declare.text("imu", "dtg", "IMU whose white noise goes into the covariances", live=True)
+        declare.texts("effects", [], "YAML files of effects of one's own that the result has", live=True)
+        declare.text("frame_id", "", "frame_id of the samples; imu_ and the body frame when empty", live=True)
+        declare.flag("same_start", False, "functions of time hold: switched on as in the calibration", live=True)
+        self.node.declare_parameter("start_temperature", math.nan, START_TEMPERATURE)
+        self._stay = declare.flag("stay", False, "do not leave at the end of the stream")
         self._start_ns: int | None = None
         self._stamps: list[int] = []
         self._interval = 0.0

@@ -61,8 +61,8 @@ class Monitor:
         # Ctrl-C belongs to the command line.
         rclpy.init(context=self._context, signal_handler_options=SignalHandlerOptions.NO)
         self._node = Node("monitor", context=self._context)
-        self._node.create_subscription(DiagnosticArray, "/rate_table/status", self._take_status, GLANCE)
-        self._node.create_subscription(JointState, "/calibration/coefficients", self._take_coefficients, GLANCE)
+        self._node.create_subscription(DiagnosticArray, "rate_table/status", self._take_status, GLANCE)
+        self._node.create_subscription(JointState, "calibration/coefficients", self._take_coefficients, GLANCE)
         self._node.create_subscription(DiagnosticArray, "/diagnostics", self._take_diagnostics, GLANCE)
         self._executor = EventsExecutor(context=self._context)
         self._executor.add_node(self._node)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from rclpy.node import Node
 
 from sdimu_calibration.core.front_door import OpeningOptions
+from sdimu_calibration.nodes.parameters import Declare
 from sdimu_calibration.storage.config import load_imu
 from sdimu_calibration.storage.opening import Source, opening_options
 from sdimu_calibration.storage.topics import Topics
@@ -20,21 +21,33 @@ def declare_opening(node: Node) -> tuple[OpeningOptions, Topics]:
     DataError
         When there is no such site or IMU, or a unit or sign is none.
     """
+    declare = Declare(node)
 
-    def text(name: str, default: str = "") -> str:
-        return str(node.declare_parameter(name, default).value)
+    def topic(name: str, default: str, of: str) -> str:
+        return declare.text(name, default.lstrip("/"), f"topic of the {of}")
 
-    def sign(name: str) -> int | None:
-        return int(node.declare_parameter(name, 0).value) or None
+    def unit(name: str, of: str) -> str | None:
+        return declare.text(name, "", f"unit of the {of} in the messages; recognised when empty") or None
+
+    def sign(name: str, of: str) -> int | None:
+        return declare.integer(name, 0, f"sign of the {of}: 1 or -1; 0: recognised", least=-1, most=1) or None
 
     own = Topics()
     topics = Topics(
-        imu=text("imu_topic", own.imu), status=text("status_topic", own.status),
-        temperature=text("temperature_topic", own.temperature),
+        imu=topic("imu_topic", own.imu, "samples"), status=topic("status_topic", own.status, "phases of the table"),
+        temperature=topic("temperature_topic", own.temperature, "temperature"),
     )  # fmt: skip
     source = Source(
-        accel_unit=text("accel_unit") or None, gyro_unit=text("gyro_unit") or None, accel_sign=sign("accel_sign"),
-        gyro_sign=sign("gyro_sign"),
+        accel_unit=unit("accel_unit", "specific force"), gyro_unit=unit("gyro_unit", "body rate"),
+        accel_sign=sign("accel_sign", "specific force"), gyro_sign=sign("gyro_sign", "body rate"),
     )  # fmt: skip
-    imu = text("imu")
-    return opening_options(text("site") or None, load_imu(imu) if imu else None, source), topics
+    imu = declare.text("imu", "", "data sheet of the IMU: name in config/imu or path; its grade is learned when empty")
+    site = declare.text("site", "", "place of the test: name in config/site or path; daejeon when empty")
+    return opening_options(site or None, load_imu(imu) if imu else None, source), topics
+
+
+def declare_frames(declare: Declare) -> tuple[str, str]:
+    """Declare the frames of calibration/navigation; the names of local-level frame and body frame, empty by default."""
+    level = declare.text("level_frame_id", "ned", "frame_id of the navigation: North, East, Down at the site")
+    body = declare.text("body_frame_id", "", "child_frame_id of the navigation; empty: imu_ and the body frame")
+    return level, body

@@ -18,7 +18,9 @@ from rclpy.task import Future
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.nodes.convert import stamp_in_label, stamp_of
 from sdimu_calibration.nodes.credits import Consumer
+from sdimu_calibration.nodes.heartbeat import MARK
 from sdimu_calibration.nodes.listening import Listener
+from sdimu_calibration.nodes.parameters import Declare
 from sdimu_calibration.nodes.spinning import run_node
 from sdimu_calibration.nodes.ticking import Ticker
 from sdimu_calibration.nodes.transform_type import TYPE_NAME as TRANSFORM_TYPE
@@ -26,19 +28,23 @@ from sdimu_calibration.nodes.transform_type import transform_class
 from sdimu_calibration.nodes.transforms import STATIC, TRANSFORMS, stamp_of_first
 from sdimu_calibration.storage.mcap_bag import McapBag
 
+DIAGNOSTICS = "/diagnostics"
 TOPICS = (
-    "/imu/data_raw=sensor_msgs/msg/Imu",
-    "/imu/temperature=sensor_msgs/msg/Temperature",
-    "/rate_table/status=diagnostic_msgs/msg/DiagnosticArray",
-    "/rate_table/joint_states=sensor_msgs/msg/JointState",
-    "/calibration/coefficients=sensor_msgs/msg/JointState",
-    "/calibration/covariance=std_msgs/msg/Float64MultiArray",
-    "/calibration/navigation=nav_msgs/msg/Odometry",
-    "/diagnostics=diagnostic_msgs/msg/DiagnosticArray",
+    "imu/data_raw=sensor_msgs/msg/Imu",
+    "imu/temperature=sensor_msgs/msg/Temperature",
+    "rate_table/status=diagnostic_msgs/msg/DiagnosticArray",
+    "rate_table/joint_states=sensor_msgs/msg/JointState",
+    "rate_table/joint_trajectory=trajectory_msgs/msg/JointTrajectory",
+    "rate_table/goal_status=diagnostic_msgs/msg/DiagnosticArray",
+    "calibration/coefficients=sensor_msgs/msg/JointState",
+    "calibration/covariance=std_msgs/msg/Float64MultiArray",
+    "calibration/navigation=nav_msgs/msg/Odometry",
+    "calibration/estimates=diagnostic_msgs/msg/DiagnosticArray",
+    f"{DIAGNOSTICS}=diagnostic_msgs/msg/DiagnosticArray",
     f"{TRANSFORMS}={TRANSFORM_TYPE}",
     f"{STATIC}={TRANSFORM_TYPE}",
 )
-STREAMS = ("/imu/data_raw", "/rate_table/status", "/calibration/coefficients")
+STREAMS = ("imu/data_raw", "rate_table/status", "calibration/coefficients")
 """Topics with an end; the first must end, the others must have ended or lost their publisher."""
 
 FLUSH_S = 0.25
@@ -52,20 +58,26 @@ class RecorderNode:
     def __init__(self) -> None:
         self.node = Node("recorder")
         self.done = Future()
-        out = Path(str(self.node.declare_parameter("out", "bag").value))
-        topics = [str(text) for text in self.node.declare_parameter("topics", list(TOPICS)).value]
-        replace = bool(self.node.declare_parameter("replace", False).value)
-        self._needed = [str(t) for t in self.node.declare_parameter("wait_for", [""]).value if t]
+        declare = Declare(self.node)
+        out = Path(declare.text("out", "bag", "folder of the bag"))
+        topics = declare.texts("topics", TOPICS, "topics to record, NAME=TYPE; relative names are of the namespace")
+        replace = declare.flag("replace", False, "replace a bag that is there")
+        needed = declare.texts("wait_for", [], "topics whose publishers to wait for, at most 5 s")
+        self._needed = [self._name(topic) for topic in needed]
         self._bag = McapBag(out, replace=replace, live=True)
         self._born = self._latest = time.monotonic()
         self._ticker = Ticker(self.node)
-        self._consumers = {name: Consumer(self.node, self._ticker, name) for name in STREAMS}
+        self._consumers = {self._name(topic): Consumer(self.node, self._ticker, topic) for topic in STREAMS}
         self._listeners: list[Listener] = []
         for text in topics:
             name, _, type_name = text.partition("=")
-            self._record(name, type_name)
+            self._record(self._name(name), type_name)
         self._bag.flush()
         self._ticker.every(FLUSH_S, self._tick)
+
+    def _name(self, topic: str) -> str:
+        """Return the whole name of a topic, as the bag has it: with the namespace, remapped."""
+        return str(self.node.resolve_topic_name(topic))
 
     def close(self) -> None:
         """Finish the bag."""
@@ -87,6 +99,8 @@ class RecorderNode:
         consumer = self._consumers.get(name)
 
         def take(message: bytes) -> None:
+            if name == DIAGNOSTICS and MARK in message:
+                return
             at = stamp(message)
             try:
                 write(name, message, at)
@@ -116,7 +130,7 @@ class RecorderNode:
             self.done.set_result(None)
 
     def _complete(self) -> bool:
-        first, *others = (self._consumers[name] for name in STREAMS)
+        first, *others = self._consumers.values()
         return first.ended and all(c.ended or not self.node.count_publishers(c.topic) for c in others)
 
 

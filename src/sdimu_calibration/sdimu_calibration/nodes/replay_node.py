@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
+from dataclasses import astuple
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,7 @@ from sensor_msgs.msg import Imu, JointState, Temperature
 from sdimu_calibration.core.recording import NOMINAL_FROM, DataError
 from sdimu_calibration.nodes.convert import NS, stamp_of
 from sdimu_calibration.nodes.credits import HISTORY, STREAM, Producer, publish
+from sdimu_calibration.nodes.parameters import Declare
 from sdimu_calibration.nodes.spinning import run_node
 from sdimu_calibration.nodes.ticking import Ticker
 from sdimu_calibration.storage.bag_reader import read_messages
@@ -43,16 +45,19 @@ class ReplayNode:
     def __init__(self) -> None:
         self.node = Node("replay")
         self.done = Future()
-        declare = self.node.declare_parameter
-        bag = Path(str(declare("bag", "").value))
-        self._speed = float(declare("speed", 0.0).value)
-        self._needed = int(declare("consumers", 0).value)
-        asked = [str(declare(f"{kind}_topic", "").value) or None for kind in ("imu", "status", "joint", "temperature")]
+        declare = Declare(self.node)
+        bag = Path(declare.text("bag", "", "rosbag2 folder or .mcap file"))
+        self._speed = declare.number("speed", 0.0, "times real time; 0: as fast as credits allow", least=0.0)
+        self._needed = declare.integer("consumers", 0, "credits to wait for before it starts", least=0)
+        asked = [
+            declare.text(f"{kind}_topic", "", f"{kind} topic in the bag; chosen by type when empty") or None
+            for kind in ("imu", "status", "joint", "temperature")
+        ]
         notes: list[str] = []
         chosen, raw = read_messages(bag, TopicChoice(*asked), notes)
         for note in notes:
             self.node.get_logger().info(note)
-        topics = Topics()
+        topics = Topics(*(topic.lstrip("/") for topic in astuple(Topics())))  # relative: of the node's namespace
         found: dict[str, Sequence[bytes]] = {
             getattr(topics, kind): raw.get(getattr(chosen, kind), ()) for kind in _CLASSES
         }

@@ -24,6 +24,7 @@ from std_msgs.msg import Float64MultiArray
 from rate_table_sim.nodes.motion_message import decode_motion
 from sdimu_calibration.nodes.convert import encode_imu
 from sdimu_calibration.nodes.credits import LATCHED, NS, STREAM, Consumer, Producer, header, publish
+from sdimu_calibration.nodes.parameters import Declare
 from sdimu_calibration.nodes.spinning import run_node
 from sdimu_calibration.nodes.ticking import Ticker
 from sdimu_calibration.nodes.transform_type import transform_class
@@ -45,7 +46,7 @@ PATIENT = QoSProfile(
 )
 """Keeps more than a window: a successor finds all that its predecessor had not acknowledged."""
 FAREWELL_S = 20.0
-TRUE_MOTION = "/rate_table/true_motion"
+TRUE_MOTION = "rate_table/true_motion"
 
 
 class SdimuNode:
@@ -54,13 +55,13 @@ class SdimuNode:
     def __init__(self) -> None:
         self.node = Node("sdimu")
         self.done = Future()
-        declare = self.node.declare_parameter
-        scenario = self._scenario()
-        truth_file = str(declare("truth_file", "").value)
-        self._needed = int(declare("consumers", 0).value)
-        patience_s = float(declare("patience_s", 0.0).value)
+        declare = Declare(self.node)
+        scenario = self._scenario(declare)
+        truth_file = declare.text("truth_file", "", "file for the truth, written at the start; none when empty")
+        self._needed = declare.integer("consumers", 0, "credits on the samples to wait for at the start", least=0)
+        patience_s = declare.number("patience_s", 0.0, "wait so long for the successor of a killed consumer", least=0.0)
         stream = PATIENT if patience_s > 0.0 else STREAM
-        self._frame = str(declare("frame_id", "imu_link").value)
+        self._frame = declare.text("frame_id", "imu_link", "frame_id of the samples")
         self._rate_hz = scenario.rate_hz
         profile = scenario.temperature
         self._thermometer = None if profile is None else Thermometer(profile, scenario.seed)
@@ -83,12 +84,12 @@ class SdimuNode:
         ticker = Ticker(self.node)
         window = round(WINDOW_SAMPLES / self._rate_hz * NS)
         self._imu = Producer(
-            self.node, ticker, Imu, "/imu/data_raw", window_ns=window, on_credit=self._pump, qos=stream,
+            self.node, ticker, Imu, "imu/data_raw", window_ns=window, on_credit=self._pump, qos=stream,
             patience_s=patience_s,
         )  # fmt: skip
         # Without a profile there must be no publisher: the calibrator would wait for it.
         if self._thermometer is not None:
-            self._temperature = self.node.create_publisher(Temperature, "/imu/temperature", stream)
+            self._temperature = self.node.create_publisher(Temperature, "imu/temperature", stream)
         self._place = self._transforms()
         # A message of motion is a block: each one is acknowledged.
         self._motion = Consumer(
@@ -100,19 +101,20 @@ class SdimuNode:
     def close(self) -> None:
         """Nothing to leave behind."""
 
-    def _scenario(self) -> Scenario:
-        declare = self.node.declare_parameter
-        mount = str(declare("mount", "").value)
-        temperature = str(declare("temperature", "").value)
+    def _scenario(self, declare: Declare) -> Scenario:
+        mount = declare.text("mount", "", "rotation of the IMU on the table: X,Y,Z (deg); drawn when empty")
+        temperature = declare.text("temperature", "", "profile: name in config/temperature or path; none when empty")
         return Scenario(
-            plan=load_plan(str(declare("plan", "kim18").value)),
-            imu=load_imu(str(declare("imu", "dtg").value)),
-            site=load_site(str(declare("site", "daejeon").value)),
-            rate_hz=float(declare("rate_hz", 100.0).value),
-            seed=int(declare("seed", 1).value),
+            plan=load_plan(declare.text("plan", "kim18", "plan that the truth file names")),
+            imu=load_imu(declare.text("imu", "dtg", "IMU from which the errors are drawn: name or path")),
+            site=load_site(declare.text("site", "daejeon", "site: name in config/site or path")),
+            rate_hz=declare.number("rate_hz", 100.0, "samples a second", least=1.0, most=10000.0),
+            seed=declare.integer("seed", 1, "of errors, mount and noise", least=0),
             mount_rad=mount_rad(mount) if mount else None,
-            mount_max_rad=math.radians(float(declare("mount_max_deg", 3.0).value)),
-            effects=tuple(str(e) for e in declare("effects", [""]).value if e),
+            mount_max_rad=math.radians(
+                declare.number("mount_max_deg", 3.0, "largest drawn rotation of the IMU (deg)", least=0.0, most=180.0)
+            ),
+            effects=tuple(declare.texts("effects", [], "hidden effects: NAME=VALUE")),
             temperature=load_temperature(temperature) if temperature else None,
         )
 

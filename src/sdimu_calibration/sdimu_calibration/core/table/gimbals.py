@@ -13,11 +13,21 @@ from sdimu_calibration.core.rotation import rotation_matrix
 from sdimu_calibration.core.table.description import AXES
 
 PARALLEL_RAD = 1e-9
-"""Largest angle (rad) between a gimbal axis and the platform axis that it is taken to turn about, for stated angles."""
+"""Largest angle (rad) between a gimbal axis and the platform axis it turns about: rounding of stated angles."""
 
 
 def unit(letter: str) -> Floats:
-    """Return the unit vector, shape (3,), of an axis letter (dimensionless)."""
+    """Return the unit vector of an axis letter.
+
+    Parameters
+    ----------
+    letter : str
+
+    Returns
+    -------
+    ndarray, shape (3,)
+        A direction (1).
+    """
     vector = np.zeros(3)
     vector[AXES.index(letter)] = 1.0
     return vector

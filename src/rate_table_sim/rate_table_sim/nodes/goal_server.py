@@ -1,0 +1,104 @@
+"""The side of the simulated table that takes goals: its topic, its services, and what it says of each goal."""
+
+from __future__ import annotations
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rclpy.node import Node
+from std_srvs.srv import Trigger
+from trajectory_msgs.msg import JointTrajectory
+
+from rate_table_sim.core.programme import GoalProgramme
+from rate_table_sim.core.specification import TableSpecification
+from rate_table_sim.nodes.goal_message import goal_of
+from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.nodes.credits import HISTORY, NS, header, publish
+
+_LEVELS = {"refused": DiagnosticStatus.WARN, "stopped": DiagnosticStatus.WARN, "held": DiagnosticStatus.WARN}
+
+
+class GoalServer:
+    """Takes trajectories and the services hold, resume, stop and finish.
+
+    Parameters
+    ----------
+    node : rclpy.node.Node
+    programme : GoalProgramme
+    table : TableSpecification
+    start_ns : int
+        Stamp at which the table's time begins.
+    allow_partial : bool
+        Take trajectories that leave joints out.
+    """
+
+    def __init__(
+        self, node: Node, programme: GoalProgramme, table: TableSpecification, start_ns: int, *, allow_partial: bool
+    ) -> None:
+        self._node, self._programme, self._table = node, programme, table
+        self._start_ns, self._partial = start_ns, allow_partial
+        self._status = node.create_publisher(DiagnosticArray, "rate_table/goal_status", HISTORY)
+        # Depth as the controller's: a trajectory is a command, the newest counts.
+        node.create_subscription(JointTrajectory, "rate_table/joint_trajectory", self._take, 10)
+        for name, action in (
+            ("hold", self._hold), ("resume", self._resume), ("stop", self._stop), ("finish", self._finish),
+        ):  # fmt: skip
+            node.create_service(Trigger, f"~/{name}", action)
+
+    def sent(self) -> None:
+        """Say that a goal was reached when its last sample has been sent."""
+        goal = self._programme.reached()
+        if goal is not None:
+            self._say("reached", goal.name, "the table is at rest on the last point")
+
+    def _take(self, message: JointTrajectory) -> None:
+        name = message.header.frame_id
+        if not message.points:
+            forgotten = self._programme.stop()
+            self._programme.resume()
+            self._say("stopped", forgotten.name if forgotten else name, "stopped by a trajectory without points")
+            return
+        try:
+            goal = goal_of(
+                message, self._table.axis_names, self._programme.end_angle, self._start_ns, allow_partial=self._partial
+            )
+            replaced = self._programme.take(goal)
+        except DataError as error:
+            self._say("refused", name, str(error))
+            return
+        if replaced is not None:
+            self._say("replaced", replaced.name, f"replaced by {name or 'another goal'}")
+        self._say("accepted", name, f"to {goal.points[-1].time_s:.6g} s after its start")
+
+    def _hold(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        goal = self._programme.goal
+        moved = self._programme.hold()
+        response.success, response.message = True, "the table comes to rest" if moved else "the table was at rest"
+        if goal is not None:
+            self._say("held", goal.name, "held; the service resume goes on")
+        return response
+
+    def _resume(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        goal = self._programme.resume()
+        response.success, response.message = True, f"goes on with {goal.name}" if goal else "ready for goals"
+        if goal is not None:
+            self._say("resumed", goal.name, "goes on from rest")
+        return response
+
+    def _stop(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        goal = self._programme.stop()
+        response.success, response.message = True, "stopped; no goal is taken until resume"
+        self._say("stopped", goal.name if goal else "", "stopped; no goal is taken until resume")
+        return response
+
+    def _finish(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        self._programme.finish()
+        response.success, response.message = True, "the test ends with what is under way"
+        return response
+
+    def _say(self, state: str, goal: str, text: str) -> None:
+        level = _LEVELS.get(state, DiagnosticStatus.OK)
+        status = DiagnosticStatus(level=level, name="rate_table: goal", message=text, hardware_id="rate_table")
+        status.values = [KeyValue(key="state", value=state), KeyValue(key="goal", value=goal)]
+        stamp = self._start_ns + round(self._programme.now_s * NS)
+        publish(self._status, DiagnosticArray(header=header(stamp), status=[status]))
+        log = self._node.get_logger()
+        (log.warning if state in _LEVELS else log.info)(f"goal {goal or 'without a name'} {state}: {text}")
