@@ -1,4 +1,4 @@
-"""What tests share: a domain of their own, a small recording, results of a batch, and recordings from elsewhere."""
+"""What tests share: a domain of their own, recordings, a diagnosis with a hidden effect, results of a batch."""
 
 from __future__ import annotations
 
@@ -10,12 +10,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rate_table_sim.core import TableSpecification
+from sdimu_calibration.core.diagnosis.diagnose import Diagnosis, diagnose
 from sdimu_calibration.core.effects import registry
 from sdimu_calibration.core.origin import Origin
+from sdimu_calibration.core.recording import Recording, TableLog
 from sdimu_calibration.core.results import Calibration, no_history
 from sdimu_calibration.core.units import to_si
+from sdimu_calibration.report.report_extras import ReportExtras, report_extras
 from sdimu_calibration.storage.bag_writer import write_recording
+from sdimu_calibration.storage.config import load_imu, load_model, load_plan, load_site
 from sdimu_calibration.storage.result_file import write_result
+from sdimu_sim.core.scenario import Scenario, generate
 
 START_NS = 1_700_000_000_000_000_000
 INTERVAL_NS = 10_000_000
@@ -123,3 +129,31 @@ def batch(tmp_path: Path) -> Callable[..., Path]:
         return tmp_path / "batch"
 
     return make
+
+
+HIDDEN = "accel_quadratic_x"
+SEED = 5
+ANGLES = np.radians([[0.0, -30.0], [720.0, 30.0]])
+"""Two turns of the outer axis in the whole test, a sixth of one of the inner (rad)."""
+
+
+@pytest.fixture(scope="session")
+def recording() -> Recording:
+    """With 40 ug/g^2, forty times what this plan sees at one sigma."""
+    scenario = Scenario(
+        load_plan("kim18"), load_imu("dtg"), load_site("daejeon"), TableSpecification(axes=None), rate_hz=20.0,
+        seed=SEED, effects=(f"{HIDDEN}=40 ug/g^2",),
+    )  # fmt: skip
+    return generate(scenario)[0]
+
+
+@pytest.fixture(scope="session")
+def diagnosis(recording: Recording) -> Diagnosis:
+    return diagnose(recording, load_site("daejeon"), load_imu("dtg"), load_model("baseline"))
+
+
+@pytest.fixture(scope="session")
+def more(recording: Recording, diagnosis: Diagnosis) -> ReportExtras:
+    """With the table's angles, as a bag has them."""
+    table = TableLog(np.array([0.0, recording.t[-1]]), ("outer", "inner"), ANGLES)
+    return replace(report_extras(diagnosis), table=table)

@@ -28,7 +28,8 @@ def test_the_fleet_draws_and_sorts_by_the_heading_that_is_clicked(batch, opened)
     folder = batch(units=6, out=2)
     fleet([folder])
     opened.goto(f"file://{folder / 'fleet.html'}")
-    opened.wait_for_function("document.querySelectorAll('.js-plotly-plot').length >= 5", timeout=60_000)
+    opened.evaluate("sdimuDrawAll()")
+    assert opened.locator(".js-plotly-plot").count() >= 5
     heading = opened.locator("thead th", has_text="spread").first
     heading.click()
     column = opened.evaluate("head => Array.from(head.parentNode.children).indexOf(head)", heading.element_handle())

@@ -33,7 +33,7 @@ def test_the_unit_that_is_out_is_named_and_the_files_say_the_same(batch, capsys,
     assert not scale["control_low"] < scale["values"][4] < scale["control_high"]
     page = (tmp_path / "pages" / "fleet.html").read_text()
     assert "SN4 is out" in page
-    assert page.count("drawLater(") >= 5
+    assert page.count('class="figure"') >= 5
 
 
 def test_a_clean_fleet_has_nobody_out(batch, capsys):

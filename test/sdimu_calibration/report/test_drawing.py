@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from plotly.subplots import make_subplots
 
+from sdimu_calibration.report.design.palette import LIGHT, palette
 from sdimu_calibration.report.drawing import Figure, html, lay_out
 
 
@@ -47,7 +48,7 @@ def test_numbers_and_words_read_back_from_the_page():
     y = np.array([1.0 / 3.0, np.nan, -2e9])
     figure.add("scatter", x=np.arange(3), y=y, error_y={"array": y}, text=["</script>", "b", "\u2212"])
     figure.add("heatmap", z=np.eye(2))
-    found = re.search(r'drawLater\("figure-2", (.*), (\{.*\})\);</script>', html(figure, 2))
+    found = re.search(r'id="figure-2".*<script type="application/json">(.*)</script>', html(figure, 2))
     trace, grid = json.loads(found[1].replace("<\\/", "</"))["data"]
     assert "</script>" not in found[1]
     assert trace["x"] == [0, 1, 2]
@@ -64,15 +65,16 @@ def test_a_notebook_gets_a_figure_of_the_python_package():
     figure.add("scatter", x=np.arange(3), y=np.ones(3))
     shown = figure.as_plotly()
     assert shown.data[0].type == "scatter"
-    assert shown.layout.template.layout.plot_bgcolor == "white"
+    assert shown.layout.template.layout.font.color == palette(LIGHT)["ink"]
 
 
 def test_a_page_does_without_the_objects_of_the_python_package():
     code = (
         "import sys\n"
         "from sdimu_calibration.report import page\n"
+        "from sdimu_calibration.report.design.sheet import document\n"
         "from sdimu_calibration.report.drawing import Figure, html, lay_out\n"
-        "assert 'plotly.js v' in html(lay_out(Figure(), 300), 1)\n"
+        "assert 'id=\"library\"' in document('x', html(lay_out(Figure(), 300), 1))\n"
         "sys.exit('plotly is loaded' if 'plotly' in sys.modules else 0)\n"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)

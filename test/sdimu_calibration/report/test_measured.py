@@ -9,8 +9,6 @@ from sdimu_calibration.core.recording import TableLog
 from sdimu_calibration.core.units import from_si
 from sdimu_calibration.report import data, measured
 
-from .conftest import ANGLES
-
 
 @pytest.fixture(scope="module")
 def found(diagnosis) -> data.Residuals:
@@ -55,6 +53,6 @@ def test_one_jump_stands_for_each_turn_with_its_axis_and_angle(diagnosis, found)
 
 
 def test_angles_of_the_table_stay_within_half_a_turn():
-    log = TableLog(np.array([0.0, 100.0]), ("outer", "inner"), ANGLES)
+    log = TableLog(np.array([0.0, 100.0]), ("outer", "inner"), np.radians([[0.0, -30.0], [720.0, 30.0]]))
     angle = measured.table_angles(log, np.array([10.0, 50.0, 60.0]))
     assert angle == pytest.approx(np.array([[72.0, -24.0], [0.0, 0.0], [72.0, 6.0]]), abs=1e-9)

@@ -4,10 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
-import os
 import re
-import shutil
-import subprocess
 from dataclasses import replace
 from html import escape
 
@@ -28,7 +25,7 @@ from sdimu_calibration.report import (
 )
 from sdimu_calibration.report.export import as_csv, as_yaml
 from sdimu_calibration.report.markup import prose
-from sdimu_calibration.report.page import page, write_report
+from sdimu_calibration.report.page import page
 from sdimu_calibration.report.report_extras import ReportExtras
 from sdimu_calibration.report.table import rows
 
@@ -62,7 +59,7 @@ def test_the_verdict_stands_first(text, diagnosis):
 
 
 def test_the_page_brings_its_library_once_and_asks_no_network(text):
-    assert text.count("plotly.js v") == 1
+    assert text.count('id="library"') == 1
     assert not re.search(r"<(script|link|img)[^>]+(src|href)=", text)
     assert len(text.encode()) < 6e6
 
@@ -185,21 +182,3 @@ def test_copies_read_back_as_the_table(diagnosis):
         assert copied[row.name]["value"] == pytest.approx(row.value, rel=1e-8, abs=1e-12)
         assert copied[row.name]["unit"] == listed[row.name]["unit"] == row.unit
         assert float(listed[row.name]["sigma"]) == pytest.approx(row.sigma, rel=1e-3)
-
-
-def test_a_browser_opens_the_page_without_complaint(diagnosis, more, tmp_path):
-    browser = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-    if not browser:
-        pytest.skip("no Chromium here (package chromium)")
-    write_report(tmp_path / "report.html", diagnosis.after, summary=summarise(diagnosis), more=more)
-    done = subprocess.run(
-        [browser, "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
-         "--disable-background-networking", "--disable-component-update", "--disable-sync", "--enable-logging=stderr",
-         f"--user-data-dir={tmp_path / 'profile'}", "--virtual-time-budget=8000", "--dump-dom",
-         (tmp_path / "report.html").as_uri()],
-        capture_output=True, text=True, check=False, timeout=120, env={**os.environ, "HOME": str(tmp_path)},
-    )  # fmt: skip
-    complaints = [line for line in done.stderr.splitlines() if "CONSOLE" in line]
-    assert complaints == []
-    # Every figure was drawn: plotly puts its drawing into each.
-    assert done.stdout.count('class="main-svg"') >= done.stdout.count('id="figure-')

@@ -106,7 +106,7 @@ def test_the_page_without_a_history_has_the_table_alone(calibration):
     empty = replace(h, **{name: getattr(h, name)[:0] for name in h.__dataclass_fields__})
     text = page(replace(calibration, history=empty), "x")
     assert "gyro_bias_x" in text
-    assert "plotly" not in text
+    assert 'id="library"' not in text
 
 
 def test_every_free_coefficient_has_a_line_that_ends_at_its_sigma(calibration):

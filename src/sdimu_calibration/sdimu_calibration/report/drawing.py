@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-import json
 from base64 import b64encode
 from collections.abc import Iterator, Mapping, Sequence
-from importlib.util import find_spec
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-BEFORE, AFTER = "#b45f06", "#0b5394"
-"""Ink of "model as given" and of "with what was found"."""
-BAND = "rgba(0, 0, 0, 0.10)"
-PALE = "rgba(90, 90, 90, 0.45)"
-DIVERGING = ((0.0, "#2166ac"), (0.25, "#92c5de"), (0.5, "#ffffff"), (0.75, "#f4a582"), (1.0, "#b2182b"))
-"""Blue, white, red (C. Brewer's RdBu): also tells signs to those who do not see red and green."""
-TEMPLATE = "simple_white"
+from sdimu_calibration.report.design.library import as_script
+from sdimu_calibration.report.design.palette import LIGHT, paint
+from sdimu_calibration.report.design.plotly_template import template
+
+BEFORE, AFTER, BEFORE_PALE = "@before", "@after", "@before_pale"
+BAND, PALE, INK, MUTED = "@band", "@pale", "@ink", "@muted"
+"""Roles of `design.palette`: "model as given", "with what was found", what was allowed, what is thin, and words."""
 
 
 class Figure:
@@ -111,10 +108,7 @@ class Figure:
         self.layout["annotations"].append({"text": text, "showarrow": False, "xref": f"x{n}", "yref": f"y{n}", **more})
 
     def shape(self, kind: str, *, row: int = 1, col: int = 1, **more: Any) -> None:
-        """Draw a ``line`` or a ``rect`` into a panel; without `x0` from side to side, without `y0` of full height.
-
-        The template makes shapes pale unless their `opacity` is given.
-        """
+        """Draw a ``line`` or a ``rect`` into a panel; without `x0` from side to side, without `y0` of full height."""
         n = self._number(row, col)
         made: dict[str, Any] = {"type": kind, "xref": f"x{n}", "yref": f"y{n}", **more}
         for letter in "xy":
@@ -122,11 +116,13 @@ class Figure:
                 made |= {f"{letter}ref": f"{letter}{n} domain", f"{letter}0": 0, f"{letter}1": 1}
         self.layout["shapes"].append(made)
 
-    def as_plotly(self) -> Any:
+    def as_plotly(self, theme: str = LIGHT) -> Any:
         """Return it as a `plotly.graph_objects.Figure`, for a notebook or the workbench."""
         from plotly.graph_objects import Figure as PlotlyFigure  # noqa: PLC0415 (slow to load; reports do without)
 
-        return PlotlyFigure({"data": self.data, "layout": {"template": TEMPLATE, **self.layout}})
+        return PlotlyFigure(
+            paint({"data": self.data, "layout": {"template": template(theme), **self.layout}}, theme)
+        )
 
 
 def _single(value: Any) -> Any:
@@ -139,7 +135,7 @@ def _single(value: Any) -> Any:
 def lay_out(figure: Figure, height: int, **more: Any) -> Figure:
     """Give a figure the look of the house."""
     figure.layout |= {
-        "height": height, "font": {"size": 13, "color": "#222"}, "hoverlabel": {"namelength": -1},
+        "height": height, "hoverlabel": {"namelength": -1},
         "showlegend": False, "margin": {"l": 80, "r": 30, "t": 40, "b": 60},
         "legend": {"orientation": "h", "yanchor": "bottom", "y": 1.02, "x": 0},
         **more,
@@ -147,92 +143,14 @@ def lay_out(figure: Figure, height: int, **more: Any) -> Figure:
     return figure
 
 
-CONFIG = {"responsive": True, "displaylogo": False, "modeBarButtonsToRemove": ["lasso2d", "select2d"]}
-"""Buttons of a figure."""
-
-
-_QUEUE = """
-(function () {
-  var waiting = [], LARGE = 1.5;
-  function next() { if (waiting.length) { waiting.shift()(); setTimeout(next, 0); } }
-  // Figures count in pixels: on a screen of 4K all that is written, and the room for it, is made larger.
-  function enlarge(part, by) {
-    Object.keys(part).forEach(function (key) {
-      var value = part[key];
-      if (!value || typeof value !== 'object' || key === 'template' || typeof value[0] === 'number') { return; }
-      if (/font$|^marker$/.test(key) && typeof value.size === 'number') { value.size *= by; }
-      enlarge(value, by);
-    });
-  }
-  function forLargeScreen(id, figure) {
-    enlarge(figure, LARGE);
-    var margin = figure.layout.margin;
-    Object.keys(margin).forEach(function (side) { margin[side] *= LARGE; });
-    figure.layout.height *= LARGE;
-    document.getElementById(id).style.height = figure.layout.height + 'px';
-  }
-  window.drawLater = function (id, figure, config) {
-    waiting.push(function () {
-      figure.layout.template = FIGURE_TEMPLATE;
-      if (window.innerWidth >= 2400) { forLargeScreen(id, figure); }
-      Plotly.newPlot(id, figure.data, figure.layout, config);
-    });
-  };
-  document.addEventListener('DOMContentLoaded', function () { setTimeout(next, 0); });
-  window.addEventListener('beforeprint', function () { while (waiting.length) { waiting.shift()(); } });
-})();
-"""
-
-PRINT = """
-(function () {
-  function figures() { return document.querySelectorAll('.js-plotly-plot'); }
-  window.addEventListener('beforeprint', function () {
-    figures().forEach(function (f) {
-      // The sheet shows figures at 68 %, so that the tallest fits on a page; at less what a large screen has larger.
-      var share = 0.68 * 13 / f._fullLayout.font.size;
-      Plotly.relayout(f, {width: 680 / share, autosize: false});
-      f.parentNode.style.height = share * f._fullLayout.height + 'px';
-      f.querySelector('.plot-container').style.zoom = share;
-    });
-  });
-  window.addEventListener('afterprint', function () {
-    figures().forEach(function (f) {
-      f.parentNode.style.height = '';
-      f.querySelector('.plot-container').style.zoom = '';
-      Plotly.relayout(f, {width: null, autosize: true});
-    });
-  });
-})();
-"""
-"""Fits the figures of a page to the sheet while it is printed."""
-
-
 def html(figure: Figure, number: int) -> str:
-    """Return a figure as a part of a page; number 1 brings the library along, so it has to be the first on it.
-
-    Figures are drawn one after another once the page is read, so that it opens before the last one is drawn.
-    """
-    content = {"data": figure.data, "layout": figure.layout}
-    name, height = f"figure-{number}", figure.layout["height"]
-    place = f'<div id="{name}" class="plotly-graph-div" style="height:{height}px; width:100%;"></div>'
-    script = f'drawLater("{name}", {_script(content)}, {_script(CONFIG)});'
-    return f"{_library() if number == 1 else ''}<div>{place}<script>{script}</script></div>"
-
-
-def _library() -> str:
-    """Scripts that draw: those of the Python package, found without loading it, which takes long."""
-    spec = find_spec("plotly")
-    if spec is None or spec.origin is None:
-        raise ModuleNotFoundError("figures need the Python package plotly: pip install plotly", name="plotly")
-    folder = Path(spec.origin).parent / "package_data"
-    script = (folder / "plotly.min.js").read_text(encoding="utf-8")
-    look = (folder / "templates" / f"{TEMPLATE}.json").read_text(encoding="utf-8")
-    return f"<script>{script}</script><script>var FIGURE_TEMPLATE = {look};{_QUEUE}{PRINT}</script>"
-
-
-def _script(content: Any) -> str:
-    # "</" would end the script wherever it stands.
-    return json.dumps(content, default=_array, separators=(",", ":")).replace("</", "<\\/")
+    """Return a figure as a part of a page; `design.sheet.document` brings the library and draws it when it is near."""
+    content = as_script({"data": figure.data, "layout": figure.layout}, _array)
+    height = figure.layout["height"]
+    return (
+        f'<div class="figure"><div id="figure-{number}" class="plotly-graph-div" style="height:{height}px"></div>'
+        f'<script type="application/json">{content}</script></div>'
+    )
 
 
 def _array(values: Any) -> Any:

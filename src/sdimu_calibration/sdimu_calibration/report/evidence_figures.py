@@ -10,7 +10,8 @@ from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.evidence.consistency import CHANNEL_NAMES
 from sdimu_calibration.report import data
-from sdimu_calibration.report.drawing import AFTER, BEFORE, DIVERGING, PALE, Figure, lay_out
+from sdimu_calibration.report.design.palette import DIVERGING
+from sdimu_calibration.report.drawing import AFTER, BEFORE, INK, MUTED, PALE, Figure, lay_out
 from sdimu_calibration.report.table import with_sigma
 
 _FULL = 8.0
@@ -22,7 +23,7 @@ _BINS = 20
 _LEGEND = {"orientation": "h", "xanchor": "right", "x": 1.0, "yanchor": "bottom", "y": 1.03}
 _ABOVE = "{}<br>\N{NO-BREAK SPACE}<br>\N{NO-BREAK SPACE}"
 """Title of a colour bar that does not touch its uppermost number."""
-_LIMIT = {"dash": "dash", "color": "#222", "width": 1.5}
+_LIMIT = {"dash": "dash", "color": INK, "width": 1.5}
 
 
 def heat_map(grid: data.Grid, channels: Sequence[str] = CHANNEL_NAMES) -> Figure:
@@ -51,7 +52,7 @@ def deviates(
     figure = Figure()
     figure.add(
         "heatmap", x=list(columns), y=[c.replace("_", " ") for c in lines], z=value,
-        text=text, texttemplate="%{text}", textfont={"size": 12}, zmin=-_FULL, zmax=_FULL, colorscale=DIVERGING,
+        text=text, texttemplate="%{text}", textfont={"size": 12}, zmin=-_FULL, zmax=_FULL, colorscale=list(DIVERGING),
         xgap=2, ygap=2, colorbar={"title": {"text": _ABOVE.format("sigma"), "side": "top"}, "thickness": 12},
         hovertemplate=f"%{{y}} at {column} %{{x}}: %{{z:+.1f}} sigma<extra></extra>",
     )  # fmt: skip
@@ -85,7 +86,7 @@ def ranking(entries: Sequence[data.Scored], threshold: float) -> Figure:
     figure = Figure()
     figure.add(
         "bar", y=names, x=[abs(s.z) for s in shown], orientation="h", name="model as given",
-        marker={"color": ["#555" if s.chosen else "#bbb" for s in shown], "line": {"color": "#222", "width": 1}},
+        marker={"color": [MUTED if s.chosen else PALE for s in shown], "line": {"color": INK, "width": 1}},
         customdata=sizes, hovertemplate="%{y}<br>|z| = %{x:.1f}<br>%{customdata}<extra></extra>",
     )  # fmt: skip
     # Beside the bar, but never under the line of the noise.
@@ -143,7 +144,7 @@ def explained(parts: Sequence[data.Explained]) -> Figure:
         x, mean, error = data.binned(part.predicted, part.misfit, _BINS)
         ends = [float(x.min()), float(x.max())] if len(x) else [0.0, 0.0]
         figure.add(
-            "scatter", x=ends, y=ends, mode="lines", line={"color": "#222", "dash": "dash", "width": 1},
+            "scatter", x=ends, y=ends, mode="lines", line={"color": INK, "dash": "dash", "width": 1},
             hoverinfo="skip", col=column,
         )  # fmt: skip
         figure.add(
@@ -165,7 +166,7 @@ def correlation(names: Sequence[str], C: Floats) -> Figure:
     figure = Figure()
     figure.add(
         "heatmap", x=shown, y=shown, z=C, text=text, texttemplate="%{text}", textfont={"size": 11}, zmin=-1, zmax=1,
-        colorscale=DIVERGING, xgap=1, ygap=1,
+        colorscale=list(DIVERGING), xgap=1, ygap=1,
         colorbar={"title": {"text": _ABOVE.format("correlation"), "side": "top"}, "thickness": 12},
         hovertemplate="%{y} \u00b7 %{x}: %{z:.2f}<extra></extra>",
     )  # fmt: skip

@@ -7,10 +7,10 @@ import numpy as np
 from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.results import Calibration, History
 from sdimu_calibration.core.units import from_si
+from sdimu_calibration.report.design.palette import SERIES
 from sdimu_calibration.report.drawing import BAND, Figure, lay_out
 from sdimu_calibration.report.groups import groups, is_free, short_name, title
 
-_COLOURS = ("#0b5394", "#b45f06", "#38761d", "#741b47", "#134f5c", "#7f6000")
 _DASHES = ("solid", "dash", "dot", "dashdot", "longdash", "longdashdot")
 _COLUMNS = 2
 _PANEL_HEIGHT = 260
@@ -56,7 +56,7 @@ def sigma_history(calibration: Calibration) -> Figure:
             )
     return lay_out(
         figure, _PANEL_HEIGHT * rows + 60, margin={"l": 70, "r": 50, "t": 40, "b": 50},
-        font={"size": 12, "color": "#222"}, hovermode="x",
+        font={"size": 12}, hovermode="x",
     )  # fmt: skip
 
 
@@ -71,7 +71,7 @@ def _draw(
         sigma = history.sigma[kept, index] * from_si(1.0, unit)
         if not is_free(calibration, index):
             continue
-        sigma, ink = np.where(sigma > 0, sigma, np.nan), _COLOURS[order % 6]
+        sigma, ink = np.where(sigma > 0, sigma, np.nan), SERIES[order % 6]
         drawn.append((short_name(calibration.names[index], effect), sigma, ink))
         figure.add(
             "scatter", x=history.t[kept] / 60.0, y=sigma, mode="lines", name=calibration.names[index],

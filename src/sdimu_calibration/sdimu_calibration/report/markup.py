@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
 from html import escape
 from typing import Any
@@ -11,8 +12,14 @@ Draw = Callable[[Any], str]
 
 
 def section(heading: str, *parts: str) -> str:
-    """Return a heading with what belongs to it."""
-    return f"<section><h2>{escape(heading)}</h2>\n" + "\n".join(part for part in parts if part) + "</section>"
+    """Return a card: a heading with what belongs to it, and an anchor made of the heading."""
+    body = "\n".join(part for part in parts if part)
+    return f'<section class="card" id="{anchor(heading)}"><h2>{escape(heading)}</h2>\n{body}</section>'
+
+
+def anchor(heading: str) -> str:
+    """Name of a place in a page, made of its heading."""
+    return "-".join(re.findall(r"[a-z0-9]+", heading.lower()))
 
 
 def prose(text: str) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from sdimu_calibration.core.evidence.consistency import CHANNEL_NAMES
-from sdimu_calibration.report.drawing import AFTER, BEFORE, Figure, lay_out
+from sdimu_calibration.report.drawing import AFTER, BEFORE, MUTED, Figure, lay_out
 from sdimu_calibration.report.measured import UNITS, Jumps, Overlay
 
 _LEGEND = {"orientation": "h", "yanchor": "bottom", "y": 1.045, "x": 0}
@@ -34,7 +34,7 @@ def overlay(values: Overlay) -> Figure:
             )  # fmt: skip
         figure.y_axes(title=UNITS[channel], standoff=2, **place)
     figure.x_axes(title="time (min)", row=4)
-    figure.y_axes(zeroline=True, zerolinecolor="#999", zerolinewidth=1, nticks=6)
+    figure.y_axes(zeroline=True, zerolinecolor=MUTED, zerolinewidth=1, nticks=6)
     return lay_out(figure, 820, showlegend=True, margin={"l": 65, "r": 20, "t": 95, "b": 55}, legend=_LEGEND)
 
 
@@ -60,8 +60,8 @@ def jumps(values: Jumps, two: bool) -> Figure:
     for channel, letter in enumerate("ned"):
         figure.y_axes(title=f"velocity {letter}<br>(sigma)", row=channel + 1, col=1)
     figure.x_axes(title="angle turned (deg)", row=3)
-    figure.y_axes(zeroline=True, zerolinecolor="#999", zerolinewidth=1)
-    figure.x_axes(zeroline=True, zerolinecolor="#999", zerolinewidth=1, dtick=90)
+    figure.y_axes(zeroline=True, zerolinecolor=MUTED, zerolinewidth=1)
+    figure.x_axes(zeroline=True, zerolinecolor=MUTED, zerolinewidth=1, dtick=90)
     return lay_out(
         figure, 520, showlegend=True, margin={"l": 80, "r": 20, "t": 85, "b": 55},
         legend={**_LEGEND, "y": 1.1},

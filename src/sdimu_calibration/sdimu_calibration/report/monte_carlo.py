@@ -16,14 +16,15 @@ from rich.table import Table
 from scipy import stats
 
 from sdimu_calibration.core.units import from_si
-from sdimu_calibration.report.drawing import BAND, Figure, html, lay_out
-from sdimu_calibration.report.style import STYLE
+from sdimu_calibration.report.design.sheet import document
+from sdimu_calibration.report.drawing import BAND, INK, Figure, html, lay_out
+from sdimu_calibration.report.markup import grid, quiet, section, sentence
 from sdimu_calibration.storage.json_file import read_json
 from sdimu_calibration.storage.whole_file import write_whole
 
 FORMAT = "sdimu-monte-carlo/1"
 
-_INK, _WARN = "#0b5394", "#b45f06"
+_INK, _WARN = "@after", "@bad"
 
 _COLUMNS = ("coefficient", "bias", "+-", "RMS error", "sigma", "bound", "unit", "RMS / sigma", "RMS / bound")
 _CHECK_COLUMNS = ("check", "value", "interval", "passed")
@@ -89,26 +90,24 @@ def page(content: Mapping[str, Any]) -> str:
     verdict = f"{len(bad)} of {len(content['checks'])} checks failed." if bad else "All checks passed."
     heading = f"Monte-Carlo campaign of {runs} runs"
     figure = html(figures(content), 1)
+    told = f"Intervals hold {100 * content['level']:.0f} % of what a right estimator gives."
+    unconverged = "Runs that took all passes and may not have converged"
     parts = [
-        f"<h1>{heading}</h1>",
-        f'<p class="quiet">body frame: {escape(str(content["body_frame"]).replace("_", " "))} · '
-        f"{content['time']['cpu_s_per_run']:.2f} s of processor a run · {len(lost)} failed</p>",
-        f"<p>{verdict} Intervals hold {100 * content['level']:.0f} % of what a right estimator gives.</p>",
-        _table(_CHECK_COLUMNS, [check_cells(c) for c in content["checks"]], {0}),
-        "<h2>Coefficients</h2>",
-        _table(_COLUMNS, [cells(c) for c in content["coefficients"]], {0, 6}),
-        f'<p class="quiet">RMS over the runs; bound: {escape(content["bound_from"])}.</p>',
-        "<h2>Distributions</h2>",
-        figure,
-        *(["<h2>Runs that took all passes and may not have converged</h2>"] if slow else []),
-        *([f"<p>seeds {', '.join(map(str, slow))}</p>"] if slow else []),
-        *(["<h2>Failed runs</h2>"] if lost else []),
-        *(f"<p>seed {run['seed']}: {escape(str(run['error']))}</p>" for run in lost),
-    ]
-    return (
-        f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><title>{heading}</title>'
-        f"<style>{STYLE}</style></head><body>\n" + "\n".join(parts) + "\n</body></html>\n"
-    )
+        f'<div class="verdict {"bad" if bad else "good"}"><p class="head">{verdict}</p></div>',
+        section("Checks", grid(_CHECK_COLUMNS, [check_cells(c) for c in content["checks"]], {0}), quiet(told)),
+        section(
+            "Coefficients", grid(_COLUMNS, [cells(c) for c in content["coefficients"]], {0, 6}),
+            quiet(f"RMS over the runs; bound: {content['bound_from']}."),
+        ),
+        section("Distributions", figure),
+        section(unconverged, sentence(f"seeds {', '.join(map(str, slow))}")) if slow else "",
+        section("Failed runs", *(sentence(f"seed {run['seed']}: {run['error']}") for run in lost)) if lost else "",
+    ]  # fmt: skip
+    words = (
+        f"body frame: {str(content['body_frame']).replace('_', ' ')}",
+        f"{content['time']['cpu_s_per_run']:.2f} s of processor a run", f"{len(lost)} failed",
+    )  # fmt: skip
+    return document(heading, "\n".join(part for part in parts if part), under=escape(" · ".join(words)))
 
 
 def figures(content: Mapping[str, Any]) -> Figure:
@@ -123,7 +122,7 @@ def figures(content: Mapping[str, Any]) -> Figure:
     measured = [a for a in content["autocorrelation"] if a["pairs"]]
     limit = content["checks"][-1]["high"] / np.sqrt(min((a["pairs"] for a in measured), default=1))
     _dots(figure, [a["channel"] for a in measured], [a["value"] for a in measured], (-limit, limit), (2, 2))
-    return lay_out(figure, 900, margin={"l": 60, "r": 20, "t": 40, "b": 130}, font={"size": 12, "color": "#222"})
+    return lay_out(figure, 900, margin={"l": 60, "r": 20, "t": 40, "b": 130}, font={"size": 12})
 
 
 def _dots(figure: Figure, names: list[str], values: list[float], interval: Any, place: tuple[int, int]) -> None:
@@ -148,13 +147,5 @@ def _nees(figure: Figure, nees: Mapping[str, Any], place: tuple[int, int]) -> No
     figure.add(
         "histogram", x=values, histnorm="probability density", marker={"color": _INK}, opacity=0.5, row=row, col=col
     )
-    figure.add("scatter", x=x, y=stats.chi2.pdf(x, dof), mode="lines", line={"color": "#222"}, row=row, col=col)
+    figure.add("scatter", x=x, y=stats.chi2.pdf(x, dof), mode="lines", line={"color": INK}, row=row, col=col)
     figure.x_axes(title=f"chi-square of {dof} degrees of freedom (line)", row=row, col=col)
-
-
-def _table(columns: tuple[str, ...], lines: list[list[str]], text: set[int]) -> str:
-    kind = [' class="text"' if k in text else "" for k in range(len(columns))]
-    head = "".join(f"<th{k}>{escape(c)}</th>" for c, k in zip(columns, kind, strict=True))
-    cells_of = (zip(line, kind, strict=True) for line in lines)
-    body = "".join("<tr>" + "".join(f"<td{k}>{escape(c)}</td>" for c, k in line) + "</tr>" for line in cells_of)
-    return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"

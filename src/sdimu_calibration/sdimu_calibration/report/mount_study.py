@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 
 from sdimu_calibration.core.units import from_si
+from sdimu_calibration.report.design.palette import SERIES
+from sdimu_calibration.report.design.sheet import document
 from sdimu_calibration.report.drawing import Figure, html, lay_out
 from sdimu_calibration.report.groups import title
-from sdimu_calibration.report.style import STYLE
 from sdimu_calibration.storage.whole_file import write_whole
 
 _DASHES = ("solid", "dash", "dot")
-_COLOURS = ("#0b5394", "#b45f06", "#38761d")
 _COLUMNS = 2
 
 
@@ -35,12 +35,12 @@ def figure(content: Mapping[str, Any], units: Mapping[str, str]) -> Figure:
                 "scatter", x=mounts, y=np.asarray(by_effect[effect]) * factor, mode="lines+markers", name=estimator,
                 legendgroup=estimator, showlegend=panel == 0,
                 error_y={"type": "data", "array": np.asarray(content["spread"][estimator][effect]) * factor},
-                line={"color": _COLOURS[order % 3], "dash": _DASHES[order % 3]}, **place,
+                line={"color": SERIES[order % 3], "dash": _DASHES[order % 3]}, **place,
             )  # fmt: skip
         drawn.y_axes(type="log", dtick=1, exponentformat="power", title=f"RMS ({units[effect]})", **place)
         drawn.x_axes(title="mount (deg)" if panel >= len(effects) - _COLUMNS else None, **place)
     return lay_out(
-        drawn, 260 * rows + 80, font={"size": 12, "color": "#222"}, showlegend=True,
+        drawn, 260 * rows + 80, font={"size": 12}, showlegend=True,
         legend={"orientation": "h", "y": 1.06}, margin={"l": 70, "r": 30, "t": 60, "b": 50},
     )  # fmt: skip
 
@@ -54,9 +54,4 @@ def write_page(path: Path, content: Mapping[str, Any], units: Mapping[str, str])
         "accelerometers' own frame afterwards it loses most of the mount again: on a table whose angles are perfect."
     )
     heading = "Error against mount misalignment"
-    page = (
-        f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><title>{heading}</title>'
-        f'<style>{STYLE}</style></head><body>\n<h1>{heading}</h1><p class="quiet">{escape(text)}</p>'
-        f"{drawn}\n</body></html>\n"
-    )
-    write_whole(path, page)
+    write_whole(path, document(heading, f'<section class="card"><p>{escape(text)}</p>{drawn}</section>'))

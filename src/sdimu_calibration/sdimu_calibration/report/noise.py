@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from html import escape
 from pathlib import Path
 
 import numpy as np
@@ -11,8 +10,9 @@ from rich.table import Table
 
 from sdimu_calibration.core.noise import TERMS, Allan, Terms
 from sdimu_calibration.core.units import from_si
-from sdimu_calibration.report.drawing import Figure, html, lay_out
-from sdimu_calibration.report.style import STYLE
+from sdimu_calibration.report.design.sheet import document
+from sdimu_calibration.report.drawing import MUTED, Figure, html, lay_out
+from sdimu_calibration.report.markup import grid, quiet, section
 from sdimu_calibration.storage.whole_file import write_whole
 
 CHANNELS = ("gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z")
@@ -30,7 +30,7 @@ WORDS = {
 }  # fmt: skip
 HEAD = ("channel", "term", "value", "sigma", "unit")
 _SHOWN = {"gyro": "deg/h", "accel": "ug"}
-_INK = ("#0b5394", "#b45f06", "#38761d")
+_INK = ("@x", "@y", "@z")
 _DASH = ("solid", "dash", "dot")
 
 
@@ -116,11 +116,11 @@ def _slopes(made: Figure, column: int, deviations: Sequence[Allan], factor: floa
     for word, slope in _SLOPES:
         x, y = low + _DECADE * np.array([0.0, 1.0]), bottom + _DECADE * np.array([0.0, slope])
         made.add(
-            "scatter", x=10.0**x, y=10.0**y, mode="lines", line={"color": "#999", "width": 1}, hoverinfo="skip",
+            "scatter", x=10.0**x, y=10.0**y, mode="lines", line={"color": MUTED, "width": 1}, hoverinfo="skip",
             showlegend=False, col=column,
         )  # fmt: skip
         made.annotate(
-            word, x=float(x[1]), y=float(y[1]), xanchor="left", font={"size": 10, "color": "#666"}, col=column,
+            word, x=float(x[1]), y=float(y[1]), xanchor="left", font={"size": 10, "color": MUTED}, col=column,
         )  # fmt: skip
 
 
@@ -133,22 +133,20 @@ def write_page(
     path: Path, deviations: Mapping[str, Allan], found: Mapping[str, Terms], title: str, words: Sequence[str]
 ) -> None:
     """Write the page: one file that needs no network; `words` are sentences for its head."""
-    head = "".join(f"<th>{escape(word)}</th>" for word in HEAD)
-    lines = "".join("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in rows(found))
     body = [
-        f"<h1>{escape(title)}</h1>",
-        *(f'<p class="quiet">{escape(word)}</p>' for word in words),
-        "<h2>Allan deviation</h2>",
-        '<p class="quiet">Overlapping, pooled over the stretches; bars: one sigma; lines: the terms; '
-        'grey: their slopes.</p>',
-        html(figure(deviations, found), 1),
-        "<h2>Terms</h2>",
-        '<p class="quiet">Below three sigma only an upper limit is known. White noise is the angle or velocity random '
-        'walk: 60 deg/h/sqrt(Hz) are 1 deg/sqrt(h). The random walk of the bias is the rate random walk.</p>',
-        f"<table><thead><tr>{head}</tr></thead><tbody>{lines}</tbody></table>",
+        section("Data", *(quiet(word) for word in words)),
+        section(
+            "Allan deviation",
+            quiet("Overlapping, pooled over the stretches; bars: one sigma; lines: the terms; grey: their slopes."),
+            html(figure(deviations, found), 1),
+        ),
+        section(
+            "Terms",
+            quiet(
+                "Below three sigma only an upper limit is known. White noise is the angle or velocity random walk: "
+                "60 deg/h/sqrt(Hz) are 1 deg/sqrt(h). The random walk of the bias is the rate random walk."
+            ),
+            grid(HEAD, rows(found), {0, 1, 4}),
+        ),
     ]
-    write_whole(
-        path,
-        f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><title>{escape(title)}</title>'
-        f"<style>{STYLE}</style></head><body>\n" + "\n".join(body) + "\n</body></html>\n",
-    )
+    write_whole(path, document(title, "\n".join(body)))

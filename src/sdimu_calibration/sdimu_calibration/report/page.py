@@ -12,6 +12,7 @@ from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary
 from sdimu_calibration.core.results import Calibration, without_advice
 from sdimu_calibration.report import data, handheld_sections, sections, table
+from sdimu_calibration.report.design.sheet import document
 from sdimu_calibration.report.drawing import html
 from sdimu_calibration.report.export import as_csv, as_yaml
 from sdimu_calibration.report.figures import sigma_history
@@ -19,7 +20,6 @@ from sdimu_calibration.report.markup import Draw, prose, quiet, section
 from sdimu_calibration.report.report_extras import ReportExtras
 from sdimu_calibration.report.rests_section import rests_section
 from sdimu_calibration.report.set_sections import set_sections
-from sdimu_calibration.report.style import SCRIPT, STYLE
 from sdimu_calibration.report.use_section import in_use
 from sdimu_calibration.storage.whole_file import write_whole
 
@@ -96,21 +96,13 @@ def page(
         parts.append(section("Sigma of every coefficient against time", remark, draw(sigma_history(calibration))))
         parts.append(sections.separation(calibration, draw))
     head = [
-        f"<h1>{escape(title)}</h1>",
-        f'<p class="quiet">{_summary(calibration)}</p>',
         sections.verdict(summary) if summary else "",
         f"<p><b>{prose(lead)}</b></p>" if lead else "",
         # Of a handheld run the ladder says it, in sigmas that models can be compared by.
         "" if handheld else f"<p>{_fit(calibration, summary is not None or bool(lead))}</p>",
         _notes(calibration.notes if summary is None else without_advice(calibration.notes)),
     ]
-    return (
-        '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">'
-        f"<title>{escape(title)}</title><style>{STYLE}</style></head><body>\n"
-        + "\n".join(part for part in head if part)
-        + "\n<main>\n" + "\n".join(parts) + f"\n</main>\n<script>{SCRIPT}</script></body></html>\n"
-    )  # fmt: skip
+    return document(title, "\n".join(part for part in (*head, *parts) if part), under=_summary(calibration))
 
 
 @dataclass(frozen=True)

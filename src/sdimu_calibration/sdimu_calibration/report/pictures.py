@@ -21,7 +21,7 @@ from sdimu_calibration.core.estimation.free_inertial import FreeInertialRun
 from sdimu_calibration.core.evidence.consistency import CHANNEL_NAMES
 from sdimu_calibration.report import data
 from sdimu_calibration.report.architecture_figure import architecture_figure
-from sdimu_calibration.report.drawing import AFTER, BEFORE, DIVERGING
+from sdimu_calibration.report.design.palette import DIVERGING, LIGHT, paint, palette
 from sdimu_calibration.report.evidence_figures import cell
 from sdimu_calibration.report.table import with_sigma
 
@@ -29,6 +29,8 @@ _STYLE = {
     "font.family": "DejaVu Sans", "font.size": 9, "axes.spines.top": False, "axes.spines.right": False,
     "axes.titlesize": 10, "axes.titlelocation": "left", "savefig.facecolor": "white",
 }  # fmt: skip
+_PALETTE = palette(LIGHT)
+_INK, _MUTED, _LINE, _BEFORE, _AFTER = (_PALETTE[k] for k in ("ink", "muted", "line", "before", "after"))
 _DPI = 110
 _COLOURS = 200
 _FULL = 8.0
@@ -94,10 +96,10 @@ def heat_maps(diagnosis: Diagnosis) -> Figure:
 
 
 def _heat_map(axes: Any, grid: data.Grid) -> None:
-    colours = LinearSegmentedColormap.from_list("signed", list(DIVERGING))
+    colours = LinearSegmentedColormap.from_list("signed", paint(DIVERGING, LIGHT))
     axes.imshow(grid.value, cmap=colours, vmin=-_FULL, vmax=_FULL, aspect="auto")
     for (row, column), value in np.ndenumerate(grid.value):
-        ink = "white" if abs(value) > _WHITE_FROM else "#222"
+        ink = "white" if abs(value) > _WHITE_FROM else _INK
         axes.text(column, row, cell(float(value)), ha="center", va="center", fontsize=6.5, color=ink)
     axes.set_yticks(range(len(CHANNEL_NAMES)), [name.replace("_", " ") for name in CHANNEL_NAMES], fontsize=7.5)
     axes.set_xticks(range(len(grid.stops)), [str(stop) for stop in grid.stops], fontsize=7.5)
@@ -111,10 +113,10 @@ def candidates(diagnosis: Diagnosis) -> Figure:
     figure = Figure(figsize=(8.6, 2.7), layout="constrained")
     axes = figure.add_subplot()
     at = np.arange(len(shown))
-    axes.barh(at, [abs(s.z) for s in shown], color=["#555" if s.chosen else "#ccc" for s in shown], edgecolor="#222",
+    axes.barh(at, [abs(s.z) for s in shown], color=[_MUTED if s.chosen else _LINE for s in shown], edgecolor=_INK,
               linewidth=0.6, height=0.75, label="added alone")  # fmt: skip
-    axes.plot([abs(s.left) for s in shown], at, "D", mfc="white", mec=AFTER, ms=5, label="left with what was found")
-    axes.axvline(diagnosis.found.threshold, color="#222", ls="--", lw=1.2, label="what noise reaches")
+    axes.plot([abs(s.left) for s in shown], at, "D", mfc="white", mec=_AFTER, ms=5, label="left with what was found")
+    axes.axvline(diagnosis.found.threshold, color=_INK, ls="--", lw=1.2, label="what noise reaches")
     for k, s in enumerate(shown):
         size = with_sigma(s.estimate, s.sigma, s.unit)
         axes.text(max(abs(s.z), diagnosis.found.threshold), k, f" {size}", va="center", fontsize=8)
@@ -134,15 +136,15 @@ def ladder(diagnosis: Diagnosis) -> Figure:
     third = [float(c.fit.get("held_out_rms") or np.nan) for c in (diagnosis.before, diagnosis.after)]
     figure = Figure(figsize=(8.6, 2.3), layout="constrained")
     axes = figure.add_subplot()
-    axes.plot(one, "o-", color=AFTER, label="one stop held out at a time")
+    axes.plot(one, "o-", color=_AFTER, label="one stop held out at a time")
     texts = [(x, y, 5) for x, y in enumerate(one)]
     if np.isfinite(third).all():
         ends = [0, len(names) - 1]
-        axes.plot(ends, third, "^--", color=BEFORE, mfc="white", label="a third of the stops held out at a time")
+        axes.plot(ends, third, "^--", color=_BEFORE, mfc="white", label="a third of the stops held out at a time")
         texts += [(x, y, -12) for x, y in zip(ends, third, strict=True)]
     for x, y, lift in texts:
         axes.annotate(f"{y:.3f}", (x, y), (8, lift), textcoords="offset points", fontsize=8)
-    axes.axhline(1.0, color="#222", ls=":", lw=1.2, label="right")
+    axes.axhline(1.0, color=_INK, ls=":", lw=1.2, label="right")
     axes.set_xticks(range(len(names)), names)
     axes.set_xlim(-0.3, len(names) - 0.6)
     axes.set_ylim(0.0, 1.25 * max(y for _, y, _ in texts))
@@ -157,12 +159,12 @@ def in_use(trials: Sequence[FreeInertialRun]) -> Figure:
     first = None
     for place, trial in enumerate(trials, 1):
         first = axes = figure.add_subplot(1, len(trials), place, sharey=first)
-        for (ink, dash), drift in zip((("#555", ":"), (BEFORE, "--"), (AFTER, "-")), trial.drifts, strict=False):
+        for (ink, dash), drift in zip(((_MUTED, ":"), (_BEFORE, "--"), (_AFTER, "-")), trial.drifts, strict=False):
             rows = drift.t >= 30.0
             axes.semilogy(drift.t[rows] / 60.0, drift.distance[rows], dash, color=ink, lw=1.8, label=drift.name)
         axes.set_title(f"Unseen {trial.segment.place} of the recording")
         axes.set_xlabel("time without aid (min)")
         axes.set_ylabel("position error (m)" if place == 1 else "")
-        axes.grid(visible=True, axis="y", color="#ddd", lw=0.6)
+        axes.grid(visible=True, axis="y", color=_PALETTE["grid"], lw=0.6)
     figure.axes[0].legend(frameon=False, fontsize=8)
     return figure

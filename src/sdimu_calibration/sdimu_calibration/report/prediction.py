@@ -15,10 +15,11 @@ from sdimu_calibration.core.effect_key import effect_of
 from sdimu_calibration.core.planning.predict import Prediction
 from sdimu_calibration.core.results import Calibration, History
 from sdimu_calibration.core.units import from_si
+from sdimu_calibration.report.design.sheet import document
 from sdimu_calibration.report.drawing import html
 from sdimu_calibration.report.figures import sigma_history
 from sdimu_calibration.report.groups import groups
-from sdimu_calibration.report.style import STYLE
+from sdimu_calibration.report.markup import grid, quiet, section
 from sdimu_calibration.storage.whole_file import write_whole
 
 _DEFINED = 1e-6
@@ -116,26 +117,23 @@ def page(
     published: tuple[Sequence[str], Sequence[Sequence[str]]] | None = None,
 ) -> str:
     """Make the page as HTML text; parameters as in `write_page`."""
-    heading = escape(f"Prediction of plan {about.get('plan', '')}")
+    heading = f"Prediction of plan {about.get('plan', '')}"
     words = [f"{key.replace('_', ' ')}: {value}" for key, value in about.items() if key != "plan"]
     words.append(f"{prediction.duration_s / 60.0:.1f} min")
-    parts = [f"<h1>{heading}</h1>", f'<p class="quiet">{escape(" · ".join(words))}</p>']
+    parts = []
     if published is not None:
         columns, rows = published
-        parts += [
-            "<h2>Beside the published values</h2>",
-            _html_table(("largest of the axes", *columns, "off by", "unit"), rows),
-            '<p class="quiet">In brackets: as printed.</p>',
-        ]
+        heads = ("largest of the axes", *columns, "off by", "unit")
+        table = grid(heads, rows, {0, len(heads) - 1})
+        parts.append(section("Beside the published values", table, quiet("In brackets: as printed.")))
     figure = html(sigma_history(as_history(prediction)), 1)
-    told = '<p class="quiet">In white noise. Grey: the table turns.</p>'
-    parts += ["<h2>Sigma of every coefficient against time</h2>", told, figure]
-    parts += ["<h2>At the end</h2>", _html_table(COLUMNS, coefficient_rows(prediction))]
-    parts += ["<h2>Not observable</h2>", _unobservable(prediction)]
-    return (
-        f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><title>{heading}</title>'
-        f"<style>{STYLE}</style></head><body>\n" + "\n".join(parts) + "\n</body></html>\n"
-    )
+    told = quiet("In white noise. Grey: the table turns.")
+    parts += [
+        section("Sigma of every coefficient against time", told, figure),
+        section("At the end", grid(COLUMNS, coefficient_rows(prediction), {0, len(COLUMNS) - 1})),
+        section("Not observable", _unobservable(prediction)),
+    ]
+    return document(heading, "\n".join(parts), under=escape(" · ".join(words)))
 
 
 def as_history(prediction: Prediction) -> Calibration:
@@ -166,19 +164,6 @@ def _unobservable(prediction: Prediction) -> str:
     items = (f"<li>{escape(c.text)} ({100.0 * c.left:.0f} % of the prior variance is left)</li>"
              for c in prediction.unobservable)  # fmt: skip
     return f"<ul>{''.join(items)}</ul>"
-
-
-def _html_table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    head = "".join(_cell("th", k, columns, word) for k, word in enumerate(columns))
-    lines = ("".join(_cell("td", k, columns, word) for k, word in enumerate(row)) for row in rows)
-    body = "".join(f"<tr>{line}</tr>" for line in lines)
-    return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
-
-
-def _cell(tag: str, k: int, columns: Sequence[str], word: str) -> str:
-    """First and last column are words, the others numbers."""
-    kind = ' class="text"' if k in (0, len(columns) - 1) else ""
-    return f"<{tag}{kind}>{escape(word)}</{tag}>"
 
 
 def _short(value: float) -> str:

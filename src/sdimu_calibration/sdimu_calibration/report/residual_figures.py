@@ -11,13 +11,12 @@ from sdimu_calibration.core.effects.effect import CHANNELS
 from sdimu_calibration.core.evidence.consistency import CHANNEL_NAMES
 from sdimu_calibration.core.units import from_si
 from sdimu_calibration.report import data
-from sdimu_calibration.report.drawing import AFTER, BAND, BEFORE, PALE, Figure, lay_out
+from sdimu_calibration.report.drawing import AFTER, BAND, BEFORE, BEFORE_PALE, INK, MUTED, PALE, Figure, lay_out
 
 _MOST_POINTS = 500
 _BINS = 12
 _GAP_MIN = 0.5
 """No line is drawn over a gap of more minutes than this: there the table turns."""
-_BAR = "rgba(0, 0, 0, 0.28)"
 
 
 def _layers(found: data.Residuals, two: bool) -> list[tuple[Floats, str, str, str]]:
@@ -61,7 +60,7 @@ def innovations(found: data.Residuals, two: bool) -> Figure:
         reach *= from_si(1.0, data.CHANNEL_UNITS[channel])
         figure.y_axes(range=[-reach, reach], title=data.CHANNEL_UNITS[channel], standoff=2, **place)
     figure.x_axes(title="time (min)", row=4)
-    figure.y_axes(zeroline=True, zerolinecolor="#999", zerolinewidth=1)
+    figure.y_axes(zeroline=True, zerolinecolor=MUTED, zerolinewidth=1)
     return lay_out(
         figure,
         900,
@@ -85,7 +84,7 @@ def _bars(figure: Figure, minutes: Floats, sigma: Floats, place: dict[str, int])
     figure.add(
         "scatter", x=minutes[good], y=np.zeros(int(good.sum())), mode="markers",
         marker={"size": 1, "color": PALE}, hoverinfo="skip", showlegend=False,
-        error_y={"array": (3.0 * sigma[good]), "color": _BAR, "thickness": 5, "width": 0}, **place,
+        error_y={"array": (3.0 * sigma[good]), "color": PALE, "thickness": 5, "width": 0}, **place,
     )  # fmt: skip
 
 
@@ -151,7 +150,7 @@ def against_variables(
         figure.y_axes(title=f"{CHANNELS[row].replace('_', ' ')}<br>(sigma)", row=row + 1, col=1)
     for column, k in enumerate(used, 1):
         figure.x_axes(title=f"{names[k][0]} ({names[k][1]})", row=6, col=column)
-    figure.y_axes(zeroline=True, zerolinecolor="#999", zerolinewidth=1, nticks=5)
+    figure.y_axes(zeroline=True, zerolinecolor=MUTED, zerolinewidth=1, nticks=5)
     figure.x_axes(nticks=5, tickangle=0)
     return lay_out(figure, 760, showlegend=True, margin={"l": 80, "r": 20, "t": 40, "b": 60})
 
@@ -168,8 +167,8 @@ def free_inputs(found: data.FreeInputs, two: bool) -> Figure:
         figure.add(
             "bar", x=middle, y=found.before[:, channel], width=width,
             marker={
-                "color": "rgba(180, 95, 6, 0.55)", "line": {"color": BEFORE, "width": 0.5},
-                "pattern": {"shape": ["/" if turn else "" for turn in found.turn], "size": 4, "fgcolor": "#222"},
+                "color": BEFORE_PALE, "line": {"color": BEFORE, "width": 0.5},
+                "pattern": {"shape": ["/" if turn else "" for turn in found.turn], "size": 4, "fgcolor": INK},
             },
             text=["\u2217" if f else "" for f in far], textposition="outside", cliponaxis=False, name="model as given",
             legendgroup="before", showlegend=channel == 0, customdata=found.z[:, channel],
@@ -183,7 +182,7 @@ def free_inputs(found: data.FreeInputs, two: bool) -> Figure:
             )  # fmt: skip
         figure.y_axes(title=unit, standoff=2, **place)
     figure.x_axes(title="time (min)", row=2)
-    figure.y_axes(zeroline=True, zerolinecolor="#999", zerolinewidth=1)
+    figure.y_axes(zeroline=True, zerolinecolor=MUTED, zerolinewidth=1)
     return lay_out(
         figure, 560, showlegend=True, bargap=0, barmode="overlay", margin={"l": 60, "r": 20, "t": 95, "b": 55},
         legend={"orientation": "h", "yanchor": "bottom", "y": 1.09, "x": 0},

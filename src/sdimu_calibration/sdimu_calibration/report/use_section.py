@@ -10,12 +10,12 @@ from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.estimation.free_inertial import Drift, FreeInertialRun
 from sdimu_calibration.core.estimation.holdout import WANTED_S
 from sdimu_calibration.core.units import from_si
-from sdimu_calibration.report.drawing import AFTER, BEFORE, Figure, lay_out
+from sdimu_calibration.report.drawing import AFTER, BEFORE, MUTED, Figure, lay_out
 from sdimu_calibration.report.markup import Draw, grid, quiet, section, sentence
 from sdimu_calibration.report.report_extras import ReportExtras
 
 _NAUTICAL_MILE = 1852.0
-_INK = (("#555", "dot"), (BEFORE, "dash"), (AFTER, "solid"))
+_INK = ((MUTED, "dot"), (BEFORE, "dash"), (AFTER, "solid"))
 _PLACES = {"end": "end of the recording", "start": "start of the recording"}
 _SKIP_S = 30.0
 """Logarithmic axes begin here: before there is nothing to see and much room for it."""

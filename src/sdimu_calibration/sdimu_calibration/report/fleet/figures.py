@@ -11,7 +11,8 @@ import numpy as np
 from sdimu_calibration.core.fleet.population import Coefficient, Measured
 from sdimu_calibration.core.fleet.study import Study
 from sdimu_calibration.core.units import from_si
-from sdimu_calibration.report.drawing import AFTER, BEFORE, DIVERGING, Figure, lay_out
+from sdimu_calibration.report.design.palette import DIVERGING
+from sdimu_calibration.report.drawing import AFTER, BEFORE, INK, Figure, lay_out
 
 _ROW, _FEWEST_PX = 24, 260
 """Height of a row of the heat map and of the least figure (px): names stay readable."""
@@ -32,7 +33,7 @@ def heat_map(done: Study) -> Figure:
     names = [one.name for one in people.coefficients]
     figure.add(
         "heatmap", x=list(people.units), y=names, z=z, zmin=-_LARGEST, zmax=_LARGEST, xgap=1, ygap=1,
-        colorscale=[list(stop) for stop in DIVERGING], colorbar={"title": {"text": "sigma"}},
+        colorscale=list(DIVERGING), colorbar={"title": {"text": "sigma"}},
         hovertemplate="%{x}<br>%{y}<br>%{z:.2f} sigma<extra></extra>",
     )  # fmt: skip
     for one in people.out:
@@ -88,7 +89,7 @@ def _panel(
     error = {"type": "data", "array": sigma, "thickness": 1, "width": 2}
     figure.add(
         "scatter", x=list(x), y=value, mode="markers", error_y=error, text=list(fleet.serials),
-        marker={"color": "#222", "size": 6}, hovertemplate="%{text}<br>%{x}<br>%{y:.4g} " + unit + "<extra></extra>",
+        marker={"color": INK, "size": 6}, hovertemplate="%{text}<br>%{x}<br>%{y:.4g} " + unit + "<extra></extra>",
         **place,
     )  # fmt: skip
 

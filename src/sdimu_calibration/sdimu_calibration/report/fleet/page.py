@@ -8,12 +8,12 @@ from pathlib import Path
 
 from sdimu_calibration.core.effect_key import effect_of
 from sdimu_calibration.core.fleet.study import Candidates, Study
+from sdimu_calibration.report.design.sheet import document
 from sdimu_calibration.report.drawing import html
 from sdimu_calibration.report.fleet import tables
 from sdimu_calibration.report.fleet.figures import control_chart, heat_map
 from sdimu_calibration.report.groups import title as words_of
 from sdimu_calibration.report.markup import grid, prose, quiet, section
-from sdimu_calibration.report.style import SCRIPT, STYLE
 from sdimu_calibration.storage.fleet_folder import Gathered
 from sdimu_calibration.storage.whole_file import write_whole
 
@@ -39,9 +39,6 @@ document.querySelectorAll('table').forEach(function (table) {
     head.addEventListener('keydown', function (event) { if (event.key === 'Enter') { sort(); } });
   });
 });
-"""
-_SORT_STYLE = """
-th[aria-sort=ascending]::after { content: ' \\25B2'; } th[aria-sort=descending]::after { content: ' \\25BC'; }
 """
 
 
@@ -75,13 +72,9 @@ def write_page(path: Path, gathered: Gathered, done: Study, candidates: Candidat
         Heading of the page.
     """
     units = display_units(gathered, candidates)
-    told = tables.sentences(done, units)
     kind = "bad" if done.people.out else "good"
-    head = [
-        f"<h1>{escape(title)}</h1>",
-        quiet(headline(gathered, done)),
-        f'<div class="verdict {kind}">' + "<br>".join(prose(one) for one in told) + "</div>",
-    ]
+    sentences = "<br>".join(prose(one) for one in tables.sentences(done, units))
+    told = f'<div class="verdict {kind}">{sentences}</div>'
     parts = [
         _coefficients(done, units),
         section(
@@ -94,14 +87,8 @@ def write_page(path: Path, gathered: Gathered, done: Study, candidates: Candidat
         _trends(gathered, done, units),
         _apart(gathered.apart),
     ]  # fmt: skip
-    write_whole(
-        path,
-        '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">'
-        f"<title>{escape(title)}</title><style>{STYLE}{_SORT_STYLE}</style></head><body>\n" + "\n".join(head)
-        + "\n<main>\n" + "\n".join(part for part in parts if part)
-        + f"\n</main>\n<script>{SCRIPT}{_SORT}</script></body></html>\n",
-    )  # fmt: skip
+    body = "\n".join(part for part in (told, *parts) if part)
+    write_whole(path, document(title, body, under=prose(headline(gathered, done)), script=_SORT))
 
 
 def _coefficients(done: Study, units: dict[str, str]) -> str:

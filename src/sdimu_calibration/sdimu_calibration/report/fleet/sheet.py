@@ -11,9 +11,9 @@ from pathlib import Path
 
 from sdimu_calibration.core.fleet.sheet import FAIL, PASS, Line
 from sdimu_calibration.core.units import from_si
+from sdimu_calibration.report.design.sheet import document
 from sdimu_calibration.report.fleet.tables import three
 from sdimu_calibration.report.markup import grid, prose, quiet, section
-from sdimu_calibration.report.style import SCRIPT, STYLE
 from sdimu_calibration.report.table import cells
 from sdimu_calibration.report.table import rows as coefficient_rows
 from sdimu_calibration.storage.datasheet_file import Certificate
@@ -24,10 +24,10 @@ HEADINGS = ("term", "value", "95 %", "unit", "n", "limit", "verdict")
 _COEFFICIENTS = ("coefficient", "estimate", "sigma", "unit")
 _SHEET_STYLE = """
 table.sheet td { white-space: normal; vertical-align: top; } table.sheet td.number { white-space: nowrap; }
-td.pass { color: #0b5394; font-weight: bold; } td.fail { color: #b45f06; font-weight: bold; }
-td.undecided { font-weight: bold; } tr.group td { border-top: 2px solid #222; font-weight: bold; text-align: left; }
-code { font-size: .8em; overflow-wrap: anywhere; } .sign { display: flex; gap: 4em; margin-top: 4em; }
-.sign div { border-top: 1px solid #222; flex: 1; padding-top: .3em; break-inside: avoid; }
+td.pass { color: var(--good); font-weight: bold; } td.fail { color: var(--bad); font-weight: bold; }
+td.undecided { font-weight: bold; } tr.group td { background: var(--sunken); font-weight: bold; text-align: left; }
+.sign { display: flex; gap: 4em; margin-top: 4em; }
+.sign div { border-top: 1px solid var(--ink); flex: 1; padding-top: .3em; break-inside: avoid; }
 """
 
 
@@ -73,14 +73,8 @@ def write_page(
         _missing(lines),
         _signatures(about) if certificate else "",
     ]
-    write_whole(
-        path,
-        '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">'
-        f"<title>{escape(title)}</title><style>{STYLE}{_SHEET_STYLE}</style></head><body>\n"
-        f"<h1>{escape(title)}</h1>{_head(about, entries)}{_conditions(lines)}{_verdict(lines)}\n"
-        + "\n".join(part for part in parts if part) + f"\n<script>{SCRIPT}</script></body></html>\n",
-    )  # fmt: skip
+    body = "\n".join(part for part in (_head(about, entries), _conditions(lines), _verdict(lines), *parts) if part)
+    write_whole(path, document(title, body, style=_SHEET_STYLE))
 
 
 def _head(about: Certificate, entries: Sequence[Entry]) -> str:

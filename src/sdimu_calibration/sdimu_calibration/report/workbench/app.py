@@ -14,7 +14,7 @@ from sdimu_calibration.core.evidence.consistency import CHANNEL_NAMES
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.units import UnitError
 from sdimu_calibration.report import data
-from sdimu_calibration.report.drawing import PRINT
+from sdimu_calibration.report.design.library import PRINT
 from sdimu_calibration.report.workbench import figures, tables, view
 from sdimu_calibration.report.workbench.export import archive
 from sdimu_calibration.report.workbench.fit import FitSession

@@ -9,7 +9,7 @@ import numpy as np
 
 from sdimu_calibration.core.evidence.consistency import CHANNEL_NAMES
 from sdimu_calibration.report import data, evidence_figures
-from sdimu_calibration.report.drawing import AFTER, BAND, BEFORE, Figure, lay_out
+from sdimu_calibration.report.drawing import AFTER, BAND, BEFORE, INK, MUTED, Figure, lay_out
 
 _FONT = 13
 
@@ -20,7 +20,7 @@ def heat_map(grid: data.Grid, cell: tuple[int, int]) -> Any:
     row, column = cell[0], int(np.searchsorted(grid.stops, cell[1]))
     figure.shape(
         "rect", x0=column - 0.5, x1=column + 0.5, y0=row - 0.5, y1=row + 0.5, fillcolor="rgba(0, 0, 0, 0)",
-        line={"color": "#111", "width": 3},
+        line={"color": INK, "width": 3},
     )  # fmt: skip
     return figure.as_plotly()
 
@@ -50,7 +50,7 @@ def cell(found: data.Residuals, grid: data.Grid, channel: int, stop: int) -> Any
         mean = float(y.mean())
         figure.shape("line", y0=mean, y1=mean, line={"color": BEFORE, "width": 2, "dash": "dash"}, opacity=1.0)
     figure.x_axes(title="time (s)")
-    figure.y_axes(title="innovation (sigma)", zeroline=True, zerolinecolor="#999")
+    figure.y_axes(title="innovation (sigma)", zeroline=True, zerolinecolor=MUTED)
     met = grid.value[channel, grid.stops == stop]
     told = f"{met[0]:+.1f} sigma on the way (above); " if np.isfinite(met).any() else ""
     said = f"{told}with the final coefficients mean {y.mean():+.2f} sigma (dashed)" if len(y) else "not measured"
@@ -70,7 +70,7 @@ def ladder(names: Sequence[str], values: Sequence[float], at_held: Sequence[floa
             "scatter", x=list(names), y=list(at_held), mode="markers+lines", name="stops held out",
             line={"color": BEFORE, "dash": "dot"}, marker={"symbol": "square-open", "size": 9},
         )  # fmt: skip
-    figure.shape("line", y0=1.0, y1=1.0, line={"dash": "dash", "color": "#222", "width": 1.5}, opacity=1.0)
+    figure.shape("line", y0=1.0, y1=1.0, line={"dash": "dash", "color": INK, "width": 1.5}, opacity=1.0)
     figure.annotate("1 is right", x=0, xref="x domain", y=1.0, xanchor="left", yanchor="top")
     top = max([*values, *(v for v in at_held if v is not None), 1.0])
     figure.y_axes(title="held-out RMS (sigma)", range=[0, 1.25 * top])

@@ -10,7 +10,7 @@ import numpy as np
 from dash import dcc, html
 
 from sdimu_calibration.report import data
-from sdimu_calibration.report.drawing import CONFIG
+from sdimu_calibration.report.design.library import CONFIG
 from sdimu_calibration.report.table import with_sigma
 from sdimu_calibration.report.workbench.fit import Fitted, Missing
 

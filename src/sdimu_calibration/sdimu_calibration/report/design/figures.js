@@ -1,0 +1,85 @@
+// Draws figures when they come near the window, in the colours of the theme; those that are folded away wait.
+(function () {
+  var LARGE = 1.5, NEAR = '400px', queue = [], library = null;
+
+  // The library lies in the page compressed: it is unpacked once, after the page is there.
+  function load() {
+    library = library || (async function () {
+      var packed = atob(document.getElementById('library').textContent);
+      var stream = new Blob([Uint8Array.from(packed, function (c) { return c.charCodeAt(0); })]).stream();
+      var text = await new Response(stream.pipeThrough(new DecompressionStream('gzip'))).text();
+      var script = document.createElement('script');
+      script.textContent = text; document.head.appendChild(script);
+    })();
+    return library;
+  }
+
+  // Figures count in pixels: on a screen of 4K all that is written, and the room for it, is made larger.
+  function enlarge(part, by) {
+    Object.keys(part).forEach(function (key) {
+      var value = part[key];
+      if (!value || typeof value !== 'object' || key === 'template' || typeof value[0] === 'number') { return; }
+      if (/font$|^marker$/.test(key) && typeof value.size === 'number') { value.size *= by; }
+      enlarge(value, by);
+    });
+  }
+
+  function content(place) {
+    var theme = window.sdimuTheme(), colours = FIGURE_COLOURS[theme];
+    var figure = JSON.parse(place.querySelector('script').textContent.replace(/"@(\w+)"/g, function (all, name) {
+      return name in colours ? '"' + colours[name] + '"' : all;
+    }));
+    figure.layout.template = FIGURE_TEMPLATES[theme];
+    if (window.innerWidth >= 2400) {
+      enlarge(figure, LARGE);
+      Object.keys(figure.layout.margin).forEach(function (side) { figure.layout.margin[side] *= LARGE; });
+      figure.layout.height *= LARGE;
+    }
+    return figure;
+  }
+
+  function draw(place) {
+    var figure = content(place), box = place.firstElementChild;
+    box.style.height = figure.layout.height + 'px';
+    place.dataset.drawn = 'yes';
+    Plotly.react(box, figure.data, figure.layout, FIGURE_CONFIG);
+  }
+
+  function next() {
+    if (!queue.length) { return; }
+    load().then(function () {
+      var place = queue.shift();
+      if (place && !place.dataset.drawn) { draw(place); }
+      setTimeout(next, 0);
+    });
+  }
+
+  // For tests and for printing by a program: draws everything, folded away or not.
+  window.sdimuDrawAll = function () { return load().then(function () { all().forEach(draw); }); };
+  function all() { return Array.from(document.querySelectorAll('.figure')); }
+  document.addEventListener('DOMContentLoaded', function () {
+    var near = new IntersectionObserver(function (entries) {
+      entries.forEach(function (entry) {
+        if (!entry.isIntersecting) { return; }
+        near.unobserve(entry.target);
+        queue.push(entry.target);
+        if (queue.length === 1) { next(); }
+      });
+    }, {rootMargin: NEAR});
+    all().forEach(function (place) { near.observe(place); });
+    setTimeout(load, 0);
+  });
+  window.addEventListener('sdimu-theme', function () {
+    if (window.Plotly) { all().filter(function (p) { return p.dataset.drawn; }).forEach(draw); }
+  });
+  window.addEventListener('beforeprint', function () {
+    if (!window.Plotly) { return; }
+    var theme = window.sdimuTheme;
+    window.sdimuTheme = function () { return 'light'; };
+    all().forEach(draw);
+    window.sdimuTheme = theme;
+  });
+  window.addEventListener('afterprint', function () {
+    if (window.Plotly) { all().filter(function (p) { return p.dataset.drawn; }).forEach(draw); }
+  });
+})();
