@@ -76,7 +76,7 @@ def model_doubt(fit: Fit, evidence: LinearEvidence, chosen: Sequence[int], allow
     q, count = evidence.coefficients, len(chosen)
     # Each parameter has its odds, however many time constants or moments of it are tried.
     votes = np.exp(-problem.log_variants[allowed - problem.p])
-    # A sensor that has k effects of the catalogue is likelier to have one more: Laplace's rule, (k + 1) to the catalogue.
+    # A sensor that has k effects is likelier to have one more: odds k + 1 to the catalogue (Laplace).
     rare = np.log(max(1.0, votes.sum() / (1 + count)))
     is_chosen = np.isin(allowed, chosen)
     more = _alternatives(problem, chosen, allowed, scale)
