@@ -93,8 +93,8 @@ def test_two_effects_that_look_alike_widen_the_sigma_by_what_lies_between_them()
     model = linear_model(np.array([1.0, -1.0, 0.0, 4.0, 0.0]), ratio=WIDE)
     got = model_doubt(FIT, model, [3], np.array([3, 4]), 1.0)
     other = spread(model, [3], [(1.0, [3]), (1.0, [4]), (2.0, [])], stays=True)
-    # One effect more, at odds of one in the two that were looked at.
-    more = spread(model, [3], [(1.0, [3]), (0.5, [3, 4])])
+    # One effect more beside one that was found, at odds of two in the two that were looked at.
+    more = spread(model, [3], [(1.0, [3]), (1.0, [3, 4])])
     assert np.trace(other) > 0.01 * np.trace(posterior(model, [3])[2])
     assert got[:2, :2] == pytest.approx(other + more, rel=1e-3, abs=1e-3 * np.trace(other))
 

@@ -76,8 +76,8 @@ def model_doubt(fit: Fit, evidence: LinearEvidence, chosen: Sequence[int], allow
     q, count = evidence.coefficients, len(chosen)
     # Each parameter has its odds, however many time constants or moments of it are tried.
     votes = np.exp(-problem.log_variants[allowed - problem.p])
-    # A sensor that has k effects is likelier to have one more: odds k + 1 to the catalogue (Laplace).
-    rare = np.log(max(1.0, votes.sum() / (1 + count)))
+    # A sensor with k effects is likelier to have one more: odds of k + 1 to the catalogue (Laplace).
+    rare, rare_without = (np.log(max(1.0, votes.sum() / k)) for k in (count + 1, max(count, 1)))
     is_chosen = np.isin(allowed, chosen)
     more = _alternatives(problem, chosen, allowed, scale)
     weight = _shares(more.score + np.log(votes) - rare, np.isfinite(more.score) & ~is_chosen)
@@ -88,7 +88,7 @@ def model_doubt(fit: Fit, evidence: LinearEvidence, chosen: Sequence[int], allow
         rivals = _alternatives(problem, others, allowed, scale)
         place = int(np.flatnonzero(allowed == column)[0])
         own = rivals.score[place] + np.log(votes[place])
-        others_and_none = np.append(rivals.score + np.log(votes), rare) - own
+        others_and_none = np.append(rivals.score + np.log(votes), rare_without) - own
         weight = _shares(others_and_none, np.append(np.isfinite(rivals.score) & ~is_chosen, np.isfinite(own)))
         rest = [k for k in range(q + count) if k != q + number]
         told = [*range(q), *range(problem.p, problem.p + count - 1)]

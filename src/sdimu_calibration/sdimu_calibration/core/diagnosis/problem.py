@@ -115,6 +115,7 @@ class Problem(Generic[E]):
         Returns
         -------
         ndarray, shape (q,)
+            Log (1).
         """
         names = [c.label if c.family == "own" else c.parameter.name for c in self.evidence.candidates]
         count = Counter(names)
