@@ -5,6 +5,7 @@ from importlib import metadata
 from pathlib import Path
 
 import numba
+import plotly
 
 HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE / "extensions"))
@@ -53,7 +54,8 @@ numpydoc_show_class_members = False
 html_theme = "furo"
 html_title = "sdimu-calibration"
 html_math_renderer = "mathml"
-html_static_path = ["style"]
+# The figures of the notebooks need it: no network when the book is read.
+html_static_path = ["style", str(Path(plotly.__file__).parent / "package_data" / "plotly.min.js")]
 html_css_files = ["book.css"]
 html_show_sphinx = False
 html_copy_source = False

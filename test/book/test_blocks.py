@@ -8,6 +8,9 @@ import pytest
 
 from .pages import ROOT, Block, commands, fenced, run
 
+# Under a load of eight the longest page took six minutes.
+pytestmark = pytest.mark.timeout(1800)
+
 TUTORIALS = sorted((ROOT / "doc" / "tutorials").glob("*.md"))
 LIVE = "live"
 SERVES = "sdimu workbench"
