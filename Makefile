@@ -8,6 +8,7 @@ SETUPS := $(wildcard src/*/setup.py)
 RUN    := $(VENV)/.run
 STAMP  := $(VENV)/.installed
 TOOLS  := campaigns test build
+BOOK   := $(VENV)/.book
 OUT    ?= out/demo
 PACKAGES := rate_table_sim sdimu_calibration sdimu_sim
 NUMBER   := $(words $(PACKAGES))
@@ -28,6 +29,10 @@ $(RUN): requirements/run.lock $(SETUPS)
 
 $(STAMP): $(RUN) $(TOOLS:%=requirements/%.lock)
 	$(PIP) --require-hashes $(TOOLS:%=-r requirements/%.lock)
+	touch $@
+
+$(BOOK): $(STAMP) requirements/docs.lock
+	$(PIP) --require-hashes -r requirements/docs.lock
 	touch $@
 
 # A whole simulated test over DDS, from the table to report.html.
@@ -71,9 +76,10 @@ study: setup
 mutations: setup
 	$(BIN)/python -m pytest test/mutation -m slow -s --timeout 0
 
-# The pages that are made from code and runs. The campaigns take hours; they go on where they stood.
-docs: setup
+# The book, out/docs/index.html: it is read without a network. Every warning is an error.
+docs: $(BOOK)
 	$(BIN)/sdimu effects --markdown > doc/effects.md
+	$(BIN)/python -m sphinx -W --keep-going -q -b html doc out/docs
 
 # Minutes: every kind of fault in the data at five sizes.
 faults: setup

@@ -27,6 +27,7 @@ SETS = {
     "campaigns": ("many runs at once: monte-carlo, hidden-campaign, study", ["sdimu-sim[campaigns]"]),
     "test": ("style, types, tests", ["sdimu-calibration[test]"]),
     "build": ("colcon, as ROS users build", ["sdimu-calibration[build]"]),
+    "docs": ("the book: make docs", ["sdimu-calibration[docs]"]),
 }
 PYTHONS = ("3.11", "3.12", "3.13", "3.14")
 _ABSENT = re.compile(r"No matching distribution found for ([\w.-]+==\S+)")

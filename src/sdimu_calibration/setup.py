@@ -47,6 +47,17 @@ EXTRAS = {
         "types-PyYAML",
     ],
     "build": ["colcon-common-extensions"],
+    "docs": [
+        "furo",
+        "math-core",
+        "myst-nb",
+        "myst-parser",
+        "numpydoc",
+        "pandas",
+        "sphinx",
+        "sphinxcontrib-bibtex",
+        "ziamath",
+    ],
 }
 
 

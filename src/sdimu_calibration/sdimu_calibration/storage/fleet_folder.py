@@ -102,6 +102,8 @@ def gather(folders: Sequence[Path], one_model: bool = True) -> Gathered:
             apart.append(f"{entry.name}: {reason}")
         else:
             entries.append(entry)
+    if not entries:
+        raise DataError(f"{folders[0]}: no result is left to compare; {apart[0]}")
     return Gathered(tuple(entries), tuple(apart), _given(usable, main))
 
 

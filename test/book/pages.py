@@ -1,0 +1,60 @@
+"""Code blocks of the pages, as a reader would run them: in the order of the page, in one empty folder."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+DEADLINE_S = 580.0
+_FENCED = re.compile(r"^```(bash|python)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+_COMMAND = re.compile(r"^    (sdimu .*?)(?:\s+# .*)?$|^\|[^|]*\| `(sdimu [^`]*)` \|", re.MULTILINE)
+
+
+@dataclass(frozen=True)
+class Block:
+    """One block: its language, and its text."""
+
+    language: str
+    text: str
+
+
+def fenced(page: Path) -> list[Block]:
+    """Blocks between fences that say their language; output has none, or ``text``."""
+    return [Block(*found.groups()) for found in _FENCED.finditer(page.read_text(encoding="utf-8"))]
+
+
+def commands(page: Path) -> list[str]:
+    """Commands of a page in its order: lines of indented blocks, without their remarks, and cells of tables."""
+    return [line or cell for line, cell in _COMMAND.findall(page.read_text(encoding="utf-8"))]
+
+
+def run(blocks: Iterable[Block], folder: Path) -> str:
+    """Run blocks one after the other; return what they printed.
+
+    Raises
+    ------
+    AssertionError
+        When a block ends with an error: the block, and what it said.
+    """
+    tools = folder / "tools"
+    tools.mkdir()
+    program = tools / "sdimu"
+    program.write_text(f'#!/bin/sh\nexec "{sys.executable}" -m sdimu_calibration.cli.main "$@"\n', encoding="utf-8")
+    program.chmod(0o755)
+    environment = os.environ | {"PATH": f"{tools}:{os.environ['PATH']}", "COLUMNS": "80"}
+    said = []
+    for block in blocks:
+        shell = ["bash", "-eu", "-c"] if block.language == "bash" else [sys.executable, "-c"]
+        done = subprocess.run(
+            [*shell, block.text], cwd=folder, env=environment, capture_output=True, text=True, timeout=DEADLINE_S,
+            check=False,
+        )  # fmt: skip
+        assert done.returncode == 0, f"{block.text}\n{done.stdout}{done.stderr}"
+        said.append(done.stdout)
+    return "\n".join(said)
