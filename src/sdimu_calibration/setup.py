@@ -110,6 +110,7 @@ setup(
             "compensate_node = sdimu_calibration.nodes.compensate_node:main",
             "recorder_node = sdimu_calibration.nodes.recorder_node:main",
             "replay_node = sdimu_calibration.nodes.replay_node:main",
+            "table_goals = sdimu_calibration.nodes.table_goals_node:main",
         ],
     },
 )

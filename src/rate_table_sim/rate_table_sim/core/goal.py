@@ -23,8 +23,8 @@ from sdimu_calibration.core.table.description import AxisLimits
 
 Floats = NDArray[np.float64]
 
-LONGEST_S = 7.0 * 86400.0
-"""A goal beyond a week (s) is one with a wrong unit; its samples would not fit into the memory."""
+LONGEST_S = 6.0 * 3600.0
+"""Longest goal (s): its samples are made at once, and six hours of them are 250 MB at 100 Hz."""
 _ROUNDING = 1e-6
 """Excess over a limit (1) that is rounding of the message or of the interpolation."""
 _SAME_RAD = math.radians(0.01)

@@ -261,7 +261,7 @@ def _still_to_come(goal: Goal, now_s: float) -> tuple[GoalPoint, ...]:
     late = now_s - goal.start_s
     points = tuple(replace(p, time_s=p.time_s - late) for p in goal.points if p.time_s > late + _ROUNDING)
     if not points:
-        raise DataError(f"the trajectory ends {late - goal.points[-1].time_s:.3f} s in the past")
+        raise DataError(f"the trajectory ends {late - goal.points[-1].time_s:.4g} s in the past")
     return points
 
 

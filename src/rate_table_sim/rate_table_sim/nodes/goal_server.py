@@ -100,5 +100,9 @@ class GoalServer:
         status.values = [KeyValue(key="state", value=state), KeyValue(key="goal", value=goal)]
         stamp = self._start_ns + round(self._programme.now_s * NS)
         publish(self._status, DiagnosticArray(header=header(stamp), status=[status]))
-        log = self._node.get_logger()
-        (log.warning if state in _LEVELS else log.info)(f"goal {goal or 'without a name'} {state}: {text}")
+        line = f"goal {goal or 'without a name'} {state}: {text}"
+        # The severity belongs to the place of the call.
+        if level == DiagnosticStatus.OK:
+            self._node.get_logger().info(line)
+        else:
+            self._node.get_logger().warning(line)

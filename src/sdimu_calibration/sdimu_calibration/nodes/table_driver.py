@@ -96,7 +96,7 @@ class TableDriver:
         self._commanded: Floats | None = None
         self._move: Move | None = None
         self._future: Future | None = None
-        self._why, self._number = "", 0
+        self._why, self._number, self._brake = "", 0, ""
         self._progress: MoveProgress | None = None
         self._waiting_since = 0.0
         self._stop, self._said_ns, self._status = 0, 0, None
@@ -180,7 +180,8 @@ class TableDriver:
     def stop(self, reason: str) -> None:
         """Bring the table to rest within its limits and end the move under way."""
         if self._progress is not None and self._seen is not None:
-            publish(self._trajectory, braking(self._table, self._seen))
+            self._brake = f"{self._progress.goal}/brake"
+            publish(self._trajectory, braking(self._table, self._seen, self._brake))
         if self._future is not None:
             self._end(reason)
 
@@ -231,6 +232,10 @@ class TableDriver:
     def _take_goal_status(self, message: DiagnosticArray) -> None:
         for status in message.status:
             values = {entry.key: entry.value for entry in status.values}
+            if self._brake and (values.get("goal"), values.get("state")) == (self._brake, "refused"):
+                # A table that speaks, as the simulated one does, also knows the trajectory without points.
+                self._brake = ""
+                publish(self._trajectory, JointTrajectory())
             if self._progress is not None and values.get("goal") == self._progress.goal:
                 reason = self._progress.told(values.get("state", ""), status.message)
                 if reason:

@@ -83,9 +83,11 @@ class MoveProgress:
         self._start, self._target = seen.angles, np.asarray(move.target)
         self._tolerance_rad, self._rest_rad_s = tolerance_rad, rest_rad_s
         self._begun, self._held = move.turn_s == 0.0, False
+        self._interval_ns = 0
 
     def take(self, seen: Seen) -> Outcome:
         """Take the next joint states; `reason` says why a move that is over has failed."""
+        self._interval_ns = max(self._interval_ns, seen.interval_ns)
         there = bool(np.abs(seen.angles - self._target).max() < self._tolerance_rad)
         at_rest = bool(np.abs(seen.rates).max() < self._rest_rad_s)
         self._begun = self._begun or not at_rest or bool(np.abs(seen.angles - self._start).max() > self._tolerance_rad)
@@ -94,9 +96,9 @@ class MoveProgress:
             if not (there and at_rest and self._begun):
                 return self._late(seen, at_rest)
             self.arrived_ns = seen.ns
-        # The move is as long as it was planned, and the dwell as long as it was asked for but for one message.
+        # As long as it was planned; and the dwell as asked for, but for the messages between which the table arrived.
         planned = self.start_ns + round(self.move.duration_s * NS)
-        dwelt = self.arrived_ns + round(self.move.step.dwell_s * NS) - 2 * seen.interval_ns
+        dwelt = self.arrived_ns + round(self.move.step.dwell_s * NS) - 2 * self._interval_ns
         return Outcome.OVER if seen.ns >= max(planned, dwelt) else Outcome.DWELLING
 
     def told(self, state: str, text: str) -> str:

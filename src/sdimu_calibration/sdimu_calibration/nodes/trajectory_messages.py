@@ -23,17 +23,18 @@ def trajectory(table: RateTable, move: Move, goal: str) -> JointTrajectory:
     return JointTrajectory(header=header(0, goal), joint_names=list(table.joints), points=points)
 
 
-def braking(table: RateTable, seen: Seen) -> JointTrajectory:
+def braking(table: RateTable, seen: Seen, goal: str) -> JointTrajectory:
     """Return the trajectory that brings a table to rest from where it is, each joint within its limit.
 
-    A point is used, and no empty trajectory: ROS 2's controller refuses that.
+    A point is used, and no empty trajectory: ROS 2's controller refuses that. The table is further on than its joint
+    states; a quarter of the limit leaves room for that.
     """
     most = np.array([limits.acceleration_rad_s2 for limits in table.limits])
-    time_s = max(float(np.max(np.abs(seen.rates) / most)), 0.1)
+    time_s = max(4.0 * float(np.max(np.abs(seen.rates) / most)), 1.0)
     # At constant deceleration over the same time for all joints.
     angles = seen.angles + 0.5 * seen.rates * time_s
     points = [_point(time_s, angles.tolist(), [0.0] * len(table.joints))]
-    return JointTrajectory(header=header(0), joint_names=list(table.joints), points=points)
+    return JointTrajectory(header=header(0, goal), joint_names=list(table.joints), points=points)
 
 
 def duration_ns(point: JointTrajectoryPoint) -> int:
