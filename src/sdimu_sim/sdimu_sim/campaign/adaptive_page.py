@@ -78,8 +78,10 @@ def _holds(row: Row) -> bool:
 
 
 def _hidden(rows: Sequence[Row]) -> list[str]:
-    lines = ["| hidden effect, 10 to 30 sigma on kim18 | ends with one effect | of these the right one | in its class |",
-             "|---|---|---|---|"]  # fmt: skip
+    lines = [
+        "| hidden effect, 10 to 30 sigma on kim18 | ends with one effect | of these the right one | in its class |",
+        "|---|---|---|---|",
+    ]
     tests = {"adaptive": rows} | {plan: [row["fixed"][plan] for row in rows] for plan in FIXED}
     for name, scored in tests.items():
         one = [row for row in scored if row["one"]]

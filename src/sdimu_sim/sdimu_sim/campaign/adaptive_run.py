@@ -13,8 +13,10 @@ from sdimu_calibration.core.diagnosis.diagnose import Diagnosis, climb
 from sdimu_calibration.core.effects.selection import resolve
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.estimation.solve import solve
+from sdimu_calibration.core.joint.scope import is_shared
 from sdimu_calibration.core.specification import ImuSpecification, Model, Site
 from sdimu_calibration.storage.config import load_plan
+from sdimu_calibration.storage.table_file import load_rate_table
 from sdimu_sim.campaign.adaptive_test import adaptive_test
 from sdimu_sim.campaign.hidden_draw import Truth, drawn_effect, hideable_names
 from sdimu_sim.campaign.hidden_score import baseline_z, same_effect
@@ -75,7 +77,9 @@ class AdaptiveRun:
             effects=() if truth is None else (truth.text,), temperature=WARM_UP,
         )  # fmt: skip
         sensor = imu_truth(scenario)
-        done = adaptive_test(scenario, sensor, self.model, self.goals, Menu(), LOOK_S[self.kind])
+        done = adaptive_test(
+            scenario, sensor, load_rate_table("ideal"), self.model, self.goals, Menu(), LOOK_S[self.kind]
+        )
         found = done.last.found
         row: dict[str, Any] = {
             "minutes": done.plan.duration_s / 60.0, "stops": len(done.plan.dwell_s),
@@ -102,13 +106,7 @@ def hidden(sizes: Sizes, seed: int) -> Truth:
 
 
 def _of_one_recording() -> frozenset[str]:
-    names = hideable_names()
-    return frozenset(n for n in names if _of_one_time(n))
-
-
-def _of_one_time(name: str) -> bool:
-    effect = resolve(name)
-    return effect.scope == "recording" or bool({"t0", "span", "turn"} & effect.options.keys())
+    return frozenset(name for name in hideable_names() if not is_shared(resolve(name)))
 
 
 def _scored(found: Diagnosis, truth: Truth | None) -> dict[str, Any]:

@@ -8,14 +8,15 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from rate_table_sim.core import phase_changes, table_motion
-from rate_table_sim.core.gimbal import assign_turns
-from sdimu_calibration.core.adaptive import Choice, Goals, Knowledge, Menu, choose, knowledge
+from sdimu_calibration.core.adaptive import Choice, End, Goals, Knowledge, Menu, choose, knowledge
+from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis, climb
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.estimation.solve import solve
-from sdimu_calibration.core.plan import Plan, Turn
+from sdimu_calibration.core.plan import Plan
 from sdimu_calibration.core.recording import DataError, PhaseLog, Recording
 from sdimu_calibration.core.specification import Model
+from sdimu_calibration.core.table import RateTable, Step, plan_move
 from sdimu_sim.core.generator import ImuGenerator, ImuSamples
 from sdimu_sim.core.platform import PlatformMotion
 from sdimu_sim.core.scenario import Scenario, temperature_log
@@ -53,11 +54,13 @@ class AdaptiveTest:
     choices : tuple of (float, Choice)
         Minutes at which each was made.
     looks : tuple of Look
+    end : End
     """
 
     plan: Plan
     choices: tuple[tuple[float, Choice], ...]
     looks: tuple[Look, ...]
+    end: End
 
     @property
     def last(self) -> Look:
@@ -71,7 +74,9 @@ class _Bench:
 
     scenario: Scenario
     sensor: ImuTruth
+    table: RateTable
     plan: Plan
+    angles: Floats = field(default_factory=lambda: np.zeros(3))
     generator: ImuGenerator = field(init=False)
     parts: list[ImuSamples] = field(default_factory=list)
     moved: int = 0
@@ -92,23 +97,29 @@ class _Bench:
         log = temperature_log(self.scenario, float(motion.t[-1]))
         return Recording(self.scenario.start_ns, t, omega, force, PhaseLog(*phase_changes(motion)), log)
 
-    def possible(self, turn: Turn) -> bool:
-        """Whether a gimbal of the table can make a turn next."""
-        axes = self.scenario.table.axes
-        if axes is None:
-            return True
+    def possible(self, step: Step) -> bool:
+        """Whether the table can make a step next."""
         try:
-            assign_turns(_longer(self.plan, turn, 1.0), axes)
+            plan_move(self.table, self.angles, step)
         except DataError:
             return False
         return True
+
+    def do(self, step: Step) -> None:
+        """Make a step the next one of the plan."""
+        self.angles = np.asarray(plan_move(self.table, self.angles, step).target)
+        dwell, turn, plan = step.dwell_s, step.turn, self.plan
+        if turn is None:
+            self.plan = replace(plan, dwell_s=(*plan.dwell_s[:-1], plan.dwell_s[-1] + dwell))
+        else:
+            self.plan = replace(plan, dwell_s=(*plan.dwell_s, dwell), turns=(*plan.turns, turn))
 
 
 _ARRAYS = ("t", "omega_ib_b", "f_ib_b")
 
 
 def adaptive_test(
-    scenario: Scenario, sensor: ImuTruth, model: Model, goals: Goals, menu: Menu, look_s: float,
+    scenario: Scenario, sensor: ImuTruth, table: RateTable, model: Model, goals: Goals, menu: Menu, look_s: float,
     told: Callable[[str], None] = lambda _: None,
 ) -> AdaptiveTest:  # fmt: skip
     """Simulate a test that chooses its turns.
@@ -118,6 +129,8 @@ def adaptive_test(
     scenario : Scenario
         Its plan is not read.
     sensor : ImuTruth
+    table : RateTable
+        Of the scenario, as its driver sees it.
     model : Model
         What is estimated.
     goals : Goals
@@ -132,7 +145,7 @@ def adaptive_test(
     DataError
         When the scenario, the model or the goals cannot be used.
     """
-    bench = _Bench(scenario, sensor, Plan("adaptive", (FIRST_STOP_S,), (), menu.acceleration_rad_s2))
+    bench = _Bench(scenario, sensor, table, Plan("adaptive", (FIRST_STOP_S,), (), menu.acceleration_rad_s2))
     looks: list[Look] = []
     choices: list[tuple[float, Choice]] = []
     while True:
@@ -143,17 +156,12 @@ def adaptive_test(
         while bench.plan.duration_s < due:
             done = bench.plan.duration_s / 60.0
             choice = choose(looks[-1].known, goals, menu, goals.minutes - done, bench.possible, here)
-            if choice is None:
+            if isinstance(choice, End):
+                end = choice
                 break
             choices.append((done, choice))
             told(f"{done:5.1f} min  {choice.text}")
-            bench.plan = _longer(bench.plan, choice.turn, choice.dwell_s)
+            bench.do(choice.step)
             here = choice.after
         if bench.plan.duration_s / 60.0 == minutes:
-            return AdaptiveTest(bench.plan, tuple(choices), tuple(looks))
-
-
-def _longer(plan: Plan, turn: Turn | None, dwell_s: float) -> Plan:
-    if turn is None:
-        return replace(plan, dwell_s=(*plan.dwell_s[:-1], plan.dwell_s[-1] + dwell_s))
-    return replace(plan, dwell_s=(*plan.dwell_s, dwell_s), turns=(*plan.turns, turn))
+            return AdaptiveTest(bench.plan, tuple(choices), tuple(looks), end)

@@ -15,9 +15,10 @@ from sdimu_calibration.core.adaptive.worth import Worth, worth
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.plan import Turn
 from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.table import Step
 
 _DECISION_S = 5.0
-"""Time that a stop costs beside its length (s): the fit and the choice at its end; without it stops would be shortest."""
+"""Time that a stop costs beside its length (s): fit and choice at its end; without it stops would be shortest."""
 _NOTHING_NAT = 0.02
 """Gain of the best move (nat a minute) below which none is worth its time: an hour would bring one nat."""
 
@@ -53,7 +54,7 @@ class Menu:
     longest_s: float = 60.0
 
     def turns(self, apart: bool, oblique: bool) -> tuple[Turn, ...]:
-        """Turns to choose from.
+        """List the turns to choose from.
 
         Parameters
         ----------
@@ -61,6 +62,10 @@ class Menu:
             Something is to be told apart.
         oblique : bool
             The test stands between the axes, and may have to go back.
+
+        Returns
+        -------
+        tuple of Turn
         """
         angles = (*self.angles_rad, *self.oblique_rad) if apart or oblique else self.angles_rad
         rates = (self.rate_rad_s, self.slow_rad_s) if apart else (self.rate_rad_s,)
@@ -73,10 +78,8 @@ class Choice:
 
     Attributes
     ----------
-    turn : Turn or None
-        None stays.
-    dwell_s : float
-        Stop after it (s).
+    step : Step
+        Turn and stop, for the table.
     minutes : float
         Of turn and stop.
     gain : float
@@ -89,8 +92,7 @@ class Choice:
         Nothing will be lacking after it.
     """
 
-    turn: Turn | None
-    dwell_s: float
+    step: Step
     minutes: float
     gain: float
     reason: str
@@ -99,8 +101,24 @@ class Choice:
 
     @property
     def text(self) -> str:
-        """Move and reason, such as ``X +90 at 10 deg/s, stop 30 s: tells A from B, 0.7 min``."""
-        return f"{_words(self.turn)}stop {self.dwell_s:.0f} s: {self.reason}, {self.minutes:.1f} min"
+        """Move and reason, such as ``X +90 deg at 10 deg/s, then dwell 30 s: tells A from B, 0.7 min``."""
+        return f"{self.step.words}: {self.reason}, {self.minutes:.1f} min"
+
+
+@dataclass(frozen=True)
+class End:
+    """The end of a test, and why.
+
+    Attributes
+    ----------
+    reason : str
+        In words.
+    reached : bool
+        All limits hold, and no class is open.
+    """
+
+    reason: str
+    reached: bool
 
 
 @dataclass(frozen=True)
@@ -115,8 +133,8 @@ class _Option:
 
 def choose(
     known: Knowledge, goals: Goals, menu: Menu, minutes_left: float,
-    possible: Callable[[Turn], bool] = lambda _: True, at: SoFar | None = None,
-) -> Choice | None:  # fmt: skip
+    possible: Callable[[Step], bool] = lambda _: True, at: SoFar | None = None,
+) -> Choice | End:  # fmt: skip
     """Choose the next move.
 
     Parameters
@@ -128,14 +146,14 @@ def choose(
     minutes_left : float
         No move is longer.
     possible : callable
-        ``Turn -> bool``: whether the table can make it from where it stands.
+        ``Step -> bool``: whether the table can make it from where it stands.
     at : SoFar, optional
         Where moves since then have brought the test; by default nothing has moved.
 
     Returns
     -------
-    Choice or None
-        None when nothing is lacking, or no move brings anything in the time that is left.
+    Choice or End
+        The end when nothing is lacking, or no move brings anything in the time that is left.
 
     Raises
     ------
@@ -146,10 +164,10 @@ def choose(
     now = worth(known, goals, here.covariance[None], known.at.covariance)
     needed = np.zeros(0) if known.open is None else known.open.needed
     if now.reached(needed)[0]:
-        return None
+        return End("all limits hold and nothing is to be told apart", reached=True)
     options = []
     turns = menu.turns(known.open is not None, not here.square)
-    for turn in (None, *(t for t in turns if possible(t))):
+    for turn in (None, *(t for t in turns if possible(Step(t, menu.shortest_s, menu.acceleration_rad_s2)))):
         longest = min(menu.longest_s, 60.0 * minutes_left - _length(turn))
         if longest < menu.shortest_s:
             continue
@@ -160,11 +178,11 @@ def choose(
         options.append(_best(turn, told, worth(known, goals, told.covariance, known.at.covariance), now, menu, needed))
     found = [one for one in options if one is not None]
     if not found:
-        return None
+        return End(f"the time is up; {_lacking(known, now)}", reached=False)
     # What ends the test soonest comes first, then what brings most a minute.
     best = min(found, key=lambda o: (not o.done, o.ahead.elapsed_s[o.row] if o.done else -o.rate))
     if not best.done and best.rate < _NOTHING_NAT:
-        return None
+        return End(f"no move of this table brings more; {_lacking(known, now)}", reached=False)
     return _choice(known, best, now, here, menu)
 
 
@@ -187,9 +205,20 @@ def _choice(known: Knowledge, best: _Option, now: Worth, here: SoFar, menu: Menu
     dwell = float(round(best.ahead.dwell_s[best.row]))
     reached = ahead(here, best.turn, dwell, menu.acceleration_rad_s2).end
     return Choice(
-        best.turn, dwell, (dwell + _length(best.turn)) / 60.0, float(now.lacking[0] - best.worth.lacking[best.row]),
-        _reason(known, best, now), reached, best.done,
+        Step(best.turn, dwell, menu.acceleration_rad_s2), (dwell + _length(best.turn)) / 60.0,
+        float(now.lacking[0] - best.worth.lacking[best.row]), _reason(known, best, now), reached, best.done,
     )  # fmt: skip
+
+
+def _lacking(known: Knowledge, now: Worth) -> str:
+    """Say what a test that ends has not reached."""
+    told = []
+    worst = int(np.argmax(now.ratio[0]))
+    if now.ratio[0, worst] > 1.0:
+        told.append(f"{known.limited[worst]} is at {_times(now.ratio[0, worst])} of its limit")
+    if known.open is not None:
+        told.append(f"{known.open.found} is not told from {', '.join(known.open.alike)}")
+    return " and ".join(told)
 
 
 def _reason(known: Knowledge, best: _Option, now: Worth) -> str:
@@ -204,18 +233,10 @@ def _reason(known: Knowledge, best: _Option, now: Worth) -> str:
             told.append(f"tells {known.open.found} from {known.open.alike[nearest]} ({lacked[nearest]:+.1f} nat)")
     if nat.max() > 0.0:
         i = int(np.argmax(nat))
-        told.append(
-            f"brings {known.limited[i]} from {_times(now.ratio[0, i])} to {_times(best.worth.ratio[best.row, i])} of its limit"
-        )
+        from_to = f"from {_times(now.ratio[0, i])} to {_times(best.worth.ratio[best.row, i])} of its limit"
+        told.append(f"brings {known.limited[i]} {from_to}")
     return " and ".join(told) or "brings nothing"
 
 
 def _times(ratio: float) -> str:
     return f"{ratio:.0f} times" if ratio > 9.5 else f"{ratio:.2g}"
-
-
-def _words(turn: Turn | None) -> str:
-    if turn is None:
-        return "stay, "
-    degrees, rate = math.degrees(turn.angle_rad), math.degrees(turn.rate_rad_s)
-    return f"{turn.axis} {degrees:+.0f} at {rate:g} deg/s, "

@@ -53,7 +53,8 @@ class Goals:
         limit = np.array([np.nan if n in pinned else self.limits.get(_effect(n), np.nan) for n in names])
         limited = np.isfinite(limit)
         if not limited.any():
-            raise DataError(f"goals '{self.name}': no limit is of a coefficient of the model ({', '.join(self.limits)})")
+            there = ", ".join(self.limits)
+            raise DataError(f"goals '{self.name}': the model has no coefficient with a limit (limits: {there})")
         return limited, limit[limited]
 
 

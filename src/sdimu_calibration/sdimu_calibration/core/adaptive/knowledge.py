@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -14,6 +15,8 @@ from sdimu_calibration.core.diagnosis.found import looked_at
 from sdimu_calibration.core.diagnosis.scan import INDISTINGUISHABLE
 from sdimu_calibration.core.diagnosis.search import Problem, look_alikes
 from sdimu_calibration.core.effects import body_frame
+from sdimu_calibration.core.effects.effect import Effect
+from sdimu_calibration.core.estimation.fit import Fit
 from sdimu_calibration.core.estimation.navigation_fit import NavigationFit
 from sdimu_calibration.core.evidence.candidate import Candidate
 from sdimu_calibration.core.recording import DataError
@@ -100,26 +103,44 @@ def knowledge(found: Diagnosis, goals: Goals) -> Knowledge:
     DataError
         When the fit does not navigate.
     """
-    fit = found.extended
+    alike, sizes, needed, place = _class(found)
+    named = tuple(c.label for c in found.chosen)
+    known = fitted(found.extended, goals, tuple(c.effect for c in alike), named)
+    if not alike:
+        return replace(known, verdict=found.verdict)
+    count = len(known.at.names) - len(alike)
+    columns = (count - len(named) + place, *range(count, count + len(alike)))
+    one = OpenClass(named[place], tuple(c.label for c in alike), columns, sizes, needed)
+    return replace(known, open=one, verdict=found.verdict)
+
+
+def fitted(fit: Fit, goals: Goals, alike: Sequence[Effect] = (), named: tuple[str, ...] = ()) -> Knowledge:
+    """Take from a fit alone what the choice of the next move needs: nothing stands out of its noise.
+
+    Parameters
+    ----------
+    fit : Fit
+    goals : Goals
+    alike : sequence of Effect
+        Candidates that are estimated along in `Knowledge.at`.
+    named : tuple of str
+        Labels of what the model of the fit has beyond the one that was given.
+
+    Raises
+    ------
+    DataError
+        When the fit does not navigate.
+    """
     if not isinstance(fit, NavigationFit):
         raise DataError(f"a {fit.estimator} fit says nothing of the next turn of a table: choose another --estimator")
-    alike, sizes, needed, place = _class(found)
-    at = so_far(fit, [c.effect for c in alike], _ROOM)
-    count = len(at.names) - len(alike)
-    open_class = None
-    if alike:
-        chosen = count - len(found.chosen) + place
-        columns = (chosen, *range(count, count + len(alike)))
-        open_class = OpenClass(found.chosen[place].label, tuple(c.label for c in alike), columns, sizes, needed)
+    at = so_far(fit, alike, _ROOM)
     limited, limit = goals.of(fit.names, fit.model.body_frame)
-    reached = np.sqrt(np.diag(fit.with_doubt(None).covariance)[limited])
-    ratio = reached / limit
+    # What a class leaves in doubt is no noise: it falls when the class is told apart, and not by the square root of time.
+    certain = fit.with_doubt(None) if alike else fit
+    ratio = np.sqrt(np.diag(certain.covariance)[limited]) / limit
     white = ratios(at, goals, at.covariance)
     names = tuple(name for name, has in zip(fit.names, limited, strict=True) if has)
-    return Knowledge(
-        at, names, ratio, np.maximum(ratio / white, 1.0), open_class, tuple(c.label for c in found.chosen),
-        found.verdict,
-    )  # fmt: skip
+    return Knowledge(at, names, ratio, np.maximum(ratio / white, 1.0), None, named, "consistent")
 
 
 def ratios(at: SoFar, goals: Goals, covariance: Floats) -> Floats:
@@ -157,7 +178,7 @@ def _class(found: Diagnosis) -> tuple[tuple[Candidate, ...], Floats, Floats, int
             continue
         others = [c for c in chosen if c != column]
         scanned = problem.scan(others, scale)
-        scores = problem.scores(scanned, scale, others)
+        scores = problem.scores(scanned, scale)
         needed = INDISTINGUISHABLE + CLEAR - (scores[column] - scores[near])
         return tuple(problem.candidate(i) for i in near), scanned.estimate[[column, *near]], needed, place
     return (), np.empty(0), np.empty(0), 0

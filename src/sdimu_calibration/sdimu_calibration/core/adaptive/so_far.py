@@ -157,15 +157,20 @@ def ahead(at: SoFar, turn: Turn | None, dwell_s: float, acceleration_rad_s2: flo
     plan = Plan("move", rests, turns, acceleration_rad_s2 if turns else _NEVER_RAD_S2)
     prepared = reduce(nominal_recording(plan, setup.site, C_nt=at.state.C_nb), setup, screened=False)
     epochs = prepared.epochs
-    C_nb = at.state.C_nb.copy()
-    cycles = replace(prepared.cycles, t=prepared.cycles.t + at.seen.t[-1])
-    seen = motion(
-        cycles, prepared.rest, sensors, np.zeros(len(sensors.prior)), C_nb, setup.site.latitude_rad, setup.gravity,
-        at.temperature, predicted=True, before=at.seen, magnetic_n=setup.magnetic_n,
-    )  # fmt: skip
     new = epochs.start > _BEFORE_S - 1e-6
-    data = pass_input(prepared, sensors.regressors(seen), sensors.channel, sensors.parameter)
+    skipped = int(epochs.first[new][0])
+    cycles = prepared.cycles[skipped:]
+    cycles = replace(cycles, t=cycles.t - _BEFORE_S + at.seen.t[-1])
+    C_nb = at.state.C_nb.copy()
+    seen = motion(
+        cycles, prepared.rest[skipped:], sensors, np.zeros(len(sensors.prior)), C_nb, setup.site.latitude_rad,
+        setup.gravity, at.temperature, predicted=True, before=at.seen, magnetic_n=setup.magnetic_n,
+    )  # fmt: skip
+    data = pass_input(
+        replace(prepared, cycles=cycles), sensors.regressors(seen), sensors.channel, sensors.parameter
+    )
     data = data._replace(**{name: getattr(data, name)[new] for name in _BY_EPOCH})
+    data = data._replace(first=data.first - skipped, last=data.last - skipped)
     state = PassState(*(v.copy() for v in at.state))
     output = new_output(int(new.sum()), len(sensors.prior), False, 1)
     run_pass(data, pass_settings(setup, closed_loop=False), state, output)

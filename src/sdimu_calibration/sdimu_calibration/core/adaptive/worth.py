@@ -5,8 +5,8 @@ the limit. A class lacks what the difference of log Bayes factors is short of; a
 
     min_i (theta_i^2 (J_ii - J_ij^2 / J_jj)) / 2,
 
-the part of the effect's information that the other cannot replace, J being that of the two given all else (T-optimality:
-A. Atkinson & V. Fedorov, *Biometrika* 62 (1975)).
+the part of the effect's information that the other cannot replace, J being that of the two given all else
+(T-optimality: A. Atkinson & V. Fedorov, *Biometrika* 62 (1975)).
 """
 
 from __future__ import annotations
