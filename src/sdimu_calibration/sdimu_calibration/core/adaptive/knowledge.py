@@ -64,9 +64,9 @@ class Knowledge:
     limited : tuple of str, length c
         Coefficients with a limit.
     ratio : ndarray, shape (c,)
-        Sigma of every coefficient with a limit over that limit, in the noise of the fit.
+        Sigma of every coefficient with a limit over that limit, in the noise of the fit (1).
     noise : ndarray, shape (c,)
-        Sigma in the noise of the fit over that in white noise.
+        Sigma in the noise of the fit over that in white noise (1).
     open : OpenClass or None
         The class to be told apart; None where none is open.
     named : tuple of str
@@ -135,7 +135,7 @@ def fitted(fit: Fit, goals: Goals, alike: Sequence[Effect] = (), named: tuple[st
         raise DataError(f"a {fit.estimator} fit says nothing of the next turn of a table: choose another --estimator")
     at = so_far(fit, alike, _ROOM)
     limited, limit = goals.of(fit.names, fit.model.body_frame)
-    # What a class leaves in doubt is no noise: it falls when the class is told apart, and not by the square root of time.
+    # What a class leaves in doubt is no noise: it falls when the class is told apart, and not with time.
     certain = fit.with_doubt(None) if alike else fit
     ratio = np.sqrt(np.diag(certain.covariance)[limited]) / limit
     white = ratios(at, goals, at.covariance)

@@ -51,7 +51,7 @@ class SoFar:
     temperature : TemperatureLog or None
         It stays as it was last.
     first : ndarray, shape (3, 3)
-        Attitude at the first stop, b to n.
+        Attitude at the first stop, b to n (dimensionless).
     """
 
     setup: TestSetup

@@ -17,7 +17,7 @@ import numpy as np
 
 from sdimu_calibration.core.adaptive.goals import Goals
 from sdimu_calibration.core.adaptive.knowledge import Knowledge, OpenClass, ratios
-from sdimu_calibration.core.arrays import Floats
+from sdimu_calibration.core.arrays import Bools, Floats
 
 
 @dataclass(frozen=True)
@@ -38,8 +38,18 @@ class Worth:
     apart: Floats
     lacking: Floats
 
-    def reached(self, needed: Floats) -> Floats:
-        """Say which covariances leave nothing lacking, (k,) of bool; `needed` (a,) as of `OpenClass`."""
+    def reached(self, needed: Floats) -> Bools:
+        """Say which covariances leave nothing lacking.
+
+        Parameters
+        ----------
+        needed : ndarray, shape (a,)
+            Difference of log Bayes factors that is lacking, as of `OpenClass` (1).
+
+        Returns
+        -------
+        ndarray of bool, shape (k,)
+        """
         return np.asarray((self.ratio <= 1.0).all(axis=1) & (self.apart >= needed).all(axis=1))
 
 
