@@ -88,7 +88,7 @@ def draw(kind: str, seed: int, tables: Sequence[Sizes], hideable: frozenset[str]
     truths: list[Truth] = []
     while len(truths) < count:
         size = float(np.exp(rng.uniform(np.log(low), np.log(high))))
-        one = _outside(rng, found, size) if kind == "outside" else _effect(rng, found, size, hideable)
+        one = _outside(rng, found, size) if kind == "outside" else drawn_effect(rng, found, size, hideable)
         if all(_sensor(one.name) != _sensor(other.name) for other in truths):
             truths.append(one)
     return Draw(kind, plan, latitude, tuple(truths))
@@ -99,8 +99,19 @@ def hideable_names() -> frozenset[str]:
     return frozenset(drawn_names())
 
 
-def _effect(rng: np.random.Generator, found: Sizes, size: float, hideable: frozenset[str]) -> Truth:
-    """Draw family, then parameter, then variant, so that every family is as frequent as any other."""
+def drawn_effect(rng: np.random.Generator, found: Sizes, size: float, hideable: frozenset[str]) -> Truth:
+    """Draw family, then parameter, then variant, so that every family is as frequent as any other.
+
+    Parameters
+    ----------
+    rng : Generator
+    found : Sizes
+        Of the plan at the latitude.
+    size : float
+        In sigmas of a clean test.
+    hideable : frozenset of str
+        Parameters that may be drawn.
+    """
     pool: dict[str, dict[str, list[int]]] = {}
     for k, label in enumerate(found.label):
         name = label.partition("(")[0]

@@ -93,18 +93,21 @@ _LEAST_DWELL_S = 2.0
 """Shortest first dwell (s): contains a complete epoch of a second, wherever the epochs begin."""
 
 
-def nominal_recording(plan: Plan, site: Site, mount_rad: Floats | None = None, rate_hz: float = RATE_HZ) -> Recording:
+def nominal_recording(
+    plan: Plan, site: Site, mount_rad: Floats | None = None, rate_hz: float = RATE_HZ, C_nt: Floats | None = None
+) -> Recording:
     """Record a plan with a perfect IMU.
 
     Parameters
     ----------
     plan : Plan
-        At stop 0 the table's X, Y, Z point north, east, down.
     site : Site
     mount_rad : ndarray, shape (3,), optional
         Rotation vector of the IMU on the table (rad), ``C_tb = rotation_matrix(mount)``; zero by default.
     rate_hz : float
         Sample rate.
+    C_nt : ndarray, shape (3, 3), optional
+        Attitude of the table at stop 0, t to n; by default its X, Y, Z point north, east, down.
 
     Returns
     -------
@@ -130,7 +133,7 @@ def nominal_recording(plan: Plan, site: Site, mount_rad: Floats | None = None, r
     # that a start cuts: those see the table at rest before it, which the clipped angle gives too.
     span = np.maximum(np.searchsorted(begin, edges[1:] - 1e-9, side="left") - 1, 0)
     omega, force = np.empty((len(edges) - 1, 3)), np.empty((len(edges) - 1, 3))
-    C_nt = np.eye(3)
+    C_nt = np.eye(3) if C_nt is None else C_nt
     w_ie, down = earth.earth_rate(site.latitude_rad), np.array([0.0, 0.0, 1.0])
     for k, turn in enumerate(plan.turns):
         rows = np.flatnonzero(span == k)
@@ -140,7 +143,7 @@ def nominal_recording(plan: Plan, site: Site, mount_rad: Floats | None = None, r
         force[rows] = -gravity * _turned_back(C_nt.T @ down, axis, mean_cos, mean_sin)
         C_nt = C_nt @ rotation_matrix(turn.angle_rad * axis)
     if not plan.turns:
-        omega[:], force[:] = w_ie, -gravity * down
+        omega[:], force[:] = C_nt.T @ w_ie, -gravity * (C_nt.T @ down)
     return Recording(0, edges[1:], omega @ C_tb, force @ C_tb, phase=_phases(begin, end, total))
 
 

@@ -1,0 +1,62 @@
+"""What an adaptive test has to reach: the largest sigma of each effect's coefficients, in the time there is."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from sdimu_calibration.core.arrays import Bools, Floats
+from sdimu_calibration.core.effects import body_frame
+from sdimu_calibration.core.recording import DataError
+
+
+@dataclass(frozen=True)
+class Goals:
+    """Limits of a test.
+
+    Attributes
+    ----------
+    name : str
+    limits : mapping of str to float
+        Largest sigma allowed, by effect (SI).
+    minutes : float
+        Time there is (min).
+    """
+
+    name: str
+    limits: Mapping[str, float]
+    minutes: float
+
+    def of(self, names: Sequence[str], frame: str) -> tuple[Bools, Floats]:
+        """Find the coefficients that have a limit.
+
+        Parameters
+        ----------
+        names : sequence of str, length p
+        frame : str
+            Body frame of the report; what it makes zero needs no limit.
+
+        Returns
+        -------
+        limited : ndarray of bool, shape (p,)
+        limit : ndarray, shape (limited,)
+            SI.
+
+        Raises
+        ------
+        DataError
+            When no coefficient has a limit.
+        """
+        pinned = body_frame.pinned_in(names, frame)
+        limit = np.array([np.nan if n in pinned else self.limits.get(_effect(n), np.nan) for n in names])
+        limited = np.isfinite(limit)
+        if not limited.any():
+            there = ", ".join(self.limits)
+            raise DataError(f"goals '{self.name}': the model has no coefficient with a limit (limits: {there})")
+        return limited, limit[limited]
+
+
+def _effect(coefficient: str) -> str:
+    return coefficient.rpartition("_")[0]

@@ -1,0 +1,184 @@
+"""What a test knows at a stop: the fit, the sigmas that it reached, and the classes that its data leave open."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from sdimu_calibration.core.adaptive.goals import Goals
+from sdimu_calibration.core.adaptive.so_far import SoFar, so_far
+from sdimu_calibration.core.arrays import Floats
+from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
+from sdimu_calibration.core.diagnosis.found import looked_at
+from sdimu_calibration.core.diagnosis.scan import INDISTINGUISHABLE
+from sdimu_calibration.core.diagnosis.search import Problem, look_alikes
+from sdimu_calibration.core.effects import body_frame
+from sdimu_calibration.core.effects.effect import Effect
+from sdimu_calibration.core.estimation.fit import Fit
+from sdimu_calibration.core.estimation.navigation_fit import NavigationFit
+from sdimu_calibration.core.evidence.candidate import Candidate
+from sdimu_calibration.core.recording import DataError
+
+_MOST_ALIKE = 6
+"""Number of look-alikes of a class that are simulated: those nearest to the one that was found."""
+_ROOM = 30.0
+"""Prior of a candidate over the size that physics gives it (1): its size is the data's to say."""
+CLEAR = 2.0
+"""Difference of log Bayes factors (1) beyond the one that tells two candidates apart: what noise may take back."""
+
+
+@dataclass(frozen=True)
+class OpenClass:
+    """An effect that was found, and those that the data cannot tell from it.
+
+    Attributes
+    ----------
+    found : str
+        Label.
+    alike : tuple of str, length k
+        Labels; the nearest first.
+    columns : tuple of int, length k + 1
+        Parameters of `SoFar`: that of `found`, then those of `alike`.
+    size : ndarray, shape (k + 1,)
+        Estimate of each by itself (SI).
+    needed : ndarray, shape (k,)
+        Difference of log Bayes factors (1) that is lacking before `found` is told from each.
+    """
+
+    found: str
+    alike: tuple[str, ...]
+    columns: tuple[int, ...]
+    size: Floats
+    needed: Floats
+
+
+@dataclass(frozen=True)
+class Knowledge:
+    """What a test knows at a stop.
+
+    Attributes
+    ----------
+    at : SoFar
+    limited : tuple of str, length c
+        Coefficients with a limit.
+    ratio : ndarray, shape (c,)
+        Sigma of every coefficient with a limit over that limit, in the noise of the fit (1).
+    noise : ndarray, shape (c,)
+        Sigma in the noise of the fit over that in white noise (1).
+    open : OpenClass or None
+        The class to be told apart; None where none is open.
+    named : tuple of str
+        Labels of everything that was found.
+    verdict : str
+        Of the diagnosis.
+    """
+
+    at: SoFar
+    limited: tuple[str, ...]
+    ratio: Floats
+    noise: Floats
+    open: OpenClass | None
+    named: tuple[str, ...]
+    verdict: str
+
+    @property
+    def holds(self) -> bool:
+        """Whether all limits hold."""
+        return bool((self.ratio <= 1.0).all())
+
+
+def knowledge(found: Diagnosis, goals: Goals) -> Knowledge:
+    """Take from a diagnosis what the choice of the next move needs.
+
+    Parameters
+    ----------
+    found : Diagnosis
+        Of what was recorded so far.
+    goals : Goals
+
+    Raises
+    ------
+    DataError
+        When the fit does not navigate.
+    """
+    alike, sizes, needed, place = _class(found)
+    named = tuple(c.label for c in found.chosen)
+    known = fitted(found.extended, goals, tuple(c.effect for c in alike), named)
+    if not alike:
+        return replace(known, verdict=found.verdict)
+    count = len(known.at.names) - len(alike)
+    columns = (count - len(named) + place, *range(count, count + len(alike)))
+    one = OpenClass(named[place], tuple(c.label for c in alike), columns, sizes, needed)
+    return replace(known, open=one, verdict=found.verdict)
+
+
+def fitted(fit: Fit, goals: Goals, alike: Sequence[Effect] = (), named: tuple[str, ...] = ()) -> Knowledge:
+    """Take from a fit alone what the choice of the next move needs: nothing stands out of its noise.
+
+    Parameters
+    ----------
+    fit : Fit
+    goals : Goals
+    alike : sequence of Effect
+        Candidates that are estimated along in `Knowledge.at`.
+    named : tuple of str
+        Labels of what the model of the fit has beyond the one that was given.
+
+    Raises
+    ------
+    DataError
+        When the fit does not navigate.
+    """
+    if not isinstance(fit, NavigationFit):
+        raise DataError(f"a {fit.estimator} fit says nothing of the next turn of a table: choose another --estimator")
+    at = so_far(fit, alike, _ROOM)
+    limited, limit = goals.of(fit.names, fit.model.body_frame)
+    # What a class leaves in doubt is no noise: it falls when the class is told apart, and not with time.
+    certain = fit.with_doubt(None) if alike else fit
+    ratio = np.sqrt(np.diag(certain.covariance)[limited]) / limit
+    white = ratios(at, goals, at.covariance)
+    names = tuple(name for name, has in zip(fit.names, limited, strict=True) if has)
+    return Knowledge(at, names, ratio, np.maximum(ratio / white, 1.0), None, named, "consistent")
+
+
+def ratios(at: SoFar, goals: Goals, covariance: Floats) -> Floats:
+    """Sigma over limit in white noise.
+
+    Parameters
+    ----------
+    at : SoFar
+    goals : Goals
+    covariance : ndarray, shape (..., p, p)
+        Of its parameters (SI).
+
+    Returns
+    -------
+    ndarray, shape (..., c)
+        Dimensionless.
+    """
+    frame = at.setup.model.body_frame
+    limited, limit = goals.of(at.names, frame)
+    J = body_frame.frame_jacobian(at.names, frame)[limited] / limit[:, None]
+    return np.asarray(np.sqrt(np.einsum("ci,...ij,cj->...c", J, covariance, J)))
+
+
+def _class(found: Diagnosis) -> tuple[tuple[Candidate, ...], Floats, Floats, int]:
+    """Look-alikes of the first class that is open, with sizes, what is lacking, and the place of the class."""
+    problem = Problem(found.evidence)
+    chosen, scale, allowed = found.found.chosen.tolist(), found.found.scale, looked_at(found)
+    for place, column in enumerate(chosen):
+        name = problem.candidate(column).parameter.name
+        near = [
+            i for i in look_alikes(problem, chosen, column, allowed, scale)
+            if problem.candidate(i).parameter.name != name
+        ][:_MOST_ALIKE]  # fmt: skip
+        if not near:
+            continue
+        others = [c for c in chosen if c != column]
+        scanned = problem.scan(others, scale)
+        scores = problem.scores(scanned, scale)
+        needed = INDISTINGUISHABLE + CLEAR - (scores[column] - scores[near])
+        return tuple(problem.candidate(i) for i in near), scanned.estimate[[column, *near]], needed, place
+    return (), np.empty(0), np.empty(0), 0

@@ -1,0 +1,102 @@
+"""What a covariance is worth to a test, in nat: how much is lacking to its limits, and to telling a class apart.
+
+Both count log-likelihood. A coefficient lacks ``log(sigma / limit)``: the Shannon information that brings its sigma to
+the limit. A class lacks what the difference of log Bayes factors is short of; a move adds to it, on average,
+
+    min_i (theta_i^2 (J_ii - J_ij^2 / J_jj)) / 2,
+
+the part of the effect's information that the other cannot replace, J being that of the two given all else
+(T-optimality: A. Atkinson & V. Fedorov, *Biometrika* 62 (1975)).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from sdimu_calibration.core.adaptive.goals import Goals
+from sdimu_calibration.core.adaptive.knowledge import Knowledge, OpenClass, ratios
+from sdimu_calibration.core.arrays import Bools, Floats
+
+
+@dataclass(frozen=True)
+class Worth:
+    """What is lacking after each of k covariances.
+
+    Attributes
+    ----------
+    ratio : ndarray, shape (k, c)
+        Sigma over limit.
+    apart : ndarray, shape (k, a)
+        Difference of log Bayes factors that was added between the members of the open class (1).
+    lacking : ndarray, shape (k,)
+        To all limits and to telling the class apart (nat).
+    """
+
+    ratio: Floats
+    apart: Floats
+    lacking: Floats
+
+    def reached(self, needed: Floats) -> Bools:
+        """Say which covariances leave nothing lacking.
+
+        Parameters
+        ----------
+        needed : ndarray, shape (a,)
+            Difference of log Bayes factors that is lacking, as of `OpenClass` (1).
+
+        Returns
+        -------
+        ndarray of bool, shape (k,)
+        """
+        return np.asarray((self.ratio <= 1.0).all(axis=1) & (self.apart >= needed).all(axis=1))
+
+
+def worth(known: Knowledge, goals: Goals, covariance: Floats, since: Floats) -> Worth:
+    """Count what is lacking.
+
+    Parameters
+    ----------
+    known : Knowledge
+    goals : Goals
+    covariance : ndarray, shape (k, p, p)
+        After moves (SI).
+    since : ndarray, shape (p, p)
+        At the stop at which `known` was taken (SI): what was recorded there has told its part.
+    """
+    ratio = ratios(known.at, goals, covariance) * known.noise
+    lacking = np.log(np.maximum(ratio, 1.0)).sum(axis=1)
+    if known.open is None:
+        return Worth(ratio, np.zeros((len(ratio), 0)), lacking)
+    before = separation(known, known.open, since[None])
+    apart = separation(known, known.open, covariance) - before
+    return Worth(ratio, apart, lacking + np.maximum(known.open.needed - apart, 0.0).sum(axis=1))
+
+
+def separation(known: Knowledge, one: OpenClass, covariance: Floats) -> Floats:
+    """Half the square of the significance by which each look-alike differs from what was found.
+
+    Parameters
+    ----------
+    known : Knowledge
+    one : OpenClass
+        With a look-alikes.
+    covariance : ndarray, shape (k, p, p)
+        SI.
+
+    Returns
+    -------
+    ndarray, shape (k, a)
+        Mean difference of log-likelihoods (1), by the one of the two that shows less.
+    """
+    rows = np.array(one.columns)
+    prior = known.at.setup.sensors.prior[rows]
+    C = covariance[:, rows][:, :, rows] / np.outer(prior, prior)
+    J = np.linalg.inv(C) - np.eye(len(rows))
+    size = (one.size / prior) ** 2
+    own = np.maximum(np.diagonal(J, axis1=1, axis2=2), 1e-12)
+    across = J[:, 0, 1:] ** 2
+    first = size[0] * (own[:, :1] - across / own[:, 1:])
+    other = size[1:] * (own[:, 1:] - across / own[:, :1])
+    return np.asarray(0.5 * np.maximum(np.minimum(first, other), 0.0))

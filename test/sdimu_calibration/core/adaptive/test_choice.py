@@ -1,0 +1,113 @@
+"""The next move is one that the table can make, brings most a minute, and says why; nothing is chosen for nothing."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sdimu_calibration.core.adaptive import Choice, End, Goals, Menu, choose, fitted, so_far
+from sdimu_calibration.core.adaptive.knowledge import OpenClass, ratios
+from sdimu_calibration.core.adaptive.worth import separation, worth
+from sdimu_calibration.core.effects.selection import resolve
+from sdimu_calibration.core.plan import Plan, Turn
+from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.storage.goal_file import load_goals
+
+from .conftest import ACCELERATION, part, perfect_fit
+
+GOALS = load_goals("table33")
+BOTH_SENSES = Plan(
+    "both senses", (30.0,) * 6,
+    tuple(Turn(axis, math.radians(angle), math.radians(10.0)) for axis, angle in
+          (("Y", 90.0), ("Y", -90.0), ("X", 90.0), ("Z", -90.0), ("Y", 90.0))), ACCELERATION,
+)  # fmt: skip
+PAIR = ("gyro_scale_asymmetry_y", "gyro_scale_quadratic_y")
+
+
+@pytest.fixture(scope="module")
+def known(first_stop):
+    return fitted(first_stop, GOALS)
+
+
+def test_a_choice_brings_more_a_minute_than_any_other_move(known):
+    choice = choose(known, GOALS, Menu(), 30.0)
+    assert isinstance(choice, Choice)
+    now = worth(known, GOALS, known.at.covariance[None], known.at.covariance).lacking[0]
+    after = worth(known, GOALS, choice.after.covariance[None], known.at.covariance).lacking[0]
+    assert now - after == pytest.approx(choice.gain)
+    stay = choose(known, GOALS, Menu(), 30.0, lambda _: False)
+    assert isinstance(stay, Choice)
+    assert stay.step.turn is None
+    assert choice.gain / choice.minutes > stay.gain / stay.minutes
+
+
+def test_only_what_the_table_can_do_is_chosen_and_the_reason_names_a_coefficient(known):
+    choice = choose(known, GOALS, Menu(), 30.0, lambda step: step.turn.axis == "Z" and step.turn.angle_rad < 0.0)
+    assert isinstance(choice, Choice)
+    assert choice.step.turn is None or choice.step.turn.axis == "Z"
+    assert any(name in choice.text for name in known.limited)
+    assert choice.text.endswith("min")
+
+
+def test_a_test_ends_when_all_limits_hold_and_says_what_lacks_when_time_is_up(known):
+    wide = Goals("wide", dict.fromkeys(GOALS.limits, 1000.0), 30.0)
+    end = choose(replace(known, noise=np.ones_like(known.noise)), wide, Menu(), 30.0)
+    assert isinstance(end, End)
+    assert end.reached
+    late = choose(known, GOALS, Menu(), 0.1)
+    assert isinstance(late, End)
+    assert not late.reached
+    assert "time is up" in late.reason
+    assert "of its limit" in late.reason
+
+
+def test_no_move_is_longer_than_the_time_that_is_left(known):
+    choice = choose(known, GOALS, Menu(), 0.5)
+    assert isinstance(choice, Choice)
+    assert choice.minutes <= 0.5
+
+
+def test_an_open_class_is_told_apart_by_a_turn_about_its_own_axis_once_the_limits_hold():
+    fit = perfect_fit(BOTH_SENSES, PAIR[:1])
+    wide = Goals("wide", dict.fromkeys(GOALS.limits, 1000.0), 30.0)
+    at = so_far(fit, [resolve(PAIR[1])], 30.0)
+    count = len(fit.names)
+    size = 3.0 * at.setup.sensors.prior[[count - 1, count]] / np.array([1.0, 30.0])
+    one = OpenClass(PAIR[0], PAIR[1:], (count - 1, count), size, np.array([3.0]))
+    known = replace(fitted(fit, wide), at=at, open=one)
+    choice = choose(known, wide, Menu(), 30.0)
+    assert isinstance(choice, Choice)
+    assert choice.step.turn.axis == "Y"
+    assert f"tells {PAIR[0]} from {PAIR[1]}" in choice.text
+    gained = separation(known, one, choice.after.covariance[None]) - separation(known, one, at.covariance[None])
+    assert gained[0, 0] > 0.0
+
+
+def test_what_has_the_same_signature_is_never_apart():
+    fit = perfect_fit(part(4), PAIR[:1])
+    at = so_far(fit, [resolve(PAIR[1])], 30.0)
+    count = len(fit.names)
+    known = replace(fitted(fit, GOALS), at=at)
+    size = at.setup.sensors.prior[[count - 1, count]]
+    twin = OpenClass(PAIR[0], (PAIR[0],), (count - 1, count), size, np.array([3.0]))
+    same = at.covariance.copy()
+    # One parameter in two places: a sum is known, the difference is not.
+    prior = at.setup.sensors.prior[count - 1]
+    s2 = (1e-3 * prior) ** 2
+    J = np.array([[1.0 / s2, 1.0 / s2], [1.0 / s2, 1.0 / s2]]) + np.eye(2) / prior**2
+    same[np.ix_([count - 1, count], [count - 1, count])] = np.linalg.inv(J)
+    known.at.setup.sensors.prior[count] = prior
+    assert separation(known, twin, same[None])[0, 0] < 1e-6 * size[0] ** 2 / s2
+
+
+def test_ratios_are_sigmas_in_the_reported_frame_over_their_limits(known, first_stop):
+    limited, limit = GOALS.of(first_stop.names, first_stop.model.body_frame)
+    expected = np.sqrt(np.diag(first_stop.covariance)[limited]) / limit
+    np.testing.assert_allclose(ratios(known.at, GOALS, known.at.covariance), expected, rtol=1e-6)
+    assert not any(name in known.limited for name in ("accel_misalignment_xy", "accel_misalignment_xz"))
+
+
+def test_limits_of_nothing_in_the_model_are_refused(first_stop):
+    with pytest.raises(DataError, match="accel_cubic"):
+        fitted(first_stop, Goals("other", {"accel_cubic": 1.0}, 30.0))
