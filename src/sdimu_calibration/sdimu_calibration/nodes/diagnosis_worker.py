@@ -32,7 +32,7 @@ from sdimu_calibration.storage.journal import read_journal
 
 Question = Callable[[Fit, LiveDiagnosis, Any], Any]
 """A further question of a fit: `Job.question`."""
-_NICE = 5
+_NICE = 10
 """Steps by which samples come first."""
 
 
