@@ -1,6 +1,6 @@
 """Node that calibrates while the test runs.
 
-Parameters: `ros2 param describe` tells them; `add` may be set while the test runs. With `stay`, what comes after the end
+Parameters: `ros2 param describe` tells them; `add` may be set while a test runs. With `stay`, what comes after the end
 of a stream belongs to the same test until ~/reset, and the next end is answered again.
 Subscriptions (relative, remap them at will): imu/data_raw, rate_table/status, imu/temperature. Publications once a
 second of data: calibration/coefficients, calibration/covariance, calibration/navigation, /diagnostics; every ten

@@ -13,7 +13,7 @@ import numpy as np
 
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.diagnosis.diagnose import NOT_DIAGNOSABLE, Diagnosis, in_measured_noise
-from sdimu_calibration.core.diagnosis.search import Problem
+from sdimu_calibration.core.diagnosis.problem import Problem
 from sdimu_calibration.core.diagnosis.survey import survey
 from sdimu_calibration.core.estimation.fit import Fit
 from sdimu_calibration.core.estimation.outcome import outcome
