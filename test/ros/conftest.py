@@ -53,7 +53,8 @@ class FitSession:
     def start(self, name: str, **more: object) -> None:
         parameters: dict[str, dict[str, object]] = {
             "recorder": {"out": str(self.folder / "bag"), "wait_for": ["/imu/data_raw", "/rate_table/status"]},
-            "calibration": {"out": str(self.folder)},
+            # Most tests are not about the diagnosis, which costs a process and its time.
+            "calibration": {"out": str(self.folder), "diagnose": False},
             "sdimu": {"rate_hz": float(RATE_HZ), "consumers": 2},
             "rate_table": {"plan": str(self.plan), "speed": self.speed, "consumers": 1},
         }

@@ -32,6 +32,7 @@ def replay(
     speed: Annotated[float, typer.Option(help="Times real time; 0 is as fast as the calibration allows.")] = 0.0,
     out: Annotated[Path | None, typer.Option(help="Folder of the results; BAG_replay by default.")] = None,
     patience: Annotated[float, typer.Option(help="Longest time without an end (s); 0 waits for ever.")] = 0.0,
+    diagnose: Annotated[bool, typer.Option(help="Publish a diagnosis at the end of each stop.")] = False,
     imu_topic: ImuTopic = None,
     status_topic: StatusTopic = None,
     joint_topic: JointTopic = None,
@@ -63,7 +64,7 @@ def replay(
     begun = time.monotonic()
     calibrating = {
         "site": site or "", "imu": imu or "", "model": model, "out": str(folder), "accel_unit": accel_unit or "",
-        "gyro_unit": gyro_unit or "", "accel_sign": accel_sign or 0, "gyro_sign": gyro_sign or 0,
+        "gyro_unit": gyro_unit or "", "accel_sign": accel_sign or 0, "gyro_sign": gyro_sign or 0, "diagnose": diagnose,
     }  # fmt: skip
     playing = {
         "bag": str(bag), "speed": speed, "consumers": 1, "imu_topic": imu_topic or "",

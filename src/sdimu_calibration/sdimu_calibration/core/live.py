@@ -69,6 +69,8 @@ class EpochEstimate:
     navigation_covariance : ndarray, shape (9, 9)
     nis : dict
         Mean squared normalised innovation per degree of freedom so far, by channel of `NIS_CHANNELS`.
+    stop_nis : dict
+        The same at the present stop, or the last one: what the verdict is about.
     verdict : str
         ``consistent``, or which channels contradict their sigma at the present stop. A first pass is linearised about
         what it did not know yet, so the first stops may complain about a wrong initial azimuth.
@@ -95,6 +97,7 @@ class EpochEstimate:
     q_nb: Floats
     navigation_covariance: Floats
     nis: dict[str, float]
+    stop_nis: dict[str, float]
     verdict: str
     counts: dict[str, int]
 
@@ -369,8 +372,6 @@ class LiveCalibration:
         p = len(sensors.prior)
         site = self.setup.site
         radius = 6.371e6 + site.height_m
-        with np.errstate(invalid="ignore"):
-            nis = self._nis_sum / self._nis_count
         return EpochEstimate(
             ns=origin_ns + round(float(epochs.end[k]) * 1e9), t=float(epochs.end[k]),
             dwell=bool(phases.dwell[k]), used=bool(phases.used[k]), stop=int(phases.stop[k]),
@@ -389,13 +390,18 @@ class LiveCalibration:
             velocity=state.velocity.copy(), q_nb=quaternion(state.C_nb),
             navigation_covariance=state.P[:NAV, :NAV].copy(),
             verdict=stop_verdict(*self._stop_nis),
-            nis={c: float(v) for c, v in zip(NIS_CHANNELS, nis, strict=True) if np.isfinite(v)},
+            nis=_by_channel(self._nis_sum, self._nis_count), stop_nis=_by_channel(*self._stop_nis),
             counts={
                 "samples": self._intake.taken, "late": self._intake.late, "lost": self._lost,
                 "rejected": self._intake.rejected,
                 "contradicted": self._contradicted,
             },
         )  # fmt: skip
+
+
+def _by_channel(total: Floats, dof: Floats) -> dict[str, float]:
+    """Mean squares of the channels that were measured."""
+    return {c: float(t / d) for c, t, d in zip(NIS_CHANNELS, total, dof, strict=True) if d > 0}
 
 
 def stop_verdict(total: Floats, dof: Floats) -> str:

@@ -89,6 +89,7 @@ def diagnostics(stamp_ns: int, estimate: EpochEstimate, name: str = "calibration
     values = {"phase": phase, "stop": str(estimate.stop), "used": str(estimate.used).lower()}
     values |= {key: str(count) for key, count in estimate.counts.items()}
     values |= {f"nis_{channel}": f"{nis:.6g}" for channel, nis in estimate.nis.items()}
+    values |= {f"stop_nis_{channel}": f"{nis:.6g}" for channel, nis in estimate.stop_nis.items()}
     values["verdict"] = estimate.verdict
     level = DiagnosticStatus.OK if estimate.verdict == "consistent" else DiagnosticStatus.WARN
     status = DiagnosticStatus(level=level, name=name, message=phase, hardware_id="imu")

@@ -1,11 +1,11 @@
 """Node that calibrates while the test runs.
 
-Parameters: `ros2 param describe` tells them. With `stay`, what comes after the end of a stream belongs to the same test
-until ~/reset, and the next end is answered again.
+Parameters: `ros2 param describe` tells them; `add` may be set while a test runs. With `stay`, what comes after the end
+of a stream belongs to the same test until ~/reset, and the next end is answered again.
 Subscriptions (relative, remap them at will): imu/data_raw, rate_table/status, imu/temperature. Publications once a
 second of data: calibration/coefficients, calibration/covariance, calibration/navigation, /diagnostics; every ten
-seconds calibration/estimates, each coefficient with its sigma in customary units. Services: ~/save writes result.json
-from everything that has come, ~/reset forgets it.
+seconds calibration/estimates, each coefficient with its sigma in customary units; at the end of each stop those of
+`nodes.diagnosing`. Services: ~/save writes result.json from everything that has come, ~/reset forgets it.
 
 A header stamp decides what happens, never the order of arrival. At the end of the stream the whole test is opened and
 calibrated once more as `sdimu calibrate` does it; the last coefficients and covariance are that result. On the way
@@ -25,7 +25,9 @@ from typing import Any
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
 from nav_msgs.msg import Odometry
+from rcl_interfaces.msg import SetParametersResult
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 from rclpy.task import Future
 from sensor_msgs.msg import Imu, JointState, Temperature
 from std_msgs.msg import Float64MultiArray
@@ -40,6 +42,8 @@ from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.specification import Model
 from sdimu_calibration.nodes import calibration_messages as messages
 from sdimu_calibration.nodes.credits import STREAM, Consumer, Producer, publish
+from sdimu_calibration.nodes.diagnosing import Diagnosing
+from sdimu_calibration.nodes.diagnosis_worker import Job
 from sdimu_calibration.nodes.feed import Feed
 from sdimu_calibration.nodes.heartbeat import Heartbeat
 from sdimu_calibration.nodes.listening import Listener
@@ -47,6 +51,7 @@ from sdimu_calibration.nodes.opening_parameters import declare_frames, declare_o
 from sdimu_calibration.nodes.parameters import Declare
 from sdimu_calibration.nodes.spinning import run_node
 from sdimu_calibration.nodes.ticking import Ticker
+from sdimu_calibration.report.live_text import model_name
 from sdimu_calibration.report.progress_text import falling, light, sigma_words
 from sdimu_calibration.storage.config import load_model
 from sdimu_calibration.storage.effect_file import SUFFIXES, extended_model
@@ -59,6 +64,10 @@ JOURNAL = "calibration.journal"
 BLOCK = 20
 SETTLE_S = 2.0
 FAREWELL_S = 10.0
+CATCH_UP_S = 0.025
+"""Time (s) between two ticks for a filter that is made anew: half of it, the other half is for samples."""
+DIAGNOSIS_S = 120.0
+"""Time (s) after the result for which the last diagnosis is awaited: minutes are a day of data."""
 GRAVITY = 9.8
 _NEARLY_NS = 1_000
 """A status this much before the last sample is the one that belongs to it (ns)."""
@@ -72,8 +81,8 @@ class CalibrationNode:
         self.done = Future()
         declare = Declare(self.node)
         self._options, self._topics = declare_opening(self.node)
-        model = declare.text("model", "baseline", "model to estimate: name in config/model or path")
-        added = declare.texts("add", [], "effects beyond the model's: names, equations or files")
+        self._base = model = declare.text("model", "baseline", "model to estimate: name in config/model or path")
+        added = tuple(declare.texts("add", [], "effects beyond the model's: names, equations or files", live=True))
         self._model = extended_model(model, added)
         self._out = Path(declare.text("out", ".", "folder of result.json and of the journal"))
         self._stay = declare.flag("stay", False, "do not leave at the end of the stream")
@@ -88,6 +97,8 @@ class CalibrationNode:
         self._feed = Feed(self._make, self._journal)
         resumed = self._feed.resumed_ns
         self._ended: float | None = None
+        self._result: Calibration | None = None
+        self._concluded = 0.0
         self._departed: float | None = None
         self._first: dict[str, float] = {}
         self._last = ""
@@ -107,6 +118,11 @@ class CalibrationNode:
             Listener(node, ticker, Temperature, self._topics.temperature, self._take_temperature, late=bool(resumed)),
             Listener(node, ticker, Imu, self._topics.imu, self._take_imu, raw=True, late=bool(resumed)),
         )
+        diagnose = declare.flag("diagnose", True, "publish a diagnosis at the end of each stop")
+        job = Job(self._journal.place, self._options, model) if diagnose else None
+        self._diagnosing = Diagnosing(node, job, added)
+        node.add_on_set_parameters_callback(self._check_added)
+        node.add_post_set_parameters_callback(self._take_added)
         if resumed:
             self._catch_up(resumed)
         ticker.every(0.05, self._tick)
@@ -115,6 +131,7 @@ class CalibrationNode:
 
     def close(self) -> None:
         """Leave the journal to a successor, unless the test is over: then there is nothing to go on with."""
+        self._diagnosing.close()
         if self._departed is None:
             self._journal.close()
         else:
@@ -129,9 +146,29 @@ class CalibrationNode:
     def _make(self) -> LiveCalibration:
         return LiveCalibration(self._options, self._model)
 
+    def _check_added(self, parameters: list[Parameter]) -> SetParametersResult:
+        """Refuse effects that cannot be added, with the line that the command line says."""
+        try:
+            for parameter in parameters:
+                if parameter.name == "add":
+                    LiveCalibration(self._options, extended_model(self._base, _effects(parameter)))
+        except DataError as error:
+            return SetParametersResult(successful=False, reason=str(error))
+        return SetParametersResult(successful=True)
+
+    def _take_added(self, parameters: list[Parameter]) -> None:
+        """Go on with other effects in the model."""
+        for parameter in parameters:
+            if parameter.name == "add":
+                added = _effects(parameter)
+                self._model = extended_model(self._base, added)
+                self._feed.begin_again()
+                self._diagnosing.change_model(added)
+                self.node.get_logger().info(f"model {model_name(added)}: the filter begins again from the journal")
+
     def _take_imu(self, message: bytes) -> None:
         if self._stay and self._departed is not None:
-            self._ended = self._departed = None  # the test goes on
+            self._ended = self._departed = self._result = None  # the test goes on
         self._feed.take_imu(message)
         if self._feed.waiting >= BLOCK:
             self._work()
@@ -163,6 +200,7 @@ class CalibrationNode:
         return bool(self.node.count_publishers(self.node.resolve_topic_name(topic)))
 
     def _publish(self, e: EpochEstimate) -> None:
+        self._diagnosing.take(e)
         self._publish_coefficients(e.ns, e.body_frame, e.names, e.coefficients, e.covariance)
         publish(self._navigation, messages.navigation(e.ns, e, *self._frames))
         publish(self._diagnostics, messages.diagnostics(e.ns, e, self._heartbeat.name))
@@ -184,7 +222,7 @@ class CalibrationNode:
             units = dict(zip(e.names, e.display_units, strict=True))
             effects = [effect if isinstance(effect, str) else effect.key for effect in self._model.effects]
             words = sigma_words(falling(self._first, sigmas, units, effects))
-            self._last = f"stop {e.stop} after {e.t:.0f} s; {words}; {light(e.nis, e.verdict)}"
+            self._last = f"stop {e.stop} after {e.t:.0f} s; {words}; {light(e.stop_nis, e.verdict)}"
         elif self._last and not e.dwell:
             self.node.get_logger().info(self._last)
             self._last = ""
@@ -196,7 +234,14 @@ class CalibrationNode:
 
     def _tick(self) -> None:
         self._work()
-        if self._ended is not None and self._departed is None:
+        if self._feed.catch_up(CATCH_UP_S):
+            self._first = {}
+            self.node.get_logger().info("the filter on the way has the new model")
+        self._diagnosing.tick(self._feed.imu_ns)
+        if self._result is not None and self._departed is None:
+            if self._diagnosing.idle or time.monotonic() - self._concluded > DIAGNOSIS_S:
+                self._depart(self._result)
+        elif self._ended is not None and self._departed is None:
             status = self._feed.status
             complete = status.heard is None or (status.latest_ns or 0) >= self._feed.imu_ns - _NEARLY_NS
             if complete or time.monotonic() - self._ended > SETTLE_S:
@@ -207,15 +252,17 @@ class CalibrationNode:
                 self.done.set_result(None)
 
     def _take_end(self) -> None:
-        self._ended, self._departed = time.monotonic(), None
+        self._ended, self._departed, self._result = time.monotonic(), None, None
 
     def _conclude(self) -> None:
-        """Calibrate on the whole test, publish that as the last word, and write it."""
+        """Calibrate on the whole test, and write that; meanwhile its diagnosis is made."""
+        self._feed.catch_up()
         for estimate in self._feed.process(False, False, final=True):
             self._publish(estimate)
         self._tell_notes()
+        self._diagnosing.end()
         try:
-            result = self._write_result()
+            self._result, self._concluded = self._write_result(), time.monotonic()
         except DataError as error:
             # The journal stays: it is all that there is of a test whose result could not be made.
             if self._stay:
@@ -223,7 +270,9 @@ class CalibrationNode:
                 self.node.get_logger().error(str(error))
             elif not self.done.done():
                 self.done.set_exception(error)
-            return
+
+    def _depart(self, result: Calibration) -> None:
+        """Publish the result as the last word."""
         stamp = self._feed.imu_ns
         units = result.display_units
         publish(self._estimates, messages.estimates(stamp, result.names, result.values, result.covariance, units))
@@ -249,10 +298,16 @@ class CalibrationNode:
         self._journal.restart()
         self._feed = Feed(self._make, self._journal)
         self._stream.restart()
-        self._ended = self._departed = None
+        self._diagnosing.restart()
+        self._ended = self._departed = self._result = None
         self._first, self._last = {}, ""
         response.success = True
         return response
+
+
+def _effects(parameter: Parameter) -> tuple[str, ...]:
+    """Effects that the parameter `add` names."""
+    return tuple(str(effect) for effect in parameter.value or () if effect)
 
 
 def _warm_up(options: OpeningOptions, model: Model) -> None:

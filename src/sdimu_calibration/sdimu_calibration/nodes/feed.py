@@ -17,7 +17,7 @@ from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.nodes.gate import Companion
 from sdimu_calibration.nodes.remembered import Remembered
 from sdimu_calibration.storage.cdr import LayoutError, decode_imu
-from sdimu_calibration.storage.journal import Journal, Samples, Status
+from sdimu_calibration.storage.journal import Journal, Record, Samples, Status, Temperature
 
 AWAY_S = 600.0
 """Samples that come so long after those of the journal are of another test."""
@@ -51,6 +51,9 @@ class Feed:
         """Newest stamp (ns) of the journal, and number of seconds that the filter has done with it."""
         self._raw: list[bytes] = []
         self._live = make()
+        self._successor: Feed | None = None
+        self._records: Iterator[Record] = iter(())
+        self._told_ns = NEVER
         self._born = time.monotonic()
         self._first_ns: int | None = None
         self.imu_ns = NEVER
@@ -67,16 +70,45 @@ class Feed:
         for record in journal.records():
             if isinstance(record, Samples):
                 before.add(record)
-                self._keep(record)
-                until, known = self.status.reaches(self.imu_ns, bool(journal.before.statuses))
-                self.resumed_s += sum(1 for _ in self._advance(until, known))
-            elif isinstance(record, Status):
-                self._note_status(record.ns, record.dwell, record.stop)
-            else:
-                self._note_temperature(record.ns, record.value)
+            self.resumed_s += self._take_again(record, bool(journal.before.statuses))
         before.settle()
         self._before, self._unsure = before, True
         self.resumed_ns = before.newest_ns
+
+    def _take_again(self, record: Record, speaks: bool) -> int:
+        """Take a record as its author did, where a status topic `speaks`; the number of seconds that it completed."""
+        if isinstance(record, Status):
+            self._note_status(record.ns, record.dwell, record.stop)
+        elif isinstance(record, Temperature):
+            self._note_temperature(record.ns, record.value)
+        else:
+            self._keep(record)
+            return sum(1 for _ in self._advance(*self.status.reaches(self.imu_ns, speaks)))
+        return 0
+
+    def begin_again(self) -> None:
+        """Make the filter anew, with what `make` makes now, from the journal; `catch_up` does it piece by piece."""
+        assert self._journal is not None
+        self._successor = Feed(self._make)
+        self._successor._live.kept_by(self._journal.raw)
+        self._records = self._journal.records(everything=True)
+
+    def catch_up(self, seconds: float = float("inf")) -> bool:
+        """Work for so long (s of wall time) on a filter that is made anew; whether it took the place of the old one.
+
+        Until then the old one goes on, and the new one gets from the journal what comes meanwhile.
+        """
+        if self._successor is None:
+            return False
+        until = time.monotonic() + seconds
+        speaks = self.status.latest_ns is not None
+        for record in self._records:
+            self._successor._take_again(record, speaks)
+            if time.monotonic() > until:
+                return False
+        self._live, self._successor = self._successor._live, None
+        self._live.notes = []
+        return True
 
     def _forget(self) -> None:
         """Begin anew: what comes is of another test than the journal; what came since counts."""
@@ -181,13 +213,17 @@ class Feed:
         until = min(until, warm)
         if final:
             until, known = self.imu_ns, self.status.latest_ns is not None
-        yield from self._advance(until, known)
-        if final:
-            yield from self._live.advance(until, known, final=True)
+        for estimate in self._advance(until, known, final=final):
+            # A filter that was made anew may say of some seconds again what its predecessor said.
+            if estimate.ns > self._told_ns:
+                self._told_ns = estimate.ns
+                yield estimate
 
-    def _advance(self, until_ns: int, known: bool) -> Iterator[EpochEstimate]:
+    def _advance(self, until_ns: int, known: bool, *, final: bool = False) -> Iterator[EpochEstimate]:
         while (step := self._live.next_ns) is not None and step <= until_ns:
             yield from self._live.advance(step, known)
+        if final:
+            yield from self._live.advance(until_ns, known, final=True)
 
     def notes(self) -> list[str]:
         """Return the notes since the last call, such as what the filter waits for."""

@@ -36,9 +36,9 @@ class Progress:
     first : dict of str to float
         The first sigma published.
     nis : dict of str to float
-        Mean squared innovation per degree of freedom so far, by channel.
+        Mean squared innovation per degree of freedom at the present stop, by channel.
     verdict : str
-        Of the present stop.
+        Of the same stop.
     """
 
     stop: int = 0
@@ -106,4 +106,4 @@ class Monitor:
                 self.progress.nis = {key.removeprefix(_NIS): float(value) for key, value in nis.items()}
 
 
-_NIS = "nis_"
+_NIS = "stop_nis_"

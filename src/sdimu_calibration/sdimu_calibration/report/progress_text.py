@@ -47,14 +47,20 @@ def falling(
 
 
 def light(nis: Mapping[str, float], verdict: str) -> str:
-    """Say whether the innovations are as large as promised: mean squares by channel, 1 is right, and the verdict.
+    """Say whether the innovations of a stop are as large as promised, and how large: 1 is right.
 
-    The numbers are of the whole test so far, the verdict of the present stop.
+    Parameters
+    ----------
+    nis : mapping of str to float
+        Mean squared innovation per degree of freedom at the stop, by channel.
+    verdict : str
+        On the same numbers, as `core.live.stop_verdict` says it.
     """
     if not nis:
         return "innovations: none yet"
     mark = _FINE if verdict.startswith("consistent") else _ALARM
-    return f"{mark} NIS so far " + " ".join(f"{channel} {value:.2f}" for channel, value in nis.items()) + f": {verdict}"
+    numbers = " ".join(f"{channel} {value:.2f}" for channel, value in nis.items())
+    return f"{mark} NIS of this stop {numbers}: {verdict}"
 
 
 def sigma_words(fallen: Sequence[Falling], most: int = 2) -> str:

@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 
 from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.data.arrival import RawTest
+from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage.journal_walk import Counts, raw_test, walk
 
 Stamps = Ints
@@ -38,6 +39,8 @@ _COLUMNS = 7
 """Doubles a sample: the stamp's bits, three rates, three forces."""
 _READ = 1 << 20
 """Bytes that are read at once."""
+_LONGEST_HEADER = 1000
+"""Bytes within which the line at the head ends."""
 
 
 @dataclass(frozen=True)
@@ -122,11 +125,14 @@ class Journal:
     def _content(self) -> NDArray[np.uint8]:
         return np.asarray(np.memmap(self._file, np.uint8, "r"))
 
-    def records(self) -> Iterator[Record]:
-        """Give what the journal held when it was opened, record by record."""
+    def records(self, *, everything: bool = False) -> Iterator[Record]:
+        """Give what the journal held when it was opened, record by record; `everything` is also what came since.
+
+        What is written between two records of everything comes, too.
+        """
         at, size = len(self._header), _READ
-        while at < self._before_end:
-            block = os.pread(self._file.fileno(), min(size, self._before_end - at), at)
+        while at < (end := os.fstat(self._file.fileno()).st_size if everything else self._before_end):
+            block = os.pread(self._file.fileno(), min(size, end - at), at)
             place = 0
             while place + _HEAD.size <= len(block):
                 kind, length, _ = _HEAD.unpack_from(block, place)
@@ -137,6 +143,11 @@ class Journal:
                 place = end
             at += place
             size = _READ if place else _HEAD.size + length
+
+    @property
+    def place(self) -> Path:
+        """Where another process reads it (`read_journal`), even where it has no name."""
+        return Path(f"/proc/{os.getpid()}/fd/{self._file.fileno()}")
 
     def raw(self) -> RawTest:
         """Everything that is in it, in the order of arrival."""
@@ -175,6 +186,24 @@ class Journal:
     def close(self) -> None:
         """Leave it for a successor."""
         self._file.close()
+
+
+def read_journal(path: Path) -> RawTest:
+    """Read what another process has written so far, in the order of arrival.
+
+    Raises
+    ------
+    DataError
+        When it is no journal, or gone.
+    """
+    try:
+        content = np.fromfile(path, np.uint8)
+    except OSError as error:
+        raise DataError(f"{path}: the journal cannot be read ({error.strerror})") from error
+    (ends,) = np.nonzero(content[:_LONGEST_HEADER] == ord("\n"))
+    if not len(ends):
+        raise DataError(f"{path}: no journal of a calibration")
+    return raw_test(content, int(ends[0]) + 1)
 
 
 def _decoded(kind: bytes, content: bytes) -> Record:

@@ -33,6 +33,7 @@ def run(
     mount_max: Annotated[float, typer.Option(help="Without --mount: drawn up to this about every axis (deg).")] = 3.0,
     effect: Annotated[list[str] | None, typer.Option(help=EFFECT)] = None,
     temperature: Annotated[str | None, typer.Option(help=TEMPERATURE)] = None,
+    diagnose: Annotated[bool, typer.Option(help="Publish a diagnosis at the end of each stop.")] = True,
     out: Annotated[Path, typer.Option(help="Folder of the results.")] = Path("out/run"),
 ) -> None:
     """Run a whole simulated test over ROS 2: table, IMU, calibration and recorder, each its own process."""
@@ -52,6 +53,7 @@ def run(
         # What the simulated gyros send is known, so the filter on the way need not wait for a turn.
         "calibration": {
             "site": site, "imu": imu, "model": model, "out": str(out), "gyro_unit": "rad/s", "gyro_sign": 1,
+            "diagnose": diagnose,
         },
     }  # fmt: skip
     duration = _check(options)

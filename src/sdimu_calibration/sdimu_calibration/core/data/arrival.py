@@ -6,8 +6,8 @@ nowhere else, stamps (ns) become the seconds of a recording.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import NamedTuple
+from dataclasses import dataclass, replace
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
@@ -74,6 +74,9 @@ class RawTemperature(NamedTuple):
     value: Floats
 
 
+M = TypeVar("M", RawStatus, RawTemperature)
+
+
 @dataclass(frozen=True)
 class RawTest:
     """What the topics of a test brought, in the order of arrival.
@@ -100,6 +103,28 @@ class RawTest:
     where: str = IMU_TOPIC
     status_topic: str = STATUS_TOPIC
     temperature_topic: str = TEMPERATURE_TOPIC
+
+
+def until(raw: RawTest, ns: int) -> RawTest:
+    """Return what has a stamp up to `ns`: the same of a test that goes on and of one that has ended.
+
+    Parameters
+    ----------
+    raw : RawTest
+    ns : int
+        The last stamp that counts (ns).
+    """
+    rows = raw.ns <= ns
+    return replace(
+        raw, ns=raw.ns[rows], omega_ib_b=raw.omega_ib_b[rows], f_ib_b=raw.f_ib_b[rows],
+        status=_until(raw.status, ns), temperature=_until(raw.temperature, ns),
+    )  # fmt: skip
+
+
+def _until(messages: M | None, ns: int) -> M | None:
+    if messages is None or not (rows := messages.ns <= ns).any():
+        return None
+    return type(messages)._make(column[rows] for column in messages)
 
 
 @dataclass(frozen=True)

@@ -193,12 +193,9 @@ def climb(
     """
     if not fit.diagnosable:
         raise DataError(NOT_DIAGNOSABLE)
-    consistency = fit.consistency()
-    noise, imu = measured_noise(consistency, fit)
     stated = fit.test.imu
-    if noise:
-        fit = solve(fit.test.with_imu(imu), fit.model, fit.estimator, progress=progress, learn=False)
-    fit = in_white_noise(fit)
+    fit, consistency, noise = in_measured_noise(fit, progress)
+    imu = fit.test.imu
     wander = None if fit.learns_scatter else fit.wander
     request = Request(fit, tuple(extra), alpha, wander, frozenset(without))
     done = search_until_stable(request, progress)
@@ -236,6 +233,29 @@ def climb(
         rungs,
     )  # fmt: skip
     return replace(partial, sentence=sentence(partial))
+
+
+def in_measured_noise(fit: Fit, progress: Progress = silent) -> tuple[Fit, Consistency, tuple[str, ...]]:
+    """Fit in white noise, of the size that the recording shows where the IMU file is wrong about it.
+
+    Parameters
+    ----------
+    fit : Fit
+    progress : callable
+
+    Returns
+    -------
+    fit : Fit
+    consistency : Consistency
+        Of the fit as it was given.
+    noise : tuple of str
+        What is wrong in the IMU file, one line each.
+    """
+    consistency = fit.consistency()
+    noise, imu = measured_noise(consistency, fit)
+    if noise:
+        fit = solve(fit.test.with_imu(imu), fit.model, fit.estimator, progress=progress, learn=False)
+    return in_white_noise(fit), consistency, noise
 
 
 def alike_first(of: Round | Diagnosis) -> tuple[str, ...]:

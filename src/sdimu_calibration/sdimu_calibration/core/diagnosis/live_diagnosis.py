@@ -1,0 +1,209 @@
+"""The diagnosis of a test that still runs: where the model fails so far, what would explain it, how far the error fell.
+
+No search: one scan of all candidates, as `climb` begins. What it says of all data is therefore the first scan of the
+diagnosis of the recording, to the last digit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from sdimu_calibration.core.arrays import Floats
+from sdimu_calibration.core.diagnosis.diagnose import NOT_DIAGNOSABLE, Diagnosis, in_measured_noise
+from sdimu_calibration.core.diagnosis.problem import Problem
+from sdimu_calibration.core.diagnosis.survey import survey
+from sdimu_calibration.core.estimation.fit import Fit
+from sdimu_calibration.core.estimation.outcome import outcome
+from sdimu_calibration.core.estimation.prepared_test import PreparedTest
+from sdimu_calibration.core.estimation.solve import solve
+from sdimu_calibration.core.evidence.consistency import StopMean
+from sdimu_calibration.core.evidence.linear import LinearEvidence
+from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.specification import Model
+
+WAITING = "waiting"
+"""Verdict while there is too little to fit."""
+_FEWEST_STOPS = 2
+"""Number of stops at least: one is predicted from the others."""
+
+
+@dataclass(frozen=True)
+class Ranked:
+    """A candidate beside the model as given.
+
+    Attributes
+    ----------
+    label : str
+    z : float
+        Estimate over sigma.
+    estimate, sigma : float
+        SI.
+    display_unit : str
+        Customary.
+    """
+
+    label: str
+    z: float
+    estimate: float
+    sigma: float
+    display_unit: str
+
+
+@dataclass(frozen=True)
+class ModelError:
+    """How large the error of a model is on the data so far.
+
+    Attributes
+    ----------
+    added : tuple of str
+        What it has beyond the model that the test began with.
+    held_out : float
+        RMS of the normalised errors at stops predicted from the others (1 is right); NaN with fewer than two stops.
+    nis : float
+        Normalised innovation squared per degree of freedom (1 is right).
+    """
+
+    added: tuple[str, ...]
+    held_out: float
+    nis: float
+
+
+@dataclass(frozen=True)
+class LiveDiagnosis:
+    """What a diagnosis says of the data up to the end of a stop.
+
+    Attributes
+    ----------
+    stop : int
+        The last one.
+    until_s : float
+        Length of the data (s).
+    verdict : str
+        ``consistent``, ``misfit``, or ``waiting`` where nothing could be fitted.
+    sentence : str
+        The verdict for people; while it waits, for what.
+    added : tuple of str
+        Effects beyond the model that the test began with.
+    threshold : float
+        Size of the score (sigma) that pure noise reaches; inf where no candidate is testable.
+    p_value : float
+        Of what no candidate stands for.
+    where : tuple of StopMean
+        Every channel and stop, largest first.
+    ranking : tuple of Ranked
+        Every testable candidate, largest score first.
+    ladder : tuple of ModelError
+        Every model that this test has had, on the same data, the one in use last.
+    noise : tuple of str
+        What is wrong with the white noise of the IMU file, one line each.
+    """
+
+    stop: int
+    until_s: float
+    verdict: str
+    sentence: str
+    added: tuple[str, ...] = ()
+    threshold: float = float("inf")
+    p_value: float = 1.0
+    where: tuple[StopMean, ...] = ()
+    ranking: tuple[Ranked, ...] = ()
+    ladder: tuple[ModelError, ...] = ()
+    noise: tuple[str, ...] = ()
+
+    @property
+    def standing(self) -> tuple[Ranked, ...]:
+        """Candidates that stand out of the noise."""
+        return tuple(r for r in self.ranking if abs(r.z) > self.threshold)
+
+
+def waiting(stop: int, until_s: float, added: Sequence[str], why: str) -> LiveDiagnosis:
+    """Return the diagnosis of a stop that cannot be fitted yet, which says why."""
+    return LiveDiagnosis(stop, until_s, WAITING, f"no diagnosis yet: {why}", tuple(added))
+
+
+def so_far(
+    test: PreparedTest, model: Model, added: Sequence[str] = (), ladder: Sequence[ModelError] = ()
+) -> tuple[LiveDiagnosis, Fit]:
+    """Diagnose what there is of a test.
+
+    Parameters
+    ----------
+    test : PreparedTest
+        The data up to the end of a stop.
+    model : Model
+    added : sequence of str
+        What `model` has beyond the model that the test began with.
+    ladder : sequence of ModelError
+        Of other models on the same data.
+
+    Returns
+    -------
+    diagnosis : LiveDiagnosis
+    fit : Fit
+        Which it is of: in white noise, of the size that the data show.
+
+    Raises
+    ------
+    DataError
+        When there is too little to fit, or the estimator cannot be diagnosed.
+    """
+    fit, noise = _fit(test, model)
+    done = survey(fit, outcome(fit, held_out=False))
+    return LiveDiagnosis(
+        stop=max(done.evidence.stop.tolist(), default=0),
+        until_s=float(test.recording.t[-1]),
+        verdict=done.verdict,
+        sentence=done.sentence,
+        added=tuple(added),
+        threshold=done.found.threshold,
+        p_value=done.p_value,
+        where=done.consistency.where,
+        ranking=_ranked(done),
+        ladder=(*ladder, _error(fit, done.evidence.only(np.empty(0, dtype=np.int64)), added)),
+        noise=noise,
+    ), fit
+
+
+def error_of(test: PreparedTest, model: Model, added: Sequence[str] = ()) -> ModelError:
+    """Say how large the error of a model is on a test; parameters as for `so_far`.
+
+    Raises
+    ------
+    DataError
+        When the model cannot be fitted.
+    """
+    fit, _ = _fit(test, model)
+    return _error(fit, fit.evidence(), added)
+
+
+def _fit(test: PreparedTest, model: Model) -> tuple[Fit, tuple[str, ...]]:
+    fit = solve(test, model, learn=False)
+    if not fit.diagnosable:
+        raise DataError(NOT_DIAGNOSABLE)
+    fit, _, noise = in_measured_noise(fit)
+    return fit, noise
+
+
+def _error(fit: Fit, evidence: LinearEvidence, added: Sequence[str]) -> ModelError:
+    """Error of the model of a fit; `evidence` about it, without candidates."""
+    stops = np.unique(evidence.stop)
+    held_out = Problem(evidence).held_out([], 1.0).rms if len(stops) >= _FEWEST_STOPS else float("nan")
+    return ModelError(tuple(added), held_out, float(fit.statistics()["nis_mean"] or np.nan))
+
+
+def _ranked(done: Diagnosis) -> tuple[Ranked, ...]:
+    first, evidence = done.found.first, done.evidence
+    p = len(evidence.weight)
+    sigma: Floats = first.sigma
+    columns = [k for k in range(p, len(first.z)) if np.isfinite(sigma[k])]
+    rows = [
+        Ranked(
+            evidence.names[k], float(first.z[k]), float(first.estimate[k]), float(sigma[k]),
+            evidence.candidates[k - p].parameter.display_unit,
+        )
+        for k in columns
+    ]  # fmt: skip
+    return tuple(sorted(rows, key=lambda r: -abs(r.z)))

@@ -1,0 +1,101 @@
+"""The live diagnosis on its topics: asked at the end of each stop, published and logged when it is there.
+
+Publications: calibration/diagnosis (verdict, where, ranking and ladder for people), calibration/ranking (every
+candidate with all digits), calibration/heat_map (channel by stop).
+"""
+
+from __future__ import annotations
+
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.node import Node
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64MultiArray
+
+from sdimu_calibration.core.diagnosis.live_diagnosis import WAITING
+from sdimu_calibration.core.live import EpochEstimate
+from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.nodes import diagnosis_messages as messages
+from sdimu_calibration.nodes.credits import HISTORY, publish
+from sdimu_calibration.nodes.diagnosis_worker import Answer, Job
+from sdimu_calibration.nodes.live_diagnosis import StopDiagnosis, Worker
+from sdimu_calibration.report.live_text import told
+
+
+class Diagnosing:
+    """Diagnoses a running test.
+
+    Parameters
+    ----------
+    node : Node
+    job : Job or None
+        None where nothing is to be diagnosed.
+    added : tuple of str
+        Effects beyond the model that the test begins with.
+
+    Attributes
+    ----------
+    last : Answer or None
+        The newest diagnosis, with the answer to the question of the job.
+    """
+
+    def __init__(self, node: Node, job: Job | None, added: tuple[str, ...]) -> None:
+        self._node = node
+        self._stops = StopDiagnosis(Worker(job), added) if job else None
+        self.last: Answer | None = None
+        # Few and telling: who comes late gets them all.
+        self._diagnosis = node.create_publisher(DiagnosticArray, "calibration/diagnosis", HISTORY)
+        self._ranking = node.create_publisher(JointState, "calibration/ranking", HISTORY)
+        self._heat_map = node.create_publisher(Float64MultiArray, "calibration/heat_map", HISTORY)
+
+    @property
+    def idle(self) -> bool:
+        """Whether nothing is asked that is not answered."""
+        return self._stops is None or self._stops.idle
+
+    def take(self, e: EpochEstimate) -> None:
+        """Note an epoch of the filter on the way."""
+        if self._stops:
+            self._stops.take(e)
+
+    def end(self) -> None:
+        """Ask for the diagnosis of everything."""
+        if self._stops:
+            self._stops.end()
+
+    def change_model(self, added: tuple[str, ...]) -> None:
+        """Diagnose again with other effects added."""
+        if self._stops:
+            self._stops.change_model(added)
+
+    def restart(self) -> None:
+        """Forget the test."""
+        if self._stops:
+            self._stops.restart()
+
+    def tick(self, newest_ns: int) -> None:
+        """Publish a diagnosis once it is there; `newest_ns` is the stamp of one of everything."""
+        if self._stops is None:
+            return
+        try:
+            answer = self._stops.answer()
+        except DataError as error:
+            self._node.get_logger().error(str(error))
+            self.close()
+            return
+        if answer is not None:
+            self.last = answer
+            self._publish(answer, newest_ns if answer.request.until_ns is None else answer.request.until_ns)
+
+    def _publish(self, answer: Answer, stamp_ns: int) -> None:
+        found = answer.diagnosis
+        if found.verdict != WAITING:
+            publish(self._ranking, messages.ranking(stamp_ns, found))
+            publish(self._heat_map, messages.heat_map(stamp_ns, found))
+        publish(self._diagnosis, messages.diagnosis(stamp_ns, found))
+        self._node.get_logger().info(f"diagnosis of {told(found)} ({answer.seconds:.1f} s after it was asked)")
+
+    def close(self) -> None:
+        """End the process that diagnoses."""
+        if self._stops:
+            self._stops.close()
+            self._stops = None

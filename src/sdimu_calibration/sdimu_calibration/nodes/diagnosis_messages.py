@@ -1,0 +1,91 @@
+"""A live diagnosis as messages: tables for people, exact numbers for programs."""
+
+from __future__ import annotations
+
+from array import array
+from collections.abc import Iterable
+
+import numpy as np
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64MultiArray, MultiArrayDimension, MultiArrayLayout
+
+from sdimu_calibration.core.diagnosis.live_diagnosis import WAITING, LiveDiagnosis, Ranked
+from sdimu_calibration.nodes.credits import header
+from sdimu_calibration.report.data import places
+from sdimu_calibration.report.live_text import best_ranked, ladder_rows, model_name, size
+
+_MOST_RANKED = 12
+"""Number of candidates in the table for people."""
+
+
+def diagnosis(stamp_ns: int, found: LiveDiagnosis) -> DiagnosticArray:
+    """Return verdict, where the last stop fails, ranking and ladder, one status each; all but the first are tables."""
+    level = DiagnosticStatus.OK if found.verdict == "consistent" else DiagnosticStatus.WARN
+    parts = [_status("verdict", found.sentence, _verdict(found), level)]
+    if found.verdict != WAITING:
+        reaches = f"noise reaches {found.threshold:.2f}"
+        parts += [
+            _status("where", f"stop {found.stop}: mean innovation over its sigma", _last_stop(found)),
+            _status("ranking", reaches, ((r.label, f"{r.z:+.1f} sigma, {size(r)}") for r in _first(found))),
+            _status("ladder", "error at stops held out, 1 is right", ladder_rows(found.ladder)),
+        ]
+    return DiagnosticArray(header=header(stamp_ns), status=parts)
+
+
+def ranking(stamp_ns: int, found: LiveDiagnosis) -> JointState:
+    """Return every candidate: estimate (SI) as position, score (sigma) as velocity, sigma (SI) as effort."""
+    message = JointState(header=header(stamp_ns), name=[r.label for r in found.ranking])
+    message.position = array("d", [r.estimate for r in found.ranking])
+    message.velocity = array("d", [r.z for r in found.ranking])
+    message.effort = array("d", [r.sigma for r in found.ranking])
+    return message
+
+
+def heat_map(stamp_ns: int, found: LiveDiagnosis) -> Float64MultiArray:
+    """Return mean innovations over their sigma, channel by stop; labels name both, the last one is the stamp."""
+    grid, channels = places(found.where)
+    rows, columns = grid.value.shape
+    dims = [
+        MultiArrayDimension(label="channel:" + ",".join(channels), size=rows, stride=rows * columns),
+        MultiArrayDimension(label="stop:" + ",".join(map(str, grid.stops)), size=columns, stride=columns),
+        MultiArrayDimension(label=f"stamp_ns={stamp_ns}", size=1, stride=1),
+    ]
+    data = array("d", np.ascontiguousarray(grid.value).tobytes())
+    return Float64MultiArray(layout=MultiArrayLayout(dim=dims), data=data)
+
+
+def _verdict(found: LiveDiagnosis) -> Iterable[tuple[str, str]]:
+    yield "verdict", found.verdict
+    yield "stop", str(found.stop)
+    yield "until_s", f"{found.until_s:.6g}"
+    yield "model", model_name(found.added)
+    if found.verdict == WAITING:
+        return
+    yield "threshold", f"{found.threshold:.6g}"
+    yield "candidates_above", str(len(found.standing))
+    yield "largest_score", f"{max((abs(r.z) for r in found.ranking), default=0.0):.6g}"
+    yield "best", found.ranking[0].label if found.standing else "none"
+    yield "p_unexplained", f"{found.p_value:.3g}"
+    yield "held_out", f"{found.ladder[-1].held_out:.6g}"
+    yield "nis", f"{found.ladder[-1].nis:.6g}"
+    for number, text in enumerate(found.noise, start=1):
+        yield f"noise_{number}", text
+
+
+def _last_stop(found: LiveDiagnosis) -> list[tuple[str, str]]:
+    grid, channels = places(found.where)
+    column = grid.value[:, -1] if grid.value.size else np.empty(0)
+    return [(name, f"{value:.4g}") for name, value in zip(channels, column, strict=True) if np.isfinite(value)]
+
+
+def _first(found: LiveDiagnosis) -> list[Ranked]:
+    return best_ranked(found.ranking)[:_MOST_RANKED]
+
+
+def _status(
+    name: str, message: str, values: Iterable[tuple[str, str]], level: bytes = DiagnosticStatus.OK
+) -> DiagnosticStatus:
+    status = DiagnosticStatus(level=level, name=name, message=message, hardware_id="imu")
+    status.values = [KeyValue(key=key, value=value) for key, value in values]
+    return status

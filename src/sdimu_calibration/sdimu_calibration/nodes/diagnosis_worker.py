@@ -1,0 +1,168 @@
+"""The process that diagnoses a running test: one request after the other, each a fit of what the journal holds.
+
+It knows no ROS: it gets requests and gives answers through a pipe (`nodes.live_diagnosis`), and ends with it.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import Any
+
+from sdimu_calibration.core.data.arrival import in_order, until
+from sdimu_calibration.core.diagnosis.live_diagnosis import (
+    LiveDiagnosis,
+    ModelError,
+    error_of,
+    so_far,
+    waiting,
+)
+from sdimu_calibration.core.estimation.fit import Fit
+from sdimu_calibration.core.estimation.prepared_test import PreparedTest
+from sdimu_calibration.core.front_door import OpeningOptions, open_test
+from sdimu_calibration.core.recording import NOMINAL_FROM, DataError
+from sdimu_calibration.storage.effect_file import extended_model
+from sdimu_calibration.storage.journal import read_journal
+
+Question = Callable[[Fit, LiveDiagnosis, Any], Any]
+"""A further question of a fit: `Job.question`."""
+_NICE = 10
+"""Steps by which samples come first."""
+
+
+@dataclass(frozen=True)
+class Job:
+    """What holds for all requests.
+
+    Attributes
+    ----------
+    journal : Path
+        As `Journal.place`.
+    options : OpeningOptions
+    model : str
+        Name or path.
+    question : callable, optional
+        Function of a module that is asked of every fit, as ``question(fit, diagnosis, about)``; its answer must survive
+        `pickle`.
+    """
+
+    journal: Path
+    options: OpeningOptions
+    model: str
+    question: Question | None = None
+
+
+@dataclass(frozen=True)
+class Request:
+    """Diagnose what there is.
+
+    Attributes
+    ----------
+    stop : int
+    until_ns : int or None
+        The last stamp that counts; None for everything.
+    models : tuple of tuple of str
+        What was added to the model, one entry for each model that the test has had, the one in use last.
+    about : object
+        For the question.
+    asked : float
+        When (s of the monotonic clock, which all processes share).
+    """
+
+    stop: int
+    until_ns: int | None
+    models: tuple[tuple[str, ...], ...] = ((),)
+    about: Any = None
+    asked: float = field(default_factory=time.monotonic)
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What came of a request.
+
+    Attributes
+    ----------
+    request : Request
+    diagnosis : LiveDiagnosis
+    more : object
+        Answer to the question; None without question or fit.
+    seconds : float
+        From the request to the answer.
+    """
+
+    request: Request
+    diagnosis: LiveDiagnosis
+    more: Any
+    seconds: float
+
+
+class Diagnoser:
+    """Answers requests, and remembers the last data and the errors of models on them."""
+
+    def __init__(self, job: Job) -> None:
+        self._job = job
+        self._test: tuple[int | None, PreparedTest] | None = None
+        self._errors: dict[tuple[str, ...], ModelError] = {}
+
+    def answer(self, request: Request) -> Answer:
+        """Diagnose what there is; a diagnosis that waits where that is not possible yet."""
+        more, added = None, request.models[-1]
+        try:
+            test = self._opened(request.until_ns)
+            earlier = [self._error(test, models) for models in request.models[:-1]]
+            found, fit = so_far(test, extended_model(self._job.model, added), added, earlier)
+            self._errors[added] = found.ladder[-1]
+            if self._job.question is not None:
+                more = self._job.question(fit, found, request.about)
+        except DataError as error:
+            until_s = float(self._test[1].recording.t[-1]) if self._test else 0.0
+            found = waiting(request.stop, until_s, added, str(error))
+        return Answer(request, found, more, time.monotonic() - request.asked)
+
+    def _error(self, test: PreparedTest, added: tuple[str, ...]) -> ModelError:
+        if added not in self._errors:
+            self._errors[added] = error_of(test, extended_model(self._job.model, added), added)
+        return self._errors[added]
+
+    def _opened(self, until_ns: int | None) -> PreparedTest:
+        """Open the data up to a stamp, unless they are those of the last request; everything is read anew."""
+        if self._test is None or until_ns is None or self._test[0] != until_ns:
+            self._test, self._errors = None, {}
+            raw = read_journal(self._job.journal)
+            raw = raw if until_ns is None else until(raw, until_ns)
+            if len(raw.ns) <= NOMINAL_FROM:
+                raise DataError("too few samples have come")
+            opened = open_test(in_order(raw), self._job.options)
+            self._test = until_ns, PreparedTest(opened.recording, opened.imu, opened.site)
+        return self._test[1]
+
+
+def work(pipe: Connection) -> None:
+    """Answer requests until the pipe breaks.
+
+    Parameters
+    ----------
+    pipe : Connection
+        Brings a `Job`, then each `Request`; takes each `Answer`.
+    """
+    # Ctrl-C reaches every process of a terminal; this one ends with its node.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    os.nice(_NICE)
+    try:
+        diagnoser = Diagnoser(pipe.recv())
+        while True:
+            pipe.send(diagnoser.answer(pipe.recv()))
+    except (EOFError, OSError):
+        # The node has left.
+        return
+
+
+def main() -> None:
+    """Work at the pipe whose number is the argument."""
+    work(Connection(int(sys.argv[1])))

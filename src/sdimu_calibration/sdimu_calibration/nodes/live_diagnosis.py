@@ -1,0 +1,145 @@
+"""The diagnosis at the end of each stop: asked of a process of its own, so that no sample waits for a fit."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from contextlib import suppress
+from multiprocessing import Pipe
+from typing import Any
+
+from sdimu_calibration.core.live import EpochEstimate
+from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.nodes.diagnosis_worker import Answer, Job, Request
+
+_PROGRAM = "from sdimu_calibration.nodes.diagnosis_worker import main; main()"
+"""Not ``-m``: what goes through the pipe is of the classes of a module by its real name."""
+
+
+class Worker:
+    """A process that answers one request at a time; the newest one waits, those before it are forgotten.
+
+    Parameters
+    ----------
+    job : Job
+    """
+
+    def __init__(self, job: Job) -> None:
+        self._pipe, far = Pipe()
+        # A new interpreter, not a fork: the threads of DDS do not survive one.
+        self._process = subprocess.Popen(
+            [sys.executable, "-c", _PROGRAM, str(far.fileno())],
+            pass_fds=[far.fileno()], stdin=subprocess.DEVNULL, env=dict(os.environ),
+        )  # fmt: skip
+        # The only other end is the worker's: it reads the end of the pipe when this process is gone.
+        far.close()
+        self._pipe.send(job)
+        self._busy: Request | None = None
+        self._next: Request | None = None
+
+    @property
+    def idle(self) -> bool:
+        """Whether every request that still counts is answered."""
+        return self._busy is None and self._next is None
+
+    def ask(self, request: Request) -> None:
+        """Take a request in place of the one that waits."""
+        self._next = request
+        self._send()
+
+    def _send(self) -> None:
+        if self._busy is None and self._next is not None:
+            self._busy, self._next = self._next, None
+            # A process that has ended is noticed where its answer is awaited.
+            with suppress(OSError):
+                self._pipe.send(self._busy)
+
+    def answer(self) -> Answer | None:
+        """Return an answer once it is there.
+
+        Raises
+        ------
+        DataError
+            When the process has ended.
+        """
+        try:
+            if self._busy is None or not self._pipe.poll():
+                return None
+            answer: Answer = self._pipe.recv()
+            self._busy = None
+            self._send()
+        except (EOFError, OSError) as error:
+            self._busy = self._next = None
+            raise DataError("the process of the live diagnosis has ended; the test goes on without it") from error
+        return answer
+
+    def close(self) -> None:
+        """End the process; a fit that it works on is not wanted any more."""
+        self._pipe.close()
+        self._process.kill()
+        self._process.wait()
+
+
+class StopDiagnosis:
+    """Asks at the end of each stop, and again when the model has changed.
+
+    Attributes
+    ----------
+    about : object
+        For `Job.question`, as it stands when a stop ends.
+
+    Parameters
+    ----------
+    worker : Worker
+    added : tuple of str
+        Effects beyond the model that the test begins with.
+    """
+
+    def __init__(self, worker: Worker, added: tuple[str, ...]) -> None:
+        self._worker = worker
+        self._models = [added]
+        self._stop, self._rest_ns = 0, 0
+        self._last: tuple[int, int | None] | None = None
+        self.about: Any = None
+
+    @property
+    def idle(self) -> bool:
+        """Whether everything that was asked is answered."""
+        return self._worker.idle
+
+    def take(self, e: EpochEstimate) -> None:
+        """Note an epoch; the first one of a turn ends the stop before it."""
+        if e.used:
+            self._stop, self._rest_ns = e.stop, e.ns
+        elif not e.dwell and self._rest_ns:
+            self._ask(self._stop, self._rest_ns)
+            self._rest_ns = 0
+
+    def end(self) -> None:
+        """Ask for the diagnosis of everything."""
+        self._rest_ns = 0
+        self._ask(self._stop, None)
+
+    def change_model(self, added: tuple[str, ...]) -> None:
+        """Ask for the last diagnosis again, with other effects added; the ladder gets a rung."""
+        self._models = [*(model for model in self._models if model != added), added]
+        if self._last is not None:
+            self._ask(*self._last)
+
+    def restart(self) -> None:
+        """Forget the test."""
+        self._models, self._last = self._models[-1:], None
+        self._stop, self._rest_ns = 0, 0
+
+    def _ask(self, stop: int, until_ns: int | None) -> None:
+        self._last = stop, until_ns
+        self._worker.ask(Request(stop, until_ns, tuple(self._models), self.about))
+
+    def answer(self) -> Answer | None:
+        """Return a diagnosis once it is there; raises as `Worker.answer`."""
+        return self._worker.answer()
+
+    def close(self) -> None:
+        """End the process."""
+        self._worker.close()

@@ -1,0 +1,182 @@
+"""The diagnosis while the table turns is that of `sdimu diagnose` on the same data, and waits for nobody."""
+
+from __future__ import annotations
+
+import importlib
+import os
+import sys
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sdimu_calibration.core.data.arrival import RawStatus, RawTest, until
+from sdimu_calibration.core.diagnosis import ground, noise_search
+from sdimu_calibration.core.diagnosis.diagnose import climb
+from sdimu_calibration.core.diagnosis.live_diagnosis import LiveDiagnosis
+from sdimu_calibration.core.diagnosis.problem import Problem
+from sdimu_calibration.core.diagnosis.search import FALSE_ALARM, search
+from sdimu_calibration.core.estimation.solve import solve
+from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.nodes.diagnosis_worker import Answer, Diagnoser, Job, Request
+from sdimu_calibration.nodes.live_diagnosis import Worker
+from sdimu_calibration.storage.bag_writer import write_recording
+from sdimu_calibration.storage.config import load_imu, load_model, load_plan
+from sdimu_calibration.storage.journal import Journal, digest
+from sdimu_calibration.storage.opening import Source, open_test, opening_options
+from sdimu_sim.core.scenario import Scenario, generate
+
+EFFECT = "gyro_scale_asymmetry_y"
+START = 1_700_000_000 * 10**9
+PATIENCE_S = 300.0  # a first run on a new machine compiles
+OPTIONS = opening_options("daejeon", load_imu("dtg"), Source(gyro_unit="rad/s", gyro_sign=1))
+KIM18 = load_plan("kim18_signed")
+PLAN = replace(KIM18, dwell_s=(60.0,) * 6, turns=KIM18.turns[:5])
+
+
+@pytest.fixture(scope="module")
+def raw() -> RawTest:
+    """A test of six stops with an effect that the model lacks."""
+    scenario = Scenario(PLAN, OPTIONS.imu, OPTIONS.site, rate_hz=20.0, seed=7, effects=(f"{EFFECT}=400 ppm",))
+    r = generate(scenario)[0]
+    second = np.arange(0.0, r.t[-1])
+    row = np.searchsorted(r.phase.t, second, side="right") - 1
+    status = RawStatus(START + (second * 1e9).astype(np.int64), r.phase.dwell[row], r.phase.stop[row])
+    return RawTest(START + np.rint(r.t * 1e9).astype(np.int64), r.omega_ib_b, r.f_ib_b, status)
+
+
+@pytest.fixture(scope="module")
+def job(raw: RawTest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Job]:
+    journal = Journal(tmp_path_factory.mktemp("node") / "journal", digest("options"))
+    for entry in zip(*raw.status, strict=True):
+        journal.status(*map(int, entry))
+    journal.samples(raw.ns, raw.omega_ib_b, raw.f_ib_b)
+    yield Job(journal.place, OPTIONS, "baseline")
+    journal.close()
+
+
+@pytest.fixture(scope="module")
+def whole(job: Job) -> LiveDiagnosis:
+    return Diagnoser(job).answer(Request(5, None)).diagnosis
+
+
+def stop_end(raw: RawTest, stop: int) -> int:
+    return int(raw.status.ns[(raw.status.stop == stop) & raw.status.dwell].max())
+
+
+def test_all_data_are_ranked_as_the_first_scan_of_a_diagnosis_of_the_bag(raw, whole, tmp_path, monkeypatch):
+    write_recording(
+        tmp_path / "bag", start_ns=START, imu_ns=raw.ns - START, omega_ib_b=raw.omega_ib_b, f_ib_b=raw.f_ib_b,
+        status=(raw.status.ns - START, raw.status.dwell, raw.status.stop),
+    )  # fmt: skip
+    searches = []
+
+    def seen(evidence, allowed, *arguments):
+        searches.append((evidence.only(allowed), search(evidence, allowed, *arguments)))
+        return searches[-1][1]
+
+    for room in (ground, noise_search):  # the first one searches where an effect is strong
+        monkeypatch.setattr(room, "search", seen)
+    climb(solve(open_test(tmp_path / "bag", "daejeon", load_imu("dtg")), load_model("baseline")))
+    evidence, first = searches[0][0], searches[0][1].first
+    assert {r.label: (r.z, r.estimate, r.sigma) for r in whole.ranking} == {
+        evidence.names[k]: (first.z[k], first.estimate[k], first.sigma[k])
+        for k in range(len(evidence.weight), len(first.z)) if np.isfinite(first.sigma[k])
+    }
+    assert whole.threshold == Problem(evidence).threshold(first, FALSE_ALARM)
+
+
+def test_what_is_missing_stands_out_and_leaves_when_it_is_added(job, whole):
+    assert whole.verdict == "misfit"
+    assert EFFECT in {r.label for r in whole.standing}
+    added = Diagnoser(job).answer(Request(5, None, ((), (EFFECT,)))).diagnosis
+    assert added.verdict == "consistent"
+    assert [rung.added for rung in added.ladder] == [(), (EFFECT,)]
+    assert added.ladder[0] == whole.ladder[0]
+    assert added.ladder[1].nis == pytest.approx(1.0, abs=0.1)
+    assert added.ladder[1].held_out < added.ladder[0].held_out
+
+
+def test_a_stop_is_diagnosed_by_what_had_come_by_its_end(raw, job, tmp_path):
+    """Whatever is in the journal behind it."""
+    end = stop_end(raw, 2)
+    short = until(raw, end)
+    journal = Journal(tmp_path / "short", digest("options"))
+    for entry in zip(*short.status, strict=True):
+        journal.status(*map(int, entry))
+    journal.samples(short.ns, short.omega_ib_b, short.f_ib_b)
+    alone = Diagnoser(replace(job, journal=journal.place)).answer(Request(2, None)).diagnosis
+    assert Diagnoser(job).answer(Request(2, end)).diagnosis == alone
+    assert alone.stop == 2
+    assert {place.stop for place in alone.where} == {0, 1, 2}
+
+
+def test_a_stop_that_cannot_be_fitted_says_what_it_waits_for(job):
+    answer = Diagnoser(job).answer(Request(0, START + 10**9))
+    assert answer.diagnosis.verdict == "waiting"
+    assert "too few samples" in answer.diagnosis.sentence
+
+
+QUESTION = '''
+def largest_score(fit, diagnosis, about):
+    return about, fit.estimator, diagnosis.ranking[0].label
+'''
+
+
+@pytest.fixture
+def question(tmp_path, monkeypatch):
+    """A question as an adaptive test asks it, in a module that worker and node can import."""
+    (tmp_path / "adaptive_question.py").write_text(QUESTION, encoding="utf-8")
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join(sys.path))
+    return importlib.import_module("adaptive_question").largest_score
+
+
+def wait_for(worker: Worker) -> list[Answer]:
+    answers, begun = [], time.monotonic()
+    while not worker.idle:
+        assert time.monotonic() - begun < PATIENCE_S
+        answer = worker.answer()
+        answers += [answer] if answer else []
+        time.sleep(0.01)
+    return answers
+
+
+def test_of_the_requests_that_wait_the_newest_alone_is_answered(raw, job, whole, question):
+    worker = Worker(replace(job, question=question))
+    try:
+        for stop in (1, 2, 3, 4):
+            worker.ask(Request(stop, stop_end(raw, stop), about=f"stop {stop}"))
+        worker.ask(Request(5, None, about="the end"))
+        answers = wait_for(worker)
+    finally:
+        worker.close()
+    assert [answer.request.stop for answer in answers] == [1, 5]
+    assert answers[1].diagnosis == whole
+    assert answers[1].more == ("the end", "filter", whole.ranking[0].label)
+
+
+def test_a_worker_that_has_ended_is_told_once(job):
+    worker = Worker(job)
+    worker._process.kill()
+    worker._process.wait()
+    worker.ask(Request(1, None))
+    with pytest.raises(DataError, match="goes on without it"):
+        wait_for(worker)
+    assert worker.idle
+    worker.close()
+
+
+def test_a_worker_ends_with_its_node(job):
+    worker = Worker(job)
+    worker._pipe.close()  # as the system does when the node is killed
+    assert worker._process.wait(PATIENCE_S) == 0
+
+
+def test_a_folder_is_no_journal(job, tmp_path):
+    answer = Diagnoser(replace(job, journal=Path(tmp_path))).answer(Request(0, None))
+    assert answer.diagnosis.verdict == "waiting"
+    assert "cannot be read" in answer.diagnosis.sentence
