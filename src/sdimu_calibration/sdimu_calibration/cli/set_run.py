@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from sdimu_calibration.core.effects.effect import Effect
     from sdimu_calibration.core.estimation.prepared_test import PreparedTest
     from sdimu_calibration.core.joint.member import Member
+    from sdimu_calibration.core.joint.set_diagnosis import SetDiagnosis
     from sdimu_calibration.core.joint.set_fit import Run, SetOptions
     from sdimu_calibration.core.progress import Progress
     from sdimu_calibration.core.results import Calibration
@@ -144,16 +145,13 @@ def calibrate_together(asked: SetRequest) -> None:
 
 def diagnose_together(asked: SetRequest, extra: Sequence[Effect]) -> None:
     """Find what the model of a set misses; leaves set.json, result.json and report.html."""
-    from sdimu_calibration.core.joint.set_diagnosis import diagnose_set
     from sdimu_calibration.report.page import write_report
     from sdimu_calibration.storage.result_file import write_result
     from sdimu_calibration.storage.set_result_file import write_set_diagnosis
     from sdimu_calibration.storage.whole_file import written_together
 
     console = plain()
-    with _begun(console, asked) as (members, options, run, progress):
-        found = diagnose_set(members, options, run, extra, progress)
-        progress("done", 1.0)
+    found, members = diagnosed_set(console, asked, extra)
     after = _with_serial(found.after, members)
     folder = _folder(asked, "diagnosis")
     with written_together(folder) as part:
@@ -166,6 +164,18 @@ def diagnose_together(asked: SetRequest, extra: Sequence[Effect]) -> None:
         console.print(f"advice: {line}", soft_wrap=True, highlight=False)
     console.print(f"results in {folder}", soft_wrap=True)
     leave(after)
+
+
+def diagnosed_set(
+    console: Console, asked: SetRequest, extra: Sequence[Effect]
+) -> tuple[SetDiagnosis, tuple[Member, ...]]:
+    """Find what the model of a set misses; give its recordings, too."""
+    from sdimu_calibration.core.joint.set_diagnosis import diagnose_set
+
+    with _begun(console, asked) as (members, options, run, progress):
+        found = diagnose_set(members, options, run, extra, progress)
+        progress("done", 1.0)
+    return found, members
 
 
 @contextmanager
