@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -12,7 +12,6 @@ import typer
 
 from sdimu_calibration.cli.console import plain
 from sdimu_calibration.cli.options import leave, tell
-from sdimu_calibration.core.recording import DataError
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -184,10 +183,9 @@ def _begun(
 ) -> Iterator[tuple[tuple[Member, ...], SetOptions, Run, Progress]]:
     """Members, options and runner of what is asked, with a bar that shows the recordings that are done."""
     from sdimu_calibration.cli.progress import bar
-    from sdimu_calibration.core.joint.set_fit import SetOptions
     from sdimu_calibration.core.units import parse_quantity
-    from sdimu_calibration.storage.model_choice import HANDHELD, named_estimator, named_model
-    from sdimu_calibration.storage.recording_set import BagSource, load_set, set_of
+    from sdimu_calibration.storage.model_choice import HANDHELD, named_estimator
+    from sdimu_calibration.storage.recording_set import BagSource, load_set, set_of, set_options
     from sdimu_calibration.storage.set_work import set_runner
 
     estimator = named_estimator(asked.estimator, "--estimator")
@@ -199,10 +197,7 @@ def _begun(
     wanted = set_of(asked.bags, like) if asked.file is None else load_set(asked.file, like)
     serial = asked.serial
     members = tuple(m if serial is None else replace(m, serial=serial) for m in wanted.members)
-    chosen = estimator if estimator != "auto" else wanted.estimator
-    by_hand = chosen == HANDHELD or (chosen == "auto" and _moved_by_hand(members))
-    model = named_model(asked.model or wanted.model, asked.add, handheld=by_hand)
-    options = SetOptions(model, chosen, scopes=wanted.scopes)
+    options = set_options(replace(wanted, members=members), asked.model, asked.add, estimator)
     with bar(console) as progress:
         def told(done: int, of: int) -> None:
             progress(f"recordings {done} of {of}", done / of)
@@ -210,14 +205,6 @@ def _begun(
         kept = _folder(asked, "evidence")
         with set_runner(len(members), asked.workers, kept, asked.scheduler, told) as run:
             yield members, options, run, progress
-
-
-def _moved_by_hand(members: Sequence[Member]) -> bool:
-    """Whether the first recording that can be opened was moved by hand; fitting tells of those that cannot."""
-    for member in members:
-        with suppress(DataError):
-            return bool(member.open().why_handheld)
-    return False
 
 
 def _folder(asked: SetRequest, what: str) -> Path:
@@ -234,8 +221,7 @@ def _title(asked: SetRequest, word: str) -> str:
 
 
 def _with_serial(result: Calibration, members: Sequence[Member]) -> Calibration:
-    serial = next((m.serial for m in members if m.serial), "")
-    return replace(result, origin=replace(result.origin, serial=serial))
+    return result.with_serial(next((m.serial for m in members if m.serial), ""))
 
 
 def _show(console: Console, result: Calibration) -> None:

@@ -12,7 +12,7 @@ from sdimu_calibration.core.effects.selection import resolve
 from sdimu_calibration.core.evidence.known import Standing
 from sdimu_calibration.core.joint.member import Member
 from sdimu_calibration.core.joint.scope import tagged
-from sdimu_calibration.core.joint.set_fit import Run, SetOptions
+from sdimu_calibration.core.joint.set_fit import Run, SetFit, SetOptions
 from sdimu_calibration.core.joint.set_result import SCATTERS, base_fit, set_outcome
 from sdimu_calibration.core.joint.set_search import SetSearch, search_set
 from sdimu_calibration.core.joint.set_standing import next_recording
@@ -87,8 +87,9 @@ class SetDiagnosis:
 
 
 def diagnose_set(
-    members: Sequence[Member], options: SetOptions, run: Run, extra: Sequence[Effect] = (), progress: Progress = silent
-) -> SetDiagnosis:
+    members: Sequence[Member], options: SetOptions, run: Run, extra: Sequence[Effect] = (),
+    progress: Progress = silent, fitted: SetFit | None = None,
+) -> SetDiagnosis:  # fmt: skip
     """Find what the model of a set misses; parameters as for `search_set`.
 
     Raises
@@ -98,7 +99,7 @@ def diagnose_set(
     """
     if len(members) < 2:
         raise DataError("a set of one recording: diagnose it by itself (sdimu diagnose BAG)")
-    found = search_set(members, options, run, extra, progress)
+    found = search_set(members, options, run, extra, progress, fitted=fitted)
     progress("report", 0.95)
     before = set_outcome(found.before)
     after = before if found.after is found.before else set_outcome(found.after)

@@ -104,7 +104,7 @@ class SetSearch:
 
 def search_set(
     members: Sequence[Member], options: SetOptions, run: Run, extra: Sequence[Effect] = (),
-    progress: Progress = silent, alpha: float = FALSE_ALARM,
+    progress: Progress = silent, alpha: float = FALSE_ALARM, fitted: SetFit | None = None,
 ) -> SetSearch:  # fmt: skip
     """Find what the model of a set misses.
 
@@ -120,13 +120,15 @@ def search_set(
     progress : callable
     alpha : float
         False-alarm probability of a whole scan.
+    fitted : SetFit, optional
+        The set with the model as given, where it was fitted already.
 
     Raises
     ------
     DataError
         When the set cannot be fitted.
     """
-    before = fit = fit_set(members, options, run, progress=progress)
+    before = fit = fitted or fit_set(members, options, run, progress=progress)
     chosen: dict[str, Candidate] = {}
     scores: dict[str, float] = {}
     local: list[LocalFind] = []
