@@ -29,9 +29,18 @@ if "numpy" in sys.modules and "OPENBLAS_NUM_THREADS" not in os.environ:
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 if TYPE_CHECKING:
-    from sdimu_calibration.api.functions import calibrate, compare, diagnose, open, plan, predict, simulate  # noqa: A004
+    from sdimu_calibration.api.functions import (
+        calibrate,
+        compare,
+        diagnose,
+        open,  # noqa: A004
+        open_set,
+        plan,
+        predict,
+        simulate,
+    )
 
-__all__ = ["calibrate", "compare", "diagnose", "open", "plan", "predict", "simulate"]
+__all__ = ["calibrate", "compare", "diagnose", "open", "open_set", "plan", "predict", "simulate"]
 
 
 def __getattr__(name: str) -> Any:

@@ -103,7 +103,7 @@ def test_a_plan_is_predicted():
 
 def test_the_package_shows_its_functions_and_no_more():
     public = [name for name in dir(sdimu) if not name.startswith("_")]
-    assert public == ["calibrate", "compare", "diagnose", "open", "plan", "predict", "simulate"]
+    assert public == ["calibrate", "compare", "diagnose", "open", "open_set", "plan", "predict", "simulate"]
     with pytest.raises(AttributeError, match="no attribute 'calibrat'"):
         _ = sdimu.calibrat
 

@@ -11,8 +11,10 @@ from sdimu_calibration.api.fit import CalibrationFit
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.diagnosis.found import Found
 from sdimu_calibration.core.diagnosis.problem import Problem
+from sdimu_calibration.core.diagnosis.standing import standing
 from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary, summarise
 from sdimu_calibration.core.evidence.candidate import Candidate
+from sdimu_calibration.core.evidence.known import Standing
 from sdimu_calibration.core.evidence.navigation_evidence import NavigationEvidence
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.report import data, evidence_figures
@@ -78,6 +80,11 @@ class FitDiagnosis:
     def advice(self) -> tuple[str, ...]:
         """What to do next, one sentence each."""
         return self.summary.advice
+
+    @property
+    def known(self) -> Standing:
+        """What the recording knows of the unit: what a plan for the next one begins with."""
+        return standing(self.core, self.summary.found)
 
     def plot_ranking(self) -> Any:
         """Scores of the candidates against what noise reaches (a plotly figure)."""

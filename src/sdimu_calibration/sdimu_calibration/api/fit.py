@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import io
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from functools import cached_property
-from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from rich.console import Console
 
-from sdimu_calibration.api.coefficient import Coefficient
+from sdimu_calibration.api.fitted import Fitted
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.compensation import Compensated, compensate_recording, compensator
 from sdimu_calibration.core.effects.effect import Effect
@@ -20,24 +17,17 @@ from sdimu_calibration.core.estimation.fit import Fit
 from sdimu_calibration.core.estimation.outcome import outcome
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.estimation.solve import extend
-from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.report.page import write_report
-from sdimu_calibration.report.table import cells, headings, rich_table, rows
 from sdimu_calibration.storage.effect_file import find_effects, new_parts
 from sdimu_calibration.storage.result_file import write_result
 from sdimu_calibration.storage.whole_file import written_together
 
 if TYPE_CHECKING:
-    import pandas as pd
-
     from sdimu_calibration.core.evidence.candidate import Candidate
 
-_WIDTH = 110
-"""Columns of the table that stands for a fit."""
 
-
-class CalibrationFit:
+class CalibrationFit(Fitted):
     """A model fitted to a test.
 
     Indexed by the name of a coefficient; its ``repr`` is the table of coefficients, in a notebook as HTML.
@@ -83,63 +73,9 @@ class CalibrationFit:
         estimate, _ = evidence.information.estimate(evidence.model, evidence.weight)
         return np.asarray(evidence.e - evidence.W @ estimate)
 
-    def __getitem__(self, name: str) -> Coefficient:
-        """Give a coefficient by its name."""
-        if name not in self.names:
-            raise KeyError(f"no coefficient '{name}' in this model (it has {', '.join(self.names[:6])}, ...)")
-        k = self.names.index(name)
-        parameter = self.core.sensors.parameters[k]
-        sigma = float(np.sqrt(self.covariance[k, k]))
-        return Coefficient(name, float(self.values[k]), sigma, parameter.unit, parameter.display_unit)
-
-    def __iter__(self) -> Iterator[Coefficient]:
-        """Go through the coefficients in the order of `values`."""
-        return (self[name] for name in self.names)
-
-    def __len__(self) -> int:
-        """Return the number of coefficients."""
-        return len(self.names)
-
-    def __repr__(self) -> str:
-        """Table of coefficients with units, and how well the fit predicts."""
-        text = io.StringIO()
-        console = Console(file=text, width=_WIDTH, color_system=None)
-        console.print(rich_table(rows(self.result), f"{self.core.estimator}, body frame: {self.result.body_frame}"))
-        return text.getvalue() + self._figures()
-
-    def _repr_html_(self) -> str:
-        """Table of coefficients as HTML."""
-        entries = rows(self.result)
-        columns = headings(entries)
-        head = "".join(f"<th>{escape(c)}</th>" for c in columns)
-        body = "".join(
-            "<tr>" + "".join(f"<td>{escape(text)}</td>" for text in cells(row, columns)) + "</tr>" for row in entries
-        )
-        table = f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
-        return f"<p>{escape(self.core.estimator)}, body frame: {escape(self.result.body_frame)}</p>{table}" + (
-            f"<p>{escape(self._figures())}</p>"
-        )
-
-    def _figures(self) -> str:
-        fit = self.result.fit
-        held_out = fit["held_out_rms"]
-        shown = "" if held_out is None else f", held-out error {held_out:.3f}"
-        return "; ".join([f"NIS {fit['nis_mean']:.3f}{shown} (1 is right)", *self.result.inseparable])
-
-    def to_dataframe(self) -> pd.DataFrame:
-        """Coefficients as a table: name, value, sigma, unit (customary).
-
-        Raises
-        ------
-        DataError
-            When pandas is not installed.
-        """
-        try:
-            import pandas as pd  # noqa: PLC0415 (optional, and slow to load)
-        except ImportError as error:
-            raise DataError("to_dataframe needs pandas: pip install pandas") from error
-        numbers = [(c.name, *c.to(c.display_unit), c.display_unit) for c in self]
-        return pd.DataFrame(numbers, columns=["name", "value", "sigma", "unit"]).set_index("name")
+    @property
+    def _heading(self) -> str:
+        return f"{self.core.estimator}, body frame: {self.result.body_frame}"
 
     def add(self, effect: str | Effect | Candidate) -> CalibrationFit:
         """Fit again with an effect more, beginning where this fit ended.

@@ -7,15 +7,17 @@ from collections.abc import Sequence
 from dataclasses import replace
 from importlib.metadata import entry_points
 from pathlib import Path
-from typing import Any
+from typing import Any, overload
 
 from sdimu_calibration.api.comparison import Comparison
 from sdimu_calibration.api.diagnosis import FitDiagnosis
 from sdimu_calibration.api.fit import CalibrationFit
+from sdimu_calibration.api.recording_set import JointDiagnosis, JointFit, OpenedSet
 from sdimu_calibration.core.batch.batch import bound_covariance
 from sdimu_calibration.core.diagnosis.diagnose import climb
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.estimation.solve import AUTO, solve
+from sdimu_calibration.core.evidence.known import Standing
 from sdimu_calibration.core.plan import Plan
 from sdimu_calibration.core.plan_search import Found, Goal, Question, search
 from sdimu_calibration.core.plan_search.bound import bounds
@@ -30,6 +32,7 @@ from sdimu_calibration.storage.config import load_imu, load_plan, load_site
 from sdimu_calibration.storage.effect_file import find_effects
 from sdimu_calibration.storage.model_choice import HANDHELD, named_estimator, named_model
 from sdimu_calibration.storage.opening import Source, open_test
+from sdimu_calibration.storage.recording_set import BagSource, load_set, set_of, set_options
 
 _ABLE = Abilities((math.radians(2.0), math.radians(10.0)), math.radians(20.0), (20.0, 40.0, 60.0, 80.0, 100.0, 130.0))
 """What the table may be asked for: mean rates (rad/s), acceleration (rad/s^2) and dwells (s), as of `sdimu plan`."""
@@ -75,6 +78,48 @@ def open(  # noqa: A001 (as every library of files has it)
     return opened if whole_turns is None else replace(opened, whole_turns=parse_quantity(whole_turns, "deg"))
 
 
+def open_set(
+    bags: str | Path | Sequence[str | Path],
+    site: str | None = None,
+    imu: str | None = None,
+    source: Source | None = None,
+    serial: str | None = None,
+    reference_temperature: str | None = None,
+    workers: int = 1,
+    keep: str | Path | None = None,
+) -> OpenedSet:
+    """Open several recordings of one unit, to be calibrated and diagnosed together.
+
+    Parameters
+    ----------
+    bags : sequence of str or Path, or str or Path
+        Bags; or one set file (`sdimu set init`).
+    site, imu : str, optional
+        As for `open`, for all recordings; what a set file says of one comes first.
+    source : Source, optional
+        Topics, units and senses of all recordings.
+    serial : str, optional
+        Of the unit, in place of what the bags say.
+    reference_temperature : str, optional
+        From which temperature effects count, such as ``25 degC``.
+    workers : int
+        Processes that read recordings: a script that asks for more than one needs ``if __name__ == "__main__"``.
+    keep : str or Path, optional
+        Folder in which what each recording says is kept: a tenth recording then costs one.
+
+    Raises
+    ------
+    DataError
+        When a bag or the set file cannot be used.
+    """
+    reference = None if reference_temperature is None else parse_quantity(reference_temperature, "degC")
+    like = BagSource(Path(), site, imu, source or Source(), reference_degc=reference)
+    wanted = load_set(Path(bags), like) if isinstance(bags, str | Path) else set_of([Path(bag) for bag in bags], like)
+    if serial is not None:
+        wanted = replace(wanted, members=tuple(replace(m, serial=serial) for m in wanted.members))
+    return OpenedSet(wanted, workers, None if keep is None else Path(keep))
+
+
 def _expect(function: str, argument: str, value: object, kind: type, meant: str) -> None:
     if not isinstance(value, kind):
         raise DataError(f"{function}({argument}=...): expected {meant}, not {value!r:.60}")
@@ -85,15 +130,25 @@ def _listed(texts: str | Sequence[str]) -> list[str]:
     return [texts] if isinstance(texts, str) else list(texts)
 
 
+@overload
 def calibrate(
-    test: PreparedTest, model: str | None = None, add: Sequence[str] = (), estimator: str = AUTO,
+    test: PreparedTest, model: str | None = ..., add: Sequence[str] = ..., estimator: str = ...,
+    progress: Progress = ...,
+) -> CalibrationFit: ...  # fmt: skip
+@overload
+def calibrate(
+    test: OpenedSet, model: str | None = ..., add: Sequence[str] = ..., estimator: str = ..., progress: Progress = ...,
+) -> JointFit: ...  # fmt: skip
+def calibrate(
+    test: PreparedTest | OpenedSet, model: str | None = None, add: Sequence[str] = (), estimator: str = AUTO,
     progress: Progress = silent,
-) -> CalibrationFit:  # fmt: skip
-    """Fit a model to a test.
+) -> CalibrationFit | JointFit:  # fmt: skip
+    """Fit a model to a test, or to a set of recordings together.
 
     Parameters
     ----------
-    test : PreparedTest
+    test : PreparedTest or OpenedSet
+        What `open` or `open_set` returns.
     model : str, optional
         Name in config/model or path; ``baseline``, or ``hand`` (also ``handheld``) for a handheld run.
     add : sequence of str
@@ -108,20 +163,30 @@ def calibrate(
     DataError
         When the test, the model or the estimator cannot be used.
     """
-    _expect("calibrate", "test", test, PreparedTest, "what open(...) returns")
     wanted = named_estimator(estimator)
+    if isinstance(test, OpenedSet):
+        return test.fit(set_options(test.core, model, _listed(add), wanted), progress)
+    _expect("calibrate", "test", test, PreparedTest, "what open(...) or open_set(...) returns")
     handheld = wanted == HANDHELD or (wanted == AUTO and bool(test.why_handheld))
     return CalibrationFit(solve(test, named_model(model, _listed(add), handheld), wanted, progress=progress))
 
 
+@overload
 def diagnose(
-    fit: CalibrationFit, attempt: Sequence[str] = (), refits: bool = False, progress: Progress = silent
-) -> FitDiagnosis:
+    fit: CalibrationFit, attempt: Sequence[str] = ..., refits: bool = ..., progress: Progress = ...
+) -> FitDiagnosis: ...
+@overload
+def diagnose(
+    fit: JointFit, attempt: Sequence[str] = ..., refits: bool = ..., progress: Progress = ...
+) -> JointDiagnosis: ...
+def diagnose(
+    fit: CalibrationFit | JointFit, attempt: Sequence[str] = (), refits: bool = False, progress: Progress = silent
+) -> FitDiagnosis | JointDiagnosis:
     """Find what the model of a fit is missing.
 
     Parameters
     ----------
-    fit : CalibrationFit
+    fit : CalibrationFit or JointFit
     attempt : sequence of str
         Effects of your own that are tried with the catalogue, as for `sdimu diagnose --try`.
     refits : bool
@@ -134,8 +199,12 @@ def diagnose(
     DataError
         When an effect cannot be read, or an extended model cannot be fitted.
     """
-    _expect("diagnose", "fit", fit, CalibrationFit, "what calibrate(...) returns")
     extra = [effect for text in _listed(attempt) for effect in find_effects(text)]
+    if isinstance(fit, JointFit):
+        if refits:
+            raise DataError("diagnose(refits=True): is of one recording: leave it out for a set")
+        return fit.of.diagnose(fit, extra, progress)
+    _expect("diagnose", "fit", fit, CalibrationFit, "what calibrate(...) returns")
     return FitDiagnosis(climb(fit.core, extra, progress, refits=refits))
 
 
@@ -170,7 +239,7 @@ def predict(
 def plan(
     start: str | Plan = "kim18", imu: str = "dtg", site: str = "daejeon", model: str = "baseline",
     add: Sequence[str] = (), minutes: float | None = None, slack: float = 1.2, tries: int = 150,
-    progress: Progress = silent,
+    progress: Progress = silent, after: Standing | None = None,
 ) -> Found:  # fmt: skip
     """Search for a shorter or more telling plan with the bound of the data.
 
@@ -188,6 +257,9 @@ def plan(
         Plans that are evaluated at most.
     progress : callable
         Called with a word and the fraction done.
+    after : Standing, optional
+        What is known already (`known` of a diagnosis): the plan that tells most beyond it, in the time of `start`
+        where `minutes` are left out.
 
     Raises
     ------
@@ -195,6 +267,11 @@ def plan(
         When a name is unknown.
     """
     first = load_plan(start) if isinstance(start, str) else start
+    if after is not None:
+        wanted = named_model(model, [*after.added, *add])
+        asked = Question(load_site(site), load_imu(imu), wanted, after.known)
+        goal = Goal({}, first.duration_s / 60.0 if minutes is None else minutes)
+        return search(first, asked, _ABLE, goal, tries, progress)
     asked = Question(load_site(site), load_imu(imu), named_model(model, add))
     limits = {effect: slack * sigma for effect, sigma in bounds(first, asked).largest().items()}
     return search(first, asked, _ABLE, Goal(limits, minutes), tries, progress)

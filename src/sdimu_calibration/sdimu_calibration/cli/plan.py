@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -21,9 +22,16 @@ _LIMIT = "Largest sigma allowed, EFFECT='0.005 deg/h'; may be repeated. By defau
 
 
 def plan(
+    more: Annotated[
+        list[Path] | None, typer.Argument(metavar="[BAG...]", help="More recordings behind --after.")
+    ] = None,
     plan: Annotated[str, typer.Option(help="Plan to begin with: name in config/plan or path.")] = "kim18",
-    imu: Annotated[str, typer.Option(help="Specification of the IMU: name in config/imu or path.")] = "dtg",
-    site: Annotated[str, typer.Option(help="Where the test will be: name in config/site or path.")] = "daejeon",
+    imu: Annotated[
+        str | None, typer.Option(help="Specification of the IMU: name in config/imu or path; that of --after, or dtg.")
+    ] = None,
+    site: Annotated[
+        str | None, typer.Option(help="Where the test will be: name in config/site or path; of --after, or daejeon.")
+    ] = None,
     model: Annotated[str, typer.Option(help="Model to estimate: name in config/model or path.")] = "baseline",
     add: Annotated[
         list[str] | None, typer.Option(metavar="EFFECT", help="Effect that the plan should also show; may be repeated.")
@@ -41,12 +49,20 @@ def plan(
         list[str] | None,
         typer.Option(metavar="COEFFICIENT", help="Rank extra turns that tell these apart, and search no plan."),
     ] = None,
+    after: Annotated[
+        list[Path] | None,
+        typer.Option(
+            metavar="BAG or FOLDER", help="What is known already: recordings of the unit, or results of calibrate or "
+            "diagnose. Searches the plan that tells most beyond it in --minutes (those of --plan).",
+        ),
+    ] = None,
     out: Annotated[Path, typer.Option(help="Plan file to write.")] = Path("out/plan/found.yaml"),
 ) -> None:
     """Search for a plan with the bound of the data; leaves a plan file for --plan."""
+    from sdimu_calibration.cli.plan_after import After, standing_of, tell_gain
     from sdimu_calibration.cli.progress import bar
     from sdimu_calibration.core.plan_search import Goal, Question, next_turn, search
-    from sdimu_calibration.core.plan_search.bound import bounds
+    from sdimu_calibration.core.plan_search.bound import already, bounds
     from sdimu_calibration.core.plan_search.moves import Abilities
     from sdimu_calibration.storage.config import load_imu, load_plan, load_site
     from sdimu_calibration.storage.model_choice import named_model
@@ -54,47 +70,66 @@ def plan(
 
     console = plain()
     start = load_plan(plan)
-    asked = Question(load_site(site), load_imu(imu), named_model(model, add or []))
+    if more and not after:
+        raise typer.BadParameter("recordings stand behind --after", param_hint="BAG")
+    before = standing_of(console, After([*after, *(more or [])], imu, site, model)) if after else None
+    imu, site = imu or (before and before.imu) or "dtg", site or (before and before.site) or "daejeon"
+    wanted = named_model(model, [*(before.added if before else ()), *(add or [])])
+    asked = Question(load_site(site), load_imu(imu), wanted, before.known if before else None)
     speeds = tuple(math.radians(v) for v in _numbers("--rates", rates))
     if tell:
+        # The next recording is one of its own: the shortest that tells these apart.
+        onto = replace(start, dwell_s=start.dwell_s[:1], turns=()) if before else start
         with bar(console) as progress:
-            ranked = next_turn(start, asked, tell, rates_rad_s=speeds, progress=progress)
+            ranked = next_turn(onto, asked, tell, rates_rad_s=speeds, progress=progress)
         for one in ranked[:5]:
             console.print(one.text, soft_wrap=True, highlight=False)
         return
     able = Abilities(speeds, math.radians(acceleration), tuple(_numbers("--dwells", dwells)))
     with bar(console) as progress:
-        before = bounds(start, asked)
-        limits = {e: slack * sigma for e, sigma in before.largest().items()} | _limits(limit or [])
+        first = bounds(start, asked)
+        usual = {} if before else {e: slack * sigma for e, sigma in first.largest().items()}
+        limits = usual | _limits(limit or [])
+        if not limits and minutes is None:
+            minutes = start.duration_s / 60.0
         found = search(start, asked, able, Goal(limits, minutes), tries, progress)
     title = f"sigma, the largest of the axes: {start.name} and {out.stem}"
-    console.print(_table(title, start, before, found, limits))
+    console.print(_table(title, start, already(asked) if before else None, first, found, limits))
+    if before:
+        tell_gain(console, start, found, before.open, (already(asked), first, found.bounds))
     if found.plan is start:
         console.print(f"nothing better than {start.name} among {found.tried} plans; no file written", soft_wrap=True)
         return
     about = f"Found by sdimu plan from {start.name} among {found.tried} plans: {found.minutes:.1f} min."
-    write_plan(out, found.plan, [about, f"IMU {imu}, site {site}, worst sigma {found.worst:.3f} of its limit."])
+    reached = f"worst sigma {found.worst:.3f} of its limit" if limits else "tells most beyond what was known"
+    write_plan(out, found.plan, [about, f"IMU {imu}, site {site}, {reached}."])
     console.print(
-        f"{start.name} {start.duration_s / 60.0:.1f} min; found {found.minutes:.1f} min, worst sigma "
-        f"{found.worst:.2f} of its limit, {found.tried} plans tried; use: --plan {out}",
+        f"{start.name} {start.duration_s / 60.0:.1f} min; found {found.minutes:.1f} min, {reached}, {found.tried} "
+        f"plans tried; use: --plan {out}",
         soft_wrap=True, highlight=False,
     )  # fmt: skip
 
 
-def _table(title: str, start: Plan, before: Bounds, found: Found, limits: Mapping[str, float]) -> Table:
+def _table(
+    title: str, start: Plan, known: Bounds | None, first: Bounds, found: Found, limits: Mapping[str, float]
+) -> Table:
+    """Largest sigma of each effect: what is known (where something is), with both plans, and what is allowed."""
     from rich.table import Table
 
     from sdimu_calibration.core.units import from_si
 
-    made = Table("effect", start.name, "found", "limit", "unit", title=title, pad_edge=False)
-    units = dict(zip(before.effect, before.units, strict=True))
-    old, new = before.largest(), found.bounds.largest()
-    for column in made.columns[1:4]:
+    columns = {"known": known, start.name: first, "found": found.bounds}
+    shown = {name: b.largest() for name, b in columns.items() if b is not None}
+    made = Table("effect", *shown, *(["limit"] if limits else []), "unit", title=title, pad_edge=False)
+    units = dict(zip(first.effect, first.units, strict=True))
+    for column in made.columns[1:-1]:
         column.justify = "right"
-    for effect, limit in limits.items():
-        cells = (f"{from_si(v, units[effect]):.3g}" for v in (old[effect], new[effect], limit))
-        made.add_row(effect, *cells, units[effect])
-    made.add_row("minutes", f"{start.duration_s / 60.0:.1f}", f"{found.minutes:.1f}", "", "min")
+    for effect in limits if known is None else shown["found"]:
+        unit = units[effect]
+        numbers = [sizes.get(effect) for sizes in shown.values()] + ([limits.get(effect)] if limits else [])
+        made.add_row(effect, *("" if v is None else f"{from_si(v, unit):.3g}" for v in numbers), unit)
+    lengths = {"known": "", start.name: f"{start.duration_s / 60.0:.1f}", "found": f"{found.minutes:.1f}"}
+    made.add_row("minutes", *(lengths[name] for name in shown), *([""] if limits else []), "min")
     return made
 
 

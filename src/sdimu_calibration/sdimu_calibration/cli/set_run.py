@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -12,7 +12,6 @@ import typer
 
 from sdimu_calibration.cli.console import plain
 from sdimu_calibration.cli.options import leave, tell
-from sdimu_calibration.core.recording import DataError
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -20,6 +19,7 @@ if TYPE_CHECKING:
     from sdimu_calibration.core.effects.effect import Effect
     from sdimu_calibration.core.estimation.prepared_test import PreparedTest
     from sdimu_calibration.core.joint.member import Member
+    from sdimu_calibration.core.joint.set_diagnosis import SetDiagnosis
     from sdimu_calibration.core.joint.set_fit import Run, SetOptions
     from sdimu_calibration.core.progress import Progress
     from sdimu_calibration.core.results import Calibration
@@ -144,16 +144,13 @@ def calibrate_together(asked: SetRequest) -> None:
 
 def diagnose_together(asked: SetRequest, extra: Sequence[Effect]) -> None:
     """Find what the model of a set misses; leaves set.json, result.json and report.html."""
-    from sdimu_calibration.core.joint.set_diagnosis import diagnose_set
     from sdimu_calibration.report.page import write_report
     from sdimu_calibration.storage.result_file import write_result
     from sdimu_calibration.storage.set_result_file import write_set_diagnosis
     from sdimu_calibration.storage.whole_file import written_together
 
     console = plain()
-    with _begun(console, asked) as (members, options, run, progress):
-        found = diagnose_set(members, options, run, extra, progress)
-        progress("done", 1.0)
+    found, members = diagnosed_set(console, asked, extra)
     after = _with_serial(found.after, members)
     folder = _folder(asked, "diagnosis")
     with written_together(folder) as part:
@@ -168,16 +165,27 @@ def diagnose_together(asked: SetRequest, extra: Sequence[Effect]) -> None:
     leave(after)
 
 
+def diagnosed_set(
+    console: Console, asked: SetRequest, extra: Sequence[Effect]
+) -> tuple[SetDiagnosis, tuple[Member, ...]]:
+    """Find what the model of a set misses; give its recordings, too."""
+    from sdimu_calibration.core.joint.set_diagnosis import diagnose_set
+
+    with _begun(console, asked) as (members, options, run, progress):
+        found = diagnose_set(members, options, run, extra, progress)
+        progress("done", 1.0)
+    return found, members
+
+
 @contextmanager
 def _begun(
     console: Console, asked: SetRequest
 ) -> Iterator[tuple[tuple[Member, ...], SetOptions, Run, Progress]]:
     """Members, options and runner of what is asked, with a bar that shows the recordings that are done."""
     from sdimu_calibration.cli.progress import bar
-    from sdimu_calibration.core.joint.set_fit import SetOptions
     from sdimu_calibration.core.units import parse_quantity
-    from sdimu_calibration.storage.model_choice import HANDHELD, named_estimator, named_model
-    from sdimu_calibration.storage.recording_set import BagSource, load_set, set_of
+    from sdimu_calibration.storage.model_choice import HANDHELD, named_estimator
+    from sdimu_calibration.storage.recording_set import BagSource, load_set, set_of, set_options
     from sdimu_calibration.storage.set_work import set_runner
 
     estimator = named_estimator(asked.estimator, "--estimator")
@@ -189,10 +197,7 @@ def _begun(
     wanted = set_of(asked.bags, like) if asked.file is None else load_set(asked.file, like)
     serial = asked.serial
     members = tuple(m if serial is None else replace(m, serial=serial) for m in wanted.members)
-    chosen = estimator if estimator != "auto" else wanted.estimator
-    by_hand = chosen == HANDHELD or (chosen == "auto" and _moved_by_hand(members))
-    model = named_model(asked.model or wanted.model, asked.add, handheld=by_hand)
-    options = SetOptions(model, chosen, scopes=wanted.scopes)
+    options = set_options(replace(wanted, members=members), asked.model, asked.add, estimator)
     with bar(console) as progress:
         def told(done: int, of: int) -> None:
             progress(f"recordings {done} of {of}", done / of)
@@ -200,14 +205,6 @@ def _begun(
         kept = _folder(asked, "evidence")
         with set_runner(len(members), asked.workers, kept, asked.scheduler, told) as run:
             yield members, options, run, progress
-
-
-def _moved_by_hand(members: Sequence[Member]) -> bool:
-    """Whether the first recording that can be opened was moved by hand; fitting tells of those that cannot."""
-    for member in members:
-        with suppress(DataError):
-            return bool(member.open().why_handheld)
-    return False
 
 
 def _folder(asked: SetRequest, what: str) -> Path:
@@ -224,8 +221,7 @@ def _title(asked: SetRequest, word: str) -> str:
 
 
 def _with_serial(result: Calibration, members: Sequence[Member]) -> Calibration:
-    serial = next((m.serial for m in members if m.serial), "")
-    return replace(result, origin=replace(result.origin, serial=serial))
+    return result.with_serial(next((m.serial for m in members if m.serial), ""))
 
 
 def _show(console: Console, result: Calibration) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -274,6 +274,10 @@ class Calibration:
     rests: tuple[Rest, ...] = ()
     of_set: SetSummary | None = None
     origin: Origin = field(default_factory=Origin)
+
+    def with_serial(self, serial: str) -> Calibration:
+        """Return the result as one of the unit with this serial number."""
+        return replace(self, origin=replace(self.origin, serial=serial))
 
     @property
     def not_to_be_trusted(self) -> tuple[str, ...]:

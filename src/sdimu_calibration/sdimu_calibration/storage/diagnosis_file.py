@@ -16,12 +16,14 @@ from sdimu_calibration.core.diagnosis.ladder import Rung
 from sdimu_calibration.core.diagnosis.plan_seen import PlanSeen
 from sdimu_calibration.core.diagnosis.scan import scale_of, scan
 from sdimu_calibration.core.diagnosis.search import Step
+from sdimu_calibration.core.diagnosis.standing import standing
 from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary
 from sdimu_calibration.core.evidence.consistency import Noise
 from sdimu_calibration.core.handheld.handheld_fit import FORCE, RATE, TURN
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.storage.correlation_text import packed
 from sdimu_calibration.storage.json_file import read_json, write_json
+from sdimu_calibration.storage.standing_file import as_plain
 
 FORMAT = "sdimu-diagnosis/1"
 
@@ -93,6 +95,7 @@ def content(summary: DiagnosisSummary) -> dict[str, Any]:
             "after": _free_inputs(d.free_inputs_after),
         },
         "alone": _alone(d),
+        "known": as_plain(standing(d, summary.found)),
         "fit": {"before": fit_of(d.before), "after": fit_of(d.after)},
         "ladder": [step_of(s) for s in d.found.steps],
         "grown": [_rung(r) for r in d.rungs],

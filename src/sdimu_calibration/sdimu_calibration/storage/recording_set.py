@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
@@ -14,10 +15,11 @@ from pydantic import Field
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.estimation.solve import AUTO
 from sdimu_calibration.core.joint.member import Member
+from sdimu_calibration.core.joint.set_fit import SetOptions
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage.bag_metadata import METADATA, custom_data
 from sdimu_calibration.storage.config import Schema, load_imu, quantity, read_yaml
-from sdimu_calibration.storage.model_choice import HANDHELD, named_estimator
+from sdimu_calibration.storage.model_choice import HANDHELD, named_estimator, named_model
 from sdimu_calibration.storage.opening import Source, open_test
 from sdimu_calibration.storage.whole_file import write_whole
 
@@ -165,6 +167,37 @@ def set_of(bags: Sequence[Path], like: BagSource) -> RecordingSet:
         for bag, name in zip(bags, names, strict=True)
     ]
     return RecordingSet(tuple(members))
+
+
+def set_options(wanted: RecordingSet, model: str | None, add: Sequence[str], estimator: str) -> SetOptions:
+    """Say how a set is to be fitted: what is asked for comes before what its file says.
+
+    Parameters
+    ----------
+    wanted : RecordingSet
+    model : str or None
+        Name or path.
+    add : sequence of str
+        Effects to add.
+    estimator : str
+        ``auto`` is that of the file.
+
+    Raises
+    ------
+    DataError
+        When the model or an effect is unknown.
+    """
+    chosen = estimator if estimator != AUTO else wanted.estimator
+    by_hand = chosen == HANDHELD or (chosen == AUTO and _moved_by_hand(wanted.members))
+    return SetOptions(named_model(model or wanted.model, add, handheld=by_hand), chosen, scopes=wanted.scopes)
+
+
+def _moved_by_hand(members: Sequence[Member]) -> bool:
+    """Whether the first recording that can be opened was moved by hand; fitting tells of those that cannot."""
+    for member in members:
+        with suppress(DataError):
+            return bool(member.open().why_handheld)
+    return False
 
 
 def _named(folder: Path, word: str | None) -> str | None:

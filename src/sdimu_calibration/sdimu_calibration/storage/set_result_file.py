@@ -20,6 +20,7 @@ from sdimu_calibration.core.results import (
     TurnOn,
 )
 from sdimu_calibration.storage.json_file import write_json
+from sdimu_calibration.storage.standing_file import as_plain as standing_as_plain
 
 FORMAT = "sdimu-set-diagnosis/1"
 
@@ -99,13 +100,13 @@ class _Plain:
 
 
 def write_set_diagnosis(path: Path, found: SetDiagnosis) -> None:
-    """Write set.json: verdict, sentence, findings (SI), advice."""
+    """Write set.json: verdict, sentence, findings (SI), advice, and what is known of the unit."""
     write_json(
         Path(path),
         {
             "format": FORMAT, "verdict": found.verdict, "sentence": found.sentence, "threshold": found.threshold,
             "findings": [asdict(f) | {"alike": list(f.alike)} for f in found.findings],
             "held_out_before": found.before.fit["held_out_rms"], "held_out_after": found.after.fit["held_out_rms"],
-            "advice": list(found.advice),
+            "advice": list(found.advice), "known": standing_as_plain(found.standing),
         },
     )  # fmt: skip

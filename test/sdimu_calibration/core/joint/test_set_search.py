@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import math
+
 import pytest
 
 from sdimu_calibration.core.diagnosis.diagnose import climb
 from sdimu_calibration.core.estimation.solve import solve
 from sdimu_calibration.core.joint.set_diagnosis import diagnose_set
+from sdimu_calibration.core.plan import Plan, Turn
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage.config import load_model
 
@@ -47,3 +50,20 @@ def test_a_fault_of_one_recording_is_told_of_that_one(options):
 def test_one_recording_is_no_set(options):
     with pytest.raises(DataError, match="a set of one recording"):
         diagnose_set(unit_set(32, [short()]).members, options, here)
+
+
+def test_what_two_recordings_leave_open_the_advised_third_one_closes(options):
+    """One rate leaves asymmetry and quadratic term open; advised is another rate about the same axis."""
+    strong = ("gyro_scale_asymmetry_y=40 ppm",)
+    plan = short("kim18_signed")
+    two = unit_set(34, [plan, plan], strong)
+    found = diagnose_set(two.members, options, here)
+    assert found.verdict == "class of effects"
+    assert set(found.standing.open[0]) >= {"gyro_scale_asymmetry_y", "gyro_scale_quadratic_y"}
+    line = next(a for a in found.advice if "gyro_scale_quadratic_y" in a)
+    assert "turn Y +90 deg at 10 deg/s" in line
+    advised = Plan("advised", (100.0,) * 2, (Turn("Y", 0.5 * math.pi, math.radians(10.0)),), math.radians(20.0))
+    three = unit_set(34, [plan, plan, advised], strong)
+    closed = diagnose_set(three.members, options, here)
+    assert [f.label for f in closed.findings] == ["gyro_scale_asymmetry_y"]
+    assert "gyro_scale_quadratic_y" not in closed.findings[0].alike

@@ -10,10 +10,11 @@ import pytest
 from sdimu_calibration.core.effects import body_frame
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.estimation.solve import solve
+from sdimu_calibration.core.evidence.known import data_information, known_from
 from sdimu_calibration.core.plan import Plan
 from sdimu_calibration.core.plan_search import Goal, Known, Question, gain, known_of, next_turn, search
 from sdimu_calibration.core.plan_search.bound import already, bounds
-from sdimu_calibration.core.plan_search.known import data_information, known_from, together
+from sdimu_calibration.core.plan_search.known import together
 from sdimu_calibration.core.plan_search.moves import Abilities
 from sdimu_calibration.core.planning.nominal import nominal_recording
 from sdimu_calibration.core.recording import DataError

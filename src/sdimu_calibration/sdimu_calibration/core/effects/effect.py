@@ -29,6 +29,8 @@ BASELINE = "The baseline"
 """Group of the seven effects of Kim, Song & Lyou."""
 REFERENCES = "References and geometry"
 """Group of errors of the test, not of the sensors."""
+OF_ONE_TIME = frozenset({"t0", "span", "turn"})
+"""Options of effects that happen at one time of one recording."""
 Scope = Literal["unit", "power-on", "setup", "recording"]
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sdimu_calibration.core.effects.effect import Effect
+from sdimu_calibration.core.effects.effect import OF_ONE_TIME, Effect
 from sdimu_calibration.core.evidence.candidate import OWN
 
 OF_RECORDING = "@"
@@ -20,10 +20,6 @@ def split_tag(label: str) -> tuple[str, str]:
     return name, recording
 
 
-_OF_ONE_TIME = {"t0", "span", "turn"}
-"""Options of effects that happen at one time of one recording."""
-
-
 def is_local(effect: Effect) -> bool:
     """Whether an effect may be in one recording and not in the next: a fault of the data, a drift of a power-on."""
     return effect.scope in {"recording", "power-on"} and "span" not in effect.options
@@ -31,7 +27,7 @@ def is_local(effect: Effect) -> bool:
 
 def is_shared(effect: Effect) -> bool:
     """Whether an effect may be the same in all recordings: neither a fault of the data nor an event."""
-    return effect.scope != "recording" and not _OF_ONE_TIME & effect.options.keys()
+    return effect.scope != "recording" and not OF_ONE_TIME & effect.options.keys()
 
 
 def by_name(effect: Effect | str) -> Effect | str:

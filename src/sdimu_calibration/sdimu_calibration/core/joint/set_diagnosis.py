@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.effects.selection import resolve
+from sdimu_calibration.core.evidence.known import Standing
 from sdimu_calibration.core.joint.member import Member
 from sdimu_calibration.core.joint.scope import tagged
-from sdimu_calibration.core.joint.set_fit import Run, SetOptions
-from sdimu_calibration.core.joint.set_result import SCATTERS, set_outcome
+from sdimu_calibration.core.joint.set_fit import Run, SetFit, SetOptions
+from sdimu_calibration.core.joint.set_result import SCATTERS, base_fit, set_outcome
 from sdimu_calibration.core.joint.set_search import SetSearch, search_set
+from sdimu_calibration.core.joint.set_standing import next_recording
+from sdimu_calibration.core.plan_search import NextTurn
 from sdimu_calibration.core.progress import Progress, silent
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.results import Calibration
@@ -69,6 +72,8 @@ class SetDiagnosis:
     threshold : float
         Score that noise reaches in a scan.
     advice : tuple of str
+    standing : Standing
+        What the set knows of the unit: what a plan for the next recording begins with.
     """
 
     verdict: str
@@ -78,11 +83,13 @@ class SetDiagnosis:
     after: Calibration
     threshold: float
     advice: tuple[str, ...]
+    standing: Standing
 
 
 def diagnose_set(
-    members: Sequence[Member], options: SetOptions, run: Run, extra: Sequence[Effect] = (), progress: Progress = silent
-) -> SetDiagnosis:
+    members: Sequence[Member], options: SetOptions, run: Run, extra: Sequence[Effect] = (),
+    progress: Progress = silent, fitted: SetFit | None = None,
+) -> SetDiagnosis:  # fmt: skip
     """Find what the model of a set misses; parameters as for `search_set`.
 
     Raises
@@ -92,15 +99,17 @@ def diagnose_set(
     """
     if len(members) < 2:
         raise DataError("a set of one recording: diagnose it by itself (sdimu diagnose BAG)")
-    found = search_set(members, options, run, extra, progress)
+    found = search_set(members, options, run, extra, progress, fitted=fitted)
     progress("report", 0.95)
     before = set_outcome(found.before)
     after = before if found.after is found.before else set_outcome(found.after)
     findings = _findings(found)
     word = _verdict(findings, after)
+    test = base_fit(found.after).test
+    standing = replace(found.standing, site=test.origin.site)
     return SetDiagnosis(
         word, _sentence(word, findings, before, after), findings, before, after, found.threshold,
-        _advice(word, findings),
+        _advice(word, findings, next_recording(found.after, standing, test)), standing,
     )  # fmt: skip
 
 
@@ -180,16 +189,23 @@ def _rms(result: Calibration) -> str:
     return "-" if value is None else f"{value:.3f}"
 
 
-def _advice(word: str, findings: Sequence[SetFinding]) -> tuple[str, ...]:
+def _advice(
+    word: str, findings: Sequence[SetFinding], closing: Sequence[tuple[tuple[str, ...], NextTurn]]
+) -> tuple[str, ...]:
     out = []
+    closed = {members[0] for members, _ in closing}
     for f in findings:
         if f.recording:
             out.append(f"look what happened in {f.recording}, or leave it out of the set: {f.label}")
-        elif f.alike:
+        elif f.alike and f.label not in closed:
             out.append(
-                f"a recording in which {f.label} and {f.alike[0]} differ tells them apart: sdimu plan --tell "
-                f"{f.label} --tell {f.alike[0]} shows the turn"
+                f"no plan tells {f.label} from {f.alike[0]}: record at another temperature, or after another warm-up"
             )
+    for (label, *others), turn in closing:
+        out.append(
+            f"to tell {label} from {', '.join(others)}, record once more, rests of 100 s and between them: "
+            f"{turn.text}; a whole plan: sdimu plan --after"
+        )
     if word == "unexplained":
         out.append("diagnose the recordings one by one (sdimu diagnose BAG), the one with the largest deviates first")
     return tuple(out)

@@ -22,10 +22,12 @@ from sdimu_calibration.core.effects.imu_model import prior_size
 from sdimu_calibration.core.estimation.handheld_fit import HandheldFit
 from sdimu_calibration.core.estimation.solve import with_effects
 from sdimu_calibration.core.evidence.candidate import Candidate, split
+from sdimu_calibration.core.evidence.known import Standing
 from sdimu_calibration.core.joint.member import Job, Member, Report
 from sdimu_calibration.core.joint.scope import by_name, is_shared, split_tag
 from sdimu_calibration.core.joint.set_evidence import SetEvidence, set_evidence, white_power_on
 from sdimu_calibration.core.joint.set_fit import Run, SetFit, SetOptions, fit_set, power_on, with_own, with_reports
+from sdimu_calibration.core.joint.set_standing import set_standing
 from sdimu_calibration.core.probability import normal_limit
 from sdimu_calibration.core.progress import Progress, silent
 from sdimu_calibration.core.recording import DataError
@@ -86,6 +88,8 @@ class SetSearch:
         Score that noise reaches in a scan of the joint evidence.
     first : Search
         Of the first round: its scan and its refused step, if there is one.
+    standing : Standing
+        What the set knows of the unit.
     """
 
     before: SetFit
@@ -96,11 +100,12 @@ class SetSearch:
     local: tuple[LocalFind, ...]
     threshold: float
     first: Search[SetEvidence]
+    standing: Standing
 
 
 def search_set(
     members: Sequence[Member], options: SetOptions, run: Run, extra: Sequence[Effect] = (),
-    progress: Progress = silent, alpha: float = FALSE_ALARM,
+    progress: Progress = silent, alpha: float = FALSE_ALARM, fitted: SetFit | None = None,
 ) -> SetSearch:  # fmt: skip
     """Find what the model of a set misses.
 
@@ -116,13 +121,15 @@ def search_set(
     progress : callable
     alpha : float
         False-alarm probability of a whole scan.
+    fitted : SetFit, optional
+        The set with the model as given, where it was fitted already.
 
     Raises
     ------
     DataError
         When the set cannot be fitted.
     """
-    before = fit = fit_set(members, options, run, progress=progress)
+    before = fit = fitted or fit_set(members, options, run, progress=progress)
     chosen: dict[str, Candidate] = {}
     scores: dict[str, float] = {}
     local: list[LocalFind] = []
@@ -161,13 +168,15 @@ def search_set(
         raise AssertionError("a search has one round at least")
     fit, kept = _without_small(members, options, run, fit, chosen, progress)
     alike: dict[str, tuple[str, ...]] = {}
+    at_end = set_evidence(fit, ())
     if kept:
         effects = _candidates(fit, extra, [])
         full = _gathered(fit, effects, run)
-        alike = _alike(set_evidence(full, [c for effect in effects for c in split(effect)]), kept)
+        at_end = set_evidence(full, [c for effect in effects for c in split(effect)])
+        alike = _alike(at_end, kept)
     return SetSearch(
         before, fit, tuple(kept.values()), tuple(scores.get(label, float("nan")) for label in kept), alike,
-        tuple(local), first.threshold, first,
+        tuple(local), first.threshold, first, set_standing(fit, at_end, kept, alike),
     )  # fmt: skip
 
 

@@ -3,8 +3,9 @@
 A package of its own so that a change here compiles none of the loops of the estimator again.
 """
 
+from sdimu_calibration.core.evidence.known import Known, known_of
 from sdimu_calibration.core.plan_search.bound import Bounds, Question
-from sdimu_calibration.core.plan_search.known import Known, gain, known_of
+from sdimu_calibration.core.plan_search.known import gain
 from sdimu_calibration.core.plan_search.next_turn import NextTurn, next_turn
 from sdimu_calibration.core.plan_search.search import Found, Goal, search
 

@@ -10,8 +10,9 @@ from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.batch.batch import bound_covariance
 from sdimu_calibration.core.effects import body_frame, imu_model
 from sdimu_calibration.core.effects.imu_model import ImuModel
+from sdimu_calibration.core.evidence.known import Known
 from sdimu_calibration.core.plan import Plan
-from sdimu_calibration.core.plan_search.known import Known, together
+from sdimu_calibration.core.plan_search.known import together
 from sdimu_calibration.core.planning.predict import prepare
 from sdimu_calibration.core.specification import ImuSpecification, Model, Site
 

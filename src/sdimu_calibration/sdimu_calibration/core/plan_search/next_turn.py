@@ -107,7 +107,7 @@ def next_turn(
     with_class = replace(asked, model=model)
     # Fast turns need this acceleration; before and after are compared with one, which shapes the turns there are too.
     plan = replace(plan, acceleration_rad_s2=max(plan.acceleration_rad_s2, _ACCELERATION_RAD_S2))
-    before = _apart(bounds(plan, with_class), names, sizes)
+    before = apart(bounds(plan, with_class), names, sizes)
     dwell = float(np.median(plan.dwell_s))
     extras = _extras(rates_rad_s)
     out = []
@@ -116,12 +116,36 @@ def next_turn(
             plan.name, (*plan.dwell_s, *(dwell for _ in turns)), (*plan.turns, *turns),
             plan.acceleration_rad_s2,
         )  # fmt: skip
-        after = _apart(bounds(longer, with_class), names, sizes)
+        after = apart(bounds(longer, with_class), names, sizes)
         minutes = (longer.duration_s - plan.duration_s) / 60.0
         out.append(NextTurn(turns, minutes, before, after))
         if progress is not None:
             progress("next turn", count / len(extras))
     return tuple(sorted(out, key=lambda one: -one.gain))
+
+
+def apart(told: Bounds, names: Sequence[str], sizes: Mapping[str, float] | None) -> float:
+    """Significance in sigma by which the least separable pair of parameters differs.
+
+    Parameters
+    ----------
+    told : Bounds
+    names : sequence of str
+        Two coefficients or more.
+    sizes : mapping of str to float or None
+        As for `next_turn`.
+    """
+    rows = [told.names.index(name) for name in names]
+    prior = told.prior[rows]
+    # In units of the priors, because coefficients of ppm and of rad/s share the matrix.
+    covariance = told.covariance[np.ix_(rows, rows)] / np.outer(prior, prior)
+    J = np.linalg.inv(covariance) - np.eye(len(rows))
+    size = np.array([1.0 if sizes is None else sizes.get(n, p) / p for n, p in zip(names, prior, strict=True)])
+    worst = min(
+        size[i] ** 2 * (J[i, i] - (J[i, j] ** 2 / J[j, j] if J[j, j] > 0.0 else 0.0))
+        for i, j in permutations(range(len(rows)), 2)
+    )
+    return float(np.sqrt(max(worst, 0.0)))
 
 
 def _parameters(effect: str | Effect) -> tuple[str, ...]:
@@ -135,18 +159,3 @@ def _extras(rates: Sequence[float]) -> list[tuple[Turn, ...]]:
     fast = max(rates)
     pairs = [(Turn(axis, math.pi, fast), Turn(axis, -math.pi, fast)) for axis in "XYZ"]
     return [*singles, *pairs]
-
-
-def _apart(told: Bounds, names: Sequence[str], sizes: Mapping[str, float] | None) -> float:
-    """Significance in sigma by which the least separable pair of parameters differs."""
-    rows = [told.names.index(name) for name in names]
-    prior = told.prior[rows]
-    # In units of the priors, because coefficients of ppm and of rad/s share the matrix.
-    covariance = told.covariance[np.ix_(rows, rows)] / np.outer(prior, prior)
-    J = np.linalg.inv(covariance) - np.eye(len(rows))
-    size = np.array([1.0 if sizes is None else sizes.get(n, p) / p for n, p in zip(names, prior, strict=True)])
-    worst = min(
-        size[i] ** 2 * (J[i, i] - (J[i, j] ** 2 / J[j, j] if J[j, j] > 0.0 else 0.0))
-        for i, j in permutations(range(len(rows)), 2)
-    )
-    return float(np.sqrt(max(worst, 0.0)))

@@ -1,0 +1,108 @@
+"""What every fit shows, of one recording or of a set: coefficients with units, as a table."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterator
+from html import escape
+from typing import TYPE_CHECKING
+
+import numpy as np
+from rich.console import Console
+
+from sdimu_calibration.api.coefficient import Coefficient
+from sdimu_calibration.core.arrays import Floats
+from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.results import Calibration
+from sdimu_calibration.report.table import cells, headings, rich_table, rows
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+_WIDTH = 110
+"""Columns of the table that stands for a fit."""
+
+
+class Fitted:
+    """Coefficients with units, indexed by their names; its ``repr`` is their table, in a notebook as HTML."""
+
+    @property
+    def result(self) -> Calibration:
+        """Coefficients, covariance, fit figures and notes."""
+        raise NotImplementedError
+
+    @property
+    def _heading(self) -> str:
+        raise NotImplementedError
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the coefficients, length p."""
+        return self.result.names
+
+    @property
+    def values(self) -> Floats:
+        """Coefficients (SI) in the reported body frame, shape (p,)."""
+        return self.result.values
+
+    @property
+    def covariance(self) -> Floats:
+        """Covariance of `values`, shape (p, p)."""
+        return self.result.covariance
+
+    def __getitem__(self, name: str) -> Coefficient:
+        """Give a coefficient by its name."""
+        if name not in self.names:
+            raise KeyError(f"no coefficient '{name}' in this model (it has {', '.join(self.names[:6])}, ...)")
+        k, result = self.names.index(name), self.result
+        sigma = float(np.sqrt(self.covariance[k, k]))
+        return Coefficient(name, float(self.values[k]), sigma, result.units[k], result.display_units[k])
+
+    def __iter__(self) -> Iterator[Coefficient]:
+        """Go through the coefficients in the order of `values`."""
+        return (self[name] for name in self.names)
+
+    def __len__(self) -> int:
+        """Return the number of coefficients."""
+        return len(self.names)
+
+    def __repr__(self) -> str:
+        """Table of coefficients with units, and how well the fit predicts."""
+        text = io.StringIO()
+        console = Console(file=text, width=_WIDTH, color_system=None)
+        console.print(rich_table(rows(self.result), self._heading))
+        return text.getvalue() + self._figures()
+
+    def _repr_html_(self) -> str:
+        """Table of coefficients as HTML."""
+        entries = rows(self.result)
+        columns = headings(entries)
+        head = "".join(f"<th>{escape(c)}</th>" for c in columns)
+        body = "".join(
+            "<tr>" + "".join(f"<td>{escape(text)}</td>" for text in cells(row, columns)) + "</tr>" for row in entries
+        )
+        table = f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
+        return f"<p>{escape(self._heading)}</p>{table}" + (
+            f"<p>{escape(self._figures())}</p>"
+        )
+
+    def _figures(self) -> str:
+        fit = self.result.fit
+        held_out = fit["held_out_rms"]
+        shown = "" if held_out is None else f", held-out error {held_out:.3f}"
+        return "; ".join([f"NIS {fit['nis_mean']:.3f}{shown} (1 is right)", *self.result.inseparable])
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """Coefficients as a table: name, value, sigma, unit (customary).
+
+        Raises
+        ------
+        DataError
+            When pandas is not installed.
+        """
+        try:
+            import pandas as pd  # noqa: PLC0415 (optional, and slow to load)
+        except ImportError as error:
+            raise DataError("to_dataframe needs pandas: pip install pandas") from error
+        numbers = [(c.name, *c.to(c.display_unit), c.display_unit) for c in self]
+        return pd.DataFrame(numbers, columns=["name", "value", "sigma", "unit"]).set_index("name")

@@ -1,0 +1,208 @@
+"""Several recordings of one unit as scripts and notebooks see them: the set, its fit, its diagnosis."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from html import escape
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from sdimu_calibration.api.fitted import Fitted
+from sdimu_calibration.core.effects.effect import Effect
+from sdimu_calibration.core.joint.member import Member
+from sdimu_calibration.core.joint.set_diagnosis import SetDiagnosis, SetFinding, diagnose_set
+from sdimu_calibration.core.joint.set_fit import SetFit, SetOptions, fit_set
+from sdimu_calibration.core.joint.set_result import set_outcome
+from sdimu_calibration.core.progress import Progress
+from sdimu_calibration.core.results import Calibration, SetSummary
+from sdimu_calibration.report.page import write_report
+from sdimu_calibration.storage.recording_set import RecordingSet
+from sdimu_calibration.storage.result_file import write_result
+from sdimu_calibration.storage.set_result_file import write_set_diagnosis
+from sdimu_calibration.storage.set_work import set_runner
+from sdimu_calibration.storage.whole_file import written_together
+
+if TYPE_CHECKING:
+    from sdimu_calibration.core.evidence.known import Standing
+
+
+@dataclass(frozen=True, repr=False)
+class OpenedSet:
+    """Recordings of one unit, ready to be fitted together; each is read when it is needed.
+
+    Attributes
+    ----------
+    core : RecordingSet
+    workers : int
+        Processes that read them.
+    kept : Path or None
+        Folder in which what they say is kept from one call to the next.
+    """
+
+    core: RecordingSet
+    workers: int = 1
+    kept: Path | None = None
+
+    @property
+    def members(self) -> tuple[Member, ...]:
+        """The recordings: `name`, `serial`, `power_on`, and `open()` for the test of each."""
+        return self.core.members
+
+    def __len__(self) -> int:
+        """Return the number of recordings."""
+        return len(self.members)
+
+    def __repr__(self) -> str:
+        """List the recordings, one a line."""
+        lines = [f"{len(self)} recordings of {self.serial or 'a unit without a serial number'}"]
+        return "\n".join([*lines, *(f"  {m.name}: power-on {m.power_on or 'of its own'}" for m in self.members)])
+
+    def _repr_html_(self) -> str:
+        """List the recordings as HTML."""
+        first, *lines = repr(self).splitlines()
+        return f"<p>{escape(first)}</p><ul>{''.join(f'<li>{escape(line.strip())}</li>' for line in lines)}</ul>"
+
+    @property
+    def serial(self) -> str:
+        """Serial number of the unit; empty where no recording says it."""
+        return next((m.serial for m in self.members if m.serial), "")
+
+    def fit(self, options: SetOptions, progress: Progress) -> JointFit:
+        """Fit all recordings together.
+
+        Raises
+        ------
+        DataError
+            When they are of several units, or none can be used.
+        """
+        with set_runner(len(self), self.workers, self.kept) as run:
+            return JointFit(self, options, fit_set(self.members, options, run, progress=progress))
+
+    def diagnose(self, fit: JointFit, extra: Sequence[Effect], progress: Progress) -> JointDiagnosis:
+        """Find what the model of a fit of this set misses.
+
+        Raises
+        ------
+        DataError
+            When there is one recording, or an extended model cannot be fitted.
+        """
+        with set_runner(len(self), self.workers, self.kept) as run:
+            return JointDiagnosis(
+                self, diagnose_set(self.members, fit.options, run, extra, progress, fitted=fit.core)
+            )
+
+
+class JointFit(Fitted):
+    """A model fitted to several recordings of one unit.
+
+    Indexed by the name of a coefficient; its ``repr`` is the table of coefficients, in a notebook as HTML.
+
+    Attributes
+    ----------
+    of : OpenedSet
+    options : SetOptions
+    core : SetFit
+        With the reduced rows of every recording.
+    """
+
+    def __init__(self, of: OpenedSet, options: SetOptions, core: SetFit) -> None:
+        self.of = of
+        self.options = options
+        self.core = core
+
+    @cached_property
+    def result(self) -> Calibration:
+        """Coefficients of the unit, covariance, fit figures, notes; what differs between recordings in `of_set`."""
+        return _of_unit(set_outcome(self.core), self.of)
+
+    @property
+    def of_set(self) -> SetSummary:
+        """Recordings, what differs from power-on to power-on, and what the coefficients follow."""
+        return _summary(self.result)
+
+    @property
+    def _heading(self) -> str:
+        return f"{len(self.core.reports)} recordings together, body frame: {self.result.body_frame}"
+
+    def save(self, folder: str | Path) -> Path:
+        """Write result.json and report.html into a folder, as `sdimu calibrate` does."""
+        folder = Path(folder)
+        with written_together(folder) as part:
+            write_result(part / "result.json", self.result)
+            write_report(part / "report.html", self.result, title=f"Calibration of {len(self.of)} recordings")
+        return folder
+
+
+class JointDiagnosis:
+    """What the model of a set misses.
+
+    Attributes
+    ----------
+    of : OpenedSet
+    core : SetDiagnosis
+    """
+
+    def __init__(self, of: OpenedSet, core: SetDiagnosis) -> None:
+        self.of = of
+        self.core = core
+
+    @property
+    def verdict(self) -> str:
+        """The verdict in a word or two."""
+        return self.core.verdict
+
+    @property
+    def adequate(self) -> bool:
+        """Whether the model explains all recordings."""
+        return self.core.verdict == "consistent"
+
+    @property
+    def found(self) -> tuple[SetFinding, ...]:
+        """Effects that were found: `label`, `recording` (empty where all show it), `value`, `sigma` (SI), `alike`."""
+        return self.core.findings
+
+    @property
+    def advice(self) -> tuple[str, ...]:
+        """What to do next, one sentence each."""
+        return self.core.advice
+
+    @property
+    def known(self) -> Standing:
+        """What all recordings know of the unit: what a plan for the next one begins with."""
+        return self.core.standing
+
+    @cached_property
+    def result(self) -> Calibration:
+        """The result with everything that was found."""
+        return _of_unit(self.core.after, self.of)
+
+    def save(self, folder: str | Path) -> Path:
+        """Write set.json, result.json and report.html into a folder, as `sdimu diagnose` does."""
+        folder = Path(folder)
+        title = f"Diagnosis of {len(self.of)} recordings"
+        with written_together(folder) as part:
+            write_set_diagnosis(part / "set.json", self.core)
+            write_result(part / "result.json", self.result, self.verdict)
+            write_report(part / "report.html", self.result, title=title, lead=self.core.sentence)
+        return folder
+
+    def __repr__(self) -> str:
+        """Sentence and advice."""
+        return "\n".join([f"{self.verdict}: {self.core.sentence}", *(f"advice: {text}" for text in self.advice)])
+
+    def _repr_html_(self) -> str:
+        """Sentence and advice as HTML."""
+        listed = "".join(f"<li>{escape(text)}</li>" for text in self.advice)
+        return f"<p><b>{escape(self.verdict)}.</b> {escape(self.core.sentence)}</p><ul>{listed}</ul>"
+
+
+def _summary(result: Calibration) -> SetSummary:
+    if result.of_set is None:
+        raise AssertionError("the result of a set says what it is of")
+    return result.of_set
+
+
+def _of_unit(result: Calibration, of: OpenedSet) -> Calibration:
+    return result.with_serial(of.serial)

@@ -1,0 +1,112 @@
+"""`sdimu plan --after`: the plan that tells most beyond what recordings or results know."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from sdimu_calibration.core.recording import DataError
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from sdimu_calibration.core.evidence.known import Standing
+    from sdimu_calibration.core.plan import Plan
+    from sdimu_calibration.core.plan_search import Bounds, Found
+
+
+@dataclass(frozen=True)
+class After:
+    """What stands in the options of `sdimu plan`; entries as the options of the same names."""
+
+    paths: Sequence[Path]
+    imu: str | None
+    site: str | None
+    model: str
+
+
+def standing_of(console: Console, asked: After) -> Standing:
+    """Read what results know; recordings are diagnosed first, several as one set.
+
+    Raises
+    ------
+    DataError
+        When a path is neither, or results stand beside other paths.
+    """
+    from sdimu_calibration.storage.result_standing import standing_of_result
+    from sdimu_calibration.storage.standing_file import holds_standing, read_standing
+
+    results = [p for p in asked.paths if holds_standing(p) or (p / "result.json").is_file() or p.name == "result.json"]
+    if results and len(asked.paths) > 1:
+        raise DataError(
+            f"--after {results[0]}: results stand alone, as two of them may count a recording twice; name the bags, "
+            "which are then diagnosed together"
+        )
+    if results:
+        return read_standing(results[0]) if holds_standing(results[0]) else standing_of_result(results[0], asked.imu)
+    return _diagnosed(console, asked)
+
+
+def _diagnosed(console: Console, asked: After) -> Standing:
+    from sdimu_calibration.cli.progress import bar
+    from sdimu_calibration.cli.set_run import WORKERS, SetRequest, diagnosed_set
+    from sdimu_calibration.core.diagnosis.diagnose import climb
+    from sdimu_calibration.core.diagnosis.standing import standing
+    from sdimu_calibration.core.diagnosis.summary import summarise
+    from sdimu_calibration.core.estimation.solve import solve
+    from sdimu_calibration.storage.config import load_imu
+    from sdimu_calibration.storage.model_choice import named_model
+    from sdimu_calibration.storage.opening import Source, open_test
+
+    if len(asked.paths) > 1:
+        found = diagnosed_set(console, SetRequest(
+            asked.paths, None, asked.model, asked.site, asked.imu, (), Source(), "auto", None, None, WORKERS, None,
+            None, None,
+        ), ())[0]  # fmt: skip
+        console.print(f"{found.verdict}: {found.sentence}", soft_wrap=True, highlight=False)
+        return found.standing
+    test = open_test(asked.paths[0], asked.site, None if asked.imu is None else load_imu(asked.imu))
+    with bar(console) as progress:
+        one = summarise(climb(solve(test, named_model(asked.model, ()), progress=progress), progress=progress))
+    console.print(f"{one.diagnosis.verdict}: {one.diagnosis.sentence}", soft_wrap=True, highlight=False)
+    return standing(one.diagnosis, one.found)
+
+
+def tell_gain(
+    console: Console, start: Plan, found: Found, classes: Sequence[Sequence[str]],
+    sigmas: tuple[Bounds, Bounds, Bounds],
+) -> None:  # fmt: skip
+    """Say what the plan tells beyond what is known, beside the plan that the search began with.
+
+    Parameters
+    ----------
+    console : Console
+    start : Plan
+    found : Found
+    classes : sequence of sequence of str
+        What is open, by coefficients.
+    sigmas : tuple of Bounds
+        Known, with the start, with the plan that was found.
+    """
+    from sdimu_calibration.core.effects.selection import resolve
+    from sdimu_calibration.core.plan_search import gain
+    from sdimu_calibration.core.plan_search.next_turn import apart
+
+    known, first, last = sigmas
+    tells = [gain(known.covariance, b.covariance) for b in (first, last)]
+    console.print(
+        f"beyond what is known {start.name} tells {tells[0]:.1f} nat in {start.duration_s / 60.0:.1f} min, the plan "
+        f"found {tells[1]:.1f} nat in {found.minutes:.1f} min ({found.tried} plans tried)",
+        soft_wrap=True, highlight=False,
+    )  # fmt: skip
+    for labels in classes:
+        names = [p.name for label in labels for p in resolve(label).parameters]
+        sizes = [apart(b, names, None) for b in sigmas]
+        console.print(
+            f"{labels[0]} from {', '.join(labels[1:])}, each as large as its prior: apart by {sizes[0]:.1f} sigma now, "
+            f"{sizes[1]:.1f} after {start.name}, {sizes[2]:.1f} after the plan found",
+            soft_wrap=True, highlight=False,
+        )  # fmt: skip
+

@@ -1,0 +1,108 @@
+"""Where a set leaves its unit, and the recording that tells apart what all of its recordings leave open."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from sdimu_calibration.core.effects import selection
+from sdimu_calibration.core.estimation.prepared_test import PreparedTest
+from sdimu_calibration.core.estimation.solve import with_effects
+from sdimu_calibration.core.evidence.candidate import Candidate
+from sdimu_calibration.core.evidence.known import Standing, class_of, is_lasting, known_of
+from sdimu_calibration.core.joint.set_evidence import SetEvidence
+from sdimu_calibration.core.joint.set_fit import SetFit
+from sdimu_calibration.core.plan import Plan
+from sdimu_calibration.core.plan_search import NextTurn, Question, next_turn
+from sdimu_calibration.core.recording import DataError
+
+_REST_S = 100.0
+"""Length of the rests of an advised recording (s): that of the plans, enough to level and to find north."""
+_ACCELERATION_RAD_S2 = math.radians(20.0)
+"""Acceleration of its turns (rad/s^2): half a second to the fastest rate of `next_turn`."""
+
+
+def set_standing(
+    fit: SetFit, evidence: SetEvidence, kept: Mapping[str, Candidate], alike: Mapping[str, Sequence[str]]
+) -> Standing:
+    """Say what all recordings of a set know of the unit.
+
+    Parameters
+    ----------
+    fit : SetFit
+        With everything that was found.
+    evidence : SetEvidence
+        About it, with the candidates that may look the same.
+    kept : mapping of str to Candidate
+        What was found, by label.
+    alike : mapping of str to sequence of str
+        By label, what the set cannot tell from it.
+    """
+    place = {name: k for k, name in enumerate(evidence.names)}
+    first = len(evidence.weight)
+    more: dict[str, int] = {}
+    classes, labels = [], dict.fromkeys(label for label, c in kept.items() if is_lasting(c.effect))
+    for label, found in kept.items():
+        others = [evidence.candidates[place[name] - first] for name in alike.get(label, ()) if name in place]
+        members = class_of(found, others)
+        if members:
+            classes.append(tuple(c.label for c in members))
+            labels |= dict.fromkeys(classes[-1])
+            more |= {c.label: place[c.label] for c in members[1:] if c.label not in kept}
+    known = known_of(evidence, np.array(list(more.values()), dtype=np.int64))
+    sizes = dict.fromkeys((n for own in fit.varying.values() for n in own), math.inf)
+    for t, own in zip(fit.turn_on, fit.varying.values(), strict=False):
+        sizes |= dict.fromkeys(own, t.sigma)
+    # With one power-on nobody knows how far the next one is off: as far as the prior says.
+    scatter = np.minimum([sizes.get(name, 0.0) for name in known.names], known.prior)
+    return Standing(
+        replace(known, scatter=np.where(np.isfinite(scatter), scatter, 0.0)), tuple(labels), tuple(classes),
+        fit.reports[0].imu.name,
+    )  # fmt: skip
+
+
+def next_recording(fit: SetFit, standing: Standing, test: PreparedTest) -> list[tuple[tuple[str, ...], NextTurn]]:
+    """Find the shortest recording that tells the members of each open class apart, all recordings counted.
+
+    Parameters
+    ----------
+    fit : SetFit
+    standing : Standing
+        Of the set.
+    test : PreparedTest
+        One of its recordings: gives IMU and site.
+
+    Returns
+    -------
+    list of (tuple of str, NextTurn)
+        Each class with the turns between rests that tell most of it a minute; none where there is no site.
+    """
+    if test.site is None:
+        return []
+    stay = Plan("next", (_REST_S,), (), _ACCELERATION_RAD_S2)
+    found = []
+    for members in standing.open:
+        effects = [selection.resolve(e) if isinstance(e, str) else e for e in fit.model.effects]
+        have = {label for e in effects for label in e.labels}
+        added = [label for label in standing.added if label not in have and label not in members]
+        asked = Question(test.site, test.imu, with_effects(fit.model, added), standing.known)
+        try:
+            ranked = next_turn(stay, asked, members, _sizes(fit, standing, members))
+        except DataError:
+            continue
+        found.append((members, ranked[0]))
+    return found
+
+
+def _sizes(fit: SetFit, standing: Standing, members: Sequence[str]) -> dict[str, float]:
+    """Size (SI) of each member of a class if it were the cause: the first as estimated, the others to match it."""
+    names = [selection.resolve(label).parameters[0].name for label in members]
+    known = standing.known
+    J = known.of(names, np.ones(len(names)))
+    own = float(abs(fit.estimate.values[fit.names.index(names[0])])) if names[0] in fit.names else 0.0
+    if not own > 0.0:
+        return {}
+    return {name: own * float(abs(J[0, k]) / J[k, k]) for k, name in enumerate(names) if J[k, k] > 0.0}

@@ -1,0 +1,75 @@
+"""`sdimu plan --after`: what results know counts."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sdimu_calibration.cli.plan import plan
+from sdimu_calibration.core.estimation.prepared_test import PreparedTest
+from sdimu_calibration.core.estimation.solve import solve
+from sdimu_calibration.core.evidence.known import Standing, known_of
+from sdimu_calibration.core.planning.nominal import nominal_recording
+from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.storage.config import load_imu, load_plan, load_site
+from sdimu_calibration.storage.json_file import write_json
+from sdimu_calibration.storage.model_choice import named_model
+from sdimu_calibration.storage.standing_file import as_plain, read_standing
+
+OPEN = ("gyro_scale_asymmetry_y", "gyro_scale_quadratic_y")
+
+
+@pytest.fixture(scope="module")
+def standing() -> Standing:
+    """What kim18 leaves of asymmetry and quadratic term."""
+    site = load_site("daejeon")
+    test = PreparedTest(nominal_recording(load_plan("kim18"), site), load_imu("dtg"), site)
+    known = known_of(solve(test, named_model("baseline", OPEN), "filter").evidence(), np.empty(0, dtype=np.int64))
+    anew = np.where(["bias" in name for name in known.names], 0.1 * known.prior, 0.0)
+    return Standing(replace(known, scatter=anew), OPEN, (OPEN,), "dtg", "daejeon")
+
+
+@pytest.fixture
+def folder(standing, tmp_path):
+    write_json(tmp_path / "set.json", {"format": "sdimu-set-diagnosis/1", "known": as_plain(standing)})
+    return tmp_path
+
+
+def test_what_was_written_is_read(standing, folder):
+    read = read_standing(folder)
+    assert (read.added, read.open, read.imu, read.site) == (OPEN, (OPEN,), "dtg", "daejeon")
+    for one, other in ((read.known.J, standing.known.J), (read.known.scatter, standing.known.scatter)):
+        np.testing.assert_array_equal(one, other)
+
+
+def test_a_search_after_results_says_what_is_known_and_what_the_plan_adds(folder, capsys):
+    plan(plan="kim18", after=[folder], tries=2, out=folder / "found.yaml")
+    told = capsys.readouterr().out
+    assert "beyond what is known kim18 tells" in told
+    assert "gyro_scale_asymmetry_y from gyro_scale_quadratic_y" in told
+    # Both classes are in the table, though the model of the command has neither.
+    assert "gyro_scale_quadratic" in told
+    assert load_plan(str(folder / "found.yaml")).duration_s <= load_plan("kim18").duration_s + 1e-6
+
+
+def test_the_shortest_recording_that_tells_them_apart_turns_at_another_rate(folder, capsys):
+    plan(plan="kim18", after=[folder], tell=list(OPEN))
+    first = capsys.readouterr().out.splitlines()[0]
+    assert first.startswith("turn Y")
+    assert "at 10 deg/s" in first
+
+
+def test_results_beside_others_may_count_a_recording_twice_and_are_refused(folder):
+    with pytest.raises(DataError, match="stand alone"):
+        plan(plan="kim18", after=[folder, folder])
+
+
+def test_results_of_another_version_are_told(folder):
+    write_json(folder / "set.json", {"format": "sdimu-set-diagnosis/1"})
+    with pytest.raises(DataError, match="run sdimu diagnose again"):
+        plan(plan="kim18", after=[folder])
+    write_json(folder / "set.json", {"format": "sdimu-set-diagnosis/1", "known": {"names": ["gyro_bias_x"]}})
+    with pytest.raises(DataError, match="damaged"):
+        plan(plan="kim18", after=[folder])
