@@ -46,6 +46,8 @@ def open(  # noqa: A001 (as every library of files has it)
     handheld: bool | None = None,
     measured_noise: bool = False,
     whole_turns: str | None = None,
+    exclude_stops: Sequence[int] = (),
+    exclude_times: Sequence[tuple[float, float]] = (),
 ) -> PreparedTest:
     """Open a recording: read, brought to SI and one clock, with its site and the IMU's file.
 
@@ -67,6 +69,10 @@ def open(  # noqa: A001 (as every library of files has it)
         White noise from the rests of the recording, not from `imu`.
     whole_turns : str, optional
         By hand: turns of about 360 deg about the vertical are whole ones to this, such as ``1 deg``.
+    exclude_stops : sequence of int
+        Stops that no fit sees.
+    exclude_times : sequence of (float, float)
+        Spans of time (s) in which no fit takes a measurement.
 
     Raises
     ------
@@ -75,6 +81,7 @@ def open(  # noqa: A001 (as every library of files has it)
     """
     specification = load_imu(imu) if isinstance(imu, str) else imu
     opened = open_test(Path(bag), site, specification, source, handheld, measured_noise)
+    opened = opened.without_stops(tuple(exclude_stops)).without_times(tuple(exclude_times))
     return opened if whole_turns is None else replace(opened, whole_turns=parse_quantity(whole_turns, "deg"))
 
 

@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from sdimu_calibration.cli.console import plain
+from sdimu_calibration.cli.exclusion_options import ExcludeStops, ExcludeTimes, left_out
 from sdimu_calibration.cli.options import (
     EstimatorOption,
     HandOption,
@@ -69,6 +70,8 @@ def calibrate(
     estimator: EstimatorOption = "auto",
     hand: HandOption = False,
     whole_turns: WholeTurnsOption = None,
+    exclude_stops: ExcludeStops = None,
+    exclude_times: ExcludeTimes = None,
     serial: SerialOption = None,
     power_on: PowerOnOption = None,
     set_file: SetOption = None,
@@ -107,7 +110,8 @@ def calibrate(
     asked = "handheld" if hand else estimator
     bag = single(bags, set_file)
     if bag is None:
-        refuse_for_sets(truth=truth, whole_turns=whole_turns, power_on=power_on)
+        refuse_for_sets(truth=truth, whole_turns=whole_turns, power_on=power_on,
+                         exclude_stops=exclude_stops, exclude_times=exclude_times)
         calibrate_together(SetRequest(
             bags or [], set_file, model, site, imu, add or [], origin, asked, noise, out, workers,
             scheduler, serial, reference_temperature,
@@ -116,6 +120,7 @@ def calibrate(
     test, wanted, chosen = opened(
         console, bag, model, site, imu, add, origin, asked, noise, whole_turns
     )
+    test = left_out(test, exclude_stops, exclude_times)
     test = about_reference(replace(test, origin=test.origin.stated(serial, power_on)), reference_temperature)
     notes = test.recording.notes
     with explained(console, notes), bar(console) as progress:

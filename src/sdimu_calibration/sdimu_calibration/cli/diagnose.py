@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from sdimu_calibration.cli.console import plain
+from sdimu_calibration.cli.exclusion_options import ExcludeStops, ExcludeTimes, left_out
 from sdimu_calibration.cli.options import (
     EstimatorOption,
     HandOption,
@@ -78,6 +79,8 @@ def diagnose(
     estimator: EstimatorOption = "auto",
     hand: HandOption = False,
     whole_turns: WholeTurnsOption = None,
+    exclude_stops: ExcludeStops = None,
+    exclude_times: ExcludeTimes = None,
     serial: SerialOption = None,
     power_on: PowerOnOption = None,
     out: Annotated[Path | None, typer.Option(help="Folder of the results; BAG_diagnosis by default.")] = None,
@@ -118,13 +121,15 @@ def diagnose(
     )
     bag = single(bags, set_file)
     if bag is None:
-        refuse_for_sets(bootstrap=bootstrap, grow=grow, whole_turns=whole_turns, power_on=power_on)
+        refuse_for_sets(bootstrap=bootstrap, grow=grow, whole_turns=whole_turns, power_on=power_on,
+                         exclude_stops=exclude_stops, exclude_times=exclude_times)
         diagnose_together(SetRequest(
             bags or [], set_file, model, site, imu, add or [], origin, asked, noise, out, workers, scheduler, serial,
             reference_temperature,
         ), extra)  # fmt: skip
         return
     test, wanted, chosen = opened(console, bag, model, site, imu, add, origin, asked, noise, whole_turns)
+    test = left_out(test, exclude_stops, exclude_times)
     test = about_reference(replace(test, origin=test.origin.stated(serial, power_on)), reference_temperature)
     if bootstrap and chosen == "auto" and test.why_handheld:
         raise DataError(NO_BOOTSTRAP)

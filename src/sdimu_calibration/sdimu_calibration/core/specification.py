@@ -115,6 +115,26 @@ class ImuSpecification:
 
 
 @dataclass(frozen=True)
+class StatedPrior:
+    """What a model states of one coefficient before the test.
+
+    Attributes
+    ----------
+    name : str
+        Of the coefficient.
+    mean, sigma : float
+        In the frame of the report (SI); a sigma of zero fixes the coefficient at the mean.
+    unit : str
+        In which both were written: tells a wrong one.
+    """
+
+    name: str
+    mean: float
+    sigma: float
+    unit: str
+
+
+@dataclass(frozen=True)
 class Model:
     """What is estimated and how the measurements are weighed.
 
@@ -135,6 +155,8 @@ class Model:
         Model that the same samples drive the navigation and make Zw and Zf.
     extra_rate_sigma, extra_force_sigma : float
         Noise of Zw and Zf per epoch beyond the IMU's white noise (rad/s, m/s^2).
+    priors : tuple of StatedPrior
+        Of single coefficients, in the place of what the IMU's file says of all of an effect.
     """
 
     effects: tuple[str, ...]
@@ -146,3 +168,4 @@ class Model:
     shared_noise: bool = True
     extra_rate_sigma: float = 0.0
     extra_force_sigma: float = 0.0
+    priors: tuple[StatedPrior, ...] = ()

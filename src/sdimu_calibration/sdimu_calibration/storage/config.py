@@ -19,8 +19,8 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationEr
 
 from sdimu_calibration.core.plan import Plan, Turn
 from sdimu_calibration.core.recording import DataError
-from sdimu_calibration.core.specification import ImuSpecification, Model, Site
-from sdimu_calibration.core.units import parse_quantity
+from sdimu_calibration.core.specification import ImuSpecification, Model, Site, StatedPrior
+from sdimu_calibration.core.units import parse_quantity, parse_unit
 
 CONFIG_VARIABLE = "SDIMU_CONFIG"
 """Environment variable that names the config folder."""
@@ -60,14 +60,18 @@ def _as_text(value: Any, expected: str) -> str:
     return str(value)
 
 
-def _quantity_of_any_unit(value: Any) -> tuple[float, str]:
+def _signed_quantity(value: Any) -> tuple[float, str]:
     # The effect that owns a prior knows its dimension; the file reader does not know effects.
     text = _as_text(value, "ppm")
     unit = re.sub(r"^\s*[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?\s*", "", text)
-    size = parse_quantity(text, unit or "1")
+    return parse_quantity(text, unit or "1"), unit or "1"
+
+
+def _quantity_of_any_unit(value: Any) -> tuple[float, str]:
+    size, unit = _signed_quantity(value)
     if size < 0.0:
-        raise ValueError(f"'{text}' is below zero (expected a sigma)")
-    return size, unit or "1"
+        raise ValueError(f"'{value}' is below zero (expected a sigma)")
+    return size, unit
 
 
 def config_folder() -> Path:
@@ -262,6 +266,11 @@ class _ImuFile(Schema):
     prior: dict[str, Annotated[tuple[float, str], BeforeValidator(_quantity_of_any_unit)]] = {}
 
 
+class _PriorFile(Schema):
+    value: Annotated[tuple[float, str], BeforeValidator(_signed_quantity)]
+    sigma: Annotated[tuple[float, str], BeforeValidator(_quantity_of_any_unit)]
+
+
 class _ModelFile(Schema):
     format: Literal["sdimu-model/1"] = "sdimu-model/1"
     name: str | None = None
@@ -270,6 +279,7 @@ class _ModelFile(Schema):
     position_sigma: Annotated[float, quantity("m"), Field(gt=0)] = Model.position_sigma
     settle: Annotated[float, quantity("s"), Field(ge=0)] = Model.settle_s
     body_frame: Literal["accelerometer_triad", "prior"] = "accelerometer_triad"
+    priors: dict[str, _PriorFile] = {}
 
 
 class _SiteFile(Schema):
@@ -346,7 +356,15 @@ def load_model(name_or_path: str | Path) -> Model:
         position_sigma=file.position_sigma,
         settle_s=file.settle,
         body_frame=file.body_frame,
+        priors=tuple(_stated_prior(f"{path}: priors.{name}", name, one) for name, one in file.priors.items()),
     )
+
+
+def _stated_prior(where: str, name: str, one: _PriorFile) -> StatedPrior:
+    (mean, unit), (sigma, other) = one.value, one.sigma
+    if parse_unit(unit).dimension != parse_unit(other).dimension:
+        raise DataError(f"{where}: value and sigma have different units, '{unit}' and '{other}'")
+    return StatedPrior(name, mean, sigma, unit)
 
 
 def load_site(name_or_path: str | Path) -> Site:

@@ -23,7 +23,7 @@ from sdimu_calibration.core.data.phases import (
     without_early_motion,
 )
 from sdimu_calibration.core.data.sample_screening import sound, wild
-from sdimu_calibration.core.effects import imu_model
+from sdimu_calibration.core.effects import body_frame, imu_model
 from sdimu_calibration.core.effects.imu_model import ImuModel
 from sdimu_calibration.core.measurement_kind import ALL, SENSORS, SKIP
 from sdimu_calibration.core.navigation.strapdown import Cycles, Reducer
@@ -115,7 +115,8 @@ def set_up(site: Site, imu: ImuSpecification, model: Model, epoch_s: float | Non
     """
     epoch_s = imu.epoch_s if epoch_s is None else epoch_s
     check_priors(imu)
-    sensors = imu_model.build(model.effects, imu)
+    sensors = imu_model.restate(imu_model.build(model.effects, imu), model.priors)
+    body_frame.check_priors([one.name for one in model.priors], sensors.names, model.body_frame)
     for what, noise in (("gyro", imu.gyro_white_noise), ("accel", imu.accel_white_noise)):
         if not noise > 0.0:
             raise DataError(f"IMU '{imu.name}': noise.{what} is zero, and measurements are weighed by it: give it")

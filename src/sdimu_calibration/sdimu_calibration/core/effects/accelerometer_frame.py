@@ -135,11 +135,15 @@ def accelerometer_frame_model(asked: ImuModel, imu: ImuSpecification) -> Acceler
     inner = imu_model.build(effects, imu)
     sizes = dict(zip(asked.names, _turned_prior(asked), strict=True))
     if outside:
-        misalignment = asked.prior[asked.names.index("accel_misalignment_xy")]
-        sizes |= dict.fromkeys(_OUTSIDE, float(np.sqrt(2.0) * misalignment * np.max(asked.prior[unbalance])))
-    prior = np.array([sizes[name] for name in inner.names])
+        misalignment = asked.stated[asked.names.index("accel_misalignment_xy")]
+        sizes |= dict.fromkeys(_OUTSIDE, float(np.sqrt(2.0) * misalignment * np.max(asked.stated[unbalance])))
+    stated = np.array([sizes[name] for name in inner.names])
     place = np.array([inner.names.index(n) if n in inner.names else -1 for n in asked.names])
-    return AccelerometerFrameModel(asked, replace(inner, prior=prior, stated=prior), place)
+    own = np.flatnonzero(asked.restated & (place >= 0))
+    prior, mean, restated = stated.copy(), inner.mean.copy(), inner.restated.copy()
+    prior[place[own]], mean[place[own]], restated[place[own]] = asked.prior[own], asked.mean[own], True
+    inner = replace(inner, prior=prior, mean=mean, restated=restated, stated=stated)
+    return AccelerometerFrameModel(asked, inner, place)
 
 
 def _turned_prior(asked: ImuModel) -> Floats:
@@ -148,4 +152,4 @@ def _turned_prior(asked: ImuModel) -> Floats:
     The data say a thousand times more than these priors, so that only their size matters.
     """
     J = body_frame.frame_jacobian(asked.names, FRAME, by_temperature=False)
-    return np.asarray(np.sqrt(np.diag(J @ np.diag(asked.prior**2) @ J.T)))
+    return np.asarray(np.sqrt(np.diag(J @ np.diag(asked.stated**2) @ J.T)))

@@ -17,6 +17,7 @@ holds that turn, and no square of it is lost; what they report is turned.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 
 import numpy as np
 
@@ -52,6 +53,9 @@ def _places(triad: str, power: str = "") -> dict[str, tuple[int, int, float]]:
 def _unbalance_places(power: str = "") -> dict[str, tuple[int, int, float]]:
     """Coefficient name -> place in the matrix of the mass unbalance, or a power of it."""
     return {f"gyro_mass_unbalance{power}_{k}": (row, column, 1.0) for k, (row, column) in _UNBALANCE.items()}
+
+
+_TRIADS = (partial(_places, "accel"), partial(_places, "gyro"))
 
 
 def _matrix(places: dict[str, tuple[int, int, float]], names: Sequence[str], values: Floats) -> Floats:
@@ -328,6 +332,47 @@ def pinned_in(names: Sequence[str], frame: str = FRAMES[0]) -> tuple[str, ...]:
     if frame == "prior" or not set(pinned_names()) <= set(names):
         return ()
     return tuple(name for power in ("", *_turning_powers(names)) for name in _pinned(power))
+
+
+def check_priors(stated: Sequence[str], names: Sequence[str], frame: str) -> None:
+    """Refuse priors of coefficients that a body frame makes zero.
+
+    Parameters
+    ----------
+    stated : sequence of str
+        Coefficients whose prior a model states.
+    names : sequence of str, length p
+        Of the model.
+    frame : str
+        One of `FRAMES`.
+
+    Raises
+    ------
+    DataError
+        When there is one.
+    """
+    for name in set(stated) & set(pinned_in(names, frame)):
+        raise DataError(
+            f"priors.{name}: the body frame of the accelerometers makes it zero by definition: leave the line out"
+        )
+
+
+def turning_names(names: Sequence[str], frame: str) -> frozenset[str]:
+    """Coefficients whose values depend on the body frame: a prior of one is stated in the frame of the report.
+
+    Parameters
+    ----------
+    names : sequence of str, length p
+        Of the model.
+    frame : str
+        One of `FRAMES`.
+    """
+    if not pinned_in(names, frame):
+        return frozenset()
+    powers = ("", *_BY_TEMPERATURE)
+    matrices = [places(power) for power in powers for places in (*_TRIADS, _unbalance_places)]
+    seen = {f"{_SEEN_AS_BIAS}_{axis}" for axis in "xyz"} if _turning_powers(names) else set()
+    return frozenset(names) & (seen | {name for places in matrices for name in places})
 
 
 def _pinned(power: str) -> tuple[str, ...]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sdimu_calibration.core.arrays import Floats, Ints
+from sdimu_calibration.core.arrays import Bools, Floats, Ints
 from sdimu_calibration.core.compiled import compiled
 from sdimu_calibration.core.effects import selection
 from sdimu_calibration.core.effects.effect import Effect, Parameter
@@ -16,7 +16,7 @@ from sdimu_calibration.core.effects.motion import Motion
 from sdimu_calibration.core.effects.registry import get
 from sdimu_calibration.core.effects.registry import names as registered
 from sdimu_calibration.core.recording import DataError
-from sdimu_calibration.core.specification import ImuSpecification
+from sdimu_calibration.core.specification import ImuSpecification, StatedPrior
 from sdimu_calibration.core.units import parse_unit
 
 
@@ -31,7 +31,11 @@ class ImuModel:
     channel, parameter : ndarray of int, shape (m,)
         Sensor axis (0-2 gyro, 3-5 accelerometer) and state of each regressor column.
     prior : ndarray, shape (p,)
-        One-sigma (SI) that the filter starts from.
+        One-sigma (SI) that the filter starts from; zero for a coefficient that is known.
+    mean : ndarray, shape (p,)
+        Mean of the prior (SI).
+    restated : ndarray of bool, shape (p,)
+        The model states the prior of this coefficient by itself: it is taken as it is.
     stated : ndarray, shape (p,)
         One-sigma (SI) of the specification; `prior` where it was not found too narrow.
     decay_rate : ndarray, shape (p,)
@@ -45,6 +49,8 @@ class ImuModel:
     channel: Ints
     parameter: Ints
     prior: Floats
+    mean: Floats
+    restated: Bools
     stated: Floats
     decay_rate: Floats
     drive: Floats
@@ -53,6 +59,16 @@ class ImuModel:
     def names(self) -> tuple[str, ...]:
         """Coefficient names in the order of the state."""
         return tuple(p.name for p in self.parameters)
+
+    @property
+    def fixed(self) -> Bools:
+        """Coefficients that are known, shape (p,)."""
+        return np.asarray(self.prior == 0.0)
+
+    @property
+    def weight(self) -> Floats:
+        """Prior information of each coefficient (1/SI^2), shape (p,): finite for those that are known, too."""
+        return np.asarray(np.where(self.fixed, _KNOWN * self.stated, self.prior) ** -2.0)
 
     def regressors(self, motion: Motion) -> Floats:
         """Regressor columns of all effects.
@@ -91,6 +107,10 @@ class ImuModel:
             Gyros (rad/s), then accelerometers (m/s^2), in b.
         """
         return np.asarray(_errors(np.ascontiguousarray(values), self.channel, coefficients[self.parameter]))
+
+
+_KNOWN = 1e-6
+"""Sigma of a known coefficient in a least squares, a multiple of the specification's: data never say that much."""
 
 
 @compiled
@@ -143,8 +163,40 @@ def build(effects: Sequence[str | Effect], imu: ImuSpecification) -> ImuModel:
         drive += [effect.random_walk.get(imu.grade, 0.0) ** 2] * len(effect.parameters)
     return ImuModel(
         chosen, tuple(parameters), np.array(channel, dtype=np.int64), np.array(parameter, dtype=np.int64),
-        np.array(prior), np.array(prior), np.array(decay), np.array(drive),
+        np.array(prior), np.zeros(len(prior)), np.zeros(len(prior), dtype=bool), np.array(prior), np.array(decay),
+        np.array(drive),
     )  # fmt: skip
+
+
+def restate(sensors: ImuModel, priors: Sequence[StatedPrior]) -> ImuModel:
+    """Take the priors that a model states of single coefficients.
+
+    Parameters
+    ----------
+    sensors : ImuModel
+    priors : sequence of StatedPrior
+
+    Raises
+    ------
+    DataError
+        When a coefficient is none of the model's, stands twice or has a wrong unit, or a sigma is below zero.
+    """
+    prior, mean, restated = sensors.prior.copy(), sensors.mean.copy(), sensors.restated.copy()
+    for one in priors:
+        if one.name not in sensors.names:
+            near = difflib.get_close_matches(one.name, sensors.names, n=1)
+            hint = f"did you mean {near[0]}?" if near else f"it has {', '.join(sensors.names[:3])}, ..."
+            raise DataError(f"priors.{one.name}: the model has no such coefficient ({hint})")
+        k = sensors.names.index(one.name)
+        unit = sensors.parameters[k].display_unit
+        if parse_unit(one.unit).dimension != parse_unit(unit).dimension:
+            raise DataError(f"priors.{one.name}: '{one.unit}' is a wrong unit (expected something like '1 {unit}')")
+        if not one.sigma >= 0.0 or not np.isfinite([one.mean, one.sigma]).all():
+            raise DataError(f"priors.{one.name}: expected a value, and a sigma above zero, or zero to fix it")
+        if restated[k]:
+            raise DataError(f"priors.{one.name}: stands twice (state it once)")
+        prior[k], mean[k], restated[k] = one.sigma, one.mean, True
+    return replace(sensors, prior=prior, mean=mean, restated=restated)
 
 
 def prior_size(effect: Effect, imu: ImuSpecification) -> float | None:

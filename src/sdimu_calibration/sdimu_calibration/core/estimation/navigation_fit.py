@@ -327,10 +327,21 @@ class NavigationFit(Fit):
         """List the stops that were found, and those held out."""
         held = self.test.held_out
         told = (f"stops held out of the fit: {', '.join(map(str, held))}",) if held else ()
+        spans = ", ".join(f"{begin:g}-{end:g}" for begin, end in self.test.excluded)
+        told = (*told, *((f"times held out of the fit (s): {spans}",) if spans else ()), *self._stated_priors())
         noise = () if self.noise is None else (self.noise.note,)
         magnetic = any(effect.needs == "magnetic" for effect in self.sensors.effects)
         field = (NO_FIELD,) if magnetic and self.setup.site.magnetic_field_t is None else ()
         return (*stops_line(self.test.recording, self.prepared), *told, *noise, *field)
+
+    def _stated_priors(self) -> tuple[str, ...]:
+        """Say which coefficients are fixed, and which have a prior of their own."""
+        fixed = [one.name for one in self.model.priors if one.sigma == 0.0]
+        other = [one.name for one in self.model.priors if one.sigma > 0.0]
+        return (
+            *((f"fixed by the model, not estimated: {', '.join(fixed)}",) if fixed else ()),
+            *((f"with a prior that the model states: {', '.join(other)}",) if other else ()),
+        )
 
     def warnings(self, statistics: dict[str, float | None]) -> tuple[str, ...]:
         """Misfit as a whole and of single stops, and coefficients outside the specification.

@@ -7,7 +7,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from sdimu_calibration.core.arrays import Floats
+from sdimu_calibration.core.arrays import Bools, Floats
 from sdimu_calibration.core.effects import bias
 from sdimu_calibration.core.estimation.fit import Fit
 from sdimu_calibration.core.estimation.navigation_fit import NavigationFit
@@ -70,7 +70,7 @@ def in_noise(fit: F, evidence: LinearEvidence, wander: Wander, terms: Sequence[N
         return fit.with_noise(None)
     bare, modes = evidence.only(np.empty(0, dtype=np.int64)), wander.modes(terms)
     noisy = bare.with_noise(modes.columns)
-    deviation, covariance = _with_mean(bare, modes)
+    deviation, covariance = _with_mean(bare, modes, fit.setup.sensors.fixed)
     residual = noisy.e - noisy.W @ noisy.information.estimate(noisy.model, noisy.weight)[0]
     squared = float(residual @ noisy.weighed(residual[:, None])[:, 0])
     rms = predict(noisy, noisy.model, noisy.weight, noisy.shift).rms
@@ -82,8 +82,10 @@ def in_noise(fit: F, evidence: LinearEvidence, wander: Wander, terms: Sequence[N
     return fit.with_noise(estimate)
 
 
-def _with_mean(evidence: LinearEvidence, modes: Modes) -> tuple[Floats, Floats]:
+def _with_mean(evidence: LinearEvidence, modes: Modes, fixed: Bools) -> tuple[Floats, Floats]:
     """Deviation of the coefficients (q,) and its covariance, a bias with the mean of its noise over all dwells.
+
+    Coefficients that are `fixed` (q,) stay as they are.
 
     A constant part of wandering noise cannot be told from the bias, so the bias by itself means nothing in it; what
     the bias was in the mean over the test is known well.
@@ -94,6 +96,8 @@ def _with_mean(evidence: LinearEvidence, modes: Modes) -> tuple[Floats, Floats]:
     d = W.T @ evidence.e
     d[:q] += evidence.weight * evidence.shift
     estimate, covariance = Information(W.T @ W, d).estimate(np.arange(q + r), weight)
+    known = np.flatnonzero(fixed)
+    covariance[known], covariance[:, known], estimate[known] = 0.0, 0.0, 0.0
     T = np.hstack([np.eye(q), np.zeros((q, r))])
     for channel, name in enumerate(bias.NAMES):
         if name in evidence.names:

@@ -6,14 +6,12 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
-import numpy as np
-
 from sdimu_calibration.core.alignment.prepared import PreparedData, TestSetup, reduce
+from sdimu_calibration.core.alignment.without import without
 from sdimu_calibration.core.data.by_hand import why_handheld
 from sdimu_calibration.core.handheld.handheld import PreparedRun, prepare_run
-from sdimu_calibration.core.measurement_kind import SKIP
 from sdimu_calibration.core.origin import Origin
-from sdimu_calibration.core.recording import DataError, Recording
+from sdimu_calibration.core.recording import Recording
 from sdimu_calibration.core.specification import EPOCH_S, ImuSpecification, Site
 
 
@@ -30,6 +28,8 @@ class PreparedTest:
         None where no site is stated: only a handheld run does without.
     held_out : tuple of int
         Stops whose measurements no fit takes.
+    excluded : tuple of (float, float)
+        Spans of time (s) whose measurements no fit takes; the samples in them are still navigated.
     assumed_site : str
         Name of the site where nobody stated one.
     whole_turns : float
@@ -42,6 +42,7 @@ class PreparedTest:
     imu: ImuSpecification
     site: Site | None = None
     held_out: tuple[int, ...] = ()
+    excluded: tuple[tuple[float, float], ...] = ()
     assumed_site: str = ""
     whole_turns: float = 0.0
     origin: Origin = field(default_factory=Origin)
@@ -50,6 +51,10 @@ class PreparedTest:
     def without_stops(self, stops: tuple[int, ...]) -> PreparedTest:
         """Hold stops out of all fits."""
         return replace(self, held_out=tuple(stops))
+
+    def without_times(self, spans: tuple[tuple[float, float], ...]) -> PreparedTest:
+        """Take no measurement within spans of time (s)."""
+        return replace(self, excluded=tuple(spans))
 
     def with_imu(self, imu: ImuSpecification) -> PreparedTest:
         """Take other white noise or priors for the fits; phases and data faults stay as they were decided."""
@@ -66,7 +71,7 @@ class PreparedTest:
         key = (setup.model.settle_s, setup.model.zero_velocity, setup.epoch_s)
         if key not in self._prepared:
             self._prepared[key] = reduce(self.recording, setup)
-        return _masked(self._prepared[key], self.held_out)
+        return without(self._prepared[key], self.held_out, self.excluded)
 
     @cached_property
     def why_handheld(self) -> str:
@@ -98,15 +103,3 @@ class PreparedTest:
             self._prepared["run"] = prepare_run(self.recording, self.whole_turns)
         done: PreparedRun = self._prepared["run"]
         return done
-
-
-def _masked(prepared: PreparedData, stops: tuple[int, ...]) -> PreparedData:
-    """Leave the measurements of some stops out."""
-    if not stops:
-        return prepared
-    out = np.isin(prepared.phases.stop, stops)
-    left = np.unique(prepared.phases.stop[(prepared.kind > 0) & ~out])
-    first = int(prepared.phases.stop[np.argmax(prepared.kind > 0)])
-    if first in stops or len(left) < 2:
-        raise DataError("held-out stops: keep the first stop, which gives the attitude, and at least one more")
-    return replace(prepared, kind=np.where(out, SKIP, prepared.kind).astype(np.int64))

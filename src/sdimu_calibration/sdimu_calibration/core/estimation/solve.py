@@ -91,6 +91,7 @@ def solve(
     choice = choose_estimator(test, model) if estimator == AUTO else Choice(estimator, "by request")
     if choice.estimator not in ESTIMATORS:
         raise DataError(f"estimator '{estimator}': expected one of {', '.join((AUTO, *ESTIMATORS))}")
+    _check(test, model, choice.estimator)
     try:
         fit = replace(ESTIMATORS[choice.estimator](test, model, start, progress), reason=choice.reason)
     except DivergedError as error:
@@ -98,6 +99,21 @@ def solve(
             raise
         raise DivergedError(f"{error} (no site was stated: {test.assumed_site} was assumed)") from error
     return with_noise_learned(fit) if learn else fit
+
+
+def _check(test: PreparedTest, model: Model, estimator: str) -> None:
+    if estimator in _TAKES_PRIORS:
+        return
+    if model.priors:
+        raise DataError(
+            f"priors.{model.priors[0].name}: the estimator '{estimator}' takes the priors of the IMU's file alone: "
+            f"leave them out of the model, or use one of {', '.join(_TAKES_PRIORS)}"
+        )
+    if test.held_out or test.excluded:
+        raise DataError(
+            f"the estimator '{estimator}' takes every stop: cut the recording instead (sdimu bag cut), or use one of "
+            f"{', '.join(_TAKES_PRIORS)}"
+        )
 
 
 @dataclass(frozen=True)
@@ -127,6 +143,10 @@ def choose_estimator(test: PreparedTest, model: Model) -> Choice:
     if test.why_handheld:
         return Choice(HandheldFit.estimator, test.why_handheld)
     setup = _setup(test, model)
+    turning = body_frame.turning_names(setup.sensors.names, model.body_frame)
+    stated = [one.name for one in model.priors if one.name in turning]
+    if stated:
+        return Choice(SecondOrderFit.estimator, f"the prior of {stated[0]} is stated in the accelerometers' frame")
     if _second_order_model(setup, float(test.recording.t[-1])) is None:
         return Choice(FilterFit.estimator, "errors are so small that their squares do not count")
     if squares_count(setup.sensors):
@@ -309,7 +329,8 @@ def fit_about(
     values = np.array([coefficients.get(name, 0.0) for name in begun.setup.sensors.names])
     C_nb = begun.alignment.C_nb if start is None else start.C_nb
     sensors = begun.setup.sensors
-    known = replace(begun, setup=replace(begun.setup, sensors=replace(sensors, prior=np.zeros(len(sensors.prior)))))
+    fixed = replace(sensors, prior=np.zeros(len(sensors.prior)), mean=values)
+    known = replace(begun, setup=replace(begun.setup, sensors=fixed))
     fit = _navigation_about(test, model, known, frame_model, C_nb, values)
     return replace(fit, setup=begun.setup)
 
@@ -340,6 +361,8 @@ def _navigation_about(
     return FilterFit(test, model, setup.sensors, setup, prepared, alignment, solution)
 
 
+_TAKES_PRIORS = (FilterFit.estimator, SecondOrderFit.estimator)
+"""Estimators that take priors of single coefficients, and leave measurements out."""
 ESTIMATORS: Mapping[str, Callable[[PreparedTest, Model, Start | None, Progress], Fit]] = {
     FilterFit.estimator: _filter,
     SecondOrderFit.estimator: _second_order,

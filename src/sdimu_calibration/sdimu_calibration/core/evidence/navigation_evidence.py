@@ -199,7 +199,7 @@ def navigation_evidence(
     return NavigationEvidence(
         e=known.output.normalised[epoch, channel], W=columns(prepared, known, latitude, [*sensors.effects, *effects]),
         stop=prepared.phases.stop[epoch], names=(*sensors.names, *(c.label for c in candidates)),
-        weight=1.0 / sensors.prior**2, shift=-estimate, stated=sensors.stated, candidates=candidates, prior=prior,
+        weight=sensors.weight, shift=sensors.mean - estimate, stated=sensors.stated, candidates=candidates, prior=prior,
         imu=setup.imu, times=timetable(prepared), coefficients=len(sensors.prior),
         epoch=epoch, channel=channel, known=known, prepared=prepared, latitude=latitude,
     )  # fmt: skip

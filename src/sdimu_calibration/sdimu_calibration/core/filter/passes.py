@@ -124,7 +124,7 @@ def start_state(setup: TestSetup, start: Alignment, C_nb: Floats, reference: Flo
     C_nb : ndarray, shape (3, 3)
         Attitude about which the pass is linearised, b to n.
     reference : ndarray, shape (p,)
-        Coefficients about which it is linearised (SI); one with a prior of zero is known to be the reference.
+        Coefficients about which it is linearised (SI).
     """
     p = len(setup.sensors.prior)
     s = NAV + p + COPY
@@ -139,7 +139,7 @@ def start_state(setup: TestSetup, start: Alignment, C_nb: Floats, reference: Flo
     P[range(NAV, NAV + p), range(NAV, NAV + p)] = setup.sensors.prior**2
     shift = rotation_vector(C_nb @ start.C_nb.T)
     x[6:9] = x[NAV + p :] = -shift
-    x[NAV : NAV + p] = np.where(setup.sensors.prior > 0.0, -reference, 0.0)
+    x[NAV : NAV + p] = setup.sensors.mean - reference
     position = np.array([setup.site.latitude_rad, 0.0, setup.site.height_m])
     return PassState(x, P, C_nb.copy(), np.zeros(3), position, reference.copy())
 
@@ -264,7 +264,7 @@ def refine(
         new = one_pass(
             prepared, use, start, last.smoothed_start, reference, closed_loop=False, near=last.data.values
         )
-        moved = np.max(np.abs(new.estimate - last.estimate) / np.sqrt(np.diag(new.covariance)))
+        moved = furthest_move(new.estimate - last.estimate, new.covariance)
         last = new
         if settling:
             settling = not (moved < _SETTLED or count > MOST_PASSES // 2)
@@ -274,6 +274,26 @@ def refine(
             return last, count, True
     # The passes contract by a third each where Earth rate says little of the azimuth: near enough is told from lost.
     return last, MOST_PASSES, bool(moved < _NEAR)
+
+
+def furthest_move(step: Floats, covariance: Floats) -> float:
+    """Largest step of a coefficient that is not known.
+
+    Parameters
+    ----------
+    step : ndarray, shape (p,)
+        SI.
+    covariance : ndarray, shape (p, p)
+        SI; zero where a coefficient is known.
+
+    Returns
+    -------
+    float
+        In units of its sigma (1).
+    """
+    sigma = np.sqrt(np.diag(covariance))
+    free = sigma > 0.0
+    return float(np.max(np.abs(step[free]) / sigma[free], initial=0.0))
 
 
 def coarse_pass(prepared: PreparedData, setup: TestSetup, start: Alignment) -> Pass:
@@ -315,7 +335,8 @@ class Solution:
 def widen_contradicted_priors(sensors: ImuModel, estimate: Floats, covariance: Floats) -> ImuModel:
     """Widen the prior of an effect that is far beyond it and that it holds back; the same object when none is.
 
-    A prior is a statement about the class of the sensor. Where the data contradict a prior, the estimate lies between
+    A prior is a statement about the class of the sensor; one that the model states of a coefficient is taken at its
+    word. Where the data contradict a prior, the estimate lies between
     the two and is wrong, and the rest of the effect goes into the other coefficients. Misalignments keep their prior:
     nothing else holds their common part, the frame of the prior.
 
@@ -328,9 +349,9 @@ def widen_contradicted_priors(sensors: ImuModel, estimate: Floats, covariance: F
     """
     sigma = np.sqrt(np.diag(covariance))
     size = np.abs(estimate)
-    pull = size * sigma / sensors.prior**2
+    pull = size * sigma * sensors.weight
     gauge = np.array([e.gauge for e in sensors.effects for _ in e.parameters])
-    held = (size > _BEYOND * sensors.prior) & (pull > _PULL) & ~gauge
+    held = (size > _BEYOND * sensors.prior) & (pull > _PULL) & ~gauge & ~sensors.restated
     if not held.any():
         return sensors
     return replace(sensors, prior=np.where(held, _ROOM * size, sensors.prior))

@@ -154,6 +154,11 @@ def fit_set(
         When the recordings are of several units, one stands twice, or none can be used.
     """
     check_members(members)
+    if options.model.priors:
+        raise DataError(
+            f"priors.{options.model.priors[0].name}: a set takes the priors of the IMU's file alone: leave them out of "
+            "the model"
+        )
     bare = replace(options.model, effects=())
     options = replace(options, model=with_effects(bare, [by_name(e) for e in options.model.effects]))
     progress("recordings", 0.1)

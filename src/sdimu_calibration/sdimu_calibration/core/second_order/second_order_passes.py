@@ -29,7 +29,7 @@ from sdimu_calibration.core.alignment.rest_means import Layout, layout
 from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.effects.motion import Motion
 from sdimu_calibration.core.filter.filter_pass import COPY, NAV, PassInput, PassOutput, PassState, new_output, run_pass
-from sdimu_calibration.core.filter.passes import check_finite, pass_input, pass_settings, start_state
+from sdimu_calibration.core.filter.passes import check_finite, furthest_move, pass_input, pass_settings, start_state
 from sdimu_calibration.core.navigation.correct_cycles import CorrectedCycles, correct_cycles, spread
 from sdimu_calibration.core.navigation.strapdown import Cycles
 from sdimu_calibration.core.navigation.track import integrate, motion
@@ -138,7 +138,7 @@ def solve_second_order(
     for count in range(1, MOST_PASSES + 1):
         progress("passes", min(0.95, 0.2 + 0.05 * count))
         last = second_order_pass(prepared, wide if loose else firm, start, C_nb, reference)
-        moved = float(np.max(np.abs(last.estimate - reference) / np.sqrt(np.diag(last.covariance))))
+        moved = furthest_move(last.estimate - reference, last.covariance)
         reference, C_nb = last.estimate, last.smoothed_start
         if not loose and moved < CONVERGED:
             return last, count, True
