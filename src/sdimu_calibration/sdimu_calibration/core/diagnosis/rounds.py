@@ -196,8 +196,8 @@ def mark_dropped(steps: Sequence[Step], kept: set[str], small: set[str]) -> tupl
 def prefer(wide: Round, done: Round) -> bool:
     """Whether equations tell more than the catalogue.
 
-    They do when they leave less by more than chance, or as little with fewer terms; and where nothing can be left,
-    when they found something and the catalogue did not.
+    They do when they leave less by more than chance, or as little with fewer terms, and are no less likely with what
+    each term costs; and where nothing can be left, when they found something and the catalogue did not.
     """
     many, few = len(done.found.chosen), len(wide.found.chosen)
     if not len(done.free):
@@ -205,6 +205,8 @@ def prefer(wide: Round, done: Round) -> bool:
     if done.found.noise or wide.found.noise:
         # Noise that is drawn anew leaves nothing in any dwell or turn: what explains more of it is better.
         return wide.found.net > done.found.net + _OWN_GAIN
+    if wide.found.net < done.found.net:
+        return False
     chance = 3.0 * np.sqrt(2.0 * done.after.dof)
     if few > max(1, many) and done.after.p_value > UNEXPLAINED_P:
         return False
