@@ -106,6 +106,7 @@ setup(
     entry_points={
         "console_scripts": [
             "sdimu = sdimu_calibration.cli.main:main",
+            "adaptive = sdimu_calibration.nodes.adaptive_node:main",
             "calibration_node = sdimu_calibration.nodes.calibration_node:main",
             "compensate_node = sdimu_calibration.nodes.compensate_node:main",
             "recorder_node = sdimu_calibration.nodes.recorder_node:main",

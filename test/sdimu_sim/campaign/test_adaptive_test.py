@@ -36,8 +36,9 @@ def test_it_ends_with_all_limits_held_by_the_sigmas_of_the_fit_in_less_time_than
     assert done.end.reached
     assert done.last.known.holds
     assert done.plan.duration_s < 0.5 * load_plan("recommended").duration_s
-    limited, limit = load_goals("table33").of(done.last.found.after.names, "accelerometer_triad")
-    assert (np.sqrt(np.diag(done.last.found.after.covariance))[limited] <= limit).all()
+    fit = done.last.found.extended.with_doubt(None)
+    limited, limit = load_goals("table33").of(fit.names, fit.body_frame)
+    assert (np.sqrt(np.diag(fit.covariance))[limited] <= limit).all()
 
 
 def test_every_choice_has_its_reason_and_its_time(done):

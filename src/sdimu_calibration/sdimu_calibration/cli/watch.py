@@ -35,14 +35,15 @@ class Outline:
     Attributes
     ----------
     duration_s : float
-    stops : int
+    stops : int or None
+        None where they are chosen as the test goes on.
     effects : sequence of str
     units : mapping of str to str
         Customary unit by coefficient.
     """
 
     duration_s: float
-    stops: int
+    stops: int | None
     effects: Sequence[str]
     units: Mapping[str, str]
 
@@ -88,11 +89,16 @@ class Watch:
     def line(self, seen: Seen, wall_s: float) -> str:
         """Return the whole of it in one line."""
         parts = [
-            f"stop {seen.stop} of {self._test.stops - 1} {seen.phase}",
+            self.stage(seen),
             f"{seen.table_s:.0f} of {self._test.duration_s:.0f} s, {self.left(seen, wall_s)}",
             sigma_words(self._falling(seen)), light(seen.nis, seen.verdict),
         ]  # fmt: skip
         return "; ".join(part for part in parts if part)
+
+    def stage(self, seen: Seen) -> str:
+        """Say where the test is."""
+        last = "" if self._test.stops is None else f" of {self._test.stops - 1}"
+        return f"stop {seen.stop}{last} {seen.phase}"
 
     def left(self, seen: Seen, wall_s: float) -> str:
         """Say how long it will take at the pace so far."""
@@ -111,7 +117,7 @@ class Watch:
         from rich.text import Text
 
         fine = seen.verdict.startswith("consistent") or not seen.nis
-        stage = f"stop {seen.stop} of {self._test.stops - 1} {seen.phase}" if streaming else "last calibration"
+        stage = self.stage(seen) if streaming else "last calibration"
         left = self.left(seen, wall_s) if streaming else "no more to come"
         head = Table.grid(padding=(0, 1))
         head.add_row(

@@ -36,6 +36,7 @@ TOPICS = (
     "rate_table/joint_states=sensor_msgs/msg/JointState",
     "rate_table/joint_trajectory=trajectory_msgs/msg/JointTrajectory",
     "rate_table/goal_status=diagnostic_msgs/msg/DiagnosticArray",
+    "adaptive/choice=diagnostic_msgs/msg/DiagnosticArray",
     "calibration/coefficients=sensor_msgs/msg/JointState",
     "calibration/covariance=std_msgs/msg/Float64MultiArray",
     "calibration/navigation=nav_msgs/msg/Odometry",

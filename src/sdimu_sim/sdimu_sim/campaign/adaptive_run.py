@@ -14,6 +14,7 @@ from sdimu_calibration.core.effects.selection import resolve
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.estimation.solve import solve
 from sdimu_calibration.core.joint.scope import is_shared
+from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.specification import ImuSpecification, Model, Site
 from sdimu_calibration.storage.config import load_plan
 from sdimu_calibration.storage.table_file import load_rate_table
@@ -21,8 +22,9 @@ from sdimu_sim.campaign.adaptive_test import adaptive_test
 from sdimu_sim.campaign.hidden_draw import Truth, drawn_effect, hideable_names
 from sdimu_sim.campaign.hidden_score import baseline_z, same_effect
 from sdimu_sim.campaign.hidden_sizes import RATE_HZ, WARM_UP, Sizes
-from sdimu_sim.campaign.run import in_the_mean, simulate
+from sdimu_sim.campaign.run import in_the_mean, simulate, true_values
 from sdimu_sim.core.scenario import Scenario, imu_truth
+from sdimu_sim.core.truth import ImuTruth
 
 KINDS = ("table33", "clean", "hidden")
 """Clean tests to the accuracy of Table 3.3; clean tests, and tests with a hidden effect, to that of kim18."""
@@ -64,7 +66,8 @@ class AdaptiveRun:
         -------
         dict
             ``minutes``, ``stops``, ``worst`` (sigma over limit at the end), ``looks`` (minutes, worst, named), ``z`` of
-            the baseline coefficients, and of `_scored`; with a hidden effect ``truth`` and, by fixed plan, ``fixed``.
+            the baseline coefficients, ``errors`` (over their limits), and that of `_scored`; with a hidden effect
+            ``truth`` and, by fixed plan, ``fixed``.
 
         Raises
         ------
@@ -81,11 +84,12 @@ class AdaptiveRun:
             scenario, sensor, load_rate_table("ideal"), self.model, self.goals, Menu(), LOOK_S[self.kind]
         )
         found = done.last.found
+        true = in_the_mean(sensor, found.fit.test.recording, seed)
         row: dict[str, Any] = {
             "minutes": done.plan.duration_s / 60.0, "stops": len(done.plan.dwell_s),
             "worst": float(done.last.known.ratio.max()),
             "looks": [[x.minutes, float(x.known.ratio.max()), list(x.known.named)] for x in done.looks],
-            "z": baseline_z(found.after, in_the_mean(sensor, found.fit.test.recording, seed)).tolist(),
+            "z": baseline_z(found.after, true).tolist(), "errors": _errors(found.after, true, self.goals),
             "truth": None if truth is None else truth.text, **_scored(found, truth),
         }  # fmt: skip
         if truth is not None:
@@ -95,6 +99,13 @@ class AdaptiveRun:
                 fit = solve(PreparedTest(simulate(test, sensor), self.imu, self.site), self.model)
                 row["fixed"][name] = _scored(climb(fit), truth)
         return row
+
+
+def _errors(result: Calibration, true: ImuTruth, goals: Goals) -> list[float]:
+    """Errors of the coefficients that have a limit, over that limit."""
+    limited, limit = goals.of(result.names, result.body_frame)
+    truth = true_values(true, result.names, result.body_frame)
+    return list(map(float, (result.values - truth)[limited] / limit))
 
 
 def hidden(sizes: Sizes, seed: int) -> Truth:

@@ -34,6 +34,10 @@ def run(
     effect: Annotated[list[str] | None, typer.Option(help=EFFECT)] = None,
     temperature: Annotated[str | None, typer.Option(help=TEMPERATURE)] = None,
     diagnose: Annotated[bool, typer.Option(help="Publish a diagnosis at the end of each stop.")] = True,
+    adaptive: Annotated[
+        str | None, typer.Option(metavar="GOALS", help="Choose each turn by what is known; limits as in config/goal.")
+    ] = None,
+    ask: Annotated[bool, typer.Option(help="With --adaptive: each turn waits for a yes on /adaptive/confirm.")] = False,
     out: Annotated[Path, typer.Option(help="Folder of the results.")] = Path("out/run"),
 ) -> None:
     """Run a whole simulated test over ROS 2: table, IMU, calibration and recorder, each its own process."""
@@ -57,17 +61,21 @@ def run(
         },
     }  # fmt: skip
     duration = _check(options)
+    if adaptive is not None:
+        duration = _choosing(options, adaptive, ask)
     console = make_console()
     # Only the bag of an earlier run is replaced, never one that someone put here.
     replace = (out / "log" / "rate_table.yaml").is_file()
-    for stale in ("result.json", "report.html", "diagnosis.json", "calibration.journal"):
+    for stale in ("result.json", "report.html", "diagnosis.json", "calibration.journal", "choices.json"):
         (out / stale).unlink(missing_ok=True)
     begun = time.monotonic()
     with own_domain(out / "log"), Children(out / "log") as children:
         _start(children, options, out / "bag", replace)
-        streamed = _watch(console, children, _test(plan, model, duration))
+        streamed = _watch(console, children, _test(None if adaptive else plan, model, duration))
     wall = time.monotonic() - begun
-    result = _report(console, out, site, imu, model, plan)
+    if adaptive is not None:
+        _tell_choices(console, out / "choices.json")
+    result = _report(console, out, site, imu, model, f"adaptive to {adaptive}" if adaptive else f"plan {plan}")
     _say_measured(console, out, result, streamed, wall)
 
 
@@ -98,6 +106,18 @@ def _check(options: dict[str, dict[str, Any]]) -> float:
     return float(motion.t[-1])
 
 
+def _choosing(options: dict[str, dict[str, Any]], goals: str, ask: bool) -> float:
+    """Let the table follow goals, and add the node that chooses them; longest length of the test (s)."""
+    from sdimu_calibration.storage.goal_file import load_goals
+
+    options["table"]["follow_goals"] = True
+    given = {key: value for key, value in options["calibration"].items() if key != "diagnose"}
+    options["adaptive"] = {
+        **given, "goals": goals, "table": options["table"]["table"], "allow_motion": True, "ask": ask, "finish": True,
+    }  # fmt: skip
+    return 60.0 * load_goals(goals).minutes
+
+
 def _start(children: Children, options: dict[str, dict[str, Any]], bag: Path, replace: bool) -> None:
     """Start the four nodes; each waits for those it feeds, so their order does not matter."""
     recorder = {
@@ -110,6 +130,8 @@ def _start(children: Children, options: dict[str, dict[str, Any]], bag: Path, re
     children.start("sdimu", "sdimu_sim.nodes.sdimu_node", {**options["imu"], "consumers": 2})
     table = {**options["table"], "consumers": 1, "status_peers": 2, "joint_peers": 1}
     children.start("rate_table", "rate_table_sim.nodes.rate_table_node", table)
+    if "adaptive" in options:
+        children.start("adaptive", "sdimu_calibration.nodes.adaptive_node", options["adaptive"])
 
 
 def _watch(console: Console, children: Children, test: Outline) -> float:
@@ -151,7 +173,7 @@ def _watch(console: Console, children: Children, test: Outline) -> float:
     return streamed
 
 
-def _test(plan: str, model: str, duration: float) -> Outline:
+def _test(plan: str | None, model: str, duration: float) -> Outline:
     """Collect what is known of the test before it runs."""
     from sdimu_calibration.cli.watch import Outline
     from sdimu_calibration.core.effects import selection
@@ -160,10 +182,11 @@ def _test(plan: str, model: str, duration: float) -> Outline:
 
     effects = [selection.resolve(e) if isinstance(e, str) else e for e in extended_model(model, ()).effects]
     units = {q.name: q.display_unit for effect in effects for q in effect.parameters}
-    return Outline(duration, len(load_plan(plan).dwell_s), [effect.key for effect in effects], units)
+    stops = None if plan is None else len(load_plan(plan).dwell_s)
+    return Outline(duration, stops, [effect.key for effect in effects], units)
 
 
-def _report(console: Console, out: Path, site: str, imu: str, model: str, plan: str) -> Calibration:
+def _report(console: Console, out: Path, site: str, imu: str, model: str, test_name: str) -> Calibration:
     """Diagnose the bag, print the table with the truth, write diagnosis and page."""
     from sdimu_calibration.core.diagnosis.diagnose import climb
     from sdimu_calibration.core.diagnosis.summary import summarise
@@ -185,7 +208,7 @@ def _report(console: Console, out: Path, site: str, imu: str, model: str, plan: 
         test = open_test(out / "bag", site, load_imu(imu))
         diagnosis = climb(solve(test, extended_model(model, ())))
         summary, more = summarise(diagnosis), report_extras(diagnosis)
-    title = f"Simulated test: plan {plan}, model {model}"
+    title = f"Simulated test: {test_name}, model {model}"
     with written_together(out) as part:
         write_diagnosis(part / "diagnosis.json", summary)
         write_report(
@@ -196,6 +219,15 @@ def _report(console: Console, out: Path, site: str, imu: str, model: str, plan: 
     console.print(shown, soft_wrap=True)
     console.print(diagnosis.sentence, soft_wrap=True, highlight=False)
     return result
+
+
+def _tell_choices(console: Console, path: Path) -> None:
+    """Print every choice with its reason."""
+    from sdimu_calibration.storage.json_file import read_json
+
+    for choice in read_json(path, "sdimu-choices/1")["choices"]:
+        text = f"{choice['until_s'] / 60.0:5.1f} min  {choice['text']}"
+        console.print(text, soft_wrap=True, markup=False, highlight=False)
 
 
 def _say_measured(console: Console, out: Path, result: Calibration, streamed: float, wall: float) -> None:

@@ -136,9 +136,8 @@ def fitted(fit: Fit, goals: Goals, alike: Sequence[Effect] = (), named: tuple[st
         raise DataError(f"a {fit.estimator} fit says nothing of the next turn of a table: choose another --estimator")
     at = so_far(fit, alike, _ROOM)
     limited, limit = goals.of(fit.names, fit.model.body_frame)
-    # What a class leaves in doubt is no noise: it falls when the class is told apart, and not with time.
-    certain = fit.with_doubt(None) if alike else fit
-    ratio = np.sqrt(np.diag(certain.covariance)[limited]) / limit
+    # The doubt about the model is no noise: what is too small to be found stays so, however long a test is.
+    ratio = np.sqrt(np.diag(fit.with_doubt(None).covariance)[limited]) / limit
     white = ratios(at, goals, at.covariance)
     names = tuple(name for name, has in zip(fit.names, limited, strict=True) if has)
     return Knowledge(at, names, ratio, np.maximum(ratio / white, 1.0), None, named, "consistent")

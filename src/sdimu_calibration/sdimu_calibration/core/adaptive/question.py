@@ -1,0 +1,116 @@
+"""What a running test asks at the end of each stop: which move is next, or is it the end.
+
+A function that a process of its own answers (`nodes.diagnosis_worker`), because a fit of minutes of data does not go
+through a pipe, and what comes of it here does.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from sdimu_calibration.core.adaptive.choice import Choice, End, Menu, choose
+from sdimu_calibration.core.adaptive.goals import Goals
+from sdimu_calibration.core.adaptive.knowledge import Knowledge, fitted, knowledge
+from sdimu_calibration.core.diagnosis.diagnose import climb
+from sdimu_calibration.core.diagnosis.live_diagnosis import LiveDiagnosis
+from sdimu_calibration.core.estimation.fit import Fit
+from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.table import RateTable, Step, plan_move
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What is asked of.
+
+    Attributes
+    ----------
+    goals : Goals
+    menu : Menu
+    table : RateTable
+    angles : tuple of float
+        Of its joints (rad).
+    """
+
+    goals: Goals
+    menu: Menu
+    table: RateTable
+    angles: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Decision:
+    """What to do next, and what it was decided by.
+
+    Attributes
+    ----------
+    step : Step or None
+        None ends the test.
+    text : str
+        Move and reason, or the reason of the end.
+    reason : str
+        The reason alone.
+    reached : bool
+        The test ends with all limits held and no class open.
+    until_s : float
+        Length of the data that were looked at (s).
+    worst : float
+        Largest sigma over its limit (1).
+    named, alike : tuple of str
+        Effects that were found, and what the first open class holds besides.
+    """
+
+    step: Step | None
+    text: str
+    reason: str
+    reached: bool
+    until_s: float
+    worst: float
+    named: tuple[str, ...]
+    alike: tuple[str, ...]
+
+
+def next_move(fit: Fit, diagnosis: LiveDiagnosis, about: Asked) -> Decision:
+    """Choose the next move of a test.
+
+    The search for effects is made when something stands out, and before the test ends.
+
+    Parameters
+    ----------
+    fit : Fit
+        Of what was recorded so far.
+    diagnosis : LiveDiagnosis
+        About it.
+    about : Asked
+
+    Raises
+    ------
+    DataError
+        When the fit does not navigate, or no coefficient of the model has a limit.
+    """
+    left = about.goals.minutes - diagnosis.until_s / 60.0
+    searched = diagnosis.verdict != "consistent"
+    known = knowledge(climb(fit), about.goals) if searched else fitted(fit, about.goals)
+    chosen = _choose(known, about, left)
+    if isinstance(chosen, End) and not searched:
+        known = knowledge(climb(fit), about.goals)
+        chosen = _choose(known, about, left)
+    alike = () if known.open is None else known.open.alike
+    facts = (diagnosis.until_s, float(known.ratio.max()), known.named, alike)
+    if isinstance(chosen, End):
+        return Decision(None, f"the test ends: {chosen.reason}", chosen.reason, chosen.reached, *facts)
+    return Decision(chosen.step, chosen.text, chosen.reason, False, *facts)
+
+
+def _choose(known: Knowledge, about: Asked, minutes_left: float) -> Choice | End:
+    angles = np.array(about.angles)
+
+    def possible(step: Step) -> bool:
+        try:
+            plan_move(about.table, angles, step)
+        except DataError:
+            return False
+        return True
+
+    return choose(known, about.goals, about.menu, minutes_left, possible)

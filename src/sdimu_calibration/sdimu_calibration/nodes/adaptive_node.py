@@ -1,0 +1,183 @@
+"""Node that lets a test choose its turns: it looks at what the calibration node keeps, chooses, and drives the table.
+
+Parameters: see ``ros2 param describe adaptive``. Nothing moves unless allow_motion is true; with ask each turn waits
+for ``ros2 service call /adaptive/confirm std_srvs/srv/SetBool "{data: true}"``: no ends the test.
+
+Publications: ~/choice (diagnostic_msgs/DiagnosticArray: each choice with its reason, minutes, worst sigma over its
+limit, what was found, what is open), also logged; ~/moves and ~/question as of every driver (nodes/table_driver). It
+leaves choices.json in `out`.
+
+What was recorded is read from the journal of the calibration node, in the folder `out` that both are given: the same
+samples, opened by the same options, as the calibration at the end of the test.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import asdict
+from pathlib import Path
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rclpy.node import Node
+from rclpy.task import Future
+from std_srvs.srv import Trigger
+
+from sdimu_calibration.core.adaptive.choice import Menu
+from sdimu_calibration.core.adaptive.question import Asked, Decision, next_move
+from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.table import Step
+from sdimu_calibration.nodes.calibration_node import JOURNAL
+from sdimu_calibration.nodes.credits import HISTORY, NS, header
+from sdimu_calibration.nodes.diagnosis_worker import Answer, Job, Request
+from sdimu_calibration.nodes.live_diagnosis import Worker
+from sdimu_calibration.nodes.opening_parameters import declare_opening
+from sdimu_calibration.nodes.parameters import Declare
+from sdimu_calibration.nodes.spinning import run_node
+from sdimu_calibration.nodes.table_driver import Arrival, TableDriver
+from sdimu_calibration.nodes.table_goals_node import FINISH, PATIENCE_S
+from sdimu_calibration.nodes.ticking import Ticker
+from sdimu_calibration.storage.goal_file import load_goals
+from sdimu_calibration.storage.json_file import write_json
+from sdimu_calibration.storage.table_file import load_rate_table
+
+FIRST_STOP_S = 20.0
+"""First stop (s): the azimuth is then known well enough for the passes to converge."""
+LATE_S = 1.5
+"""Samples (s) that may still be on their way to the journal when a stop is looked at: an epoch and a block."""
+CHOICES = "choices.json"
+"""Name of the file with all choices."""
+FORMAT = "sdimu-choices/1"
+"""Format of that file."""
+AGAIN_S = 0.3
+"""Wall time (s) after which the journal is read again when the stop is not in it yet."""
+
+
+class AdaptiveNode:
+    """Chooses and drives; see the module."""
+
+    def __init__(self) -> None:
+        self.node = Node("adaptive")
+        self.done = Future()
+        declare = Declare(self.node)
+        options, _ = declare_opening(self.node)
+        goals = load_goals(declare.text("goals", "table33", "limits to reach: name in config/goal or path"))
+        self._table = load_rate_table(declare.text("table", "ideal", "the table: name in config/table or path"))
+        model = declare.text("model", "baseline", "model to estimate: name in config/model or path")
+        added = tuple(declare.texts("add", [], "effects beyond the model's: names, equations or files"))
+        self._out = Path(declare.text("out", ".", "folder of the calibration node, with its journal"))
+        self._finish = declare.flag("finish", False, "end the streams of a simulated table after the test")
+        self._goals, self._models, self._menu = goals, (added,), Menu()
+        self._worker = Worker(Job(self._out / JOURNAL, options, model, next_move))
+        ticker = Ticker(self.node)
+        self._driver = TableDriver(self.node, ticker, self._table)
+        self._choices = self.node.create_publisher(DiagnosticArray, "~/choice", HISTORY)
+        self._client = self.node.create_client(Trigger, FINISH)
+        self._next: Step | None = Step(None, FIRST_STOP_S)
+        self._why = "first stop"
+        self._stop, self._begin_ns, self._end_ns = 0, 0, 0
+        self._look_at, self._arrived, self._tries = 0.0, 0.0, 0
+        self._made: list[dict[str, object]] = []
+        self._farewell: Future | None = None
+        self._born = time.monotonic()
+        ticker.every(0.05, self._tick)
+
+    def close(self) -> None:
+        """Leave no table in motion and no process behind."""
+        self._driver.stop("the node was stopped")
+        self._worker.close()
+
+    def _tick(self) -> None:
+        if self.done.done() or self._driver.busy:
+            return
+        angles = self._driver.angles
+        if angles is None:
+            if time.monotonic() - self._born > PATIENCE_S:
+                self._fail(f"rate_table/joint_states: nothing has come for {PATIENCE_S:.0f} s (is the table on?)")
+        elif self._farewell is not None:
+            self._leave(self._farewell)
+        elif self._next is not None:
+            step, self._next = self._next, None
+            future = self._driver.move(step, self._why)
+            future.add_done_callback(lambda done: self._arrive(done.result(), step))
+        else:
+            self._look(tuple(angles.tolist()))
+
+    def _arrive(self, arrival: Arrival, step: Step) -> None:
+        if not arrival.ok:
+            self._fail(arrival.reason)
+            return
+        self._begin_ns = self._begin_ns or arrival.start_ns
+        self._stop += step.turn is not None
+        self._end_ns, self._look_at, self._tries = arrival.end_ns, 0.0, 0
+        self._arrived = time.monotonic()
+
+    def _look(self, angles: tuple[float, ...]) -> None:
+        """Ask for the next move until the answer is of everything that was recorded."""
+        try:
+            answer = self._worker.answer()
+        except DataError as error:
+            self._fail(str(error))
+            return
+        if answer is None:
+            if self._worker.idle and time.monotonic() > self._look_at:
+                about = Asked(self._goals, self._menu, self._table, angles)
+                # The worker keeps what it has read up to a stamp: another stamp lets it read the journal again.
+                self._worker.ask(Request(self._stop, self._end_ns + self._tries, self._models, about))
+                self._tries += 1
+            return
+        lacking = (self._end_ns - self._begin_ns) / NS - answer.diagnosis.until_s
+        if lacking > LATE_S:
+            self._look_at = time.monotonic() + AGAIN_S
+            if time.monotonic() - self._arrived > PATIENCE_S:
+                self._fail(f"the journal lacks the last {lacking:.0f} s of the test (is the calibration node alive?)")
+            return
+        self._take(answer)
+
+    def _take(self, answer: Answer) -> None:
+        if not isinstance(answer.more, Decision):
+            self._fail(answer.diagnosis.sentence)
+            return
+        decision = answer.more
+        minutes = decision.until_s / 60.0
+        text = f"{minutes:.1f} min, worst sigma {decision.worst:.2f} of its limit; {decision.text}"
+        self.node.get_logger().info(text)
+        self._publish(decision)
+        self._made.append(asdict(decision))
+        write_json(self._out / CHOICES, {"format": FORMAT, "goals": self._goals.name, "choices": self._made})
+        if decision.step is None:
+            self._farewell = self._client.call_async(Trigger.Request()) if self._finish else Future()
+            if not self._finish:
+                self._farewell.set_result(None)
+            self._born = time.monotonic()
+            return
+        self._next, self._why = decision.step, decision.reason
+
+    def _publish(self, decision: Decision) -> None:
+        words = "" if decision.step is None else decision.step.words
+        values = {
+            "move": words, "reason": decision.reason, "minutes": f"{decision.until_s / 60.0:.2f}",
+            "worst": f"{decision.worst:.3f}", "named": ", ".join(decision.named), "open": ", ".join(decision.alike),
+            "reached": str(decision.reached).lower(),
+        }  # fmt: skip
+        status = DiagnosticStatus(level=DiagnosticStatus.OK, name="choice", message=decision.text)
+        status.values = [KeyValue(key=key, value=value) for key, value in values.items()]
+        self._choices.publish(DiagnosticArray(header=header(self._end_ns), status=[status]))
+
+    def _leave(self, farewell: Future) -> None:
+        if farewell.done():
+            self.done.set_result(None)
+        elif time.monotonic() - self._born > PATIENCE_S:
+            self._fail(f"{self._client.srv_name}: no answer (only a simulated table has an end)")
+
+    def _fail(self, reason: str) -> None:
+        if not self.done.done():
+            self.done.set_exception(DataError(reason))
+
+
+def main() -> None:
+    """Run the node."""
+    run_node(AdaptiveNode)
+
+
+if __name__ == "__main__":
+    main()

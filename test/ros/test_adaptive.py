@@ -1,0 +1,71 @@
+"""A test that chooses its turns, over DDS: choices with reasons, limits that hold, a bag that gives the result anew."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sdimu_calibration.core.adaptive import Goals
+from sdimu_calibration.core.estimation.outcome import outcome
+from sdimu_calibration.core.estimation.solve import solve
+from sdimu_calibration.storage.config import load_imu, load_model
+from sdimu_calibration.storage.goal_file import load_goals
+from sdimu_calibration.storage.json_file import read_json
+from sdimu_calibration.storage.opening import open_test
+from sdimu_calibration.storage.result_file import read_result
+
+from .conftest import DEADLINE_S, sdimu
+
+pytestmark = pytest.mark.ros
+
+GOALS = """format: sdimu-goal/1
+name: coarse
+minutes: 6
+limits: {gyro_bias: 0.05 deg/h, accel_bias: 10 ug, accel_scale: 15 ppm}
+"""
+
+
+@pytest.fixture(scope="module")
+def done(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Goals, str]:
+    folder = tmp_path_factory.mktemp("adaptive")
+    goals = folder / "coarse.yaml"
+    goals.write_text(GOALS, encoding="utf-8")
+    process = sdimu("run", "--adaptive", goals, "--rate", 50, "--seed", 7, "--no-diagnose", "--out", folder / "run")
+    try:
+        out, err = process.communicate(timeout=DEADLINE_S)
+    finally:
+        process.kill()
+    assert process.returncode == 0, err
+    return folder / "run", load_goals(goals), out
+
+
+def test_every_choice_is_kept_and_printed_with_its_reason_and_the_last_one_ends_the_test(done):
+    folder, _, out = done
+    choices = read_json(folder / "choices.json", "sdimu-choices/1")["choices"]
+    assert len(choices) >= 3
+    for choice in choices:
+        assert choice["text"] in out
+    for choice in choices[:-1]:
+        assert "of its limit" in choice["reason"]
+    assert choices[-1]["step"] is None
+    assert choices[-1]["reached"]
+    # Each look is at everything that the moves before it brought.
+    times = [choice["until_s"] for choice in choices]
+    turned = [
+        (abs(c["step"]["turn"]["angle_rad"]) / c["step"]["turn"]["rate_rad_s"] if c["step"]["turn"] else 0.0)
+        + c["step"]["dwell_s"]
+        for c in choices[:-1]
+    ]
+    np.testing.assert_allclose(np.diff(times), turned, atol=1.5)
+
+
+def test_the_limits_hold_by_the_result_and_the_bag_gives_it_again_to_the_last_digit(done):
+    folder, goals, _ = done
+    live = read_result(folder / "result.json")
+    limited, limit = goals.of(live.names, live.body_frame)
+    assert (np.sqrt(np.diag(live.covariance))[limited] <= limit).all()
+    test = open_test(folder / "bag", "daejeon", load_imu("dtg"))
+    again = outcome(solve(test, load_model("baseline")))
+    np.testing.assert_array_equal(again.values, live.values)
