@@ -1,4 +1,4 @@
-"""A running test in the terminal: stop, phase, time left, sigmas that fall, the light of the innovations.
+"""A running test in the terminal: stop, phase, time left, sigmas that fall, light of the innovations, diagnosis.
 
 In a terminal a picture that changes in place; elsewhere, in a file or a pipe, one plain line a stop.
 """
@@ -10,6 +10,8 @@ from dataclasses import dataclass
 from types import TracebackType
 from typing import TYPE_CHECKING, Protocol
 
+from sdimu_calibration.cli.watch_diagnosis import picture
+from sdimu_calibration.report.live_text import SeenDiagnosis
 from sdimu_calibration.report.progress_text import Falling, falling, light, short, sigma_words
 
 if TYPE_CHECKING:
@@ -26,6 +28,7 @@ class Seen(Protocol):
     first: dict[str, float]
     nis: dict[str, float]
     verdict: str
+    diagnosis: SeenDiagnosis
 
 
 @dataclass(frozen=True)
@@ -56,6 +59,7 @@ class Watch:
         self._console, self._test = console, test
         self._live = Live(console=console, transient=True, auto_refresh=False) if console.is_terminal else None
         self._reported = -1
+        self._diagnosed = SeenDiagnosis()
 
     def __enter__(self) -> Watch:
         if self._live:
@@ -81,9 +85,18 @@ class Watch:
         """
         if self._live:
             self._live.update(self.picture(seen, streaming, wall_s), refresh=True)
-        elif streaming and seen.sigmas and seen.stop > self._reported:
+            return
+        if streaming and seen.sigmas and seen.stop > self._reported:
             self._reported = seen.stop
-            self._console.print(self.line(seen, wall_s), soft_wrap=True, markup=False, highlight=False)
+            self._print(self.line(seen, wall_s))
+        if seen.diagnosis is not self._diagnosed:
+            # The heat map comes before the rest.
+            if seen.diagnosis.line != self._diagnosed.line:
+                self._print(seen.diagnosis.line)
+            self._diagnosed = seen.diagnosis
+
+    def _print(self, line: str) -> None:
+        self._console.print(line, soft_wrap=True, markup=False, highlight=False)
 
     def line(self, seen: Seen, wall_s: float) -> str:
         """Return the whole of it in one line."""
@@ -122,7 +135,7 @@ class Watch:
         for f in self._falling(seen):
             sigmas.add_row(f.effect, f"{short(f.sigma)} {f.unit}", _gauge(f), f"{short(100.0 * f.share)} %")
         lamp = Text(light(seen.nis, seen.verdict), style="green" if fine else "bold yellow")
-        return Group(head, lamp, sigmas)
+        return Group(head, lamp, sigmas, picture(seen.diagnosis))
 
     def _falling(self, seen: Seen) -> list[Falling]:
         return falling(seen.first, seen.sigmas, self._test.units, self._test.effects)

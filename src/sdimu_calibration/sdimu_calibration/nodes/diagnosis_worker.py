@@ -17,6 +17,7 @@ from typing import Any
 
 from sdimu_calibration.core.data.arrival import in_order, until
 from sdimu_calibration.core.diagnosis.live_diagnosis import (
+    WAITING,
     LiveDiagnosis,
     ModelError,
     error_of,
@@ -102,6 +103,29 @@ class Answer:
     seconds: float
 
 
+@dataclass(frozen=True)
+class Picture:
+    """What comes after each answer.
+
+    Attributes
+    ----------
+    request : Request
+    png : bytes
+        Of the diagnosis; empty where it waits.
+    """
+
+    request: Request
+    png: bytes
+
+
+def picture(answer: Answer) -> Picture:
+    """Draw the diagnosis of an answer."""
+    # matplotlib takes half a second to load.
+    from sdimu_calibration.report.live_picture import live_picture  # noqa: PLC0415
+
+    return Picture(answer.request, b"" if answer.diagnosis.verdict == WAITING else live_picture(answer.diagnosis))
+
+
 class Diagnoser:
     """Answers requests, and remembers the last data and the errors of models on them."""
 
@@ -149,7 +173,7 @@ def work(pipe: Connection) -> None:
     Parameters
     ----------
     pipe : Connection
-        Brings a `Job`, then each `Request`; takes each `Answer`.
+        Brings a `Job`, then each `Request`; takes each `Answer`, and its `Picture`, which need not be waited for.
     """
     # Ctrl-C reaches every process of a terminal; this one ends with its node.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -157,7 +181,9 @@ def work(pipe: Connection) -> None:
     try:
         diagnoser = Diagnoser(pipe.recv())
         while True:
-            pipe.send(diagnoser.answer(pipe.recv()))
+            answer = diagnoser.answer(pipe.recv())
+            pipe.send(answer)
+            pipe.send(picture(answer))
     except (EOFError, OSError):
         # The node has left.
         return
