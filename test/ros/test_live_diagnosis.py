@@ -13,7 +13,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
 from PIL import Image
+from rclpy.context import Context
+from rclpy.node import Node
+from std_msgs.msg import Float64MultiArray
 
 from sdimu_calibration.core.data.arrival import RawStatus, RawTest, until
 from sdimu_calibration.core.diagnosis import ground, noise_search
@@ -23,6 +28,8 @@ from sdimu_calibration.core.diagnosis.problem import Problem
 from sdimu_calibration.core.diagnosis.search import FALSE_ALARM, search
 from sdimu_calibration.core.estimation.solve import solve
 from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.nodes.credits import HISTORY
+from sdimu_calibration.nodes.diagnosis_messages import diagnosis, heat_map
 from sdimu_calibration.nodes.diagnosis_worker import Answer, Diagnoser, Job, Picture, Request
 from sdimu_calibration.nodes.live_diagnosis import Worker
 from sdimu_calibration.storage.bag_writer import write_recording
@@ -30,6 +37,8 @@ from sdimu_calibration.storage.config import load_imu, load_model, load_plan
 from sdimu_calibration.storage.journal import Journal, digest
 from sdimu_calibration.storage.opening import Source, open_test, opening_options
 from sdimu_sim.core.scenario import Scenario, generate
+
+from .conftest import DEADLINE_S, sdimu
 
 EFFECT = "gyro_scale_asymmetry_y"
 START = 1_700_000_000 * 10**9
@@ -184,3 +193,26 @@ def test_a_folder_is_no_journal(job, tmp_path):
     answer = Diagnoser(replace(job, journal=Path(tmp_path))).answer(Request(0, None))
     assert answer.diagnosis.verdict == "waiting"
     assert "cannot be read" in answer.diagnosis.sentence
+
+
+@pytest.mark.ros
+@pytest.mark.usefixtures("bench")
+def test_a_running_test_is_watched(whole: LiveDiagnosis) -> None:
+    watching = sdimu("watch", "--for", 30)
+    context = Context()
+    rclpy.init(context=context)
+    node = Node("calibration", context=context)
+    found = node.create_publisher(DiagnosticArray, "calibration/diagnosis", HISTORY)
+    heat = node.create_publisher(Float64MultiArray, "calibration/heat_map", HISTORY)
+    try:
+        heat.publish(heat_map(START, whole))
+        found.publish(diagnosis(START, whole))  # before anybody listens: the last one is kept
+        out, err = watching.communicate(timeout=DEADLINE_S)
+    finally:
+        watching.kill()
+        node.destroy_node()
+        context.try_shutdown()
+    assert watching.returncode == 0, err
+    assert out.startswith("watching ROS domain ")
+    (line,) = (line for line in out.splitlines() if line.startswith("diagnosis of stop 5: misfit"))
+    assert EFFECT in line

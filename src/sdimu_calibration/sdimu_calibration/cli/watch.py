@@ -38,7 +38,9 @@ class Outline:
     Attributes
     ----------
     duration_s : float
+        0 where nobody knows.
     stops : int
+        0 where nobody knows.
     effects : sequence of str
     units : mapping of str to str
         Customary unit by coefficient.
@@ -101,15 +103,22 @@ class Watch:
     def line(self, seen: Seen, wall_s: float) -> str:
         """Return the whole of it in one line."""
         parts = [
-            f"stop {seen.stop} of {self._test.stops - 1} {seen.phase}",
-            f"{seen.table_s:.0f} of {self._test.duration_s:.0f} s, {self.left(seen, wall_s)}",
+            self._place(seen), f"{self._time(seen)}, {self.left(seen, wall_s)}",
             sigma_words(self._falling(seen)), light(seen.nis, seen.verdict),
         ]  # fmt: skip
         return "; ".join(part for part in parts if part)
 
+    def _place(self, seen: Seen) -> str:
+        of = f" of {self._test.stops - 1}" if self._test.stops else ""
+        return f"stop {seen.stop}{of} {seen.phase}"
+
+    def _time(self, seen: Seen) -> str:
+        of = f" of {self._test.duration_s:.0f}" if self._test.duration_s else ""
+        return f"{seen.table_s:.0f}{of} s"
+
     def left(self, seen: Seen, wall_s: float) -> str:
         """Say how long it will take at the pace so far."""
-        if wall_s < 1.0 or seen.table_s <= 0.0:
+        if not self._test.duration_s or wall_s < 1.0 or seen.table_s <= 0.0:
             return "time left unknown"
         pace = seen.table_s / wall_s
         rest = max(0.0, self._test.duration_s - seen.table_s) / pace
@@ -124,12 +133,12 @@ class Watch:
         from rich.text import Text
 
         fine = seen.verdict.startswith("consistent") or not seen.nis
-        stage = f"stop {seen.stop} of {self._test.stops - 1} {seen.phase}" if streaming else "last calibration"
+        stage = self._place(seen) if streaming else "last calibration"
         left = self.left(seen, wall_s) if streaming else "no more to come"
         head = Table.grid(padding=(0, 1))
         head.add_row(
-            Text(stage, style="bold"), ProgressBar(self._test.duration_s, seen.table_s, width=30),
-            f"{seen.table_s:.0f} of {self._test.duration_s:.0f} s, {left}",
+            Text(stage, style="bold"), ProgressBar(self._test.duration_s or None, seen.table_s, width=30),
+            f"{self._time(seen)}, {left}",
         )  # fmt: skip
         sigmas = Table.grid(padding=(0, 2))
         for f in self._falling(seen):
