@@ -121,6 +121,7 @@ def test_foxglove_places_every_panel_once() -> None:
 def test_foxglove_topics_of_other_panels_are_there(messages: dict[str, list[Any]]) -> None:
     panels = json.loads(FOXGLOVE.read_text(encoding="utf-8"))["configById"]
     named = [panel[key] for panel in panels.values() for key in ("topicPath", "topicToRender") if panel.get(key)]
+    named += [panel["imageMode"]["imageTopic"] for panel in panels.values() if "imageMode" in panel]
     assert named
     for path in named:
         topic, rest = split(path)

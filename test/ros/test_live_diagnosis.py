@@ -8,10 +8,17 @@ import sys
 import time
 from collections.abc import Iterator
 from dataclasses import replace
+from io import BytesIO
 from pathlib import Path
 
 import numpy as np
 import pytest
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
+from PIL import Image
+from rclpy.context import Context
+from rclpy.node import Node
+from std_msgs.msg import Float64MultiArray
 
 from sdimu_calibration.core.data.arrival import RawStatus, RawTest, until
 from sdimu_calibration.core.diagnosis import ground, noise_search
@@ -21,13 +28,17 @@ from sdimu_calibration.core.diagnosis.problem import Problem
 from sdimu_calibration.core.diagnosis.search import FALSE_ALARM, search
 from sdimu_calibration.core.estimation.solve import solve
 from sdimu_calibration.core.recording import DataError
-from sdimu_calibration.nodes.diagnosis_worker import Answer, Diagnoser, Job, Request
+from sdimu_calibration.nodes.credits import HISTORY
+from sdimu_calibration.nodes.diagnosis_messages import diagnosis, heat_map
+from sdimu_calibration.nodes.diagnosis_worker import Answer, Diagnoser, Job, Picture, Request
 from sdimu_calibration.nodes.live_diagnosis import Worker
 from sdimu_calibration.storage.bag_writer import write_recording
 from sdimu_calibration.storage.config import load_imu, load_model, load_plan
 from sdimu_calibration.storage.journal import Journal, digest
 from sdimu_calibration.storage.opening import Source, open_test, opening_options
 from sdimu_sim.core.scenario import Scenario, generate
+
+from .conftest import DEADLINE_S, sdimu
 
 EFFECT = "gyro_scale_asymmetry_y"
 START = 1_700_000_000 * 10**9
@@ -135,14 +146,13 @@ def question(tmp_path, monkeypatch):
     return importlib.import_module("adaptive_question").largest_score
 
 
-def wait_for(worker: Worker) -> list[Answer]:
-    answers, begun = [], time.monotonic()
+def wait_for(worker: Worker) -> tuple[list[Answer], list[Picture]]:
+    came, begun = [], time.monotonic()
     while not worker.idle:
         assert time.monotonic() - begun < PATIENCE_S
-        answer = worker.answer()
-        answers += [answer] if answer else []
+        came.append(worker.answer())
         time.sleep(0.01)
-    return answers
+    return [a for a in came if isinstance(a, Answer)], [p for p in came if isinstance(p, Picture)]
 
 
 def test_of_the_requests_that_wait_the_newest_alone_is_answered(raw, job, whole, question):
@@ -151,10 +161,13 @@ def test_of_the_requests_that_wait_the_newest_alone_is_answered(raw, job, whole,
         for stop in (1, 2, 3, 4):
             worker.ask(Request(stop, stop_end(raw, stop), about=f"stop {stop}"))
         worker.ask(Request(5, None, about="the end"))
-        answers = wait_for(worker)
+        answers, pictures = wait_for(worker)
     finally:
         worker.close()
     assert [answer.request.stop for answer in answers] == [1, 5]
+    assert [picture.request.stop for picture in pictures] == [1, 5]
+    for picture in pictures:
+        Image.open(BytesIO(picture.png)).verify()
     assert answers[1].diagnosis == whole
     assert answers[1].more == ("the end", "filter", whole.ranking[0].label)
 
@@ -180,3 +193,26 @@ def test_a_folder_is_no_journal(job, tmp_path):
     answer = Diagnoser(replace(job, journal=Path(tmp_path))).answer(Request(0, None))
     assert answer.diagnosis.verdict == "waiting"
     assert "cannot be read" in answer.diagnosis.sentence
+
+
+@pytest.mark.ros
+@pytest.mark.usefixtures("bench")
+def test_a_running_test_is_watched(whole: LiveDiagnosis) -> None:
+    watching = sdimu("watch", "--for", 30)
+    context = Context()
+    rclpy.init(context=context)
+    node = Node("calibration", context=context)
+    found = node.create_publisher(DiagnosticArray, "calibration/diagnosis", HISTORY)
+    heat = node.create_publisher(Float64MultiArray, "calibration/heat_map", HISTORY)
+    try:
+        heat.publish(heat_map(START, whole))
+        found.publish(diagnosis(START, whole))  # before anybody listens: the last one is kept
+        out, err = watching.communicate(timeout=DEADLINE_S)
+    finally:
+        watching.kill()
+        node.destroy_node()
+        context.try_shutdown()
+    assert watching.returncode == 0, err
+    assert out.startswith("watching ROS domain ")
+    (line,) = (line for line in out.splitlines() if line.startswith("diagnosis of stop 5: misfit"))
+    assert EFFECT in line

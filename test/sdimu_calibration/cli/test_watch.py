@@ -5,11 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from io import StringIO
 
+import numpy as np
 import pytest
 from rich.console import Console
 
 from sdimu_calibration.cli.watch import Outline, Watch
 from sdimu_calibration.core.units import to_si
+from sdimu_calibration.report.live_text import SeenDiagnosis
 from sdimu_calibration.report.progress_text import falling, light
 
 BIAS, SCALE = to_si(1.0, "deg/h"), to_si(150.0, "ppm")
@@ -25,6 +27,7 @@ class Now:
     first: dict[str, float] = field(default_factory=lambda: {"gyro_bias_x": BIAS, "gyro_scale_x": SCALE})
     nis: dict[str, float] = field(default_factory=lambda: {"rate": 1.02, "force": 0.99})
     verdict: str = "consistent"
+    diagnosis: SeenDiagnosis = field(default_factory=SeenDiagnosis)
 
 
 def told(terminal: bool, *shown: tuple[Now, bool]) -> str:
@@ -71,3 +74,30 @@ def test_what_has_fallen_least_comes_first():
     fallen = falling(now.first, now.sigmas, TEST.units, TEST.effects)
     assert [(f.effect, f.share) for f in fallen] == [("gyro_scale", 0.5), ("gyro_bias", pytest.approx(0.01))]
     assert fallen[1].sigma == pytest.approx(0.01)
+
+
+MISFIT = SeenDiagnosis(
+    3, "misfit", "2 candidates stand out of the noise, asymmetry most.", "noise reaches 3.82",
+    (("asymmetry", "+27.4 sigma, 41 ppm"), ("quadratic", "+12.1 sigma, 3 ppm")),
+    (("as given", "2.42"), ("+ asymmetry", "0.98")),
+    ("gyro_x", "gyro_y"), ("0", "1", "2", "3"), np.array([[0.4, -4.2, 0.1, np.nan], [0.0, 1.0, 11.7, -2.9]]),
+)  # fmt: skip
+
+
+def test_heat_map_ranking_and_ladder_are_shown():
+    text = told(True, (Now(diagnosis=MISFIT), True))
+    for word in ("asymmetry most", "gyro y", "+12", "-4", "noise reaches 3.82", "+27.4 sigma, 41 ppm", "2.42", "0.98"):
+        assert word in text
+    assert "-3" not in text  # below three sigma a cell is a dot
+
+
+def test_a_pipe_gets_one_line_a_diagnosis():
+    waiting = SeenDiagnosis(0, "waiting", "no diagnosis yet: too few samples have come")
+    lines = told(False, (Now(diagnosis=waiting), True), (Now(diagnosis=MISFIT), True), (Now(diagnosis=MISFIT), False))
+    found = [line for line in lines.splitlines() if line.startswith("diagnosis")]
+    assert found == [
+        "diagnosis of stop 0: waiting: no diagnosis yet: too few samples have come",
+        "diagnosis of stop 3: misfit: 2 candidates stand out of the noise, asymmetry most; "
+        "asymmetry +27.4 sigma, 41 ppm, quadratic +12.1 sigma, 3 ppm (noise reaches 3.82); "
+        "error at stops held out: as given 2.42, + asymmetry 0.98",
+    ]

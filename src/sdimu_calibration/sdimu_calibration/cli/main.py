@@ -37,6 +37,7 @@ _VERBS = {
     "datasheet": "sdimu_calibration.cli.datasheet:datasheet",
     "export": "sdimu_calibration.cli.export:export",
     "fleet": "sdimu_calibration.cli.fleet:fleet",
+    "watch": "sdimu_calibration.cli.watch_verb:watch",
     "workbench": "sdimu_calibration.cli.workbench:workbench",
     "pictures": "sdimu_calibration.cli.pictures:pictures",
     "bag": "sdimu_calibration.cli.bag:app",

@@ -1,4 +1,4 @@
-"""A running test in the terminal: stop, phase, time left, sigmas that fall, the light of the innovations.
+"""A running test in the terminal: stop, phase, time left, sigmas that fall, light of the innovations, diagnosis.
 
 In a terminal a picture that changes in place; elsewhere, in a file or a pipe, one plain line a stop.
 """
@@ -10,6 +10,8 @@ from dataclasses import dataclass
 from types import TracebackType
 from typing import TYPE_CHECKING, Protocol
 
+from sdimu_calibration.cli.watch_diagnosis import picture
+from sdimu_calibration.report.live_text import SeenDiagnosis
 from sdimu_calibration.report.progress_text import Falling, falling, light, short, sigma_words
 
 if TYPE_CHECKING:
@@ -26,6 +28,7 @@ class Seen(Protocol):
     first: dict[str, float]
     nis: dict[str, float]
     verdict: str
+    diagnosis: SeenDiagnosis
 
 
 @dataclass(frozen=True)
@@ -35,15 +38,16 @@ class Outline:
     Attributes
     ----------
     duration_s : float
-    stops : int or None
-        None where they are chosen as the test goes on.
+        0 where nobody knows.
+    stops : int
+        0 where nobody knows.
     effects : sequence of str
     units : mapping of str to str
         Customary unit by coefficient.
     """
 
     duration_s: float
-    stops: int | None
+    stops: int
     effects: Sequence[str]
     units: Mapping[str, str]
 
@@ -57,6 +61,7 @@ class Watch:
         self._console, self._test = console, test
         self._live = Live(console=console, transient=True, auto_refresh=False) if console.is_terminal else None
         self._reported = -1
+        self._diagnosed = SeenDiagnosis()
 
     def __enter__(self) -> Watch:
         if self._live:
@@ -82,27 +87,38 @@ class Watch:
         """
         if self._live:
             self._live.update(self.picture(seen, streaming, wall_s), refresh=True)
-        elif streaming and seen.sigmas and seen.stop > self._reported:
+            return
+        if streaming and seen.sigmas and seen.stop > self._reported:
             self._reported = seen.stop
-            self._console.print(self.line(seen, wall_s), soft_wrap=True, markup=False, highlight=False)
+            self._print(self.line(seen, wall_s))
+        if seen.diagnosis is not self._diagnosed:
+            # The heat map comes before the rest.
+            if seen.diagnosis.line != self._diagnosed.line:
+                self._print(seen.diagnosis.line)
+            self._diagnosed = seen.diagnosis
+
+    def _print(self, line: str) -> None:
+        self._console.print(line, soft_wrap=True, markup=False, highlight=False)
 
     def line(self, seen: Seen, wall_s: float) -> str:
         """Return the whole of it in one line."""
         parts = [
-            self.stage(seen),
-            f"{seen.table_s:.0f} of {self._test.duration_s:.0f} s, {self.left(seen, wall_s)}",
+            self._place(seen), f"{self._time(seen)}, {self.left(seen, wall_s)}",
             sigma_words(self._falling(seen)), light(seen.nis, seen.verdict),
         ]  # fmt: skip
         return "; ".join(part for part in parts if part)
 
-    def stage(self, seen: Seen) -> str:
-        """Say where the test is."""
-        last = "" if self._test.stops is None else f" of {self._test.stops - 1}"
-        return f"stop {seen.stop}{last} {seen.phase}"
+    def _place(self, seen: Seen) -> str:
+        of = f" of {self._test.stops - 1}" if self._test.stops else ""
+        return f"stop {seen.stop}{of} {seen.phase}"
+
+    def _time(self, seen: Seen) -> str:
+        of = f" of {self._test.duration_s:.0f}" if self._test.duration_s else ""
+        return f"{seen.table_s:.0f}{of} s"
 
     def left(self, seen: Seen, wall_s: float) -> str:
         """Say how long it will take at the pace so far."""
-        if wall_s < 1.0 or seen.table_s <= 0.0:
+        if not self._test.duration_s or wall_s < 1.0 or seen.table_s <= 0.0:
             return "time left unknown"
         pace = seen.table_s / wall_s
         rest = max(0.0, self._test.duration_s - seen.table_s) / pace
@@ -117,18 +133,18 @@ class Watch:
         from rich.text import Text
 
         fine = seen.verdict.startswith("consistent") or not seen.nis
-        stage = self.stage(seen) if streaming else "last calibration"
+        stage = self._place(seen) if streaming else "last calibration"
         left = self.left(seen, wall_s) if streaming else "no more to come"
         head = Table.grid(padding=(0, 1))
         head.add_row(
-            Text(stage, style="bold"), ProgressBar(self._test.duration_s, seen.table_s, width=30),
-            f"{seen.table_s:.0f} of {self._test.duration_s:.0f} s, {left}",
+            Text(stage, style="bold"), ProgressBar(self._test.duration_s or None, seen.table_s, width=30),
+            f"{self._time(seen)}, {left}",
         )  # fmt: skip
         sigmas = Table.grid(padding=(0, 2))
         for f in self._falling(seen):
             sigmas.add_row(f.effect, f"{short(f.sigma)} {f.unit}", _gauge(f), f"{short(100.0 * f.share)} %")
         lamp = Text(light(seen.nis, seen.verdict), style="green" if fine else "bold yellow")
-        return Group(head, lamp, sigmas)
+        return Group(head, lamp, sigmas, picture(seen.diagnosis))
 
     def _falling(self, seen: Seen) -> list[Falling]:
         return falling(seen.first, seen.sigmas, self._test.units, self._test.effects)

@@ -67,7 +67,7 @@ class AdaptiveNode:
         self._out = Path(declare.text("out", ".", "folder of the calibration node, with its journal"))
         self._finish = declare.flag("finish", False, "end the streams of a simulated table after the test")
         self._goals, self._models, self._menu = goals, (added,), Menu()
-        self._worker = Worker(Job(self._out / JOURNAL, options, model, next_move))
+        self._worker = Worker(Job(self._out / JOURNAL, options, model, next_move, pictures=False))
         ticker = Ticker(self.node)
         self._driver = TableDriver(self.node, ticker, self._table)
         self._choices = self.node.create_publisher(DiagnosticArray, "~/choice", HISTORY)
@@ -118,7 +118,7 @@ class AdaptiveNode:
         except DataError as error:
             self._fail(str(error))
             return
-        if answer is None:
+        if not isinstance(answer, Answer):
             if self._worker.idle and time.monotonic() > self._look_at:
                 about = Asked(self._goals, self._menu, self._table, angles)
                 # The worker keeps what it has read up to a stamp: another stamp lets it read the journal again.

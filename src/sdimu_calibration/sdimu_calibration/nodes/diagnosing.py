@@ -1,21 +1,21 @@
 """The live diagnosis on its topics: asked at the end of each stop, published and logged when it is there.
 
 Publications: calibration/diagnosis (verdict, where, ranking and ladder for people), calibration/ranking (every
-candidate with all digits), calibration/heat_map (channel by stop).
+candidate with all digits), calibration/heat_map (channel by stop), calibration/picture (all of it, drawn).
 """
 
 from __future__ import annotations
 
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.node import Node
-from sensor_msgs.msg import JointState
+from sensor_msgs.msg import CompressedImage, JointState
 from std_msgs.msg import Float64MultiArray
 
 from sdimu_calibration.core.diagnosis.live_diagnosis import WAITING
 from sdimu_calibration.core.live import EpochEstimate
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.nodes import diagnosis_messages as messages
-from sdimu_calibration.nodes.credits import HISTORY, publish
+from sdimu_calibration.nodes.credits import HISTORY, LATCHED, publish
 from sdimu_calibration.nodes.diagnosis_worker import Answer, Job
 from sdimu_calibration.nodes.live_diagnosis import StopDiagnosis, Worker
 from sdimu_calibration.report.live_text import told
@@ -46,6 +46,7 @@ class Diagnosing:
         self._diagnosis = node.create_publisher(DiagnosticArray, "calibration/diagnosis", HISTORY)
         self._ranking = node.create_publisher(JointState, "calibration/ranking", HISTORY)
         self._heat_map = node.create_publisher(Float64MultiArray, "calibration/heat_map", HISTORY)
+        self._picture = node.create_publisher(CompressedImage, "calibration/picture", LATCHED)
 
     @property
     def idle(self) -> bool:
@@ -82,9 +83,14 @@ class Diagnosing:
             self._node.get_logger().error(str(error))
             self.close()
             return
-        if answer is not None:
+        if answer is None:
+            return
+        stamp_ns = newest_ns if answer.request.until_ns is None else answer.request.until_ns
+        if isinstance(answer, Answer):
             self.last = answer
-            self._publish(answer, newest_ns if answer.request.until_ns is None else answer.request.until_ns)
+            self._publish(answer, stamp_ns)
+        elif answer.png:
+            publish(self._picture, messages.picture(stamp_ns, answer.png))
 
     def _publish(self, answer: Answer, stamp_ns: int) -> None:
         found = answer.diagnosis

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from array import array
 from collections.abc import Iterable
+from dataclasses import replace
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from sensor_msgs.msg import JointState
+from sensor_msgs.msg import CompressedImage, JointState
 from std_msgs.msg import Float64MultiArray, MultiArrayDimension, MultiArrayLayout
 
 from sdimu_calibration.core.diagnosis.live_diagnosis import WAITING, LiveDiagnosis, Ranked
 from sdimu_calibration.nodes.credits import header
 from sdimu_calibration.report.data import places
-from sdimu_calibration.report.live_text import best_ranked, ladder_rows, model_name, size
+from sdimu_calibration.report.live_text import SeenDiagnosis, best_ranked, ladder_rows, model_name, size
 
 _MOST_RANKED = 12
 """Number of candidates in the table for people."""
@@ -53,6 +54,30 @@ def heat_map(stamp_ns: int, found: LiveDiagnosis) -> Float64MultiArray:
     ]
     data = array("d", np.ascontiguousarray(grid.value).tobytes())
     return Float64MultiArray(layout=MultiArrayLayout(dim=dims), data=data)
+
+
+def picture(stamp_ns: int, png: bytes) -> CompressedImage:
+    """Return a drawn diagnosis."""
+    return CompressedImage(header=header(stamp_ns, "diagnosis"), format="png", data=array("B", png))
+
+
+def seen_diagnosis(message: DiagnosticArray, before: SeenDiagnosis) -> SeenDiagnosis:
+    """Read what `diagnosis` made; the heat map is that of before."""
+    parts = {status.name: status for status in message.status}
+    tables = {name: tuple((v.key, v.value) for v in status.values) for name, status in parts.items()}
+    about = dict(tables["verdict"])
+    return replace(
+        before, stop=int(about["stop"]), verdict=about["verdict"], sentence=parts["verdict"].message,
+        reaches=parts["ranking"].message if "ranking" in parts else "",
+        ranking=tables.get("ranking", ()), ladder=tables.get("ladder", ()),
+    )  # fmt: skip
+
+
+def seen_heat_map(message: Float64MultiArray, before: SeenDiagnosis) -> SeenDiagnosis:
+    """Read what `heat_map` made; all else is that of before."""
+    channels, stops = (tuple(dim.label.partition(":")[2].split(",")) for dim in message.layout.dim[:2])
+    heat = np.array(message.data).reshape(len(channels), len(stops))
+    return replace(before, channels=channels, stops=stops, heat=heat)
 
 
 def _verdict(found: LiveDiagnosis) -> Iterable[tuple[str, str]]:

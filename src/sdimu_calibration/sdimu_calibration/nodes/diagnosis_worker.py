@@ -17,6 +17,7 @@ from typing import Any
 
 from sdimu_calibration.core.data.arrival import in_order, until
 from sdimu_calibration.core.diagnosis.live_diagnosis import (
+    WAITING,
     LiveDiagnosis,
     ModelError,
     error_of,
@@ -50,12 +51,15 @@ class Job:
     question : callable, optional
         Function of a module that is asked of every fit, as ``question(fit, diagnosis, about)``; its answer must survive
         `pickle`.
+    pictures : bool
+        Draw each diagnosis.
     """
 
     journal: Path
     options: OpeningOptions
     model: str
     question: Question | None = None
+    pictures: bool = True
 
 
 @dataclass(frozen=True)
@@ -100,6 +104,29 @@ class Answer:
     diagnosis: LiveDiagnosis
     more: Any
     seconds: float
+
+
+@dataclass(frozen=True)
+class Picture:
+    """What comes after each answer.
+
+    Attributes
+    ----------
+    request : Request
+    png : bytes
+        Of the diagnosis; empty where it waits.
+    """
+
+    request: Request
+    png: bytes
+
+
+def picture(answer: Answer) -> Picture:
+    """Draw the diagnosis of an answer."""
+    # matplotlib takes half a second to load.
+    from sdimu_calibration.report.live_picture import live_picture  # noqa: PLC0415
+
+    return Picture(answer.request, b"" if answer.diagnosis.verdict == WAITING else live_picture(answer.diagnosis))
 
 
 class Diagnoser:
@@ -149,15 +176,19 @@ def work(pipe: Connection) -> None:
     Parameters
     ----------
     pipe : Connection
-        Brings a `Job`, then each `Request`; takes each `Answer`.
+        Brings a `Job`, then each `Request`; takes each `Answer`, and its `Picture` where the job wants it, which need not be waited for.
     """
     # Ctrl-C reaches every process of a terminal; this one ends with its node.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     os.nice(_NICE)
     try:
-        diagnoser = Diagnoser(pipe.recv())
+        job = pipe.recv()
+        diagnoser = Diagnoser(job)
         while True:
-            pipe.send(diagnoser.answer(pipe.recv()))
+            answer = diagnoser.answer(pipe.recv())
+            pipe.send(answer)
+            if job.pictures:
+                pipe.send(picture(answer))
     except (EOFError, OSError):
         # The node has left.
         return

@@ -11,7 +11,7 @@ from typing import Any
 
 from sdimu_calibration.core.live import EpochEstimate
 from sdimu_calibration.core.recording import DataError
-from sdimu_calibration.nodes.diagnosis_worker import Answer, Job, Request
+from sdimu_calibration.nodes.diagnosis_worker import Answer, Job, Picture, Request
 
 _PROGRAM = "from sdimu_calibration.nodes.diagnosis_worker import main; main()"
 """Not ``-m``: what goes through the pipe is of the classes of a module by its real name."""
@@ -55,8 +55,8 @@ class Worker:
             with suppress(OSError):
                 self._pipe.send(self._busy)
 
-    def answer(self) -> Answer | None:
-        """Return an answer once it is there.
+    def answer(self) -> Answer | Picture | None:
+        """Return what has come: an answer, then the picture of it.
 
         Raises
         ------
@@ -66,9 +66,10 @@ class Worker:
         try:
             if self._busy is None or not self._pipe.poll():
                 return None
-            answer: Answer = self._pipe.recv()
-            self._busy = None
-            self._send()
+            answer: Answer | Picture = self._pipe.recv()
+            if isinstance(answer, Picture):
+                self._busy = None
+                self._send()
         except (EOFError, OSError) as error:
             self._busy = self._next = None
             raise DataError("the process of the live diagnosis has ended; the test goes on without it") from error
@@ -136,8 +137,8 @@ class StopDiagnosis:
         self._last = stop, until_ns
         self._worker.ask(Request(stop, until_ns, tuple(self._models), self.about))
 
-    def answer(self) -> Answer | None:
-        """Return a diagnosis once it is there; raises as `Worker.answer`."""
+    def answer(self) -> Answer | Picture | None:
+        """Return a diagnosis once it is there, then its picture; raises as `Worker.answer`."""
         return self._worker.answer()
 
     def close(self) -> None:

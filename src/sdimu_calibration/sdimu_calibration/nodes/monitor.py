@@ -13,8 +13,11 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64MultiArray
 
-from sdimu_calibration.nodes.credits import NS, to_ns
+from sdimu_calibration.nodes.credits import LATCHED, NS, to_ns
+from sdimu_calibration.nodes.diagnosis_messages import seen_diagnosis, seen_heat_map
+from sdimu_calibration.report.live_text import SeenDiagnosis
 from sdimu_calibration.storage.status_message import first_entry, phase_entry, stamp_ns
 
 # Watching must never hold up what is watched.
@@ -39,6 +42,8 @@ class Progress:
         Mean squared innovation per degree of freedom at the present stop, by channel.
     verdict : str
         Of the same stop.
+    diagnosis : SeenDiagnosis
+        The newest one; of stop -1 before the first.
     """
 
     stop: int = 0
@@ -49,6 +54,7 @@ class Progress:
     first: dict[str, float] = field(default_factory=dict)
     nis: dict[str, float] = field(default_factory=dict)
     verdict: str = ""
+    diagnosis: SeenDiagnosis = field(default_factory=SeenDiagnosis)
 
 
 class Monitor:
@@ -64,6 +70,8 @@ class Monitor:
         self._node.create_subscription(DiagnosticArray, "rate_table/status", self._take_status, GLANCE)
         self._node.create_subscription(JointState, "calibration/coefficients", self._take_coefficients, GLANCE)
         self._node.create_subscription(DiagnosticArray, "/diagnostics", self._take_diagnostics, GLANCE)
+        self._node.create_subscription(DiagnosticArray, "calibration/diagnosis", self._take_diagnosis, LATCHED)
+        self._node.create_subscription(Float64MultiArray, "calibration/heat_map", self._take_heat_map, LATCHED)
         self._executor = EventsExecutor(context=self._context)
         self._executor.add_node(self._node)
         self._never = Future()
@@ -104,6 +112,12 @@ class Monitor:
                 self.progress.verdict = values["verdict"]
                 nis = {key: value for key, value in values.items() if key.startswith(_NIS)}
                 self.progress.nis = {key.removeprefix(_NIS): float(value) for key, value in nis.items()}
+
+    def _take_heat_map(self, message: Float64MultiArray) -> None:
+        self.progress.diagnosis = seen_heat_map(message, self.progress.diagnosis)
+
+    def _take_diagnosis(self, message: DiagnosticArray) -> None:
+        self.progress.diagnosis = seen_diagnosis(message, self.progress.diagnosis)
 
 
 _NIS = "stop_nis_"

@@ -42,6 +42,7 @@ TOPICS = (
     "calibration/navigation=nav_msgs/msg/Odometry",
     "calibration/diagnosis=diagnostic_msgs/msg/DiagnosticArray",
     "calibration/ranking=sensor_msgs/msg/JointState",
+    "calibration/picture=sensor_msgs/msg/CompressedImage",
     "calibration/heat_map=std_msgs/msg/Float64MultiArray",
     "calibration/estimates=diagnostic_msgs/msg/DiagnosticArray",
     f"{DIAGNOSTICS}=diagnostic_msgs/msg/DiagnosticArray",

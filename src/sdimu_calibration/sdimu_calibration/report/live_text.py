@@ -3,14 +3,63 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 
+import numpy as np
+
+from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.diagnosis.live_diagnosis import WAITING, LiveDiagnosis, ModelError, Ranked
 from sdimu_calibration.core.units import from_si
 from sdimu_calibration.report.table import with_sigma
 
+Rows = tuple[tuple[str, str], ...]
+
 AS_GIVEN = "as given"
+MISFIT = "misfit"
+"""Verdict of a survey in which something stands out."""
 _NAMED = 2
 """Number of candidates that a line names."""
+
+
+@dataclass(frozen=True)
+class SeenDiagnosis:
+    """A live diagnosis as its topics tell it.
+
+    Attributes
+    ----------
+    stop : int
+    verdict, sentence : str
+    reaches : str
+        Size of the score that noise reaches, in words.
+    ranking, ladder : tuple of (str, str)
+        Candidates and their scores; models and their errors.
+    channels : tuple of str, length c
+    stops : tuple of str, length s
+    heat : ndarray, shape (c, s)
+        Mean innovation over its sigma.
+    """
+
+    stop: int = -1
+    verdict: str = ""
+    sentence: str = ""
+    reaches: str = ""
+    ranking: Rows = ()
+    ladder: Rows = ()
+    channels: tuple[str, ...] = ()
+    stops: tuple[str, ...] = ()
+    heat: Floats = field(default_factory=lambda: np.empty((0, 0)))
+
+    @property
+    def line(self) -> str:
+        """The whole of it in one line, but for the heat map."""
+        named = ", ".join(f"{label} {score}" for label, score in self.ranking[:_NAMED])
+        errors = ", ".join(f"{name} {error}" for name, error in self.ladder)
+        parts = (
+            f"diagnosis of stop {self.stop}: {self.verdict}: {self.sentence}",
+            f"{named} ({self.reaches})" if named and self.verdict == MISFIT else "",
+            f"error at stops held out: {errors}" if errors else "",
+        )
+        return "; ".join(part.rstrip(".") for part in parts if part)
 
 
 def model_name(added: Sequence[str]) -> str:

@@ -25,7 +25,7 @@ from sdimu_calibration.report.design.palette import DIVERGING, LIGHT, paint, pal
 from sdimu_calibration.report.evidence_figures import cell
 from sdimu_calibration.report.table import with_sigma
 
-_STYLE = {
+STYLE = {
     "font.family": "DejaVu Sans", "font.size": 9, "axes.spines.top": False, "axes.spines.right": False,
     "axes.titlesize": 10, "axes.titlelocation": "left", "savefig.facecolor": "white",
 }  # fmt: skip
@@ -56,7 +56,7 @@ def write_pictures(folder: Path, diagnosis: Diagnosis, trials: Sequence[FreeIner
     list of Path
     """
     folder.mkdir(parents=True, exist_ok=True)
-    with mpl.rc_context(_STYLE):
+    with mpl.rc_context(STYLE):
         figures = {
             "heat-map": heat_maps(diagnosis), "candidates": candidates(diagnosis),
             "architecture": architecture_figure(),
@@ -89,19 +89,20 @@ def heat_maps(diagnosis: Diagnosis) -> Figure:
     figure = Figure(figsize=(8.6, 3.0 * len(grids)), layout="constrained")
     for place, (title, grid) in enumerate(grids, 1):
         axes = figure.add_subplot(len(grids), 1, place)
-        _heat_map(axes, grid)
+        draw_heat_map(axes, grid)
         axes.set_title(f"{title}: mean innovation over its sigma")
     axes.set_xlabel("stop")
     return figure
 
 
-def _heat_map(axes: Any, grid: data.Grid) -> None:
+def draw_heat_map(axes: Any, grid: data.Grid, channels: Sequence[str] = CHANNEL_NAMES) -> None:
+    """Draw residual means, channel by stop, in axes of matplotlib: number and sign in each cell, colour besides."""
     colours = LinearSegmentedColormap.from_list("signed", paint(DIVERGING, LIGHT))
     axes.imshow(grid.value, cmap=colours, vmin=-_FULL, vmax=_FULL, aspect="auto")
     for (row, column), value in np.ndenumerate(grid.value):
         ink = "white" if abs(value) > _WHITE_FROM else _INK
         axes.text(column, row, cell(float(value)), ha="center", va="center", fontsize=6.5, color=ink)
-    axes.set_yticks(range(len(CHANNEL_NAMES)), [name.replace("_", " ") for name in CHANNEL_NAMES], fontsize=7.5)
+    axes.set_yticks(range(len(channels)), [name.replace("_", " ") for name in channels], fontsize=7.5)
     axes.set_xticks(range(len(grid.stops)), [str(stop) for stop in grid.stops], fontsize=7.5)
     axes.tick_params(length=0)
     axes.spines[:].set_visible(False)
