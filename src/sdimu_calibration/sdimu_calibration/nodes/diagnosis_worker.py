@@ -176,7 +176,8 @@ def work(pipe: Connection) -> None:
     Parameters
     ----------
     pipe : Connection
-        Brings a `Job`, then each `Request`; takes each `Answer`, and its `Picture` where the job wants it, which need not be waited for.
+        Brings a `Job`, then each `Request`; takes each `Answer`, and where the job wants it a `Picture`,
+        which need not be waited for.
     """
     # Ctrl-C reaches every process of a terminal; this one ends with its node.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
