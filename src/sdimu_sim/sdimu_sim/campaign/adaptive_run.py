@@ -89,7 +89,7 @@ class AdaptiveRun:
             "minutes": done.plan.duration_s / 60.0, "stops": len(done.plan.dwell_s),
             "worst": float(done.last.known.ratio.max()),
             "looks": [[x.minutes, float(x.known.ratio.max()), list(x.known.named)] for x in done.looks],
-            "z": baseline_z(found.after, true).tolist(), "errors": _errors(found.after, true, self.goals),
+            "z": baseline_z(found.after, true).tolist(), "errors": limit_errors(found.after, true, self.goals),
             "truth": None if truth is None else truth.text, **_scored(found, truth),
         }  # fmt: skip
         if truth is not None:
@@ -101,7 +101,7 @@ class AdaptiveRun:
         return row
 
 
-def _errors(result: Calibration, true: ImuTruth, goals: Goals) -> list[float]:
+def limit_errors(result: Calibration, true: ImuTruth, goals: Goals) -> list[float]:
     """Errors of the coefficients that have a limit, over that limit."""
     limited, limit = goals.of(result.names, result.body_frame)
     truth = true_values(true, result.names, result.body_frame)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from rate_table_sim.core import phase_changes, table_motion
-from sdimu_calibration.core.adaptive import Choice, End, Goals, Knowledge, Menu, choose, knowledge
+from sdimu_calibration.core.adaptive import Choice, End, Goals, Knowledge, Menu, choose, knowledge, nearest_other
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis, climb
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
@@ -41,6 +41,11 @@ class Look:
     minutes: float
     found: Diagnosis
     known: Knowledge
+
+    @property
+    def nearest(self) -> float | None:
+        """Difference of log Bayes factors between the first effect found and the nearest other one; None for none."""
+        return nearest_other(self.found)
 
 
 @dataclass(frozen=True)

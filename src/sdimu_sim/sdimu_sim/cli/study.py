@@ -8,11 +8,16 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from sdimu_calibration.cli.console import plain
+from sdimu_sim.cli.adaptive_study import adaptive, adaptive_run
 
 if TYPE_CHECKING:
     from sdimu_calibration.core.progress import Progress
 
 app = typer.Typer(help="Put a claim of the method to the test, by simulation.", no_args_is_help=True)
+
+
+app.command()(adaptive)
+app.command()(adaptive_run)
 
 
 @app.callback()
@@ -355,54 +360,6 @@ def hand(
     console.print(table)
     refused = [r["error"] for rows in results.values() for r in rows if "error" in r]
     console.print(f"refused: {len(refused)}", *sorted(set(refused))[:5], sep="\n", markup=False)
-    console.print(f"results in {out}", soft_wrap=True)
-
-
-@app.command()
-def adaptive(
-    out: Annotated[Path, typer.Option(help="Folder of runs, adaptive.json, adaptive.md.")] = Path("out/study-adaptive"),
-    runs: Annotated[int, typer.Option("-n", min=1, help="Tests of each kind.")] = 50,
-    seed: Annotated[int, typer.Option(help="First seed.")] = 90_001,
-    kind: Annotated[list[str] | None, typer.Option(help="table33, clean, hidden; repeatable. All by default.")] = None,
-    plan: Annotated[list[str] | None, typer.Option(help="Fixed plan beside it; repeatable.")] = None,
-    imu: Annotated[str, typer.Option(help="IMU file.")] = "dtg",
-    site: Annotated[str, typer.Option(help="Site.")] = "daejeon",
-    workers: Annotated[int, typer.Option(min=1, help="Processes.")] = 2,
-) -> None:
-    """Let tests choose their turns: minutes to the limits, do the sigmas hold, is a hidden effect told apart."""
-    import math
-    from functools import partial
-
-    from sdimu_calibration.cli.progress import bar
-    from sdimu_calibration.core.recording import DataError
-    from sdimu_calibration.storage.config import load_imu, load_model, load_site
-    from sdimu_calibration.storage.goal_file import load_goals
-    from sdimu_calibration.storage.json_file import write_json
-    from sdimu_sim.campaign.adaptive_page import fixed_minutes, page
-    from sdimu_sim.campaign.adaptive_run import KINDS, AdaptiveRun
-    from sdimu_sim.campaign.campaign import HERE, run_campaign
-    from sdimu_sim.campaign.hidden_sizes import sizes
-
-    unknown = [k for k in kind or [] if k not in KINDS]
-    if unknown:
-        raise DataError(f"--kind {unknown[0]}: expected one of {', '.join(KINDS)}")
-    console, seeds, results = plain(), range(seed, seed + runs), {}
-    place, sensor, model = load_site(site), load_imu(imu), load_model("baseline")
-    seen = sizes("kim18", math.degrees(place.latitude_rad), sensor, model)
-    for name in kind or KINDS:
-        run = AdaptiveRun(name, sensor, place, model, load_goals("table33" if name == "table33" else "kim18"), seen)
-        with bar(console) as progress:
-            tell = partial(_named, progress, name)
-            here = HERE if workers == 1 else None
-            results[name] = run_campaign(run, seeds, out / name, here, progress=tell, workers=workers)
-    write_json(out / "adaptive.json", results)
-    fixed = {
-        p: {g: fixed_minutes(p, g, place, sensor, model) for g in ("table33", "kim18")}
-        for p in plan or ("kim18", "recommended")
-    }
-    text = page(results, fixed, seed)
-    (out / "adaptive.md").write_text(text, encoding="utf-8")
-    console.print(text, soft_wrap=True, markup=False, highlight=False)
     console.print(f"results in {out}", soft_wrap=True)
 
 

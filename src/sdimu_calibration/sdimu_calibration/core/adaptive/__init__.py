@@ -2,10 +2,10 @@
 
 from sdimu_calibration.core.adaptive.choice import Choice, End, Menu, choose
 from sdimu_calibration.core.adaptive.goals import Goals
-from sdimu_calibration.core.adaptive.knowledge import Knowledge, OpenClass, fitted, knowledge
+from sdimu_calibration.core.adaptive.knowledge import Knowledge, OpenClass, fitted, knowledge, nearest_other
 from sdimu_calibration.core.adaptive.so_far import Ahead, SoFar, ahead, so_far
 
 __all__ = [
     "Ahead", "Choice", "End", "Goals", "Knowledge", "Menu", "OpenClass", "SoFar", "ahead", "choose", "fitted",
-    "knowledge", "so_far",
+    "knowledge", "nearest_other", "so_far",
 ]  # fmt: skip

@@ -88,6 +88,10 @@ class Choice:
         What it brings, in words.
     after : SoFar
         Where the test will then be, by the covariance alone.
+    ratio : ndarray, shape (c,)
+        Sigma of every coefficient with a limit over that limit, after it (1).
+    told : float
+        Part of the gain that tells a class apart (nat).
     done : bool
         Nothing will be lacking after it.
     """
@@ -97,6 +101,8 @@ class Choice:
     gain: float
     reason: str
     after: SoFar
+    ratio: Floats
+    told: float
     done: bool
 
     @property
@@ -206,7 +212,8 @@ def _choice(known: Knowledge, best: _Option, now: Worth, here: SoFar, menu: Menu
     reached = ahead(here, best.turn, dwell, menu.acceleration_rad_s2).end
     return Choice(
         Step(best.turn, dwell, menu.acceleration_rad_s2), (dwell + _length(best.turn)) / 60.0,
-        float(now.lacking[0] - best.worth.lacking[best.row]), _reason(known, best, now), reached, best.done,
+        float(now.lacking[0] - best.worth.lacking[best.row]), _reason(known, best, now), reached,
+        best.worth.ratio[best.row], float(_told(known, best, now).sum()), best.done,
     )  # fmt: skip
 
 
@@ -221,13 +228,19 @@ def _lacking(known: Knowledge, now: Worth) -> str:
     return " and ".join(told)
 
 
+def _told(known: Knowledge, best: _Option, now: Worth) -> Floats:
+    """Say how much of what is lacking a move adds to each difference of log Bayes factors, shape (a,)."""
+    needed = np.zeros(0) if known.open is None else known.open.needed
+    return np.asarray(np.minimum(best.worth.apart[best.row], needed) - np.minimum(now.apart[0], needed))
+
+
 def _reason(known: Knowledge, best: _Option, now: Worth) -> str:
     """Say what a move brings most of: a class told apart, or a coefficient brought nearer to its limit."""
     told = []
     before, after = np.maximum(now.ratio[0], 1.0), np.maximum(best.worth.ratio[best.row], 1.0)
     nat = np.log(before / after)
     if known.open is not None:
-        lacked = np.minimum(best.worth.apart[best.row], known.open.needed) - np.minimum(now.apart[0], known.open.needed)
+        lacked = _told(known, best, now)
         if lacked.sum() > max(0.5 * nat.sum(), _WORDS_NAT):
             nearest = int(np.argmax(lacked))
             told.append(f"tells {known.open.found} from {known.open.alike[nearest]} ({lacked[nearest]:+.1f} nat)")
@@ -239,4 +252,4 @@ def _reason(known: Knowledge, best: _Option, now: Worth) -> str:
 
 
 def _times(ratio: float) -> str:
-    return f"{ratio:.0f} times" if ratio > 9.5 else f"{ratio:.2g}"
+    return f"{ratio:.0f} times" if ratio > 9.5 else f"{ratio:.2f}"

@@ -164,6 +164,31 @@ def ratios(at: SoFar, goals: Goals, covariance: Floats) -> Floats:
     return np.asarray(np.sqrt(np.einsum("ci,...ij,cj->...c", J, covariance, J)))
 
 
+def nearest_other(found: Diagnosis) -> float | None:
+    """Difference of log Bayes factors between the first effect that was found and the next likely one.
+
+    Time constants of the same effect are no other one.
+
+    Parameters
+    ----------
+    found : Diagnosis
+
+    Returns
+    -------
+    float or None
+        None where nothing was found, or nothing else can be seen.
+    """
+    chosen = found.found.chosen.tolist()
+    if not chosen:
+        return None
+    problem, scale = Problem(found.evidence), found.found.scale
+    name = problem.candidate(chosen[0]).parameter.name
+    scores = problem.scores(problem.scan(chosen[1:], scale), scale)
+    others = [i for i in looked_at(found) if problem.candidate(int(i)).parameter.name != name and i not in chosen]
+    best = float(np.max(scores[others], initial=-np.inf))
+    return float(scores[chosen[0]]) - best if np.isfinite(best) else None
+
+
 def _class(found: Diagnosis) -> tuple[tuple[Candidate, ...], Floats, Floats, int]:
     """Look-alikes of the first class that is open, with sizes, what is lacking, and the place of the class."""
     problem = Problem(found.evidence)
