@@ -13,8 +13,9 @@ samples, opened by the same options, as the calibration at the end of the test.
 
 from __future__ import annotations
 
+import math
 import time
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -74,6 +75,7 @@ class AdaptiveNode:
         self._client = self.node.create_client(Trigger, FINISH)
         self._next: Step | None = Step(None, FIRST_STOP_S)
         self._why = "first stop"
+        self._last = Decision(None, "", "", False, 0.0, math.inf, (), ())
         self._stop, self._begin_ns, self._end_ns = 0, 0, 0
         self._look_at, self._arrived, self._tries = 0.0, 0.0, 0
         self._made: list[dict[str, object]] = []
@@ -104,7 +106,9 @@ class AdaptiveNode:
 
     def _arrive(self, arrival: Arrival, step: Step) -> None:
         if not arrival.ok:
-            self._fail(arrival.reason)
+            # A person said no, or the table cannot: what was measured until then is a test.
+            text = f"the test ends: {arrival.reason}"
+            self._carry_out(replace(self._last, step=None, text=text, reason=arrival.reason, reached=False))
             return
         self._begin_ns = self._begin_ns or arrival.start_ns
         self._stop += step.turn is not None
@@ -134,23 +138,25 @@ class AdaptiveNode:
         self._take(answer)
 
     def _take(self, answer: Answer) -> None:
-        if not isinstance(answer.more, Decision):
+        if isinstance(answer.more, Decision):
+            self._carry_out(answer.more)
+        else:
             self._fail(answer.diagnosis.sentence)
-            return
-        decision = answer.more
-        minutes = decision.until_s / 60.0
-        text = f"{minutes:.1f} min, worst sigma {decision.worst:.2f} of its limit; {decision.text}"
-        self.node.get_logger().info(text)
+
+    def _carry_out(self, decision: Decision) -> None:
+        """Tell a decision, keep it, and make it the next move or the end."""
+        told = f"{decision.until_s / 60.0:.1f} min, worst sigma {decision.worst:.2f} of its limit; {decision.text}"
+        self.node.get_logger().info(told)
         self._publish(decision)
         self._made.append(asdict(decision))
         write_json(self._out / CHOICES, {"format": FORMAT, "goals": self._goals.name, "choices": self._made})
+        self._last, self._next, self._why = decision, decision.step, decision.reason
         if decision.step is None:
-            self._farewell = self._client.call_async(Trigger.Request()) if self._finish else Future()
-            if not self._finish:
+            self._farewell, self._born = Future(), time.monotonic()
+            if self._finish:
+                self._farewell = self._client.call_async(Trigger.Request())
+            else:
                 self._farewell.set_result(None)
-            self._born = time.monotonic()
-            return
-        self._next, self._why = decision.step, decision.reason
 
     def _publish(self, decision: Decision) -> None:
         words = "" if decision.step is None else decision.step.words

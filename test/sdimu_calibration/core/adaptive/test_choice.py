@@ -62,6 +62,17 @@ def test_a_test_ends_when_all_limits_hold_and_says_what_lacks_when_time_is_up(kn
     assert "of its limit" in late.reason
 
 
+def test_between_the_axes_a_test_only_goes_back_or_on():
+    # From there the gimbals of a table can turn about one axis or two, and a test would stay with them.
+    half = Turn("Y", math.pi / 4.0, math.radians(10.0))
+    known = fitted(perfect_fit(Plan("oblique", (20.0, 20.0), (half,), ACCELERATION)), GOALS)
+    assert not known.at.square
+    tried = []
+    choice = choose(known, GOALS, Menu(), 30.0, lambda step: tried.append(step.turn) or True)
+    assert isinstance(choice, Choice)
+    assert {round(math.degrees(abs(turn.angle_rad))) for turn in tried} == {45}
+
+
 def test_no_move_is_longer_than_the_time_that_is_left(known):
     choice = choose(known, GOALS, Menu(), 0.5)
     assert isinstance(choice, Choice)

@@ -53,21 +53,21 @@ class Menu:
     shortest_s: float = 10.0
     longest_s: float = 60.0
 
-    def turns(self, apart: bool, oblique: bool) -> tuple[Turn, ...]:
+    def turns(self, apart: bool, square: bool) -> tuple[Turn, ...]:
         """List the turns to choose from.
 
         Parameters
         ----------
         apart : bool
             Something is to be told apart.
-        oblique : bool
-            The test stands between the axes, and may have to go back.
+        square : bool
+            The test stands along the axes; between them it only goes back, or on.
 
         Returns
         -------
         tuple of Turn
         """
-        angles = (*self.angles_rad, *self.oblique_rad) if apart or oblique else self.angles_rad
+        angles = (*(self.angles_rad if square else ()), *(self.oblique_rad if apart or not square else ()))
         rates = (self.rate_rad_s, self.slow_rad_s) if apart else (self.rate_rad_s,)
         return tuple(Turn(axis, angle, rate) for axis in "XYZ" for angle in angles for rate in rates)
 
@@ -172,7 +172,7 @@ def choose(
     if now.reached(needed)[0]:
         return End("all limits hold and nothing is to be told apart", reached=True)
     options = []
-    turns = menu.turns(known.open is not None, not here.square)
+    turns = menu.turns(known.open is not None, here.square)
     for turn in (None, *(t for t in turns if possible(Step(t, menu.shortest_s, menu.acceleration_rad_s2)))):
         longest = min(menu.longest_s, 60.0 * minutes_left - _length(turn))
         if longest < menu.shortest_s:
