@@ -10,7 +10,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -156,10 +156,14 @@ class Children:
         # A file, not -p NAME:=VALUE: there "1,2" or "on" would be read as something else than text.
         file = self._log / f"{name}.yaml"
         file.write_text(yaml.safe_dump({name: {"ros__parameters": given}}), encoding="utf-8")
+        self.run(name, module, ["--ros-args", "--params-file", str(file)])
+
+    def run(self, name: str, module: str, arguments: Sequence[str]) -> None:
+        """Start a process: a Python module with its arguments, called `name` here."""
         path = self._log / f"{name}.log"
         with path.open("wb") as output:
             process = subprocess.Popen(
-                [sys.executable, "-m", module, "--ros-args", "--params-file", str(file)],
+                [sys.executable, "-m", module, *arguments],
                 env=dict(os.environ),
                 stdin=subprocess.DEVNULL,
                 stdout=output,

@@ -1,15 +1,17 @@
 """A whole simulated test: table, IMU, calibration and recorder.
 
-    ros2 launch sdimu_calibration simulation_launch.py plan:=recommended out:=out/run
-    ros2 launch sdimu_calibration simulation_launch.py goals:=true allow_motion:=true     # the plan by trajectories
+    ros2 launch sdimu_sim simulation_launch.py plan:=recommended out:=out/run
+    ros2 launch sdimu_sim simulation_launch.py drive:=plan allow_motion:=true        # the plan by trajectories
+    ros2 launch sdimu_sim simulation_launch.py drive:=adaptive allow_motion:=true    # the test chooses its turns
 """
 
-from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument
-from launch.conditions import IfCondition, UnlessCondition
-from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
+from launch.conditions import IfCondition
+from launch.substitutions import LaunchConfiguration, PathJoinSubstitution, PythonExpression
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
+
+from launch import LaunchDescription
 
 ARGUMENTS = (
     ("namespace", "", "of all nodes: two tests in one graph have two"),
@@ -22,7 +24,8 @@ ARGUMENTS = (
     ("speed", "0.0", "times real time; 0: as fast as nothing gets lost"),
     ("rate_hz", "100.0", "samples of the IMU a second"),
     ("out", "out/run", "folder of the results"),
-    ("goals", "false", "carry out the plan by trajectories"),
+    ("drive", "", "plan: by trajectories; adaptive: the test chooses its turns; empty: the table plays the plan"),
+    ("goals", "table33", "limits that an adaptive test is to reach: name in config/goal or path"),
     ("allow_motion", "false", "let trajectories be sent"),
     ("ask", "false", "ask before each move"),
 )
@@ -47,7 +50,15 @@ def generate_launch_description():
         "plan": argument("plan"), "table": argument("table"), "seed": argument("seed", int),
         "speed": argument("speed", float), "consumers": 1, "status_peers": 2, "joint_peers": 1,
     }  # fmt: skip
-    goals = LaunchConfiguration("goals")
+
+    def driven(*ways):
+        drive = LaunchConfiguration("drive")
+        return IfCondition(PythonExpression(["'", drive, "' in ", repr(ways)]))
+
+    driving = {
+        "table": argument("table"), "finish": True, "allow_motion": argument("allow_motion", bool),
+        "ask": argument("ask", bool),
+    }  # fmt: skip
     return LaunchDescription([
         *(DeclareLaunchArgument(name, default_value=default, description=text) for name, default, text in ARGUMENTS),
         node("sdimu_calibration", "recorder_node", "recorder", {
@@ -63,10 +74,14 @@ def generate_launch_description():
             "seed": argument("seed", int), "rate_hz": argument("rate_hz", float),
             "truth_file": PathJoinSubstitution([out, "truth.yaml"]), "consumers": 2,
         }),
-        node("rate_table_sim", "rate_table_node", "rate_table", table, UnlessCondition(goals)),
-        node("rate_table_sim", "rate_table_node", "rate_table", table | {"follow_goals": True}, IfCondition(goals)),
-        node("sdimu_calibration", "table_goals", "table_goals", {
-            "plan": argument("plan"), "table": argument("table"), "finish": True,
-            "allow_motion": argument("allow_motion", bool), "ask": argument("ask", bool),
-        }, IfCondition(goals)),
+        node("rate_table_sim", "rate_table_node", "rate_table", table, driven("")),
+        node(
+            "rate_table_sim", "rate_table_node", "rate_table", table | {"follow_goals": True},
+            driven("plan", "adaptive"),
+        ),
+        node("sdimu_calibration", "table_goals", "table_goals", driving | {"plan": argument("plan")}, driven("plan")),
+        node("sdimu_calibration", "adaptive", "adaptive", driving | {
+            "imu": argument("imu"), "site": argument("site"), "model": argument("model"), "goals": argument("goals"),
+            "gyro_unit": "rad/s", "gyro_sign": 1, "out": out,
+        }, driven("adaptive")),
     ])  # fmt: skip

@@ -3,11 +3,12 @@
     ros2 launch sdimu_calibration replay_launch.py bag:=my_bag speed:=10.0
 """
 
-from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
+
+from launch import LaunchDescription
 
 ARGUMENTS = (
     ("bag", None, "rosbag2 folder or .mcap file"),

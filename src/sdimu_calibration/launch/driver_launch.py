@@ -7,12 +7,13 @@
 The node leaves nothing on its own: ros2 service call /calibration/save std_srvs/srv/Trigger writes result.json.
 """
 
-from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument
 from launch.conditions import IfCondition
 from launch.substitutions import LaunchConfiguration, PathJoinSubstitution, PythonExpression
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
+
+from launch import LaunchDescription
 
 ARGUMENTS = (
     ("namespace", "", "of the nodes: two IMUs in one graph have two"),
@@ -26,7 +27,9 @@ ARGUMENTS = (
     ("gyro_unit", "", "unit of the body rate in the messages; recognised when empty"),
     ("out", "out/driver", "folder of bag and results"),
     ("table", "", "a table to drive: name in config/table or path; none when empty"),
+    ("drive", "plan", "plan: carry out the plan; adaptive: the test chooses its turns"),
     ("plan", "kim18", "plan to carry out on the table"),
+    ("goals", "table33", "limits that an adaptive test is to reach: name in config/goal or path"),
     ("allow_motion", "false", "let trajectories be sent: nothing moves without"),
     ("ask", "true", "ask before each move"),
     ("joint_trajectory", "rate_table/joint_trajectory", "where the controller takes trajectories"),
@@ -43,8 +46,16 @@ def generate_launch_description():
     """Declare the arguments and start calibration and recorder, and what drives a table when one is named."""
     namespace, out = LaunchConfiguration("namespace"), LaunchConfiguration("out")
     opened = ("imu_topic", "status_topic", "temperature_topic", "imu", "site", "model", "accel_unit", "gyro_unit")
-    driven = IfCondition(PythonExpression(["'", LaunchConfiguration("table"), "' != ''"]))
+
+    def driven(way):
+        table, drive = LaunchConfiguration("table"), LaunchConfiguration("drive")
+        return IfCondition(PythonExpression(["'", table, "' != '' and '", drive, f"' == '{way}'"]))
+
+    driving = {
+        "table": argument("table"), "allow_motion": argument("allow_motion", bool), "ask": argument("ask", bool),
+    }  # fmt: skip
     joints = ("rate_table/joint_states", LaunchConfiguration("joint_states"))
+    trajectory = ("rate_table/joint_trajectory", LaunchConfiguration("joint_trajectory"))
     samples = [
         ("imu/data_raw", LaunchConfiguration("imu_topic")), ("rate_table/status", LaunchConfiguration("status_topic")),
         ("imu/temperature", LaunchConfiguration("temperature_topic")),
@@ -61,11 +72,12 @@ def generate_launch_description():
         ),
         Node(
             package="sdimu_calibration", executable="table_goals", name="table_goals", namespace=namespace,
-            parameters=[{
-                "table": argument("table"), "plan": argument("plan"), "allow_motion": argument("allow_motion", bool),
-                "ask": argument("ask", bool),
-            }],
-            remappings=[joints, ("rate_table/joint_trajectory", LaunchConfiguration("joint_trajectory"))],
-            output="screen", condition=driven,
+            parameters=[driving | {"plan": argument("plan")}], remappings=[joints, trajectory], output="screen",
+            condition=driven("plan"),
+        ),
+        Node(
+            package="sdimu_calibration", executable="adaptive", name="adaptive", namespace=namespace,
+            parameters=[driving | {name: argument(name) for name in (*opened, "goals")} | {"out": out}],
+            remappings=[joints, trajectory], output="screen", condition=driven("adaptive"),
         ),
     ])  # fmt: skip
