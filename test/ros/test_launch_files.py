@@ -15,8 +15,8 @@ from .launch_stub import DeclareLaunchArgument, Node, description, started
 ROOT = Path(__file__).resolve().parents[2]
 FILES = sorted(ROOT.glob("src/*/launch/*_launch.py"))
 WAYS = {
-    "simulation_launch.py": ({}, {"drive": "plan", "allow_motion": "true"}),
-    "driver_launch.py": ({}, {"table": "ideal"}),
+    "simulation_launch.py": ({}, {"drive": "plan", "allow_motion": "true"}, {"drive": "adaptive"}),
+    "driver_launch.py": ({}, {"table": "ideal"}, {"table": "ideal", "drive": "adaptive", "ask": "false"}),
     "replay_launch.py": ({"bag": "somewhere"},),
 }
 CASES = [(file, given) for file in FILES for given in WAYS[file.name]]
