@@ -48,7 +48,8 @@ check: setup
 test: check
 	$(BIN)/python -m pytest -n 2 -m "not slow and not bench"
 
-# As a user of ROS would: build the three packages and test what was installed.
+# As a user of ROS would: build the three packages, test what was installed, and run a launch file of it outside the
+# repository (by the stand-in for ros2/launch, which is no wheel).
 colcon: setup
 	work=$$(mktemp -d) && trap 'rm -rf "$$work"' EXIT && \
 	test "$$(colcon --log-base $$work/log list --base-paths src | grep -c '(ros.ament_python)')" -eq $(NUMBER) && \
@@ -56,7 +57,12 @@ colcon: setup
 	colcon --log-base $$work/log test --base-paths src --build-base $$work/build \
 	    --install-base $$work/install --python-testing pytest --return-code-on-test-failure \
 	    --packages-select $(COLCON_TEST) \
-	    --pytest-args -q -m "not slow and not bench and not ros"
+	    --pytest-args -q -m "not slow and not bench and not ros" && \
+	printf '%s\n' 'format: sdimu-plan/1' 'dwell: 8 s' 'rate: 30 deg/s' 'acceleration: 60 deg/s^2' \
+	    'turns: [{axis: Y, angle: 90 deg}]' > $$work/plan.yaml && cp test/ros/launch_stub.py $$work && cd / && \
+	ROS_DOMAIN_ID=97 ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST ROS_LOG_DIR=$$work/log $(CURDIR)/$(BIN)/python \
+	    $$work/launch_stub.py $$work/install sdimu_sim simulation_launch.py plan:=$$work/plan.yaml out:=$$work/run \
+	    drive:=plan allow_motion:=true && test -s $$work/run/result.json
 
 # For a machine without a clone: pip install out/wheels/*.whl brings `sdimu`, its config files and what it needs to run.
 wheels: $(RUN)

@@ -81,6 +81,15 @@ def test_every_package_declares_itself_as_ament_python():
         assert "<build_type>ament_python</build_type>" in manifest.read_text()
         assert (manifest.parent / "resource" / manifest.parent.name).is_file()
 
+
+@pytest.mark.parametrize("manifest", sorted(ROOT.glob("src/*/package.xml")), ids=lambda path: path.parent.name)
+def test_a_manifest_names_every_ros_package_that_is_imported(manifest):
+    ros = re.compile(r"^\s*(?:from|import) (rclpy|launch|launch_ros|\w+_(?:msgs|srvs|interfaces))\b", re.MULTILINE)
+    texts = [path.read_text() for path in manifest.parent.rglob("*.py") if "build" not in path.parts]
+    imported = {name for text in texts for name in ros.findall(text)}
+    assert imported <= set(re.findall(r"<exec_depend>(\w+)</exec_depend>", manifest.read_text()))
+
+
 _NAMED_IN = ("core/effects/", "core/hidden.py", "core/truth.py", "core/true_coefficients.py")
 """Where effects have their names: the registry, and the truth of the simulator."""
 _OTHER_WORDS = {"temperature_rate", "random_walk"}

@@ -54,12 +54,23 @@ def requirements(wheel):
 
 
 def test_all_configuration_files_are_in_the_wheel(wheels):
-    inside = {name for name in wheels["sdimu_calibration"].namelist() if "/config/" in name}
+    names = wheels["sdimu_calibration"].namelist()
+    inside = {name for name in names if name.startswith("sdimu_calibration/config/")}
     shipped = {path for path in (ROOT / "config").rglob("*") if path.is_file()}
     assert inside == {f"sdimu_calibration/config/{path.relative_to(ROOT / 'config').as_posix()}" for path in shipped}
     for path in shipped:
         name = f"sdimu_calibration/config/{path.relative_to(ROOT / 'config').as_posix()}"
         assert wheels["sdimu_calibration"].read(name) == path.read_bytes()
+        # And once more where users of ROS look for it.
+        (shared,) = (n for n in names if n.endswith(f"/share/{name}"))
+        assert wheels["sdimu_calibration"].read(shared) == path.read_bytes()
+
+
+def test_launch_files_are_in_the_share_folders_of_the_wheels(wheels):
+    for file in ROOT.glob("src/*/launch/*_launch.py"):
+        package = file.parents[1].name
+        (name,) = (n for n in wheels[package].namelist() if n.endswith(f"share/{package}/launch/{file.name}"))
+        assert wheels[package].read(name) == file.read_bytes()
 
 
 @pytest.mark.parametrize("package", PACKAGES)
@@ -67,7 +78,7 @@ def test_every_module_type_marker_and_licence_is_in_the_wheel(wheels, package):
     inside = wheels[package].namelist()
     source = ROOT / "src" / package
     modules = {path.relative_to(source).as_posix() for path in (source / package).rglob("*.py")}
-    assert modules == {name for name in inside if name.endswith(".py")}
+    assert modules == {name for name in inside if name.endswith(".py") and name.startswith(f"{package}/")}
     assert f"{package}/py.typed" in inside
     licence = next(name for name in inside if name.endswith("LICENSE"))
     assert wheels[package].read(licence) == (ROOT / "LICENSE").read_bytes()

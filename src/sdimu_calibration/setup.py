@@ -1,5 +1,6 @@
 """Package the sdimu_calibration ROS 2 package; the entry points are the nodes and the command-line verbs."""
 
+import os
 import shutil
 from pathlib import Path
 
@@ -9,6 +10,14 @@ from setuptools.command.build_py import build_py
 NAME = "sdimu_calibration"
 CONFIG = Path(__file__).resolve().parents[2] / "config"
 """The repository's configuration files, which every copy that is installed takes along."""
+HERE = Path(__file__).resolve().parent
+LAUNCH = [str(path.relative_to(HERE)) for path in sorted((HERE / "launch").glob("*_launch.py"))]
+SHARED_CONFIG = [
+    (f"share/{NAME}/config/{folder.name}", [os.path.relpath(path, HERE) for path in sorted(folder.iterdir())])
+    for folder in sorted(CONFIG.glob("*"))
+    if folder.is_dir()
+]
+"""The same once more where users of ROS look for them: layouts, tables, analyzers."""
 
 RUN_TIME = [
     "AllanTools",
@@ -101,6 +110,8 @@ setup(
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),
+        (f"share/{NAME}/launch", LAUNCH),
+        *SHARED_CONFIG,
     ],
     zip_safe=False,
     entry_points={

@@ -1,8 +1,12 @@
 """Package the sdimu_sim ROS 2 package; the entry points are the nodes and the command-line verbs."""
 
+from pathlib import Path
+
 from setuptools import find_packages, setup
 
 NAME = "sdimu_sim"
+HERE = Path(__file__).resolve().parent
+LAUNCH = [str(path.relative_to(HERE)) for path in sorted((HERE / "launch").glob("*_launch.py"))]
 VERSION = "0.1.0"
 
 setup(
@@ -31,6 +35,7 @@ setup(
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),
+        (f"share/{NAME}/launch", LAUNCH),
     ],
     zip_safe=False,
     entry_points={

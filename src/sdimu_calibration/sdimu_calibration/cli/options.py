@@ -48,6 +48,10 @@ PowerOnOption = Annotated[
     str | None, typer.Option(metavar="NAME", help="Which switch-on of the unit; taken from the bag where it says it.")
 ]
 HandOption = Annotated[bool, typer.Option("--hand", help="Moved by hand: the same as --estimator handheld.")]
+DomainOption = Annotated[
+    int | None,
+    typer.Option(metavar="N", help="ROS domain of the nodes; that of ROS_DOMAIN_ID, or a free one, when left out."),
+]
 NOT_TRUSTED = 3
 """Exit status of a run that is done, and whose estimate is not to be trusted."""
 HANDHELD_CHOSEN = "handheld: {why}, so nothing is navigated (--estimator filter forces navigation)"

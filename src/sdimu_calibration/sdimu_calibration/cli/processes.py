@@ -10,7 +10,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,12 +23,14 @@ from sdimu_calibration.storage.config import config_folder
 
 # 0 is where everyone else is; above 101 the ports of DDS reach into the system's ephemeral ones.
 DOMAINS = range(1, 102)
+STATED = range(233)
+DOMAIN_VARIABLE = "ROS_DOMAIN_ID"
 POLITE_S = 5.0
 _DIE_WITH_PARENT = 1  # PR_SET_PDEATHSIG of Linux
 
 
 @contextmanager
-def own_domain(log: Path) -> Iterator[int]:
+def own_domain(log: Path, domain: int | None = None) -> Iterator[int]:
     """Put this process, and the children it starts, into a ROS domain that no other run on this machine uses.
 
     Traffic stays on the loopback interface. The domain is held by a lock file until the end.
@@ -37,6 +39,8 @@ def own_domain(log: Path) -> Iterator[int]:
     ----------
     log : Path
         Folder of the nodes' logs.
+    domain : int, optional
+        The domain; left out, it is that of ``ROS_DOMAIN_ID``, and without it one that is free.
 
     Yields
     ------
@@ -46,12 +50,13 @@ def own_domain(log: Path) -> Iterator[int]:
     Raises
     ------
     DataError
-        When all domains are taken.
+        When all domains are taken, or the stated one is not 0 to 232 or holds another run.
     """
-    domain, lock = _free_domain()
+    stated = domain if domain is not None else stated_domain()
+    domain, lock = _free_domain() if stated is None else _stated_domain(stated)
     before = dict(os.environ)
     os.environ |= {
-        "ROS_DOMAIN_ID": str(domain),
+        DOMAIN_VARIABLE: str(domain),
         "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
         "ROS_LOG_DIR": str(log.resolve()),
     }
@@ -65,20 +70,46 @@ def own_domain(log: Path) -> Iterator[int]:
         lock.close()
 
 
+def stated_domain() -> int | None:
+    """Return the domain of ``ROS_DOMAIN_ID``; None without it, DataError when it is none."""
+    text = os.environ.get(DOMAIN_VARIABLE, "").strip()
+    if not text:
+        return None
+    if not text.isdigit() or int(text) not in STATED:
+        raise DataError(f"environment variable {DOMAIN_VARIABLE}: '{text}' is no ROS domain (expected 0 to 232)")
+    return int(text)
+
+
+def _stated_domain(number: int) -> tuple[int, IO[str]]:
+    """Take a domain that the user wants; two runs in one would take each other's samples."""
+    if number not in STATED:
+        raise DataError(f"--domain {number}: expected 0 to 232")
+    lock = _locked(number)
+    if lock is None:
+        raise DataError(f"ROS domain {number} holds another run of sdimu: end it, or state another with --domain")
+    return number, lock
+
+
+def _locked(number: int) -> IO[str] | None:
+    """Lock a domain; None when it is taken."""
+    try:
+        lock = (Path(tempfile.gettempdir()) / f"sdimu-domain-{number}.lock").open("a", encoding="utf-8")
+    except OSError:
+        return None  # another user's
+    try:
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        lock.close()
+        return None
+    return lock
+
+
 def _free_domain() -> tuple[int, IO[str]]:
-    folder = Path(tempfile.gettempdir())
     # Starting at different places keeps two runs that begin together from racing for each lock.
     start = os.getpid() % len(DOMAINS)
     for number in [*DOMAINS[start:], *DOMAINS[:start]]:
-        try:
-            lock = (folder / f"sdimu-domain-{number}.lock").open("a", encoding="utf-8")
-        except OSError:
-            continue  # another user's
-        try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            lock.close()
-        else:
+        lock = _locked(number)
+        if lock is not None:
             return number, lock
     raise DataError("all 101 ROS domains of this machine are in use; end other runs first")
 
@@ -125,10 +156,14 @@ class Children:
         # A file, not -p NAME:=VALUE: there "1,2" or "on" would be read as something else than text.
         file = self._log / f"{name}.yaml"
         file.write_text(yaml.safe_dump({name: {"ros__parameters": given}}), encoding="utf-8")
+        self.run(name, module, ["--ros-args", "--params-file", str(file)])
+
+    def run(self, name: str, module: str, arguments: Sequence[str]) -> None:
+        """Start a process: a Python module with its arguments, called `name` here."""
         path = self._log / f"{name}.log"
         with path.open("wb") as output:
             process = subprocess.Popen(
-                [sys.executable, "-m", module, "--ros-args", "--params-file", str(file)],
+                [sys.executable, "-m", module, *arguments],
                 env=dict(os.environ),
                 stdin=subprocess.DEVNULL,
                 stdout=output,

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from sdimu_calibration.cli.console import plain
-from sdimu_calibration.cli.options import ImuOption, default_folder, leave
+from sdimu_calibration.cli.options import DomainOption, ImuOption, default_folder, leave
 from sdimu_calibration.cli.source_options import (
     AccelSign,
     AccelUnit,
@@ -31,6 +31,7 @@ def replay(
     imu: ImuOption = None,
     speed: Annotated[float, typer.Option(help="Times real time; 0 is as fast as the calibration allows.")] = 0.0,
     out: Annotated[Path | None, typer.Option(help="Folder of the results; BAG_replay by default.")] = None,
+    domain: DomainOption = None,
     patience: Annotated[float, typer.Option(help="Longest time without an end (s); 0 waits for ever.")] = 0.0,
     diagnose: Annotated[bool, typer.Option(help="Publish a diagnosis at the end of each stop.")] = False,
     imu_topic: ImuTopic = None,
@@ -72,7 +73,7 @@ def replay(
         "temperature_topic": temperature_topic or "",
     }  # fmt: skip
     with console.status("replaying") if console.is_terminal else plain(quiet=True).status(""):
-        _play(folder / "log", calibrating, playing, patience)
+        used = _play(folder / "log", calibrating, playing, patience, domain)
     calibration = read_result(folder / "result.json")
     wall = time.monotonic() - begun
     console.print(rich_table(rows(calibration), f"body frame: {calibration.body_frame}"), soft_wrap=True)
@@ -81,22 +82,25 @@ def replay(
         f"{duration:.0f} s in {wall:.1f} s: {duration / wall:.0f} times real time; {lost:.0f} samples lost",
         highlight=False,
     )
-    console.print(f"results in {folder}", soft_wrap=True)
+    console.print(f"results in {folder}; it ran in ROS domain {used}", soft_wrap=True, highlight=False)
     leave(calibration)
 
 
-def _play(log: Path, calibrating: dict[str, Any], playing: dict[str, Any], patience: float) -> None:
-    """Run the calibration node and the player until both have ended."""
+def _play(
+    log: Path, calibrating: dict[str, Any], playing: dict[str, Any], patience: float, domain: int | None
+) -> int:
+    """Run the calibration node and the player until both have ended; the ROS domain they ran in."""
     import time
 
     from sdimu_calibration.cli.processes import Children, own_domain
     from sdimu_calibration.core.recording import DataError
 
     begun = time.monotonic()
-    with own_domain(log), Children(log) as children:
+    with own_domain(log, domain) as used, Children(log) as children:
         children.start("calibration", "sdimu_calibration.nodes.calibration_node", calibrating)
         children.start("replay", "sdimu_calibration.nodes.replay_node", playing)
         while children.running():
             if patience and time.monotonic() - begun > patience:
                 raise DataError(f"replay: not done after {patience:g} s; see {log}")
             time.sleep(0.05)
+    return used

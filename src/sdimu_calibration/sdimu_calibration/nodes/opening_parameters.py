@@ -30,7 +30,8 @@ def declare_opening(node: Node) -> tuple[OpeningOptions, Topics]:
         return declare.text(name, "", f"unit of the {of} in the messages; recognised when empty") or None
 
     def sign(name: str, of: str) -> int | None:
-        return declare.integer(name, 0, f"sign of the {of}: 1 or -1; 0: recognised", least=-1, most=1) or None
+        text = f"sign of the {of}: expected 1 or -1, or 0 to recognise it"
+        return declare.integer(name, 0, text, least=-1, most=1) or None
 
     own = Topics()
     topics = Topics(

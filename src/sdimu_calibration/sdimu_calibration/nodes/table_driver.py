@@ -37,6 +37,7 @@ from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.table import Move, RateTable, Step, plan_move
 from sdimu_calibration.nodes.credits import HISTORY, LATCHED, NS, header, publish
 from sdimu_calibration.nodes.listening import Listener
+from sdimu_calibration.nodes.parameters import Declare
 from sdimu_calibration.nodes.table_progress import MoveProgress, Outcome, Seen
 from sdimu_calibration.nodes.ticking import Ticker
 from sdimu_calibration.nodes.trajectory_messages import braking, trajectory
@@ -321,8 +322,9 @@ class TableDriver:
 
 
 def _declare(node: Node) -> tuple[bool, bool]:
-    declare = node.declare_parameter
-    allowed, ask = bool(declare("allow_motion", False).value), bool(declare("ask", False).value)
-    declare("tolerance_deg", 0.05)
-    declare("rest_deg_s", 0.05)
+    declare = Declare(node)
+    allowed = declare.flag("allow_motion", False, "let trajectories be sent; set to false: motion ends", live=True)
+    ask = declare.flag("ask", False, "wait for a yes on ~/confirm before each move", live=True)
+    declare.number("tolerance_deg", 0.05, "so close to its target a joint has arrived (deg)", least=1e-6, most=5.0)
+    declare.number("rest_deg_s", 0.05, "below this rate a joint is at rest (deg/s)", least=1e-6, most=5.0)
     return allowed, ask

@@ -14,7 +14,7 @@ from rclpy.task import Future
 from std_srvs.srv import Trigger
 
 from sdimu_calibration.core.recording import DataError
-from sdimu_calibration.core.table import assign_turns, steps_of
+from sdimu_calibration.core.table import joints_of, steps_of
 from sdimu_calibration.nodes.parameters import Declare
 from sdimu_calibration.nodes.spinning import run_node
 from sdimu_calibration.nodes.table_driver import Arrival, TableDriver
@@ -23,8 +23,9 @@ from sdimu_calibration.storage.config import load_plan
 from sdimu_calibration.storage.table_file import load_rate_table
 
 FINISH = "rate_table/finish"
-PATIENCE_S = 60.0
-"""Wall time (s) in which joint states must come at the start, and an answer at the end."""
+PATIENCE_S = 300.0
+"""Wall time (s) in which joint states must come at the start, and an answer at the end: a simulated table waits for its
+consumers, which compile for minutes where they have never run."""
 
 
 class TableGoalsNode:
@@ -69,14 +70,9 @@ class TableGoalsNode:
                 self._fail(f"rate_table/joint_states: nothing has come for {PATIENCE_S:.0f} s (is the table on?)")
             return
         try:
-            chosen: tuple[tuple[int, float] | None, ...] = tuple(None for _ in self._plan.turns)
-            if self._table.axes is not None:
-                one, two, three = (limits.reach_rad for limits in self._table.limits)
-                chosen = assign_turns(self._plan, self._table.axes, self._driver.angles, (one, two, three))
+            self._axes = joints_of(self._table, self._driver.angles, self._plan)
         except DataError as error:
             self._fail(str(error))
-            return
-        self._axes = (None, *chosen)
 
     def _take(self, arrival: Arrival) -> None:
         if not arrival.ok:

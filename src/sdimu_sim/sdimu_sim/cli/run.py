@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from sdimu_calibration.cli.options import DomainOption
 from sdimu_sim.cli.simulate import EFFECT, TEMPERATURE
 
 if TYPE_CHECKING:
@@ -38,6 +39,7 @@ def run(
         str | None, typer.Option(metavar="GOALS", help="Choose each turn by what is known; limits as in config/goal.")
     ] = None,
     ask: Annotated[bool, typer.Option(help="With --adaptive: each turn waits for a yes on /adaptive/confirm.")] = False,
+    domain: DomainOption = None,
     out: Annotated[Path, typer.Option(help="Folder of the results.")] = Path("out/run"),
 ) -> None:
     """Run a whole simulated test over ROS 2: table, IMU, calibration and recorder, each its own process."""
@@ -69,7 +71,8 @@ def run(
     for stale in ("result.json", "report.html", "diagnosis.json", "calibration.journal", "choices.json"):
         (out / stale).unlink(missing_ok=True)
     begun = time.monotonic()
-    with own_domain(out / "log"), Children(out / "log") as children:
+    with own_domain(out / "log", domain) as used, Children(out / "log") as children:
+        console.print(f"ROS domain {used}", highlight=False)
         _start(children, options, out / "bag", replace)
         streamed = _watch(console, children, _test(None if adaptive else plan, model, duration))
     wall = time.monotonic() - begun

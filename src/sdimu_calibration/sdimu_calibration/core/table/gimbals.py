@@ -71,6 +71,7 @@ def assign_turns(
     axes: tuple[str, str, str],
     start: Floats | None = None,
     reach_rad: tuple[float, float, float] = (math.inf, math.inf, math.inf),
+    tolerance_rad: float = PARALLEL_RAD,
 ) -> tuple[tuple[int, float], ...]:
     """Which gimbal axis makes each turn, and in which sense.
 
@@ -86,6 +87,8 @@ def assign_turns(
         Angles at the start (rad); zero when left out.
     reach_rad : tuple of float
         Largest angle of each axis either way (rad).
+    tolerance_rad : float
+        How far from parallel still counts (rad): encoders read a start that is nearly zero.
 
     Returns
     -------
@@ -102,7 +105,7 @@ def assign_turns(
     furthest = 0
     choice: list[tuple[int, float]] = []
     angles = [np.zeros(3) if start is None else np.asarray(start, dtype=np.float64)]
-    untried = [_choices(plan, 0, angles[0], axes)]
+    untried = [_choices(plan, 0, angles[0], axes, tolerance_rad)]
     while len(choice) < len(plan.turns):
         number = len(choice)
         furthest = max(furthest, number)
@@ -126,12 +129,14 @@ def assign_turns(
             continue
         choice.append((k, sign))
         angles.append(after)
-        untried.append(_choices(plan, number + 1, after, axes))
+        untried.append(_choices(plan, number + 1, after, axes, tolerance_rad))
     return tuple(choice)
 
 
-def _choices(plan: Plan, number: int, angles: Floats, axes: tuple[str, str, str]) -> list[tuple[int, float]]:
-    return axes_along(plan.turns[number].axis, angles, axes) if number < len(plan.turns) else []
+def _choices(
+    plan: Plan, number: int, angles: Floats, axes: tuple[str, str, str], tolerance_rad: float
+) -> list[tuple[int, float]]:
+    return axes_along(plan.turns[number].axis, angles, axes, tolerance_rad) if number < len(plan.turns) else []
 
 
 def _state(angles: Floats, bounded: bool) -> tuple[float, ...]:

@@ -156,6 +156,32 @@ def steps_of(plan: Plan) -> tuple[Step, ...]:
     )
 
 
+def joints_of(table: RateTable, angles: Floats, plan: Plan) -> tuple[tuple[int, float] | None, ...]:
+    """Choose the joint and sense of each step of a plan so that every later turn is possible.
+
+    Parameters
+    ----------
+    table : RateTable
+    angles : ndarray, shape (3,)
+        Where the joints are at the start (rad).
+    plan : Plan
+
+    Returns
+    -------
+    tuple of (int, float) or None
+        One a step; None where nothing is to be chosen.
+
+    Raises
+    ------
+    DataError
+        As `assign_turns`.
+    """
+    if table.axes is None:
+        return tuple(None for _ in plan.dwell_s)
+    first, middle, last = (limits.reach_rad for limits in table.limits)
+    return (None, *assign_turns(plan, table.axes, angles, (first, middle, last), _ALONG_RAD))
+
+
 def moves_of(table: RateTable, angles: Floats, plan: Plan) -> tuple[Move, ...]:
     """Make the moves of a whole plan, with the joints chosen so that every later turn is possible.
 
@@ -172,12 +198,8 @@ def moves_of(table: RateTable, angles: Floats, plan: Plan) -> tuple[Move, ...]:
         As `assign_turns` and `plan_move`.
     """
     here = np.asarray(angles, dtype=np.float64)
-    chosen: tuple[tuple[int, float] | None, ...] = tuple(None for _ in plan.turns)
-    if table.axes is not None:
-        first, middle, last = (limits.reach_rad for limits in table.limits)
-        chosen = assign_turns(plan, table.axes, here, (first, middle, last))
     moves = []
-    for step, axis in zip(steps_of(plan), (None, *chosen), strict=True):
+    for step, axis in zip(steps_of(plan), joints_of(table, here, plan), strict=True):
         moves.append(plan_move(table, here, step, axis))
         here = np.asarray(moves[-1].target)
     return tuple(moves)

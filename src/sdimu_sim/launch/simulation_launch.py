@@ -1,0 +1,87 @@
+"""A whole simulated test: table, IMU, calibration and recorder.
+
+    ros2 launch sdimu_sim simulation_launch.py plan:=recommended out:=out/run
+    ros2 launch sdimu_sim simulation_launch.py drive:=plan allow_motion:=true        # the plan by trajectories
+    ros2 launch sdimu_sim simulation_launch.py drive:=adaptive allow_motion:=true    # the test chooses its turns
+"""
+
+from launch.actions import DeclareLaunchArgument
+from launch.conditions import IfCondition
+from launch.substitutions import LaunchConfiguration, PathJoinSubstitution, PythonExpression
+from launch_ros.actions import Node
+from launch_ros.parameter_descriptions import ParameterValue
+
+from launch import LaunchDescription
+
+ARGUMENTS = (
+    ("namespace", "", "of all nodes: two tests in one graph have two"),
+    ("plan", "kim18", "test plan: name in config/plan or path"),
+    ("table", "ideal", "rate table: name in config/table or path"),
+    ("imu", "dtg", "IMU: name in config/imu or path"),
+    ("site", "daejeon", "site: name in config/site or path"),
+    ("model", "baseline", "model to estimate: name in config/model or path"),
+    ("seed", "1", "of errors, mount and noise"),
+    ("speed", "0.0", "times real time; 0: as fast as nothing gets lost"),
+    ("rate_hz", "100.0", "samples of the IMU a second"),
+    ("out", "out/run", "folder of the results"),
+    ("drive", "", "plan: by trajectories; adaptive: the test chooses its turns; empty: the table plays the plan"),
+    ("goals", "table33", "limits that an adaptive test is to reach: name in config/goal or path"),
+    ("allow_motion", "false", "let trajectories be sent"),
+    ("ask", "false", "ask before each move"),
+)
+
+
+def argument(name, kind=str):
+    """Return the value of a launch argument as a parameter of that type."""
+    return ParameterValue(LaunchConfiguration(name), value_type=kind)
+
+
+def generate_launch_description():
+    """Declare the arguments and start the nodes; each waits for those it feeds."""
+    out, namespace = LaunchConfiguration("out"), LaunchConfiguration("namespace")
+
+    def node(package, executable, name, parameters, condition=None):
+        return Node(
+            package=package, executable=executable, name=name, namespace=namespace, parameters=[parameters],
+            output="screen", condition=condition,
+        )  # fmt: skip
+
+    table = {
+        "plan": argument("plan"), "table": argument("table"), "seed": argument("seed", int),
+        "speed": argument("speed", float), "consumers": 1, "status_peers": 2, "joint_peers": 1,
+    }  # fmt: skip
+
+    def driven(*ways):
+        drive = LaunchConfiguration("drive")
+        return IfCondition(PythonExpression(["'", drive, "' in ", repr(ways)]))
+
+    driving = {
+        "table": argument("table"), "finish": True, "allow_motion": argument("allow_motion", bool),
+        "ask": argument("ask", bool),
+    }  # fmt: skip
+    return LaunchDescription([
+        *(DeclareLaunchArgument(name, default_value=default, description=text) for name, default, text in ARGUMENTS),
+        node("sdimu_calibration", "recorder_node", "recorder", {
+            "out": PathJoinSubstitution([out, "bag"]),
+            "wait_for": ["imu/data_raw", "rate_table/status", "calibration/coefficients"],
+        }),
+        node("sdimu_calibration", "calibration_node", "calibration", {
+            "site": argument("site"), "imu": argument("imu"), "model": argument("model"), "out": out,
+            "gyro_unit": "rad/s", "gyro_sign": 1,
+        }),
+        node("sdimu_sim", "sdimu_node", "sdimu", {
+            "imu": argument("imu"), "site": argument("site"), "plan": argument("plan"),
+            "seed": argument("seed", int), "rate_hz": argument("rate_hz", float),
+            "truth_file": PathJoinSubstitution([out, "truth.yaml"]), "consumers": 2,
+        }),
+        node("rate_table_sim", "rate_table_node", "rate_table", table, driven("")),
+        node(
+            "rate_table_sim", "rate_table_node", "rate_table", table | {"follow_goals": True},
+            driven("plan", "adaptive"),
+        ),
+        node("sdimu_calibration", "table_goals", "table_goals", driving | {"plan": argument("plan")}, driven("plan")),
+        node("sdimu_calibration", "adaptive", "adaptive", driving | {
+            "imu": argument("imu"), "site": argument("site"), "model": argument("model"), "goals": argument("goals"),
+            "gyro_unit": "rad/s", "gyro_sign": 1, "out": out,
+        }, driven("adaptive")),
+    ])  # fmt: skip
