@@ -53,6 +53,7 @@ def workbench(
     from sdimu_calibration.report.workbench.app import build
     from sdimu_calibration.report.workbench.fit import FitSession
     from sdimu_calibration.report.workbench.recording_cache import RecordingCache, neighbours
+    from sdimu_calibration.report.workbench.setting import Setting
     from sdimu_calibration.storage.config import load_imu, load_site
     from sdimu_calibration.storage.model_choice import named_model
     from sdimu_calibration.storage.opening import open_test
@@ -81,8 +82,8 @@ def workbench(
     with bar(plain(stderr=True)) as progress:
         progress("reading", 0.0)
         bench = shelf.bench()
-        bench.fit((), (), progress)
-        bench.missing((), (), progress)
+        bench.fit(Setting(), progress)
+        bench.missing(Setting(), progress)
     logging.getLogger("werkzeug").setLevel(logging.ERROR)
     # The address is printed when the port listens: a browser that follows it at once is not refused.
     server = make_server(host, port, build(shelf, host).server, threaded=True)
