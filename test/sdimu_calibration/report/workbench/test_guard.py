@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -18,13 +17,13 @@ from sdimu_calibration.report.workbench.recording_cache import RecordingCache
 from .test_workbench import OWN, Page, bench, shelf  # noqa: F401 (a fixture)
 
 
-def closed(_: Path) -> Any:
+def closed(_: str) -> Any:
     raise DataError("bag: is no recording")
 
 
 @pytest.fixture(scope="module")
 def server() -> Any:
-    return build(RecordingCache({"bag": Path("bag")}, closed)).server
+    return build(RecordingCache(["bag"], closed)).server
 
 
 @pytest.mark.parametrize("host", ["127.0.0.1", "127.0.0.1:8050", "localhost:8050", "LOCALHOST", "[::1]:8050"])
@@ -50,7 +49,7 @@ def test_a_page_of_another_site_is_refused(server):
 
 
 def test_an_address_that_was_asked_for_is_answered_too():
-    server = build(RecordingCache({"bag": Path("bag")}, closed), "192.168.1.7").server
+    server = build(RecordingCache(["bag"], closed), "192.168.1.7").server
     assert server.test_client().get("/", headers={"Host": "192.168.1.7:8050"}).status_code == 200
     assert server.test_client().get("/", headers={"Host": "evil.example"}).status_code == 403
 

@@ -14,16 +14,17 @@ from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.diagnosis.advice import reason, telling_turn
 from sdimu_calibration.core.diagnosis.found import DetectableSize
 from sdimu_calibration.core.diagnosis.plan_seen import plan_seen
+from sdimu_calibration.core.diagnosis.problem import Problem
 from sdimu_calibration.core.diagnosis.rounds import LEAST_SIGMAS
 from sdimu_calibration.core.diagnosis.scan import TESTABLE
-from sdimu_calibration.core.diagnosis.search import Problem, look_alikes
+from sdimu_calibration.core.diagnosis.search import look_alikes
 from sdimu_calibration.core.estimation.fit import Fit
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.evidence.navigation_evidence import NavigationEvidence
 from sdimu_calibration.core.results import Calibration
 
 RAISED = 10.0
-"""Ratio (1) of a coefficient's sigma with an addition to that without: from it on the data do not tell the two apart."""
+"""Ratio (1) of a coefficient's sigma with an addition to that without: from there the data do not tell them apart."""
 _CONTRADICTED = 4.5
 """Size of an added coefficient (sigma of what physics gives it) from which it is contradicted: chance puts one in 150
 000 there."""

@@ -35,7 +35,7 @@ def heat_map(grid: data.Grid, cell: tuple[int, int]) -> Figure:
     # Colours repeat what the numbers say: their scale would take the room of three stops.
     figure.data[0] |= {"showscale": False, "textfont": {"size": _CELL}}
     figure.layout |= {"height": HEIGHT, "margin": _SHORT | {"l": 80}}
-    figure.y_axes(title="")
+    figure.y_axes(title="channel", standoff=0)
     return figure
 
 
@@ -45,7 +45,7 @@ def ranking(entries: Sequence[data.Scored], threshold: float) -> Figure:
     figure = evidence_figures.ranking(shown, threshold)
     del figure.data[1]
     figure.x_axes(range=[0, 1.05 * max([abs(e.z) for e in shown] + [threshold])])
-    figure.y_axes(title="", tickfont={"size": 11})
+    figure.y_axes(title="candidate", standoff=0, tickfont={"size": 11})
     figure.layout |= {"showlegend": False, "height": HEIGHT, "margin": _SHORT | {"l": 20, "t": 22}}
     return figure
 
@@ -157,8 +157,8 @@ def ladder(names: Sequence[str], values: Sequence[float], at_held: Sequence[floa
     numbers = [v for v in (*values, *at_held, 1.0) if v is not None]
     low, high = min(numbers), max(numbers)
     room = max(0.3 * (high - low), 0.02)
-    figure.x_axes(title="held-out RMS (sigma); 1 is right", range=[low - 0.3 * room, high + 1.4 * room])
-    figure.y_axes(type="category", autorange="reversed", ticks="", automargin=True)
+    figure.x_axes(title="held-out RMS, 1 is right (sigma)", range=[low - 0.3 * room, high + 1.4 * room])
+    figure.y_axes(type="category", autorange="reversed", ticks="", automargin=True, title="model", standoff=0)
     return lay_out(figure, HEIGHT, margin=_SHORT | {"l": 20, "r": 40})
 
 
