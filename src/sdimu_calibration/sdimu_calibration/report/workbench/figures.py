@@ -182,4 +182,6 @@ def finished(figure: Figure, look: Any) -> Any:
     made.update_traces(textfont_size=12 * scale, selector={"type": "heatmap"})
     made.update_traces(marker_size=8 * scale, selector={"type": "scatter"})
     made.update_annotations(font_size=_FONT * scale)
+    made.update_yaxes(tickfont_size=11 * scale)
+    made.update_layout(legend_font_size=11 * scale)
     return made

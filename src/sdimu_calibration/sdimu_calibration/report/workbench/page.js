@@ -20,6 +20,17 @@
   }
   setTimeout(ask, ALIVE_MS);
 
+  // Components of Dash lack names, and hide elements that a keyboard still reaches: said and mended here.
+  var NAMES = {shows: 'What is shown', which: 'Which stops', candidate: 'Candidate', channel: 'Channel', against: 'Against', added: 'Added effect', held: 'Stops left out', recording: 'Recording', coefficient: 'Coefficient'};
+  function mend() {
+    document.querySelectorAll('.dash-dropdown-focus-target').forEach(function (input) { input.tabIndex = -1; });
+    document.querySelectorAll('.dash-radioitems').forEach(function (list) { list.setAttribute('role', 'radiogroup'); });
+    document.querySelectorAll('.dash-radioitems label').forEach(function (label) { label.removeAttribute('role'); label.removeAttribute('aria-selected'); });
+    document.querySelectorAll('#upload input').forEach(function (input) { input.setAttribute('aria-label', 'Effect file'); input.tabIndex = -1; });
+    Object.keys(NAMES).forEach(function (id) { if (at(id)) { at(id).setAttribute('aria-label', NAMES[id]); } });
+  }
+  new MutationObserver(mend).observe(document.documentElement, {childList: true, subtree: true});
+
   function candidate(by) {
     var figure = document.querySelector('#ranking .js-plotly-plot');
     if (!figure || !figure.data.length) { return; }

@@ -83,7 +83,8 @@ def coefficients(given: Fitted, now: Fitted, setting: Setting) -> Any:
         if name in at and sigma[k] > 0.0:
             before = as_far([from_si(float(first.values[at[name]]), unit)], spread)[0]
             moved = f"{(here.values[k] - first.values[at[name]]) / sigma[k]:+.1f}"
-        numbers = as_far([value, spread], spread) if spread > 0.0 else [f"{value:.6g}", "0"]
+        known = f"{value:.6g}" if now.prior[k] == 0.0 else "0"
+        numbers = as_far([value, spread], spread) if spread > 0.0 else [known, "0"]
         state = "fixed" if now.prior[k] == 0.0 else "by the frame" if not sigma[k] > 0.0 else "free"
         shown = f"{mean:.4g} \N{PLUS-MINUS SIGN} {prior:.4g}" if mean else f"\N{PLUS-MINUS SIGN} {prior:.4g}"
         cells = [name, *numbers, unit, shown, f"{state}, own prior" if name in changed and state == "free" else state]
