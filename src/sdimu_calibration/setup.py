@@ -103,7 +103,7 @@ setup(
     platforms=["Linux x86_64"],
     python_requires=">=3.10",
     packages=find_packages(),
-    package_data={NAME: ["py.typed", "report/design/*.css", "report/design/*.js"]},
+    package_data={NAME: ["py.typed", "report/*/*.css", "report/*/*.js"]},
     cmdclass={"build_py": BuildWithConfig},
     install_requires=RUN_TIME,
     extras_require=EXTRAS,

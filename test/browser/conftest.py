@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -60,12 +61,19 @@ def workbench(browser: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterato
     subprocess.run(making, check=True, capture_output=True, timeout=START_S)
     (folder / "broken.mcap").write_bytes(b"this is no recording")
     port = 20000 + os.getpid() % 20000
+    with serving(port, bag):
+        yield Workbench(f"http://127.0.0.1:{port}/", folder, bag)
+
+
+@contextmanager
+def serving(port: int, *arguments: object) -> Iterator[subprocess.Popen[str]]:
+    """Serve a workbench until the end of the block, or until it is ended there."""
     process = subprocess.Popen(
-        sdimu("workbench", bag, "--port", port), stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+        sdimu("workbench", *arguments, "--port", port), stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
     )
     try:
         _wait_until_it_says("http://", process)
-        yield Workbench(f"http://127.0.0.1:{port}/", folder, bag)
+        yield process
     finally:
         process.terminate()
         process.wait(20)
@@ -105,15 +113,19 @@ def visit(browser: Any, workbench: Workbench) -> Iterator[Callable[[], Any]]:
     assert complaints == []
 
 
+_SETTLED = """
+(() => {
+  const drawn = name => document.querySelector(`#${name} .js-plotly-plot`)?._fullData?.length;
+  return document.querySelector('#verdict')?.textContent && document.querySelector('#busy').hidden
+    && !document.querySelector('[data-dash-is-loading]')
+    && ['heat', 'residuals', 'ranking', 'ladder'].every(drawn);
+})()
+"""
+
+
 def settle(page: Any) -> None:
     """Wait until nothing is being worked on, verdict and candidates included."""
-    page.wait_for_function(
-        "document.querySelector('#verdict')?.textContent && document.querySelector('#busy').hidden"
-        " && !document.querySelector('#verdict').classList.contains('stale')"
-        " && document.querySelector('#ranking .main-svg')"
-    )
     # One callback follows another: still the same after a moment means the last one is done.
-    page.wait_for_timeout(300)
-    page.wait_for_function(
-        "document.querySelector('#busy').hidden && !document.querySelector('#verdict').classList.contains('stale')"
-    )
+    for _ in range(3):
+        page.wait_for_function(_SETTLED)
+        page.wait_for_timeout(300)

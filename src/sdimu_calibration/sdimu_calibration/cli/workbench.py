@@ -1,14 +1,14 @@
-"""`sdimu workbench`: look at a recording in the browser, add effects, watch the error fall."""
+"""`sdimu workbench`: look at recordings in the browser, add effects, watch the error fall."""
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from sdimu_calibration.cli.console import plain
 from sdimu_calibration.cli.options import ImuOption
+from sdimu_calibration.cli.set_run import Bags, SetOption, single
 from sdimu_calibration.cli.source_options import (
     AccelSign,
     AccelUnit,
@@ -21,18 +21,24 @@ from sdimu_calibration.cli.source_options import (
     source,
 )
 
+if TYPE_CHECKING:
+    from sdimu_calibration.core.estimation.prepared_test import PreparedTest
+
 HOST = "127.0.0.1"
 
 
 def workbench(
-    bag: Annotated[Path, typer.Argument(metavar="BAG", help="rosbag2 folder or .mcap file.")],
+    bags: Bags = None,
     port: Annotated[int, typer.Option(min=1, max=65535, help="Port on this machine.")] = 8050,
-    model: Annotated[str, typer.Option(help="Model to start from: name in config/model or path.")] = "baseline",
+    model: Annotated[
+        str | None, typer.Option(help="Model to start from: name in config/model or path; baseline when left out.")
+    ] = None,
     site: Annotated[
         str | None, typer.Option(help="Where the test was: name in config/site or path; daejeon when left out.")
     ] = None,
     imu: ImuOption = None,
     host: Annotated[str, typer.Option(help="Address to listen on; others than this machine only when asked.")] = HOST,
+    set_file: SetOption = None,
     imu_topic: ImuTopic = None,
     status_topic: StatusTopic = None,
     joint_topic: JointTopic = None,
@@ -42,17 +48,21 @@ def workbench(
     accel_sign: AccelSign = None,
     gyro_sign: GyroSign = None,
 ) -> None:
-    """Open a recording in the browser; runs until it is stopped with Ctrl-C."""
+    """Open recordings in the browser; runs until it is stopped with Ctrl-C."""
     import logging
     import socket
+    from collections.abc import Callable, Mapping
+    from functools import partial
 
     from werkzeug.serving import make_server
 
     from sdimu_calibration.cli.progress import bar
+    from sdimu_calibration.cli.set_bench import bench_of_set
     from sdimu_calibration.core.recording import DataError
     from sdimu_calibration.report.workbench.app import build
     from sdimu_calibration.report.workbench.fit import FitSession
     from sdimu_calibration.report.workbench.recording_cache import RecordingCache, neighbours
+    from sdimu_calibration.report.workbench.setting import Setting
     from sdimu_calibration.storage.config import load_imu, load_site
     from sdimu_calibration.storage.model_choice import named_model
     from sdimu_calibration.storage.opening import open_test
@@ -66,25 +76,44 @@ def workbench(
     origin = source(
         imu_topic, status_topic, joint_topic, temperature_topic, accel_unit, gyro_unit, accel_sign, gyro_sign
     )
+    bag, judge = single(bags, set_file), None
+    openers: Mapping[str, Callable[[], PreparedTest]]
+    if bag is None:
+        openers, wanted, judge = bench_of_set(bags or [], set_file, model, site, imu, origin)
+    else:
+        around = neighbours(bag)
+        openers = {name: partial(open_test, path, site, specification, origin) for name, path in around.items()}
 
-    def session(path: Path) -> FitSession:
-        test = open_test(path, site, specification, origin)
-        if test.why_handheld:
-            raise DataError(
-                f"{path.name}: a handheld run, in which nothing is navigated ({test.why_handheld}): use sdimu diagnose "
-                f"{path.name} (its report has the same figures)"
-            )
-        return FitSession(test, wanted)
+    def session(name: str) -> FitSession:
+        return FitSession(navigated(name, openers[name]()), wanted)
 
-    shelf = RecordingCache(neighbours(bag), session)
+    shelf = RecordingCache(list(openers), session)
     console = plain()
     with bar(plain(stderr=True)) as progress:
         progress("reading", 0.0)
         bench = shelf.bench()
-        bench.fit((), (), progress)
-        bench.missing((), (), progress)
+        bench.fit(Setting(), progress)
+        bench.missing(Setting(), progress)
     logging.getLogger("werkzeug").setLevel(logging.ERROR)
     # The address is printed when the port listens: a browser that follows it at once is not refused.
-    server = make_server(host, port, build(shelf, host).server, threaded=True)
-    console.print(f"workbench of {bag.name} at http://{host}:{port} (Ctrl-C ends it)", soft_wrap=True)
+    server = make_server(host, port, build(shelf, host, judge).server, threaded=True)
+    console.print(f"workbench of {shelf.names[0]} at http://{host}:{port} (Ctrl-C ends it)", soft_wrap=True)
     server.serve_forever()
+
+
+def navigated(name: str, test: PreparedTest) -> PreparedTest:
+    """Return a test that is navigated.
+
+    Raises
+    ------
+    DataError
+        When a hand turned the IMU: there are no stops to navigate between.
+    """
+    from sdimu_calibration.core.recording import DataError
+
+    if test.why_handheld:
+        raise DataError(
+            f"{name}: a handheld run, in which nothing is navigated ({test.why_handheld}): use sdimu diagnose "
+            f"{name} (its report has the same figures)"
+        )
+    return test

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -18,13 +17,13 @@ from sdimu_calibration.report.workbench.recording_cache import RecordingCache
 from .test_workbench import OWN, Page, bench, shelf  # noqa: F401 (a fixture)
 
 
-def closed(_: Path) -> Any:
+def closed(_: str) -> Any:
     raise DataError("bag: is no recording")
 
 
 @pytest.fixture(scope="module")
 def server() -> Any:
-    return build(RecordingCache({"bag": Path("bag")}, closed)).server
+    return build(RecordingCache(["bag"], closed)).server
 
 
 @pytest.mark.parametrize("host", ["127.0.0.1", "127.0.0.1:8050", "localhost:8050", "LOCALHOST", "[::1]:8050"])
@@ -50,7 +49,7 @@ def test_a_page_of_another_site_is_refused(server):
 
 
 def test_an_address_that_was_asked_for_is_answered_too():
-    server = build(RecordingCache({"bag": Path("bag")}, closed), "192.168.1.7").server
+    server = build(RecordingCache(["bag"], closed), "192.168.1.7").server
     assert server.test_client().get("/", headers={"Host": "192.168.1.7:8050"}).status_code == 200
     assert server.test_client().get("/", headers={"Host": "evil.example"}).status_code == 403
 
@@ -85,16 +84,23 @@ def test_a_page_reads_no_file_of_the_server(tmp_path):
 
 
 BAD = [
-    {"added": [], "held": [9999]},
-    {"added": [], "held": [-1]},
+    {"now": {"held": [9999]}},
+    {"now": {"held": [-1]}},
+    {"now": {"cut": [[5.0]]}},
+    {"now": {"cut": [[700.0, 1e9], [-5.0, 3.0]]}},
+    {"now": {"cut": [[9.0, 8.0]]}},
+    {"now": {"priors": [["gyro_bias_x", "1 ppm", "1 deg/h"]]}},
+    {"now": {"priors": [["nobody", "1 deg/h", "nan deg/h"]]}},
+    {"now": {"priors": "abc"}},
+    {"now": 7},
     {"cell": [99, 0]},
     {"cell": [-5, 10**9]},
     {"cell": [0, 1e400]},
-    {"added": ["gyro_bias"]},
-    {"added": ["/etc/passwd"]},
-    {"added": ["a\nb"]},
-    {"added": [[]], "past": 7},
-    {"seen": [[["x"], [4]]], "past": [[["no"], [1]]]},
+    {"now": {"added": ["gyro_bias"]}},
+    {"now": {"added": ["/etc/passwd"]}},
+    {"now": {"added": ["a\nb"]}},
+    {"now": {"added": [[]]}, "past": 7},
+    {"seen": [{"added": ["x"], "held": [4]}], "past": [{"added": ["no"], "held": [1]}], "future": [{}]},
     {"recording": ["good"]},
     {"recording": "../../etc"},
     {"cell": {}},
@@ -108,14 +114,14 @@ BAD = [
 @pytest.mark.parametrize("state", BAD, ids=str)
 def test_a_bad_state_shows_a_page_and_says_what_is_wrong(bench, state):  # noqa: F811
     page = Page(build(shelf(bench)), state)
-    shown = page.post("heat.figure", "state.modified_timestamp")
+    shown = page.post("numbers.children", "state.modified_timestamp")
     assert shown["title"]["children"].startswith("Workbench")
     page.post("verdict.children", "shown.data", shown_at_data=state)
     page.post("state.data", "undo.n_clicks")
 
 
 def test_a_bad_state_takes_nothing_home_and_is_told(bench):  # noqa: F811
-    for state in ({"recording": "gone"}, {"held": [9999]}, {"added": ["no_such_effect"]}):
+    for state in ({"recording": "gone"}, {"now": {"held": [9999]}}, {"now": {"added": ["no_such_effect"]}}):
         answer = Page(build(shelf(bench)), state).post("file.data", "export.n_clicks")
         assert answer["message"]["children"].startswith("Not done")
         assert "file" not in answer
@@ -126,7 +132,10 @@ def test_a_bad_state_takes_nothing_home_and_is_told(bench):  # noqa: F811
     [
         ("heat.clickData", {"heat_at_clickData": {"points": []}}),
         ("heat.clickData", {"heat_at_clickData": {"points": [{"x": "7", "y": "no channel"}]}}),
-        ("ranking.clickData", {"ranking_at_clickData": {"points": [{}]}}),
+        ("leave-points.n_clicks", {"residuals_at_selectedData": {"points": [{"customdata": ["a", 2]}]}}),
+        ("fix.n_clicks", {"coefficient_at_value": "gyro_bias_x", "mean_at_value": "much"}),
+        ("set-prior.n_clicks", {"coefficient_at_value": "gyro_bias_x", "mean_at_value": "1 deg/h"}),
+        ("fix.n_clicks", {"mean_at_value": "1 deg/h"}),
         ("hold.n_clicks", {"held_at_value": ["a", 1]}),
         ("hold.n_clicks", {"held_at_value": [4711]}),
         ("add.n_clicks", {"candidate_at_value": {"a": 1}}),

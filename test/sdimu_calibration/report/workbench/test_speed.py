@@ -10,6 +10,7 @@ import pytest
 from rate_table_sim.core import TableSpecification
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.report.workbench.fit import FitSession
+from sdimu_calibration.report.workbench.setting import Setting
 from sdimu_calibration.storage.config import load_imu, load_model, load_plan, load_site
 from sdimu_sim.core.scenario import Scenario, generate
 
@@ -25,13 +26,13 @@ def test_a_refit_of_298000_samples_takes_less_than_three_seconds(capsys):
     recording = generate(Scenario(plan, imu, site, table, rate_hz=100.0, seed=7, effects=effects))[0]
     assert len(recording.t) == 298_000
     bench = FitSession(PreparedTest(recording, imu, site), load_model("baseline"))
-    bench.fit((), ())
-    bench.missing((), ())
+    bench.fit(Setting())
+    bench.missing(Setting())
     for added in (("gyro_scale_asymmetry_y",), ("gyro_scale_asymmetry_y", "accel_quadratic_x")):
         start = time.process_time()
-        bench.fit(added, ())
+        bench.fit(Setting(added))
         numbers = time.process_time() - start
-        bench.missing(added, ())
+        bench.missing(Setting(added))
         with capsys.disabled():
             took = time.process_time() - start
             sys.stdout.write(f"\nrefit: numbers {numbers:.2f} s, with candidates {took:.2f} s of processor")

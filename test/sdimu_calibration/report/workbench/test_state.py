@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 
+from sdimu_calibration.report.workbench.setting import Setting
 from sdimu_calibration.report.workbench.state import State, from_json
 
 
@@ -12,15 +13,20 @@ def test_undo_goes_back_through_every_step():
     for step in (lambda s: s.add("a"), lambda s: s.add("b"), lambda s: s.hold((3, 1)), lambda s: s.drop("a")):
         steps.append(step(steps[-1]))
     state = steps[-1]
-    assert (state.added, state.held) == (("b",), (1, 3))
+    assert (state.now.added, state.now.held) == (("b",), (1, 3))
     for before in reversed(steps[:-1]):
         state = state.undo()
-        assert state == before
-    assert state.undo() == state
+        assert (state.now, state.past) == (before.now, before.past)
+    assert state.undo() is state
+    for after in steps[1:]:
+        state = state.redo()
+        assert (state.now, state.past) == (after.now, after.past)
+    assert state.redo() is state
 
 
 def test_a_reload_of_the_page_loses_nothing():
     state = State().add("a").add("own: 1\nname: x").hold((4,)).look(8, 2)
+    state = state.then(state.now.without_span(3.0, 4.5).with_prior("a_x", "1 ppm", "0 ppm")).undo()
     assert from_json(json.loads(json.dumps(state.as_json()))) == state
 
 
@@ -33,3 +39,30 @@ def test_steps_that_change_nothing_are_no_steps():
     assert state.add("a") is state
     assert state.drop("b") is state
     assert state.hold(()) is state
+
+
+def test_spans_that_touch_become_one_and_are_cut_where_points_come_back():
+    setting = Setting().without_span(10.0, 12.0).without_span(20.0, 21.0).without_span(12.0, 13.0)
+    assert setting.cut == ((10.0, 13.0), (20.0, 21.0))
+    assert setting.with_span(11.0, 12.0).cut == ((10.0, 11.0), (12.0, 13.0), (20.0, 21.0))
+    assert setting.with_span(0.0, 30.0).cut == ()
+
+
+def test_the_priors_of_an_effect_go_with_it():
+    own = "format: sdimu-effect/1\nname: bent\n"
+    state = State().add("gyro_drift").add(own)
+    setting = state.now
+    for name in ("gyro_bias_x", "gyro_drift_x", "bent_k"):
+        setting = setting.with_prior(name, "0 ppm", "1 ppm")
+    state = state.then(setting)
+    assert [name for name, _, _ in state.drop(own).now.priors] == ["gyro_bias_x", "gyro_drift_x"]
+    assert [name for name, _, _ in state.drop("gyro_drift").now.priors] == ["bent_k", "gyro_bias_x"]
+    assert [name for name, _, _ in state.now.given.priors] == ["gyro_bias_x"]
+
+
+def test_a_page_sends_no_more_than_its_last_hundred_steps():
+    state = State()
+    for stop in range(150):
+        state = state.hold((stop,))
+    assert len(state.past) == 100
+    assert state.undo().now.held == (148,)

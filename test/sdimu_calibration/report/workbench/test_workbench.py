@@ -6,7 +6,6 @@ import base64
 import io
 import json
 import zipfile
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,11 +13,14 @@ import pytest
 
 from sdimu_calibration.core.estimation.outcome import calibrate
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
+from sdimu_calibration.core.estimation.solve import solve
 from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.units import from_si
 from sdimu_calibration.report.workbench.app import build
 from sdimu_calibration.report.workbench.fit import FitSession
+from sdimu_calibration.report.workbench.parts import numbers
 from sdimu_calibration.report.workbench.recording_cache import RecordingCache, neighbours
-from sdimu_calibration.report.workbench.view import numbers
+from sdimu_calibration.report.workbench.setting import Setting
 from sdimu_calibration.storage.config import load_imu, load_model, load_site
 from sdimu_calibration.storage.effect_file import extended_model
 
@@ -44,12 +46,12 @@ def bench(recording: Any) -> FitSession:
 def shelf(bench: FitSession) -> RecordingCache:
     """A shelf with one recording that reads, and one that does not."""
 
-    def make(path: Path) -> FitSession:
-        if path.name == "bad":
+    def make(name: str) -> FitSession:
+        if name == "bad":
             raise DataError("bad: is no recording")
         return bench
 
-    return RecordingCache({"good": Path("good"), "bad": Path("bad")}, make)
+    return RecordingCache(["good", "bad"], make)
 
 
 @pytest.fixture(scope="module")
@@ -68,8 +70,14 @@ class Page:
         return self.post_all(output, changed, **values)["response"]
 
     def post_all(self, output: str, changed: str, **values: Any) -> dict[str, Any]:
-        known = {"state.data": self.state, **{k.replace("__", "-").replace("_at_", "."): v for k, v in values.items()}}
-        (callback,) = [c for c in self.callbacks if output in c["output"] and c["clientside_function"] is None]
+        look = {"scale": 1, "theme": "light"}
+        told = {k.replace("__", "-").replace("_at_", "."): v for k, v in values.items()}
+        known = {"state.data": self.state, "look.data": look, **told}
+        (callback,) = [
+            c for c in self.callbacks
+            if output in c["output"] and c["clientside_function"] is None
+            and changed in {f"{one['id']}.{one['property']}" for one in c["inputs"]}
+        ]
         parts = [o.rsplit(".", 1) for o in callback["output"].strip(".").split("...")]
         outputs = [{"id": part[0], "property": part[1]} for part in parts]
 
@@ -89,10 +97,19 @@ class Page:
         self.state = answer.get("state", {}).get("data", self.state)
         self.message = answer["message"]["children"]
 
+    def add(self, effect: str) -> None:
+        self.click("add.n_clicks", candidate_at_value=effect)
+
     def shown(self) -> dict[str, Any]:
         """Everything that the page shows: the numbers, then what the candidates say."""
-        numbers = self.post("heat.figure", "state.modified_timestamp")
-        return numbers | self.post("verdict.children", "shown.data", shown_at_data=numbers["shown"]["data"])
+        numbers = self.post("numbers.children", "state.modified_timestamp")
+        kept = {"shown_at_data": numbers["shown"]["data"]}
+        return numbers | self.post("verdict.children", "shown.data", **kept) | self.drawn(numbers)
+
+    def drawn(self, shown: dict[str, Any], **choices: Any) -> dict[str, Any]:
+        """Heat map and residuals of what is chosen."""
+        usual = {"shows_at_value": "now", "which_at_value": "one", "against_at_value": "time (s)"}
+        return self.post("heat.figure", "shown.data", shown_at_data=shown["shown"]["data"], **{**usual, **choices})
 
     @property
     def verdict(self) -> str:
@@ -105,10 +122,11 @@ def test_the_loop_finds_adds_and_takes_home_the_hidden_effect(app, recording, tm
     assert HIDDEN in shown["verdict"]["children"]
     bars = shown["ranking"]["figure"]["data"][0]["y"]
     assert bars[0] == HIDDEN
-    page.click("ranking.clickData", ranking_at_clickData={"points": [{"y": bars[0]}]})
+    chosen = page.post("candidate.value", "ranking.clickData", ranking_at_clickData={"points": [{"y": bars[0]}]})
+    page.add(chosen["candidate"]["value"])
     after = page.shown()
     assert "Nothing stands out" in after["verdict"]["children"]
-    rungs = after["ladder"]["figure"]["data"][0]["y"]
+    rungs = after["ladder"]["figure"]["data"][0]["x"]
     assert rungs[1] < rungs[0]
     # A right model predicts left-out stops to one sigma; 11,000 numbers scatter by 0.7 %.
     assert rungs[1] == pytest.approx(1.0, abs=0.03)
@@ -130,8 +148,8 @@ def test_an_effect_of_ones_own_does_what_the_registered_one_does(app, bench):
     page = Page(app)
     page.click("add-own.n_clicks", own_at_value=OWN)
     assert page.message == ""
-    own = bench.fit((OWN,), ()).calibration
-    registered = bench.fit((HIDDEN,), ()).calibration
+    own = bench.fit(Setting((OWN,))).calibration
+    registered = bench.fit(Setting((HIDDEN,))).calibration
     sigma = registered.covariance[-1, -1] ** 0.5
     assert own.names[-1] == "bent_k"
     # The priors differ (50 against the grade's), the data outweigh both by hundreds.
@@ -159,7 +177,7 @@ def test_bad_effects_are_told_in_the_page_and_change_nothing(app, text, word):
 def test_undo_brings_the_misfit_back(app):
     page = Page(app)
     before = page.verdict
-    page.click("add.n_clicks", candidate_at_value=HIDDEN)
+    page.add(HIDDEN)
     assert page.verdict != before
     page.click("undo.n_clicks")
     assert page.verdict == before
@@ -168,7 +186,7 @@ def test_undo_brings_the_misfit_back(app):
 def test_two_pages_do_not_disturb_each_other_and_a_restart_loses_nothing(app, recording):
     one, other = Page(app), Page(app)
     before = other.verdict
-    one.click("add.n_clicks", candidate_at_value=HIDDEN)
+    one.add(HIDDEN)
     assert other.verdict == before
     restarted = build(shelf(new_bench(recording)))
     # The restarted server fits from cold, the first one went on from the fit before: same numbers to the digits shown.
@@ -178,26 +196,27 @@ def test_two_pages_do_not_disturb_each_other_and_a_restart_loses_nothing(app, re
 def test_a_click_on_a_cell_shows_that_stop_and_channel(app):
     page = Page(app)
     page.click("heat.clickData", heat_at_clickData={"points": [{"x": "7", "y": "accel x"}]})
-    assert "accel x at stop 7" in page.shown()["cell"]["figure"]["layout"]["title"]["text"]
+    assert "accel x at stop 7" in page.shown()["residuals"]["figure"]["layout"]["title"]["text"]
 
 
 def test_held_out_stops_are_predicted_not_fitted(bench):
-    held = bench.fit((HIDDEN,), (5, 9))
+    held = bench.fit(Setting((HIDDEN,), (5, 9)))
     assert not np.isin(held.grid.stops, (5, 9)).any()
     # Errors of the coefficients are common to a stop: some 24 independent numbers, an RMS that scatters by 14 %.
     assert held.at_held == pytest.approx(1.0, abs=3 * 0.14)
-    assert bench.fit((), (5, 9)).at_held > held.at_held
+    assert bench.fit(Setting(held=(5, 9))).at_held > held.at_held
 
 
 def test_a_coefficient_that_is_another_one_is_told(bench):
-    given = bench.fit((), ())
-    assert "gyro_bias_x and gyro_x: 1 cannot be told from each other" in numbers(bench.fit(("gyro_x: 1",), ()), given)
+    given = bench.fit(Setting())
+    twice = bench.fit(Setting(("gyro_x: 1",)))
+    assert "gyro_bias_x and gyro_x: 1 cannot be told from each other" in numbers(twice, given)
     assert "cannot be told" not in numbers(given, given)
 
 
 def test_the_first_stop_cannot_be_held_out(bench):
     with pytest.raises(DataError, match="attitude"):
-        bench.fit((), (bench.stops[0],))
+        bench.fit(Setting(held=(bench.stops[0],)))
 
 
 def test_a_recording_that_cannot_be_read_is_told_and_the_other_stays(app):
@@ -210,8 +229,8 @@ def test_a_recording_that_cannot_be_read_is_told_and_the_other_stays(app):
 
 
 def test_a_state_of_another_server_shows_a_fresh_page_and_says_so(app):
-    page = Page(app, {"added": ["no_such_effect"], "recording": "gone"})
-    shown = page.post("heat.figure", "state.modified_timestamp")
+    page = Page(app, {"now": {"added": ["no_such_effect"]}, "recording": "gone"})
+    shown = page.post("numbers.children", "state.modified_timestamp")
     assert "gone" in shown["message"]["children"]
     assert shown["title"]["children"].endswith("good")
 
@@ -219,7 +238,7 @@ def test_a_state_of_another_server_shows_a_fresh_page_and_says_so(app):
 def test_models_of_a_page_stand_side_by_side_after_an_undo(app):
     page = Page(app)
     page.shown()
-    page.click("add.n_clicks", candidate_at_value=HIDDEN)
+    page.add(HIDDEN)
     page.shown()
     page.click("undo.n_clicks")
     body = page.shown()["models"]["children"]["props"]["children"][1]["props"]["children"]
@@ -238,6 +257,134 @@ def test_recordings_beside_the_one_asked_for_are_offered(tmp_path):
 
 def test_numbers_do_not_wait_for_candidates(recording):
     told: list[str] = []
-    new_bench(recording).fit((), (), lambda word, _share: told.append(word))
+    new_bench(recording).fit(Setting(), lambda word, _share: told.append(word))
     assert "passes" in told
     assert "candidates" not in told
+
+
+def test_undo_and_redo_walk_the_steps_and_a_new_step_forgets_the_way_forward(app):
+    page = Page(app)
+    page.add(HIDDEN)
+    page.click("toggle-stop.n_clicks", stop_at_data=5)
+    both = page.state["now"]
+    page.click("undo.n_clicks")
+    page.click("undo.n_clicks")
+    assert page.state["now"] == {"added": [], "held": [], "cut": [], "priors": []}
+    page.click("undo.n_clicks")
+    assert page.message == "Nothing to undo."
+    page.click("redo.n_clicks")
+    page.click("redo.n_clicks")
+    assert page.state["now"] == both
+    page.click("undo.n_clicks")
+    page.click("toggle-stop.n_clicks", stop_at_data=7)
+    page.click("redo.n_clicks")
+    assert page.message == "Nothing to redo."
+
+
+def test_points_that_are_selected_are_left_out_and_taken_in_again(app, bench):
+    page = Page(app)
+    drawn = page.shown()["residuals"]["figure"]["data"][0]
+    spans = drawn["customdata"][10:13]
+    points = {"points": [{"customdata": span} for span in spans]}
+    page.click("leave-points.n_clicks", residuals_at_selectedData=points)
+    ((begin, end),) = page.state["now"]["cut"]
+    assert (begin, end) == (pytest.approx(spans[0][0], abs=0.01), pytest.approx(spans[-1][1], abs=0.01))
+    fitted = bench.fit(Setting(cut=((begin, end),)))
+    assert np.isfinite(fitted.left_out).any(axis=1).sum() == len(spans)
+    # What is left out is drawn apart, with the error by which the others predict it.
+    shown = page.shown()["residuals"]["figure"]["data"]
+    assert [trace["name"] for trace in shown] == ["residual", "left out"]
+    assert len(shown[1]["customdata"]) == len(spans)
+    page.click("take-points.n_clicks", residuals_at_selectedData=points)
+    assert page.state["now"]["cut"] == []
+
+
+def test_a_coefficient_is_fixed_given_a_prior_and_freed(app, bench):
+    page = Page(app)
+    free = bench.fit(Setting()).calibration
+    # Where it is already, so that the noise that is learned stays what it is.
+    mean = f"{from_si(free.values[0], 'deg/h'):.6f} deg/h"
+    one = {"coefficient_at_value": "gyro_bias_x", "mean_at_value": mean, "sigma_at_value": "0.0001 deg/h"}
+    page.click("fix.n_clicks", **one)
+    assert page.state["now"]["priors"] == [["gyro_bias_x", mean, "0 deg/h"]]
+    fixed = bench.fit(Setting(priors=(("gyro_bias_x", mean, "0 deg/h"),))).calibration
+    assert fixed.covariance[0, 0] == 0.0
+    assert fixed.values[0] == pytest.approx(free.values[0], rel=1e-5)
+    page.click("set-prior.n_clicks", **one)
+    told = bench.fit(Setting(priors=(("gyro_bias_x", mean, "0.0001 deg/h"),))).calibration
+    assert 0.0 < told.covariance[0, 0] < free.covariance[0, 0]
+    page.click("free.n_clicks", **one)
+    assert page.state["now"]["priors"] == []
+    page.click("fix.n_clicks", **{**one, "mean_at_value": "0.5 ppm"})
+    assert "wrong unit" in page.message
+    assert page.state["now"]["priors"] == []
+
+
+def test_a_candidate_is_shown_with_what_it_would_take_before_it_is_added(app, bench):
+    page = Page(app)
+    kept = {"shown_at_data": page.shown()["shown"]["data"]}
+    looked = page.post("preview.children", "candidate.value", candidate_at_value=HIDDEN, **kept)
+    assert "df_i = K2_i a_i^2" in json.dumps(looked["preview"]["children"])
+    found = bench.preview(Setting(), HIDDEN)
+    assert found.what.objections == ()
+    after = bench.fit(Setting((HIDDEN,)))
+    # The linear model, before the fit, says what the fit then finds; noise that was learned weighs stops otherwise.
+    sigma = after.calibration.covariance[-1, -1] ** 0.5
+    sigma = max(sigma, found.what.sigma[0])
+    assert found.what.estimate[0] == pytest.approx(after.calibration.values[-1], abs=3.0 * sigma)
+    assert found.what.held_out[1] == pytest.approx(after.held_out, abs=0.01)
+    drawn = page.drawn({"shown": {"data": kept["shown_at_data"]}}, looked_at_data=HIDDEN)
+    assert "would take" in drawn["residuals"]["figure"]["data"][-1]["name"]
+
+
+def test_a_degenerate_addition_is_objected_to_before_and_after_and_gets_no_tick(app, bench):
+    before = " ".join(bench.preview(Setting((HIDDEN,)), "gyro_x: 1").what.objections)
+    after = " ".join(bench.objections(Setting((HIDDEN, "gyro_x: 1"))))
+    for told in (before, after):
+        assert "raises the sigma of gyro_bias_x" in told
+        assert "does not lower the error" in told
+    page = Page(app)
+    page.add(HIDDEN)
+    assert page.shown()["verdict"]["className"] == "verdict good"
+    page.click("add-own.n_clicks", own_at_value="gyro_x: 1")
+    shown = page.shown()
+    assert shown["verdict"]["className"] == "verdict doubtful"
+    assert not shown["verdict"]["children"].startswith("\N{CHECK MARK}")
+    assert len(shown["objections"]["children"]) >= 2
+
+
+def test_residuals_are_drawn_against_what_is_chosen(app, bench):
+    page = Page(app)
+    shown = page.shown()
+    axes = bench.fit(Setting()).axes
+    for against in axes:
+        drawn = page.drawn(shown, against_at_value=against, which_at_value="all")["residuals"]["figure"]
+        assert drawn["layout"]["xaxis"]["title"]["text"] == against
+        assert len(drawn["data"][0]["customdata"]) > 1000
+    assert {"roll (deg)", "specific force z (g)", "rate x (deg/h)", "turn before, x (deg/s)"} <= set(axes)
+
+
+def test_what_is_taken_home_names_what_was_left_out_and_fixed(app, recording, tmp_path):
+    page = Page(app)
+    page.add(HIDDEN)
+    page.click("toggle-stop.n_clicks", stop_at_data=5)
+    page.click("fix.n_clicks", coefficient_at_value="gyro_bias_x", mean_at_value="0.69 deg/h")
+    points = {"points": [{"customdata": [700.0, 701.0]}]}
+    page.click("leave-points.n_clicks", residuals_at_selectedData=points)
+    packed = page.post("file.data", "export.n_clicks")["file"]["data"]["content"]
+    zipfile.ZipFile(io.BytesIO(base64.b64decode(packed))).extractall(tmp_path)
+    command = (tmp_path / "command.txt").read_text()
+    assert "--exclude-stops 5 --exclude-times 700.001-700.999" in command
+    model = extended_model(str(tmp_path / "model.yaml"), [])
+    test = PreparedTest(recording, load_imu("dtg"), load_site("daejeon"))
+    again = solve(test.without_stops((5,)).without_times(((700.001, 700.999),)), model)
+    result = json.loads((tmp_path / "result.json").read_text())["coefficients"]
+    assert [c["value"] for c in result] == again.values.tolist()
+    assert [c["sigma"] for c in result] == np.sqrt(np.diag(again.covariance)).tolist()
+    assert json.loads((tmp_path / "session.json").read_text())["now"] == page.state["now"]
+
+
+def test_the_server_says_that_it_is_alive_and_to_this_machine_alone(app):
+    client = app.server.test_client()
+    assert client.get("/alive").status_code == 204
+    assert client.get("/alive", headers={"Host": "elsewhere.example"}).status_code == 403

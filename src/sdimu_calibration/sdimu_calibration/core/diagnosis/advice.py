@@ -16,7 +16,7 @@ from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.diagnosis.found import DetectableSize, Found
 from sdimu_calibration.core.diagnosis.plan_seen import PlanSeen
 from sdimu_calibration.core.effects import references, registry, selection
-from sdimu_calibration.core.effects.effect import Excitation
+from sdimu_calibration.core.effects.effect import Effect, Excitation
 from sdimu_calibration.core.recording import DataError
 
 _SLOW_MINUTES = 20.0
@@ -182,8 +182,13 @@ def _about_latitude(one: Found) -> str:
 
 def separate(one: Found, plan: PlanSeen) -> str:
     """Name the next turn or stop that would tell a class apart, with minutes."""
+    return telling_turn(one.candidate.effect, plan)
+
+
+def telling_turn(effect: Effect, plan: PlanSeen) -> str:
+    """Name the next turn or stop that would tell an effect from what looks the same, with minutes."""
     dwell = max(plan.dwell_minutes, 1.0)
-    needed = one.candidate.effect.excitation
+    needed = effect.excitation
     if Excitation.TWO_RATES in needed and plan.one_rate():
         minutes = 2 * (dwell + 0.3)
         return f"add a turn of 180 deg and back about that axis, level, at 10 deg/s ({minutes:.0f} min)"

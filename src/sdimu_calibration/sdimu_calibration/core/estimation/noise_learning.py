@@ -100,7 +100,7 @@ def _with_mean(evidence: LinearEvidence, modes: Modes, fixed: Bools) -> tuple[Fl
     covariance[known], covariance[:, known], estimate[known] = 0.0, 0.0, 0.0
     T = np.hstack([np.eye(q), np.zeros((q, r))])
     for channel, name in enumerate(bias.NAMES):
-        if name in evidence.names:
+        if name in evidence.names and not fixed[evidence.names.index(name)]:
             T[evidence.names.index(name), q:] = modes.mean[channel]
     return T @ estimate, T @ covariance @ T.T
 

@@ -1,69 +1,73 @@
-"""The dash application: callbacks that turn clicks into states and states into pictures."""
+"""The dash application: one page, and callbacks that turn clicks into states and states into pictures."""
 
 from __future__ import annotations
 
-import base64
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import dash
-import numpy as np
-from dash import Dash, Input, Output, dcc, html, no_update
+from dash import Dash, Input, Output, no_update
 from dash import State as Kept
 
-from sdimu_calibration.core.evidence.consistency import CHANNEL_NAMES
+from sdimu_calibration.core.joint.set_diagnosis import SetDiagnosis
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.units import UnitError
-from sdimu_calibration.report import data
 from sdimu_calibration.report.design.library import PRINT
-from sdimu_calibration.report.workbench import figures, tables, view
-from sdimu_calibration.report.workbench.export import archive
-from sdimu_calibration.report.workbench.fit import FitSession
+from sdimu_calibration.report.design.sheet import EARLY
+from sdimu_calibration.report.design.sheet import SCRIPT as DESIGN_SCRIPT
+from sdimu_calibration.report.design.sheet import STYLE as DESIGN_STYLE
+from sdimu_calibration.report.workbench import looking, showing, taking_home, together, view
 from sdimu_calibration.report.workbench.guard import LOOPBACK, guard, tell_error
-from sdimu_calibration.report.workbench.own_effect import named, read_effect
 from sdimu_calibration.report.workbench.recording_cache import RecordingCache
-from sdimu_calibration.report.workbench.state import State, from_json
-from sdimu_calibration.report.workbench.task_progress import TaskProgress
+from sdimu_calibration.report.workbench.state import from_json
+from sdimu_calibration.report.workbench.steps import NOTHING, step
+from sdimu_calibration.report.workbench.task_progress import BUSY, TaskProgress
 
-_PAGE = """<!doctype html><html lang="en"><head>{%metas%}<title>{%title%}</title>{%css%}<style>STYLE</style></head>
-<body>{%app_entry%}<footer>{%config%}{%scripts%}{%renderer%}<script>PRINT</script></footer></body></html>"""
-_WORKING = [(Output("busy", "hidden"), False, True), (Output("tick", "disabled"), False, True)]
-_BUSY = [
-    *_WORKING,
-    *((Output(button, "disabled"), True, False) for button in ("add", "undo", "add-own", "hold", "drop", "open")),
-]
-_LOOKING = [*_WORKING, (Output("candidates", "className"), "stale", ""), (Output("verdict", "className"),
-            "verdict stale", "verdict")]  # fmt: skip
-_LARGE = "function(_) { return window.innerWidth >= 2400 ? 1.6 : 1; }"
-"""Figures count in pixels: on a screen of 4K they are drawn larger."""
-_NOTHING = {
-    "undo": "Nothing to undo.",
-    "add": "Nothing added: choose an effect that is not in the model.",
-    "add-own": "Nothing added: write an effect that is not in the model.",
-    "drop": "Nothing taken out: choose an effect that was added.",
-    "hold": "Nothing changed: these are the stops that are held out now.",
-    "ranking": "Nothing added: it is in the model already.",
-}
-"""What a click that asks for nothing is told."""
-_ARROW = "\N{BLACK RIGHT-POINTING TRIANGLE} "
+_PAGE = """<!doctype html><html lang="en"><head>{%metas%}<title>{%title%}</title><script>EARLY</script>
+{%css%}<style>STYLE</style></head><body>{%app_entry%}<footer>{%config%}{%scripts%}{%renderer%}
+<script>SCRIPT</script></footer></body></html>"""
+_BUTTONS = (
+    "undo", "redo", "add", "add-own", "drop", "hold", "toggle-stop", "leave-points", "take-points", "fix",
+    "set-prior", "free", "open",
+)  # fmt: skip
+_CONTROLS = {
+    "candidate": Kept("candidate", "value"), "own": Kept("own", "value"), "held": Kept("held", "value"),
+    "added": Kept("added", "value"), "recording": Kept("recording", "value"), "stop": Kept("stop", "data"),
+    "points": Kept("residuals", "selectedData"), "coefficient": Kept("coefficient", "value"),
+    "mean": Kept("mean", "value"), "sigma": Kept("sigma", "value"),
+}  # fmt: skip
+
+Judge = Callable[[Sequence[str], Callable[[str, float], None]], SetDiagnosis]
 
 
-def build(shelf: RecordingCache, host: str = LOOPBACK[0]) -> Dash:
-    """Make the application of a shelf of recordings, to be served at an address of this machine."""
+def build(shelf: RecordingCache, host: str = LOOPBACK[0], judge: Judge | None = None) -> Dash:
+    """Make the application of a shelf of recordings, to be served at an address of this machine.
+
+    Parameters
+    ----------
+    shelf : RecordingCache
+    host : str
+    judge : callable, optional
+        Diagnoses all recordings of the shelf as one set, with some effects added.
+    """
     app = Dash(
         "sdimu workbench", title="sdimu workbench", update_title="", serve_locally=True, assets_ignore=".*",
         on_error=tell_error,
     )  # fmt: skip
     guard(app.server, host)
-    app.index_string = _PAGE.replace("STYLE", view.STYLE).replace("PRINT", PRINT)
-    app.layout = lambda: view.layout("Workbench", shelf.names)
+    page = _PAGE.replace("EARLY", EARLY).replace("STYLE", f"{DESIGN_STYLE}\n{view.STYLE}")
+    app.index_string = page.replace("SCRIPT", f"{DESIGN_SCRIPT}\n{PRINT}\n{view.SCRIPT}")
+    app.layout = lambda: view.layout("Workbench", judge is not None)
     doing = TaskProgress()
-    app.clientside_callback(_LARGE, Output("scale", "data"), Input("page", "data"))
+    app.clientside_callback(
+        "function(_) { return window.benchLook(); }", Output("look", "data"), Input("page", "data")
+    )
     _follow_clicks(app, shelf, doing)
-    _show_states(app, shelf, doing)
-    _search_candidates(app, shelf, doing)
-    _read_uploads(app)
-    _pack_exports(app, shelf, doing)
-    _show_progress(app, doing)
+    showing.register(app, shelf, doing)
+    looking.register(app, shelf, doing)
+    taking_home.register(app, shelf, doing)
+    if judge is not None:
+        together.register(app, judge, doing)
     return app
 
 
@@ -71,179 +75,24 @@ def _follow_clicks(app: Dash, shelf: RecordingCache, doing: TaskProgress) -> Non
     """Turn clicks into states, each fitted before it is kept."""
 
     @app.callback(
-        Output("state", "data"), Output("message", "children"),
-        Input("add", "n_clicks"), Input("add-own", "n_clicks"), Input("undo", "n_clicks"), Input("hold", "n_clicks"),
-        Input("drop", "n_clicks"), Input("open", "n_clicks"), Input("ranking", "clickData"), Input("heat", "clickData"),
-        Kept("candidate", "value"), Kept("own", "value"), Kept("held", "value"), Kept("added", "value"),
-        Kept("recording", "value"), Kept("state", "data"), Kept("page", "data"),
-        running=_BUSY, prevent_initial_call=True,
+        output=[Output("state", "data"), Output("message", "children")],
+        inputs={
+            "clicks": [Input(name, "n_clicks") for name in _BUTTONS],
+            "seen": {"cell": Input("heat", "clickData"), "channel": Input("channel", "value")},
+            "controls": _CONTROLS, "kept": Kept("state", "data"), "page": Kept("page", "data"),
+        },
+        running=BUSY, prevent_initial_call=True,
     )  # fmt: skip
-    def clicked(*values: Any) -> tuple[Any, Any]:
-        *_, bar, point, candidate, own, held, chosen, recording, kept, page = values
-        tell = doing.teller(str(page))
+    def clicked(clicks: Any, seen: Any, controls: Any, kept: Any, page: Any) -> tuple[Any, Any]:
+        del clicks
+        tell, what = doing.teller(str(page)), str(dash.ctx.triggered_id)
         try:
             now = from_json(kept)
-            wanted = _step(now, dash.ctx.triggered_id, bar, point, candidate, own, held, chosen, recording)
+            wanted = step(now, what, {**controls, **seen})
             if wanted == now:
-                return no_update, _NOTHING.get(str(dash.ctx.triggered_id), "")
+                return no_update, NOTHING.get(what, "")
             tell("read", 0.0)
-            shelf.bench(wanted.recording).fit(wanted.added, wanted.held, tell)
+            shelf.bench(wanted.recording).fit(wanted.now, tell)
         except (DataError, UnitError) as error:
-            return no_update, f"Not done: {_line(error)}"
+            return no_update, f"Not done: {' '.join(str(error).split())}"
         return wanted.as_json(), ""
-
-
-def _show_states(app: Dash, shelf: RecordingCache, doing: TaskProgress) -> None:
-    """Show a state: numbers, pictures and tables."""
-
-    @app.callback(
-        Output("title", "children"), Output("numbers", "children"), Output("heat", "figure"),
-        Output("cell", "figure"), Output("ladder", "figure"), Output("added", "options"), Output("held", "options"),
-        Output("held", "value"), Output("moved", "children"), Output("models", "children"),
-        Output("recording", "value"), Output("shown", "data"), Output("message", "children", allow_duplicate=True),
-        Input("state", "modified_timestamp"), Input("scale", "data"), Kept("state", "data"), Kept("page", "data"),
-        running=_BUSY, prevent_initial_call="initial_duplicate",
-    )  # fmt: skip
-    def show(_when: Any, scale: Any, kept: Any, page: Any) -> tuple[Any, ...]:
-        now, told = from_json(kept), ""
-        tell = doing.teller(str(page))
-        try:
-            bench = shelf.bench(now.recording)
-            bench.fit(now.added, now.held, tell)
-        except (DataError, UnitError) as error:  # the server was started anew, with other files
-            now, told = State(), f"What this page held cannot be shown: {_line(error)}"
-            bench = shelf.bench()
-        return (*_shown(bench, now, now.recording or shelf.names[0], float(scale or 1), tell), now.as_json(), told)
-
-
-def _search_candidates(app: Dash, shelf: RecordingCache, doing: TaskProgress) -> None:
-    """Score the candidates of a state."""
-
-    @app.callback(
-        Output("verdict", "children"), Output("ranking", "figure"), Output("candidate", "options"),
-        Input("shown", "data"), Kept("scale", "data"), Kept("page", "data"),
-        running=_LOOKING, prevent_initial_call=True,
-    )  # fmt: skip
-    def search(kept: Any, scale: Any, page: Any) -> tuple[Any, ...]:
-        now = from_json(kept)
-        missing = shelf.bench(now.recording).missing(now.added, now.held, doing.teller(str(page)))
-        picture = figures.enlarged(figures.ranking(missing.entries, missing.threshold), float(scale or 1))
-        return view.verdict(missing), picture, view.options(missing.entries)
-
-
-def _read_uploads(app: Dash) -> None:
-    """Put the file of an own effect into the page."""
-
-    @app.callback(
-        Output("own", "value"), Output("message", "children", allow_duplicate=True),
-        Input("upload", "contents"), Kept("upload", "filename"), prevent_initial_call=True,
-    )  # fmt: skip
-    def upload(contents: Any, name: Any) -> tuple[Any, str]:
-        try:
-            text = base64.b64decode(str(contents).partition(",")[2], validate=True).decode("utf-8")
-            if "\n" not in text.strip():
-                raise ValueError
-        except ValueError:  # not base64, not UTF-8, no lines
-            return no_update, f"Not read: {name} is no effect file (expected YAML, format: sdimu-effect/1)"
-        try:
-            read_effect(text)
-        except (DataError, UnitError) as error:
-            return text, f"{name}: {_line(error)}"
-        return text, ""
-
-
-def _pack_exports(app: Dash, shelf: RecordingCache, doing: TaskProgress) -> None:
-    """Send what is taken home."""
-
-    @app.callback(
-        Output("file", "data"), Output("message", "children", allow_duplicate=True),
-        Input("export", "n_clicks"), Kept("state", "data"), Kept("page", "data"), running=_BUSY,
-        prevent_initial_call=True,
-    )  # fmt: skip
-    def export(_clicks: Any, kept: Any, page: Any) -> tuple[Any, str]:
-        now, tell = from_json(kept), doing.teller(str(page))
-        try:
-            bench = shelf.bench(now.recording)
-            final = bench.final(now.added, now.held, tell)
-            tell("report", 0.8)
-            packed = archive(bench.model, now.added, final, f"Workbench: {now.recording or shelf.names[0]}")
-        except (DataError, UnitError) as error:
-            return no_update, f"Not done: {_line(error)}"
-        return dcc.send_bytes(packed, "calibration.zip"), ""
-
-
-def _show_progress(app: Dash, doing: TaskProgress) -> None:
-    """Say what the server does for a page."""
-
-    @app.callback(
-        Output("busy", "children"), Input("tick", "n_intervals"), Kept("page", "data"), prevent_initial_call=True
-    )
-    def progress(_count: Any, page: Any) -> Any:
-        word, share = doing.at(str(page))
-        return [f"{word} \u2026", html.Progress(value=f"{share:.2f}", max="1")]
-
-
-def _step(
-    now: State, what: Any, bar: Any, point: Any, candidate: Any, own: Any, held: Any, chosen: Any, recording: Any
-) -> State:
-    """Return the state that a click asks for; the same one when it asks for nothing."""
-    if what == "undo":
-        return now.undo()
-    if what == "hold":
-        return now.hold(tuple(held or ()))
-    if what == "drop" and chosen:
-        return now.drop(chosen)
-    if what == "open" and recording:
-        return now.open(str(recording))
-    if what == "add-own" and own:
-        return now.add(own)
-    if what == "add" and candidate:
-        return now.add(candidate)
-    if what == "ranking" and bar:
-        return now.add(str(bar["points"][0]["y"]).removeprefix(_ARROW))
-    if what == "heat" and point:
-        first = point["points"][0]
-        return now.look(CHANNEL_NAMES.index(str(first["y"]).replace(" ", "_")), int(first["x"]))
-    return now
-
-
-def _shown(bench: FitSession, now: State, recording: str, scale: float, tell: Any) -> tuple[Any, ...]:
-    """Everything that a state shows but the candidates, which come later."""
-    rungs = [bench.fit(now.added[:k], now.held, tell) for k in range(len(now.added) + 1)]
-    here, given = rungs[-1], rungs[0]
-    cell = now.cell if now.cell and _is_in(here.grid, *now.cell) else _worst(here.grid)
-    names = ["model as given", *(f"+ {named(text)}" for text in now.added)]
-    keys = [(now.added[:k], now.held) for k in range(len(now.added) + 1)]
-    keys = [*now.seen, *(key for key in keys if key not in now.seen)]
-    pictures = (
-        figures.heat_map(here.grid, cell), figures.cell(here.residuals, here.grid, *cell),
-        figures.ladder(names, [r.held_out for r in rungs], [r.at_held for r in rungs]),
-    )  # fmt: skip
-    return (
-        f"Workbench: {recording}",
-        view.numbers(here, given),
-        *(figures.enlarged(picture, scale) for picture in pictures),
-        [{"label": named(text), "value": text} for text in now.added],
-        [{"label": f"stop {s}", "value": s} for s in bench.stops],
-        list(now.held),
-        tables.moved(given.calibration, here.calibration),
-        tables.models(bench, keys, (now.added, now.held)),
-        recording,
-    )
-
-
-_SENSORS = 6
-"""Channels from here on are measured every second: there is more to see."""
-
-
-def _worst(grid: data.Grid) -> tuple[int, int]:
-    row, column = np.unravel_index(np.nanargmax(np.abs(grid.value[_SENSORS:])), grid.value[_SENSORS:].shape)
-    return int(row) + _SENSORS, int(grid.stops[column])
-
-
-def _is_in(grid: data.Grid, channel: int, stop: int) -> bool:
-    return 0 <= channel < len(grid.value) and stop in grid.stops
-
-
-def _line(error: Exception) -> str:
-    return " ".join(str(error).split())

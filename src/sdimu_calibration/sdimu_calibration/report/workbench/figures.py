@@ -1,93 +1,187 @@
-"""Figures that only the workbench has: one stop of one channel in time, the ladder of fits; and their sizes."""
+"""Figures that only the workbench has: residuals against any variable, the ladder of fits; and their sizes."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from sdimu_calibration.core.arrays import Bools, Floats
 from sdimu_calibration.core.evidence.consistency import CHANNEL_NAMES
 from sdimu_calibration.report import data, evidence_figures
-from sdimu_calibration.report.drawing import AFTER, BAND, BEFORE, INK, MUTED, Figure, lay_out
+from sdimu_calibration.report.drawing import AFTER, BAND, BEFORE, PALE, Figure, lay_out
+from sdimu_calibration.report.workbench.axes import TIME
+from sdimu_calibration.report.workbench.fit import Fitted
 
 _FONT = 13
+HEIGHT = 306
+"""Height of a figure (px): two rows of them and the bar fit on a screen of 900."""
+_CELL = 10
+"""Size of the numbers in the cells (px): with it those of 19 stops stand beside each other."""
+_MOST_BARS = 14
+_SHORT = {"l": 55, "r": 10, "t": 8, "b": 42}
 
 
-def heat_map(grid: data.Grid, cell: tuple[int, int]) -> Any:
+def heat_map(grid: data.Grid, cell: tuple[int, int]) -> Figure:
     """Heat map of the report with a frame around the cell that is looked at."""
     figure = evidence_figures.heat_map(grid)
     row, column = cell[0], int(np.searchsorted(grid.stops, cell[1]))
     figure.shape(
         "rect", x0=column - 0.5, x1=column + 0.5, y0=row - 0.5, y1=row + 0.5, fillcolor="rgba(0, 0, 0, 0)",
-        line={"color": INK, "width": 3},
+        line={"color": BEFORE, "width": 3},
     )  # fmt: skip
-    return figure.as_plotly()
+    # Colours repeat what the numbers say: their scale would take the room of three stops.
+    figure.data[0] |= {"showscale": False, "textfont": {"size": _CELL}}
+    figure.layout |= {"height": HEIGHT, "margin": _SHORT | {"l": 80}}
+    figure.y_axes(title="channel", standoff=0)
+    return figure
 
 
-def ranking(entries: Sequence[data.Scored], threshold: float) -> Any:
-    """Ranking of the report, with room for the numbers at the ends of the bars."""
-    figure = evidence_figures.ranking(entries, threshold)
-    top = max([abs(e.z) for e in entries] + [threshold])
-    figure.x_axes(range=[0, 1.85 * top])
-    figure.layout["showlegend"] = False
-    return figure.as_plotly()
+def ranking(entries: Sequence[data.Scored], threshold: float) -> Figure:
+    """Ranking of the report, without the sizes: the candidate that is looked at has its own beside it."""
+    shown = data.best_variants(entries)[:_MOST_BARS]
+    figure = evidence_figures.ranking(shown, threshold)
+    del figure.data[1]
+    figure.x_axes(range=[0, 1.05 * max([abs(e.z) for e in shown] + [threshold])])
+    figure.y_axes(title="candidate", standoff=0, tickfont={"size": 11})
+    figure.layout |= {"showlegend": False, "height": HEIGHT, "margin": _SHORT | {"l": 20, "t": 22}}
+    return figure
 
 
-def cell(found: data.Residuals, grid: data.Grid, channel: int, stop: int) -> Any:
-    """Innovations of a channel at a stop against time, with three sigma and their mean.
+@dataclass(frozen=True)
+class Curve:
+    """What is drawn of a fit.
+
+    Attributes
+    ----------
+    y : ndarray, shape (e, 12)
+        Residuals (sigma).
+    signature : ndarray, shape (e, 12), or None
+        What the candidate that is looked at would take out of them.
+    name : str
+        Of the candidate.
+    """
+
+    y: Floats
+    signature: Floats | None = None
+    name: str = ""
+
+
+def residuals(fitted: Fitted, curve: Curve, channel: int, stop: int | None, against: str) -> Figure:
+    """Residuals of a channel against a variable, with three sigma, what is left out, and a signature.
 
     They are those of the final coefficients; the heat map has those that the filter met on its way, which knew less.
+
+    Parameters
+    ----------
+    fitted : Fitted
+    curve : Curve
+    channel : int
+    stop : int or None
+        None shows all stops.
+    against : str
+        One of `fitted.axes`.
     """
-    rows = (found.stop == stop) & np.isfinite(found.before[:, channel])
-    t, y = found.t[rows], found.before[rows, channel]
+    rows = np.ones(len(fitted.residuals.t), dtype=bool) if stop is None else fitted.residuals.stop == stop
+    x, y, out = fitted.axes[against], curve.y[:, channel], fitted.left_out[:, channel]
+    used, gone = rows & np.isfinite(y), rows & np.isfinite(out)
     figure = Figure()
     figure.shape("rect", y0=-3.0, y1=3.0, fillcolor=BAND, line={"width": 0}, opacity=1.0, layer="below")
-    marker = {"color": AFTER, "size": 5}
-    hover = "%{x:.0f} s: %{y:.2f}<extra></extra>"
-    figure.add("scatter", x=t, y=y, mode="markers", marker=marker, hovertemplate=hover)
-    if len(y):
-        mean = float(y.mean())
-        figure.shape("line", y0=mean, y1=mean, line={"color": BEFORE, "width": 2, "dash": "dash"}, opacity=1.0)
-    figure.x_axes(title="time (s)")
-    figure.y_axes(title="innovation (sigma)", zeroline=True, zerolinecolor=MUTED)
-    met = grid.value[channel, grid.stops == stop]
-    told = f"{met[0]:+.1f} sigma on the way (above); " if np.isfinite(met).any() else ""
-    said = f"{told}with the final coefficients mean {y.mean():+.2f} sigma (dashed)" if len(y) else "not measured"
-    named = f"{CHANNEL_NAMES[channel].replace('_', ' ')} at stop {stop}: {said}".replace("-", "\N{MINUS SIGN}")
-    return lay_out(figure, 280, title={"text": named, "font": {"size": 14}}).as_plotly()
+    _points(figure, fitted, used, x, y, "residual", {"color": AFTER, "size": 5})
+    if gone.any():
+        _points(figure, fitted, gone, x, out, "left out", {"color": BEFORE, "size": 7, "symbol": "x-thin-open"})
+    if curve.signature is not None:
+        order = np.flatnonzero(used)[np.argsort(x[used], kind="stable")]
+        broken = _gaps(x[order], curve.signature[order, channel], against)
+        figure.add(
+            "scatter", x=broken[0], y=broken[1], mode="lines" if against == TIME else "markers",
+            name=f"{curve.name} would take", line={"color": BEFORE, "width": 3}, hoverinfo="skip",
+            marker={"color": BEFORE, "size": 7, "symbol": "diamond"},
+        )  # fmt: skip
+    figure.x_axes(title=against)
+    figure.y_axes(title="residual (sigma)", zeroline=True, zerolinecolor=PALE)
+    more = {"dragmode": "select", "clickmode": "event+select", "margin": _SHORT | {"t": 30}}
+    words = _title(curve, fitted, used, channel, stop)
+    title = {"text": words, "font": {"size": 13}, "y": 0.97, "x": 0, "xref": "paper", "xanchor": "left"}
+    legend = {"orientation": "h", "x": 1, "xanchor": "right", "y": 1.0, "yanchor": "bottom", "font": {"size": 11}}
+    drawn = gone.any() or curve.signature is not None
+    return lay_out(figure, HEIGHT, title=title, legend=legend, showlegend=bool(drawn), **more)
 
 
-def ladder(names: Sequence[str], values: Sequence[float], at_held: Sequence[float | None]) -> Any:
-    """Held-out RMS of each fit; one is right."""
-    figure = Figure()
+def _points(
+    figure: Figure, fitted: Fitted, rows: Bools, x: Floats, y: Floats, name: str, marker: dict[str, Any]
+) -> None:
+    # The span of its epoch goes with each point: what is selected is left out of the fit by its time.
+    spans = np.column_stack([fitted.begin[rows], fitted.residuals.t[rows]]).round(3).tolist()
+    stops = fitted.residuals.stop[rows].tolist()
     figure.add(
-        "scatter", x=list(names), y=list(values), mode="lines+markers+text", text=[f"{v:.3f}" for v in values],
-        name="leave one out", textposition="top center", line={"color": AFTER}, marker={"size": 9}, cliponaxis=False,
+        "scatter", x=x[rows], y=y[rows], mode="markers", name=name, marker=marker, customdata=spans, text=stops,
+        hovertemplate="stop %{text}, %{customdata[1]:.0f} s<br>%{x:.4g}: %{y:.2f} sigma<extra></extra>",
+    )  # fmt: skip
+
+
+def _gaps(x: Floats, y: Floats, against: str) -> tuple[Floats, Floats]:
+    return data.interrupted(x, y, 5.0) if against == TIME else (x, y)
+
+
+def _title(curve: Curve, fitted: Fitted, used: Bools, channel: int, stop: int | None) -> str:
+    named = f"{CHANNEL_NAMES[channel].replace('_', ' ')} at {'all stops' if stop is None else f'stop {stop}'}"
+    y = curve.y[used, channel]
+    if not len(y):
+        return f"{named}: {'left out' if stop in _left(fitted) else 'not measured'}"
+    return f"{named}: mean {y.mean():+.2f} sigma".replace("-", "\N{MINUS SIGN}")
+
+
+def _left(fitted: Fitted) -> set[int]:
+    return set(fitted.residuals.stop[np.isfinite(fitted.left_out).any(axis=1)].tolist())
+
+
+def ladder(names: Sequence[str], values: Sequence[float], at_held: Sequence[float | None]) -> Figure:
+    """Held-out RMS of each fit, less one, on a scale of powers: one is right, and a small step is seen, too."""
+    figure = Figure()
+    short = [name if len(name) < 26 else f"{name[:24]}\N{HORIZONTAL ELLIPSIS}" for name in names]
+    figure.add(
+        "scatter", y=short, x=list(values), mode="lines+markers+text", text=[f"{v:.3f}" for v in values],
+        name="leave one out", textposition="middle right", line={"color": AFTER}, marker={"size": 9}, cliponaxis=False,
+        customdata=list(names), hovertemplate="%{customdata}: %{x:.3f} sigma<extra></extra>",
     )  # fmt: skip
     if any(v is not None for v in at_held):
         figure.add(
-            "scatter", x=list(names), y=list(at_held), mode="markers+lines", name="stops held out",
-            line={"color": BEFORE, "dash": "dot"}, marker={"symbol": "square-open", "size": 9},
+            "scatter", y=short, x=list(at_held), mode="markers", name="what is left out",
+            marker={"symbol": "square-open", "size": 9, "color": BEFORE},
+            hovertemplate="left out: %{x:.3f} sigma<extra></extra>",
         )  # fmt: skip
-    figure.shape("line", y0=1.0, y1=1.0, line={"dash": "dash", "color": INK, "width": 1.5}, opacity=1.0)
-    figure.annotate("1 is right", x=0, xref="x domain", y=1.0, xanchor="left", yanchor="top")
-    top = max([*values, *(v for v in at_held if v is not None), 1.0])
-    figure.y_axes(title="held-out RMS (sigma)", range=[0, 1.25 * top])
-    figure.x_axes(type="category", title="model, rung by rung")
-    return lay_out(figure, 320, showlegend=True).as_plotly()
+    figure.shape("line", x0=1.0, x1=1.0, line={"dash": "dash", "color": PALE, "width": 1.5}, opacity=1.0)
+    numbers = [v for v in (*values, *at_held, 1.0) if v is not None]
+    low, high = min(numbers), max(numbers)
+    room = max(0.3 * (high - low), 0.02)
+    figure.x_axes(title="held-out RMS, 1 is right (sigma)", range=[low - 0.3 * room, high + 1.4 * room])
+    figure.y_axes(type="category", autorange="reversed", ticks="", automargin=True, title="model", standoff=0)
+    return lay_out(figure, HEIGHT, margin=_SHORT | {"l": 20, "r": 40})
 
 
-def enlarged(figure: Any, scale: float) -> Any:
-    """Make a figure larger, writing and all, for screens on which it would be too small to read."""
+def finished(figure: Figure, look: Any) -> Any:
+    """Make a figure for the page: in its theme, and larger where it would be too small to read.
+
+    Parameters
+    ----------
+    figure : Figure
+    look : mapping
+        ``theme``, and ``scale`` of what is written.
+    """
+    made, scale = figure.as_plotly(str(look.get("theme", "light"))), float(look.get("scale", 1.0))
     if scale == 1.0:
-        return figure
-    margin = {side: value * scale for side, value in figure.layout.margin.to_plotly_json().items() if side in "lrtb"}
-    figure.update_layout(height=figure.layout.height * scale, font={"size": _FONT * scale}, margin=margin)
-    figure.update_layout(hoverlabel_font_size=_FONT * scale)
-    if figure.layout.title.text:
-        figure.update_layout(title_font_size=14 * scale)
-    figure.update_traces(textfont_size=12 * scale, selector={"type": "heatmap"})
-    figure.update_traces(marker_size=8 * scale, selector={"type": "scatter"})
-    figure.update_annotations(font_size=_FONT * scale)
-    return figure
+        return made
+    margin = {side: value * scale for side, value in made.layout.margin.to_plotly_json().items() if side in "lrtb"}
+    made.update_layout(height=made.layout.height * scale, font={"size": _FONT * scale}, margin=margin)
+    made.update_layout(hoverlabel_font_size=_FONT * scale)
+    if made.layout.title.text:
+        made.update_layout(title_font_size=14 * scale)
+    made.update_traces(textfont_size=12 * scale, selector={"type": "heatmap"})
+    made.update_traces(marker_size=8 * scale, selector={"type": "scatter"})
+    made.update_annotations(font_size=_FONT * scale)
+    made.update_yaxes(tickfont_size=11 * scale)
+    made.update_layout(legend_font_size=11 * scale)
+    return made

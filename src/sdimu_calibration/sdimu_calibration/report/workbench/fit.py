@@ -1,38 +1,44 @@
-"""Fits of the workbench, in two parts: the numbers, which are quick, and the candidates, which come after them.
+"""Fits of the workbench, in parts: the numbers, which are quick, then the candidates, then one of them looked at.
 
 Samples are prepared once a recording, and each fit starts where the fit with one effect less ended. Kept is only what a
-page shows: the matrices of a fit, some 200 MB, stay for the last one alone, whose candidates are asked for next.
+page shows: the matrices of a fit and of its candidates, some 300 MB, stay for the last one alone.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from threading import Lock
+from threading import RLock
 from typing import Any
 
 import numpy as np
 
+from sdimu_calibration.core.arrays import Floats
+from sdimu_calibration.core.diagnosis.addition import Addition, addition, objections
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
+from sdimu_calibration.core.diagnosis.found import looked_at
 from sdimu_calibration.core.diagnosis.free_input_test import FreeInputTest
 from sdimu_calibration.core.diagnosis.problem import Problem
 from sdimu_calibration.core.diagnosis.survey import survey
+from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.estimation.fit import Fit, Start
 from sdimu_calibration.core.estimation.navigation_fit import NavigationFit
 from sdimu_calibration.core.estimation.outcome import outcome
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.estimation.solve import solve, with_effects
+from sdimu_calibration.core.measurement_kind import SKIP
 from sdimu_calibration.core.progress import silent
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.results import Calibration, no_history
 from sdimu_calibration.core.specification import Model
 from sdimu_calibration.report import data
-from sdimu_calibration.report.workbench.own_effect import added_effects
+from sdimu_calibration.report.workbench.axes import axes
+from sdimu_calibration.report.workbench.own_effect import added_effects, stated_priors
+from sdimu_calibration.report.workbench.setting import Setting
 
-Key = tuple[tuple[str, ...], tuple[int, ...]]
 Tell = Callable[[str, float], None]
 _MOST_KEPT = 200
-"""Fits that are kept: each holds some 2 MB."""
+"""Fits that are kept: each holds some 3 MB."""
 
 
 @dataclass(frozen=True)
@@ -43,20 +49,36 @@ class Fitted:
     ----------
     calibration : Calibration
         Without the history of its first pass.
+    prior, mean : ndarray, shape (p,)
+        Sigma and mean of each coefficient's prior (SI).
+    stated : ndarray, shape (p,)
+        One-sigma (SI) that the IMU's file, or physics, gives each coefficient.
     grid : Grid
         Normalised means, channel by stop.
     residuals : Residuals
+    begin : ndarray, shape (e,)
+        Start of each epoch (s).
+    axes : mapping of str to ndarray, shape (e,)
+        What they can be drawn against.
+    left_out : ndarray, shape (e, 12)
+        Prediction errors (sigma) of what the fit has not seen; NaN elsewhere.
     held_out : float
         Leave-one-stop-out RMS over the stops of the fit (sigma).
     at_held : float or None
-        RMS of the prediction errors at the stops that are held out.
+        RMS of `left_out`.
     start : Start
         Where a fit with one effect more begins.
     """
 
     calibration: Calibration
+    prior: Floats
+    mean: Floats
+    stated: Floats
     grid: data.Grid
     residuals: data.Residuals
+    begin: Floats
+    axes: Mapping[str, Floats]
+    left_out: Floats
     held_out: float
     at_held: float | None
     start: Start
@@ -85,79 +107,119 @@ class Missing:
     left: FreeInputTest
 
 
+@dataclass(frozen=True)
+class Preview:
+    """A candidate before it is added, by the linear model.
+
+    Attributes
+    ----------
+    effect : Effect
+        The first, where a text gives several.
+    what : Addition
+    residuals : Residuals
+        `before` and `after` it is added.
+    """
+
+    effect: Effect
+    what: Addition
+    residuals: data.Residuals
+
+
 class FitSession:
     """A recording with the fits made so far; safe for several pages at once."""
 
     def __init__(self, test: PreparedTest, model: Model) -> None:
         self.test, self.model = test, model
-        self._fits: dict[Key, Fitted] = {}
-        self._missing: dict[Key, Missing] = {}
-        self._warm: tuple[Key, Fit] | None = None
-        self._lock = Lock()
+        self._fits: dict[Setting, Fitted] = {}
+        self._missing: dict[Setting, Missing] = {}
+        self._warm: tuple[Setting, Fit] | None = None
+        self._surveyed: tuple[Setting, Diagnosis] | None = None
+        self._lock = RLock()
 
     @property
     def stops(self) -> list[int]:
         """Stops with measurements."""
-        return [int(s) for s in self.fit((), ()).grid.stops]
+        return [int(s) for s in self.fit(Setting()).grid.stops]
 
-    def known(self, added: tuple[str, ...], held: tuple[int, ...]) -> Fitted | None:
+    def known(self, setting: Setting) -> Fitted | None:
         """Return a fit that was made already."""
-        return self._fits.get((added, held))
+        return self._fits.get(setting)
 
-    def fit(self, added: tuple[str, ...], held: tuple[int, ...], tell: Tell = silent) -> Fitted:
-        """Fit the model with the effects `added`, without the stops `held`; `tell` gets a word and the share done.
+    def fit(self, setting: Setting, tell: Tell = silent) -> Fitted:
+        """Fit what a setting says; `tell` gets a word and the share done.
 
         Raises
         ------
         DataError
-            When an effect cannot be read, a stop is none of the recording, or nothing is left to fit.
+            When an effect or a prior cannot be read, a stop is none of the recording, or nothing is left to fit.
         """
-        self._check(held)
         with self._lock:
-            key = (added, held)
-            if key not in self._fits:
-                _keep(self._fits, key, self._numbers(self._solved(key, tell), held))
-            return self._fits[key]
+            if setting not in self._fits:
+                _keep(self._fits, setting, self._numbers(self._solved(setting, tell)))
+            return self._fits[setting]
 
-    def missing(self, added: tuple[str, ...], held: tuple[int, ...], tell: Tell = silent) -> Missing:
+    def missing(self, setting: Setting, tell: Tell = silent) -> Missing:
         """Score all candidates against a fit, without adding any."""
-        self._check(held)
         with self._lock:
-            key = (added, held)
-            if key not in self._missing:
-                fit = self._solved(key, tell)
-                tell("candidates", 0.5)
-                scores = survey(fit, _without_history(fit))
+            if setting not in self._missing:
+                scores = self._survey(setting, tell)
                 found = Missing(
                     tuple(data.scored(scores)), scores.found.threshold, scores.adequate, scores.sentence,
                     scores.free_inputs_after,
                 )  # fmt: skip
-                _keep(self._missing, key, found)
-            return self._missing[key]
+                _keep(self._missing, setting, found)
+            return self._missing[setting]
 
-    def final(self, added: tuple[str, ...], held: tuple[int, ...], tell: Tell = silent) -> Diagnosis:
-        """Fit once more from nothing, as `sdimu calibrate` does, so that it gives the same numbers."""
-        self._check(held)
+    def preview(self, setting: Setting, text: str, tell: Tell = silent) -> Preview:
+        """Look at an effect before it is added.
+
+        Raises
+        ------
+        DataError
+            When it cannot be read, or is in the model already.
+        """
         with self._lock:
-            fit = solve(self.test.without_stops(held), self._extended(added), progress=tell)
+            effects = added_effects(self._extended(setting), [text], self.test.imu)
+            scores = self._survey(setting, tell)
+            names, labels = list(scores.evidence.names), [label for e in effects for label in e.labels]
+            if not set(labels) <= set(names):
+                scores = replace(scores, evidence=scores.evidence.with_effects(effects))
+                names = list(scores.evidence.names)
+            columns = np.array([names.index(label) for label in labels], dtype=np.int64)
+            what = addition(scores.fit, scores.evidence, columns.tolist(), looked_at(scores), scores.found.scale)
+            chosen = replace(scores, found=replace(scores.found, chosen=columns))
+            return Preview(effects[0], what, data.residuals(chosen))
+
+    def objections(self, setting: Setting, tell: Tell = silent) -> tuple[str, ...]:
+        """Say what speaks against the effects of a setting, each against the fit with those before it."""
+        out: list[str] = []
+        for count in range(1, len(setting.added) + 1):
+            below, here = self.fit(setting.rung(count - 1), tell), self.fit(setting.rung(count), tell)
+            out += objections(
+                below.calibration, here.calibration, here.stated, (below.held_out, here.held_out)
+            )
+        return tuple(dict.fromkeys(out))
+
+    def final(self, setting: Setting, tell: Tell = silent) -> Diagnosis:
+        """Fit once more from nothing, as `sdimu calibrate` does, so that it gives the same numbers."""
+        with self._lock:
+            fit = solve(self._left(setting), self._extended(setting), progress=tell)
             tell("candidates", 0.6)
             return survey(fit, outcome(fit))
 
-    def _check(self, held: tuple[int, ...]) -> None:
-        unknown = sorted(set(held) - set(self.stops)) if held else []
-        if unknown:
-            raise DataError(f"stop {unknown[0]} has no measurements in this recording")
+    def _left(self, setting: Setting) -> PreparedTest:
+        return self.test.without_stops(setting.held).without_times(setting.cut)
 
-    def _extended(self, added: tuple[str, ...]) -> Model:
-        return with_effects(self.model, added_effects(self.model, added, self.test.imu))
+    def _extended(self, setting: Setting) -> Model:
+        model = with_effects(self.model, added_effects(self.model, setting.added, self.test.imu))
+        return replace(model, priors=stated_priors(self.model.priors, setting.priors))
 
-    def _solved(self, key: Key, tell: Tell) -> Fit:
-        if self._warm is not None and self._warm[0] == key:
+    def _solved(self, setting: Setting, tell: Tell) -> Fit:
+        if self._warm is not None and self._warm[0] == setting:
             return self._warm[1]
-        self._warm = None
-        added, held = key
-        test, model = self.test.without_stops(held), self._extended(added)
-        parent = self._fits.get(key) or self._fits.get((added[:-1], held))
+        self._warm = self._surveyed = None
+        test, model = self._left(setting), self._extended(setting)
+        parent = self._fits.get(setting) or self._fits.get(setting.rung(len(setting.added) - 1))
         try:
             fit = solve(test, model, start=parent.start if parent else None, progress=tell)
         except DataError:
@@ -166,15 +228,25 @@ class FitSession:
             fit = solve(test, model, progress=tell)
         if not fit.converged and parent is not None:
             fit = solve(test, model, progress=tell)
-        self._warm = (key, fit)
+        self._warm = (setting, fit)
         return fit
 
-    def _numbers(self, fit: Fit, held: tuple[int, ...]) -> Fitted:
+    def _survey(self, setting: Setting, tell: Tell) -> Diagnosis:
+        if self._surveyed is None or self._surveyed[0] != setting:
+            fit = self._solved(setting, tell)
+            tell("candidates", 0.5)
+            self._surveyed = (setting, survey(fit, _without_history(fit)))
+        return self._surveyed[1]
+
+    def _numbers(self, fit: Fit) -> Fitted:
         scores = survey(fit, _without_history(fit), with_candidates=False)
         everything = Problem(scores.evidence.only(np.empty(0, dtype=np.int64)))
+        errors = _left_out(fit, self.test)
+        seen = errors[np.isfinite(errors)]
         return Fitted(
-            scores.after, data.where(scores.consistency), data.residuals(scores), everything.held_out([], 1.0).rms,
-            _at_held(fit, self.test, held), fit.start,
+            scores.after, fit.sensors.prior, fit.sensors.mean, fit.sensors.stated, data.where(scores.consistency),
+            data.residuals(scores), scores.navigation.prepared.epochs.start, axes(scores), errors,
+            everything.held_out([], 1.0).rms, float(np.sqrt(np.mean(seen**2))) if len(seen) else None, fit.start,
         )  # fmt: skip
 
 
@@ -183,17 +255,19 @@ def _without_history(fit: Fit) -> Calibration:
     return replace(outcome(fit, held_out=False), history=no_history(len(fit.names)))
 
 
-def _at_held(fit: Fit, whole: PreparedTest, held: tuple[int, ...]) -> float | None:
-    """RMS of normalised prediction errors at the stops that the fit has not seen."""
-    if not held or not isinstance(fit, NavigationFit):
-        return None
+def _left_out(fit: Fit, whole: PreparedTest) -> Floats:
+    """Normalised prediction errors (e, 12) of what a fit has not seen; NaN elsewhere."""
+    if not isinstance(fit, NavigationFit):
+        return np.empty((0, 12))
     seen = replace(fit, prepared=whole.data(fit.setup))
-    out = np.isin(seen.prepared.phases.stop, held) & (seen.prepared.kind > 0)
-    return float(np.sqrt(np.nanmean(seen.predict(out)[out] ** 2)))
+    out = (fit.prepared.kind == SKIP) & (seen.prepared.kind != SKIP)
+    if not out.any():
+        return np.full((len(out), 12), np.nan)
+    return np.where(out[:, None], seen.predict(out), np.nan)
 
 
-def _keep(kept: dict[Key, Any], key: Key, value: Any) -> None:
+def _keep(kept: dict[Setting, Any], setting: Setting, value: Any) -> None:
     """Keep a fit; the oldest goes when there are too many."""
     while len(kept) >= _MOST_KEPT:
         kept.pop(next(iter(kept)))
-    kept[key] = value
+    kept[setting] = value

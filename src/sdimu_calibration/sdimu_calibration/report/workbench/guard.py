@@ -40,6 +40,11 @@ def guard(server: Flask, host: str) -> None:
         if not all(_name(address) in names for address in asked):
             abort(403, "The workbench answers this machine only.")
 
+    @server.get("/alive")
+    def alive() -> Response:
+        """Let a page know that there is a server."""
+        return Response(status=204)
+
     @server.errorhandler(Exception)
     def say(error: Exception) -> HTTPException | Response:
         if isinstance(error, HTTPException):

@@ -10,7 +10,9 @@ from sdimu_calibration.core.effect_key import parse_key
 from sdimu_calibration.core.effects import imu_model
 from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.recording import DataError
-from sdimu_calibration.core.specification import ImuSpecification, Model
+from sdimu_calibration.core.specification import ImuSpecification, Model, StatedPrior
+from sdimu_calibration.core.units import UnitError, parse_quantity
+from sdimu_calibration.report.workbench.setting import Prior
 from sdimu_calibration.storage.effect_file import find_effects, load_effect, new_parts
 
 
@@ -27,6 +29,32 @@ def added_effects(model: Model, added: Sequence[str], imu: ImuSpecification) -> 
     for text in added:
         effects += new_parts(read_effect(text), effects, named(text))
     return tuple(effects[given:])
+
+
+def stated_priors(given: Sequence[StatedPrior], changed: Sequence[Prior]) -> tuple[StatedPrior, ...]:
+    """Put the priors of a page over those of the model that it started from.
+
+    Parameters
+    ----------
+    given : sequence of StatedPrior
+    changed : sequence of (str, str, str)
+        Coefficient, mean and sigma as a page holds them.
+
+    Raises
+    ------
+    DataError
+        When a quantity cannot be read, or mean and sigma have different units.
+    """
+    names = {name for name, _, _ in changed}
+    return (*(one for one in given if one.name not in names), *(_stated(*one) for one in changed))
+
+
+def _stated(name: str, mean: str, sigma: str) -> StatedPrior:
+    try:
+        unit = sigma.partition(" ")[2].strip() or "1"
+        return StatedPrior(name, parse_quantity(mean, unit), parse_quantity(sigma, unit), unit)
+    except UnitError as error:
+        raise DataError(f"prior of {name}: {error}") from error
 
 
 def read_effect(text: str) -> tuple[Effect, ...]:

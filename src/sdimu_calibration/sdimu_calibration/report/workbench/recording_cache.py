@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from threading import Lock
 
@@ -18,21 +18,21 @@ class RecordingCache:
 
     Parameters
     ----------
-    paths : dict of str to Path
-        By name; the first is the one a fresh page shows.
+    names : sequence of str
+        The first is the one a fresh page shows.
     make : callable
-        Opens a path; raises DataError.
+        Opens the recording of a name; raises DataError.
     """
 
-    def __init__(self, paths: dict[str, Path], make: Callable[[Path], FitSession]) -> None:
-        self._paths, self._make = paths, make
+    def __init__(self, names: Sequence[str], make: Callable[[str], FitSession]) -> None:
+        self._names, self._make = tuple(names), make
         self._open: dict[str, FitSession] = {}
         self._lock = Lock()
 
     @property
     def names(self) -> list[str]:
         """All names, the first one shown first."""
-        return list(self._paths)
+        return list(self._names)
 
     def bench(self, name: str = "") -> FitSession:
         """Return the bench of a recording; the first one's when no name is given.
@@ -43,11 +43,11 @@ class RecordingCache:
             When there is none of that name any more, or it cannot be read.
         """
         wanted = name or self.names[0]
-        if wanted not in self._paths:
+        if wanted not in self._names:
             raise DataError(f"no recording '{wanted}' here (choose one of: {', '.join(self.names)})")
         with self._lock:
             if wanted not in self._open:
-                bench = self._make(self._paths[wanted])
+                bench = self._make(wanted)
                 while len(self._open) >= _MOST_OPEN:
                     self._open.pop(next(iter(self._open)))
                 self._open[wanted] = bench

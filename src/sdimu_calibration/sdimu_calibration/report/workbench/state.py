@@ -1,12 +1,18 @@
 """What a page of the workbench has done so far: plain data that lives in the page, and pure steps from one to the next.
 
-Fits are functions of this state alone, so a reload of the page, two pages side by side and an undo need nothing more.
+Fits are functions of this state alone, so a reload of the page, two pages side by side, undo and redo, and a restart of
+the server need nothing more.
 """
 
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
+
+from sdimu_calibration.report.workbench.setting import Setting, setting_from
+
+_MOST_STEPS = 100
+"""Number of steps that undo goes back: each is sent with every click."""
 
 
 @dataclass(frozen=True)
@@ -15,81 +21,88 @@ class State:
 
     Attributes
     ----------
-    added : tuple of str
-        Effects added to the model, in order: what `sdimu calibrate --add` takes, or the text of an effect file.
-    held : tuple of int
-        Stops held out of the fit, ascending.
+    now : Setting
+        What is fitted.
     cell : tuple of (int, int) or None
         Channel and stop that are looked at.
-    past : tuple of (added, held)
-        What undo goes back to, the last one first to go.
-    seen : tuple of (added, held)
-        Every model that was fitted in this page, for comparison; an undo does not forget them.
+    past, future : tuple of Setting
+        What undo and redo go to; the last one is the next to go to.
+    seen : tuple of Setting
+        Everything that was fitted in this page, for comparison; an undo does not forget it.
     recording : str
         Name of the recording; empty is the one a fresh page shows.
     """
 
-    added: tuple[str, ...] = ()
-    held: tuple[int, ...] = ()
+    now: Setting = field(default_factory=Setting)
     cell: tuple[int, int] | None = None
-    past: tuple[tuple[tuple[str, ...], tuple[int, ...]], ...] = field(default=())
-    seen: tuple[tuple[tuple[str, ...], tuple[int, ...]], ...] = field(default=(), compare=False)
+    past: tuple[Setting, ...] = ()
+    future: tuple[Setting, ...] = ()
+    seen: tuple[Setting, ...] = field(default=(), compare=False)
     recording: str = ""
 
     def as_json(self) -> dict[str, Any]:
         """Return it as the page keeps it."""
         return asdict(self)
 
-    def _then(self, **change: Any) -> State:
-        here = (self.added, self.held)
-        seen = self.seen if here in self.seen else (*self.seen, here)
-        return replace(self, past=(*self.past, here), seen=seen, **change)
+    def then(self, setting: Setting) -> State:
+        """Go on to a setting; the one that is left can be gone back to."""
+        if setting == self.now:
+            return self
+        past = (*self.past, self.now)[-_MOST_STEPS:]
+        return replace(self, now=setting, past=past, future=(), seen=self._seen())
 
     def add(self, effect: str) -> State:
         """Add an effect; one that is there already changes nothing."""
-        return self if effect in self.added else self._then(added=(*self.added, effect))
+        return self if effect in self.now.added else self.then(replace(self.now, added=(*self.now.added, effect)))
 
     def drop(self, effect: str) -> State:
-        """Take an effect out again."""
-        return self._then(added=tuple(e for e in self.added if e != effect)) if effect in self.added else self
+        """Take an effect out again, and the priors of its coefficients with it."""
+        if effect not in self.now.added:
+            return self
+        others = tuple(e for e in self.now.added if e != effect)
+        return self.then(replace(replace(self.now, added=(*others, effect)).rung(len(others)), added=others))
 
     def hold(self, stops: tuple[int, ...]) -> State:
-        """Hold these stops out, and no others."""
-        wanted = tuple(sorted(set(stops)))
-        return self if wanted == self.held else self._then(held=wanted)
+        """Leave these stops out, and no others."""
+        return self.then(replace(self.now, held=tuple(sorted(set(stops)))))
 
     def look(self, channel: int, stop: int) -> State:
         """Look at a channel and stop; no step to be undone."""
         return replace(self, cell=(channel, stop))
 
     def undo(self) -> State:
-        """Go back one step; the model that is left stays among those seen."""
+        """Go back one step."""
         if not self.past:
             return self
-        here, (added, held) = (self.added, self.held), self.past[-1]
-        seen = self.seen if here in self.seen else (*self.seen, here)
-        return replace(self, added=added, held=held, past=self.past[:-1], seen=seen)
+        return replace(
+            self, now=self.past[-1], past=self.past[:-1], future=(*self.future, self.now), seen=self._seen()
+        )
+
+    def redo(self) -> State:
+        """Go forward again where an undo came from."""
+        if not self.future:
+            return self
+        return replace(
+            self, now=self.future[-1], past=(*self.past, self.now), future=self.future[:-1], seen=self._seen()
+        )
 
     def open(self, recording: str) -> State:
         """Begin afresh with another recording."""
         return self if recording == self.recording else State(recording=recording)
+
+    def _seen(self) -> tuple[Setting, ...]:
+        return self.seen if self.now in self.seen else (*self.seen, self.now)
 
 
 def from_json(kept: Any) -> State:
     """Read what the page kept; anything else is a fresh page."""
     try:
         cell = kept.get("cell")
+        past, future, seen = (tuple(map(setting_from, kept.get(name, ()))) for name in ("past", "future", "seen"))
         return State(
-            tuple(map(str, kept.get("added", ()))),
-            tuple(map(int, kept.get("held", ()))),
+            setting_from(kept.get("now", {})),
             (int(cell[0]), int(cell[1])) if cell else None,
-            _steps(kept.get("past", ())),
-            _steps(kept.get("seen", ())),
-            str(kept.get("recording", "")),
-        )
+            past, future, seen, str(kept.get("recording", "")),
+        )  # fmt: skip
     except (AttributeError, TypeError, ValueError, IndexError, KeyError, OverflowError):
         return State()
-
-
-def _steps(kept: Any) -> tuple[tuple[tuple[str, ...], tuple[int, ...]], ...]:
-    return tuple((tuple(map(str, a)), tuple(map(int, h))) for a, h in kept)

@@ -9,71 +9,84 @@ import numpy as np
 from dash import html
 
 from sdimu_calibration.core.diagnosis.ladder import moved_coefficients
-from sdimu_calibration.core.results import Calibration
-from sdimu_calibration.core.units import from_si
+from sdimu_calibration.core.units import from_si, parse_quantity
 from sdimu_calibration.report.table import as_far
-from sdimu_calibration.report.workbench.fit import FitSession, Fitted, Key
+from sdimu_calibration.report.workbench.fit import FitSession, Fitted
 from sdimu_calibration.report.workbench.own_effect import named
+from sdimu_calibration.report.workbench.parts import span
+from sdimu_calibration.report.workbench.setting import Setting
 
-_STANDS = 0.01
-"""Sigmas below which a coefficient has not moved."""
 _HEADINGS = (
-    "model", "log-likelihood", "against the model as given", "NIS", "held-out RMS", "at held-out stops", "moved most",
+    "model", "log-likelihood", "against the model as given", "NIS", "held-out RMS", "what is left out", "moved most",
 )  # fmt: skip
 
 
-def models(bench: FitSession, keys: Sequence[Key], here: Key) -> Any:
+def models(bench: FitSession, settings: Sequence[Setting], here: Setting) -> Any:
     """Compare the models of a page; a mark points at the one shown.
 
-    A model is compared with the one as given, fitted to the same stops.
+    A model is compared with the one as given, fitted to the same measurements.
     """
-    found = [(key, bench.known(*key)) for key in keys]
-    rows: list[tuple[Key, Fitted]] = [(key, fitted) for key, fitted in found if fitted is not None]
+    found = [(setting, bench.known(setting)) for setting in settings]
+    rows: list[tuple[Setting, Fitted]] = [(setting, fitted) for setting, fitted in found if fitted is not None]
     return html.Table([
         html.Thead(html.Tr([html.Th(word) for word in _HEADINGS])),
         html.Tbody([
             html.Tr(
-                [html.Td(text) for text in _model(key, fitted, bench.known((), key[1]))],
-                className="here" if key == here else "",
+                [html.Td(text) for text in _model(setting, fitted, bench.known(setting.given))],
+                className="here" if setting == here else "",
             )
-            for key, fitted in rows
+            for setting, fitted in rows
         ]),
     ])  # fmt: skip
 
 
-def _model(key: Key, fitted: Fitted, given: Fitted | None) -> list[str]:
+def _model(setting: Setting, fitted: Fitted, given: Fitted | None) -> list[str]:
     fit = fitted.calibration.fit
     gained, most = "", ""
     if given is not None and given is not fitted:
         gained = f"{(fit['log_likelihood'] or 0.0) - (given.calibration.fit['log_likelihood'] or 0.0):+.1f}"
         sizes = moved_coefficients(given.calibration, fitted.calibration)[:2]
         most = ", ".join(f"{name} {size:+.1f} sigma" for name, size in sizes)
-    out = f" without stops {', '.join(map(str, key[1]))}" if key[1] else ""
     return [
-        (" ".join(f"+ {named(text)}" for text in key[0]) or "model as given") + out,
-        f"{fit['log_likelihood']:.1f}", gained, f"{fit['nis_mean']:.3f}",
+        described(setting), f"{fit['log_likelihood']:.1f}", gained, f"{fit['nis_mean']:.3f}",
         f"{fitted.held_out:.3f}", "" if fitted.at_held is None else f"{fitted.at_held:.3f}",
         most,
     ]  # fmt: skip
 
 
-def moved(first: Calibration, now: Calibration, most: int = 8) -> Any:
-    """Table of the coefficients that differ most between two fits, in sigmas of the later one."""
-    at = {name: i for i, name in enumerate(first.names)}
-    sigma = np.sqrt(np.diag(now.covariance))
+def described(setting: Setting) -> str:
+    """Say in a line what a setting fits."""
+    out = " ".join(f"+ {named(text)}" for text in setting.added) or "model as given"
+    out += f" without stops {', '.join(map(str, setting.held))}" if setting.held else ""
+    out += f" without {', '.join(map(span, setting.cut))} s" if setting.cut else ""
+    priors = (f"{name} {'=' if _is_zero(sigma) else 'about'} {mean}" for name, mean, sigma in setting.priors)
+    return "; ".join([out, *priors])
+
+
+def _is_zero(quantity: str) -> bool:
+    return parse_quantity(quantity, quantity.partition(" ")[2] or "1") == 0.0
+
+
+def coefficients(given: Fitted, now: Fitted, setting: Setting) -> Any:
+    """Table of all coefficients: value, sigma and prior, and how far each moved against the model as given."""
+    first, here = given.calibration, now.calibration
+    sigma, at = np.sqrt(np.diag(here.covariance)), {name: k for k, name in enumerate(first.names)}
+    changed = {name for name, _, _ in setting.priors}
+    headings = ("coefficient", "value", "sigma", "unit", "prior", "state", "as given", "moved (sigma)")
     rows = []
-    for i, name in enumerate(now.names):
-        if name in at and sigma[i] > 0.0 and first.covariance[at[name], at[name]] > 0.0:
-            rows.append((abs(now.values[i] - first.values[at[name]]) / sigma[i], i, at[name]))
-    headings = ("coefficient", "as given", "now", "sigma", "unit", "moved (sigma)")
-    cells = [html.Tr([html.Th(word) for word in headings])]
-    for size, i, k in sorted(rows, reverse=True)[:most]:
-        if size < _STANDS:
-            break
-        unit = now.display_units[i]
-        numbers = [from_si(float(v), unit) for v in (first.values[k], now.values[i], sigma[i])]
-        cells.append(html.Tr([
-            html.Td(now.names[i]), *map(html.Td, as_far(numbers, numbers[-1])), html.Td(unit),
-            html.Td(f"{size:.1f}"),
-        ]))  # fmt: skip
-    return html.Table(cells) if len(cells) > 1 else "none"
+    for k, name in enumerate(here.names):
+        unit = here.display_units[k]
+        value, spread, prior, mean = (
+            from_si(float(v), unit) for v in (here.values[k], sigma[k], now.prior[k], now.mean[k])
+        )
+        before, moved = "", ""
+        if name in at and sigma[k] > 0.0:
+            before = as_far([from_si(float(first.values[at[name]]), unit)], spread)[0]
+            moved = f"{(here.values[k] - first.values[at[name]]) / sigma[k]:+.1f}"
+        known = f"{value:.6g}" if now.prior[k] == 0.0 else "0"
+        numbers = as_far([value, spread], spread) if spread > 0.0 else [known, "0"]
+        state = "fixed" if now.prior[k] == 0.0 else "by the frame" if not sigma[k] > 0.0 else "free"
+        shown = f"{mean:.4g} \N{PLUS-MINUS SIGN} {prior:.4g}" if mean else f"\N{PLUS-MINUS SIGN} {prior:.4g}"
+        cells = [name, *numbers, unit, shown, f"{state}, own prior" if name in changed and state == "free" else state]
+        rows.append(html.Tr([html.Td(text) for text in (*cells, before, moved)]))
+    return html.Table([html.Thead(html.Tr([html.Th(word) for word in headings])), html.Tbody(rows)])

@@ -1,18 +1,17 @@
-"""What a page of the workbench shows: its layout, and its parts for a fit."""
+"""The layout of a page of the workbench; figures and texts come with the first callback."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from importlib.resources import files
 from typing import Any
 from uuid import uuid4
 
-import numpy as np
 from dash import dcc, html
 
-from sdimu_calibration.report import data
+from sdimu_calibration.core.evidence.consistency import CHANNEL_NAMES
 from sdimu_calibration.report.design.library import CONFIG
-from sdimu_calibration.report.table import with_sigma
-from sdimu_calibration.report.workbench.fit import Fitted, Missing
+from sdimu_calibration.report.workbench.axes import STOP, TIME
 
 TEMPLATE = """format: sdimu-effect/1
 name: my_effect
@@ -22,123 +21,200 @@ parameters:
   k: {unit: deg/h, prior: 0.5 deg/h}
 """
 """What the field for an effect of one's own starts with."""
-
-STYLE = """
-body { font: 15px/1.45 system-ui, sans-serif; color: #222; margin: 0; }
-main { display: grid; grid-template-columns: 1fr 1fr; gap: 0 2em; }
-@media (max-width: 1000px) { main { display: block; } }
-@media (min-width: 2400px) { body { font-size: 24px; } }
-main { padding: 0 1.5em; } section { min-width: 0; } .whole { grid-column: 1 / -1; overflow-x: auto; }
-header { position: sticky; top: 0; z-index: 5; background: #fff; }
-header { padding: .3em 1.5em .4em; border-bottom: 1px solid #bbb; }
-h1 { font-size: 1.2em; margin: .1em 0; } h2 { font-size: 1.05em; margin: 1em 0 .3em; }
-.verdict { border: 2px solid #222; border-left-width: 12px; padding: .3em 1em; }
-.line { display: flex; align-items: center; gap: 1em; flex-wrap: wrap; }
-.line .grow { flex: 1 1 12em; min-width: 0; }
-.message { color: #7a1f00; font-weight: 600; } .message:empty { display: none; }
-.message::before { content: "\\26A0\\00A0"; }
-.busy { background: #222; color: #fff; padding: .2em 1em; margin-left: auto; } .busy[hidden] { display: none; }
-.busy progress { width: 8em; margin-left: 1em; vertical-align: middle; }
-button { font: inherit; padding: .2em 1em; margin: .3em .5em .3em 0; cursor: pointer; }
-button:disabled { cursor: wait; opacity: .5; } .stale { opacity: .35; }
-textarea { width: 100%; box-sizing: border-box; font: .9em/1.4 ui-monospace, monospace; }
-table { border-collapse: collapse; font-variant-numeric: tabular-nums; font-size: .93em; }
-th, td { padding: .1em .7em; text-align: right; border-bottom: 1px solid #ddd; }
-th:first-child, td:first-child { text-align: left; }
-tr.here td { font-weight: 700; } tr.here td:first-child::before { content: "\\25B6\\00A0"; }
-@media print {
-  @page { size: A4 portrait; margin: 12mm; }
-  body { font-size: 11px; } main { display: block; } main, header { padding-left: 0; padding-right: 0; }
-  button, .busy, .control, .modebar-container { display: none !important; } header { position: static; }
-  :has(> .js-plotly-plot), tr { break-inside: avoid; } h2 { break-after: avoid; }
-  .verdict, .dash-graph { print-color-adjust: exact; -webkit-print-color-adjust: exact; }
-}
-"""
+_HERE = files("sdimu_calibration.report.workbench")
+STYLE = (_HERE / "page.css").read_text(encoding="utf-8")
+SCRIPT = (_HERE / "page.js").read_text(encoding="utf-8")
+NOW, GIVEN, WITH = "now", "given", "with"
+SHOWS = {GIVEN: "as given", NOW: "now", WITH: "with the candidate"}
+"""What the heat map and the residuals are of."""
+_KEYS = (
+    ("?", "this list"), ("Ctrl+Z, U", "undo"), ("Ctrl+Y, Ctrl+Shift+Z, R", "redo"),
+    ("J, K", "next and previous candidate"),
+    ("A", "add the candidate"), ("B", "as given, now, with the candidate"), ("S", "leave the stop out, or take it in"),
+    ("X, I", "leave selected points out, take them in"), ("E", "take home"), ("Esc", "close this list"),
+)  # fmt: skip
 
 
-def layout(title: str, recordings: Sequence[str]) -> Any:
-    """Lay a fresh page out; figures come with the first callback."""
+def layout(title: str, together: bool = False) -> Any:
+    """Lay a fresh page out.
+
+    Parameters
+    ----------
+    title : str
+    together : bool
+        They can be judged as one set.
+    """
     return html.Div([
         dcc.Store(id="state", storage_type="session"), dcc.Store(id="page", data=uuid4().hex),
-        dcc.Store(id="scale"), dcc.Store(id="shown"), dcc.Interval(id="tick", interval=200, disabled=True),
-        html.Header([
-            html.Div([
-                html.H1(title, id="title"),
-                html.Div(["Working", html.Progress(value="0", max="1")], id="busy", className="busy", hidden=True),
-            ], className="line"),
-            html.Div(id="verdict", className="verdict", role="status"),
-            html.Div([html.Div(id="numbers", className="grow"), html.Button("Undo", id="undo")], className="line"),
-            html.Div(id="message", className="message", role="alert"),
-        ]),
+        dcc.Store(id="look"), dcc.Store(id="shown"), dcc.Store(id="stop"), dcc.Store(id="looked"),
+        dcc.Interval(id="tick", interval=200, disabled=True),
+        html.Div(
+            "The workbench does not answer any more. Start it again with the same command: this page then goes on "
+            "where it was; nothing that you did is lost.",
+            id="lost", className="lost", role="alert", hidden=True,
+        ),
+        _help(), _bar(title),
         html.Main([
-            html.Section([
-                html.H2("Where does it fail? Click a cell"), _graph("heat"), _graph("cell"),
-            ], className="whole"),
-            html.Section([
-                html.H2("How far the error fell"), _graph("ladder"),
-                html.H2("Coefficients that moved against the model as given"), html.Div(id="moved"),
+            html.Div([
+                html.Div([_left(), _middle(), _right()], className="bench"),
                 html.Div([
-                    html.H2("Stops held out of the fit"),
-                    dcc.Dropdown(id="held", options=[], multi=True, placeholder="none"),
-                    html.Button("Hold out", id="hold"),
-                    html.H2("Take home"), html.Button("Model, calibration and report", id="export"),
-                    dcc.Download(id="file"),
-                    html.H2("Another recording of this folder"),
-                    dcc.Dropdown(id="recording", options=list(recordings), clearable=False),
-                    html.Button("Open", id="open"),
-                ], className="control"),
+                    _coefficients(), _own(), _home(), *([_set()] if together else []),
+                    _card("Models of this page side by side", html.Div(id="models", className="scroll"), more="whole"),
+                ], className="below"),
             ]),
-            html.Section([
-                html.H2("Which effect is missing? Click a bar to add it"), html.Div(_graph("ranking"), id="candidates"),
-                html.Div([
-                    dcc.Dropdown(id="candidate", placeholder="or search the catalogue"),
-                    html.Button("Add", id="add"),
-                    html.H2("Added to the model"),
-                    dcc.Dropdown(id="added", placeholder="choose one to take out"), html.Button("Take out", id="drop"),
-                    html.H2("An effect of your own, as an expression"),
-                    dcc.Textarea(id="own", value=TEMPLATE, rows=8, persistence=True, persistence_type="session"),
-                    html.Div([
-                        html.Button("Add this", id="add-own"),
-                        dcc.Upload(html.Button("Read a file"), id="upload", accept=".yaml,.yml"),
-                    ], className="line"),
-                ], className="control"),
-            ]),
-            html.Section([html.H2("Models of this page side by side"), html.Div(id="models")], className="whole"),
         ]),
     ])  # fmt: skip
 
 
-def _graph(name: str) -> Any:
+def _bar(title: str) -> Any:
+    return html.Header([
+        html.Div([
+            html.H1(title, id="title"),
+            html.Div(id="numbers", className="grow"),
+            html.Div(["Working", html.Progress(value="0", max="1")], id="busy", className="busy", hidden=True),
+            html.Button("Undo", id="undo", title="Ctrl+Z"), html.Button("Redo", id="redo", title="Ctrl+Y"),
+            html.Button("Dark", id="theme", **{"data-switch-theme": "", "aria-pressed": "false"}),
+            html.Button("Keys ?", id="help-open", **{"aria-controls": "help"}),
+        ], className="line"),
+        html.Div(id="verdict", className="verdict", role="status"),
+        html.Ul(id="objections", className="objections"),
+        html.Div(id="message", className="message", role="alert"),
+    ], className="bench-bar")  # fmt: skip
+
+
+def _help() -> Any:
+    rows = [html.Tr([html.Td(_keys(keys)), html.Td(what)]) for keys, what in _KEYS]
+    return html.Div(
+        [html.H2("Keys"), html.Table(html.Tbody(rows)), html.Button("Close", id="help-close")],
+        id="help", className="help", role="dialog", hidden=True, tabIndex="-1", **{"aria-label": "Keys"},
+    )  # fmt: skip
+
+
+def _keys(keys: str) -> list[Any]:
+    return [part for key in keys.split(", ") for part in (html.Kbd(key), " ")]
+
+
+def _left() -> Any:
+    return html.Div([
+        _card(
+            "Where does it fail? Click a cell",
+            html.Div([
+                dcc.RadioItems(
+                    id="shows", options=[{"label": words, "value": key} for key, words in SHOWS.items()], value=NOW,
+                    inline=True, className="choices",
+                ),
+                html.Button("Leave stop out / take in", id="toggle-stop", title="S"),
+            ], className="controls"),
+            _graph("heat", "Normalised mean of every channel at every stop"),
+        ),
+        _card(
+            "Residuals: click points, or draw a box",
+            html.Div([
+                _picker("channel", "channel", [
+                    {"label": name.replace("_", " "), "value": k} for k, name in enumerate(CHANNEL_NAMES)
+                ], None),
+                _picker("against", "against", [TIME, STOP], TIME),
+                dcc.RadioItems(
+                    id="which", options=[{"label": "this stop", "value": "one"}, {"label": "all", "value": "all"}],
+                    value="one", inline=True, className="choices",
+                ),
+                html.Button("Leave out", id="leave-points", title="X"),
+                html.Button("Take in", id="take-points", title="I"),
+            ], className="controls"),
+            _graph("residuals", "Residuals of the channel that is looked at"),
+        ),
+    ], className="column")  # fmt: skip
+
+
+def _middle() -> Any:
+    return html.Div([
+        _card(
+            "What is missing? Click a bar",
+            dcc.Dropdown(id="candidate", placeholder="or search the catalogue"),
+            html.Div(_graph("ranking", "Score of every candidate"), id="candidates"),
+        ),
+        _card("How far the error fell", _graph("ladder", "Held-out error of each model")),
+    ], className="column")  # fmt: skip
+
+
+def _right() -> Any:
+    return html.Div([
+        html.Section([
+            html.H2("The candidate"),
+            html.Div("Click a bar, or press J.", id="preview", className="candidate"),
+            html.Div(html.Button("Add it and fit", id="add", className="main-action", title="A"), className="controls"),
+        ], className="card"),
+        html.Section([
+            html.H2("Added to the model"),
+            dcc.Dropdown(id="added", placeholder="choose one to take out"),
+            html.Div(html.Button("Take out", id="drop"), className="controls"),
+        ], className="card control"),
+        html.Section([
+            html.H2("Left out of the fit"),
+            dcc.Dropdown(id="held", options=[], multi=True, placeholder="no stop"),
+            html.Div([html.Button("Leave these stops out", id="hold"), html.Span(id="cut")], className="controls"),
+        ], className="card control"),
+        html.Section([
+            html.H2("Recording"),
+            dcc.Dropdown(id="recording", options=[], clearable=False),
+            html.Div(html.Button("Open", id="open"), className="controls"),
+        ], className="card control"),
+    ], className="column")  # fmt: skip
+
+
+def _coefficients() -> Any:
+    return _card(
+        "Coefficients",
+        html.Div([
+            dcc.Dropdown(id="coefficient", placeholder="choose one to fix, free or give a prior", className="pick"),
+            html.Label(["value ", dcc.Input(id="mean", type="text", value="", debounce=False)]),
+            html.Label(["sigma ", dcc.Input(id="sigma", type="text", value="", debounce=False)]),
+            html.Button("Fix at this value", id="fix"), html.Button("Take this prior", id="set-prior"),
+            html.Button("Free again", id="free"),
+        ], className="controls control"),
+        html.Div(id="coefficients", className="scroll"), more="whole",
+    )  # fmt: skip
+
+
+def _own() -> Any:
+    return html.Section([
+        html.H2("An effect of your own, as an expression"),
+        html.Label("Effect file", htmlFor="own", className="switch"),
+        dcc.Textarea(id="own", value=TEMPLATE, rows=8, persistence=True, persistence_type="session"),
+        html.Div([
+            html.Button("Look at it", id="look-own"), html.Button("Add this", id="add-own"),
+            dcc.Upload(html.Button("Read a file"), id="upload", accept=".yaml,.yml"),
+        ], className="controls"),
+    ], className="card control")  # fmt: skip
+
+
+def _home() -> Any:
+    return html.Section([
+        html.H2("Take home"),
+        html.P("Model, calibration, report, the session and the command that gives the same numbers."),
+        html.Button("Model, calibration and report", id="export", title="E"), dcc.Download(id="file"),
+    ], className="card control")  # fmt: skip
+
+
+def _set() -> Any:
+    return html.Section([
+        html.H2("All recordings together"),
+        html.P("One fit of the recordings as one unit, with the effects that are added here."),
+        html.Button("Judge them together", id="judge"), html.Div(id="judged", className="scroll"),
+    ], className="card")  # fmt: skip
+
+
+def _card(title: str, *parts: Any, more: str = "") -> Any:
+    return html.Section([html.H2(title), *parts], className=f"card {more}".strip())
+
+
+def _picker(name: str, words: str, options: Sequence[Any], value: Any) -> Any:
+    return html.Label([
+        words, dcc.Dropdown(id=name, options=list(options), value=value, clearable=False, className="pick"),
+    ])  # fmt: skip
+
+
+def _graph(name: str, words: str) -> Any:
     # Plotly's own "responsive" would take the height of the container, which has none; the component follows the width.
-    return dcc.Graph(id=name, config={key: value for key, value in CONFIG.items() if key != "responsive"})
-
-
-def options(entries: Sequence[data.Scored]) -> list[dict[str, str]]:
-    """Candidates for the search field, with their evidence."""
-    return [
-        {
-            "label": f"{e.label}   |z| {abs(e.z):.1f}   {with_sigma(e.estimate, e.sigma, e.unit)}",
-            "value": e.label,
-        }
-        for e in entries
-        if np.isfinite(e.sigma)
-    ]
-
-
-def verdict(missing: Missing) -> str:
-    """Return the verdict in one line."""
-    mark = "\N{CHECK MARK}" if missing.adequate else "\N{HEAVY BALLOT X}"
-    left = missing.left
-    return (
-        f"{mark} {missing.sentence} Unexplained sensor error, stop by stop: chi-square {left.chi2:.0f} "
-        f"for {left.dof} degrees of freedom."
-    )
-
-
-def numbers(fitted: Fitted, given: Fitted) -> str:
-    """Return how well a fit predicts, in one line."""
-    fell = "" if fitted is given else f"{given.held_out:.3f} \N{RIGHTWARDS ARROW} "
-    held = "" if fitted.at_held is None else f"; at the stops held out {fitted.at_held:.3f}"
-    nis = fitted.calibration.fit["nis_mean"]
-    errors = f"Held-out RMS {fell}{fitted.held_out:.3f} sigma{held}; mean squared innovation {nis:.3f}. 1 is right."
-    return " ".join([errors, *(f"{line}." for line in fitted.calibration.inseparable)])
+    config = {key: value for key, value in CONFIG.items() if key not in ("responsive", "modeBarButtonsToRemove")}
+    return html.Div(dcc.Graph(id=name, config=config), role="group", **{"aria-label": words})

@@ -1,0 +1,77 @@
+"""Callbacks that look for what is missing: scores of all candidates, and one of them before it is added."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import dash
+from dash import Dash, Input, Output, html, no_update
+from dash import State as Kept
+
+from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.units import UnitError
+from sdimu_calibration.report.workbench import figures, parts
+from sdimu_calibration.report.workbench.own_effect import named
+from sdimu_calibration.report.workbench.recording_cache import RecordingCache
+from sdimu_calibration.report.workbench.state import from_json
+from sdimu_calibration.report.workbench.task_progress import LOOKING, TaskProgress
+
+_ARROW = "\N{BLACK RIGHT-POINTING TRIANGLE} "
+
+
+def register(app: Dash, shelf: RecordingCache, doing: TaskProgress) -> None:
+    """Make the callbacks."""
+    _score(app, shelf, doing)
+    _choose(app)
+    _look(app, shelf, doing)
+
+
+def _score(app: Dash, shelf: RecordingCache, doing: TaskProgress) -> None:
+    @app.callback(
+        Output("verdict", "children"), Output("verdict", "className"), Output("objections", "children"),
+        Output("ranking", "figure"), Output("candidate", "options"), Output("candidate", "value"),
+        Input("shown", "data"), Kept("look", "data"), Kept("candidate", "value"), Kept("page", "data"),
+        running=LOOKING, prevent_initial_call=True,
+    )  # fmt: skip
+    def search(kept: Any, look: Any, chosen: Any, page: Any) -> tuple[Any, ...]:
+        now, tell = from_json(kept), doing.teller(str(page))
+        bench = shelf.bench(now.recording)
+        against = bench.objections(now.now, tell)
+        missing = bench.missing(now.now, tell)
+        told, tone = parts.verdict(missing, against)
+        picture = figures.finished(figures.ranking(missing.entries, missing.threshold), look)
+        still = chosen if chosen in {entry.label for entry in missing.entries} else None
+        return told, tone, [html.Li(line) for line in against], picture, parts.options(missing.entries), still
+
+
+def _choose(app: Dash) -> None:
+    """Take the bar that is clicked."""
+
+    @app.callback(
+        Output("candidate", "value", allow_duplicate=True), Input("ranking", "clickData"), prevent_initial_call=True
+    )
+    def choose(bar: Any) -> Any:
+        return str(bar["points"][0]["y"]).removeprefix(_ARROW) if bar else no_update
+
+
+def _look(app: Dash, shelf: RecordingCache, doing: TaskProgress) -> None:
+    """Show the candidate that is chosen, or the effect that is written, before it is added."""
+
+    @app.callback(
+        Output("preview", "children"), Output("looked", "data"), Output("message", "children", allow_duplicate=True),
+        Input("candidate", "value"), Input("look-own", "n_clicks"), Input("shown", "data"),
+        Kept("own", "value"), Kept("looked", "data"), Kept("page", "data"), prevent_initial_call=True,
+    )  # fmt: skip
+    def look(candidate: Any, _clicks: Any, kept: Any, own: Any, looked: Any, page: Any) -> tuple[Any, Any, Any]:
+        now = from_json(kept)
+        by_hand = dash.ctx.triggered_id == "look-own"
+        text = own if by_hand else candidate
+        if not text:
+            return "Click a bar, or press J.", None, no_update
+        try:
+            found = shelf.bench(now.recording).preview(now.now, str(text), doing.teller(str(page)))
+        except (DataError, UnitError) as error:
+            why = f"Not shown: {' '.join(str(error).split())}"
+            return "Click a bar, or press J.", None, why if by_hand else no_update
+        del looked
+        return parts.candidate(found, named(str(text))), str(text), ""

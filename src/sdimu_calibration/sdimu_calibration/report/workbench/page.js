@@ -1,0 +1,71 @@
+// Keys, the list of keys, and whether the server still answers.
+(function () {
+  var ALIVE_MS = 2000, SLOW_MS = 20000, missed = 0, lost = false;
+  function at(id) { return document.getElementById(id); }
+  function press(id) { var button = at(id); if (button && !button.disabled) { button.click(); } }
+  function set(id, props) { window.dash_clientside.set_props(id, props); }
+
+  // A server that is gone refuses at once; one that works hard answers late.
+  function ask() {
+    var stop = new AbortController(), timer = setTimeout(function () { stop.abort(); }, SLOW_MS);
+    fetch('alive', {cache: 'no-store', signal: stop.signal}).then(function (answer) {
+      if (!answer.ok) { throw new Error(answer.status); }
+      missed = 0;
+      // What was asked for when the server went is lost; the state is in the page, so that it can begin anew.
+      if (lost) { location.reload(); }
+    }).catch(function () {
+      missed += 1;
+      if (missed >= 2 && !lost) { lost = true; at('lost').hidden = false; at('busy').hidden = true; }
+    }).finally(function () { clearTimeout(timer); setTimeout(ask, ALIVE_MS); });
+  }
+  setTimeout(ask, ALIVE_MS);
+
+  // Components of Dash lack names, and hide elements that a keyboard still reaches: said and mended here.
+  var NAMES = {shows: 'What is shown', which: 'Which stops', candidate: 'Candidate', channel: 'Channel', against: 'Against', added: 'Added effect', held: 'Stops left out', recording: 'Recording', coefficient: 'Coefficient'};
+  function mend() {
+    document.querySelectorAll('.dash-dropdown-focus-target').forEach(function (input) { input.tabIndex = -1; });
+    document.querySelectorAll('.dash-radioitems').forEach(function (list) { list.setAttribute('role', 'radiogroup'); });
+    document.querySelectorAll('.dash-radioitems label').forEach(function (label) { label.removeAttribute('role'); label.removeAttribute('aria-selected'); });
+    document.querySelectorAll('#upload input').forEach(function (input) { input.setAttribute('aria-label', 'Effect file'); input.tabIndex = -1; });
+    Object.keys(NAMES).forEach(function (id) { if (at(id)) { at(id).setAttribute('aria-label', NAMES[id]); } });
+  }
+  new MutationObserver(mend).observe(document.documentElement, {childList: true, subtree: true});
+
+  function candidate(by) {
+    var figure = document.querySelector('#ranking .js-plotly-plot');
+    if (!figure || !figure.data.length) { return; }
+    var names = Array.from(figure.data[0].y, function (name) { return String(name).replace(/^\u25B6 /, ''); });
+    var now = names.indexOf(at('candidate-name') ? at('candidate-name').dataset.name : '');
+    set('candidate', {value: names[Math.max(0, Math.min(names.length - 1, now + by))]});
+  }
+  function show(by) {
+    var inputs = Array.from(document.querySelectorAll('#shows input'));
+    var now = inputs.findIndex(function (input) { return input.checked; });
+    inputs[(now + by + inputs.length) % inputs.length].click();
+  }
+  var KEYS = {
+    a: function () { press('add'); }, j: function () { candidate(1); }, k: function () { candidate(-1); },
+    x: function () { press('leave-points'); }, i: function () { press('take-points'); }, s: function () { press('toggle-stop'); },
+    b: function () { show(1); }, u: function () { press('undo'); }, r: function () { press('redo'); }, e: function () { press('export'); },
+    '?': function () { var help = at('help'); help.hidden = !help.hidden; if (!help.hidden) { help.focus(); } }, Escape: function () { at('help').hidden = true; }
+  };
+  document.addEventListener('keydown', function (event) {
+    var key = event.key.length === 1 ? event.key.toLowerCase() : event.key;
+    var writes = /^(INPUT|TEXTAREA|SELECT)$/.test(event.target.tagName) && event.target.type !== 'radio' || event.target.isContentEditable;
+    if (writes || event.altKey) { return; }
+    if (event.ctrlKey || event.metaKey) {
+      if (key === 'z') { event.preventDefault(); press(event.shiftKey ? 'redo' : 'undo'); }
+      if (key === 'y') { event.preventDefault(); press('redo'); }
+      return;
+    }
+    if (KEYS[key]) { event.preventDefault(); KEYS[key](); }
+  });
+  document.addEventListener('click', function (event) {
+    if (event.target.id === 'help-open') { KEYS['?'](); }
+    if (event.target.id === 'help-close') { at('help').hidden = true; }
+  });
+  window.addEventListener('sdimu-theme', function () { if (at('heat')) { set('look', {data: window.benchLook()}); } });
+  window.benchLook = function () {
+    return {scale: window.innerWidth >= 2400 ? 1.6 : 1, theme: window.sdimuTheme ? window.sdimuTheme() : 'light'};
+  };
+})();

@@ -1,0 +1,97 @@
+"""Texts of a page of the workbench: verdict, numbers, what a candidate is and would do."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from dash import html
+
+from sdimu_calibration.core.units import from_si
+from sdimu_calibration.report import data
+from sdimu_calibration.report.table import with_sigma
+from sdimu_calibration.report.workbench.fit import Fitted, Missing, Preview
+from sdimu_calibration.report.workbench.setting import Setting
+
+_MOST_PARAMETERS = 9
+"""Number of parameters of a candidate that are listed: a whole matrix of them."""
+
+
+def options(entries: Sequence[data.Scored]) -> list[dict[str, str]]:
+    """Candidates for the search field, with their evidence."""
+    return [
+        {
+            "label": f"{e.label}   |z| {abs(e.z):.1f}   {with_sigma(e.estimate, e.sigma, e.unit)}"
+            if np.isfinite(e.sigma) else f"{e.label}   not seen in this test",
+            "value": e.label,
+        }
+        for e in entries
+    ]  # fmt: skip
+
+
+def verdict(missing: Missing, objections: Sequence[str]) -> tuple[str, str]:
+    """Return the verdict in one line, and its class: a tick only where nothing speaks against the model."""
+    left = missing.left
+    mark, tone = ("\N{CHECK MARK}", "good") if missing.adequate else ("\N{HEAVY BALLOT X}", "bad")
+    if missing.adequate and objections:
+        mark, tone = "\N{WARNING SIGN}", "doubtful"
+    return (
+        f"{mark} {missing.sentence} Unexplained sensor error, stop by stop: chi-square {left.chi2:.0f} "
+        f"for {left.dof} degrees of freedom."
+    ), f"verdict {tone}"
+
+
+def numbers(fitted: Fitted, given: Fitted) -> str:
+    """Return how well a fit predicts, in one line."""
+    fell = "" if fitted is given else f"{given.held_out:.3f} \N{RIGHTWARDS ARROW} "
+    held = "" if fitted.at_held is None else f"; of what is left out {fitted.at_held:.3f}"
+    nis = fitted.calibration.fit["nis_mean"]
+    errors = f"Held-out RMS {fell}{fitted.held_out:.3f} sigma{held}; mean squared innovation {nis:.3f}. 1 is right."
+    return " ".join([errors, *(f"{line}." for line in fitted.calibration.inseparable)])
+
+
+def left_out(setting: Setting) -> str:
+    """Say which spans of time are left out."""
+    spans = ", ".join(map(span, setting.cut))
+    return f"and the times (s) {spans}" if spans else ""
+
+
+def span(one: tuple[float, float]) -> str:
+    """Write a span of time as the option ``--exclude-times`` takes it."""
+    return "-".join(f"{t:.3f}".rstrip("0").rstrip(".") for t in one)
+
+
+def candidate(found: Preview, name: str) -> list[Any]:
+    """Say what a candidate is, what it would take, what it cannot be told from, and what speaks against it."""
+    effect, what = found.effect, found.what
+    head = html.P(html.B(_capital(effect.title)), id="candidate-name", **{"data-name": name})
+    cause = [html.P(effect.description)] if effect.description else []
+    alike = (
+        [html.P(["Looks the same here: ", ", ".join(what.alike), "."]), html.P(["To tell them: ", what.tells, "."])]
+        if what.alike else [html.P("Nothing else looks the same here.")] if not what.objections else []
+    )  # fmt: skip
+    against = [html.Ul([html.Li(line) for line in what.objections], className="against")] if what.objections else []
+    error = " \N{RIGHTWARDS ARROW} ".join(f"{value:.3f}" for value in what.held_out)
+    return [
+        head, html.P(effect.equation, className="equation"), *cause, *(html.P(line) for line in _sizes(found)),
+        html.P(f"Held-out RMS {error} sigma, by the linear model."),
+        *alike, *against,
+    ]  # fmt: skip
+
+
+def _sizes(found: Preview) -> list[str]:
+    what = found.what
+    parameters = dict(zip(found.effect.labels, found.effect.parameters, strict=True))
+    out: list[str] = []
+    for label, value, sigma in zip(what.labels, what.estimate, what.sigma, strict=True):
+        if label not in parameters or len(out) == _MOST_PARAMETERS:
+            continue
+        unit = parameters[label].display_unit
+        size = with_sigma(from_si(float(value), unit), from_si(float(sigma), unit), unit)
+        out.append(f"{label}: {size}, {value / sigma if sigma else 0.0:+.1f} sigma")
+    return out
+
+
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]

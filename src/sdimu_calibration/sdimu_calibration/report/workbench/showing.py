@@ -1,0 +1,146 @@
+"""Callbacks that show a state: numbers, pictures and tables."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from dash import Dash, Input, Output, html, no_update
+from dash import State as Kept
+
+from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.units import UnitError
+from sdimu_calibration.report import data
+from sdimu_calibration.report.workbench import figures, parts, tables
+from sdimu_calibration.report.workbench.fit import FitSession, Fitted, Preview, Tell
+from sdimu_calibration.report.workbench.own_effect import named
+from sdimu_calibration.report.workbench.recording_cache import RecordingCache
+from sdimu_calibration.report.workbench.state import State, from_json
+from sdimu_calibration.report.workbench.task_progress import BUSY, TaskProgress
+from sdimu_calibration.report.workbench.view import GIVEN, WITH
+
+_SENSORS = 6
+"""Channels from here on are measured every second: there is more to see."""
+
+
+def register(app: Dash, shelf: RecordingCache, doing: TaskProgress) -> None:
+    """Make the callbacks."""
+    _show_states(app, shelf, doing)
+    _draw(app, shelf, doing)
+    _show_progress(app, doing)
+
+
+def _show_states(app: Dash, shelf: RecordingCache, doing: TaskProgress) -> None:
+    """Show what follows from a state alone; what is drawn by choice comes with `_draw`."""
+
+    @app.callback(
+        Output("title", "children"), Output("numbers", "children"), Output("ladder", "figure"),
+        Output("added", "options"), Output("held", "options"), Output("held", "value"), Output("cut", "children"),
+        Output("coefficients", "children"), Output("coefficient", "options"), Output("models", "children"),
+        Output("recording", "options"), Output("recording", "value"), Output("against", "options"),
+        Output("channel", "value"), Output("stop", "data"), Output("shown", "data"),
+        Output("message", "children", allow_duplicate=True),
+        Input("state", "modified_timestamp"), Input("look", "data"), Kept("state", "data"), Kept("page", "data"),
+        running=BUSY, prevent_initial_call="initial_duplicate",
+    )  # fmt: skip
+    def show(_when: Any, look: Any, kept: Any, page: Any) -> tuple[Any, ...]:
+        if not look:
+            return (no_update,) * 17
+        now, told = from_json(kept), ""
+        tell = doing.teller(str(page))
+        try:
+            bench = shelf.bench(now.recording)
+            bench.fit(now.now, tell)
+        except (DataError, UnitError) as error:  # the server was started anew, with other files
+            now, told = State(), f"What this page held cannot be shown: {' '.join(str(error).split())}"
+            bench = shelf.bench()
+        recording = now.recording or shelf.names[0]
+        return (*_shown(bench, now, recording, shelf.names, look, tell), now.as_json(), told)
+
+
+def _shown(
+    bench: FitSession, now: State, recording: str, names: list[str], look: Any, tell: Tell
+) -> tuple[Any, ...]:
+    setting = now.now
+    rungs = [setting.rung(k) for k in range(len(setting.added) + 1)]
+    fits = [bench.fit(rung, tell) for rung in rungs]
+    here, given = fits[-1], fits[0]
+    channel, stop = cell_of(now, here)
+    words = ["model as given", *(f"+ {named(text)}" for text in setting.added)]
+    ladder = figures.ladder(words, [r.held_out for r in fits], [r.at_held for r in fits])
+    return (
+        f"Workbench: {recording}",
+        parts.numbers(here, given),
+        figures.finished(ladder, look),
+        [{"label": named(text), "value": text} for text in setting.added],
+        [{"label": f"stop {s}", "value": s} for s in bench.stops],
+        list(setting.held),
+        parts.left_out(setting),
+        tables.coefficients(given, here, setting),
+        list(here.calibration.names),
+        tables.models(bench, [*now.seen, *(r for r in rungs if r not in now.seen)], setting),
+        names,
+        recording,
+        list(here.axes),
+        channel,
+        stop,
+    )
+
+
+def cell_of(now: State, fitted: Fitted) -> tuple[int, int]:
+    """Channel and stop that a page looks at: those that were clicked, else the worst."""
+    if now.cell and 0 <= now.cell[0] < len(fitted.grid.value) and now.cell[1] in fitted.residuals.stop:
+        return now.cell
+    sizes = np.abs(fitted.grid.value[_SENSORS:])
+    row, column = np.unravel_index(np.nanargmax(sizes), sizes.shape)
+    return int(row) + _SENSORS, int(fitted.grid.stops[column])
+
+
+def _draw(app: Dash, shelf: RecordingCache, doing: TaskProgress) -> None:
+    """Draw heat map and residuals of what was chosen: as given, now, or with the candidate."""
+
+    @app.callback(
+        Output("heat", "figure"), Output("residuals", "figure"), Output("residuals", "selectedData"),
+        Input("shown", "data"), Input("shows", "value"), Input("against", "value"), Input("which", "value"),
+        Input("looked", "data"), Kept("look", "data"), Kept("page", "data"),
+        prevent_initial_call=True,
+    )  # fmt: skip
+    def draw(
+        kept: Any, shows: Any, against: Any, which: Any, looked: Any, look: Any, page: Any
+    ) -> tuple[Any, Any, Any]:
+        now, tell = from_json(kept), doing.teller(str(page))
+        bench = shelf.bench(now.recording)
+        try:
+            found = bench.preview(now.now, str(looked), tell) if looked else None
+        except (DataError, UnitError):  # it is in the model now
+            found = None
+        fitted = bench.fit(now.now.given if shows == GIVEN else now.now, tell)
+        channel, stop = cell_of(now, bench.fit(now.now, tell))
+        grid, curve = _chosen(fitted, found, str(shows), str(looked))
+        variable = against if against in fitted.axes else next(iter(fitted.axes))
+        residuals = figures.residuals(fitted, curve, channel, None if which == "all" else stop, variable)
+        heat = figures.heat_map(grid, (channel, stop))
+        return figures.finished(heat, look), figures.finished(residuals, look), None
+
+
+def _chosen(
+    fitted: Fitted, found: Preview | None, shows: str, name: str
+) -> tuple[data.Grid, figures.Curve]:
+    """Heat map and residuals, with what the candidate would take out of those of the model that it joins."""
+    if shows == GIVEN or found is None:
+        return fitted.grid, figures.Curve(fitted.residuals.before)
+    if shows == WITH:
+        return data.stop_grid(found.residuals, after=True), figures.Curve(found.residuals.after)
+    signature = found.residuals.before - found.residuals.after
+    return fitted.grid, figures.Curve(fitted.residuals.before, signature, named(name))
+
+
+def _show_progress(app: Dash, doing: TaskProgress) -> None:
+    """Say what the server does for a page."""
+
+    @app.callback(
+        Output("busy", "children"), Input("tick", "n_intervals"), Kept("page", "data"), prevent_initial_call=True
+    )
+    def progress(_count: Any, page: Any) -> Any:
+        word, share = doing.at(str(page))
+        return [f"{word} \u2026", html.Progress(value=f"{share:.2f}", max="1", **{"aria-label": word})]
