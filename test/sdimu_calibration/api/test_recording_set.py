@@ -9,6 +9,8 @@ import pytest
 
 import sdimu_calibration as sdimu
 from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.units import to_si
+from sdimu_calibration.storage.fleet_folder import candidates, gather
 from sdimu_calibration.storage.json_file import write_json
 from sdimu_calibration.storage.result_file import read_result
 
@@ -71,7 +73,14 @@ def test_files_are_those_of_the_verbs(fit, found, tmp_path):
     assert {p.name for p in fit.save(tmp_path / "cal").iterdir()} == {"result.json", "report.html"}
     assert {p.name for p in found.save(tmp_path / "dia").iterdir()} == {"set.json", "result.json", "report.html"}
     np.testing.assert_array_equal(read_result(tmp_path / "cal").values, fit.values)
-    assert json.loads((tmp_path / "dia" / "set.json").read_text())["verdict"] == found.verdict
+    content = json.loads((tmp_path / "dia" / "set.json").read_text())
+    assert content["verdict"] == found.verdict
+    # A fleet reads from a set what it reads from a diagnosis of one recording.
+    given = gather([tmp_path / "dia"]).given
+    assert [entry.unit for entry in given] == ["SN3"]
+    of_fleet = candidates(given)
+    k = of_fleet.names.index("gyro_scale_asymmetry_y")
+    assert of_fleet.estimates[0, k] == pytest.approx(to_si(40.0, "ppm"), abs=5.0 * of_fleet.sigmas[0, k])
 
 
 def test_what_cannot_be_used_is_one_line(fit, opened, tmp_path):

@@ -170,3 +170,21 @@ def test_a_recording_that_stands_twice_is_refused_and_a_folder_that_cannot_be_wr
     kept.write_text("")
     with set_runner(2, 1, kept) as work, pytest.raises(DataError, match="are the same recording"):
         fit_set(set_of([bags / "run1", tmp_path / "again"], LIKE).members, OPTIONS, work)
+
+
+def test_two_dask_workers_give_bitwise_what_this_process_gives(bags):
+    distributed = pytest.importorskip("distributed")
+    members = set_of([bags / "run1", bags / "run2"], LIKE).members
+    jobs = [job_of(member, OPTIONS, None) for member in members]
+    with set_runner(2, 1, None) as here:
+        local = here(jobs)
+    with (
+        distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster,
+        set_runner(2, 2, None, cluster.scheduler_address) as there,
+    ):
+        remote = there(jobs)
+    for one, other in zip(local, remote, strict=True):
+        assert one.name == other.name
+        for name in ("A", "y", "point", "weight"):
+            np.testing.assert_array_equal(getattr(one.reduction, name), getattr(other.reduction, name))
+        np.testing.assert_array_equal(one.values, other.values)

@@ -159,7 +159,7 @@ class Recording:
     @cached_property
     def interval_s(self) -> float:
         """Nominal sample interval (s): the median of the stamp differences."""
-        return float(np.median(np.diff(self.t)))
+        return float(np.median(np.diff(self.t), overwrite_input=True))
 
 
 def nominal_interval_ns(stamps_ns: Ints) -> int:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -14,11 +15,12 @@ from sdimu_calibration.core.diagnosis.found import DetectableSize, Found
 from sdimu_calibration.core.diagnosis.free_input_test import FreeInputTest
 from sdimu_calibration.core.diagnosis.ladder import Rung
 from sdimu_calibration.core.diagnosis.plan_seen import PlanSeen
-from sdimu_calibration.core.diagnosis.scan import scale_of, scan
+from sdimu_calibration.core.diagnosis.scan import Scan, scale_of, scan
 from sdimu_calibration.core.diagnosis.search import Step
 from sdimu_calibration.core.diagnosis.standing import standing
 from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary
 from sdimu_calibration.core.evidence.consistency import Noise
+from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.handheld.handheld_fit import FORCE, RATE, TURN
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.storage.correlation_text import packed
@@ -94,7 +96,7 @@ def content(summary: DiagnosisSummary) -> dict[str, Any]:
             "before": _free_inputs(d.free_inputs_before),
             "after": _free_inputs(d.free_inputs_after),
         },
-        "alone": _alone(d),
+        "alone": alone(d.evidence, d.found.first, d.free.tolist()),
         "known": as_plain(standing(d, summary.found)),
         "fit": {"before": fit_of(d.before), "after": fit_of(d.after)},
         "ladder": [step_of(s) for s in d.found.steps],
@@ -105,10 +107,19 @@ def content(summary: DiagnosisSummary) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _alone(d: Diagnosis) -> dict[str, Any]:
-    """Give every candidate of the catalogue alone beside the given model, however small: many units make it large."""
-    evidence, free = d.evidence, set(d.free.tolist())
-    first = scan(evidence.information, evidence.model, evidence.weight, scale_of(d.found.first))
+def alone(evidence: LinearEvidence, before: Scan, free: Sequence[int] = ()) -> dict[str, Any]:
+    """Give every candidate of the catalogue alone beside the given model, however small: many units make it large.
+
+    Parameters
+    ----------
+    evidence : LinearEvidence
+        Of a recording, or of a set.
+    before : Scan
+        Of the search, before anything was added: says how large the noise is.
+    free : sequence of int
+        Columns of the evidence that are no candidates.
+    """
+    first = scan(evidence.information, evidence.model, evidence.weight, scale_of(before))
     J = evidence.information.given(evidence.model, evidence.weight).J
     p = len(evidence.weight)
     shown = [

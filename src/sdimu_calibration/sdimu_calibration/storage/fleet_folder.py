@@ -18,9 +18,10 @@ from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.storage.correlation_text import unpacked
 from sdimu_calibration.storage.diagnosis_file import read_diagnosis
 from sdimu_calibration.storage.result_file import read_result
+from sdimu_calibration.storage.set_result_file import read_set_diagnosis
 from sdimu_calibration.storage.whole_file import RESULT
 
-DIAGNOSIS = "diagnosis.json"
+DIAGNOSIS, SET = "diagnosis.json", "set.json"
 
 
 @dataclass(frozen=True)
@@ -35,7 +36,7 @@ class Entry:
         Its folder.
     result : Calibration
     diagnosis : mapping or None
-        Content of diagnosis.json beside it.
+        Content of diagnosis.json or set.json beside it.
     """
 
     name: str
@@ -114,7 +115,7 @@ def _given(usable: Sequence[Entry], main: tuple[str, tuple[str, ...], str]) -> t
     usual = max(dict.fromkeys(models), key=models.count, default=())
     out: list[Entry] = []
     for entry, model in zip(diagnosed, models, strict=True):
-        if model == usual and not _repeats(entry, out):
+        if model == usual and not _repeats(entry, out) and not _part_of_set(entry, diagnosed):
             out.append(entry)
     return tuple(out)
 
@@ -143,8 +144,7 @@ def _read(name: str, path: Path, apart: list[str]) -> Entry | None:
     """Read a result; None, and a line in `apart`, where it must not be used."""
     try:
         result = read_result(path)
-        beside = path.parent / DIAGNOSIS
-        entry = Entry(name, path.parent, result, read_diagnosis(beside) if beside.is_file() else None)
+        entry = Entry(name, path.parent, result, _diagnosis_beside(path.parent))
     except DataError as error:
         apart.append(str(error))
         return None
@@ -155,6 +155,13 @@ def _read(name: str, path: Path, apart: list[str]) -> Entry | None:
         apart.append(f"{name}: has a value or a covariance that is no number")
         return None
     return entry
+
+
+def _diagnosis_beside(folder: Path) -> dict[str, Any] | None:
+    """Read the diagnosis of a recording, or of a set, beside its result; None where there is none."""
+    if (folder / DIAGNOSIS).is_file():
+        return read_diagnosis(folder / DIAGNOSIS)
+    return read_set_diagnosis(folder / SET) if (folder / SET).is_file() else None
 
 
 def _misfit(entry: Entry, main: tuple[str, tuple[str, ...], str], one_model: bool) -> str:

@@ -6,12 +6,12 @@ from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
-from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.storage.cdr import LayoutError, decode_imu_block
 from sdimu_calibration.storage.raw_messages import Block, RawMessages
+from sdimu_calibration.storage.sample_file import SampleFile, Samples
 
-Samples = tuple[Ints, Floats, Floats]
-"""Stamps (n,) (ns), rates (n, 3) (rad/s), specific forces (n, 3) (m/s^2)."""
+_IN_MEMORY = 1 << 21
+"""Number of samples from which they lie in a file: a hundred megabytes, three hours at 200 Hz."""
 _LOOSE = 4096
 """Messages that are decoded at once where they come one by one."""
 
@@ -26,6 +26,8 @@ class ImuMessages(RawMessages):
     def __init__(self) -> None:
         super().__init__()
         self._decoded: list[Samples | Block] = []
+        self._file: SampleFile | None = None
+        self._waiting = 0
         self._number = 0
         self._ends: list[bytes] = []
 
@@ -57,6 +59,9 @@ class ImuMessages(RawMessages):
             one_by_one(list(_messages_of(part))) if isinstance(part, Block) else part for part in self._decoded
         ]
         self._decoded = []
+        if self._file is not None:
+            self._file.append(found)
+            return self._file.samples()
         ns, omega, force = zip(*found, strict=True) if found else ((), (), ())
         empty = np.empty((0, 3))
         return (
@@ -74,6 +79,17 @@ class ImuMessages(RawMessages):
             self._decoded.append(decode_imu_block(block))
         except LayoutError:
             self._decoded.append(block)
+        self._waiting += len(block.start)
+        if self._waiting >= _IN_MEMORY:
+            self._put_away()
+
+    def _put_away(self) -> None:
+        """Write what was decoded to a file, up to the first block that waits for a reader of single messages."""
+        count = next((k for k, part in enumerate(self._decoded) if isinstance(part, Block)), len(self._decoded))
+        known, self._decoded = self._decoded[:count], self._decoded[count:]
+        self._file = self._file or SampleFile()
+        self._file.append([part for part in known if not isinstance(part, Block)])
+        self._waiting = 0
 
 
 def _messages_of(block: Block) -> Iterator[bytes]:

@@ -19,7 +19,8 @@ from sdimu_calibration.core.results import (
     SetTrend,
     TurnOn,
 )
-from sdimu_calibration.storage.json_file import write_json
+from sdimu_calibration.storage.diagnosis_file import alone
+from sdimu_calibration.storage.json_file import read_json, write_json
 from sdimu_calibration.storage.standing_file import as_plain as standing_as_plain
 
 FORMAT = "sdimu-set-diagnosis/1"
@@ -108,5 +109,18 @@ def write_set_diagnosis(path: Path, found: SetDiagnosis) -> None:
             "findings": [asdict(f) | {"alike": list(f.alike)} for f in found.findings],
             "held_out_before": found.before.fit["held_out_rms"], "held_out_after": found.after.fit["held_out_rms"],
             "advice": list(found.advice), "known": standing_as_plain(found.standing),
+            "fit": {"before": {"model": list(found.before.model)}},
+            "alone": alone(found.first.evidence, found.first.first),
         },
     )  # fmt: skip
+
+
+def read_set_diagnosis(path: Path) -> dict[str, Any]:
+    """Read set.json.
+
+    Raises
+    ------
+    DataError
+        When it is not there or not of this format.
+    """
+    return read_json(Path(path), FORMAT)

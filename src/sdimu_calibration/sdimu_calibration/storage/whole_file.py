@@ -13,7 +13,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 RESULT = "result.json"
-COMPANIONS = ("report.html", "diagnosis.json")
+COMPANIONS = ("report.html", "diagnosis.json", "set.json")
 """Files that speak of the result.json beside them: those of an earlier run go when a new one comes."""
 
 

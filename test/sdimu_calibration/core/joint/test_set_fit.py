@@ -141,3 +141,11 @@ def test_what_is_open_of_the_scatter_hides_no_deviate(options):
     assert np.isfinite(varied.z[:, biases]).all()
     # Two recordings differ from their mean by the same.
     assert varied.z[0, biases] == pytest.approx(-varied.z[1, biases], abs=0.2)
+
+
+def test_imus_of_different_grades_are_one_clear_error(options):
+    some = unit_set(35, [short(), short()])
+    test = some.members[1].open()
+    other = Member("other", InMemory(test.with_imu(replace(test.imu, name="cheap", grade="mems"))))
+    with pytest.raises(DataError, match=r"different grades \(r0: dtg, navigation, other: cheap, mems\)"):
+        fit_set((some.members[0], other), options, here)

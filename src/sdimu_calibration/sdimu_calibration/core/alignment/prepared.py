@@ -9,6 +9,7 @@ import numpy as np
 from sdimu_calibration.core import earth
 from sdimu_calibration.core.alignment.alignment import Alignment, align
 from sdimu_calibration.core.arrays import Bools, Floats, Ints
+from sdimu_calibration.core.data.blocks import let_go, pieces
 from sdimu_calibration.core.data.dwell_detection import specification_is_wide
 from sdimu_calibration.core.data.epochs import Epochs, cut
 from sdimu_calibration.core.data.gaps import Bridges, bridges, judge, largest_acceleration, weighed
@@ -182,7 +183,13 @@ def reduce(recording: Recording, setup: TestSetup, screened: bool = True) -> Pre
     if len(recording.t) < NOMINAL_FROM + 1:
         raise DataError(f"/imu/data_raw: {len(recording.t)} usable samples are too few to calibrate")
     nominal = nominal_interval(recording.t)
-    cycles = Reducer(nominal).add(recording.t, recording.omega_ib_b, recording.f_ib_b)
+    reducer = Reducer(nominal)
+    cycles = Cycles.concatenate([
+        reducer.add(recording.t[rows], recording.omega_ib_b[rows], recording.f_ib_b[rows])
+        for rows in pieces(len(recording.t))
+    ])
+    # From here on cycles are looked at, and samples hardly.
+    let_go(recording.omega_ib_b, recording.f_ib_b)
     epochs = cut(cycles, nominal)
     if not len(epochs):
         raise DataError("/imu/data_raw: the recording is shorter than one second")
@@ -191,6 +198,7 @@ def reduce(recording: Recording, setup: TestSetup, screened: bool = True) -> Pre
     cycles = cycles[: int(epochs.last[-1])]
     found = bridges(cycles, epochs, phases.dwell, nominal, largest_acceleration(cycles), setup.gravity)
     at, excess, rough = wild(recording)
+    let_go(recording.omega_ib_b, recording.f_ib_b)
     found = weighed(found, epochs, at, excess)
     unsound = (*unsound, *rough)
     noise = (setup.imu.gyro_white_noise, setup.imu.accel_white_noise)

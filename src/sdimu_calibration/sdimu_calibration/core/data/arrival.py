@@ -12,6 +12,7 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 
 from sdimu_calibration.core.arrays import Bools, Floats, Ints
+from sdimu_calibration.core.data.blocks import all_finite, ascending
 from sdimu_calibration.core.data.bursts import Bursts, find_bursts
 from sdimu_calibration.core.data.strays import stamp_text, strays
 from sdimu_calibration.core.recording import (
@@ -163,6 +164,8 @@ def arrange(ns: Stamps, omega_ib_b: Floats, f_ib_b: Floats, where: str) -> Arran
     DataError
         When nothing can be used, or the clock of the stamps was set back: then one stamp means two times.
     """
+    if len(ns) >= _MINIMUM_SAMPLES and ascending(ns) and all_finite(omega_ib_b) and all_finite(f_ib_b):
+        return Arranged(np.arange(len(ns)), dict.fromkeys(("not_finite", "out_of_order", "repeated"), 0), ())
     finite = np.isfinite(omega_ib_b).all(axis=1) & np.isfinite(f_ib_b).all(axis=1)
     if not finite.any():
         raise DataError(f"{where}: all {len(ns)} samples are NaN or infinite; check the driver of the IMU")

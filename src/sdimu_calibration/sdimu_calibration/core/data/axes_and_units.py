@@ -23,6 +23,7 @@ from itertools import permutations, product
 import numpy as np
 
 from sdimu_calibration.core.arrays import Floats, Ints
+from sdimu_calibration.core.data.blocks import median_length
 from sdimu_calibration.core.data.windows import Windows, cut_windows, turned
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.units import STANDARD_GRAVITY, parse_unit
@@ -117,7 +118,7 @@ def recognise(t: Floats, w: Floats, f: Floats, stated: Stated) -> Reading:
 
 
 def _accel_unit(f: Floats, stated: Stated) -> tuple[float, tuple[str, ...]]:
-    size = float(np.median(np.linalg.norm(f, axis=1)))
+    size = median_length(f)
     if stated.accel is not None:
         if not _is_gravity(size * stated.accel):
             raise DataError(

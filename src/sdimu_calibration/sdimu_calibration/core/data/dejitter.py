@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from sdimu_calibration.core.arrays import Floats
+from sdimu_calibration.core.data.blocks import pieces
 from sdimu_calibration.core.recording import Recording
 
 _DOUBT = 0.25
@@ -36,6 +37,8 @@ def dejittered(recording: Recording) -> Recording:
     """
     t = recording.t
     interval = recording.interval_s
+    if _plainly_even(t, interval):
+        return recording
     steps = np.rint(np.diff(t) / interval)
     count = np.concatenate([[0.0], np.cumsum(steps)])
     slope, offset = np.polyfit(count, t, 1)
@@ -52,6 +55,18 @@ def dejittered(recording: Recording) -> Recording:
     even = t - jitter
     note = f"{measured}: samples are taken as even, and their count as the clock"
     return replace(recording, t=even, notes=(*recording.notes, note))
+
+
+def _plainly_even(t: Floats, interval: float) -> bool:
+    """Whether every step is so near the interval that no sum of them over the smoothing time is jitter.
+
+    Over the h samples to each side of its mean a stamp is off by less than the sum of what their steps are off.
+    """
+    half = max(round(_DRIFT_S / interval), 1)
+    return all(
+        float(np.abs(np.diff(t[rows]) - interval).max(initial=0.0)) * half < _LEAST * interval
+        for rows in pieces(len(t) - 1, 1)
+    )
 
 
 def _smooth(values: Floats, half: int) -> Floats:

@@ -15,6 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from sdimu_calibration.core.arrays import Bools, Floats, Ints
+from sdimu_calibration.core.data.blocks import let_go, pieces
 from sdimu_calibration.core.recording import DataFault, Recording
 
 CHANNELS = tuple(f"{triad} {axis}" for triad in ("gyro", "accelerometer") for axis in "xyz")
@@ -90,6 +91,7 @@ def _channels(recording: Recording) -> Iterator[tuple[str, Floats]]:
     """Name and numbers of each channel that has noise, one after the other in memory."""
     for name, column in zip(CHANNELS, (*recording.omega_ib_b.T, *recording.f_ib_b.T), strict=True):
         x = np.ascontiguousarray(column)
+        let_go(recording.omega_ib_b, recording.f_ib_b)
         if not _noiseless(x):
             yield name, x
 
@@ -131,7 +133,7 @@ def _stuck(x: Floats) -> Ints:
     """Find runs of one number that are too long for the channel."""
     none = np.empty(0, dtype=np.int64)
     n = len(x)
-    same = np.diff(x) == 0.0
+    same = x[1:] == x[:-1]
     if n < 3 or not same.any():
         return none
     share = max(_repetition(same), 1.0 / n)
@@ -184,7 +186,7 @@ _ROUNDING = 1e-9
 def _saturated(x: Floats) -> Ints:
     """Find readings that stand at the largest or smallest number of a channel that else repeats nothing."""
     none = np.empty(0, dtype=np.int64)
-    if len(x) < 3 or _repetition(np.diff(x) == 0.0) > 1.0 / _BLOCK or _counts(x):
+    if len(x) < 3 or _repetition(x[1:] == x[:-1]) > 1.0 / _BLOCK or _counts(x):
         return none
     ends = [np.flatnonzero(x == end) for end in (x.max(), x.min())]
     rows = [at for at in ends if len(at) >= _LEAST_AT_END]
@@ -195,10 +197,10 @@ def _noiseless(x: Floats) -> bool:
     """Whether a channel has no noise to speak of, as a perfect simulation: what repeats in it is no fault."""
     if len(x) < 3:
         return True
-    second, limit = _bend(x), _PERFECT * float(np.abs(x).max())
+    limit, count = _PERFECT * float(max(x.max(), -x.min())), len(x) - 2
     # Counting is quicker than a median, which only a tie needs.
-    below = 2 * int(np.count_nonzero(second < limit))
-    return below > len(second) if below != len(second) else float(np.median(second)) < limit
+    below = 2 * sum(int(np.count_nonzero(_bend(x[rows]) < limit)) for rows in pieces(count, 2))
+    return below > count if below != count else float(np.median(_bend(x))) < limit
 
 
 def _bend(x: Floats) -> Floats:
@@ -206,20 +208,31 @@ def _bend(x: Floats) -> Floats:
     return np.asarray(np.abs(x[1:-1] - 0.5 * (x[:-2] + x[2:])))
 
 
+def _bends(x: Floats) -> Floats:
+    """Return the same of all samples, zero at the first and the last."""
+    out = np.zeros(len(x))
+    for rows in pieces(len(x) - 2, 2):
+        out[rows.start + 1 : rows.stop - 1] = _bend(x[rows])
+    return out
+
+
 def _spikes(x: Floats) -> Ints:
     """Find one sample or two far from both neighbours, where these agree and little around is as rough."""
-    rows = np.arange(len(x))
+    none = np.empty(0, dtype=np.int64)
     if len(x) < 2 * _BLOCK:
-        return rows[:0]
+        return none
+    rows: Ints | None = None
     # One spike may hide another beside it: what is left is looked through again.
     for _round in range(_ROUNDS):
-        left = x if len(rows) == len(x) else x[rows]
-        size = np.concatenate([[0.0], _bend(left), [0.0]])
+        left = x if rows is None else x[rows]
+        size = _bends(left)
         sigma = _GAUSS_MAD * float(np.median(size))
         at = np.union1d(_stand_out(left, size, sigma, 1), _stand_out(left, size, sigma, 2))
         if not len(at):
             break
-        rows = np.delete(rows, at)
+        rows = np.delete(np.arange(len(x)) if rows is None else rows, at)
+    if rows is None:
+        return none
     return np.setdiff1d(np.arange(len(x)), rows, assume_unique=True)
 
 
@@ -232,7 +245,9 @@ def _stand_out(x: Floats, size: Floats, sigma: float, width: int) -> Ints:
         return np.empty(0, dtype=np.int64)
     last = len(x) - width - 1
     # Few samples are far from the line; the rest is asked of these alone.
-    at = np.flatnonzero(np.abs(_off_line(x, slice(0, last), 1, width)) > _SPIKE * sigma)
+    at = np.concatenate([
+        rows.start + np.flatnonzero(np.abs(_off_line(x, rows, 1, width)) > _SPIKE * sigma) for rows in pieces(last)
+    ])
     off = np.abs([_off_line(x, at, j, width) for j in range(1, width + 1)]).min(axis=0)
     good = (off > _SPIKE * sigma) & (np.abs(x[at + width + 1] - x[at]) < 0.5 * off)
     at, off = at[good], off[good]
@@ -291,15 +306,15 @@ def wild(recording: Recording) -> tuple[Floats, Floats, tuple[DataFault, ...]]:
     faults = []
     # Across missing samples a difference of four is none.
     uneven = np.ones(len(recording.t), dtype=bool)
-    uneven[2:-2] = np.abs(recording.t[4:] - recording.t[:-4] - 4.0 * recording.interval_s) > recording.interval_s / 2
+    interval = recording.interval_s
+    for rows in pieces(len(recording.t) - 4, 4):
+        t = recording.t[rows]
+        uneven[rows.start + 2 : rows.stop - 2] = np.abs(t[4:] - t[:-4] - 4.0 * interval) > interval / 2
     middle = recording.t[_WINDOW // 2 :: _WINDOW][:windows]
     moving = _changing_rate(recording.omega_ib_b[: windows * _WINDOW].reshape(windows, _WINDOW, 3))
+    let_go(recording.omega_ib_b)
     for name, x in _channels(recording):
-        # Gravity turns through a body in motion: its fourth difference is nothing beside noise, its second is not.
-        fourth = np.zeros_like(x)
-        fourth[2:-2] = x[:-4] - 4.0 * x[1:-3] + 6.0 * x[2:-2] - 4.0 * x[3:-1] + x[4:]
-        fourth[uneven] = np.nan
-        rough = _medians(np.abs(fourth[: windows * _WINDOW]).reshape(windows, _WINDOW))
+        rough = _roughness(x, uneven, windows)
         usual = float(np.median(rough[rough > 0.0])) if rough.any() else 0.0
         at = (rough > _WILD * usual) & ~moving
         if usual == 0.0 or not at.any() or at.mean() > _RARE:
@@ -311,9 +326,26 @@ def wild(recording: Recording) -> tuple[Floats, Floats, tuple[DataFault, ...]]:
         more = f" and {np.count_nonzero(np.diff(t) > 1.0)} times more" if np.any(np.diff(t) > 1.0) else ""
         line = f"{text}{more}; its weight is reduced there"
         faults.append(DataFault("wild", line, int(at.sum()) * _WINDOW, float(t[0]), float(t[-1])))
-    rows = largest > 1.0
-    excess = (largest[rows] ** 2 - 1.0) * _WINDOW * recording.interval_s
-    return middle[rows], excess, tuple(faults)
+    disturbed = largest > 1.0
+    excess = (largest[disturbed] ** 2 - 1.0) * _WINDOW * interval
+    return middle[disturbed], excess, tuple(faults)
+
+
+def _roughness(x: Floats, uneven: Bools, windows: int) -> Floats:
+    """Median size of the fourth difference in each window, shape (windows,); `uneven` (n,) are no differences.
+
+    Gravity turns through a body in motion: its fourth difference is nothing beside noise, its second is not.
+    """
+    out = np.empty(windows)
+    for part in pieces(windows):
+        begin, end = part.start * _WINDOW, part.stop * _WINDOW
+        fourth = np.zeros(end - begin)
+        first, last = max(begin, 2), min(end, len(x) - 2)
+        y = x[first - 2 : last + 2]
+        fourth[first - begin : last - begin] = y[:-4] - 4.0 * y[1:-3] + 6.0 * y[2:-2] - 4.0 * y[3:-1] + y[4:]
+        fourth[uneven[begin:end]] = np.nan
+        out[part] = _medians(np.abs(fourth).reshape(-1, _WINDOW))
+    return out
 
 
 def _changing_rate(windows: Floats) -> Bools:
@@ -329,10 +361,24 @@ def _changing_rate(windows: Floats) -> Bools:
     ndarray of bool, shape (k,)
     """
     out = np.zeros(len(windows), dtype=bool)
-    for edge in (windows[:, :_EDGE], windows[:, -_EDGE:]):
-        change = windows - edge.mean(axis=1, keepdims=True)
-        # A turn goes to one side of where it began, or of where it ended; noise goes to both.
-        one_sided = np.abs(change.sum(axis=1)) > _ONE_SIDED * np.abs(change).sum(axis=1)
-        usual = np.median(np.abs(change), axis=(0, 1))
-        out |= (one_sided & (np.abs(change).max(axis=1) > _TURN_BEGINS * usual)).any(axis=1)
+    for axis in range(3):
+        for edge in (slice(_EDGE), slice(-_EDGE, None)):
+            out |= _turn_begins(windows[:, :, axis], edge)
     return out
+
+
+def _turn_begins(windows: Floats, edge: slice) -> Bools:
+    """Return the same for one axis (k, n) against one edge of each window."""
+    one_sided, largest = np.zeros(len(windows), dtype=bool), np.empty(len(windows))
+    sizes = np.empty(windows.shape)
+    for part in pieces(len(windows)):
+        # Samples first, so that sums go through a window in its order.
+        here = np.ascontiguousarray(windows[part].T)
+        change = here - here[edge].mean(axis=0)
+        size = np.abs(change)
+        # A turn goes to one side of where it began, or of where it ended; noise goes to both.
+        one_sided[part] = np.abs(change.sum(axis=0)) > _ONE_SIDED * size.sum(axis=0)
+        largest[part] = size.max(axis=0)
+        sizes[part] = size.T
+    usual = float(np.median(sizes, overwrite_input=True)) if len(windows) else 0.0
+    return np.asarray(one_sided & (largest > _TURN_BEGINS * usual))

@@ -13,6 +13,7 @@ import numpy as np
 from sdimu_calibration.core import earth
 from sdimu_calibration.core.arrays import Bools, Floats, Ints
 from sdimu_calibration.core.compiled import compiled
+from sdimu_calibration.core.data.blocks import let_go
 from sdimu_calibration.core.matrix3 import multiplied, rotation3, store
 
 WINDOW_S = 1.0
@@ -157,15 +158,21 @@ def cut_windows(
     interval_s : float, optional
         Of the samples; by default the median of their stamps' differences.
     """
-    dt = interval_s or float(np.median(np.diff(t)))
+    dt = interval_s or float(np.median(np.diff(t), overwrite_input=True))
     m, q = samples_of(length_s, dt)
     first = np.arange(m, len(t) - m - q + 1, m)
     whole = t[np.minimum(first + m + q, len(t)) - 1] - t[first - q] < _GAP * (m + 2 * q) * dt
     first = first[whole]
-    (total_w, offset_w), (total_f, offset_f) = (_running_sum(np.ascontiguousarray(x)) for x in (w, f))
+    # Of the running sums only those at the edges are kept: a day of samples has a gigabyte of them.
+    at = np.unique(np.concatenate([first + step for step in (-q, 0, q, m - q, m, m + q)]))
+    total_w, offset_w = _running_sum(np.ascontiguousarray(w), at)
+    let_go(w)
+    total_f, offset_f = _running_sum(np.ascontiguousarray(f), at)
+    let_go(f)
 
     def mean(total: Floats, offset: Floats, begin: Ints, end: Ints) -> Floats:
-        return np.asarray((total[end] - total[begin]) / (end - begin)[:, None] + offset)
+        rows = np.searchsorted(at, end), np.searchsorted(at, begin)
+        return np.asarray((total[rows[0]] - total[rows[1]]) / (end - begin)[:, None] + offset)
 
     return Windows(
         start=t[first - 1], end=t[first + m - 1], first=first, length=m, interval_s=dt,
@@ -182,17 +189,21 @@ def samples_of(length_s: float, interval_s: float) -> tuple[int, int]:
 
 
 @compiled
-def _running_sum(x: Floats) -> tuple[Floats, Floats]:
-    """Sum of ``x - mean`` up to each row of x (n, 3), shape (n + 1, 3), and the mean (3,)."""
+def _running_sum(x: Floats, at: Ints) -> tuple[Floats, Floats]:
+    """Sum of ``x - mean`` of the rows of x (n, 3) before each of `at` (c,), ascending; shape (c, 3); the mean (3,)."""
     n, mean = len(x), np.zeros(3)
     for i in range(n):
         for k in range(3):
             mean[k] += x[i, k]
     mean /= n
-    out = np.zeros((n + 1, 3))
-    for i in range(n):
-        for k in range(3):
-            out[i + 1, k] = out[i, k] + (x[i, k] - mean[k])
+    out, total, reached = np.zeros((len(at), 3)), np.zeros(3), 0
+    for i in range(n + 1):
+        while reached < len(at) and at[reached] == i:
+            out[reached] = total
+            reached += 1
+        if i < n:
+            for k in range(3):
+                total[k] += x[i, k] - mean[k]
     return out, mean
 
 

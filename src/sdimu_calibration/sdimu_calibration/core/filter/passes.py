@@ -74,6 +74,10 @@ class Pass:
     data: PassInput
     settings: PassSettings
 
+    def without_regressors(self) -> Pass:
+        """Return the pass without its regressors: of a long recording they are most of what it holds."""
+        return replace(self, data=self.data._replace(values=np.empty((0, self.data.values.shape[1]))))
+
     @property
     def smoothed_start(self) -> Floats:
         """Initial attitude as the whole test sees it, shape (3, 3)."""
@@ -316,7 +320,7 @@ class Solution:
     ----------
     setup, prepared, alignment : TestSetup, PreparedData, Alignment
     first, last : Pass
-        The closed-loop pass and the converged one.
+        The closed-loop pass (its output: no regressors are kept) and the converged one.
     passes : int
         How many there were.
     converged : bool
@@ -406,4 +410,4 @@ def solve(setup: TestSetup, prepared: PreparedData, begin: StartPoint | None, pr
         setup = replace(setup, sensors=wider)
         last, more, converged = refine(prepared, setup, start, last, progress)
         passes += more - 1
-    return Solution(setup, prepared, start, first, last, passes, converged)
+    return Solution(setup, prepared, start, first.without_regressors(), last, passes, converged)

@@ -7,11 +7,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from sdimu_calibration.core.diagnosis.search import Search
 from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.effects.selection import resolve
 from sdimu_calibration.core.evidence.known import Standing
 from sdimu_calibration.core.joint.member import Member
 from sdimu_calibration.core.joint.scope import tagged
+from sdimu_calibration.core.joint.set_evidence import SetEvidence
 from sdimu_calibration.core.joint.set_fit import Run, SetFit, SetOptions
 from sdimu_calibration.core.joint.set_result import SCATTERS, base_fit, set_outcome
 from sdimu_calibration.core.joint.set_search import SetSearch, search_set
@@ -74,6 +76,8 @@ class SetDiagnosis:
     advice : tuple of str
     standing : Standing
         What the set knows of the unit: what a plan for the next recording begins with.
+    first : Search
+        Of the first round, with every candidate beside the model as given.
     """
 
     verdict: str
@@ -84,6 +88,7 @@ class SetDiagnosis:
     threshold: float
     advice: tuple[str, ...]
     standing: Standing
+    first: Search[SetEvidence]
 
 
 def diagnose_set(
@@ -109,7 +114,7 @@ def diagnose_set(
     standing = replace(found.standing, site=test.origin.site)
     return SetDiagnosis(
         word, _sentence(word, findings, before, after), findings, before, after, found.threshold,
-        _advice(word, findings, next_recording(found.after, standing, test)), standing,
+        _advice(word, findings, next_recording(found.after, standing, test)), standing, found.first,
     )  # fmt: skip
 
 

@@ -171,6 +171,7 @@ def fit_set(
         first, why = next(iter(left.items()))
         raise DataError(f"no recording of the set can be used: {first}: {why}")
     _check_different(reports)
+    _check_one_grade(reports)
     reports = _one_estimator(members, options, reports, run)
     firm, late = [r for r in reports if r.stands_alone], {}
     if firm and before is None:
@@ -245,6 +246,25 @@ def _check_different(reports: Sequence[Report]) -> None:
         first = seen.setdefault((report.start_ns, report.values.tobytes()), report.name)
         if first != report.name and len(report.values):
             raise DataError(f"'{first}' and '{report.name}' are the same recording: name it once")
+
+
+def _check_one_grade(reports: Sequence[Report]) -> None:
+    """Refuse recordings of IMUs of different grades: they are of several units, whatever their serials say.
+
+    Raises
+    ------
+    DataError
+        When there are two grades.
+    """
+    first: dict[str, Report] = {}
+    for report in reports:
+        first.setdefault(report.imu.grade, report)
+    if len(first) > 1:
+        told = ", ".join(f"{r.name}: {r.imu.name}, {grade}" for grade, r in first.items())
+        raise DataError(
+            f"the recordings are of IMUs of different grades ({told}): a joint fit is of one unit; state its --imu if "
+            "it is one, else calibrate each by itself"
+        )
 
 
 def job_of(
