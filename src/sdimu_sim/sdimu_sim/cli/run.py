@@ -218,7 +218,7 @@ def _report(console: Console, out: Path, site: str, imu: str, model: str, test_n
         write_diagnosis(part / "diagnosis.json", summary)
         write_report(
             part / "report.html", result, title=title, truth=truth, reference=read_reference(), summary=summary,
-            more=more, trace=traced([out / "bag"], sys.argv[1:], site=site, imu=imu, model=model, plan=plan),
+            more=more, trace=traced([out / "bag"], sys.argv[1:], site=site, imu=imu, model=model),
         )  # fmt: skip
     shown = rich_table(rows(result, truth, read_reference()), f"body frame: {result.body_frame}")
     console.print(shown, soft_wrap=True)
