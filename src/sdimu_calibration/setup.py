@@ -40,6 +40,7 @@ RUN_TIME = [
 ]
 EXTRAS = {
     "test": [
+        "axe-playwright-python",
         "hypothesis",
         "import-linter",
         "mcap-ros2-support",

@@ -123,6 +123,18 @@ _SETTLED = """
 """
 
 
+def broken_rules(page: Any) -> list[str]:
+    """Rules of axe-core that a page breaks seriously, with the first place of each.
+
+    Figures are left to the test of the palette: axe takes minutes over their thousands of marks.
+    """
+    axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="no axe-core here (make setup)")
+    found = axe.Axe().run(page, {"exclude": [[".figure"], [".js-plotly-plot"]]}).response["violations"]
+    return [
+        f"{rule['id']}: {rule['nodes'][0]['html'][:200]}" for rule in found if rule["impact"] in {"serious", "critical"}
+    ]
+
+
 def settle(page: Any) -> None:
     """Wait until nothing is being worked on, verdict and candidates included."""
     # One callback follows another: still the same after a moment means the last one is done.

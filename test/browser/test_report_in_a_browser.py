@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,11 @@ from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.diagnosis.summary import summarise
 from sdimu_calibration.report.page import write_report
 from sdimu_calibration.report.report_extras import ReportExtras
+
+from .conftest import broken_rules
+
+OPEN_S = 1.5
+"""Time of processor until the page can be read (s): a page that is opened often must not be waited for."""
 
 
 @pytest.fixture(scope="module")
@@ -38,6 +44,71 @@ def test_every_figure_is_drawn(opened: Any) -> None:
     opened.evaluate("sdimuDrawAll()")
     assert opened.locator(".figure").count() > 8
     assert opened.locator(".figure .main-svg").count() >= opened.locator(".figure").count()
+
+
+def test_no_rule_of_accessibility_is_broken(opened: Any) -> None:
+    opened.evaluate("document.querySelectorAll('details').forEach(d => { d.open = true; })")
+    assert broken_rules(opened) == []
+
+
+def test_the_first_screen_answers(opened: Any, diagnosis: Diagnosis) -> None:
+    """Verdict, costs, advice, ladder and heat map are seen without scrolling."""
+    below = "e => e.getBoundingClientRect().bottom"
+    parts = (".verdict .head", ".numbers li:last-child span", "ol li:last-child", ".pictures .card:last-child .quiet")
+    for part in parts:
+        assert opened.locator(f"#verdict {part}").last.evaluate(below) <= 900, part
+    (found,) = diagnosis.chosen
+    assert found.effect.title in opened.locator(".verdict .head").inner_text()
+
+
+def test_the_heat_map_shows_one_model_at_a_time(opened: Any) -> None:
+    opened.wait_for_function("document.querySelector('.switched .js-plotly-plot')")
+    shown = "() => document.querySelector('.switched .js-plotly-plot')._fullData.map(t => t.visible)"
+    assert opened.evaluate(shown) == [True, False]
+    opened.locator(".switched button", has_text="with what was found").click()
+    assert opened.evaluate(shown) == [False, True]
+
+
+def test_an_effect_shows_its_equation_to_mouse_and_keyboard(opened: Any) -> None:
+    effect = opened.locator(".verdict .effect").first
+    assert not effect.locator(".tip").is_visible()
+    effect.focus()
+    assert effect.locator(".tip math").is_visible()
+
+
+def test_the_imu_turns_with_the_slider(opened: Any) -> None:
+    slider, told = opened.locator(".attitude input"), opened.locator(".attitude output")
+    before = told.inner_text(), opened.locator(".attitude svg").inner_html()
+    slider.fill("3")
+    assert (told.inner_text(), opened.locator(".attitude svg").inner_html()) != before
+    assert told.inner_text().startswith("stop 3")
+
+
+def test_the_page_opens_quickly_and_is_small(browser: Any, report: Path) -> None:
+    context = browser.new_context(viewport={"width": 1440, "height": 900})
+    page = context.new_page()
+    tools = context.new_cdp_session(page)
+    tools.send("Performance.enable")
+    page.goto(report.as_uri(), wait_until="domcontentloaded")
+    # Of processor: others may share this machine.
+    (seconds,) = (m["value"] for m in tools.send("Performance.getMetrics")["metrics"] if m["name"] == "ProcessTime")
+    assert page.locator(".verdict .head").is_visible()
+    page.wait_for_function("document.querySelectorAll('#verdict .js-plotly-plot .main-svg').length >= 2")
+    context.close()
+    assert report.stat().st_size < 6e6
+    assert seconds < OPEN_S
+
+
+def test_it_prints_with_every_figure(browser: Any, report: Path) -> None:
+    page = browser.new_page(color_scheme="dark")
+    page.goto(report.as_uri())
+    page.wait_for_function("window.Plotly")
+    page.emulate_media(media="print")
+    paper = page.pdf(prefer_css_page_size=True)
+    drawn = page.evaluate("document.querySelectorAll('.figure[data-drawn]').length")
+    assert drawn == page.locator(".figure").count()
+    assert len(re.findall(rb"/Type\s*/Page\b", paper)) > 5
+    page.close()
 
 
 def test_the_switch_changes_pages_and_figures_and_is_kept(opened: Any) -> None:

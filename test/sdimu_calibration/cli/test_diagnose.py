@@ -132,7 +132,7 @@ def test_a_run_by_hand_is_diagnosed_by_its_own_fit(sdimu, tmp_path):
     (one,) = found["candidates"]
     assert "accel_quadratic_x" in {one["label"], *one["indistinguishable_from"]}
     page = (tmp_path / "d" / "report.html").read_text()
-    for words in ("Which effect is missing?", "Where does it fail? Channel by rest", "Ladder of models"):
+    for words in ("Effects: what is missing", "Where it fails: channel by rest", "Ladder of models"):
         assert words in page
     more = ("calibrate", bag, "--imu", "mems_by_hand", "--add", one["label"], "--out", tmp_path / "c")
     assert sdimu(*more)[0] == 0

@@ -12,8 +12,9 @@ import pytest
 import yaml
 
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
-from sdimu_calibration.core.diagnosis.ladder import Rung
+from sdimu_calibration.core.diagnosis.ladder import Rung, error_ladder
 from sdimu_calibration.core.diagnosis.summary import summarise
+from sdimu_calibration.core.error_figures import held_out
 from sdimu_calibration.report import (
     data,
     evidence_figures,
@@ -38,7 +39,7 @@ def text(diagnosis: Diagnosis, more: ReportExtras) -> str:
 def all_figures(diagnosis: Diagnosis, more: ReportExtras) -> dict[str, object]:
     found = data.residuals(diagnosis)
     return {
-        "ladder": evidence_figures.ladder(diagnosis),
+        "ladder": evidence_figures.rungs(*zip(*error_ladder(diagnosis), strict=True)),
         "ranking": evidence_figures.ranking(data.scored(diagnosis), diagnosis.found.threshold),
         "heat map": evidence_figures.heat_map(data.where(diagnosis.consistency)),
         "explained": evidence_figures.explained(data.explained(diagnosis)),
@@ -55,7 +56,9 @@ def all_figures(diagnosis: Diagnosis, more: ReportExtras) -> dict[str, object]:
 
 def test_the_verdict_stands_first(text, diagnosis):
     body = text.partition("<body>")[2]
-    assert body.index(prose(diagnosis.sentence)) < body.index("<h2>")
+    (found,) = diagnosis.chosen
+    assert body.index(found.effect.title) < body.index("<h2>")
+    assert prose(diagnosis.sentence) in body
 
 
 def test_the_page_brings_its_library_once_and_asks_no_network(text):
@@ -65,9 +68,15 @@ def test_the_page_brings_its_library_once_and_asks_no_network(text):
 
 
 def test_the_ladder_tells_the_fall_of_the_held_out_error(text, diagnosis):
-    (step,) = diagnosis.found.steps
-    assert f"{step.held_out_before.rms:.3f} \u2192 {step.held_out_after.rms:.3f}" in text
-    assert step.held_out_after.rms < step.held_out_before.rms
+    (first, before), (last, after) = error_ladder(diagnosis)
+    assert (before, after) == (held_out(diagnosis.before), held_out(diagnosis.after))
+    assert after < before
+    # The same figure in banner, sentence, table and ladder.
+    assert f"{before:.2f} \u2192 {after:.2f}" in text
+    assert f"{before:.3f} \u2192 {after:.3f}" in prose(diagnosis.sentence)
+    assert text.count(f"{before:.3f} \u2192 {after:.3f}") == 2
+    for name, value in ((first, before), (last, after)):
+        assert f"<b>{value:.3f}<\\/b>  {name}" in text
 
 
 def test_cells_of_the_heat_map_say_their_sign_without_colour(diagnosis):
@@ -169,7 +178,7 @@ def test_a_diagnosis_of_a_right_model_makes_a_page_too(diagnosis):
 
 def test_a_ladder_without_steps_does_not_deny_the_candidates_that_stand_out(diagnosis):
     empty = replace(diagnosis.found, steps=(), chosen=diagnosis.found.chosen[:0])
-    text = sections.ladder(replace(diagnosis, found=empty, adequate=False), str)
+    text = sections.ladder(replace(diagnosis, found=empty, adequate=False))
     assert "No candidate" not in text
     assert "stand out of the noise" in text
 

@@ -23,6 +23,7 @@ from sdimu_calibration.report.page import write_report
 from sdimu_calibration.report.report_extras import report_extras
 from sdimu_calibration.storage.diagnosis_file import write_diagnosis
 from sdimu_calibration.storage.result_file import write_result
+from sdimu_calibration.storage.trace import traced
 from sdimu_calibration.storage.whole_file import written_together
 
 
@@ -113,7 +114,7 @@ class FitDiagnosis:
             write_result(part / "result.json", self.core.after, self.core.verdict)
             write_report(
                 part / "report.html", self.core.after, title="Diagnosis", summary=self.summary,
-                more=report_extras(self.core),
+                more=report_extras(self.core), trace=traced(),
             )  # fmt: skip
         return folder
 

@@ -21,6 +21,7 @@ from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.report.page import write_report
 from sdimu_calibration.storage.effect_file import find_effects, new_parts
 from sdimu_calibration.storage.result_file import write_result
+from sdimu_calibration.storage.trace import traced
 from sdimu_calibration.storage.whole_file import written_together
 
 if TYPE_CHECKING:
@@ -122,7 +123,7 @@ class CalibrationFit(Fitted):
         folder = Path(folder)
         with written_together(folder) as part:
             write_result(part / "result.json", self.result)
-            write_report(part / "report.html", self.result, title="Calibration")
+            write_report(part / "report.html", self.result, title="Calibration", fit=self.core, trace=traced())
         return folder
 
 

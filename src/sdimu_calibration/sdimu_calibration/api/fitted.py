@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import math
 from collections.abc import Iterator
 from html import escape
 from typing import TYPE_CHECKING
@@ -12,6 +13,7 @@ from rich.console import Console
 
 from sdimu_calibration.api.coefficient import Coefficient
 from sdimu_calibration.core.arrays import Floats
+from sdimu_calibration.core.error_figures import held_out, nis
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.report.table import cells, headings, rich_table, rows
@@ -87,10 +89,9 @@ class Fitted:
         )
 
     def _figures(self) -> str:
-        fit = self.result.fit
-        held_out = fit["held_out_rms"]
-        shown = "" if held_out is None else f", held-out error {held_out:.3f}"
-        return "; ".join([f"NIS {fit['nis_mean']:.3f}{shown} (1 is right)", *self.result.inseparable])
+        error = held_out(self.result)
+        shown = "" if math.isnan(error) else f", held-out error {error:.3f}"
+        return "; ".join([f"NIS {nis(self.result):.3f}{shown} (1 is right)", *self.result.inseparable])
 
     def to_dataframe(self) -> pd.DataFrame:
         """Coefficients as a table: name, value, sigma, unit (customary).

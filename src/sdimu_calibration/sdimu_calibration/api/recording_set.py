@@ -185,7 +185,7 @@ class JointDiagnosis:
         with written_together(folder) as part:
             write_set_diagnosis(part / "set.json", self.core)
             write_result(part / "result.json", self.result, self.verdict)
-            write_report(part / "report.html", self.result, title=title, lead=self.core.sentence)
+            write_report(part / "report.html", self.result, title=title, of_set=self.core)
         return folder
 
     def __repr__(self) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
@@ -96,6 +97,7 @@ def calibrate(
     from sdimu_calibration.report.table import rich_table, rows
     from sdimu_calibration.storage.reference_file import read_truth
     from sdimu_calibration.storage.result_file import write_result
+    from sdimu_calibration.storage.trace import traced
     from sdimu_calibration.storage.whole_file import written_together
 
     console = plain()
@@ -124,7 +126,8 @@ def calibrate(
     test = about_reference(replace(test, origin=test.origin.stated(serial, power_on)), reference_temperature)
     notes = test.recording.notes
     with explained(console, notes), bar(console) as progress:
-        result = outcome(solve(test, wanted, chosen, progress=progress))
+        fit = solve(test, wanted, chosen, progress=progress)
+        result = outcome(fit)
         progress("done", 1.0)
     # Without a place gravity is a convention, and the truth is compared at it.
     taken = STANDARD_GRAVITY if test.site is None else None
@@ -132,7 +135,10 @@ def calibrate(
     folder = out or default_folder(bag)
     with written_together(folder) as part:
         write_result(part / "result.json", result)
-        write_report(part / "report.html", result, title=f"Calibration of {bag.name}", truth=true)
+        trace = traced([bag], sys.argv[1:], site=site, imu=imu, model=model)
+        write_report(
+            part / "report.html", result, title=f"Calibration of {bag.name}", truth=true, fit=fit, trace=trace
+        )
     console.print(rich_table(rows(result, true), f"body frame: {result.body_frame}"), soft_wrap=True)
     tell(console, (*notes, *(note for note in result.notes if note not in notes)))
     console.print(f"results in {folder}", soft_wrap=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -55,6 +56,7 @@ if TYPE_CHECKING:
     from sdimu_calibration.core.diagnosis.bootstrap import Null
     from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary
     from sdimu_calibration.core.progress import Progress
+    from sdimu_calibration.storage.trace import Trace
 
 NO_BOOTSTRAP = "--bootstrap: a handheld run learns its scatter, so there is no noise to draw; leave it out"
 
@@ -108,6 +110,7 @@ def diagnose(
     from sdimu_calibration.core.results import without_advice
     from sdimu_calibration.storage.effect_file import find_effects
     from sdimu_calibration.storage.model_choice import HANDHELD, named_estimator
+    from sdimu_calibration.storage.trace import traced
 
     console = plain()
     asked = HANDHELD if hand else named_estimator(estimator, "--estimator")
@@ -145,14 +148,17 @@ def diagnose(
         line(console, f"bootstrap: {null.sentence}")
     folder = out or default_folder(bag, "diagnosis")
     with bar(console) as progress:
-        _write(folder, f"Diagnosis of {bag.name}", summary, null, progress)
+        trace = traced([bag], sys.argv[1:], site=site, imu=imu, model=model)
+        _write(folder, f"Diagnosis of {bag.name}", summary, null, progress, trace)
     more = without_advice(found.after.notes) if found.fit.learns_scatter else found.after.inseparable
     tell(console, (*notes, *(note for note in more if note not in notes)))
     console.print(f"results in {folder}", soft_wrap=True)
     leave(found.after)
 
 
-def _write(folder: Path, title: str, summary: DiagnosisSummary, null: Null | None, progress: Progress) -> None:
+def _write(
+    folder: Path, title: str, summary: DiagnosisSummary, null: Null | None, progress: Progress, trace: Trace
+) -> None:
     """Leave diagnosis.json, result.json and report.html."""
     from sdimu_calibration.report.page import write_report
     from sdimu_calibration.report.report_extras import report_extras
@@ -165,4 +171,5 @@ def _write(folder: Path, title: str, summary: DiagnosisSummary, null: Null | Non
         write_diagnosis(part / "diagnosis.json", summary, null)
         write_result(part / "result.json", found.after, found.verdict)
         progress("navigation without aid", 0.5)
-        write_report(part / "report.html", found.after, title=title, summary=summary, more=report_extras(found))
+        more = report_extras(found)
+        write_report(part / "report.html", found.after, title=title, summary=summary, more=more, trace=trace)

@@ -12,7 +12,7 @@ from sdimu_calibration.core.units import UnitError, from_si
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from sdimu_calibration.core.diagnosis.found import DetectableSize
+    from sdimu_calibration.core.diagnosis.found import DetectableSize, Found
     from sdimu_calibration.core.diagnosis.ladder import Rung
     from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary
 
@@ -69,13 +69,19 @@ def _candidates(console: Console, summary: DiagnosisSummary) -> None:
         lines.append(
             [
                 f.candidate.label, amount(f.value, unit, 4), amount(f.sigma, unit, 2), unit, f"{f.z:+.1f}",
-                f"{100 * f.explained:.0f} %", f"{f.held_out_before:.3f} -> {f.held_out_after:.3f}",
+                f"{100 * f.explained:.0f} %", _fall(f),
                 ", ".join(f.alike[:4]),
             ]
         )  # fmt: skip
-    headings = ("effect", "estimate", "+-", "unit", "z", "explains", "one stop held out", "looks the same here")
+    headings = ("effect", "estimate", "+-", "unit", "z", "explains", "held-out error", "looks the same here")
     title = "found" if summary.candidates else "tried, but not enough to explain the misfit"
     print_table(console, headings, lines, title)
+
+
+def _fall(f: Found) -> str:
+    """Held-out error without and with an effect; empty where no such model was fitted."""
+    known = f.held_out_before == f.held_out_before and f.held_out_after == f.held_out_after
+    return f"{f.held_out_before:.3f} -> {f.held_out_after:.3f}" if known else ""
 
 
 def _steps(console: Console, summary: DiagnosisSummary) -> None:
@@ -83,7 +89,7 @@ def _steps(console: Console, summary: DiagnosisSummary) -> None:
     if not steps:
         return
     for number, s in enumerate(steps, start=1):
-        end = f"error with one stop held out {s.held_out_before.rms:.3f} -> {s.held_out_after.rms:.3f}"
+        end = f"log score of stops left out {s.held_out_gain:+.0f} +- {s.held_out_error:.0f}"
         line(
             console,
             f"step {number}: {s.label} (z {s.z:+.1f}, threshold {s.threshold:.1f}, "

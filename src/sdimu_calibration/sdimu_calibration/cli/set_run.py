@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from sdimu_calibration.core.progress import Progress
     from sdimu_calibration.core.results import Calibration
     from sdimu_calibration.storage.opening import Source
+    from sdimu_calibration.storage.trace import Trace
 
 _PANEL = "Several recordings of one unit"
 Bags = Annotated[
@@ -136,7 +138,7 @@ def calibrate_together(asked: SetRequest) -> None:
     folder = _folder(asked, "calibration")
     with written_together(folder) as part:
         write_result(part / "result.json", result)
-        write_report(part / "report.html", result, title=_title(asked, "Calibration"))
+        write_report(part / "report.html", result, title=_title(asked, "Calibration"), trace=_trace(asked))
     _show(console, result)
     console.print(f"results in {folder}", soft_wrap=True)
     leave(result)
@@ -156,7 +158,7 @@ def diagnose_together(asked: SetRequest, extra: Sequence[Effect]) -> None:
     with written_together(folder) as part:
         write_set_diagnosis(part / "set.json", found)
         write_result(part / "result.json", after, found.verdict)
-        write_report(part / "report.html", after, title=_title(asked, "Diagnosis"), lead=found.sentence)
+        write_report(part / "report.html", after, title=_title(asked, "Diagnosis"), of_set=found, trace=_trace(asked))
     _show(console, after)
     console.print(f"{found.verdict}: {found.sentence}", soft_wrap=True, highlight=False)
     for line in found.advice:
@@ -213,6 +215,12 @@ def _folder(asked: SetRequest, what: str) -> Path:
         return asked.out / what if what == "evidence" else asked.out
     first = (asked.file or asked.bags[0]).resolve()
     return first.with_name(f"{first.stem if asked.file else first.name}_set_{what}")
+
+
+def _trace(asked: SetRequest) -> Trace:
+    from sdimu_calibration.storage.trace import traced
+
+    return traced(asked.bags, sys.argv[1:], set=asked.file, site=asked.site, imu=asked.imu, model=asked.model)
 
 
 def _title(asked: SetRequest, word: str) -> str:

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-
-from sdimu_calibration.core.diagnosis.ladder import moved_coefficients, number
+from sdimu_calibration.core.diagnosis.ladder import moved_coefficients
+from sdimu_calibration.core.error_figures import by_hand, held_out_ladder, log_likelihood, nis
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.units import from_si
@@ -45,7 +44,7 @@ def comparison(names: Sequence[str], results: Sequence[Calibration]) -> list[lis
     if len(results) < 2:
         raise DataError("compare: give at least two results of one recording")
     _check_same_data(names, results)
-    held_out = _held_out(results)
+    held_out = held_out_ladder(results)
     lines = [
         _row(names[k], result, results[k - 1] if k else None, held_out[k]) for k, result in enumerate(results)
     ]
@@ -57,27 +56,11 @@ def comparison(names: Sequence[str], results: Sequence[Calibration]) -> list[lis
 
 def remarks(results: Sequence[Calibration]) -> tuple[str, ...]:
     """Say what the columns mean and where they do not compare, one line each."""
-    by_hand = [_is_by_hand(result) for result in results]
+    handheld = [by_hand(result) for result in results]
     return (
         *([_OTHER_SCALE] if any(_differ(result, results[0], "conditions") for result in results[1:]) else []),
-        *([_BY_HAND] if all(by_hand) else [_TWO_KINDS] if any(by_hand) else []),
+        *([_BY_HAND] if all(handheld) else [_TWO_KINDS] if any(handheld) else []),
     )
-
-
-def _is_by_hand(result: Calibration) -> bool:
-    return result.estimator == "handheld"
-
-
-def _held_out(results: Sequence[Calibration]) -> list[float]:
-    """Held-out error of each result; by hand in one scale for all, that of the last."""
-    if not all(map(_is_by_hand, results)):
-        return [number(result.fit.get("held_out_rms")) for result in results]
-    scale = np.array([rest.ahead_sigma for rest in results[-1].rests])
-    return [
-        float(np.sqrt(np.mean((np.array([rest.ahead for rest in result.rests]) / scale) ** 2)))
-        if 0 < len(result.rests) == len(scale) else float("nan")
-        for result in results
-    ]
 
 
 def _noise(result: Calibration) -> str:
@@ -105,15 +88,15 @@ def _differ(a: Calibration, b: Calibration, key: str) -> bool:
 
 
 def _row(name: str, result: Calibration, before: Calibration | None, held_out: float) -> list[str]:
-    likelihood, nis = (number(result.fit.get(k)) for k in ("log_likelihood", "nis_mean"))
+    likelihood = log_likelihood(result)
     if before is None:
         model, difference, moved = f"{len(result.model)} effects", "", ""
     else:
         model = _change(before.model, result.model)
-        difference = f"{likelihood - number(before.fit.get('log_likelihood')):+.1f}"
+        difference = f"{likelihood - log_likelihood(before):+.1f}"
         sizes = moved_coefficients(before, result)[:_MOST_MOVED]
         moved = ", ".join(f"{coefficient} {size:+.1f}" for coefficient, size in sizes)
-    return [name, model, f"{likelihood:.1f}", difference, f"{nis:.3f}", f"{held_out:.3f}", moved]
+    return [name, model, f"{likelihood:.1f}", difference, f"{nis(result):.3f}", f"{held_out:.3f}", moved]
 
 
 def _change(before: tuple[str, ...], after: tuple[str, ...]) -> str:

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from sdimu_calibration.core.arrays import Floats
-from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.evidence.consistency import CHANNEL_NAMES
 from sdimu_calibration.report import data
 from sdimu_calibration.report.design.palette import DIVERGING
@@ -29,6 +28,15 @@ _LIMIT = {"dash": "dash", "color": INK, "width": 1.5}
 def heat_map(grid: data.Grid, channels: Sequence[str] = CHANNEL_NAMES) -> Figure:
     """Normalised residual means, channel by stop: number and sign in each cell, colour besides."""
     return deviates([str(s) for s in grid.stops], channels, grid.value, "stop", "channel", 440)
+
+
+def heat_maps(grids: Sequence[data.Grid], channels: Sequence[str] = CHANNEL_NAMES, height: int = 370) -> Figure:
+    """Draw heat maps of several models with one scale of colours upon each other; a switch of the page shows one."""
+    figure = heat_map(grids[0], channels)
+    for grid in grids[1:]:
+        other = heat_map(grid, channels).data[0]
+        figure.data.append({**other, "visible": False})
+    return lay_out(figure, height, margin={"l": 95, "r": 10, "t": 12, "b": 45})
 
 
 def deviates(
@@ -113,28 +121,30 @@ def ranking(entries: Sequence[data.Scored], threshold: float) -> Figure:
     return lay_out(figure, 24 * len(shown) + 150, showlegend=True, margin=margin, legend=_LEGEND)
 
 
-def ladder(diagnosis: Diagnosis) -> Figure | None:
-    """Held-out RMS rung by rung; one is right."""
-    accepted = [step for step in diagnosis.found.steps if step.accepted and not step.taken_out]
-    if not diagnosis.found.steps:
-        return None
-    names = ["model as given", *(f"+ {step.label}" for step in accepted)]
-    values = [diagnosis.found.steps[0].held_out_before.rms, *(step.held_out_after.rms for step in accepted)]
-    return rungs(names, values)
+def rungs(names: Sequence[str], values: Sequence[float], height: int = 300) -> Figure:
+    """Draw the held-out error of one model after the other, each with its name and number; the line is right.
 
-
-def rungs(names: Sequence[str], values: Sequence[float]) -> Figure:
-    """Draw the held-out RMS of one model after the other."""
+    The axis holds what there is and not zero: beside it a fall of many sigmas looks flat.
+    """
     figure = Figure()
+    at = np.arange(len(names))
     figure.add(
-        "scatter", x=names, y=values, mode="lines+markers+text", text=[f"{v:.3f}" for v in values],
-        textposition="top right", line={"color": AFTER}, marker={"size": 10}, cliponaxis=False,
-        hovertemplate="%{x}: %{y:.3f} sigma<extra></extra>",
+        "scatter", x=np.array(values), y=at, mode="lines+markers", line={"color": AFTER, "width": 2},
+        marker={"size": 12, "color": [BEFORE, *[AFTER] * (len(names) - 1)],
+                "symbol": ["triangle-up", *["circle"] * (len(names) - 1)]},
+        text=list(names), cliponaxis=False, hovertemplate="%{text}: %{x:.3f} sigma<extra></extra>",
     )  # fmt: skip
-    figure.shape("line", y0=1.0, y1=1.0, line=_LIMIT, opacity=1.0)
-    figure.y_axes(title="held-out RMS (sigma)", rangemode="tozero", range=[0, 1.2 * max(*values, 1.0)])
-    figure.x_axes(type="category", title="model", range=[-0.3, len(names) - 0.5])
-    return lay_out(figure, 300)
+    for k, (name, value) in enumerate(zip(names, values, strict=True)):
+        figure.annotate(
+            f"<b>{value:.3f}</b>  {name}", x=0, y=k, xref="x domain", xanchor="left", yanchor="bottom", yshift=8,
+            align="left", bgcolor="@card",
+        )  # fmt: skip
+    figure.shape("line", x0=1.0, x1=1.0, line=_LIMIT)
+    known = [v for v in (*values, 1.0) if np.isfinite(v)]
+    room = max(0.08 * (max(known) - min(known)), 0.02)
+    figure.x_axes(title="held-out error (sigma); 1 is right", range=[min(known) - room, max(known) + room])
+    figure.y_axes(range=[len(names) - 0.6, -0.7], showticklabels=False, ticks="", showgrid=False, title="model")
+    return lay_out(figure, height, margin={"l": 30, "r": 25, "t": 10, "b": 50})
 
 
 def explained(parts: Sequence[data.Explained]) -> Figure:

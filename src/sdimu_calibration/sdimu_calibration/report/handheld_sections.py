@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.diagnosis.ladder import Rung
 from sdimu_calibration.core.diagnosis.problem import Problem
 from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary
@@ -13,14 +12,14 @@ from sdimu_calibration.core.evidence.handheld_evidence import HandheldEvidence, 
 from sdimu_calibration.core.handheld.handheld_fit import FORCE, RATE, TURN
 from sdimu_calibration.core.units import from_si
 from sdimu_calibration.report import data, evidence_figures
-from sdimu_calibration.report.markup import Draw, grid, quiet, section, sentence
-from sdimu_calibration.report.sections import STEP_COLUMNS, step_row
+from sdimu_calibration.report.markup import Draw, grid, quiet, section, sentence, switched
+from sdimu_calibration.report.sections import STEP_COLUMNS, found_table, step_row
 from sdimu_calibration.report.table import with_sigma
 
 
 def evidence(summary: DiagnosisSummary, draw: Draw) -> list[str]:
     """Tell how the error falls, what is missing and where it shows."""
-    return [_ladder(summary, draw), _missing(summary.diagnosis, draw), _where(summary.diagnosis, draw)]
+    return [_missing(summary, draw), _ladder(summary)]
 
 
 _RUNGS = (
@@ -29,7 +28,7 @@ _RUNGS = (
 )  # fmt: skip
 
 
-def _ladder(summary: DiagnosisSummary, draw: Draw) -> str:
+def _ladder(summary: DiagnosisSummary) -> str:
     d = summary.diagnosis
     names = ["model as given", *(f"+ {r.added}" for r in d.rungs[1:])]
     sizes = ["", *(_size(f.value, f.sigma, f.candidate.parameter.display_unit) for f in summary.found)]
@@ -40,10 +39,9 @@ def _ladder(summary: DiagnosisSummary, draw: Draw) -> str:
         ]
         for name, size, r in zip(names, sizes, d.rungs, strict=True)
     ]  # fmt: skip
-    tried = [grid(STEP_COLUMNS, [step_row(step) for step in d.found.steps], {0, 7})] if d.found.steps else []
+    tried = [grid(STEP_COLUMNS, [step_row(step) for step in d.found.steps], {0, 6})] if d.found.steps else []
     return section(
-        "Ladder of models: how far the error falls",
-        draw(evidence_figures.rungs(names, [r.held_out_rms for r in d.rungs])) if summary.found else "",
+        "Ladder of models",
         grid(_RUNGS, rows, {0}),
         quiet(
             "Each model has its own fit. Held-out: every rest and the turn to it predicted from the others, in "
@@ -65,12 +63,14 @@ def _scatter(rung: Rung) -> tuple[float, ...]:
     return rung.scatter or (0.0, 0.0, 0.0)
 
 
-def _missing(d: Diagnosis, draw: Draw) -> str:
+def _missing(summary: DiagnosisSummary, draw: Draw) -> str:
+    d = summary.diagnosis
     problem, columns = Problem(d.evidence), range(len(d.evidence.weight), len(d.evidence.names))
     first, last = problem.scan([]), problem.scan([int(c) for c in d.found.chosen])
     entries = data.scores(d.evidence, first, last, columns, d.found.chosen)
     return section(
-        "Which effect is missing?",
+        "Effects: what is missing, how large",
+        found_table(summary),
         draw(evidence_figures.ranking(entries, d.found.threshold)),
         quiet(
             "Each candidate is added to the model alone, everything else is estimated again, in sigmas of the last "
@@ -80,18 +80,17 @@ def _missing(d: Diagnosis, draw: Draw) -> str:
     )
 
 
-def _where(d: Diagnosis, draw: Draw) -> str:
+def heat_maps(summary: DiagnosisSummary, draw: Draw) -> str:
+    """Return a card with the residuals by rest, of the model as given and with what was found, one at a time."""
+    d = summary.diagnosis
     assert isinstance(d.evidence, HandheldEvidence)
-    parts = [
-        draw(evidence_figures.heat_map(*data.places(d.consistency.where))),
-        quiet(
-            "Residual of every rate and force at rest, and of the turn to it, model as given, in sigmas of the last "
-            "model."
-        ),
-    ]
+    found = [data.places(d.consistency.where)]
     if len(d.found.chosen):
-        parts += [
-            draw(evidence_figures.heat_map(*data.places(places(d.evidence, d.found.chosen)))),
-            quiet("The same with the found effects added."),
-        ]
-    return section("Where does it fail? Channel by rest", *parts)
+        found.append(data.places(places(d.evidence, d.found.chosen)))
+    figure = evidence_figures.heat_maps([grid for grid, _ in found], found[0][1])
+    return (
+        '<section class="card"><h2>Where it fails: channel by rest</h2>'
+        + switched(draw(figure), ("model as given", "with what was found")[: len(found)])
+        + quiet("Residual of rate and force at each rest, and of the turn to it, in sigmas of the last model.")
+        + "</section>"
+    )

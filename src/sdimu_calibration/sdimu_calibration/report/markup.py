@@ -17,6 +17,23 @@ def section(heading: str, *parts: str) -> str:
     return f'<section class="card" id="{anchor(heading)}"><h2>{escape(heading)}</h2>\n{body}</section>'
 
 
+def switched(figure: str, words: Sequence[str]) -> str:
+    """Return a figure with a switch for its traces, of which one is shown at a time; of one alone the figure."""
+    if len(words) < 2:
+        return figure
+    buttons = "".join(
+        f'<button type="button" data-show="{k}" aria-pressed="{str(not k).lower()}">{escape(word)}</button>'
+        for k, word in enumerate(words)
+    )
+    return f'<div class="switched"><div class="switch" role="group" aria-label="model">{buttons}</div>{figure}</div>'
+
+
+def folded(heading: str, *parts: str, opened: bool = False) -> str:
+    """Return parts that are shown on demand; their figures are drawn when they are unfolded."""
+    state = " open" if opened else ""
+    return f"<details{state}><summary>{escape(heading)}</summary><div>{''.join(parts)}</div></details>"
+
+
 def anchor(heading: str) -> str:
     """Name of a place in a page, made of its heading."""
     return "-".join(re.findall(r"[a-z0-9]+", heading.lower()))

@@ -1,29 +1,36 @@
-"""report.html: one file that needs no network."""
+"""report.html: one file that needs no network. Sections stand in the order of use."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from html import escape
 from pathlib import Path
 from typing import Any
 
-from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
+from sdimu_calibration.core.diagnosis.ladder import error_ladder
 from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary
+from sdimu_calibration.core.estimation.fit import Fit
+from sdimu_calibration.core.estimation.navigation_fit import NavigationFit
+from sdimu_calibration.core.joint.set_diagnosis import SetDiagnosis
 from sdimu_calibration.core.results import Calibration, without_advice
-from sdimu_calibration.report import data, handheld_sections, sections, table
+from sdimu_calibration.report import data, evidence_figures, experiment, first_screen, handheld_sections, sections
+from sdimu_calibration.report.coefficients import coefficients_section
 from sdimu_calibration.report.design.sheet import document
 from sdimu_calibration.report.drawing import html
-from sdimu_calibration.report.export import as_csv, as_yaml
-from sdimu_calibration.report.figures import sigma_history
-from sdimu_calibration.report.markup import Draw, prose, quiet, section
+from sdimu_calibration.report.markup import Draw, prose, section
 from sdimu_calibration.report.report_extras import ReportExtras
 from sdimu_calibration.report.rests_section import rests_section
 from sdimu_calibration.report.set_sections import set_sections
+from sdimu_calibration.report.statistics_section import noise_section
+from sdimu_calibration.report.traceability import traceability
 from sdimu_calibration.report.use_section import in_use
+from sdimu_calibration.storage.trace import Trace
 from sdimu_calibration.storage.whole_file import write_whole
 
-_TEXT_COLUMNS = frozenset({"coefficient", "unit"})
+_HEADING = re.compile(r'<section class="card" id="([\w-]+)"><h2>(.*?)</h2>')
+_LADDER = 355
+"""Height of the ladder on the first screen (px): that of the heat map beside it."""
 
 
 def write_report(
@@ -35,7 +42,9 @@ def write_report(
     reference: Mapping[str, float] | None = None,
     summary: DiagnosisSummary | None = None,
     more: ReportExtras | None = None,
-    lead: str = "",
+    fit: Fit | None = None,
+    of_set: SetDiagnosis | None = None,
+    trace: Trace | None = None,
 ) -> None:
     """Write report.html.
 
@@ -55,14 +64,18 @@ def write_report(
         Adds the verdict, what is missing, where it fails, and how the error falls.
     more : ReportExtras, optional
         What to show besides the diagnosis: table angles, drift in use.
-    lead : str
-        Sentence that stands first on the page of a set.
+    fit : Fit, optional
+        Of the calibration: adds data, innovations and priors; that of the diagnosis where there is one.
+    of_set : SetDiagnosis, optional
+        What was found in a set of recordings.
+    trace : Trace, optional
+        Command, program, files and their hashes.
     """
-    write_whole(path, page(calibration, title, truth, reference, summary, more, lead))
+    write_whole(path, page(calibration, title, truth, reference, summary, more, fit, of_set, trace))
 
 
 class _Drawing:
-    """Turns figures into parts of one page; the first brings the library along."""
+    """Turns figures into parts of one page."""
 
     def __init__(self) -> None:
         self._count = 0
@@ -79,129 +92,84 @@ def page(
     reference: Mapping[str, float] | None = None,
     summary: DiagnosisSummary | None = None,
     more: ReportExtras | None = None,
-    lead: str = "",
+    fit: Fit | None = None,
+    of_set: SetDiagnosis | None = None,
+    trace: Trace | None = None,
 ) -> str:
     """Make the page as HTML text; parameters as in `write_report`."""
-    draw = _Drawing()
-    more = more or ReportExtras()
-    handheld = summary is not None and summary.diagnosis.fit.learns_scatter
-    shown = None if summary is None or handheld else _Shown.of(summary.diagnosis)
-    parts = [] if summary is None else _evidence(summary, shown, more, draw)
-    parts += [] if calibration.of_set is None else set_sections(calibration, calibration.of_set, draw)
-    parts.append(_coefficients(calibration, truth, reference))
-    parts += [rests_section(calibration.rests)] if calibration.rests else []
-    parts += [] if summary is None or shown is None else _residuals(summary.diagnosis, shown, more, draw)
-    if len(calibration.history.t):
-        remark = quiet("Closed-loop pass. Grey: the table turns, no measurements.")
-        parts.append(section("Sigma of every coefficient against time", remark, draw(sigma_history(calibration))))
-        parts.append(sections.separation(calibration, draw))
-    head = [
-        sections.verdict(summary) if summary else "",
-        f"<p><b>{prose(lead)}</b></p>" if lead else "",
-        # Of a handheld run the ladder says it, in sigmas that models can be compared by.
-        "" if handheld else f"<p>{_fit(calibration, summary is not None or bool(lead))}</p>",
+    draw, more = _Drawing(), more or ReportExtras()
+    if summary is not None:
+        fit = summary.diagnosis.extended
+    parts = [
+        _first(calibration, summary, more, fit, of_set, draw),
+        coefficients_section(calibration, fit, truth, reference, draw),
+        *([] if calibration.of_set is None else set_sections(calibration, calibration.of_set, draw)),
+        *([] if summary is None else _evidence(summary, more, draw)),
+        rests_section(calibration.rests) if calibration.rests else "",
+        noise_section(fit, draw) if isinstance(fit, NavigationFit) else "",
+        experiment.data_section(fit, draw) if fit is not None else "",
         _notes(calibration.notes if summary is None else without_advice(calibration.notes)),
+        traceability(calibration, trace),
     ]
-    return document(title, "\n".join(part for part in (*head, *parts) if part), under=_summary(calibration))
+    body = "\n".join(part for part in parts if part)
+    headings = [("verdict", "Verdict"), *_HEADING.findall(body)]
+    contents = [(anchor, words.partition(":")[0]) for anchor, words in headings]
+    return document(
+        title, body, under=_under(calibration), contents=contents,
+        script=experiment.ATTITUDE_SCRIPT if fit is not None else "",
+    )  # fmt: skip
 
 
-@dataclass(frozen=True)
-class _Shown:
-    """Numbers of a diagnosis by navigation that several parts of the page show."""
+def _first(
+    calibration: Calibration, summary: DiagnosisSummary | None, more: ReportExtras, fit: Fit | None,
+    of_set: SetDiagnosis | None, draw: Draw,
+) -> str:  # fmt: skip
+    """Verdict, costs, advice, ladder and heat map."""
+    if summary is not None:
+        verdict = first_screen.of_diagnosis(summary, more.trials)
+        rungs = error_ladder(summary.diagnosis)
+        handheld = summary.diagnosis.fit.learns_scatter
+        maps = handheld_sections.heat_maps(summary, draw) if handheld else sections.heat_maps(summary.diagnosis, draw)
+        return first_screen.render(verdict, _ladder(rungs, draw), maps)
+    if of_set is not None:
+        return first_screen.render(first_screen.of_set(of_set))
+    maps = sections.heat_map_card([fit.consistency()], draw) if isinstance(fit, NavigationFit) else ""
+    return first_screen.render(first_screen.of_fit(calibration), maps)
 
-    candidates: list[data.Scored]
-    residuals: data.Residuals
 
-    @classmethod
-    def of(cls, diagnosis: Diagnosis) -> _Shown:
-        return cls(data.scored(diagnosis), data.residuals(diagnosis))
+def _ladder(rungs: Sequence[tuple[str, float]], draw: Draw) -> str:
+    names, values = zip(*rungs, strict=True)
+    if len(rungs) < 2:
+        return ""
+    figure = draw(evidence_figures.rungs(names, values, _LADDER))
+    return f'<section class="card"><h2>How far the error falls</h2>{figure}</section>'
 
 
-def _evidence(summary: DiagnosisSummary, shown: _Shown | None, more: ReportExtras, draw: Draw) -> list[str]:
-    """Tell what is missing and where it shows."""
+def _evidence(summary: DiagnosisSummary, more: ReportExtras, draw: Draw) -> list[str]:
+    """Tell what is missing, what it would be confused with, what it does in use, and where it shows."""
     diagnosis = summary.diagnosis
-    if shown is None:
-        return handheld_sections.evidence(summary, draw)
+    if diagnosis.fit.learns_scatter:
+        return [*handheld_sections.evidence(summary, draw), sections.confused(summary)]
+    candidates, residuals = data.scored(diagnosis), data.residuals(diagnosis)
     return [
-        sections.ladder(diagnosis, draw),
-        sections.refits(diagnosis.rungs),
-        sections.missing(diagnosis, shown.candidates, draw),
-        sections.where(diagnosis, shown.residuals, draw),
+        sections.effects(summary, candidates, draw),
+        sections.confused(summary),
+        sections.smallest(candidates),
         in_use(more, draw),
+        sections.residuals(diagnosis, residuals, more, draw),
     ]
 
 
-def _residuals(diagnosis: Diagnosis, shown: _Shown, more: ReportExtras, draw: Draw) -> list[str]:
-    """Show the data themselves, and tell what they could have shown."""
-    return [
-        sections.residuals(diagnosis, shown.residuals, more, draw),
-        sections.smallest(shown.candidates),
-    ]
-
-
-def _coefficients(
-    calibration: Calibration, truth: Mapping[str, float] | None, reference: Mapping[str, float] | None
-) -> str:
-    entries = table.rows(calibration, truth, reference)
-    copies = {"YAML": as_yaml(entries, calibration.body_frame), "CSV": as_csv(entries)}
-    buttons = "".join(f'<button data-copy="copy-{kind}">Copy as {kind}</button>' for kind in copies)
-    texts = "".join(
-        f'<textarea id="copy-{kind}" hidden readonly>{escape(text)}</textarea>' for kind, text in copies.items()
-    )
-    return section(
-        "Coefficients",
-        f"<p>{buttons}{texts}</p>",
-        f'<div class="wide">{_table(entries)}</div>',
-        quiet(
-            f"One sigma; body frame: {calibration.body_frame.replace('_', ' ')}. "
-            "Fixed: zero by the choice of that frame."
-        ),
-    )
-
-
-def _summary(calibration: Calibration) -> str:
-    counts = calibration.data
+def _under(calibration: Calibration) -> str:
+    """Say which recording it is of, beside the title."""
+    origin, counts = calibration.origin, calibration.data
     words = [
-        f"{counts['duration_s'] / 60.0:.1f} min" if "duration_s" in counts else "",
-        *(f"{counts[key]:.0f} {key}" for key in ("stops", "samples", "lost", "rejected") if key in counts),
-        *calibration.origin.words,
-        f"{len(calibration.names)} coefficients of {len(calibration.model)} effects",
-    ]
-    return escape(" · ".join(word for word in words if word))
-
-
-def _fit(calibration: Calibration, diagnosed: bool) -> str:
-    """Say what the fit figures mean; no verdict without a diagnosis."""
-    nis, dof = calibration.fit.get("nis_mean"), calibration.fit.get("nis_dof")
-    held_out = calibration.fit.get("held_out_rms")
-    sentences = ["With the coefficients on this page:"] if diagnosed else []
-    if nis is not None and dof:
-        sentences.append(f"Squared innovations are {nis:.3f} times what the noise explains ({dof:.0f} in number).")
-    if held_out is not None:
-        left_out = "Stops" if calibration.of_set is None else "Recordings"
-        sentences.append(
-            f"{left_out} that the fit has not seen are predicted to {held_out:.2f} sigma (RMS); 1 is right."
-        )
-    if not sentences:
-        return "Fit: not computed."
-    if not diagnosed:
-        sentences.append("Whether something is missing in the model, and what: sdimu diagnose.")
-    return escape(" ".join(sentences))
+        origin.recording, f"{counts['duration_s'] / 60.0:.1f} min" if "duration_s" in counts else "",
+        f"IMU {origin.imu}" if origin.imu else "", *origin.words, origin.site,
+    ]  # fmt: skip
+    return escape(" \N{MIDDLE DOT} ".join(word for word in words if word))
 
 
 def _notes(notes: Sequence[str]) -> str:
-    return "<ul>" + "".join(f"<li>{prose(note)}</li>" for note in notes) + "</ul>" if notes else ""
-
-
-def _table(entries: list[table.Row]) -> str:
-    columns = table.headings(entries)
-    kinds = [' class="text"' if column in _TEXT_COLUMNS else "" for column in columns]
-    head = "".join(f"<th{kind}>{escape(column)}</th>" for column, kind in zip(columns, kinds, strict=True))
-    lines = []
-    before = None
-    for row in entries:
-        first = ' class="first"' if row.effect != before else ""
-        before = row.effect
-        values = zip(table.cells(row, columns), kinds, strict=True)
-        lines.append(f"<tr{first}>" + "".join(f"<td{kind}>{escape(text)}</td>" for text, kind in values) + "</tr>")
-    return f"<table><thead><tr>{head}</tr></thead><tbody>{''.join(lines)}</tbody></table>"
+    items = "".join(f"<li>{prose(note)}</li>" for note in notes)
+    return section("Notes", f"<ul>{items}</ul>") if notes else ""

@@ -17,6 +17,7 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
+from sdimu_calibration.core.diagnosis.ladder import error_ladder
 from sdimu_calibration.core.estimation.free_inertial import FreeInertialRun
 from sdimu_calibration.core.evidence.consistency import CHANNEL_NAMES
 from sdimu_calibration.report import data
@@ -130,26 +131,20 @@ def candidates(diagnosis: Diagnosis) -> Figure:
 
 
 def ladder(diagnosis: Diagnosis) -> Figure:
-    """Error at held-out stops, model by model: one stop at a time, and a third at a time."""
-    steps = [step for step in diagnosis.found.steps if step.accepted and not step.taken_out]
-    names = ["model as given", *(f"+ {step.label}" for step in steps)]
-    one = [diagnosis.found.steps[0].held_out_before.rms, *(step.held_out_after.rms for step in steps)]
-    third = [float(c.fit.get("held_out_rms") or np.nan) for c in (diagnosis.before, diagnosis.after)]
+    """Held-out error, model by model."""
+    names, errors = zip(*error_ladder(diagnosis), strict=True)
     figure = Figure(figsize=(8.6, 2.3), layout="constrained")
     axes = figure.add_subplot()
-    axes.plot(one, "o-", color=_AFTER, label="one stop held out at a time")
-    texts = [(x, y, 5) for x, y in enumerate(one)]
-    if np.isfinite(third).all():
-        ends = [0, len(names) - 1]
-        axes.plot(ends, third, "^--", color=_BEFORE, mfc="white", label="a third of the stops held out at a time")
-        texts += [(x, y, -12) for x, y in zip(ends, third, strict=True)]
-    for x, y, lift in texts:
-        axes.annotate(f"{y:.3f}", (x, y), (8, lift), textcoords="offset points", fontsize=8)
+    axes.plot(errors, "o-", color=_AFTER, label="a third of the stops held out at a time")
+    for x, y in enumerate(errors):
+        axes.annotate(f"{y:.3f}", (x, y), (8, 5), textcoords="offset points", fontsize=8)
     axes.axhline(1.0, color=_INK, ls=":", lw=1.2, label="right")
     axes.set_xticks(range(len(names)), names)
     axes.set_xlim(-0.3, len(names) - 0.6)
-    axes.set_ylim(0.0, 1.25 * max(y for _, y, _ in texts))
-    axes.set_ylabel("held-out RMS (sigma)")
+    low, high = min(*errors, 1.0), max(*errors, 1.0)
+    room = max(0.15 * (high - low), 0.02)
+    axes.set_ylim(low - room, high + room)
+    axes.set_ylabel("held-out error (sigma)")
     axes.legend(frameon=False, fontsize=8)
     return figure
 

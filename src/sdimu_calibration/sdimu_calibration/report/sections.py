@@ -11,25 +11,18 @@ from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.diagnosis.ladder import Rung
 from sdimu_calibration.core.diagnosis.search import Step
 from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary
+from sdimu_calibration.core.evidence.consistency import Consistency
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.units import from_si
 from sdimu_calibration.report import data, evidence_figures, measured, measured_figures, residual_figures
-from sdimu_calibration.report.markup import Draw, grid, prose, quiet, section, sentence
+from sdimu_calibration.report.effect_words import effect_of_key, families, family_words, tip, title_of
+from sdimu_calibration.report.markup import Draw, folded, grid, prose, quiet, section, sentence, switched
 from sdimu_calibration.report.report_extras import ReportExtras
 from sdimu_calibration.report.table import with_sigma
 
 
-def verdict(summary: DiagnosisSummary) -> str:
-    """Return the verdict in one sentence, what is wrong with data and noise, what to do, and the numbers behind it."""
-    d = summary.diagnosis
-    told = [*(f.text for f in d.findings), *d.noise, *summary.advice]
-    mark, kind = ("\N{CHECK MARK}", "good") if d.adequate else ("\N{HEAVY BALLOT X}", "bad")
-    box = f'<p class="verdict {kind}"><strong>{mark} {escape(d.verdict)}.</strong> {prose(d.sentence)}</p>'
-    listed = "<ul>" + "".join(f"<li>{prose(text)}</li>" for text in told) + "</ul>" if told else ""
-    return box + listed + quiet(_numbers(d))
-
-
-def _numbers(d: Diagnosis) -> str:
+def numbers(d: Diagnosis) -> str:
+    """Return the numbers behind a verdict in one line."""
     left, c = d.free_inputs_after, d.consistency
     if d.fit.learns_scatter:
         return f"p {_probability(d.p_value)} that a right model has a candidate as large as the largest."
@@ -50,30 +43,25 @@ def _probability(p: float) -> str:
 
 
 STEP_COLUMNS = (
-    "step", "estimate", "|z| (noise reaches)", "log-likelihood gain", "log Bayes factor", "held-out RMS",
-    "held-out gain", "verdict",
+    "step", "estimate", "|z| (noise reaches)", "log-likelihood gain", "log Bayes factor", "held-out log score",
+    "verdict",
 )  # fmt: skip
 
 
-def ladder(diagnosis: Diagnosis, draw: Draw) -> str:
-    """Return the ladder of models: what each step gains, which coefficients it moves, why the last was refused."""
+def ladder(diagnosis: Diagnosis) -> str:
+    """Return the steps of the search: what each gains, which coefficients it moves, why the last was refused."""
     steps = diagnosis.found.steps
     if not steps:
-        return section("Ladder of models", sentence(_no_step(diagnosis)))
-    first = ["model as given", "", "", "", "", f"{steps[0].held_out_before.rms:.3f}", "", ""]
+        return sentence(_no_step(diagnosis))
     told = [item for step in steps for item in _told(step)]
-    figure = evidence_figures.ladder(diagnosis)
-    return section(
-        "Ladder of models: how far the error falls",
-        draw(figure),
-        grid(STEP_COLUMNS, [first, *(step_row(step) for step in steps)], {0, 7}),
-        "<ul>" + "".join(f"<li>{prose(text)}</li>" for text in told) + "</ul>",
-        quiet(
-            "Held-out: every stop predicted from the others, in sigmas; 1 is right. In-sample likelihood rises with "
-            "every parameter, this error does not. The verdict's held-out error leaves out every third stop at once: "
-            "larger when the model is wrong. Estimates are those of the step, with all before it."
-        ),
-    )
+    return (
+        grid(STEP_COLUMNS, [step_row(step) for step in steps], {0, 6})
+        + "<ul>" + "".join(f"<li>{prose(text)}</li>" for text in told) + "</ul>"
+        + quiet(
+            "Estimates are those of the step, with all before it. Log score: gain in the predictive density of stops "
+            "left out one at a time, over all stops; in-sample likelihood rises with every parameter, this does not."
+        )
+    )  # fmt: skip
 
 
 def _no_step(diagnosis: Diagnosis) -> str:
@@ -94,13 +82,8 @@ def refits(rungs: Sequence[Rung]) -> str:
     """Return the ladder of real refits; nothing when the model was not grown."""
     if not rungs:
         return ""
-    return section(
-        "Ladder of refits: one effect at a time",
-        grid(_REFITS, [_refit(rung) for rung in rungs], {0, 6, 7}),
-        quiet(
-            "Each model is fitted to the whole recording. Held-out leaves out every third stop at once. NIS: "
-            "squared innovations a degree of freedom. Velocity after turns: RMS of the first second of each stop."
-        ),
+    return grid(_REFITS, [_refit(rung) for rung in rungs], {0, 6, 7}) + quiet(
+        "Each model is fitted to the whole recording. Velocity after turns: RMS of the first second of each stop."
     )
 
 
@@ -120,8 +103,7 @@ def step_row(step: Step) -> list[str]:
     return [
         f"+ {step.label}", with_sigma(step.estimate * factor, step.sigma * factor, step.display_unit),
         f"{abs(step.z):.1f} ({step.threshold:.1f})", f"{step.log_likelihood_gain:.1f}", f"{step.log_bayes_factor:.1f}",
-        f"{step.held_out_before.rms:.3f} \u2192 {step.held_out_after.rms:.3f}",
-        f"{step.held_out_gain:.1f} \u00b1 {step.held_out_error:.1f}",
+        f"{step.held_out_gain:+.0f} \u00b1 {step.held_out_error:.0f}",
         step.fate,
     ]  # fmt: skip
 
@@ -134,45 +116,103 @@ def _told(step: Step) -> list[str]:
     return out
 
 
-def missing(diagnosis: Diagnosis, entries: Sequence[data.Scored], draw: Draw) -> str:
-    """Return the ranking of missing effects, and how well what was found fits."""
-    parts = data.explained(diagnosis)
-    fits = [draw(evidence_figures.explained(parts))] if parts else []
-    if parts:
-        fits.append(
-            quiet(
-                "Misfit against the prediction of the effect, everything else estimated with it: points on the line "
-                "confirm the effect."
-            )
-        )
+def effects(summary: DiagnosisSummary, entries: Sequence[data.Scored], draw: Draw) -> str:
+    """Return what was found with sizes, how each was found, and every candidate that was looked at."""
+    d = summary.diagnosis
+    parts = data.explained(d)
+    fits = [
+        draw(evidence_figures.explained(parts)),
+        quiet("Misfit against the prediction of each effect, all else estimated with it: on the line it is right."),
+    ] if parts else []
     return section(
-        "Which effect is missing?",
-        draw(evidence_figures.ranking(entries, diagnosis.found.threshold)),
-        quiet(
-            "Each candidate is added to the model alone, all coefficients are estimated again; its size stands at the "
-            "bar. The dashed line is what the largest of all candidates reaches on pure noise once in fifty tests. "
-            "A triangle marks a found effect."
-        ),
+        "Effects: what is missing, how large",
+        sentence(d.sentence),
+        found_table(summary),
         *fits,
+        folded(
+            "Every candidate, added alone",
+            draw(evidence_figures.ranking(entries, d.found.threshold)),
+            quiet(
+                "All coefficients are estimated again with it; its size stands at the bar. The dashed line is what the "
+                "largest of all candidates reaches on pure noise once in fifty tests. A triangle marks a found effect."
+            ),
+        ),
+        folded("Steps of the search", ladder(d)),
+        folded("Ladder of refits: one effect at a time", refits(d.rungs)) if d.rungs else "",
+        quiet(numbers(d)),
+    )  # fmt: skip
+
+
+_FOUND = ("effect", "coefficient", "size", "z", "explains", "log Bayes factor", "held-out error")
+
+
+def found_table(summary: DiagnosisSummary) -> str:
+    """Return the effects that were found by families, the largest first."""
+    if not summary.found:
+        return sentence(_no_step(summary.diagnosis))
+    lines = []
+    for group in families(summary.found):
+        for k, one in enumerate(group):
+            unit = one.candidate.parameter.display_unit
+            size = with_sigma(from_si(one.value, unit), from_si(one.sigma, unit), unit)
+            fall = (one.held_out_before, one.held_out_after)
+            cells = (
+                size, f"{one.z:+.1f}", f"{100 * one.explained:.0f} %", f"{one.log_bayes_factor:.0f}",
+                f"{fall[0]:.3f} \u2192 {fall[1]:.3f}" if np.isfinite(fall).all() else "",
+            )  # fmt: skip
+            name = f'<td class="text">{family_words(group) if not k else ""}</td>'
+            label = f'<td class="text"><code>{escape(one.candidate.label)}</code></td>'
+            lines.append(f"<tr>{name}{label}{''.join(f'<td>{escape(text)}</td>' for text in cells)}</tr>")
+    head = "".join(f'<th scope="col"{" class=text" if k < 2 else ""}>{word}</th>' for k, word in enumerate(_FOUND))
+    tried = "" if summary.candidates else sentence("Tried, but not enough to explain the misfit:")
+    body = "".join(lines)
+    return f'{tried}<div class="wide"><table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>'
+
+
+def confused(summary: DiagnosisSummary) -> str:
+    """Return what each found effect would be confused with, what hangs on it, and what would tell; empty if nothing."""
+    rows = []
+    for one in summary.found:
+        if not one.alike:
+            continue
+        others = "; ".join(tip(title_of(name), effect_of_key(name), [name]) for name in one.alike[:6])
+        stake = "; ".join(
+            f"with {s.other} instead, {s.coefficient} moves by {s.sigmas:+.1f} of its sigmas"
+            for s in one.coefficient_shifts[:3]
+        )  # fmt: skip
+        rows.append(
+            f'<tr><td class="text"><code>{escape(one.candidate.label)}</code></td><td class="text">{others}</td>'
+            f'<td class="text">{prose(stake) or "nothing that matters"}</td></tr>'
+        )
+    if not rows:
+        return ""
+    told = [text for text in summary.advice if text.startswith(("To tell", "Turns ranked"))]
+    return section(
+        "What it would be confused with",
+        '<div class="wide"><table class="words"><thead><tr><th class="text" scope="col">found</th>'
+        '<th class="text" scope="col">looks the same in these data</th><th class="text" scope="col">what hangs on it'
+        f"</th></tr></thead><tbody>{''.join(rows)}</tbody></table></div>",
+        *(sentence(text) for text in told),
     )
 
 
-def where(diagnosis: Diagnosis, found: data.Residuals, draw: Draw) -> str:
-    """Return the heat maps of normalised residual means."""
-    two = bool(len(diagnosis.found.chosen))
-    parts = [
-        draw(evidence_figures.heat_map(data.where(diagnosis.consistency))),
-        quiet(
-            "Mean innovation of each channel at each stop over its own sigma, model as given, predicted second by "
-            "second as the test went on. Standard normal when the model is right: of 200 cells, one beyond 3 is chance."
-        ),
-    ]
-    if two:
-        parts += [
-            draw(evidence_figures.heat_map(data.stop_grid(found, after=True))),
-            quiet("The same with the found effects added: residuals of the fit."),
-        ]
-    return section("Where does it fail? Channel by stop", *parts)
+def heat_maps(diagnosis: Diagnosis, draw: Draw) -> str:
+    """Return the heat map of the model as given and of that with what was found, one scale, one at a time."""
+    fits = [diagnosis.fit] if diagnosis.extended is diagnosis.fit else [diagnosis.fit, diagnosis.extended]
+    if diagnosis.fit.learns_scatter:
+        return ""
+    return heat_map_card([fit.consistency() for fit in fits], draw)
+
+
+def heat_map_card(found: Sequence[Consistency], draw: Draw) -> str:
+    """Return a card with the heat map of each check, one at a time."""
+    figure = evidence_figures.heat_maps([data.where(one) for one in found])
+    return (
+        '<section class="card"><h2>Where it fails: channel by stop</h2>'
+        + switched(draw(figure), ("model as given", "with what was found")[: len(found)])
+        + quiet("Mean innovation over its sigma, as the test went on: of 200 cells, one beyond 3 is chance.")
+        + "</section>"
+    )
 
 
 _MARKS = "Orange triangles: model as given. Blue dots: with the found effects added."
@@ -182,8 +222,15 @@ def residuals(diagnosis: Diagnosis, found: data.Residuals, more: ReportExtras, d
     """Return measured against predicted, residuals in time and against physical variables, and free inputs."""
     two = bool(len(diagnosis.found.chosen))
     marks = _MARKS if two else "Triangles: model as given."
-    return "\n".join([
-        section(
+    return section(
+        "Residuals",
+        draw(residual_figures.innovations(found, two)),
+        quiet(
+            f"Measured minus predicted, all coefficients at their final values. Grey: three sigma. {marks} "
+            "Position and velocity are measured in the first second after a turn; of rate and force, one "
+            "second each, the marks are means over stops and the thin line keeps the extremes."
+        ),
+        folded(
             "Measured against predicted",
             draw(measured_figures.overlay(measured.overlay(diagnosis, found))),
             quiet(
@@ -192,15 +239,9 @@ def residuals(diagnosis: Diagnosis, found: data.Residuals, more: ReportExtras, d
                 "given after each turn, where the truth is rest, and the prediction of "
                 f"{'the found effects' if two else 'the model'}."
             ),
-            draw(residual_figures.innovations(found, two)),
-            quiet(
-                f"Measured minus predicted, all coefficients at their final values. Grey: three sigma. {marks} "
-                "Position and velocity are measured in the first second after a turn; of rate and force, one "
-                "second each, the marks are means over stops and the thin line keeps the extremes."
-            ),
         ),
         _variables(diagnosis, found, more, two, marks, draw),
-        section(
+        folded(
             "The sensor error that each stop and turn would need",
             draw(residual_figures.free_inputs(data.free_inputs(diagnosis), two)),
             quiet(
@@ -208,7 +249,7 @@ def residuals(diagnosis: Diagnosis, found: data.Residuals, more: ReportExtras, d
                 "A star: its score alone is beyond three sigma. Dots: with the found effects added."
             ),
         ),
-    ])  # fmt: skip
+    )
 
 
 def _variables(
@@ -228,7 +269,7 @@ def _variables(
     turned = measured.jumps(diagnosis, found)
     if len(turned.angle):
         parts.append(draw(measured_figures.jumps(turned, two)))
-    return section(
+    return folded(
         "Residuals against physical variables",
         *parts,
         quiet(
@@ -246,7 +287,7 @@ def separation(calibration: Calibration, draw: Draw) -> str:
     words = (
         "Hardest to separate: " + "; ".join(pairs) + "." if pairs else "No two coefficients are correlated beyond 0.5."
     )
-    return section("What is hard to separate", f"<p>{escape(words)}</p>", draw(evidence_figures.correlation(names, C)))
+    return f"<p>{escape(words)}</p>{draw(evidence_figures.correlation(names, C))}"
 
 
 _SMALLEST = ("effect", "smallest that would be found", "unit", "usual size", "share of signature left", "testable here")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from rich.box import SIMPLE_HEAD
@@ -29,6 +29,8 @@ class Row:
         True value, estimate minus truth, and that over sigma.
     reference : float or None
         Published sigma of its group.
+    prior : float or None
+        One sigma by the IMU's file.
     """
 
     name: str
@@ -40,12 +42,14 @@ class Row:
     error: float | None = None
     error_sigmas: float | None = None
     reference: float | None = None
+    prior: float | None = None
 
 
 def rows(
     calibration: Calibration,
     truth: Mapping[str, float] | None = None,
     reference: Mapping[str, float] | None = None,
+    prior: Mapping[str, float] | None = None,
 ) -> list[Row]:
     """Make the rows of the table.
 
@@ -56,6 +60,8 @@ def rows(
         True value (SI) by coefficient name, in the body frame of the calibration.
     reference : mapping of str to float, optional
         Published sigma (SI) by effect name.
+    prior : mapping of str to float, optional
+        One sigma (SI) by the IMU's file, by coefficient name.
 
     Returns
     -------
@@ -63,10 +69,12 @@ def rows(
         In the order of the calibration.
     """
     sigmas = np.sqrt(np.diag(calibration.covariance))
-    return [
+    found = [
         _row(calibration, index, float(sigma) if is_free(calibration, index) else 0.0, truth or {}, reference or {})
         for index, sigma in enumerate(sigmas)
     ]
+    known = prior or {}
+    return [replace(row, prior=from_si(known[row.name], row.unit)) if row.name in known else row for row in found]
 
 
 def _row(
@@ -94,6 +102,8 @@ def _row(
 def headings(table: list[Row]) -> list[str]:
     """Column headings: those that have something to say."""
     columns = ["coefficient", "estimate", "sigma", "unit"]
+    if any(row.prior is not None for row in table):
+        columns += ["prior", "sigma / prior"]
     if any(row.truth is not None for row in table):
         columns += ["truth", "error", "error/sigma"]
     if any(row.reference is not None for row in table):
@@ -110,6 +120,8 @@ def cells(row: Row, columns: list[str]) -> list[str]:
         "estimate": f"{row.value:.{decimals}f}",
         "sigma": sigma,
         "unit": row.unit,
+        "prior": "" if row.prior is None else f"{row.prior:.3g}",
+        "sigma / prior": f"{100.0 * row.sigma / row.prior:.2g} %" if row.prior and row.sigma > 0 else "",
         "truth": _number(row.truth, decimals),
         "error": _number(row.error, decimals),
         "error/sigma": _number(row.error_sigmas, 2),

@@ -90,9 +90,9 @@ def hashed(entries: Sequence[Entry], given: Sequence[Path]) -> tuple[tuple[str, 
         if found is None:
             missing.append((name, ""))
         else:
-            out |= _files(found)
+            out |= file_hashes(found)
     for path in given:
-        out |= _files(path)
+        out |= file_hashes(path)
     return (*out.values(), *missing)
 
 
@@ -104,8 +104,8 @@ def recordings_of(entry: Entry) -> list[str]:
     return [entry.result.origin.recording] if entry.result.origin.recording else []
 
 
-def _files(path: Path) -> dict[Path, tuple[str, str]]:
-    """Name and hash of a file, or of the files of a bag."""
+def file_hashes(path: Path) -> dict[Path, tuple[str, str]]:
+    """Name and SHA-256 of a file, or of the files of a bag, by path."""
     files = [path] if path.is_file() else sorted(file for file in path.iterdir() if file.is_file())
     return {
         file.resolve(): (file.name if path.is_file() else f"{path.resolve().name}/{file.name}", _sha256(file))

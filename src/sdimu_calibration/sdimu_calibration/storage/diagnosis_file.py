@@ -201,7 +201,7 @@ def step_of(s: Step) -> dict[str, Any]:
         "taken_out": s.taken_out, "z": s.z,
         "threshold": s.threshold, "estimate": s.estimate, "sigma": s.sigma, "unit": s.unit,
         "log_likelihood_gain": s.log_likelihood_gain, "log_bayes_factor": s.log_bayes_factor,
-        "held_out_rms_before": s.held_out_before.rms, "held_out_rms_after": s.held_out_after.rms,
+        "one_stop_out_before": s.held_out_before.rms, "one_stop_out_after": s.held_out_after.rms,
         "held_out_gain": s.held_out_gain, "held_out_error": s.held_out_error,
         "indistinguishable_from": list(s.alike),
         "moved": [{"name": name, "sigmas": size} for name, size in s.moved],

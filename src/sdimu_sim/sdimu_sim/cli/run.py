@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -203,6 +204,7 @@ def _report(console: Console, out: Path, site: str, imu: str, model: str, test_n
     from sdimu_calibration.storage.opening import open_test
     from sdimu_calibration.storage.reference_file import read_reference, read_truth
     from sdimu_calibration.storage.result_file import read_result
+    from sdimu_calibration.storage.trace import traced
     from sdimu_calibration.storage.whole_file import written_together
 
     result = read_result(out / "result.json")
@@ -216,7 +218,7 @@ def _report(console: Console, out: Path, site: str, imu: str, model: str, test_n
         write_diagnosis(part / "diagnosis.json", summary)
         write_report(
             part / "report.html", result, title=title, truth=truth, reference=read_reference(), summary=summary,
-            more=more,
+            more=more, trace=traced([out / "bag"], sys.argv[1:], site=site, imu=imu, model=model),
         )  # fmt: skip
     shown = rich_table(rows(result, truth, read_reference()), f"body frame: {result.body_frame}")
     console.print(shown, soft_wrap=True)

@@ -10,6 +10,7 @@ from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.diagnosis.coefficient_shifts import CoefficientShift, coefficient_shifts
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.diagnosis.free_input_test import free_input_test
+from sdimu_calibration.core.diagnosis.ladder import error_ladder
 from sdimu_calibration.core.diagnosis.problem import Problem
 from sdimu_calibration.core.diagnosis.scan import POWER_80, scan
 from sdimu_calibration.core.diagnosis.search import look_alikes
@@ -36,7 +37,7 @@ class Found:
     explained : float
         Share of the free-input misfit of the model as given that this effect removes.
     held_out_before, held_out_after : float
-        RMS of the normalised prediction errors at stops left out.
+        `error_figures.held_out` without it and with it; NaN where no model with so many effects was fitted.
     alike : tuple of str
         Candidates that the data cannot tell from it, all others found being in the model.
     coefficient_shifts : tuple of CoefficientShift
@@ -75,7 +76,7 @@ def found_effects(d: Diagnosis) -> tuple[Found, ...]:
     whole = max(misfit[0], 1e-9) if misfit else 1.0
     values, sigmas = _estimates(d, problem, chosen)
     allowed = looked_at(d)
-    held_out = [problem.held_out(chosen[:k], 1.0).rms for k in range(len(chosen) + 1)] if chosen else []
+    held_out = _held_out(d, len(chosen))
     out = []
     for k, column in enumerate(chosen):
         scanned = problem.scan(chosen[:k], d.found.scale)
@@ -100,6 +101,12 @@ def found_effects(d: Diagnosis) -> tuple[Found, ...]:
             )
         )
     return tuple(out)
+
+
+def _held_out(d: Diagnosis, count: int) -> list[float]:
+    """Held-out error with none, the first, the first two ... of what was found."""
+    known = [error for _, error in error_ladder(d)]
+    return known if len(known) == count + 1 else [known[0], *[float("nan")] * (count - 1), known[-1]]
 
 
 def _bayes(d: Diagnosis, k: int, linear: float) -> float:

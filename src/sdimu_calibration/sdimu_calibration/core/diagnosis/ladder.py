@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sdimu_calibration.core.diagnosis.problem import Problem
+from sdimu_calibration.core.error_figures import held_out, log_likelihood, nis
 from sdimu_calibration.core.estimation.fit import Fit
 from sdimu_calibration.core.estimation.handheld_fit import HandheldFit
 from sdimu_calibration.core.estimation.navigation_fit import NavigationFit
@@ -17,6 +18,7 @@ from sdimu_calibration.core.progress import Progress
 from sdimu_calibration.core.results import Calibration
 
 if TYPE_CHECKING:
+    from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
     from sdimu_calibration.core.diagnosis.rounds import Round
 
 MOVED = 2.0
@@ -80,20 +82,33 @@ def ladder(fit: Fit, final: Fit, done: Round, progress: Progress) -> tuple[Rung,
     problem, chosen = Problem(done.evidence), [int(c) for c in done.found.chosen]
     rungs: list[Rung] = []
     for k, (one, result) in enumerate(zip(fits, results, strict=True)):
-        held_out = problem.held_out(chosen[:k], 1.0).rms if one.learns_scatter else number(result.fit["held_out_rms"])
+        error = problem.held_out(chosen[:k], 1.0).rms if one.learns_scatter else held_out(result)
         added = done.chosen[k - 1].label if k else ""
-        rungs.append(_rung(added, one, result, held_out, results[k - 1] if k else None, rungs[-1] if rungs else None))
+        rungs.append(_rung(added, one, result, error, results[k - 1] if k else None, rungs[-1] if rungs else None))
     return tuple(rungs)
 
 
+def error_ladder(d: Diagnosis) -> list[tuple[str, float]]:
+    """Held-out error (`error_figures.held_out`) of the model as given and with what was found, by name.
+
+    With every effect by itself where the model was grown, else with all of them at once; with nothing found one entry.
+    """
+    if d.rungs:
+        return [(f"+ {r.added}" if r.added else "model as given", r.held_out_rms) for r in d.rungs]
+    first = ("model as given", held_out(d.before))
+    added = [c.label for c in d.chosen]
+    name = f"+ {added[0]}" if len(added) == 1 else f"+ {len(added)} effects"
+    return [first, (name, held_out(d.after))] if added else [first]
+
+
 def _rung(
-    added: str, fit: Fit, result: Calibration, held_out: float, earlier: Calibration | None, below: Rung | None
+    added: str, fit: Fit, result: Calibration, error: float, earlier: Calibration | None, below: Rung | None
 ) -> Rung:
-    likelihood = number(result.fit["log_likelihood"])
+    likelihood = log_likelihood(result)
     standard, velocity = jump(fit)
     rung = Rung(
         added, True, "", likelihood, likelihood - below.log_likelihood if below else 0.0,
-        number(result.fit["nis_mean"]), held_out, standard, velocity,
+        nis(result), error, standard, velocity,
         moved_coefficients(earlier, result) if earlier else (),
         tuple(fit.scatter.tolist()) if isinstance(fit, HandheldFit) else None,
     )  # fmt: skip
@@ -133,8 +148,3 @@ def moved_coefficients(
             if abs(size) > least:
                 out.append((name, size))
     return tuple(sorted(out, key=lambda item: -abs(item[1])))
-
-
-def number(value: float | None) -> float:
-    """Give NaN for what was not computed."""
-    return float("nan") if value is None else float(value)

@@ -11,12 +11,12 @@ import numpy as np
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.diagnosis.screen import Finding
 from sdimu_calibration.core.diagnosis.search import Search
+from sdimu_calibration.core.error_figures import held_out
 from sdimu_calibration.core.estimation.noise_estimate import told
 from sdimu_calibration.core.evidence.candidate import Candidate
 from sdimu_calibration.core.evidence.consistency import SLOW_S, Consistency
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.handheld.handheld_fit import FORCE, RATE, TURN
-from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.units import from_si
 
 if TYPE_CHECKING:
@@ -146,8 +146,8 @@ def _unexplained(d: Diagnosis, names: str) -> str:
             "sigmas take it into account."
         )
     tail = f"; {names} would take {100 * d.explained:.0f} % of it" if names else ""
-    if names and _rms(d.after) > 1.0 and _rms(d.after) == _rms(d.after):
-        tail += f", and the error at stops held out is then {_rms(d.after):.2f} (1 is right)"
+    if names and held_out(d.after) > 1.0:
+        tail += f", and the error at stops held out is then {held_out(d.after):.2f} (1 is right)"
     return f"Something is missing that no effect of the catalogue explains{tail}{_coloured(d.consistency)}."
 
 
@@ -159,7 +159,7 @@ def error_falls(d: Diagnosis) -> str:
             f"error at rests held out: {first.held_out_rms:.3f} -> {last.held_out_rms:.3f}; beyond white noise: "
             f"{beyond(d.rungs[0].scatter)} -> {beyond(d.rungs[-1].scatter)}"
         )
-    return f"error at stops held out, a third at a time: {_rms(d.before):.3f} -> {_rms(d.after):.3f}"
+    return f"error at stops held out, a third at a time: {held_out(d.before):.3f} -> {held_out(d.after):.3f}"
 
 
 def beyond(scatter: Sequence[float] | Floats) -> str:
@@ -189,8 +189,3 @@ def _coloured(consistency: Consistency) -> str:
         if noise.slow > _COLOURED
     ]
     return f"; coloured noise would explain it: {' and '.join(told)}" if told else ""
-
-
-def _rms(calibration: Calibration) -> float:
-    value = calibration.fit.get("held_out_rms")
-    return float("nan") if value is None else float(value)

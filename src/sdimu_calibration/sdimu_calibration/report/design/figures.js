@@ -30,6 +30,9 @@
       return name in colours ? '"' + colours[name] + '"' : all;
     }));
     figure.layout.template = FIGURE_TEMPLATES[theme];
+    if (place.dataset.show) {
+      figure.data.forEach(function (trace, k) { trace.visible = k === Number(place.dataset.show); });
+    }
     if (window.innerWidth >= 2400) {
       enlarge(figure, LARGE);
       Object.keys(figure.layout.margin).forEach(function (side) { figure.layout.margin[side] *= LARGE; });
@@ -68,6 +71,16 @@
     }, {rootMargin: NEAR});
     all().forEach(function (place) { near.observe(place); });
     setTimeout(load, 0);
+  });
+  document.addEventListener('click', function (event) {
+    var button = event.target.closest && event.target.closest('.switched button[data-show]');
+    if (!button) { return; }
+    button.parentNode.querySelectorAll('button').forEach(function (other) {
+      other.setAttribute('aria-pressed', String(other === button));
+    });
+    var place = button.closest('.switched').querySelector('.figure');
+    place.dataset.show = button.dataset.show;
+    if (place.dataset.drawn) { draw(place); }
   });
   window.addEventListener('sdimu-theme', function () {
     if (window.Plotly) { all().filter(function (p) { return p.dataset.drawn; }).forEach(draw); }

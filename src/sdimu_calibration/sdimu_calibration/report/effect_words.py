@@ -1,0 +1,74 @@
+"""Effects as a person reads them: title, coefficients, equation; grouped by family, the largest first."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cache
+from html import escape
+
+from sdimu_calibration.core.diagnosis.found import Found
+from sdimu_calibration.core.effects.effect import Effect
+from sdimu_calibration.core.effects.selection import resolve
+from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.report.formula import mathml
+from sdimu_calibration.report.groups import title as in_words
+
+MOST_FAMILIES = 3
+"""Number of families that a headline names: the table has the rest."""
+
+
+@cache
+def effect_of_key(key: str) -> Effect | None:
+    """Return the effect of a canonical key, None for one that only a file of its user knows."""
+    try:
+        return resolve(key)
+    except DataError:
+        return None
+
+
+def title_of(key: str) -> str:
+    """Title of an effect; of one that the registry does not know, its key in words."""
+    effect = effect_of_key(key)
+    return in_words(key) if effect is None else effect.title + effect.variant
+
+
+def tip(words: str, effect: Effect | None, names: Sequence[str] = ()) -> str:
+    """Words that show equation, cause and names of an effect on hover, touch or focus."""
+    if effect is None:
+        return escape(words)
+    lines = [mathml(effect.equation), f"<br>{escape(effect.description)}" if effect.description else ""]
+    called = ", ".join(names) or effect.family or effect.name
+    lines.append(f"<br><code>{escape(called)}</code>")
+    shown = f'<span class="tip" role="tooltip">{"".join(lines)}</span>'
+    return f'<span class="effect" tabindex="0">{escape(words)}{shown}</span>'
+
+
+def families(found: Sequence[Found]) -> list[list[Found]]:
+    """Group what was found by effect, the largest score first."""
+    groups: dict[str, list[Found]] = {}
+    for one in sorted(found, key=lambda f: -abs(f.z)):
+        key = one.candidate.label if one.candidate.family == "own" else one.candidate.effect.title
+        groups.setdefault(key, []).append(one)
+    return list(groups.values())
+
+
+def family_words(group: Sequence[Found]) -> str:
+    """Name a family with the coefficients that were found, as HTML: ``gyro scale-factor asymmetry, y``."""
+    first = group[0].candidate
+    labels = [one.candidate.label for one in group]
+    if first.family == "own":
+        return f"<code>{escape(first.label)}</code>"
+    stem = first.family
+    axes = [label.partition("(")[0].removeprefix(stem).strip("_") for label in labels]
+    words = f"{first.effect.title}{', ' + ', '.join(axes) if any(axes) else ''}{first.effect.variant}"
+    return tip(words, first.effect, labels)
+
+
+def headline_of(found: Sequence[Found]) -> str:
+    """Name the families with the largest scores, and count the rest, as HTML."""
+    groups = families(found)
+    words = [family_words(group) for group in groups[:MOST_FAMILIES]]
+    more = len(groups) - len(words)
+    if more:
+        words.append(f"{more} more")
+    return " and ".join([", ".join(words[:-1]), words[-1]]) if len(words) > 1 else words[0]

@@ -1,0 +1,129 @@
+"""Numbers that a statistician looks for: are the innovations white and normal, which stop carries an estimate."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import stats
+
+from sdimu_calibration.core.arrays import Bools, Floats, Ints
+from sdimu_calibration.core.estimation.navigation_fit import NavigationFit
+from sdimu_calibration.core.evidence.influence import influence
+
+KINDS = ("position", "velocity", "rate", "force")
+_LAGS = 30
+"""Number of lags of the autocorrelation: half a minute at rest."""
+_BINS = np.linspace(-5.0, 5.0, 41)
+"""Edges of the histogram (sigma)."""
+_QUANTILES = 80
+"""Number of points of a QQ plot: enough for a line, with the tails kept one by one."""
+_TAIL = 12
+"""Number of the smallest and of the largest values that a QQ plot keeps one by one."""
+LEVEL = 0.95
+"""Probability of the bands."""
+
+
+@dataclass(frozen=True)
+class Whiteness:
+    """Whitened innovations of a finished fit in four kinds: position, velocity, rate, force.
+
+    Attributes
+    ----------
+    bins : ndarray, shape (b,)
+        Middles of the bins of the histogram (sigma).
+    density : ndarray, shape (4, b)
+        Probability density; zero where a kind is not measured.
+    expected, found : tuple of ndarray, each shape (q,)
+        Quantiles of the normal distribution and of each kind (sigma).
+    lags : ndarray of int, shape (l,)
+        Epochs.
+    correlation : ndarray, shape (l, 6)
+        Autocorrelation of gyro x, y, z and accelerometer x, y, z within the stops (dimensionless).
+    band : float
+        What white noise stays inside with `LEVEL`.
+    t : ndarray, shape (s,)
+        Middle of each stop (min).
+    stop : ndarray of int, shape (s,)
+    nis : ndarray, shape (s, 4)
+        Mean NIS per degree of freedom at each stop; NaN where not measured.
+    low, high : ndarray, shape (s, 4)
+        Band of `nis` with `LEVEL`.
+    """
+
+    bins: Floats
+    density: Floats
+    expected: tuple[Floats, ...]
+    found: tuple[Floats, ...]
+    lags: Ints
+    correlation: Floats
+    band: float
+    t: Floats
+    stop: Ints
+    nis: Floats
+    low: Floats
+    high: Floats
+
+
+def whiteness(fit: NavigationFit) -> Whiteness:
+    """Take the innovations of the last pass of a fit apart."""
+    white, nis = fit.last.output.normalised, fit.last.output.nis
+    stop, used = fit.prepared.phases.stop, fit.prepared.kind > 0
+    kinds = [white[:, 3 * k : 3 * k + 3][np.isfinite(white[:, 3 * k : 3 * k + 3])] for k in range(4)]
+    density = [np.histogram(v, _BINS, density=True)[0] if len(v) else np.zeros(len(_BINS) - 1) for v in kinds]
+    quantiles = [_quantiles(v) for v in kinds]
+    correlation, pairs = _autocorrelation(white[:, 6:], stop, used)
+    stops = np.unique(stop[used])
+    mean, count = np.full((len(stops), 4), np.nan), np.zeros((len(stops), 4))
+    for row, one in enumerate(stops):
+        at = nis[used & (stop == one)]
+        count[row] = np.isfinite(at).sum(axis=0)
+        mean[row] = np.where(count[row] > 0, np.nansum(at, axis=0) / np.maximum(3.0 * count[row], 1.0), np.nan)
+    dof = 3.0 * np.maximum(count, 1.0)
+    low, high = (stats.chi2.ppf(p, dof) / dof for p in (0.5 - 0.5 * LEVEL, 0.5 + 0.5 * LEVEL))
+    middle = np.array([fit.prepared.epochs.end[used & (stop == one)].mean() for one in stops]) / 60.0
+    return Whiteness(
+        0.5 * (_BINS[1:] + _BINS[:-1]), np.array(density), tuple(e for e, _ in quantiles),
+        tuple(f for _, f in quantiles), np.arange(1, _LAGS + 1), correlation,
+        float(stats.norm.ppf(0.5 + 0.5 * LEVEL) / np.sqrt(max(pairs, 1))),
+        middle, stops, mean, low, high,
+    )  # fmt: skip
+
+
+def _quantiles(values: Floats) -> tuple[Floats, Floats]:
+    """Quantiles (q,) of the normal distribution and of `values` (n,), both in sigma; the tails one by one."""
+    n = len(values)
+    if not n:
+        return np.empty(0), np.empty(0)
+    middle = np.linspace(0, n - 1, min(n, _QUANTILES)).astype(np.int64)
+    rank = np.unique(np.concatenate([np.arange(min(_TAIL, n)), middle, np.arange(max(0, n - _TAIL), n)]))
+    return np.asarray(stats.norm.ppf((rank + 0.5) / n)), np.sort(values)[rank]
+
+
+def _autocorrelation(white: Floats, stop: Ints, used: Bools) -> tuple[Floats, int]:
+    """Correlation (lags, 6) of the columns of `white` (e, 6) with themselves later at the same stop; least pairs."""
+    out, least = np.full((_LAGS, white.shape[1]), np.nan), len(white)
+    variance = np.nanmean(white[used] ** 2, axis=0)
+    for lag in range(1, _LAGS + 1):
+        pair = used[lag:] & used[:-lag] & (stop[lag:] == stop[:-lag])
+        product = white[lag:][pair] * white[:-lag][pair]
+        least = min(least, len(product))
+        if len(product):
+            out[lag - 1] = np.nanmean(product, axis=0) / variance
+    return out, least
+
+
+@dataclass(frozen=True)
+class Influence:
+    """How far each coefficient moves without each stop: `moved` (s, k) in sigmas, of `stops` (s,) and `names` (k)."""
+
+    stops: Ints
+    names: tuple[str, ...]
+    moved: Floats
+
+
+def influences(fit: NavigationFit) -> Influence:
+    """Leave every stop out of a fit in its linear model."""
+    evidence = fit.evidence()
+    stops, moved = influence(evidence)
+    return Influence(stops, evidence.names[: evidence.coefficients], moved)

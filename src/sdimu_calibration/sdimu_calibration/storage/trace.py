@@ -1,0 +1,68 @@
+"""What a result was made from and how: the files of its recordings with their hashes, the command, the program."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+from sdimu_calibration.storage.bag_metadata import custom_data
+from sdimu_calibration.storage.datasheet_file import file_hashes
+
+
+@dataclass(frozen=True)
+class Trace:
+    """How a result came about.
+
+    Attributes
+    ----------
+    made : str
+        When (UTC).
+    program : str
+        Name and version.
+    command : str
+        What was typed; empty from Python.
+    stated : tuple of (str, str)
+        What the user named: IMU file, site, model, plan.
+    files : tuple of (str, str)
+        Path of each file of the recordings and its SHA-256.
+    """
+
+    made: str
+    program: str
+    command: str = ""
+    stated: tuple[tuple[str, str], ...] = ()
+    files: tuple[tuple[str, str], ...] = ()
+
+
+def traced(bags: Sequence[Path] = (), arguments: Sequence[str] = (), **stated: str | Path | None) -> Trace:
+    """Put down what is known now.
+
+    Parameters
+    ----------
+    bags : sequence of Path
+        Recordings, whose files are read once more for their hashes.
+    arguments : sequence of str
+        Of the command line, without the name of the program; empty from Python.
+    stated
+        What the user named, by what it is; None for what was left out.
+    """
+    files = [(str(path), digest) for bag in bags for path, (_, digest) in file_hashes(bag).items()]
+    plan = next((said for bag in bags if (said := custom_data(bag).get("plan"))), None)
+    named = {**stated, "plan": plan} if plan else stated
+    return Trace(
+        datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"), f"sdimu {program_version()}",
+        shlex.join(["sdimu", *arguments]) if arguments else "",
+        tuple((key, str(value)) for key, value in named.items() if value), tuple(files),
+    )  # fmt: skip
+
+
+def program_version() -> str:
+    """Version of the program; empty where it runs without being installed."""
+    try:
+        return version("sdimu_calibration")
+    except PackageNotFoundError:
+        return ""
