@@ -1,0 +1,110 @@
+"""Advice as whole commands: with the recording, the options that were given, and everything spelled out."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from sdimu_calibration.core.diagnosis.plan_seen import PlanSeen
+    from sdimu_calibration.core.plan import Plan
+
+PLAN = "plan.yaml"
+"""File beside a diagnosis: the plan as the motion showed it."""
+DIAGNOSE = "run: sdimu diagnose"
+"""Words of a note that sends to a diagnosis."""
+_ACCELERATION = 1.0
+"""Angular acceleration (rad/s^2) of a plan that was seen: the motion does not tell the limit, and no sum needs it."""
+_COMMAND = re.compile(r"^(.*?):? ((?:sdimu [a-z]+ |--add ).*?)\.?$")
+
+
+_REPEATED = (
+    "site", "imu", "model", "noise", "estimator", "whole_turns", "exclude_stops", "exclude_times", "serial", "power_on",
+    "reference_temperature", "imu_topic", "status_topic", "joint_topic", "temperature_topic", "accel_unit", "gyro_unit",
+    "accel_sign", "gyro_sign",
+)  # fmt: skip
+"""Options that calibrate and diagnose share, and that the next of them has to repeat."""
+_USUAL = (None, False, "auto")
+"""Values of options that nobody stated."""
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What a verb was asked for, so far as the next one has to repeat it.
+
+    Attributes
+    ----------
+    bags : sequence of Path
+    options : sequence of str
+        As words of a command.
+    place : sequence of str
+        Site and IMU alone, likewise.
+    folder : Path
+        Of the results.
+    """
+
+    bags: Sequence[Path]
+    options: Sequence[str]
+    place: Sequence[str]
+    folder: Path
+
+    @classmethod
+    def of(cls, bags: Sequence[Path], given: Mapping[str, Any], folder: Path) -> Asked:
+        """Take the arguments of a verb, by name."""
+        options = [word for name in _REPEATED if given.get(name) not in _USUAL
+                   for word in (f"--{name.replace('_', '-')}", str(given[name]))]  # fmt: skip
+        options += ["--hand"] if given.get("hand") else []
+        options += [word for effect in given.get("add") or () for word in ("--add", effect)]
+        place = [word for name in ("site", "imu") if given.get(name) for word in (f"--{name}", str(given[name]))]
+        return cls(bags, options, place, folder)
+
+    def command(self, verb: str) -> str:
+        """Write the command of a verb about the same recording, with the same options."""
+        return shlex.join(["sdimu", verb, *map(str, self.bags), *self.options])
+
+
+def spelled(advice: str, asked: Asked) -> tuple[str, str]:
+    """Part an advice into words and the whole command that it means; no command where it names none.
+
+    ``Keep X in the model: --add 'X'.`` becomes a calibration of the recording, ``sdimu plan --plan YOURS`` names
+    the plan that was seen and the same site and IMU.
+    """
+    found = _COMMAND.match(advice)
+    if found is None:
+        return advice, ""
+    words, rest = found.groups()
+    if rest.startswith("--add"):
+        rest = f"{asked.command('calibrate')} {rest}"
+    elif rest.startswith("sdimu plan --after"):
+        rest = shlex.join(["sdimu", "plan", "--after", str(asked.folder)])
+    elif rest.startswith("sdimu plan --plan YOURS"):
+        plan = shlex.join(["--plan", str(asked.folder / PLAN), *asked.place])
+        rest = rest.replace("--plan YOURS", plan, 1)
+    elif rest.startswith("sdimu diagnose BAG"):
+        rest = rest.replace("BAG", shlex.quote(str(asked.bags[0])), 1)
+    return f"{words}:", rest
+
+
+def as_plan(seen: PlanSeen | None) -> Plan | None:
+    """Write the plan that was seen as a plan to begin with; None where a turn was about several axes, or none was.
+
+    Angles are rounded to whole degrees and rates to tenths: the motion tells them to the mount and the scale factors.
+    """
+    import math
+
+    from sdimu_calibration.core.plan import Plan, Turn
+
+    if seen is None or not seen.turns or any(turn.axis is None for turn in seen.turns):
+        return None
+    dwell = max(1.0, round(60.0 * seen.dwell_minutes))
+    turns = []
+    for turn in seen.turns:
+        angle, rate = round(math.degrees(turn.angle)), round(abs(math.degrees(turn.rate)), 1)
+        if not angle or not rate or turn.axis is None:
+            return None
+        turns.append(Turn("XYZ"[turn.axis], math.radians(angle), math.radians(rate)))
+    return Plan("seen", (dwell,) * (len(turns) + 1), tuple(turns), _ACCELERATION)
