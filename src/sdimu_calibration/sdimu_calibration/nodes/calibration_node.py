@@ -132,7 +132,7 @@ class CalibrationNode:
     def close(self) -> None:
         """Leave the journal to a successor, unless the test is over: then there is nothing to go on with."""
         self._diagnosing.close()
-        if self._departed is None:
+        if self._departed is None and self._result is None:
             self._journal.close()
         else:
             self._journal.remove()
