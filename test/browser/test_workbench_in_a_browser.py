@@ -63,30 +63,6 @@ def add_first(page: Any) -> None:
     page.locator("#add").click()
 
 
-def select_points(page: Any, first: float, last: float) -> int:
-    """Draw a box around the residuals between two times; return how many there are."""
-    page.locator("#residuals").evaluate("graph => graph.scrollIntoView({block: 'center'})")
-    page.wait_for_timeout(300)
-    ends = page.evaluate(
-        "times => { const f = document.querySelector('#residuals .js-plotly-plot'), l = f._fullLayout,"
-        " b = f.getBoundingClientRect(); return [...times.map(t => b.x + l.xaxis._offset + l.xaxis.d2p(t)),"
-        " b.y + l.yaxis._offset, l.yaxis._length]; }",
-        [first, last],
-    )
-    count = sum(first <= t <= last for t in drawn(page, "residuals", "x"))
-    for _ in range(5):  # a figure that is drawn anew meanwhile forgets what was selected
-        page.mouse.move(ends[0], ends[2] + 2)
-        page.mouse.down()
-        page.mouse.move(0.5 * (ends[0] + ends[1]), ends[2] + 0.5 * ends[3], steps=5)
-        page.mouse.move(ends[1], ends[2] + ends[3] - 2, steps=5)
-        page.mouse.up()
-        page.wait_for_timeout(1500)
-        chosen = page.evaluate("document.querySelector('#residuals .js-plotly-plot')._fullData[0].selectedpoints")
-        if chosen is not None and len(chosen) == count:
-            break
-    return count
-
-
 def choose(page: Any, field: str, option: str) -> None:
     page.locator(f"#{field}").click()
     page.get_by_text(option, exact=True).last.click()
@@ -298,49 +274,6 @@ def test_before_and_after_are_shown_by_a_key_on_the_same_cells(visit: Callable[[
     page.wait_for_timeout(500)
     assert drawn(page, "heat", "z.map(r => Array.from(r))") == given
     assert drawn(page, "heat", "x") == [str(stop) for stop in range(19)]
-
-
-def test_points_in_a_box_a_stop_and_a_coefficient_are_excluded_by_page_and_shell_alike(
-    visit: Callable[[], Any], workbench: Workbench, tmp_path: Path
-) -> None:
-    page = visit()
-    add_first(page)
-    page.locator("#verdict", has_text="\N{CHECK MARK}").wait_for()
-    settle(page)
-    click_cell(page, "accel x", "7")
-    page.locator("#residuals .gtitle", has_text="accel x at stop 7").wait_for()
-    settle(page)
-    times = drawn(page, "residuals", "x")
-    count = select_points(page, times[20] - 0.4, times[29] + 0.4)
-    assert count == 10
-    page.locator("#leave-points").click()
-    page.locator("#numbers", has_text="of what is left out").wait_for()
-    settle(page)
-    page.locator("#residuals .legendtext", has_text="left out").wait_for()
-    left = page.evaluate("document.querySelector('#residuals .js-plotly-plot')._fullData[1].x.length")
-    assert left == count
-    click_cell(page, "accel x", "9")
-    page.locator("#residuals .gtitle", has_text="accel x at stop 9").wait_for()
-    page.locator("#toggle-stop").click()
-    page.wait_for_function("!document.querySelector('#heat .js-plotly-plot')._fullData[0].x.includes('9')")
-    settle(page)
-    choose(page, "coefficient", "gyro_bias_x")
-    page.locator("#mean").fill("0.687 deg/h")
-    page.locator("#mean").blur()
-    page.locator("#fix").click()
-    page.locator("#coefficients td", has_text="fixed").wait_for()
-    settle(page)
-
-    home = take_home(page, tmp_path / "home")
-    said = (home / "command.txt").read_text(encoding="utf-8")
-    assert "--exclude-stops 9" in said
-    assert "--exclude-times" in said
-    exported = json.loads((home / "result.json").read_text(encoding="utf-8"))
-    assert exported["coefficients"][0]["sigma"] == 0.0
-    again = calibrated(workbench, home, tmp_path / "again")
-    assert_same_numbers(again, exported)
-    # The page itself showed these numbers, too.
-    assert f"{again['fit']['nis_mean']:.3f}" in text(page, "numbers")
 
 
 def test_undo_redo_and_help_by_keyboard(visit: Callable[[], Any]) -> None:
