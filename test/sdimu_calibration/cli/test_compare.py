@@ -41,6 +41,7 @@ def run(monkeypatch, capsys, tmp_path):
             write_result(tmp_path / f"run{k}" / "result.json", result)
             folders.append(str(tmp_path / f"run{k}"))
         monkeypatch.setattr(sys, "argv", ["sdimu", "compare", *folders])
+        monkeypatch.setenv("COLUMNS", "200")
         with pytest.raises(SystemExit) as ending:
             cli.main()
         captured = capsys.readouterr()

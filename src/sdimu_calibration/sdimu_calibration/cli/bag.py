@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+import shlex
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from sdimu_calibration.cli.console import plain
+from sdimu_calibration.cli.console import JsonOption, answer, command, plain, say
 from sdimu_calibration.core.plain_text import one_line
 
 app = typer.Typer(
@@ -19,22 +20,23 @@ Bag = Annotated[Path, typer.Argument(metavar="BAG", help="rosbag2 folder or .mca
 
 
 @app.command()
-def info(bag: Bag) -> None:
+def info(bag: Bag, as_json: JsonOption = False) -> None:
     """Show topics, types and counts."""
-    from rich.table import Table
-
+    from sdimu_calibration.cli.wide_table import print_table
     from sdimu_calibration.storage.bag_info import read_info
 
     content = read_info(bag)
-    table = Table("topic", "type", "messages", pad_edge=False)
-    table.columns[2].justify = "right"
-    for topic, type_name in sorted(content.types.items()):
-        table.add_row(one_line(topic), one_line(type_name), str(content.counts[topic]))
-    console = plain()
-    console.print(table)
+    rows = [(str(content.counts[topic]), one_line(topic), one_line(name)) for topic, name in content.types.items()]
+    console = plain(stderr=as_json)
+    print_table(console, ("messages", "topic", "type"), sorted(rows, key=lambda row: row[1]), left=3)
     console.print(f"{(content.last_ns - content.first_ns) * 1e-9:.1f} s from {content.first_ns * 1e-9:.3f} s")
     for part in content.damaged:
-        console.print(f"{part} is cut short or damaged; run: sdimu bag recover {bag}", soft_wrap=True)
+        say(console, f"{part} is cut short or damaged; to mend it:")
+        command(console, shlex.join(["sdimu", "bag", "recover", str(bag)]))
+    topics = {topic: {"type": name, "messages": content.counts[topic]} for topic, name in content.types.items()}
+    damaged = [str(part) for part in content.damaged]
+    answer({"format": "sdimu-bag-info/1", "first_ns": content.first_ns, "last_ns": content.last_ns,
+            "topics": topics, "damaged": damaged}, as_json)  # fmt: skip
 
 
 @app.command()

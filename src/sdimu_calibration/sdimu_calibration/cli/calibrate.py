@@ -9,8 +9,9 @@ from typing import Annotated
 
 import typer
 
-from sdimu_calibration.cli.console import plain
+from sdimu_calibration.cli.console import JsonOption, answer, command, plain, say
 from sdimu_calibration.cli.exclusion_options import ExcludeStops, ExcludeTimes, left_out
+from sdimu_calibration.cli.next_commands import DIAGNOSE, pasted
 from sdimu_calibration.cli.options import (
     EstimatorOption,
     HandOption,
@@ -79,6 +80,7 @@ def calibrate(
     reference_temperature: ReferenceOption = None,
     workers: WorkersOption = WORKERS,
     scheduler: SchedulerOption = None,
+    as_json: JsonOption = False,
     imu_topic: ImuTopic = None,
     status_topic: StatusTopic = None,
     joint_topic: JointTopic = None,
@@ -100,7 +102,7 @@ def calibrate(
     from sdimu_calibration.storage.trace import traced
     from sdimu_calibration.storage.whole_file import written_together
 
-    console = plain()
+    console = plain(stderr=as_json)
     origin = source(
         imu_topic, status_topic, joint_topic, temperature_topic, accel_unit, gyro_unit, accel_sign, gyro_sign
     )
@@ -116,7 +118,7 @@ def calibrate(
                          exclude_stops=exclude_stops, exclude_times=exclude_times)
         calibrate_together(SetRequest(
             bags or [], set_file, model, site, imu, add or [], origin, asked, noise, out, workers,
-            scheduler, serial, reference_temperature,
+            scheduler, serial, reference_temperature, as_json,
         ))  # fmt: skip
         return
     test, wanted, chosen = opened(
@@ -141,5 +143,9 @@ def calibrate(
         )
     console.print(rich_table(rows(result, true), f"body frame: {result.body_frame}"), soft_wrap=True)
     tell(console, (*notes, *(note for note in result.notes if note not in notes)))
-    console.print(f"results in {folder}", soft_wrap=True)
+    if any(DIAGNOSE in note for note in result.notes):
+        say(console, "To learn what the model misses:")
+        command(console, pasted("diagnose", [bag], site, imu, model, add))
+    say(console, f"results in {folder}")
+    answer(folder / "result.json", as_json)
     leave(result)

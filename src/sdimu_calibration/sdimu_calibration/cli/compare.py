@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from sdimu_calibration.cli.console import plain
+from sdimu_calibration.cli.console import JsonOption, answer, plain, say
+
+if TYPE_CHECKING:
+    from sdimu_calibration.core.results import Calibration
 
 
 def compare(
     folders: Annotated[list[Path], typer.Argument(metavar="DIR DIR ...", help="Folders with result.json.")],
+    as_json: JsonOption = False,
 ) -> None:
     """Show how far the error fell with each model; folders of one recording, simplest model first."""
     from sdimu_calibration.cli.wide_table import print_table
@@ -23,16 +27,29 @@ def compare(
         raise DataError("compare: give at least two folders with a result.json each")
     results = [read_result(folder) for folder in folders]
     lines = comparison([str(folder) for folder in folders], results)
-    console = plain()
+    console = plain(stderr=as_json)
     for remark in remarks(results):
-        console.print(remark, soft_wrap=True, highlight=False)
+        say(console, remark)
     short = [[folder.name, *line[1:]] for folder, line in zip(folders, lines, strict=True)]
     columns = headings(results)
     print_table(console, ("folder", *columns[1:]), short, left=columns.index("log-likelihood"))
     for folder in folders:
         verdict = _verdict(folder)
         if verdict:
-            console.print(f"{folder.name}: {verdict}", soft_wrap=True, markup=False, highlight=False)
+            say(console, f"{folder.name}: {verdict}")
+    rungs = [dict(zip(columns[1:], line[1:], strict=True)) for line in lines]
+    answer(_content(folders, rungs, results), as_json)
+
+
+def _content(
+    folders: list[Path], rungs: list[dict[str, str]], results: list[Calibration]
+) -> dict[str, Any]:  # fmt: skip
+    """Give the ladder as plain data: what the table says, with the numbers of each fit as its file has them."""
+    models = [
+        {"folder": str(folder), "model": list(result.model), "fit": dict(result.fit), "table": rung}
+        for folder, rung, result in zip(folders, rungs, results, strict=True)
+    ]
+    return {"format": "sdimu-comparison/1", "models": models}
 
 
 def _verdict(folder: Path) -> str:

@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from typing import Any
+import textwrap
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Annotated, Any
 
+import typer
 from rich.console import Console, ConsoleOptions, ConsoleRenderable, RenderHook, RenderResult
 from rich.segment import Segment
 
-from sdimu_calibration.core.plain_text import printable
+from sdimu_calibration.core.plain_text import one_line, printable
+
+JsonOption = Annotated[
+    bool, typer.Option("--json", help="Print the answer as JSON, as its file has it; words go to stderr.")
+]
 
 _PIPE_WIDTH = 140
 """Columns when it is unknown how wide the output is: a file or a pipe must not cut the table."""
@@ -19,6 +26,33 @@ def plain(**options: Any) -> Console:
     made = Console(markup=False, emoji=False, **options)
     made.push_render_hook(_Printable())
     return made
+
+
+def say(console: Console, text: str) -> None:
+    """Print a line: wrapped between words in a terminal, whole in a pipe, so that it can be searched."""
+    line = one_line(text, None)
+    if console.is_terminal:
+        line = textwrap.fill(
+            line, console.width, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False
+        )  # fmt: skip
+    console.print(line, soft_wrap=True, highlight=False)
+
+
+def command(console: Console, text: str) -> None:
+    """Print a command to paste: on a line of its own, which is never broken."""
+    console.print(f"  {one_line(text, None)}", soft_wrap=True, highlight=False)
+
+
+def answer(content: Path | Mapping[str, Any], asked: bool) -> None:
+    """Print the answer on stdout where ``--json`` asks for it: a file as it is, or what one would hold."""
+    if not asked:
+        return
+    if isinstance(content, Path):
+        typer.echo(content.read_text(encoding="utf-8"), nl=False)
+    else:
+        from sdimu_calibration.storage.json_file import json_text
+
+        typer.echo(json_text(content))
 
 
 def console() -> Console:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from sdimu_calibration.cli.console import plain
+from sdimu_calibration.cli.console import JsonOption, answer, plain, say
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -32,6 +32,7 @@ def datasheet(
         list[Path] | None, typer.Option(metavar="BAG", help="Recording to hash that is not beside its result.")
     ] = None,
     out: Annotated[Path | None, typer.Option(help="Folder of the pages; FOLDER by default.")] = None,
+    as_json: JsonOption = False,
 ) -> None:
     """Make a data sheet from results; leaves datasheet.json and datasheet.html (prints on A4)."""
     from datetime import UTC, datetime
@@ -46,12 +47,12 @@ def datasheet(
     from sdimu_calibration.storage.noise_terms_file import read_noise_terms
     from sdimu_calibration.storage.whole_file import written_together
 
-    console = plain()
+    console = plain(stderr=as_json)
     allowed = {} if limits is None else read_limits(limits, core.known_terms())
     rests = [read_noise_terms(path) for path in noise or _noise_below(folders)]
     gathered = gather(folders, one_model=False)
     for line in gathered.apart:
-        console.print(f"set apart: {line}", soft_wrap=True, highlight=False)
+        say(console, f"set apart: {line}")
     entries = _of_unit(gathered.entries, serial, certificate)
     lines = core.datasheet([core.Sample(entry.unit, entry.result) for entry in entries], rests)
     lines = tuple(line.against(allowed[line.term]) if line.term in allowed else line for line in lines)
@@ -67,8 +68,9 @@ def datasheet(
         write_page(part / "datasheet.html", lines, about, entries, certificate)
     for name, digest in about.recordings:
         if not digest:
-            console.print(f"note: {name} was not found, so it has no hash: --recording BAG", soft_wrap=True)
-    console.print(f"datasheet.json and datasheet.html in {folder}", soft_wrap=True, highlight=False)
+            say(console, f"note: {name} was not found, so it has no hash: --recording BAG")
+    say(console, f"datasheet.json and datasheet.html in {folder}")
+    answer(folder / "datasheet.json", as_json)
 
 
 def _noise_below(folders: Sequence[Path]) -> list[Path]:

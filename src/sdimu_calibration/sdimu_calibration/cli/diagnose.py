@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from sdimu_calibration.cli.console import plain
+from sdimu_calibration.cli.console import JsonOption, answer, plain, say
 from sdimu_calibration.cli.exclusion_options import ExcludeStops, ExcludeTimes, left_out
 from sdimu_calibration.cli.options import (
     EstimatorOption,
@@ -90,6 +90,7 @@ def diagnose(
     reference_temperature: ReferenceOption = None,
     workers: WorkersOption = WORKERS,
     scheduler: SchedulerOption = None,
+    as_json: JsonOption = False,
     imu_topic: ImuTopic = None,
     status_topic: StatusTopic = None,
     joint_topic: JointTopic = None,
@@ -100,7 +101,8 @@ def diagnose(
     gyro_sign: GyroSign = None,
 ) -> None:
     """Find what the model is missing; leaves diagnosis.json and report.html, and result.json of the model found."""
-    from sdimu_calibration.cli.diagnosis_text import line, print_summary
+    from sdimu_calibration.cli.diagnosis_text import print_summary
+    from sdimu_calibration.cli.next_commands import Asked
     from sdimu_calibration.cli.progress import bar
     from sdimu_calibration.core.diagnosis.bootstrap import bootstrap as repeat_on_noise
     from sdimu_calibration.core.diagnosis.diagnose import NOT_DIAGNOSABLE, climb
@@ -112,7 +114,7 @@ def diagnose(
     from sdimu_calibration.storage.model_choice import HANDHELD, named_estimator
     from sdimu_calibration.storage.trace import traced
 
-    console = plain()
+    console = plain(stderr=as_json)
     asked = HANDHELD if hand else named_estimator(estimator, "--estimator")
     if asked == "classical":
         raise DataError(NOT_DIAGNOSABLE)
@@ -128,7 +130,7 @@ def diagnose(
                          exclude_stops=exclude_stops, exclude_times=exclude_times)
         diagnose_together(SetRequest(
             bags or [], set_file, model, site, imu, add or [], origin, asked, noise, out, workers, scheduler, serial,
-            reference_temperature,
+            reference_temperature, as_json,
         ), extra)  # fmt: skip
         return
     test, wanted, chosen = opened(console, bag, model, site, imu, add, origin, asked, noise, whole_turns)
@@ -140,19 +142,20 @@ def diagnose(
     with explained(console, notes), bar(console) as progress:
         found = climb(solve(test, wanted, chosen, progress=progress), extra, progress, refits=grow)
     summary = summarise(found)
-    print_summary(console, summary)
+    folder = out or default_folder(bag, "diagnosis")
+    print_summary(console, summary, Asked((bag,), site, imu, model, tuple(add or ()), folder))
     null = None
     if bootstrap:
         with bar(console) as progress:
             null = repeat_on_noise(found, bootstrap, progress=progress)
-        line(console, f"bootstrap: {null.sentence}")
-    folder = out or default_folder(bag, "diagnosis")
+        say(console, f"bootstrap: {null.sentence}")
     with bar(console) as progress:
         trace = traced([bag], sys.argv[1:], site=site, imu=imu, model=model)
         _write(folder, f"Diagnosis of {bag.name}", summary, null, progress, trace)
     more = without_advice(found.after.notes) if found.fit.learns_scatter else found.after.inseparable
     tell(console, (*notes, *(note for note in more if note not in notes)))
-    console.print(f"results in {folder}", soft_wrap=True)
+    say(console, f"results in {folder}")
+    answer(folder / "diagnosis.json", as_json)
     leave(found.after)
 
 
@@ -160,9 +163,11 @@ def _write(
     folder: Path, title: str, summary: DiagnosisSummary, null: Null | None, progress: Progress, trace: Trace
 ) -> None:
     """Leave diagnosis.json, result.json and report.html."""
+    from sdimu_calibration.cli.next_commands import PLAN, as_plan
     from sdimu_calibration.report.page import write_report
     from sdimu_calibration.report.report_extras import report_extras
     from sdimu_calibration.storage.diagnosis_file import write_diagnosis
+    from sdimu_calibration.storage.plan_file import write_plan
     from sdimu_calibration.storage.result_file import write_result
     from sdimu_calibration.storage.whole_file import written_together
 
@@ -170,6 +175,8 @@ def _write(
     with written_together(folder) as part:
         write_diagnosis(part / "diagnosis.json", summary, null)
         write_result(part / "result.json", found.after, found.verdict)
+        if (plan := as_plan(summary.plan)) is not None:
+            write_plan(part / PLAN, plan, ["The plan as the motion showed it, for: sdimu plan --plan"])
         progress("navigation without aid", 0.5)
         more = report_extras(found)
         write_report(part / "report.html", found.after, title=title, summary=summary, more=more, trace=trace)

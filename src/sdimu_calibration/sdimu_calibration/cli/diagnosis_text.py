@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from sdimu_calibration.cli.console import command
+from sdimu_calibration.cli.console import say as line
+from sdimu_calibration.cli.next_commands import spelled
 from sdimu_calibration.cli.wide_table import print_table
 from sdimu_calibration.core.diagnosis.verdict import beyond
-from sdimu_calibration.core.plain_text import one_line
 from sdimu_calibration.core.units import UnitError, from_si
 
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from sdimu_calibration.cli.next_commands import Asked
     from sdimu_calibration.core.diagnosis.found import DetectableSize, Found
     from sdimu_calibration.core.diagnosis.ladder import Rung
     from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary
@@ -19,8 +22,8 @@ if TYPE_CHECKING:
 _TOP = 5
 
 
-def print_summary(console: Console, summary: DiagnosisSummary) -> None:
-    """Print everything that a diagnosis has to say."""
+def print_summary(console: Console, summary: DiagnosisSummary, asked: Asked) -> None:
+    """Print everything that a diagnosis has to say; its advice as commands for what was asked."""
     d = summary.diagnosis
     line(console, d.sentence)
     for finding in d.findings:
@@ -35,7 +38,10 @@ def print_summary(console: Console, summary: DiagnosisSummary) -> None:
     print_ladder(console, d.rungs)
     _out_of_sight(console, summary)
     for text in summary.advice:
-        line(console, f"advice: {text}")
+        words, whole = spelled(text, asked)
+        line(console, f"advice: {words}")
+        if whole:
+            command(console, whole)
 
 
 def amount(value: float, unit: str, digits: int = 3) -> str:
@@ -44,11 +50,6 @@ def amount(value: float, unit: str, digits: int = 3) -> str:
         return f"{from_si(value, unit):.{digits}g}"
     except UnitError:
         return f"{value:.{digits}g}"
-
-
-def line(console: Console, text: str) -> None:
-    """Print a line as it is: no markup, no wrapping."""
-    console.print(one_line(text, None), soft_wrap=True, highlight=False)
 
 
 def _where(console: Console, summary: DiagnosisSummary) -> None:
@@ -69,13 +70,15 @@ def _candidates(console: Console, summary: DiagnosisSummary) -> None:
         lines.append(
             [
                 f.candidate.label, amount(f.value, unit, 4), amount(f.sigma, unit, 2), unit, f"{f.z:+.1f}",
-                f"{100 * f.explained:.0f} %", _fall(f),
-                ", ".join(f.alike[:4]),
+                f"{100 * f.explained:.0f} %",
             ]
         )  # fmt: skip
-    headings = ("effect", "estimate", "+-", "unit", "z", "explains", "held-out error", "looks the same here")
+    headings = ("effect", "estimate", "+-", "unit", "z", "explains")
     title = "found" if summary.candidates else "tried, but not enough to explain the misfit"
     print_table(console, headings, lines, title)
+    for f in shown:
+        alike = f"; looks here like {', '.join(f.alike[:4])}" if f.alike else ""
+        line(console, f"{f.candidate.label}: held-out error {_fall(f)}{alike}")
 
 
 def _fall(f: Found) -> str:

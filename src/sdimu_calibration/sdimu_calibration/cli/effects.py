@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from sdimu_calibration.cli.console import plain
+from sdimu_calibration.cli.console import JsonOption, answer, plain, say
 
 if TYPE_CHECKING:
-    from rich.table import Table
+    from rich.console import Console
 
     from sdimu_calibration.core.effects.effect import Effect
 
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 def effects(
     name: Annotated[str | None, typer.Argument(metavar="[NAME]", help="Effect to show in full.")] = None,
     markdown: Annotated[bool, typer.Option("--markdown", help="Print the page of the documentation.")] = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Show the catalogue: equation, unit, typical size, what an effect is confused with."""
     from sdimu_calibration.report.catalogue import grouped, page
@@ -27,22 +28,24 @@ def effects(
         return
     register_plugins()
     console = plain()
+    answer(_content(name), as_json)
+    if as_json:
+        return
     if name is None:
         for title, found in grouped():
-            console.print(_table(title, found))
+            _print_group(console, title, found)
     else:
         for line in _page(name):
-            console.print(line, soft_wrap=True, markup=False, highlight=False)
+            say(console, line)
 
 
-def _table(title: str, found: list[Effect]) -> Table:
-    from rich.table import Table
-
-    table = Table("effect", "coefficients", "unit", "equation", title=title, title_justify="left", pad_edge=False)
+def _print_group(console: Console, title: str, found: list[Effect]) -> None:
+    """Print effects of a group: name, coefficients and unit, and the equation below."""
+    say(console, f"\n{title}".strip())
     for effect in found:
-        units = dict.fromkeys(parameter.display_unit for parameter in effect.parameters)
-        table.add_row(effect.name, str(len(effect.parameters)), ", ".join(units), effect.equation.replace("[", r"\["))
-    return table
+        units = ", ".join(dict.fromkeys(parameter.display_unit for parameter in effect.parameters))
+        say(console, f"  {effect.name:34} {len(effect.parameters):3}  {units}")
+        say(console, f"    {effect.equation}")
 
 
 def _page(name: str) -> list[str]:
@@ -57,3 +60,17 @@ def _page(name: str) -> list[str]:
     if effect.typical:
         lines += ["", f"typical: {effect.typical}"]
     return [*lines, f"prior, one sigma: {sizes(effect)}", *facts(effect)]
+
+
+def _content(name: str | None) -> dict[str, Any]:
+    """Give the catalogue, or one effect of it, as plain data (SI)."""
+    from sdimu_calibration.report.catalogue import grouped
+    from sdimu_calibration.storage.effect_file import find_effects
+
+    chosen = find_effects(name) if name else [effect for _, found in grouped() for effect in found]
+    return {"format": "sdimu-catalogue/1", "effects": [
+        {"name": effect.name, "title": effect.title, "equation": effect.equation, "description": effect.description,
+         "typical": effect.typical, "scope": effect.scope, "prior": dict(effect.prior),
+         "coefficients": [{"name": p.name, "unit": p.unit, "display_unit": p.display_unit} for p in effect.parameters]}
+        for effect in chosen
+    ]}  # fmt: skip

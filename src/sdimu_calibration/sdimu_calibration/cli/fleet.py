@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from sdimu_calibration.cli.console import plain
+from sdimu_calibration.cli.console import JsonOption, answer, plain, say
 
 
 def fleet(
@@ -19,6 +19,7 @@ def fleet(
         str | None, typer.Option(help="IMU whose noise and grade go into --priors; that of the results by default.")
     ] = None,
     out: Annotated[Path | None, typer.Option(help="Folder of the pages; FOLDER by default.")] = None,
+    as_json: JsonOption = False,
 ) -> None:
     """Compare all units of a type: mean and spread, who is out, what is common; leaves fleet.json and fleet.html."""
     from sdimu_calibration.cli.wide_table import print_table
@@ -29,17 +30,17 @@ def fleet(
     from sdimu_calibration.storage.fleet_folder import as_measured, candidates, gather
     from sdimu_calibration.storage.whole_file import written_together
 
-    console = plain()
+    console = plain(stderr=as_json)
     gathered = gather(folders)
     for line in gathered.apart:
-        console.print(f"set apart: {line}", soft_wrap=True, highlight=False)
+        say(console, f"set apart: {line}")
     alone = candidates(gathered.given)
     done = study(as_measured(gathered.entries), gathered.entries[0].result.model, alone)
     units = display_units(gathered, alone)
-    console.print(headline(gathered, done), soft_wrap=True, highlight=False)
+    say(console, headline(gathered, done))
     print_table(console, tables.HEADINGS, tables.rows(done, units), left=2)
     for line in tables.sentences(done, units):
-        console.print(line, soft_wrap=True, highlight=False)
+        say(console, line)
     folder = out or (folders[0] if folders[0].is_dir() else folders[0].parent)
     with written_together(folder) as part:
         write_fleet(part / "fleet.json", gathered, done)
@@ -47,5 +48,6 @@ def fleet(
     if priors is not None:
         base = imu or gathered.entries[0].result.origin.imu
         written = write_priors(priors, base, gathered, done)
-        console.print(f"priors of {len(written)} effects in {priors}; use: --imu {priors}", soft_wrap=True)
-    console.print(f"fleet.json and fleet.html in {folder}", soft_wrap=True, highlight=False)
+        say(console, f"priors of {len(written)} effects in {priors}; use: --imu {priors}")
+    say(console, f"fleet.json and fleet.html in {folder}")
+    answer(folder / "fleet.json", as_json)

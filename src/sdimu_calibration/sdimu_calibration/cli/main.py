@@ -23,34 +23,52 @@ from sdimu_calibration.core.units import UnitError
 PACKAGE = "sdimu_calibration"
 ENTRY_POINTS = "sdimu_calibration.verbs"
 
-_VERBS = {
-    "calibrate": "sdimu_calibration.cli.calibrate:calibrate",
-    "diagnose": "sdimu_calibration.cli.diagnose:diagnose",
-    "compare": "sdimu_calibration.cli.compare:compare",
-    "effects": "sdimu_calibration.cli.effects:effects",
-    "predict": "sdimu_calibration.cli.predict:predict",
-    "import": "sdimu_calibration.cli.import_files:import_files",
-    "replay": "sdimu_calibration.cli.replay:replay",
-    "compensate": "sdimu_calibration.cli.compensate:compensate",
-    "plan": "sdimu_calibration.cli.plan:plan",
-    "noise": "sdimu_calibration.cli.noise:noise",
-    "datasheet": "sdimu_calibration.cli.datasheet:datasheet",
-    "export": "sdimu_calibration.cli.export:export",
-    "fleet": "sdimu_calibration.cli.fleet:fleet",
-    "watch": "sdimu_calibration.cli.watch_verb:watch",
-    "workbench": "sdimu_calibration.cli.workbench:workbench",
-    "pictures": "sdimu_calibration.cli.pictures:pictures",
-    "bag": "sdimu_calibration.cli.bag:app",
-    "set": "sdimu_calibration.cli.set_files:app",
-}
+_PANELS = {
+    "Simulate and record": {
+        "simulate": "", "run": "",
+        "import": "sdimu_calibration.cli.import_files:import_files",
+        "bag": "sdimu_calibration.cli.bag:app",
+        "set": "sdimu_calibration.cli.set_files:app",
+    },
+    "Calibrate": {
+        "calibrate": "sdimu_calibration.cli.calibrate:calibrate",
+        "noise": "sdimu_calibration.cli.noise:noise",
+        "replay": "sdimu_calibration.cli.replay:replay",
+        "watch": "sdimu_calibration.cli.watch_verb:watch",
+    },
+    "Diagnose": {
+        "diagnose": "sdimu_calibration.cli.diagnose:diagnose",
+        "compare": "sdimu_calibration.cli.compare:compare",
+        "effects": "sdimu_calibration.cli.effects:effects",
+        "workbench": "sdimu_calibration.cli.workbench:workbench",
+        "pictures": "sdimu_calibration.cli.pictures:pictures",
+    },
+    "Plan": {
+        "predict": "sdimu_calibration.cli.predict:predict",
+        "plan": "sdimu_calibration.cli.plan:plan",
+    },
+    "Use": {
+        "compensate": "sdimu_calibration.cli.compensate:compensate",
+        "export": "sdimu_calibration.cli.export:export",
+        "datasheet": "sdimu_calibration.cli.datasheet:datasheet",
+        "fleet": "sdimu_calibration.cli.fleet:fleet",
+    },
+    "Study": {"monte-carlo": "", "hidden-campaign": "", "study": "", "bench": ""},
+}  # fmt: skip
+"""Verbs in the order of work, as ``module:attribute``; empty: of another package, which may not be installed."""
+_VERBS = {name: place for verbs in _PANELS.values() for name, place in verbs.items() if place}
+_MORE = "More"
+"""Where verbs of other packages stand that have no place above."""
 
 
 class Verbs(TyperGroup):
     """The verbs of this package and of every package that adds some."""
 
     def list_commands(self, ctx: Any) -> list[str]:  # noqa: ARG002 (the signature is the base class')
-        """Names of the verbs: those of other packages, which run tests, first."""
-        return [*_added(), *_VERBS]
+        """Names of the verbs in the order of work, then what other packages add."""
+        there = {**_VERBS, **_added()}
+        placed = [name for verbs in _PANELS.values() for name in verbs if name in there]
+        return [*placed, *(name for name in there if name not in placed)]
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:  # noqa: ARG002
         """Load a verb; None when there is none of that name."""
@@ -132,8 +150,9 @@ def _command(name: str, verb: Any) -> Any:
         single = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
         single.command(name=name)(verb)
         verb = single
-    command = get_command(verb)
+    command: Any = get_command(verb)
     command.name = name
+    command.rich_help_panel = next((panel for panel, verbs in _PANELS.items() if name in verbs), _MORE)
     return command
 
 

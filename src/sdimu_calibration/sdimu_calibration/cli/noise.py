@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from sdimu_calibration.cli.console import plain
+from sdimu_calibration.cli.console import JsonOption, answer, command, plain, say
 
 
 def noise(
@@ -16,14 +17,17 @@ def noise(
     longest: Annotated[bool, typer.Option("--longest", help="The longest rest alone, not all of them.")] = False,
     seed: Annotated[int, typer.Option(help="Of the draws behind the standard errors.")] = 1,
     out: Annotated[Path | None, typer.Option(help="Folder of the results; BAG_noise by default.")] = None,
+    as_json: JsonOption = False,
 ) -> None:
     """Find the noise terms from the rests of a recording; leaves noise.html, noise.json, imu.yaml for --imu."""
     import numpy as np
 
     from sdimu_calibration.cli.options import default_folder
     from sdimu_calibration.cli.progress import bar
+    from sdimu_calibration.cli.wide_table import print_table
     from sdimu_calibration.core.noise import allan, fit_terms, rests, white_noise
-    from sdimu_calibration.report.noise import CHANNELS, misfits, table, write_page
+    from sdimu_calibration.report.noise import CHANNELS, HEAD, misfits, write_page
+    from sdimu_calibration.report.noise import rows as listed
     from sdimu_calibration.storage.config import find_config
     from sdimu_calibration.storage.imu_file import write_measured_imu
     from sdimu_calibration.storage.noise_terms_file import write_noise_terms
@@ -37,7 +41,7 @@ def noise(
         rows = (max(rows, key=lambda r: r.stop - r.start),)
     data = np.hstack([recording.omega_ib_b, recording.f_ib_b])
     rng = np.random.default_rng(seed)
-    console = plain()
+    console = plain(stderr=as_json)
     deviations, terms = {}, {}
     with bar(console) as progress:
         for k, channel in enumerate(CHANNELS):
@@ -57,8 +61,10 @@ def noise(
         write_noise_terms(part / "noise.json", bag.resolve().name, seconds, terms)
         write_page(part / "noise.html", deviations, terms, f"Noise of {bag.name}", words)
         write_measured_imu(part / "imu.yaml", imu, measured, terms, [f"Noise measured in {bag.name}: {words[0]}"])
-    console.print(table(terms))
+    print_table(console, HEAD, listed(terms), "terms of the Allan deviation, one sigma", left=2)
     for word in words:
-        console.print(f"note: {word}", soft_wrap=True, markup=False, highlight=False)
-    console.print(f"note: grade and priors in imu.yaml are those of '{imu}' (--imu)", soft_wrap=True, highlight=False)
-    console.print(f"results in {folder}; use: --imu {folder / 'imu.yaml'}", soft_wrap=True, highlight=False)
+        say(console, f"note: {word}")
+    say(console, f"note: grade and priors in imu.yaml are those of '{imu}' (--imu)")
+    say(console, f"results in {folder}; to use them:")
+    command(console, shlex.join(["sdimu", "calibrate", str(bag), "--imu", str(folder / "imu.yaml")]))
+    answer(folder / "noise.json", as_json)

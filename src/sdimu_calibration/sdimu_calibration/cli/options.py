@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from sdimu_calibration.core.plain_text import one_line
+from sdimu_calibration.cli.console import say
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -110,7 +110,7 @@ def opened(
 def tell(console: Console, notes: Iterable[str]) -> None:
     """Print notes, one line each."""
     for note in notes:
-        console.print(one_line(f"note: {note}", None), soft_wrap=True, highlight=False)
+        say(console, f"note: {note}")
 
 
 def leave(result: Calibration) -> None:

@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 import math
+import shlex
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from sdimu_calibration.cli.console import plain
+from sdimu_calibration.cli.console import JsonOption, answer, command, plain, say
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
     from sdimu_calibration.core.plan import Plan
-    from sdimu_calibration.core.plan_search import Bounds, Found
+    from sdimu_calibration.core.plan_search import Bounds, Found, NextTurn
 
 _LIMIT = "Largest sigma allowed, EFFECT='0.005 deg/h'; may be repeated. By default what --plan reaches, times --slack."
 
@@ -57,10 +56,12 @@ def plan(
         ),
     ] = None,
     out: Annotated[Path, typer.Option(help="Plan file to write.")] = Path("out/plan/found.yaml"),
+    as_json: JsonOption = False,
 ) -> None:
     """Search for a plan with the bound of the data; leaves a plan file for --plan."""
     from sdimu_calibration.cli.plan_after import After, standing_of, tell_gain
     from sdimu_calibration.cli.progress import bar
+    from sdimu_calibration.cli.wide_table import print_table
     from sdimu_calibration.core.plan_search import Goal, Question, next_turn, search
     from sdimu_calibration.core.plan_search.bound import already, bounds
     from sdimu_calibration.core.plan_search.moves import Abilities
@@ -68,7 +69,7 @@ def plan(
     from sdimu_calibration.storage.model_choice import named_model
     from sdimu_calibration.storage.plan_file import write_plan
 
-    console = plain()
+    console = plain(stderr=as_json)
     start = load_plan(plan)
     if more and not after:
         raise typer.BadParameter("recordings stand behind --after", param_hint="BAG")
@@ -83,7 +84,8 @@ def plan(
         with bar(console) as progress:
             ranked = next_turn(onto, asked, tell, rates_rad_s=speeds, progress=progress)
         for one in ranked[:5]:
-            console.print(one.text, soft_wrap=True, highlight=False)
+            say(console, one.text)
+        answer(_ranking(start, tell, ranked), as_json)
         return
     able = Abilities(speeds, math.radians(acceleration), tuple(_numbers("--dwells", dwells)))
     with bar(console) as progress:
@@ -94,43 +96,61 @@ def plan(
             minutes = start.duration_s / 60.0
         found = search(start, asked, able, Goal(limits, minutes), tries, progress)
     title = f"sigma, the largest of the axes: {start.name} and {out.stem}"
-    console.print(_table(title, start, already(asked) if before else None, first, found, limits))
+    known = already(asked) if before else None
+    print_table(console, *_table(start, known, first, found, limits), title)
     if before:
         tell_gain(console, start, found, before.open, (already(asked), first, found.bounds))
     if found.plan is start:
-        console.print(f"nothing better than {start.name} among {found.tried} plans; no file written", soft_wrap=True)
+        say(console, f"nothing better than {start.name} among {found.tried} plans; no file written")
+        answer(_content(start, known, first, found, limits, None), as_json)
         return
     about = f"Found by sdimu plan from {start.name} among {found.tried} plans: {found.minutes:.1f} min."
     reached = f"worst sigma {found.worst:.3f} of its limit" if limits else "tells most beyond what was known"
     write_plan(out, found.plan, [about, f"IMU {imu}, site {site}, {reached}."])
-    console.print(
+    say(
+        console,
         f"{start.name} {start.duration_s / 60.0:.1f} min; found {found.minutes:.1f} min, {reached}, {found.tried} "
-        f"plans tried; use: --plan {out}",
-        soft_wrap=True, highlight=False,
-    )  # fmt: skip
+        f"plans tried; in {out}. To look at it:",
+    )
+    command(console, shlex.join(["sdimu", "predict", "--plan", str(out), "--imu", imu, "--site", site]))
+    answer(_content(start, known, first, found, limits, out), as_json)
 
 
 def _table(
-    title: str, start: Plan, known: Bounds | None, first: Bounds, found: Found, limits: Mapping[str, float]
-) -> Table:
-    """Largest sigma of each effect: what is known (where something is), with both plans, and what is allowed."""
-    from rich.table import Table
-
+    start: Plan, known: Bounds | None, first: Bounds, found: Found, limits: Mapping[str, float]
+) -> tuple[list[str], list[list[str]]]:
+    """Headings, and the largest sigma of each effect: what is known (where something is), with both plans, allowed."""
     from sdimu_calibration.core.units import from_si
 
     columns = {"known": known, start.name: first, "found": found.bounds}
     shown = {name: b.largest() for name, b in columns.items() if b is not None}
-    made = Table("effect", *shown, *(["limit"] if limits else []), "unit", title=title, pad_edge=False)
     units = dict(zip(first.effect, first.units, strict=True))
-    for column in made.columns[1:-1]:
-        column.justify = "right"
+    rows = []
     for effect in limits if known is None else shown["found"]:
         unit = units[effect]
         numbers = [sizes.get(effect) for sizes in shown.values()] + ([limits.get(effect)] if limits else [])
-        made.add_row(effect, *("" if v is None else f"{from_si(v, unit):.3g}" for v in numbers), unit)
+        rows.append([effect, *("" if v is None else f"{from_si(v, unit):.3g}" for v in numbers), unit])
     lengths = {"known": "", start.name: f"{start.duration_s / 60.0:.1f}", "found": f"{found.minutes:.1f}"}
-    made.add_row("minutes", *(lengths[name] for name in shown), *([""] if limits else []), "min")
-    return made
+    rows.append(["minutes", *(lengths[name] for name in shown), *([""] if limits else []), "min"])
+    return ["effect", *shown, *(["limit"] if limits else []), "unit"], rows
+
+
+def _content(
+    start: Plan, known: Bounds | None, first: Bounds, found: Found, limits: Mapping[str, float], out: Path | None
+) -> dict[str, object]:
+    """Give the plan that was found as plain data (SI); `file` is null where none is better."""
+    sigma = {"before": first.largest(), "found": found.bounds.largest(), "limit": dict(limits)}
+    return {
+        "format": "sdimu-plan-search/1", "plan": start.name, "file": None if out is None else str(out),
+        "minutes": {"before": start.duration_s / 60.0, "found": found.minutes}, "worst": found.worst,
+        "tried": found.tried, "sigma": sigma | ({"known": known.largest()} if known else {}),
+    }  # fmt: skip
+
+
+def _ranking(start: Plan, tell: Sequence[str], ranked: Sequence[NextTurn]) -> dict[str, object]:
+    """Give the turns that tell coefficients apart as plain data, the most telling first."""
+    turns = [asdict(one) | {"text": one.text} for one in ranked]
+    return {"format": "sdimu-next-turn/1", "plan": start.name, "tell": list(tell), "turns": turns}
 
 
 def _limits(texts: Sequence[str]) -> dict[str, float]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from sdimu_calibration.cli.console import say
 from sdimu_calibration.core.recording import DataError
 
 if TYPE_CHECKING:
@@ -65,12 +66,12 @@ def _diagnosed(console: Console, asked: After) -> Standing:
             asked.paths, None, asked.model, asked.site, asked.imu, (), Source(), "auto", None, None, WORKERS, None,
             None, None,
         ), ())[0]  # fmt: skip
-        console.print(f"{found.verdict}: {found.sentence}", soft_wrap=True, highlight=False)
+        say(console, f"{found.verdict}: {found.sentence}")
         return found.standing
     test = open_test(asked.paths[0], asked.site, None if asked.imu is None else load_imu(asked.imu))
     with bar(console) as progress:
         one = summarise(climb(solve(test, named_model(asked.model, ()), progress=progress), progress=progress))
-    console.print(f"{one.diagnosis.verdict}: {one.diagnosis.sentence}", soft_wrap=True, highlight=False)
+    say(console, f"{one.diagnosis.verdict}: {one.diagnosis.sentence}")
     return standing(one.diagnosis, one.found)
 
 
@@ -96,17 +97,17 @@ def tell_gain(
 
     known, first, last = sigmas
     tells = [gain(known.covariance, b.covariance) for b in (first, last)]
-    console.print(
+    say(
+        console,
         f"beyond what is known {start.name} tells {tells[0]:.1f} nat in {start.duration_s / 60.0:.1f} min, the plan "
         f"found {tells[1]:.1f} nat in {found.minutes:.1f} min ({found.tried} plans tried)",
-        soft_wrap=True, highlight=False,
-    )  # fmt: skip
+    )
     for labels in classes:
         names = [p.name for label in labels for p in resolve(label).parameters]
         sizes = [apart(b, names, None) for b in sigmas]
-        console.print(
+        say(
+            console,
             f"{labels[0]} from {', '.join(labels[1:])}, each as large as its prior: apart by {sizes[0]:.1f} sigma now, "
             f"{sizes[1]:.1f} after {start.name}, {sizes[2]:.1f} after the plan found",
-            soft_wrap=True, highlight=False,
-        )  # fmt: skip
+        )
 

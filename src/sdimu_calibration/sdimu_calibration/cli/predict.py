@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from sdimu_calibration.cli.console import plain
+from sdimu_calibration.cli.console import JsonOption, answer, plain, say
 from sdimu_calibration.core.recording import DataError
 
 if TYPE_CHECKING:
@@ -30,17 +30,19 @@ def predict(
     mount: Annotated[str | None, typer.Option(metavar="DEG", help=_MOUNT)] = None,
     noise: Annotated[str | None, typer.Option(help=_NOISE)] = None,
     out: Annotated[Path, typer.Option(help="Folder of the results.")] = Path("out/predict"),
+    as_json: JsonOption = False,
 ) -> None:
     """Simulate the covariance of a test; leaves prediction.json and prediction.html."""
+    from sdimu_calibration.cli.wide_table import print_table
     from sdimu_calibration.core.batch.batch import bound_covariance
     from sdimu_calibration.core.planning.predict import predict as simulate
-    from sdimu_calibration.report.prediction import coefficient_table, published_table, write_page
+    from sdimu_calibration.report.prediction import COLUMNS, coefficient_rows, write_page
     from sdimu_calibration.storage.config import load_imu, load_model, load_plan, load_site
     from sdimu_calibration.storage.noise_file import load_noise
     from sdimu_calibration.storage.prediction_file import write_prediction
     from sdimu_calibration.storage.whole_file import written_together
 
-    console = plain()
+    console = plain(stderr=as_json)
     what = load_plan(plan), load_site(site), load_imu(imu), load_model(model)
     assumed = None if noise is None else load_noise(noise)
     printed = _published(assumed)
@@ -52,14 +54,16 @@ def predict(
     if assumed is not None and printed:
         rows = _beside(what, assumed, printed, prediction)
         published = tuple(printed), rows
-        console.print(published_table(rows, tuple(printed), f"{assumed.reference}: here (printed), by mount"))
-    console.print(coefficient_table(prediction))
+        headings = ("largest of the axes", *printed, "off by", "unit")
+        print_table(console, headings, rows, f"{assumed.reference}: here (printed), by mount")
+    print_table(console, COLUMNS, coefficient_rows(prediction), f"body frame: {prediction.body_frame}")
     for found in prediction.unobservable:
-        console.print(f"not observable: {found.text}", soft_wrap=True, markup=False, highlight=False)
+        say(console, f"not observable: {found.text}")
     with written_together(out) as part:
         write_prediction(part / "prediction.json", prediction, about)
         write_page(part / "prediction.html", prediction, about, published)
-    console.print(f"results in {out}", soft_wrap=True)
+    say(console, f"results in {out}")
+    answer(out / "prediction.json", as_json)
 
 
 def _published(noise: NoiseSet | None) -> dict[str, dict[str, float]]:

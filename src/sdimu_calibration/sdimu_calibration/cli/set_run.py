@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from sdimu_calibration.cli.console import plain
+from sdimu_calibration.cli.console import answer, plain, say
 from sdimu_calibration.cli.options import leave, tell
 
 if TYPE_CHECKING:
@@ -65,6 +65,8 @@ class SetRequest:
     add : list of str
     source : Source
     workers : int
+    as_json : bool
+        Print the answer as JSON; words go to stderr.
     """
 
     bags: Sequence[Path]
@@ -81,6 +83,7 @@ class SetRequest:
     scheduler: str | None
     serial: str | None
     reference: str | None
+    as_json: bool = False
 
 
 def single(bags: list[Path] | None, file: Path | None) -> Path | None:
@@ -131,7 +134,7 @@ def calibrate_together(asked: SetRequest) -> None:
     from sdimu_calibration.storage.result_file import write_result
     from sdimu_calibration.storage.whole_file import written_together
 
-    console = plain()
+    console = plain(stderr=asked.as_json)
     with _begun(console, asked) as (members, options, run, progress):
         result = _with_serial(set_outcome(fit_set(members, options, run, progress=progress)), members)
         progress("done", 1.0)
@@ -140,7 +143,8 @@ def calibrate_together(asked: SetRequest) -> None:
         write_result(part / "result.json", result)
         write_report(part / "report.html", result, title=_title(asked, "Calibration"), trace=_trace(asked))
     _show(console, result)
-    console.print(f"results in {folder}", soft_wrap=True)
+    say(console, f"results in {folder}")
+    answer(folder / "result.json", asked.as_json)
     leave(result)
 
 
@@ -151,7 +155,7 @@ def diagnose_together(asked: SetRequest, extra: Sequence[Effect]) -> None:
     from sdimu_calibration.storage.set_result_file import write_set_diagnosis
     from sdimu_calibration.storage.whole_file import written_together
 
-    console = plain()
+    console = plain(stderr=asked.as_json)
     found, members = diagnosed_set(console, asked, extra)
     after = _with_serial(found.after, members)
     folder = _folder(asked, "diagnosis")
@@ -160,10 +164,11 @@ def diagnose_together(asked: SetRequest, extra: Sequence[Effect]) -> None:
         write_result(part / "result.json", after, found.verdict)
         write_report(part / "report.html", after, title=_title(asked, "Diagnosis"), of_set=found, trace=_trace(asked))
     _show(console, after)
-    console.print(f"{found.verdict}: {found.sentence}", soft_wrap=True, highlight=False)
-    for line in found.advice:
-        console.print(f"advice: {line}", soft_wrap=True, highlight=False)
-    console.print(f"results in {folder}", soft_wrap=True)
+    say(console, f"{found.verdict}: {found.sentence}")
+    for text in found.advice:
+        say(console, f"advice: {text}")
+    say(console, f"results in {folder}")
+    answer(folder / "set.json", asked.as_json)
     leave(after)
 
 

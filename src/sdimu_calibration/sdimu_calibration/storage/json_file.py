@@ -18,7 +18,12 @@ def write_json(path: Path, content: Any) -> None:
 
     A list of numbers or words stands on one line, everything else one entry a line.
     """
-    write_whole(path, _text(content, "\n") + "\n")
+    write_whole(path, json_text(content) + "\n")
+
+
+def json_text(content: Any) -> str:
+    """Write `content` as `write_json` does, as text."""
+    return _text(content, "\n")
 
 
 def read_json(path: Path, expected_format: str) -> dict[str, Any]:

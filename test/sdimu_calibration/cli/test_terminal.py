@@ -1,0 +1,169 @@
+"""The terminal: every verb fits 80 columns, pipes plainly, answers in JSON, and advises what can be pasted."""
+
+from __future__ import annotations
+
+import json
+import re
+import shlex
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from sdimu_calibration.cli.next_commands import Asked, spelled
+
+WIDTH = 80
+CONTROL = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]")
+EFFECT = "gyro_scale_asymmetry_y"
+PLAN = """format: sdimu-plan/1
+name: small
+dwell: 20 s
+rate: 10 deg/s
+acceleration: 20 deg/s^2
+turns:
+  - {axis: Y, angle: 90 deg}
+  - {axis: Y, angle: 180 deg}
+  - {axis: Y, angle: -180 deg}
+  - {axis: Z, angle: 90 deg}
+  - {axis: X, angle: 90 deg}
+  - {axis: X, angle: -180 deg}
+"""
+
+
+@dataclass
+class Terminal:
+    """A folder with a small recording of a hidden effect, and the program in it."""
+
+    folder: Path
+
+    def __call__(self, *arguments: object, terminal: bool = False) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(
+            [sys.executable, "-m", "sdimu_calibration.cli.main", *map(str, arguments)], cwd=self.folder,
+            env=self.environment(terminal), capture_output=True, text=True, timeout=300, check=False,
+        )  # fmt: skip
+
+    @staticmethod
+    def environment(terminal: bool) -> dict[str, str]:
+        import os
+
+        kept = {k: v for k, v in os.environ.items() if k not in {"NO_COLOR", "FORCE_COLOR", "TERM"}}
+        return kept | {"COLUMNS": str(WIDTH), "TTY_COMPATIBLE": "1" if terminal else "0", "TERM": "xterm"}
+
+
+@pytest.fixture(scope="module")
+def sdimu(tmp_path_factory: pytest.TempPathFactory) -> Terminal:
+    folder = tmp_path_factory.mktemp("terminal")
+    (folder / "small.yaml").write_text(PLAN)
+    run = Terminal(folder)
+    # Two recordings of one unit, and two more units.
+    for number, unit in ((1, 1), (2, 1), (3, 3), (4, 4)):
+        making = ("simulate", "--plan", "small.yaml", "--rate", 20, "--seed", number, "--unit", unit, "--serial",
+                  f"SN{unit}", "--effect", f"{EFFECT}=200 ppm", "--out", f"bag{number}")  # fmt: skip
+        assert run(*making).returncode == 0
+        if number != 2:
+            made = run("calibrate", f"bag{number}", "--imu", "dtg", "--out", f"results/base{number}")
+            assert made.returncode in (0, 3), made.stderr
+    assert run("diagnose", "bag1", "--imu", "dtg", "--out", "diagnosis").returncode in (0, 3)
+    return run
+
+
+ANSWERS = {
+    "calibrate": (("calibrate", "bag1", "--imu", "dtg", "--out", "again"), "sdimu-result/1"),
+    "set": (("calibrate", "bag1", "bag2", "--imu", "dtg", "--out", "both"), "sdimu-result/1"),
+    "diagnose": (("diagnose", "bag1", "--imu", "dtg", "--out", "diagnosed"), "sdimu-diagnosis/1"),
+    "compare": (("compare", "results/base1", "diagnosis"), "sdimu-comparison/1"),
+    "effects": (("effects",), "sdimu-catalogue/1"),
+    "effect": (("effects", "gyro_scale"), "sdimu-catalogue/1"),
+    "predict": (("predict", "--plan", "small.yaml"), "sdimu-prediction/1"),
+    "plan": (("plan", "--plan", "small.yaml", "--tries", 2), "sdimu-plan-search/1"),
+    "tell": (("plan", "--plan", "small.yaml", "--tell", EFFECT, "--tell", "gyro_scale_quadratic_y"),
+             "sdimu-next-turn/1"),
+    "noise": (("noise", "bag1", "--out", "noise"), "sdimu-noise-terms/1"),
+    "info": (("bag", "info", "bag1"), "sdimu-bag-info/1"),
+    "fleet": (("fleet", "results", "--out", "fleet"), "sdimu-fleet/1"),
+    "datasheet": (("datasheet", "results", "--out", "sheet"), "sdimu-datasheet/1"),
+}  # fmt: skip
+"""What prints figures, with small data, and the format of its answer."""
+
+
+def too_wide(text: str) -> list[str]:
+    """Lines that do not fit, but for commands to paste, which stand alone, and names without a place to break."""
+    lines = CONTROL.sub("", text.replace("\r", "\n")).splitlines()
+    return [line for line in lines if len(line) > WIDTH and " " in line.strip() and not line.startswith("  sdimu ")]
+
+
+@pytest.mark.parametrize("verb", ANSWERS)
+def test_a_verb_fits_the_window(sdimu, verb):
+    shown = sdimu(*ANSWERS[verb][0], terminal=True)
+    assert shown.returncode in (0, 3), shown.stderr
+    assert shown.stdout.strip()
+    assert too_wide(shown.stdout) == []
+    assert "…" not in shown.stdout
+
+
+@pytest.mark.parametrize("verb", ANSWERS)
+def test_a_verb_answers_in_json_alone_as_its_file_does_and_speaks_plainly_beside_it(sdimu, verb):
+    arguments, kind = ANSWERS[verb]
+    done = sdimu(*arguments, "--json")
+    assert done.returncode in (0, 3), done.stderr
+    content = json.loads(done.stdout)
+    assert content["format"] == kind
+    if "--out" in arguments:
+        folder = sdimu.folder / str(arguments[arguments.index("--out") + 1])
+        assert content in [json.loads(path.read_text()) for path in folder.glob("*.json")]
+    # What a pipe without --json would get.
+    assert "\x1b" not in done.stderr
+    assert "…" not in done.stderr
+    rules = [line for line in done.stderr.splitlines() if set(line.strip()) == {"─"}]
+    assert all(len(line) <= WIDTH for line in rules)
+
+
+def test_a_pipe_gets_words_without_colour(sdimu):
+    done = sdimu("compare", "results/base1", "diagnosis")
+    assert done.returncode == 0
+    assert EFFECT in done.stdout
+    assert "\x1b" not in done.stdout + done.stderr
+
+
+def test_help_of_every_verb_fits_and_stands_in_the_order_of_work(sdimu):
+    words = sdimu("--help").stdout
+    panels = ("Simulate and record", "Calibrate", "Diagnose", "Plan", "Use", "Study")
+    places = [words.index(f"─ {panel} ─") for panel in panels]
+    assert places == sorted(places)
+    verbs = re.findall(r"^│ ([a-z][a-z-]*) ", words, re.MULTILINE)
+    assert verbs.index("simulate") < verbs.index("calibrate") < verbs.index("diagnose") < verbs.index("compensate")
+    for text in (words, *(sdimu(verb, "--help").stdout for verb in ("calibrate", "diagnose", "plan"))):
+        assert max(map(len, text.splitlines())) <= WIDTH
+        assert "…" not in text
+
+
+def test_advice_can_be_pasted(sdimu):
+    said = sdimu("diagnose", "bag1", "--imu", "dtg", "--out", "pasted").stdout
+    commands = [line.strip() for line in said.splitlines() if line.startswith("  sdimu ")]
+    assert commands
+    for line in commands:
+        program, *arguments = shlex.split(line)
+        assert program == "sdimu"
+        done = sdimu(*arguments)
+        assert done.returncode in (0, 3), f"{line}\n{done.stderr}"
+    added = [line for line in commands if line.startswith("sdimu calibrate bag1 --imu dtg --add ")]
+    assert len(added) == 1
+
+
+def test_advice_repeats_what_was_asked_for():
+    asked = Asked((Path("a bag"),), "my site.yaml", "dtg", None, ("lever_arm",), Path("out"))
+    words, command = spelled("Keep lever in the model: --add 'coupling.yaml:k1' --add 'x(tau=3 s)'.", asked)
+    assert words == "Keep lever in the model:"
+    assert shlex.split(command) == [
+        "sdimu", "calibrate", "a bag", "--site", "my site.yaml", "--imu", "dtg", "--add", "lever_arm",
+        "--add", "coupling.yaml:k1", "--add", "x(tau=3 s)",
+    ]  # fmt: skip
+    _, command = spelled("Turns ranked by what they tell: sdimu plan --plan YOURS --tell 'a' --tell 'b'.", asked)
+    assert shlex.split(command) == [
+        "sdimu", "plan", "--plan", "out/plan.yaml", "--site", "my site.yaml", "--imu", "dtg",
+        "--tell", "a", "--tell", "b",
+    ]  # fmt: skip
+    plain = "Run the plan again in another order: what comes back belongs to the sensor."
+    assert spelled(plain, asked) == (plain, "")
