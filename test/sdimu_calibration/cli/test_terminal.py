@@ -153,17 +153,21 @@ def test_advice_can_be_pasted(sdimu):
 
 
 def test_advice_repeats_what_was_asked_for():
-    asked = Asked((Path("a bag"),), "my site.yaml", "dtg", None, ("lever_arm",), Path("out"))
+    given = {"site": "my site.yaml", "imu": "dtg", "model": None, "estimator": "auto", "gyro_sign": -1, "hand": False,
+             "add": ["lever_arm"], "out": Path("out")}  # fmt: skip
+    asked = Asked.of((Path("a bag"),), given, Path("out"))
     words, command = spelled("Keep lever in the model: --add 'coupling.yaml:k1' --add 'x(tau=3 s)'.", asked)
     assert words == "Keep lever in the model:"
     assert shlex.split(command) == [
-        "sdimu", "calibrate", "a bag", "--site", "my site.yaml", "--imu", "dtg", "--add", "lever_arm",
-        "--add", "coupling.yaml:k1", "--add", "x(tau=3 s)",
+        "sdimu", "calibrate", "a bag", "--site", "my site.yaml", "--imu", "dtg", "--gyro-sign", "-1", "--add",
+        "lever_arm", "--add", "coupling.yaml:k1", "--add", "x(tau=3 s)",
     ]  # fmt: skip
     _, command = spelled("Turns ranked by what they tell: sdimu plan --plan YOURS --tell 'a' --tell 'b'.", asked)
     assert shlex.split(command) == [
         "sdimu", "plan", "--plan", "out/plan.yaml", "--site", "my site.yaml", "--imu", "dtg",
         "--tell", "a", "--tell", "b",
     ]  # fmt: skip
+    _, command = spelled("a whole plan: sdimu plan --after", asked)
+    assert command == "sdimu plan --after out"
     plain = "Run the plan again in another order: what comes back belongs to the sensor."
     assert spelled(plain, asked) == (plain, "")

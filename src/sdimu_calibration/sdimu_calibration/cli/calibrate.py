@@ -11,7 +11,7 @@ import typer
 
 from sdimu_calibration.cli.console import JsonOption, answer, command, plain, say
 from sdimu_calibration.cli.exclusion_options import ExcludeStops, ExcludeTimes, left_out
-from sdimu_calibration.cli.next_commands import DIAGNOSE, pasted
+from sdimu_calibration.cli.next_commands import DIAGNOSE, Asked
 from sdimu_calibration.cli.options import (
     EstimatorOption,
     HandOption,
@@ -91,6 +91,7 @@ def calibrate(
     gyro_sign: GyroSign = None,
 ) -> None:
     """Estimate the coefficients from a recording; leaves result.json and report.html."""
+    given = dict(locals())
     from sdimu_calibration.cli.progress import bar
     from sdimu_calibration.core.estimation.outcome import outcome
     from sdimu_calibration.core.estimation.solve import solve
@@ -145,7 +146,7 @@ def calibrate(
     tell(console, (*notes, *(note for note in result.notes if note not in notes)))
     if any(DIAGNOSE in note for note in result.notes):
         say(console, "To learn what the model misses:")
-        command(console, pasted("diagnose", [bag], site, imu, model, add))
+        command(console, Asked.of((bag,), given, folder).command("diagnose"))
     say(console, f"results in {folder}")
     answer(folder / "result.json", as_json)
     leave(result)

@@ -101,6 +101,7 @@ def diagnose(
     gyro_sign: GyroSign = None,
 ) -> None:
     """Find what the model is missing; leaves diagnosis.json and report.html, and result.json of the model found."""
+    given = dict(locals())
     from sdimu_calibration.cli.diagnosis_text import print_summary
     from sdimu_calibration.cli.next_commands import Asked
     from sdimu_calibration.cli.progress import bar
@@ -143,7 +144,7 @@ def diagnose(
         found = climb(solve(test, wanted, chosen, progress=progress), extra, progress, refits=grow)
     summary = summarise(found)
     folder = out or default_folder(bag, "diagnosis")
-    print_summary(console, summary, Asked((bag,), site, imu, model, tuple(add or ()), folder))
+    print_summary(console, summary, Asked.of((bag,), given, folder))
     null = None
     if bootstrap:
         with bar(console) as progress:

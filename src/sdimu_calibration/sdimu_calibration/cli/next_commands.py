@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import re
 import shlex
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from sdimu_calibration.core.diagnosis.plan_seen import PlanSeen
@@ -22,6 +22,16 @@ _ACCELERATION = 1.0
 _COMMAND = re.compile(r"^(.*?):? ((?:sdimu [a-z]+ |--add ).*?)\.?$")
 
 
+_REPEATED = (
+    "site", "imu", "model", "noise", "estimator", "whole_turns", "exclude_stops", "exclude_times", "serial", "power_on",
+    "reference_temperature", "imu_topic", "status_topic", "joint_topic", "temperature_topic", "accel_unit", "gyro_unit",
+    "accel_sign", "gyro_sign",
+)  # fmt: skip
+"""Options that calibrate and diagnose share, and that the next of them has to repeat."""
+_USUAL = (None, False, "auto")
+"""Values of options that nobody stated."""
+
+
 @dataclass(frozen=True)
 class Asked:
     """What a verb was asked for, so far as the next one has to repeat it.
@@ -29,33 +39,32 @@ class Asked:
     Attributes
     ----------
     bags : sequence of Path
-    site, imu, model : str or None
-    add : sequence of str
+    options : sequence of str
+        As words of a command.
+    place : sequence of str
+        Site and IMU alone, likewise.
     folder : Path
         Of the results.
     """
 
     bags: Sequence[Path]
-    site: str | None
-    imu: str | None
-    model: str | None
-    add: Sequence[str]
+    options: Sequence[str]
+    place: Sequence[str]
     folder: Path
 
+    @classmethod
+    def of(cls, bags: Sequence[Path], given: Mapping[str, Any], folder: Path) -> Asked:
+        """Take the arguments of a verb, by name."""
+        options = [word for name in _REPEATED if given.get(name) not in _USUAL
+                   for word in (f"--{name.replace('_', '-')}", str(given[name]))]  # fmt: skip
+        options += ["--hand"] if given.get("hand") else []
+        options += [word for effect in given.get("add") or () for word in ("--add", effect)]
+        place = [word for name in ("site", "imu") if given.get(name) for word in (f"--{name}", str(given[name]))]
+        return cls(bags, options, place, folder)
 
-def pasted(
-    verb: str, bags: Sequence[Path], site: str | None, imu: str | None, model: str | None, add: Sequence[str] | None
-) -> str:
-    """Write a command that repeats a recording and its options."""
-    options = _stated(("--site", site), ("--imu", imu), ("--model", model))
-    return shlex.join(
-        ["sdimu", verb, *map(str, bags), *options, *(text for one in add or () for text in ("--add", one))]
-    )  # fmt: skip
-
-
-def _stated(*options: tuple[str, str | None]) -> list[str]:
-    """Options that have a value, as words of a command."""
-    return [text for name, value in options if value for text in (name, value)]
+    def command(self, verb: str) -> str:
+        """Write the command of a verb about the same recording, with the same options."""
+        return shlex.join(["sdimu", verb, *map(str, self.bags), *self.options])
 
 
 def spelled(advice: str, asked: Asked) -> tuple[str, str]:
@@ -69,11 +78,12 @@ def spelled(advice: str, asked: Asked) -> tuple[str, str]:
         return advice, ""
     words, rest = found.groups()
     if rest.startswith("--add"):
-        rest = f"{pasted('calibrate', asked.bags, asked.site, asked.imu, asked.model, asked.add)} {rest}"
-    elif rest.startswith("sdimu plan"):
-        where = _stated(("--site", asked.site), ("--imu", asked.imu))
-        plan = shlex.join(["--plan", str(asked.folder / PLAN), *where])
-        rest = rest.replace("sdimu plan --plan YOURS", "sdimu plan").replace("sdimu plan", f"sdimu plan {plan}", 1)
+        rest = f"{asked.command('calibrate')} {rest}"
+    elif rest.startswith("sdimu plan --after"):
+        rest = shlex.join(["sdimu", "plan", "--after", str(asked.folder)])
+    elif rest.startswith("sdimu plan --plan YOURS"):
+        plan = shlex.join(["--plan", str(asked.folder / PLAN), *asked.place])
+        rest = rest.replace("--plan YOURS", plan, 1)
     elif rest.startswith("sdimu diagnose BAG"):
         rest = rest.replace("BAG", shlex.quote(str(asked.bags[0])), 1)
     return f"{words}:", rest

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from sdimu_calibration.cli.console import answer, plain, say
+from sdimu_calibration.cli.console import answer, command, plain, say
+from sdimu_calibration.cli.next_commands import Asked, spelled
 from sdimu_calibration.cli.options import leave, tell
 
 if TYPE_CHECKING:
@@ -165,8 +166,12 @@ def diagnose_together(asked: SetRequest, extra: Sequence[Effect]) -> None:
         write_report(part / "report.html", after, title=_title(asked, "Diagnosis"), of_set=found, trace=_trace(asked))
     _show(console, after)
     say(console, f"{found.verdict}: {found.sentence}")
+    about = Asked.of(asked.bags, {"site": asked.site, "imu": asked.imu}, folder)
     for text in found.advice:
-        say(console, f"advice: {text}")
+        words, whole = spelled(text, about)
+        say(console, f"advice: {words}")
+        if whole:
+            command(console, whole)
     say(console, f"results in {folder}")
     answer(folder / "set.json", asked.as_json)
     leave(after)
