@@ -77,8 +77,10 @@ def _candidates(console: Console, summary: DiagnosisSummary) -> None:
     title = "found" if summary.candidates else "tried, but not enough to explain the misfit"
     print_table(console, headings, lines, title)
     for f in shown:
-        alike = f"; looks here like {', '.join(f.alike[:4])}" if f.alike else ""
-        line(console, f"{f.candidate.label}: held-out error {_fall(f)}{alike}")
+        fall, alike = _fall(f), ", ".join(f.alike[:4])
+        told = [f"held-out error {fall}" if fall else "", f"looks here like {alike}" if alike else ""]
+        if any(told):
+            line(console, f"{f.candidate.label}: {'; '.join(filter(None, told))}")
 
 
 def _fall(f: Found) -> str:
