@@ -35,6 +35,7 @@ class Worker:
         # The only other end is the worker's: it reads the end of the pipe when this process is gone.
         far.close()
         self._pipe.send(job)
+        self._last = Picture if job.pictures else Answer
         self._busy: Request | None = None
         self._next: Request | None = None
 
@@ -56,7 +57,7 @@ class Worker:
                 self._pipe.send(self._busy)
 
     def answer(self) -> Answer | Picture | None:
-        """Return what has come: an answer, then the picture of it.
+        """Return what has come: an answer, then the picture of it where the job wants one.
 
         Raises
         ------
@@ -67,7 +68,7 @@ class Worker:
             if self._busy is None or not self._pipe.poll():
                 return None
             answer: Answer | Picture = self._pipe.recv()
-            if isinstance(answer, Picture):
+            if isinstance(answer, self._last):
                 self._busy = None
                 self._send()
         except (EOFError, OSError) as error:
