@@ -6,7 +6,6 @@ A `Verdict` says it in words; the same parts stand on the page of a diagnosis, o
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from html import escape
 
@@ -15,7 +14,6 @@ import numpy as np
 from sdimu_calibration.core.diagnosis.ladder import error_ladder, moved_coefficients
 from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary
 from sdimu_calibration.core.error_figures import by_hand, held_out, nis
-from sdimu_calibration.core.estimation.free_inertial import FreeInertialRun
 from sdimu_calibration.core.joint.set_diagnosis import SetDiagnosis
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.units import from_si
@@ -57,7 +55,7 @@ class Verdict:
     cost_title: str = field(default="What it costs to ignore it")
 
 
-def of_diagnosis(summary: DiagnosisSummary, trials: Sequence[FreeInertialRun] = ()) -> Verdict:
+def of_diagnosis(summary: DiagnosisSummary) -> Verdict:
     """Say what a diagnosis found."""
     d = summary.diagnosis
     named = bool(summary.candidates) and d.verdict != "data fault"
@@ -66,7 +64,7 @@ def of_diagnosis(summary: DiagnosisSummary, trials: Sequence[FreeInertialRun] = 
     advice = [*(f.text for f in d.findings), *d.noise, *summary.advice]
     if d.adequate and not advice:
         advice = ["Nothing: use the coefficients of this page."]
-    costs = _costs(summary, trials)
+    costs = _costs(summary)
     title = "What it costs to ignore it" if summary.found else "How well it predicts"
     return Verdict(tone, head, costs, tuple(map(_told, advice)), title)
 
@@ -85,7 +83,7 @@ def _missing(summary: DiagnosisSummary) -> str:
     return f"{words}: {headline_of(found)}{size}{more}."
 
 
-def _costs(summary: DiagnosisSummary, trials: Sequence[FreeInertialRun]) -> tuple[tuple[str, str], ...]:
+def _costs(summary: DiagnosisSummary) -> tuple[tuple[str, str], ...]:
     d, out = summary.diagnosis, []
     rungs = error_ladder(d)
     where = "rests" if d.fit.learns_scatter else "stops"
@@ -101,12 +99,6 @@ def _costs(summary: DiagnosisSummary, trials: Sequence[FreeInertialRun]) -> tupl
             f"{from_si(float(off), unit):+.3g} {unit}".replace("-", "\N{MINUS SIGN}"),
             f"<code>{name}</code> is off without it: {abs(sigmas):.0f} of its sigmas",
         ))  # fmt: skip
-    for trial in trials[:1]:
-        metres = [drift.distance[-1] for drift in trial.drifts if not drift.name.startswith("no ")]
-        if metres:
-            ends = _ARROW.join(f"{m:.0f} m" if m < 1e4 else f"{m / 1e3:.0f} km" for m in metres)
-            minutes = f"{trial.segment.length_s / 60.0:.0f} min"
-            out.append((ends, f"position error after {minutes} without aid, one draw"))
     return tuple(out)
 
 

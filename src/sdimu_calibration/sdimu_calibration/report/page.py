@@ -126,7 +126,7 @@ def _first(
 ) -> str:  # fmt: skip
     """Verdict, costs, advice, ladder and heat map."""
     if summary is not None:
-        verdict = first_screen.of_diagnosis(summary, more.trials)
+        verdict = first_screen.of_diagnosis(summary)
         rungs = error_ladder(summary.diagnosis)
         handheld = summary.diagnosis.fit.learns_scatter
         maps = handheld_sections.heat_maps(summary, draw) if handheld else sections.heat_maps(summary.diagnosis, draw)
