@@ -124,16 +124,19 @@ class AdaptiveNode:
             return
         if not isinstance(answer, Answer):
             if self._worker.idle and time.monotonic() > self._look_at:
-                about = Asked(self._goals, self._menu, self._table, angles)
+                about = Asked(self._goals, self._menu, self._table, angles, (self._end_ns - self._begin_ns) / NS)
                 # The worker keeps what it has read up to a stamp: another stamp lets it read the journal again.
                 self._worker.ask(Request(self._stop, self._end_ns + self._tries, self._models, about))
                 self._tries += 1
             return
-        lacking = (self._end_ns - self._begin_ns) / NS - answer.diagnosis.until_s
+        lacking = (self._end_ns - answer.reached_ns) / NS
         if lacking > LATE_S:
             self._look_at = time.monotonic() + AGAIN_S
             if time.monotonic() - self._arrived > PATIENCE_S:
-                self._fail(f"the journal lacks the last {lacking:.0f} s of the test (is the calibration node alive?)")
+                self._fail(
+                    f"the journal lacks the last {lacking:.0f} s of the test (is the calibration node alive, and have "
+                    "IMU and table one clock?)"
+                )
             return
         self._take(answer)
 

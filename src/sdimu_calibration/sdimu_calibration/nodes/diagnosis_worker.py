@@ -98,12 +98,15 @@ class Answer:
         Answer to the question; None without question or fit.
     seconds : float
         From the request to the answer.
+    reached_ns : int
+        Stamp of the last sample that was looked at (ns); 0 where there was none.
     """
 
     request: Request
     diagnosis: LiveDiagnosis
     more: Any
     seconds: float
+    reached_ns: int
 
 
 @dataclass(frozen=True)
@@ -135,6 +138,7 @@ class Diagnoser:
     def __init__(self, job: Job) -> None:
         self._job = job
         self._test: tuple[int | None, PreparedTest] | None = None
+        self._reached_ns = 0
         self._errors: dict[tuple[str, ...], ModelError] = {}
 
     def answer(self, request: Request) -> Answer:
@@ -150,7 +154,7 @@ class Diagnoser:
         except DataError as error:
             until_s = float(self._test[1].recording.t[-1]) if self._test else 0.0
             found = waiting(request.stop, until_s, added, str(error))
-        return Answer(request, found, more, time.monotonic() - request.asked)
+        return Answer(request, found, more, time.monotonic() - request.asked, self._reached_ns)
 
     def _error(self, test: PreparedTest, added: tuple[str, ...]) -> ModelError:
         if added not in self._errors:
@@ -163,6 +167,7 @@ class Diagnoser:
             self._test, self._errors = None, {}
             raw = read_journal(self._job.journal)
             raw = raw if until_ns is None else until(raw, until_ns)
+            self._reached_ns = int(raw.ns.max(initial=0))
             if len(raw.ns) <= NOMINAL_FROM:
                 raise DataError("too few samples have come")
             opened = open_test(in_order(raw), self._job.options)

@@ -101,7 +101,7 @@ def page(
     if summary is not None:
         fit = summary.diagnosis.extended
     parts = [
-        _first(calibration, summary, more, fit, of_set, draw),
+        _first(calibration, summary, fit, of_set, draw),
         coefficients_section(calibration, fit, truth, reference, draw),
         *([] if calibration.of_set is None else set_sections(calibration, calibration.of_set, draw)),
         *([] if summary is None else _evidence(summary, more, draw)),
@@ -121,9 +121,8 @@ def page(
 
 
 def _first(
-    calibration: Calibration, summary: DiagnosisSummary | None, more: ReportExtras, fit: Fit | None,
-    of_set: SetDiagnosis | None, draw: Draw,
-) -> str:  # fmt: skip
+    calibration: Calibration, summary: DiagnosisSummary | None, fit: Fit | None, of_set: SetDiagnosis | None, draw: Draw
+) -> str:
     """Verdict, costs, advice, ladder and heat map."""
     if summary is not None:
         verdict = first_screen.of_diagnosis(summary)

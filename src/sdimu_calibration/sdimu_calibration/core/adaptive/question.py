@@ -31,12 +31,15 @@ class Asked:
     table : RateTable
     angles : tuple of float
         Of its joints (rad).
+    elapsed_s : float
+        Since the test began (s): what was recorded before does not count.
     """
 
     goals: Goals
     menu: Menu
     table: RateTable
     angles: tuple[float, ...]
+    elapsed_s: float
 
 
 @dataclass(frozen=True)
@@ -54,7 +57,7 @@ class Decision:
     reached : bool
         The test ends with all limits held and no class open.
     until_s : float
-        Length of the data that were looked at (s).
+        Since the test began (s).
     worst : float
         Largest sigma over its limit (1).
     named, alike : tuple of str
@@ -89,7 +92,7 @@ def next_move(fit: Fit, diagnosis: LiveDiagnosis, about: Asked) -> Decision:
     DataError
         When the fit does not navigate, or no coefficient of the model has a limit.
     """
-    left = about.goals.minutes - diagnosis.until_s / 60.0
+    left = about.goals.minutes - about.elapsed_s / 60.0
     searched = diagnosis.verdict != "consistent"
     known = knowledge(climb(fit), about.goals) if searched else fitted(fit, about.goals)
     chosen = _choose(known, about, left)
@@ -97,7 +100,7 @@ def next_move(fit: Fit, diagnosis: LiveDiagnosis, about: Asked) -> Decision:
         known = knowledge(climb(fit), about.goals)
         chosen = _choose(known, about, left)
     alike = () if known.open is None else known.open.alike
-    facts = (diagnosis.until_s, float(known.ratio.max()), known.named, alike)
+    facts = (about.elapsed_s, float(known.ratio.max()), known.named, alike)
     if isinstance(chosen, End):
         return Decision(None, f"the test ends: {chosen.reason}", chosen.reason, chosen.reached, *facts)
     return Decision(chosen.step, chosen.text, chosen.reason, False, *facts)
