@@ -34,7 +34,7 @@ def drawn(page: Any, name: str, what: str) -> Any:
 
 
 def held_out(page: Any) -> float:
-    """Last held-out RMS of the line of numbers."""
+    """Last error with one stop left out in the line of numbers."""
     return [float(number) for number in re.findall(r"[\d.]+(?= sigma)", text(page, "numbers"))][-1]
 
 
@@ -248,7 +248,8 @@ def test_a_candidate_is_drawn_over_the_residuals_before_it_is_added(visit: Calla
     page.locator("#candidate-name").wait_for()
     said = text(page, "preview")
     assert "df_i = K2_i a_i^2" in said
-    before, after = map(float, re.search(r"Held-out RMS ([\d.]+) \N{RIGHTWARDS ARROW} ([\d.]+)", said).groups())
+    words = r"Error with one stop left out ([\d.]+) \N{RIGHTWARDS ARROW} ([\d.]+)"
+    before, after = map(float, re.search(words, said).groups())
     assert before == held_out(page)
     page.locator("#residuals .legendtext", has_text=f"{HIDDEN} would take").wait_for()
     page.locator("#add").click()

@@ -2,6 +2,7 @@
 
 import math
 import pickle
+from dataclasses import replace
 
 from sdimu_calibration.core.adaptive import Goals, Menu, fitted, question
 from sdimu_calibration.core.adaptive.question import Asked, next_move
@@ -16,7 +17,7 @@ TABLE = load_rate_table("ideal")
 
 
 def asked(goals: Goals, *angles: float) -> Asked:
-    return Asked(goals, Menu(), TABLE, angles or (0.0, 0.0, 0.0))
+    return Asked(goals, Menu(), TABLE, angles or (0.0, 0.0, 0.0), 60.0)
 
 
 def consistent(minutes: float) -> LiveDiagnosis:
@@ -40,8 +41,11 @@ def test_no_turn_is_chosen_for_which_no_gimbal_is_along_the_axis():
     assert stuck.step.turn is None or stuck.step.turn.axis == "X"
 
 
-def test_the_time_counts_from_the_data(first_stop):
-    decision = next_move(first_stop, consistent(GOALS.minutes), asked(GOALS))
+def test_the_time_counts_from_the_start_of_the_test_and_not_of_the_recording(first_stop):
+    goes_on = next_move(first_stop, consistent(GOALS.minutes), asked(GOALS))
+    assert goes_on.step is not None
+    late = replace(asked(GOALS), elapsed_s=60.0 * GOALS.minutes)
+    decision = next_move(first_stop, consistent(0.3), late)
     assert decision.step is None
     assert not decision.reached
     assert "time is up" in decision.text

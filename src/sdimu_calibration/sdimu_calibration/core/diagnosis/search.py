@@ -66,7 +66,7 @@ class Step:
     reason : str
         Why it was refused; empty when accepted.
     moved : tuple of (str, float)
-        Coefficients of the model that it moves most, in their own sigmas.
+        Coefficients of the model that were most wrong while it was missing: their errors, in their own sigmas.
     taken_out : str
         Why an accepted step is not among what was found in the end; empty when it is.
     """
@@ -322,13 +322,13 @@ def judged(
 
 
 def _moved(problem: Problem[E], chosen: Sequence[int], best: int, size: float) -> tuple[tuple[str, float], ...]:
-    """Coefficients that the effect moves most, in their own sigmas: the damage it did while it was missing."""
+    """Errors of the coefficients, in their own sigmas, while the effect was missing: the largest."""
     known, weight, _ = problem.known(chosen)
     J = problem.evidence.information.J
     A = J[np.ix_(known, known)] + np.diag(weight)
     unit = 1.0 / np.sqrt(np.diag(A))
     inverse = np.linalg.inv(A * np.outer(unit, unit)) * np.outer(unit, unit)
-    change = -inverse @ J[known, best] * size / np.sqrt(np.diag(inverse))
+    change = inverse @ J[known, best] * size / np.sqrt(np.diag(inverse))
     # Neither attitudes nor the like, which only serve: coefficients of the model, and what was chosen before.
     told = [*range(problem.evidence.coefficients), *range(problem.p, len(known))]
     order = sorted(told, key=lambda i: -abs(change[i]))[:4]

@@ -139,7 +139,7 @@ def _left(fitted: Fitted) -> set[int]:
 
 
 def ladder(names: Sequence[str], values: Sequence[float], at_held: Sequence[float | None]) -> Figure:
-    """Held-out RMS of each fit, less one, on a scale of powers: one is right, and a small step is seen, too."""
+    """Error of each fit with one stop left out, less one, on a scale of powers: a small step is seen, too."""
     figure = Figure()
     short = [name if len(name) < 26 else f"{name[:24]}\N{HORIZONTAL ELLIPSIS}" for name in names]
     figure.add(
@@ -157,7 +157,7 @@ def ladder(names: Sequence[str], values: Sequence[float], at_held: Sequence[floa
     numbers = [v for v in (*values, *at_held, 1.0) if v is not None]
     low, high = min(numbers), max(numbers)
     room = max(0.3 * (high - low), 0.02)
-    figure.x_axes(title="held-out RMS, 1 is right (sigma)", range=[low - 0.3 * room, high + 1.4 * room])
+    figure.x_axes(title="one stop left out (sigma)", range=[low - 0.3 * room, high + 1.4 * room])
     figure.y_axes(type="category", autorange="reversed", ticks="", automargin=True, title="model", standoff=0)
     return lay_out(figure, HEIGHT, margin=_SHORT | {"l": 20, "r": 40})
 

@@ -47,7 +47,10 @@ def numbers(fitted: Fitted, given: Fitted) -> str:
     fell = "" if fitted is given else f"{given.held_out:.3f} \N{RIGHTWARDS ARROW} "
     held = "" if fitted.at_held is None else f"; of what is left out {fitted.at_held:.3f}"
     nis = fitted.calibration.fit["nis_mean"]
-    errors = f"Held-out RMS {fell}{fitted.held_out:.3f} sigma{held}; mean squared innovation {nis:.3f}. 1 is right."
+    errors = (
+        f"Error with one stop left out {fell}{fitted.held_out:.3f} sigma{held}; mean squared innovation {nis:.3f}. "
+        "1 is right."
+    )
     return " ".join([errors, *(f"{line}." for line in fitted.calibration.inseparable)])
 
 
@@ -75,7 +78,7 @@ def candidate(found: Preview, name: str) -> list[Any]:
     error = " \N{RIGHTWARDS ARROW} ".join(f"{value:.3f}" for value in what.held_out)
     return [
         head, html.P(effect.equation, className="equation"), *cause, *(html.P(line) for line in _sizes(found)),
-        html.P(f"Held-out RMS {error} sigma, by the linear model."),
+        html.P(f"Error with one stop left out {error} sigma, by the linear model."),
         *alike, *against,
     ]  # fmt: skip
 

@@ -17,7 +17,8 @@ from sdimu_calibration.report.workbench.parts import span
 from sdimu_calibration.report.workbench.setting import Setting
 
 _HEADINGS = (
-    "model", "log-likelihood", "against the model as given", "NIS", "held-out RMS", "what is left out", "moved most",
+    "model", "log-likelihood", "against the model as given", "NIS", "one stop left out", "what is left out",
+    "moved most",
 )  # fmt: skip
 
 
