@@ -151,7 +151,7 @@ def fit_set(
     Raises
     ------
     DataError
-        When the recordings are of several units, one stands twice, or none can be used.
+        When the recordings are of several units, one stands twice, or fewer than two of several can be used.
     """
     check_members(members)
     if options.model.priors:
@@ -196,6 +196,9 @@ def fit_set(
         fit = _combined(members, options, reports)
         if stuck:
             break
+    if left and len(fit.reports) < 2:
+        why = "; ".join(f"{name} is left out: {text}" for name, text in left.items())
+        raise DataError(f"of {len(members)} recordings one can be used, and one is no set ({why})")
     late = {name: r for name, r in late.items() if name not in left}
     return replace(_noise_of(late, fit, options, run) if late else fit, left_out=tuple(left.items()))
 
