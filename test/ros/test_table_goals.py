@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import time
 from collections.abc import Iterator
 from typing import Any
@@ -239,6 +240,19 @@ def test_motion_that_is_forbidden_on_the_way_comes_to_rest(bench: FitSession, pe
     person.until(done.done, "the answer")
     with pytest.raises(DataError, match="allow_motion was set to false"):
         bench.wait_for_end(60.0)
+    person.until(lambda: not any(person.joints[-1][2]), "rest")
+    assert 20.0 < person.angles[0] < 170.0
+
+
+@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_brings_the_table_to_rest(bench: FitSession, person: Person, how: signal.Signals) -> None:
+    write_plan(bench.plan, 5.0)
+    bench.plan.write_text(bench.plan.read_text().replace("90 deg", "180 deg").replace("rate: 30", "rate: 5"))
+    start_table(bench, speed=5.0)
+    driving = {"plan": str(bench.plan), "table": "ideal", "allow_motion": True}
+    bench.children.start("table_goals", GOALS, driving)
+    person.until(lambda: person.joints and person.angles[0] > 20.0, "a turn under way")
+    assert bench.children.stop("table_goals", how) == 0
     person.until(lambda: not any(person.joints[-1][2]), "rest")
     assert 20.0 < person.angles[0] < 170.0
 

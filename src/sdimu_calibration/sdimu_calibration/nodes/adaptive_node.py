@@ -85,8 +85,10 @@ class AdaptiveNode:
 
     def close(self) -> None:
         """Leave no table in motion and no process behind."""
-        self._driver.stop("the node was stopped")
-        self._worker.close()
+        try:
+            self._driver.stop("the node was stopped")
+        finally:
+            self._worker.close()
 
     def _tick(self) -> None:
         if self.done.done() or self._driver.busy:

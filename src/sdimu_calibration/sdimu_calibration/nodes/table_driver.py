@@ -23,7 +23,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from rcl_interfaces.msg import SetParametersResult
+from rclpy.duration import Duration
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.task import Future
@@ -48,6 +48,8 @@ GOAL_STATUS = "rate_table/goal_status"
 STATUS = "rate_table/status"
 LISTENER_PATIENCE_S = 5.0
 """Wall time (s) for which a controller is waited for that does not listen yet: discovery takes up to three."""
+ACKNOWLEDGED_S = 2.0
+"""Longest wall time (s) for which a brake waits until the controller holds it: the node may leave right after."""
 SILENCE_S = 120.0
 """Wall time (s) without joint states after which a move has failed; a table in simulation waits for slow consumers."""
 
@@ -98,6 +100,7 @@ class TableDriver:
         self._move: Move | None = None
         self._future: Future | None = None
         self._why, self._number, self._brake = "", 0, ""
+        self._question_open = False
         self._progress: MoveProgress | None = None
         self._waiting_since = 0.0
         self._stop, self._said_ns, self._status = 0, 0, None
@@ -110,7 +113,7 @@ class TableDriver:
             Listener(node, ticker, JointState, JOINT_STATES, self._take_joints, late=True),
             Listener(node, ticker, DiagnosticArray, GOAL_STATUS, self._take_goal_status),
         )
-        node.add_on_set_parameters_callback(self._set)
+        node.add_post_set_parameters_callback(self._take_parameters)
         ticker.every(0.05, self._tick)
 
     @property
@@ -170,10 +173,7 @@ class TableDriver:
         if not self._allowed:
             self._end(f"{step.words}: nothing moves while the parameter allow_motion is false")
         elif self._ask and step.turn is not None:
-            text = f"{step.words}{f' ({why})' if why else ''}: move the table? Answer on {self._confirm.srv_name}"
-            self._node.get_logger().warning(text)
-            self._question.publish(String(data=text))
-            self._say("asked", text)
+            self._put_question(step)
         else:
             self._send()
         return future
@@ -182,7 +182,9 @@ class TableDriver:
         """Bring the table to rest within its limits and end the move under way."""
         if self._progress is not None and self._seen is not None:
             self._brake = f"{self._progress.goal}/brake"
-            publish(self._trajectory, braking(self._table, self._seen, self._brake))
+            # Not by `publish`, which sends nothing after a signal: that is when the brake is needed most.
+            self._trajectory.publish(braking(self._table, self._seen, self._brake))
+            self._trajectory.wait_for_all_acked(Duration(seconds=ACKNOWLEDGED_S))
         if self._future is not None:
             self._end(reason)
 
@@ -191,6 +193,14 @@ class TableDriver:
             topic = self._node.resolve_topic_name(JOINT_STATES)
             raise DataError(f"{step.words}: {topic}: no angles of {', '.join(self._table.joints)} have come yet")
         return plan_move(self._table, angles, step, axis)
+
+    def _put_question(self, step: Step) -> None:
+        why = f" ({self._why})" if self._why else ""
+        text = f"{step.words}{why}: move the table? Answer on {self._confirm.srv_name}"
+        self._question_open = True
+        self._node.get_logger().warning(text)
+        self._question.publish(String(data=text))
+        self._say("asked", text)
 
     def _send(self) -> None:
         """Send the move once somebody listens."""
@@ -244,28 +254,26 @@ class TableDriver:
                     return
 
     def _tick(self) -> None:
-        if self._move is not None and self._progress is None and not self._asking:
+        if self._move is not None and self._progress is None and not self._question_open:
             self._send()
         if self._progress is not None and time.monotonic() - self._heard > SILENCE_S:
             self._end(f"{JOINT_STATES}: nothing has come for {SILENCE_S:.0f} s")
 
-    @property
-    def _asking(self) -> bool:
-        return self._ask and self._move is not None and self._move.step.turn is not None
-
     def _answer(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
-        waiting = self._asking and self._progress is None
+        waiting = self._question_open
         response.success, response.message = waiting, "no move waits for an answer"
         if waiting and self._move is not None:
             response.message = self._move.step.words
         if waiting and request.data:
-            self._waiting_since = time.monotonic()
+            # The yes holds while a controller is waited for: `_tick` tries again.
+            self._question_open, self._waiting_since = False, time.monotonic()
             self._send()
         elif waiting:
             self._end(f"{response.message}: a person said no")
         return response
 
-    def _set(self, parameters: Sequence[Parameter]) -> SetParametersResult:
+    def _take_parameters(self, parameters: Sequence[Parameter]) -> None:
+        """Act on parameters that have been set; a question that is open stays open."""
         for parameter in parameters:
             if parameter.name == "allow_motion":
                 self._allowed = bool(parameter.value)
@@ -273,12 +281,19 @@ class TableDriver:
                     self.stop("stopped: the parameter allow_motion was set to false")
             if parameter.name == "ask":
                 self._ask = bool(parameter.value)
-        return SetParametersResult(successful=True)
+                self._ask_before_it_is_sent()
+
+    def _ask_before_it_is_sent(self) -> None:
+        """Ask for a move that still waits for its controller."""
+        move = self._move if self._progress is None and not self._question_open else None
+        if self._ask and move is not None and move.step.turn is not None:
+            self._put_question(move.step)
 
     def _end(self, reason: str) -> None:
         future, arrival = self._future, self._arrival(reason)
         words = self._move.step.words if self._move is not None else ""
         self._future = self._move = self._progress = None
+        self._question_open = False
         self._question.publish(String(data=""))
         self._say("failed" if reason else "done", reason or words)
         if reason:

@@ -24,15 +24,22 @@ def trajectory(table: RateTable, move: Move, goal: str) -> JointTrajectory:
 
 
 def braking(table: RateTable, seen: Seen, goal: str) -> JointTrajectory:
-    """Return the trajectory that brings a table to rest from where it is, each joint within its limit.
+    """Return the trajectory that brings a table to rest from where it is, each joint within its limits.
 
     A point is used, and no empty trajectory: ROS 2's controller refuses that. The table is further on than its joint
-    states; a quarter of the limit leaves room for that.
+    states; a quarter of the largest deceleration leaves room for that. Where the stops or the cable are nearer, the
+    joint that turns rests there, by as much more deceleration as that takes: never more than the last ramp of a move.
     """
     most = np.array([limits.acceleration_rad_s2 for limits in table.limits])
-    time_s = max(4.0 * float(np.max(np.abs(seen.rates) / most)), 1.0)
-    # At constant deceleration over the same time for all joints.
-    angles = seen.angles + 0.5 * seen.rates * time_s
+    reach = np.array([limits.reach_rad for limits in table.limits])
+    k = int(np.argmax(np.abs(seen.rates) / most))
+    speed, hardest_s = abs(float(seen.rates[k])), abs(float(seen.rates[k])) / most[k]
+    room = max(float(reach[k] - np.sign(seen.rates[k]) * seen.angles[k]), 0.0)
+    time_s = max(4.0 * hardest_s, 1.0)
+    if 0.5 * speed * time_s > room:
+        time_s = max(2.0 * room / speed, hardest_s, 1.0 / table.sample_rate_hz)
+    # At constant deceleration over the same time for all joints; encoders' noise may read beyond a stop.
+    angles = np.clip(seen.angles + 0.5 * seen.rates * time_s, -reach, reach)
     points = [_point(time_s, angles.tolist(), [0.0] * len(table.joints))]
     return JointTrajectory(header=header(0, goal), joint_names=list(table.joints), points=points)
 
