@@ -62,6 +62,19 @@ def test_a_journal_of_other_options_or_of_something_else_is_not_gone_on_with(tmp
     assert not any(Journal(tmp_path / "k", OPTIONS).before)
 
 
+def test_a_journal_of_other_options_is_kept_beside_the_new_one(tmp_path):
+    write(tmp_path / "j").close()
+    was = (tmp_path / "j").read_bytes()
+    (tmp_path / "j.1").write_bytes(b"of an earlier restart")
+    other = Journal(tmp_path / "j", digest("another site", "imu"))
+    assert other.set_aside == tmp_path / "j.2"
+    assert other.set_aside.read_bytes() == was
+    assert (tmp_path / "j.1").read_bytes() == b"of an earlier restart"
+    other.close()
+    again = Journal(tmp_path / "j", OPTIONS)
+    assert again.set_aside is None  # it held no record
+
+
 def test_an_ended_journal_is_gone(tmp_path):
     write(tmp_path / "j").remove()
     assert not (tmp_path / "j").exists()

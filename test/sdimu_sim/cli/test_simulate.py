@@ -69,3 +69,10 @@ def test_an_unknown_effect_leaves_no_bag(run, tmp_path):
 def test_the_bag_says_of_which_unit_and_power_on_it_is(run, tmp_path):
     assert run("--serial", "SN9", "--power-on", "2").exit_code == 0
     assert custom_data(tmp_path / "bag") == {"serial": "SN9", "power_on": "2"}
+
+
+@pytest.mark.parametrize("option", ["--seed", "--unit"])
+def test_a_negative_seed_is_wrong_usage(run, option):
+    refused = run(option, "-1")
+    assert refused.exit_code == 2
+    assert option in refused.output

@@ -70,6 +70,27 @@ def own_domain(log: Path, domain: int | None = None) -> Iterator[int]:
         lock.close()
 
 
+@contextmanager
+def own_folder(out: Path) -> Iterator[None]:
+    """Hold a folder of results, so that no other run writes into it; it is made where it is missing.
+
+    Parameters
+    ----------
+    out : Path
+
+    Raises
+    ------
+    DataError
+        When another run holds it.
+    """
+    (out / "log").mkdir(parents=True, exist_ok=True)
+    lock = _lock(out / "log" / "run.lock")
+    if lock is None:
+        raise DataError(f"{out}: another sdimu run writes into this folder; wait for it, or name another with --out")
+    with lock:
+        yield
+
+
 def stated_domain() -> int | None:
     """Return the domain of ``ROS_DOMAIN_ID``; None without it, DataError when it is none."""
     text = os.environ.get(DOMAIN_VARIABLE, "").strip()
@@ -93,9 +114,14 @@ def _stated_domain(number: int) -> tuple[int, IO[str]]:
 def _locked(number: int) -> IO[str] | None:
     """Lock a domain; None when it is taken."""
     try:
-        lock = (Path(tempfile.gettempdir()) / f"sdimu-domain-{number}.lock").open("a", encoding="utf-8")
+        return _lock(Path(tempfile.gettempdir()) / f"sdimu-domain-{number}.lock")
     except OSError:
         return None  # another user's
+
+
+def _lock(path: Path) -> IO[str] | None:
+    """Lock a file until it is closed or this process ends; None when another holds it."""
+    lock = path.open("a", encoding="utf-8")
     try:
         fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except OSError:

@@ -17,6 +17,7 @@ one that was killed goes on with its journal; what it missed in between is a gap
 
 from __future__ import annotations
 
+import math
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -94,6 +95,9 @@ class CalibrationNode:
         self._frames = declare_frames(declare)
         beat_s = declare.number("heartbeat_s", 1.0, "wall time between heartbeats (s); 0: none", least=0.0)
         self._journal = Journal(self._out / JOURNAL, options, lasting=checkpoint)
+        if aside := self._journal.set_aside:
+            text = f"{self._out / JOURNAL}: was of other options than this node's, which begins anew; kept as {aside}"
+            self.node.get_logger().warning(text)
         self._feed = Feed(self._make, self._journal)
         resumed = self._feed.resumed_ns
         self._ended: float | None = None
@@ -120,7 +124,7 @@ class CalibrationNode:
         )
         diagnose = declare.flag("diagnose", True, "publish a diagnosis at the end of each stop")
         job = Job(self._journal.place, self._options, model) if diagnose else None
-        self._diagnosing = Diagnosing(node, job, added)
+        self._diagnosing = Diagnosing(node, job, added, self._warn)
         node.add_on_set_parameters_callback(self._check_added)
         node.add_post_set_parameters_callback(self._take_added)
         if resumed:
@@ -211,8 +215,12 @@ class CalibrationNode:
     def _tell_notes(self) -> None:
         """Log and publish what the filter on the way waits for, recognised or gave up."""
         for note in self._feed.notes():
-            self.node.get_logger().warning(note)
-            publish(self._diagnostics, messages.notice(self._feed.imu_ns, note, self._heartbeat.name))
+            self._warn(note)
+
+    def _warn(self, text: str) -> None:
+        self.node.get_logger().warning(text)
+        # Before the first sample there is no stamp.
+        publish(self._diagnostics, messages.notice(max(self._feed.imu_ns, 0), text, self._heartbeat.name))
 
     def _tell(self, e: EpochEstimate) -> None:
         """Log one line at the end of each stop: how far the sigmas have fallen, and the innovations."""
@@ -234,9 +242,7 @@ class CalibrationNode:
 
     def _tick(self) -> None:
         self._work()
-        if self._feed.catch_up(CATCH_UP_S):
-            self._first = {}
-            self.node.get_logger().info("the filter on the way has the new model")
+        self._take_model(CATCH_UP_S)
         self._diagnosing.tick(self._feed.imu_ns)
         if self._result is not None and self._departed is None:
             if self._diagnosing.idle or time.monotonic() - self._concluded > DIAGNOSIS_S:
@@ -251,12 +257,18 @@ class CalibrationNode:
             if self._coefficients.acknowledged or late:
                 self.done.set_result(None)
 
+    def _take_model(self, seconds: float = math.inf) -> None:
+        """Work for so long (s) on the filter with a model that was changed; go on with it once it is there."""
+        if self._feed.catch_up(seconds):
+            self._first = {}
+            self.node.get_logger().info("the filter on the way has the new model")
+
     def _take_end(self) -> None:
         self._ended, self._departed, self._result = time.monotonic(), None, None
 
     def _conclude(self) -> None:
         """Calibrate on the whole test, and write that; meanwhile its diagnosis is made."""
-        self._feed.catch_up()
+        self._take_model()
         for estimate in self._feed.process(False, False, final=True):
             self._publish(estimate)
         self._tell_notes()
@@ -288,6 +300,7 @@ class CalibrationNode:
 
     def _answer_save(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         try:
+            self._take_model()
             self._write_result()
             response.success, response.message = True, str(self._out / "result.json")
         except (DataError, OSError) as error:

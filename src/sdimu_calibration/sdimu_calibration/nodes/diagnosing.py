@@ -6,6 +6,8 @@ candidate with all digits), calibration/heat_map (channel by stop), calibration/
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.node import Node
 from sensor_msgs.msg import CompressedImage, JointState
@@ -31,6 +33,8 @@ class Diagnosing:
         None where nothing is to be diagnosed.
     added : tuple of str
         Effects beyond the model that the test begins with.
+    warn : callable
+        Tells the user that there will be no more diagnoses, and why.
 
     Attributes
     ----------
@@ -38,8 +42,8 @@ class Diagnosing:
         The newest diagnosis, with the answer to the question of the job.
     """
 
-    def __init__(self, node: Node, job: Job | None, added: tuple[str, ...]) -> None:
-        self._node = node
+    def __init__(self, node: Node, job: Job | None, added: tuple[str, ...], warn: Callable[[str], None]) -> None:
+        self._node, self._warn = node, warn
         self._stops = StopDiagnosis(Worker(job), added) if job else None
         self.last: Answer | None = None
         # Few and telling: who comes late gets them all.
@@ -80,7 +84,7 @@ class Diagnosing:
         try:
             answer = self._stops.answer()
         except DataError as error:
-            self._node.get_logger().error(str(error))
+            self._warn(str(error))
             self.close()
             return
         if answer is None:

@@ -10,7 +10,7 @@ from pydantic import Field
 from sdimu_calibration.core.adaptive.goals import Goals
 from sdimu_calibration.core.effects import registry
 from sdimu_calibration.core.recording import DataError
-from sdimu_calibration.core.units import parse_quantity
+from sdimu_calibration.core.units import UnitError, parse_quantity
 from sdimu_calibration.storage.config import Schema, find_config, read_yaml
 
 
@@ -35,7 +35,10 @@ def load_goals(name_or_path: str | Path) -> Goals:
     for effect, text in file.limits.items():
         if effect not in registry.names():
             raise DataError(f"{path}: limits.{effect}: no effect of the catalogue; sdimu effects lists them")
-        limits[effect] = parse_quantity(text, registry.get(effect).parameters[0].display_unit)
+        try:
+            limits[effect] = parse_quantity(text, registry.get(effect).parameters[0].display_unit)
+        except UnitError as error:
+            raise DataError(f"{path}: limits.{effect}: {error}") from error
         if not limits[effect] > 0.0:
             raise DataError(f"{path}: limits.{effect}: '{text}' must be more than zero")
     if not limits:

@@ -12,6 +12,7 @@ before the end asks for it (`Journal.raw`).
 from __future__ import annotations
 
 import hashlib
+import itertools
 import json
 import os
 import struct
@@ -94,6 +95,8 @@ class Journal:
         What it held when it was opened.
     cut_bytes : int
         Bytes behind the last whole record of a predecessor, which are gone.
+    set_aside : Path or None
+        Where the file now is that was in this place and is of other options.
     """
 
     def __init__(self, path: Path, options: str, *, lasting: bool = True) -> None:
@@ -101,6 +104,7 @@ class Journal:
         self._lasting = lasting
         self._header = json.dumps({"format": FORMAT, "options": options}).encode() + b"\n"
         path.parent.mkdir(parents=True, exist_ok=True)
+        self.set_aside = self._put_aside() if lasting else None
         # Unbuffered: a record is with the system when the call returns.
         self._file = (
             path.open("a+b", buffering=0)
@@ -111,8 +115,20 @@ class Journal:
         self._before_end = len(self._header)
         self._recall()
 
+    def _put_aside(self) -> Path | None:
+        """Rename what is of other options, to the first number that is free: it may be all that there is of a test."""
+        if not self._path.is_file():
+            return None
+        with self._path.open("rb") as file:
+            head = file.read(len(self._header) + 1)
+        if len(head) <= len(self._header) or head.startswith(self._header):
+            return None
+        names = (self._path.with_name(f"{self._path.name}.{number}") for number in itertools.count(1))
+        aside = next(name for name in names if not name.exists())
+        return self._path.rename(aside)
+
     def _recall(self) -> None:
-        """Count what is there and cut off a torn end; a file of other options is emptied."""
+        """Count what is there and cut off a torn end; a file that holds no records is begun."""
         if os.pread(self._file.fileno(), len(self._header), 0) != self._header:
             self.restart()
             return

@@ -20,16 +20,19 @@ if TYPE_CHECKING:
     from sdimu_calibration.core.results import Calibration
 
 STALL_S = 180.0
+DEFAULT_PLAN = "kim18"
 
 
 def run(
-    plan: Annotated[str, typer.Option(help="Test plan: name in config/plan or path.")] = "kim18",
+    plan: Annotated[
+        str | None, typer.Option(help="Test plan: name in config/plan or path; kim18. Not with --adaptive.")
+    ] = None,
     imu: Annotated[str, typer.Option(help="IMU specification, from which the true errors are drawn.")] = "dtg",
     model: Annotated[str, typer.Option(help="Model to estimate.")] = "baseline",
     site: Annotated[str, typer.Option(help="Site.")] = "daejeon",
     table: Annotated[str, typer.Option(help="Rate table.")] = "ideal",
     speed: Annotated[float, typer.Option(help="Times real time; 0 is as fast as nothing gets lost.")] = 0.0,
-    seed: Annotated[int, typer.Option(help="Of coefficients, mount and noise.")] = 1,
+    seed: Annotated[int, typer.Option(min=0, help="Of coefficients, mount and noise.")] = 1,
     rate: Annotated[float, typer.Option(help="Sample rate of the IMU (Hz), 10 to 1000.")] = 100.0,
     mount: Annotated[str | None, typer.Option(help="Rotation of the IMU on the table: 'X,Y,Z' (deg).")] = None,
     mount_max: Annotated[float, typer.Option(help="Without --mount: drawn up to this about every axis (deg).")] = 3.0,
@@ -47,9 +50,11 @@ def run(
     import time
 
     from sdimu_calibration.cli.console import console as make_console
-    from sdimu_calibration.cli.processes import Children, own_domain
+    from sdimu_calibration.cli.processes import Children, own_domain, own_folder
     from sdimu_sim.own_effects import simulated_effects
 
+    _check_choosing(adaptive, ask, plan)
+    plan = plan or DEFAULT_PLAN
     options: dict[str, dict[str, Any]] = {
         "table": {"plan": plan, "table": table, "seed": seed, "speed": speed},
         "imu": {
@@ -67,20 +72,49 @@ def run(
     if adaptive is not None:
         duration = _choosing(options, adaptive, ask)
     console = make_console()
-    # Only the bag of an earlier run is replaced, never one that someone put here.
-    replace = (out / "log" / "rate_table.yaml").is_file()
+    with own_folder(out):
+        begun = time.monotonic()
+        with own_domain(out / "log", domain) as used, Children(out / "log") as children:
+            replace = _clear(out)
+            console.print(f"ROS domain {used}", highlight=False)
+            _start(children, options, out / "bag", replace)
+            streamed = _watch(console, children, _test(None if adaptive else plan, model, duration))
+        wall = time.monotonic() - begun
+        if adaptive is not None:
+            _tell_choices(console, out / "choices.json")
+        result = _report(console, out, site, imu, model, f"adaptive to {adaptive}" if adaptive else f"plan {plan}")
+        _say_measured(console, out, result, streamed, wall)
+
+
+def _check_choosing(adaptive: str | None, ask: bool, plan: str | None) -> None:
+    """Refuse options that would have no effect."""
+    from sdimu_calibration.core.recording import DataError
+
+    if ask and adaptive is None:
+        raise DataError("--ask: a plan asks nothing; it needs --adaptive GOALS")
+    if plan is not None and adaptive is not None:
+        raise DataError(f"--plan {plan} and --adaptive {adaptive}: a test follows a plan or chooses; state one")
+
+
+def _clear(out: Path) -> bool:
+    """Remove the results of an earlier run, once nothing refuses this one; whether its bag may be replaced.
+
+    Raises
+    ------
+    DataError
+        When something is in the bag's place that is of no earlier run: it is never replaced, and nothing is removed.
+    """
+    from sdimu_calibration.core.recording import DataError
+    from sdimu_calibration.storage.bag_folder import check_room
+    from sdimu_calibration.storage.bag_metadata import METADATA
+
+    bag, replace = out / "bag", (out / "log" / "rate_table.yaml").is_file()
+    if not replace and (bag / METADATA).is_file():
+        raise DataError(f"{bag}: is a bag of no earlier run; move it, or name another folder with --out")
+    check_room(bag, replace)
     for stale in ("result.json", "report.html", "diagnosis.json", "calibration.journal", "choices.json"):
         (out / stale).unlink(missing_ok=True)
-    begun = time.monotonic()
-    with own_domain(out / "log", domain) as used, Children(out / "log") as children:
-        console.print(f"ROS domain {used}", highlight=False)
-        _start(children, options, out / "bag", replace)
-        streamed = _watch(console, children, _test(None if adaptive else plan, model, duration))
-    wall = time.monotonic() - begun
-    if adaptive is not None:
-        _tell_choices(console, out / "choices.json")
-    result = _report(console, out, site, imu, model, f"adaptive to {adaptive}" if adaptive else f"plan {plan}")
-    _say_measured(console, out, result, streamed, wall)
+    return replace
 
 
 def _check(options: dict[str, dict[str, Any]]) -> float:

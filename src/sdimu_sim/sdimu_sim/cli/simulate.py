@@ -36,11 +36,13 @@ def simulate(
         str | None, typer.Option(help="IMU that gives the true errors their size; dtg (handheld: mems_by_hand).")
     ] = None,
     site: Annotated[str, typer.Option(help="Site.")] = "daejeon",
-    unit: Annotated[int | None, typer.Option(help="Seed of the coefficients alone: recordings of one unit.")] = None,
+    unit: Annotated[
+        int | None, typer.Option(min=0, help="Seed of the coefficients alone: recordings of one unit.")
+    ] = None,
     turn_on: Annotated[list[str] | None, typer.Option(metavar="GROUP=SIGMA", help=TURN_ON)] = None,
     table: Annotated[str, typer.Option(help="Rate table.")] = "ideal",
     rate: Annotated[float, typer.Option(help="Sample rate of the IMU (Hz), 10 to 1000.")] = 100.0,
-    seed: Annotated[int, typer.Option(help="Of coefficients, mount and noise.")] = 1,
+    seed: Annotated[int, typer.Option(min=0, help="Of coefficients, mount and noise.")] = 1,
     mount: Annotated[str | None, typer.Option(help="Rotation of the IMU on the table: 'X,Y,Z' (deg).")] = None,
     mount_max: Annotated[float, typer.Option(help="Without --mount: drawn up to this about every axis (deg).")] = 3.0,
     effect: Annotated[list[str] | None, typer.Option(help=EFFECT)] = None,

@@ -1,0 +1,22 @@
+"""The live diagnosis without its topics."""
+
+from types import SimpleNamespace
+
+from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.nodes.diagnosing import Diagnosing
+
+
+def test_the_death_of_the_worker_is_told_once(monkeypatch):
+    def answer():
+        raise DataError("the process has ended")
+
+    stops = SimpleNamespace(answer=answer, close=lambda: None)
+    monkeypatch.setattr("sdimu_calibration.nodes.diagnosing.Worker", lambda _: None)
+    monkeypatch.setattr("sdimu_calibration.nodes.diagnosing.StopDiagnosis", lambda *_: stops)
+    told = []
+    node = SimpleNamespace(create_publisher=lambda *_: None)
+    diagnosing = Diagnosing(node, SimpleNamespace(), (), told.append)
+    diagnosing.tick(1)
+    diagnosing.tick(2)
+    assert told == ["the process has ended"]
+    assert diagnosing.idle

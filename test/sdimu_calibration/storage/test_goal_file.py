@@ -1,0 +1,15 @@
+"""Goal files: what is wrong with one is said with file and key."""
+
+import pytest
+
+from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.storage.goal_file import load_goals
+
+
+@pytest.mark.parametrize("text", ["0.016 ppm", "0.016", "small"])
+def test_a_wrong_unit_names_file_and_key(tmp_path, text):
+    path = tmp_path / "goals.yaml"
+    path.write_text(f"format: sdimu-goal/1\nlimits: {{gyro_bias: '{text}'}}\n")
+    with pytest.raises(DataError) as refused:
+        load_goals(path)
+    assert str(refused.value).startswith(f"{path}: limits.gyro_bias: '{text}'")

@@ -1,0 +1,70 @@
+"""The verb run: what it refuses, and that a refused run leaves everything as it was."""
+
+import pytest
+import typer
+from typer.testing import CliRunner
+
+from sdimu_calibration.cli.processes import own_domain, own_folder
+from sdimu_calibration.core.recording import DataError
+from sdimu_sim.cli.run import _clear, run
+
+
+@pytest.fixture
+def invoke(tmp_path, monkeypatch):
+    monkeypatch.delenv("ROS_DOMAIN_ID", raising=False)
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))  # locks of this test alone
+    (tmp_path / "run").mkdir()
+    (tmp_path / "run" / "result.json").write_text("earlier")
+    app = typer.Typer()
+    app.command()(run)
+    yield lambda *options: CliRunner().invoke(app, ["--out", str(tmp_path / "run"), *options])
+    assert (tmp_path / "run" / "result.json").read_text() == "earlier"
+
+
+def test_a_domain_that_is_taken_removes_no_earlier_result(invoke, tmp_path):
+    with own_domain(tmp_path / "other", 23):
+        refused = invoke("--domain", "23").exception
+    assert isinstance(refused, DataError)
+    assert "ROS domain 23 holds another run" in str(refused)
+
+
+def test_a_second_run_into_the_same_folder_is_refused_in_one_line(invoke, tmp_path):
+    with own_folder(tmp_path / "run"):
+        refused = invoke().exception
+    assert isinstance(refused, DataError)
+    assert str(refused).startswith(f"{tmp_path / 'run'}: another sdimu run")
+    assert "\n" not in str(refused)
+    with own_folder(tmp_path / "run"):  # the first has ended
+        pass
+
+
+@pytest.mark.parametrize(
+    ("options", "words"), [(("--ask",), "--ask: "), (("--plan", "kim18", "--adaptive", "table33"), "state one")]
+)
+def test_options_that_exclude_each_other_are_refused(invoke, options, words):
+    refused = invoke(*options).exception
+    assert isinstance(refused, DataError)
+    assert words in str(refused)
+
+
+def test_a_negative_seed_is_wrong_usage(invoke):
+    refused = invoke("--seed", "-1")
+    assert refused.exit_code == 2
+    assert "--seed" in refused.output
+
+
+@pytest.mark.usefixtures("invoke")
+@pytest.mark.parametrize(("file", "words"), [("metadata.yaml", "of no earlier run"), ("notes.txt", "not a bag")])
+def test_what_is_in_the_place_of_the_bag_is_kept_and_so_is_the_result(tmp_path, file, words):
+    (tmp_path / "run" / "bag").mkdir()
+    (tmp_path / "run" / "bag" / file).touch()
+    with pytest.raises(DataError, match=words):
+        _clear(tmp_path / "run")
+
+
+def test_results_of_an_earlier_run_are_removed_once_nothing_refuses(tmp_path):
+    (tmp_path / "log").mkdir()
+    for name in ("log/rate_table.yaml", "result.json", "report.html", "kept"):
+        (tmp_path / name).touch()
+    assert _clear(tmp_path)
+    assert sorted(entry.name for entry in tmp_path.iterdir()) == ["kept", "log"]
