@@ -22,6 +22,7 @@ from sdimu_calibration.core.specification import Site
 from sdimu_calibration.report.page import page
 from sdimu_calibration.report.report_extras import ReportExtras
 from sdimu_calibration.report.workbench.fit import FitSession
+from sdimu_calibration.report.workbench.setting import Setting
 from sdimu_calibration.storage.bag_reader import read_recording
 from sdimu_calibration.storage.config import load_imu, load_model, load_plan
 from sdimu_calibration.storage.diagnosis_file import read_diagnosis, write_diagnosis
@@ -139,7 +140,7 @@ def test_a_fit_is_diagnosed_and_shown(case, tmp_path):
     assert read["estimator"] == case.estimator
     assert read["where"]
     text = page(summary.diagnosis.after, "A test", summary=summary, more=ReportExtras())
-    assert "Where does it fail?" in text
+    assert "Where it fails" in text
     assert summary.diagnosis.verdict == "consistent", summary.diagnosis.sentence
 
 
@@ -167,7 +168,7 @@ def test_every_caller_gives_the_same_digits(imu, tmp_path):
     recording = test.recording
     once = calibrate(recording, SITE, test.imu, model)
     base = diagnose(recording, SITE, test.imu, model).before
-    bench = FitSession(PreparedTest(recording, test.imu, SITE), model).fit((), ()).calibration
+    bench = FitSession(PreparedTest(recording, test.imu, SITE), model).fit(Setting()).calibration
     live = LiveCalibration(options, model)
     ns = recording.start_ns + np.rint(recording.t * 1e9).astype(np.int64)
     live.add_samples(ns, recording.omega_ib_b, recording.f_ib_b)
