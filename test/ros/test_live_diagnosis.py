@@ -198,7 +198,7 @@ def test_a_folder_is_no_journal(job, tmp_path):
 @pytest.mark.ros
 @pytest.mark.usefixtures("bench")
 def test_a_running_test_is_watched(whole: LiveDiagnosis) -> None:
-    watching = sdimu("watch", "--for", 30)
+    watching = sdimu("watch", "--domain", os.environ["ROS_DOMAIN_ID"], "--for", 30)
     context = Context()
     rclpy.init(context=context)
     node = Node("calibration", context=context)
