@@ -21,7 +21,6 @@ from sdimu_calibration.report.report_extras import ReportExtras, report_extras
 from sdimu_calibration.storage.bag_writer import write_recording
 from sdimu_calibration.storage.config import load_imu, load_model, load_plan, load_site
 from sdimu_calibration.storage.result_file import write_result
-from sdimu_sim.core.scenario import Scenario, generate
 
 START_NS = 1_700_000_000_000_000_000
 INTERVAL_NS = 10_000_000
@@ -140,6 +139,9 @@ ANGLES = np.radians([[0.0, -30.0], [720.0, 30.0]])
 @pytest.fixture(scope="session")
 def recording() -> Recording:
     """With 40 ug/g^2, forty times what this plan sees at one sigma."""
+    # The tests of the table run where the simulated IMU is not installed.
+    from sdimu_sim.core.scenario import Scenario, generate  # noqa: PLC0415
+
     scenario = Scenario(
         load_plan("kim18"), load_imu("dtg"), load_site("daejeon"), TableSpecification(axes=None), rate_hz=20.0,
         seed=SEED, effects=(f"{HIDDEN}=40 ug/g^2",),

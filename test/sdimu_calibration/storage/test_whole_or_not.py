@@ -140,7 +140,7 @@ def test_a_result_without_its_report_is_not_left(tmp_path, monkeypatch):
     write_whole(tmp_path / "report.html", "old")
     monkeypatch.setattr(api_fit, "write_report", stopped)
     with pytest.raises(Stopped):
-        api_fit.CalibrationFit.save(SimpleNamespace(result=result()), tmp_path)
+        api_fit.CalibrationFit.save(SimpleNamespace(result=result(), core=None), tmp_path)
     assert content_of(tmp_path) == {"result.json": b"old", "report.html": b"old"}
 
 
