@@ -140,7 +140,7 @@ ANGLES = np.radians([[0.0, -30.0], [720.0, 30.0]])
 def recording() -> Recording:
     """With 40 ug/g^2, forty times what this plan sees at one sigma."""
     # The tests of the table run where the simulated IMU is not installed.
-    from sdimu_sim.core.scenario import Scenario, generate  # noqa: PLC0415
+    from sdimu_sim.core.scenario import Scenario, generate
 
     scenario = Scenario(
         load_plan("kim18"), load_imu("dtg"), load_site("daejeon"), TableSpecification(axes=None), rate_hz=20.0,
