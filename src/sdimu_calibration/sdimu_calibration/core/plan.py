@@ -23,6 +23,11 @@ class Turn:
     angle_rad: float
     rate_rad_s: float
 
+    @property
+    def duration_s(self) -> float:
+        """Length of the turn (s)."""
+        return abs(self.angle_rad) / self.rate_rad_s
+
 
 @dataclass(frozen=True)
 class Plan:
@@ -46,4 +51,4 @@ class Plan:
     @property
     def duration_s(self) -> float:
         """Length of the whole test (s)."""
-        return sum(self.dwell_s) + sum(abs(t.angle_rad) / t.rate_rad_s for t in self.turns)
+        return sum(self.dwell_s) + sum(t.duration_s for t in self.turns)

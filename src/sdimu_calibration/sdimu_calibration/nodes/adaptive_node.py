@@ -23,7 +23,7 @@ from rclpy.node import Node
 from rclpy.task import Future
 from std_srvs.srv import Trigger
 
-from sdimu_calibration.core.adaptive.choice import Menu
+from sdimu_calibration.core.adaptive.choice import FIRST_STOP_S, Menu
 from sdimu_calibration.core.adaptive.question import Asked, Decision, next_move
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.table import Step
@@ -41,8 +41,6 @@ from sdimu_calibration.storage.goal_file import load_goals
 from sdimu_calibration.storage.json_file import write_json
 from sdimu_calibration.storage.table_file import load_rate_table
 
-FIRST_STOP_S = 20.0
-"""First stop (s): the azimuth is then known well enough for the passes to converge."""
 LATE_S = 1.5
 """Samples (s) that may still be on their way to the journal when a stop is looked at: an epoch and a block."""
 CHOICES = "choices.json"

@@ -8,22 +8,29 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from rate_table_sim.core import phase_changes, table_motion
-from sdimu_calibration.core.adaptive import Choice, End, Goals, Knowledge, Menu, choose, knowledge, nearest_other
+from sdimu_calibration.core.adaptive import (
+    FIRST_STOP_S,
+    Choice,
+    End,
+    Goals,
+    Knowledge,
+    Menu,
+    choose,
+    knowledge,
+    nearest_other,
+)
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis, climb
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.estimation.solve import solve
 from sdimu_calibration.core.plan import Plan
-from sdimu_calibration.core.recording import DataError, PhaseLog, Recording
+from sdimu_calibration.core.recording import PhaseLog, Recording
 from sdimu_calibration.core.specification import Model
-from sdimu_calibration.core.table import RateTable, Step, plan_move
+from sdimu_calibration.core.table import RateTable, Step, is_possible, plan_move
 from sdimu_sim.core.generator import ImuGenerator, ImuSamples
 from sdimu_sim.core.platform import PlatformMotion
 from sdimu_sim.core.scenario import Scenario, temperature_log
 from sdimu_sim.core.truth import ImuTruth
-
-FIRST_STOP_S = 20.0
-"""First stop (s): the azimuth is then known well enough for the passes to converge."""
 
 
 @dataclass(frozen=True)
@@ -104,11 +111,7 @@ class _Bench:
 
     def possible(self, step: Step) -> bool:
         """Whether the table can make a step next."""
-        try:
-            plan_move(self.table, self.angles, step)
-        except DataError:
-            return False
-        return True
+        return is_possible(self.table, self.angles, step)
 
     def do(self, step: Step) -> None:
         """Make a step the next one of the plan."""

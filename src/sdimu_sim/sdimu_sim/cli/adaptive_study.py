@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from sdimu_calibration.cli.console import plain
-
-if TYPE_CHECKING:
-    from sdimu_calibration.core.progress import Progress
+from sdimu_sim.cli.shown_campaign import check_kinds, shown_campaign
 
 
 def adaptive(
@@ -25,30 +23,21 @@ def adaptive(
 ) -> None:
     """Let tests choose their turns: minutes to the limits, do the sigmas hold, is a hidden effect told apart."""
     import math
-    from functools import partial
 
-    from sdimu_calibration.cli.progress import bar
-    from sdimu_calibration.core.recording import DataError
     from sdimu_calibration.storage.config import load_imu, load_model, load_site
     from sdimu_calibration.storage.goal_file import load_goals
     from sdimu_calibration.storage.json_file import write_json
     from sdimu_sim.campaign.adaptive_page import fixed_minutes, page
     from sdimu_sim.campaign.adaptive_run import KINDS, AdaptiveRun
-    from sdimu_sim.campaign.campaign import HERE, run_campaign
     from sdimu_sim.campaign.hidden_sizes import sizes
 
-    unknown = [k for k in kind or [] if k not in KINDS]
-    if unknown:
-        raise DataError(f"--kind {unknown[0]}: expected one of {', '.join(KINDS)}")
+    check_kinds(kind, KINDS)
     console, seeds, results = plain(), range(seed, seed + runs), {}
     place, sensor, model = load_site(site), load_imu(imu), load_model("baseline")
     seen = sizes("kim18", math.degrees(place.latitude_rad), sensor, model)
     for name in kind or KINDS:
         run = AdaptiveRun(name, sensor, place, model, load_goals("table33" if name == "table33" else "kim18"), seen)
-        with bar(console) as progress:
-            tell = partial(_named, progress, name)
-            here = HERE if workers == 1 else None
-            results[name] = run_campaign(run, seeds, out / name, here, progress=tell, workers=workers)
+        results[name] = shown_campaign(console, name, run, seeds, out / name, workers)
     write_json(out / "adaptive.json", results)
     fixed = {
         p: {g: fixed_minutes(p, g, place, sensor, model) for g in ("table33", "kim18")}
@@ -98,7 +87,3 @@ def adaptive_run(
     write_picture(out / "adaptive-run.png", done, limits, true)
     (out / "choices.txt").write_text("\n".join(told) + "\n", encoding="utf-8")
     console.print(f"results in {out}", soft_wrap=True)
-
-
-def _named(progress: Progress, name: str, word: str, share: float) -> None:
-    progress(f"{name}: {word}", share)

@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from sdimu_calibration.cli.console import plain
 from sdimu_sim.cli.adaptive_study import adaptive, adaptive_run
-
-if TYPE_CHECKING:
-    from sdimu_calibration.core.progress import Progress
+from sdimu_sim.cli.shown_campaign import check_kinds, shown_campaign
 
 app = typer.Typer(help="Put a claim of the method to the test, by simulation.", no_args_is_help=True)
-
-
 app.command()(adaptive)
 app.command()(adaptive_run)
 
@@ -125,12 +121,8 @@ def grades(
     workers: Annotated[int, typer.Option(min=1, help="Processes.")] = 2,
 ) -> None:
     """Diagnose clean tests and tests with one hidden effect of every IMU file."""
-    from functools import partial
-
-    from sdimu_calibration.cli.progress import bar
     from sdimu_calibration.storage.config import config_folder
     from sdimu_calibration.storage.json_file import write_json
-    from sdimu_sim.campaign.campaign import run_campaign
     from sdimu_sim.campaign.grade_page import page
     from sdimu_sim.campaign.grade_run import HANDHELD, PLANS, GradeRun, choice
 
@@ -138,11 +130,9 @@ def grades(
     console, seeds = plain(), range(seed, seed + runs)
     clean, hidden, choices = {}, {}, {}
     for name in names:
-        with bar(console) as progress:
-            tell = partial(_named, progress, name)
-            folder = out / name
-            clean[name] = run_campaign(GradeRun(name, False), seeds, folder / "clean", workers=workers, progress=tell)
-            hidden[name] = run_campaign(GradeRun(name, True), seeds, folder / "hidden", workers=workers, progress=tell)
+        folder = out / name
+        clean[name] = shown_campaign(console, name, GradeRun(name, False), seeds, folder / "clean", workers)
+        hidden[name] = shown_campaign(console, name, GradeRun(name, True), seeds, folder / "hidden", workers)
         plans = PLANS[:1] if name == HANDHELD else PLANS
         choices[name] = [
             {"plan": plan, "estimator": choice(name, plan, seed + k)} for plan in plans for k in range(draws)
@@ -164,31 +154,22 @@ def noise(
     workers: Annotated[int, typer.Option(min=1, help="Processes.")] = 2,
 ) -> None:
     """Diagnose tests in noise with a memory: are terms named with their size, do the sigmas hold."""
-    from functools import partial
-
-    from sdimu_calibration.cli.progress import bar
-    from sdimu_calibration.core.recording import DataError
     from sdimu_calibration.storage.config import config_folder
     from sdimu_calibration.storage.json_file import write_json
-    from sdimu_sim.campaign.campaign import run_campaign
     from sdimu_sim.campaign.grade_run import HANDHELD
     from sdimu_sim.campaign.noise_page import page
     from sdimu_sim.campaign.noise_run import NoiseRun
     from sdimu_sim.core.coloured import KINDS
 
     known = ("white", *KINDS)
-    unknown = sorted(set(kind or ()) - set(known))
-    if unknown:
-        raise DataError(f"--kind {unknown[0]}: expected one of {', '.join(known)}")
+    check_kinds(kind, known)
     names = imu or sorted(p.stem for p in (config_folder() / "imu").glob("*.yaml") if p.stem != HANDHELD)
     console, seeds = plain(), range(seed, seed + runs)
     results = {}
     for name in names:
         for one in kind or known:
-            with bar(console) as progress:
-                tell = partial(_named, progress, f"{name}, {one}")
-                folder = out / name / one
-                results[name, one] = run_campaign(NoiseRun(name, one), seeds, folder, workers=workers, progress=tell)
+            work, folder = NoiseRun(name, one), out / name / one
+            results[name, one] = shown_campaign(console, f"{name}, {one}", work, seeds, folder, workers)
     write_json(out / "noise.json", {f"{name} {one}": rows for (name, one), rows in results.items()})
     text = page(results, seed)
     (out / "noise.md").write_text(text, encoding="utf-8")
@@ -206,13 +187,9 @@ def missing(
     workers: Annotated[int, typer.Option(min=1, help="Processes.")] = 2,
 ) -> None:
     """Diagnose tests as if the catalogue lacked what is hidden in them: is that seen, do the sigmas hold."""
-    from functools import partial
-
-    from sdimu_calibration.cli.progress import bar
     from sdimu_calibration.core.effects import registry
     from sdimu_calibration.core.recording import DataError
     from sdimu_calibration.storage.json_file import write_json
-    from sdimu_sim.campaign.campaign import run_campaign
     from sdimu_sim.campaign.missing_page import page
     from sdimu_sim.campaign.missing_run import MissingRun
     from sdimu_sim.core.hidden import effect_names
@@ -229,9 +206,7 @@ def missing(
         )  # fmt: skip
     console, seeds, results = plain(), range(seed, seed + runs), {}
     for name in effect or known:
-        with bar(console) as progress:
-            tell = partial(_named, progress, name)
-            results[name] = run_campaign(MissingRun(imu, name), seeds, out / name, workers=workers, progress=tell)
+        results[name] = shown_campaign(console, name, MissingRun(imu, name), seeds, out / name, workers)
     write_json(out / "missing.json", results)
     text = page(imu, results, seed)
     (out / "missing.md").write_text(text, encoding="utf-8")
@@ -248,22 +223,16 @@ def many(
     workers: Annotated[int, typer.Option(min=1, help="Processes.")] = 2,
 ) -> None:
     """Diagnose tests with five to twelve effects of 3 to 50 sigma at once."""
-    from functools import partial
-
     import numpy as np
     from rich.box import SIMPLE
     from rich.table import Table
 
-    from sdimu_calibration.cli.progress import bar
     from sdimu_calibration.storage.json_file import write_json
-    from sdimu_sim.campaign.campaign import run_campaign
     from sdimu_sim.campaign.many_run import ManyRun
 
     console, seeds, results = plain(), range(seed, seed + runs), {}
     for name in imu or ["dtg", "rlg_navigation"]:
-        with bar(console) as progress:
-            tell = partial(_named, progress, name)
-            results[name] = run_campaign(ManyRun(name), seeds, out / name, workers=workers, progress=tell)
+        results[name] = shown_campaign(console, name, ManyRun(name), seeds, out / name, workers)
     write_json(out / "many.json", results)
     headings = ("IMU file", "runs", "8 sigma or more, named", "5 to 8", "below", "wrong names", "RMS z", "s")
     table = Table(*headings, box=SIMPLE)
@@ -293,26 +262,17 @@ def sets(
     workers: Annotated[int, typer.Option(min=1, help="Processes.")] = 2,
 ) -> None:
     """Fit and diagnose sets of recordings of one unit."""
-    from functools import partial
-
     from rich.box import SIMPLE
     from rich.table import Table
 
-    from sdimu_calibration.cli.progress import bar
-    from sdimu_calibration.core.recording import DataError
     from sdimu_calibration.storage.json_file import write_json
-    from sdimu_sim.campaign.campaign import run_campaign
     from sdimu_sim.campaign.set_page import headings, line
     from sdimu_sim.campaign.set_run import KINDS, SetRun
 
-    unknown = [k for k in kind or [] if k not in KINDS]
-    if unknown:
-        raise DataError(f"--kind {unknown[0]}: expected one of {', '.join(KINDS)}")
+    check_kinds(kind, KINDS)
     console, seeds, results = plain(), range(seed, seed + runs), {}
     for name in kind or KINDS:
-        with bar(console) as progress:
-            tell = partial(_named, progress, name)
-            results[name] = run_campaign(SetRun(name, imu), seeds, out / name, workers=workers, progress=tell)
+        results[name] = shown_campaign(console, name, SetRun(name, imu), seeds, out / name, workers)
     write_json(out / "sets.json", results)
     table = Table(*headings(), box=SIMPLE)
     for name, rows in results.items():
@@ -329,22 +289,16 @@ def hand(
     workers: Annotated[int, typer.Option(min=1, help="Processes.")] = 2,
 ) -> None:
     """Diagnose runs by hand of any grade and rate, with bias instability and rests that somebody nudges."""
-    from functools import partial
-
     import numpy as np
     from rich.box import SIMPLE
     from rich.table import Table
 
-    from sdimu_calibration.cli.progress import bar
     from sdimu_calibration.storage.json_file import write_json
-    from sdimu_sim.campaign.campaign import run_campaign
     from sdimu_sim.campaign.hand_run import IMUS, HandRun
 
     console, seeds, results = plain(), range(seed, seed + runs), {}
     for word, hidden in (("clean", False), ("hidden", True)):
-        with bar(console) as progress:
-            tell = partial(_named, progress, word)
-            results[word] = run_campaign(HandRun(hidden), seeds, out / word, workers=workers, progress=tell)
+        results[word] = shown_campaign(console, word, HandRun(hidden), seeds, out / word, workers)
     write_json(out / "hand.json", results)
     headings = ("IMU file", "clean runs", "consistent", "RMS z", "hidden runs", "in a class", "first", "RMS z")
     table = Table(*headings, box=SIMPLE)
@@ -361,7 +315,3 @@ def hand(
     refused = [r["error"] for rows in results.values() for r in rows if "error" in r]
     console.print(f"refused: {len(refused)}", *sorted(set(refused))[:5], sep="\n", markup=False)
     console.print(f"results in {out}", soft_wrap=True)
-
-
-def _named(progress: Progress, name: str, word: str, share: float) -> None:
-    progress(f"{name}: {word}", share)

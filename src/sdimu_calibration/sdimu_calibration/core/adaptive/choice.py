@@ -17,12 +17,12 @@ from sdimu_calibration.core.plan import Turn
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.table import Step
 
+FIRST_STOP_S = 20.0
+"""First stop of a test (s): the azimuth is then known well enough for the passes to converge."""
 _DECISION_S = 5.0
 """Time that a stop costs beside its length (s): fit and choice at its end; without it stops would be shortest."""
 _NOTHING_NAT = 0.02
 """Gain of the best move (nat a minute) below which none is worth its time: an hour would bring one nat."""
-
-
 _WORDS_NAT = 0.1
 """Gain (nat) from which a reason tells of a class: odds of 1.1 to 1."""
 
@@ -193,7 +193,7 @@ def choose(
 
 
 def _length(turn: Turn | None) -> float:
-    return 0.0 if turn is None else abs(turn.angle_rad) / turn.rate_rad_s
+    return 0.0 if turn is None else turn.duration_s
 
 
 def _best(turn: Turn | None, told: Ahead, then: Worth, now: Worth, menu: Menu, needed: Floats) -> _Option | None:

@@ -7,6 +7,7 @@ through a pipe, and what comes of it here does.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -16,8 +17,7 @@ from sdimu_calibration.core.adaptive.knowledge import Knowledge, fitted, knowled
 from sdimu_calibration.core.diagnosis.diagnose import climb
 from sdimu_calibration.core.diagnosis.live_diagnosis import LiveDiagnosis
 from sdimu_calibration.core.estimation.fit import Fit
-from sdimu_calibration.core.recording import DataError
-from sdimu_calibration.core.table import RateTable, Step, plan_move
+from sdimu_calibration.core.table import RateTable, Step, is_possible
 
 
 @dataclass(frozen=True)
@@ -107,13 +107,5 @@ def next_move(fit: Fit, diagnosis: LiveDiagnosis, about: Asked) -> Decision:
 
 
 def _choose(known: Knowledge, about: Asked, minutes_left: float) -> Choice | End:
-    angles = np.array(about.angles)
-
-    def possible(step: Step) -> bool:
-        try:
-            plan_move(about.table, angles, step)
-        except DataError:
-            return False
-        return True
-
+    possible = partial(is_possible, about.table, np.array(about.angles))
     return choose(known, about.goals, about.menu, minutes_left, possible)

@@ -175,7 +175,7 @@ def ahead(at: SoFar, turn: Turn | None, dwell_s: float, acceleration_rad_s2: flo
     output = new_output(int(new.sum()), len(sensors.prior), False, 1)
     run_pass(data, pass_settings(setup, closed_loop=False), state, output)
     check_finite(state)
-    moved = sum(abs(t.angle_rad) / t.rate_rad_s for t in turns)
+    moved = sum(t.duration_s for t in turns)
     rows = np.flatnonzero(data.kind != SKIP)
     elapsed = epochs.end[new][rows] - _BEFORE_S
     return Ahead(

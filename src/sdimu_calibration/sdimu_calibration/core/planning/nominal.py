@@ -80,7 +80,7 @@ def turned(t: Floats, turn: Turn, ramp_s: float) -> tuple[Floats, Floats]:
     angle, rate : ndarray, shape (m,)
         rad, rad/s.
     """
-    length = abs(turn.angle_rad) / turn.rate_rad_s
+    length = turn.duration_s
     peak = turn.angle_rad / (length - ramp_s)
     at = np.clip(t, 0.0, length)
     to_end = np.minimum(at, length - at)
@@ -150,7 +150,7 @@ def nominal_recording(
 def _schedule(plan: Plan) -> tuple[Floats, Floats, list[float]]:
     """Start and end of every turn (s), shape (turns,), and its ramps."""
     ramps = [ramp_length(t, plan.acceleration_rad_s2, k) for k, t in enumerate(plan.turns, start=1)]
-    length = np.array([abs(t.angle_rad) / t.rate_rad_s for t in plan.turns])
+    length = np.array([t.duration_s for t in plan.turns])
     end = np.cumsum(np.asarray(plan.dwell_s[: len(length)]) + length)
     return end - length, end, ramps
 

@@ -142,6 +142,15 @@ def plan_move(
     raise DataError(f"{step.words}: {'; '.join(reasons)}")
 
 
+def is_possible(table: RateTable, angles: Floats, step: Step) -> bool:
+    """Whether a step is possible from where the table stands; parameters as for `plan_move`."""
+    try:
+        plan_move(table, angles, step)
+    except DataError:
+        return False
+    return True
+
+
 def steps_of(plan: Plan) -> tuple[Step, ...]:
     """Take a plan apart into steps: the first only dwells.
 
