@@ -35,3 +35,18 @@ def test_nothing_hangs_on_a_choice_that_the_data_make(bench):
     (one,) = found_effects(bench.diagnosis(effects=_HIDDEN))
     assert one.alike == ()
     assert one.coefficient_shifts == ()
+
+
+def test_a_step_says_how_wrong_the_coefficients_were_and_in_which_sense(diagnosis):
+    (step,) = diagnosis.found.steps
+    before, after = diagnosis.before, diagnosis.after
+    sigma = before.conditional_sigma if before.conditional_sigma is not None else np.sqrt(np.diag(before.covariance))
+    wrong = {
+        name: (before.values[k] - after.values[after.names.index(name)]) / sigma[k]
+        for k, name in enumerate(before.names) if sigma[k] > 0.0
+    }  # fmt: skip
+    told = [(name, size) for name, size in step.moved if abs(size) > 3.0 and name in wrong]
+    assert told
+    for name, size in told:
+        assert np.sign(size) == np.sign(wrong[name])
+        assert size == pytest.approx(wrong[name], rel=0.3)

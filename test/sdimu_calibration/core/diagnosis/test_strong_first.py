@@ -1,0 +1,98 @@
+"""Strong effects are fitted before the others are searched: about a fit without them no signature is right."""
+
+from __future__ import annotations
+
+import math
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from rate_table_sim.core import TableSpecification
+from sdimu_calibration.core.diagnosis.diagnose import climb
+from sdimu_calibration.core.diagnosis.ground import Ground, Request, fresh_ground, strong_first
+from sdimu_calibration.core.diagnosis.problem import Problem
+from sdimu_calibration.core.diagnosis.rounds import prefer
+from sdimu_calibration.core.diagnosis.search import FALSE_ALARM
+from sdimu_calibration.core.estimation.prepared_test import PreparedTest
+from sdimu_calibration.core.estimation.solve import solve
+from sdimu_calibration.core.progress import silent
+from sdimu_calibration.core.specification import Site
+from sdimu_calibration.storage.config import load_imu, load_model, load_plan
+from sdimu_sim.core.scenario import Scenario, generate
+
+HIDDEN = {
+    "accel_quadratic_z": "-50 ug/g^2", "accel_delay_z": "0.97 ms", "gyro_scale_quadratic_y": "-22 ppm*s/deg",
+    "gyro_scale_quadratic_z": "-18 ppm*s/deg", "gyro_magnetic_yz": "0.13 deg/h/G",
+}  # fmt: skip
+"""Forty to fifty sigma each, the last one twenty."""
+SITE = Site(math.radians(60.0), 0.0)
+
+
+@pytest.fixture(scope="module")
+def fit():
+    scenario = Scenario(
+        load_plan("kim18_signed"), load_imu("dtg"), SITE, TableSpecification(axes=None), rate_hz=20.0, seed=2,
+        effects=tuple(f"{name}={size}" for name, size in HIDDEN.items()),
+    )  # fmt: skip
+    return solve(PreparedTest(generate(scenario)[0], load_imu("dtg"), SITE), load_model("baseline"), learn=False)
+
+
+def excess(ground: Ground) -> float:
+    """Chi-square of the true effects about a ground, in standard deviations beyond noise."""
+    problem, evidence = Problem(ground.evidence), ground.evidence
+    known, weight, _ = problem.known([evidence.names.index(name) for name in HIDDEN])
+    left = evidence.e - evidence.W[:, known] @ evidence.information.estimate(known, weight)[0]
+    dof = len(left) - len(known)
+    return (float(left @ evidence.weighed(left[:, None])[:, 0]) - dof) / math.sqrt(2.0 * dof)
+
+
+def test_the_truth_explains_the_data_about_a_fit_with_the_strong_effects_alone(fit):
+    request = Request(fit, (), FALSE_ALARM)
+    assert excess(fresh_ground(request, fit, (), False)) > 5.0
+    ground = strong_first(request, silent)
+    assert len(ground.tried) >= 3
+    assert excess(ground) < 4.0
+
+
+def test_a_weaker_effect_beside_strong_ones_is_named_and_nothing_without_a_cause(fit):
+    found = climb(fit)
+    labels = {c.label for c in found.chosen}
+    assert {"accel_quadratic_z", "accel_delay_z", "gyro_magnetic_yz"} <= labels
+    assert not any(c.family == "own" for c in found.chosen)
+    assert len(labels) == len(HIDDEN)
+
+
+def test_nothing_strong_leaves_the_fit_as_given(bench):
+    fit = bench.fit()
+    assert strong_first(Request(fit, (), FALSE_ALARM), silent).fit is fit
+
+
+def test_the_variants_of_a_cause_share_its_odds(fit):
+    evidence = fresh_ground(Request(fit, (), FALSE_ALARM), fit, (), False).evidence
+    problem = Problem(evidence)
+    odds: dict[str, float] = {}
+    for candidate, share in zip(evidence.candidates, np.exp(-problem.log_variants), strict=True):
+        odds[candidate.parameter.name] = odds.get(candidate.parameter.name, 0.0) + float(share)
+    assert max(odds.values()) == pytest.approx(1.0)
+    assert min(odds.values()) == pytest.approx(1.0)
+    against = problem.odds_against[problem.p :]
+    faults = [c.effect.scope == "recording" for c in evidence.candidates]
+    assert (against[faults] > problem.log_variants[faults]).all()
+    assert (against[np.logical_not(faults)] == problem.log_variants[np.logical_not(faults)]).all()
+
+
+def look(chosen: int, chi2: float, net: float) -> SimpleNamespace:
+    """A round that chose some effects without noise, with what is left."""
+    return SimpleNamespace(
+        found=SimpleNamespace(chosen=range(chosen), noise=(), net=net), free=range(9),
+        after=SimpleNamespace(chi2=chi2, dof=250, p_value=0.4),
+    )  # fmt: skip
+
+
+def test_an_equation_must_be_likelier_than_the_effects_it_stands_for():
+    catalogue = look(4, 250.0, 100.0)
+    assert prefer(look(1, 252.0, 110.0), catalogue)
+    assert not prefer(look(1, 252.0, 90.0), catalogue)
+    # As likely, and nothing else speaks for it: neither fewer terms nor less left.
+    assert not prefer(look(4, 252.0, 110.0), catalogue)
