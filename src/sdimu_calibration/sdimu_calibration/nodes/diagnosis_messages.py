@@ -29,7 +29,7 @@ def diagnosis(stamp_ns: int, found: LiveDiagnosis) -> DiagnosticArray:
         parts += [
             _status("where", f"stop {found.stop}: mean innovation over its sigma", _last_stop(found)),
             _status("ranking", reaches, ((r.label, f"{r.z:+.1f} sigma, {size(r)}") for r in _first(found))),
-            _status("ladder", "error at stops held out, 1 is right", ladder_rows(found.ladder)),
+            _status("ladder", "error with one stop left out, 1 is right", ladder_rows(found.ladder)),
         ]
     return DiagnosticArray(header=header(stamp_ns), status=parts)
 

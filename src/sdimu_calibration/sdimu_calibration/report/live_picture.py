@@ -78,4 +78,4 @@ def _ladder(axes: Any, found: LiveDiagnosis) -> None:
     axes.set_yticks(at, [model_name(rung.added) for rung in found.ladder], fontsize=7.5)
     axes.invert_yaxis()
     axes.set_xlim(0.0, _TALLEST * max([1.0, *errors]))
-    axes.set_xlabel("error at stops held out (sigma); dashed: 1 is right")
+    axes.set_xlabel("error with one stop left out (sigma); dashed: 1 is right")

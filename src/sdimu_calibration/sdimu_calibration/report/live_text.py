@@ -57,7 +57,7 @@ class SeenDiagnosis:
         parts = (
             f"diagnosis of stop {self.stop}: {self.verdict}: {self.sentence}",
             f"{named} ({self.reaches})" if named and self.verdict == MISFIT else "",
-            f"error at stops held out: {errors}" if errors else "",
+            f"error with one stop left out: {errors}" if errors else "",
         )
         return "; ".join(part.rstrip(".") for part in parts if part)
 
@@ -82,7 +82,7 @@ def best_ranked(ranking: Sequence[Ranked]) -> list[Ranked]:
 
 
 def ladder_rows(ladder: Sequence[ModelError]) -> list[tuple[str, str]]:
-    """Name each model and write its error at stops held out."""
+    """Name each model and write its error with one stop left out."""
     return [(model_name(rung.added), f"{rung.held_out:.4g}") for rung in ladder]
 
 
@@ -93,4 +93,4 @@ def told(found: LiveDiagnosis) -> str:
     named = ", ".join(f"{r.label} {r.z:+.1f}" for r in best_ranked(found.standing)[:_NAMED])
     above = f" ({named}; noise reaches {found.threshold:.1f})" if named else ""
     errors = ", ".join(f"{name} {error}" for name, error in ladder_rows(found.ladder))
-    return f"stop {found.stop}: {found.verdict}{above}; error at stops held out: {errors}"
+    return f"stop {found.stop}: {found.verdict}{above}; error with one stop left out: {errors}"
