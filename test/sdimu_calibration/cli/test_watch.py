@@ -99,5 +99,5 @@ def test_a_pipe_gets_one_line_a_diagnosis():
         "diagnosis of stop 0: waiting: no diagnosis yet: too few samples have come",
         "diagnosis of stop 3: misfit: 2 candidates stand out of the noise, asymmetry most; "
         "asymmetry +27.4 sigma, 41 ppm, quadratic +12.1 sigma, 3 ppm (noise reaches 3.82); "
-        "error at stops held out: as given 2.42, + asymmetry 0.98",
+        "error with one stop left out: as given 2.42, + asymmetry 0.98",
     ]

@@ -62,7 +62,8 @@ def _tables(seen: SeenDiagnosis) -> RenderableType:
 
     beside = Table.grid(padding=(0, 4))
     beside.add_row(
-        _rows(f"candidates, {seen.reaches}", seen.ranking[:_MOST_RANKED]), _rows("error with one stop left out", seen.ladder)
+        _rows(f"candidates, {seen.reaches}", seen.ranking[:_MOST_RANKED]),
+        _rows("error with one stop left out", seen.ladder),
     )
     return beside
 
