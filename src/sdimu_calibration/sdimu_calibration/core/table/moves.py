@@ -143,7 +143,16 @@ def plan_move(
 
 
 def is_possible(table: RateTable, angles: Floats, step: Step) -> bool:
-    """Whether a step is possible from where the table stands; parameters as for `plan_move`."""
+    """Whether a step is possible from where the table stands.
+
+    Parameters
+    ----------
+    table : RateTable
+    angles : ndarray, shape (3,)
+        Where the joints are (rad).
+    step : Step
+        What is to be done.
+    """
     try:
         plan_move(table, angles, step)
     except DataError:
