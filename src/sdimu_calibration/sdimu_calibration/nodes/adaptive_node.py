@@ -20,26 +20,23 @@ from pathlib import Path
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.node import Node
-from rclpy.task import Future
-from std_srvs.srv import Trigger
 
 from sdimu_calibration.core.adaptive.choice import FIRST_STOP_S, Menu
 from sdimu_calibration.core.adaptive.question import Asked, Decision, next_move
+from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.table import Step
 from sdimu_calibration.nodes.calibration_node import JOURNAL
 from sdimu_calibration.nodes.credits import HISTORY, NS, header
 from sdimu_calibration.nodes.diagnosis_worker import Answer, Job, Request
+from sdimu_calibration.nodes.driving import PATIENCE_S, Driving
 from sdimu_calibration.nodes.live_diagnosis import Worker
 from sdimu_calibration.nodes.opening_parameters import declare_opening
 from sdimu_calibration.nodes.parameters import Declare
 from sdimu_calibration.nodes.spinning import run_node
-from sdimu_calibration.nodes.table_driver import Arrival, TableDriver
-from sdimu_calibration.nodes.table_goals_node import FINISH, PATIENCE_S
-from sdimu_calibration.nodes.ticking import Ticker
+from sdimu_calibration.nodes.table_driver import Arrival
 from sdimu_calibration.storage.goal_file import load_goals
 from sdimu_calibration.storage.json_file import write_json
-from sdimu_calibration.storage.table_file import load_rate_table
 
 LATE_S = 1.5
 """Samples (s) that may still be on their way to the journal when a stop is looked at: an epoch and a block."""
@@ -56,53 +53,38 @@ class AdaptiveNode:
 
     def __init__(self) -> None:
         self.node = Node("adaptive")
-        self.done = Future()
         declare = Declare(self.node)
         options, _ = declare_opening(self.node)
         goals = load_goals(declare.text("goals", "table33", "limits to reach: name in config/goal or path"))
-        self._table = load_rate_table(declare.text("table", "ideal", "the table: name in config/table or path"))
         model = declare.text("model", "baseline", "model to estimate: name in config/model or path")
         added = tuple(declare.texts("add", [], "effects beyond the model's: names, equations or files"))
         self._out = Path(declare.text("out", ".", "folder of the calibration node, with its journal"))
-        self._finish = declare.flag("finish", False, "end the streams of a simulated table after the test")
         self._goals, self._models, self._menu = goals, (added,), Menu()
         self._worker = Worker(Job(self._out / JOURNAL, options, model, next_move, pictures=False))
-        ticker = Ticker(self.node)
-        self._driver = TableDriver(self.node, ticker, self._table)
+        self._driving = Driving(self.node, self._act)
+        self.done = self._driving.done
         self._choices = self.node.create_publisher(DiagnosticArray, "~/choice", HISTORY)
-        self._client = self.node.create_client(Trigger, FINISH)
         self._next: Step | None = Step(None, FIRST_STOP_S)
         self._why = "first stop"
         self._last = Decision(None, "", "", False, 0.0, math.inf, (), ())
         self._stop, self._begin_ns, self._end_ns = 0, 0, 0
         self._look_at, self._arrived, self._tries = 0.0, 0.0, 0
         self._made: list[dict[str, object]] = []
-        self._farewell: Future | None = None
-        self._born = time.monotonic()
-        ticker.every(0.05, self._tick)
 
     def close(self) -> None:
         """Leave no table in motion and no process behind."""
         try:
-            self._driver.stop("the node was stopped")
+            self._driving.driver.stop("the node was stopped")
         finally:
             self._worker.close()
 
-    def _tick(self) -> None:
-        if self.done.done() or self._driver.busy:
-            return
-        angles = self._driver.angles
-        if angles is None:
-            if time.monotonic() - self._born > PATIENCE_S:
-                self._fail(f"rate_table/joint_states: nothing has come for {PATIENCE_S:.0f} s (is the table on?)")
-        elif self._farewell is not None:
-            self._leave(self._farewell)
-        elif self._next is not None:
-            step, self._next = self._next, None
-            future = self._driver.move(step, self._why)
-            future.add_done_callback(lambda done: self._arrive(done.result(), step))
-        else:
+    def _act(self, angles: Floats) -> None:
+        if self._next is None:
             self._look(tuple(angles.tolist()))
+            return
+        step, self._next = self._next, None
+        future = self._driving.driver.move(step, self._why)
+        future.add_done_callback(lambda done: self._arrive(done.result(), step))
 
     def _arrive(self, arrival: Arrival, step: Step) -> None:
         if not arrival.ok:
@@ -120,11 +102,11 @@ class AdaptiveNode:
         try:
             answer = self._worker.answer()
         except DataError as error:
-            self._fail(str(error))
+            self._driving.fail(str(error))
             return
         if not isinstance(answer, Answer):
             if self._worker.idle and time.monotonic() > self._look_at:
-                about = Asked(self._goals, self._menu, self._table, angles, (self._end_ns - self._begin_ns) / NS)
+                about = Asked(self._goals, self._menu, self._driving.table, angles, (self._end_ns - self._begin_ns) / NS)
                 # The worker keeps what it has read up to a stamp: another stamp lets it read the journal again.
                 self._worker.ask(Request(self._stop, self._end_ns + self._tries, self._models, about))
                 self._tries += 1
@@ -133,7 +115,7 @@ class AdaptiveNode:
         if lacking > LATE_S:
             self._look_at = time.monotonic() + AGAIN_S
             if time.monotonic() - self._arrived > PATIENCE_S:
-                self._fail(
+                self._driving.fail(
                     f"the journal lacks the last {lacking:.0f} s of the test (is the calibration node alive, and have "
                     "IMU and table one clock?)"
                 )
@@ -144,7 +126,7 @@ class AdaptiveNode:
         if isinstance(answer.more, Decision):
             self._carry_out(answer.more)
         else:
-            self._fail(answer.diagnosis.sentence)
+            self._driving.fail(answer.diagnosis.sentence)
 
     def _carry_out(self, decision: Decision) -> None:
         """Tell a decision, keep it, and make it the next move or the end."""
@@ -155,11 +137,7 @@ class AdaptiveNode:
         write_json(self._out / CHOICES, {"format": FORMAT, "goals": self._goals.name, "choices": self._made})
         self._last, self._next, self._why = decision, decision.step, decision.reason
         if decision.step is None:
-            self._farewell, self._born = Future(), time.monotonic()
-            if self._finish:
-                self._farewell = self._client.call_async(Trigger.Request())
-            else:
-                self._farewell.set_result(None)
+            self._driving.end()
 
     def _publish(self, decision: Decision) -> None:
         words = "" if decision.step is None else decision.step.words
@@ -171,16 +149,6 @@ class AdaptiveNode:
         status = DiagnosticStatus(level=DiagnosticStatus.OK, name="choice", message=decision.text)
         status.values = [KeyValue(key=key, value=value) for key, value in values.items()]
         self._choices.publish(DiagnosticArray(header=header(self._end_ns), status=[status]))
-
-    def _leave(self, farewell: Future) -> None:
-        if farewell.done():
-            self.done.set_result(None)
-        elif time.monotonic() - self._born > PATIENCE_S:
-            self._fail(f"{self._client.srv_name}: no answer (only a simulated table has an end)")
-
-    def _fail(self, reason: str) -> None:
-        if not self.done.done():
-            self.done.set_exception(DataError(reason))
 
 
 def main() -> None:

@@ -3,7 +3,8 @@
 A turn of angle A in the time T with ramps t_r at acceleration a has the area ``A = a t_r (T - t_r)``; the smaller root
 t_r, rounded up to the grid, keeps T and lowers the acceleration. Its waypoints are the corners of the trapezoid with
 their rates: the cubic that a trajectory controller lays through two of them is the motion itself, because the angle is
-a polynomial of second order between corners.
+a polynomial of second order between corners. The simulated table has ramps of its own (rate_table_sim.core.profile):
+what it does must not follow from what it is asked for.
 """
 
 from __future__ import annotations
@@ -78,6 +79,8 @@ class Move:
     step : Step
     joint : str
         The joint that turns; empty when none does.
+    axis : (int, float) or None
+        Its index and the sense in which it turns, as `plan_move` takes them.
     waypoints : tuple of Waypoint
         At least one; times ascend, the last is the end of the dwell.
     turn_s : float
@@ -86,6 +89,7 @@ class Move:
 
     step: Step
     joint: str
+    axis: tuple[int, float] | None
     waypoints: tuple[Waypoint, ...]
     turn_s: float
 
@@ -132,12 +136,12 @@ def plan_move(
     if step.turn is None or step.turn.angle_rad == 0.0:
         if step.dwell_s <= 0.0:
             raise DataError(f"{step.words}: nothing to do (state a turn or a dwell)")
-        return Move(step, "", (Waypoint(step.dwell_s, tuple(here.tolist()), (0.0, 0.0, 0.0)),), 0.0)
+        return Move(step, "", None, (Waypoint(step.dwell_s, tuple(here.tolist()), (0.0, 0.0, 0.0)),), 0.0)
     reasons = []
     for k, sign in [axis] if axis else reversed(_joints(table, here, step, tolerance_rad)):
         corners, reason = _corners(table.limits[k], step, sign, float(here[k]), table.sample_rate_hz)
         if not reason:
-            return _move(table, here, step, k, corners)
+            return _move(table, here, step, (k, sign), corners)
         reasons.append(f"{table.joints[k]}: {reason}")
     raise DataError(f"{step.words}: {'; '.join(reasons)}")
 
@@ -174,32 +178,6 @@ def steps_of(plan: Plan) -> tuple[Step, ...]:
     )
 
 
-def joints_of(table: RateTable, angles: Floats, plan: Plan) -> tuple[tuple[int, float] | None, ...]:
-    """Choose the joint and sense of each step of a plan so that every later turn is possible.
-
-    Parameters
-    ----------
-    table : RateTable
-    angles : ndarray, shape (3,)
-        Where the joints are at the start (rad).
-    plan : Plan
-
-    Returns
-    -------
-    tuple of (int, float) or None
-        One a step; None where nothing is to be chosen.
-
-    Raises
-    ------
-    DataError
-        As `assign_turns`.
-    """
-    if table.axes is None:
-        return tuple(None for _ in plan.dwell_s)
-    first, middle, last = (limits.reach_rad for limits in table.limits)
-    return (None, *assign_turns(plan, table.axes, angles, (first, middle, last), _ALONG_RAD))
-
-
 def moves_of(table: RateTable, angles: Floats, plan: Plan) -> tuple[Move, ...]:
     """Make the moves of a whole plan, with the joints chosen so that every later turn is possible.
 
@@ -216,8 +194,12 @@ def moves_of(table: RateTable, angles: Floats, plan: Plan) -> tuple[Move, ...]:
         As `assign_turns` and `plan_move`.
     """
     here = np.asarray(angles, dtype=np.float64)
+    axes: tuple[tuple[int, float] | None, ...] = (None,) * len(plan.dwell_s)
+    if table.axes is not None:
+        first, middle, last = (limits.reach_rad for limits in table.limits)
+        axes = (None, *assign_turns(plan, table.axes, here, (first, middle, last), _ALONG_RAD))
     moves = []
-    for step, axis in zip(steps_of(plan), joints_of(table, here, plan), strict=True):
+    for step, axis in zip(steps_of(plan), axes, strict=True):
         moves.append(plan_move(table, here, step, axis))
         here = np.asarray(moves[-1].target)
     return tuple(moves)
@@ -275,8 +257,10 @@ def _corners(
     return (corners if 2 * ramp_steps < steps else [corners[0], corners[2]]), ""
 
 
-def _move(table: RateTable, here: Floats, step: Step, k: int, corners: list[tuple[float, float, float]]) -> Move:
-    turn_s = corners[-1][0]
+def _move(
+    table: RateTable, here: Floats, step: Step, axis: tuple[int, float], corners: list[tuple[float, float, float]]
+) -> Move:
+    k, turn_s = axis[0], corners[-1][0]
     if step.dwell_s > 0.0:
         corners = [*corners, (turn_s + step.dwell_s, corners[-1][1], 0.0)]
     waypoints = []
@@ -285,4 +269,4 @@ def _move(table: RateTable, here: Floats, step: Step, k: int, corners: list[tupl
         angles[k] += turned
         rates[k] = rate
         waypoints.append(Waypoint(time_s, tuple(angles.tolist()), tuple(rates.tolist())))
-    return Move(step, table.joints[k], tuple(waypoints), turn_s)
+    return Move(step, table.joints[k], axis, tuple(waypoints), turn_s)
