@@ -82,7 +82,8 @@ def wheels_for(python: str, pins: list[str]) -> tuple[list[Package], list[str]]:
     while True:
         try:
             left = [pin for pin in pins if pin not in absent]
-            return asked(left, "--only-binary=:all:", "--python-version", python), absent
+            # pip takes 3.11 for 3.11.0, and some files ask for a later patch of it.
+            return asked(left, "--only-binary=:all:", "--python-version", f"{python}.99"), absent
         except RuntimeError as error:  # noqa: PERF203 (pip names one at a time)
             found = _ABSENT.search(str(error))
             if found is None or found.group(1) not in pins:

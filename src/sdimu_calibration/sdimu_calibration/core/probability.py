@@ -8,6 +8,8 @@ from __future__ import annotations
 import math
 from statistics import NormalDist
 
+from sdimu_calibration.core.arrays import Floats
+
 
 def normal_tail(z: float) -> float:
     """Probability that a standard normal variable exceeds `z`."""
@@ -38,6 +40,24 @@ def chi2_limit(p: float, dof: float) -> float:
     from scipy.special import chdtri  # noqa: PLC0415
 
     return float(chdtri(dof, p))
+
+
+def squares_tail(x: float, weights: Floats) -> float:
+    """Probability that a weighted sum of squares of standard normal variables exceeds `x`.
+
+    That of a chi-square with the same first three moments: exact for equal weights. Source: E. S. Pearson, in
+    J. P. Imhof, "Computing the distribution of quadratic forms in normal variables", Biometrika 48 (1961), section 4.
+
+    Parameters
+    ----------
+    x : float
+        In the unit of the weights.
+    weights : ndarray, shape (n,)
+        Eigenvalues of the covariance, where the variables are correlated.
+    """
+    first, second, third = (float((weights**k).sum()) for k in (1, 2, 3))
+    dof = second**3 / third**2
+    return chi2_tail(dof + (x - first) * math.sqrt(dof / second), dof)
 
 
 def student_tail(t: float, dof: float) -> float:

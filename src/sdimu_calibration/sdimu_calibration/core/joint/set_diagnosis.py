@@ -13,7 +13,7 @@ from sdimu_calibration.core.effects.selection import resolve
 from sdimu_calibration.core.evidence.known import Standing
 from sdimu_calibration.core.joint.member import Member
 from sdimu_calibration.core.joint.scope import tagged
-from sdimu_calibration.core.joint.set_evidence import SetEvidence
+from sdimu_calibration.core.joint.set_evidence import SetEvidence, held_out_chance
 from sdimu_calibration.core.joint.set_fit import Run, SetFit, SetOptions
 from sdimu_calibration.core.joint.set_result import SCATTERS, base_fit, set_outcome
 from sdimu_calibration.core.joint.set_search import SetSearch, search_set
@@ -25,7 +25,8 @@ from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.units import from_si
 
 _STILL_WRONG = 1.25
-"""Held-out error (sigma) from which a model is not called explained, as for one recording: 1 is right."""
+"""Held-out error (sigma) from which a model is not called explained, as for one recording, where chance does not
+reach it: 1 is right."""
 _LISTED = 4
 """Number of effects that a sentence names: the table has the rest."""
 
@@ -109,7 +110,7 @@ def diagnose_set(
     before = set_outcome(found.before)
     after = before if found.after is found.before else set_outcome(found.after)
     findings = _findings(found)
-    word = _verdict(findings, after)
+    word = _verdict(findings, after, found.after)
     test = base_fit(found.after).test
     standing = replace(found.standing, site=test.origin.site)
     return SetDiagnosis(
@@ -141,9 +142,11 @@ def _findings(found: SetSearch) -> tuple[SetFinding, ...]:
     )
 
 
-def _verdict(findings: Sequence[SetFinding], after: Calibration) -> str:
+def _verdict(findings: Sequence[SetFinding], after: Calibration, fit: SetFit) -> str:
     shared = [f for f in findings if not f.recording]
-    left = _scatter(after) < SCATTERS or (after.fit["held_out_rms"] or 0.0) > _STILL_WRONG
+    error = after.fit["held_out_rms"] or 0.0
+    still = error > _STILL_WRONG and held_out_chance(fit, error) < SCATTERS
+    left = _scatter(after) < SCATTERS or still
     # A fault leaves traces in its recording that are no physics of the unit.
     if left and (shared or not findings):
         return "unexplained"

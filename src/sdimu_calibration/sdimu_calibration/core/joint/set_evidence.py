@@ -19,6 +19,7 @@ from sdimu_calibration.core.evidence.linear import LinearEvidence, candidate_pri
 from sdimu_calibration.core.joint.combine import Rows, spread_out, stacked
 from sdimu_calibration.core.joint.reduction import compressed, unit_noise
 from sdimu_calibration.core.joint.set_fit import SetFit, columns_of, power_on, prior_weight
+from sdimu_calibration.core.probability import squares_tail
 
 MOST_FOLDS = 50
 """Number of folds of power-ons at most: each is left out once, and more folds predict no better."""
@@ -134,3 +135,32 @@ def held_out(fit: SetFit) -> HeldOut | None:
     if len(np.unique(evidence.stop)) < 2:
         return None
     return predict(evidence, evidence.model, evidence.weight, evidence.shift)
+
+
+def held_out_chance(fit: SetFit, rms: float) -> float:
+    """Probability that the held-out error of a model that is right exceeds `rms`.
+
+    All errors of a power-on hang on the same few differences between it and the others, which stand in the errors of
+    the others, too: the squares have fewer degrees of freedom than there are rows.
+
+    Parameters
+    ----------
+    fit : SetFit
+        Two power-ons or more.
+    rms : float
+        RMS of the normalised prediction errors (`held_out`).
+    """
+    evidence = set_evidence(fit, ())
+    # All errors are a linear function of what is random: the noise of the rows, and the coefficients about their prior.
+    random = np.vstack([evidence.W, np.diag(np.sqrt(evidence.weight))])
+    errors = np.zeros((len(evidence.e), len(random)))
+    unit = 1.0 / np.sqrt(np.sum(random**2, axis=0))
+    random = random * unit
+    for stop in np.unique(evidence.stop):
+        rows = np.flatnonzero(evidence.stop == stop)
+        others = random.copy()
+        others[rows] = 0.0
+        errors[rows] = -random[rows] @ np.linalg.solve(others.T @ others, others.T)
+        errors[rows, rows] = 1.0
+    errors /= np.linalg.norm(errors, axis=1)[:, None]
+    return squares_tail(rms**2 * len(errors), np.asarray(np.linalg.eigvalsh(errors @ errors.T), dtype=np.float64))

@@ -1,0 +1,48 @@
+"""The error at recordings held out: how far chance takes it where there are few recordings."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sdimu_calibration.core.joint.set_evidence import held_out, held_out_chance
+from sdimu_calibration.core.joint.set_fit import SetFit, SetOptions, fit_set, prior_weight, with_reports
+from sdimu_calibration.storage.config import load_model
+
+from .conftest import here, short, unit_set
+
+
+@pytest.fixture(scope="module")
+def two() -> SetFit:
+    """Recordings of plans that see different things; the model lets nothing differ from power-on to power-on."""
+    some = unit_set(35, [short("kim18_signed"), short("kim18")])
+    scopes = dict.fromkeys(("gyro_bias", "accel_bias"), "unit")
+    return fit_set(some.members, SetOptions(load_model("baseline"), scopes=scopes), here)
+
+
+def drawn(fit: SetFit, rng: np.random.Generator) -> SetFit:
+    """The set with coefficients from their priors and noise drawn anew."""
+    values = rng.standard_normal(len(fit.names)) / np.sqrt(prior_weight(fit.reports, fit.names))
+    truth = dict(zip(fit.names, values.tolist(), strict=True))
+    reports = []
+    for report in fit.reports:
+        own = report.reduction
+        y = own.A[:, : len(own.names)] @ [truth[name] for name in own.names] + rng.standard_normal(len(own.y))
+        reports.append(replace(report, reduction=replace(own, y=y)))
+    return with_reports(fit, reports)
+
+
+def test_what_chance_reaches_is_known_for_two_recordings(two):
+    rng = np.random.default_rng(1)
+    errors = np.array([held_out(drawn(two, rng)).rms for _ in range(1000)])
+    for p in (0.5, 0.1, 0.02):
+        limit = np.quantile(errors, 1.0 - p)
+        # Four standard deviations of a share of 1000.
+        assert held_out_chance(two, float(limit)) == pytest.approx(p, abs=4.0 * np.sqrt(p * (1.0 - p) / 1000.0))
+
+
+def test_power_ons_that_differ_are_beyond_chance(two):
+    # Their biases were switched on anew, which this model denies.
+    assert held_out_chance(two, held_out(two).rms) < 1e-6
