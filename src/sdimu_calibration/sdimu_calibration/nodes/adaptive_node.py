@@ -106,7 +106,8 @@ class AdaptiveNode:
             return
         if not isinstance(answer, Answer):
             if self._worker.idle and time.monotonic() > self._look_at:
-                about = Asked(self._goals, self._menu, self._driving.table, angles, (self._end_ns - self._begin_ns) / NS)
+                spent_s = (self._end_ns - self._begin_ns) / NS
+                about = Asked(self._goals, self._menu, self._driving.table, angles, spent_s)
                 # The worker keeps what it has read up to a stamp: another stamp lets it read the journal again.
                 self._worker.ask(Request(self._stop, self._end_ns + self._tries, self._models, about))
                 self._tries += 1

@@ -1,4 +1,4 @@
-"""What every node that drives a table through a test does: waits for the table, acts while it rests, takes its leave."""
+"""What every node that drives a table through a test does: wait for the table, act while it rests, leave."""
 
 from __future__ import annotations
 
