@@ -69,3 +69,18 @@ def test_the_limits_hold_by_the_result_and_the_bag_gives_it_again_to_the_last_di
     test = open_test(folder / "bag", "daejeon", load_imu("dtg"))
     again = outcome(solve(test, load_model("baseline")))
     np.testing.assert_array_equal(again.values, live.values)
+
+
+def test_a_test_that_ends_without_its_limits_says_so_with_its_exit_status(tmp_path):
+    goals = tmp_path / "hopeless.yaml"
+    limits = "limits: {gyro_bias: 1e-6 deg/h}"
+    goals.write_text(f"format: sdimu-goal/1\nname: hopeless\nminutes: 1\n{limits}\n", encoding="utf-8")
+    process = sdimu("run", "--adaptive", goals, "--rate", 50, "--no-diagnose", "--out", tmp_path / "run")
+    try:
+        _, err = process.communicate(timeout=DEADLINE_S)
+    finally:
+        process.kill()
+    last = read_json(tmp_path / "run" / "choices.json", "sdimu-choices/1")["choices"][-1]
+    assert process.returncode == 3
+    assert "were not reached" in err
+    assert last["text"] in err

@@ -36,7 +36,7 @@ class Driving:
     Attributes
     ----------
     done : Future
-        Of the node: its result is the exit status.
+        Of the node.
     table : RateTable
     driver : TableDriver
     """
@@ -51,13 +51,12 @@ class Driving:
         self._act = act
         self._client = node.create_client(Trigger, FINISH)
         self._waiting_since = time.monotonic()
-        self._status = 0
         self._farewell: Future | None = None
         ticker.every(0.05, self._tick)
 
-    def end(self, status: int = 0) -> None:
-        """Leave with an exit status, once a simulated table has ended its streams if it is to."""
-        self._status, self._waiting_since = status, time.monotonic()
+    def end(self) -> None:
+        """Leave, once a simulated table has ended its streams if it is to."""
+        self._waiting_since = time.monotonic()
         self._farewell = self._client.call_async(Trigger.Request()) if self._finish else Future()
 
     def fail(self, reason: str) -> None:
@@ -71,7 +70,7 @@ class Driving:
         late = time.monotonic() - self._waiting_since > PATIENCE_S
         if self._farewell is not None:
             if self._farewell.done() or not self._finish:
-                self.done.set_result(self._status)
+                self.done.set_result(None)
             elif late:
                 self.fail(f"{self._client.srv_name}: no answer (only a simulated table has an end)")
         elif (angles := self.driver.angles) is not None:

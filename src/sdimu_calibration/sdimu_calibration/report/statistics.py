@@ -5,11 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
+from scipy.special import chdtri, ndtri
 
 from sdimu_calibration.core.arrays import Bools, Floats, Ints
 from sdimu_calibration.core.estimation.navigation_fit import NavigationFit
 from sdimu_calibration.core.evidence.influence import influence
+from sdimu_calibration.core.probability import normal_limit
 
 KINDS = ("position", "velocity", "rate", "force")
 _LAGS = 30
@@ -80,12 +81,12 @@ def whiteness(fit: NavigationFit) -> Whiteness:
         count[row] = np.isfinite(at).sum(axis=0)
         mean[row] = np.where(count[row] > 0, np.nansum(at, axis=0) / np.maximum(3.0 * count[row], 1.0), np.nan)
     dof = 3.0 * np.maximum(count, 1.0)
-    low, high = (stats.chi2.ppf(p, dof) / dof for p in (0.5 - 0.5 * LEVEL, 0.5 + 0.5 * LEVEL))
+    low, high = (chdtri(dof, p) / dof for p in (0.5 + 0.5 * LEVEL, 0.5 - 0.5 * LEVEL))
     middle = np.array([fit.prepared.epochs.end[used & (stop == one)].mean() for one in stops]) / 60.0
     return Whiteness(
         0.5 * (_BINS[1:] + _BINS[:-1]), np.array(density), tuple(e for e, _ in quantiles),
         tuple(f for _, f in quantiles), np.arange(1, _LAGS + 1), correlation,
-        float(stats.norm.ppf(0.5 + 0.5 * LEVEL) / np.sqrt(max(pairs, 1))),
+        float(normal_limit(0.5 - 0.5 * LEVEL) / np.sqrt(max(pairs, 1))),
         middle, stops, mean, low, high,
     )  # fmt: skip
 
@@ -97,7 +98,7 @@ def _quantiles(values: Floats) -> tuple[Floats, Floats]:
         return np.empty(0), np.empty(0)
     middle = np.linspace(0, n - 1, min(n, _QUANTILES)).astype(np.int64)
     rank = np.unique(np.concatenate([np.arange(min(_TAIL, n)), middle, np.arange(max(0, n - _TAIL), n)]))
-    return np.asarray(stats.norm.ppf((rank + 0.5) / n)), np.sort(values)[rank]
+    return np.asarray(ndtri((rank + 0.5) / n)), np.sort(values)[rank]
 
 
 def _autocorrelation(white: Floats, stop: Ints, used: Bools) -> tuple[Floats, int]:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from sdimu_calibration.cli.options import DomainOption
+from sdimu_calibration.cli.options import NOT_TRUSTED, DomainOption
 from sdimu_sim.cli.simulate import EFFECT, TEMPERATURE
 
 if TYPE_CHECKING:
@@ -80,10 +80,12 @@ def run(
             _start(children, options, out / "bag", replace)
             streamed = _watch(console, children, _test(None if adaptive else plan, model, duration))
         wall = time.monotonic() - begun
-        if adaptive is not None:
-            _tell_choices(console, out / "choices.json")
+        end = _tell_choices(console, out / "choices.json") if adaptive is not None else None
         result = _report(console, out, site, imu, model, f"adaptive to {adaptive}" if adaptive else f"plan {plan}")
         _say_measured(console, out, result, streamed, wall)
+    if end is not None and not end["reached"]:
+        typer.echo(f"sdimu: the limits of {adaptive} were not reached: {end['text']}", err=True)
+        raise typer.Exit(NOT_TRUSTED)
 
 
 def _check_choosing(adaptive: str | None, ask: bool, plan: str | None) -> None:
@@ -260,13 +262,15 @@ def _report(console: Console, out: Path, site: str, imu: str, model: str, test_n
     return result
 
 
-def _tell_choices(console: Console, path: Path) -> None:
-    """Print every choice with its reason."""
+def _tell_choices(console: Console, path: Path) -> dict[str, Any]:
+    """Print every choice with its reason, and give the last one, which ended the test."""
     from sdimu_calibration.storage.json_file import read_json
 
-    for choice in read_json(path, "sdimu-choices/1")["choices"]:
+    choices: list[dict[str, Any]] = read_json(path, "sdimu-choices/1")["choices"]
+    for choice in choices:
         text = f"{choice['until_s'] / 60.0:5.1f} min  {choice['text']}"
         console.print(text, soft_wrap=True, markup=False, highlight=False)
+    return choices[-1]
 
 
 def _say_measured(console: Console, out: Path, result: Calibration, streamed: float, wall: float) -> None:

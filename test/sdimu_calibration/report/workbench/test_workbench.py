@@ -59,6 +59,9 @@ def app(bench: FitSession) -> Any:
     return build(shelf(bench))
 
 
+CHOICES = {"shows_at_value": "now", "which_at_value": "one", "against_at_value": "time (s)"}
+
+
 class Page:
     """A page of a browser: it keeps its state and posts what is clicked, as the page's script does."""
 
@@ -102,14 +105,13 @@ class Page:
 
     def shown(self) -> dict[str, Any]:
         """Everything that the page shows: the numbers, then what the candidates say."""
-        numbers = self.post("numbers.children", "state.modified_timestamp")
+        numbers = self.post("numbers.children", "state.modified_timestamp", **CHOICES)
         kept = {"shown_at_data": numbers["shown"]["data"]}
-        return numbers | self.post("verdict.children", "shown.data", **kept) | self.drawn(numbers)
+        return numbers | self.post("verdict.children", "shown.data", **kept)
 
     def drawn(self, shown: dict[str, Any], **choices: Any) -> dict[str, Any]:
         """Heat map and residuals of what is chosen."""
-        usual = {"shows_at_value": "now", "which_at_value": "one", "against_at_value": "time (s)"}
-        return self.post("heat.figure", "shown.data", shown_at_data=shown["shown"]["data"], **{**usual, **choices})
+        return self.post("heat.figure", "looked.data", shown_at_data=shown["shown"]["data"], **{**CHOICES, **choices})
 
     @property
     def verdict(self) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,10 @@ from sdimu_calibration.report.workbench.view import GIVEN, WITH
 
 _SENSORS = 6
 """Channels from here on are measured every second: there is more to see."""
+_CHOICES = ("shows", "against", "which")
+"""Controls that choose what heat map and residuals show."""
+_DRAWN = (Output("heat", "figure"), Output("residuals", "figure"), Output("residuals", "selectedData"))
+"""What `_drawn` gives."""
 
 
 def register(app: Dash, shelf: RecordingCache, doing: TaskProgress) -> None:
@@ -31,21 +36,22 @@ def register(app: Dash, shelf: RecordingCache, doing: TaskProgress) -> None:
 
 
 def _show_states(app: Dash, shelf: RecordingCache, doing: TaskProgress) -> None:
-    """Show what follows from a state alone; what is drawn by choice comes with `_draw`."""
+    """Show what follows from a state. Heat map and residuals come with it: the search that follows takes longer."""
 
     @app.callback(
         Output("title", "children"), Output("numbers", "children"), Output("ladder", "figure"),
         Output("added", "options"), Output("held", "options"), Output("held", "value"), Output("cut", "children"),
         Output("coefficients", "children"), Output("coefficient", "options"), Output("models", "children"),
         Output("recording", "options"), Output("recording", "value"), Output("against", "options"),
-        Output("channel", "value"), Output("stop", "data"), Output("shown", "data"),
+        Output("channel", "value"), Output("stop", "data"), *_DRAWN, Output("shown", "data"),
         Output("message", "children", allow_duplicate=True),
         Input("state", "modified_timestamp"), Input("look", "data"), Kept("state", "data"), Kept("page", "data"),
+        *(Kept(name, "value") for name in _CHOICES),
         running=BUSY, prevent_initial_call="initial_duplicate",
     )  # fmt: skip
-    def show(_when: Any, look: Any, kept: Any, page: Any) -> tuple[Any, ...]:
+    def show(_when: Any, look: Any, kept: Any, page: Any, *choices: str) -> tuple[Any, ...]:
         if not look:
-            return (no_update,) * 17
+            return (no_update,) * 20
         now, told = from_json(kept), ""
         tell = doing.teller(str(page))
         try:
@@ -55,7 +61,8 @@ def _show_states(app: Dash, shelf: RecordingCache, doing: TaskProgress) -> None:
             now, told = State(), f"What this page held cannot be shown: {' '.join(str(error).split())}"
             bench = shelf.bench()
         recording = now.recording or shelf.names[0]
-        return (*_shown(bench, now, recording, shelf.names, look, tell), now.as_json(), told)
+        shown = _shown(bench, now, recording, shelf.names, look, tell)
+        return (*shown, *_drawn(bench, now, choices, None, look, tell), now.as_json(), told)
 
 
 def _shown(
@@ -97,30 +104,39 @@ def cell_of(now: State, fitted: Fitted) -> tuple[int, int]:
 
 
 def _draw(app: Dash, shelf: RecordingCache, doing: TaskProgress) -> None:
-    """Draw heat map and residuals of what was chosen: as given, now, or with the candidate."""
+    """Draw heat map and residuals anew when a choice or the candidate changes."""
 
     @app.callback(
-        Output("heat", "figure"), Output("residuals", "figure"), Output("residuals", "selectedData"),
-        Input("shown", "data"), Input("shows", "value"), Input("against", "value"), Input("which", "value"),
-        Input("looked", "data"), Kept("look", "data"), Kept("page", "data"),
+        *(Output(drawn.component_id, drawn.component_property, allow_duplicate=True) for drawn in _DRAWN),
+        *(Input(name, "value") for name in _CHOICES), Input("looked", "data"),
+        Kept("shown", "data"), Kept("look", "data"), Kept("page", "data"),
         prevent_initial_call=True,
     )  # fmt: skip
-    def draw(
-        kept: Any, shows: Any, against: Any, which: Any, looked: Any, look: Any, page: Any
-    ) -> tuple[Any, Any, Any]:
+    def draw(*given: Any) -> tuple[Any, ...]:
+        *choices, looked, kept, look, page = given
+        if not kept:
+            return (no_update,) * len(_DRAWN)
         now, tell = from_json(kept), doing.teller(str(page))
         bench = shelf.bench(now.recording)
-        try:
-            found = bench.preview(now.now, str(looked), tell) if looked else None
-        except (DataError, UnitError):  # it is in the model now
-            found = None
-        fitted = bench.fit(now.now.given if shows == GIVEN else now.now, tell)
-        channel, stop = cell_of(now, bench.fit(now.now, tell))
-        grid, curve = _chosen(fitted, found, str(shows), str(looked))
-        variable = against if against in fitted.axes else next(iter(fitted.axes))
-        residuals = figures.residuals(fitted, curve, channel, None if which == "all" else stop, variable)
-        heat = figures.heat_map(grid, (channel, stop))
-        return figures.finished(heat, look), figures.finished(residuals, look), None
+        return _drawn(bench, now, choices, looked, look, tell)
+
+
+def _drawn(
+    bench: FitSession, now: State, choices: Sequence[str], looked: str | None, look: Any, tell: Tell
+) -> tuple[Any, Any, None]:
+    """Heat map and residuals of what was chosen: as given, now, or with the candidate; no point is selected."""
+    shows, against, which = choices
+    try:
+        found = bench.preview(now.now, looked, tell) if looked else None
+    except (DataError, UnitError):  # it is in the model now
+        found = None
+    fitted = bench.fit(now.now.given if shows == GIVEN else now.now, tell)
+    channel, stop = cell_of(now, bench.fit(now.now, tell))
+    grid, curve = _chosen(fitted, found, shows, str(looked))
+    variable = against if against in fitted.axes else next(iter(fitted.axes))
+    residuals = figures.residuals(fitted, curve, channel, None if which == "all" else stop, variable)
+    heat = figures.heat_map(grid, (channel, stop))
+    return figures.finished(heat, look), figures.finished(residuals, look), None
 
 
 def _chosen(
