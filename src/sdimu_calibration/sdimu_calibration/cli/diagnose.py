@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -53,6 +54,7 @@ from sdimu_calibration.cli.source_options import (
 )
 
 if TYPE_CHECKING:
+    from sdimu_calibration.cli.next_commands import Asked
     from sdimu_calibration.core.diagnosis.bootstrap import Null
     from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary
     from sdimu_calibration.core.progress import Progress
@@ -144,7 +146,8 @@ def diagnose(
         found = climb(solve(test, wanted, chosen, progress=progress), extra, progress, refits=grow)
     summary = summarise(found)
     folder = out or default_folder(bag, "diagnosis")
-    print_summary(console, summary, Asked.of((bag,), given, folder))
+    about = Asked.of((bag,), given, folder)
+    print_summary(console, summary, about)
     null = None
     if bootstrap:
         with bar(console) as progress:
@@ -152,7 +155,7 @@ def diagnose(
         say(console, f"bootstrap: {null.sentence}")
     with bar(console) as progress:
         trace = traced([bag], sys.argv[1:], site=site, imu=imu, model=model)
-        _write(folder, f"Diagnosis of {bag.name}", summary, null, progress, trace)
+        _write(about, f"Diagnosis of {bag.name}", summary, null, progress, trace)
     more = without_advice(found.after.notes) if found.fit.learns_scatter else found.after.inseparable
     tell(console, (*notes, *(note for note in more if note not in notes)))
     say(console, f"results in {folder}")
@@ -161,10 +164,10 @@ def diagnose(
 
 
 def _write(
-    folder: Path, title: str, summary: DiagnosisSummary, null: Null | None, progress: Progress, trace: Trace
+    about: Asked, title: str, summary: DiagnosisSummary, null: Null | None, progress: Progress, trace: Trace
 ) -> None:
     """Leave diagnosis.json, result.json and report.html."""
-    from sdimu_calibration.cli.next_commands import PLAN, as_plan
+    from sdimu_calibration.cli.next_commands import PLAN, as_plan, spelled
     from sdimu_calibration.report.page import write_report
     from sdimu_calibration.report.report_extras import report_extras
     from sdimu_calibration.storage.diagnosis_file import write_diagnosis
@@ -173,11 +176,14 @@ def _write(
     from sdimu_calibration.storage.whole_file import written_together
 
     found = summary.diagnosis
-    with written_together(folder) as part:
+    with written_together(about.folder) as part:
         write_diagnosis(part / "diagnosis.json", summary, null)
         write_result(part / "result.json", found.after, found.verdict)
         if (plan := as_plan(summary.plan)) is not None:
             write_plan(part / PLAN, plan, ["The plan as the motion showed it, for: sdimu plan --plan"])
         progress("navigation without aid", 0.5)
         more = report_extras(found)
-        write_report(part / "report.html", found.after, title=title, summary=summary, more=more, trace=trace)
+        write_report(
+            part / "report.html", found.after, title=title, summary=summary, more=more, trace=trace,
+            spell=partial(spelled, asked=about),
+        )  # fmt: skip

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from sdimu_calibration.cli.console import command
 from sdimu_calibration.cli.console import say as line
-from sdimu_calibration.cli.next_commands import spelled
+from sdimu_calibration.cli.next_commands import print_advice
 from sdimu_calibration.cli.wide_table import print_table
 from sdimu_calibration.core.diagnosis.verdict import beyond
 from sdimu_calibration.core.units import UnitError, from_si
@@ -37,11 +36,7 @@ def print_summary(console: Console, summary: DiagnosisSummary, asked: Asked) -> 
     _steps(console, summary)
     print_ladder(console, d.rungs)
     _out_of_sight(console, summary)
-    for text in summary.advice:
-        words, whole = spelled(text, asked)
-        line(console, f"advice: {words}")
-        if whole:
-            command(console, whole)
+    print_advice(console, summary.advice, asked)
 
 
 def amount(value: float, unit: str, digits: int = 3) -> str:

@@ -9,7 +9,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from sdimu_calibration.cli.console import command, say
+
 if TYPE_CHECKING:
+    from rich.console import Console
+
     from sdimu_calibration.core.diagnosis.plan_seen import PlanSeen
     from sdimu_calibration.core.plan import Plan
 
@@ -87,6 +91,15 @@ def spelled(advice: str, asked: Asked) -> tuple[str, str]:
     elif rest.startswith("sdimu diagnose BAG"):
         rest = rest.replace("BAG", shlex.quote(str(asked.bags[0])), 1)
     return f"{words}:", rest
+
+
+def print_advice(console: Console, advice: Sequence[str], asked: Asked) -> None:
+    """Print each advice, its command on a line of its own."""
+    for text in advice:
+        words, whole = spelled(text, asked)
+        say(console, f"advice: {words}")
+        if whole:
+            command(console, whole)
 
 
 def as_plan(seen: PlanSeen | None) -> Plan | None:

@@ -6,13 +6,14 @@ import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from sdimu_calibration.cli.console import answer, command, plain, say
-from sdimu_calibration.cli.next_commands import Asked, spelled
+from sdimu_calibration.cli.console import answer, plain, say
+from sdimu_calibration.cli.next_commands import Asked, print_advice, spelled
 from sdimu_calibration.cli.options import leave, tell
 
 if TYPE_CHECKING:
@@ -160,18 +161,17 @@ def diagnose_together(asked: SetRequest, extra: Sequence[Effect]) -> None:
     found, members = diagnosed_set(console, asked, extra)
     after = _with_serial(found.after, members)
     folder = _folder(asked, "diagnosis")
+    about = Asked.of(asked.bags, {"site": asked.site, "imu": asked.imu}, folder)
     with written_together(folder) as part:
         write_set_diagnosis(part / "set.json", found)
         write_result(part / "result.json", after, found.verdict)
-        write_report(part / "report.html", after, title=_title(asked, "Diagnosis"), of_set=found, trace=_trace(asked))
+        write_report(
+            part / "report.html", after, title=_title(asked, "Diagnosis"), of_set=found, trace=_trace(asked),
+            spell=partial(spelled, asked=about),
+        )  # fmt: skip
     _show(console, after)
     say(console, f"{found.verdict}: {found.sentence}")
-    about = Asked.of(asked.bags, {"site": asked.site, "imu": asked.imu}, folder)
-    for text in found.advice:
-        words, whole = spelled(text, about)
-        say(console, f"advice: {words}")
-        if whole:
-            command(console, whole)
+    print_advice(console, found.advice, about)
     say(console, f"results in {folder}")
     answer(folder / "set.json", asked.as_json)
     leave(after)

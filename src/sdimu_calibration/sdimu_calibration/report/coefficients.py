@@ -29,9 +29,12 @@ _TRIADS = ("Gyros", "Accelerometers", "Others")
 
 def coefficients_section(
     calibration: Calibration, fit: Fit | None, truth: Mapping[str, float] | None,
-    reference: Mapping[str, float] | None, draw: Draw,
+    reference: Mapping[str, float] | None, lacking: Sequence[str], draw: Draw,
 ) -> str:  # fmt: skip
-    """Return the table with what belongs to it: prior against posterior, correlations, history, influence of stops."""
+    """Return the table with what belongs to it: prior against posterior, correlations, history, influence of stops.
+
+    `lacking` are the coefficients that the diagnosis found and that these do not have.
+    """
     prior = priors(fit)
     entries = table.rows(calibration, truth, reference, prior)
     copies = {"YAML": as_yaml(entries, calibration.body_frame), "CSV": as_csv(entries)}
@@ -47,8 +50,10 @@ def coefficients_section(
     if len(calibration.history.t):
         told = quiet("Closed-loop pass. Grey: the table turns, no measurements.")
         drawn.append(folded("Sigma of every coefficient against time", told, draw(sigma_history(calibration))))
+    told = f"Of the model as given, which lacks {escape(', '.join(lacking))}: these are off as the first screen says."
     return section(
         "Coefficients",
+        f'<p class="lacking">{told}</p>' if lacking else "",
         f"<p>{buttons}{texts}</p>",
         grouped_table(entries),
         quiet(

@@ -75,7 +75,7 @@ def cell(value: float) -> str:
         return ""
     if abs(value) < 0.05:
         return "0.0"
-    shown = f"{value:+.0f}" if abs(value) >= 9.95 else f"{value:+.1f}"
+    shown = f"{value:.0f}" if abs(value) >= 9.95 else f"{value:.1f}"
     return shown.replace("-", "\N{MINUS SIGN}")
 
 
@@ -122,18 +122,18 @@ def ranking(entries: Sequence[data.Scored], threshold: float) -> Figure:
 
 
 def rungs(names: Sequence[str], values: Sequence[float], height: int = 300) -> Figure:
-    """Draw the held-out error of one model after the other, each with its name and number; the line is right.
+    """Draw how far the held-out error of each model is from 1, each with its name and number.
 
     The axis holds what there is and not zero: beside it a fall of many sigmas looks flat.
     """
     figure = Figure()
-    at = np.arange(len(names))
-    figure.add(
-        "scatter", x=np.array(values), y=at, mode="lines+markers", line={"color": AFTER, "width": 2},
-        marker={"size": 12, "color": [BEFORE, *[AFTER] * (len(names) - 1)],
-                "symbol": ["triangle-up", *["circle"] * (len(names) - 1)]},
-        text=list(names), cliponaxis=False, hovertemplate="%{text}: %{x:.3f} sigma<extra></extra>",
-    )  # fmt: skip
+    for k, (name, value) in enumerate(zip(names, values, strict=True)):
+        color, symbol = (AFTER, "circle") if k else (BEFORE, "triangle-up")
+        figure.add(
+            "scatter", x=[1.0, value], y=[k, k], mode="lines+markers", line={"color": color, "width": 2},
+            marker={"size": [0, 12], "color": color, "symbol": symbol, "opacity": 1.0}, text=[name, name], cliponaxis=False,
+            hovertemplate="%{text}: %{x:.3f} sigma<extra></extra>",
+        )  # fmt: skip
     for k, (name, value) in enumerate(zip(names, values, strict=True)):
         figure.annotate(
             f"<b>{value:.3f}</b>  {name}", x=0, y=k, xref="x domain", xanchor="left", yanchor="bottom", yshift=8,

@@ -6,6 +6,7 @@ A `Verdict` says it in words; the same parts stand on the page of a diagnosis, o
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from html import escape
 
@@ -29,6 +30,9 @@ _WORST = 3
 """Number of coefficients that are named as off, and of pieces of advice that are shown at once."""
 _COMMAND = re.compile(r"(sdimu [a-z-]+(?: --?[\w-]+(?: [A-Z]+\b| '[^']*')?)*|--\w+ '[^']*'(?: --\w+ '[^']*')*)")
 _MINUTES = re.compile(r"\((\d+ min)[^)]*\)")
+
+Spell = Callable[[str], tuple[str, str]]
+"""Parts an advice into words and the whole command that it means; an empty command where it names none."""
 
 
 @dataclass(frozen=True)
@@ -55,8 +59,8 @@ class Verdict:
     cost_title: str = field(default="What it costs to ignore it")
 
 
-def of_diagnosis(summary: DiagnosisSummary) -> Verdict:
-    """Say what a diagnosis found."""
+def of_diagnosis(summary: DiagnosisSummary, spell: Spell | None = None) -> Verdict:
+    """Say what a diagnosis found; `spell` makes whole commands of its advice."""
     d = summary.diagnosis
     named = bool(summary.candidates) and d.verdict != "data fault"
     tone = GOOD if d.adequate else DOUBTFUL if d.verdict == "noise model wrong" else BAD
@@ -66,7 +70,7 @@ def of_diagnosis(summary: DiagnosisSummary) -> Verdict:
         advice = ["Nothing: use the coefficients of this page."]
     costs = _costs(summary)
     title = "What it costs to ignore it" if summary.found else "How well it predicts"
-    return Verdict(tone, head, costs, tuple(map(_told, advice)), title)
+    return Verdict(tone, head, costs, tuple(_told(text, spell) for text in advice), title)
 
 
 def _missing(summary: DiagnosisSummary) -> str:
@@ -133,14 +137,15 @@ def _fit_figures(calibration: Calibration) -> tuple[tuple[str, str], ...]:
     return tuple(out)
 
 
-def of_set(found: SetDiagnosis) -> Verdict:
-    """Say what was found in a set of recordings."""
+def of_set(found: SetDiagnosis, spell: Spell | None = None) -> Verdict:
+    """Say what was found in a set of recordings; `spell` makes whole commands of its advice."""
     tone = GOOD if found.verdict == "consistent" else BAD
     before, after = held_out(found.before), held_out(found.after)
     values = [f"{value:.2f}" for value in dict.fromkeys((before, after)) if np.isfinite(value)]
     costs = ((_ARROW.join(values), "sigma: held-out error, recordings left out; 1 is right"),) if values else ()
     advice = found.advice or ("Nothing: use the coefficients of this page.",)
-    return Verdict(tone, prose(found.sentence), costs, tuple(map(_told, advice)), "What it costs to ignore it")
+    told = tuple(_told(text, spell) for text in advice)
+    return Verdict(tone, prose(found.sentence), costs, told, "What it costs to ignore it")
 
 
 def render(verdict: Verdict, *pictures: str) -> str:
@@ -163,8 +168,13 @@ def render(verdict: Verdict, *pictures: str) -> str:
     )
 
 
-def _told(text: str) -> str:
+def _told(text: str, spell: Spell | None) -> str:
     """Advice as HTML: commands that can be pasted, minutes that stand out."""
+    words, command = (text, "") if spell is None else spell(text)
+    if command:
+        # A browser breaks a line after a hyphen: a word of a command stays whole.
+        whole = " ".join(f"<span>{escape(word)}</span>" for word in command.split(" "))
+        return f'{_told(words, None)} <code class="command">{whole}</code>'
     return _MINUTES.sub(r"<strong>(\1)</strong>", _COMMAND.sub(r"<code>\1</code>", prose(text).replace("&#x27;", "'")))
 
 

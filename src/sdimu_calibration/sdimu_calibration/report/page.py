@@ -45,6 +45,7 @@ def write_report(
     fit: Fit | None = None,
     of_set: SetDiagnosis | None = None,
     trace: Trace | None = None,
+    spell: first_screen.Spell | None = None,
 ) -> None:
     """Write report.html.
 
@@ -70,8 +71,10 @@ def write_report(
         What was found in a set of recordings.
     trace : Trace, optional
         Command, program, files and their hashes.
+    spell : callable, optional
+        Parts an advice into words and the whole command that it means.
     """
-    write_whole(path, page(calibration, title, truth, reference, summary, more, fit, of_set, trace))
+    write_whole(path, page(calibration, title, truth, reference, summary, more, fit, of_set, trace, spell))
 
 
 class _Drawing:
@@ -95,14 +98,15 @@ def page(
     fit: Fit | None = None,
     of_set: SetDiagnosis | None = None,
     trace: Trace | None = None,
+    spell: first_screen.Spell | None = None,
 ) -> str:
     """Make the page as HTML text; parameters as in `write_report`."""
     draw, more = _Drawing(), more or ReportExtras()
     if summary is not None:
         fit = summary.diagnosis.extended
     parts = [
-        _first(calibration, summary, fit, of_set, draw),
-        coefficients_section(calibration, fit, truth, reference, draw),
+        _first(calibration, summary, fit, of_set, spell, draw),
+        coefficients_section(calibration, fit, truth, reference, _lacks(calibration, summary), draw),
         *([] if calibration.of_set is None else set_sections(calibration, calibration.of_set, draw)),
         *([] if summary is None else _evidence(summary, more, draw)),
         rests_section(calibration.rests) if calibration.rests else "",
@@ -121,19 +125,25 @@ def page(
 
 
 def _first(
-    calibration: Calibration, summary: DiagnosisSummary | None, fit: Fit | None, of_set: SetDiagnosis | None, draw: Draw
-) -> str:
+    calibration: Calibration, summary: DiagnosisSummary | None, fit: Fit | None, of_set: SetDiagnosis | None,
+    spell: first_screen.Spell | None, draw: Draw,
+) -> str:  # fmt: skip
     """Verdict, costs, advice, ladder and heat map."""
     if summary is not None:
-        verdict = first_screen.of_diagnosis(summary)
+        verdict = first_screen.of_diagnosis(summary, spell)
         rungs = error_ladder(summary.diagnosis)
         handheld = summary.diagnosis.fit.learns_scatter
         maps = handheld_sections.heat_maps(summary, draw) if handheld else sections.heat_maps(summary.diagnosis, draw)
         return first_screen.render(verdict, _ladder(rungs, draw), maps)
     if of_set is not None:
-        return first_screen.render(first_screen.of_set(of_set))
+        return first_screen.render(first_screen.of_set(of_set, spell))
     maps = sections.heat_map_card([fit.consistency()], draw) if isinstance(fit, NavigationFit) else ""
     return first_screen.render(first_screen.of_fit(calibration), maps)
+
+
+def _lacks(calibration: Calibration, summary: DiagnosisSummary | None) -> tuple[str, ...]:
+    """Name the effects that were found and that the coefficients of the page do not have."""
+    return () if summary is None else tuple(n for n in summary.diagnosis.after.names if n not in calibration.names)
 
 
 def _ladder(rungs: Sequence[tuple[str, float]], draw: Draw) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from contextlib import nullcontext
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 
 STALL_S = 180.0
 DEFAULT_PLAN = "kim18"
+DEFAULT_MODEL = "baseline"
 
 
 def run(
@@ -28,7 +30,7 @@ def run(
         str | None, typer.Option(help="Test plan: name in config/plan or path; kim18. Not with --adaptive.")
     ] = None,
     imu: Annotated[str, typer.Option(help="IMU specification, from which the true errors are drawn.")] = "dtg",
-    model: Annotated[str, typer.Option(help="Model to estimate.")] = "baseline",
+    model: Annotated[str, typer.Option(help="Model to estimate.")] = DEFAULT_MODEL,
     site: Annotated[str, typer.Option(help="Site.")] = "daejeon",
     table: Annotated[str, typer.Option(help="Rate table.")] = "ideal",
     speed: Annotated[float, typer.Option(help="Times real time; 0 is as fast as nothing gets lost.")] = 0.0,
@@ -228,6 +230,7 @@ def _test(plan: str | None, model: str, duration: float) -> Outline:
 
 def _report(console: Console, out: Path, site: str, imu: str, model: str, test_name: str) -> Calibration:
     """Diagnose the bag, print the table with the truth, write diagnosis and page."""
+    from sdimu_calibration.cli.next_commands import Asked, print_advice, spelled
     from sdimu_calibration.core.diagnosis.diagnose import climb
     from sdimu_calibration.core.diagnosis.summary import summarise
     from sdimu_calibration.core.estimation.solve import solve
@@ -250,15 +253,18 @@ def _report(console: Console, out: Path, site: str, imu: str, model: str, test_n
         diagnosis = climb(solve(test, extended_model(model, ())))
         summary, more = summarise(diagnosis), report_extras(diagnosis)
     title = f"Simulated test: {test_name}, model {model}"
+    asked = Asked.of((out / "bag",), {"site": site, "imu": imu, "model": None if model == DEFAULT_MODEL else model}, out)
     with written_together(out) as part:
         write_diagnosis(part / "diagnosis.json", summary)
         write_report(
             part / "report.html", result, title=title, truth=truth, reference=read_reference(), summary=summary,
             more=more, trace=traced([out / "bag"], sys.argv[1:], site=site, imu=imu, model=model),
+            spell=partial(spelled, asked=asked),
         )  # fmt: skip
     shown = rich_table(rows(result, truth, read_reference()), f"body frame: {result.body_frame}")
     console.print(shown, soft_wrap=True)
     console.print(diagnosis.sentence, soft_wrap=True, highlight=False)
+    print_advice(console, summary.advice, asked)
     return result
 
 
