@@ -75,7 +75,7 @@ def cell(value: float) -> str:
         return ""
     if abs(value) < 0.05:
         return "0.0"
-    shown = f"{value:.0f}" if abs(value) >= 9.95 else f"{value:.1f}"
+    shown = f"{value:+.0f}" if abs(value) >= 9.95 else f"{value:+.1f}"
     return shown.replace("-", "\N{MINUS SIGN}")
 
 
