@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 import subprocess
 import zipfile
@@ -56,6 +57,25 @@ def click_cell(page: Any, channel: str, stop: str) -> None:
     page.locator("#heat .js-plotly-plot").click(position={"x": at[0], "y": at[1]})
 
 
+def draw_box(page: Any, left: float, right: float) -> None:
+    """Drag the mouse over the residuals between two places of their horizontal axis."""
+    page.locator("#residuals").evaluate("figure => figure.scrollIntoView({block: 'center'})")
+    frame = page.locator("#residuals .nsewdrag").first.bounding_box()
+    one, other = page.evaluate(
+        "([left, right]) => { const l = document.querySelector('#residuals .js-plotly-plot')._fullLayout;"
+        " return [left, right].map(x => l.xaxis.d2p(x)); }",
+        [left, right],
+    )
+    page.mouse.move(frame["x"] + one, frame["y"] + 2.0)
+    page.mouse.down()
+    # As slowly as a hand: Plotly looks at the box every 50 ms, and tells the page a moment after its end.
+    for share in (0.25, 0.5, 0.75, 1.0):
+        page.wait_for_timeout(100)
+        page.mouse.move(frame["x"] + one + share * (other - one), frame["y"] + 2.0 + share * (frame["height"] - 4.0))
+    page.mouse.up()
+    page.wait_for_timeout(300)
+
+
 def add_first(page: Any) -> None:
     """Look at the first candidate, then add it."""
     click_bar(page, 0)
@@ -65,7 +85,7 @@ def add_first(page: Any) -> None:
 
 def choose(page: Any, field: str, option: str) -> None:
     page.locator(f"#{field}").click()
-    page.get_by_text(option, exact=True).last.click()
+    page.locator(".dash-options-list-option-text").get_by_text(option, exact=True).click()
     page.keyboard.press("Escape")
 
 
@@ -213,6 +233,39 @@ def test_stops_held_out_are_predicted(visit: Callable[[], Any]) -> None:
     page.locator("#numbers", has_text="of what is left out").wait_for()
     settle(page)
     assert "5" not in drawn(page, "heat", "x")
+
+
+def test_points_in_a_box_and_a_fixed_coefficient_give_the_numbers_of_the_command(
+    visit: Callable[[], Any], workbench: Workbench, tmp_path: Path
+) -> None:
+    page = visit()
+    click_cell(page, "accel x", "7")
+    page.locator("#residuals .gtitle", has_text="accel x at stop 7").wait_for()
+    settle(page)
+    times = drawn(page, "residuals", "x")
+    draw_box(page, 0.5 * (times[9] + times[10]), 0.5 * (times[19] + times[20]))
+    page.locator("#leave-points").click()
+    page.locator("#cut", has_text="the times (s)").wait_for()
+    settle(page)
+    begin, end = map(float, re.search(r"([\d.]+)-([\d.]+)", text(page, "cut")).groups())
+    # A residual stands at the end of its epoch of a second.
+    assert begin == pytest.approx(times[10] - 1.0, abs=0.01)
+    assert end == pytest.approx(times[19], abs=0.01)
+
+    choose(page, "coefficient", "gyro_bias_x")
+    page.locator("#mean").fill("0.2 deg/h")
+    page.locator("#mean").blur()
+    page.locator("#fix").click()
+    page.locator("#coefficients tr", has_text="gyro_bias_x").filter(has_text="fixed").wait_for()
+    settle(page)
+
+    home = take_home(page, tmp_path / "home")
+    said = (home / "command.txt").read_text(encoding="utf-8")
+    assert "--exclude-times" in said
+    exported = json.loads((home / "result.json").read_text(encoding="utf-8"))
+    assert_same_numbers(calibrated(workbench, home, tmp_path / "again"), exported)
+    fixed = next(c for c in exported["coefficients"] if c["name"] == "gyro_bias_x")
+    assert fixed["value"] == pytest.approx(math.radians(0.2) / 3600.0, rel=1e-9)
 
 
 def test_every_axis_says_its_unit(visit: Callable[[], Any]) -> None:

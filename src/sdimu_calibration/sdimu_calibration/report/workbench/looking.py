@@ -67,11 +67,11 @@ def _look(app: Dash, shelf: RecordingCache, doing: TaskProgress) -> None:
         by_hand = dash.ctx.triggered_id == "look-own"
         text = own if by_hand else candidate
         if not text:
-            return "Click a bar, or press J.", None, no_update
+            # A redrawn figure loses the points that are selected: drawn anew only where a candidate was shown.
+            return "Click a bar, or press J.", None if looked else no_update, no_update
         try:
             found = shelf.bench(now.recording).preview(now.now, str(text), doing.teller(str(page)))
         except (DataError, UnitError) as error:
             why = f"Not shown: {' '.join(str(error).split())}"
             return "Click a bar, or press J.", None, why if by_hand else no_update
-        del looked
         return parts.candidate(found, named(str(text))), str(text), ""
