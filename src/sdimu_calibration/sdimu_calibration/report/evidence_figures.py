@@ -131,7 +131,8 @@ def rungs(names: Sequence[str], values: Sequence[float], height: int = 300) -> F
         color, symbol = (AFTER, "circle") if k else (BEFORE, "triangle-up")
         figure.add(
             "scatter", x=[1.0, value], y=[k, k], mode="lines+markers", line={"color": color, "width": 2},
-            marker={"size": [0, 12], "color": color, "symbol": symbol, "opacity": 1.0}, text=[name, name], cliponaxis=False,
+            marker={"size": [0, 12], "color": color, "symbol": symbol, "opacity": 1.0},
+            text=[name, name], cliponaxis=False,
             hovertemplate="%{text}: %{x:.3f} sigma<extra></extra>",
         )  # fmt: skip
     for k, (name, value) in enumerate(zip(names, values, strict=True)):

@@ -253,7 +253,8 @@ def _report(console: Console, out: Path, site: str, imu: str, model: str, test_n
         diagnosis = climb(solve(test, extended_model(model, ())))
         summary, more = summarise(diagnosis), report_extras(diagnosis)
     title = f"Simulated test: {test_name}, model {model}"
-    asked = Asked.of((out / "bag",), {"site": site, "imu": imu, "model": None if model == DEFAULT_MODEL else model}, out)
+    named = None if model == DEFAULT_MODEL else model
+    asked = Asked.of((out / "bag",), {"site": site, "imu": imu, "model": named}, out)
     with written_together(out) as part:
         write_diagnosis(part / "diagnosis.json", summary)
         write_report(
