@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -11,7 +12,7 @@ import typer
 
 from sdimu_calibration.cli.console import JsonOption, answer, command, plain, say
 from sdimu_calibration.cli.exclusion_options import ExcludeStops, ExcludeTimes, left_out
-from sdimu_calibration.cli.next_commands import DIAGNOSE, Asked
+from sdimu_calibration.cli.next_commands import DIAGNOSE, Asked, spelled
 from sdimu_calibration.cli.options import (
     EstimatorOption,
     HandOption,
@@ -136,17 +137,19 @@ def calibrate(
     taken = STANDARD_GRAVITY if test.site is None else None
     true = None if truth is None else read_truth(truth, result.body_frame, taken)
     folder = out or default_folder(bag)
+    about = Asked.of((bag,), given, folder)
     with written_together(folder) as part:
         write_result(part / "result.json", result)
         trace = traced([bag], sys.argv[1:], site=site, imu=imu, model=model)
         write_report(
-            part / "report.html", result, title=f"Calibration of {bag.name}", truth=true, fit=fit, trace=trace
-        )
+            part / "report.html", result, title=f"Calibration of {bag.name}", truth=true, fit=fit, trace=trace,
+            spell=partial(spelled, asked=about),
+        )  # fmt: skip
     console.print(rich_table(rows(result, true), f"body frame: {result.body_frame}"), soft_wrap=True)
     tell(console, (*notes, *(note for note in result.notes if note not in notes)))
     if any(DIAGNOSE in note for note in result.notes):
         say(console, "To learn what the model misses:")
-        command(console, Asked.of((bag,), given, folder).command("diagnose"))
+        command(console, about.command("diagnose"))
     say(console, f"results in {folder}")
     answer(folder / "result.json", as_json)
     leave(result)

@@ -35,7 +35,7 @@ def print_summary(console: Console, summary: DiagnosisSummary, asked: Asked) -> 
     _candidates(console, summary)
     _steps(console, summary)
     print_ladder(console, d.rungs)
-    _out_of_sight(console, summary)
+    print_out_of_sight(console, summary)
     print_advice(console, summary.advice, asked)
 
 
@@ -101,7 +101,8 @@ def _steps(console: Console, summary: DiagnosisSummary) -> None:
                 line(console, f"  without it these were wrong: {moved}")
 
 
-def _out_of_sight(console: Console, summary: DiagnosisSummary) -> None:
+def print_out_of_sight(console: Console, summary: DiagnosisSummary) -> None:
+    """Print how many effects could not have been seen, and why."""
     hidden = [r for r in summary.reached if not r.testable]
     if hidden:
         line(console, f"{len(hidden)} of {len(summary.reached)} candidates could not have been seen with this plan:")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import shlex
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -89,7 +89,7 @@ def spelled(advice: str, asked: Asked) -> tuple[str, str]:
         plan = shlex.join(["--plan", str(asked.folder / PLAN), *asked.place])
         rest = rest.replace("--plan YOURS", plan, 1)
     elif rest.startswith("sdimu diagnose BAG"):
-        rest = rest.replace("BAG", shlex.quote(str(asked.bags[0])), 1)
+        rest = rest.replace("sdimu diagnose BAG", replace(asked, bags=asked.bags[:1]).command("diagnose"), 1)
     return f"{words}:", rest
 
 

@@ -21,6 +21,7 @@ def watch(
     from sdimu_calibration.cli.console import console as make_console
     from sdimu_calibration.cli.watch import Outline, Watch
     from sdimu_calibration.core.effects import selection
+    from sdimu_calibration.core.recording import DataError
     from sdimu_calibration.storage.effect_file import extended_model
 
     chosen = extended_model(model, ())
@@ -32,11 +33,18 @@ def watch(
     from sdimu_calibration.nodes.monitor import Monitor
 
     console, begun = make_console(), time.monotonic()
-    console.print(f"watching ROS domain {os.environ.get('ROS_DOMAIN_ID', '0')}; Ctrl-C ends", highlight=False)
+    used = os.environ.get("ROS_DOMAIN_ID", "0")
+    end = f"ends after {seconds:g} s" if seconds else "Ctrl-C ends"
+    console.print(f"watching ROS domain {used}; {end}", highlight=False)
+    heard = False
     monitor = Monitor()
     try:
         with Watch(console, Outline(0.0, 0, [effect.key for effect in effects], units)) as shown:
             while not seconds or time.monotonic() - begun < seconds:
-                shown.show(monitor.listen(0.2), True, time.monotonic() - begun)
+                now = monitor.listen(0.2)
+                heard = heard or now.table_s > 0.0 or now.filter_s > 0.0
+                shown.show(now, True, time.monotonic() - begun)
     finally:
         monitor.close()
+    if not heard:
+        raise DataError(f"ROS domain {used}: nothing heard in {seconds:g} s (is a test running? state its --domain)")

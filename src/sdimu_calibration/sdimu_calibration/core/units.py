@@ -142,7 +142,7 @@ def parse_quantity(text: str | float, expected: str) -> float:
     Parameters
     ----------
     text : str or float
-        Number and unit. A bare number is taken only where a pure number is expected.
+        Number and unit. A bare number is taken only where the expected unit is ``1``.
     expected : str
         A unit of the wanted dimension, for the check and the message.
 
@@ -161,7 +161,7 @@ def parse_quantity(text: str | float, expected: str) -> float:
         raise UnitError(f"'{text}' is not a number with a unit (expected something like '1 {expected}')")
     wanted = parse_unit(expected)
     written = match.group(2)
-    if not written and wanted.dimension:
+    if not written and expected != "1":
         raise UnitError(f"'{text}' has no unit (expected something like '{text} {expected}')")
     unit = parse_unit(written or "1")
     if unit.dimension != wanted.dimension:

@@ -12,6 +12,7 @@ from sdimu_calibration.core.units import from_si
 
 _HEADINGS = ("name", "model", "log-likelihood", "difference", "nis", "held-out", "moved by more than 2 sigma")
 _NOISE = "noise learned"
+_OTHER_STOPS = "the results leave out different stops: their log-likelihoods and errors do not compare"
 _OTHER_SCALE = "not with one site and one noise specification: log-likelihoods and NIS are of different scales"
 _BY_HAND = (
     "held-out: the force of each rest by hand predicted from everything else, in sigmas of the last model; every model "
@@ -58,6 +59,7 @@ def remarks(results: Sequence[Calibration]) -> tuple[str, ...]:
     """Say what the columns mean and where they do not compare, one line each."""
     handheld = [by_hand(result) for result in results]
     return (
+        *([_OTHER_STOPS] if any(_differ(result, results[0], "stops") for result in results[1:]) else []),
         *([_OTHER_SCALE] if any(_differ(result, results[0], "conditions") for result in results[1:]) else []),
         *([_BY_HAND] if all(handheld) else [_TWO_KINDS] if any(handheld) else []),
     )

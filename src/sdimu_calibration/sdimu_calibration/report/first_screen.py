@@ -5,8 +5,6 @@ A `Verdict` says it in words; the same parts stand on the page of a diagnosis, o
 
 from __future__ import annotations
 
-import re
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from html import escape
 
@@ -18,21 +16,18 @@ from sdimu_calibration.core.error_figures import by_hand, held_out, nis
 from sdimu_calibration.core.joint.set_diagnosis import SetDiagnosis
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.units import from_si
+from sdimu_calibration.report.advice import Spell, advice_html
 from sdimu_calibration.report.effect_words import headline_of, title_of
 from sdimu_calibration.report.markup import prose
 from sdimu_calibration.report.table import with_sigma
 
 GOOD, DOUBTFUL, BAD = "good", "doubtful", "bad"
 _MARKS = {GOOD: "\N{CHECK MARK}", DOUBTFUL: "!", BAD: "\N{HEAVY BALLOT X}"}
-_WORDS = {GOOD: "The model is right", DOUBTFUL: "With reservations", BAD: "The model is wrong"}
+_WORDS = {GOOD: "The model explains the data", DOUBTFUL: "With reservations", BAD: "The model is wrong"}
 _ARROW = " \N{RIGHTWARDS ARROW} "
 _WORST = 3
 """Number of coefficients that are named as off, and of pieces of advice that are shown at once."""
-_COMMAND = re.compile(r"(sdimu [a-z-]+(?: --?[\w-]+(?: [A-Z]+\b| '[^']*')?)*|--\w+ '[^']*'(?: --\w+ '[^']*')*)")
-_MINUTES = re.compile(r"\((\d+ min)[^)]*\)")
 
-Spell = Callable[[str], tuple[str, str]]
-"""Parts an advice into words and the whole command that it means; an empty command where it names none."""
 
 
 @dataclass(frozen=True)
@@ -63,14 +58,28 @@ def of_diagnosis(summary: DiagnosisSummary, spell: Spell | None = None) -> Verdi
     """Say what a diagnosis found; `spell` makes whole commands of its advice."""
     d = summary.diagnosis
     named = bool(summary.candidates) and d.verdict != "data fault"
-    tone = GOOD if d.adequate else DOUBTFUL if d.verdict == "noise model wrong" else BAD
+    doubts = d.after.warnings if d.adequate else ()
+    bad = not d.adequate and d.verdict != "noise model wrong"
+    tone = BAD if bad else GOOD if d.adequate and not doubts else DOUBTFUL
     head = _missing(summary) if named else prose(d.sentence)
-    advice = [*(f.text for f in d.findings), *d.noise, *summary.advice]
+    advice = list(dict.fromkeys([*(f.text for f in d.findings), *doubts, *d.noise, *summary.advice]))
     if d.adequate and not advice:
-        advice = ["Nothing: use the coefficients of this page."]
+        advice = ["Use the coefficients of this page."]
+    if d.adequate and summary.untestable:
+        advice.append(_unseen(summary))
     costs = _costs(summary)
     title = "What it costs to ignore it" if summary.found else "How well it predicts"
-    return Verdict(tone, head, costs, tuple(_told(text, spell) for text in advice), title)
+    return Verdict(tone, head, costs, tuple(advice_html(text, spell) for text in advice), title)
+
+
+def _unseen(summary: DiagnosisSummary) -> str:
+    """Say how many effects may be there unseen, and what would show most of them."""
+    hidden, most = [one for one in summary.reached if not one.testable], summary.untestable[0]
+    names = ", ".join(most.labels[:_WORST]) + (" and others" if len(most.labels) > _WORST else "")
+    return (
+        f"{len(hidden)} of {len(summary.reached)} effects could not have been seen in this test, and spoil the "
+        f"coefficients if they are there: {names} ({most.reason})."
+    )
 
 
 def _missing(summary: DiagnosisSummary) -> str:
@@ -106,8 +115,8 @@ def _costs(summary: DiagnosisSummary) -> tuple[tuple[str, str], ...]:
     return tuple(out)
 
 
-def of_fit(calibration: Calibration) -> Verdict:
-    """Say whether a fit fits; what is missing is for a diagnosis to say."""
+def of_fit(calibration: Calibration, spell: Spell | None = None) -> Verdict:
+    """Say whether a fit fits; what is missing is for a diagnosis to say. `spell` makes whole commands of advice."""
     grave, doubts = calibration.not_to_be_trusted, calibration.warnings
     costs = _fit_figures(calibration)
     if grave:
@@ -118,12 +127,11 @@ def of_fit(calibration: Calibration) -> Verdict:
         tone, head = DOUBTFUL, prose(_capital(doubts[0])) + "."
     else:
         tone, head = GOOD, "The model explains the recording as a whole."
-    bag = calibration.origin.recording or "BAG"
-    says = "which effect is missing, and how large it is" if tone == BAD else "whether smaller effects are missing"
-    advice = [f"<code>sdimu diagnose {escape(bag)}</code> says {says}."]
-    if grave:
-        advice.insert(0, "Check the IMU file, the site, units and axes.")
-    return Verdict(tone, head, costs, tuple(advice), "How well it predicts")
+    bag = "BAG" if spell else calibration.origin.recording or "BAG"
+    says = f"Find {'which effect is missing' if tone == BAD else 'out whether smaller effects are missing'}"
+    advice = [*(["Check the IMU file, the site, units and axes."] if grave else []), f"{says}: sdimu diagnose {bag}"]
+    told = tuple(advice_html(text, spell) for text in advice)
+    return Verdict(tone, head, costs, told, "How well it predicts")
 
 
 def _fit_figures(calibration: Calibration) -> tuple[tuple[str, str], ...]:
@@ -144,7 +152,7 @@ def of_set(found: SetDiagnosis, spell: Spell | None = None) -> Verdict:
     values = [f"{value:.2f}" for value in dict.fromkeys((before, after)) if np.isfinite(value)]
     costs = ((_ARROW.join(values), "sigma: held-out error, recordings left out; 1 is right"),) if values else ()
     advice = found.advice or ("Nothing: use the coefficients of this page.",)
-    told = tuple(_told(text, spell) for text in advice)
+    told = tuple(advice_html(text, spell) for text in advice)
     return Verdict(tone, prose(found.sentence), costs, told, "What it costs to ignore it")
 
 
@@ -166,16 +174,6 @@ def render(verdict: Verdict, *pictures: str) -> str:
         f'<section class="card"><h2>What to do next</h2><ol>{shown}</ol>{more}</section></div>'
         f'<div class="pictures">{"".join(picture for picture in pictures if picture)}</div></section>'
     )
-
-
-def _told(text: str, spell: Spell | None) -> str:
-    """Advice as HTML: commands that can be pasted, minutes that stand out."""
-    words, command = (text, "") if spell is None else spell(text)
-    if command:
-        # A browser breaks a line after a hyphen: a word of a command stays whole.
-        whole = " ".join(f"<span>{escape(word)}</span>" for word in command.split(" "))
-        return f'{_told(words, None)} <code class="command">{whole}</code>'
-    return _MINUTES.sub(r"<strong>(\1)</strong>", _COMMAND.sub(r"<code>\1</code>", prose(text).replace("&#x27;", "'")))
 
 
 def _capital(text: str) -> str:

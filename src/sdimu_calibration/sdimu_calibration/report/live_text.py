@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -82,8 +83,12 @@ def best_ranked(ranking: Sequence[Ranked]) -> list[Ranked]:
 
 
 def ladder_rows(ladder: Sequence[ModelError]) -> list[tuple[str, str]]:
-    """Name each model and write its error with one stop left out."""
-    return [(model_name(rung.added), f"{rung.held_out:.4g}") for rung in ladder]
+    """Name each model and write its error with one stop left out, which needs two stops."""
+    known = "{:.4g}".format
+    return [
+        (model_name(rung.added), known(rung.held_out) if math.isfinite(rung.held_out) else "not yet")
+        for rung in ladder
+    ]
 
 
 def told(found: LiveDiagnosis) -> str:

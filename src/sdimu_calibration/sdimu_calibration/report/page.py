@@ -15,6 +15,7 @@ from sdimu_calibration.core.estimation.navigation_fit import NavigationFit
 from sdimu_calibration.core.joint.set_diagnosis import SetDiagnosis
 from sdimu_calibration.core.results import Calibration, without_advice
 from sdimu_calibration.report import data, evidence_figures, experiment, first_screen, handheld_sections, sections
+from sdimu_calibration.report.advice import Spell
 from sdimu_calibration.report.coefficients import coefficients_section
 from sdimu_calibration.report.design.sheet import document
 from sdimu_calibration.report.drawing import html
@@ -45,7 +46,7 @@ def write_report(
     fit: Fit | None = None,
     of_set: SetDiagnosis | None = None,
     trace: Trace | None = None,
-    spell: first_screen.Spell | None = None,
+    spell: Spell | None = None,
 ) -> None:
     """Write report.html.
 
@@ -98,7 +99,7 @@ def page(
     fit: Fit | None = None,
     of_set: SetDiagnosis | None = None,
     trace: Trace | None = None,
-    spell: first_screen.Spell | None = None,
+    spell: Spell | None = None,
 ) -> str:
     """Make the page as HTML text; parameters as in `write_report`."""
     draw, more = _Drawing(), more or ReportExtras()
@@ -108,7 +109,7 @@ def page(
         _first(calibration, summary, fit, of_set, spell, draw),
         coefficients_section(calibration, fit, truth, reference, _lacks(calibration, summary), draw),
         *([] if calibration.of_set is None else set_sections(calibration, calibration.of_set, draw)),
-        *([] if summary is None else _evidence(summary, more, draw)),
+        *([] if summary is None else _evidence(summary, more, spell, draw)),
         rests_section(calibration.rests) if calibration.rests else "",
         noise_section(fit, draw) if isinstance(fit, NavigationFit) else "",
         experiment.data_section(fit, draw) if fit is not None else "",
@@ -126,7 +127,7 @@ def page(
 
 def _first(
     calibration: Calibration, summary: DiagnosisSummary | None, fit: Fit | None, of_set: SetDiagnosis | None,
-    spell: first_screen.Spell | None, draw: Draw,
+    spell: Spell | None, draw: Draw,
 ) -> str:  # fmt: skip
     """Verdict, costs, advice, ladder and heat map."""
     if summary is not None:
@@ -138,7 +139,7 @@ def _first(
     if of_set is not None:
         return first_screen.render(first_screen.of_set(of_set, spell))
     maps = sections.heat_map_card([fit.consistency()], draw) if isinstance(fit, NavigationFit) else ""
-    return first_screen.render(first_screen.of_fit(calibration), maps)
+    return first_screen.render(first_screen.of_fit(calibration, spell), maps)
 
 
 def _lacks(calibration: Calibration, summary: DiagnosisSummary | None) -> tuple[str, ...]:
@@ -154,15 +155,17 @@ def _ladder(rungs: Sequence[tuple[str, float]], draw: Draw) -> str:
     return f'<section class="card"><h2>How far the error falls</h2>{figure}</section>'
 
 
-def _evidence(summary: DiagnosisSummary, more: ReportExtras, draw: Draw) -> list[str]:
+def _evidence(
+    summary: DiagnosisSummary, more: ReportExtras, spell: Spell | None, draw: Draw
+) -> list[str]:
     """Tell what is missing, what it would be confused with, what it does in use, and where it shows."""
     diagnosis = summary.diagnosis
     if diagnosis.fit.learns_scatter:
-        return [*handheld_sections.evidence(summary, draw), sections.confused(summary)]
+        return [*handheld_sections.evidence(summary, draw), sections.confused(summary, spell)]
     candidates, residuals = data.scored(diagnosis), data.residuals(diagnosis)
     return [
         sections.effects(summary, candidates, draw),
-        sections.confused(summary),
+        sections.confused(summary, spell),
         sections.smallest(candidates),
         in_use(more, draw),
         sections.residuals(diagnosis, residuals, more, draw),

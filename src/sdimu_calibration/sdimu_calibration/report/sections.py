@@ -15,6 +15,7 @@ from sdimu_calibration.core.evidence.consistency import Consistency
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.units import from_si
 from sdimu_calibration.report import data, evidence_figures, measured, measured_figures, residual_figures
+from sdimu_calibration.report.advice import Spell, advice_html
 from sdimu_calibration.report.effect_words import effect_of_key, families, family_words, tip, title_of
 from sdimu_calibration.report.markup import Draw, folded, grid, prose, quiet, section, sentence, switched
 from sdimu_calibration.report.report_extras import ReportExtras
@@ -169,7 +170,7 @@ def found_table(summary: DiagnosisSummary) -> str:
     return f'{tried}<div class="wide"><table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>'
 
 
-def confused(summary: DiagnosisSummary) -> str:
+def confused(summary: DiagnosisSummary, spell: Spell | None = None) -> str:
     """Return what each found effect would be confused with, what hangs on it, and what would tell; empty if nothing."""
     rows = []
     for one in summary.found:
@@ -192,7 +193,7 @@ def confused(summary: DiagnosisSummary) -> str:
         '<div class="wide"><table class="words"><thead><tr><th class="text" scope="col">found</th>'
         '<th class="text" scope="col">looks the same in these data</th><th class="text" scope="col">what hangs on it'
         f"</th></tr></thead><tbody>{''.join(rows)}</tbody></table></div>",
-        *(sentence(text) for text in told),
+        *(f"<p>{advice_html(text, spell)}</p>" for text in told),
     )
 
 

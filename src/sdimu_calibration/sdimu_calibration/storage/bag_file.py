@@ -193,7 +193,10 @@ def bag_parts(path: Path) -> list[Path]:
         raise DataError(f"{path}: no such file or folder")
     if path.is_file():
         if path.suffix not in _SUFFIXES:
-            raise DataError(f"{path}: not a bag (expected a rosbag2 folder or a .mcap file)")
+            raise DataError(
+                f"{path}: not a bag (expected a rosbag2 folder or a .mcap file; sdimu import makes one of columns in "
+                "text, MAT and NPZ files)"
+            )
         return [path]
     information = read_metadata(path)
     if _mode(information) or information.get("storage_identifier") == "sqlite3":

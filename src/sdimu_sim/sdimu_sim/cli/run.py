@@ -230,6 +230,7 @@ def _test(plan: str | None, model: str, duration: float) -> Outline:
 
 def _report(console: Console, out: Path, site: str, imu: str, model: str, test_name: str) -> Calibration:
     """Diagnose the bag, print the table with the truth, write diagnosis and page."""
+    from sdimu_calibration.cli.diagnosis_text import print_out_of_sight
     from sdimu_calibration.cli.next_commands import Asked, print_advice, spelled
     from sdimu_calibration.core.diagnosis.diagnose import climb
     from sdimu_calibration.core.diagnosis.summary import summarise
@@ -265,6 +266,7 @@ def _report(console: Console, out: Path, site: str, imu: str, model: str, test_n
     shown = rich_table(rows(result, truth, read_reference()), f"body frame: {result.body_frame}")
     console.print(shown, soft_wrap=True)
     console.print(diagnosis.sentence, soft_wrap=True, highlight=False)
+    print_out_of_sight(console, summary)
     print_advice(console, summary.advice, asked)
     return result
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from sdimu_calibration.core.adaptive import Choice, End, Goals, Menu, choose, fitted, so_far
+from sdimu_calibration.core.adaptive.choice import most_gain
 from sdimu_calibration.core.adaptive.knowledge import OpenClass, ratios
 from sdimu_calibration.core.adaptive.worth import separation, worth
 from sdimu_calibration.core.effects.selection import resolve
@@ -60,6 +61,24 @@ def test_a_test_ends_when_all_limits_hold_and_says_what_lacks_when_time_is_up(kn
     assert not late.reached
     assert "time is up" in late.reason
     assert "of its limit" in late.reason
+
+
+def test_what_the_time_left_can_bring_is_the_gain_of_information_that_grows_as_time():
+    # A sigma that falls as one over the square root of time gains half a nat each time that the time is e-fold.
+    rate = 0.5 * math.log(32.01 / 32.0) / 0.01
+    assert most_gain(rate, 60.0, 28.0) == pytest.approx(0.5 * math.log(60.0 / 32.0), rel=1e-3)
+    assert most_gain(rate, 60.0, 0.0) == 0.0
+    assert most_gain(rate, 60.0, 60.0) == math.inf
+
+
+def test_a_test_that_gains_little_ends_only_where_its_limits_are_out_of_reach(known, monkeypatch):
+    monkeypatch.setattr("sdimu_calibration.core.adaptive.choice._NOTHING_NAT", math.inf)
+    begun = 20.0 / 60.0
+    assert isinstance(choose(known, GOALS, Menu(), GOALS.minutes - begun), Choice)
+    never = Goals("never", {name: 1e-4 * limit for name, limit in GOALS.limits.items()}, 10.0)
+    end = choose(known, never, Menu(), 0.5)
+    assert isinstance(end, End)
+    assert "no move of this table brings more" in end.reason
 
 
 def test_between_the_axes_a_test_only_goes_back_or_on():

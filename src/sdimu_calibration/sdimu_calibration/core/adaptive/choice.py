@@ -22,7 +22,7 @@ FIRST_STOP_S = 20.0
 _DECISION_S = 5.0
 """Time that a stop costs beside its length (s): fit and choice at its end; without it stops would be shortest."""
 _NOTHING_NAT = 0.02
-"""Gain of the best move (nat a minute) below which none is worth its time unless the limits can be reached."""
+"""Gain of the best move (nat/min) below which a test ends that cannot reach its limits: an hour would bring one."""
 _WORDS_NAT = 0.1
 """Gain (nat) from which a reason tells of a class: odds of 1.1 to 1."""
 
@@ -187,13 +187,27 @@ def choose(
         return End(f"the time is up; {_lacking(known, now)}", reached=False)
     # What ends the test soonest comes first, then what brings most a minute.
     best = min(found, key=lambda o: (not o.done, o.ahead.elapsed_s[o.row] if o.done else -o.rate))
-    if not best.done and best.rate < _NOTHING_NAT and _most(best.rate, goals.minutes, minutes_left) < now.lacking[0]:
+    out_of_reach = most_gain(best.rate, goals.minutes, minutes_left) < now.lacking[0]
+    if not best.done and best.rate < _NOTHING_NAT and out_of_reach:
         return End(f"no move of this table brings more; {_lacking(known, now)}", reached=False)
     return _choice(known, best, now, here, menu)
 
 
-def _most(rate: float, minutes: float, left: float) -> float:
-    """Bound what the time that is left can bring (nat): information grows as time at best, and a gain is its log."""
+def most_gain(rate: float, minutes: float, left: float) -> float:
+    """Bound what the time that is left can bring: information grows as time at best, and a gain is its logarithm.
+
+    Parameters
+    ----------
+    rate : float
+        What the best move brings now (nat/min).
+    minutes, left : float
+        Whole length of the test, and what is left of it (min).
+
+    Returns
+    -------
+    float
+        In nat; infinite at the start of the test.
+    """
     done = minutes - left
     return math.inf if done <= 0.0 else rate * done * math.log(minutes / done)
 

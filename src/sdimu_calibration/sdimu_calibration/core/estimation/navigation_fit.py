@@ -25,6 +25,7 @@ from sdimu_calibration.core.estimation.free_inertial import (
     free_inertial_runs,
 )
 from sdimu_calibration.core.estimation.noise_estimate import NoiseEstimate
+from sdimu_calibration.core.estimation.stated_prior import contradicted
 from sdimu_calibration.core.evidence.consistency import Consistency, check
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.evidence.navigation_evidence import (
@@ -367,8 +368,10 @@ class NavigationFit(Fit):
         return (*out, *([worst] if worst else []), *self.beyond_specification()[:1])
 
     def beyond_specification(self) -> list[str]:
-        """Name coefficients far outside the IMU's file, one line each, the furthest first."""
-        return outside(self.setup.sensors, self.settled)
+        """Name stated priors that contradict the data, then coefficients far outside the IMU's file; one line each."""
+        sensors = self.setup.sensors
+        against = contradicted(sensors, self.settled, self.settled_covariance)
+        return against + outside(sensors, self.settled)
 
     def free_inertial(self, rivals: Sequence[tuple[str, Fit]]) -> tuple[FreeInertialRun, ...]:
         """Navigate without aid, with this fit and with `rivals` (name, fit), on parts that no fit has seen.

@@ -1,0 +1,49 @@
+"""A prior that the model states may be wrong: how far the data pull its coefficient away from it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sdimu_calibration.core.arrays import Floats
+from sdimu_calibration.core.effects.imu_model import ImuModel
+from sdimu_calibration.core.units import from_si
+
+_PULL = 4.5
+"""Distance (sigma) from which a prior contradicts the data: chance puts one in 150 000 there."""
+_LEAST = 1e-9
+"""Part of a prior's variance (1) that a fit has to take away at least: below it the data say nothing, and rounding
+decides."""
+
+
+def contradicted(sensors: ImuModel, estimate: Floats, covariance: Floats) -> list[str]:
+    """Name the stated priors that contradict the data, one line each, the worst first.
+
+    The difference of posterior and prior mean has the variance that the fit takes away from the prior.
+
+    Parameters
+    ----------
+    sensors : ImuModel
+        q parameters.
+    estimate : ndarray, shape (q,)
+        SI.
+    covariance : ndarray, shape (q, q)
+        Of the estimate (SI).
+
+    Returns
+    -------
+    list of str
+    """
+    prior, variance = sensors.prior, np.diag(covariance)
+    taken = np.maximum(prior**2 - variance, _LEAST * prior**2)
+    told = sensors.restated & (prior > 0.0)
+    pull = np.divide(np.abs(estimate - sensors.mean), np.sqrt(taken), out=np.zeros(len(prior)), where=told)
+    out = []
+    for k in np.argsort(-pull):
+        if pull[k] > _PULL:
+            unit = sensors.parameters[k].display_unit
+            mean, sigma, found = (from_si(float(v[k]), unit) for v in (sensors.mean, prior, estimate))
+            out.append(
+                f"the stated prior of {sensors.names[k]} ({mean:.4g} +- {sigma:.3g} {unit}) contradicts the data: they "
+                f"say {found:.4g} {unit}, {pull[k]:.0f} sigma away; correct that prior, or leave it out"
+            )
+    return out
