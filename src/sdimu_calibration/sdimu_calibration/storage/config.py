@@ -362,7 +362,7 @@ def load_model(name_or_path: str | Path) -> Model:
 
 def _stated_prior(where: str, name: str, one: _PriorFile) -> StatedPrior:
     (mean, unit), (sigma, other) = one.value, one.sigma
-    if parse_unit(unit).dimension != parse_unit(other).dimension:
+    if parse_unit(unit).dimension != parse_unit(other).dimension or (unit == "1") != (other == "1"):
         raise DataError(f"{where}: value and sigma have different units, '{unit}' and '{other}'")
     return StatedPrior(name, mean, sigma, unit)
 

@@ -200,7 +200,9 @@ def climb(
     request = Request(fit, tuple(extra), alpha, wander, frozenset(without))
     done = search_until_stable(request, progress)
     final = in_doubt(fit, done.fit, done.evidence, done.found.chosen, done.free, done.found.scale)
-    findings = (*screen(fit), *(Finding(text, grave=False) for text in final.beyond_specification()))
+    # Beside what was found a prior may no longer stand against the data: the fit of the model as given tells it.
+    odd = [*fit.contradicted_priors(), *final.beyond_specification()]
+    findings = (*screen(fit), *(Finding(text, grave=False) for text in odd))
     findings += () if final.converged else (Finding(NOT_CONVERGED, grave=True),)
     progress("report", 0.9)
     if fit.learns_scatter:

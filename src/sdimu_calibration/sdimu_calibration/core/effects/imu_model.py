@@ -189,8 +189,7 @@ def restate(sensors: ImuModel, priors: Sequence[StatedPrior]) -> ImuModel:
             raise DataError(f"priors.{one.name}: the model has no such coefficient ({hint})")
         k = sensors.names.index(one.name)
         unit = sensors.parameters[k].display_unit
-        if parse_unit(one.unit).dimension != parse_unit(unit).dimension:
-            raise DataError(f"priors.{one.name}: '{one.unit}' is a wrong unit (expected something like '1 {unit}')")
+        _check_unit(f"priors.{one.name}", one.unit, unit)
         if not one.sigma >= 0.0 or not np.isfinite([one.mean, one.sigma]).all():
             raise DataError(f"priors.{one.name}: expected a value, and a sigma above zero, or zero to fix it")
         if restated[k]:
@@ -212,10 +211,15 @@ def _check_priors(chosen: Sequence[Effect], imu: ImuSpecification) -> None:
             near = difflib.get_close_matches(name, units, n=1)
             hint = f"did you mean {near[0]}?" if near else "the prior of an effect of your own stands in its own file"
             raise DataError(f"IMU '{imu.name}': prior.{name}: no effect of this name ({hint})")
-        if parse_unit(unit).dimension != parse_unit(units[name]).dimension:
-            raise DataError(
-                f"IMU '{imu.name}': prior.{name}: '{unit}' is a wrong unit (expected something like '1 {units[name]}')"
-            )
+        _check_unit(f"IMU '{imu.name}': prior.{name}", unit, units[name])
+
+
+def _check_unit(where: str, unit: str, expected: str) -> None:
+    """Refuse a wrong unit, and none where the expected one is more than a number: 40 is not 40 ppm."""
+    if unit == "1" and expected != "1":
+        raise DataError(f"{where}: has no unit (expected something like '1 {expected}')")
+    if parse_unit(unit).dimension != parse_unit(expected).dimension:
+        raise DataError(f"{where}: '{unit}' is a wrong unit (expected something like '1 {expected}')")
 
 
 def told_apart(effects: Sequence[Effect]) -> tuple[Effect, ...]:

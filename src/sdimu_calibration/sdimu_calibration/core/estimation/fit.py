@@ -254,6 +254,10 @@ class Fit(ABC):
         """Name coefficients far outside the IMU's file, one line each, the furthest first."""
         return []
 
+    def contradicted_priors(self) -> list[str]:
+        """Name stated priors that contradict the data, one line each, the worst first."""
+        return []
+
     def dwell_means(self, effect: Effect) -> Floats:
         """Mean of the regressors (SI) of a drift of a bias over all dwells; zero where biases are not their means.
 

@@ -365,13 +365,15 @@ class NavigationFit(Fit):
             text = f"NIS {nis:.3f}" + ("" if held_out is None else f", held-out error {held_out:.3f}")
             out.append(f"the model does not fit ({text}; 1 is right){in_turn}; run: sdimu diagnose")
         worst = stop_misfit(self.last.output.normalised, self.prepared)
-        return (*out, *([worst] if worst else []), *self.beyond_specification()[:1])
+        return (*out, *([worst] if worst else []), *self.contradicted_priors()[:1], *self.beyond_specification()[:1])
 
     def beyond_specification(self) -> list[str]:
-        """Name stated priors that contradict the data, then coefficients far outside the IMU's file; one line each."""
-        sensors = self.setup.sensors
-        against = contradicted(sensors, self.settled, self.settled_covariance)
-        return against + outside(sensors, self.settled)
+        """Name coefficients far outside the IMU's file, one line each, the furthest first."""
+        return outside(self.setup.sensors, self.settled)
+
+    def contradicted_priors(self) -> list[str]:
+        """Name stated priors that contradict the data, one line each, the worst first."""
+        return contradicted(self.setup.sensors, self.settled, self.settled_covariance)
 
     def free_inertial(self, rivals: Sequence[tuple[str, Fit]]) -> tuple[FreeInertialRun, ...]:
         """Navigate without aid, with this fit and with `rivals` (name, fit), on parts that no fit has seen.
