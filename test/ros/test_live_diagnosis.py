@@ -216,3 +216,15 @@ def test_a_running_test_is_watched(whole: LiveDiagnosis) -> None:
     assert out.startswith("watching ROS domain ")
     (line,) = (line for line in out.splitlines() if line.startswith("diagnosis of stop 5: misfit"))
     assert EFFECT in line
+
+
+@pytest.mark.ros
+def test_a_domain_without_a_test_is_told_after_the_time_to_watch() -> None:
+    nobody = 1 + (int(os.environ["ROS_DOMAIN_ID"]) + 50) % 100
+    watching = sdimu("watch", "--domain", nobody, "--for", 2)
+    try:
+        _, err = watching.communicate(timeout=DEADLINE_S)
+    finally:
+        watching.kill()
+    assert watching.returncode == 1
+    assert f"ROS domain {nobody}: nothing heard in 2 s" in err

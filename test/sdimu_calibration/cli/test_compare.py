@@ -132,3 +132,9 @@ def test_one_folder_is_not_enough(run):
     status, _, err = run(FIRST)
     assert status == 1
     assert "two" in err
+
+
+def test_results_that_leave_out_different_stops_are_told_to_be_no_match(run):
+    first = replace(FIRST, data={**FIRST.data, "stops": 19.0})
+    assert "leave out different stops" in run(first, replace(SECOND, data={**SECOND.data, "stops": 18.0}))[1]
+    assert "leave out different stops" not in run(first, replace(SECOND, data=first.data))[1]

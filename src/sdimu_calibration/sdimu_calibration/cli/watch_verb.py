@@ -36,15 +36,12 @@ def watch(
     used = os.environ.get("ROS_DOMAIN_ID", "0")
     end = f"ends after {seconds:g} s" if seconds else "Ctrl-C ends"
     console.print(f"watching ROS domain {used}; {end}", highlight=False)
-    heard = False
     monitor = Monitor()
     try:
         with Watch(console, Outline(0.0, 0, [effect.key for effect in effects], units)) as shown:
             while not seconds or time.monotonic() - begun < seconds:
-                now = monitor.listen(0.2)
-                heard = heard or now.table_s > 0.0 or now.filter_s > 0.0
-                shown.show(now, True, time.monotonic() - begun)
+                shown.show(monitor.listen(0.2), True, time.monotonic() - begun)
     finally:
         monitor.close()
-    if not heard:
+    if not monitor.progress.heard:
         raise DataError(f"ROS domain {used}: nothing heard in {seconds:g} s (is a test running? state its --domain)")

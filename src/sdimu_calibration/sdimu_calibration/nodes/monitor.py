@@ -44,6 +44,8 @@ class Progress:
         Of the same stop.
     diagnosis : SeenDiagnosis
         The newest one; of stop -1 before the first.
+    heard : bool
+        Any message has come.
     """
 
     stop: int = 0
@@ -55,6 +57,7 @@ class Progress:
     nis: dict[str, float] = field(default_factory=dict)
     verdict: str = ""
     diagnosis: SeenDiagnosis = field(default_factory=SeenDiagnosis)
+    heard: bool = False
 
 
 class Monitor:
@@ -88,6 +91,7 @@ class Monitor:
         self._context.try_shutdown()
 
     def _take_status(self, message: DiagnosticArray) -> None:
+        self.progress.heard = True
         entry = phase_entry(stamp_ns(message), *first_entry(message))
         if entry is None:
             return
@@ -99,6 +103,7 @@ class Monitor:
         self.progress.table_s = (stamp - self._start_ns) / NS
 
     def _take_coefficients(self, message: JointState) -> None:
+        self.progress.heard = True
         if self._start_ns is not None:
             self.progress.filter_s = (to_ns(message.header.stamp) - self._start_ns) / NS
         self.progress.sigmas = dict(zip(message.name, message.effort, strict=True))
@@ -106,6 +111,7 @@ class Monitor:
             self.progress.first = dict(self.progress.sigmas)
 
     def _take_diagnostics(self, message: DiagnosticArray) -> None:
+        self.progress.heard = True
         for status in message.status:
             values = {entry.key: entry.value for entry in status.values}
             if status.name == "calibration" and "verdict" in values:
@@ -114,9 +120,11 @@ class Monitor:
                 self.progress.nis = {key.removeprefix(_NIS): float(value) for key, value in nis.items()}
 
     def _take_heat_map(self, message: Float64MultiArray) -> None:
+        self.progress.heard = True
         self.progress.diagnosis = seen_heat_map(message, self.progress.diagnosis)
 
     def _take_diagnosis(self, message: DiagnosticArray) -> None:
+        self.progress.heard = True
         self.progress.diagnosis = seen_diagnosis(message, self.progress.diagnosis)
 
 

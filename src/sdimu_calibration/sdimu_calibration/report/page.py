@@ -24,7 +24,7 @@ from sdimu_calibration.report.report_extras import ReportExtras
 from sdimu_calibration.report.rests_section import rests_section
 from sdimu_calibration.report.set_sections import set_sections
 from sdimu_calibration.report.statistics_section import noise_section
-from sdimu_calibration.report.traceability import traceability
+from sdimu_calibration.report.traceability import recorded, traceability
 from sdimu_calibration.report.use_section import in_use
 from sdimu_calibration.storage.trace import Trace
 from sdimu_calibration.storage.whole_file import write_whole
@@ -176,7 +176,8 @@ def _under(calibration: Calibration) -> str:
     """Say which recording it is of, beside the title."""
     origin, counts = calibration.origin, calibration.data
     words = [
-        origin.recording, f"{counts['duration_s'] / 60.0:.1f} min" if "duration_s" in counts else "",
+        origin.recording, recorded(origin.start_ns),
+        f"{counts['duration_s'] / 60.0:.1f} min" if "duration_s" in counts else "",
         f"IMU {origin.imu}" if origin.imu else "", *origin.words, origin.site,
     ]  # fmt: skip
     return escape(" \N{MIDDLE DOT} ".join(word for word in words if word))

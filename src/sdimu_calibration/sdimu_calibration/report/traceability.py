@@ -23,7 +23,7 @@ def traceability(calibration: Calibration, trace: Trace | None) -> str:
     numbers = [f"{counts[key]:.0f} {key}" for key in ("stops", "samples", "lost", "rejected") if key in counts]
     heat = f"{origin.temperature_degc:.1f} deg C" if origin.temperature_degc == origin.temperature_degc else ""
     rows = [
-        ("recording", escape(origin.recording)), ("recorded", escape(_date(origin.start_ns))),
+        ("recording", escape(origin.recording)), ("recorded", escape(recorded(origin.start_ns))),
         ("content", escape(", ".join(word for word in (length, *numbers, heat) if word))),
         *(("SHA-256", f"<code>{escape(digest)}</code><br><code>{escape(path)}</code>") for path, digest in
           (trace.files if trace else ())),
@@ -40,5 +40,6 @@ def _facts(rows: Sequence[tuple[str, str]]) -> str:
     return f'<dl class="facts">{lines}</dl>'
 
 
-def _date(start_ns: int) -> str:
+def recorded(start_ns: int) -> str:
+    """Say when a recording began; empty where its stamps do not tell."""
     return datetime.fromtimestamp(1e-9 * start_ns, UTC).strftime("%Y-%m-%d %H:%M:%S UTC") if start_ns else ""

@@ -98,6 +98,8 @@ class Missing:
     sentence : str
     left : FreeInputTest
         Of the free inputs.
+    held_out : float or None
+        Error at stops or rests held out (sigma), as `sdimu calibrate` has it.
     """
 
     entries: tuple[data.Scored, ...]
@@ -105,6 +107,7 @@ class Missing:
     adequate: bool
     sentence: str
     left: FreeInputTest
+    held_out: float | None
 
 
 @dataclass(frozen=True)
@@ -165,7 +168,7 @@ class FitSession:
                 scores = self._survey(setting, tell)
                 found = Missing(
                     tuple(data.scored(scores)), scores.found.threshold, scores.adequate, scores.sentence,
-                    scores.free_inputs_after,
+                    scores.free_inputs_after, scores.fit.held_out_rms(),
                 )  # fmt: skip
                 _keep(self._missing, setting, found)
             return self._missing[setting]

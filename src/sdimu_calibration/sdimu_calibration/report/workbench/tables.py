@@ -73,7 +73,7 @@ def coefficients(given: Fitted, now: Fitted, setting: Setting) -> Any:
     first, here = given.calibration, now.calibration
     sigma, at = np.sqrt(np.diag(here.covariance)), {name: k for k, name in enumerate(first.names)}
     changed = {name for name, _, _ in setting.priors}
-    headings = ("coefficient", "value", "sigma", "unit", "prior", "state", "as given", "moved (sigma)")
+    headings = ("coefficient", "value", "sigma", "unit", "prior", "state", "as given", "moved (sigma as given)")
     rows = []
     for k, name in enumerate(here.names):
         unit = here.display_units[k]
@@ -81,9 +81,10 @@ def coefficients(given: Fitted, now: Fitted, setting: Setting) -> Any:
             from_si(float(v), unit) for v in (here.values[k], sigma[k], now.prior[k], now.mean[k])
         )
         before, moved = "", ""
-        if name in at and sigma[k] > 0.0:
+        if name in at and sigma[k] > 0.0 and first.covariance[at[name], at[name]] > 0.0:
             before = as_far([from_si(float(first.values[at[name]]), unit)], spread)[0]
-            moved = f"{(here.values[k] - first.values[at[name]]) / sigma[k]:+.1f}"
+            j = at[name]
+            moved = f"{(here.values[k] - first.values[j]) / np.sqrt(first.covariance[j, j]):+.1f}"
         known = f"{value:.6g}" if now.prior[k] == 0.0 else "0"
         numbers = as_far([value, spread], spread) if spread > 0.0 else [known, "0"]
         state = "fixed" if now.prior[k] == 0.0 else "by the frame" if not sigma[k] > 0.0 else "free"
