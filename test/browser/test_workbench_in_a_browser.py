@@ -106,7 +106,7 @@ def take_home(page: Any, to: Path) -> Path:
 def calibrated(workbench: Workbench, home: Path, out: Path) -> dict[str, Any]:
     """Result of the command that was taken home."""
     said = (home / "command.txt").read_text(encoding="utf-8").splitlines()[0].split()
-    assert said[:3] == ["sdimu", "calibrate", workbench.bag.name]
+    assert said[:3] == ["sdimu", "calibrate", str(workbench.bag.resolve())]
     options = [str(home / word) if word == "model.yaml" else word for word in said[3:]]
     command = sdimu("calibrate", workbench.bag, *options, "--out", out)
     subprocess.run(command, check=True, capture_output=True, timeout=START_S)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -49,6 +50,7 @@ def workbench(
     gyro_sign: GyroSign = None,
 ) -> None:
     """Open recordings in the browser; runs until it is stopped with Ctrl-C."""
+    given = {name: value for name, value in locals().items() if name != "model"}
     import logging
     import socket
     from collections.abc import Callable, Mapping
@@ -56,6 +58,7 @@ def workbench(
 
     from werkzeug.serving import make_server
 
+    from sdimu_calibration.cli.next_commands import Asked
     from sdimu_calibration.cli.progress import bar
     from sdimu_calibration.cli.set_bench import bench_of_set
     from sdimu_calibration.core.recording import DataError
@@ -76,7 +79,7 @@ def workbench(
     origin = source(
         imu_topic, status_topic, joint_topic, temperature_topic, accel_unit, gyro_unit, accel_sign, gyro_sign
     )
-    bag, judge = single(bags, set_file), None
+    bag, judge, around = single(bags, set_file), None, dict[str, Path]()
     openers: Mapping[str, Callable[[], PreparedTest]]
     if bag is None:
         openers, wanted, judge = bench_of_set(bags or [], set_file, model, site, imu, origin)
@@ -87,7 +90,7 @@ def workbench(
     def session(name: str) -> FitSession:
         return FitSession(navigated(name, openers[name]()), wanted)
 
-    shelf = RecordingCache(list(openers), session)
+    shelf = RecordingCache(list(openers), session, around, Asked.of((), given, Path()).options)
     console = plain()
     with bar(plain(stderr=True)) as progress:
         progress("reading", 0.0)

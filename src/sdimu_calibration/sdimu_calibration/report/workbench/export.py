@@ -7,6 +7,7 @@ import json
 import shlex
 import tempfile
 import zipfile
+from collections.abc import Sequence
 from pathlib import Path
 
 import yaml
@@ -68,16 +69,18 @@ def _in_si(prior: StatedPrior) -> dict[str, str]:
     return {"value": f"{prior.mean / factor!r} {prior.unit}", "sigma": f"{prior.sigma / factor!r} {prior.unit}"}
 
 
-def command(setting: Setting, bag: str) -> str:
+def command(setting: Setting, bag: str, options: Sequence[str] = ()) -> str:
     """Command that gives the same numbers, for the folder in which the archive is unpacked.
 
     Parameters
     ----------
     setting : Setting
     bag : str
-        Name of the recording.
+        Place or name of the recording.
+    options : sequence of str
+        Words that say how it is opened.
     """
-    out = ["sdimu", "calibrate", shlex.quote(bag), "--model", "model.yaml"]
+    out = ["sdimu", "calibrate", shlex.quote(bag), "--model", "model.yaml", *map(shlex.quote, options)]
     if setting.held:
         out += ["--exclude-stops", ",".join(map(str, setting.held))]
     if setting.cut:
@@ -85,7 +88,9 @@ def command(setting: Setting, bag: str) -> str:
     return " ".join(out)
 
 
-def archive(model: Model, state: State, final: Diagnosis, recording: str) -> bytes:
+def archive(
+    model: Model, state: State, final: Diagnosis, recording: str, place: str = "", options: Sequence[str] = ()
+) -> bytes:
     """Return a zip with model, result, report, the session, and the command that gives the same numbers."""
     with tempfile.TemporaryDirectory() as folder:
         root = Path(folder)
@@ -93,7 +98,7 @@ def archive(model: Model, state: State, final: Diagnosis, recording: str) -> byt
         write_report(root / "report.html", final.after, title=f"Workbench: {recording}", summary=summarise(final))
         texts = model_files(model, state.now) | {
             "session.json": json.dumps(state.as_json(), indent=1),
-            "command.txt": f"{command(state.now, recording)}\n(with the --site and --imu of the workbench)\n",
+            "command.txt": f"{command(state.now, place or recording, options)}\n",
         }
         for name, text in texts.items():
             (root / name).write_text(text, encoding="utf-8")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from threading import Lock
 
@@ -22,10 +22,18 @@ class RecordingCache:
         The first is the one a fresh page shows.
     make : callable
         Opens the recording of a name; raises DataError.
+    places : mapping of str to Path, optional
+        Where they are; a command that is taken home names a recording without a place by its name.
+    options : sequence of str
+        Words of the command line that say how they are opened.
     """
 
-    def __init__(self, names: Sequence[str], make: Callable[[str], FitSession]) -> None:
-        self._names, self._make = tuple(names), make
+    def __init__(
+        self, names: Sequence[str], make: Callable[[str], FitSession], places: Mapping[str, Path] | None = None,
+        options: Sequence[str] = (),
+    ) -> None:  # fmt: skip
+        self._names, self._make, self._places = tuple(names), make, places or {}
+        self.options = tuple(options)
         self._open: dict[str, FitSession] = {}
         self._lock = Lock()
 
@@ -33,6 +41,11 @@ class RecordingCache:
     def names(self) -> list[str]:
         """All names, the first one shown first."""
         return list(self._names)
+
+    def place(self, name: str) -> str:
+        """Where the recording of a name is, as a command takes it; the first one's when no name is given."""
+        wanted = name or self.names[0]
+        return str(self._places.get(wanted, wanted))
 
     def bench(self, name: str = "") -> FitSession:
         """Return the bench of a recording; the first one's when no name is given.

@@ -58,7 +58,8 @@ def _pack_exports(app: Dash, shelf: RecordingCache, doing: TaskProgress) -> None
             bench = shelf.bench(now.recording)
             final = bench.final(now.now, tell)
             tell("report", 0.8)
-            packed = archive(bench.model, now, final, now.recording or shelf.names[0])
+            name = now.recording or shelf.names[0]
+            packed = archive(bench.model, now, final, name, shelf.place(name), shelf.options)
         except (DataError, UnitError) as error:
             return no_update, f"Not done: {' '.join(str(error).split())}"
         return dcc.send_bytes(packed, "calibration.zip"), ""
