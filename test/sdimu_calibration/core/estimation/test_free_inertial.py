@@ -111,3 +111,19 @@ def test_a_recording_of_minutes_has_nothing_to_spare(setup, site):
     prepared = reduce(nominal_recording(plan_of(30.0, TURNS[:1]), site), setup)
     with pytest.raises(DataError, match="too short"):
         holdout_segments(prepared)
+
+
+def test_all_models_start_from_the_azimuth_of_the_model_with_what_was_found(setup, site, imu):
+    recording = nominal_recording(plan_of(180.0), site)
+    # What the base model lacks turns its azimuth: half of it is a scale factor, the other half is not.
+    asymmetry = 40e-6 * np.abs(recording.omega_ib_b[:, 1])
+    omega = recording.omega_ib_b + np.column_stack([0.0 * asymmetry, asymmetry, 0.0 * asymmetry])
+    test = PreparedTest(replace(recording, omega_ib_b=omega), imu, site)
+    lacking = solve(test, setup.model, "filter")
+    found = solve(test, Model((*setup.model.effects, "gyro_scale_asymmetry_y")), "filter")
+    for together, alone in zip(
+        lacking.free_inertial([("with what was found", found)]), found.free_inertial([]), strict=True
+    ):
+        assert [d.name for d in together.drifts] == [NOTHING, "model as given", "with what was found"]
+        for one, other in ((together.drifts[0], alone.drifts[0]), (together.drifts[2], alone.drifts[1])):
+            np.testing.assert_array_equal(one.position, other.position)

@@ -383,8 +383,9 @@ class NavigationFit(Fit):
         DataError
             When there is no such part.
         """
-        navigators = [(name, fit) for name, fit in rivals if isinstance(fit, NavigationFit)]
-        return free_inertial_runs(self.prepared, [("model as given", self), *navigators], self.known.output)
+        fits = [("model as given", self), *((name, fit) for name, fit in rivals if isinstance(fit, NavigationFit))]
+        # A model that lacks an effect has a wrong azimuth, too: all start from that of the last, which knows most.
+        return free_inertial_runs(self.prepared, fits, fits[-1][1].known.output)
 
     def _rows_of_history(self, rows: Ints, output: PassOutput, values: Floats, covariance: Floats) -> History:
         """History at epochs (k,), with values (k, p) and covariance (k, p, p) in the frame of the report."""
