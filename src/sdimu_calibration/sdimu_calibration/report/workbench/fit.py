@@ -194,8 +194,13 @@ class FitSession:
             return Preview(effects[0], what, data.residuals(chosen))
 
     def objections(self, setting: Setting, tell: Tell = silent) -> tuple[str, ...]:
-        """Say what speaks against a fit, and against each of its effects beside the fit with those before it."""
-        out = [line.partition("; run:")[0] for line in self.fit(setting, tell).calibration.warnings]
+        """Say what speaks against the effects of a setting, each against the fit with those before it.
+
+        Where no candidate stands out, the warnings about the fit come first; a verdict that names some needs none.
+        """
+        clean = self.missing(setting, tell).adequate
+        warnings = self.fit(setting, tell).calibration.warnings if clean else ()
+        out = [line.partition("; run:")[0] for line in warnings]
         for count in range(1, len(setting.added) + 1):
             below, here = self.fit(setting.rung(count - 1), tell), self.fit(setting.rung(count), tell)
             out += objections(

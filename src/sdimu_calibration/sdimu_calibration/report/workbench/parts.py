@@ -36,10 +36,9 @@ def verdict(missing: Missing, objections: Sequence[str]) -> tuple[str, str]:
     mark, tone = ("\N{CHECK MARK}", "good") if missing.adequate else ("\N{HEAVY BALLOT X}", "bad")
     if missing.adequate and objections:
         mark, tone = "\N{WARNING SIGN}", "doubtful"
-    held = "" if missing.held_out is None else f" Held-out error, as a result has it: {missing.held_out:.3f} sigma."
+    held = "" if missing.held_out is None else f" Held-out error of a result: {missing.held_out:.3f} sigma."
     return (
-        f"{mark} {missing.sentence}{held} Unexplained sensor error, stop by stop: chi-square {left.chi2:.0f} "
-        f"for {left.dof} degrees of freedom."
+        f"{mark} {missing.sentence}{held} Left by stops: chi-square {left.chi2:.0f}, {left.dof} dof."
     ), f"verdict {tone}"
 
 
