@@ -64,7 +64,7 @@ def _signed_quantity(value: Any) -> tuple[float, str]:
     # The effect that owns a prior knows its dimension; the file reader does not know effects.
     text = _as_text(value, "ppm")
     unit = re.sub(r"^\s*[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?\s*", "", text)
-    return parse_quantity(text, unit or "1"), unit or "1"
+    return parse_quantity(text, unit or "1"), unit
 
 
 def _quantity_of_any_unit(value: Any) -> tuple[float, str]:
@@ -362,7 +362,7 @@ def load_model(name_or_path: str | Path) -> Model:
 
 def _stated_prior(where: str, name: str, one: _PriorFile) -> StatedPrior:
     (mean, unit), (sigma, other) = one.value, one.sigma
-    if parse_unit(unit).dimension != parse_unit(other).dimension or (unit == "1") != (other == "1"):
+    if parse_unit(unit or "1").dimension != parse_unit(other or "1").dimension or bool(unit) != bool(other):
         raise DataError(f"{where}: value and sigma have different units, '{unit}' and '{other}'")
     return StatedPrior(name, mean, sigma, unit)
 

@@ -216,9 +216,9 @@ def _check_priors(chosen: Sequence[Effect], imu: ImuSpecification) -> None:
 
 def _check_unit(where: str, unit: str, expected: str) -> None:
     """Refuse a wrong unit, and none where the expected one is more than a number: 40 is not 40 ppm."""
-    if unit == "1" and expected != "1":
+    if not unit and expected != "1":
         raise DataError(f"{where}: has no unit (expected something like '1 {expected}')")
-    if parse_unit(unit).dimension != parse_unit(expected).dimension:
+    if parse_unit(unit or "1").dimension != parse_unit(expected).dimension:
         raise DataError(f"{where}: '{unit}' is a wrong unit (expected something like '1 {expected}')")
 
 

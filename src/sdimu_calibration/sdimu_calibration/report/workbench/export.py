@@ -65,7 +65,7 @@ def _check_named(name: str) -> None:
 
 def _in_si(prior: StatedPrior) -> dict[str, str]:
     """Write a prior of the model to start from as a model file has it."""
-    factor = parse_unit(prior.unit).factor
+    factor = parse_unit(prior.unit or "1").factor
     return {"value": f"{prior.mean / factor!r} {prior.unit}", "sigma": f"{prior.sigma / factor!r} {prior.unit}"}
 
 
