@@ -14,7 +14,7 @@ from sdimu_calibration.core.diagnosis.ladder import error_ladder, moved_coeffici
 from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary
 from sdimu_calibration.core.error_figures import by_hand, held_out, nis
 from sdimu_calibration.core.joint.set_diagnosis import SetDiagnosis
-from sdimu_calibration.core.results import Calibration
+from sdimu_calibration.core.results import Calibration, without_advice
 from sdimu_calibration.core.units import from_si
 from sdimu_calibration.report.advice import Spell, advice_html
 from sdimu_calibration.report.effect_words import headline_of, title_of
@@ -58,7 +58,7 @@ def of_diagnosis(summary: DiagnosisSummary, spell: Spell | None = None) -> Verdi
     """Say what a diagnosis found; `spell` makes whole commands of its advice."""
     d = summary.diagnosis
     named = bool(summary.candidates) and d.verdict != "data fault"
-    doubts = d.after.warnings if d.adequate else ()
+    doubts = without_advice(d.after.warnings) if d.adequate else ()
     bad = not d.adequate and d.verdict != "noise model wrong"
     tone = BAD if bad else GOOD if d.adequate and not doubts else DOUBTFUL
     head = _missing(summary) if named else prose(d.sentence)

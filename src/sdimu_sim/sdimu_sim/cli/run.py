@@ -85,8 +85,13 @@ def run(
         end = _tell_choices(console, out / "choices.json") if adaptive is not None else None
         result = _report(console, out, site, imu, model, f"adaptive to {adaptive}" if adaptive else f"plan {plan}")
         _say_measured(console, out, result, streamed, wall)
+    _leave(adaptive, end)
+
+
+def _leave(goals: str | None, end: dict[str, Any] | None) -> None:
+    """End with exit status 3 and a line on stderr when an adaptive test has not reached its limits."""
     if end is not None and not end["reached"]:
-        typer.echo(f"sdimu: the limits of {adaptive} were not reached: {end['text']}", err=True)
+        typer.echo(f"sdimu: the limits of {goals} were not reached: {end['text']}", err=True)
         raise typer.Exit(NOT_TRUSTED)
 
 

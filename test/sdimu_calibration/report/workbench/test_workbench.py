@@ -355,6 +355,21 @@ def test_a_degenerate_addition_is_objected_to_before_and_after_and_gets_no_tick(
     assert len(shown["objections"]["children"]) >= 2
 
 
+def test_a_prior_that_the_data_contradict_gets_no_tick_and_is_named(app, bench):
+    prior = ("gyro_scale_y", "-2000 ppm", "10 ppm")
+    page = Page(app)
+    page.add(HIDDEN)
+    page.click(
+        "set-prior.n_clicks", coefficient_at_value=prior[0], mean_at_value=prior[1], sigma_at_value=prior[2]
+    )  # fmt: skip
+    shown = page.shown()
+    assert shown["verdict"]["className"] != "verdict good"
+    (told,) = (line for line in bench.fit(Setting((HIDDEN,), priors=(prior,))).calibration.warnings if "stated" in line)
+    assert "the stated prior of gyro_scale_y (-2000 +- 10 ppm) contradicts the data" in told
+    page.click("set-prior.n_clicks", coefficient_at_value=prior[0], mean_at_value="-2000", sigma_at_value="10")
+    assert "has no unit" in page.message
+
+
 def test_residuals_are_drawn_against_what_is_chosen(app, bench):
     page = Page(app)
     shown = page.shown()

@@ -16,7 +16,6 @@ from sdimu_calibration.core.alignment.prepared import PreparedData, TestSetup, s
 from sdimu_calibration.core.arrays import Bools, Floats, Ints
 from sdimu_calibration.core.effects import bias
 from sdimu_calibration.core.effects.effect import Effect, Timetable
-from sdimu_calibration.core.effects.imu_model import ImuModel
 from sdimu_calibration.core.estimation.fit import NOT_CONVERGED, Fit, Start, temperature_counts
 from sdimu_calibration.core.estimation.free_inertial import (
     Compensated,
@@ -25,7 +24,7 @@ from sdimu_calibration.core.estimation.free_inertial import (
     free_inertial_runs,
 )
 from sdimu_calibration.core.estimation.noise_estimate import NoiseEstimate
-from sdimu_calibration.core.estimation.stated_prior import contradicted
+from sdimu_calibration.core.estimation.prior_check import contradicted, outside
 from sdimu_calibration.core.evidence.consistency import Consistency, check
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.evidence.navigation_evidence import (
@@ -60,8 +59,6 @@ NO_FIELD = (
     "east, down) in the site's file, or what magnetism takes is wrong"
 )
 """Note on an effect of magnetism without a stated field."""
-_OUTSIDE = 4.5
-"""Size of a coefficient (sigma of the specification) from which a user is warned: chance puts one in 150 000 there."""
 
 
 @dataclass(frozen=True)
@@ -404,23 +401,6 @@ def fit_statistics(output: PassOutput) -> dict[str, float | None]:
         "nis_mean": float(np.nansum(output.nis) / max(dof, 1)),
         "nis_dof": float(dof),
     }
-
-
-def outside(sensors: ImuModel, estimate: Floats) -> list[str]:
-    """Name the coefficients beyond what the specification allows, one line each, the furthest first.
-
-    Parameters
-    ----------
-    sensors : ImuModel
-        q parameters.
-    estimate : ndarray, shape (q,)
-        SI.
-    """
-    size = np.abs(estimate) / sensors.stated
-    return [
-        f"{sensors.names[i]} is {size[i]:.1f} times the sigma of the specification"
-        for i in np.argsort(-size) if size[i] > _OUTSIDE
-    ]  # fmt: skip
 
 
 def checksum(*arrays: Floats) -> float:

@@ -29,7 +29,7 @@ from sdimu_calibration.core.estimation.solve import solve, with_effects
 from sdimu_calibration.core.measurement_kind import SKIP
 from sdimu_calibration.core.progress import silent
 from sdimu_calibration.core.recording import DataError
-from sdimu_calibration.core.results import Calibration, no_history
+from sdimu_calibration.core.results import Calibration, no_history, without_advice
 from sdimu_calibration.core.specification import Model
 from sdimu_calibration.report import data
 from sdimu_calibration.report.workbench.axes import axes
@@ -200,7 +200,7 @@ class FitSession:
         """
         clean = self.missing(setting, tell).adequate
         warnings = self.fit(setting, tell).calibration.warnings if clean else ()
-        out = [line.partition("; run:")[0] for line in warnings]
+        out = list(without_advice(warnings))
         for count in range(1, len(setting.added) + 1):
             below, here = self.fit(setting.rung(count - 1), tell), self.fit(setting.rung(count), tell)
             out += objections(

@@ -1,4 +1,4 @@
-"""A prior that the model states may be wrong: how far the data pull its coefficient away from it."""
+"""What was known before the test may be wrong: priors that the model states, and the specification of the IMU."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.effects.imu_model import ImuModel
 from sdimu_calibration.core.units import from_si
 
-_PULL = 4.5
-"""Distance (sigma) from which a prior contradicts the data: chance puts one in 150 000 there."""
+_FAR = 4.5
+"""Distance (sigma) from which a prior and the data contradict each other: chance puts one in 150 000 there."""
 _LEAST = 1e-9
 """Part of a prior's variance (1) that a fit has to take away at least: below it the data say nothing, and rounding
 decides."""
@@ -39,7 +39,7 @@ def contradicted(sensors: ImuModel, estimate: Floats, covariance: Floats) -> lis
     pull = np.divide(np.abs(estimate - sensors.mean), np.sqrt(taken), out=np.zeros(len(prior)), where=told)
     out = []
     for k in np.argsort(-pull):
-        if pull[k] > _PULL:
+        if pull[k] > _FAR:
             unit = sensors.parameters[k].display_unit
             mean, sigma, found = (from_si(float(v[k]), unit) for v in (sensors.mean, prior, estimate))
             out.append(
@@ -47,3 +47,20 @@ def contradicted(sensors: ImuModel, estimate: Floats, covariance: Floats) -> lis
                 f"say {found:.4g} {unit}, {pull[k]:.0f} sigma away; correct that prior, or leave it out"
             )
     return out
+
+
+def outside(sensors: ImuModel, estimate: Floats) -> list[str]:
+    """Name the coefficients beyond what the specification allows, one line each, the furthest first.
+
+    Parameters
+    ----------
+    sensors : ImuModel
+        q parameters.
+    estimate : ndarray, shape (q,)
+        SI.
+    """
+    size = np.abs(estimate) / sensors.stated
+    return [
+        f"{sensors.names[i]} is {size[i]:.1f} times the sigma of the specification"
+        for i in np.argsort(-size) if size[i] > _FAR
+    ]  # fmt: skip

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from sdimu_calibration.core.effects.imu_model import ImuModel
-from sdimu_calibration.core.estimation.stated_prior import contradicted
+from sdimu_calibration.core.estimation.prior_check import contradicted
 from sdimu_calibration.core.planning.predict import prepare
 from sdimu_calibration.storage.config import load_imu, load_model, load_plan, load_site
 
