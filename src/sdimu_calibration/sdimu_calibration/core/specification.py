@@ -125,7 +125,7 @@ class StatedPrior:
     mean, sigma : float
         In the frame of the report (SI); a sigma of zero fixes the coefficient at the mean.
     unit : str
-        In which both were written: tells a wrong one.
+        In which both were written: tells a wrong one; empty where none was, which only a pure number may have.
     """
 
     name: str

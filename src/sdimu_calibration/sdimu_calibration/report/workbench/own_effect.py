@@ -51,8 +51,8 @@ def stated_priors(given: Sequence[StatedPrior], changed: Sequence[Prior]) -> tup
 
 def _stated(name: str, mean: str, sigma: str) -> StatedPrior:
     try:
-        unit = sigma.partition(" ")[2].strip() or "1"
-        return StatedPrior(name, parse_quantity(mean, unit), parse_quantity(sigma, unit), unit)
+        unit = sigma.partition(" ")[2].strip()
+        return StatedPrior(name, parse_quantity(mean, unit or "1"), parse_quantity(sigma, unit or "1"), unit)
     except UnitError as error:
         raise DataError(f"prior of {name}: {error}") from error
 
