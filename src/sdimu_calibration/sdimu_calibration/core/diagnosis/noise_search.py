@@ -40,8 +40,8 @@ truth was among them in every trial, and each costs tens of milliseconds."""
 _COST = 8.0
 """Log-likelihood (1) that an effect must bring: half the square of the usual threshold of a whole scan, 4.0."""
 _DRIFT_COST = 8.0
-"""Log-likelihood (1) that the drift of a bias, or a transient of one, must bring besides where noise makes the same
-triad wander, and a fault of the recording in any noise: a wander has jumps, trends and transients by itself, and the
+"""Log-likelihood (1) that the drift of a bias, or a transient of one, must bring besides where noise makes any triad
+wander, and a fault of the recording in any noise: a wander has jumps, trends and transients by itself, and the
 scan looks for them at every time and with every time constant."""
 _OWN_COST = 16.0
 """Log-likelihood (1) that an equation must bring besides: a wander has waves of any period and phase."""
@@ -102,9 +102,8 @@ class _Ground(Generic[E]):
 
         `share` multiplies the part that every effect must bring, not the part of those that a wander imitates.
         """
-        effect = self.white.candidate(column).effect
-        triads = {TRIADS[term.channel // 3] for term in effect.terms}
-        rival = effect.scope == "recording" or any(term.triad in triads for term in terms)
+        # One triad that wanders says of which kind the IMU is: the biases of its other triad wander as well.
+        rival = self.white.candidate(column).effect.scope == "recording" or bool(terms)
         unknown = _UNKNOWN_COST if any(term.kind in DRAWN for term in terms) else 0.0
         return share * (max(_COST, 0.5 * self.limit**2) + unknown) + (self.beside(column) if rival else 0.0)
 

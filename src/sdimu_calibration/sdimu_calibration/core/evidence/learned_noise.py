@@ -96,9 +96,13 @@ class Wander:
             Inverse squares of the units (SI) of the errors.
         """
         out = np.empty((self.U.shape[1], self.U.shape[1]))
-        for columns, since in self._blocks:
+
+        def fill(block: tuple[slice, int]) -> None:
+            columns, since = block
             out[columns, : columns.stop] = self.U[since:, columns].T @ self.U[since:, : columns.stop]
             out[: columns.stop, columns] = out[columns, : columns.stop].T
+
+        side_by_side(fill, self._blocks)
         return out
 
     def across(self, W: Floats) -> Floats:
@@ -115,8 +119,12 @@ class Wander:
             Inverse products of the units (SI) of parameters and errors.
         """
         out = np.empty((W.shape[1], self.U.shape[1]))
-        for columns, since in self._blocks:
+
+        def fill(block: tuple[slice, int]) -> None:
+            columns, since = block
             out[:, columns] = W[since:].T @ self.U[since:, columns]
+
+        side_by_side(fill, self._blocks)
         return out
 
     @cached_property
