@@ -90,6 +90,32 @@ def test_a_wrong_unit_is_one_line(sdimu, bag, tmp_path):
     assert_one_line(err, "site.yaml", "latitude_deg")
 
 
+@pytest.mark.parametrize("verb", ["calibrate", "diagnose"])
+def test_a_file_in_the_place_of_the_results_is_told_before_any_work(sdimu, tmp_path, verb):
+    (tmp_path / "taken").write_text("")
+    status, _, err = sdimu(verb, tmp_path / "bag", "--out", tmp_path / "taken")
+    assert status == 2
+    assert "--out" in err
+    assert "is a file" in err
+
+
+def test_a_file_in_the_way_of_a_folder_is_told_with_what_to_do(sdimu, monkeypatch):
+    def taken(*_: object) -> None:
+        raise FileExistsError(17, "File exists", "out")
+
+    monkeypatch.setattr(cli, "app", taken)
+    status, _, err = sdimu("study", "mount")
+    assert status == 1
+    assert_one_line(err, "out: a file is in the way", "--out")
+
+
+def test_limits_without_a_line_are_told_with_what_to_write(sdimu, tmp_path):
+    (tmp_path / "goal.yaml").write_text("format: sdimu-goal/1\nname: g\nminutes: 5\nlimits:\n")
+    status, _, err = sdimu("run", "--adaptive", tmp_path / "goal.yaml", "--out", tmp_path / "run")
+    assert status == 1
+    assert_one_line(err, "goal.yaml", "limits", "name: value", "nothing")
+
+
 def test_an_error_of_the_system_names_the_file(sdimu, monkeypatch):
     def full(*_: object) -> None:
         raise OSError(28, "No space left on device", "out/result.json")

@@ -68,7 +68,9 @@ def calibrate(
         ),
     ] = None,
     noise: NoiseOption = None,
-    out: Annotated[Path | None, typer.Option(help="Folder of the results; BAG_calibration by default.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(file_okay=False, help="Folder of the results; BAG_calibration by default.")
+    ] = None,
     truth: Annotated[Path | None, typer.Option(help="Truth of a simulation, to show the errors.")] = None,
     estimator: EstimatorOption = "auto",
     hand: HandOption = False,

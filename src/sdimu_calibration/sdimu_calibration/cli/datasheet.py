@@ -31,7 +31,7 @@ def datasheet(
     recording: Annotated[
         list[Path] | None, typer.Option(metavar="BAG", help="Recording to hash that is not beside its result.")
     ] = None,
-    out: Annotated[Path | None, typer.Option(help="Folder of the pages; FOLDER by default.")] = None,
+    out: Annotated[Path | None, typer.Option(file_okay=False, help="Folder of the pages; FOLDER by default.")] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Make a data sheet from results; leaves datasheet.json and datasheet.html (prints on A4)."""

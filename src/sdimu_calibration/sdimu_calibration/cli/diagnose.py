@@ -87,7 +87,9 @@ def diagnose(
     exclude_times: ExcludeTimes = None,
     serial: SerialOption = None,
     power_on: PowerOnOption = None,
-    out: Annotated[Path | None, typer.Option(help="Folder of the results; BAG_diagnosis by default.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(file_okay=False, help="Folder of the results; BAG_diagnosis by default.")
+    ] = None,
     set_file: SetOption = None,
     reference_temperature: ReferenceOption = None,
     workers: WorkersOption = WORKERS,

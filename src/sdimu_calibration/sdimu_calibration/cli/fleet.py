@@ -18,7 +18,7 @@ def fleet(
     imu: Annotated[
         str | None, typer.Option(help="IMU whose noise and grade go into --priors; that of the results by default.")
     ] = None,
-    out: Annotated[Path | None, typer.Option(help="Folder of the pages; FOLDER by default.")] = None,
+    out: Annotated[Path | None, typer.Option(file_okay=False, help="Folder of the pages; FOLDER by default.")] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Compare all units of a type: mean and spread, who is out, what is common; leaves fleet.json and fleet.html."""

@@ -115,6 +115,8 @@ def main() -> None:
         app()
     except (DataError, UnitError) as error:
         sys.exit(_complain(str(error)))
+    except (FileExistsError, NotADirectoryError) as error:
+        sys.exit(_complain(f"{error.filename or 'system'}: a file is in the way of a folder; name another with --out"))
     except OSError as error:
         sys.exit(_complain(f"{error.filename or 'system'}: {error.strerror or error}"))
     except MemoryError:

@@ -16,7 +16,9 @@ def noise(
     imu: Annotated[str, typer.Option(help="IMU whose grade and priors go into the new file: name or path.")] = "dtg",
     longest: Annotated[bool, typer.Option("--longest", help="The longest rest alone, not all of them.")] = False,
     seed: Annotated[int, typer.Option(help="Of the draws behind the standard errors.")] = 1,
-    out: Annotated[Path | None, typer.Option(help="Folder of the results; BAG_noise by default.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(file_okay=False, help="Folder of the results; BAG_noise by default.")
+    ] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Find the noise terms from the rests of a recording; leaves noise.html, noise.json, imu.yaml for --imu."""

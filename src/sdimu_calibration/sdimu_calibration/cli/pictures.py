@@ -15,7 +15,9 @@ def pictures(
     model: Annotated[str, typer.Option(help="Model to examine: name in config/model or path.")] = "baseline",
     site: Annotated[str, typer.Option(help="Where the test was: name in config/site or path.")] = "daejeon",
     imu: Annotated[str, typer.Option(help="Specification of the IMU: name in config/imu or path.")] = "dtg",
-    out: Annotated[Path | None, typer.Option(help="Folder of the pictures; BAG_pictures by default.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(file_okay=False, help="Folder of the pictures; BAG_pictures by default.")
+    ] = None,
 ) -> None:
     """Draw a diagnosis as PNG files: heat map before and after, candidates, ladder, drift in use."""
     from sdimu_calibration.cli.options import default_folder

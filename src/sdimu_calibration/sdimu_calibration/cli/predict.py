@@ -29,7 +29,7 @@ def predict(
     model: Annotated[str, typer.Option(help="Model to estimate: name in config/model or path.")] = "baseline",
     mount: Annotated[str | None, typer.Option(metavar="DEG", help=_MOUNT)] = None,
     noise: Annotated[str | None, typer.Option(help=_NOISE)] = None,
-    out: Annotated[Path, typer.Option(help="Folder of the results.")] = Path("out/predict"),
+    out: Annotated[Path, typer.Option(file_okay=False, help="Folder of the results.")] = Path("out/predict"),
     as_json: JsonOption = False,
 ) -> None:
     """Simulate the covariance of a test; leaves prediction.json and prediction.html."""

@@ -30,7 +30,9 @@ def replay(
     ] = None,
     imu: ImuOption = None,
     speed: Annotated[float, typer.Option(help="Times real time; 0 is as fast as the calibration allows.")] = 0.0,
-    out: Annotated[Path | None, typer.Option(help="Folder of the results; BAG_replay by default.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(file_okay=False, help="Folder of the results; BAG_replay by default.")
+    ] = None,
     domain: DomainOption = None,
     patience: Annotated[float, typer.Option(help="Longest time without an end (s); 0 waits for ever.")] = 0.0,
     diagnose: Annotated[bool, typer.Option(help="Publish a diagnosis at the end of each stop.")] = False,

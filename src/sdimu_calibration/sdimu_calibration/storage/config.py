@@ -199,6 +199,10 @@ def check(data: Mapping[str, Any], schema: type[S], source: str) -> S:
         ) from error
 
 
+_SHAPES = {"dict_type": "write one line `name: value` for each, below the key", "list_type": "write a list [a, b, ...]"}
+"""What to write where a file has something else in the place of a mapping or list."""
+
+
 def _rank(error: Any) -> int:
     """Order errors by what says best what to mend.
 
@@ -215,6 +219,8 @@ def _message(error: Any, schema: type[BaseModel]) -> str:
         return f"unknown key (known keys: {', '.join(_known_keys(schema, error['loc'][:-1]))})"
     if kind == "missing":
         return "missing key"
+    if kind in _SHAPES:
+        return f"{_SHAPES[kind]} (found: {'nothing' if found is None else reprlib.repr(found)})"
     text = str(error["msg"]).removeprefix("Value error, ")
     text = text[:1].lower() + text[1:] if kind != "value_error" else text
     return text if kind == "value_error" else f"{text} (found: {reprlib.repr(found)})"

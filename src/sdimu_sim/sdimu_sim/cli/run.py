@@ -46,7 +46,7 @@ def run(
     ] = None,
     ask: Annotated[bool, typer.Option(help="With --adaptive: each turn waits for a yes on /adaptive/confirm.")] = False,
     domain: DomainOption = None,
-    out: Annotated[Path, typer.Option(help="Folder of the results.")] = Path("out/run"),
+    out: Annotated[Path, typer.Option(file_okay=False, help="Folder of the results.")] = Path("out/run"),
 ) -> None:
     """Run a whole simulated test over ROS 2: table, IMU, calibration and recorder, each its own process."""
     import time
