@@ -9,14 +9,18 @@ noise repeat numbers by nature; for them a run must be as long as their own repe
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable
 from dataclasses import replace
+from typing import TypeVar
 
 import numpy as np
 
 from sdimu_calibration.core.arrays import Bools, Floats, Ints
 from sdimu_calibration.core.data.blocks import let_go, pieces
 from sdimu_calibration.core.recording import DataFault, Recording
+from sdimu_calibration.core.side_by_side import side_by_side
+
+R = TypeVar("R")
 
 CHANNELS = tuple(f"{triad} {axis}" for triad in ("gyro", "accelerometer") for axis in "xyz")
 _FALSE_ALARM = 1e-3
@@ -50,6 +54,8 @@ _ONE_SIDED = 0.9
 """Ratio of the sum of changes to the sum of their sizes from which they go to one side: white noise reaches 0.8."""
 _TURN_BEGINS = 10.0
 """Ratio of a change of rate to the usual one from which it may be a turn: noise reaches 7."""
+_TOGETHER = 2_000_000
+"""Number of samples to which channels are looked at side by side: longer recordings lie in a file, not in memory."""
 _GAUSS_MAD = 1.482602218505602
 """Ratio of sigma to median absolute deviation: that of a Gaussian."""
 
@@ -70,9 +76,8 @@ def sound(recording: Recording) -> tuple[Recording, tuple[DataFault, ...]]:
     """
     bad = np.zeros(len(recording.t), dtype=bool)
     found: dict[str, list[tuple[str, Ints]]] = {}
-    for name, x in _channels(recording):
-        for kind, test in _TESTS.items():
-            rows = test(x)
+    for name, tested in _on_channels(recording, _tested):
+        for kind, rows in tested.items():
             if len(rows):
                 found.setdefault(kind, []).append((name, rows))
                 bad[rows] = True
@@ -87,13 +92,23 @@ def sound(recording: Recording) -> tuple[Recording, tuple[DataFault, ...]]:
     return mended, faults
 
 
-def _channels(recording: Recording) -> Iterator[tuple[str, Floats]]:
-    """Name and numbers of each channel that has noise, one after the other in memory."""
-    for name, column in zip(CHANNELS, (*recording.omega_ib_b.T, *recording.f_ib_b.T), strict=True):
-        x = np.ascontiguousarray(column)
-        let_go(recording.omega_ib_b, recording.f_ib_b)
-        if not _noiseless(x):
-            yield name, x
+def _on_channels(recording: Recording, work: Callable[[Floats], R]) -> list[tuple[str, R]]:
+    """Do some work on the numbers (n,) of each channel that has noise; return it with the name of the channel."""
+
+    def one(channel: int) -> tuple[str, R] | None:
+        triad = recording.omega_ib_b if channel < 3 else recording.f_ib_b
+        x = np.ascontiguousarray(triad[:, channel % 3])
+        let_go(triad)
+        return None if _noiseless(x) else (CHANNELS[channel], work(x))
+
+    # Two channels of a long recording at a time would need twice the memory.
+    each = side_by_side if len(recording.t) <= _TOGETHER else map
+    return [done for done in each(one, range(len(CHANNELS))) if done is not None]
+
+
+def _tested(x: Floats) -> dict[str, Ints]:
+    """Rows of a channel that are no measurement, by kind of fault."""
+    return {kind: test(x) for kind, test in _TESTS.items()}
 
 
 _TEXT = {
@@ -313,8 +328,7 @@ def wild(recording: Recording) -> tuple[Floats, Floats, tuple[DataFault, ...]]:
     middle = recording.t[_WINDOW // 2 :: _WINDOW][:windows]
     moving = _changing_rate(recording.omega_ib_b[: windows * _WINDOW].reshape(windows, _WINDOW, 3))
     let_go(recording.omega_ib_b)
-    for name, x in _channels(recording):
-        rough = _roughness(x, uneven, windows)
+    for name, rough in _on_channels(recording, lambda x: _roughness(x, uneven, windows)):
         usual = float(np.median(rough[rough > 0.0])) if rough.any() else 0.0
         at = (rough > _WILD * usual) & ~moving
         if usual == 0.0 or not at.any() or at.mean() > _RARE:
