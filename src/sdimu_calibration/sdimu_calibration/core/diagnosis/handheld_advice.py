@@ -22,8 +22,8 @@ def handheld_advice(d: Diagnosis, found: tuple[Found, ...]) -> tuple[str, ...]:
             ]  # fmt: skip
     if d.verdict == "unexplained":
         out.append(
-            "Record the run again in another order, and diagnose both recordings together (sdimu diagnose FIRST SECOND): "
-            "that says whether it comes back at the same attitude, time or temperature, or is of this run."
+            "Record the run again in another order, and diagnose both recordings together (sdimu diagnose FIRST "
+            "SECOND): that says whether it comes back at the same attitude, time or temperature, or is of this run."
         )
     return tuple(dict.fromkeys(out))
 

@@ -19,7 +19,6 @@ from sdimu_calibration.core.joint.combine import stacked
 from sdimu_calibration.core.joint.member import Job, Report
 from sdimu_calibration.core.joint.set_evidence import white_power_on
 from sdimu_calibration.core.joint.set_fit import Run, SetFit, power_on, prior_weight, with_own
-from sdimu_calibration.core.joint.stretch_rows import Places
 from sdimu_calibration.core.recording import DataError
 
 ATTITUDE, TIME, TEMPERATURE = "attitude", "time", "temperature"
@@ -32,13 +31,13 @@ _TIME_SHARES = (0.02, 0.15)
 """Shares of the longest recording (1) over which the likeness of two times falls to 1/e: half a stop of a plan for what
 happens at one time, and several for a warm-up; the mean of both."""
 _HEAT_SHARES = (0.05, 0.4)
-"""The same of the range of all temperatures (1)."""
+"""The same of the range of all temperatures (1): a coefficient changes slowly with it, a hysteresis at one."""
 _LEAST_HEAT = 0.3
 """Least temperature difference (K) that counts: thermometers are no better from day to day."""
 _MOST_COLUMNS = 1000
 """Number of leftovers at most: the time of a test goes with the cube, and six recordings show what twenty do."""
 _ALIKE = 0.5
-"""Likeness (1) from which two dwells count as a pair."""
+"""Likeness (1) from which two dwells count as a pair: nearer to one place than to another."""
 
 
 @dataclass(frozen=True)
@@ -77,14 +76,13 @@ class Leftovers:
         )  # fmt: skip
 
     def pairs(self, kind: str) -> int:
-        """Number of pairs of dwells of two recordings that are alike in a kind."""
+        """Count the pairs of dwells of two recordings that are alike in a kind."""
         one = self.sensor == self.sensor[0]
         other = self.recording[one][:, None] != self.recording[one][None, :]
         return int(np.count_nonzero((self.likeness[kind][np.ix_(one, one)] > _ALIKE) & other) // 2)
 
-
     def coincide(self, one: str, other: str) -> float:
-        """Share of dwells whose partner of another recording in one kind is their partner in the other kind, too."""
+        """Tell the share of dwells whose partner in another recording is the same one in both kinds."""
         mine = np.flatnonzero(self.sensor == self.sensor[0])
         of, square = self.recording[mine], np.ix_(mine, mine)
         shares = []
@@ -135,7 +133,7 @@ def leftovers(fit: SetFit, run: Run) -> Leftovers:
 def _asked(fit: SetFit, run: Run) -> list[Report]:
     """Rows of the recordings about the joint estimate with an error in each dwell."""
     columns = [len(CHANNELS) * len(r.times.stops) for r in fit.reports]
-    most = max(2, int(_MOST_COLUMNS // max(max(columns), 1)))
+    most = max(2, int(_MOST_COLUMNS // max(*columns, 1)))
     # Spread over the set where it holds more than are asked.
     asked = set(np.unique(np.linspace(0, len(columns) - 1, min(most, len(columns))).round().astype(int)).tolist())
     places = [k for k in range(len(columns)) if k in asked]
@@ -188,7 +186,7 @@ def _scaled(J: Floats, d: Floats, reports: Sequence[Report], fit: SetFit) -> Lef
     return Leftovers(
         d * unit, J * np.outer(unit, unit), sensor,
         np.repeat(np.arange(len(dwells)), [count * len(p) for p in dwells]),
-        {kind: np.kron(value, np.ones((count, count))) for kind, value in alike.items()},
+        {kind: np.repeat(np.repeat(value, count, 0), count, 1) for kind, value in alike.items()},
     )  # fmt: skip
 
 

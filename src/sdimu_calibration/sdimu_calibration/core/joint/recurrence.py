@@ -1,4 +1,4 @@
-"""Does what a set leaves unexplained come back at the same attitude, time or temperature, or not at all?
+"""Whether what a set leaves unexplained comes back at the same attitude, time or temperature, or not at all.
 
 Leftovers u of dwells show in scores s with information G: ``cov s = G + G K G``, K the covariance of u. Under the
 hypothesis that nothing comes back, the leftovers of two recordings are independent: each sensor of each recording has
@@ -23,15 +23,18 @@ from itertools import combinations
 import numpy as np
 
 from sdimu_calibration.core.arrays import Floats, Ints
-from sdimu_calibration.core.diagnosis.free_input_test import free_input_test
+from sdimu_calibration.core.diagnosis.free_input_test import FreeInputTest, free_input_test
 from sdimu_calibration.core.effects.effect import CHANNELS
 from sdimu_calibration.core.evidence.information import Information
 from sdimu_calibration.core.joint.leftovers import KINDS, Leftovers
 
 _LEFT = 1e-3
 """Probability that the leftovers of some sensor of a right model are so large: below it something is left."""
+_ASIDE = 0.1
+"""Share of the largest mean square of a sensor (1) from which the leftovers of another one count: below is what a
+strong one leaves in the others, as an error that changes within a stop looks like a tilt."""
 _FALSE_ALARM = 0.01
-"""Share of sets in which leftovers that do not come back are said to."""
+"""Share of sets in which leftovers that do not come back are said to (1): what is said sends people to the table."""
 _DRAWS = 4000
 """Number of simulated sets of scores: chance at one in a hundred is then known to a sixth."""
 _SEED = 20240607
@@ -42,6 +45,8 @@ _FREE = 0.01
 """Share of the variance of a score (1) that the coefficients must leave: with less they take up what comes back so."""
 _ALMOST = 0.9999
 """Largest correlation (1): above it is rounding."""
+_OPEN = 2.0
+"""Score (sigma) from which a kind is not ruled out: chance reaches it once in forty."""
 _SAME_ORDER = 0.7
 """Share of dwells (1) that have one partner in both kinds, from which recordings do not tell the kinds apart: a plan in
 another order leaves a fifth, by chance."""
@@ -88,7 +93,7 @@ class Recurrence:
     limit : float
         Score that chance reaches in one set of a hundred, all kinds and sensors counted.
     sensors : tuple of str
-        Those where something is left.
+        Those where most is left.
     p_value : float
         Probability that a right model leaves so much, all sensors counted.
     """
@@ -102,8 +107,14 @@ class Recurrence:
 
     @property
     def told(self) -> tuple[str, ...]:
-        """Kinds about which the recordings say something."""
-        return tuple(k.kind for k in self.kinds if np.isfinite(k.score))
+        """Kinds that leftovers come back with, or certainly do not."""
+        return tuple(k.kind for k in self.kinds if k.kind in self.answer or k.score < _OPEN)
+
+    @property
+    def doubtful(self) -> tuple[str, ...]:
+        """Kinds whose score is more than usual and less than chance reaches, the largest first."""
+        near = [k for k in self.kinds if k.kind not in self.answer and k.score >= _OPEN]
+        return tuple(k.kind for k in sorted(near, key=lambda k: -k.score))
 
 
 def recurrence(left: Leftovers) -> Recurrence | None:
@@ -119,33 +130,35 @@ def recurrence(left: Leftovers) -> Recurrence | None:
     Recurrence or None
         None where nothing is left that a right model does not leave.
     """
-    p_values = {int(g): _chance(left, int(g)) for g in np.unique(left.sensor)}
-    loud = [g for g, p in p_values.items() if p * len(p_values) < _LEFT]
+    tests = {int(g): _chance(left, int(g)) for g in np.unique(left.sensor)}
+    loud = [g for g, t in tests.items() if t.p_value * len(tests) < _LEFT]
     if not loud or len(np.unique(left.recording)) < 2:
         return None
+    excess = {g: tests[g].chi2 / tests[g].dof - 1.0 for g in loud}
+    main = [g for g in loud if excess[g] > _ASIDE * max(excess.values())]
     left = left.only(np.flatnonzero(np.isin(left.sensor, loud)))
-    alone = _tested(left, ())
+    alone = _tested(left, main, ())
     found = [kind for kind in KINDS if alone.largest(kind) > alone.limit]
-    answer, apart = (found, True) if len(found) < 2 else _needed(left, found)
+    answer, apart = (found, True) if len(found) < 2 else _needed(left, main, found)
     return Recurrence(
-        tuple(answer), apart, tuple(_kind(left, alone, k) for k in KINDS), alone.limit,
-        tuple(CHANNELS[g] for g in loud), min(1.0, len(p_values) * min(p_values.values())),
+        tuple(answer), apart, tuple(_kind(left, main, alone, k) for k in KINDS), alone.limit,
+        tuple(CHANNELS[g] for g in main), min(1.0, len(tests) * min(t.p_value for t in tests.values())),
     )  # fmt: skip
 
 
-def _needed(left: Leftovers, found: Sequence[str]) -> tuple[Sequence[str], bool]:
-    """Say which of several kinds are needed, each with the others in the hypothesis, and whether they can be told apart."""
+def _needed(left: Leftovers, main: Sequence[int], found: Sequence[str]) -> tuple[Sequence[str], bool]:
+    """Say which of several kinds are needed beside the others, and whether they can be told apart."""
     if any(left.coincide(one, other) > _SAME_ORDER for one, other in combinations(found, 2)):
         return found, False
-    given = {other: _tested(left, (other,)) for other in found}
+    given = {other: _tested(left, main, (other,)) for other in found}
     needed = [k for k in found if all(t.largest(k) > t.limit for other, t in given.items() if other != k)]
     return (needed, True) if needed else (found, False)
 
 
-def _chance(left: Leftovers, group: int) -> float:
-    """Probability of the leftovers of one sensor when the model is right."""
+def _chance(left: Leftovers, group: int) -> FreeInputTest:
+    """Test whether one sensor has leftovers that a right model does not leave."""
     mine, none = np.flatnonzero(left.sensor == group), np.empty(0, dtype=np.int64)
-    return free_input_test(Information(left.gram, left.score), none, np.empty(0), mine, 1.0).p_value
+    return free_input_test(Information(left.gram, left.score), none, np.empty(0), mine, 1.0)
 
 
 @dataclass(frozen=True)
@@ -165,8 +178,8 @@ def _largest(values: Floats) -> float:
     return float(seen.max()) if len(seen) else float("nan")
 
 
-def _kind(left: Leftovers, test: _Test, kind: str) -> Kind:
-    own = zip(np.unique(left.sensor).tolist(), test.scores[kind][:-1].tolist(), strict=True)
+def _kind(left: Leftovers, main: Sequence[int], test: _Test, kind: str) -> Kind:
+    own = zip(main, test.scores[kind][:-1].tolist(), strict=True)
     over = tuple(CHANNELS[g] for g, z in own if z > test.limit)
     return Kind(kind, left.pairs(kind), _largest(test.correlation[kind]), test.largest(kind), over)
 
@@ -179,14 +192,15 @@ class _Component:
     kernel: Floats
 
 
-def _tested(left: Leftovers, common: Sequence[str]) -> _Test:
-    """Test every kind against leftovers that come back in the kinds `common` alone."""
+def _tested(left: Leftovers, main: Sequence[int], common: Sequence[str]) -> _Test:
+    """Test every kind in the sensors `main` against leftovers that come back in the kinds `common` alone."""
     groups = [np.flatnonzero(left.sensor == g) for g in np.unique(left.sensor)]
     x, F = _fitted(left, [part for mine in groups for part in _components(left, mine, common)])
     draws = np.column_stack([x, _drawn(F)])
+    asked = [np.flatnonzero(left.sensor == g) for g in main]
     correlation, scores, chance = {}, {}, []
     for kind in KINDS:
-        of_all = np.array([_correlation(left, kind, mine, draws) for mine in groups])
+        of_all = np.array([_correlation(left, kind, mine, draws) for mine in asked])
         # Fisher's transformation makes the scatter of a correlation the same at any size.
         even = np.arctanh(np.clip(of_all, -_ALMOST, _ALMOST))
         even = (even - even[:, 1:].mean(axis=1)[:, None]) / even[:, 1:].std(axis=1)[:, None]
@@ -217,7 +231,8 @@ def _fitted(left: Leftovers, parts: Sequence[_Component]) -> tuple[Floats, Float
         for part, size in zip(parts, sizes.tolist(), strict=True):
             K[np.ix_(part.places, part.places)] += size * part.kernel
         both = np.linalg.solve(np.eye(m) + left.gram @ K, np.column_stack([left.gram, left.score]))
-        x, F = both[:, -1], 0.5 * (both[:, :-1] + both[:, :-1].T)
+        x = np.asarray(both[:, -1], dtype=np.float64)
+        F = np.asarray(0.5 * (both[:, :-1] + both[:, :-1].T), dtype=np.float64)
         if turn == _ROUNDS:
             break
         for k, part in enumerate(parts):
@@ -238,8 +253,8 @@ def _drawn(F: Floats) -> Floats:
 def _correlation(left: Leftovers, kind: str, mine: Ints, x: Floats) -> Floats:
     """Correlation of the scores x (m, n) of a sensor in one recording with those in the others, shape (n,).
 
-    ``x' C x / ((R - 1) x' K x)``, C the likeness of places in different recordings, K that in the same: between -1 and 1
-    as both together are positive semidefinite. NaN where the coefficients take up all that might come back.
+    ``x' C x / ((R - 1) x' K x)``, C the likeness of places in different recordings, K that in the same: between -1
+    and 1, as both together are positive semidefinite. NaN where the coefficients take up all that might come back.
     """
     square = np.ix_(mine, mine)
     alike, own = left.likeness[kind][square], left.gram[square]

@@ -11,12 +11,14 @@ _WORDS = {ATTITUDE: "attitude", TIME: "time after the start", TEMPERATURE: "temp
 _BELONGS = {ATTITUDE: "the sensor", TIME: "the warm-up", TEMPERATURE: "the temperature"}
 _ORDER = "record the plan in another order (sdimu plan --plan YOURS --backwards), and diagnose it with these"
 _NEXT = {
-    ATTITUDE: "what comes back at the same attitude is an error of the sensor that the catalogue lacks: try an equation "
-    "of the specific force (sdimu diagnose BAG --try FILE)",
-    TIME: "what comes back at the same time is over when the unit is warm: begin the plan later, or let the first stop be "
-    "longer",
-    TEMPERATURE: "what comes back at the same temperature is told by soaks: record at more temperatures that stand still",
+    ATTITUDE: "what comes back at the same attitude is an error of the sensor that the catalogue lacks: try an "
+    "equation of the specific force (sdimu diagnose BAG --try FILE)",
+    TIME: "what comes back at the same time is over when the unit is warm: begin the plan later, or let the first "
+    "stop be longer",
+    TEMPERATURE: "what comes back at the same temperature is told by soaks: record at more temperatures that stand "
+    "still",
 }
+_OF_EACH = "what does not come back is of each run: look at mount, cables and floor, and take it for scatter until then"
 
 
 def told(found: Recurrence, unexplained: bool) -> str:
@@ -48,8 +50,14 @@ def told(found: Recurrence, unexplained: bool) -> str:
         )
     if not unexplained:
         return ""
+    if found.doubtful:
+        near = next(k for k in found.kinds if k.kind == found.doubtful[0])
+        return (
+            f"Whether {what[0].lower()}{what[1:]} comes back is open: nearest is the same {_WORDS[near.kind]} "
+            f"({_figures(near, found.limit)})."
+        )
     if not found.told:
-        return f"Whether {what.lower()} comes back cannot be told: the recordings share too few stops."
+        return f"Whether {what[0].lower()}{what[1:]} comes back cannot be told: the recordings share too few stops."
     return (
         f"{what} in the stops ({', '.join(found.sensors)}) does not come back at the same "
         f"{_listed(found.told, 'or')}: it belongs to each run."
@@ -71,15 +79,15 @@ def next_steps(found: Recurrence | None, unexplained: bool) -> list[str]:
         return [_NEXT[kind] for kind in found.answer] if found.apart else [_ORDER]
     if not unexplained:
         return []
-    if ATTITUDE not in found.told:
+    if ATTITUDE not in found.told or found.doubtful:
         return [_ORDER]
-    return ["what does not come back is of each run: look at mount, cables and floor, and take it for scatter until then"]
+    return [_OF_EACH]
 
 
 def _figures(one: Kind, limit: float) -> str:
     """Name the sensors of a kind, how well recordings agree, and what chance does."""
-    where = ", ".join(one.sensors) or "all sensors together"
-    return f"{where}: correlation {one.correlation:.2f}, {one.score:.1f} sigma where chance ends at {limit:.1f}"
+    where = f"{', '.join(one.sensors)}: " if one.sensors else ""
+    return f"{where}correlation {one.correlation:.2f}, {one.score:.1f} sigma where chance ends at {limit:.1f}"
 
 
 def _listed(kinds: Sequence[str], between: str) -> str:
