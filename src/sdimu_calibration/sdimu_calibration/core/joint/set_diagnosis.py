@@ -221,7 +221,7 @@ def _advice(
     word: str, findings: Sequence[SetFinding], closing: Sequence[tuple[tuple[str, ...], NextTurn]],
     again: Recurrence | None,
 ) -> tuple[str, ...]:
-    out = []
+    out = next_steps(again, word == "unexplained")
     closed = {members[0] for members, _ in closing}
     for f in findings:
         if f.recording:
@@ -235,7 +235,6 @@ def _advice(
             f"to tell {label} from {', '.join(others)}, record once more, rests of 100 s and between them: "
             f"{turn.text}; a whole plan: sdimu plan --after"
         )
-    out += next_steps(again, word == "unexplained")
     if word == "unexplained":
         out.append("diagnose the recordings one by one (sdimu diagnose BAG), the one with the largest deviates first")
     return tuple(out)
