@@ -14,6 +14,8 @@ import typer
 from sdimu_calibration.cli.console import JsonOption, answer, command, plain, say
 
 if TYPE_CHECKING:
+    from rich.console import Console
+
     from sdimu_calibration.core.plan import Plan
     from sdimu_calibration.core.plan_search import Bounds, Found, NextTurn
 
@@ -55,6 +57,9 @@ def plan(
             "diagnose. Searches the plan that tells most beyond it in --minutes (those of --plan).",
         ),
     ] = None,
+    backwards: Annotated[
+        bool, typer.Option("--backwards", help="Write --plan in the opposite order, and search no plan.")
+    ] = False,
     out: Annotated[Path, typer.Option(help="Plan file to write.")] = Path("out/plan/found.yaml"),
     as_json: JsonOption = False,
 ) -> None:
@@ -71,6 +76,10 @@ def plan(
 
     console = plain(stderr=as_json)
     start = load_plan(plan)
+    if backwards:
+        _write_backwards(console, start, out)
+        answer({"plan": str(out), "minutes": start.duration_s / 60.0}, as_json)
+        return
     if more and not after:
         raise typer.BadParameter("recordings stand behind --after", param_hint="BAG")
     before = standing_of(console, After([*after, *(more or [])], imu, site, model)) if after else None
@@ -114,6 +123,15 @@ def plan(
     )
     command(console, shlex.join(["sdimu", "predict", "--plan", str(out), "--imu", imu, "--site", site]))
     answer(_content(start, known, first, found, limits, out), as_json)
+
+
+def _write_backwards(console: Console, start: Plan, out: Path) -> None:
+    """Write the plan whose recording tells what is of an attitude from what is of a time."""
+    from sdimu_calibration.core.plan import backwards
+    from sdimu_calibration.storage.plan_file import write_plan
+
+    write_plan(out, backwards(start), [f"{start.name} in the opposite order, every turn in the other sense."])
+    say(console, f"{start.name} backwards, {start.duration_s / 60.0:.1f} min; in {out}")
 
 
 def _table(

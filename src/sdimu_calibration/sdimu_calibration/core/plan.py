@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 
 @dataclass(frozen=True)
@@ -52,3 +52,12 @@ class Plan:
     def duration_s(self) -> float:
         """Length of the whole test (s)."""
         return sum(self.dwell_s) + sum(t.duration_s for t in self.turns)
+
+
+def backwards(plan: Plan) -> Plan:
+    """Return a plan with the stops and turns in the opposite order, every turn in the other sense.
+
+    It begins as every plan does, with the IMU level: it passes many of the same attitudes at other times.
+    """
+    turns = tuple(replace(turn, angle_rad=-turn.angle_rad) for turn in reversed(plan.turns))
+    return replace(plan, name=f"{plan.name}_backwards", dwell_s=tuple(reversed(plan.dwell_s)), turns=turns)

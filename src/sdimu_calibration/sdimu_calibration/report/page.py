@@ -22,7 +22,7 @@ from sdimu_calibration.report.drawing import html
 from sdimu_calibration.report.markup import Draw, prose, section
 from sdimu_calibration.report.report_extras import ReportExtras
 from sdimu_calibration.report.rests_section import rests_section
-from sdimu_calibration.report.set_sections import set_sections
+from sdimu_calibration.report.set_sections import recurrence_section, set_sections
 from sdimu_calibration.report.statistics_section import noise_section
 from sdimu_calibration.report.traceability import recorded, traceability
 from sdimu_calibration.report.use_section import in_use
@@ -108,6 +108,7 @@ def page(
     parts = [
         _first(calibration, summary, fit, of_set, spell, draw),
         coefficients_section(calibration, fit, truth, reference, _lacks(calibration, summary), draw),
+        recurrence_section(of_set.recurrence) if of_set is not None and of_set.recurrence else "",
         *([] if calibration.of_set is None else set_sections(calibration, calibration.of_set, draw)),
         *([] if summary is None else _evidence(summary, more, spell, draw)),
         rests_section(calibration.rests) if calibration.rests else "",

@@ -6,6 +6,7 @@ from datetime import UTC, datetime
 
 import numpy as np
 
+from sdimu_calibration.core.joint.recurrence import Recurrence
 from sdimu_calibration.core.results import Calibration, SetRecording, SetSummary
 from sdimu_calibration.core.units import from_si
 from sdimu_calibration.report.evidence_figures import deviates
@@ -98,3 +99,23 @@ def _trends(calibration: Calibration, of_set: SetSummary) -> list[str]:
             quiet("p: probability of such a slope by chance, all coefficients and covariates counted."),
         )
     ]
+
+
+def recurrence_section(found: Recurrence) -> str:
+    """Tell what comes back of that what the model leaves in the stops."""
+    rows = [
+        [f"same {one.kind}", str(one.pairs), _number(one.correlation, 2), _number(one.score, 1), ", ".join(one.sensors)]
+        for one in found.kinds
+    ]  # fmt: skip
+    return section(
+        "What comes back",
+        grid(("at the", "pairs of stops", "correlation", "sigma", "sensors"), rows, {0, 4}),
+        quiet(
+            f"What the model leaves in the stops ({', '.join(found.sensors)}), compared between recordings. Chance "
+            f"reaches {found.limit:.1f} sigma in one set of a hundred. Empty: the recordings say nothing of it."
+        ),
+    )
+
+
+def _number(value: float, digits: int) -> str:
+    return f"{value:.{digits}f}" if np.isfinite(value) else ""

@@ -13,6 +13,7 @@ from sdimu_calibration.core.effects.effect import Timetable
 from sdimu_calibration.core.estimation.fit import Start
 from sdimu_calibration.core.joint.member import Report
 from sdimu_calibration.core.joint.reduction import Reduction
+from sdimu_calibration.core.joint.stretch_rows import Places
 from sdimu_calibration.core.noise_term import NoiseTerm
 from sdimu_calibration.core.specification import ImuSpecification
 from sdimu_calibration.storage.whole_file import beside
@@ -35,13 +36,14 @@ def write_report(path: Path, report: Report) -> None:
         "notes": report.notes, "warnings": report.warnings, "heading_rad": report.heading_rad,
         "noise": [vars(term) for term in report.noise], "widened": report.widened,
     }  # fmt: skip
+    places = {} if report.places is None else {f"dwell_{key}": value for key, value in vars(report.places).items()}
     part = beside(path)
     try:
         with part.open("wb") as file:
             np.savez(
                 file, words=np.frombuffer(json.dumps(words).encode(), dtype=np.uint8), A=found.A, y=found.y,
                 point=found.point, weight=found.weight, start=start.coefficients, C_nb=start.C_nb, more=start.more,
-                values=report.values, sigma=report.sigma,
+                values=report.values, sigma=report.sigma, **places,
             )  # fmt: skip
         part.replace(path)
     finally:
@@ -79,7 +81,13 @@ def _report(words: dict[str, Any], arrays: dict[str, Any]) -> Report | None:
         int(words["start_ns"]), times, math.nan if heat is None else float(heat), words["data"], words["statistics"],
         tuple(words["reported"]), arrays["values"], arrays["sigma"], tuple(words["notes"]), tuple(words["warnings"]),
         float(words["heading_rad"]), tuple(_term(entry) for entry in words["noise"]), bool(words["widened"]),
+        _places(arrays),
     )  # fmt: skip
+
+
+def _places(arrays: dict[str, Any]) -> Places | None:
+    own = {key.removeprefix("dwell_"): value for key, value in arrays.items() if key.startswith("dwell_")}
+    return Places(**own) if own else None
 
 
 def _term(entry: dict[str, Any]) -> NoiseTerm:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from sdimu_calibration.core.arrays import Floats
+from sdimu_calibration.core.joint.recurrence import Recurrence
 from sdimu_calibration.core.joint.set_diagnosis import SetDiagnosis
 from sdimu_calibration.core.plain_text import one_line
 from sdimu_calibration.core.results import (
@@ -101,7 +102,7 @@ class _Plain:
 
 
 def write_set_diagnosis(path: Path, found: SetDiagnosis) -> None:
-    """Write set.json: verdict, sentence, findings (SI), advice, and what is known of the unit."""
+    """Write set.json: verdict, sentence, findings (SI), advice, what is known of the unit, and what comes back."""
     write_json(
         Path(path),
         {
@@ -110,9 +111,19 @@ def write_set_diagnosis(path: Path, found: SetDiagnosis) -> None:
             "held_out_before": found.before.fit["held_out_rms"], "held_out_after": found.after.fit["held_out_rms"],
             "advice": list(found.advice), "known": standing_as_plain(found.standing),
             "fit": {"before": {"model": list(found.before.model)}},
-            "alone": alone(found.first.evidence, found.first.first),
+            "alone": alone(found.first.evidence, found.first.first), "recurrence": _recurrence(found.recurrence),
         },
     )  # fmt: skip
+
+
+def _recurrence(found: Recurrence | None) -> dict[str, Any] | None:
+    """Give what comes back as plain data; None where the model leaves nothing in the stops."""
+    if found is None:
+        return None
+    return asdict(found) | {
+        "answer": list(found.answer), "sensors": list(found.sensors),
+        "kinds": [asdict(k) | {"sensors": list(k.sensors)} for k in found.kinds],
+    }  # fmt: skip
 
 
 def read_set_diagnosis(path: Path) -> dict[str, Any]:

@@ -150,7 +150,7 @@ def job_number(job: Job) -> str:
         tuple(map(load_imu, CLASSES if source.imu is None else (source.imu,))),
         load_site(source.site or DEFAULT_SITE), source.site,
         source.source, source.handheld, source.measured_noise, source.reference_degc, job.model, job.estimator,
-        job.local, job.candidates, job.with_local, job.noise, job.imu,
+        job.local, job.candidates, job.with_local, job.stretches, job.noise, job.imu,
         None if job.about is None else sorted(job.about.items()),
         None if job.start is None else (
             job.start.names, job.start.coefficients.tobytes(), job.start.C_nb.tobytes(), job.start.more.tobytes()

@@ -18,6 +18,7 @@ from sdimu_calibration.core.specification import Site
 from sdimu_calibration.storage.config import load_imu, load_model, load_plan
 from sdimu_sim.campaign.run import simulate
 from sdimu_sim.core.scenario import Scenario, imu_truth
+from sdimu_sim.core.temperature import TemperatureProfile
 from sdimu_sim.core.truth import draw_coefficients, turned_on
 
 SITE = Site(latitude_rad=float(np.radians(36.4)), height_m=80.0)
@@ -56,25 +57,28 @@ def switched_on(seed: int, power_on: int) -> dict[str, float]:
 @lru_cache(maxsize=8)
 def _recorded(
     seed: int, number: int, plan: Plan, effects: tuple[str, ...], shift: tuple[tuple[str, float], ...],
-    mount: tuple[float, float, float] | None, power_on: int,
+    mount: tuple[float, float, float] | None, power_on: int, noise: tuple[str, ...] = (),
+    temperature: TemperatureProfile | None = None,
 ) -> PreparedTest:  # fmt: skip
     own = switched_on(seed, power_on)
     own |= {name: own[name] + size for name, size in shift}
     scenario = Scenario(
         plan, IMU, SITE, rate_hz=10.0, seed=1000 * seed + number, coefficients=own, effects=effects, mount_rad=mount,
-        start_ns=(1_700_000_000 + 86_400 * number) * 10**9,
+        start_ns=(1_700_000_000 + 86_400 * number) * 10**9, noise=noise, temperature=temperature,
     )  # fmt: skip
     return PreparedTest(simulate(scenario, imu_truth(scenario)), IMU, SITE)
 
 
 def unit_set(
     seed: int, plans: Sequence[Plan], effects: tuple[str, ...] = (),
-    shift: Mapping[int, Mapping[str, float]] | None = None,
+    shift: Mapping[int, Mapping[str, float]] | None = None, noise: tuple[str, ...] = (),
+    temperature: Sequence[TemperatureProfile] = (),
 ) -> UnitSet:  # fmt: skip
     members = []
     for k, plan in enumerate(plans):
         own = tuple((shift or {}).get(k, {}).items())
-        members.append(Member(f"r{k}", InMemory(_recorded(seed, k, plan, effects, own, None, k))))
+        heat = temperature[k] if temperature else None
+        members.append(Member(f"r{k}", InMemory(_recorded(seed, k, plan, effects, own, None, k, noise, heat))))
     return UnitSet(tuple(members), draw_coefficients(IMU, seed))
 
 

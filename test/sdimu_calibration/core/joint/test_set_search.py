@@ -35,6 +35,7 @@ def test_a_clean_set_is_consistent(options):
     assert found.verdict == "consistent"
     assert not found.findings
     assert found.after.fit["held_out_rms"] < 1.25
+    assert found.recurrence is None
 
 
 def test_a_fault_of_one_recording_is_told_of_that_one(options):

@@ -104,8 +104,9 @@ def _about_found(d: Diagnosis, found: tuple[Found, ...], plan: PlanSeen) -> list
         else:
             out.append(f"Do not use coefficients of this test beyond their scatter: something unknown acts{place}.")
         out.append(
-            "Run the plan again in another order: what comes back at the same attitude belongs to the sensor, what "
-            "comes back at the same time to warm-up, what does not come back to this run."
+            "Run the plan again in another order, and diagnose both recordings together (sdimu diagnose FIRST SECOND): "
+            "that says whether it comes back at the same attitude, time or temperature, or is of this run. The other "
+            "order: sdimu plan --plan YOURS --backwards."
         )
         if found:
             names = ", ".join(f.candidate.label for f in found)

@@ -21,7 +21,10 @@ def handheld_advice(d: Diagnosis, found: tuple[Found, ...]) -> tuple[str, ...]:
                 "its sigmas." for s in one.coefficient_shifts[:3]
             ]  # fmt: skip
     if d.verdict == "unexplained":
-        out.append("Record the run again in another order: what comes back at the same attitude belongs to the sensor.")
+        out.append(
+            "Record the run again in another order, and diagnose both recordings together (sdimu diagnose FIRST "
+            "SECOND): that says whether it comes back at the same attitude, time or temperature, or is of this run."
+        )
     return tuple(dict.fromkeys(out))
 
 

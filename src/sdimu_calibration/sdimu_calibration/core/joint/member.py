@@ -22,6 +22,7 @@ from sdimu_calibration.core.estimation.solve import AUTO, fit_about, solve
 from sdimu_calibration.core.evidence.learned_noise import Wander
 from sdimu_calibration.core.joint.reduction import Reduction, reduced
 from sdimu_calibration.core.joint.scope import is_local, tagged
+from sdimu_calibration.core.joint.stretch_rows import Places, stretch_rows
 from sdimu_calibration.core.noise_term import NoiseTerm
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.specification import ImuSpecification, Model
@@ -67,6 +68,8 @@ class Job:
         Effects whose signatures are wanted.
     with_local : bool
         Also those of effects that are of one recording.
+    stretches : bool
+        Signatures of an error of each sensor in each dwell and turn, in place of candidates.
     about : mapping of str to float or None
         Coefficients of the estimator (SI), by name, about which the rows are linear; None is the recording's own fit.
     imu : ImuSpecification or None
@@ -87,6 +90,7 @@ class Job:
     imu: ImuSpecification | None = None
     start: Start | None = None
     noise: tuple[NoiseTerm, ...] | None = None
+    stretches: bool = False
 
 
 @dataclass(frozen=True)
@@ -123,6 +127,8 @@ class Report:
         Noise with a memory that was learned.
     widened : bool
         The recording alone contradicts priors of the IMU file.
+    places : Places or None
+        Of its dwells and turns, where they were asked for.
     """
 
     name: str
@@ -146,6 +152,7 @@ class Report:
     heading_rad: float = 0.0
     noise: tuple[NoiseTerm, ...] = ()
     widened: bool = False
+    places: Places | None = None
 
     @property
     def stands_alone(self) -> bool:
@@ -221,7 +228,10 @@ def _report(job: Job, fit: Fit) -> Report:
     name, recording = job.member.name, fit.test.recording
     shared = [selection.resolve(e) if isinstance(e, str) else e for e in job.candidates]
     own = _local_candidates(fit) if job.with_local else []
-    found = reduced(fit.evidence([*shared, *own]), fit.noise_terms)
+    if job.stretches:
+        found, places = stretch_rows(fit)
+    else:
+        found, places = reduced(fit.evidence([*shared, *own]), fit.noise_terms), None
     log = recording.temperature
     return Report(
         name, job.member.serial, job.member.power_on, _named(found, job, shared), fit.estimator,
@@ -232,7 +242,7 @@ def _report(job: Job, fit: Fit) -> Report:
         np.sqrt(np.diag(fit.covariance)) if job.about is None else np.empty(0),
         (*recording.notes, *(told(term) for term in fit.noise_terms)), tuple(f.text for f in fit.faults if f.grave),
         _heading(fit), fit.noise_terms,
-        _widened(fit),
+        _widened(fit), places,
     )  # fmt: skip
 
 

@@ -11,7 +11,10 @@ from sdimu_calibration.core.diagnosis.search import Search
 from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.effects.selection import resolve
 from sdimu_calibration.core.evidence.known import Standing
+from sdimu_calibration.core.joint.leftovers import leftovers
 from sdimu_calibration.core.joint.member import Member
+from sdimu_calibration.core.joint.recurrence import Recurrence, recurrence
+from sdimu_calibration.core.joint.recurrence_words import next_steps, told
 from sdimu_calibration.core.joint.scope import tagged
 from sdimu_calibration.core.joint.set_evidence import SetEvidence, held_out_chance
 from sdimu_calibration.core.joint.set_fit import Run, SetFit, SetOptions
@@ -79,6 +82,8 @@ class SetDiagnosis:
         What the set knows of the unit: what a plan for the next recording begins with.
     first : Search
         Of the first round, with every candidate beside the model as given.
+    recurrence : Recurrence or None
+        What comes back of that what the model leaves in the stops; None where it leaves nothing.
     """
 
     verdict: str
@@ -90,6 +95,7 @@ class SetDiagnosis:
     advice: tuple[str, ...]
     standing: Standing
     first: Search[SetEvidence]
+    recurrence: Recurrence | None
 
 
 def diagnose_set(
@@ -110,12 +116,13 @@ def diagnose_set(
     before = set_outcome(found.before)
     after = before if found.after is found.before else set_outcome(found.after)
     findings = _findings(found)
-    word = _verdict(findings, after, found.after)
+    again = recurrence(leftovers(found.after, run))
+    word = _verdict(findings, after, found.after, again)
     test = base_fit(found.after).test
     standing = replace(found.standing, site=test.origin.site)
     return SetDiagnosis(
-        word, _sentence(word, findings, before, after), findings, before, after, found.threshold,
-        _advice(word, findings, next_recording(found.after, standing, test)), standing, found.first,
+        word, _sentence(word, findings, (before, after), again), findings, before, after, found.threshold,
+        _advice(word, findings, next_recording(found.after, standing, test), again), standing, found.first, again,
     )  # fmt: skip
 
 
@@ -142,11 +149,12 @@ def _findings(found: SetSearch) -> tuple[SetFinding, ...]:
     )
 
 
-def _verdict(findings: Sequence[SetFinding], after: Calibration, fit: SetFit) -> str:
+def _verdict(findings: Sequence[SetFinding], after: Calibration, fit: SetFit, again: Recurrence | None) -> str:
     shared = [f for f in findings if not f.recording]
     error = after.fit["held_out_rms"] or 0.0
     still = error > _STILL_WRONG and held_out_chance(fit, error) < SCATTERS
-    left = _scatter(after) < SCATTERS or still
+    # Noise does not come back: where something does, it is no noise, whatever each recording took it for.
+    left = _scatter(after) < SCATTERS or still or (again is not None and len(again.answer) > 0)
     # A fault leaves traces in its recording that are no physics of the unit.
     if left and (shared or not findings):
         return "unexplained"
@@ -165,16 +173,28 @@ def _scatter(result: Calibration) -> float:
     return float(min(1.0, len(seen) * seen.min())) if len(seen) else 1.0
 
 
-def _sentence(word: str, findings: Sequence[SetFinding], before: Calibration, after: Calibration) -> str:
-    told = [_named(f) for f in findings]
-    names = " and ".join(told[:_LISTED]) + (f" and {len(told) - _LISTED} more" if len(told) > _LISTED else "")
+def _sentence(
+    word: str, findings: Sequence[SetFinding], results: tuple[Calibration, Calibration], again: Recurrence | None
+) -> str:
+    """Say what was found, then what comes back of that what the model leaves."""
+    more = told(again, word == "unexplained") if again else ""
+    return f"{_found(word, findings, *results, again)} {more}".strip()
+
+
+def _found(
+    word: str, findings: Sequence[SetFinding], before: Calibration, after: Calibration, again: Recurrence | None
+) -> str:
+    listed = [_named(f) for f in findings]
+    names = " and ".join(listed[:_LISTED]) + (f" and {len(listed) - _LISTED} more" if len(listed) > _LISTED else "")
     if word == "consistent":
         return "The model explains all recordings together: nothing stands out of the noise."
     if word == "data fault":
         return f"All recordings agree but for {names}."
     if word == "unexplained":
         most = f" Found, but not all: {names}." if names else ""
-        return f"Something differs between the recordings that no effect of the catalogue explains.{most}{_odd(after)}"
+        shared = again is not None and again.answer and not _odd(after)
+        what = "The recordings share something" if shared else "Something differs between the recordings"
+        return f"{what} that no effect of the catalogue explains.{most}{_odd(after)}"
     falls = f"error at recordings held out: {_rms(before)} -> {_rms(after)}"
     if word == "class of effects":
         others = ", ".join(findings[0].alike[:_LISTED])
@@ -198,9 +218,10 @@ def _rms(result: Calibration) -> str:
 
 
 def _advice(
-    word: str, findings: Sequence[SetFinding], closing: Sequence[tuple[tuple[str, ...], NextTurn]]
+    word: str, findings: Sequence[SetFinding], closing: Sequence[tuple[tuple[str, ...], NextTurn]],
+    again: Recurrence | None,
 ) -> tuple[str, ...]:
-    out = []
+    out = next_steps(again, word == "unexplained")
     closed = {members[0] for members, _ in closing}
     for f in findings:
         if f.recording:

@@ -1,0 +1,120 @@
+"""Each dwell of a recording as a candidate: a constant error of every sensor, and where the IMU was meanwhile.
+
+Two recordings in another order pass the same attitudes at other times. What a model leaves in their dwells then says
+what it belongs to (`recurrence`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from sdimu_calibration.core.arrays import Floats
+from sdimu_calibration.core.effects.effect import CHANNELS, Timetable
+from sdimu_calibration.core.effects.motion import Motion
+from sdimu_calibration.core.estimation.fit import Fit
+from sdimu_calibration.core.evidence.handheld_evidence import HandheldEvidence
+from sdimu_calibration.core.evidence.linear import LinearEvidence
+from sdimu_calibration.core.evidence.navigation_evidence import NavigationEvidence
+from sdimu_calibration.core.evidence.noise_kernels import Stretches
+from sdimu_calibration.core.joint.reduction import Reduction, reduced
+from sdimu_calibration.core.recording import TemperatureLog
+
+_READINGS = 9
+"""Number of times of a dwell (1) at which its temperature is read: a thermometer changes little in one."""
+
+
+@dataclass(frozen=True)
+class Places:
+    """Where the IMU was in each dwell of a recording, n of them.
+
+    Attributes
+    ----------
+    start, end : ndarray, shape (n,)
+        Seconds after the start of the recording (s).
+    up : ndarray, shape (n, 3)
+        Direction of the mean specific force in b: a unit vector.
+    temperature_degc : ndarray, shape (n,)
+        Mean; NaN where none is recorded.
+    """
+
+    start: Floats
+    end: Floats
+    up: Floats
+    temperature_degc: Floats
+
+    def __len__(self) -> int:
+        """Return the number of dwells."""
+        return len(self.start)
+
+    @property
+    def middle(self) -> Floats:
+        """Time of the middle of each dwell.
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            Seconds after the start of the recording (s).
+        """
+        return np.asarray(0.5 * (self.start + self.end))
+
+
+def stretch_rows(fit: Fit) -> tuple[Reduction, Places]:
+    """Compress what a recording says of its coefficients and of the errors in each dwell.
+
+    Noise with a memory that was learned is left out: it would take in what may come back.
+
+    Parameters
+    ----------
+    fit : Fit
+
+    Returns
+    -------
+    reduction : Reduction
+        Its labels are those of the six sensors in the first dwell, in the second ...; one per rad/s or m/s^2.
+    places : Places
+    """
+    evidence = fit.evidence()
+    cut, own = _dwells(evidence.times), len(evidence.weight)
+    labels = [f"{name} in dwell {k}" for k in range(len(cut)) for name in CHANNELS]
+    wide = replace(
+        evidence, W=np.hstack([evidence.W[:, :own], evidence.constant_signature(cut)]),
+        names=(*evidence.names[:own], *labels),
+    )  # fmt: skip
+    return reduced(wide), _places(evidence, cut, fit.test.recording.temperature)
+
+
+def _dwells(times: Timetable) -> Stretches:
+    """Every dwell, uncut."""
+    _, start, end = zip(*times.stops, strict=True)
+    count = len(times.stops)
+    return Stretches(np.array(start), np.array(end), np.arange(count), np.zeros(count, dtype=bool))
+
+
+def _places(evidence: LinearEvidence, cut: Stretches, log: TemperatureLog | None) -> Places:
+    motion = _seen(evidence)
+    middle = motion.t - 0.5 * motion.dt
+    up, heat = np.zeros((len(cut), 3)), np.full(len(cut), np.nan)
+    for k, (begin, end) in enumerate(zip(cut.start.tolist(), cut.end.tolist(), strict=True)):
+        rows = (middle >= begin) & (middle <= end)
+        force = motion.f[rows].mean(axis=0)
+        up[k] = force / float(np.linalg.norm(force))
+        if log is not None and len(log.t):
+            heat[k] = np.interp(np.linspace(begin, end, _READINGS), log.t, log.value).mean()
+    return Places(cut.start, cut.end, up, heat)
+
+
+def _seen(evidence: LinearEvidence) -> Motion:
+    """Motion along which the evidence was linearised; of a run by hand at its rests.
+
+    Raises
+    ------
+    TypeError
+        For an evidence of another kind.
+    """
+    if isinstance(evidence, HandheldEvidence):
+        return evidence.rests
+    if isinstance(evidence, NavigationEvidence):
+        return evidence.seen
+    raise TypeError(f"no motion in {type(evidence).__name__}")

@@ -1,0 +1,220 @@
+"""What stays unexplained in a set: does it come back at the same attitude, time or temperature, or not at all?"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sdimu_calibration.core.arrays import Floats
+from sdimu_calibration.core.joint.leftovers import ATTITUDE, TEMPERATURE, TIME, Leftovers, leftovers, likeness
+from sdimu_calibration.core.joint.recurrence import Kind, Recurrence, recurrence
+from sdimu_calibration.core.joint.recurrence_words import next_steps, told
+from sdimu_calibration.core.joint.set_diagnosis import diagnose_set
+from sdimu_calibration.core.joint.set_fit import SetOptions, fit_set
+from sdimu_calibration.core.plan import Plan, backwards
+from sdimu_calibration.report.set_sections import recurrence_section
+from sdimu_calibration.storage.config import load_model
+from sdimu_calibration.storage.json_file import read_json
+from sdimu_calibration.storage.reduction_file import read_report, write_report
+from sdimu_calibration.storage.set_result_file import FORMAT, write_set_diagnosis
+from sdimu_sim.core.temperature import TemperatureProfile
+
+from .conftest import here, short, unit_set
+
+FORTH = short("recommended", stops=28)
+BACK = backwards(FORTH)
+OF_ATTITUDE = ("accel_x: sin(7 fx/g + 4 fy/g)=40 ug",)
+"""Of the specific force, and no power of it: the catalogue has nothing like it."""
+OF_TIME = ("accel_x: exp(-t/300 s)=60 ug",)
+OF_TEMPERATURE = ("accel_x: T^3=0.8 ug/degC^3",)
+HEAT = tuple(
+    TemperatureProfile(start_degc=24.0, ripple=4.0, ripple_period_s=period) for period in (500.0, 370.0, -430.0)
+)
+"""Three recordings whose temperatures come and go at different times."""
+OPTIONS = SetOptions(load_model("baseline"))
+
+
+def left_of(seed: int, plans: Sequence[Plan], effects: tuple[str, ...] = (), **more: object) -> Leftovers:
+    """What the baseline leaves in the stops of a simulated set."""
+    members = unit_set(seed, plans, effects, **more).members  # type: ignore[arg-type]
+    return leftovers(fit_set(members, OPTIONS, here), here)
+
+
+@pytest.fixture(scope="module")
+def clean() -> Leftovers:
+    """Two clean recordings of one plan, forth and back."""
+    return left_of(41, [FORTH, BACK])
+
+
+def drawn(clean: Leftovers, u: Floats, seed: int) -> Leftovers:
+    """The same recordings with other noise, and with errors u of the sensors in the stops."""
+    values, vectors = np.linalg.eigh(clean.gram)
+    noise = vectors @ (np.sqrt(np.maximum(values, 0.0)) * np.random.default_rng(seed).standard_normal(len(u)))
+    return replace(clean, score=noise + clean.gram @ u)
+
+
+def test_a_clean_set_is_not_asked(clean):
+    assert recurrence(clean) is None
+    assert all(recurrence(drawn(clean, np.zeros(len(clean.score)), seed)) is None for seed in range(20))
+
+
+def test_the_order_of_the_plans_decides_what_is_told_apart(clean):
+    assert clean.coincide(ATTITUDE, TIME) < 0.5
+    assert clean.pairs(ATTITUDE) > 20
+    assert clean.pairs(TEMPERATURE) == 0
+
+
+def test_likeness_is_that_of_places():
+    up = np.array([[0.0, 0.0, 1.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
+    alike = likeness(up, np.array([0.0, 0.5, 0.5]), np.array([20.0, 20.0, np.nan]))
+    assert alike[ATTITUDE][0, 1] == 1.0
+    assert alike[ATTITUDE][0, 2] < 0.02
+    assert alike[TIME][1, 2] == 1.0
+    assert alike[TIME][0, 1] < 0.05
+    assert alike[TEMPERATURE][0, 1] == 1.0
+    assert not alike[TEMPERATURE][2].any()
+    assert all(np.linalg.eigvalsh(value).min() > -1e-12 for value in alike.values())
+
+
+@pytest.mark.parametrize("own", ["scatter", ATTITUDE, TIME])
+def test_what_is_of_each_recording_does_not_come_back(clean, own):
+    """Ten draws each: scatter, or a function of attitude or time that every recording has anew.
+
+    With one false alarm in a hundred, two in ten have a probability of 0.4 %.
+    """
+    accel = clean.sensor == 3
+    same = clean.recording[:, None] == clean.recording[None, :]
+    K = np.eye(len(accel)) if own == "scatter" else np.where(same, clean.likeness[own], 0.0)
+    root = np.linalg.cholesky(K[np.ix_(accel, accel)] + 1e-9 * np.eye(accel.sum()))
+    false = 0
+    for seed in range(10):
+        u = np.zeros(len(accel))
+        u[accel] = 10.0 * root @ np.random.default_rng(seed + 100).standard_normal(accel.sum())
+        found = recurrence(drawn(clean, u, seed))
+        assert found is not None
+        false += bool(found.answer)
+    assert false < 2
+
+
+@pytest.mark.parametrize("kind", [ATTITUDE, TIME])
+def test_what_is_common_comes_back(clean, kind):
+    """Five draws of a function of attitude or time that is the same in both recordings."""
+    accel = clean.sensor == 3
+    root = np.linalg.cholesky(clean.likeness[kind][np.ix_(accel, accel)] + 1e-6 * np.eye(accel.sum()))
+    right = 0
+    for seed in range(5):
+        u = np.zeros(len(accel))
+        u[accel] = 10.0 * root @ np.random.default_rng(seed + 200).standard_normal(accel.sum())
+        found = recurrence(drawn(clean, u, seed))
+        assert found is not None
+        right += found.answer == (kind,)
+    assert right >= 4
+
+
+def test_recordings_in_the_same_order_do_not_tell_attitude_from_time():
+    found = recurrence(left_of(1, [FORTH, FORTH], OF_ATTITUDE))
+    assert found is not None
+    assert (found.answer, found.apart) == ((ATTITUDE, TIME), False)
+    assert "same order" in told(found, True)
+    assert "--backwards" in next_steps(found, True)[0]
+
+
+@pytest.mark.slow
+def test_a_set_says_what_comes_back(tmp_path):
+    """A shape that no effect of the catalogue has; noise takes it in where a recording is alone."""
+    found = diagnose_set(unit_set(3, [FORTH, BACK], OF_ATTITUDE).members, OPTIONS, here)
+    assert found.verdict == "unexplained"
+    assert found.recurrence is not None
+    assert found.recurrence.answer == (ATTITUDE,)
+    assert "comes back at the same attitude (accel_x" in found.sentence
+    assert "it belongs to the sensor" in found.sentence
+    assert any("--try FILE" in line for line in found.advice)
+    write_set_diagnosis(tmp_path / "set.json", found)
+    content = read_json(tmp_path / "set.json", FORMAT)["recurrence"]
+    assert content["answer"] == [ATTITUDE]
+    assert content["kinds"][0]["sensors"][0] == "accel_x"
+
+
+def _found(answer: tuple[str, ...], apart: bool, scores: tuple[float, float, float]) -> Recurrence:
+    pairs = zip((ATTITUDE, TIME, TEMPERATURE), scores, strict=True)
+    kinds = tuple(Kind(k, 20, 0.2 * z, z, ("accel_x",) if k in answer else ()) for k, z in pairs)
+    return Recurrence(answer, apart, kinds, 3.0, ("accel_x",), 1e-9)
+
+
+@pytest.mark.parametrize(
+    ("found", "words", "step"),
+    [
+        (_found((TIME,), True, (0.1, 4.5, 0.2)), "comes back at the same time after the start (accel_x: corr", "warm"),
+        (_found((TEMPERATURE,), True, (0.1, 0.5, 4.2)), "it belongs to the temperature", "soaks"),
+        (_found((), True, (0.1, 0.5, np.nan)), "does not come back at the same attitude or time after the", "mount"),
+        (_found((), True, (0.1, 2.5, np.nan)), "is open: nearest is the same time after the start", "--backwards"),
+        (_found((), True, (np.nan, np.nan, np.nan)), "share too few stops", "--backwards"),
+    ],
+)  # fmt: skip
+def test_words_say_what_it_belongs_to_and_what_to_do(found, words, step):
+    assert words in told(found, True)
+    assert step in next_steps(found, True)[0]
+    assert bool(told(found, False)) == bool(found.answer)
+
+
+def test_the_page_has_what_comes_back():
+    text = recurrence_section(_found((ATTITUDE,), True, (4.0, 0.5, np.nan)))
+    assert "What comes back" in text
+    assert "<td>4.0</td>" in text
+
+
+def test_places_are_kept(tmp_path):
+    kept = []
+
+    def run(jobs):
+        done = here(jobs)
+        for report in done:
+            write_report(tmp_path / "one.npz", report)
+            kept.append((report, read_report(tmp_path / "one.npz")))
+        return done
+
+    leftovers(fit_set(unit_set(41, [FORTH, BACK]).members, OPTIONS, here), run)
+    for report, back in kept:
+        for name in ("start", "end", "up", "temperature_degc"):
+            np.testing.assert_array_equal(getattr(back.places, name), getattr(report.places, name))
+
+
+def _answers(
+    seeds: Sequence[int], plans: Sequence[Plan], effects: tuple[str, ...] = (), **more: object
+) -> list[object]:
+    found: list[Recurrence | None] = [recurrence(left_of(seed, plans, effects, **more)) for seed in seeds]
+    return [None if r is None else r.answer for r in found]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("effects", "kind"),
+    [
+        (OF_ATTITUDE, ATTITUDE), (("gyro_x: sin(7 fx/g + 4 fy/g)=0.2 deg/h",), ATTITUDE), (OF_TIME, TIME),
+        (("gyro_x: sin(2 pi t/700 s)=0.2 deg/h",), TIME),
+    ],
+)  # fmt: skip
+def test_two_recordings_say_what_comes_back(effects, kind):
+    answers = _answers(range(1, 11), [FORTH, BACK], effects)
+    assert answers.count((kind,)) >= 8
+
+
+@pytest.mark.slow
+def test_three_recordings_say_what_comes_back_with_the_temperature():
+    answers = _answers(range(1, 11), [FORTH, BACK, FORTH], OF_TEMPERATURE, temperature=HEAT)
+    assert answers.count((TEMPERATURE,)) >= 8
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("noise", ["accel_noise_stop=20 ug", "accel_noise_random_walk=60 ug/sqrt(h)"])
+def test_noise_does_not_come_back(noise):
+    answers = _answers(range(1, 11), [FORTH, BACK], noise=(noise,))
+    assert sum(bool(answer) for answer in answers) <= 1
+
+
+@pytest.mark.slow
+def test_ten_clean_sets_are_not_asked():
+    assert _answers(range(1, 11), [FORTH, BACK]) == [None] * 10
