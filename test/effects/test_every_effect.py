@@ -164,6 +164,7 @@ NOT_OF_THE_MEAN = {
     "gyro_acceleration_sensitivity": 0.2, "gyro_delay": 0.2, "accel_delay": 0.02, "accel_triad_delay": 0.02,
     "accel_size": 0.2, "lever_arm": 0.2, "gyro_bias_temperature_rate": 0.05, "accel_bias_temperature_rate": 0.05,
     "gyro_scale_temperature_rate": 0.05, "accel_scale_temperature_rate": 0.05,
+    "gyro_bias_temperature_rate_linear": 0.05, "gyro_bias_temperature_rate_quadratic": 0.05,
     "gyro_bias_temperature_hysteresis": 0.05, "accel_bias_temperature_hysteresis": 0.05,
     "gyro_scale_temperature_hysteresis": 0.05, "accel_scale_temperature_hysteresis": 0.05,
     # Switches: they change inside a cycle, and are softened where noise decides.

@@ -49,9 +49,7 @@ DIRECTIONS = frozenset(f"{v}{i}" for v in "ne" for i in _XYZ)
 
 TEMPERATURE_NAMES = frozenset({"T", "dT", "dTdt", "slow"})
 
-
 _BOTH = (("gyro", "deg/h", "w{i}"), ("accel", "ug", "g*a{i}"))
-
 
 
 def _by_temperature(word: str, per: str, power: str) -> list[Row]:
@@ -99,6 +97,8 @@ _ROWS: tuple[Row, ...] = (
     Row("gyro_dead_band_{i}", "deg/h", "-min(max(w{i}, -k), k)"),
     Row("gyro_hysteresis_{i}", "deg/h", "k*turned{i}"),
     Row("gyro_magnetic_{i}{any}", "deg/h/G", "k*B{any}"),
+    Row("gyro_bias_temperature_rate_linear_{i}", "deg/h*min/degC^2", "k*dT*dTdt", drawn=False),
+    Row("gyro_bias_temperature_rate_quadratic_{i}", "deg/h*min/degC^3", "k*dT**2*dTdt", drawn=False),
     *(
         row
         for triad, unit, signal in _BOTH

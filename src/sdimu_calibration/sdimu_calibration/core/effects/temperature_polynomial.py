@@ -6,11 +6,15 @@ state temperature coefficients as such polynomials.
 
 One recording rarely spans the temperatures that tell the powers apart. They are tried where several recordings are
 diagnosed together, and can be added to any model.
+
+The rate coefficient of the gyro biases is such a polynomial, too: so gyros see axes that turn in the second and third
+power of the temperature (`body_frame`), and sensors whose thermometer runs ahead show it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -24,6 +28,7 @@ from sdimu_calibration.core.effects.misalignment import ACCEL_MISALIGNMENT, GYRO
 from sdimu_calibration.core.effects.motion import Motion
 from sdimu_calibration.core.effects.registry import register
 from sdimu_calibration.core.effects.scale import ACCEL_SCALE, GYRO_SCALE
+from sdimu_calibration.core.effects.temperature import GYRO_BIAS_TEMPERATURE_RATE
 from sdimu_calibration.core.units import from_si, to_si
 
 _BASES = (
@@ -102,6 +107,36 @@ def _hysteresis(base: Effect, threshold: float = _THRESHOLD) -> Effect:
     )  # fmt: skip
 
 
+_SEEN = {
+    1: "axes that bend by 0.01 arcsec/C^2: 0.0003 deg/h*min/C^2",
+    2: "axes that bend by 0.0001 arcsec/C^3: 0.000005 deg/h*min/C^3",
+}
+
+
+def _rate_power(order: int, word: str) -> Effect:
+    """Rate coefficient of the gyro biases that follows a power of the temperature."""
+    base, power = GYRO_BIAS_TEMPERATURE_RATE, "" if order == 1 else f"^{order}"
+    stem, smaller = f"{base.name}_{word}", (_BEND / _RANGE_K) ** order
+    return replace(
+        base,
+        name=stem,
+        title=f"{base.title}: {word} in the temperature",
+        equation=f"dw_i = k_i (T - T0){power} dT/dt",
+        parameters=tuple(
+            Parameter(stem + p.name.removeprefix(base.name), f"{p.unit}^{order + 1}", f"{p.display_unit}^{order + 1}")
+            for p in base.parameters
+        ),
+        regressors=lambda motion: base.regressors(motion) * (motion.temperature**order)[:, None],
+        prior={grade: smaller * size for grade, size in base.prior.items()},
+        typical=_SEEN[order],
+        description="What the gyros see of axes that turn with a power of the temperature above the first: put it into "
+        "a model with such axes (doc/temperature.md).",
+        confused_with=(base.name,),
+        tried_in="request",
+        sheet="",
+    )
+
+
 def _multiplied(
     base: Effect, suffix: str, factor: Callable[[Motion], Floats], units: tuple[str, str], **more: Any
 ) -> Effect:
@@ -129,5 +164,7 @@ for _base in _BASES:
     for _order, _power_word in _POWERS.items():
         if registry.find(f"{_base.name}_temperature{_power_word}") is None:
             register(_power(_base, _order))
+for _order, _power_word in ((1, "linear"), (2, "quadratic")):
+    register(_rate_power(_order, _power_word))
 for _base in _OF_ONE_SENSOR:
     register(_hysteresis(_base))
