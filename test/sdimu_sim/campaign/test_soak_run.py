@@ -8,13 +8,16 @@ import numpy as np
 import pytest
 
 from sdimu_calibration.core.compensation.compensator import compensate_recording, compensator
+from sdimu_calibration.core.effect_key import sized
 from sdimu_calibration.core.joint.set_fit import SetOptions, fit_set
 from sdimu_calibration.core.joint.set_result import set_outcome
 from sdimu_sim.campaign import soak_page
 from sdimu_sim.campaign.set_world import here, members_of, opened
 from sdimu_sim.campaign.soak_run import SOAK_KINDS, SoakRun, errors, of_power_on, ratios
-from sdimu_sim.campaign.soak_world import in_the_frame, noise_of
-from sdimu_sim.core.true_coefficients import POWERS, SEEN_OF_TURNS, true_coefficients, with_lag
+from sdimu_sim.campaign.soak_world import T0_DEGC, in_the_frame, noise_of, ramp
+from sdimu_sim.core.hidden import size_unit
+from sdimu_sim.core.true_coefficients import POWERS, RATES, SEEN_OF_TURNS, true_coefficients, with_lag
+from sdimu_sim.core.truth import ImuTruth
 
 SEED = 3
 
@@ -54,7 +57,7 @@ def test_a_compensated_ramp_has_little_more_than_its_noise(fitted):
 
 
 def without_noise(sensor_of, scenario, test):
-    """RMS of what compensation leaves of samples free of noise where the IMU rests and the rate of the temperature stands.
+    """RMS of what compensation leaves of samples free of noise, at rest and where the temperature's rate stands.
 
     In turns the noise of the thermometer counts, times coefficients of scale factors.
     """
@@ -91,11 +94,20 @@ def test_the_truth_compensates_a_ramp_with_axes_that_bend(fitted):
 
 
 def test_a_lag_shows_as_rate_terms():
-    first, second = (f"gyro_bias_{power}_y" for power in POWERS[:2])
-    found = with_lag({first: 3.0, second: 0.5, f"{SEEN_OF_TURNS[0]}_y": 1.0}, 40.0)
-    assert found[f"{SEEN_OF_TURNS[0]}_y"] == pytest.approx(1.0 - 40.0 * 3.0)
-    assert found[f"{SEEN_OF_TURNS[1]}_y"] == pytest.approx(-2.0 * 40.0 * 0.5)
-    assert found[first] == 3.0
+    """What a lagging sensor reads late in a ramp is what its rate terms say."""
+    sizes = {f"accel_bias_{POWERS[0]}_y": 3e-5, f"accel_bias_{POWERS[1]}_y": 2e-7, "accel_scale_temperature_x": 4e-6}
+    shown = {name: size_unit(name) for name in sizes}
+    truth = ImuTruth(effects=tuple(sized(name, size, shown[name]) for name, size in sizes.items()))
+    lag, rate, above = 40.0, 1.0 / 30.0, 20.0
+    profile = replace(ramp(-40.0, 70.0, rate, lag), reference_degc=T0_DEGC)
+    at = (above + T0_DEGC + 40.0) / rate + 300.0
+    behind = profile.sensor_value(np.array([at]))[0] - T0_DEGC
+    found = with_lag(truth, "prior", lag)
+    k, square, of_rate, linear = (found[f"accel_bias_{word}_y"] for word in (*POWERS[:2], *RATES))
+    # Beyond it is the square of what the sensor lags, 1.3 K.
+    expected = k * behind + square * behind**2 - square * (lag * rate) ** 2
+    assert k * above + square * above**2 + (of_rate + linear * above) * rate == pytest.approx(expected, rel=1e-9)
+    assert found["accel_scale_temperature_rate_x"] == pytest.approx(-lag * 4e-6)
 
 
 def test_tables_sort_coefficients_by_power_and_kind():

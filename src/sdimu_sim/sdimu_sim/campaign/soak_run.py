@@ -31,7 +31,7 @@ from sdimu_sim.campaign.soak_world import (
     polynomials,
 )
 from sdimu_sim.core.scenario import Scenario
-from sdimu_sim.core.true_coefficients import RATES, SEEN_OF_TURNS, true_coefficients, with_lag
+from sdimu_sim.core.true_coefficients import RATES, SEEN_OF_TURNS, with_lag
 
 LAG = "soaks-lag"
 SOAK_KINDS = ("soaks", LAG, "soaks-flicker", "soaks-markov")
@@ -90,9 +90,10 @@ class SoakRun:
         rng = np.random.default_rng(np.random.SeedSequence([seed, crc32(f"{self.kind} {self.imu}".encode())]))
         imu = load_imu(self.imu)
         plan, latitude = load_plan(str(rng.choice(PLANS))), math.radians(float(rng.uniform(*_LATITUDES_DEG)))
-        shares = np.exp(rng.uniform(*np.log(TURN_ON), 2))
+        low, high = np.log(TURN_ON)
+        shares = np.exp(rng.uniform(low, high, 2)).tolist()
         biases = [e for e in load_model("baseline").effects if registry.get(e).scope == "power-on"]
-        turn_on = {name: float(share) * imu.prior[name] for name, share in zip(biases, shares, strict=True)}
+        turn_on = {name: share * imu.prior[name] for name, share in zip(biases, shares, strict=True)}
         effects = drawn_polynomials(imu, self.orders, rng)
         drawn = SoakWorld(World(self.imu, imu, seed, rng), Site(latitude, 0.0), plan, effects, turn_on)
         if self.kind == LAG:
@@ -102,14 +103,16 @@ class SoakRun:
 
     def model(self) -> Model:
         """Return the baseline with its polynomials, as `sdimu calibrate --add` makes it."""
-        lagging = RATES if self.kind == LAG else ()
+        baseline = load_model("baseline")
+        rates = RATES[: self.orders] if self.kind == LAG else ()
+        lagging = [f"{base}_{rate}" for rate in rates for base in baseline.effects]
         added = dict.fromkeys((*polynomials(self.orders), *SEEN_OF_TURNS[: self.orders], *lagging))
-        return with_effects(load_model("baseline"), list(added))
+        return with_effects(baseline, list(added))
 
 
 def errors(result: Calibration, world: SoakWorld) -> dict[str, float]:
     """Error over sigma of every coefficient that the body frame leaves free, by name."""
-    truth = with_lag(true_coefficients(world.world.unit(world.effects), result.body_frame), world.lag_s)
+    truth = with_lag(world.world.unit(world.effects), result.body_frame, world.lag_s)
     sigma = np.sqrt(np.diag(result.covariance))
     pinned = body_frame.pinned_in(result.names, result.body_frame)
     return {

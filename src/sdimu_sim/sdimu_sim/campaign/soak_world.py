@@ -163,12 +163,13 @@ def in_the_frame(scenario: Scenario) -> tuple[Floats, Floats]:
     frames = accelerometer_frames(sensor, _GRID_K)
     middle = len(_GRID_K) // 2
     turns = np.array([rotation_vector(R @ frames[middle].T) for R in frames])
-    above = profile.sensor_value(t) - profile.origin_degc
+    # The frame follows the thermometer: what the axes lag behind it is an error of the sensors.
+    above = profile.value(t) - profile.origin_degc
     theta = np.column_stack([np.interp(above, _GRID_K, turns[:, k]) for k in range(3)])
     slope = np.column_stack([np.interp(above, _GRID_K, np.gradient(turns[:, k], _GRID_K)) for k in range(3)])
     omega, force = (_turned(theta, values @ frames[middle].T) for values in (perfect.omega_ib_b, perfect.f_ib_b))
     # v' = exp([theta x]) v of vectors at rest: the frame itself turns the other way.
-    return omega - slope * profile.sensor_rate(t)[:, None], force
+    return omega - slope * profile.rate(t)[:, None], force
 
 
 def _turned(theta: Floats, values: Floats) -> Floats:
