@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 from zlib import crc32
@@ -75,12 +76,12 @@ class SoakRun:
         result = set_outcome(fit_set(members, SetOptions(self.model()), here))
         own = of_power_on(result, members[-1].name)
         # From here on the truth is known; nothing before this line has seen it.
+        (ramp,) = ratios([own], scenarios[-2], tests[-2].recording)
+        other, mean_bias = ratios([own, result], scenarios[-1], tests[-1].recording)
         return {
             "plan": world.plan.name, "latitude_deg": math.degrees(world.site.latitude_rad), "lag_s": world.lag_s,
             "noise": list(world.noise), "z": errors(result, world), "scatter": scatter(result, world),
-            "ramp": ratios(own, scenarios[-2], tests[-2].recording),
-            "other_ramp": ratios(own, scenarios[-1], tests[-1].recording),
-            "mean_bias": ratios(result, scenarios[-1], tests[-1].recording),
+            "ramp": ramp, "other_ramp": other, "mean_bias": mean_bias,
             "left_out": [f"{name}: {why}" for name, why in (result.of_set.left_out if result.of_set else ())],
             "warnings": list(result.warnings),
         }  # fmt: skip
@@ -138,11 +139,27 @@ def of_power_on(result: Calibration, recording: str) -> Calibration:
     return replace(result, values=result.values + np.array([own.get(name, 0.0) for name in result.names]))
 
 
-def ratios(result: Calibration, scenario: Scenario, recording: Recording) -> dict[str, float]:
-    """RMS of compensated rates and forces less the true ones over that of their noise, in means over ten seconds."""
-    done = compensate_recording(compensator(result, scenario.imu, has_temperature=True), recording)
-    omega, force = in_the_frame(scenario)
-    noise = noise_of(scenario, recording)
-    pairs = ((done.omega_ib_b - omega, noise[0]), (done.f_ib_b - force, noise[1]))
-    rms = [[block_rms(values, recording.interval_s) for values in pair] for pair in pairs]
-    return {triad: left / own for triad, (left, own) in zip(("gyro", "accel"), rms, strict=True)}
+def ratios(results: Sequence[Calibration], scenario: Scenario, recording: Recording) -> list[dict[str, float]]:
+    """RMS of compensated rates and forces less the true ones over that of their noise, in means over ten seconds.
+
+    Parameters
+    ----------
+    results : sequence of Calibration
+        To compensate with.
+    scenario, recording : Scenario, Recording
+        A ramp, and its samples.
+
+    Returns
+    -------
+    list of dict
+        Of each result, ``gyro`` and ``accel`` (1).
+    """
+    true = in_the_frame(scenario)
+    noise = [block_rms(values, recording.interval_s) for values in noise_of(scenario, recording)]
+    out = []
+    for result in results:
+        done = compensate_recording(compensator(result, scenario.imu, has_temperature=True), recording)
+        left = (done.omega_ib_b - true[0], done.f_ib_b - true[1])
+        rms = [block_rms(values, recording.interval_s) / own for values, own in zip(left, noise, strict=True)]
+        out.append(dict(zip(("gyro", "accel"), rms, strict=True)))
+    return out
