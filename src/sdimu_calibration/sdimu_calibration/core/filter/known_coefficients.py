@@ -8,8 +8,8 @@ from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.filter.passes import loosened, misfits, one_pass
 
 _ATTITUDE_PASSES = 3
-"""Number of passes that let position and velocity go: each leaves the square of the attitude's error, so that of a degree
-nothing is left."""
+"""Number of passes that let position and velocity go: each leaves the square of the attitude's error: of a degree
+nothing."""
 
 
 def attitude_about(
@@ -17,8 +17,8 @@ def attitude_about(
 ) -> Floats:
     """Find the initial attitude where the coefficients are given.
 
-    The coarse azimuth of uncalibrated gyros may be wrong by a degree, and a pass that does not fit for it would be pinned
-    near it by position and velocity, as in `refine`.
+    The coarse azimuth of uncalibrated gyros may be wrong by a degree; position and velocity would pin a pass near
+    it, as in `passes.refine`.
 
     Parameters
     ----------
