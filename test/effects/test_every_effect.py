@@ -162,10 +162,8 @@ def test_what_can_be_estimated_can_be_simulated_by_the_same_key(name):
 NOT_OF_THE_MEAN = {
     # Derivatives of the motion: a cycle of 0.1 s and its neighbours smooth the ramps of the rate.
     "gyro_acceleration_sensitivity": 0.2, "gyro_delay": 0.2, "accel_delay": 0.02, "accel_triad_delay": 0.02,
-    "accel_size": 0.2, "lever_arm": 0.2, "gyro_bias_temperature_rate": 0.05, "accel_bias_temperature_rate": 0.05,
-    "gyro_scale_temperature_rate": 0.05, "accel_scale_temperature_rate": 0.05,
-    "gyro_bias_temperature_hysteresis": 0.05, "accel_bias_temperature_hysteresis": 0.05,
-    "gyro_scale_temperature_hysteresis": 0.05, "accel_scale_temperature_hysteresis": 0.05,
+    "accel_size": 0.2, "lever_arm": 0.2,
+    **{name: 0.05 for name in EFFECTS if "_temperature_rate" in name or "_temperature_hysteresis" in name},
     # Switches: they change inside a cycle, and are softened where noise decides.
     "gyro_dead_band": 0.1, "gyro_hysteresis": 0.1, "accel_hysteresis": 0.1, "gyro_bias_in_motion": 0.1,
     "accel_bias_in_motion": 0.1, "accel_bias_asymmetry": 0.05,

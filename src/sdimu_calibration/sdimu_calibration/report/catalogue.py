@@ -51,6 +51,8 @@ def facts(effect: Effect) -> list[str]:
         out.append("needs: " + ", ".join(n for n in (effect.needs, "a table" if effect.needs_table else "") if n))
     if effect.tried_in == "set":
         out.append("tried unasked only where several recordings are diagnosed together")
+    if effect.tried_in == "request":
+        out.append("not tried unasked")
     if effect.confused_with:
         out.append(f"confused with: {', '.join(effect.confused_with)}")
     return out

@@ -16,28 +16,21 @@ from sdimu_calibration.core.effects import registry
 from sdimu_calibration.core.effects.effect import Excitation
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.estimation.solve import solve
-from sdimu_calibration.core.front_door import OpeningOptions, open_test
-from sdimu_calibration.core.joint.member import Job, Member, Report, tried
 from sdimu_calibration.core.joint.set_diagnosis import SetDiagnosis, diagnose_set
 from sdimu_calibration.core.joint.set_fit import SetOptions, fit_set
 from sdimu_calibration.core.joint.set_result import set_outcome
 from sdimu_calibration.core.plan import Plan, Turn
 from sdimu_calibration.core.plan_search import Question, next_turn
-from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.results import Calibration
-from sdimu_calibration.core.specification import ImuSpecification, Site
 from sdimu_calibration.storage.config import load_imu, load_model, load_plan
-from sdimu_sim.campaign.grade_run import LATITUDES_DEG, PLANS, drawn_effect
+from sdimu_sim.campaign.grade_run import PLANS, drawn_effect
 from sdimu_sim.campaign.hidden_draw import Truth
 from sdimu_sim.campaign.hidden_score import baseline_z, same_effect
-from sdimu_sim.campaign.run import simulate
-from sdimu_sim.core.scenario import Scenario, imu_truth
-from sdimu_sim.core.truth import ImuTruth, draw_coefficients, turned_on
+from sdimu_sim.campaign.set_world import World, here, members_of
+from sdimu_sim.core.truth import ImuTruth
 
 KINDS = ("weak", "clean", "class", "turn-on")
 """Questions of the study."""
-_RATE_HZ = 10.0
-"""Sample rate (Hz): navigation cycles are 0.1 s at any rate, so this costs no information."""
 _WEAK = (20, 2.5)
 """Number of recordings with a weak effect, and its size in the sigma of one of them."""
 _POWER_ONS = 8
@@ -82,65 +75,6 @@ class SetRun:
         return work(World(self.imu, load_imu(self.imu), seed, rng))
 
 
-@dataclass(frozen=True)
-class World:
-    """A unit and where it is tested.
-
-    Attributes
-    ----------
-    name : str
-        Of the IMU file.
-    imu : ImuSpecification
-    seed : int
-        Of the unit; recordings count from it.
-    rng : Generator
-    """
-
-    name: str
-    imu: ImuSpecification
-    seed: int
-    rng: np.random.Generator
-
-    def site(self) -> Site:
-        """Draw the site."""
-        return Site(math.radians(float(self.rng.choice(LATITUDES_DEG))), 0.0)
-
-    def unit(self, effects: Sequence[str] = ()) -> ImuTruth:
-        """Sensor of the unit, biases those of the mean over all power-ons."""
-        scenario = Scenario(load_plan("kim18"), self.imu, Site(0.6), seed=self.seed, effects=tuple(effects))
-        return imu_truth(scenario)
-
-    def recording(
-        self, number: int, plan: Plan, site: Site, turn_on: dict[str, float], effects: Sequence[str] = ()
-    ) -> PreparedTest:
-        """Simulate a recording of the unit and open it as every recording is opened."""
-        seed = 1000 * self.seed + number
-        own = turned_on(draw_coefficients(self.imu, self.seed), turn_on, seed)
-        scenario = Scenario(
-            plan, self.imu, site, rate_hz=_RATE_HZ, seed=seed, coefficients=own, effects=tuple(effects)
-        )
-        recording = simulate(scenario, imu_truth(scenario))
-        return PreparedTest(*open_test(recording, OpeningOptions(self.imu, site)))
-
-
-class _Opened:
-    """Gives a test that is in memory."""
-
-    def __init__(self, test: PreparedTest) -> None:
-        self.test = test
-
-    def __call__(self) -> PreparedTest:
-        return self.test
-
-
-def _members(tests: Sequence[PreparedTest]) -> list[Member]:
-    return [Member(f"r{k}", _Opened(test)) for k, test in enumerate(tests)]
-
-
-def _here(jobs: Sequence[Job]) -> list[Report | DataError]:
-    return [tried(job) for job in jobs]
-
-
 def _options() -> SetOptions:
     return SetOptions(load_model("baseline"))
 
@@ -170,7 +104,7 @@ def _weak(world: World) -> dict[str, Any]:
     turn_on = _sizes(world, clean)
     tests = [world.recording(k, plan, site, turn_on, (truth.text,)) for k in range(1, count + 1)]
     alone = climb(solve(tests[0], load_model("baseline")))
-    found = diagnose_set(_members(tests), _options(), _here)
+    found = diagnose_set(members_of(tests), _options(), here)
     named = [[f.candidate.label, *f.alike] for f in found_effects(alone)]
     in_one = any(same_effect(n, truth, ()) for one in named for n in one)
     return _scored(found, truth, world.unit((truth.text,))) | {"plan": plan.name, "in_one": in_one}
@@ -182,7 +116,7 @@ def _clean(world: World) -> dict[str, Any]:
     plans = [load_plan(str(world.rng.choice(PLANS))) for _ in range(count)]
     turn_on = _sizes(world, world.recording(0, plans[0], site, {}))
     tests = [world.recording(k + 1, plan, site, turn_on) for k, plan in enumerate(plans)]
-    found = diagnose_set(_members(tests), _options(), _here)
+    found = diagnose_set(members_of(tests), _options(), here)
     return _scored(found, None, world.unit()) | {"recordings": count}
 
 
@@ -198,7 +132,7 @@ def _class(world: World) -> dict[str, Any]:
     named = [n for f in found_effects(alone)[:1] for n in (f.candidate.label, *f.alike)]
     advised = next_turn(plan, Question(site, world.imu, model), named)[0].turns if len(named) > 1 else ()
     second = world.recording(2, _advised(plan, advised), site, turn_on, (truth.text,))
-    found = diagnose_set(_members([first, second]), _options(), _here)
+    found = diagnose_set(members_of([first, second]), _options(), here)
     return _scored(found, truth, world.unit((truth.text,))) | {"open": named}
 
 
@@ -214,7 +148,7 @@ def _turn_on(world: World) -> dict[str, Any]:
     site, plan = world.site(), load_plan(str(world.rng.choice(PLANS[1:])))
     sizes = _sizes(world, world.recording(0, plan, site, {}))
     tests = [world.recording(k + 1, plan, site, sizes) for k in range(_POWER_ONS)]
-    fit = fit_set(_members(tests), _options(), _here)
+    fit = fit_set(members_of(tests), _options(), here)
     result = set_outcome(fit)
     z = baseline_z(result, world.unit())
     return {

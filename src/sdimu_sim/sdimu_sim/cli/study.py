@@ -257,27 +257,40 @@ def sets(
     out: Annotated[Path, typer.Option(help="Folder of runs and sets.json.")] = Path("out/study-sets"),
     runs: Annotated[int, typer.Option("-n", min=1, help="Sets of each kind.")] = 20,
     seed: Annotated[int, typer.Option(help="First seed.")] = 71_001,
-    kind: Annotated[list[str] | None, typer.Option(help="weak, clean, class, turn-on; repeatable. All.")] = None,
+    kind: Annotated[list[str] | None, typer.Option(help="Kind of set, such as weak or soaks; repeatable. All.")] = None,
     imu: Annotated[str, typer.Option(help="IMU file.")] = "dtg",
     workers: Annotated[int, typer.Option(min=1, help="Processes.")] = 2,
 ) -> None:
-    """Fit and diagnose sets of recordings of one unit."""
+    """Fit and diagnose sets of recordings of one unit; soaks: every coefficient a polynomial of the temperature."""
     from rich.box import SIMPLE
     from rich.table import Table
 
     from sdimu_calibration.storage.json_file import write_json
+    from sdimu_sim.campaign import soak_page
     from sdimu_sim.campaign.set_page import headings, line
     from sdimu_sim.campaign.set_run import KINDS, SetRun
+    from sdimu_sim.campaign.soak_run import SOAK_KINDS, SoakRun
 
-    check_kinds(kind, KINDS)
+    known = (*KINDS, *SOAK_KINDS)
+    check_kinds(kind, known)
     console, seeds, results = plain(), range(seed, seed + runs), {}
-    for name in kind or KINDS:
-        results[name] = shown_campaign(console, name, SetRun(name, imu), seeds, out / name, workers)
+    for name in kind or known:
+        work = SoakRun(name, imu) if name in SOAK_KINDS else SetRun(name, imu)
+        results[name] = shown_campaign(console, name, work, seeds, out / name, workers)
     write_json(out / "sets.json", results)
     table = Table(*headings(), box=SIMPLE)
     for name, rows in results.items():
-        table.add_row(*line(name, rows))
-    console.print(table)
+        if name in KINDS:
+            table.add_row(*line(name, rows))
+    if table.rows:
+        console.print(table)
+    for name, rows in results.items():
+        if name in SOAK_KINDS:
+            for one in soak_page.tables(name, rows):
+                shown = Table(*one[0], box=SIMPLE)
+                for cells in one[1:]:
+                    shown.add_row(*cells)
+                console.print(shown)
     console.print(f"results in {out}", soft_wrap=True)
 
 

@@ -48,10 +48,7 @@ DIRECTIONS = frozenset(f"{v}{i}" for v in "ne" for i in _XYZ)
 """Variables that cost the generator a pass of their own."""
 
 TEMPERATURE_NAMES = frozenset({"T", "dT", "dTdt", "slow"})
-
-
 _BOTH = (("gyro", "deg/h", "w{i}"), ("accel", "ug", "g*a{i}"))
-
 
 
 def _by_temperature(word: str, per: str, power: str) -> list[Row]:
@@ -99,6 +96,7 @@ _ROWS: tuple[Row, ...] = (
     Row("gyro_dead_band_{i}", "deg/h", "-min(max(w{i}, -k), k)"),
     Row("gyro_hysteresis_{i}", "deg/h", "k*turned{i}"),
     Row("gyro_magnetic_{i}{any}", "deg/h/G", "k*B{any}"),
+    Row("gyro_bias_temperature_rate_quadratic_{i}", "deg/h*min/degC^3", "k*dT**2*dTdt", drawn=False),
     *(
         row
         for triad, unit, signal in _BOTH
@@ -126,9 +124,11 @@ _ROWS: tuple[Row, ...] = (
         row
         for word, per, power in (
             ("temperature", "degC", "dT"), ("temperature_squared", "degC^2", "dT**2"),
-            ("temperature_cubed", "degC^3", "dT**3"),
+            ("temperature_cubed", "degC^3", "dT**3"), ("temperature_rate", "degC*min", "dTdt"),
+            ("temperature_rate_linear", "degC^2*min", "dT*dTdt"),
         )
         for row in _by_temperature(word, per, power)
+        if power != "dTdt" or "misalignment" in row.names or "unbalance" in row.names
     ),
     # The triad is turned by the angle k about axis i: the next axis turns towards the one after it, that away from it.
     *(

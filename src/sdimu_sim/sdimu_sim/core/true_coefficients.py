@@ -19,9 +19,16 @@ from sdimu_sim.core.truth import (
     unbalance_matrix,
 )
 
-_POWERS = ("temperature", "temperature_squared", "temperature_cubed")
+POWERS = ("temperature", "temperature_squared", "temperature_cubed")
+"""Powers of the temperature, as they stand in the names of effects."""
+SEEN_OF_TURNS = tuple(f"gyro_bias_temperature_rate{power}" for power in ("", "_linear", "_quadratic"))
+"""Effects by which gyros see axes that turn with each of `POWERS`."""
+RATES = ("temperature_rate", "temperature_rate_linear")
+"""Rates of the first powers of the temperature, as they stand in the names of effects."""
 _SPAN_K = np.linspace(-50.0, 50.0, 11)
 """Temperatures about T0 (K) at which the turned sensor is read: the range in which an IMU is used."""
+_STEP_K = 0.01
+"""Step of central differences (K): the third power of the temperature leaves a share of 1e-7."""
 _TRIADS = ("gyro", "accel")
 
 
@@ -55,36 +62,91 @@ def true_coefficients(truth: ImuTruth, frame: str) -> dict[str, float]:
     return out
 
 
+def with_lag(truth: ImuTruth, frame: str, lag_s: float) -> dict[str, float]:
+    """State sensors that lag behind their thermometer by what a calibration without a lag finds.
+
+    To first order of the lag L, ``k1 (T - L dT/dt - T0) + k2 (T - L dT/dt - T0)^2`` is the polynomial and rate terms
+    ``-k1 L dT/dt`` and ``-2 k2 L (T - T0) dT/dt``. The frame is that of accelerometers without the lag, so rate terms
+    of axes are those as built.
+
+    Parameters
+    ----------
+    truth : ImuTruth
+    frame : str
+        ``prior`` or ``accelerometer_triad``.
+    lag_s : float
+        s.
+
+    Returns
+    -------
+    dict of str to float
+        As `true_coefficients` (SI).
+    """
+    out = true_coefficients(truth, frame)
+    for name, size in parse_effects(truth.effects).sizes.items():
+        stem, _, part = name.rpartition("_")
+        for times, (power, rate) in enumerate(zip(POWERS, RATES, strict=False), start=1):
+            if stem.endswith(f"_{power}"):
+                late = f"{stem.removesuffix(power)}{rate}_{part}"
+                out[late] = out.get(late, 0.0) - times * lag_s * size
+    return out
+
+
 def _turned(coefficients: Mapping[str, float], sizes: Mapping[str, float]) -> dict[str, float]:
     """Polynomials of axes, scale factors and mass unbalance in the frame of the accelerometers at each temperature."""
     axes = {triad: _at(input_axes(triad, coefficients), triad, sizes) for triad in _TRIADS}
     unbalance = _with_powers(
-        unbalance_matrix(coefficients), [unbalance_matrix(_of_power(sizes, power)) for power in _POWERS]
+        unbalance_matrix(coefficients), [unbalance_matrix(_of_power(sizes, power)) for power in POWERS]
     )
     R = np.array([triad_rotation(M) for M in axes["accel"]])
     out: dict[str, float] = {}
-    for order, power in enumerate(_POWERS, start=1):
+    for order, power in enumerate(POWERS, start=1):
         for triad, M in axes.items():
             part = _power_of(M @ R.transpose(0, 2, 1), order)
             out |= {_named(name, power): value for name, value in elements(triad, part + np.eye(3)).items()}
         part = _power_of(unbalance @ R.transpose(0, 2, 1), order)
         out |= {_named(name, power): value for name, value in unbalance_elements(part).items()}
-    turn = _power_of(np.array([rotation_vector(R[len(R) // 2] @ at.T) for at in R]), 1)
-    for axis, seen in zip("xyz", axes["gyro"][len(R) // 2] @ R[len(R) // 2].T @ turn, strict=True):
-        name = f"gyro_bias_temperature_rate_{axis}"
-        out[name] = sizes.get(name, 0.0) - float(seen)
+    ahead, behind = (_frames(coefficients, sizes, _SPAN_K + step) for step in (_STEP_K, -_STEP_K))
+    turn = [rotation_vector(one @ other.T) / (2.0 * _STEP_K) for one, other in zip(behind, ahead, strict=True)]
+    seen = np.einsum("kij,klj,kl->ki", axes["gyro"], R, np.array(turn))
+    for order, effect in enumerate(SEEN_OF_TURNS):
+        for axis, value in zip("xyz", _power_of(seen, order), strict=True):
+            name = f"{effect}_{axis}"
+            out[name] = sizes.get(name, 0.0) - float(value)
     return out
 
 
-def _at(constant: Floats, triad: str, sizes: Mapping[str, float]) -> Floats:
-    """Input axes of a triad at each temperature of `_SPAN_K`, shape (k, 3, 3)."""
-    small = [_of_power(sizes, power) for power in _POWERS]
-    return _with_powers(constant, [_small_errors(triad, part) for part in small])
+def accelerometer_frames(truth: ImuTruth, above_k: Floats) -> Floats:
+    """Turn from the body frame in which a sensor was built to that of its accelerometers at every temperature.
+
+    Parameters
+    ----------
+    truth : ImuTruth
+    above_k : ndarray, shape (k,)
+        Temperatures of the sensors above T0 (K).
+
+    Returns
+    -------
+    ndarray, shape (k, 3, 3)
+        R in v_triad = R v_b.
+    """
+    return _frames(truth.coefficients, parse_effects(truth.effects).sizes, above_k)
 
 
-def _with_powers(constant: Floats, parts: list[Floats]) -> Floats:
+def _frames(coefficients: Mapping[str, float], sizes: Mapping[str, float], above_k: Floats) -> Floats:
+    axes = _at(input_axes("accel", coefficients), "accel", sizes, above_k)
+    return np.array([triad_rotation(M) for M in axes])
+
+
+def _at(constant: Floats, triad: str, sizes: Mapping[str, float], above_k: Floats = _SPAN_K) -> Floats:
+    """Input axes of a triad at each temperature (K above T0), shape (k, 3, 3)."""
+    small = [_of_power(sizes, power) for power in POWERS]
+    return _with_powers(constant, [_small_errors(triad, part) for part in small], above_k)
+
+
+def _with_powers(constant: Floats, parts: list[Floats], above_k: Floats = _SPAN_K) -> Floats:
     """Sum ``constant + parts[n - 1] x^n`` at each temperature, shape (k, 3, 3)."""
-    return np.asarray(constant + sum(np.multiply.outer(_SPAN_K ** (n + 1), part) for n, part in enumerate(parts)))
+    return np.asarray(constant + sum(np.multiply.outer(above_k ** (n + 1), part) for n, part in enumerate(parts)))
 
 
 def _small_errors(triad: str, part: Mapping[str, float]) -> Floats:
@@ -115,5 +177,5 @@ def _power_of(values: Floats, order: int) -> Floats:
     """Coefficient of one power of the temperature in values at `_SPAN_K`, shape (k, ...)."""
     flat = values.reshape(len(values), -1)
     # Orders beyond those that are stated take what the turn adds there.
-    found = np.polynomial.polynomial.polyfit(_SPAN_K, flat, len(_POWERS) + 5)
+    found = np.polynomial.polynomial.polyfit(_SPAN_K, flat, len(POWERS) + 5)
     return np.asarray(found[order].reshape(values.shape[1:]))

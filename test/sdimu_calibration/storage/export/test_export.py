@@ -140,6 +140,7 @@ def test_a_form_applied_to_raw_samples_gives_the_numbers_of_the_core(form: str, 
 WARM = (
     *(f"{base}_temperature" for base in BASELINE), *(f"{base}_temperature_squared" for base in BASELINE),
     *(f"{base}_temperature_cubed" for base in BASELINE), "gyro_bias_temperature_rate", "accel_scale_temperature_rate",
+    "gyro_bias_temperature_rate_linear", "gyro_bias_temperature_rate_quadratic",
 )  # fmt: skip
 START, NOW, RATE = 22.0, 47.5, 0.02
 

@@ -28,7 +28,9 @@ class Factor(NamedTuple):
 
 
 _CONSTANT = Factor(0, 0)
-_FACTORS = (_CONSTANT, Factor(1, 0), Factor(2, 0), Factor(3, 0), Factor(0, 1))
+_FACTORS = (
+    _CONSTANT, Factor(1, 0), Factor(2, 0), Factor(3, 0), Factor(0, 1), Factor(1, 1), Factor(2, 1),
+)  # fmt: skip
 """Factors that a form of export may have a place for."""
 
 

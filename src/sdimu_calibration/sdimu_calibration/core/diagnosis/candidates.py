@@ -48,7 +48,8 @@ def catalogue(times: Timetable, in_model: set[str], has_temperature: bool, of_a_
     out: list[Effect] = []
     for name in registry.names():
         effect = registry.get(name)
-        if (effect.needs == "temperature" and not has_temperature) or (effect.tried_in == "set" and not of_a_set):
+        tried = effect.tried_in == "recording" or (effect.tried_in == "set" and of_a_set)
+        if not tried or (effect.needs == "temperature" and not has_temperature):
             continue
         variants = effect.scan(times) if effect.scan else (effect,)
         for variant in variants:

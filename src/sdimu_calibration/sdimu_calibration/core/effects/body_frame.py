@@ -11,7 +11,8 @@ arcminutes is right to 1e-3 of a sigma.
 With misalignments that are polynomials of the temperature the frame is that of the accelerometers at every temperature:
 ``M_a(T) R(T)'`` is lower triangular. It turns against the case while the temperature changes, and the gyros see that
 turn as a bias that follows the rate of the temperature. Estimators work in the frame at T0, where nothing but the prior
-holds that turn, and no square of it is lost; what they report is turned.
+holds that turn, and no square of it is lost; what they report is turned. A turn in the second power of the temperature
+is seen as a bias that follows ``(T - T0) dT/dt``, one in the third as one that follows ``(T - T0)^2 dT/dt``.
 """
 
 from __future__ import annotations
@@ -37,8 +38,9 @@ _UNBALANCE = {"dx": (0, 0), "qx": (0, 1), "dy": (1, 1), "qy": (1, 0), "dz": (2, 
 _PINNED = ("xy", "xz", "yx")
 _BY_TEMPERATURE = ("_temperature", "_temperature_squared", "_temperature_cubed")
 """Powers of the temperature, as they stand in the names of coefficients."""
-_SEEN_AS_BIAS = "gyro_bias_temperature_rate"
-"""How gyros see a frame that turns in proportion to the temperature."""
+_SEEN_AS_BIAS = tuple(f"gyro_bias_temperature_rate{power}" for power in ("", "_linear", "_quadratic"))
+"""How gyros see a frame that turns with the temperature: biases that follow its rate, times powers of T - T0. The rate
+of a turn in the second power of the temperature is linear in it, and so on."""
 _STEP = 1e-5
 """Step of central differences (SI of any coefficient): error 1e-10 by curvature, 1e-11 by rounding."""
 
@@ -161,11 +163,26 @@ def at_every_temperature(names: Sequence[str], values: Floats) -> Floats:
             turns[k] = turns[k] + _cross(theta[k])
         for group, part in zip(groups, parts, strict=True):
             _read_back(_of_power(part, turns, k), group[k], names, out)
-    seen = np.einsum("...ij,...j->...i", parts[1][0], theta[1])
-    for i, axis in enumerate("xyz"):
-        if f"{_SEEN_AS_BIAS}_{axis}" in names:
-            out[..., names.index(f"{_SEEN_AS_BIAS}_{axis}")] -= seen[..., i]
+    for k, seen in enumerate(_seen(parts[1], turns, theta)):
+        for i, axis in enumerate("xyz"):
+            name = f"{_SEEN_AS_BIAS[k]}_{axis}"
+            if name in names:
+                out[..., names.index(name)] -= seen[..., i]
     return out
+
+
+def _seen(gyro: list[Floats], turns: list[Floats], theta: Floats) -> list[Floats]:
+    """Powers of what the gyros see of the turning frame, ``M_g(T) R(T)' w``, per rate of the temperature, (..., 3).
+
+    The frame turns with ``w = theta' - theta x theta' / 2`` per kelvin (Bortz 1971), to second order of theta.
+    """
+    rate = [theta[1], 2.0 * theta[2], 3.0 * theta[3] - 0.5 * np.cross(theta[1], theta[2])]
+    return [
+        np.asarray(sum(
+            np.einsum("...ij,...j->...i", _of_power(gyro, turns, k - n), rate[n]) for n in range(k + 1)
+        ))
+        for k in range(len(rate))
+    ]  # fmt: skip
 
 
 def _cross(theta: Floats) -> Floats:
@@ -269,10 +286,11 @@ def _turns(power: str, index: Mapping[str, int]) -> Floats:
             if name in index and row != column:
                 for k in range(3):
                     turns[index[name], k] = -sign * _levi_civita(row, column, k)
-    if power == _BY_TEMPERATURE[0]:
+    if power in _BY_TEMPERATURE:
+        order = _BY_TEMPERATURE.index(power)
         for k, axis in enumerate("xyz"):
-            if f"{_SEEN_AS_BIAS}_{axis}" in index:
-                turns[index[f"{_SEEN_AS_BIAS}_{axis}"], k] = 1.0
+            if f"{_SEEN_AS_BIAS[order]}_{axis}" in index:
+                turns[index[f"{_SEEN_AS_BIAS[order]}_{axis}"], k] = order + 1.0
     return turns
 
 
@@ -371,7 +389,7 @@ def turning_names(names: Sequence[str], frame: str) -> frozenset[str]:
         return frozenset()
     powers = ("", *_BY_TEMPERATURE)
     matrices = [places(power) for power in powers for places in (*_TRIADS, _unbalance_places)]
-    seen = {f"{_SEEN_AS_BIAS}_{axis}" for axis in "xyz"} if _turning_powers(names) else set()
+    seen = {f"{bias}_{axis}" for bias in _SEEN_AS_BIAS for axis in "xyz"} if _turning_powers(names) else set()
     return frozenset(names) & (seen | {name for places in matrices for name in places})
 
 

@@ -136,7 +136,7 @@ class Effect:
         Density of a random walk of the parameters by grade (SI/sqrt(s)); empty for constants.
     tried_in : str
         Where a diagnosis looks for it unasked: in every ``recording``, or only in a ``set`` of recordings that are
-        diagnosed together. Every effect that is tried raises the threshold of all others.
+        diagnosed together; ``request``: nowhere. Every effect that is tried raises the threshold of all others.
     family : str
         Registry name of the effect of which this is a part; empty for whole effects.
     needs : str
@@ -179,7 +179,7 @@ class Effect:
     gauge: bool = False
     never_seen: str = ""
     needs: str = ""
-    tried_in: Literal["recording", "set"] = "recording"
+    tried_in: Literal["recording", "set", "request"] = "recording"
     family: str = ""
     options: Mapping[str, str] = field(default_factory=dict)
     with_options: Callable[..., Effect] | None = None

@@ -6,12 +6,16 @@ state temperature coefficients as such polynomials.
 
 One recording rarely spans the temperatures that tell the powers apart. They are tried where several recordings are
 diagnosed together, and can be added to any model.
+
+Coefficients of the rate of the temperature are linear in it, too: sensors whose thermometer runs ahead show what
+follows ``d(T - T0)^2/dt``. So do gyros whose axes turn in the second power (`body_frame`), with a square in the third.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from dataclasses import replace
+from typing import Any, Literal
 
 import numpy as np
 
@@ -44,6 +48,8 @@ _BEND = 0.5
 _LOOP = 0.05
 """Width of the loop of heating and cooling, a share of the linear change over `_RANGE_K` (1): data sheets of quartz and
 silicon accelerometers and of fibre-optic gyros state 1 to 10 %."""
+_LAG_S = 120.0
+"""Lag of a sensor behind its thermometer (s): a case of a kilogram warms its instruments in minutes."""
 _THRESHOLD = to_si(0.2, "degC/min")
 """Rate at which heating is told from cooling (K/s): above what a resolution of 0.06 degC gives over a minute, below
 the slowest ramp of a chamber."""
@@ -102,8 +108,52 @@ def _hysteresis(base: Effect, threshold: float = _THRESHOLD) -> Effect:
     )  # fmt: skip
 
 
+def _rate(base: Effect) -> Effect:
+    """Coefficient of the rate of the temperature of a baseline effect that has none in `temperature`."""
+    return _multiplied(
+        base, "_temperature_rate", lambda motion: motion.temperature_rate,
+        units=("*s/K", "*min/degC"),
+        prior={grade: _LAG_S * size for grade, size in _linear_prior(base).items()},
+        title=f"{base.title}: temperature-rate coefficient",
+        equation=f"{base.equation}, each coefficient k dT/dt",
+        typical="the temperature coefficient times the lag of the sensor behind its thermometer, some 10 s to minutes",
+        description="A sensor that lags behind the thermometer by L shows -L times its temperature coefficient.",
+        confused_with=(f"{base.name}_temperature",),
+        tried_in="request",
+    )  # fmt: skip
+
+
+def _rate_power(rate: Effect, order: int, word: str) -> Effect:
+    """Rate coefficient that follows a power of the temperature."""
+    stem, power = f"{rate.name}_{word}", "" if order == 1 else f"^{order}"
+    smaller = (_BEND / _RANGE_K) ** order
+    return replace(
+        rate,
+        name=stem,
+        title=f"{rate.title}: {word} in the temperature",
+        equation=f"{rate.equation.replace('dT/dt', f'(T - T0){power} dT/dt')}",
+        parameters=tuple(
+            Parameter(stem + p.name.removeprefix(rate.name), f"{p.unit}^{order + 1}", f"{p.display_unit}^{order + 1}")
+            for p in rate.parameters
+        ),
+        regressors=lambda motion: rate.regressors(motion) * (motion.temperature**order)[:, None],
+        prior={grade: smaller * size for grade, size in rate.prior.items()},
+        typical="-2 k L of a quadratic temperature coefficient k and a lag L; 2 or 3 times the bend of the axes",
+        description="The rate of a square or cube: a sensor that lags behind the thermometer shows it, and so do gyros "
+        "whose axes bend with the temperature (doc/temperature.md).",
+        confused_with=(rate.name,),
+        tried_in="request",
+        sheet="",
+    )
+
+
 def _multiplied(
-    base: Effect, suffix: str, factor: Callable[[Motion], Floats], units: tuple[str, str], **more: Any
+    base: Effect,
+    suffix: str,
+    factor: Callable[[Motion], Floats],
+    units: tuple[str, str],
+    tried_in: Literal["set", "request"] = "set",
+    **more: Any,
 ) -> Effect:
     """Make an effect of a baseline effect whose coefficients are `factor`, shape (n,), times new ones."""
     stem = base.name + suffix
@@ -120,7 +170,7 @@ def _multiplied(
         excitation=frozenset({Excitation.REPEATED_ATTITUDES}),
         shifts_bias=base.scope == "power-on",
         gauge=base.gauge,
-        tried_in="set",
+        tried_in=tried_in,
         **more,
     )
 
@@ -129,5 +179,10 @@ for _base in _BASES:
     for _order, _power_word in _POWERS.items():
         if registry.find(f"{_base.name}_temperature{_power_word}") is None:
             register(_power(_base, _order))
+for _base in _BASES:
+    _own = registry.find(f"{_base.name}_temperature_rate") or register(_rate(_base))
+    register(_rate_power(_own, 1, "linear"))
+    if _base is GYRO_BIAS:
+        register(_rate_power(_own, 2, "quadratic"))
 for _base in _OF_ONE_SENSOR:
     register(_hysteresis(_base))

@@ -44,6 +44,7 @@ from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.estimation.reference_fits import BatchFit, ClassicalFit
 from sdimu_calibration.core.estimation.second_order_fit import SecondOrderFit
 from sdimu_calibration.core.filter.filter_pass import NAV
+from sdimu_calibration.core.filter.known_coefficients import attitude_about
 from sdimu_calibration.core.filter.passes import MOST_WIDENINGS, Solution, one_pass, widen_contradicted_priors
 from sdimu_calibration.core.filter.passes import solve as solve_filter
 from sdimu_calibration.core.progress import Progress, silent
@@ -331,6 +332,8 @@ def fit_about(
     sensors = begun.setup.sensors
     fixed = replace(sensors, prior=np.zeros(len(sensors.prior)), mean=values)
     known = replace(begun, setup=replace(begun.setup, sensors=fixed))
+    if start is None and frame_model is None:
+        C_nb = attitude_about(known.prepared, known.setup, known.alignment, C_nb, values)
     fit = _navigation_about(test, model, known, frame_model, C_nb, values)
     return replace(fit, setup=begun.setup)
 

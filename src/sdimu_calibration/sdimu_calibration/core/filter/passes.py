@@ -256,11 +256,7 @@ def refine(
     DataError
         When the filter diverges.
     """
-    last = first
-    loose = replace(setup, model=replace(setup.model, velocity_sigma=_LOOSE_VELOCITY, position_sigma=_LOOSE_POSITION))
-    nis = first.output.nis
-    settling = bool(np.nansum(nis) > _FITS * 3 * np.isfinite(nis).sum())
-    tight = 0
+    last, loose, settling, tight = first, loosened(setup), misfits(first), 0
     for count in range(2, MOST_PASSES + 1):
         progress("passes", min(0.95, 0.3 + 0.1 * (count - 1)))
         reference = last.estimate * (setup.sensors.decay_rate == 0.0)
@@ -278,6 +274,17 @@ def refine(
             return last, count, True
     # The passes contract by a third each where Earth rate says little of the azimuth: near enough is told from lost.
     return last, MOST_PASSES, bool(moved < _NEAR)
+
+
+def loosened(setup: TestSetup) -> TestSetup:
+    """Let position and velocity go."""
+    return replace(setup, model=replace(setup.model, velocity_sigma=_LOOSE_VELOCITY, position_sigma=_LOOSE_POSITION))
+
+
+def misfits(done: Pass) -> bool:
+    """Whether the innovations are so large that linearisation may be the trouble."""
+    nis = done.output.nis
+    return bool(np.nansum(nis) > _FITS * 3 * np.isfinite(nis).sum())
 
 
 def furthest_move(step: Floats, covariance: Floats) -> float:
