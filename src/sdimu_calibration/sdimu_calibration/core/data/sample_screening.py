@@ -90,8 +90,10 @@ def sound(recording: Recording) -> tuple[Recording, tuple[DataFault, ...]]:
 def _channels(recording: Recording) -> Iterator[tuple[str, Floats]]:
     """Name and numbers of each channel that has noise, one after the other in memory."""
     for name, column in zip(CHANNELS, (*recording.omega_ib_b.T, *recording.f_ib_b.T), strict=True):
-        x = np.ascontiguousarray(column)
-        let_go(recording.omega_ib_b, recording.f_ib_b)
+        x = np.empty(len(column))
+        for rows in pieces(len(column)):
+            x[rows] = column[rows]
+            let_go(column)
         if not _noiseless(x):
             yield name, x
 
