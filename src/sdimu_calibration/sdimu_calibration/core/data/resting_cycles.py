@@ -9,6 +9,7 @@ its parts one after the other: the coning and sculling of the whole are what its
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -25,7 +26,12 @@ _AFTER_TURN = 10
 
 
 def standing(phases: Phases) -> Bools:
-    """Epochs whose cycles may be joined, shape (e,): in a dwell that is measured, some seconds after its begin."""
+    """Epochs whose cycles may be joined: in a dwell that is measured, some seconds after its begin.
+
+    Returns
+    -------
+    ndarray of bool, shape (e,)
+    """
     index = np.arange(len(phases.used))
     begun = np.maximum.accumulate(np.where(phases.used, -1, index))
     return np.asarray(phases.used & (index - begun > _AFTER_TURN))
@@ -54,7 +60,7 @@ def join(cycles: Cycles, epochs: Epochs, still: Bools) -> tuple[Cycles, Epochs]:
     begin = np.flatnonzero(first_of_epoch | ~np.repeat(still, count))
     last = np.append(begin[1:], len(cycles)) - 1
 
-    def total(values: Floats | Ints) -> Floats | Ints:
+    def total(values: Any) -> Any:
         return np.add.reduceat(values, begin)
 
     alpha, upsilon = total(cycles.alpha), total(cycles.upsilon)
@@ -89,4 +95,5 @@ def _join(
         store(turned, C)
         coning_sum[k] = rotation_vector(C) - alpha_sum[k]
         without = velocity_increment(alpha_sum[k], upsilon_sum[k], none)
-        sculling_sum[k, 0], sculling_sum[k, 1], sculling_sum[k, 2] = dv0 - without[0], dv1 - without[1], dv2 - without[2]
+        sculling_sum[k, 0], sculling_sum[k, 1] = dv0 - without[0], dv1 - without[1]
+        sculling_sum[k, 2] = dv2 - without[2]

@@ -101,9 +101,9 @@ def drifting(sensors: ImuModel, imu: ImuSpecification, gravity: float, duration:
 
     An attitude wrong by a shows gravity too small by g a^2 / 2. It counts when this, at three sigma of the gyros' white
     noise over the test, exceeds three sigma of the mean force. In a long test a tenth of that counts: the ordinary
-    passes then take the second order for knowledge of the common turn of all axes, and move on for a dozen passes
-    (12 h, navigation grade: by a third less each) where the passes of second order need five. Effects that change at random are left to the ordinary
-    passes, as samples are corrected at constants here: for them the answer is no.
+    passes then take the second order for knowledge of the common turn of all axes and move on for dozens of passes
+    (12 h, navigation grade: by a third less each), where those of second order need five. Effects that change at
+    random are left to the ordinary passes, as samples are corrected at constants here: for them the answer is no.
 
     Parameters
     ----------
