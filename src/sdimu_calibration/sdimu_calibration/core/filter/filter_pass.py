@@ -41,7 +41,7 @@ from sdimu_calibration.core.navigation.ins_errors import (
     responses,
     transition,
 )
-from sdimu_calibration.core.navigation.strapdown import navigate_cycle, velocity_increment
+from sdimu_calibration.core.navigation.strapdown import mean_attitude, navigate_cycle, velocity_increment
 from sdimu_calibration.core.rotation import orthonormal, rotation_matrix, skew
 
 NAV = 9
@@ -226,21 +226,6 @@ def new_output(epochs: int, parameters: int, keep: bool, stride: int, navigation
 
 
 @compiled
-def _mean_attitude(C_nb: Floats, phi: Floats, out: Floats) -> None:
-    """Put the mean of `C_nb` over a cycle that turns by `phi` into `out`: ``C_nb (1 + [phi x] / 2 + [phi x]^2 / 6)``.
-
-    The half sum of both ends would be short by a twelfth of the angle's square; a lever arm shows it.
-    """
-    x, y, z = phi
-    for i in range(3):
-        a, b, c = C_nb[i, 0], C_nb[i, 1], C_nb[i, 2]
-        u, v, w = b * z - c * y, c * x - a * z, a * y - b * x
-        out[i, 0] = a + 0.5 * u + (v * z - w * y) / 6.0
-        out[i, 1] = b + 0.5 * v + (w * x - u * z) / 6.0
-        out[i, 2] = c + 0.5 * w + (u * y - v * x) / 6.0
-
-
-@compiled
 def _navigate_epoch(
     data: PassInput, e: int, settings: PassSettings, state: PassState, G: Floats, D: Floats, sums: Floats,
     C_mean: Floats, f_n: Floats, R: Floats,
@@ -272,7 +257,7 @@ def _navigate_epoch(
             sums[i] += alpha[i]
             sums[3 + i] += upsilon[i]
         gravity = earth.normal_gravity(state.position[0], state.position[2]) + settings.gravity_excess
-        _mean_attitude(state.C_nb, phi, C_mean[k])
+        mean_attitude(state.C_nb, phi, C_mean[k])
         dv = velocity_increment(alpha, upsilon, data.sculling[c])
         # Not the mean attitude times the mean force: that leans off the vertical in a turn, and a filter
         # that sees it takes it for knowledge of azimuth.
