@@ -351,7 +351,7 @@ class LiveCalibration:
         gap = bridges(part, alone, one.dwell, self._intake.interval_s, self._acceleration, setup.gravity)
         data = PassInput(
             part.dt, part.alpha, part.upsilon, part.coning, part.sculling, alone.first, alone.last,
-            gap.white, gap.angle, gap.velocity, kind,
+            gap.white, gap.angle, gap.velocity, kind, np.zeros(1, dtype=bool),
             sensors.regressors(seen), sensors.channel, sensors.parameter,
         )  # fmt: skip
         out = new_output(1, len(sensors.prior), False, 1)

@@ -11,6 +11,9 @@ EPOCH_S = 1.0
 """Nominal length of an epoch (s): the paper's measurement rate is 1 Hz."""
 LONGEST_EPOCH_S = 10.0
 """Longest epoch (s): the error dynamics of an epoch are expanded in its length; from 15 s on some tests diverge."""
+MOST_EPOCHS = 10_000
+"""Number of epochs from which those at rest are longer: a test of three hours has as many, and memory and time of an
+estimate go with it."""
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ from importlib.resources import files
 import numpy as np
 
 from sdimu_calibration.core.arrays import Floats
+from sdimu_calibration.core.data.blocks import let_go
 from sdimu_calibration.core.effects.effect import AXES, CHANNELS
 from sdimu_calibration.core.estimation.fit import Fit
 from sdimu_calibration.core.estimation.navigation_fit import NavigationFit
@@ -58,7 +59,11 @@ def envelope(t: Floats, y: Floats, blocks: int = _BLOCKS) -> tuple[Floats, Float
     """
     first = np.unique(np.linspace(0, len(t), min(blocks, len(t)), endpoint=False).astype(np.int64))
     last = np.append(first[1:], len(t)) - 1
-    return 0.5 * (t[first] + t[last]), np.minimum.reduceat(y, first, axis=0), np.maximum.reduceat(y, first, axis=0)
+    low, high = np.empty((len(first), y.shape[1])), np.empty((len(first), y.shape[1]))
+    for k, (a, b) in enumerate(zip(first.tolist(), last.tolist(), strict=True)):
+        low[k], high[k] = y[a : b + 1].min(axis=0), y[a : b + 1].max(axis=0)
+        let_go(y)
+    return 0.5 * (t[first] + t[last]), low, high
 
 
 def raw_data(recording: Recording, fit: Fit) -> Figure:
@@ -66,8 +71,9 @@ def raw_data(recording: Recording, fit: Fit) -> Figure:
     figure = Figure(
         rows=2, cols=3, titles=[name.replace("_", " ") for name in CHANNELS], gap_x=0.07, gap_y=0.14, share_x=True,
     )  # fmt: skip
-    rate, force = np.degrees(recording.omega_ib_b), recording.f_ib_b / STANDARD_GRAVITY
-    t, low, high = envelope(recording.t, np.hstack([rate, force]))
+    t, *rate = envelope(recording.t, recording.omega_ib_b)
+    _, *force = envelope(recording.t, recording.f_ib_b)
+    low, high = (np.hstack([np.degrees(w), f / STANDARD_GRAVITY]) for w, f in zip(rate, force, strict=True))
     minutes = t / 60.0
     for channel in range(6):
         place = {"row": channel // 3 + 1, "col": channel % 3 + 1}

@@ -144,7 +144,9 @@ def test_gyros_that_lose_the_attitude_over_the_test_take_the_same_path(imu, mode
     sensors = imu_model.build(model.effects, fog)
     assert drifting(sensors, fog, 9.8, 2980.0)
     assert not drifting(sensors, fog, 9.8, 300.0)
-    assert not drifting(imu_model.build(model.effects, imu), imu, 9.8, 86400.0)
+    assert not drifting(imu_model.build(model.effects, imu), imu, 9.8, 5 * 3600.0)
+    # In a long test a tenth of that counts: the ordinary passes did not converge in a day.
+    assert drifting(imu_model.build(model.effects, imu), imu, 9.8, 86400.0)
     # Seed 5: the ordinary passes do not converge, and end with a normalised square of 60.
     recording, truth = generate(Scenario(KIM18, fog, site, seed=5, rate_hz=20.0))
     found = calibrate(recording, site, fog, model, held_out=False)

@@ -23,6 +23,7 @@ from sdimu_calibration.core.data.phases import (
     rest_limits,
     without_early_motion,
 )
+from sdimu_calibration.core.data.resting_cycles import join, standing
 from sdimu_calibration.core.data.sample_screening import sound, wild
 from sdimu_calibration.core.effects import body_frame, imu_model
 from sdimu_calibration.core.effects.imu_model import ImuModel
@@ -30,7 +31,7 @@ from sdimu_calibration.core.measurement_kind import ALL, SENSORS, SKIP
 from sdimu_calibration.core.navigation.strapdown import Cycles, Reducer
 from sdimu_calibration.core.navigation.track import MAGNETIC_FIELD
 from sdimu_calibration.core.recording import NOMINAL_FROM, DataError, DataFault, Recording, TemperatureLog
-from sdimu_calibration.core.specification import EPOCH_S, ImuSpecification, Model, Site
+from sdimu_calibration.core.specification import EPOCH_S, MOST_EPOCHS, ImuSpecification, Model, Site
 
 _LISTED = 40
 """Number of stops that are listed one by one: more do not fit on a line."""
@@ -52,6 +53,8 @@ class TestSetup:
         At the site (m/s^2).
     epoch_s : float
         Length of an epoch at rest (s).
+    counted : bool
+        A sensor counts pulses: what a second scatters then says nothing of the noise.
     """
 
     site: Site
@@ -61,6 +64,7 @@ class TestSetup:
     limits: RestLimits
     gravity: float
     epoch_s: float = EPOCH_S
+    counted: bool = False
 
     @property
     def magnetic_n(self) -> Floats:
@@ -84,6 +88,8 @@ class PreparedData:
     bridges : Bridges
         What gaps in the data add to the noise.
     faults : tuple of DataFault
+    seconds : tuple of Epochs and Phases, or None
+        Those of single seconds, where the epochs are longer only because the test is long.
     """
 
     cycles: Cycles
@@ -93,6 +99,7 @@ class PreparedData:
     temperature: TemperatureLog | None
     bridges: Bridges
     faults: tuple[DataFault, ...] = ()
+    seconds: tuple[Epochs, Phases] | None = None
 
     @property
     def rest(self) -> Bools:
@@ -114,7 +121,7 @@ def set_up(site: Site, imu: ImuSpecification, model: Model, epoch_s: float | Non
     DataError
         When a noise or a prior is zero, or model and IMU do not fit together.
     """
-    epoch_s = imu.epoch_s if epoch_s is None else epoch_s
+    counted, epoch_s = imu.epoch_s > EPOCH_S, imu.epoch_s if epoch_s is None else epoch_s
     check_priors(imu)
     sensors = imu_model.restate(imu_model.build(model.effects, imu), model.priors)
     body_frame.check_priors([one.name for one in model.priors], sensors.names, model.body_frame)
@@ -122,7 +129,7 @@ def set_up(site: Site, imu: ImuSpecification, model: Model, epoch_s: float | Non
         if not noise > 0.0:
             raise DataError(f"IMU '{imu.name}': noise.{what} is zero, and measurements are weighed by it: give it")
     gravity = site.gravity_m_s2 or float(earth.normal_gravity(site.latitude_rad, site.height_m))
-    return TestSetup(site, imu.in_means_over(epoch_s), model, sensors, rest_limits(imu), gravity, epoch_s)
+    return TestSetup(site, imu.in_means_over(epoch_s), model, sensors, rest_limits(imu), gravity, epoch_s, counted)
 
 
 def check_priors(imu: ImuSpecification) -> None:
@@ -204,10 +211,13 @@ def reduce(recording: Recording, setup: TestSetup, screened: bool = True) -> Pre
     noise = (setup.imu.gyro_white_noise, setup.imu.accel_white_noise)
     lost = judge(cycles, epochs, phases, nominal, found, noise, unsound)
     faults = (*unsound, *lost, *contradictions(epochs, phases, recording.phase, not specification_is_wide(setup.imu)))
+    if len(epochs) > MOST_EPOCHS:
+        cycles, epochs = join(cycles, epochs, standing(phases))
+    seconds = (epochs, phases) if setup.epoch_s > EPOCH_S and not setup.counted else None
     if setup.epoch_s > EPOCH_S:
         epochs, phases, found = long_epochs(epochs, phases, found, setup.epoch_s)
     kind = measurement_kinds(phases, setup.model.zero_velocity == "every_epoch")
-    return PreparedData(cycles, epochs, phases, kind, recording.temperature, found, faults)
+    return PreparedData(cycles, epochs, phases, kind, recording.temperature, found, faults, seconds)
 
 
 def first_attitude(epochs: Epochs, phases: Phases, setup: TestSetup) -> Alignment:

@@ -25,6 +25,9 @@ from sdimu_calibration.core.units import STANDARD_GRAVITY
 
 STALE_S = 2.5
 """Age from which a status says nothing any more (s): it is sent at every change and at 1 Hz."""
+RESTART_S = 110.0
+"""Time at rest (s) after which navigation starts anew from the known point: by g times the square of an attitude error
+of 1e-4 rad, two digits below the sigma of the velocity."""
 _SIGMAS = 6.0
 """Limit of rest (sigma of what bias and noise can do): beyond it the guard calls an IMU moving."""
 
@@ -219,6 +222,20 @@ _GAUSS_MAD = 1.482602218505602
 """Factor from the median of |x| to the standard deviation: of Gaussian noise."""
 _EARLY_SIGMAS = 5.0
 """Deviation from the mean rate of its dwell (sigma): beyond it the last second before a turn belongs to the turn."""
+
+
+def restarts(epochs: Epochs, phases: Phases) -> Bools:
+    """Epochs before which navigation starts anew from the known point, `RESTART_S` apart in the rest of a stop.
+
+    Returns
+    -------
+    ndarray of bool, shape (e,)
+    """
+    used, stop = phases.used, phases.stop
+    begins = np.append(True, ~used[:-1] | (stop[1:] != stop[:-1]))
+    begun = epochs.start[np.maximum.accumulate(np.where(begins, np.arange(len(used)), 0))]
+    count = np.floor((epochs.start - begun + 1e-6) / RESTART_S)
+    return np.asarray(used & ~begins & (count > np.append(0.0, count[:-1])))
 
 
 def contradictions(epochs: Epochs, phases: Phases, log: PhaseLog | None, feels_turns: bool) -> tuple[DataFault, ...]:

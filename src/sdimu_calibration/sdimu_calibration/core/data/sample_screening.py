@@ -97,8 +97,10 @@ def _on_channels(recording: Recording, work: Callable[[Floats], R]) -> list[tupl
 
     def one(channel: int) -> tuple[str, R] | None:
         triad = recording.omega_ib_b if channel < 3 else recording.f_ib_b
-        x = np.ascontiguousarray(triad[:, channel % 3])
-        let_go(triad)
+        x = np.empty(len(triad))
+        for rows in pieces(len(triad)):
+            x[rows] = triad[rows, channel % 3]
+            let_go(triad)
         return None if _noiseless(x) else (CHANNELS[channel], work(x))
 
     # Two channels of a long recording at a time would need twice the memory.

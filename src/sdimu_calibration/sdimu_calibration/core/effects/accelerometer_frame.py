@@ -22,7 +22,7 @@ from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.effects import body_frame, imu_model, registry
 from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.effects.imu_model import ImuModel
-from sdimu_calibration.core.specification import ImuSpecification
+from sdimu_calibration.core.specification import EPOCH_S, MOST_EPOCHS, ImuSpecification
 
 FRAME = "accelerometer_triad"
 _OUTSIDE = ("gyro_g_sensitivity_xz", "gyro_g_sensitivity_yz", "gyro_g_sensitivity_zx")
@@ -100,8 +100,10 @@ def drifting(sensors: ImuModel, imu: ImuSpecification, gravity: float, duration:
     """Tell whether the gyros lose the attitude so far over the test that the square of that counts.
 
     An attitude wrong by a shows gravity too small by g a^2 / 2. It counts when this, at three sigma of the gyros' white
-    noise over the test, exceeds three sigma of the mean force. Effects that change at random are left to the ordinary
-    passes, as samples are corrected at constants here: for them the answer is no.
+    noise over the test, exceeds three sigma of the mean force. In a long test a tenth of that counts: the ordinary
+    passes then take the second order for knowledge of the common turn of all axes and move on for dozens of passes
+    (12 h, navigation grade: by a third less each), where those of second order need five. Effects that change at
+    random are left to the ordinary passes, as samples are corrected at constants here: for them the answer is no.
 
     Parameters
     ----------
@@ -115,7 +117,8 @@ def drifting(sensors: ImuModel, imu: ImuSpecification, gravity: float, duration:
     if ((sensors.decay_rate > 0) | (sensors.drive > 0)).any():
         return False
     attitude = 3.0 * imu.gyro_white_noise * float(np.sqrt(duration))
-    return bool(0.5 * gravity * attitude**2 > 3.0 * imu.accel_white_noise / float(np.sqrt(duration)))
+    sigmas = 3.0 if duration <= MOST_EPOCHS * EPOCH_S else 0.3
+    return bool(0.5 * gravity * attitude**2 > sigmas * imu.accel_white_noise / float(np.sqrt(duration)))
 
 
 def accelerometer_frame_model(asked: ImuModel, imu: ImuSpecification) -> AccelerometerFrameModel | None:

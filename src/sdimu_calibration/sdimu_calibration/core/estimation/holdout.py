@@ -138,5 +138,5 @@ def part(prepared: PreparedData, first: int, last: int) -> PreparedData:
     bridges = Bridges(*(getattr(prepared.bridges, field.name)[rows] for field in fields(Bridges)))
     return replace(
         prepared, cycles=prepared.cycles[begin:end], epochs=Epochs(**cut), phases=phases, kind=prepared.kind[rows],
-        bridges=bridges,
+        bridges=bridges, seconds=None,
     )  # fmt: skip

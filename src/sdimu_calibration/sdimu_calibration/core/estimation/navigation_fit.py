@@ -14,6 +14,7 @@ import numpy as np
 from sdimu_calibration.core.alignment.alignment import Alignment
 from sdimu_calibration.core.alignment.prepared import PreparedData, TestSetup, stops_line
 from sdimu_calibration.core.arrays import Bools, Floats, Ints
+from sdimu_calibration.core.data.blocks import let_go, pieces
 from sdimu_calibration.core.effects import bias
 from sdimu_calibration.core.effects.effect import Effect, Timetable
 from sdimu_calibration.core.estimation.fit import NOT_CONVERGED, Fit, Start, temperature_counts
@@ -407,7 +408,9 @@ def checksum(*arrays: Floats) -> float:
     """Give a number that other samples do not have: the same recording is known again by it."""
     value = 0
     for array in arrays:
-        value = crc32(np.ascontiguousarray(array).tobytes(), value)
+        for rows in pieces(len(array)):
+            value = crc32(np.ascontiguousarray(array[rows]).tobytes(), value)
+        let_go(array)
     return float(value)
 
 

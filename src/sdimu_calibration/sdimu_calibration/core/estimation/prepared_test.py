@@ -12,7 +12,7 @@ from sdimu_calibration.core.data.by_hand import why_handheld
 from sdimu_calibration.core.handheld.handheld import PreparedRun, prepare_run
 from sdimu_calibration.core.origin import Origin
 from sdimu_calibration.core.recording import Recording
-from sdimu_calibration.core.specification import EPOCH_S, ImuSpecification, Site
+from sdimu_calibration.core.specification import EPOCH_S, LONGEST_EPOCH_S, MOST_EPOCHS, ImuSpecification, Site
 
 
 @dataclass(frozen=True)
@@ -79,15 +79,16 @@ class PreparedTest:
         return why_handheld(self.recording, self.imu)
 
     def epoch_s(self, settle_s: float) -> float:
-        """Length of an epoch at rest (s): what quantisation asks for, and no longer than the usual dwell.
+        """Length of an epoch at rest (s): what quantisation and a long test ask for, no longer than the usual dwell.
 
         Parameters
         ----------
         settle_s : float
             What settling takes from a dwell (s).
         """
-        wanted, log = self.imu.epoch_s, self.recording.phase
-        usual = None if log is None else log.usual_dwell_s(float(self.recording.t[-1]))
+        log, end = self.recording.phase, float(self.recording.t[-1])
+        wanted = max(self.imu.epoch_s, min(end / MOST_EPOCHS, LONGEST_EPOCH_S))
+        usual = None if log is None else log.usual_dwell_s(end)
         return wanted if usual is None else max(min(usual - settle_s, wanted), EPOCH_S)
 
     @property

@@ -141,7 +141,7 @@ def known_pass(prepared: PreparedData, setup: TestSetup, finished: Pass) -> Know
     """
     p = len(setup.sensors.prior)
     state = _with_known_coefficients(finished.start, p)._replace(used=finished.estimate.copy())
-    output = new_output(len(prepared.epochs), p, True, len(prepared.epochs))
+    output = new_output(len(prepared.epochs), p, True, len(prepared.epochs), navigation_only=True)
     run_pass(finished.data._replace(kind=prepared.kind), pass_settings(setup, closed_loop=False), state, output)
     check_finite(state)
     seen = motion(

@@ -17,7 +17,9 @@ and accelerometer noise densities q_g, q_a (power)
     E[velocity Zw'] = -[f x] C q_g T / 2,                         E[position Zw'] = -[f x] C q_g T^2 / 6.
 
 While the table rests, Zv and Zp are integrals of Zf, so they are taken once after each motion; at every epoch they
-would add information only if they had noise of their own. Derivation: doc/shared-noise.md.
+would add information only if they had noise of their own. Derivation: doc/shared-noise.md. For the same reason nothing
+is lost when a long dwell ends the navigation and begins it again at the known point: what the sensors add up to in a
+dwell is in Zf, and to second order in the attitude it would contradict Zv and Zp of the next stop.
 """
 
 from __future__ import annotations
@@ -27,7 +29,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sdimu_calibration.core import earth
-from sdimu_calibration.core.arrays import Floats, Ints
+from sdimu_calibration.core.arrays import Bools, Floats, Ints
 from sdimu_calibration.core.compiled import compiled
 from sdimu_calibration.core.filter.kalman import cholesky, propagate, update, whiten
 from sdimu_calibration.core.matrix3 import applied, elements, sparse_product, transposed
@@ -39,7 +41,7 @@ from sdimu_calibration.core.navigation.ins_errors import (
     responses,
     transition,
 )
-from sdimu_calibration.core.navigation.strapdown import navigate_cycle, velocity_increment
+from sdimu_calibration.core.navigation.strapdown import mean_attitude, navigate_cycle, velocity_increment
 from sdimu_calibration.core.rotation import orthonormal, rotation_matrix, skew
 
 NAV = 9
@@ -67,6 +69,8 @@ class PassInput(NamedTuple):
         Sigma that missing samples add on every axis (rad, m/s).
     kind : ndarray of int, shape (e,)
         ``SKIP`` to ``HELD_ALL`` of `alignment.prepared`.
+    restart : ndarray of bool, shape (e,)
+        Before the epoch navigation starts anew from the known point, at rest (`restarts`).
     values : ndarray, shape (n, m)
         Regressors (SI).
     channel, parameter : ndarray of int, shape (m,)
@@ -84,6 +88,7 @@ class PassInput(NamedTuple):
     gap_angle: Floats
     gap_velocity: Floats
     kind: Ints
+    restart: Bools
     values: Floats
     channel: Ints
     parameter: Ints
@@ -153,6 +158,8 @@ class PassState(NamedTuple):
 class PassOutput(NamedTuple):
     """Output of a pass, one row an epoch; k = e where the matrices are kept, else 0. SI units.
 
+    Of the state the kept matrices have the first t rows: all s, or the NAV navigation errors.
+
     Attributes
     ----------
     estimate : ndarray, shape (e, p)
@@ -173,13 +180,13 @@ class PassOutput(NamedTuple):
     covariance : ndarray, shape (ceil(e / stride), p, p)
         Of the coefficients.
     Phi : ndarray, shape (k, 9, 9)
-        Transition of the navigation errors.
+        Transition of the navigation errors; zero for those of position and velocity after a restart.
     G : ndarray, shape (k, 9, p)
-        Their response to the coefficients.
-    H : ndarray, shape (k, 12, s)
+        Their response to the coefficients; not kept (k, 9, 0) with the navigation errors alone.
+    H : ndarray, shape (k, 12, t)
     L : ndarray, shape (k, 12, 12)
         Lower Cholesky factor of the innovations' covariance.
-    K : ndarray, shape (k, s, 12)
+    K : ndarray, shape (k, t, 12)
         Gain.
     """
 
@@ -200,33 +207,22 @@ class PassOutput(NamedTuple):
     K: Floats
 
 
-def new_output(epochs: int, parameters: int, keep: bool, stride: int) -> PassOutput:
-    """Allocate the output of a pass: matrices of every epoch where `keep`, the covariance every `stride` epochs."""
+def new_output(epochs: int, parameters: int, keep: bool, stride: int, navigation_only: bool = False) -> PassOutput:
+    """Allocate the output of a pass: matrices of every epoch where `keep`, the covariance every `stride` epochs.
+
+    With `navigation_only` the matrices have the rows of the navigation errors alone, a fifth of them all.
+    """
     e, p, s = epochs, parameters, NAV + parameters + COPY
     k = e if keep else 0
+    t, g = (NAV, 0) if navigation_only else (s, p)
     nan = np.nan
     return PassOutput(
         np.zeros((e, p)), np.zeros((e, s)), np.full((e, MEASURED), nan), np.full((e, MEASURED), nan),
         np.full((e, MEASURED), nan),
         np.zeros(e), np.full((e, 4), nan), np.zeros((e, 3, 3)), stride, np.zeros((-(-e // stride), p, p)),
-        np.zeros((k, NAV, NAV)), np.zeros((k, NAV, p)), np.zeros((k, MEASURED, s)), np.zeros((k, MEASURED, MEASURED)),
-        np.zeros((k, s, MEASURED)),
+        np.zeros((k, NAV, NAV)), np.zeros((k, NAV, g)), np.zeros((k, MEASURED, t)), np.zeros((k, MEASURED, MEASURED)),
+        np.zeros((k, t, MEASURED)),
     )  # fmt: skip
-
-
-@compiled
-def _mean_attitude(C_nb: Floats, phi: Floats, out: Floats) -> None:
-    """Put the mean of `C_nb` over a cycle that turns by `phi` into `out`: ``C_nb (1 + [phi x] / 2 + [phi x]^2 / 6)``.
-
-    The half sum of both ends would be short by a twelfth of the angle's square; a lever arm shows it.
-    """
-    x, y, z = phi
-    for i in range(3):
-        a, b, c = C_nb[i, 0], C_nb[i, 1], C_nb[i, 2]
-        u, v, w = b * z - c * y, c * x - a * z, a * y - b * x
-        out[i, 0] = a + 0.5 * u + (v * z - w * y) / 6.0
-        out[i, 1] = b + 0.5 * v + (w * x - u * z) / 6.0
-        out[i, 2] = c + 0.5 * w + (u * y - v * x) / 6.0
 
 
 @compiled
@@ -261,7 +257,7 @@ def _navigate_epoch(
             sums[i] += alpha[i]
             sums[3 + i] += upsilon[i]
         gravity = earth.normal_gravity(state.position[0], state.position[2]) + settings.gravity_excess
-        _mean_attitude(state.C_nb, phi, C_mean[k])
+        mean_attitude(state.C_nb, phi, C_mean[k])
         dv = velocity_increment(alpha, upsilon, data.sculling[c])
         # Not the mean attitude times the mean force: that leans off the vertical in a turn, and a filter
         # that sees it takes it for knowledge of azimuth.
@@ -349,6 +345,19 @@ def _feed_back(settings: PassSettings, state: PassState, p: int) -> None:
 
 
 @compiled
+def _restart(settings: PassSettings, state: PassState) -> None:
+    """Begin the navigation anew from the known point, at rest, in place; attitude and coefficients stay."""
+    state.position[:] = settings.reference
+    state.velocity[:] = 0.0
+    state.x[:6] = 0.0
+    state.P[:6, :] = 0.0
+    state.P[:, :6] = 0.0
+    for i in range(3):
+        state.P[i, i] = settings.position_sigma**2
+        state.P[3 + i, 3 + i] = settings.velocity_sigma**2
+
+
+@compiled
 def run_pass(data: PassInput, settings: PassSettings, state: PassState, out: PassOutput) -> None:
     """Navigate, propagate and measure, epoch by epoch; `state` and `out` are filled in place."""
     p = state.used.shape[0]
@@ -361,7 +370,10 @@ def run_pass(data: PassInput, settings: PassSettings, state: PassState, out: Pas
     accel = np.eye(3) * settings.accel_psd
     longest = (data.last - data.first).max()
     C_mean, f_mean, response = np.empty((longest, 3, 3)), np.empty((longest, 3)), np.empty((longest, 6, NAV))
+    keep, kept, g = out.Phi.shape[0] > 0, out.H.shape[2], out.G.shape[2]
     for e in range(data.first.shape[0]):
+        if data.restart[e]:
+            _restart(settings, state)
         position, velocity = state.position.copy(), state.velocity.copy()
         T = _navigate_epoch(data, e, settings, state, G[:, :p], D, sums, C_mean, f_mean, response)
         f_n = sums[6:] / T
@@ -378,10 +390,11 @@ def run_pass(data: PassInput, settings: PassSettings, state: PassState, out: Pas
                 state.used[j] *= d
         propagate(state.x, state.P, Phi, G, Q, decay, drive)
         kind = data.kind[e]
-        keep = out.Phi.shape[0] > 0
         if keep:
             out.Phi[e] = Phi
-            out.G[e] = G[:, :p]
+            if data.restart[e]:
+                out.Phi[e, :, :6] = 0.0
+            out.G[e] = G[:, :g]
         if kind != SKIP:
             low = 0 if abs(kind) == ALL else 6
             z, H, R, M = _measurement(settings, state, D, sums, T, p, data.white[e])
@@ -391,7 +404,7 @@ def run_pass(data: PassInput, settings: PassSettings, state: PassState, out: Pas
             if kind > 0:
                 innovation, L, K = update(state.x, state.P, z[low:], Hl, Rl, Ml)
                 if keep:
-                    out.K[e, :, low:] = K
+                    out.K[e, :, low:] = K[:kept]
             else:
                 HM = sparse_product(Hl, Ml)
                 HP = sparse_product(Hl, state.P)
@@ -413,7 +426,7 @@ def run_pass(data: PassInput, settings: PassSettings, state: PassState, out: Pas
                 first = 3 * group - low
                 out.nis[e, group] = white[first] ** 2 + white[first + 1] ** 2 + white[first + 2] ** 2
             if keep:
-                out.H[e, low:] = Hl
+                out.H[e, low:] = Hl[:, :kept]
                 out.L[e, low:, low:] = L
             if kind > 0:
                 _feed_back(settings, state, p)

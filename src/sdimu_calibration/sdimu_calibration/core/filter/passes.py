@@ -16,6 +16,7 @@ from sdimu_calibration.core.alignment.alignment import Alignment
 from sdimu_calibration.core.alignment.coarse_alignment import StartPoint, coarse_start
 from sdimu_calibration.core.alignment.prepared import PreparedData, TestSetup, first_attitude
 from sdimu_calibration.core.arrays import Floats, Ints
+from sdimu_calibration.core.data.phases import restarts
 from sdimu_calibration.core.effects.imu_model import ImuModel
 from sdimu_calibration.core.filter.filter_pass import (
     COPY,
@@ -27,6 +28,7 @@ from sdimu_calibration.core.filter.filter_pass import (
     new_output,
     run_pass,
 )
+from sdimu_calibration.core.measurement_kind import SKIP
 from sdimu_calibration.core.navigation.track import motion
 from sdimu_calibration.core.progress import Progress
 from sdimu_calibration.core.recording import DataError, DivergedError
@@ -165,7 +167,7 @@ def pass_input(
     c, e, b = prepared.cycles, prepared.epochs, prepared.bridges
     return PassInput(
         c.dt, c.alpha, c.upsilon, c.coning, c.sculling, e.first, e.last, b.white, b.angle, b.velocity, prepared.kind,
-        values, channel, parameter,
+        restarts(e, prepared.phases) & (prepared.kind != SKIP), values, channel, parameter,
     )  # fmt: skip
 
 

@@ -53,6 +53,9 @@ _PIECE = 3
 """Number of epochs of a stop between two shifts of the attitude to that of the stop: in more, a cheap gyro drifts so
 far that azimuth looks observable."""
 
+_OF_EPOCHS = ("first", "last", "white", "gap_angle", "gap_velocity", "kind", "restart")
+"""Fields of `PassInput` with one row an epoch."""
+
 
 @dataclass(frozen=True)
 class SecondOrderPass:
@@ -319,8 +322,8 @@ def run_stops(
     for (a, b), k in zip(pairwise(edges), stop, strict=True):
         if k >= 0:
             _shift(state, C_stop[k])
-        part = data._replace(first=data.first[a:b], last=data.last[a:b], kind=data.kind[a:b])
-        out = new_output(b - a, len(state.used), keep, b - a)
+        part = data._replace(**{name: getattr(data, name)[a:b] for name in _OF_EPOCHS})
+        out = new_output(b - a, len(state.used), keep, b - a, navigation_only=True)
         run_pass(part, settings, state, out)
         parts.append(out)
         rows.append(np.array([a]))
