@@ -13,7 +13,7 @@ import numpy as np
 from sdimu_calibration.core import earth
 from sdimu_calibration.core.arrays import Bools, Floats, Ints
 from sdimu_calibration.core.compiled import compiled
-from sdimu_calibration.core.data.blocks import let_go
+from sdimu_calibration.core.data.blocks import let_go, pieces
 from sdimu_calibration.core.matrix3 import multiplied, rotation3, store
 
 WINDOW_S = 1.0
@@ -165,10 +165,8 @@ def cut_windows(
     first = first[whole]
     # Of the running sums only those at the edges are kept: a day of samples has a gigabyte of them.
     at = np.unique(np.concatenate([first + step for step in (-q, 0, q, m - q, m, m + q)]))
-    total_w, offset_w = _running_sum(np.ascontiguousarray(w), at)
-    let_go(w)
-    total_f, offset_f = _running_sum(np.ascontiguousarray(f), at)
-    let_go(f)
+    total_w, offset_w = _running_sum(w, at)
+    total_f, offset_f = _running_sum(f, at)
 
     def mean(total: Floats, offset: Floats, begin: Ints, end: Ints) -> Floats:
         rows = np.searchsorted(at, end), np.searchsorted(at, begin)
@@ -188,23 +186,45 @@ def samples_of(length_s: float, interval_s: float) -> tuple[int, int]:
     return m, max(m // _END, 1)
 
 
-@compiled
 def _running_sum(x: Floats, at: Ints) -> tuple[Floats, Floats]:
     """Sum of ``x - mean`` of the rows of x (n, 3) before each of `at` (c,), ascending; shape (c, 3); the mean (3,)."""
-    n, mean = len(x), np.zeros(3)
-    for i in range(n):
+    mean, total, out = np.zeros(3), np.zeros(3), np.zeros((len(at), 3))
+    for rows in pieces(len(x)):
+        _add_up(np.ascontiguousarray(x[rows]), mean)
+        let_go(x)
+    mean /= len(x)
+    reached = 0
+    for rows in pieces(len(x)):
+        reached = _sum_before(np.ascontiguousarray(x[rows]), mean, at - rows.start, reached, total, out)
+        let_go(x)
+    out[reached:] = total
+    return out, mean
+
+
+@compiled
+def _add_up(x: Floats, total: Floats) -> None:
+    """Add the rows of x (n, 3) to `total` (3,), in place."""
+    for i in range(len(x)):
         for k in range(3):
-            mean[k] += x[i, k]
-    mean /= n
-    out, total, reached = np.zeros((len(at), 3)), np.zeros(3), 0
-    for i in range(n + 1):
+            total[k] += x[i, k]
+
+
+@compiled
+def _sum_before(x: Floats, mean: Floats, at: Ints, reached: int, total: Floats, out: Floats) -> int:
+    """Add ``x - mean`` to `total` (3,), row by row; put it into `out` (c, 3) before each row of `at` from `reached` on.
+
+    Returns
+    -------
+    int
+        Number of rows of `at` that were reached.
+    """
+    for i in range(len(x)):
         while reached < len(at) and at[reached] == i:
             out[reached] = total
             reached += 1
-        if i < n:
-            for k in range(3):
-                total[k] += x[i, k] - mean[k]
-    return out, mean
+        for k in range(3):
+            total[k] += x[i, k] - mean[k]
+    return reached
 
 
 def turned(w: Floats, windows: Windows, chosen: Ints, factor: float) -> Floats:
