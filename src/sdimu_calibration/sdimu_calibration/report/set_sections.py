@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from datetime import UTC, datetime
 
 import numpy as np
@@ -107,13 +108,15 @@ def recurrence_section(found: Recurrence) -> str:
         [f"same {one.kind}", str(one.pairs), _number(one.correlation, 2), _number(one.score, 1), ", ".join(one.sensors)]
         for one in found.kinds
     ]  # fmt: skip
+    sensors = ", ".join(found.sensors)
+    chance = (
+        f"Chance reaches {found.limit:.1f} sigma in one set of a hundred. Empty: the recordings say nothing of it."
+        if math.isfinite(found.limit) else "The recordings share too few stops to say more."
+    )  # fmt: skip
     return section(
         "What comes back",
         grid(("at the", "pairs of stops", "correlation", "sigma", "sensors"), rows, {0, 4}),
-        quiet(
-            f"What the model leaves in the stops ({', '.join(found.sensors)}), compared between recordings. Chance "
-            f"reaches {found.limit:.1f} sigma in one set of a hundred. Empty: the recordings say nothing of it."
-        ),
+        quiet(f"What the model leaves in the stops ({sensors}), compared between recordings. {chance}"),
     )
 
 

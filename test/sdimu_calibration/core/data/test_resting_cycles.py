@@ -57,6 +57,16 @@ def test_joined_cycles_navigate_as_their_parts(cycles):
         assert (np.abs(other - one) < tolerance).all()
 
 
+def test_a_second_that_is_not_used_does_not_make_a_rest_short():
+    at = np.arange(400.0)
+    used = (at % 100.0 != 50.0) & ((at < 220.0) | (at > 350.0))
+    none = np.zeros(400, dtype=bool)
+    epochs = Epochs(*(np.zeros(400, np.int64),) * 2, at, at + 1.0, at, np.zeros((400, 3)), np.zeros((400, 3)))
+    phases = Phases(used, used, none, np.zeros(400, np.int64), none, none)
+    # What was not looked at for two minutes begins anew at once.
+    assert np.flatnonzero(restarts(epochs, phases)).tolist() == [110, 351]
+
+
 def test_navigation_starts_anew_in_long_rests_alone():
     at = np.arange(400.0)
     used = at != 100.0

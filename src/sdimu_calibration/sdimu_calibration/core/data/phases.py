@@ -231,11 +231,16 @@ def restarts(epochs: Epochs, phases: Phases) -> Bools:
     -------
     ndarray of bool, shape (e,)
     """
-    used, stop = phases.used, phases.stop
-    begins = np.append(True, ~used[:-1] | (stop[1:] != stop[:-1]))
-    begun = epochs.start[np.maximum.accumulate(np.where(begins, np.arange(len(used)), 0))]
-    count = np.floor((epochs.start - begun + 1e-6) / RESTART_S)
-    return np.asarray(used & ~begins & (count > np.append(0.0, count[:-1])))
+    out = np.zeros(len(phases.used), dtype=bool)
+    # A second in a rest that is not used does not make it a new rest.
+    at = np.flatnonzero(phases.used)
+    if not len(at):
+        return out
+    begins = np.append(True, np.diff(phases.stop[at]) != 0)
+    first = np.maximum.accumulate(np.where(begins, np.arange(len(at)), 0))
+    count = np.floor((epochs.start[at] - epochs.start[at[first]] + 1e-6) / RESTART_S)
+    out[at] = ~begins & (count > np.append(0.0, count[:-1]))
+    return out
 
 
 def contradictions(epochs: Epochs, phases: Phases, log: PhaseLog | None, feels_turns: bool) -> tuple[DataFault, ...]:

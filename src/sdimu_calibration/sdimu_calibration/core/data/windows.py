@@ -158,6 +158,7 @@ def cut_windows(
     interval_s : float, optional
         Of the samples; by default the median of their stamps' differences.
     """
+    let_go(w, f)
     dt = interval_s or float(np.median(np.diff(t), overwrite_input=True))
     m, q = samples_of(length_s, dt)
     first = np.arange(m, len(t) - m - q + 1, m)

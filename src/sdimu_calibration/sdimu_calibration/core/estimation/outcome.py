@@ -8,10 +8,11 @@ from dataclasses import replace
 import numpy as np
 
 from sdimu_calibration.core.arrays import Floats
+from sdimu_calibration.core.data.blocks import let_go
 from sdimu_calibration.core.estimation.fit import Fit
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.estimation.solve import AUTO, solve
-from sdimu_calibration.core.origin import measured
+from sdimu_calibration.core.origin import Origin, measured
 from sdimu_calibration.core.progress import Progress, silent
 from sdimu_calibration.core.recording import Recording
 from sdimu_calibration.core.results import INSEPARABLE, Calibration
@@ -63,8 +64,16 @@ def outcome(fit: Fit, held_out: bool = True) -> Calibration:
         noise=fit.noise_terms,
         drift_means=fit.drift_means,
         rests=fit.rests(),
-        origin=measured(fit.test.origin, fit.test.recording, fit.test.imu.name),
+        origin=_origin(fit),
     )
+
+
+def _origin(fit: Fit) -> Origin:
+    """Return the origin with what the samples say; those that lie in a file are let go again."""
+    recording = fit.test.recording
+    out = measured(fit.test.origin, recording, fit.test.imu.name)
+    let_go(recording.omega_ib_b, recording.f_ib_b)
+    return out
 
 
 def inseparable(names: Sequence[str], covariance: Floats) -> list[str]:

@@ -8,6 +8,7 @@ from typing import Any
 
 from sdimu_calibration.core.alignment.prepared import PreparedData, TestSetup, reduce
 from sdimu_calibration.core.alignment.without import without
+from sdimu_calibration.core.data.blocks import let_go
 from sdimu_calibration.core.data.by_hand import why_handheld
 from sdimu_calibration.core.handheld.handheld import PreparedRun, prepare_run
 from sdimu_calibration.core.origin import Origin
@@ -71,6 +72,7 @@ class PreparedTest:
         key = (setup.model.settle_s, setup.model.zero_velocity, setup.epoch_s)
         if key not in self._prepared:
             self._prepared[key] = reduce(self.recording, setup)
+            let_go(self.recording.t, self.recording.omega_ib_b, self.recording.f_ib_b)
         return without(self._prepared[key], self.held_out, self.excluded)
 
     @cached_property

@@ -91,7 +91,8 @@ class Recurrence:
         False where the recordings cannot tell the kinds of the answer apart.
     kinds : tuple of Kind
     limit : float
-        Score that chance reaches in one set of a hundred, all kinds and sensors counted.
+        Score that chance reaches in one set of a hundred, all kinds and sensors counted; NaN where the recordings share
+        too few stops.
     sensors : tuple of str
         Those where most is left.
     p_value : float
@@ -209,7 +210,9 @@ def _tested(left: Leftovers, main: Sequence[int], common: Sequence[str]) -> _Tes
         every = np.vstack([even, together])
         correlation[kind], scores[kind] = of_all[:, 0], every[:, 0]
         chance.append(np.where(np.isfinite(every[:, 1:]), every[:, 1:], -np.inf).max(axis=0))
-    return _Test(correlation, scores, float(np.quantile(np.max(chance, axis=0), 1.0 - _FALSE_ALARM)))
+    largest = np.max(chance, axis=0)
+    limit = float(np.quantile(largest, 1.0 - _FALSE_ALARM)) if np.isfinite(largest).all() else float("nan")
+    return _Test(correlation, scores, limit)
 
 
 def _components(left: Leftovers, mine: Ints, common: Sequence[str]) -> list[_Component]:

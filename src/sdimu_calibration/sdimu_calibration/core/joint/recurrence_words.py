@@ -28,12 +28,12 @@ def told(found: Recurrence, unexplained: bool) -> str:
     ----------
     found : Recurrence
     unexplained : bool
-        The verdict on the set; else only what comes back is worth a sentence.
+        The verdict on the set.
 
     Returns
     -------
     str
-        Empty where there is nothing to say.
+        A sentence.
     """
     what = "What stays unexplained" if unexplained else "What the model leaves in the stops"
     if found.answer:
@@ -41,15 +41,13 @@ def told(found: Recurrence, unexplained: bool) -> str:
         seen = "; ".join(_figures(by_kind[kind], found.limit) for kind in found.answer)
         if not found.apart:
             return (
-                f"{what} comes back at the same {_listed(found.answer, 'or')} ({seen}): the recordings pass their "
-                "stops in the same order, which does not tell the two apart."
+                f"{what} comes back at the same {_listed(found.answer, 'or')} ({seen}): the order of the stops in "
+                "these recordings does not tell which."
             )
         return (
             f"{what} comes back at the same {_listed(found.answer, 'and')} ({seen}): it belongs to "
             f"{' and '.join(_BELONGS[kind] for kind in found.answer)}."
         )
-    if not unexplained:
-        return ""
     if found.doubtful:
         near = next(k for k in found.kinds if k.kind == found.doubtful[0])
         return (
@@ -58,27 +56,17 @@ def told(found: Recurrence, unexplained: bool) -> str:
         )
     if not found.told:
         return f"Whether {what[0].lower()}{what[1:]} comes back cannot be told: the recordings share too few stops."
-    return (
-        f"{what} in the stops ({', '.join(found.sensors)}) does not come back at the same "
-        f"{_listed(found.told, 'or')}: it belongs to each run."
-    )
+    of_each = ": it belongs to each run" if {ATTITUDE, TIME} <= set(found.told) else ""
+    where = f"{' in the stops' if unexplained else ''} ({', '.join(found.sensors)})"
+    return f"{what}{where} does not come back at the same {_listed(found.told, 'or')}{of_each}."
 
 
-def next_steps(found: Recurrence | None, unexplained: bool) -> list[str]:
-    """Say what to do about what comes back, the most useful first.
-
-    Parameters
-    ----------
-    found : Recurrence or None
-    unexplained : bool
-        The verdict on the set.
-    """
+def next_steps(found: Recurrence | None) -> list[str]:
+    """Say what to do about what comes back, the most useful first."""
     if found is None:
         return []
     if found.answer:
         return [_NEXT[kind] for kind in found.answer] if found.apart else [_ORDER]
-    if not unexplained:
-        return []
     if ATTITUDE not in found.told or found.doubtful:
         return [_ORDER]
     return [_OF_EACH]

@@ -186,6 +186,8 @@ def _found(
 ) -> str:
     listed = [_named(f) for f in findings]
     names = " and ".join(listed[:_LISTED]) + (f" and {len(listed) - _LISTED} more" if len(listed) > _LISTED else "")
+    if word == "consistent" and again is not None:
+        return "The model explains all recordings together, each in a noise of its own."
     if word == "consistent":
         return "The model explains all recordings together: nothing stands out of the noise."
     if word == "data fault":
@@ -221,7 +223,7 @@ def _advice(
     word: str, findings: Sequence[SetFinding], closing: Sequence[tuple[tuple[str, ...], NextTurn]],
     again: Recurrence | None,
 ) -> tuple[str, ...]:
-    out = next_steps(again, word == "unexplained")
+    out = next_steps(again)
     closed = {members[0] for members, _ in closing}
     for f in findings:
         if f.recording:
