@@ -128,6 +128,15 @@ def test_a_coefficient_that_follows_the_date_is_told(options):
     assert any("accel_scale_x is not the same in all recordings" in line for line in result.warnings)
 
 
+def test_recordings_that_the_model_does_not_fit_are_named_though_learned_noise_takes_it_in(options):
+    some = unit_set(19, [short()] * 2, ("accel_x: sin(7 fx/g + 4 fy/g)=100 ug",))
+    result = set_outcome(fit_set(some.members, options, here))
+    line = next(text for text in result.warnings if "does not fit" in text)
+    assert "r0 " in line
+    assert "r1 " in line
+    assert line.endswith("run: sdimu diagnose")
+
+
 def test_a_clean_set_scatters_as_chance_does(options):
     smallest = []
     for seed in (21, 22, 23, 24):

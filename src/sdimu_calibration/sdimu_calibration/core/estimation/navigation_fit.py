@@ -50,7 +50,7 @@ HELD_OUT_FOLDS = 3
 """Number of interleaved groups of stops, each held out once: two thirds of the stops are then in every fit."""
 _ABSURD = 1e3
 """NIS per degree of freedom (1) from which there is no fit at all: units, axes or site are wrong."""
-_MISFIT = 1.2
+MISFIT = 1.2
 """NIS per degree of freedom, and held-out error (sigma), from which a user is warned: 1 is right, and chance stays
 within a few per cent of it."""
 _OF_THE_PASSES = {"known", "timetable", "wander", "centring", "_drifts", "_share_of_rest"}
@@ -359,7 +359,7 @@ class NavigationFit(Fit):
                 f"{in_turn}; check --imu, --site, units and axes"
             )
         out = [] if self.converged else [NOT_CONVERGED]
-        if nis > _MISFIT or (held_out is not None and held_out > _MISFIT):
+        if nis > MISFIT or (held_out is not None and held_out > MISFIT):
             text = f"NIS {nis:.3f}" + ("" if held_out is None else f", held-out error {held_out:.3f}")
             out.append(f"the model does not fit ({text}; 1 is right){in_turn}; run: sdimu diagnose")
         worst = stop_misfit(self.last.output.normalised, self.prepared)

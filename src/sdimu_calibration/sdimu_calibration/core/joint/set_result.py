@@ -9,7 +9,7 @@ import numpy as np
 
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.estimation.fit import Fit
-from sdimu_calibration.core.estimation.navigation_fit import NavigationFit
+from sdimu_calibration.core.estimation.navigation_fit import MISFIT, NavigationFit
 from sdimu_calibration.core.estimation.outcome import inseparable
 from sdimu_calibration.core.joint.member import Report, fitted
 from sdimu_calibration.core.joint.set_evidence import held_out
@@ -27,6 +27,8 @@ from sdimu_calibration.core.results import (
 )
 from sdimu_calibration.core.units import from_si
 
+_LISTED = 4
+"""Number of recordings that a line names."""
 SCATTERS = 1e-3
 """Probability (1) below which a coefficient is told to differ from recording to recording: one set in a thousand does
 so by chance."""
@@ -155,7 +157,20 @@ def _warnings(fit: SetFit, varied: Variation, names: Sequence[str]) -> tuple[str
         for p, name in sorted(odd)
     ]
     left_out = [f"{name} is left out: {why}" for name, why in fit.left_out]
-    return (*left_out, *lines, *(f"{r.name}: {text}" for r in fit.reports for text in r.warnings))
+    return (*left_out, *_misfit(fit), *lines, *(f"{r.name}: {text}" for r in fit.reports for text in r.warnings))
+
+
+def _misfit(fit: SetFit) -> list[str]:
+    """Name the recordings whose innovations are larger than white noise makes them, the worst first."""
+    nis = {r.name: float(r.statistics["nis_mean"] or 0.0) for r in fit.reports}
+    bad = sorted((name for name, value in nis.items() if value > MISFIT), key=lambda name: -nis[name])
+    if not bad:
+        return []
+    told = ", ".join(f"{name} {nis[name]:.3g}" for name in bad[:_LISTED]) + (" and others" if bad[_LISTED:] else "")
+    return [
+        f"the model in white noise does not fit (NIS of {told}; 1 is right): physics is missing, or the noise has a "
+        "memory; run: sdimu diagnose"
+    ]
 
 
 def _summary(fit: SetFit, varied: Variation, names: Sequence[str], base: Fit) -> SetSummary:
