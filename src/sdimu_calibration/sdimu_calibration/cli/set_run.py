@@ -169,7 +169,7 @@ def diagnose_together(asked: SetRequest, extra: Sequence[Effect]) -> None:
             part / "report.html", after, title=_title(asked, "Diagnosis"), of_set=found, trace=_trace(asked),
             spell=partial(spelled, asked=about),
         )  # fmt: skip
-    _show(console, after)
+    _show(console, after, diagnosed=True)
     say(console, f"{found.verdict}: {found.sentence}")
     print_advice(console, found.advice, about)
     say(console, f"results in {folder}")
@@ -242,12 +242,13 @@ def _with_serial(result: Calibration, members: Sequence[Member]) -> Calibration:
     return result.with_serial(next((m.serial for m in members if m.serial), ""))
 
 
-def _show(console: Console, result: Calibration) -> None:
+def _show(console: Console, result: Calibration, diagnosed: bool = False) -> None:
     """Print the table, the power-ons and what the user should know."""
+    from sdimu_calibration.core.results import without_advice
     from sdimu_calibration.report.table import rich_table, rows
 
     count = len(result.of_set.recordings) if result.of_set else 0
     console.print(
         rich_table(rows(result), f"{count} recordings together, body frame: {result.body_frame}"), soft_wrap=True
     )
-    tell(console, result.notes)
+    tell(console, without_advice(result.notes) if diagnosed else result.notes)

@@ -114,7 +114,7 @@ def page(
         rests_section(calibration.rests) if calibration.rests else "",
         noise_section(fit, draw) if isinstance(fit, NavigationFit) else "",
         experiment.data_section(fit, draw) if fit is not None else "",
-        _notes(calibration.notes if summary is None else without_advice(calibration.notes)),
+        _notes(without_advice(calibration.notes) if summary or of_set else calibration.notes),
         traceability(calibration, trace),
     ]
     body = "\n".join(part for part in parts if part)
