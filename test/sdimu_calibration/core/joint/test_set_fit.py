@@ -10,7 +10,7 @@ import pytest
 from sdimu_calibration.core.joint.member import Member, fitted
 from sdimu_calibration.core.joint.set_fit import SetOptions, fit_set, job_of
 from sdimu_calibration.core.joint.set_result import set_outcome
-from sdimu_calibration.core.joint.variation import variation
+from sdimu_calibration.core.joint.variation import _scatter, variation
 from sdimu_calibration.core.plan import Plan
 from sdimu_calibration.core.recording import DataError
 from sdimu_sim.campaign.hidden_score import baseline_z
@@ -135,6 +135,21 @@ def test_recordings_that_the_model_does_not_fit_are_named_though_learned_noise_t
     assert "r0 " in line
     assert "r1 " in line
     assert line.endswith("run: sdimu diagnose")
+
+
+def test_a_prior_that_holds_all_recordings_back_is_no_scatter():
+    # Three recordings of one coefficient, six sigma of its prior in size, which the estimate is held back from.
+    own, weight = np.array([40.0, 90.0, 160.0]), 30.0
+    value, P = 6.0 / np.sqrt(weight), 1.0 / (own.sum() + weight)
+    gram = np.diag(own) - P * np.outer(own, own)
+    held_back = own * P * weight * value
+    seen = np.ones(3, dtype=bool)
+    assert float(held_back @ np.linalg.solve(gram, held_back)) > 30.0
+    assert _scatter(gram, held_back, own, seen) > 0.999
+    assert _scatter(gram, held_back + np.array([40.0, 0.0, -40.0]), own, seen) < 1e-4
+    rng = np.random.default_rng(1)
+    p = [_scatter(gram, d, own, seen) for d in rng.multivariate_normal(held_back, gram, 2000)]
+    assert 0.035 < np.mean(np.array(p) < 0.05) < 0.075
 
 
 def test_a_clean_set_scatters_as_chance_does(options):

@@ -80,7 +80,9 @@ def variation(fit: SetFit) -> Variation:
         seen = own > _SEEN**2 * scores.alone
         z = np.where(seen, scores.d / np.sqrt(own), np.nan)
         deviation = np.where(seen, scores.d / own, np.nan)
-    p_value = np.array([_scatter(scores.gram[c], scores.d[:, c], seen[:, c]) for c in range(len(shared))])
+    p_value = np.array([
+        _scatter(scores.gram[c], scores.d[:, c], scores.alone[:, c], seen[:, c]) for c in range(len(shared))
+    ])
     return Variation(
         tuple(shared), tuple(r.name for r in fit.reports), z, deviation, p_value, _trends(fit, shared, scores)
     )
@@ -109,14 +111,19 @@ def _scores(fit: SetFit, p: int) -> _Scores:
     return _Scores(gram, np.diagonal(within, axis1=1, axis2=2).T.copy(), d)
 
 
-def _scatter(gram: Floats, d: Floats, seen: Bools) -> float:
-    """Probability of the scores of one coefficient; NaN where fewer than two recordings see it."""
+def _scatter(gram: Floats, d: Floats, alone: Floats, seen: Bools) -> float:
+    """Probability of the scores of one coefficient; NaN where fewer than two recordings see it.
+
+    A prior that holds the joint estimate back moves the scores of all recordings one way, each by its information.
+    That is no scatter, so the test asks across that direction.
+    """
     if seen.sum() < 2:
         return float("nan")
-    unit = 1.0 / np.sqrt(np.diag(gram)[seen])
-    values, vectors = np.linalg.eigh(gram[np.ix_(seen, seen)] * np.outer(unit, unit))
+    size = np.sqrt(np.diag(gram)[seen])
+    across = np.linalg.svd((alone[seen] / size)[None, :])[2][1:].T
+    values, vectors = np.linalg.eigh(across.T @ (gram[np.ix_(seen, seen)] / np.outer(size, size)) @ across)
     counts = values > _RANK * values[-1]
-    along = vectors[:, counts].T @ (d[seen] * unit)
+    along = vectors[:, counts].T @ (across.T @ (d[seen] / size))
     return chi2_tail(float(np.sum(along**2 / values[counts])), float(counts.sum()))
 
 
