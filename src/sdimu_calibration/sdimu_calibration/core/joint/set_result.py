@@ -28,7 +28,7 @@ from sdimu_calibration.core.results import (
 from sdimu_calibration.core.units import from_si
 
 _LISTED = 4
-"""Number of recordings that a line names."""
+"""Number of recordings that a line names: the table of the page has all."""
 SCATTERS = 1e-3
 """Probability (1) below which a coefficient is told to differ from recording to recording: one set in a thousand does
 so by chance."""
