@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from sdimu_calibration.core.effects.effect import Timetable
-from sdimu_calibration.core.evidence.learned_noise import LEAST_GAIN, NoiseInformation, learn, likelihood, root_of
+from sdimu_calibration.core.evidence.learned_noise import LEAST_GAIN, NoiseInformation, learn, likelihood
 from sdimu_calibration.core.evidence.noise_kernels import kernel, stretches
-from sdimu_calibration.core.noise_term import KINDS, MARKOV, NoiseTerm
+from sdimu_calibration.core.noise_term import KINDS, MARKOV, TRIADS, NoiseTerm
 
 STOPS = 12
 
@@ -24,8 +24,13 @@ def cut():
 def drawn(cut, terms, seed):
     """Information of an ideal sensor that measures each stretch with a white error of one, wandering by `terms`."""
     rng = np.random.default_rng(seed)
-    root = root_of(terms, cut)
-    e = rng.standard_normal(6 * len(cut)) + root @ rng.standard_normal(root.shape[1])
+    e = rng.standard_normal(6 * len(cut))
+    for term in terms:
+        # Of the whole kernel, not of the modes that the program keeps.
+        variance, vectors = np.linalg.eigh(kernel(term.kind, term.tau, cut))
+        draws = np.sqrt(np.maximum(variance, 0.0))[:, None] * rng.standard_normal((len(cut), 3))
+        first = 3 * TRIADS.index(term.triad)
+        e.reshape(-1, 6)[:, first : first + 3] += term.size * vectors @ draws
     return NoiseInformation(np.eye(6 * len(cut)), e, 0.0)
 
 
@@ -62,6 +67,22 @@ def test_flicker_has_the_allan_deviation_of_its_name():
     K = kernel("flicker", 0.0, stretches(Timetable(1200.0, dwells, ())))
     difference = np.diag(K)[1:] + np.diag(K)[:-1] - 2.0 * np.diag(K, 1)
     assert 0.5 * difference.mean() == pytest.approx(2.0 * np.log(2.0) / np.pi, rel=0.05)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_modes_of_a_term_make_its_whole_kernel(cut, kind):
+    root = cut.mode(kind, 100.0 if kind == MARKOV else 0.0)
+    np.testing.assert_allclose(root @ root.T, kernel(kind, 100.0 if kind == MARKOV else 0.0, cut), atol=1e-6)
+
+
+@pytest.mark.parametrize("kind", ["random_walk", "flicker"])
+def test_noise_far_above_white_noise_keeps_its_name(cut, kind):
+    """A wander of many modes is not told as one time constant, however large it is."""
+    for seed in range(1, 11):
+        found = learn(drawn(cut, [NoiseTerm("gyro", kind, 0.0, 10.0)], seed), cut)
+        of_kind = [t for t in found if t.kind == kind or kind in t.alike]
+        assert of_kind, (seed, found)
+        assert 7.0 < of_kind[0].size < 14.0
 
 
 @pytest.mark.parametrize(("kind", "size"), [(k, 0.2 if k == "random_walk" else 3.0) for k in KINDS])

@@ -131,6 +131,10 @@ def test_a_set_says_what_comes_back(tmp_path):
     assert found.recurrence.answer == (ATTITUDE,)
     assert "comes back at the same attitude (accel_x" in found.sentence
     assert "it belongs to the sensor" in found.sentence
+    # What imitates the sine in these stops predicts the other recording worse.
+    assert not found.findings
+    assert "The model stays as given: with accel_" in found.sentence
+    np.testing.assert_array_equal(found.after.values, found.before.values)
     assert any("--try FILE" in line for line in found.advice)
     write_set_diagnosis(tmp_path / "set.json", found)
     content = read_json(tmp_path / "set.json", FORMAT)["recurrence"]

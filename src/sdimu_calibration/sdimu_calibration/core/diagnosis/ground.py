@@ -21,6 +21,7 @@ from sdimu_calibration.core.estimation.solve import extend
 from sdimu_calibration.core.evidence.candidate import Candidate, split
 from sdimu_calibration.core.evidence.learned_noise import Wander
 from sdimu_calibration.core.evidence.linear import LinearEvidence
+from sdimu_calibration.core.noise_term import NoiseTerm
 from sdimu_calibration.core.progress import Progress
 from sdimu_calibration.core.recording import DataError
 
@@ -29,6 +30,8 @@ _PARALLEL = 1e-6
 _STRONG = 20.0
 """Score (sigma) of a candidate from which it is looked for before the others: signatures about a fit without it are
 wrong by several percent, and a twentieth of it is what noise alone does."""
+_SURE = 6.0
+"""Score (sigma) in learned noise from which a strong candidate is no part of the noise: one in a billion."""
 _LEADS = 0.3
 """Score (1) of a strong candidate over that of the strongest one that the fit lacks, from which both come in at once: a
 weaker one may be what the linear model leaves of the strongest."""
@@ -52,6 +55,8 @@ class Request:
         How wandering biases would show in the test; None where the estimator learns scatter instead.
     without : frozenset of str
         Registry names of effects that are not tried.
+    learned : tuple of NoiseTerm
+        Noise with a memory that was learned before anything was looked for.
     """
 
     base: Fit
@@ -59,6 +64,7 @@ class Request:
     alpha: float
     wander: Wander | None = None
     without: frozenset[str] = frozenset()
+    learned: tuple[NoiseTerm, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -134,6 +140,9 @@ def next_ground(
 def strong_first(request: Request, progress: Progress) -> Ground:
     """Fit with the strong effects of the catalogue alone, until none that is left is strong.
 
+    Where noise with a memory was learned, only those count that are beyond doubt in it, though it was learned without
+    them: much of such noise scores as dozens of sigma in white noise.
+
     Returns
     -------
     Ground
@@ -141,24 +150,41 @@ def strong_first(request: Request, progress: Progress) -> Ground:
     """
     ground = fresh_ground(request, request.base, (), False)
     for _ in range(_MOST_REFITS):
-        limit = _strong_limit(ground)
+        allowed = _beyond_noise(request, ground)
+        limit = _strong_limit(ground, allowed)
         if limit is None:
             break
-        found = search(ground.evidence, ground.allowed, request.alpha, MOST_STEPS, limit)
+        found = search(ground.evidence, allowed, request.alpha, MOST_STEPS, limit)
         chosen = tuple(Problem(found.evidence).candidate(c) for c in found.chosen)
         if {c.label for c in chosen} == {c.label for c in ground.tried}:
             break
-        ground = fresh_ground(request, extended(request, chosen, progress), chosen, False)
+        try:
+            fit = extended(request, chosen, progress)
+        except DataError:
+            # The rounds look again about the fit that stands, with noise as a rival.
+            break
+        ground = fresh_ground(request, fit, chosen, False)
     return ground
 
 
-def _strong_limit(ground: Ground) -> float | None:
+def _beyond_noise(request: Request, ground: Ground) -> Ints:
+    """Columns that may be chosen, and that learned noise does not explain, shape (a,)."""
+    if request.wander is None or not request.learned:
+        return ground.allowed
+    problem = Problem(ground.evidence.with_noise(request.wander.modes(request.learned).columns))
+    labels = [c.label for c in ground.evidence.candidates]
+    tried = [problem.p + labels.index(c.label) for c in ground.tried]
+    z = np.abs(problem.scan(tried, 1.0).z)
+    return np.union1d(ground.allowed[z[ground.allowed] > _SURE], np.array(tried, dtype=np.int64))
+
+
+def _strong_limit(ground: Ground, allowed: Ints) -> float | None:
     """Score from which candidates come in next; None where nothing that the fit lacks is strong."""
     problem = Problem(ground.evidence)
     labels = [c.label for c in ground.evidence.candidates]
     tried = [problem.p + labels.index(c.label) for c in ground.tried]
     scanned = problem.scan(tried, problem.scale(tried))
-    largest = float(np.max(np.abs(scanned.z[ground.allowed]), initial=0.0))
+    largest = float(np.max(np.abs(scanned.z[allowed]), initial=0.0))
     return max(_STRONG, _LEADS * largest) if largest > _STRONG else None
 
 

@@ -18,6 +18,7 @@ from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.evidence.consistency import Consistency
 from sdimu_calibration.core.evidence.learned_noise import Wander
 from sdimu_calibration.core.evidence.linear import LinearEvidence
+from sdimu_calibration.core.evidence.stretch_length import wander_of
 from sdimu_calibration.core.noise_term import NoiseTerm
 from sdimu_calibration.core.recording import DataFault, TemperatureLog
 from sdimu_calibration.core.results import NOT_TRUSTED, START_TEMPERATURE, History, Rest, no_history
@@ -280,7 +281,7 @@ class Fit(ABC):
     @cached_property
     def wander(self) -> Wander:
         """How wandering biases of the sensors would show in the test."""
-        return Wander.of(self.evidence())
+        return wander_of(self.evidence())
 
     @property
     def has_temperature(self) -> bool:

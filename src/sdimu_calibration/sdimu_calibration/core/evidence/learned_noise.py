@@ -134,9 +134,9 @@ class Wander:
         return [(place, int(np.argmax(self.U[:, place].any(axis=1)))) for place in places]
 
     @classmethod
-    def of(cls, evidence: LinearEvidence) -> Wander:
-        """Work out the signatures for the test of an evidence."""
-        cut = stretches(evidence.times)
+    def of(cls, evidence: LinearEvidence, share: float = 1.0) -> Wander:
+        """Work out the signatures for the test of an evidence, in stretches of this share of the usual length."""
+        cut = stretches(evidence.times, share)
         return cls(cut, evidence.constant_signature(cut))
 
     def modes(self, terms: Sequence[NoiseTerm]) -> Modes:

@@ -22,8 +22,9 @@ _LONGEST_S = 30.0
 """Longest stretch (s): a third of the shortest time constant that is told from white noise."""
 _MOST = 100
 """Number of stretches at most: longer tests have longer ones, and the time of an estimate goes with the cube."""
-_KEPT = 3e-3
-"""Share of the largest eigenvalue of a kernel below which a mode is left out: it is below white noise."""
+_KEPT = 1e-9
+"""Share of the largest eigenvalue of a kernel below which a mode is left out: it is rounding. A larger share makes
+random walk and flicker smoother than they are, and Gauss-Markov noise is named in their place."""
 _RATIO = 4.0
 """Ratio of neighbouring time constants of flicker noise: the density then ripples by 2 %."""
 _SHORTEST_TAU_S = 2.0
@@ -75,9 +76,16 @@ class Stretches:
         return self._modes[kind, tau]
 
 
-def stretches(times: Timetable) -> Stretches:
-    """Cut the dwells and turns of a test into stretches."""
-    longest = max(_LONGEST_S, times.duration / _MOST)
+def stretches(times: Timetable, share: float = 1.0) -> Stretches:
+    """Cut the dwells and turns of a test into stretches.
+
+    Parameters
+    ----------
+    times : Timetable
+    share : float
+        Ratio of their length to the usual one.
+    """
+    longest = share * max(_LONGEST_S, times.duration / _MOST)
     spans = sorted([(a, b, False) for _, a, b in times.stops] + [(a, b, True) for _, a, b in times.turns])
     rows: list[tuple[float, float, int, bool]] = []
     for number, (begin, end, turning) in enumerate(spans):

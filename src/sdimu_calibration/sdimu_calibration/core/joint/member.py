@@ -19,7 +19,7 @@ from sdimu_calibration.core.estimation.noise_estimate import told
 from sdimu_calibration.core.estimation.noise_learning import in_noise, with_noise_learned
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.estimation.solve import AUTO, fit_about, solve
-from sdimu_calibration.core.evidence.learned_noise import Wander
+from sdimu_calibration.core.evidence.stretch_length import wander_in
 from sdimu_calibration.core.joint.reduction import Reduction, reduced
 from sdimu_calibration.core.joint.scope import is_local, tagged
 from sdimu_calibration.core.joint.stretch_rows import Places, stretch_rows
@@ -206,7 +206,7 @@ def fitted(job: Job) -> Fit:
     if job.noise is None:
         return with_noise_learned(fit)
     evidence = fit.evidence()
-    return in_noise(fit, evidence, Wander.of(evidence), job.noise) if job.noise else fit
+    return in_noise(fit, evidence, wander_in(evidence, job.noise), job.noise) if job.noise else fit
 
 
 def _own(test: PreparedTest, model: Model, job: Job) -> Fit:

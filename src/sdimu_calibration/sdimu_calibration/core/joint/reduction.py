@@ -14,8 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from sdimu_calibration.core.arrays import Floats
-from sdimu_calibration.core.evidence.learned_noise import Wander
 from sdimu_calibration.core.evidence.linear import LinearEvidence
+from sdimu_calibration.core.evidence.stretch_length import wander_in
 from sdimu_calibration.core.noise_term import NoiseTerm
 
 _ROUNDING = 1e-12
@@ -135,7 +135,7 @@ def whitened(columns: Floats, evidence: LinearEvidence, terms: tuple[NoiseTerm, 
     """
     if not terms:
         return columns
-    return unit_noise(Wander.of(evidence).modes(terms).columns, columns)
+    return unit_noise(wander_in(evidence, terms).modes(terms).columns, columns)
 
 
 def unit_noise(modes: Floats, columns: Floats) -> Floats:

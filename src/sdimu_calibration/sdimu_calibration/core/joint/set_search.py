@@ -180,6 +180,18 @@ def search_set(
     )  # fmt: skip
 
 
+def as_given(found: SetSearch) -> SetSearch:
+    """Return the search as if it had chosen nothing: the model as given stands.
+
+    Parameters
+    ----------
+    found : SetSearch
+    """
+    fit = found.before
+    standing = set_standing(fit, set_evidence(fit, ()), {}, {})
+    return replace(found, after=fit, chosen=(), z=(), alike={}, local=(), standing=standing)
+
+
 def _singles(evidence: SetEvidence) -> Ints:
     """Columns of the candidates without those of sets that another one already is: three soaks tell no third power."""
     p = len(evidence.weight)

@@ -1,0 +1,95 @@
+"""How long the stretches may be over which a wandering bias is taken as its mean.
+
+A bias that moves within a stretch by more than the white noise leaves of it is not described by its mean: the search
+then names steps and sines for what moves within, and the sigmas are too small. Stretches are halved until it does not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from sdimu_calibration.core.arrays import Floats
+from sdimu_calibration.core.evidence.joint_information import Joint
+from sdimu_calibration.core.evidence.learned_noise import Wander, learn
+from sdimu_calibration.core.evidence.linear import LinearEvidence
+from sdimu_calibration.core.evidence.noise_kernels import Stretches, kernel
+from sdimu_calibration.core.noise_term import TRIADS, NoiseTerm
+
+_HALVINGS = 1
+"""Number of times that stretches are halved at most: the time of a diagnosis grows by two to three with each."""
+_MOVES = 0.5
+"""Ratio of the variance within a stretch to that of white noise, from which the stretch is halved: flicker and random
+walk then move each half by less than a third of its white noise."""
+_STRONG = 3.0
+"""Mean square (1) of the errors of all stretches over their white noise below which nobody looks: in white noise it is
+one, and what moves within a stretch moves more from stretch to stretch."""
+
+
+def wander_of(evidence: LinearEvidence) -> Wander:
+    """Work out how wandering biases show in a test, in stretches short enough for the noise that it has.
+
+    Parameters
+    ----------
+    evidence : LinearEvidence
+        In white noise, with the model's columns first.
+    """
+    wander = Wander.of(evidence)
+    scatter = (wander.U.T @ evidence.e) ** 2
+    seen = np.einsum("ij,ij->j", wander.U, wander.U)
+    at_rest = np.repeat(~wander.cut.turning, 6) & (seen > 0.0)
+    if not at_rest.any() or np.mean(scatter[at_rest] / seen[at_rest]) < _STRONG:
+        return wander
+    terms = learn(Joint.of(evidence, wander).given(evidence.model, evidence.weight).noise, wander.cut)
+    return _halved(evidence, wander, terms)
+
+
+def wander_in(evidence: LinearEvidence, terms: Sequence[NoiseTerm]) -> Wander:
+    """Work out how wandering biases show in a test, in stretches short enough for noise that is known.
+
+    Parameters
+    ----------
+    evidence : LinearEvidence
+        In white noise.
+    terms : sequence of NoiseTerm
+    """
+    return _halved(evidence, Wander.of(evidence), terms)
+
+
+def _halved(evidence: LinearEvidence, wander: Wander, terms: Sequence[NoiseTerm]) -> Wander:
+    for halvings in range(1, _HALVINGS + 1):
+        if moves_within(wander, terms) < _MOVES:
+            break
+        wander = Wander.of(evidence, 0.5**halvings)
+    return wander
+
+
+def moves_within(wander: Wander, terms: Sequence[NoiseTerm]) -> float:
+    """Ratio of the variance between the halves of a stretch at rest to that which white noise gives it.
+
+    Parameters
+    ----------
+    wander : Wander
+    terms : sequence of NoiseTerm
+
+    Returns
+    -------
+    float
+        Of the triad that moves most; 0 without terms.
+    """
+    cut = wander.cut
+    length = float(np.median((cut.end - cut.start)[~cut.turning]))
+    edges = np.array([0.0, 0.5, 1.0]) * length
+    halves = Stretches(edges[:2], edges[1:], np.zeros(2, dtype=np.int64), np.zeros(2, dtype=bool))
+    seen = np.einsum("ij,ij->j", wander.U, wander.U).reshape(len(cut), 2, 3)[~cut.turning]
+    ratios = []
+    for place, triad in enumerate(TRIADS):
+        moved = sum(t.size**2 * _between(kernel(t.kind, t.tau, halves)) for t in terms if t.triad == triad)
+        # White noise of each half has twice the variance of the stretch's mean, their difference four times.
+        ratios.append(moved * float(np.median(seen[:, place])) / 4.0)
+    return max(ratios)
+
+
+def _between(covariance: Floats) -> float:
+    return float(covariance[0, 0] + covariance[1, 1] - 2.0 * covariance[0, 1])

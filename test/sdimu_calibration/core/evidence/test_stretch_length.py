@@ -1,0 +1,48 @@
+"""Stretches are short enough for the noise that is in them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from sdimu_calibration.core.effects.effect import Timetable
+from sdimu_calibration.core.evidence.learned_noise import Wander
+from sdimu_calibration.core.evidence.noise_kernels import stretches
+from sdimu_calibration.core.evidence.stretch_length import moves_within, wander_in
+from sdimu_calibration.core.noise_term import NoiseTerm
+
+
+class Ideal:
+    """Evidence of a sensor that measures the mean of each second with white noise of one: 1200 s at rest."""
+
+    def __init__(self) -> None:
+        self.times = Timetable(1200.0, tuple((k, 120.0 * k, 120.0 * k + 120.0) for k in range(10)), ())
+
+    def constant_signature(self, cut):
+        t = np.arange(0.5, 1200.0)
+        inside = (t[:, None] > cut.start) & (t[:, None] < cut.end)
+        return np.kron(inside, np.eye(6))
+
+
+def test_a_half_moves_against_the_other_by_the_allan_variance():
+    """IEEE Std 952, annex C: K^2 t / 3 for a random walk, (2 ln 2 / pi) B^2 for flicker; twice that of halves of 15 s.
+
+    Time constants below 1 s are left to white noise: it takes 4 B^2 / (15 pi), their density at zero. White
+    noise of one in each second gives the difference of two means of 15 s the variance 2 / 15.
+    """
+    wander = Wander.of(Ideal())
+    walk, flicker = NoiseTerm("gyro", "random_walk", size=0.1), NoiseTerm("accel", "flicker", size=0.5)
+    assert moves_within(wander, [walk]) == pytest.approx(0.01 * 15.0 / 3.0 * 15.0, rel=1e-6)
+    expected = 0.25 * (4.0 * np.log(2.0) - 4.0 / 15.0) / np.pi
+    assert moves_within(wander, [flicker]) == pytest.approx(expected * 15.0 / 2.0, rel=0.02)
+    # Each triad against its own white noise: the one that moves most counts.
+    assert moves_within(wander, [walk, flicker]) == pytest.approx(moves_within(wander, [flicker]))
+    assert moves_within(wander, []) == 0.0
+    assert moves_within(wander, [NoiseTerm("gyro", "stop", size=9.0)]) == pytest.approx(0.0, abs=1e-9)
+
+
+def test_stretches_are_halved_where_noise_moves_within_them():
+    few, many = (len(stretches(Ideal().times, share)) for share in (1.0, 0.5))
+    assert (few, many) == (40, 80)
+    assert len(wander_in(Ideal(), [NoiseTerm("gyro", "flicker", size=0.1)]).cut) == few
+    assert len(wander_in(Ideal(), [NoiseTerm("gyro", "flicker", size=1.0)]).cut) == many
