@@ -25,6 +25,9 @@ ARGUMENTS = (
     ("model", "baseline", "model to estimate: name in config/model or path"),
     ("accel_unit", "", "unit of the specific force in the messages; recognised when empty"),
     ("gyro_unit", "", "unit of the body rate in the messages; recognised when empty"),
+    ("accel_sign", "0", "sign of the specific force in the messages, 1 or -1; 0 recognises it"),
+    ("gyro_sign", "0", "sign of the body rate in the messages, 1 or -1; 0 recognises it"),
+    ("diagnose", "true", "diagnose at the end of each stop"),
     ("out", "out/driver", "folder of bag and results"),
     ("table", "", "a table to drive: name in config/table or path; none when empty"),
     ("drive", "plan", "plan: carry out the plan; adaptive: the test chooses its turns"),
@@ -47,6 +50,9 @@ def generate_launch_description():
     namespace, out = LaunchConfiguration("namespace"), LaunchConfiguration("out")
     opened = ("imu_topic", "status_topic", "temperature_topic", "imu", "site", "model", "accel_unit", "gyro_unit")
 
+    reading = {name: argument(name) for name in opened}
+    reading |= {name: argument(name, int) for name in ("accel_sign", "gyro_sign")}
+
     def driven(way):
         table, drive = LaunchConfiguration("table"), LaunchConfiguration("drive")
         return IfCondition(PythonExpression(["'", table, "' != '' and '", drive, f"' == '{way}'"]))
@@ -64,7 +70,10 @@ def generate_launch_description():
         *(DeclareLaunchArgument(name, default_value=default, description=text) for name, default, text in ARGUMENTS),
         Node(
             package="sdimu_calibration", executable="calibration_node", name="calibration", namespace=namespace,
-            parameters=[{name: argument(name) for name in opened} | {"out": out, "stay": True}], output="screen",
+            parameters=[
+                reading | {"out": out, "stay": True, "diagnose": argument("diagnose", bool)},
+            ],
+            output="screen",
         ),
         Node(
             package="sdimu_calibration", executable="recorder_node", name="recorder", namespace=namespace,
@@ -77,7 +86,7 @@ def generate_launch_description():
         ),
         Node(
             package="sdimu_calibration", executable="adaptive", name="adaptive", namespace=namespace,
-            parameters=[driving | {name: argument(name) for name in (*opened, "goals")} | {"out": out}],
+            parameters=[driving | reading | {"goals": argument("goals"), "out": out}],
             remappings=[joints, trajectory], output="screen", condition=driven("adaptive"),
         ),
     ])  # fmt: skip

@@ -20,7 +20,7 @@ from sdimu_calibration.nodes import diagnosis_messages as messages
 from sdimu_calibration.nodes.credits import HISTORY, LATCHED, publish
 from sdimu_calibration.nodes.diagnosis_worker import Answer, Job
 from sdimu_calibration.nodes.live_diagnosis import StopDiagnosis, Worker
-from sdimu_calibration.report.live_text import told
+from sdimu_calibration.report.live_text import diagnosis_line
 
 
 class Diagnosing:
@@ -102,7 +102,8 @@ class Diagnosing:
             publish(self._ranking, messages.ranking(stamp_ns, found))
             publish(self._heat_map, messages.heat_map(stamp_ns, found))
         publish(self._diagnosis, messages.diagnosis(stamp_ns, found))
-        self._node.get_logger().info(f"diagnosis of {told(found)} ({answer.seconds:.1f} s after it was asked)")
+        line = diagnosis_line(found)
+        self._node.get_logger().info(f"diagnosis of {line} ({answer.seconds:.1f} s after it was asked)")
 
     def close(self) -> None:
         """End the process that diagnoses."""

@@ -91,7 +91,7 @@ def ladder_rows(ladder: Sequence[ModelError]) -> list[tuple[str, str]]:
     ]
 
 
-def told(found: LiveDiagnosis) -> str:
+def diagnosis_line(found: LiveDiagnosis) -> str:
     """Say a diagnosis in one line: the verdict, what stands out, how far the error fell."""
     if found.verdict == WAITING:
         return f"stop {found.stop}: {found.sentence}"

@@ -34,7 +34,7 @@ def in_use(report_extras: ReportExtras, draw: Draw) -> str:
     short = min(trial.segment.length_s for trial in report_extras.trials) < WANTED_S - 1.0
     return section(
         heading,
-        *(sentence(told(trial)) for trial in report_extras.trials),
+        *(sentence(trial_sentence(trial)) for trial in report_extras.trials),
         draw(figure(report_extras.trials)),
         grid(_COLUMNS, rows, {0, 1}),
         quiet(
@@ -49,7 +49,7 @@ def in_use(report_extras: ReportExtras, draw: Draw) -> str:
     )  # fmt: skip
 
 
-def told(trial: FreeInertialRun) -> str:
+def trial_sentence(trial: FreeInertialRun) -> str:
     """Say a trial in one sentence."""
     stretch = trial.segment
     ends = "; ".join(

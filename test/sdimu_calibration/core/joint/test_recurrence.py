@@ -11,7 +11,7 @@ import pytest
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.joint.leftovers import ATTITUDE, TEMPERATURE, TIME, Leftovers, leftovers, likeness
 from sdimu_calibration.core.joint.recurrence import Kind, Recurrence, recurrence
-from sdimu_calibration.core.joint.recurrence_words import next_steps, told
+from sdimu_calibration.core.joint.recurrence_words import answer_in_words, next_steps
 from sdimu_calibration.core.joint.set_diagnosis import diagnose_set
 from sdimu_calibration.core.joint.set_fit import SetOptions, fit_set
 from sdimu_calibration.core.plan import Plan, backwards
@@ -118,7 +118,7 @@ def test_recordings_in_the_same_order_do_not_tell_attitude_from_time():
     found = recurrence(left_of(1, [FORTH, FORTH], OF_ATTITUDE))
     assert found is not None
     assert (found.answer, found.apart) == ((ATTITUDE, TIME), False)
-    assert "the order of the stops" in told(found, True)
+    assert "the order of the stops" in answer_in_words(found, True)
     assert "--backwards" in next_steps(found)[0]
 
 
@@ -159,19 +159,19 @@ def _found(answer: tuple[str, ...], apart: bool, scores: tuple[float, float, flo
     ],
 )  # fmt: skip
 def test_words_say_what_it_belongs_to_and_what_to_do(found, words, step):
-    assert words in told(found, True)
+    assert words in answer_in_words(found, True)
     assert step in next_steps(found)[0]
     # A set whose noise takes in what is left says so as well.
-    own = told(found, False)
+    own = answer_in_words(found, False)
     assert "the model leaves in the stops" in own
-    assert own.endswith(told(found, True)[-20:])
+    assert own.endswith(answer_in_words(found, True)[-20:])
 
 
 def test_what_only_the_temperature_tells_is_not_said_to_belong_to_each_run():
-    text = told(_found((), True, (np.nan, np.nan, 0.5)), True)
+    text = answer_in_words(_found((), True, (np.nan, np.nan, 0.5)), True)
     assert "does not come back at the same temperature" in text
     assert "each run" not in text
-    assert "each run" in told(_found((), True, (0.1, 0.5, np.nan)), True)
+    assert "each run" in answer_in_words(_found((), True, (0.1, 0.5, np.nan)), True)
 
 
 def test_the_page_says_that_too_few_stops_are_shared():

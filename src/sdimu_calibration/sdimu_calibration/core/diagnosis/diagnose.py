@@ -23,7 +23,7 @@ from sdimu_calibration.core.diagnosis.search import FALSE_ALARM, MOST_STEPS, Sea
 from sdimu_calibration.core.diagnosis.verdict import Verdict, sentence, verdict
 from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.estimation.fit import NOT_CONVERGED, Fit
-from sdimu_calibration.core.estimation.noise_estimate import told
+from sdimu_calibration.core.estimation.noise_estimate import term_in_words
 from sdimu_calibration.core.estimation.noise_learning import in_white_noise
 from sdimu_calibration.core.estimation.outcome import doubted, outcome
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
@@ -224,7 +224,7 @@ def climb(
     spoilt = any(finding.kind == "spike" for finding in findings)
     drawn = not spoilt and any(term.kind in DRAWN for term in done.found.noise)
     unexplained = done.after.p_value < UNEXPLAINED_P or still or loud or drawn or patched(done)
-    noise += tuple(told(term) for term in done.found.noise)
+    noise += tuple(term_in_words(term) for term in done.found.noise)
     rungs = ladder(fit, final, done, progress) if refits or fit.learns_scatter else ()
     facts = Verdict(done.found, done.chosen, alike_first(done), findings, noise, own, unexplained)
     word = verdict(facts)

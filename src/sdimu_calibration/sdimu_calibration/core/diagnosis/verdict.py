@@ -12,7 +12,7 @@ from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.diagnosis.screen import Finding
 from sdimu_calibration.core.diagnosis.search import Search
 from sdimu_calibration.core.error_figures import held_out
-from sdimu_calibration.core.estimation.noise_estimate import told
+from sdimu_calibration.core.estimation.noise_estimate import term_in_words
 from sdimu_calibration.core.evidence.candidate import Candidate
 from sdimu_calibration.core.evidence.consistency import SLOW_S, Consistency
 from sdimu_calibration.core.evidence.linear import LinearEvidence
@@ -138,7 +138,7 @@ def _unexplained(d: Diagnosis, names: str) -> str:
         most = f", {d.found.steps[0].label} most, but adding it does not help" if d.found.steps else ""
         left = beyond(d.rungs[-1].scatter)
         return f"Something stands out of the scatter{most}; beyond white noise: {left}."
-    drawn = [told(term) for term in d.found.noise]
+    drawn = [term_in_words(term) for term in d.found.noise]
     if drawn:
         begun = f"Found, but not all: {names}. What is left" if names else "Something is missing that"
         return (

@@ -38,14 +38,14 @@ class NoiseEstimate:
     @property
     def note(self) -> str:
         """What a user should know, with the terms and their sizes."""
-        terms = "; ".join(told(term) for term in self.terms)
+        terms = "; ".join(term_in_words(term) for term in self.terms)
         return (
             f"the noise is not white: {terms}; values and sigmas take it into account. A missing effect can look the "
             "same: run sdimu diagnose"
         )
 
 
-def told(term: NoiseTerm) -> str:
+def term_in_words(term: NoiseTerm) -> str:
     """Name a term with its size and the 95 % interval of it."""
     size, low, high = (f"{from_si(v, term.display_unit):.3g}" for v in (term.size, term.low, term.high))
     others = f" (or what looks the same: {', '.join(WORDS[kind] for kind in term.alike)})" if term.alike else ""

@@ -15,7 +15,7 @@ from sdimu_calibration.core.effects.effect import Effect, Timetable
 from sdimu_calibration.core.estimation.fit import Fit, Start
 from sdimu_calibration.core.estimation.handheld_fit import HandheldFit
 from sdimu_calibration.core.estimation.navigation_fit import NavigationFit
-from sdimu_calibration.core.estimation.noise_estimate import told
+from sdimu_calibration.core.estimation.noise_estimate import term_in_words
 from sdimu_calibration.core.estimation.noise_learning import in_noise, with_noise_learned
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.estimation.solve import AUTO, fit_about, solve
@@ -240,7 +240,7 @@ def _report(job: Job, fit: Fit) -> Report:
         fit.data_counts(), fit.statistics(), fit.names,
         fit.values if job.about is None else np.empty(0),
         np.sqrt(np.diag(fit.covariance)) if job.about is None else np.empty(0),
-        (*recording.notes, *(told(term) for term in fit.noise_terms)), tuple(f.text for f in fit.faults if f.grave),
+        (*recording.notes, *map(term_in_words, fit.noise_terms)), tuple(f.text for f in fit.faults if f.grave),
         _heading(fit), fit.noise_terms,
         _widened(fit), places,
     )  # fmt: skip

@@ -21,7 +21,7 @@ _NEXT = {
 _OF_EACH = "what does not come back is of each run: look at mount, cables and floor, and take it for scatter until then"
 
 
-def told(found: Recurrence, unexplained: bool) -> str:
+def answer_in_words(found: Recurrence, unexplained: bool) -> str:
     """Say in one sentence what leftovers come back with.
 
     Parameters

@@ -14,7 +14,7 @@ from sdimu_calibration.core.evidence.known import Standing
 from sdimu_calibration.core.joint.leftovers import leftovers
 from sdimu_calibration.core.joint.member import Member
 from sdimu_calibration.core.joint.recurrence import Recurrence, recurrence
-from sdimu_calibration.core.joint.recurrence_words import next_steps, told
+from sdimu_calibration.core.joint.recurrence_words import answer_in_words, next_steps
 from sdimu_calibration.core.joint.scope import tagged
 from sdimu_calibration.core.joint.set_evidence import SetEvidence, held_out_chance
 from sdimu_calibration.core.joint.set_fit import Run, SetFit, SetOptions
@@ -184,7 +184,7 @@ def _sentence(
     word: str, findings: Sequence[SetFinding], results: tuple[Calibration, Calibration], again: Recurrence | None
 ) -> str:
     """Say what was found, then what comes back of that what the model leaves."""
-    more = told(again, word == "unexplained") if again else ""
+    more = answer_in_words(again, word == "unexplained") if again else ""
     return f"{_found(word, findings, *results, again)} {more}".strip()
 
 
