@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import Any
 from zlib import crc32
@@ -19,7 +19,9 @@ from sdimu_calibration.core.effect_key import parse_key, sized
 from sdimu_calibration.core.estimation.fit import Fit
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.estimation.solve import choose_estimator, solve
+from sdimu_calibration.core.evidence.stretch_length import wander_in
 from sdimu_calibration.core.front_door import OpeningOptions, open_test
+from sdimu_calibration.core.noise_term import NoiseTerm
 from sdimu_calibration.core.recording import DataError, Recording
 from sdimu_calibration.core.specification import ImuSpecification, Model, Site
 from sdimu_calibration.core.units import STANDARD_GRAVITY
@@ -118,7 +120,7 @@ def _model(name: str) -> Model:
 
 def drawn_effect(
     rng: np.random.Generator, fit: Fit, span: tuple[float, float] = _SPAN, families: Collection[str] = (),
-    options: bool = False,
+    options: bool = False, noise: Sequence[NoiseTerm] = (),
 ) -> Truth:  # fmt: skip
     """Draw family, then parameter, among what a clean test can see at a plausible size.
 
@@ -133,6 +135,8 @@ def drawn_effect(
         Those to draw from; all without any.
     options : bool
         Draw effects with a time constant or the like, too: those that the scan tries.
+    noise : sequence of NoiseTerm
+        Noise with a memory that the sigmas count.
 
     Raises
     ------
@@ -141,6 +145,8 @@ def drawn_effect(
     """
     known = catalogue(fit.timetable, set(fit.labels), has_temperature=False)
     evidence = fit.evidence([e for e in known if not (fit.learns_scatter and (e.options or e.needs_table))])
+    if noise:
+        evidence = evidence.with_noise(wander_in(fit.evidence(), noise).modes(noise).columns)
     scanned = scan(evidence.information, evidence.model, evidence.weight)
     p, hideable = len(evidence.weight), hideable_names()
     # What a coefficient of the model is but for its prior is not missing: mass unbalance is a sensitivity to force.

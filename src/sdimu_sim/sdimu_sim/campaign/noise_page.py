@@ -18,12 +18,13 @@ diagnoses each with nothing but the IMU file and the site. {runs} runs each, see
 - seen: share of triads in which a term was found; what is below the white noise of a test cannot be
 - class: of these, the true kind was named or said to look the same
 - interval: of terms of the true kind, the true size inside the 95 % interval
-- effects: runs in which a physical effect was named (none is there); one that bears the name of the noise, as
+- named: of the runs that hide an effect, those whose effect is in a class that was named
+- effects: runs in which a physical effect was named that is not there; one that bears the name of the noise, as
   gyro_bias_random_walk in rate random walk, is the noise
 - RMS z: error over sigma of all coefficients, biases in the mean over the dwells
 
-| IMU file | noise | seen | class | interval | effects | RMS z | refused |
-|---|---|---|---|---|---|---|---|
+| IMU file | noise | seen | class | interval | named | effects | RMS z | refused |
+|---|---|---|---|---|---|---|---|---|
 """
 
 
@@ -51,8 +52,10 @@ def _line(imu: str, kind: str, rows: Rows) -> str:
     inside = sum(t["low"] <= t["true"] <= t["high"] for t in own)
     false = sum(any(f"_{kind}_" not in label for label in row["effects"]) for row in good)
     z2, count = sum(row["z2"] for row in good), sum(row["count"] for row in good)
+    hidden = [row for row in good if row.get("hidden")]
     rms = f"{np.sqrt(z2 / count):.2f}" if count else ""
     return (
         f"| {imu} | {kind} | {seen} of {triads} | {len(named)} of {len(terms)} | {inside} of {len(own)} | "
+        f"{sum(row['named'] for row in hidden)} of {len(hidden)} | "
         f"{false} of {len(good)} | {rms} | {len(rows) - len(good)} |"
     )

@@ -10,12 +10,14 @@ from zlib import crc32
 import numpy as np
 
 from sdimu_calibration.core.diagnosis.diagnose import climb
+from sdimu_calibration.core.diagnosis.found import found_effects
 from sdimu_calibration.core.estimation.solve import solve
+from sdimu_calibration.core.noise_term import NoiseTerm
 from sdimu_calibration.core.specification import ImuSpecification, Site
 from sdimu_calibration.core.units import from_si, to_si
 from sdimu_calibration.storage.config import load_imu, load_model
-from sdimu_sim.campaign.grade_run import LATITUDES_DEG, PLANS, simulated_test
-from sdimu_sim.campaign.hidden_score import baseline_z
+from sdimu_sim.campaign.grade_run import LATITUDES_DEG, PLANS, drawn_effect, simulated_test
+from sdimu_sim.campaign.hidden_score import baseline_z, same_effect
 from sdimu_sim.core.coloured import KINDS, parse_noise
 
 _INSTABILITY = {"gyro": to_si(0.01, "deg/h"), "accel": to_si(2.0, "ug")}
@@ -36,13 +38,16 @@ class NoiseRun:
         Name in config/imu.
     kind : str
         One of `sdimu_sim.core.coloured.KINDS`, or ``white``.
+    sigmas : float
+        Size of one effect to hide, in the sigma that the test gives it in the true noise; 0 hides none.
     """
 
     imu: str
     kind: str
+    sigmas: float = 0.0
 
     def __call__(self, seed: int) -> dict[str, Any]:
-        """Run a seed: verdict, terms that were found, errors over sigma of the coefficients.
+        """Run a seed: verdict, terms and effects that were found, errors over sigma of the coefficients.
 
         Raises
         ------
@@ -53,11 +58,21 @@ class NoiseRun:
         imu = load_imu(self.imu)
         plan, site = str(rng.choice(PLANS)), Site(math.radians(float(rng.choice(LATITUDES_DEG))), 0.0)
         noise = () if self.kind == "white" else drawn_noise(imu, self.kind, rng)
-        test, sensor = simulated_test(self.imu, imu, plan, site, seed, (), noise)
-        found = climb(solve(test, load_model("baseline")))
+        model, hidden = load_model("baseline"), None
+        keys = list(map(parse_noise, noise))
+        if self.sigmas:
+            clean = solve(simulated_test(self.imu, imu, plan, site, seed, ())[0], model)
+            true = [NoiseTerm(key.triad, key.kind, key.tau, key.size) for key in keys]
+            hidden = drawn_effect(rng, clean, (self.sigmas, self.sigmas), noise=true)
+        effects = () if hidden is None else (hidden.text,)
+        test, sensor = simulated_test(self.imu, imu, plan, site, seed, effects, noise)
+        found = climb(solve(test, model))
         # From here on the truth is known; nothing before this line has seen it.
         z = baseline_z(found.after, sensor)
-        truth = {key.triad: key.size for key in map(parse_noise, noise)}
+        truth = {key.triad: key.size for key in keys}
+        stops = found.evidence.times.stops
+        named = [[f.candidate.label, *f.alike] for f in found_effects(found)]
+        right = [hidden is not None and any(same_effect(n, hidden, stops) for n in one) for one in named]
         terms = [
             {"triad": t.triad, "kind": t.kind, "size": t.size, "low": t.low, "high": t.high, "alike": list(t.alike),
              "true": truth.get(t.triad, 0.0)}
@@ -65,8 +80,9 @@ class NoiseRun:
         ]  # fmt: skip
         return {
             "plan": plan, "estimator": found.fit.estimator, "verdict": found.verdict, "noise": list(noise),
-            "terms": terms, "effects": [c.label for c in found.chosen], "z2": float(np.sum(z**2)), "count": len(z),
-            "largest_z": float(np.max(np.abs(z))),
+            "terms": terms, "hidden": hidden.text if hidden else "", "named": any(right),
+            "effects": [one[0] for one, true in zip(named, right, strict=True) if not true],
+            "z2": float(np.sum(z**2)), "count": len(z), "largest_z": float(np.max(np.abs(z))),
         }  # fmt: skip
 
 

@@ -151,6 +151,9 @@ def noise(
     seed: Annotated[int, typer.Option(help="First seed.")] = 60_001,
     imu: Annotated[list[str] | None, typer.Option(help="IMU file; repeatable. All on a table by default.")] = None,
     kind: Annotated[list[str] | None, typer.Option(help="Kind of noise; repeatable. All by default.")] = None,
+    sigmas: Annotated[
+        float, typer.Option(min=0.0, help="Hide one effect of so many sigma, as the test sees it in the true noise.")
+    ] = 0.0,
     workers: Annotated[int, typer.Option(min=1, help="Processes.")] = 2,
 ) -> None:
     """Diagnose tests in noise with a memory: are terms named with their size, do the sigmas hold."""
@@ -168,7 +171,7 @@ def noise(
     results = {}
     for name in names:
         for one in kind or known:
-            work, folder = NoiseRun(name, one), out / name / one
+            work, folder = NoiseRun(name, one, sigmas), out / name / one
             results[name, one] = shown_campaign(console, f"{name}, {one}", work, seeds, folder, workers)
     write_json(out / "noise.json", {f"{name} {one}": rows for (name, one), rows in results.items()})
     text = page(results, seed)
