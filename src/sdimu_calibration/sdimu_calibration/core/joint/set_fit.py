@@ -222,7 +222,7 @@ def check_members(members: Sequence[Member]) -> None:
     names = [m.name for m in members]
     for name in names:
         if names.count(name) > 1:
-            raise DataError(f"two recordings of the set are called '{name}': give them different names")
+            raise DataError(f"two recordings of the set are called '{name}': state each one once, under its own name")
     serials = sorted({m.serial for m in members if m.serial})
     if len(serials) > 1:
         raise DataError(
