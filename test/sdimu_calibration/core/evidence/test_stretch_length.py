@@ -6,10 +6,14 @@ import numpy as np
 import pytest
 
 from sdimu_calibration.core.effects.effect import Timetable
+from sdimu_calibration.core.estimation.solve import solve
 from sdimu_calibration.core.evidence.learned_noise import Wander
 from sdimu_calibration.core.evidence.noise_kernels import stretches
 from sdimu_calibration.core.evidence.stretch_length import moves_within, wander_in
 from sdimu_calibration.core.noise_term import NoiseTerm
+from sdimu_calibration.core.specification import Site
+from sdimu_calibration.storage.config import load_imu, load_model
+from sdimu_sim.campaign.grade_run import simulated_test
 
 
 class Ideal:
@@ -46,3 +50,16 @@ def test_stretches_are_halved_where_noise_moves_within_them():
     assert (few, many) == (40, 80)
     assert len(wander_in(Ideal(), [NoiseTerm("gyro", "flicker", size=0.1)]).cut) == few
     assert len(wander_in(Ideal(), [NoiseTerm("gyro", "flicker", size=1.0)]).cut) == many
+
+
+@pytest.mark.slow
+def test_a_test_in_strong_flicker_is_cut_finer_and_one_in_white_noise_is_not():
+    imu, model, site = load_imu("mems_industrial"), load_model("baseline"), Site(0.6, 0.0)
+    counts = []
+    for noise in ((), ("gyro_noise_flicker=6 deg/h", "accel_noise_flicker=70 ug")):
+        test, _ = simulated_test("mems_industrial", imu, "recommended", site, 8, (), noise)
+        fit = solve(test, model, learn=False)
+        times = fit.evidence().times
+        counts.append((len(fit.wander.cut), len(stretches(times)), len(stretches(times, 0.5))))
+    (white, usual, _), (flicker, _, finer) = counts
+    assert (white, flicker) == (usual, finer)

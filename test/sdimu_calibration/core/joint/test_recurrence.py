@@ -137,6 +137,7 @@ def test_a_set_says_what_comes_back(tmp_path):
     np.testing.assert_array_equal(found.after.values, found.before.values)
     assert any("--try FILE" in line for line in found.advice)
     write_set_diagnosis(tmp_path / "set.json", found)
+    assert read_json(tmp_path / "set.json", FORMAT)["refused"]
     content = read_json(tmp_path / "set.json", FORMAT)["recurrence"]
     assert content["answer"] == [ATTITUDE]
     assert content["kinds"][0]["sensors"][0] == "accel_x"

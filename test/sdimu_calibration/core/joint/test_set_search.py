@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 
 from sdimu_calibration.core.diagnosis.diagnose import climb
 from sdimu_calibration.core.estimation.solve import solve
 from sdimu_calibration.core.joint.set_diagnosis import diagnose_set
+from sdimu_calibration.core.joint.set_search import as_given, search_set
 from sdimu_calibration.core.plan import Plan, Turn
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage.config import load_model
@@ -46,6 +48,19 @@ def test_a_fault_of_one_recording_is_told_of_that_one(options):
     assert found.findings[0].label.startswith("gyro_bias_step_x(")
     assert found.verdict == "data fault"
     assert "r2" in found.sentence
+
+
+@pytest.mark.slow
+def test_taking_back_effects_keeps_the_fault_of_one_recording(options):
+    bad = unit_set(33, [short()] * 3, ("gyro_bias_step_x(t0=400 s)=0.3 deg/h",))
+    members = (*unit_set(33, [short()] * 3).members[:2], bad.members[2])
+    found = search_set(members, options, here)
+    back = as_given(found, options, here)
+    assert found.local
+    assert (back.chosen, back.local, back.after.local) == ((), found.local, found.after.local)
+    assert back.standing.added == ()
+    sigma = np.sqrt(np.diag(found.after.estimate.covariance))
+    assert np.all(np.abs(back.after.estimate.values - found.after.estimate.values) < 0.02 * sigma)
 
 
 def test_one_recording_is_no_set(options):

@@ -178,6 +178,10 @@ def test_the_rest_of_a_slow_way_is_gone_at_once():
     np.testing.assert_allclose(sum(steps) + ahead * steps[-1], way / (1.0 - ratio))
 
 
+def test_a_leap_has_an_end():
+    assert rest_of_the_way([np.array([0.9999**k]) for k in range(3)]) == 50.0
+
+
 @pytest.mark.parametrize("steps", [
     [[1.0, 0.0], [0.9, 0.0]],  # two steps may be alike by chance
     [[1.0, 0.0], [0.1, 0.0], [0.01, 0.0]],  # fast enough

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Self
@@ -361,7 +361,8 @@ class NavigationFit(Fit):
         out = [] if self.converged else [NOT_CONVERGED]
         if nis > MISFIT or (held_out is not None and held_out > MISFIT):
             text = f"NIS {nis:.3f}" + ("" if held_out is None else f", held-out error {held_out:.3f}")
-            out.append(f"the model does not fit ({text}; 1 is right){in_turn}; run: sdimu diagnose")
+            text += "; 1 is right" + _in_noise(statistics)
+            out.append(f"the model does not fit ({text}){in_turn}; run: sdimu diagnose")
         worst = stop_misfit(self.last.output.normalised, self.prepared)
         return (*out, *([worst] if worst else []), *self.contradicted_priors()[:1], *self.beyond_specification()[:1])
 
@@ -419,3 +420,12 @@ def conditions(setup: TestSetup) -> float:
     site, imu = setup.site, setup.imu
     place = (site.latitude_rad, site.height_m, setup.gravity)
     return checksum(np.array([*place, imu.gyro_white_noise, imu.accel_white_noise]))
+
+
+def _in_noise(statistics: Mapping[str, float | None]) -> str:
+    """Say how the model fits in learned noise, and what that means for the sigmas; empty where none was learned."""
+    nis, held_out = statistics.get("nis_in_noise"), statistics.get("held_out_in_noise")
+    if nis is None or held_out is None:
+        return ""
+    small = ", so the sigmas are too small" if nis > MISFIT else ""
+    return f"; in the noise that was learned NIS {nis:.3f}, held-out error {held_out:.3f}{small}"

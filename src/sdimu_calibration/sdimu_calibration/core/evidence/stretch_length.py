@@ -1,7 +1,7 @@
 """How long the stretches may be over which a wandering bias is taken as its mean.
 
 A bias that moves within a stretch by more than the white noise leaves of it is not described by its mean: the search
-then names steps and sines for what moves within, and the sigmas are too small. Stretches are halved until it does not.
+then names steps and sines for what moves within, and the sigmas are too small. There stretches are halved.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ from sdimu_calibration.core.noise_term import TRIADS, NoiseTerm
 _HALVINGS = 1
 """Number of times that stretches are halved at most: the time of a diagnosis grows by two to three with each."""
 _MOVES = 0.5
-"""Ratio of the variance within a stretch to that of white noise, from which the stretch is halved: flicker and random
-walk then move each half by less than a third of its white noise."""
+"""Ratio of the variance between the halves of a stretch to that of white noise, from which the stretch is halved: half
+as much changes a sigma by a fifth."""
 _STRONG = 3.0
-"""Mean square (1) of the errors of all stretches over their white noise below which nobody looks: in white noise it is
-one, and what moves within a stretch moves more from stretch to stretch."""
+"""Mean square (1) of the errors of a triad in all stretches over their white noise below which nobody looks: in white
+noise it is one, and what moves within a stretch moves more from stretch to stretch."""
 
 
 def wander_of(evidence: LinearEvidence) -> Wander:
@@ -39,7 +39,8 @@ def wander_of(evidence: LinearEvidence) -> Wander:
     scatter = (wander.U.T @ evidence.e) ** 2
     seen = np.einsum("ij,ij->j", wander.U, wander.U)
     at_rest = np.repeat(~wander.cut.turning, 6) & (seen > 0.0)
-    if not at_rest.any() or np.mean(scatter[at_rest] / seen[at_rest]) < _STRONG:
+    ratio = np.where(at_rest, scatter / np.where(at_rest, seen, 1.0), np.nan).reshape(-1, 2, 3)
+    if not at_rest.any() or np.nanmax(np.nanmean(ratio, axis=(0, 2))) < _STRONG:
         return wander
     terms = learn(Joint.of(evidence, wander).given(evidence.model, evidence.weight).noise, wander.cut)
     return _halved(evidence, wander, terms)

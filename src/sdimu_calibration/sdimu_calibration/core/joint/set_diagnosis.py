@@ -84,6 +84,8 @@ class SetDiagnosis:
         Of the first round, with every candidate beside the model as given.
     recurrence : Recurrence or None
         What comes back of that what the model leaves in the stops; None where it leaves nothing.
+    refused : tuple of SetFinding
+        Effects that were found and taken back, as recordings held out fit worse with them.
     """
 
     verdict: str
@@ -96,6 +98,7 @@ class SetDiagnosis:
     standing: Standing
     first: Search[SetEvidence]
     recurrence: Recurrence | None
+    refused: tuple[SetFinding, ...] = ()
 
 
 def diagnose_set(
@@ -118,18 +121,23 @@ def diagnose_set(
     findings = _findings(found)
     again = recurrence(leftovers(found.after, run))
     word = _verdict(findings, after, found.after, again)
-    refused = ""
-    if word == "unexplained" and findings and _error(after) > _error(before):
+    refused: tuple[SetFinding, ...] = ()
+    taken_back = ""
+    if word == "unexplained" and found.chosen and _rises(before, after):
         # What imitates the missing cause fits here and fails elsewhere: the coefficients are better without.
-        refused = _refused(findings, before, after)
-        found, after, findings = as_given(found), before, ()
+        refused = tuple(f for f in findings if not f.recording)
+        taken_back = _taken_back(refused, before, after)
+        found = as_given(found, options, run)
+        after, findings = (set_outcome(found.after), _findings(found)) if found.local else (before, ())
         again = recurrence(leftovers(found.after, run))
+        word = _verdict(findings, after, found.after, again)
     test = base_fit(found.after).test
     standing = replace(found.standing, site=test.origin.site)
-    sentence = f"{_sentence(word, findings, (before, after), again)} {refused}".strip()
+    sentence = f"{_sentence(word, findings, (before, after), again)} {taken_back}".strip()
     return SetDiagnosis(
         word, sentence, findings, before, after, found.threshold,
         _advice(word, findings, next_recording(found.after, standing, test), again), standing, found.first, again,
+        refused,
     )  # fmt: skip
 
 
@@ -216,7 +224,7 @@ def _named(f: SetFinding) -> str:
     return f"{f.label} ({size})" + (f" in {f.recording} alone" if f.recording else "")
 
 
-def _refused(findings: Sequence[SetFinding], before: Calibration, after: Calibration) -> str:
+def _taken_back(findings: Sequence[SetFinding], before: Calibration, after: Calibration) -> str:
     names = ", ".join(f.label for f in findings[:_LISTED]) + (", ..." if len(findings) > _LISTED else "")
     return (
         f"The model stays as given: with {names} the error at recordings held out rises from {_rms(before)} to "
@@ -224,9 +232,10 @@ def _refused(findings: Sequence[SetFinding], before: Calibration, after: Calibra
     )
 
 
-def _error(result: Calibration) -> float:
-    value = result.fit["held_out_rms"]
-    return float("-inf") if value is None else float(value)
+def _rises(before: Calibration, after: Calibration) -> bool:
+    """Whether recordings held out fit worse with what was found, by more than a sentence rounds away."""
+    one, two = before.fit["held_out_rms"], after.fit["held_out_rms"]
+    return one is not None and two is not None and round(two, 3) > round(one, 3)
 
 
 def _odd(result: Calibration) -> str:

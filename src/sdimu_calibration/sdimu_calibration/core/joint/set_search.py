@@ -180,16 +180,26 @@ def search_set(
     )  # fmt: skip
 
 
-def as_given(found: SetSearch) -> SetSearch:
-    """Return the search as if it had chosen nothing: the model as given stands.
+def as_given(found: SetSearch, options: SetOptions, run: Run) -> SetSearch:
+    """Return the search as if it had chosen no effect of all recordings: the model as given stands.
 
     Parameters
     ----------
     found : SetSearch
+        What it found in one recording alone stays.
+    options : SetOptions
+        Of the search.
+    run : callable
+        Does the jobs.
     """
     fit = found.before
+    if found.local:
+        local = dict(options.local)
+        for find in found.local:
+            local[find.recording] = (*local.get(find.recording, ()), find.key)
+        fit = fit_set(fit.members, replace(options, local=local), run, fit)
     standing = set_standing(fit, set_evidence(fit, ()), {}, {})
-    return replace(found, after=fit, chosen=(), z=(), alike={}, local=(), standing=standing)
+    return replace(found, after=fit, chosen=(), z=(), alike={}, standing=standing)
 
 
 def _singles(evidence: SetEvidence) -> Ints:

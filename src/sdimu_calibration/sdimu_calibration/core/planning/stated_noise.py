@@ -9,6 +9,7 @@ from __future__ import annotations
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.estimation.filter_fit import FilterFit
 from sdimu_calibration.core.estimation.noise_learning import in_noise
+from sdimu_calibration.core.evidence.stretch_length import wander_in
 from sdimu_calibration.core.noise_term import FLICKER, RANDOM_WALK, NoiseTerm
 from sdimu_calibration.core.specification import ImuSpecification
 
@@ -41,4 +42,5 @@ def covariance_in(fit: FilterFit, terms: tuple[NoiseTerm, ...]) -> Floats:
     ndarray, shape (p, p)
         Frame of the prior (SI).
     """
-    return in_noise(fit, fit.evidence(), fit.wander, terms).settled_covariance
+    evidence = fit.evidence()
+    return in_noise(fit, evidence, wander_in(evidence, terms), terms).settled_covariance

@@ -56,6 +56,8 @@ _STRAIGHT = 0.98
 """Least cosine between such steps: they then go one way."""
 _SLOW = 0.7
 """Ratio of a step to the one before from which the way is slow: ten more passes would leave 3 % of it."""
+_FURTHEST = 50.0
+"""Number of steps that are gone at once at most: beyond it the ratio of two steps is known too badly."""
 _TINY = 1e-300
 """Least square (1) that is divided by: a coefficient that is held has no variance."""
 _PIECE = 3
@@ -159,7 +161,8 @@ def solve_second_order(
         C_nb = rotation_matrix((1.0 + ahead) * rotation_vector(last.smoothed_start @ C_nb.T)) @ C_nb
         reference = last.estimate + ahead * (last.estimate - reference)
         steps = [] if ahead else steps
-        loose = loose and moved > _NEAR
+        if loose and moved <= _NEAR:
+            loose, steps = False, []
     return last, MOST_PASSES, False
 
 
@@ -184,7 +187,7 @@ def rest_of_the_way(steps: Sequence[Floats]) -> float:
     pairs = list(pairwise(steps[-_ALIKE - 1 :]))
     ratio = min(float(b @ a) / max(float(a @ a), _TINY) for a, b in pairs)
     straight = all(float(b @ a) > _STRAIGHT * float(np.linalg.norm(a) * np.linalg.norm(b)) for a, b in pairs)
-    return ratio / (1.0 - ratio) if straight and _SLOW < ratio < 1.0 else 0.0
+    return min(_FURTHEST, ratio / (1.0 - ratio)) if straight and _SLOW < ratio < 1.0 else 0.0
 
 
 def firm_setup(setup: TestSetup) -> TestSetup:
