@@ -153,7 +153,8 @@ def of_set(found: SetDiagnosis, spell: Spell | None = None) -> Verdict:
     costs = ((_ARROW.join(values), "sigma: held-out error, recordings left out; 1 is right"),) if values else ()
     advice = found.advice or ("Nothing: use the coefficients of this page.",)
     told = tuple(advice_html(text, spell) for text in advice)
-    return Verdict(tone, prose(found.sentence), costs, told, "What it costs to ignore it")
+    title = "What it costs to ignore it" if found.findings else "How well it predicts"
+    return Verdict(tone, prose(found.sentence), costs, told, title)
 
 
 def render(verdict: Verdict, *pictures: str) -> str:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -42,6 +44,8 @@ def test_a_half_moves_against_the_other_by_the_allan_variance():
     # Each triad against its own white noise: the one that moves most counts.
     assert moves_within(wander, [walk, flicker]) == pytest.approx(moves_within(wander, [flicker]))
     assert moves_within(wander, []) == 0.0
+    turning = replace(wander, cut=replace(wander.cut, turning=np.ones(40, dtype=bool)))
+    assert moves_within(turning, [walk]) == 0.0
     assert moves_within(wander, [NoiseTerm("gyro", "stop", size=9.0)]) == pytest.approx(0.0, abs=1e-9)
 
 

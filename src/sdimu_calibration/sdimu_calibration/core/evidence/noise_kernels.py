@@ -19,7 +19,8 @@ from sdimu_calibration.core.effects.motion import Motion
 from sdimu_calibration.core.noise_term import FLICKER, MARKOV, RANDOM_WALK, SHIFT, TURN
 
 _LONGEST_S = 30.0
-"""Longest stretch (s): a third of the shortest time constant that is told from white noise."""
+"""Longest stretch (s): flicker of data-sheet size moves within it by less than a tenth of the variance of white noise
+in dtg, fog_tactical and rlg_navigation; for others `stretch_length` halves it."""
 _MOST = 100
 """Number of stretches at most: longer tests have longer ones, and the time of an estimate goes with the cube."""
 _KEPT = 1e-9

@@ -77,9 +77,11 @@ def moves_within(wander: Wander, terms: Sequence[NoiseTerm]) -> float:
     Returns
     -------
     float
-        Of the triad that moves most; 0 without terms.
+        Of the triad that moves most; 0 without terms, and without rests.
     """
     cut = wander.cut
+    if cut.turning.all():
+        return 0.0
     length = float(np.median((cut.end - cut.start)[~cut.turning]))
     edges = np.array([0.0, 0.5, 1.0]) * length
     halves = Stretches(edges[:2], edges[1:], np.zeros(2, dtype=np.int64), np.zeros(2, dtype=bool))
