@@ -127,8 +127,8 @@ def test_dashes_tell_compensations_apart(more):
 
 def test_the_page_says_what_it_means_in_use(text, more):
     for trial in more.trials:
-        assert escape(use_section.told(trial)) in text
-        assert f"{trial.segment.length_s / 60.0:.1f} min" in use_section.told(trial)
+        assert escape(use_section.trial_sentence(trial)) in text
+        assert f"{trial.segment.length_s / 60.0:.1f} min" in use_section.trial_sentence(trial)
 
 
 def test_the_page_says_why_nothing_was_navigated(diagnosis):

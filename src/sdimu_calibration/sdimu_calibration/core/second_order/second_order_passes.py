@@ -51,15 +51,16 @@ told from zero, and a covariance that falls by more than ten digits loses its sy
 _MOTION_S = 60.0
 """Length of a usual turn (s): at 2 deg/s one of 90 deg takes 45 s, one of 180 deg 90 s."""
 _ALIKE = 2
-"""Number of neighbouring pairs of steps that must be alike before the rest of a slow way is gone at once."""
+"""Number of neighbouring pairs of steps that must be alike before the rest of a slow way is gone at once: one may be
+alike by chance."""
 _STRAIGHT = 0.98
-"""Least cosine between such steps: they then go one way."""
+"""Least cosine (1) between such steps: they then go one way."""
 _SLOW = 0.7
 """Ratio of a step to the one before from which the way is slow: ten more passes would leave 3 % of it."""
 _FURTHEST = 50.0
 """Number of steps that are gone at once at most: beyond it the ratio of two steps is known too badly."""
 _TINY = 1e-300
-"""Least square (1) that is divided by: a coefficient that is held has no variance."""
+"""Least number that is divided by (the unit of the divisor): a coefficient that is held has no variance."""
 _PIECE = 3
 """Number of epochs of a stop between two shifts of the attitude to that of the stop: in more, a cheap gyro drifts so
 far that azimuth looks observable."""
