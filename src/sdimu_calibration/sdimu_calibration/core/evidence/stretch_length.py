@@ -1,7 +1,8 @@
 """How long the stretches may be over which a wandering bias is taken as its mean.
 
-A bias that moves within a stretch by more than the white noise leaves of it is not described by its mean: the search
-then names steps and sines for what moves within, and the sigmas are too small. There stretches are halved.
+A bias that moves within a stretch as much as its white noise does is not described by its mean: the search then names
+steps and sines for what moves within, and the sigmas are too small. There stretches are halved, once: a quarter of the
+length takes three times as long.
 """
 
 from __future__ import annotations
@@ -17,8 +18,6 @@ from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.evidence.noise_kernels import Stretches, kernel
 from sdimu_calibration.core.noise_term import TRIADS, NoiseTerm
 
-_HALVINGS = 1
-"""Number of times that stretches are halved at most: the time of a diagnosis grows by two to three with each."""
 _MOVES = 0.5
 """Ratio of the variance between the halves of a stretch to that of white noise, from which the stretch is halved: half
 as much changes a sigma by a fifth."""
@@ -59,11 +58,7 @@ def wander_in(evidence: LinearEvidence, terms: Sequence[NoiseTerm]) -> Wander:
 
 
 def _halved(evidence: LinearEvidence, wander: Wander, terms: Sequence[NoiseTerm]) -> Wander:
-    for halvings in range(1, _HALVINGS + 1):
-        if moves_within(wander, terms) < _MOVES:
-            break
-        wander = Wander.of(evidence, 0.5**halvings)
-    return wander
+    return wander if moves_within(wander, terms) < _MOVES else Wander.of(evidence, 0.5)
 
 
 def moves_within(wander: Wander, terms: Sequence[NoiseTerm]) -> float:
