@@ -62,7 +62,7 @@ def of_diagnosis(summary: DiagnosisSummary, spell: Spell | None = None) -> Verdi
     bad = not d.adequate and d.verdict != "noise model wrong"
     tone = BAD if bad else GOOD if d.adequate and not doubts else DOUBTFUL
     head = _missing(summary) if named else prose(d.sentence)
-    advice = list(dict.fromkeys([*(f.text for f in d.findings), *doubts, *d.noise, *summary.advice]))
+    advice = list(dict.fromkeys([*(f.text for f in d.findings), *doubts, *summary.advice, *d.noise]))
     if d.adequate and not advice:
         advice = ["Use the coefficients of this page."]
     if d.adequate and summary.untestable:
