@@ -25,9 +25,10 @@ from sdimu_calibration.core.noise_term import NoiseTerm
 from sdimu_calibration.core.recording import DataError, Recording
 from sdimu_calibration.core.specification import ImuSpecification, Model, Site
 from sdimu_calibration.core.units import STANDARD_GRAVITY
-from sdimu_calibration.storage.config import load_imu, load_model, load_plan
+from sdimu_calibration.storage.config import load_imu, load_model
 from sdimu_sim.campaign.hidden_draw import PLAUSIBLE, TESTABLE, Truth, hideable_names
 from sdimu_sim.campaign.hidden_score import baseline_z, same_effect
+from sdimu_sim.campaign.plan_draw import FILED, study_plan
 from sdimu_sim.campaign.run import in_the_mean, simulate
 from sdimu_sim.core.by_hand import ByHand, against_gravity, by_hand_recording
 from sdimu_sim.core.hidden import one_sided, size_unit
@@ -35,7 +36,7 @@ from sdimu_sim.core.scenario import Scenario, imu_truth
 from sdimu_sim.core.truth import ImuTruth
 from sdimu_sim.core.truth import Truth as TestTruth
 
-PLANS = ("kim18", "kim18_signed", "recommended")
+PLANS = FILED
 """Plans that are drawn."""
 LATITUDES_DEG = (-50.0, -20.0, 20.0, 36.4, 52.0, 60.0)
 """Latitudes that are drawn (deg)."""
@@ -98,7 +99,7 @@ def simulated_test(
         true_gravity = float(earth.normal_gravity(site.latitude_rad, site.height_m))
         told: TestTruth = against_gravity(truth, STANDARD_GRAVITY, true_gravity)
         return _opened(recording, imu, site, assumed="any"), told.imu
-    scenario = Scenario(load_plan(plan), imu, site, rate_hz=_RATE_HZ, seed=seed, effects=effects, noise=noise)
+    scenario = Scenario(study_plan(plan, seed), imu, site, rate_hz=_RATE_HZ, seed=seed, effects=effects, noise=noise)
     sensor = imu_truth(scenario)
     recording = simulate(scenario, sensor)
     return _opened(recording, imu, site, assumed=""), in_the_mean(sensor, recording, seed)

@@ -145,6 +145,34 @@ def grades(
 
 
 @app.command()
+def clean(
+    out: Annotated[Path, typer.Option(help="Folder of runs, clean.json, clean.md.")] = Path("out/study-clean"),
+    runs: Annotated[int, typer.Option("-n", min=1, help="Tests of each IMU file and plan.")] = 17,
+    seed: Annotated[int, typer.Option(help="First seed.")] = 55_001,
+    imu: Annotated[list[str] | None, typer.Option(help="IMU file; repeatable. All of config/imu by default.")] = None,
+    workers: Annotated[int, typer.Option(min=1, help="Processes.")] = 2,
+) -> None:
+    """Diagnose tests with nothing hidden in them: every IMU file on plans from six positions to random attitudes."""
+    from sdimu_calibration.storage.config import config_folder
+    from sdimu_calibration.storage.json_file import write_json
+    from sdimu_sim.campaign.clean_page import page
+    from sdimu_sim.campaign.clean_run import CleanRun, plans_of
+
+    names = imu or sorted(path.stem for path in (config_folder() / "imu").glob("*.yaml"))
+    console, seeds = plain(), range(seed, seed + runs)
+    results = {}
+    for name in names:
+        for plan in plans_of(name):
+            folder = out / name / plan.replace(" ", "_")
+            results[name, plan] = shown_campaign(console, f"{name}, {plan}", CleanRun(name, plan), seeds, folder, workers)
+    write_json(out / "clean.json", {f"{name} {plan}": rows for (name, plan), rows in results.items()})
+    text = page(results, seed)
+    (out / "clean.md").write_text(text, encoding="utf-8")
+    console.print(text, soft_wrap=True, markup=False, highlight=False)
+    console.print(f"results in {out}", soft_wrap=True)
+
+
+@app.command()
 def noise(
     out: Annotated[Path, typer.Option(help="Folder of runs, noise.json, noise.md.")] = Path("out/study-noise"),
     runs: Annotated[int, typer.Option("-n", min=1, help="Tests of each IMU file and kind of noise.")] = 40,
