@@ -28,7 +28,7 @@ from sdimu_calibration.core.units import STANDARD_GRAVITY
 from sdimu_calibration.storage.config import load_imu, load_model
 from sdimu_sim.campaign.hidden_draw import PLAUSIBLE, TESTABLE, Truth, hideable_names
 from sdimu_sim.campaign.hidden_score import baseline_z, same_effect
-from sdimu_sim.campaign.plan_draw import FILED, study_plan
+from sdimu_sim.campaign.plan_draw import FILED, study_plan, study_table
 from sdimu_sim.campaign.run import in_the_mean, simulate
 from sdimu_sim.core.by_hand import ByHand, against_gravity, by_hand_recording
 from sdimu_sim.core.hidden import one_sided, size_unit
@@ -99,7 +99,9 @@ def simulated_test(
         true_gravity = float(earth.normal_gravity(site.latitude_rad, site.height_m))
         told: TestTruth = against_gravity(truth, STANDARD_GRAVITY, true_gravity)
         return _opened(recording, imu, site, assumed="any"), told.imu
-    scenario = Scenario(study_plan(plan, seed), imu, site, rate_hz=_RATE_HZ, seed=seed, effects=effects, noise=noise)
+    scenario = Scenario(
+        study_plan(plan, seed), imu, site, study_table(plan), rate_hz=_RATE_HZ, seed=seed, effects=effects, noise=noise
+    )
     sensor = imu_truth(scenario)
     recording = simulate(scenario, sensor)
     return _opened(recording, imu, site, assumed=""), in_the_mean(sensor, recording, seed)

@@ -8,6 +8,7 @@ from zlib import crc32
 
 import numpy as np
 
+from rate_table_sim.core import TableSpecification
 from sdimu_calibration.core.plan import Plan, Turn
 from sdimu_calibration.storage.config import load_plan
 
@@ -26,8 +27,10 @@ _RANDOM_TURNS, _RANDOM_DWELL_S = 23, 75.0
 """Turns of random attitudes; stop (s) between them: about as long as kim18."""
 _RANDOM_ANGLE_DEG, _RANDOM_RATE_DEG_S = (30.0, 180.0), (2.0, 6.0)
 """Range of the angle (deg) and of the rate (deg/s) of a random turn."""
-_TEN_MINUTES = (20.0, 10.0, 5.0)
-"""Kim18 in ten minutes: stop (s), rate (deg/s), angular acceleration (deg/s^2)."""
+_TEN_MINUTES = (20.0, 10.0)
+"""Kim18 in ten minutes: stop (s) and rate (deg/s)."""
+_ACCELERATION_DEG_S2 = 5.0
+"""Angular acceleration (deg/s^2) of turns that are faster than those of kim18."""
 _THREE_HOURS_DWELL_S = 510.0
 """Stop of kim18 in three hours (s)."""
 
@@ -52,6 +55,11 @@ def study_plan(name: str, seed: int) -> Plan:
     return load_plan(name)
 
 
+def study_table(plan: str) -> TableSpecification:
+    """Table for the plan of a name: three gimbals make no turns at random, a table without gimbals does."""
+    return TableSpecification(axes=None) if plan == "random_attitudes" else TableSpecification()
+
+
 def _six_positions() -> Plan:
     of = load_plan("kim18")
     turns = tuple(Turn(axis, math.radians(angle), of.turns[0].rate_rad_s) for axis, angle in _SIX_TURNS_DEG)
@@ -68,13 +76,17 @@ def _random_attitudes(seed: int) -> Plan:
         )
         for _ in range(_RANDOM_TURNS)
     )
-    return _with_stops(replace(load_plan("kim18"), turns=turns), "random_attitudes", _RANDOM_DWELL_S)
+    return _with_stops(_faster(load_plan("kim18"), turns), "random_attitudes", _RANDOM_DWELL_S)
 
 
 def _in_ten_minutes(of: Plan) -> Plan:
-    dwell_s, rate, acceleration = _TEN_MINUTES
+    dwell_s, rate = _TEN_MINUTES
     turns = tuple(replace(turn, rate_rad_s=math.radians(rate)) for turn in of.turns)
-    return _with_stops(replace(of, turns=turns, acceleration_rad_s2=math.radians(acceleration)), "kim18_10_min", dwell_s)
+    return _with_stops(_faster(of, turns), "kim18_10_min", dwell_s)
+
+
+def _faster(plan: Plan, turns: tuple[Turn, ...]) -> Plan:
+    return replace(plan, turns=turns, acceleration_rad_s2=math.radians(_ACCELERATION_DEG_S2))
 
 
 def _with_stops(plan: Plan, name: str, dwell_s: float) -> Plan:

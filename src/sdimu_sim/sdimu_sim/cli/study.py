@@ -163,8 +163,8 @@ def clean(
     results = {}
     for name in names:
         for plan in plans_of(name):
-            folder = out / name / plan.replace(" ", "_")
-            results[name, plan] = shown_campaign(console, f"{name}, {plan}", CleanRun(name, plan), seeds, folder, workers)
+            work, folder = CleanRun(name, plan), out / name / plan.replace(" ", "_")
+            results[name, plan] = shown_campaign(console, f"{name}, {plan}", work, seeds, folder, workers)
     write_json(out / "clean.json", {f"{name} {plan}": rows for (name, plan), rows in results.items()})
     text = page(results, seed)
     (out / "clean.md").write_text(text, encoding="utf-8")
