@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sdimu_calibration.core.effects.effect import Timetable
-from sdimu_calibration.core.evidence.learned_noise import LEAST_GAIN, NoiseInformation, learn, likelihood
+from sdimu_calibration.core.evidence.learned_noise import LEAST_GAIN, NoiseInformation, Wander, learn, likelihood
 from sdimu_calibration.core.evidence.noise_kernels import kernel, stretches
 from sdimu_calibration.core.noise_term import KINDS, MARKOV, TRIADS, NoiseTerm
 
@@ -122,3 +122,18 @@ def test_noise_of_one_triad_is_not_told_of_the_other(cut):
     true = [NoiseTerm("accel", "random_walk", size=0.3)]
     for seed in range(1, 11):
         assert {t.triad for t in learn(drawn(cut, true, seed), cut)} == {"accel"}
+
+
+def test_the_mean_of_the_noise_counts_the_modes_that_no_measurement_sees(cut):
+    """An accelerometer that is seen in one stretch of four wanders in the others, too."""
+    U = np.eye(6 * len(cut))
+    U[:, np.repeat(np.arange(len(cut)) % 4 > 0, 6)] = 0.0
+    terms = (NoiseTerm("gyro", "flicker", 0.0, 2.0), NoiseTerm("accel", "random_walk", 0.0, 0.3))
+    modes = Wander(cut, U).modes(terms)
+    share = np.where(cut.turning, 0.0, cut.end - cut.start)
+    share /= share.sum()
+    total = modes.mean @ modes.mean.T + modes.unseen
+    for first, term in ((0, terms[0]), (3, terms[1])):
+        variance = term.size**2 * share @ kernel(term.kind, term.tau, cut) @ share
+        np.testing.assert_allclose(np.diag(total)[first : first + 3], variance, rtol=1e-9)
+    assert np.diag(modes.unseen).min() > 0.0

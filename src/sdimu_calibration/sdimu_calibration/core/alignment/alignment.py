@@ -11,7 +11,7 @@ Source: Groves, *Principles of GNSS, Inertial, and Multisensor Integrated Naviga
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -26,6 +26,8 @@ from sdimu_calibration.core.specification import ImuSpecification, Site
 
 UNKNOWN_AZIMUTH = np.pi / np.sqrt(3.0)
 """Sigma of an unknown azimuth (rad): that of a uniform distribution over the circle."""
+_CONVENTION_RAD = 1e-5
+"""Sigma of an azimuth that is a convention (rad): no data move it, and the covariance stays regular."""
 _WIDEN = 10.0
 """Factor from the sigmas of the alignment to those of the filter: the filter takes the same samples again."""
 
@@ -49,6 +51,17 @@ class Alignment:
     sigma: Floats
     filter_sigma: Floats
     azimuth_from: str
+
+    def with_azimuth_of(self, C_nb: Floats) -> Alignment:
+        """Return the alignment with the azimuth of an attitude as a convention, which no data move.
+
+        Parameters
+        ----------
+        C_nb : ndarray, shape (3, 3)
+            Attitude at the start, b to n (dimensionless).
+        """
+        sigma = np.array([*self.filter_sigma[:2], _CONVENTION_RAD])
+        return replace(self, C_nb=C_nb.copy(), filter_sigma=sigma, azimuth_from="nothing")
 
 
 def azimuth_of(C_nb: Floats) -> float:

@@ -256,7 +256,10 @@ def in_measured_noise(fit: Fit, progress: Progress = silent) -> tuple[Fit, Consi
     consistency = fit.consistency()
     noise, imu = measured_noise(consistency, fit)
     if noise:
-        fit = solve(fit.test.with_imu(imu), fit.model, fit.estimator, progress=progress, learn=False)
+        fit = solve(
+            fit.test.with_imu(imu), fit.model, fit.estimator, progress=progress, learn=False,
+            azimuth_free=fit.azimuth_free,
+        )  # fmt: skip
     return in_white_noise(fit), consistency, noise
 
 

@@ -14,6 +14,7 @@ misalignment. They become parameters of that size, estimated and not reported, a
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -121,8 +122,18 @@ def drifting(sensors: ImuModel, imu: ImuSpecification, gravity: float, duration:
     return bool(0.5 * gravity * attitude**2 > sigmas * imu.accel_white_noise / float(np.sqrt(duration)))
 
 
-def accelerometer_frame_model(asked: ImuModel, imu: ImuSpecification) -> AccelerometerFrameModel | None:
-    """Put a model into the accelerometers' frame; None where it cannot turn because not all misalignments are in it."""
+def accelerometer_frame_model(
+    asked: ImuModel, imu: ImuSpecification, more: Sequence[Effect] = ()
+) -> AccelerometerFrameModel | None:
+    """Put a model into the accelerometers' frame; None where it cannot turn because not all misalignments are in it.
+
+    Parameters
+    ----------
+    asked : ImuModel
+    imu : ImuSpecification
+    more : sequence of Effect
+        What the estimator estimates along, behind all others, and does not report.
+    """
     pinned = set(body_frame.pinned_names())
     if not pinned <= set(asked.names):
         return None
@@ -135,8 +146,9 @@ def accelerometer_frame_model(asked: ImuModel, imu: ImuSpecification) -> Acceler
     outside = bool(unbalance) and not set(_OUTSIDE) & set(asked.names)
     if outside:
         effects.append(registry.get("gyro_g_sensitivity").only(_OUTSIDE))
-    inner = imu_model.build(effects, imu)
-    sizes = dict(zip(asked.names, _turned_prior(asked), strict=True))
+    inner = imu_model.build([*effects, *more], imu)
+    sizes = dict(zip(inner.names, inner.prior, strict=True))
+    sizes |= dict(zip(asked.names, _turned_prior(asked), strict=True))
     if outside:
         misalignment = asked.stated[asked.names.index("accel_misalignment_xy")]
         sizes |= dict.fromkeys(_OUTSIDE, float(np.sqrt(2.0) * misalignment * np.max(asked.stated[unbalance])))

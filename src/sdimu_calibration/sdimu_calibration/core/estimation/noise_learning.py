@@ -36,11 +36,21 @@ def with_noise_learned(fit: F) -> F:
     ----------
     fit : Fit
     """
+    found = noise_of(fit)
+    return in_noise(fit, fit.evidence(), fit.wander, found) if found else fit
+
+
+def noise_of(fit: Fit) -> tuple[NoiseTerm, ...]:
+    """Learn the noise terms of a fit where its innovations contradict white noise; none where they do not.
+
+    Parameters
+    ----------
+    fit : Fit
+    """
     if not isinstance(fit, NavigationFit) or not suspected(fit):
-        return fit
+        return ()
     evidence, wander = fit.evidence(), fit.wander
-    found = balance(Joint.of(evidence, wander).given(evidence.model, evidence.weight).noise, wander)
-    return in_noise(fit, evidence, wander, found.terms)
+    return balance(Joint.of(evidence, wander).given(evidence.model, evidence.weight).noise, wander).terms
 
 
 def suspected(fit: NavigationFit) -> bool:
@@ -99,10 +109,16 @@ def _with_mean(evidence: LinearEvidence, modes: Modes, fixed: Bools) -> tuple[Fl
     known = np.flatnonzero(fixed)
     covariance[known], covariance[:, known], estimate[known] = 0.0, 0.0, 0.0
     T = np.hstack([np.eye(q), np.zeros((q, r))])
-    for channel, name in enumerate(bias.NAMES):
-        if name in evidence.names and not fixed[evidence.names.index(name)]:
-            T[evidence.names.index(name), q:] = modes.mean[channel]
-    return T @ estimate, T @ covariance @ T.T
+    moved = [
+        (channel, evidence.names.index(name)) for channel, name in enumerate(bias.NAMES)
+        if name in evidence.names and not fixed[evidence.names.index(name)]
+    ]  # fmt: skip
+    unseen = np.zeros((q, q))
+    for channel, row in moved:
+        T[row, q:] = modes.mean[channel]
+        for other, column in moved:
+            unseen[row, column] = modes.unseen[channel, other]
+    return T @ estimate, T @ covariance @ T.T + unseen
 
 
 def in_white_noise(fit: F) -> F:

@@ -7,14 +7,16 @@ from functools import cached_property
 
 import numpy as np
 
+from sdimu_calibration.core.alignment.alignment import UNKNOWN_AZIMUTH
 from sdimu_calibration.core.alignment.coarse_alignment import StartPoint
 from sdimu_calibration.core.alignment.prepared import PreparedData, first_attitude
 from sdimu_calibration.core.arrays import Floats, Ints
+from sdimu_calibration.core.effects import earth_rate
 from sdimu_calibration.core.effects.accelerometer_frame import FRAME, AccelerometerFrameModel
 from sdimu_calibration.core.estimation.free_inertial import Compensated
 from sdimu_calibration.core.estimation.navigation_fit import NavigationFit
 from sdimu_calibration.core.evidence.navigation_evidence import KnownPass, known_second_order_pass
-from sdimu_calibration.core.filter.filter_pass import PassOutput
+from sdimu_calibration.core.filter.filter_pass import NAV, PassOutput
 from sdimu_calibration.core.navigation.correct_cycles import correct_cycles, spread
 from sdimu_calibration.core.navigation.track import motion
 from sdimu_calibration.core.progress import silent
@@ -25,6 +27,12 @@ from sdimu_calibration.core.second_order.second_order_passes import (
     run_stops,
     solve_second_order,
 )
+
+_NO_AZIMUTH = (
+    "the noise that was learned hides the azimuth: the horizontal Earth rate was estimated in its place; the "
+    "coefficients do not need the azimuth, headings of this test mean nothing"
+)
+"""Note on a fit that does without the azimuth."""
 
 
 @dataclass(frozen=True)
@@ -45,6 +53,11 @@ class SecondOrderFit(NavigationFit):
     count: int
     stood_still: bool
     estimator = "second-order"
+
+    @property
+    def azimuth_free(self) -> bool:  # type: ignore[override]
+        """Whether the horizontal Earth rate is estimated in the place of the azimuth."""
+        return earth_rate.EAST in self.setup.sensors.names
 
     @property
     def last(self) -> SecondOrderPass:
@@ -154,6 +167,7 @@ class SecondOrderFit(NavigationFit):
         """
         begin = StartPoint(np.ascontiguousarray(C_nb), self.estimate)
         alignment = first_attitude(prepared.epochs, prepared.phases, self.setup)
+        alignment = alignment.with_azimuth_of(C_nb) if self.azimuth_free else alignment
         last, count, converged = solve_second_order(self.setup, prepared, alignment, begin, silent)
         return replace(
             self, prepared=prepared, alignment=alignment, finished=last, count=count, stood_still=converged, noise=None
@@ -188,9 +202,17 @@ class SecondOrderFit(NavigationFit):
         T = self.centring
         values = self.frame_model.values((self.last.reference + out.estimate[rows]) @ T.T)
         covariance = self.frame_model.covariance(T @ out.covariance @ T.T, self.settled)
-        return self._rows_of_history(rows, out, values, covariance)
+        history = self._rows_of_history(rows, out, values, covariance)
+        if not self.azimuth_free:
+            return history
+        names, prior = self.setup.sensors.names, self.setup.sensors.prior
+        at = names.index(earth_rate.EAST)
+        open_rad = np.minimum(out.sigma[rows, NAV + at] / prior[at], 1.0) * UNKNOWN_AZIMUTH
+        attitude = np.column_stack([history.attitude_sigma[:, :2], np.hypot(history.attitude_sigma[:, 2], open_rad)])
+        return replace(history, attitude_sigma=attitude)
 
     def notes(self) -> tuple[str, ...]:
         """List the stops that were found; say how many passes were made."""
         text = f"second order: {self.count} passes about exactly corrected samples, in the accelerometers' frame"
-        return (*super().notes(), text)
+        hidden = (_NO_AZIMUTH,) if self.azimuth_free else ()
+        return (*super().notes(), text, *hidden)

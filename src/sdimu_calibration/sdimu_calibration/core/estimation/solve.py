@@ -19,7 +19,7 @@ from typing import cast
 import numpy as np
 
 from sdimu_calibration.core.alignment.alignment import Alignment
-from sdimu_calibration.core.alignment.coarse_alignment import StartPoint
+from sdimu_calibration.core.alignment.coarse_alignment import StartPoint, coarse_start
 from sdimu_calibration.core.alignment.prepared import PreparedData, TestSetup, first_attitude, set_up
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.batch.batch import solve_batch
@@ -32,14 +32,16 @@ from sdimu_calibration.core.effects.accelerometer_frame import (
     drifting,
     squares_count,
 )
+from sdimu_calibration.core.effects.earth_rate import horizontal_earth_rate
 from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.effects.imu_model import ImuModel
 from sdimu_calibration.core.estimation.filter_fit import FilterFit
 from sdimu_calibration.core.estimation.fit import Fit, Start
+from sdimu_calibration.core.estimation.free_azimuth import azimuth_is_lost
 from sdimu_calibration.core.estimation.handheld_fit import HandheldFit
 from sdimu_calibration.core.estimation.handheld_solve import solve_handheld
 from sdimu_calibration.core.estimation.navigation_fit import NavigationFit
-from sdimu_calibration.core.estimation.noise_learning import with_noise_learned
+from sdimu_calibration.core.estimation.noise_learning import in_noise, noise_of
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.estimation.reference_fits import BatchFit, ClassicalFit
 from sdimu_calibration.core.estimation.second_order_fit import SecondOrderFit
@@ -67,6 +69,7 @@ def solve(
     start: Start | None = None,
     progress: Progress = silent,
     learn: bool = True,
+    azimuth_free: bool = False,
 ) -> Fit:
     """Fit a model to a test.
 
@@ -83,6 +86,9 @@ def solve(
         Called with a word and the fraction done.
     learn : bool
         Learn the noise where the innovations contradict white noise.
+    azimuth_free : bool
+        Estimate the horizontal Earth rate in the place of the azimuth, if the estimator is ``second-order``. Where the
+        noise that is learned hides the azimuth this is done unasked.
 
     Raises
     ------
@@ -93,13 +99,24 @@ def solve(
     if choice.estimator not in ESTIMATORS:
         raise DataError(f"estimator '{estimator}': expected one of {', '.join((AUTO, *ESTIMATORS))}")
     _check(test, model, choice.estimator)
+    free = azimuth_free and choice.estimator == SecondOrderFit.estimator
     try:
-        fit = replace(ESTIMATORS[choice.estimator](test, model, start, progress), reason=choice.reason)
+        made = _free_azimuth(test, model, start, progress) if free else ESTIMATORS[choice.estimator](
+            test, model, start, progress
+        )
     except DivergedError as error:
         if not test.assumed_site:
             raise
         raise DivergedError(f"{error} (no site was stated: {test.assumed_site} was assumed)") from error
-    return with_noise_learned(fit) if learn else fit
+    fit = replace(made, reason=choice.reason)
+    if not learn:
+        return fit
+    terms = noise_of(fit)
+    if azimuth_is_lost(fit, terms):
+        # Without a start: the fit is then the same whichever fit came before it.
+        fit = replace(_free_azimuth(test, model, None, progress), reason=choice.reason)
+        terms = noise_of(fit)
+    return in_noise(fit, fit.evidence(), fit.wander, terms) if terms else fit
 
 
 def _check(test: PreparedTest, model: Model, estimator: str) -> None:
@@ -177,7 +194,7 @@ def extend(
         When the extended model cannot be fitted.
     """
     model = with_effects(fit.model, effects)
-    wider = solve(fit.test, model, fit.estimator, fit.start if warm else None, progress, learn)
+    wider = solve(fit.test, model, fit.estimator, fit.start if warm else None, progress, learn, fit.azimuth_free)
     return replace(wider, reason=fit.reason)
 
 
@@ -220,9 +237,11 @@ def _begin(start: Start | None, sensors: ImuModel) -> StartPoint | None:
     return StartPoint(start.C_nb.copy(), start.coefficients_of(sensors.names) * (sensors.decay_rate == 0.0))
 
 
-def _second_order(test: PreparedTest, model: Model, start: Start | None, progress: Progress) -> Fit:
+def _second_order(
+    test: PreparedTest, model: Model, start: Start | None, progress: Progress, along: Sequence[Effect] = ()
+) -> Fit:
     setup = _setup(test, model)
-    frame_model = accelerometer_frame_model(setup.sensors, setup.imu)
+    frame_model = accelerometer_frame_model(setup.sensors, setup.imu, along)
     if frame_model is None:
         raise DataError(NO_FRAME)
     progress("reduce", 0.0)
@@ -230,6 +249,8 @@ def _second_order(test: PreparedTest, model: Model, start: Start | None, progres
     inner = replace(setup, sensors=frame_model.inner)
     alignment = first_attitude(prepared.epochs, prepared.phases, inner)
     begin = _begin(start, inner.sensors)
+    if along:
+        alignment = alignment.with_azimuth_of((begin or coarse_start(prepared, inner, alignment)).C_nb)
     last, count, converged = solve_second_order(inner, prepared, alignment, begin, progress)
     for _ in range(MOST_WIDENINGS):
         wider = widen_contradicted_priors(inner.sensors, last.estimate, last.covariance)
@@ -242,6 +263,12 @@ def _second_order(test: PreparedTest, model: Model, start: Start | None, progres
     return SecondOrderFit(
         test, model, setup.sensors, inner, prepared, alignment, frame_model, last, count, converged
     )
+
+
+def _free_azimuth(test: PreparedTest, model: Model, start: Start | None, progress: Progress) -> Fit:
+    """Fit by second-order passes that estimate the horizontal Earth rate in the place of the azimuth."""
+    effect = horizontal_earth_rate(_setup(test, model).site.latitude_rad)
+    return _second_order(test, model, start, progress, (effect,))
 
 
 @dataclass(frozen=True)

@@ -65,10 +65,14 @@ class Modes:
         Signatures in the whitened residuals.
     mean : ndarray, shape (6, r)
         What each mode adds to the mean error of each sensor over all dwells (SI).
+    unseen : ndarray, shape (6, 6)
+        Covariance of these means by modes of which the data say nothing (SI). A bias of an accelerometer that the
+        tilt takes up in most attitudes wanders there all the same.
     """
 
     columns: Floats
     mean: Floats
+    unseen: Floats
 
 
 @dataclass(frozen=True)
@@ -140,14 +144,15 @@ class Wander:
         return cls(cut, evidence.constant_signature(cut))
 
     def modes(self, terms: Sequence[NoiseTerm]) -> Modes:
-        """Work out independent modes of noise, without those of which the data say nothing."""
+        """Work out independent modes of noise, those of which the data say nothing as a covariance of the means."""
         root = root_of(terms, self.cut)
         values, vectors = np.linalg.eigh(root.T @ self.square @ root)
-        root = root @ vectors[:, values > _SEEN]
         share = np.where(self.cut.turning, 0.0, self.cut.end - self.cut.start)
         share = share / share.sum()
-        mean = np.einsum("s,scr->cr", share, root.reshape(len(self.cut), 6, -1))
-        return Modes(self.U @ root, mean)
+        mean = np.einsum("s,scr->cr", share, root.reshape(len(self.cut), 6, -1)) @ vectors
+        seen = values > _SEEN
+        hidden = mean[:, ~seen]
+        return Modes(self.U @ (root @ vectors[:, seen]), mean[:, seen], hidden @ hidden.T)
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,6 @@ from sdimu_calibration.core.compiled import compiled
 from sdimu_calibration.core.effects.motion import Motion
 from sdimu_calibration.core.filter.filter_pass import MEASURED, NAV, PassOutput
 from sdimu_calibration.core.filter.kalman import whiten
-from sdimu_calibration.core.matrix3 import applied, elements
 from sdimu_calibration.core.navigation.ins_errors import add_columns, responses
 
 
@@ -36,7 +35,8 @@ def _responses(
     Parameters
     ----------
     C_nb, f_b, dt, w_ie
-        Attitude, force (m/s^2) and length (s) of the cycles; Earth's rate in NED (rad/s).
+        Attitude, force (m/s^2) and length (s) of the cycles; Earth's rate in NED (rad/s). Of the force its vertical
+        part counts: the table does not travel.
     weight : ndarray, shape (n, 6, 6) or (0, 6, 6)
         Change of corrected rate and force per change of the measured ones; none is the identity.
     f_n, R, direct : ndarray, shapes (n, 3), (n, 6, 9), (n, 6, 6)
@@ -44,7 +44,8 @@ def _responses(
     """
     n = dt.shape[0]
     for c in range(n):
-        f_n[c, 0], f_n[c, 1], f_n[c, 2] = applied(elements(C_nb[c]), f_b[c, 0], f_b[c, 1], f_b[c, 2])
+        f_n[c, 0] = f_n[c, 1] = 0.0
+        f_n[c, 2] = C_nb[c, 2, 0] * f_b[c, 0] + C_nb[c, 2, 1] * f_b[c, 1] + C_nb[c, 2, 2] * f_b[c, 2]
     responses(C_nb, f_n, dt, 0, n, w_ie, R)
     if weight.shape[0] == 0:
         return

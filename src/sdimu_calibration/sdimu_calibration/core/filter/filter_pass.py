@@ -16,6 +16,10 @@ and accelerometer noise densities q_g, q_a (power)
     E[attitude Zw'] = -C q_g,      E[velocity Zf'] = C q_a,       E[position Zf'] = C q_a T / 2,
     E[velocity Zw'] = -[f x] C q_g T / 2,                         E[position Zw'] = -[f x] C q_g T^2 / 6.
 
+The table turns and does not travel, so the errors grow along a force of gravity alone. The force that is measured leans
+off the vertical by noise and tilt errors; a filter that takes the lean for an acceleration takes it for knowledge of
+azimuth, too: that of a cheap IMU seemed to be known seven times better than Earth rate tells it.
+
 While the table rests, Zv and Zp are integrals of Zf, so they are taken once after each motion; at every epoch they
 would add information only if they had noise of their own. Derivation: doc/shared-noise.md. For the same reason nothing
 is lost when a long dwell ends the navigation and begins it again at the known point: what the sensors add up to in a
@@ -227,13 +231,13 @@ def new_output(epochs: int, parameters: int, keep: bool, stride: int, navigation
 
 @compiled
 def _navigate_epoch(
-    data: PassInput, e: int, settings: PassSettings, state: PassState, G: Floats, D: Floats, sums: Floats,
-    C_mean: Floats, f_n: Floats, R: Floats,
+    data: PassInput, e: int, settings: PassSettings, state: PassState, f_n: Floats, G: Floats, D: Floats, sums: Floats,
+    C_mean: Floats, R: Floats,
 ) -> float:  # fmt: skip
-    """Navigate through an epoch, in place; return its length (s).
+    """Navigate through an epoch along a force `f_n` (n, 3) of its cycles in NED, in place; return its length (s).
 
-    Filled: G (9, p), D (6, p), and sums (9,) of angle and velocity increment in b and of velocity increment in n; of
-    the cycles of the epoch the mean attitude (n, 3, 3), the force (n, 3) and the responses (n, 6, 9).
+    Filled: G (9, p), D (6, p), and sums (6,) of angle and velocity increment in b; of the cycles of the epoch the mean
+    attitude (n, 3, 3) and the responses (n, 6, 9).
     """
     error = np.empty(6)
     phi = np.empty(3)
@@ -259,11 +263,6 @@ def _navigate_epoch(
         gravity = earth.normal_gravity(state.position[0], state.position[2]) + settings.gravity_excess
         mean_attitude(state.C_nb, phi, C_mean[k])
         dv = velocity_increment(alpha, upsilon, data.sculling[c])
-        # Not the mean attitude times the mean force: that leans off the vertical in a turn, and a filter
-        # that sees it takes it for knowledge of azimuth.
-        f_n[k, 0], f_n[k, 1], f_n[k, 2] = applied(elements(state.C_nb), dv[0] / dt, dv[1] / dt, dv[2] / dt)
-        for i in range(3):
-            sums[6 + i] += f_n[k, i] * dt
         navigate_cycle(state.C_nb, state.velocity, state.position, phi, dv, dt, gravity)
     responses(C_mean, f_n, dts, 0, count, earth.earth_rate(settings.reference[0]), R)
     add_columns(data.values[first : data.last[e]], data.channel, data.parameter, R, dts, G, D)
@@ -363,20 +362,22 @@ def run_pass(data: PassInput, settings: PassSettings, state: PassState, out: Pas
     p = state.used.shape[0]
     G = np.zeros((NAV, p + COPY))
     D = np.zeros((6, p))
-    sums = np.zeros(9)
+    sums = np.zeros(6)
     decay = np.ones(p + COPY)
     drive = np.zeros(p + COPY)
     gyro = np.eye(3) * settings.gyro_psd
     accel = np.eye(3) * settings.accel_psd
     longest = (data.last - data.first).max()
-    C_mean, f_mean, response = np.empty((longest, 3, 3)), np.empty((longest, 3)), np.empty((longest, 6, NAV))
+    C_mean, response = np.empty((longest, 3, 3)), np.empty((longest, 6, NAV))
+    f_cycles = np.zeros((longest, 3))
+    f_cycles[:, 2] = -earth.normal_gravity(settings.reference[0], settings.reference[2]) - settings.gravity_excess
+    f_n = f_cycles[0]
     keep, kept, g = out.Phi.shape[0] > 0, out.H.shape[2], out.G.shape[2]
     for e in range(data.first.shape[0]):
         if data.restart[e]:
             _restart(settings, state)
         position, velocity = state.position.copy(), state.velocity.copy()
-        T = _navigate_epoch(data, e, settings, state, G[:, :p], D, sums, C_mean, f_mean, response)
-        f_n = sums[6:] / T
+        T = _navigate_epoch(data, e, settings, state, f_cycles, G[:, :p], D, sums, C_mean, response)
         Phi = transition(navigation_error_matrix(position, velocity, f_n), T)
         Q = process_noise(gyro * data.white[e], accel * data.white[e], f_n, T)
         for i in range(3):

@@ -1,0 +1,70 @@
+"""Does the noise that was learned hide the azimuth? Then the horizontal Earth rate is estimated in its place.
+
+Earth rate at rest is seen as a vector that is constant in the room, the biases as one that is constant in the body. A
+bias that wanders by 25 deg/h leaves the azimuth open by tens of degrees. A fit that is linear about the azimuth that
+white noise gives is then wrong by five sigma and more in the gyro biases.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from sdimu_calibration.core import earth
+from sdimu_calibration.core.estimation.fit import Fit
+from sdimu_calibration.core.estimation.second_order_fit import SecondOrderFit
+from sdimu_calibration.core.evidence.noise_kernels import kernel, stretches
+from sdimu_calibration.core.noise_term import NoiseTerm
+
+_LOST_RAD = 0.1
+"""Sigma of the azimuth (rad) from which it is lost: at three sigma the first order of Earth rate is wrong by 4 % of it,
+which is as much as the noise leaves of a gyro bias."""
+
+
+def azimuth_is_lost(fit: Fit, terms: Sequence[NoiseTerm]) -> bool:
+    """Tell whether noise hides the azimuth from a fit that estimates it.
+
+    Only a second-order fit can do without it; one whose site states the azimuth knows it.
+
+    Parameters
+    ----------
+    fit : Fit
+    terms : sequence of NoiseTerm
+        Noise with a memory that was learned.
+    """
+    if not isinstance(fit, SecondOrderFit) or fit.azimuth_free or not terms:
+        return False
+    return fit.setup.site.initial_azimuth_rad is None and azimuth_sigma(fit, terms) > _LOST_RAD
+
+
+def azimuth_sigma(fit: SecondOrderFit, terms: Sequence[NoiseTerm]) -> float:
+    """Sigma of the azimuth by the mean rates at rest.
+
+    Generalised least squares of gyro biases and horizontal Earth rate, all else known.
+
+    Parameters
+    ----------
+    fit : SecondOrderFit
+    terms : sequence of NoiseTerm
+        Noise with a memory, beside the white noise of the IMU file.
+
+    Returns
+    -------
+    float
+        rad.
+    """
+    cut = stretches(fit.timetable)
+    rest = np.flatnonzero(~cut.turning)
+    noise = np.diag(fit.setup.imu.gyro_white_noise**2 / (cut.end - cut.start)[rest])
+    for term in terms:
+        if term.triad == "gyro":
+            noise = noise + term.size**2 * kernel(term.kind, term.tau, cut)[np.ix_(rest, rest)]
+    epochs = fit.prepared.epochs
+    middle = np.searchsorted(epochs.end, 0.5 * (cut.start + cut.end)[rest])
+    C_nb = fit.last.output.C_nb[np.minimum(middle, len(epochs.end) - 1)]
+    columns = np.concatenate([np.broadcast_to(np.eye(3), C_nb.shape), C_nb[:, :2, :].transpose(0, 2, 1)], axis=2)
+    white = np.linalg.solve(np.linalg.cholesky(noise), columns.reshape(len(rest), -1)).reshape(-1, columns.shape[2])
+    covariance = np.linalg.pinv(white.T @ white)
+    horizontal = max(earth.RATE * abs(float(np.cos(fit.setup.site.latitude_rad))), 1e-12)
+    return float(np.sqrt(0.5 * np.trace(covariance[3:, 3:]))) / horizontal
