@@ -87,7 +87,7 @@ class RateTableNode:
         """Nothing to leave behind."""
 
     def _everyone_is_here(self) -> bool:
-        if self._true_motion.consumers < self._needed:
+        if not self._true_motion.heard_by(self._needed):
             return False
         status, joints = self._peers
         matched = (

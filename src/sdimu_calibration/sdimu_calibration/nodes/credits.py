@@ -119,6 +119,13 @@ class Producer:
         """How many consumers have granted a credit and are still there."""
         return len(self._peers)
 
+    def heard_by(self, needed: int) -> bool:
+        """Whether so many consumers have granted a credit, and DDS has matched as many readers of the data.
+
+        A credit may arrive before the writer of the data knows the reader: what is sent until then is lost.
+        """
+        return self.consumers >= needed and self.publisher.get_subscription_count() >= needed
+
     @property
     def limit_ns(self) -> int:
         """Stamp up to which messages may be sent now."""

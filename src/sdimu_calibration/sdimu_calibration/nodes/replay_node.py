@@ -84,12 +84,10 @@ class ReplayNode:
         """Nothing to leave behind."""
 
     def _everyone_is_here(self) -> bool:
-        if self._imu.consumers < self._needed:
+        if not self._imu.heard_by(self._needed):
             return False
         watched = [p for topic, p in self._others.items() if not topic.endswith("joint_states")]
-        # A credit may come before the subscription is matched: samples sent until then would be missed.
-        samples = self._imu.publisher.get_subscription_count() >= self._needed
-        matched = not self._needed or (samples and all(p.get_subscription_count() for p in watched))
+        matched = not self._needed or all(p.get_subscription_count() for p in watched)
         return matched or time.monotonic() - self._born > PEERS_PATIENCE_S
 
     def _pump(self) -> None:

@@ -173,7 +173,7 @@ class SdimuNode:
         self._over = True
 
     def _tick(self) -> None:
-        if self._imu.consumers >= self._needed:
+        if self._imu.heard_by(self._needed):
             self._motion.ready()
         if not self._over or self._ready:
             self._pump()
