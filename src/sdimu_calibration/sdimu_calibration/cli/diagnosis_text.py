@@ -11,11 +11,14 @@ from sdimu_calibration.core.diagnosis.verdict import beyond
 from sdimu_calibration.core.units import UnitError, from_si
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from rich.console import Console
 
     from sdimu_calibration.cli.next_commands import Asked
     from sdimu_calibration.core.diagnosis.found import DetectableSize, Found
     from sdimu_calibration.core.diagnosis.ladder import Rung
+    from sdimu_calibration.core.diagnosis.search import Step
     from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary
 
 _TOP = 5
@@ -33,7 +36,8 @@ def print_summary(console: Console, summary: DiagnosisSummary, asked: Asked) -> 
     line(console, f"p of the model as given{noise}: {f'{d.p_value:.2g}' if d.p_value > 1e-300 else 'below 1e-300'}")
     _where(console, summary)
     _candidates(console, summary)
-    _steps(console, summary)
+    for text in step_lines(d.found.steps):
+        line(console, text)
     print_ladder(console, d.rungs)
     print_out_of_sight(console, summary)
     print_advice(console, summary.advice, asked)
@@ -84,21 +88,23 @@ def _fall(f: Found) -> str:
     return f"held-out error {f.held_out_before:.3f} -> {f.held_out_after:.3f}" if known else ""
 
 
-def _steps(console: Console, summary: DiagnosisSummary) -> None:
-    steps = summary.diagnosis.found.steps
-    if not steps:
-        return
+def step_lines(steps: Sequence[Step]) -> list[str]:
+    """Say what was added, or refused, a line each; then together what was taken out again, with the reason."""
+    lines: list[str] = []
+    out: dict[str, list[str]] = {}
     for number, s in enumerate(steps, start=1):
+        if s.taken_out:
+            out.setdefault(s.fate, []).append(f"{s.label} (step {number}, z {s.z:+.1f})")
+            continue
         end = f"log score of stops left out {s.held_out_gain:+.0f} +- {s.held_out_error:.0f}"
-        line(
-            console,
+        lines.append(
             f"step {number}: {s.label} (z {s.z:+.1f}, threshold {s.threshold:.1f}, "
-            f"log Bayes factor {s.log_bayes_factor:.0f}; {end}) {s.fate}",
+            f"log Bayes factor {s.log_bayes_factor:.0f}; {end}) {s.fate}"
         )
-        if s.accepted and not s.taken_out and s.moved:
-            moved = ", ".join(f"{name} {size:+.1f} sigma" for name, size in s.moved if abs(size) > 1.0)
-            if moved:
-                line(console, f"  without it these were wrong: {moved}")
+        moved = ", ".join(f"{name} {size:+.1f} sigma" for name, size in s.moved if abs(size) > 1.0)
+        if s.accepted and moved:
+            lines.append(f"  without it these were wrong: {moved}")
+    return lines + [f"{fate}: {', '.join(labels)}" for fate, labels in out.items()]
 
 
 def print_out_of_sight(console: Console, summary: DiagnosisSummary) -> None:
