@@ -124,7 +124,8 @@ class Influence:
 
 
 def influences(fit: NavigationFit) -> Influence:
-    """Leave every stop out of a fit in its linear model."""
+    """Leave every stop out of a fit in its linear model; of what the estimator estimates, see what is reported."""
     evidence = fit.evidence()
     stops, moved = influence(evidence)
-    return Influence(stops, evidence.names[: evidence.coefficients], moved)
+    reported = [k for k, name in enumerate(evidence.names[: evidence.coefficients]) if name in fit.names]
+    return Influence(stops, tuple(evidence.names[k] for k in reported), moved[:, reported])
