@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from sdimu_calibration.core.adaptive.so_far import so_far
 from sdimu_calibration.core.effects.earth_rate import NAMES
 from sdimu_calibration.core.estimation.free_azimuth import azimuth_is_lost, azimuth_sigma
 from sdimu_calibration.core.estimation.outcome import outcome
-from sdimu_calibration.core.estimation.solve import extend, solve
+from sdimu_calibration.core.estimation.solve import extend, fit_about, solve
+from sdimu_calibration.core.joint.member import Job, Member, run
+from sdimu_calibration.core.rotation import rotation_matrix
 from sdimu_calibration.core.specification import Site
 from sdimu_calibration.storage.config import load_imu, load_model
 from sdimu_sim.campaign.grade_run import simulated_test
@@ -65,7 +69,80 @@ def test_an_effect_more_keeps_the_azimuth_free(hidden):
     assert wider.names[-1].startswith("accel_quadratic")
 
 
-def test_an_azimuth_that_the_site_states_is_not_lost():
-    stated = Site(SITE.latitude_rad, 0.0, initial_azimuth_rad=0.0, initial_azimuth_sigma_rad=0.06)
-    fit, _ = solved(1, FLICKER, stated)
+@pytest.mark.parametrize("turned_deg", [90.0, 180.0, 270.0])
+def test_the_answer_is_the_same_for_every_azimuth_that_is_assumed(hidden, turned_deg):
+    first, _ = hidden[0]
+    turn = rotation_matrix(np.array([0.0, 0.0, math.radians(turned_deg)]))
+    sensors = np.array([0.0 if name in NAMES else value for name, value in zip(
+        first.start.names, first.start.coefficients, strict=True
+    )])  # fmt: skip
+    start = replace(first.start, coefficients=sensors, C_nb=turn @ first.start.C_nb)
+    other = solve(first.test, first.model, "second-order", start, azimuth_free=True)
+    sigma = np.sqrt(np.diag(first.covariance))
+    free = sigma > 0.0
+    assert np.max(np.abs(other.values - first.values)[free] / sigma[free]) < 0.2
+
+
+def test_a_filter_that_loses_the_azimuth_gives_way_to_passes_that_do_without_one():
+    """Flicker of 15 deg/h in the ten-minute test of a FOG: the filter alone is off by six sigma and more."""
+    imu = load_imu("fog_tactical")
+    for seed in (12, 13, 14):
+        test, sensor = simulated_test(
+            "fog_tactical", imu, "kim18_10_min", SITE, seed, (), ("gyro_noise_flicker=15 deg/h",)
+        )
+        fit = solve(test, load_model("baseline"))
+        assert fit.azimuth_free
+        assert fit.converged
+        assert np.max(np.abs(baseline_z(outcome(fit), sensor))) < 5.0
+
+
+def test_a_filter_by_request_stays_and_warns():
+    test, _ = simulated_test(
+        "fog_tactical", load_imu("fog_tactical"), "kim18_10_min", SITE, 12, (), ("gyro_noise_flicker=15 deg/h",)
+    )
+    fit = solve(test, load_model("baseline"), "filter")
     assert not fit.azimuth_free
+    assert any("hides the azimuth" in text for text in fit.warnings(fit.statistics()))
+    assert not any("do not need it" in note for note in fit.notes())
+
+
+@pytest.mark.parametrize(("sigma_deg", "free"), [(3.0, False), (60.0, True)])
+def test_an_azimuth_that_the_site_states_counts_where_it_is_known_well_enough(sigma_deg, free):
+    stated = Site(
+        SITE.latitude_rad, 0.0, initial_azimuth_rad=0.0, initial_azimuth_sigma_rad=math.radians(sigma_deg)
+    )
+    fit, _ = solved(1, FLICKER, stated)
+    assert fit.azimuth_free == free
+
+
+def test_one_attitude_tells_no_azimuth(hidden):
+    fit, _ = hidden[0]
+    output = fit.last.output
+    level = replace(fit.last, output=output._replace(C_nb=np.broadcast_to(np.eye(3), output.C_nb.shape)))
+    assert azimuth_sigma(replace(fit, finished=level), ()) == math.inf
+
+
+def test_what_stands_for_an_azimuth_is_told_nobody(hidden):
+    fit, _ = hidden[0]
+    evidence = fit.evidence()
+    assert set(evidence.names[evidence.coefficients :]) == set(NAMES)
+    doubt = np.eye(evidence.coefficients) * 1e-20
+    np.testing.assert_allclose(fit.with_doubt(doubt).covariance, fit.covariance, rtol=1e-3, atol=1e-18)
+
+
+def test_a_set_takes_each_recording_without_its_azimuth(hidden):
+    fit, _ = hidden[0]
+    alone = run(Job(Member("one", lambda: fit.test), fit.model))
+    assert not set(NAMES) & set(alone.reduction.names)
+    assert not alone.stands_alone
+    assert any("hides the azimuth" in note for note in alone.notes)
+    about = dict(zip(alone.reduction.names, alone.reduction.point.tolist(), strict=True))
+    again = fit_about(fit.test, fit.model, "second-order", about, alone.start)
+    assert again.azimuth_free
+    assert again.start.coefficients_of(NAMES) == pytest.approx(alone.start.coefficients_of(NAMES))
+
+
+def test_an_adaptive_test_does_not_take_the_convention_for_knowledge(hidden):
+    fit, _ = hidden[0]
+    at = so_far(fit)
+    assert math.sqrt(at.state.P[8, 8]) > math.radians(1.0)

@@ -13,7 +13,7 @@ from typing import cast
 
 import numpy as np
 
-from sdimu_calibration.core.alignment.prepared import TestSetup, reduce, set_up
+from sdimu_calibration.core.alignment.prepared import TestSetup, first_attitude, reduce, set_up
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.effects.motion import Motion
@@ -122,7 +122,9 @@ def so_far(fit: NavigationFit, more: Sequence[Effect] = (), room: float = 1.0) -
     setup = replace(setup, sensors=replace(sensors, prior=prior))
     prepared, reference = fit.test.data(setup), fit.start.coefficients_of(sensors.names)
     C_nb = fit.start.C_nb.copy()
-    begin = start_state(setup, fit.alignment, C_nb, reference)
+    # Without an azimuth the alignment of the fit states one as a convention; here it is as open as it was.
+    start = first_attitude(prepared.epochs, prepared.phases, setup) if fit.azimuth_free else fit.alignment
+    begin = start_state(setup, start, C_nb, reference)
     seen = motion(
         prepared.cycles, prepared.rest, sensors, reference, C_nb, setup.site.latitude_rad, setup.gravity,
         prepared.temperature, predicted=True, magnetic_n=setup.magnetic_n,

@@ -12,6 +12,7 @@ from sdimu_calibration.core.alignment.prepared import PreparedData
 from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.effects import body_frame
 from sdimu_calibration.core.estimation.azimuth_check import azimuth_note, azimuth_warning
+from sdimu_calibration.core.estimation.free_azimuth import azimuth_is_lost
 from sdimu_calibration.core.estimation.free_inertial import Compensated
 from sdimu_calibration.core.estimation.navigation_fit import NavigationFit
 from sdimu_calibration.core.evidence.navigation_evidence import KnownPass, known_pass
@@ -21,6 +22,12 @@ from sdimu_calibration.core.filter.passes import solve as solve_filter
 from sdimu_calibration.core.navigation.track import motion
 from sdimu_calibration.core.progress import silent
 from sdimu_calibration.core.results import History
+
+_LOST = (
+    "the noise that was learned hides the azimuth: gyro biases may be wrong by many of their sigmas; take the "
+    "estimator 'second-order', which does without an azimuth"
+)
+"""Warning of a filter that cannot do without an azimuth."""
 
 
 @dataclass(frozen=True)
@@ -179,7 +186,7 @@ class FilterFit(NavigationFit):
 
     def notes(self) -> tuple[str, ...]:
         """List the stops that were found; name an azimuth that is not observable."""
-        heading = azimuth_note(self.solution)
+        heading = None if azimuth_is_lost(self, self.noise_terms) else azimuth_note(self.solution)
         return (*super().notes(), *([heading] if heading else []))
 
     def warnings(self, statistics: dict[str, float | None]) -> tuple[str, ...]:
@@ -190,5 +197,6 @@ class FilterFit(NavigationFit):
         DataError
             When there is no fit at all.
         """
-        azimuth = azimuth_warning(self.solution)
+        lost = azimuth_is_lost(self, self.noise_terms)
+        azimuth = _LOST if lost else azimuth_warning(self.solution)
         return (*super().warnings(statistics), *([azimuth] if azimuth else []))

@@ -11,9 +11,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from sdimu_calibration.core import earth
+from sdimu_calibration.core.effects.earth_rate import horizontal
 from sdimu_calibration.core.estimation.fit import Fit
-from sdimu_calibration.core.estimation.second_order_fit import SecondOrderFit
+from sdimu_calibration.core.estimation.navigation_fit import NavigationFit
 from sdimu_calibration.core.evidence.noise_kernels import kernel, stretches
 from sdimu_calibration.core.noise_term import NoiseTerm
 
@@ -25,7 +25,7 @@ which is as much as the noise leaves of a gyro bias."""
 def azimuth_is_lost(fit: Fit, terms: Sequence[NoiseTerm]) -> bool:
     """Tell whether noise hides the azimuth from a fit that estimates it.
 
-    Only a second-order fit can do without it; one whose site states the azimuth knows it.
+    One whose site states the azimuth well enough knows it.
 
     Parameters
     ----------
@@ -33,26 +33,28 @@ def azimuth_is_lost(fit: Fit, terms: Sequence[NoiseTerm]) -> bool:
     terms : sequence of NoiseTerm
         Noise with a memory that was learned.
     """
-    if not isinstance(fit, SecondOrderFit) or fit.azimuth_free or not terms:
+    if not isinstance(fit, NavigationFit) or fit.azimuth_free or not terms:
         return False
-    return fit.setup.site.initial_azimuth_rad is None and azimuth_sigma(fit, terms) > _LOST_RAD
+    site = fit.setup.site
+    known = site.initial_azimuth_rad is not None and site.initial_azimuth_sigma_rad <= _LOST_RAD
+    return not known and azimuth_sigma(fit, terms) > _LOST_RAD
 
 
-def azimuth_sigma(fit: SecondOrderFit, terms: Sequence[NoiseTerm]) -> float:
+def azimuth_sigma(fit: NavigationFit, terms: Sequence[NoiseTerm]) -> float:
     """Sigma of the azimuth by the mean rates at rest.
 
     Generalised least squares of gyro biases and horizontal Earth rate, all else known.
 
     Parameters
     ----------
-    fit : SecondOrderFit
+    fit : NavigationFit
     terms : sequence of NoiseTerm
         Noise with a memory, beside the white noise of the IMU file.
 
     Returns
     -------
     float
-        rad.
+        rad; infinite where the attitudes do not tell Earth rate from the biases.
     """
     cut = stretches(fit.timetable)
     rest = np.flatnonzero(~cut.turning)
@@ -65,6 +67,7 @@ def azimuth_sigma(fit: SecondOrderFit, terms: Sequence[NoiseTerm]) -> float:
     C_nb = fit.last.output.C_nb[np.minimum(middle, len(epochs.end) - 1)]
     columns = np.concatenate([np.broadcast_to(np.eye(3), C_nb.shape), C_nb[:, :2, :].transpose(0, 2, 1)], axis=2)
     white = np.linalg.solve(np.linalg.cholesky(noise), columns.reshape(len(rest), -1)).reshape(-1, columns.shape[2])
-    covariance = np.linalg.pinv(white.T @ white)
-    horizontal = max(earth.RATE * abs(float(np.cos(fit.setup.site.latitude_rad))), 1e-12)
-    return float(np.sqrt(0.5 * np.trace(covariance[3:, 3:]))) / horizontal
+    if np.linalg.matrix_rank(white) < columns.shape[2]:
+        return float("inf")
+    covariance = np.linalg.inv(white.T @ white)
+    return float(np.sqrt(0.5 * np.trace(covariance[3:, 3:]))) / horizontal(fit.setup.site.latitude_rad)

@@ -53,6 +53,9 @@ _ABSURD = 1e3
 MISFIT = 1.2
 """NIS per degree of freedom, and held-out error (sigma), from which a user is warned: 1 is right, and chance stays
 within a few per cent of it."""
+_FAST = 3.0
+"""NIS per degree of freedom (1) in learned noise from which sigmas are too small: in flicker errors are 1.0 of them at
+2, 1.2 at 4.5 and 3.8 at 12 (twelve tests of a FOG)."""
 _OF_THE_PASSES = {"known", "timetable", "wander", "centring", "_drifts", "_share_of_rest"}
 """Cached properties that neither noise nor doubt changes."""
 NO_FIELD = (
@@ -209,9 +212,11 @@ class NavigationFit(Fit):
 
         Parameters
         ----------
-        doubt : ndarray, shape (q, q), or None
-            As the attribute `doubt` (SI).
+        doubt : ndarray, shape (k, k), or None
+            As the attribute `doubt` (SI), of the first k coefficients: those behind them only serve.
         """
+        if doubt is not None:
+            doubt = np.pad(doubt, (0, len(self.setup.sensors.names) - len(doubt)))
         return self._with_passes(replace(self, doubt=doubt))
 
     def with_noise(self, noise: NoiseEstimate | None) -> Self:
@@ -423,9 +428,10 @@ def conditions(setup: TestSetup) -> float:
 
 
 def _in_noise(statistics: Mapping[str, float | None]) -> str:
-    """Say how the model fits in learned noise, and what that means for the sigmas; empty where none was learned."""
+    """Say how the model fits in learned noise, and what is not in that noise; empty where none was learned."""
     nis, held_out = statistics.get("nis_in_noise"), statistics.get("held_out_in_noise")
     if nis is None or held_out is None:
         return ""
-    small = ", so the sigmas are too small" if nis > MISFIT else ""
-    return f"; in the noise that was learned NIS {nis:.3f}, held-out error {held_out:.3f}{small}"
+    fast = ": noise that moves within half a minute is not in it" if nis > MISFIT else ""
+    small = ", so the sigmas are too small" if nis > _FAST else ""
+    return f"; in the noise that was learned NIS {nis:.3f}, held-out error {held_out:.3f}{fast}{small}"

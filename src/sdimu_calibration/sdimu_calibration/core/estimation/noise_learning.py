@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TypeVar
 
 import numpy as np
@@ -36,21 +37,48 @@ def with_noise_learned(fit: F) -> F:
     ----------
     fit : Fit
     """
-    found = noise_of(fit)
-    return in_noise(fit, fit.evidence(), fit.wander, found) if found else fit
+    return noise_of(fit).taken_by(fit)
 
 
-def noise_of(fit: Fit) -> tuple[NoiseTerm, ...]:
-    """Learn the noise terms of a fit where its innovations contradict white noise; none where they do not.
+@dataclass(frozen=True)
+class FoundNoise:
+    """Noise terms that the innovations of a fit ask for.
+
+    Attributes
+    ----------
+    terms : tuple of NoiseTerm
+    evidence : LinearEvidence or None
+        About the fit, in white noise; None where nobody looked.
+    """
+
+    terms: tuple[NoiseTerm, ...] = ()
+    evidence: LinearEvidence | None = None
+
+    def taken_by(self, fit: F) -> F:
+        """Return the fit in this noise; as it is where there is none.
+
+        Parameters
+        ----------
+        fit : Fit
+            The one that the noise was learned from.
+        """
+        if self.evidence is None or not isinstance(fit, NavigationFit):
+            return fit
+        return in_noise(fit, self.evidence, fit.wander, self.terms)
+
+
+def noise_of(fit: Fit) -> FoundNoise:
+    """Learn the noise of a fit where its innovations contradict white noise.
 
     Parameters
     ----------
     fit : Fit
     """
     if not isinstance(fit, NavigationFit) or not suspected(fit):
-        return ()
+        return FoundNoise()
     evidence, wander = fit.evidence(), fit.wander
-    return balance(Joint.of(evidence, wander).given(evidence.model, evidence.weight).noise, wander).terms
+    terms = balance(Joint.of(evidence, wander).given(evidence.model, evidence.weight).noise, wander).terms
+    return FoundNoise(terms, evidence)
 
 
 def suspected(fit: NavigationFit) -> bool:

@@ -28,7 +28,7 @@ from sdimu_calibration.core.second_order.second_order_passes import (
     solve_second_order,
 )
 
-_NO_AZIMUTH = (
+NO_AZIMUTH = (
     "the noise that was learned hides the azimuth: the horizontal Earth rate was estimated in its place; the "
     "coefficients do not need the azimuth, headings of this test mean nothing"
 )
@@ -214,5 +214,5 @@ class SecondOrderFit(NavigationFit):
     def notes(self) -> tuple[str, ...]:
         """List the stops that were found; say how many passes were made."""
         text = f"second order: {self.count} passes about exactly corrected samples, in the accelerometers' frame"
-        hidden = (_NO_AZIMUTH,) if self.azimuth_free else ()
+        hidden = (NO_AZIMUTH,) if self.azimuth_free else ()
         return (*super().notes(), text, *hidden)

@@ -32,7 +32,8 @@ from sdimu_calibration.core.effects.accelerometer_frame import (
     drifting,
     squares_count,
 )
-from sdimu_calibration.core.effects.earth_rate import horizontal_earth_rate
+from sdimu_calibration.core.effects.earth_rate import NAMES as EARTH_RATE
+from sdimu_calibration.core.effects.earth_rate import horizontal_earth_rate, of_any_direction
 from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.effects.imu_model import ImuModel
 from sdimu_calibration.core.estimation.filter_fit import FilterFit
@@ -41,7 +42,7 @@ from sdimu_calibration.core.estimation.free_azimuth import azimuth_is_lost
 from sdimu_calibration.core.estimation.handheld_fit import HandheldFit
 from sdimu_calibration.core.estimation.handheld_solve import solve_handheld
 from sdimu_calibration.core.estimation.navigation_fit import NavigationFit
-from sdimu_calibration.core.estimation.noise_learning import in_noise, noise_of
+from sdimu_calibration.core.estimation.noise_learning import noise_of
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.estimation.reference_fits import BatchFit, ClassicalFit
 from sdimu_calibration.core.estimation.second_order_fit import SecondOrderFit
@@ -60,6 +61,8 @@ NO_FRAME = (
     "the effect, or choose the estimator 'filter'"
 )
 """Why a model cannot be fitted in the frame of the accelerometers."""
+_HIDDEN = "the noise that was learned hides the azimuth, and its passes do without one"
+"""Why the second-order estimator takes the place of the one that was chosen."""
 
 
 def solve(
@@ -87,8 +90,8 @@ def solve(
     learn : bool
         Learn the noise where the innovations contradict white noise.
     azimuth_free : bool
-        Estimate the horizontal Earth rate in the place of the azimuth, if the estimator is ``second-order``. Where the
-        noise that is learned hides the azimuth this is done unasked.
+        Estimate the horizontal Earth rate in the place of the azimuth, by second-order passes. Where the noise that is
+        learned hides the azimuth this is done unasked, but for a request of another estimator.
 
     Raises
     ------
@@ -99,24 +102,22 @@ def solve(
     if choice.estimator not in ESTIMATORS:
         raise DataError(f"estimator '{estimator}': expected one of {', '.join((AUTO, *ESTIMATORS))}")
     _check(test, model, choice.estimator)
-    free = azimuth_free and choice.estimator == SecondOrderFit.estimator
+    make = _free_azimuth if azimuth_free else ESTIMATORS[choice.estimator]
     try:
-        made = _free_azimuth(test, model, start, progress) if free else ESTIMATORS[choice.estimator](
-            test, model, start, progress
-        )
+        fit = replace(make(test, model, start, progress), reason=choice.reason)
     except DivergedError as error:
         if not test.assumed_site:
             raise
         raise DivergedError(f"{error} (no site was stated: {test.assumed_site} was assumed)") from error
-    fit = replace(made, reason=choice.reason)
     if not learn:
         return fit
-    terms = noise_of(fit)
-    if azimuth_is_lost(fit, terms):
+    found = noise_of(fit)
+    asked = estimator in (AUTO, SecondOrderFit.estimator)
+    if asked and found.terms and azimuth_is_lost(fit, found.terms) and _does_without_azimuth(fit):
         # Without a start: the fit is then the same whichever fit came before it.
-        fit = replace(_free_azimuth(test, model, None, progress), reason=choice.reason)
-        terms = noise_of(fit)
-    return in_noise(fit, fit.evidence(), fit.wander, terms) if terms else fit
+        fit = replace(_free_azimuth(test, model, None, progress), reason=_HIDDEN)
+        found = noise_of(fit)
+    return found.taken_by(fit)
 
 
 def _check(test: PreparedTest, model: Model, estimator: str) -> None:
@@ -238,18 +239,16 @@ def _begin(start: Start | None, sensors: ImuModel) -> StartPoint | None:
 
 
 def _second_order(
-    test: PreparedTest, model: Model, start: Start | None, progress: Progress, along: Sequence[Effect] = ()
+    test: PreparedTest, model: Model, start: Start | None, progress: Progress, azimuth_free: bool = False
 ) -> Fit:
     setup = _setup(test, model)
-    frame_model = accelerometer_frame_model(setup.sensors, setup.imu, along)
-    if frame_model is None:
-        raise DataError(NO_FRAME)
+    frame_model = _in_accelerometer_frame(setup, azimuth_free)
     progress("reduce", 0.0)
     prepared = test.data(setup)
     inner = replace(setup, sensors=frame_model.inner)
     alignment = first_attitude(prepared.epochs, prepared.phases, inner)
     begin = _begin(start, inner.sensors)
-    if along:
+    if azimuth_free:
         alignment = alignment.with_azimuth_of((begin or coarse_start(prepared, inner, alignment)).C_nb)
     last, count, converged = solve_second_order(inner, prepared, alignment, begin, progress)
     for _ in range(MOST_WIDENINGS):
@@ -267,8 +266,30 @@ def _second_order(
 
 def _free_azimuth(test: PreparedTest, model: Model, start: Start | None, progress: Progress) -> Fit:
     """Fit by second-order passes that estimate the horizontal Earth rate in the place of the azimuth."""
-    effect = horizontal_earth_rate(_setup(test, model).site.latitude_rad)
-    return _second_order(test, model, start, progress, (effect,))
+    return _second_order(test, model, start, progress, azimuth_free=True)
+
+
+def _in_accelerometer_frame(setup: TestSetup, azimuth_free: bool) -> AccelerometerFrameModel:
+    """Put the model of a setup into the accelerometers' frame, where asked with an Earth rate of any direction.
+
+    Raises
+    ------
+    DataError
+        When the model cannot turn.
+    """
+    latitude = setup.site.latitude_rad
+    along = (horizontal_earth_rate(latitude),) if azimuth_free else ()
+    found = accelerometer_frame_model(setup.sensors, setup.imu, along)
+    if found is None:
+        raise DataError(NO_FRAME)
+    return replace(found, inner=of_any_direction(found.inner, latitude)) if azimuth_free else found
+
+
+def _does_without_azimuth(fit: Fit) -> bool:
+    """Tell whether second-order passes can fit the model of a fit: it can turn, and nothing in it changes at random."""
+    sensors = fit.sensors
+    changing = bool(((sensors.decay_rate > 0.0) | (sensors.drive > 0.0)).any())
+    return not changing and accelerometer_frame_model(sensors, fit.test.imu) is not None
 
 
 @dataclass(frozen=True)
@@ -340,7 +361,8 @@ def fit_about(
     coefficients : mapping of str to float
         Of the estimator (SI), by name; zero where it has none.
     start : Start, optional
-        Gives the attitude at the start where it is known.
+        Gives the attitude at the start where it is known. Of a fit without an azimuth it also gives the Earth rate in
+        its place, and this fit does without one, too.
 
     Raises
     ------
@@ -348,15 +370,18 @@ def fit_about(
         When the filter diverges about them.
     """
     begun = _reduced(test, model, silent)
-    frame_model = None
+    here = {} if start is None else dict(zip(start.names, start.coefficients.tolist(), strict=True))
+    frame_model, azimuth_free = None, here.keys() >= set(EARTH_RATE)
     if estimator == SecondOrderFit.estimator:
-        frame_model = accelerometer_frame_model(begun.setup.sensors, begun.setup.imu)
-        if frame_model is None:
-            raise DataError(NO_FRAME)
+        frame_model = _in_accelerometer_frame(begun.setup, azimuth_free)
         begun = replace(begun, setup=replace(begun.setup, sensors=frame_model.inner))
-    values = np.array([coefficients.get(name, 0.0) for name in begun.setup.sensors.names])
     C_nb = begun.alignment.C_nb if start is None else start.C_nb
     sensors = begun.setup.sensors
+    known_here = dict(coefficients)
+    if azimuth_free:
+        begun = replace(begun, alignment=begun.alignment.with_azimuth_of(C_nb))
+        known_here |= {name: here[name] for name in EARTH_RATE}
+    values = np.array([known_here.get(name, 0.0) for name in sensors.names])
     fixed = replace(sensors, prior=np.zeros(len(sensors.prior)), mean=values)
     known = replace(begun, setup=replace(begun.setup, sensors=fixed))
     if start is None and frame_model is None:

@@ -16,6 +16,7 @@ import numpy as np
 from sdimu_calibration.core.alignment.alignment import Alignment
 from sdimu_calibration.core.alignment.prepared import PreparedData, TestSetup
 from sdimu_calibration.core.arrays import Floats, Ints
+from sdimu_calibration.core.effects import earth_rate
 from sdimu_calibration.core.effects.effect import Effect, Timetable
 from sdimu_calibration.core.effects.motion import Motion
 from sdimu_calibration.core.evidence.linear import LinearEvidence, candidate_priors
@@ -200,9 +201,14 @@ def navigation_evidence(
         e=known.output.normalised[epoch, channel], W=columns(prepared, known, latitude, [*sensors.effects, *effects]),
         stop=prepared.phases.stop[epoch], names=(*sensors.names, *(c.label for c in candidates)),
         weight=sensors.weight, shift=sensors.mean - estimate, stated=sensors.stated, candidates=candidates, prior=prior,
-        imu=setup.imu, times=timetable(prepared), coefficients=len(sensors.prior),
+        imu=setup.imu, times=timetable(prepared), coefficients=len(sensors.prior) - _serving(sensors.names),
         epoch=epoch, channel=channel, known=known, prepared=prepared, latitude=latitude,
     )  # fmt: skip
+
+
+def _serving(names: Sequence[str]) -> int:
+    """Count the parameters that only serve, as attitudes do: they are behind all others, and nobody is told of them."""
+    return sum(name in earth_rate.NAMES for name in names)
 
 
 def columns(prepared: PreparedData, known: KnownPass, latitude: float, effects: Sequence[Effect]) -> Floats:

@@ -18,6 +18,7 @@ from sdimu_calibration.core.estimation.navigation_fit import NavigationFit
 from sdimu_calibration.core.estimation.noise_estimate import term_in_words
 from sdimu_calibration.core.estimation.noise_learning import in_noise, with_noise_learned
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
+from sdimu_calibration.core.estimation.second_order_fit import NO_AZIMUTH
 from sdimu_calibration.core.estimation.solve import AUTO, fit_about, solve
 from sdimu_calibration.core.evidence.stretch_length import wander_in
 from sdimu_calibration.core.joint.reduction import Reduction, reduced
@@ -240,7 +241,8 @@ def _report(job: Job, fit: Fit) -> Report:
         fit.data_counts(), fit.statistics(), fit.names,
         fit.values if job.about is None else np.empty(0),
         np.sqrt(np.diag(fit.covariance)) if job.about is None else np.empty(0),
-        (*recording.notes, *map(term_in_words, fit.noise_terms)), tuple(f.text for f in fit.faults if f.grave),
+        (*recording.notes, *map(term_in_words, fit.noise_terms), *((NO_AZIMUTH,) if fit.azimuth_free else ())),
+        tuple(f.text for f in fit.faults if f.grave),
         _heading(fit), fit.noise_terms,
         _widened(fit), places,
     )  # fmt: skip

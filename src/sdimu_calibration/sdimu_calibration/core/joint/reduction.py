@@ -14,7 +14,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from sdimu_calibration.core.arrays import Floats
-from sdimu_calibration.core.effects import earth_rate
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.evidence.stretch_length import wander_in
 from sdimu_calibration.core.noise_term import NoiseTerm
@@ -64,14 +63,11 @@ def reduced(evidence: LinearEvidence, terms: tuple[NoiseTerm, ...] = ()) -> Redu
     Parameters
     ----------
     evidence : LinearEvidence
-        N rows, in white noise; parameters behind its first `coefficients`, and an Earth rate in the place of the
-        azimuth, are eliminated with their priors.
+        N rows, in white noise; parameters behind its first `coefficients` are eliminated with their priors.
     terms : tuple of NoiseTerm
         Noise with a memory that was learned in the recording.
     """
-    own = len(evidence.weight)
-    # The Earth rate that stands in the place of an azimuth is of this recording alone; it is behind all others.
-    p = evidence.coefficients - sum(name in earth_rate.NAMES for name in evidence.names[:own])
+    p, own = evidence.coefficients, len(evidence.weight)
     columns = whitened(np.column_stack([evidence.W, evidence.e]), evidence, terms)
     if own > p:
         columns = _without(columns, p, evidence.weight[p:], evidence.shift[p:])
