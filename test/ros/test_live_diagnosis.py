@@ -21,10 +21,11 @@ from rclpy.node import Node
 from std_msgs.msg import Float64MultiArray
 
 from sdimu_calibration.core.data.arrival import RawStatus, RawTest, until
-from sdimu_calibration.core.diagnosis import ground, noise_search
+from sdimu_calibration.core.diagnosis import noise_search
 from sdimu_calibration.core.diagnosis.diagnose import climb
 from sdimu_calibration.core.diagnosis.live_diagnosis import LiveDiagnosis
-from sdimu_calibration.core.diagnosis.search import search
+from sdimu_calibration.core.diagnosis.problem import Problem
+from sdimu_calibration.core.diagnosis.search import FALSE_ALARM, search
 from sdimu_calibration.core.estimation.solve import solve
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.nodes.credits import HISTORY
@@ -88,18 +89,14 @@ def test_all_data_are_ranked_as_the_first_scan_of_a_diagnosis_of_the_bag(raw, wh
         searches.append((evidence.only(allowed), search(evidence, allowed, *arguments)))
         return searches[-1][1]
 
-    for room in (ground, noise_search):  # the first one searches where an effect is strong
-        monkeypatch.setattr(room, "search", seen)
+    monkeypatch.setattr(noise_search, "search", seen)
     climb(solve(open_test(tmp_path / "bag", "daejeon", load_imu("dtg")), load_model("baseline")))
     evidence, first = searches[0][0], searches[0][1].first
-    ranked = {r.label: (r.z, r.estimate, r.sigma) for r in whole.ranking}
-    # The first search is among the strong candidates alone.
-    scanned = {
+    assert {r.label: (r.z, r.estimate, r.sigma) for r in whole.ranking} == {
         evidence.names[k]: (first.z[k], first.estimate[k], first.sigma[k])
         for k in range(len(evidence.weight), len(first.z)) if np.isfinite(first.sigma[k])
     }
-    assert EFFECT in scanned
-    assert {label: ranked[label] for label in scanned} == scanned
+    assert whole.threshold == Problem(evidence).threshold(first, FALSE_ALARM)
 
 
 def test_what_is_missing_stands_out_and_leaves_when_it_is_added(job, whole):

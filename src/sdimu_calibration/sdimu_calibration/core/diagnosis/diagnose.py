@@ -193,11 +193,11 @@ def climb(
     """
     if not fit.diagnosable:
         raise DataError(NOT_DIAGNOSABLE)
-    stated, learned = fit.test.imu, fit.noise_terms
+    stated = fit.test.imu
     fit, consistency, noise = in_measured_noise(fit, progress)
     imu = fit.test.imu
     wander = None if fit.learns_scatter else fit.wander
-    request = Request(fit, tuple(extra), alpha, wander, frozenset(without), learned)
+    request = Request(fit, tuple(extra), alpha, wander, frozenset(without))
     done = search_until_stable(request, progress)
     final = in_doubt(fit, done.fit, done.evidence, done.found.chosen, done.free, done.found.scale)
     # Beside what was found a prior may no longer stand against the data: the fit of the model as given tells it.

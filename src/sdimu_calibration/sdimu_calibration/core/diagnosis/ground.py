@@ -1,8 +1,4 @@
-"""What a round is linear about: the request, the fit with what was tried, the evidence there.
-
-Strong effects come first, alone. About a fit that lacks them the signatures of all other effects are wrong by several
-percent, and what the linear model leaves of an effect of fifty sigma looks like small companions of it.
-"""
+"""What a round is linear about: the request, the fit with what was tried, the evidence there."""
 
 from __future__ import annotations
 
@@ -13,30 +9,18 @@ import numpy as np
 
 from sdimu_calibration.core.arrays import Ints
 from sdimu_calibration.core.diagnosis.candidates import catalogue, equations, free_inputs, periodic
-from sdimu_calibration.core.diagnosis.problem import Problem
-from sdimu_calibration.core.diagnosis.search import MOST_STEPS, Search, search
+from sdimu_calibration.core.diagnosis.search import Search
 from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.estimation.fit import Fit
 from sdimu_calibration.core.estimation.solve import extend
 from sdimu_calibration.core.evidence.candidate import Candidate, split
 from sdimu_calibration.core.evidence.learned_noise import Wander
 from sdimu_calibration.core.evidence.linear import LinearEvidence
-from sdimu_calibration.core.noise_term import NoiseTerm
 from sdimu_calibration.core.progress import Progress
 from sdimu_calibration.core.recording import DataError
 
 _PARALLEL = 1e-6
 """Share of its length by which a signature must differ from another to be its own: rounding is far below."""
-_STRONG = 20.0
-"""Score (sigma) of a candidate from which it is looked for before the others: signatures about a fit without it are
-wrong by several percent, and a twentieth of it is what noise alone does."""
-_SURE = 6.0
-"""Score (sigma) in learned noise from which a strong candidate is no part of the noise: one in a billion."""
-_LEADS = 0.3
-"""Score (1) of a strong candidate over that of the strongest one that the fit lacks, from which both come in at once: a
-weaker one may be what the linear model leaves of the strongest."""
-_MOST_REFITS = 4
-"""Number of refits with strong effects at most: each brings those of a third of the strongest one that was left."""
 
 
 @dataclass(frozen=True)
@@ -55,8 +39,6 @@ class Request:
         How wandering biases would show in the test; None where the estimator learns scatter instead.
     without : frozenset of str
         Registry names of effects that are not tried.
-    learned : tuple of NoiseTerm
-        Noise with a memory that was learned before anything was looked for.
     """
 
     base: Fit
@@ -64,7 +46,6 @@ class Request:
     alpha: float
     wander: Wander | None = None
     without: frozenset[str] = frozenset()
-    learned: tuple[NoiseTerm, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -135,57 +116,6 @@ def next_ground(
         more = _untried(candidates(request, (), own), frozenset(evidence.names))
         evidence = _without_doubles(evidence, more)
     return Ground(fit, tuple(tried), evidence, free)
-
-
-def strong_first(request: Request, progress: Progress) -> Ground:
-    """Fit with the strong effects of the catalogue alone, until none that is left is strong.
-
-    Where noise with a memory was learned, only those count that are beyond doubt in it, though it was learned without
-    them: much of such noise scores as dozens of sigma in white noise.
-
-    Returns
-    -------
-    Ground
-        The fit as given where nothing is strong.
-    """
-    ground = fresh_ground(request, request.base, (), False)
-    for _ in range(_MOST_REFITS):
-        allowed = _beyond_noise(request, ground)
-        limit = _strong_limit(ground, allowed)
-        if limit is None:
-            break
-        found = search(ground.evidence, allowed, request.alpha, MOST_STEPS, limit)
-        chosen = tuple(Problem(found.evidence).candidate(c) for c in found.chosen)
-        if {c.label for c in chosen} == {c.label for c in ground.tried}:
-            break
-        try:
-            fit = extended(request, chosen, progress)
-        except DataError:
-            # The rounds look again about the fit that stands, with noise as a rival.
-            break
-        ground = fresh_ground(request, fit, chosen, False)
-    return ground
-
-
-def _beyond_noise(request: Request, ground: Ground) -> Ints:
-    """Columns that may be chosen, and that learned noise does not explain, shape (a,)."""
-    if request.wander is None or not request.learned:
-        return ground.allowed
-    problem = Problem(ground.evidence.with_noise(request.wander.modes(request.learned).columns))
-    labels = [c.label for c in ground.evidence.candidates]
-    tried = [problem.p + labels.index(c.label) for c in ground.tried]
-    z = np.abs(problem.scan(tried, 1.0).z)
-    return np.union1d(ground.allowed[z[ground.allowed] > _SURE], np.array(tried, dtype=np.int64))
-
-
-def _strong_limit(ground: Ground, allowed: Ints) -> float | None:
-    """Score from which candidates come in next; None where nothing that the fit lacks is strong."""
-    problem = Problem(ground.evidence)
-    labels = [c.label for c in ground.evidence.candidates]
-    tried = [problem.p + labels.index(c.label) for c in ground.tried]
-    scanned = problem.scan(tried, problem.scale(tried))
-    largest = float(np.max(np.abs(scanned.z[allowed]), initial=0.0))
-    return max(_STRONG, _LEADS * largest) if largest > _STRONG else None
 
 
 def extended(request: Request, chosen: Sequence[Candidate], progress: Progress) -> Fit:

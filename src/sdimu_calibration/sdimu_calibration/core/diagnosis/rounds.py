@@ -1,9 +1,8 @@
 """The one search: fit, take the evidence, choose, fit again about the choice, until the choice stands.
 
 A large effect that is not in the model bends the fit about which everything is linear, and the error of that looks like
-small companions of the effect. So the strong effects come first, alone, and the signatures of all others are taken
-about the fit that has them. Each round then fits with what the last one chose, takes the evidence there, and starts the
-search afresh: what was chosen is one candidate among the others.
+small companions of the effect. So each round fits with what the last one chose, takes the evidence there, and starts
+the search afresh: what was chosen is one candidate among the others.
 
 Where the estimator learns the scatter of its own run (handheld), a missing effect is learned as scatter. There the
 choice grows by one effect a round, because each addition lets the scatter fall and shows what it hid.
@@ -18,14 +17,7 @@ import numpy as np
 
 from sdimu_calibration.core.arrays import Ints
 from sdimu_calibration.core.diagnosis.free_input_test import FreeInputTest, free_input_test
-from sdimu_calibration.core.diagnosis.ground import (
-    Ground,
-    Request,
-    extended,
-    fresh_ground,
-    next_ground,
-    strong_first,
-)
+from sdimu_calibration.core.diagnosis.ground import Ground, Request, extended, fresh_ground, next_ground
 from sdimu_calibration.core.diagnosis.noise_search import imitated, search_with_noise
 from sdimu_calibration.core.diagnosis.search import MOST_STEPS, Search, Step, search
 from sdimu_calibration.core.estimation.fit import Fit
@@ -99,7 +91,7 @@ def search_until_stable(request: Request, progress: Progress) -> Round:
     """
     base = request.base
     growing = base.learns_scatter
-    ground = fresh_ground(request, base, (), False) if growing else strong_first(request, progress)
+    ground = fresh_ground(request, base, (), False)
     own, asked = False, False
     limits: dict[bool, float] = {}
     done: Round | None = None
