@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 
 from rate_table_sim.core import table_motion
+from sdimu_calibration.core.recording import DataError
 from sdimu_sim.campaign.clean_page import page
 from sdimu_sim.campaign.clean_run import BY_HAND, CleanRun, plans_of
 from sdimu_sim.campaign.plan_draw import PLANS, study_plan, study_table
+from sdimu_sim.cli.shown_campaign import imu_files
 
 
 @pytest.mark.parametrize("name", PLANS)
@@ -60,8 +62,22 @@ def test_the_page_counts_effects_noise_and_refusals_apart():
     good = {"named": [], "noise": [], "verdict": "consistent", "z2": 27.0, "count": 27, "largest_z": 2.0}
     rows = [
         good, good | {"named": [["gyro_delay_x"]]}, good | {"noise": ["flicker"], "verdict": "unexplained"},
-        good | {"verdict": "data fault", "largest_z": 4.0}, {"error": "refused"},
+        good | {"verdict": "data fault", "largest_z": 4.0}, {"error": "DataError: why", "seed": 7},
     ]  # fmt: skip
     lines = page({("dtg", "kim18"): rows}, 1).splitlines()
-    assert lines[-2] == "| dtg | kim18 | 5 | 1 | 1 | 1 | 1 | 1.00 | 4.0 |"
-    assert lines[-1].startswith("| **all** |")
+    one, total = lines[-6:-4]
+    assert one == "| dtg | kim18 | 5 | 1 | 1 | 1 | 1 | 1.00 | 4.0 |"
+    assert total.startswith("| **all** |")
+    assert lines[-1] == "- dtg on kim18, seed 7: DataError: why"
+
+
+@pytest.mark.parametrize("name", ["nosuch", "/tmp/dtg.yaml", "../dtg"])
+def test_an_imu_file_that_a_study_does_not_know_is_refused_before_any_work(name):
+    with pytest.raises(DataError, match=f"--imu {name}: expected one of dtg, fog_tactical"):
+        imu_files(["dtg", name])
+
+
+def test_the_imu_files_of_a_study_are_each_once_and_all_without_a_wish():
+    assert imu_files(["dtg", "fog_tactical", "dtg"]) == ["dtg", "fog_tactical"]
+    assert "mems_by_hand" in imu_files(None)
+    assert "mems_by_hand" not in imu_files(None, without="mems_by_hand")

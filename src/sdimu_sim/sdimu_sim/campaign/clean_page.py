@@ -38,7 +38,12 @@ def page(results: Mapping[tuple[str, str], Rows], first: int) -> str:
     """
     lines = [_line(imu, plan, rows) for (imu, plan), rows in results.items()]
     total = _line("**all**", "", [row for rows in results.values() for row in rows])
-    return _HEAD.format(first=first) + "\n".join([*lines, total]) + "\n"
+    refused = [
+        f"- {imu} on {plan}, seed {row['seed']}: {row['error']}"
+        for (imu, plan), rows in results.items() for row in rows if "error" in row
+    ]  # fmt: skip
+    why = ["", "Refused:", "", *refused] if refused else []
+    return _HEAD.format(first=first) + "\n".join([*lines, total, *why]) + "\n"
 
 
 def _line(imu: str, plan: str, rows: Rows) -> str:

@@ -9,7 +9,7 @@ import typer
 
 from sdimu_calibration.cli.console import plain
 from sdimu_sim.cli.adaptive_study import adaptive, adaptive_run
-from sdimu_sim.cli.shown_campaign import check_kinds, shown_campaign
+from sdimu_sim.cli.shown_campaign import check_kinds, imu_files, leave_page, shown_campaign
 
 app = typer.Typer(help="Put a claim of the method to the test, by simulation.", no_args_is_help=True)
 app.command()(adaptive)
@@ -121,12 +121,10 @@ def grades(
     workers: Annotated[int, typer.Option(min=1, help="Processes.")] = 2,
 ) -> None:
     """Diagnose clean tests and tests with one hidden effect of every IMU file."""
-    from sdimu_calibration.storage.config import config_folder
-    from sdimu_calibration.storage.json_file import write_json
     from sdimu_sim.campaign.grade_page import page
     from sdimu_sim.campaign.grade_run import HANDHELD, PLANS, GradeRun, choice
 
-    names = imu or sorted(path.stem for path in (config_folder() / "imu").glob("*.yaml"))
+    names = imu_files(imu)
     console, seeds = plain(), range(seed, seed + runs)
     clean, hidden, choices = {}, {}, {}
     for name in names:
@@ -137,11 +135,8 @@ def grades(
         choices[name] = [
             {"plan": plan, "estimator": choice(name, plan, seed + k)} for plan in plans for k in range(draws)
         ]
-    write_json(out / "grades.json", {"clean": clean, "hidden": hidden, "choices": choices})
-    text = page(clean, hidden, choices, seed)
-    (out / "grades.md").write_text(text, encoding="utf-8")
-    console.print(text, soft_wrap=True, markup=False, highlight=False)
-    console.print(f"results in {out}", soft_wrap=True)
+    rows = {"clean": clean, "hidden": hidden, "choices": choices}
+    leave_page(console, out / "grades", rows, page(clean, hidden, choices, seed))
 
 
 @app.command()
@@ -153,23 +148,17 @@ def clean(
     workers: Annotated[int, typer.Option(min=1, help="Processes.")] = 2,
 ) -> None:
     """Diagnose tests with nothing hidden in them: every IMU file on plans from six positions to random attitudes."""
-    from sdimu_calibration.storage.config import config_folder
-    from sdimu_calibration.storage.json_file import write_json
     from sdimu_sim.campaign.clean_page import page
     from sdimu_sim.campaign.clean_run import CleanRun, plans_of
 
-    names = imu or sorted(path.stem for path in (config_folder() / "imu").glob("*.yaml"))
+    names = imu_files(imu)
     console, seeds = plain(), range(seed, seed + runs)
     results = {}
     for name in names:
         for plan in plans_of(name):
             work, folder = CleanRun(name, plan), out / name / plan.replace(" ", "_")
             results[name, plan] = shown_campaign(console, f"{name}, {plan}", work, seeds, folder, workers)
-    write_json(out / "clean.json", {f"{name} {plan}": rows for (name, plan), rows in results.items()})
-    text = page(results, seed)
-    (out / "clean.md").write_text(text, encoding="utf-8")
-    console.print(text, soft_wrap=True, markup=False, highlight=False)
-    console.print(f"results in {out}", soft_wrap=True)
+    leave_page(console, out / "clean", {" ".join(key): rows for key, rows in results.items()}, page(results, seed))
 
 
 @app.command()
@@ -185,8 +174,6 @@ def noise(
     workers: Annotated[int, typer.Option(min=1, help="Processes.")] = 2,
 ) -> None:
     """Diagnose tests in noise with a memory: are terms named with their size, do the sigmas hold."""
-    from sdimu_calibration.storage.config import config_folder
-    from sdimu_calibration.storage.json_file import write_json
     from sdimu_sim.campaign.grade_run import HANDHELD
     from sdimu_sim.campaign.noise_page import page
     from sdimu_sim.campaign.noise_run import NoiseRun
@@ -194,18 +181,14 @@ def noise(
 
     known = ("white", *KINDS)
     check_kinds(kind, known)
-    names = imu or sorted(p.stem for p in (config_folder() / "imu").glob("*.yaml") if p.stem != HANDHELD)
+    names = imu_files(imu, without=HANDHELD)
     console, seeds = plain(), range(seed, seed + runs)
     results = {}
     for name in names:
         for one in kind or known:
             work, folder = NoiseRun(name, one, sigmas), out / name / one
             results[name, one] = shown_campaign(console, f"{name}, {one}", work, seeds, folder, workers)
-    write_json(out / "noise.json", {f"{name} {one}": rows for (name, one), rows in results.items()})
-    text = page(results, seed)
-    (out / "noise.md").write_text(text, encoding="utf-8")
-    console.print(text, soft_wrap=True, markup=False, highlight=False)
-    console.print(f"results in {out}", soft_wrap=True)
+    leave_page(console, out / "noise", {" ".join(key): rows for key, rows in results.items()}, page(results, seed))
 
 
 @app.command()
@@ -220,7 +203,6 @@ def missing(
     """Diagnose tests as if the catalogue lacked what is hidden in them: is that seen, do the sigmas hold."""
     from sdimu_calibration.core.effects import registry
     from sdimu_calibration.core.recording import DataError
-    from sdimu_calibration.storage.json_file import write_json
     from sdimu_sim.campaign.missing_page import page
     from sdimu_sim.campaign.missing_run import MissingRun
     from sdimu_sim.core.hidden import effect_names
@@ -238,11 +220,7 @@ def missing(
     console, seeds, results = plain(), range(seed, seed + runs), {}
     for name in effect or known:
         results[name] = shown_campaign(console, name, MissingRun(imu, name), seeds, out / name, workers)
-    write_json(out / "missing.json", results)
-    text = page(imu, results, seed)
-    (out / "missing.md").write_text(text, encoding="utf-8")
-    console.print(text, soft_wrap=True, markup=False, highlight=False)
-    console.print(f"results in {out}", soft_wrap=True)
+    leave_page(console, out / "missing", results, page(imu, results, seed))
 
 
 @app.command()
@@ -262,7 +240,7 @@ def many(
     from sdimu_sim.campaign.many_run import ManyRun
 
     console, seeds, results = plain(), range(seed, seed + runs), {}
-    for name in imu or ["dtg", "rlg_navigation"]:
+    for name in imu_files(imu or ["dtg", "rlg_navigation"]):
         results[name] = shown_campaign(console, name, ManyRun(name), seeds, out / name, workers)
     write_json(out / "many.json", results)
     headings = ("IMU file", "runs", "8 sigma or more, named", "5 to 8", "below", "wrong names", "RMS z", "s")

@@ -357,6 +357,36 @@ def _restart(settings: PassSettings, state: PassState) -> None:
 
 
 @compiled
+def _fade(settings: PassSettings, T: float, used: Floats, decay: Floats, drive: Floats) -> None:
+    """Let coefficients `used` (p,) fade over an epoch (s), in place; fill how far, and the variance that they gain."""
+    for j in range(used.shape[0]):
+        d = np.exp(-settings.decay_rate[j] * T)
+        decay[j] = d
+        drive[j] = settings.drive[j] * T
+        if d != 1.0:
+            used[j] *= d
+
+
+@compiled
+def _write(out: PassOutput, e: int, low: int, innovation: Floats, white: Floats, L: Floats) -> None:
+    """Write the innovations of an epoch, from row `low` on, their sigmas, likelihood and squares, in place."""
+    out.innovation[e, low:] = innovation
+    out.normalised[e, low:] = white
+    for i in range(MEASURED - low):
+        variance = 0.0
+        for j in range(i + 1):
+            variance += L[i, j] ** 2
+        out.innovation_sigma[e, low + i] = np.sqrt(variance)
+    log = -0.5 * (MEASURED - low) * np.log(2.0 * np.pi)
+    for i in range(MEASURED - low):
+        log -= 0.5 * white[i] ** 2 + np.log(L[i, i])
+    out.log_likelihood[e] = log
+    for group in range(low // 3, 4):
+        first = 3 * group - low
+        out.nis[e, group] = white[first] ** 2 + white[first + 1] ** 2 + white[first + 2] ** 2
+
+
+@compiled
 def run_pass(data: PassInput, settings: PassSettings, state: PassState, out: PassOutput) -> None:
     """Navigate, propagate and measure, epoch by epoch; `state` and `out` are filled in place."""
     p = state.used.shape[0]
@@ -383,12 +413,7 @@ def run_pass(data: PassInput, settings: PassSettings, state: PassState, out: Pas
         for i in range(3):
             Q[3 + i, 3 + i] += data.gap_velocity[e] ** 2
             Q[6 + i, 6 + i] += data.gap_angle[e] ** 2
-        for j in range(p):
-            d = np.exp(-settings.decay_rate[j] * T)
-            decay[j] = d
-            drive[j] = settings.drive[j] * T
-            if d != 1.0:
-                state.used[j] *= d
+        _fade(settings, T, state.used, decay, drive)
         propagate(state.x, state.P, Phi, G, Q, decay, drive)
         kind = data.kind[e]
         if keep:
@@ -412,20 +437,7 @@ def run_pass(data: PassInput, settings: PassSettings, state: PassState, out: Pas
                 L = cholesky(sparse_product(HP, Hl.T) + HM + HM.T + Rl)
                 innovation = z[low:] - sparse_product(Hl, state.x.reshape(-1, 1))[:, 0]
             white = whiten(L, innovation.reshape(-1, 1))[:, 0]
-            out.innovation[e, low:] = innovation
-            out.normalised[e, low:] = white
-            for i in range(MEASURED - low):
-                variance = 0.0
-                for j in range(i + 1):
-                    variance += L[i, j] ** 2
-                out.innovation_sigma[e, low + i] = np.sqrt(variance)
-            log = -0.5 * (MEASURED - low) * np.log(2.0 * np.pi)
-            for i in range(MEASURED - low):
-                log -= 0.5 * white[i] ** 2 + np.log(L[i, i])
-            out.log_likelihood[e] = log
-            for group in range(low // 3, 4):
-                first = 3 * group - low
-                out.nis[e, group] = white[first] ** 2 + white[first + 1] ** 2 + white[first + 2] ** 2
+            _write(out, e, low, innovation, white, L)
             if keep:
                 out.H[e, low:] = Hl[:, :kept]
                 out.L[e, low:, low:] = L
