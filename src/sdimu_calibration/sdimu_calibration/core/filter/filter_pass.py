@@ -16,7 +16,7 @@ and accelerometer noise densities q_g, q_a (power)
     E[attitude Zw'] = -C q_g,      E[velocity Zf'] = C q_a,       E[position Zf'] = C q_a T / 2,
     E[velocity Zw'] = -[f x] C q_g T / 2,                         E[position Zw'] = -[f x] C q_g T^2 / 6.
 
-The table turns and does not travel, so the errors grow along the force of gravity. What is measured leans off it by noise
+The table turns and does not travel, so errors grow along the force of gravity. What is measured leans off it by noise
 and tilt errors, and a filter that takes the lean for an acceleration takes it for knowledge of azimuth, too.
 
 While the table rests, Zv and Zp are integrals of Zf, so they are taken once after each motion; at every epoch they
