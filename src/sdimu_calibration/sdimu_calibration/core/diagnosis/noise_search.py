@@ -17,6 +17,7 @@ from typing import Generic
 import numpy as np
 
 from sdimu_calibration.core.arrays import Ints
+from sdimu_calibration.core.diagnosis.pairs import best_pair
 from sdimu_calibration.core.diagnosis.problem import Problem
 from sdimu_calibration.core.diagnosis.scan import Scan, scored
 from sdimu_calibration.core.diagnosis.search import (
@@ -239,6 +240,7 @@ def _settled(ground: _Ground[E], state: _State) -> tuple[_Ground[E], _State]:
     state = _pruned(ground, state)
     while len(state.chosen) < MOST_STEPS:
         ground, wider = _grown(ground, state)
+        wider = wider or _with_pair(ground, state)
         if wider is None:
             break
         state = _pruned(ground, wider)
@@ -254,6 +256,16 @@ def _grown(ground: _Ground[E], state: _State) -> tuple[_Ground[E], _State | None
     if finer is not ground:
         best = len(finer.evidence.names) - 1
     return finer, finer.state([*state.chosen, best], terms)
+
+
+def _with_pair(ground: _Ground[E], state: _State) -> _State | None:
+    """Add two effects that hide each other, or put them in the place of one; None when that is worth nothing."""
+    terms = state.balance.terms
+    found = best_pair(Problem(ground.in_noise(terms)), state.chosen, ground.allowed, ground.limit)
+    if found is None:
+        return None
+    other = ground.state([*found.others, *found.pair], terms)
+    return other if ground.net(other) > ground.net(state) + 1e-6 else None
 
 
 def _best_addition(ground: _Ground[E], state: _State) -> tuple[int | None, tuple[NoiseTerm, ...]]:

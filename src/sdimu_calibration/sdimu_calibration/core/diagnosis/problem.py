@@ -15,7 +15,7 @@ from sdimu_calibration.core.evidence.candidate import Candidate
 from sdimu_calibration.core.evidence.held_out import HeldOut, predict
 from sdimu_calibration.core.evidence.linear import E
 
-_WIDE = 3.0
+WIDE = 3.0
 """Factor on the physical prior of a candidate: a sensor may be out of its class."""
 _PROVEN = 30.0
 """Factor on the physical prior of a chosen effect: its size is the data's to say, and what a prior holds back of it
@@ -121,11 +121,28 @@ class Problem(Generic[E]):
         count = Counter(names)
         return np.log([count[name] for name in names])
 
-    def scores(self, scanned: Scan, scale: float = 1.0, beside: Sequence[int] = (), ratio: float = _WIDE) -> Floats:
+    def log_odds(self, beside: Sequence[int]) -> Floats:
+        """Log odds of each candidate before the data: of registered effects, and of kin of what was chosen.
+
+        Parameters
+        ----------
+        beside : sequence of int
+            Columns that were chosen.
+
+        Returns
+        -------
+        ndarray, shape (q,)
+            Log (1).
+        """
+        own = np.array([c.family == "own" for c in self.evidence.candidates], dtype=bool)
+        kin = np.isin(self.kin, self.kin[np.array(beside, dtype=int) - self.p]) & ~own
+        return np.asarray(_KIN * kin - _OWN_ODDS * own)
+
+    def scores(self, scanned: Scan, scale: float = 1.0, beside: Sequence[int] = (), ratio: float = WIDE) -> Floats:
         """Log posterior odds of every column against the model without it.
 
         The Bayes factor of an effect of size N(0, s^2), with information J on it and information vector d, is
-        ``d^2 / (2 (J + s^-2)) - log(1 + J s^2) / 2``. To it come log odds for registered effects and for kin.
+        ``d^2 / (2 (J + s^-2)) - log(1 + J s^2) / 2``. To it come the odds of `log_odds`.
 
         Parameters
         ----------
@@ -149,9 +166,7 @@ class Problem(Generic[E]):
         with np.errstate(divide="ignore", invalid="ignore"):
             occam = np.where(wide > 0.0, 0.5 * np.log1p(J / wide), 0.0)
             score = 0.5 * d**2 / (J + wide) - occam
-        own = np.array([c.family == "own" for c in self.evidence.candidates], dtype=bool)
-        kin = np.isin(self.kin, self.kin[np.array(beside, dtype=int) - p]) & ~own
-        score = score - _OWN_ODDS * own + _KIN * kin
+        score = score + self.log_odds(beside)
         wrong = (d < 0.0) & np.array([c.effect.positive for c in self.evidence.candidates], dtype=bool)
         score = np.where(wrong, -np.inf, score)
         return np.concatenate([np.full(p, -np.inf), np.where(np.isfinite(scanned.sigma[p:]), score, -np.inf)])

@@ -17,6 +17,7 @@ from typing import Generic
 import numpy as np
 
 from sdimu_calibration.core.arrays import Floats, Ints
+from sdimu_calibration.core.diagnosis.pairs import best_pair
 from sdimu_calibration.core.diagnosis.problem import Problem
 from sdimu_calibration.core.diagnosis.scan import Scan, alike
 from sdimu_calibration.core.effects.effect import Effect
@@ -170,7 +171,14 @@ def search(
         above = np.where(np.abs(scanned.z) > limit, scores - problem.odds_against, -np.inf)
         best = int(np.argmax(above))
         if not np.isfinite(above[best]):
-            break
+            pair = _with_pair(problem, chosen, limit, scale, before) if len(steps) + 2 <= most else None
+            if pair is None:
+                break
+            added, chosen, before = pair
+            steps += added
+            scale = problem.scale(chosen)
+            scanned = problem.scan(chosen, scale)
+            continue
         finer = sharpen(problem, chosen, best)
         if finer:
             evidence = evidence.with_effects([finer])
@@ -190,6 +198,25 @@ def search(
         scanned = problem.scan(chosen, scale)
     back = np.array([allowed[c - problem.p] for c in chosen], dtype=np.int64)
     return Search(tuple(steps), back, first, limit, scale, evidence)
+
+
+def _with_pair(
+    problem: Problem[E], chosen: Sequence[int], limit: float, scale: float, before: HeldOut
+) -> tuple[list[Step], list[int], HeldOut] | None:
+    """Add two effects that hide each other: their steps, the choice, its held-out error; None where there are none."""
+    allowed = np.arange(problem.p, len(problem.evidence.names))
+    found = best_pair(problem, chosen, allowed, limit, scale)
+    if found is None:
+        return None
+    trial = _polish(problem, [*found.others, *found.pair])
+    after = problem.held_out(trial, 1.0)
+    steps = []
+    for column, other in (found.pair, found.pair[::-1]):
+        beside = [*found.others, other]
+        scanned = problem.scan(beside, scale)
+        scores = problem.scores(scanned, scale, beside)
+        steps.append(judged(problem, scanned, scores, beside, column, limit, before, after))
+    return (steps, trial, after) if all(step.accepted for step in steps) else None
 
 
 def patchwork(chosen: Iterable[Candidate]) -> bool:
