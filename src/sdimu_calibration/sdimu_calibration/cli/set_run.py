@@ -143,7 +143,7 @@ def calibrate_together(asked: SetRequest) -> None:
     folder = _folder(asked, "calibration")
     with written_together(folder) as part:
         write_result(part / "result.json", result)
-        write_report(part / "report.html", result, title=_title(asked, "Calibration"), trace=_trace(asked))
+        write_report(part / "report.html", result, title=page_title(asked, "Calibration", result), trace=_trace(asked))
     _show(console, result)
     say(console, f"results in {folder}")
     answer(folder / "result.json", asked.as_json)
@@ -166,7 +166,7 @@ def diagnose_together(asked: SetRequest, extra: Sequence[Effect]) -> None:
         write_set_diagnosis(part / "set.json", found)
         write_result(part / "result.json", after, found.verdict)
         write_report(
-            part / "report.html", after, title=_title(asked, "Diagnosis"), of_set=found, trace=_trace(asked),
+            part / "report.html", after, title=page_title(asked, "Diagnosis", after), of_set=found, trace=_trace(asked),
             spell=partial(spelled, asked=about),
         )  # fmt: skip
     _show(console, after, diagnosed=True)
@@ -233,9 +233,28 @@ def _trace(asked: SetRequest) -> Trace:
     return traced(asked.bags, sys.argv[1:], set=asked.file, site=asked.site, imu=asked.imu, model=asked.model)
 
 
-def _title(asked: SetRequest, word: str) -> str:
-    count = f"{len(asked.bags)} recordings" if asked.file is None else asked.file.name
-    return f"{word} of {count}"
+def page_title(asked: SetRequest, word: str, result: Calibration) -> str:
+    """Say of how many recordings a page is, or of which set file; where some were refused, of how many of them."""
+    counted = f"{count_in_words(result)} recordings"
+    if asked.file is None:
+        return f"{word} of {counted}"
+    some = f" ({counted})" if result.of_set and result.of_set.left_out else ""
+    return f"{word} of {asked.file.name}{some}"
+
+
+def table_heading(result: Calibration) -> str:
+    """Say what a table of coefficients is of, and which recordings could not be used."""
+    refused = ", ".join(name for name, _ in result.of_set.left_out) if result.of_set else ""
+    without = f", without {refused}" if refused else ""
+    return f"{count_in_words(result)} recordings together{without}, body frame: {result.body_frame}"
+
+
+def count_in_words(result: Calibration) -> str:
+    """Count the recordings of a joint result: ``3``, or ``2 of 3`` where one was left out."""
+    if result.of_set is None:
+        return "0"
+    used, refused = len(result.of_set.recordings), len(result.of_set.left_out)
+    return f"{used} of {used + refused}" if refused else f"{used}"
 
 
 def _with_serial(result: Calibration, members: Sequence[Member]) -> Calibration:
@@ -247,8 +266,5 @@ def _show(console: Console, result: Calibration, diagnosed: bool = False) -> Non
     from sdimu_calibration.core.results import without_advice
     from sdimu_calibration.report.table import rich_table, rows
 
-    count = len(result.of_set.recordings) if result.of_set else 0
-    console.print(
-        rich_table(rows(result), f"{count} recordings together, body frame: {result.body_frame}"), soft_wrap=True
-    )
+    console.print(rich_table(rows(result), table_heading(result)), soft_wrap=True)
     tell(console, without_advice(result.notes) if diagnosed else result.notes)

@@ -54,6 +54,7 @@ def coefficients_section(
     return section(
         "Coefficients",
         f'<p class="lacking">{told}</p>' if lacking else "",
+        *(quiet(f"Without {name}, which is left out: {why}.") for name, why in _left_out(calibration)),
         f"<p>{buttons}{texts}</p>",
         grouped_table(entries),
         quiet(
@@ -62,6 +63,11 @@ def coefficients_section(
         ),
         *drawn,
     )
+
+
+def _left_out(calibration: Calibration) -> tuple[tuple[str, str], ...]:
+    """Name the recordings of a set that could not be used, and why."""
+    return () if calibration.of_set is None else calibration.of_set.left_out
 
 
 def priors(fit: Fit | None) -> dict[str, float]:

@@ -109,7 +109,7 @@ def write_set_diagnosis(path: Path, found: SetDiagnosis) -> None:
             "format": FORMAT, "verdict": found.verdict, "sentence": found.sentence, "threshold": found.threshold,
             "findings": [asdict(f) | {"alike": list(f.alike)} for f in found.findings],
             "refused": [f.label for f in found.refused],
-            "held_out_before": found.before.fit["held_out_rms"], "held_out_after": found.after.fit["held_out_rms"],
+            "held_out_before": found.error_without, "held_out_after": found.after.fit["held_out_rms"],
             "advice": list(found.advice), "known": standing_as_plain(found.standing),
             "fit": {"before": {"model": list(found.before.model)}},
             "alone": alone(found.first.evidence, found.first.first), "recurrence": _recurrence(found.recurrence),

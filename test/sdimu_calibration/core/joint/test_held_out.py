@@ -7,8 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from sdimu_calibration.core.joint.set_diagnosis import diagnose_set
 from sdimu_calibration.core.joint.set_evidence import held_out, held_out_chance
 from sdimu_calibration.core.joint.set_fit import SetFit, SetOptions, fit_set, prior_weight, with_reports
+from sdimu_calibration.report import first_screen
 from sdimu_calibration.storage.config import load_model
 
 from .conftest import here, short, unit_set
@@ -46,3 +48,20 @@ def test_what_chance_reaches_is_known_for_two_recordings(two):
 def test_power_ons_that_differ_are_beyond_chance(two):
     # Their biases were switched on anew, which this model denies.
     assert held_out_chance(two, held_out(two).rms) < 1e-6
+
+
+def test_two_recordings_that_lack_an_effect_show_it_in_the_noise_of_those_that_have_it(options):
+    """By itself each recording takes what it lacks for noise, in which its error is no larger than with the effect."""
+    some = unit_set(36, [short("kim18_signed")] * 2, ("accel_quadratic_x=30 ug/g^2",))
+    found = diagnose_set(some.members, options, here)
+    with_it = found.after.fit["held_out_rms"]
+    assert [f.label for f in found.findings] == ["accel_quadratic_x"]
+    assert with_it < 1.25
+    assert found.before.fit["held_out_rms"] < 0.5 * found.error_without
+    assert found.error_without > 1.5 * with_it
+    assert f"in one noise: {found.error_without:.3f} -> {with_it:.3f}" in found.sentence
+    assert first_screen.of_set(found).costs[0][0].startswith(f"{found.error_without:.2f} ")
+
+
+def test_a_model_without_one_of_its_coefficients_predicts_worse(two):
+    assert held_out(two, ("gyro_bias_x",)).rms > 2.0 * held_out(two).rms

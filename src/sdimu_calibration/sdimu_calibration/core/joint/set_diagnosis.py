@@ -16,7 +16,7 @@ from sdimu_calibration.core.joint.member import Member
 from sdimu_calibration.core.joint.recurrence import Recurrence, recurrence
 from sdimu_calibration.core.joint.recurrence_words import answer_in_words, next_steps
 from sdimu_calibration.core.joint.scope import tagged
-from sdimu_calibration.core.joint.set_evidence import SetEvidence, held_out_chance
+from sdimu_calibration.core.joint.set_evidence import SetEvidence, held_out, held_out_chance
 from sdimu_calibration.core.joint.set_fit import Run, SetFit, SetOptions
 from sdimu_calibration.core.joint.set_result import SCATTERS, base_fit, set_outcome
 from sdimu_calibration.core.joint.set_search import SetSearch, as_given, search_set
@@ -86,6 +86,9 @@ class SetDiagnosis:
         What comes back of that what the model leaves in the stops; None where it leaves nothing.
     refused : tuple of SetFinding
         Effects that were found and taken back, as recordings held out fit worse with them.
+    error_without : float or None
+        Held-out error (sigma) without the effects that were found in all recordings, in the noise of the model with
+        them. By itself that model learns in each recording what it lacks as noise, and its own error hides it.
     """
 
     verdict: str
@@ -99,6 +102,7 @@ class SetDiagnosis:
     first: Search[SetEvidence]
     recurrence: Recurrence | None
     refused: tuple[SetFinding, ...] = ()
+    error_without: float | None = None
 
 
 def diagnose_set(
@@ -133,12 +137,21 @@ def diagnose_set(
         word = _verdict(findings, after, found.after, again)
     test = base_fit(found.after).test
     standing = replace(found.standing, site=test.origin.site)
-    sentence = f"{_sentence(word, findings, (before, after), again)} {taken_back}".strip()
+    without = _error_without(found)
+    sentence = f"{_sentence(word, findings, (without, after), again)} {taken_back}".strip()
     return SetDiagnosis(
         word, sentence, findings, before, after, found.threshold,
         _advice(word, findings, next_recording(found.after, standing, test), again), standing, found.first, again,
-        refused,
+        refused, without,
     )  # fmt: skip
+
+
+def _error_without(found: SetSearch) -> float | None:
+    """Held-out error without what was chosen, in the noise of the fit with it; None where nothing can be held out."""
+    names = found.after.names
+    lacks = [c.parameter.name if c.parameter.name in names else c.label for c in found.chosen]
+    told = held_out(found.after, lacks)
+    return None if told is None else told.rms
 
 
 def _findings(found: SetSearch) -> tuple[SetFinding, ...]:
@@ -189,15 +202,18 @@ def _scatter(result: Calibration) -> float:
 
 
 def _sentence(
-    word: str, findings: Sequence[SetFinding], results: tuple[Calibration, Calibration], again: Recurrence | None
+    word: str, findings: Sequence[SetFinding], errors: tuple[float | None, Calibration], again: Recurrence | None
 ) -> str:
-    """Say what was found, then what comes back of that what the model leaves."""
+    """Say what was found, then what comes back of that what the model leaves.
+
+    `errors` are the one without what was found, in the noise of the result with it, and that result.
+    """
     more = answer_in_words(again, word == "unexplained") if again else ""
-    return f"{_found(word, findings, *results, again)} {more}".strip()
+    return f"{_found(word, findings, *errors, again)} {more}".strip()
 
 
 def _found(
-    word: str, findings: Sequence[SetFinding], before: Calibration, after: Calibration, again: Recurrence | None
+    word: str, findings: Sequence[SetFinding], without: float | None, after: Calibration, again: Recurrence | None
 ) -> str:
     listed = [_named(f) for f in findings]
     names = " and ".join(listed[:_LISTED]) + (f" and {len(listed) - _LISTED} more" if len(listed) > _LISTED else "")
@@ -212,7 +228,7 @@ def _found(
         shared = again is not None and again.answer and not _odd(after)
         what = "The recordings share something" if shared else "Something differs between the recordings"
         return f"{what} that no effect of the catalogue explains.{most}{_odd(after)}"
-    falls = f"error at recordings held out: {_rms(before)} -> {_rms(after)}"
+    falls = f"error at recordings held out, in one noise: {_shown(without)} -> {_rms(after)}"
     if word == "class of effects":
         others = ", ".join(findings[0].alike[:_LISTED])
         return f"One effect is missing: {names}, or what looks the same in these recordings ({others}); {falls}."
@@ -227,8 +243,8 @@ def _named(f: SetFinding) -> str:
 def _taken_back(findings: Sequence[SetFinding], before: Calibration, after: Calibration) -> str:
     names = ", ".join(f.label for f in findings[:_LISTED]) + (", ..." if len(findings) > _LISTED else "")
     return (
-        f"The model stays as given: with {names} the error at recordings held out rises from {_rms(before)} to "
-        f"{_rms(after)}."
+        f"The model stays as given: with {names} the error at recordings held out, each model in the noise that it "
+        f"leaves, rises from {_rms(before)} to {_rms(after)}."
     )
 
 
@@ -244,7 +260,10 @@ def _odd(result: Calibration) -> str:
 
 
 def _rms(result: Calibration) -> str:
-    value = result.fit["held_out_rms"]
+    return _shown(result.fit["held_out_rms"])
+
+
+def _shown(value: float | None) -> str:
     return "-" if value is None else f"{value:.3f}"
 
 

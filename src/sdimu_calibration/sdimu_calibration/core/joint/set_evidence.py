@@ -129,12 +129,22 @@ def white_power_on(
     return Rows(parts[-2], parts[-1][:, 0]), parts[:-2]
 
 
-def held_out(fit: SetFit) -> HeldOut | None:
-    """Predict every power-on from the others, every recording where there is one; None for a single one."""
+def held_out(fit: SetFit, without: Sequence[str] = ()) -> HeldOut | None:
+    """Predict every power-on from the others, every recording where there is one; None for a single one.
+
+    Parameters
+    ----------
+    fit : SetFit
+    without : sequence of str
+        Coefficients of the fit that the model lacks; the noise stays that of the fit, in which it compares.
+    """
     evidence = set_evidence(fit, ())
     if len(np.unique(evidence.stop)) < 2:
         return None
-    return predict(evidence, evidence.model, evidence.weight, evidence.shift)
+    lacks = np.isin(evidence.names, list(without))
+    kept = np.flatnonzero(~lacks)
+    bare = replace(evidence, e=evidence.e + evidence.W[:, lacks] @ fit.estimate.values[lacks])
+    return predict(bare, kept, evidence.weight[kept], evidence.shift[kept])
 
 
 def held_out_chance(fit: SetFit, rms: float) -> float:
