@@ -142,6 +142,17 @@ def test_a_set_takes_each_recording_without_its_azimuth(hidden):
     assert again.start.coefficients_of(NAMES) == pytest.approx(alone.start.coefficients_of(NAMES))
 
 
+def test_a_navigation_without_aid_drifts_as_promised_in_the_noise_that_was_learned(hidden):
+    """White noise promises a ninth: it knows neither that the biases wander nor that their wander bent the fit."""
+    learned, white = (
+        [(d.distance[-1] / d.promised[-1]) ** 2 for fit in fits for trial in fit.free_inertial([])
+         for d in trial.drifts[1:]]
+        for fits in ([fit for fit, _ in hidden], [fit.with_noise(None) for fit, _ in hidden])
+    )  # fmt: skip
+    assert np.sqrt(np.mean(white)) > 4.0
+    assert 0.3 < np.sqrt(np.mean(learned)) < 2.5
+
+
 def test_an_adaptive_test_does_not_take_the_convention_for_knowledge(hidden):
     fit, _ = hidden[0]
     at = so_far(fit)

@@ -20,6 +20,10 @@ from sdimu_calibration.core.alignment.prepared import PreparedData, TestSetup, f
 from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.compiled import compiled
 from sdimu_calibration.core.estimation.holdout import WANTED_S, Segment, holdout_segments, part
+from sdimu_calibration.core.estimation.noise_estimate import NoiseEstimate
+from sdimu_calibration.core.estimation.stretch_doubt import doubt_in_stretch
+from sdimu_calibration.core.evidence.learned_noise import Wander
+from sdimu_calibration.core.evidence.navigation_evidence import NavigationEvidence
 from sdimu_calibration.core.filter.filter_pass import COPY, NAV, PassInput, PassOutput, PassState, new_output, run_pass
 from sdimu_calibration.core.filter.passes import CONVERGED, Pass, one_pass, pass_input, pass_settings
 from sdimu_calibration.core.measurement_kind import SENSORS, SKIP
@@ -128,6 +132,17 @@ class Navigator(Protocol):
     def estimate_covariance(self) -> Floats:
         """Covariance of `estimate` (SI), shape (q, q)."""
 
+    @property
+    def noise(self) -> NoiseEstimate | None:
+        """Noise with a memory that was learned."""
+
+    @property
+    def wander(self) -> Wander:
+        """How wandering biases of the sensors would show in the recording."""
+
+    def evidence(self) -> NavigationEvidence:
+        """Whitened innovations about this fit and the signatures of its coefficients."""
+
     def on(self, prepared: PreparedData, C_nb: Floats) -> Navigator:
         """Fit the same model to a part of the recording.
 
@@ -162,7 +177,7 @@ class Refit:
     fit : Navigator
         Of the same model: how it takes errors out of samples.
     estimate, covariance : ndarray, shapes (q,) and (q, q)
-        Coefficients of the estimator by the part alone (SI).
+        Coefficients of the estimator by the part alone (SI); for a navigation with what noise with a memory adds there.
     """
 
     fit: Navigator
@@ -201,8 +216,21 @@ def _run(
     drifts = [free_navigation(NOTHING, prepared, None, fits[0][1].setup, segment, reference)]
     for name, fit in fits:
         again = refit(fit, seen, fit.last.output.C_nb[max(segment.seen[0] - 1, 0)])
+        again = _in_learned_noise(again, fit, segment)
         drifts.append(free_navigation(name, prepared, again, fit.setup, segment, reference))
     return FreeInertialRun(segment, tuple(drifts))
+
+
+def _in_learned_noise(again: Refit, fit: Navigator, segment: Segment) -> Refit:
+    """Let the covariance of a refit hold in the segment, in the noise that the fit of the whole recording learned."""
+    if fit.noise is None:
+        return again
+    at = (segment.begin_s - segment.levelled_s, segment.begin_s + segment.length_s)
+    evidence = fit.evidence()
+    rows = (evidence.epoch >= segment.seen[0]) & (evidence.epoch < segment.seen[1])
+    return replace(
+        again, covariance=again.covariance + doubt_in_stretch(evidence, rows, fit.wander, fit.noise.terms, at)
+    )
 
 
 def refit(fit: Navigator, seen: PreparedData, C_nb: Floats) -> Refit:
@@ -355,7 +383,7 @@ def _navigate(
 def _promised(
     clean: PreparedData, seen: Refit, terms: Compensated, levelling: int, C_start: Floats, sigma_azimuth: float
 ) -> Floats:
-    """One sigma of the horizontal distance (m) that the covariance of the fit gives at the end of each epoch, (k,).
+    """One sigma of the horizontal distance (m) that the covariance of the refit gives at the end of each epoch, (k,).
 
     The filter of the fit levels by Zf alone, with everything it knows of the coefficients, and then measures nothing.
     """
