@@ -128,6 +128,15 @@ def test_noise_that_was_learned_has_a_column(run):
     assert "gyro bias instability (flicker) 0.018 deg/h" in after
 
 
+def test_errors_in_white_noise_are_said_to_be_that_beside_the_one_in_learned_noise(run):
+    learned = {**SECOND.fit, "nis_in_noise": 1.02, "held_out_in_noise": 1.076}
+    _, out, _ = run(FIRST, replace(SECOND, noise=(NoiseTerm("gyro", "flicker", size=1e-7),), fit=learned))
+    after = next(text for text in out.splitlines() if "run1" in text)
+    assert "held-out 1.076" in after
+    assert "nis and held-out: in the white noise of the IMU's file" in out
+    assert "white noise of the IMU's file" not in run(FIRST, SECOND)[1]
+
+
 def test_one_folder_is_not_enough(run):
     status, _, err = run(FIRST)
     assert status == 1

@@ -13,7 +13,7 @@ from rich.console import Console
 
 from sdimu_calibration.api.coefficient import Coefficient
 from sdimu_calibration.core.arrays import Floats
-from sdimu_calibration.core.error_figures import held_out, nis
+from sdimu_calibration.core.error_figures import held_out, held_out_judged, nis, nis_judged, noise_learned
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.report.table import cells, headings, rich_table, rows
@@ -89,9 +89,13 @@ class Fitted:
         )
 
     def _figures(self) -> str:
-        error = held_out(self.result)
-        shown = "" if math.isnan(error) else f", held-out error {error:.3f}"
-        return "; ".join([f"NIS {nis(self.result):.3f}{shown} (1 is right)", *self.result.inseparable])
+        right = _errors(nis_judged(self.result), held_out_judged(self.result))
+        if noise_learned(self.result):
+            white = _errors(nis(self.result), held_out(self.result))
+            right = f"{right} in the noise that was learned (1 is right; in white noise {white})"
+        else:
+            right = f"{right} (1 is right)"
+        return "; ".join([right, *self.result.inseparable])
 
     def to_dataframe(self) -> pd.DataFrame:
         """Coefficients as a table: name, value, sigma, unit (customary).
@@ -107,3 +111,8 @@ class Fitted:
             raise DataError("to_dataframe needs pandas: pip install pandas") from error
         numbers = [(c.name, *c.to(c.display_unit), c.display_unit) for c in self]
         return pd.DataFrame(numbers, columns=["name", "value", "sigma", "unit"]).set_index("name")
+
+
+def _errors(squared: float, error: float) -> str:
+    """Name NIS and held-out error; the latter where it was computed."""
+    return f"NIS {squared:.3f}" + ("" if math.isnan(error) else f", held-out error {error:.3f}")

@@ -106,7 +106,7 @@ def diagnose(
 ) -> None:
     """Find what the model is missing; leaves diagnosis.json and report.html, and result.json of the model found."""
     given = dict(locals())
-    from sdimu_calibration.cli.diagnosis_text import print_summary
+    from sdimu_calibration.cli.diagnosis_text import notes_of_diagnosis, print_summary
     from sdimu_calibration.cli.next_commands import Asked
     from sdimu_calibration.cli.progress import bar
     from sdimu_calibration.core.diagnosis.bootstrap import bootstrap as repeat_on_noise
@@ -114,7 +114,6 @@ def diagnose(
     from sdimu_calibration.core.diagnosis.summary import summarise
     from sdimu_calibration.core.estimation.solve import solve
     from sdimu_calibration.core.recording import DataError
-    from sdimu_calibration.core.results import without_advice
     from sdimu_calibration.storage.effect_file import find_effects
     from sdimu_calibration.storage.model_choice import HANDHELD, named_estimator
     from sdimu_calibration.storage.trace import traced
@@ -158,8 +157,7 @@ def diagnose(
     with bar(console) as progress:
         trace = traced([bag], sys.argv[1:], site=site, imu=imu, model=model)
         _write(about, f"Diagnosis of {bag.name}", summary, null, progress, trace)
-    more = without_advice(found.after.notes) if found.fit.learns_scatter else found.after.inseparable
-    tell(console, (*notes, *(note for note in more if note not in notes)))
+    tell(console, (*notes, *(note for note in notes_of_diagnosis(found) if note not in notes)))
     say(console, f"results in {folder}")
     answer(folder / "diagnosis.json", as_json)
     leave(found.after)

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from sdimu_calibration.cli.next_commands import Asked
+    from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
     from sdimu_calibration.core.diagnosis.found import DetectableSize, Found
     from sdimu_calibration.core.diagnosis.ladder import Rung
     from sdimu_calibration.core.diagnosis.search import Step
@@ -43,6 +44,21 @@ def print_summary(console: Console, summary: DiagnosisSummary, asked: Asked) -> 
     print_advice(console, summary.advice, asked)
 
 
+def notes_of_diagnosis(d: Diagnosis) -> tuple[str, ...]:
+    """Return the notes of the fit that still hold: all of a run by hand, else its warnings and that headings are lost.
+
+    What stands among the findings is not said twice.
+    """
+    from sdimu_calibration.core.estimation.second_order_fit import NO_AZIMUTH
+    from sdimu_calibration.core.results import without_advice
+
+    if d.fit.learns_scatter:
+        return without_advice(d.after.notes)
+    said = {finding.text for finding in d.findings}
+    lost = [note for note in d.after.notes if note == NO_AZIMUTH]
+    return tuple(note for note in without_advice((*lost, *d.after.warnings)) if note not in said)
+
+
 def amount(value: float, unit: str, digits: int = 3) -> str:
     """Write an SI number in `unit`; the unit itself stays out."""
     try:
@@ -56,7 +72,8 @@ def _where(console: Console, summary: DiagnosisSummary) -> None:
     if summary.diagnosis.adequate or not top:
         return
     places = ", ".join(f"{w.channel} at stop {w.stop} ({w.normalised_mean:+.1f} sigma)" for w in top)
-    line(console, f"worst: {places}")
+    white = " in white noise" if summary.diagnosis.found.noise else ""
+    line(console, f"worst{white}: {places}")
 
 
 def _candidates(console: Console, summary: DiagnosisSummary) -> None:

@@ -12,14 +12,30 @@ from sdimu_calibration.core.results import Calibration
 def held_out(result: Calibration) -> float:
     """RMS of the normalised prediction errors where the fit has not seen the data; 1 is right, NaN if not computed.
 
+    In the white noise of the IMU's file, so that models compare; `held_out_judged` is the one that judges a fit.
     Stops of a table are left out a third at a time, rests of a hand one at a time, recordings of a set one at a time.
     """
     return _number(result.fit.get("held_out_rms"))
 
 
 def nis(result: Calibration) -> float:
-    """Mean of the squared normalised innovations of the last pass; 1 is right, NaN if not computed."""
+    """Mean of the squared normalised innovations of the last pass in white noise; 1 is right, NaN if not computed."""
     return _number(result.fit.get("nis_mean"))
+
+
+def noise_learned(result: Calibration) -> bool:
+    """Whether the result has figures in noise with a memory, beside those in the white noise of the IMU's file."""
+    return result.fit.get("held_out_in_noise") is not None
+
+
+def held_out_judged(result: Calibration) -> float:
+    """Held-out error that judges a fit, in the noise that was learned where any was; NaN if not computed."""
+    return _number(result.fit.get("held_out_in_noise")) if noise_learned(result) else held_out(result)
+
+
+def nis_judged(result: Calibration) -> float:
+    """NIS that judges a fit, in the noise that was learned where any was; NaN if not computed."""
+    return _number(result.fit.get("nis_in_noise")) if noise_learned(result) else nis(result)
 
 
 def log_likelihood(result: Calibration) -> float:

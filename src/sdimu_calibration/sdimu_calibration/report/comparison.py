@@ -5,7 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from sdimu_calibration.core.diagnosis.ladder import moved_coefficients
-from sdimu_calibration.core.error_figures import by_hand, held_out_ladder, log_likelihood, nis
+from sdimu_calibration.core.error_figures import (
+    by_hand,
+    held_out_judged,
+    held_out_ladder,
+    log_likelihood,
+    nis,
+    noise_learned,
+)
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.units import from_si
@@ -19,6 +26,10 @@ _BY_HAND = (
     "learns a scatter of its own, in which its NIS and its own held-out error are near 1"
 )
 _TWO_KINDS = "some by hand and some navigated: neither log-likelihoods nor held-out errors compare"
+_IN_WHITE = (
+    "nis and held-out: in the white noise of the IMU's file, in which models compare; where noise was learned, 1 is "
+    "right for the error in that noise"
+)
 _MOST_MOVED = 6
 
 
@@ -61,15 +72,17 @@ def remarks(results: Sequence[Calibration]) -> tuple[str, ...]:
     return (
         *([_OTHER_STOPS] if any(_differ(result, results[0], "stops") for result in results[1:]) else []),
         *([_OTHER_SCALE] if any(_differ(result, results[0], "conditions") for result in results[1:]) else []),
+        *([_IN_WHITE] if any(map(noise_learned, results)) else []),
         *([_BY_HAND] if all(handheld) else [_TWO_KINDS] if any(handheld) else []),
     )
 
 
 def _noise(result: Calibration) -> str:
-    """Noise with a memory that was learned, in words with sizes."""
-    return ", ".join(
+    """Noise with a memory that was learned, in words with sizes, and the held-out error in it."""
+    terms = ", ".join(
         f"{term.words} {from_si(term.size, term.display_unit):.2g} {term.display_unit}" for term in result.noise
-    ) or "none"
+    )
+    return (terms or "none") + (f"; held-out {held_out_judged(result):.3f}" if noise_learned(result) else "")
 
 
 def _check_same_data(names: Sequence[str], results: Sequence[Calibration]) -> None:

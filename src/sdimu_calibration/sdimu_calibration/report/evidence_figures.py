@@ -121,10 +121,11 @@ def ranking(entries: Sequence[data.Scored], threshold: float) -> Figure:
     return lay_out(figure, 24 * len(shown) + 150, showlegend=True, margin=margin, legend=_LEGEND)
 
 
-def rungs(names: Sequence[str], values: Sequence[float], height: int = 300) -> Figure:
+def rungs(names: Sequence[str], values: Sequence[float], height: int = 300, white: bool = False) -> Figure:
     """Draw how far the held-out error of each model is from 1, each with its name and number.
 
-    The axis holds what there is and not zero: beside it a fall of many sigmas looks flat.
+    The axis holds what there is and not zero: beside it a fall of many sigmas looks flat. `white` says that noise with
+    a memory was learned, and that the errors are not in it.
     """
     figure = Figure()
     for k, (name, value) in enumerate(zip(names, values, strict=True)):
@@ -143,7 +144,8 @@ def rungs(names: Sequence[str], values: Sequence[float], height: int = 300) -> F
     figure.shape("line", x0=1.0, x1=1.0, line=_LIMIT)
     known = [v for v in (*values, 1.0) if np.isfinite(v)]
     room = max(0.08 * (max(known) - min(known)), 0.02)
-    figure.x_axes(title="held-out error (sigma); 1 is right", range=[min(known) - room, max(known) + room])
+    title = "held-out error in white noise (sigma)" if white else "held-out error (sigma); 1 is right"
+    figure.x_axes(title=title, range=[min(known) - room, max(known) + room])
     figure.y_axes(range=[len(names) - 0.6, -0.7], showticklabels=False, ticks="", showgrid=False, title="model")
     return lay_out(figure, height, margin={"l": 30, "r": 25, "t": 10, "b": 50})
 

@@ -12,7 +12,8 @@ import numpy as np
 
 from sdimu_calibration.core.diagnosis.ladder import error_ladder, moved_coefficients
 from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary
-from sdimu_calibration.core.error_figures import by_hand, held_out, nis
+from sdimu_calibration.core.error_figures import by_hand, held_out, held_out_judged, nis_judged, noise_learned
+from sdimu_calibration.core.estimation.second_order_fit import NO_AZIMUTH
 from sdimu_calibration.core.joint.set_diagnosis import SetDiagnosis
 from sdimu_calibration.core.results import Calibration, without_advice
 from sdimu_calibration.core.units import from_si
@@ -25,6 +26,8 @@ GOOD, DOUBTFUL, BAD = "good", "doubtful", "bad"
 _MARKS = {GOOD: "\N{CHECK MARK}", DOUBTFUL: "!", BAD: "\N{HEAVY BALLOT X}"}
 _WORDS = {GOOD: "The model explains the data", DOUBTFUL: "With reservations", BAD: "The model is wrong"}
 _ARROW = " \N{RIGHTWARDS ARROW} "
+_IN_WHITE = "in the white noise of the IMU's file, for comparing models"
+"""What an error means that is not in the noise that was learned."""
 _WORST = 3
 """Number of coefficients that are named as off, and of pieces of advice that are shown at once."""
 
@@ -45,6 +48,8 @@ class Verdict:
     advice : tuple of str
         What to do next, the most useful first.
     cost_title : str
+    remarks : tuple of str
+        What a reader must know before the numbers, besides the verdict.
     """
 
     tone: str
@@ -52,6 +57,7 @@ class Verdict:
     costs: tuple[tuple[str, str], ...] = ()
     advice: tuple[str, ...] = ()
     cost_title: str = field(default="What it costs to ignore it")
+    remarks: tuple[str, ...] = ()
 
 
 def of_diagnosis(summary: DiagnosisSummary, spell: Spell | None = None) -> Verdict:
@@ -69,7 +75,13 @@ def of_diagnosis(summary: DiagnosisSummary, spell: Spell | None = None) -> Verdi
         advice.append(_unseen(summary))
     costs = _costs(summary)
     title = "What it costs to ignore it" if summary.found else "How well it predicts"
-    return Verdict(tone, head, costs, tuple(advice_html(text, spell) for text in advice), title)
+    told = tuple(advice_html(text, spell) for text in advice)
+    return Verdict(tone, head, costs, told, title, _remarks(d.after))
+
+
+def _remarks(calibration: Calibration) -> tuple[str, ...]:
+    """Repeat the note that a fit knows no headings, if it has it."""
+    return tuple(prose(_capital(note)) + "." for note in calibration.notes if note == NO_AZIMUTH)
 
 
 def _unseen(summary: DiagnosisSummary) -> str:
@@ -101,8 +113,11 @@ def _costs(summary: DiagnosisSummary) -> tuple[tuple[str, str], ...]:
     rungs = error_ladder(d)
     where = "rests" if d.fit.learns_scatter else "stops"
     values = [f"{value:.2f}" for value in dict.fromkeys((rungs[0][1], rungs[-1][1])) if np.isfinite(value)]
+    if noise_learned(d.after):
+        out.append(_in_noise(held_out_judged(d.after)))
     if values:
-        out.append((_ARROW.join(values), f"sigma: held-out error, at {where} that the fit has not seen; 1 is right"))
+        means = _IN_WHITE if noise_learned(d.after) else "1 is right"
+        out.append((_ARROW.join(values), f"sigma: held-out error, at {where} that the fit has not seen; {means}"))
     units = dict(zip(d.before.names, d.before.display_units, strict=True))
     at = {name: k for k, name in enumerate(d.before.names)}
     for name, sigmas in moved_coefficients(d.before, d.after)[:_WORST]:
@@ -113,6 +128,10 @@ def _costs(summary: DiagnosisSummary) -> tuple[tuple[str, str], ...]:
             f"<code>{name}</code> is off without it: {abs(sigmas):.0f} of its sigmas",
         ))  # fmt: skip
     return tuple(out)
+
+
+def _in_noise(error: float) -> tuple[str, str]:
+    return f"{error:.2f}", "sigma: held-out error in the noise that was learned, a stop left out at a time; 1 is right"
 
 
 def of_fit(calibration: Calibration, spell: Spell | None = None) -> Verdict:
@@ -131,24 +150,27 @@ def of_fit(calibration: Calibration, spell: Spell | None = None) -> Verdict:
     says = f"Find {'which effect is missing' if tone == BAD else 'out whether smaller effects are missing'}"
     advice = [*(["Check the IMU file, the site, units and axes."] if grave else []), f"{says}: sdimu diagnose {bag}"]
     told = tuple(advice_html(text, spell) for text in advice)
-    return Verdict(tone, head, costs, told, "How well it predicts")
+    return Verdict(tone, head, costs, told, "How well it predicts", _remarks(calibration))
 
 
 def _fit_figures(calibration: Calibration) -> tuple[tuple[str, str], ...]:
-    error, squared = held_out(calibration), nis(calibration)
+    error, squared, learned = held_out(calibration), nis_judged(calibration), noise_learned(calibration)
     left_out = "recordings" if calibration.of_set else "rests" if by_hand(calibration) else "stops"
-    out = []
+    out = [_in_noise(held_out_judged(calibration))] if learned else []
     if np.isfinite(error):
-        out.append((f"{error:.2f}", f"sigma: held-out error, at {left_out} that the fit has not seen; 1 is right"))
+        means = _IN_WHITE if learned else "1 is right"
+        out.append((f"{error:.2f}", f"sigma: held-out error, at {left_out} that the fit has not seen; {means}"))
     if np.isfinite(squared):
-        out.append((f"{squared:.3f}", "NIS: mean squared innovation over what the noise explains; 1 is right"))
+        noise = "noise that was learned" if learned else "noise"
+        out.append((f"{squared:.3f}", f"NIS: mean squared innovation over what the {noise} explains; 1 is right"))
     return tuple(out)
 
 
 def of_set(found: SetDiagnosis, spell: Spell | None = None) -> Verdict:
     """Say what was found in a set of recordings; `spell` makes whole commands of its advice."""
     tone = GOOD if found.verdict == "consistent" else BAD
-    before, after = held_out(found.before), held_out(found.after)
+    after = held_out(found.after)
+    before = after if found.error_without is None else found.error_without
     values = [f"{value:.2f}" for value in dict.fromkeys((before, after)) if np.isfinite(value)]
     costs = ((_ARROW.join(values), "sigma: held-out error, recordings left out; 1 is right"),) if values else ()
     advice = found.advice or ("Nothing: use the coefficients of this page.",)
@@ -169,7 +191,8 @@ def render(verdict: Verdict, *pictures: str) -> str:
     return (
         f'<section id="verdict"><h2 class="skip">Verdict</h2><div class="verdict {verdict.tone}" role="status">'
         f'<p class="head"><span class="mark" aria-hidden="true">{_MARKS[verdict.tone]}</span> '
-        f'<span class="tag">{_WORDS[verdict.tone]}</span> {verdict.head}</p></div>'
+        f'<span class="tag">{_WORDS[verdict.tone]}</span> {verdict.head}</p>'
+        f"{''.join(f'<p>{text}</p>' for text in verdict.remarks)}</div>"
         f'<div class="columns"><section class="card"><h2>{verdict.cost_title}</h2>'
         f'<ul class="numbers">{costs}</ul></section>'
         f'<section class="card"><h2>What to do next</h2><ol>{shown}</ol>{more}</section></div>'

@@ -10,6 +10,7 @@ from typing import Any
 
 from sdimu_calibration.core.diagnosis.ladder import error_ladder
 from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary
+from sdimu_calibration.core.error_figures import noise_learned
 from sdimu_calibration.core.estimation.fit import Fit
 from sdimu_calibration.core.estimation.navigation_fit import NavigationFit
 from sdimu_calibration.core.joint.set_diagnosis import SetDiagnosis
@@ -19,7 +20,7 @@ from sdimu_calibration.report.advice import Spell
 from sdimu_calibration.report.coefficients import coefficients_section
 from sdimu_calibration.report.design.sheet import document
 from sdimu_calibration.report.drawing import html
-from sdimu_calibration.report.markup import Draw, prose, section
+from sdimu_calibration.report.markup import Draw, prose, quiet, section
 from sdimu_calibration.report.report_extras import ReportExtras
 from sdimu_calibration.report.rests_section import rests_section
 from sdimu_calibration.report.set_sections import recurrence_section, set_sections
@@ -136,10 +137,11 @@ def _first(
         rungs = error_ladder(summary.diagnosis)
         handheld = summary.diagnosis.fit.learns_scatter
         maps = handheld_sections.heat_maps(summary, draw) if handheld else sections.heat_maps(summary.diagnosis, draw)
-        return first_screen.render(verdict, _ladder(rungs, draw), maps)
+        return first_screen.render(verdict, _ladder(rungs, noise_learned(summary.diagnosis.after), draw), maps)
     if of_set is not None:
         return first_screen.render(first_screen.of_set(of_set, spell))
-    maps = sections.heat_map_card([fit.consistency()], draw) if isinstance(fit, NavigationFit) else ""
+    learned = bool(calibration.noise)
+    maps = sections.heat_map_card([fit.consistency()], draw, learned) if isinstance(fit, NavigationFit) else ""
     return first_screen.render(first_screen.of_fit(calibration, spell), maps)
 
 
@@ -148,12 +150,16 @@ def _lacks(calibration: Calibration, summary: DiagnosisSummary | None) -> tuple[
     return () if summary is None else tuple(n for n in summary.diagnosis.after.names if n not in calibration.names)
 
 
-def _ladder(rungs: Sequence[tuple[str, float]], draw: Draw) -> str:
+_WHITE_LADDER = "In the white noise of the IMU's file, in which models compare: learned noise counts as error here."
+
+
+def _ladder(rungs: Sequence[tuple[str, float]], learned: bool, draw: Draw) -> str:
     names, values = zip(*rungs, strict=True)
     if len(rungs) < 2:
         return ""
-    figure = draw(evidence_figures.rungs(names, values, _LADDER))
-    return f'<section class="card"><h2>How far the error falls</h2>{figure}</section>'
+    figure = draw(evidence_figures.rungs(names, values, _LADDER, learned))
+    told = quiet(_WHITE_LADDER) if learned else ""
+    return f'<section class="card"><h2>How far the error falls</h2>{figure}{told}</section>'
 
 
 def _evidence(

@@ -91,9 +91,14 @@ def heat_maps(diagnosis: Diagnosis) -> Figure:
     for place, (title, grid) in enumerate(grids, 1):
         axes = figure.add_subplot(len(grids), 1, place)
         draw_heat_map(axes, grid)
-        axes.set_title(f"{title}: mean innovation over its sigma")
+        axes.set_title(f"{title}: mean innovation over its sigma{_in_white(diagnosis)}")
     axes.set_xlabel("stop")
     return figure
+
+
+def _in_white(diagnosis: Diagnosis) -> str:
+    """Say that figures are in white noise where noise with a memory was learned."""
+    return " in white noise" if diagnosis.found.noise else ""
 
 
 def draw_heat_map(axes: Any, grid: data.Grid, channels: Sequence[str] = CHANNEL_NAMES) -> None:
@@ -144,7 +149,7 @@ def ladder(diagnosis: Diagnosis) -> Figure:
     low, high = min(*errors, 1.0), max(*errors, 1.0)
     room = max(0.15 * (high - low), 0.02)
     axes.set_ylim(low - room, high + room)
-    axes.set_ylabel("held-out error (sigma)")
+    axes.set_ylabel(f"held-out error{_in_white(diagnosis)} (sigma)")
     axes.legend(frameon=False, fontsize=8)
     return figure
 

@@ -30,7 +30,7 @@ class ReportExtras:
 
 def report_extras(diagnosis: Diagnosis) -> ReportExtras:
     """Work out what the page of a diagnosis shows in addition."""
-    rivals = [("with what was found", diagnosis.extended)] if diagnosis.extended is not diagnosis.fit else []
+    rivals = [("with what was found", diagnosis.extended)] if len(diagnosis.found.chosen) else []
     table = diagnosis.fit.test.recording.table
     try:
         return ReportExtras(table, diagnosis.fit.free_inertial(rivals))

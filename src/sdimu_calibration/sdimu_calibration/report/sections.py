@@ -33,7 +33,8 @@ def numbers(d: Diagnosis) -> str:
         f"free inputs: chi-square {d.free_inputs_before.chi2:.0f}"
         + (f" -> {left.chi2:.0f}" if len(d.found.chosen) else "")
         + f" of {left.dof} degrees of freedom",
-        f"squared innovations {c.nis_mean:.3f} a degree of freedom, {c.first_nis:.2f} in the first second after turns",
+        f"squared innovations{' in white noise' if d.found.noise else ''} {c.nis_mean:.3f} a degree of freedom, "
+        f"{c.first_nis:.2f} in the first second after turns",
         f"white noise over specification: gyro {c.gyro.ratio:.3f}, accelerometer {c.accel.ratio:.3f}",
     ]
     return " \N{MIDDLE DOT} ".join(words) + "."
@@ -199,19 +200,26 @@ def confused(summary: DiagnosisSummary, spell: Spell | None = None) -> str:
 
 def heat_maps(diagnosis: Diagnosis, draw: Draw) -> str:
     """Return the heat map of the model as given and of that with what was found, one scale, one at a time."""
-    fits = [diagnosis.fit] if diagnosis.extended is diagnosis.fit else [diagnosis.fit, diagnosis.extended]
+    fits = [diagnosis.fit, diagnosis.extended] if len(diagnosis.found.chosen) else [diagnosis.fit]
     if diagnosis.fit.learns_scatter:
         return ""
-    return heat_map_card([fit.consistency() for fit in fits], draw)
+    return heat_map_card([fit.consistency() for fit in fits], draw, bool(diagnosis.found.noise))
 
 
-def heat_map_card(found: Sequence[Consistency], draw: Draw) -> str:
-    """Return a card with the heat map of each check, one at a time."""
+_CELLS = "Mean innovation over its sigma, as the test went on: of 200 cells, one beyond 3 is chance."
+_WHITE_CELLS = (
+    "Mean innovation over its sigma in the white noise of the IMU's file, as the test went on. The noise that was "
+    "learned is not in that sigma: cells beyond 3 are no proof of missing physics here."
+)
+
+
+def heat_map_card(found: Sequence[Consistency], draw: Draw, learned: bool) -> str:
+    """Return a card with the heat map of each check, one at a time; `learned`: noise with a memory was."""
     figure = evidence_figures.heat_maps([data.where(one) for one in found])
     return (
         '<section class="card"><h2>Where it fails: channel by stop</h2>'
         + switched(draw(figure), ("model as given", "with what was found")[: len(found)])
-        + quiet("Mean innovation over its sigma, as the test went on: of 200 cells, one beyond 3 is chance.")
+        + quiet(_WHITE_CELLS if learned else _CELLS)
         + "</section>"
     )
 

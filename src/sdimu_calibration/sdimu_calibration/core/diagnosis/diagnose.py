@@ -22,6 +22,7 @@ from sdimu_calibration.core.diagnosis.screen import Finding, screen
 from sdimu_calibration.core.diagnosis.search import FALSE_ALARM, MOST_STEPS, Search, look_alikes, patchwork
 from sdimu_calibration.core.diagnosis.verdict import Verdict, sentence, verdict
 from sdimu_calibration.core.effects.effect import Effect
+from sdimu_calibration.core.error_figures import held_out_judged
 from sdimu_calibration.core.estimation.fit import NOT_CONVERGED, Fit
 from sdimu_calibration.core.estimation.noise_estimate import term_in_words
 from sdimu_calibration.core.estimation.noise_learning import in_white_noise
@@ -73,7 +74,8 @@ class Diagnosis:
         The verdict for people.
     adequate : bool
     p_value : float
-        Probability that a right model looks like this, from scan, free inputs and noise together.
+        Probability that a right model looks like this, from scan, free inputs and NIS together; where noise with a
+        memory was found, from scan and free inputs in that noise.
     findings : tuple of Finding
         Of the data screen.
     noise : tuple of str
@@ -81,7 +83,7 @@ class Diagnosis:
     consistency : Consistency
         Of the model as given.
     fit, extended : Fit
-        With the model as given, and with what was found added (the same object when nothing was).
+        With the model as given, and with what was found added; the latter with doubt about its model.
     before, after : Calibration
         Their results.
     found : Search
@@ -219,7 +221,7 @@ def climb(
     judged = not (fit.learns_scatter or done.found.noise or stated.epoch_s > EPOCH_S)
     excess = misfit(after, consistency, stated, imu) if judged else 0.0
     loud = excess > largest_misfit(float(after.fit["nis_dof"] or 1.0))
-    still = not fit.learns_scatter and _held_out(after) > STILL_WRONG
+    still = not fit.learns_scatter and held_out_judged(after) > STILL_WRONG
     # Wrong samples in turns leave noise that looks drawn anew in each turn.
     spoilt = any(finding.kind == "spike" for finding in findings)
     drawn = not spoilt and any(term.kind in DRAWN for term in done.found.noise)
@@ -256,10 +258,11 @@ def in_measured_noise(fit: Fit, progress: Progress = silent) -> tuple[Fit, Consi
     consistency = fit.consistency()
     noise, imu = measured_noise(consistency, fit)
     if noise:
-        fit = solve(
+        again = solve(
             fit.test.with_imu(imu), fit.model, fit.estimator, progress=progress, learn=False,
             azimuth_free=fit.azimuth_free,
         )  # fmt: skip
+        fit = replace(again, reason=fit.reason)
     return in_white_noise(fit), consistency, noise
 
 
@@ -331,16 +334,17 @@ def measured_noise(consistency: Consistency, fit: Fit) -> tuple[tuple[str, ...],
 
 
 def p_value(done: Round, consistency: Consistency, noise: bool) -> float:
-    """Probability that a right model looks like this, by scan, free inputs and NIS (Bonferroni over the three).
+    """Probability that a right model looks like this, by scan, free inputs and NIS (Bonferroni over those that count).
 
     Parameters
     ----------
     done : Round
-        Its first scan, and its free-input test with nothing added.
+        Its first scan, and its free-input test with nothing added, both in the noise that was found.
     consistency : Consistency
-        Of the model as given.
+        Of the model as given, in white noise.
     noise : bool
-        Whether the NIS counts: the noise is not as specified, or something faster than a dwell is left.
+        Whether the NIS counts: the white noise is not as specified, or something faster than a dwell is left. Where
+        noise with a memory was found it never does: in white noise it is wrong for a right model, too.
     """
     first = done.found.first
     largest = float(np.max(np.abs(first.z), initial=0.0))
@@ -348,10 +352,6 @@ def p_value(done: Round, consistency: Consistency, noise: bool) -> float:
     of_scan = min(1.0, count * 2.0 * normal_tail(largest))
     if not len(done.free):
         return float(of_scan)
-    of_noise = consistency.nis_p_value if noise else 1.0
-    return float(min(1.0, 3.0 * min(of_scan, done.before.p_value, of_noise)))
-
-
-def _held_out(calibration: Calibration) -> float:
-    value = calibration.fit.get("held_out_in_noise", calibration.fit.get("held_out_rms"))
-    return float("nan") if value is None else float(value)
+    of_noise = consistency.nis_p_value if noise and not done.found.noise else 1.0
+    tests = 2.0 if done.found.noise else 3.0
+    return float(min(1.0, tests * min(of_scan, done.before.p_value, of_noise)))

@@ -11,7 +11,7 @@ import numpy as np
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.diagnosis.screen import Finding
 from sdimu_calibration.core.diagnosis.search import Search
-from sdimu_calibration.core.error_figures import held_out
+from sdimu_calibration.core.error_figures import held_out, held_out_judged, noise_learned
 from sdimu_calibration.core.estimation.noise_estimate import term_in_words
 from sdimu_calibration.core.evidence.candidate import Candidate
 from sdimu_calibration.core.evidence.consistency import SLOW_S, Consistency
@@ -146,8 +146,10 @@ def _unexplained(d: Diagnosis, names: str) -> str:
             "sigmas take it into account."
         )
     tail = f"; {names} would take {100 * d.explained:.0f} % of it" if names else ""
-    if names and held_out(d.after) > 1.0:
-        tail += f", and the error at stops held out is then {held_out(d.after):.2f} (1 is right)"
+    error = held_out_judged(d.after)
+    if names and error > 1.0:
+        noise = " in the noise that was learned" if noise_learned(d.after) else ""
+        tail += f", and the error at stops held out is then {error:.2f}{noise} (1 is right)"
     return f"Something is missing that no effect of the catalogue explains{tail}{_coloured(d.consistency)}."
 
 
@@ -159,7 +161,8 @@ def error_falls(d: Diagnosis) -> str:
             f"error at rests held out: {first.held_out_rms:.3f} -> {last.held_out_rms:.3f}; beyond white noise: "
             f"{beyond(d.rungs[0].scatter)} -> {beyond(d.rungs[-1].scatter)}"
         )
-    return f"error at stops held out, a third at a time: {held_out(d.before):.3f} -> {held_out(d.after):.3f}"
+    white = ", in white noise" if noise_learned(d.after) else ""
+    return f"error at stops held out, a third at a time{white}: {held_out(d.before):.3f} -> {held_out(d.after):.3f}"
 
 
 def beyond(scatter: Sequence[float] | Floats) -> str:

@@ -357,6 +357,7 @@ class NavigationFit(Fit):
         """
         nis, held_out = statistics["nis_mean"] or 0.0, statistics.get("held_out_rms")
         lost = int(self.prepared.cycles.lost.sum())
+        white = "" if self.noise is None else " in white noise"
         in_turn = f"; {lost} samples are missing by their stamps" if lost else ""
         if nis > _ABSURD:
             raise DataError(
@@ -366,10 +367,11 @@ class NavigationFit(Fit):
         out = [] if self.converged else [NOT_CONVERGED]
         if nis > MISFIT or (held_out is not None and held_out > MISFIT):
             text = f"NIS {nis:.3f}" + ("" if held_out is None else f", held-out error {held_out:.3f}")
-            text += "; 1 is right" + _in_noise(statistics)
-            out.append(f"the model does not fit ({text}){in_turn}; run: sdimu diagnose")
+            out.append(f"the model{white} does not fit ({text}{_in_noise(statistics)}){in_turn}; run: sdimu diagnose")
         worst = stop_misfit(self.last.output.normalised, self.prepared)
-        return (*out, *([worst] if worst else []), *self.contradicted_priors()[:1], *self.beyond_specification()[:1])
+        if worst:
+            out.append(f"{white.strip()}, {worst}".removeprefix(", "))
+        return (*out, *self.contradicted_priors()[:1], *self.beyond_specification()[:1])
 
     def beyond_specification(self) -> list[str]:
         """Name coefficients far outside the IMU's file, one line each, the furthest first."""
@@ -428,10 +430,10 @@ def conditions(setup: TestSetup) -> float:
 
 
 def _in_noise(statistics: Mapping[str, float | None]) -> str:
-    """Say how the model fits in learned noise, and what is not in that noise; empty where none was learned."""
+    """Say which figure is right at 1: that in learned noise where any was, with what is not in that noise."""
     nis, held_out = statistics.get("nis_in_noise"), statistics.get("held_out_in_noise")
     if nis is None or held_out is None:
-        return ""
+        return "; 1 is right"
     fast = ": noise that moves within half a minute is not in it" if nis > MISFIT else ""
     small = ", so the sigmas are too small" if nis > _FAST else ""
-    return f"; in the noise that was learned NIS {nis:.3f}, held-out error {held_out:.3f}{fast}{small}"
+    return f"; in the noise that was learned NIS {nis:.3f}, held-out error {held_out:.3f}, 1 is right{fast}{small}"

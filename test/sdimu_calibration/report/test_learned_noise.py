@@ -1,0 +1,139 @@
+"""Where noise with a memory was learned, what is right at 1 is in that noise, and the rest says that it is not."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from sdimu_calibration.api.fitted import Fitted
+from sdimu_calibration.cli.diagnosis_text import notes_of_diagnosis
+from sdimu_calibration.core.diagnosis.diagnose import Diagnosis, p_value
+from sdimu_calibration.core.diagnosis.summary import summarise
+from sdimu_calibration.core.diagnosis.verdict import error_falls
+from sdimu_calibration.core.error_figures import held_out, held_out_judged, nis_judged
+from sdimu_calibration.core.estimation.free_inertial import NOTHING
+from sdimu_calibration.core.estimation.second_order_fit import NO_AZIMUTH
+from sdimu_calibration.core.noise_term import FLICKER, NoiseTerm
+from sdimu_calibration.core.results import Calibration
+from sdimu_calibration.report import first_screen, sections
+from sdimu_calibration.report.evidence_figures import rungs
+from sdimu_calibration.report.page import page
+from sdimu_calibration.report.report_extras import report_extras
+
+TERM = NoiseTerm("gyro", FLICKER, size=1e-4)
+IN_NOISE = {"nis_in_noise": 1.303, "held_out_in_noise": 1.076}
+WHITE = {"nis_mean": 3.084, "held_out_rms": 7.052}
+
+
+def in_noise(result: Calibration) -> Calibration:
+    notes = (*result.notes, NO_AZIMUTH)
+    return replace(result, fit={**result.fit, **WHITE, **IN_NOISE}, noise=(TERM,), notes=notes)
+
+
+@pytest.fixture(scope="module")
+def learned(diagnosis: Diagnosis) -> Diagnosis:
+    """The diagnosis as if it had found noise with a memory and no effect."""
+    after = in_noise(diagnosis.after)
+    found = replace(diagnosis.found, noise=(TERM,), steps=(), chosen=diagnosis.found.chosen[:0])
+    return replace(diagnosis, found=found, before=after, after=after, verdict="noise model wrong", adequate=False)
+
+
+def no_figure(_: object) -> str:
+    return ""
+
+
+def right_at_one(costs: tuple[tuple[str, str], ...]) -> list[str]:
+    return [number for number, words in costs if "1 is right" in words]
+
+
+def test_the_figure_that_judges_is_in_the_noise_that_was_learned_where_any_was(diagnosis):
+    given = replace(diagnosis.after, fit={**diagnosis.after.fit, **WHITE})
+    assert held_out_judged(given) == held_out(given) == WHITE["held_out_rms"]
+    assert nis_judged(given) == WHITE["nis_mean"]
+    found = in_noise(diagnosis.after)
+    assert held_out(found) == WHITE["held_out_rms"]
+    assert (held_out_judged(found), nis_judged(found)) == (IN_NOISE["held_out_in_noise"], IN_NOISE["nis_in_noise"])
+
+
+def test_the_first_screen_of_a_diagnosis_calls_right_at_one_what_is_in_that_noise(learned):
+    costs = first_screen.of_diagnosis(summarise(learned)).costs
+    assert right_at_one(costs) == ["1.08"]
+    (white,) = (words for number, words in costs if number == "7.05")
+    assert "white noise" in white
+
+
+def test_the_first_screen_of_a_fit_does_so_too(learned):
+    costs = first_screen.of_fit(learned.after).costs
+    assert right_at_one(costs) == ["1.08", "1.303"]
+    assert any(number == "7.05" and "white noise" in words for number, words in costs)
+
+
+def test_a_page_without_learned_noise_says_nothing_of_white_noise(diagnosis):
+    costs = first_screen.of_diagnosis(summarise(diagnosis)).costs
+    assert right_at_one(costs)
+    assert not any("white noise" in words for _, words in costs)
+    assert "in white noise" not in error_falls(diagnosis)
+
+
+def test_a_sentence_that_compares_models_says_in_which_noise(learned):
+    assert "in white noise: 7.052 -> 7.052" in error_falls(learned)
+
+
+def test_the_heat_map_says_in_which_noise_its_sigmas_are(learned, diagnosis):
+    drawn = sections.heat_maps(learned, no_figure)
+    assert "white noise" in drawn
+    assert "is chance" not in drawn
+    assert "is chance" in sections.heat_maps(diagnosis, no_figure)
+
+
+def test_the_axis_of_the_ladder_says_in_which_noise_it_is():
+    titles = [rungs(("a", "b"), (7.0, 5.0), white=white).layout["xaxis"]["title"]["text"] for white in (True, False)]
+    assert "white noise" in titles[0]
+    assert "1 is right" not in titles[0]
+    assert "1 is right" in titles[1]
+
+
+def test_nothing_is_shown_with_what_was_found_where_nothing_was(learned, diagnosis):
+    """The fit at the end is another object than the first one, also where nothing was added."""
+    assert learned.extended is not learned.fit
+    assert "with what was found" not in sections.heat_maps(learned, no_figure)
+    assert "with what was found" in sections.heat_maps(diagnosis, no_figure)
+    for trial in report_extras(learned).trials:
+        assert [drift.name for drift in trial.drifts] == [NOTHING, "model as given"]
+
+
+def test_a_page_says_before_its_numbers_that_headings_mean_nothing(learned):
+    body = page(learned.after, "x", summary=summarise(learned)).partition("<body>")[2]
+    assert body.index("headings of this test mean nothing") < body.index("How well it predicts")
+    assert first_screen.of_fit(learned.after).remarks
+    assert not first_screen.of_fit(replace(learned.after, notes=())).remarks
+
+
+def test_the_shell_repeats_what_still_holds_and_no_finding_twice(learned):
+    warnings = ("the model in white noise does not fit (NIS 3); run: sdimu diagnose", "gyro_bias_x is far off")
+    told = notes_of_diagnosis(replace(
+        learned, after=replace(learned.after, warnings=warnings), findings=(SimpleNamespace(text=warnings[1]),),
+    ))  # fmt: skip
+    assert told == (NO_AZIMUTH, "the model in white noise does not fit (NIS 3)")
+
+
+def test_a_fit_in_python_prints_the_figure_in_that_noise_first(learned):
+    class Shown(Fitted):
+        result = learned.after
+        _heading = "x"
+
+    last = repr(Shown()).splitlines()[-1]
+    assert "NIS 1.303, held-out error 1.076 in the noise that was learned (1 is right; in white noise NIS 3.084" in last
+
+
+@pytest.mark.parametrize(("noise", "small"), [((), True), ((TERM,), False)])
+def test_p_in_the_noise_that_was_learned_does_not_take_the_nis_in_white_noise(noise, small):
+    first = SimpleNamespace(z=np.array([1.0, -2.0]), sigma=np.ones(2))
+    done = SimpleNamespace(
+        found=SimpleNamespace(first=first, noise=noise), free=np.arange(3), before=SimpleNamespace(p_value=0.3)
+    )
+    p = p_value(done, SimpleNamespace(nis_p_value=0.0), noise=True)
+    assert (p == 0.0) if small else (0.1 < p <= 0.6)
