@@ -133,8 +133,8 @@ def test_errors_in_white_noise_are_said_to_be_that_beside_the_one_in_learned_noi
     _, out, _ = run(FIRST, replace(SECOND, noise=(NoiseTerm("gyro", "flicker", size=1e-7),), fit=learned))
     after = next(text for text in out.splitlines() if "run1" in text)
     assert "held-out 1.076" in after
-    assert "nis and held-out: in the white noise of the IMU's file" in out
-    assert "white noise of the IMU's file" not in run(FIRST, SECOND)[1]
+    assert "nis and held-out: in white noise" in out
+    assert "white noise" not in run(FIRST, SECOND)[1]
 
 
 def test_one_folder_is_not_enough(run):

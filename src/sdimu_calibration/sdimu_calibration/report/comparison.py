@@ -27,7 +27,7 @@ _BY_HAND = (
 )
 _TWO_KINDS = "some by hand and some navigated: neither log-likelihoods nor held-out errors compare"
 _IN_WHITE = (
-    "nis and held-out: in the white noise of the IMU's file, in which models compare; where noise was learned, 1 is "
+    "nis and held-out: in white noise, in which models compare; where noise was learned, 1 is "
     "right for the error in that noise"
 )
 _MOST_MOVED = 6

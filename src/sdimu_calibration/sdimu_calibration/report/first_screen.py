@@ -26,7 +26,7 @@ GOOD, DOUBTFUL, BAD = "good", "doubtful", "bad"
 _MARKS = {GOOD: "\N{CHECK MARK}", DOUBTFUL: "!", BAD: "\N{HEAVY BALLOT X}"}
 _WORDS = {GOOD: "The model explains the data", DOUBTFUL: "With reservations", BAD: "The model is wrong"}
 _ARROW = " \N{RIGHTWARDS ARROW} "
-_IN_WHITE = "in the white noise of the IMU's file, for comparing models"
+_IN_WHITE = "in white noise, in which models compare"
 """What an error means that is not in the noise that was learned."""
 _WORST = 3
 """Number of coefficients that are named as off, and of pieces of advice that are shown at once."""

@@ -150,7 +150,7 @@ def _lacks(calibration: Calibration, summary: DiagnosisSummary | None) -> tuple[
     return () if summary is None else tuple(n for n in summary.diagnosis.after.names if n not in calibration.names)
 
 
-_WHITE_LADDER = "In the white noise of the IMU's file, in which models compare: learned noise counts as error here."
+_WHITE_LADDER = "In white noise, in which models compare: what was learned as noise counts as error here."
 
 
 def _ladder(rungs: Sequence[tuple[str, float]], learned: bool, draw: Draw) -> str:

@@ -208,7 +208,7 @@ def heat_maps(diagnosis: Diagnosis, draw: Draw) -> str:
 
 _CELLS = "Mean innovation over its sigma, as the test went on: of 200 cells, one beyond 3 is chance."
 _WHITE_CELLS = (
-    "Mean innovation over its sigma in the white noise of the IMU's file, as the test went on. The noise that was "
+    "Mean innovation over its sigma in white noise, as the test went on. The noise that was "
     "learned is not in that sigma: cells beyond 3 are no proof of missing physics here."
 )
 
