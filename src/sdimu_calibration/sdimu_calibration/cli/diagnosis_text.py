@@ -33,7 +33,7 @@ def print_summary(console: Console, summary: DiagnosisSummary, asked: Asked) -> 
         line(console, f"data: {finding.text}")
     for text in d.noise:
         line(console, f"noise: {text}")
-    noise = ", in the noise that was learned" if d.found.noise else ""
+    noise = " in white noise" if d.found.noise else ""
     line(console, f"p of the model as given{noise}: {f'{d.p_value:.2g}' if d.p_value > 1e-300 else 'below 1e-300'}")
     _where(console, summary)
     _candidates(console, summary)

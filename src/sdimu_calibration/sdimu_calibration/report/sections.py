@@ -28,8 +28,7 @@ def numbers(d: Diagnosis) -> str:
     if d.fit.learns_scatter:
         return f"p {_probability(d.p_value)} that a right model has a candidate as large as the largest."
     words = [
-        f"p {_probability(d.p_value)} that a right model looks like this"
-        + (" in the noise that was learned" if d.found.noise else ""),
+        f"p {_probability(d.p_value)} that a right model{' in white noise' if d.found.noise else ''} looks like this",
         f"free inputs: chi-square {d.free_inputs_before.chi2:.0f}"
         + (f" -> {left.chi2:.0f}" if len(d.found.chosen) else "")
         + f" of {left.dof} degrees of freedom",

@@ -74,8 +74,7 @@ class Diagnosis:
         The verdict for people.
     adequate : bool
     p_value : float
-        Probability that a right model looks like this, from scan, free inputs and NIS together; where noise with a
-        memory was found, from scan and free inputs in that noise.
+        Probability that a right model in white noise looks like this, from scan, free inputs and NIS together.
     findings : tuple of Finding
         Of the data screen.
     noise : tuple of str
@@ -334,17 +333,16 @@ def measured_noise(consistency: Consistency, fit: Fit) -> tuple[tuple[str, ...],
 
 
 def p_value(done: Round, consistency: Consistency, noise: bool) -> float:
-    """Probability that a right model looks like this, by scan, free inputs and NIS (Bonferroni over those that count).
+    """Probability that a right model in white noise looks like this, by scan, free inputs and NIS (Bonferroni).
 
     Parameters
     ----------
     done : Round
-        Its first scan, and its free-input test with nothing added, both in the noise that was found.
+        Its first scan, and its free-input test with nothing added.
     consistency : Consistency
         Of the model as given, in white noise.
     noise : bool
-        Whether the NIS counts: the white noise is not as specified, or something faster than a dwell is left. Where
-        noise with a memory was found it never does: in white noise it is wrong for a right model, too.
+        Whether the NIS counts: the noise is not as specified, or something faster than a dwell is left.
     """
     first = done.found.first
     largest = float(np.max(np.abs(first.z), initial=0.0))
@@ -352,6 +350,5 @@ def p_value(done: Round, consistency: Consistency, noise: bool) -> float:
     of_scan = min(1.0, count * 2.0 * normal_tail(largest))
     if not len(done.free):
         return float(of_scan)
-    of_noise = consistency.nis_p_value if noise and not done.found.noise else 1.0
-    tests = 2.0 if done.found.noise else 3.0
-    return float(min(1.0, tests * min(of_scan, done.before.p_value, of_noise)))
+    of_noise = consistency.nis_p_value if noise else 1.0
+    return float(min(1.0, 3.0 * min(of_scan, done.before.p_value, of_noise)))
