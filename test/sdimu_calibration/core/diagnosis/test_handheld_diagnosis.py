@@ -14,7 +14,7 @@ from sdimu_calibration.core.diagnosis.ground import Request, candidates
 from sdimu_calibration.core.diagnosis.scan import POWER_80
 from sdimu_calibration.core.diagnosis.search import FALSE_ALARM
 from sdimu_calibration.core.diagnosis.summary import summarise
-from sdimu_calibration.core.effects import imu_model
+from sdimu_calibration.core.effects import imu_model, registry
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.estimation.solve import solve
 from sdimu_calibration.core.evidence.handheld_evidence import places
@@ -196,3 +196,13 @@ def _draw(clean, rng):
         return None
     r, size = able[rng.integers(len(able))]
     return r.label, float(size * rng.choice([-1.0, 1.0])), r.display_unit
+
+
+def test_an_effect_that_nothing_bounds_and_nothing_shows_has_no_signature():
+    """No prior in the grade of the IMU, and a regressor that is zero in this run."""
+    evidence = _diagnosis(203).evidence
+    like = registry.get("accel_quadratic")
+    unseen = replace(like, prior={}, regressors=lambda motion: np.zeros((len(motion.t), len(like.terms))))
+    with np.errstate(all="raise"):
+        np.testing.assert_array_equal(evidence.signature([unseen]), 0.0)
+        assert np.any(evidence.signature([replace(like, prior={})]))

@@ -81,7 +81,7 @@ class HandheldEvidence(LinearEvidence):
         W = np.hstack(parts) / self.sigma[:, None]
         _, prior = candidate_priors(effects, self.imu)
         # What only shows by the gyros' answer to a force that is wrong in a turn is not seen: no sensor is so bad.
-        seen = _LARGEST * prior * np.linalg.norm(W, axis=0) > 1.0
+        seen = _LARGEST * np.linalg.norm(W, axis=0) > 1.0 / prior
         return np.where(seen, W, 0.0)
 
 
