@@ -150,3 +150,12 @@ def test_counts_of_no_unit_are_told_with_the_map_that_reads_them():
     # Gravity is the standard one to a part in a thousand, |f| to the errors of the IMU.
     assert re.search(r"of which 41\.[3-7]\d* are 1 m/s\^2 \(counts_per_unit", told)
     assert "--accel-unit" not in told
+
+
+def test_rates_beyond_measure_are_named_with_place_and_size():
+    t, w, f = samples("table", 21)
+    wild = w.copy()
+    wild[4000, 1] = -1e30
+    assert f"angular_velocity.y is -1e+30 at {t[4000]:.1f} s" in refusal(t, wild, f)
+    assert "e+30 at" in refusal(t, 1e31 * w, f)
+    assert "do not agree" in refusal(t, w[:, [1, 0, 2]] * 3.0, f)

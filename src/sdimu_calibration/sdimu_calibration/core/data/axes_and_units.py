@@ -49,6 +49,9 @@ _NEARLY_ALL = 0.9
 """Share of the turns that must fit the axes: an IMU may turn about one of them in every tenth turn only."""
 _MOST = 200_000
 """Number of samples at most: more decide nothing that these do not."""
+_NO_RATE = 1e9
+"""Reading of a gyro (any unit) from which it is no rate: a thousand times what the fastest give in deg/s, and more than
+counters of 24 bits have."""
 _FITS, _FAILS = 0.4, 2.0
 """Share of the swing, and multiple of it: the right reading leaves less than the one, every other one more than the
 other times as much."""
@@ -170,7 +173,22 @@ def _gyro_reading(t: Floats, w: Floats, f: Floats, stated: Stated) -> tuple[floa
     if seen is None:
         note = "no turn changes the direction of gravity: unit and sense of the gyros are not checked"
         return readings[0], (note,), False
-    raise DataError(seen.undecided(stated))
+    raise DataError(_beyond_measure(t, w) or seen.undecided(stated))
+
+
+def _beyond_measure(t: Floats, w: Floats) -> str:
+    """Name the largest rate where it is none in any unit; empty otherwise."""
+    rows = np.array([w.argmin(axis=0), w.argmax(axis=0)])
+    values = np.take_along_axis(w, rows, axis=0)
+    side, axis = np.unravel_index(int(np.argmax(np.abs(values))), values.shape)
+    largest = float(values[side, axis])
+    if abs(largest) < _NO_RATE:
+        return ""
+    at = t[rows[side, axis]]
+    return (
+        f"angular_velocity.{'xyz'[axis]} is {largest:.4g} at {at:.1f} s, which is no rate in any unit: "
+        "check the driver, or cut the recording before or after it (sdimu bag cut)"
+    )
 
 
 def _largest(windows: Windows) -> float:
