@@ -35,3 +35,19 @@ def one_line(text: str, longest: int | None = LONGEST_LINE) -> str:
     if longest is None or len(line) <= longest:
         return line
     return f"{line[: longest - _TAIL - 5]} ... {line[-_TAIL:]}"
+
+
+def counted(number: int, one: str, many: str = "") -> str:
+    """Write a number with its word: ``1 gap``, ``2 gaps``.
+
+    Parameters
+    ----------
+    number : int
+    one, many : str
+        What stands behind one, and behind any other number; `one` with an s by default.
+
+    Returns
+    -------
+    str
+    """
+    return f"{number} {one if number == 1 else many or one + 's'}"

@@ -15,6 +15,7 @@ from sdimu_calibration.core.arrays import Bools, Floats, Ints
 from sdimu_calibration.core.data.blocks import all_finite, ascending
 from sdimu_calibration.core.data.bursts import Bursts, find_bursts
 from sdimu_calibration.core.data.strays import stamp_text, strays
+from sdimu_calibration.core.plain_text import counted
 from sdimu_calibration.core.recording import (
     UNNUMBERED,
     DataError,
@@ -173,11 +174,11 @@ def arrange(ns: Stamps, omega_ib_b: Floats, f_ib_b: Floats, where: str) -> Arran
     rows: Stamps = np.flatnonzero(finite)
     bad = len(ns) - len(rows)
     if bad:
-        notes.append(f"{bad} samples were not finite and were dropped")
+        notes.append(f"{counted(bad, 'sample was', 'samples were')} not finite and dropped")
     late = int(np.count_nonzero(np.diff(ns[rows]) < 0))
     if late:
         _refuse_clock_set_back(ns[rows], omega_ib_b[rows], f_ib_b[rows], where)
-        notes.append(f"{late} samples came out of order and were sorted by their stamps")
+        notes.append(f"{counted(late, 'sample')} came out of order, sorted by their stamps")
         rows = rows[np.argsort(ns[rows], kind="stable")]
     new = np.concatenate([[True], np.diff(ns[rows]) > 0])
     repeated = int(np.count_nonzero(~new))
@@ -189,7 +190,7 @@ def arrange(ns: Stamps, omega_ib_b: Floats, f_ib_b: Floats, where: str) -> Arran
                 f"{where}: {np.count_nonzero(~same)} of {len(rows)} samples have the stamp of another reading: stamps "
                 "are no sample times; check header.stamp of the driver"
             )
-        notes.append(f"{repeated} samples repeated a stamp and were dropped")
+        notes.append(f"{counted(repeated, 'sample')} repeated a stamp, dropped")
     rows = rows[new]
     if len(rows) < _MINIMUM_SAMPLES:
         raise DataError(f"{where}: only one stamp in {len(ns)} samples; check header.stamp of the driver")

@@ -27,6 +27,7 @@ from sdimu_calibration.core.arrays import Bools, Floats, Ints
 from sdimu_calibration.core.data.epochs import Epochs
 from sdimu_calibration.core.data.phases import Phases
 from sdimu_calibration.core.navigation.strapdown import Cycles
+from sdimu_calibration.core.plain_text import counted
 from sdimu_calibration.core.recording import DataError, DataFault
 
 GAP_SHARE = 0.1
@@ -205,7 +206,8 @@ def judge(
         if len(rows):
             lost = int(cycles.lost[rows].sum())
             t = cycles.t[rows]
-            text = f"{lost} samples are missing by their stamps {where}, {len(rows)} gaps, bridged"
+            missing = f"{counted(lost, 'sample is', 'samples are')} missing by their stamps {where}"
+            text = f"{missing}, {counted(len(rows), 'gap')}, bridged"
             faults.append(DataFault("gap", text, lost, float(t[0]), float(t[-1])))
     return tuple(faults)
 

@@ -17,6 +17,7 @@ import numpy as np
 
 from sdimu_calibration.core.arrays import Bools, Floats, Ints
 from sdimu_calibration.core.data.blocks import let_go, pieces
+from sdimu_calibration.core.plain_text import counted
 from sdimu_calibration.core.recording import DataFault, Recording
 from sdimu_calibration.core.side_by_side import side_by_side
 
@@ -127,7 +128,7 @@ def _fault(kind: str, where: list[tuple[str, Ints]], t: Floats) -> DataFault:
     places = f"{first:.1f} s" if last - first < 1.0 else f"{first:.1f} to {last:.1f} s"
     names = [name for name, _at in where]
     who = " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
-    line = f"{who} {_TEXT[kind][len(names) > 1]} in {len(rows)} samples ({places}); they count as missing"
+    line = f"{who} {_TEXT[kind][len(names) > 1]} in {counted(len(rows), 'sample')} ({places}), taken as missing"
     return DataFault(kind, line, len(rows), first, last)
 
 

@@ -39,6 +39,7 @@ from sdimu_calibration.core.filter.filter_pass import PassOutput
 from sdimu_calibration.core.filter.passes import Pass
 from sdimu_calibration.core.measurement_kind import ALL, HELD_ALL, HELD_SENSORS, SENSORS
 from sdimu_calibration.core.noise_term import NoiseTerm
+from sdimu_calibration.core.plain_text import counted
 from sdimu_calibration.core.recording import DataError, DataFault
 from sdimu_calibration.core.results import History
 from sdimu_calibration.core.second_order.second_order_passes import (
@@ -358,7 +359,7 @@ class NavigationFit(Fit):
         nis, held_out = statistics["nis_mean"] or 0.0, statistics.get("held_out_rms")
         lost = int(self.prepared.cycles.lost.sum())
         white = "" if self.noise is None else " in white noise"
-        in_turn = f"; {lost} samples are missing by their stamps" if lost else ""
+        in_turn = f"; {counted(lost, 'sample is', 'samples are')} missing by their stamps" if lost else ""
         if nis > _ABSURD:
             raise DataError(
                 f"the recording contradicts the model: squared innovations are {nis:.3g} times what the noise explains"

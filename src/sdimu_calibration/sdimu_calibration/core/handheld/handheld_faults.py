@@ -15,6 +15,7 @@ from sdimu_calibration.core.arrays import Bools
 from sdimu_calibration.core.data.sample_screening import CHANNELS
 from sdimu_calibration.core.handheld.handheld_data import HandheldRun
 from sdimu_calibration.core.handheld.handheld_fit import FORCE, TURN, HandheldSolution
+from sdimu_calibration.core.plain_text import counted
 from sdimu_calibration.core.recording import DataFault, Recording
 from sdimu_calibration.core.units import STANDARD_GRAVITY, from_si
 
@@ -47,8 +48,8 @@ def without_impossible(recording: Recording) -> tuple[Recording, tuple[DataFault
         return recording, ()
     t = recording.t[bad]
     text = (
-        f"the gyros jump to {_BEYOND:.0f} times the fastest turns and more in {len(t)} samples ({t[0]:.1f} to "
-        f"{t[-1]:.1f} s); they count as missing"
+        f"the gyros jump to {_BEYOND:.0f} times the fastest turns and more in {counted(len(t), 'sample')} "
+        f"({t[0]:.1f} to {t[-1]:.1f} s), taken as missing"
     )
     keep = ~bad
     mended = replace(
@@ -68,7 +69,7 @@ def _missing(run: HandheldRun) -> list[DataFault]:
     if not len(at):
         return []
     lost, t = int(run.cycles.lost.sum()), run.cycles.t[at]
-    text = f"{lost} samples are missing by their stamps ({t[0]:.1f} to {t[-1]:.1f} s), bridged"
+    text = f"{counted(lost, 'sample is', 'samples are')} missing by their stamps ({t[0]:.1f} to {t[-1]:.1f} s), bridged"
     unseen = int(run.unseen.sum())
     if unseen:
         text += f"; {unseen} of {len(run.unseen)} turns have gaps in which anything may have happened, and say nothing"
@@ -84,7 +85,7 @@ def _clipped(recording: Recording) -> list[DataFault]:
         rows = np.flatnonzero(_in_a_row(x == x.max()) | _in_a_row(x == x.min()))
         if len(rows):
             t = recording.t[rows]
-            text = f"{name} is at the end of its range in {len(rows)} samples ({t[0]:.1f} to {t[-1]:.1f} s)"
+            text = f"{name} is at the end of its range in {counted(len(rows), 'sample')} ({t[0]:.1f} to {t[-1]:.1f} s)"
             out.append(DataFault("saturated", text, len(rows), float(t[0]), float(t[-1])))
     return out
 
