@@ -61,6 +61,8 @@ def test_a_formula_of_ones_own_is_what_it_says(motion, text, value):
     [
         ("gyro_x: foo", "unknown name 'foo'"),
         ("gyro_x: ax + t", "not alike"),
+        ("gyro_x: k * 1.0", "the coefficient of an equation is implied: write 'gyro_x: 1.0'"),
+        ("accel_z: ax**2 * wty * k1", "write 'accel_z: ax**2 * wty'"),
         ("gyro_x:", "cannot read"),
         ("accel_y: __import__('os')", "not allowed"),
     ],

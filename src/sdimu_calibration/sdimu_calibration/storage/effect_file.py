@@ -5,6 +5,7 @@ A file holds formulas by sensor, the parameters in which they are linear, and fi
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
@@ -123,6 +124,7 @@ def _equation(sensor: str, formula: str) -> Effect:
     proposed = own_equation(text)
     if proposed:
         return proposed
+    _refuse_coefficient(sensor, formula)
     bias = GYRO_BIAS if sensor.startswith("gyro") else ACCEL_BIAS
     shown = bias.parameters[0].display_unit
     try:
@@ -140,6 +142,25 @@ def _equation(sensor: str, formula: str) -> Effect:
     prior = {grade: size / usual for grade, size in bias.prior.items()}
     parameter = replace(effect.parameters[0], name=text)
     return replace(effect, name=text, family=text, parameters=(parameter,), prior=prior)
+
+
+def _refuse_coefficient(sensor: str, formula: str) -> None:
+    """Refuse an equation with its coefficient written before or behind the formula, and say what to write."""
+    for pattern in _WITH_COEFFICIENT:
+        found = pattern.fullmatch(formula)
+        if found and found["name"] not in VARIABLES:
+            raise DataError(
+                f"equation '{sensor}: {formula}': '{found['name']}' is none of the variables; the coefficient of an "
+                f"equation is implied: write '{sensor}: {found['rest']}' (several coefficients: an effect file, as in "
+                "doc/diagnosis.md)"
+            )
+
+
+_WITH_COEFFICIENT = (
+    re.compile(r"\s*(?P<name>[A-Za-z_]\w*)\s*\*\s*(?P<rest>[^*].*?)\s*"),
+    re.compile(r"\s*(?P<rest>.*[^*\s])\s*\*\s*(?P<name>[A-Za-z_]\w*)\s*"),
+)
+"""A name times a formula, and a formula times a name."""
 
 
 def extended_model(name: str, added: Sequence[str]) -> Model:
