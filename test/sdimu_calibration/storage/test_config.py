@@ -101,7 +101,11 @@ def test_a_site_without_format_or_azimuth_is_enough(tmp_path):
         ("model", "[gyro_bias, accel_bias]", "[]", "effects: .*at least 1"),
         ("model", "accel_bias]", "gyro_bias]", "'gyro_bias' is there twice"),
         ("site", "36.4", "136.4", "latitude_deg: .*less than or equal to 90"),
+        ("site", "36.4", "36.4 m", "latitude_deg: .*wrong unit .*1 deg"),
+        ("site", "36.4", "north", "latitude_deg: 'north' is not a number"),
         ("site", "height_m: 0", "", "height_m: missing key"),
+        ("imu", "1 deg/h,", "1e300 deg/h,", "prior.gyro_bias: .*larger than any quantity"),
+        ("imu", "1 deg/h,", ".nan,", "prior.gyro_bias: 'nan' is not a number with a unit .*40 ppm"),
         ("site", "height_m: 0", "height_m: -7e6", "height_m: .*greater than or equal to -5000"),
         ("site", "36.4", ".nan", "latitude_deg: "),
         ("site", SITE, "", "found nothing"),
@@ -126,8 +130,10 @@ def test_a_wrong_file_gives_one_line_with_file_and_key(tmp_path, kind, old, new,
 )
 def test_a_prior_that_no_effect_reads_is_refused_by_the_model(tmp_path, old, new, message):
     build(["gyro_bias", "accel_scale"], load_imu(written(tmp_path, IMU)))
-    with pytest.raises(DataError, match=message):
-        build(["gyro_bias", "accel_scale"], load_imu(written(tmp_path, IMU.replace(old, new))))
+    path = written(tmp_path, IMU.replace(old, new))
+    with pytest.raises(DataError, match=message) as caught:
+        build(["gyro_bias", "accel_scale"], load_imu(path))
+    assert str(caught.value).startswith(f"{path}: prior.")
 
 
 def test_an_unknown_name_lists_the_names_there_are():
@@ -178,3 +184,9 @@ def test_a_prior_of_zero_is_refused_by_every_estimate(tmp_path, prior):
     nothing = Recording(0, np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3)))
     with pytest.raises(DataError, match=message):
         solve(PreparedTest(nothing, imu), load_model("hand"), "handheld")
+
+
+@pytest.mark.parametrize("latitude", ["36.4 deg", "0.6353 rad", '"36.4"', "2184 arcmin"])
+def test_a_latitude_may_have_its_unit_behind_it(tmp_path, latitude):
+    site = load_site(written(tmp_path, SITE.replace("36.4", latitude)))
+    assert np.degrees(site.latitude_rad) == pytest.approx(36.4, abs=1e-3)

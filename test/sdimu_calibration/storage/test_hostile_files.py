@@ -104,7 +104,9 @@ def test_a_formula_without_a_finite_value_is_one_line(tmp_path, formula):
 def test_units_and_numbers_beyond_all_measure_are_one_line(tmp_path):
     assert "power" in refusal(parse_unit, "deg^" + "9" * 9)
     assert "power" in refusal(parse_unit, "deg^" + "9" * 6000)
-    assert "larger than any number" in refusal(parse_quantity, "9" * 400, "1")
+    for size in ("9" * 400, "1e300", "-1e21", "1e27 ppm"):
+        assert "larger than any quantity (at most 1e+20 in SI" in refusal(parse_quantity, size, "1")
+    assert parse_quantity("1e26 ppm", "1") == pytest.approx(1e20)
     truth = "format: sdimu-truth/1\ncoefficients: {gyro_bias_x: " + "9" * 400 + "}"
     assert "gyro_bias_x" in refusal(read_truth, written(tmp_path / "t.yaml", truth), "prior")
 

@@ -67,6 +67,8 @@ class ImuSpecification:
         ``navigation``, ``tactical`` or ``mems``: which default priors hold for effects not named.
     prior_units : mapping of str to str
         Unit in which a prior was written, where it was: tells a wrong one.
+    file : str
+        Where it was read from; empty for one that was not.
     """
 
     name: str
@@ -81,6 +83,12 @@ class ImuSpecification:
     accel_random_walk: float = 0.0
     gyro_quantisation: float = 0.0
     accel_quantisation: float = 0.0
+    file: str = field(default="", compare=False)
+
+    @property
+    def place(self) -> str:
+        """Where a person finds it: its file, else its name."""
+        return self.file or f"IMU '{self.name}'"
 
     @property
     def epoch_s(self) -> float:

@@ -23,6 +23,8 @@ STANDARD_GRAVITY = 9.80665
 
 _DEG = math.pi / 180.0
 """Degree (rad): definition."""
+LARGEST = 1e20
+"""Largest number of a quantity (SI): beyond all that is measured, and its square and products stay numbers."""
 _G = STANDARD_GRAVITY
 
 # name -> (factor to SI, dimension as {base: power})
@@ -154,7 +156,7 @@ def parse_quantity(text: str | float, expected: str) -> float:
     Raises
     ------
     UnitError
-        When it is not a number with a unit of that dimension.
+        When it is not a number with a unit of that dimension, or beyond `LARGEST`.
     """
     match = _QUANTITY.fullmatch(str(text))
     if not match:
@@ -167,6 +169,6 @@ def parse_quantity(text: str | float, expected: str) -> float:
     if unit.dimension != wanted.dimension:
         raise UnitError(f"'{text}' has the wrong unit (expected something like '1 {expected}')")
     value = float(match.group(1)) * unit.factor
-    if not math.isfinite(value):
-        raise UnitError(f"'{text}' is larger than any number can be")
+    if not abs(value) <= LARGEST:
+        raise UnitError(f"'{text}' is larger than any quantity (at most {LARGEST:g} in SI units; check its exponent)")
     return value

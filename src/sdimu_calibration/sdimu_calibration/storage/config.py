@@ -20,7 +20,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationEr
 from sdimu_calibration.core.plan import Plan, Turn
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.specification import ImuSpecification, Model, Site, StatedPrior
-from sdimu_calibration.core.units import parse_quantity, parse_unit
+from sdimu_calibration.core.units import from_si, parse_quantity, parse_unit
 
 CONFIG_VARIABLE = "SDIMU_CONFIG"
 """Environment variable that names the config folder."""
@@ -54,6 +54,20 @@ def quantity(expected: str) -> BeforeValidator:
     return BeforeValidator(lambda value: parse_quantity(_as_text(value, expected), expected))
 
 
+def _number_of(unit: str) -> BeforeValidator:
+    """Read a number of a key that names its unit; the unit may stand behind it once more."""
+
+    def read(value: Any) -> Any:
+        if not isinstance(value, str):
+            return value
+        try:
+            return float(value)
+        except ValueError:
+            return from_si(parse_quantity(value, unit), unit)
+
+    return BeforeValidator(read)
+
+
 def _as_text(value: Any, expected: str) -> str:
     if isinstance(value, bool) or not isinstance(value, str | int | float):
         raise ValueError(f"expected a number with a unit, something like '1 {expected}'")
@@ -63,7 +77,9 @@ def _as_text(value: Any, expected: str) -> str:
 def _signed_quantity(value: Any) -> tuple[float, str]:
     # The effect that owns a prior knows its dimension; the file reader does not know effects.
     text = _as_text(value, "ppm")
-    unit = re.sub(r"^\s*[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?\s*", "", text)
+    unit, numbers = re.subn(r"^\s*[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?\s*", "", text)
+    if not numbers:
+        raise ValueError(f"'{text}' is not a number with a unit (expected something like '40 ppm' or '1 deg/h')")
     return parse_quantity(text, unit or "1"), unit
 
 
@@ -291,12 +307,14 @@ class _ModelFile(Schema):
 class _SiteFile(Schema):
     format: Literal["sdimu-site/1"] = "sdimu-site/1"
     name: str | None = None
-    latitude_deg: float = Field(ge=-90.0, le=90.0)
-    height_m: float = Field(ge=-5000.0, le=20000.0)
-    gravity_m_s2: float | None = Field(default=None, gt=9.5, lt=10.0)
-    initial_azimuth_deg: float | None = None
+    latitude_deg: Annotated[float, _number_of("deg"), Field(ge=-90.0, le=90.0)]
+    height_m: Annotated[float, _number_of("m"), Field(ge=-5000.0, le=20000.0)]
+    gravity_m_s2: Annotated[float, _number_of("m/s^2"), Field(gt=9.5, lt=10.0)] | None = None
+    initial_azimuth_deg: Annotated[float, _number_of("deg"), Field(ge=-360.0, le=360.0)] | None = None
     magnetic_field_nt: tuple[float, float, float] | None = None
-    initial_azimuth_sigma_deg: float = Field(default=math.degrees(Site.initial_azimuth_sigma_rad), gt=0.0)
+    initial_azimuth_sigma_deg: Annotated[float, _number_of("deg"), Field(gt=0.0, le=360.0)] = math.degrees(
+        Site.initial_azimuth_sigma_rad
+    )
 
 
 def load_plan(name_or_path: str | Path) -> Plan:
@@ -335,6 +353,7 @@ def load_imu(name_or_path: str | Path) -> ImuSpecification:
     file = read_yaml(path, _ImuFile)
     return ImuSpecification(
         name=file.name or path.stem,
+        file=str(path),
         gyro_white_noise=file.noise.gyro,
         accel_white_noise=file.noise.accel,
         prior={name: size for name, (size, _) in file.prior.items()},

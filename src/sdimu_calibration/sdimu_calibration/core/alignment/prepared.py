@@ -127,7 +127,7 @@ def set_up(site: Site, imu: ImuSpecification, model: Model, epoch_s: float | Non
     body_frame.check_priors([one.name for one in model.priors], sensors.names, model.body_frame)
     for what, noise in (("gyro", imu.gyro_white_noise), ("accel", imu.accel_white_noise)):
         if not noise > 0.0:
-            raise DataError(f"IMU '{imu.name}': noise.{what} is zero, and measurements are weighed by it: give it")
+            raise DataError(f"{imu.place}: noise.{what} is zero, and measurements are weighed by it: give it")
     gravity = site.gravity_m_s2 or float(earth.normal_gravity(site.latitude_rad, site.height_m))
     return TestSetup(site, imu.in_means_over(epoch_s), model, sensors, rest_limits(imu), gravity, epoch_s, counted)
 
@@ -143,7 +143,7 @@ def check_priors(imu: ImuSpecification) -> None:
     for name, size in imu.prior.items():
         if not size > 0.0:
             raise DataError(
-                f"IMU '{imu.name}': prior.{name}: {size:g} leaves nothing to estimate (state one sigma above zero; "
+                f"{imu.place}: prior.{name}: {size:g} leaves nothing to estimate (state one sigma above zero; "
                 "without the line the prior is that of the grade)"
             )
 

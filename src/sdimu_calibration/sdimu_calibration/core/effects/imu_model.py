@@ -157,7 +157,7 @@ def build(effects: Sequence[str | Effect], imu: ImuSpecification) -> ImuModel:
         parameters += effect.parameters
         size = prior_size(effect, imu)
         if size is None or not size > 0:
-            raise DataError(f"IMU '{imu.name}' gives no prior for effect '{effect.name}': add it under prior:")
+            raise DataError(f"{imu.place}: no prior for effect '{effect.name}': add it under prior:")
         prior += [size] * len(effect.parameters)
         decay += [1.0 / effect.decay_s if effect.decay_s else 0.0] * len(effect.parameters)
         drive += [effect.random_walk.get(imu.grade, 0.0) ** 2] * len(effect.parameters)
@@ -210,8 +210,8 @@ def _check_priors(chosen: Sequence[Effect], imu: ImuSpecification) -> None:
         if name not in units:
             near = difflib.get_close_matches(name, units, n=1)
             hint = f"did you mean {near[0]}?" if near else "the prior of an effect of your own stands in its own file"
-            raise DataError(f"IMU '{imu.name}': prior.{name}: no effect of this name ({hint})")
-        _check_unit(f"IMU '{imu.name}': prior.{name}", unit, units[name])
+            raise DataError(f"{imu.place}: prior.{name}: no effect of this name ({hint})")
+        _check_unit(f"{imu.place}: prior.{name}", unit, units[name])
 
 
 def _check_unit(where: str, unit: str, expected: str) -> None:
