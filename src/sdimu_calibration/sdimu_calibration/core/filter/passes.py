@@ -28,6 +28,7 @@ from sdimu_calibration.core.filter.filter_pass import (
     new_output,
     run_pass,
 )
+from sdimu_calibration.core.filter.impossible_prior import impossible_prior
 from sdimu_calibration.core.measurement_kind import SKIP
 from sdimu_calibration.core.navigation.track import motion
 from sdimu_calibration.core.progress import Progress
@@ -219,7 +220,13 @@ def one_pass(
     output = new_output(len(prepared.epochs), len(sensors.prior), keep, SNAPSHOT_EPOCHS)
     settings = pass_settings(setup, closed_loop)
     run_pass(data, settings, state, output)
-    check_finite(state)
+    try:
+        check_finite(state)
+    except DivergedError as error:
+        told = impossible_prior(sensors, values, setup.imu.place)
+        if told:
+            raise DataError(told) from error
+        raise
     return Pass(C_nb, begin, state, output, data, settings)
 
 
