@@ -70,6 +70,7 @@ def test_what_is_drawn_anew_is_constant_in_a_stop_and_another_in_the_next():
         ("gyro_noise_markov=1 deg/h", "tau"),
         ("gyro_noise_markov(tau=0 s)=1 deg/h", "must be positive"),
         ("gyro_noise_flicker=1 ug", "gyro_noise_flicker"),
+        ("gyro_noise_flicker=1e300 deg/h", "gyro_noise_flicker=1e300 deg/h': .*larger than any quantity"),
     ],
 )
 def test_a_bad_key_says_what_is_wrong(text, part):
