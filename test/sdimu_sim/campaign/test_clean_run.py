@@ -73,7 +73,7 @@ def test_the_page_counts_effects_noise_and_refusals_apart():
 
 @pytest.mark.parametrize("name", ["nosuch", "/tmp/dtg.yaml", "../dtg"])
 def test_an_imu_file_that_a_study_does_not_know_is_refused_before_any_work(name):
-    with pytest.raises(DataError, match=f"--imu {name}: expected one of dtg, fog_tactical"):
+    with pytest.raises(DataError, match=f"--imu {name}: this study needs a file in .*/imu: one of dtg, fog_tactical"):
         imu_files(["dtg", name])
 
 

@@ -49,12 +49,12 @@ def imu_files(asked: Sequence[str] | None, without: str = "") -> list[str]:
     ----------
     asked : sequence of str, optional
     without : str
-        One that the study does not take.
+        One that the study does not take, because its runs are by hand.
 
     Raises
     ------
     DataError
-        When one is not in config/imu: worlds and folders of a study bear its name.
+        When one is not in config/imu (worlds and folders of a study bear its name), or is `without`.
     """
     from sdimu_calibration.core.recording import DataError
     from sdimu_calibration.storage.config import config_folder
@@ -62,7 +62,8 @@ def imu_files(asked: Sequence[str] | None, without: str = "") -> list[str]:
     known = sorted(path.stem for path in (config_folder() / "imu").glob("*.yaml") if path.stem != without)
     unknown = [name for name in asked or () if name not in known]
     if unknown:
-        raise DataError(f"--imu {unknown[0]}: expected one of {', '.join(known)}")
+        needs = "this study needs the file of an IMU on a rate table" if without else "this study needs a file"
+        raise DataError(f"--imu {unknown[0]}: {needs} in {config_folder() / 'imu'}: one of {', '.join(known)}")
     return list(dict.fromkeys(asked or known))
 
 

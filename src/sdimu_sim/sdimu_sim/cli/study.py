@@ -196,13 +196,14 @@ def missing(
     out: Annotated[Path, typer.Option(help="Folder of runs, missing.json, missing.md.")] = Path("out/study-missing"),
     runs: Annotated[int, typer.Option("-n", min=1, help="Tests of each effect.")] = 10,
     seed: Annotated[int, typer.Option(help="First seed.")] = 65_001,
-    imu: Annotated[str, typer.Option(help="IMU file in config/imu.")] = "dtg",
+    imu: Annotated[str, typer.Option(help="IMU file of a rate table, in config/imu.")] = "dtg",
     effect: Annotated[list[str] | None, typer.Option(help="Effect; repeatable. All by default.")] = None,
     workers: Annotated[int, typer.Option(min=1, help="Processes.")] = 2,
 ) -> None:
     """Diagnose tests as if the catalogue lacked what is hidden in them: is that seen, do the sigmas hold."""
     from sdimu_calibration.core.effects import registry
     from sdimu_calibration.core.recording import DataError
+    from sdimu_sim.campaign.grade_run import HANDHELD
     from sdimu_sim.campaign.missing_page import page
     from sdimu_sim.campaign.missing_run import MissingRun
     from sdimu_sim.core.hidden import effect_names
@@ -217,6 +218,7 @@ def missing(
             f"--effect {unknown[0]}: " + (f"a coefficient of {whole[0]}; name that" if whole
                                           else "no effect of the catalogue; sdimu effects lists them")
         )  # fmt: skip
+    (imu,) = imu_files([imu], without=HANDHELD)
     console, seeds, results = plain(), range(seed, seed + runs), {}
     for name in effect or known:
         results[name] = shown_campaign(console, name, MissingRun(imu, name), seeds, out / name, workers)
@@ -228,7 +230,10 @@ def many(
     out: Annotated[Path, typer.Option(help="Folder of runs and many.json.")] = Path("out/study-many"),
     runs: Annotated[int, typer.Option("-n", min=1, help="Tests of each IMU file.")] = 50,
     seed: Annotated[int, typer.Option(help="First seed.")] = 67_001,
-    imu: Annotated[list[str] | None, typer.Option(help="IMU file; repeatable. dtg, rlg_navigation by default.")] = None,
+    imu: Annotated[
+        list[str] | None,
+        typer.Option(help="IMU file of a rate table; repeatable. dtg, rlg_navigation by default."),
+    ] = None,
     workers: Annotated[int, typer.Option(min=1, help="Processes.")] = 2,
 ) -> None:
     """Diagnose tests with five to twelve effects of 3 to 50 sigma at once."""
@@ -237,10 +242,11 @@ def many(
     from rich.table import Table
 
     from sdimu_calibration.storage.json_file import write_json
+    from sdimu_sim.campaign.grade_run import HANDHELD
     from sdimu_sim.campaign.many_run import ManyRun
 
     console, seeds, results = plain(), range(seed, seed + runs), {}
-    for name in imu_files(imu or ["dtg", "rlg_navigation"]):
+    for name in imu_files(imu or ["dtg", "rlg_navigation"], without=HANDHELD):
         results[name] = shown_campaign(console, name, ManyRun(name), seeds, out / name, workers)
     write_json(out / "many.json", results)
     headings = ("IMU file", "runs", "8 sigma or more, named", "5 to 8", "below", "wrong names", "RMS z", "s")
@@ -276,12 +282,14 @@ def sets(
 
     from sdimu_calibration.storage.json_file import write_json
     from sdimu_sim.campaign import soak_page
+    from sdimu_sim.campaign.grade_run import HANDHELD
     from sdimu_sim.campaign.set_page import headings, line
     from sdimu_sim.campaign.set_run import KINDS, SetRun
     from sdimu_sim.campaign.soak_run import SOAK_KINDS, SoakRun
 
     known = (*KINDS, *SOAK_KINDS)
     check_kinds(kind, known)
+    (imu,) = imu_files([imu], without=HANDHELD)
     console, seeds, results = plain(), range(seed, seed + runs), {}
     for name in kind or known:
         work = SoakRun(name, imu) if name in SOAK_KINDS else SetRun(name, imu)
