@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -72,3 +73,18 @@ def test_a_bag_with_topics_of_other_names_is_compensated_too(tmp_path: Path, sma
     assert len(new.t) == len(small_test.ns)
     assert new.temperature is not None
     np.testing.assert_array_equal(new.temperature.value, small_test.temperature)
+
+
+def test_the_covariances_have_the_noise_of_the_calibration_and_of_another_imu_on_demand(bag, tmp_path, capsys):
+    mems = replace(result("gyro_bias", "accel_bias"), imu_noise=load_imu("mems_consumer").noise_alone)
+    write_result(tmp_path / "result.json", mems)
+
+    def variance(name: str, **options) -> float:
+        compensate(bag, result=tmp_path / "result.json", out=tmp_path / name, **options)
+        _, doubles = decode_doubles(raw_messages(tmp_path / name, {"/imu/data": IMU}, "/imu/data")["/imu/data"], 37)
+        return float(doubles[5, 16])
+
+    own, other = variance("own"), variance("other", imu="dtg")
+    assert "'mems_consumer', with which the result was calibrated" in capsys.readouterr().out
+    ratio = load_imu("mems_consumer").gyro_white_noise / load_imu("dtg").gyro_white_noise
+    assert own / other == pytest.approx(ratio**2, rel=0.05)

@@ -10,6 +10,7 @@ import pytest
 
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.results import Calibration, History
+from sdimu_calibration.storage.config import load_imu
 from sdimu_calibration.storage.result_file import read_result, write_result
 
 
@@ -38,6 +39,7 @@ def calibration() -> Calibration:
             used=np.arange(m) % 4 == 1,
             nis=np.where(np.arange(m)[:, None] % 4 == 1, 3.0, np.nan) * np.ones((m, 4)),
         ),
+        imu_noise=load_imu("mems_consumer").noise_alone,
     )
 
 
@@ -99,3 +101,19 @@ def test_a_failed_write_leaves_the_old_file(tmp_path):
     with pytest.raises(TypeError):
         write_result(tmp_path / "result.json", replace(calibration(), notes=(object(),)))
     assert (tmp_path / "result.json").read_bytes() == before
+
+
+def test_the_noise_of_the_imu_is_kept_with_its_units_and_refused_where_it_is_none(tmp_path):
+    write_result(tmp_path / "result.json", calibration())
+    content = json.loads((tmp_path / "result.json").read_text())
+    kept, imu = content["imu_noise"], load_imu("mems_consumer")
+    assert kept["gyro_white_noise_rad_s_sqrt_hz"] == imu.gyro_white_noise
+    assert kept["accel_random_walk_m_s2_sqrt_s"] == imu.accel_random_walk
+    for wrong in (-1.0, None, "loud"):
+        kept["gyro_white_noise_rad_s_sqrt_hz"] = wrong
+        (tmp_path / "result.json").write_text(json.dumps(content))
+        with pytest.raises(DataError, match=r"result\.json: not a complete"):
+            read_result(tmp_path / "result.json")
+    del content["imu_noise"]
+    (tmp_path / "result.json").write_text(json.dumps(content))
+    assert read_result(tmp_path / "result.json").imu_noise is None

@@ -16,7 +16,7 @@ def compensate(
     out: Annotated[Path, typer.Option(help="Bag (folder) to write: /imu/data and the other topics of BAG.")],
     imu: Annotated[
         str | None,
-        typer.Option(help="IMU whose noise goes into the covariances: name or path; dtg (by hand: mems_by_hand)."),
+        typer.Option(help="IMU whose noise goes in the covariances: name or path. That of the calibration by default."),
     ] = None,
     effect: Annotated[
         list[str] | None,
@@ -32,22 +32,20 @@ def compensate(
     replace: Annotated[bool, typer.Option("--replace", help="Overwrite the bag if it exists.")] = False,
 ) -> None:
     """Take the errors out of a recording: /imu/data_raw to /imu/data with covariances."""
-    from sdimu_calibration.cli.options import imu_of
     from sdimu_calibration.cli.progress import bar
     from sdimu_calibration.core.compensation import compensator
     from sdimu_calibration.core.units import from_si
     from sdimu_calibration.storage.bag_reader import read_recording
     from sdimu_calibration.storage.compensated_bag import write_compensated
     from sdimu_calibration.storage.compensated_imu import frame_of
-    from sdimu_calibration.storage.config import load_imu
     from sdimu_calibration.storage.effect_file import effects_of_result
+    from sdimu_calibration.storage.imu_noise import noise_for
     from sdimu_calibration.storage.result_file import read_result
 
     console = plain()
     calibration = read_result(result)
     own = effects_of_result(calibration.model, effect or [])
-    chosen, whose = imu_of(calibration, imu)
-    specification = load_imu(chosen)
+    specification, whose = noise_for(calibration, imu)
     recording = read_recording(bag)
     using = compensator(
         calibration, specification, own=own, has_temperature=recording.temperature is not None,

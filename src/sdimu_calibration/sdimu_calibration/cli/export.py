@@ -18,7 +18,7 @@ def export(
     out: Annotated[Path | None, typer.Option(help="File to write; beside the result by default.")] = None,
     imu: Annotated[
         str | None,
-        typer.Option(help="IMU whose noise goes into the kalibr form: name or path; dtg (by hand: mems_by_hand)."),
+        typer.Option(help="IMU whose noise goes in the kalibr form: name or path. That of the calibration by default."),
     ] = None,
     rate: Annotated[float, typer.Option(help="Sample rate for the kalibr form (Hz).")] = 100.0,
     temperature: Annotated[
@@ -30,19 +30,18 @@ def export(
     ] = None,
 ) -> None:
     """Write a result as matrices, Kalibr YAML, imu_tk files, a C header, YAML or CSV."""
-    from sdimu_calibration.cli.options import imu_of
-    from sdimu_calibration.storage.config import load_imu
     from sdimu_calibration.storage.effect_file import effects_of_result
     from sdimu_calibration.storage.export import FORMS
     from sdimu_calibration.storage.export import export as write
+    from sdimu_calibration.storage.imu_noise import noise_for
     from sdimu_calibration.storage.result_file import read_result
 
     calibration = read_result(result)
     own = effects_of_result(calibration.model, effect or [])
     folder = result if result.is_dir() else result.parent
     name = FORMS[form].file_name if form in FORMS else ""
-    chosen, whose = imu_of(calibration, imu)
-    done = write(form, out or folder / name, calibration, load_imu(chosen), own, rate, temperature)
+    specification, whose = noise_for(calibration, imu)
+    done = write(form, out or folder / name, calibration, specification, own, rate, temperature)
     console = plain()
     for text in done.missing:
         console.print(f"not in the file: {text}", soft_wrap=True, markup=False, highlight=False)

@@ -114,7 +114,9 @@ def tell(console: Console, notes: Iterable[str]) -> None:
 
 
 def leave(result: Calibration) -> None:
-    """End with exit status 3 and a line on stderr for each reason when a result is not to be trusted."""
+    """Say on stderr which coefficients are one, and end with exit status 3 when a result is not to be trusted."""
+    for line in result.inseparable:
+        typer.echo(f"sdimu: {line}", err=True)
     for line in result.not_to_be_trusted:
         typer.echo(f"sdimu: not to be trusted: {line}", err=True)
     if result.not_to_be_trusted:
@@ -131,18 +133,6 @@ def explained(console: Console, notes: Iterable[str]) -> Iterator[None]:
     except DataError:
         tell(console, notes)
         raise
-
-
-def imu_of(result: Calibration, imu: str | None) -> tuple[str, str]:
-    """Name the IMU file whose noise goes with a result, and say where the name is from.
-
-    A result does not hold the noise of its IMU. A run by hand is one of a cheap sensor; the default of the table would
-    say thousands of times less noise.
-    """
-    if imu is not None:
-        return imu, f"'{imu}' (--imu)"
-    name = "mems_by_hand" if result.estimator == "handheld" else "dtg"
-    return name, f"'{name}', as no --imu is given: state your own"
 
 
 def default_folder(bag: Path, what: str = "calibration") -> Path:

@@ -12,6 +12,7 @@ from sdimu_calibration.core.arrays import Bools, Floats, Ints
 from sdimu_calibration.core.noise_term import NoiseTerm
 from sdimu_calibration.core.origin import Origin
 from sdimu_calibration.core.recording import DataFault
+from sdimu_calibration.core.specification import ImuSpecification
 
 NOT_TRUSTED = "not to be trusted"
 """Words of a warning that forbids to use an estimate."""
@@ -251,6 +252,9 @@ class Calibration:
         Of a joint fit of several recordings.
     origin : Origin
         Which unit, when, at which temperature, from which recording.
+    imu_noise : ImuSpecification or None
+        Name, grade and noise of the specification with which samples were weighed, without its priors; None in older
+        results and those of others.
     """
 
     body_frame: str
@@ -274,6 +278,7 @@ class Calibration:
     rests: tuple[Rest, ...] = ()
     of_set: SetSummary | None = None
     origin: Origin = field(default_factory=Origin)
+    imu_noise: ImuSpecification | None = None
 
     def with_serial(self, serial: str) -> Calibration:
         """Return the result as one of the unit with this serial number."""

@@ -86,6 +86,11 @@ class ImuSpecification:
     file: str = field(default="", compare=False)
 
     @property
+    def noise_alone(self) -> ImuSpecification:
+        """Name, grade and noise, without priors and file."""
+        return replace(self, prior={}, prior_units={}, file="")
+
+    @property
     def place(self) -> str:
         """Where a person finds it: its file, else its name."""
         return self.file or f"IMU '{self.name}'"

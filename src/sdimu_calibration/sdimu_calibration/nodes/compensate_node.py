@@ -35,8 +35,8 @@ from sdimu_calibration.nodes.spinning import run_node
 from sdimu_calibration.nodes.ticking import Ticker
 from sdimu_calibration.storage.cdr import LayoutError, Stamps, decode_imu
 from sdimu_calibration.storage.compensated_imu import encode_compensated, frame_of
-from sdimu_calibration.storage.config import load_imu
 from sdimu_calibration.storage.effect_file import effects_of_result
+from sdimu_calibration.storage.imu_noise import noise_for
 from sdimu_calibration.storage.result_file import read_result
 
 RAW, COMPENSATED, TEMPERATURE = "imu/data_raw", "imu/data", "imu/temperature"
@@ -57,7 +57,7 @@ class CompensateNode:
         declare = Declare(self.node)
         # All but the last are live: ~/reload looks at them again.
         declare.text("result", "", "result.json or its folder", live=True)
-        declare.text("imu", "dtg", "IMU whose white noise goes into the covariances", live=True)
+        declare.text("imu", "", "IMU whose noise goes into the covariances; the calibrated one when empty", live=True)
         declare.texts("effects", [], "YAML files of effects of one's own that the result has", live=True)
         declare.text("frame_id", "", "frame_id of the samples; imu_ and the body frame when empty", live=True)
         declare.flag("same_start", False, "functions of time hold: switched on as in the calibration", live=True)
@@ -99,11 +99,13 @@ class CompensateNode:
         calibration = read_result(Path(path))
         own = effects_of_result(calibration.model, [text for text in parameter("effects").value if text])
         start = float(parameter("start_temperature").value)
+        specification, whose = noise_for(calibration, str(parameter("imu").value))
         using = compensator(
-            calibration, load_imu(str(parameter("imu").value)), own=own, has_temperature=True,
+            calibration, specification, own=own, has_temperature=True,
             same_start=bool(parameter("same_start").value), start_temperature=None if math.isnan(start) else start,
         )  # fmt: skip
         logger = self.node.get_logger()
+        logger.info(f"noise in the covariances is that of {whose}")
         for reason in using.left_out:
             logger.warning(f"not compensated: {reason}")
         return using, str(parameter("frame_id").value) or frame_of(calibration.body_frame)

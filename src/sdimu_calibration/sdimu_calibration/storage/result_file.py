@@ -16,7 +16,7 @@ from sdimu_calibration.core.origin import Origin
 from sdimu_calibration.core.plain_text import one_line
 from sdimu_calibration.core.recording import DataError, DataFault
 from sdimu_calibration.core.results import Calibration, History, Rest, without_advice
-from sdimu_calibration.storage import set_result_file
+from sdimu_calibration.storage import imu_noise, set_result_file
 from sdimu_calibration.storage.json_file import read_json, write_json
 
 FORMAT = "sdimu-result/1"
@@ -41,6 +41,7 @@ def write_result(path: Path, calibration: Calibration, verdict: str = "") -> Non
         "format": FORMAT,
         **({"verdict": verdict} if verdict else {}),
         "origin": asdict(calibration.origin),
+        **({} if calibration.imu_noise is None else {imu_noise.KEY: imu_noise.as_plain(calibration.imu_noise)}),
         "estimator": calibration.estimator,
         "estimator_reason": calibration.estimator_reason,
         "body_frame": calibration.body_frame,
@@ -133,6 +134,7 @@ def _calibration(content: Mapping[str, Any]) -> Calibration:
         conditional_sigma=_conditional(coefficients),
         rests=tuple(_rest(entry) for entry in content.get("rests", ())),
         origin=_origin(content.get("origin", {})),
+        imu_noise=imu_noise.from_plain(content.get(imu_noise.KEY)),
         of_set=set_result_file.from_plain(content, number),
         drift_means={name: float(mean) for name, mean in content.get("drift_means", {}).items()},
     )

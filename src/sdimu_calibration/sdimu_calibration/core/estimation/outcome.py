@@ -65,6 +65,7 @@ def outcome(fit: Fit, held_out: bool = True) -> Calibration:
         drift_means=fit.drift_means,
         rests=fit.rests(),
         origin=_origin(fit),
+        imu_noise=fit.test.imu.noise_alone,
     )
 
 

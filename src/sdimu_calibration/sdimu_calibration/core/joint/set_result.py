@@ -72,6 +72,7 @@ def set_outcome(fit: SetFit) -> Calibration:
         data=_data(fit.reports, base), notes=(*_notes(fit, base), *warnings), history=no_history(len(names)),
         warnings=warnings, estimator=base.estimator, estimator_reason=fit.reports[0].reason,
         drift_means=base.drift_means, of_set=_summary(fit, varied, names, base), origin=_origin(fit, base),
+        imu_noise=base.test.imu.noise_alone,
     )  # fmt: skip
 
 
