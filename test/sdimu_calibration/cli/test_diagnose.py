@@ -63,10 +63,11 @@ def hidden(tmp_path_factory):
 
 
 def test_a_coefficient_that_is_another_one_is_told_by_a_diagnosis(sdimu, hidden, tmp_path):
-    status, out, _ = sdimu("diagnose", hidden, "--add", "gyro_x: 1", "--out", tmp_path / "o")
+    status, out, err = sdimu("diagnose", hidden, "--add", "gyro_x: 1", "--out", tmp_path / "o")
     assert status == 0
     (line,) = [line for line in out.splitlines() if "cannot be told from each other" in line]
     assert line.startswith("note: gyro_bias_x and gyro_x: 1 ")
+    assert err.splitlines() == [line.replace("note", "sdimu", 1)]
 
 
 def test_the_loop_of_diagnosis_addition_and_comparison(sdimu, hidden, tmp_path):

@@ -11,6 +11,7 @@ from sdimu_calibration.api.functions import diagnose
 from sdimu_calibration.core.estimation.outcome import inseparable, outcome
 from sdimu_calibration.core.estimation.solve import extend
 from sdimu_calibration.core.evidence.noise_kernels import constant_between
+from sdimu_calibration.storage.effect_file import find_effects
 
 
 def test_a_second_bias_is_told_with_the_one_it_is(bench):
@@ -33,3 +34,10 @@ def test_a_fit_and_a_diagnosis_in_python_show_the_pair(bench):
     fit = CalibrationFit(bench.fit()).add("gyro_x: 1")
     assert "gyro_bias_x and gyro_x: 1 cannot be told" in repr(fit)
     assert "gyro_bias_x and gyro_x: 1 cannot be told" in repr(diagnose(fit))
+
+
+def test_a_sum_of_coefficients_is_told_with_each_of_them(bench):
+    """Drift by the force along two axes at once: the model has a coefficient for each."""
+    wider = outcome(extend(bench.fit(), find_effects("gyro_x: ax + ay")), held_out=False)
+    told = " ".join(w for w in wider.inseparable if "gyro_x: ax + ay" in w)
+    assert {"gyro_mass_unbalance_dx", "gyro_mass_unbalance_qx"} <= set(told.split())
