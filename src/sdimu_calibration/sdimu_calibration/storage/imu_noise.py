@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 from sdimu_calibration.core.plain_text import one_line
@@ -39,10 +40,11 @@ def from_plain(entry: Mapping[str, Any] | None) -> ImuSpecification | None:
     """
     if entry is None:
         return None
-    sizes = {own: float(entry[key]) for key, own in _KEYS.items()}
+    sizes: dict[str, Any] = {own: float(entry[key]) for key, own in _KEYS.items()}
     if not all(math.isfinite(size) and size >= 0.0 for size in sizes.values()):
         raise ValueError(f"{KEY} holds a size below zero or none")
-    return ImuSpecification(name=one_line(str(entry["name"])), grade=one_line(str(entry["grade"])), **sizes)
+    named = ImuSpecification(one_line(str(entry["name"])), 0.0, 0.0, grade=one_line(str(entry["grade"])))
+    return replace(named, **sizes)
 
 
 def noise_for(result: Calibration, imu: str | None) -> tuple[ImuSpecification, str]:

@@ -11,7 +11,7 @@ from sdimu_calibration.core.units import from_si
 _NO_ERROR = np.array([10.0] * 3 + [1000.0] * 3)
 """Error of a sensor (rad/s for gyros, m/s^2 for accelerometers) that none has: 570 deg/s or 100 g beside the truth."""
 _ONE = 0.9995
-"""Cosine (1) of two signatures in the samples from which they are one."""
+"""Cosine (1) of two signatures from which they are one: each then has thirty times the sigma it would have alone."""
 
 
 def impossible_prior(sensors: ImuModel, values: Floats, place: str) -> str:
