@@ -10,7 +10,7 @@ from typing import Any
 from sdimu_calibration.core.plain_text import one_line
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.specification import ImuSpecification
-from sdimu_calibration.storage.config import load_imu
+from sdimu_calibration.storage.config import config_folder, load_imu
 
 KEY = "imu_noise"
 """Key of result.json; missing in older files."""
@@ -50,8 +50,8 @@ def from_plain(entry: Mapping[str, Any] | None) -> ImuSpecification | None:
 def noise_for(result: Calibration, imu: str | None) -> tuple[ImuSpecification, str]:
     """Find the noise that goes with a result: of the IMU file that is named, else of the calibration itself.
 
-    A result that does not hold it (of an older version, or of others) has that of a usual IMU: a run by hand is one of
-    a cheap sensor, and a table gyro would say thousands of times less noise.
+    A result that does not hold it (of an older version, or of others) has that of the file in config/imu that it names,
+    or of a usual IMU: a run by hand is one of a cheap sensor, and a table gyro would say thousands of times less noise.
 
     Parameters
     ----------
@@ -74,5 +74,7 @@ def noise_for(result: Calibration, imu: str | None) -> tuple[ImuSpecification, s
         return load_imu(imu), f"'{imu}' (--imu)"
     if result.imu_noise is not None:
         return result.imu_noise, f"'{result.imu_noise.name}', with which the result was calibrated"
+    if result.origin.imu in {path.stem for path in (config_folder() / "imu").glob("*.yaml")}:
+        return load_imu(result.origin.imu), f"'{result.origin.imu}', the IMU that the result names"
     name = "mems_by_hand" if result.estimator == "handheld" else "dtg"
     return load_imu(name), f"'{name}', as the result does not hold its noise and no --imu is given: state your own"
