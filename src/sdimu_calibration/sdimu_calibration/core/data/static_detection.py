@@ -31,6 +31,12 @@ _SCATTER = 4.0
 """Scatter (variance) of rest, as a multiple of that of the quietest windows: a hand makes more."""
 _DRIFT = np.radians(1.0)
 """Mean rates at rest may differ by so much (rad/s): what gravity and warmth do to the bias of a cheap gyro."""
+_RAMP = 4.0
+"""Distance of the mean rate of a window from that of its neighbourhood (sigma) that is a ramp: one window of noise in
+five thousand is as far off, and cuts one sample of a rest."""
+_NEAR_S = 10.0
+"""Length of the neighbourhood (s): a table of 0.5 deg/s^2 runs up to what is taken for rest in 2 s of them, and the
+bias of a cheap gyro does not leave its noise."""
 _HOLE = 3.0
 """Distance of two samples (intervals): in a longer one a hand may have moved."""
 _EARTH_SEEN = 3.0
@@ -86,9 +92,43 @@ def detect_static(recording: Recording) -> StaticIntervals:
     long = last - first >= max(round(SHORTEST_S / dt), 3)
     if not long.any():
         raise DataError("/imu/data_raw: no rest of half a second was found: put the IMU down between the turns")
-    first, last = first[long], last[long]
+    first, last = _without_ramps(recording, first[long], last[long], width)
     gyro, accel = _density(recording.omega_ib_b, first, last, dt), _density(recording.f_ib_b, first, last, dt)
     return StaticIntervals(*joined(recording, first, last, _FRAGMENT_S), gyro, accel)
+
+
+def _without_ramps(recording: Recording, first: Ints, last: Ints, width: int) -> tuple[Ints, Ints]:
+    """Cut the begin and the end of turns off the rests.
+
+    A table runs up within a second or two. In that time its mean rate is below what the bias of a cheap gyro may change
+    by between two attitudes, and at a high sample rate its scatter is below that of the noise. Within one rest the bias
+    does not change: the ramp is where the mean rate leaves that of its neighbourhood.
+
+    Parameters
+    ----------
+    recording : Recording
+    first, last : ndarray of int, shape (k,)
+        Samples ``first:last`` of each rest.
+    width : int
+        Samples of a window.
+
+    Returns
+    -------
+    first, last : ndarray of int, shape (k,)
+        Of the same rests.
+    """
+    mean, _ = _moving(recording.omega_ib_b, width)
+    near = round(_NEAR_S / recording.interval_s)
+    sides = [slice(a, a + min(near, (b - a + 1) // 2)) for a, b in zip(first, last, strict=True)]
+    sides += [slice(b - (side.stop - side.start), b) for side, b in zip(sides, last, strict=True)]
+    away = [np.abs(mean[side] - np.median(mean[side], axis=0)) for side in sides]
+    # The median of absolute deviations of normal noise is 0.67 sigma.
+    sigma = np.median(np.concatenate(away), axis=0) / 0.6745
+    leaves = [np.any(a > _RAMP * sigma, axis=1) for a in away]
+    k = len(first)
+    begins = np.array([int(np.argmin(out)) for out in leaves[:k]])
+    ends = np.array([int(np.argmin(out[::-1])) for out in leaves[k:]])
+    return first + begins, last - ends
 
 
 def joined(recording: Recording, first: Ints, last: Ints, longest_s: float) -> tuple[Ints, Ints]:
