@@ -12,7 +12,7 @@ TURN = "turn"
 SHIFT = "shift"
 KINDS = (RANDOM_WALK, FLICKER, MARKOV, STOP, TURN, SHIFT)
 """Kinds of noise with a memory."""
-DRAWN = (STOP, TURN, SHIFT)
+DRAWN = frozenset({STOP, TURN, SHIFT})
 """Kinds of noise that any cause may hide behind that depends on attitude or rate."""
 WORDS = {
     RANDOM_WALK: "rate random walk",
@@ -56,6 +56,11 @@ class NoiseTerm:
     high: float = 0.0
     gain: float = 0.0
     alike: tuple[str, ...] = ()
+
+    @property
+    def is_drawn(self) -> bool:
+        """Whether the noise is drawn anew at stops or turns, and nothing that wanders looks the same."""
+        return DRAWN.issuperset((self.kind, *self.alike))
 
     @property
     def words(self) -> str:

@@ -107,6 +107,22 @@ def test_an_effect_found_at_the_threshold_leaves_the_model_without_it_open() -> 
     assert got[:2, :2] == pytest.approx(expected, rel=1e-3, abs=1e-3 * np.trace(expected))
 
 
+def test_a_drift_in_the_place_of_cable_wrap_moves_the_bias_to_its_mean() -> None:
+    """Beside cable wrap or temperature the bias is that without them, beside a drift the mean over the dwells."""
+    model = linear_model(np.array([1.0, -1.0, 0.0, 4.0, 0.0]), ratio=WIDE)
+    mean = cast("Fit", SimpleNamespace(dwell_means=lambda effect: np.full(len(effect.terms), 2.0)))
+    found = {}
+    for rival in ("accel_bias_ramp", "accel_bias_temperature"):
+        alike = tuple(split(registry.get(name))[0] for name in ("accel_bias_wrap", rival))
+        candidates = (model.candidates[0], *alike)
+        named = replace(model, names=("accel_bias_x", "b", *(c.label for c in candidates)), candidates=candidates)
+        found[rival] = model_doubt(mean, named, [3], np.array([3, 4]), 1.0)
+    drift, no_drift = found["accel_bias_ramp"], found["accel_bias_temperature"]
+    _, _, covariance = posterior(model, [3])
+    assert drift[0, 0] > no_drift[0, 0] + covariance[0, 0]
+    assert drift[1, 1] == pytest.approx(no_drift[1, 1])
+
+
 @pytest.mark.parametrize("seed", range(20))
 def test_the_covariance_stays_positive_with_two_finds_that_resemble_each_other(seed: int) -> None:
     rng = np.random.default_rng(seed)

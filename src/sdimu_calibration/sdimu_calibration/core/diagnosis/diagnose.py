@@ -21,6 +21,7 @@ from sdimu_calibration.core.diagnosis.rounds import UNEXPLAINED_P, Round, in_fou
 from sdimu_calibration.core.diagnosis.screen import Finding, screen
 from sdimu_calibration.core.diagnosis.search import FALSE_ALARM, MOST_STEPS, Search, look_alikes, patchwork
 from sdimu_calibration.core.diagnosis.verdict import Verdict, sentence, verdict
+from sdimu_calibration.core.diagnosis.white_noise import without_memory
 from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.error_figures import held_out_judged
 from sdimu_calibration.core.estimation.fit import NOT_CONVERGED, Fit
@@ -33,7 +34,6 @@ from sdimu_calibration.core.evidence.candidate import Candidate
 from sdimu_calibration.core.evidence.consistency import Consistency
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.evidence.navigation_evidence import NavigationEvidence
-from sdimu_calibration.core.noise_term import DRAWN
 from sdimu_calibration.core.probability import normal_tail
 from sdimu_calibration.core.progress import Progress, silent
 from sdimu_calibration.core.recording import DataError, Recording
@@ -208,6 +208,9 @@ def climb(
     progress("report", 0.9)
     if fit.learns_scatter:
         consistency = fit.consistency(done.evidence)
+    if done.found.noise:
+        consistency = without_memory(consistency, done.found.noise, stated)
+        noise, _ = measured_noise(consistency, fit)
     # In the noise that was learned without the effects nothing would be seen to be missing.
     fit = in_found_noise(request, fit, done.found.noise) if done.chosen else done.fit
     before = outcome(fit)
@@ -223,7 +226,7 @@ def climb(
     still = not fit.learns_scatter and held_out_judged(after) > STILL_WRONG
     # Wrong samples in turns leave noise that looks drawn anew in each turn.
     spoilt = any(finding.kind == "spike" for finding in findings)
-    drawn = not spoilt and any(term.kind in DRAWN for term in done.found.noise)
+    drawn = not spoilt and any(term.is_drawn for term in done.found.noise)
     unexplained = done.after.p_value < UNEXPLAINED_P or still or loud or drawn or patched(done)
     noise += tuple(term_in_words(term) for term in done.found.noise)
     rungs = ladder(fit, final, done, progress) if refits or fit.learns_scatter else ()

@@ -162,19 +162,23 @@ def _exchanged(
     """
     at = np.append(np.flatnonzero(weight[:-1]), place)
     S = rivals.slope[told][:, at]
-    if not evidence.candidates[allowed[place] - len(evidence.weight)].effect.shifts_bias:
-        _add_means(S, fit, evidence, allowed[at])
+    # Beside an effect of temperature or of cables the bias is that without it; if a drift is right in its place, what
+    # is called the bias is the mean.
+    without_it = evidence.candidates[allowed[place] - len(evidence.weight)].effect.shifts_bias
+    _add_means(S, fit, evidence, allowed[at], drifts_alone=without_it)
     moved = S * rivals.estimate[at]
     apart, w, S = moved[:, :-1] - moved[:, -1:], weight[at[:-1]], S[:, :-1]
     without = weight[-1] * np.outer(moved[:, -1], moved[:, -1])
     return np.asarray((S * (w * rivals.variance[at[:-1]])) @ S.T + (apart * w) @ apart.T + without)
 
 
-def _add_means(S: Floats, fit: Fit, evidence: LinearEvidence, columns: Ints) -> None:
+def _add_means(
+    S: Floats, fit: Fit, evidence: LinearEvidence, columns: Ints, drifts_alone: bool = False
+) -> None:  # fmt: skip
     """Turn the slope of the biases (k, a) into that of their means over the dwells, where a column shifts a bias."""
     p = len(evidence.weight)
     for place, column in enumerate(columns.tolist()):
         effect = evidence.candidates[column - p].effect
         name = bias.NAMES[effect.terms[0].channel]
-        if (effect.bias_drift or effect.shifts_bias) and name in evidence.names:
+        if (effect.bias_drift or (effect.shifts_bias and not drifts_alone)) and name in evidence.names:
             S[evidence.names.index(name), place] += fit.dwell_means(effect)[0]
