@@ -13,8 +13,8 @@ _HEAD = """# Clean tests
 
 `sdimu study clean` simulates tests of every file of config/imu with nothing hidden in them, in white noise: on the
 plans of config/plan, in six positions, in 24 attitudes at random, and on kim18 in ten minutes and in three hours; at
-latitudes of 50 S to 60 N (drawn). `mems_by_hand` makes runs by hand of 24 attitudes. Each test is diagnosed with
-nothing but the IMU file and the site. Seeds from {first}.
+latitudes of 50 S to 60 N and sample rates of 20, 50 and 100 Hz (drawn). `mems_by_hand` makes runs by hand of 24
+attitudes. Each test is diagnosed with nothing but the IMU file and the site. Seeds from {first}.
 
 - effect: a physical effect was named
 - noise: no effect, but a noise with a memory was named

@@ -18,6 +18,8 @@ from sdimu_sim.campaign.plan_draw import PLANS
 
 BY_HAND = "by hand"
 """In the place of a plan: a run by hand."""
+RATES_HZ = (20.0, 50.0, 100.0)
+"""Sample rates that are drawn (Hz): what is found in the samples, such as rests, depends on the rate."""
 
 
 @dataclass(frozen=True)
@@ -45,11 +47,15 @@ class CleanRun:
         """
         rng = np.random.default_rng(np.random.SeedSequence([seed, crc32(f"clean {self.imu} {self.plan}".encode())]))
         site = Site(math.radians(float(rng.choice(LATITUDES_DEG))), 0.0)
-        test, sensor = simulated_test(self.imu, load_imu(self.imu), self.plan, site, seed, ())
+        rate_hz = float(rng.choice(RATES_HZ))
+        test, sensor = simulated_test(self.imu, load_imu(self.imu), self.plan, site, seed, (), rate_hz=rate_hz)
         found = climb(solve(test, load_model("hand" if self.imu == HANDHELD else "baseline")))
         # From here on the truth is known; nothing before this line has seen it.
         row = scored_row(found, sensor, None)
-        return row | {"latitude_deg": math.degrees(site.latitude_rad), "noise": list(found.noise)}
+        return row | {
+            "latitude_deg": math.degrees(site.latitude_rad), "rate_hz": rate_hz, "noise": list(found.noise),
+            "estimator": found.before.estimator,
+        }  # fmt: skip
 
 
 def plans_of(imu: str) -> tuple[str, ...]:

@@ -45,7 +45,8 @@ HANDHELD = "mems_by_hand"
 RESTS = 24
 """Attitudes of a run by hand."""
 _RATE_HZ = 20.0
-"""Sample rate on the table (Hz): navigation cycles are 0.1 s at any rate, so this costs no information."""
+"""Sample rate on the table (Hz) where none is drawn: navigation cycles are 0.1 s at any rate, so this costs no
+information."""
 _SPAN = (10.0, 30.0)
 """Size of a hidden effect, in the sigma of the clean test."""
 
@@ -90,9 +91,9 @@ class GradeRun:
 
 def simulated_test(
     name: str, imu: ImuSpecification, plan: str, site: Site, seed: int, effects: tuple[str, ...],
-    noise: tuple[str, ...] = (),
+    noise: tuple[str, ...] = (), rate_hz: float = _RATE_HZ,
 ) -> tuple[PreparedTest, ImuTruth]:  # fmt: skip
-    """Simulate a test and open it as every recording is opened; a run by hand states no site."""
+    """Simulate a test and open it as every recording is opened; a run by hand states no site and has its own rate."""
     if name == HANDHELD:
         run = ByHand(RESTS, imu, site, seed=seed, effects=effects)
         recording, truth = by_hand_recording(run)
@@ -100,7 +101,7 @@ def simulated_test(
         told: TestTruth = against_gravity(truth, STANDARD_GRAVITY, true_gravity)
         return _opened(recording, imu, site, assumed="any"), told.imu
     scenario = Scenario(
-        study_plan(plan, seed), imu, site, study_table(plan), rate_hz=_RATE_HZ, seed=seed, effects=effects, noise=noise
+        study_plan(plan, seed), imu, site, study_table(plan), rate_hz=rate_hz, seed=seed, effects=effects, noise=noise
     )
     sensor = imu_truth(scenario)
     recording = simulate(scenario, sensor)
