@@ -12,7 +12,6 @@ from sdimu_calibration.core.effects.accelerometer_frame import accelerometer_fra
 from sdimu_calibration.core.estimation.outcome import calibrate
 from sdimu_calibration.core.navigation.correct_cycles import correct_cycles, spread
 from sdimu_calibration.core.navigation.track import motion
-from sdimu_calibration.core.second_order.second_order_passes import rest_of_the_way
 from sdimu_calibration.core.specification import ImuSpecification
 from sdimu_calibration.core.units import to_si
 from sdimu_calibration.storage.config import load_imu, load_plan
@@ -168,26 +167,3 @@ def test_what_speaks_against_a_result_is_in_it(model, site):
     assert found.data["lost"] == 1.0
     quiet = replace(PERCENTS, accel_white_noise=0.2 * PERCENTS.accel_white_noise)
     assert any("does not fit" in text for text in calibrate(recording, site, quiet, model, held_out=False).warnings)
-
-
-def test_the_rest_of_a_slow_way_is_gone_at_once():
-    """Steps of a geometric series: after three of them the sum of all that follow is known."""
-    way, ratio = np.array([3.0, -1.0, 0.0]), 0.95
-    steps = [way * ratio**k for k in range(3)]
-    ahead = rest_of_the_way(steps)
-    np.testing.assert_allclose(sum(steps) + ahead * steps[-1], way / (1.0 - ratio))
-
-
-def test_a_leap_has_an_end():
-    assert rest_of_the_way([np.array([0.9999**k]) for k in range(3)]) == 50.0
-
-
-@pytest.mark.parametrize("steps", [
-    [[1.0, 0.0], [0.9, 0.0]],  # two steps may be alike by chance
-    [[1.0, 0.0], [0.1, 0.0], [0.01, 0.0]],  # fast enough
-    [[1.0, 0.0], [0.0, 0.9], [0.8, 0.0]],  # not one way
-    [[1.0, 0.0], [1.1, 0.0], [1.2, 0.0]],  # no end
-    [[0.0, 0.0], [0.0, 0.0], [0.0, 0.0]],
-])  # fmt: skip
-def test_steps_that_are_not_a_slow_way_go_on_one_by_one(steps):
-    assert rest_of_the_way([np.array(s) for s in steps]) == 0.0

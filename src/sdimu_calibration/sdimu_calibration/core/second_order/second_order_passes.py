@@ -15,7 +15,6 @@ Each pass is a Gauss-Newton step of the whole test, with the original prior.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
@@ -50,17 +49,6 @@ _FIRM = 0.05
 told from zero, and a covariance that falls by more than ten digits loses its symmetry."""
 _MOTION_S = 60.0
 """Length of a usual turn (s): at 2 deg/s one of 90 deg takes 45 s, one of 180 deg 90 s."""
-_ALIKE = 2
-"""Number of neighbouring pairs of steps that must be alike before the rest of a slow way is gone at once: one may be
-alike by chance."""
-_STRAIGHT = 0.98
-"""Least cosine (1) between such steps: they then go one way."""
-_SLOW = 0.7
-"""Ratio of a step to the one before from which the way is slow: ten more passes would leave 3 % of it."""
-_FURTHEST = 50.0
-"""Number of steps that are gone at once at most: beyond it the ratio of two steps is known too badly."""
-_TINY = 1e-300
-"""Least number that is divided by (the unit of the divisor): a coefficient that is held has no variance."""
 _PIECE = 3
 """Number of epochs of a stop between two shifts of the attitude to that of the stop: in more, a cheap gyro drifts so
 far that azimuth looks observable."""
@@ -150,45 +138,16 @@ def solve_second_order(
     reference, C_nb, loose = first.coefficients, first.C_nb, begin is None
     wide = replace(setup, model=replace(setup.model, velocity_sigma=_LOOSE[0], position_sigma=_LOOSE[1]))
     firm = firm_setup(setup)
-    steps: list[Floats] = []
     for count in range(1, MOST_PASSES + 1):
         progress("passes", min(0.95, 0.2 + 0.05 * count))
         last = second_order_pass(prepared, wide if loose else firm, start, C_nb, reference)
         moved = furthest_move(last.estimate - reference, last.covariance)
         if not loose and moved < CONVERGED:
             return last, count, True
-        steps.append((last.estimate - reference) / np.sqrt(np.maximum(np.diag(last.covariance), _TINY)))
-        ahead = rest_of_the_way(steps)
-        C_nb = rotation_matrix((1.0 + ahead) * rotation_vector(last.smoothed_start @ C_nb.T)) @ C_nb
-        reference = last.estimate + ahead * (last.estimate - reference)
-        steps = [] if ahead else steps
+        C_nb, reference = last.smoothed_start, last.estimate
         if loose and moved <= _NEAR:
-            loose, steps = False, []
+            loose = False
     return last, MOST_PASSES, False
-
-
-def rest_of_the_way(steps: Sequence[Floats]) -> float:
-    """How many steps like the last one are still to go, where steps shrink slowly and evenly; else 0.
-
-    Where noise with a memory hides the azimuth from the white model, each pass goes a few hundredths of the way. The
-    sum of the geometric series that the steps begin is gone at once; the next pass says whether it was right.
-
-    Parameters
-    ----------
-    steps : sequence of ndarray, shape (q,)
-        Of the last passes, in units of sigma.
-
-    Returns
-    -------
-    float
-        Ratio to the last step.
-    """
-    if len(steps) < _ALIKE + 1:
-        return 0.0
-    pairs = list(pairwise(steps[-_ALIKE - 1 :]))
-    ratio = min(float(b @ a) / max(float(a @ a), _TINY) for a, b in pairs)
-    straight = all(float(b @ a) > _STRAIGHT * float(np.linalg.norm(a) * np.linalg.norm(b)) for a, b in pairs)
-    return min(_FURTHEST, ratio / (1.0 - ratio)) if straight and _SLOW < ratio < 1.0 else 0.0
 
 
 def firm_setup(setup: TestSetup) -> TestSetup:
