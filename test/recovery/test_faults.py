@@ -13,11 +13,12 @@ from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage.config import load_imu, load_model, load_plan, load_site
 from sdimu_sim.campaign.fault_run import NOTED, OK, REFUSED, TRACEBACK, WARNED, WRONG, as_read, run_fault, spoilt
 from sdimu_sim.campaign.fault_study import fault_study, hurried
-from sdimu_sim.core.faults import FAULTS, Fault, fault_named
+from sdimu_sim.core.faults import FAULTS, Fault
 from sdimu_sim.core.scenario import Scenario
 
 SCENARIO = Scenario(hurried(load_plan("kim18_signed")), load_imu("dtg"), load_site("daejeon"))
 MODEL = load_model("baseline")
+FAULT = {fault.name: fault for fault in FAULTS}
 NONE = Fault("none", "nothing", "", (0, 0, 0, 0, 0), samples=lambda recording, _size, _rng: recording)
 
 
@@ -51,7 +52,7 @@ def test_a_sound_test_has_nothing_to_say():
     ],
 )  # fmt: skip
 def test_what_was_wrong_is_named_in_the_data_section(name, size):
-    recording = spoilt(replace(SCENARIO, seed=5), fault_named(name), size)
+    recording = spoilt(replace(SCENARIO, seed=5), FAULT[name], size)
     result = calibrate(recording, SCENARIO.site, SCENARIO.imu, MODEL, held_out=False)
     assert result.faults
     assert all(found.text in result.notes for found in result.faults)
@@ -59,7 +60,7 @@ def test_what_was_wrong_is_named_in_the_data_section(name, size):
 
 @pytest.mark.parametrize("name", ["duplicates", "out_of_order"])
 def test_what_can_be_mended_wholly_changes_no_digit(name):
-    fault = fault_named(name)
+    fault = FAULT[name]
     scenario = replace(SCENARIO, seed=6)
     right = calibrate(spoilt(scenario, NONE, 0.0), SCENARIO.site, SCENARIO.imu, MODEL, held_out=False)
     for size in fault.sizes[2:4]:
@@ -79,13 +80,13 @@ def test_what_can_be_mended_wholly_changes_no_digit(name):
     ],
 )
 def test_what_cannot_be_bridged_is_refused_with_its_reason(name, size, words):
-    outcome = run_fault(SCENARIO, MODEL, fault_named(name), size, 7)
+    outcome = run_fault(SCENARIO, MODEL, FAULT[name], size, 7)
     assert outcome.verdict == REFUSED
     assert words in outcome.said[0]
 
 
 def test_other_biases_after_a_gap_are_never_silent():
-    fault = fault_named("power_cycle")
+    fault = FAULT["power_cycle"]
     for seed in range(11, 17):
         for size in fault.sizes:
             outcome = run_fault(SCENARIO, MODEL, fault, size, seed)
@@ -94,7 +95,7 @@ def test_other_biases_after_a_gap_are_never_silent():
 
 def test_missing_samples_leave_the_sigmas_honest():
     """Chi-square of the largest errors: with one sample in ten missing, as without."""
-    fault = fault_named("dropouts")
+    fault = FAULT["dropouts"]
     worst = [run_fault(SCENARIO, MODEL, fault, 0.1, seed).worst for seed in range(21, 31)]
     # The largest of 27 normals exceeds 4 once in 600; three of ten runs beyond it would be no chance.
     assert sum(w > 4.0 for w in worst) < 3

@@ -79,28 +79,3 @@ def normal_gravity(latitude: float, height: float) -> float:
     linear = 1.0 + FLATTENING + m - 2.0 * FLATTENING * s2
     gravity: float = g0 * (1.0 - 2.0 / SEMI_MAJOR * linear * height + 3.0 * height**2 / SEMI_MAJOR**2)
     return gravity
-
-
-@compiled
-def transport_rate(latitude: float, height: float, velocity: Floats) -> Floats:
-    """Rate of NED against the Earth, in NED.
-
-    Parameters
-    ----------
-    latitude, height : float
-        Geodetic latitude (rad), above 89.9 deg that of 89.9 deg; height above the ellipsoid (m).
-    velocity : ndarray, shape (3,)
-        N, E, D (m/s).
-
-    Returns
-    -------
-    ndarray, shape (3,)
-        rad/s.
-    """
-    lat = min(max(latitude, -POLE_LIMIT), POLE_LIMIT)
-    r_n, r_e = radii(lat)
-    w = np.empty(3)
-    w[0] = velocity[1] / (r_e + height)
-    w[1] = -velocity[0] / (r_n + height)
-    w[2] = -velocity[1] * np.tan(lat) / (r_e + height)
-    return w

@@ -61,7 +61,6 @@ class EpochEstimate:
     names, units, display_units : tuple of str, length p
     coefficients, covariance : ndarray, shapes (p,) and (p, p)
         SI, in `body_frame`.
-    latitude_rad, longitude_rad, height_m : float
     position_error_m, velocity : ndarray, shape (3,)
         N, E, D against the known point (m); N, E, D (m/s).
     q_nb : ndarray, shape (4,)
@@ -89,9 +88,6 @@ class EpochEstimate:
     display_units: tuple[str, ...]
     coefficients: Floats
     covariance: Floats
-    latitude_rad: float
-    longitude_rad: float
-    height_m: float
     position_error_m: Floats
     velocity: Floats
     q_nb: Floats
@@ -380,8 +376,6 @@ class LiveCalibration:
             display_units=tuple(q.display_unit for q in sensors.parameters),
             coefficients=body_frame.values_in_frame(sensors.names, estimate, frame),
             covariance=self._J @ state.P[NAV : NAV + p, NAV : NAV + p] @ self._J.T,
-            latitude_rad=float(state.position[0]), longitude_rad=float(state.position[1]),
-            height_m=float(state.position[2]),
             position_error_m=np.array([
                 (state.position[0] - site.latitude_rad) * radius,
                 state.position[1] * radius * np.cos(site.latitude_rad),

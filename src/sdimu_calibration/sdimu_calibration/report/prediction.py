@@ -8,10 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rich.box import SIMPLE
-from rich.table import Table
 
-from sdimu_calibration.core.effect_key import effect_of
 from sdimu_calibration.core.planning.predict import Prediction
 from sdimu_calibration.core.results import Calibration, History
 from sdimu_calibration.core.units import from_si
@@ -46,17 +43,6 @@ def coefficient_rows(prediction: Prediction) -> list[tuple[str, ...]]:
 COLUMNS = ("coefficient", "prior", "sigma", "in its noise", "bound", "sigma / bound", "unit")
 
 
-def coefficient_table(prediction: Prediction) -> Table:
-    """Table of every coefficient for the terminal."""
-    table = Table(*COLUMNS, pad_edge=False, title=f"body frame: {prediction.body_frame}")
-    for column in table.columns[1:6]:
-        column.justify = "right"
-    effects = [effect_of(name, prediction.model) for name in prediction.names]
-    for k, row in enumerate(coefficient_rows(prediction)):
-        table.add_row(*row, end_section=k + 1 < len(effects) and effects[k + 1] != effects[k])
-    return table
-
-
 def published_rows(
     found: Mapping[str, Mapping[str, float]], printed: Mapping[str, Mapping[str, float]], units: Mapping[str, str]
 ) -> list[tuple[str, ...]]:
@@ -78,17 +64,6 @@ def published_rows(
             cells.append(f"  {_short(from_si(here, unit))} ({_short(from_si(there, unit))})")
         rows.append((effect, *cells, f"{100.0 * worst:.0f} %", unit))
     return rows
-
-
-def published_table(rows: Sequence[Sequence[str]], columns: Sequence[str], title: str) -> Table:
-    """Table beside published values for the terminal."""
-    table = Table("largest of the axes", *columns, "off by", "unit", pad_edge=False, title=title, box=SIMPLE, padding=0)
-    table.columns[0].overflow = "fold"
-    for column in table.columns[1:]:
-        column.justify, column.no_wrap = "right", True
-    for row in rows:
-        table.add_row(*row)
-    return table
 
 
 def write_page(

@@ -330,8 +330,3 @@ FAULTS: tuple[Fault, ...] = (
     Fault("table_stops", "the table stands still after", "of test", (0.95, 0.7, 0.4, 0.15, 0.03), motion=_table_stops),
 )  # fmt: skip
 """Every kind, by rising size."""
-
-
-def fault_named(name: str) -> Fault:
-    """Find a kind of fault by its name."""
-    return next(fault for fault in FAULTS if fault.name == name)

@@ -32,7 +32,6 @@ def test_a_perfect_imu_finds_any_attitude(imu, q, lat_deg):
     C_nb, lat = quaternion_matrix(q), np.radians(lat_deg)
     w, f = at_rest(C_nb, lat)
     found = align(w, f, 30.0, Site(lat), imu)
-    assert found.azimuth_from == "earth rate"
     np.testing.assert_allclose(found.C_nb, C_nb, rtol=0, atol=1e-13)
     assert np.linalg.det(found.C_nb) > 0.0
     assert (found.filter_sigma >= found.sigma).all()
@@ -65,7 +64,6 @@ def test_at_the_pole_azimuth_is_unknown(imu):
     C_nb = rotation_matrix(np.array([0.3, -0.8, 2.0]))
     w, f = at_rest(C_nb, np.pi / 2)
     found = align(w, f, 30.0, Site(np.pi / 2), imu)
-    assert found.azimuth_from == "nothing"
     assert found.sigma[2] == found.filter_sigma[2] == UNKNOWN_AZIMUTH
     # Level is known all the same.
     np.testing.assert_allclose(found.C_nb[2], C_nb[2], rtol=0, atol=1e-9)
@@ -76,7 +74,6 @@ def test_a_poor_gyro_does_not_pretend_to_find_north(imu):
     poor = replace(imu, prior={**imu.prior, "gyro_bias": np.radians(100.0) / 3600.0})
     w, f = at_rest(np.eye(3), 0.6)
     found = align(w, f, 30.0, Site(0.6), poor)
-    assert found.azimuth_from == "nothing"
     assert found.sigma[2] == UNKNOWN_AZIMUTH
 
 
@@ -87,7 +84,6 @@ def test_the_azimuth_of_the_site_file_is_taken_over(imu, q, azimuth):
     w, f = at_rest(C_nb, lat)
     site = Site(lat, initial_azimuth_rad=azimuth, initial_azimuth_sigma_rad=0.02)
     found = align(w, f, 30.0, site, imu)
-    assert found.azimuth_from == "site file"
     assert found.sigma[2] == found.filter_sigma[2] == 0.02
     assert abs(np.sin(0.5 * (azimuth_of(found.C_nb) - azimuth))) < 1e-9
     # Level does not move.

@@ -71,7 +71,9 @@ def test_f11_is_the_derivative_of_the_mechanization(lat_deg, height, velocity, g
     lat, v = np.radians(lat_deg), np.array(velocity)
     position = np.array([lat, 0.3, height])
     f_b = np.array([3.0, -5.0, 7.5])
-    omega = general_attitude.T @ (earth.earth_rate(lat) + earth.transport_rate(lat, height, v))
+    r_n, r_e = earth.radii(lat)
+    turn_of_ned = [v[1] / (r_e + height), -v[0] / (r_n + height), -v[1] * np.tan(lat) / (r_e + height)]
+    omega = general_attitude.T @ (earth.earth_rate(lat) + turn_of_ned)
     # d/dt at the start: (3 D(h) with halving) kills the first order of the step.
     derivative = []
     for h in (0.8, 0.4):

@@ -43,14 +43,11 @@ class Alignment:
         Sigma of the attitude error about N, E, D (rad).
     filter_sigma : ndarray, shape (3,)
         Sigma with which the filter starts (rad).
-    azimuth_from : str
-        ``earth rate``, ``site file`` or ``nothing``.
     """
 
     C_nb: Floats
     sigma: Floats
     filter_sigma: Floats
-    azimuth_from: str
 
     def with_azimuth_of(self, C_nb: Floats) -> Alignment:
         """Return the alignment with the azimuth of an attitude as a convention, which no data move.
@@ -61,7 +58,7 @@ class Alignment:
             Attitude at the start, b to n (dimensionless).
         """
         sigma = np.array([*self.filter_sigma[:2], _CONVENTION_RAD])
-        return replace(self, C_nb=C_nb.copy(), filter_sigma=sigma, azimuth_from="nothing")
+        return replace(self, C_nb=C_nb.copy(), filter_sigma=sigma)
 
 
 def azimuth_of(C_nb: Floats) -> float:
@@ -144,12 +141,10 @@ def align(w_mean: Floats, f_mean: Floats, duration_s: float, site: Site, imu: Im
     )
     rate = max(earth.RATE * np.cos(site.latitude_rad), 1e-12)
     azimuth = min(float(np.hypot(gyro / rate, level)), UNKNOWN_AZIMUTH)
-    source = "earth rate" if azimuth < UNKNOWN_AZIMUTH else "nothing"
     start = min(_WIDEN * azimuth, UNKNOWN_AZIMUTH)
     if site.initial_azimuth_rad is not None:
         turn = site.initial_azimuth_rad - azimuth_of(C_nb)
         C_nb = rotation_matrix(np.array([0.0, 0.0, turn])) @ C_nb
         azimuth = start = site.initial_azimuth_sigma_rad
-        source = "site file"
     wide = min(_WIDEN * level, 0.5)
-    return Alignment(C_nb, np.array([level, level, azimuth]), np.array([wide, wide, start]), source)
+    return Alignment(C_nb, np.array([level, level, azimuth]), np.array([wide, wide, start]))

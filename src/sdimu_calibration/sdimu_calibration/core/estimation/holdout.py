@@ -43,8 +43,8 @@ class Segment:
         First epoch that is navigated, and one after the last.
     seen : tuple of int
         First epoch of the fit, and one after its last.
-    begin_s, levelled_s, length_s : float
-        Begin of navigation, length of levelling and of navigation.
+    begin_s, length_s : float
+        Begin and length of navigation.
     """
 
     place: str
@@ -53,7 +53,6 @@ class Segment:
     last: int
     seen: tuple[int, int]
     begin_s: float
-    levelled_s: float
     length_s: float
 
 
@@ -125,7 +124,7 @@ def _segment(
     length = float(epochs.end[last - 1]) - begin
     if length < LEAST_S:
         return None
-    return Segment(place, first, at + 1, last, seen, begin, begin - float(epochs.start[first]), length)
+    return Segment(place, first, at + 1, last, seen, begin, length)
 
 
 def part(prepared: PreparedData, first: int, last: int) -> PreparedData:

@@ -55,12 +55,6 @@ class Variation:
     p_value: Floats
     trends: tuple[SetTrend, ...]
 
-    @property
-    def overall(self) -> float:
-        """Probability that the largest scatter of all coefficients is chance (Bonferroni)."""
-        seen = self.p_value[np.isfinite(self.p_value)]
-        return float(min(1.0, len(seen) * seen.min())) if len(seen) else 1.0
-
 
 @dataclass(frozen=True)
 class _Scores:
