@@ -43,8 +43,8 @@ class Segment:
         First epoch that is navigated, and one after the last.
     seen : tuple of int
         First epoch of the fit, and one after its last.
-    begin_s, length_s : float
-        Begin and length of navigation.
+    begin_s, levelled_s, length_s : float
+        Begin of navigation, length of levelling and of navigation.
     """
 
     place: str
@@ -53,6 +53,7 @@ class Segment:
     last: int
     seen: tuple[int, int]
     begin_s: float
+    levelled_s: float
     length_s: float
 
 
@@ -124,7 +125,7 @@ def _segment(
     length = float(epochs.end[last - 1]) - begin
     if length < LEAST_S:
         return None
-    return Segment(place, first, at + 1, last, seen, begin, length)
+    return Segment(place, first, at + 1, last, seen, begin, begin - float(epochs.start[first]), length)
 
 
 def part(prepared: PreparedData, first: int, last: int) -> PreparedData:
