@@ -77,7 +77,7 @@ def look(chosen: int, chi2: float, net: float) -> SimpleNamespace:
     """A round that chose some effects without noise, with what is left."""
     return SimpleNamespace(
         found=SimpleNamespace(chosen=range(chosen), noise=(), net=net), free=range(9),
-        after=SimpleNamespace(chi2=chi2, dof=250, p_value=0.4),
+        left_after=SimpleNamespace(chi2=chi2, dof=250, p_value=0.4),
     )  # fmt: skip
 
 

@@ -195,50 +195,49 @@ def climb(
     if not fit.diagnosable:
         raise DataError(NOT_DIAGNOSABLE)
     stated = fit.test.imu
-    fit, consistency, noise = in_measured_noise(fit, progress)
-    imu = fit.test.imu
-    wander = None if fit.learns_scatter else fit.wander
-    request = Request(fit, tuple(extra), alpha, wander, frozenset(without))
+    base, consistency, noise = in_measured_noise(fit, progress)
+    wander = None if base.learns_scatter else base.wander
+    request = Request(base, tuple(extra), alpha, wander, frozenset(without))
     done = search_until_stable(request, progress)
-    final = in_doubt(fit, done.fit, done.evidence, done.found.chosen, done.free, done.found.scale)
+    widened = in_doubt(base, done.fit, done.evidence, done.found.chosen, done.free, done.found.scale)
     # Beside what was found a prior may no longer stand against the data: the fit of the model as given tells it.
-    odd = [*fit.contradicted_priors(), *final.beyond_specification()]
-    findings = (*screen(fit), *(Finding(text, grave=False) for text in odd))
-    findings += () if final.converged else (Finding(NOT_CONVERGED, grave=True),)
+    odd = [*base.contradicted_priors(), *widened.beyond_specification()]
+    findings = (*screen(base), *(Finding(text, grave=False) for text in odd))
+    findings += () if widened.converged else (Finding(NOT_CONVERGED, grave=True),)
     progress("report", 0.9)
-    if fit.learns_scatter:
-        consistency = fit.consistency(done.evidence)
+    if base.learns_scatter:
+        consistency = base.consistency(done.evidence)
     if done.found.noise:
         consistency = without_memory(consistency, done.found.noise, stated)
-        noise, _ = measured_noise(consistency, fit)
+        noise, _ = measured_noise(consistency, base)
     # In the noise that was learned without the effects nothing would be seen to be missing.
-    fit = in_found_noise(request, fit, done.found.noise) if done.chosen else done.fit
-    before = outcome(fit)
-    after = doubted(outcome(done.fit) if done.chosen else before, final)
+    as_given = in_found_noise(request, base, done.found.noise) if done.chosen else done.fit
+    before = outcome(as_given)
+    after = doubted(outcome(done.fit) if done.chosen else before, widened)
     own = any(c.family == "own" for c in done.chosen)
     # What was added must also predict: an effect that only mimics the missing one fits here and fails elsewhere.
     # The free inputs are constant in a dwell and in a turn; what changes within one shows in the NIS alone.
     # Noise that is faster than a stretch is learned by what it leaves from stretch to stretch; within, it stays.
     # Neighbouring epochs say what the noise is, but for a sensor that counts pulses.
-    judged = not (fit.learns_scatter or done.found.noise or stated.epoch_s > EPOCH_S)
-    excess = misfit(after, consistency, stated, imu) if judged else 0.0
+    judged = not (base.learns_scatter or done.found.noise or stated.epoch_s > EPOCH_S)
+    excess = misfit(after, consistency, stated, base.test.imu) if judged else 0.0
     loud = excess > largest_misfit(float(after.fit["nis_dof"] or 1.0))
-    still = not fit.learns_scatter and held_out_judged(after) > STILL_WRONG
+    still = not base.learns_scatter and held_out_judged(after) > STILL_WRONG
     # Wrong samples in turns leave noise that looks drawn anew in each turn.
     spoilt = any(finding.kind == "spike" for finding in findings)
     drawn = not spoilt and any(term.is_drawn for term in done.found.noise)
-    unexplained = done.after.p_value < UNEXPLAINED_P or still or loud or drawn or patched(done)
+    unexplained = done.left_after.p_value < UNEXPLAINED_P or still or loud or drawn or patched(done)
     noise += tuple(term_in_words(term) for term in done.found.noise)
-    rungs = ladder(fit, final, done, progress) if refits or fit.learns_scatter else ()
+    rungs = ladder(as_given, widened, done, progress) if refits or base.learns_scatter else ()
     facts = Verdict(done.found, done.chosen, alike_first(done), findings, noise, own, unexplained)
     word = verdict(facts)
     progress("done", 1.0)
-    partial = Diagnosis(
+    unspoken = Diagnosis(
         word, "", word == "consistent", p_value(done, consistency, bool(noise) or loud), findings, noise, consistency,
-        fit, final, before, after, done.found, done.evidence, done.before, done.after, done.free, own, unexplained,
-        rungs,
+        as_given, widened, before, after, done.found, done.evidence, done.left_before, done.left_after, done.free, own,
+        unexplained, rungs,
     )  # fmt: skip
-    return replace(partial, sentence=sentence(partial))
+    return replace(unspoken, sentence=sentence(unspoken))
 
 
 def in_measured_noise(fit: Fit, progress: Progress = silent) -> tuple[Fit, Consistency, tuple[str, ...]]:
@@ -354,4 +353,4 @@ def p_value(done: Round, consistency: Consistency, noise: bool) -> float:
     if not len(done.free):
         return float(of_scan)
     of_noise = consistency.nis_p_value if noise else 1.0
-    return float(min(1.0, 3.0 * min(of_scan, done.before.p_value, of_noise)))
+    return float(min(1.0, 3.0 * min(of_scan, done.left_before.p_value, of_noise)))

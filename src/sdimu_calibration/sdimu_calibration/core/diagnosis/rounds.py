@@ -56,16 +56,16 @@ class Round:
     free : ndarray of int, shape (f,)
         Columns of the free inputs in `evidence`.
     found : Search
-    before, after : FreeInputTest
-        With nothing added, with `found` added.
+    left_before, left_after : FreeInputTest
+        What is left with nothing added, and with `found` added.
     """
 
     fit: Fit
     evidence: LinearEvidence
     free: Ints
     found: Search[LinearEvidence]
-    before: FreeInputTest
-    after: FreeInputTest
+    left_before: FreeInputTest
+    left_after: FreeInputTest
 
     @property
     def chosen(self) -> tuple[Candidate, ...]:
@@ -78,7 +78,7 @@ class Round:
         """Whether something is left, or took suspiciously many terms, or looks like noise, or nothing helped."""
         refused = not len(self.free) and not len(self.found.chosen)
         many = len(self.found.chosen) >= _MANY
-        return self.after.p_value < UNEXPLAINED_P or many or refused or bool(self.found.noise)
+        return self.left_after.p_value < UNEXPLAINED_P or many or refused or bool(self.found.noise)
 
 
 def search_until_stable(request: Request, progress: Progress) -> Round:
@@ -133,8 +133,8 @@ def _with_choice(done: Round, chosen: Sequence[Candidate]) -> Round:
     p = len(done.evidence.weight)
     labels = [c.label for c in done.evidence.candidates]
     columns = np.array([p + labels.index(c.label) for c in chosen], dtype=np.int64)
-    after = left(done.evidence, columns, done.free, done.found.scale)
-    return replace(done, found=replace(done.found, chosen=columns), after=after)
+    left_after = left(done.evidence, columns, done.free, done.found.scale)
+    return replace(done, found=replace(done.found, chosen=columns), left_after=left_after)
 
 
 def drop_companions(request: Request, done: Round, progress: Progress) -> Round:
@@ -154,7 +154,7 @@ def drop_companions(request: Request, done: Round, progress: Progress) -> Round:
         if keep.all():
             steps = mark_dropped(done.found.steps, {c.label for c in done.chosen}, small)
             found = replace(done.found, steps=steps)
-            return replace(done, found=found, after=left(done.evidence, kept, done.free, done.found.scale))
+            return replace(done, found=found, left_after=left(done.evidence, kept, done.free, done.found.scale))
 
 
 def in_found_noise(request: Request, fit: Fit, terms: Sequence[NoiseTerm]) -> Fit:
@@ -199,11 +199,12 @@ def prefer(wide: Round, done: Round) -> bool:
         return wide.found.net > done.found.net + _OWN_GAIN
     if wide.found.net < done.found.net:
         return False
-    chance = 3.0 * np.sqrt(2.0 * done.after.dof)
-    if few > max(1, many) and done.after.p_value > UNEXPLAINED_P:
+    chance = 3.0 * np.sqrt(2.0 * done.left_after.dof)
+    if few > max(1, many) and done.left_after.p_value > UNEXPLAINED_P:
         return False
     fewer = 0 < few < many
-    return bool(wide.after.chi2 < done.after.chi2 - chance or (fewer and wide.after.chi2 < done.after.chi2 + chance))
+    with_equations, without = wide.left_after.chi2, done.left_after.chi2
+    return bool(with_equations < without - chance or (fewer and with_equations < without + chance))
 
 
 def run_round(
