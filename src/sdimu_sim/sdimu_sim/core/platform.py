@@ -115,6 +115,45 @@ def _in_platform(q: Floats, v: Floats) -> Vector:
 
 
 @compiled
+def _turn_of_body(
+    phi: Vector, rate: Vector, second: Vector, c1: float, c2: float, d1: float, d2: float
+) -> tuple[Vector, Vector]:
+    """Body rate and its derivative, of a rotation vector, its two derivatives and `_sine_terms`."""
+    once = _cross(phi, rate)
+    twice = _cross(phi, once)
+    w = _sum3(1.0, rate, -c1, once, c2, twice)
+    # The derivative of the line above; a2' is the rate of phi.phi.
+    a2_rate = 2.0 * _dot(phi, rate)
+    bend = _cross(phi, second)
+    alpha = _sum3(1.0, second, -c1, bend, -d1 * a2_rate, once)
+    alpha = _sum3(1.0, alpha, d2 * a2_rate, twice, c2, _cross(rate, once))
+    return w, _sum3(1.0, alpha, c2, _cross(phi, bend), 0.0, (0.0, 0.0, 0.0))
+
+
+@compiled
+def _add_means(
+    out: Floats, k: int, part: float, w: Vector, down: Vector, wt: Vector, alpha: Vector, field: Vector
+) -> None:
+    """Add the share `part` of an instant to column `k` of `mean_motion`, in place."""
+    w2 = _dot(w, w)
+    for i in range(3):
+        out[i, k] += part * w[i]
+        out[3 + i, k] += part * down[i]
+        out[6 + i, k] += part * wt[i]
+        out[9 + i, k] += part * alpha[i]
+        out[12 + i, k] += part * field[i]
+        for j in range(3):
+            out[15 + 3 * i + j, k] += part * w[i] * w[j]
+        out[15 + 4 * i, k] -= part * w2
+    out[16, k] -= part * alpha[2]
+    out[17, k] += part * alpha[1]
+    out[18, k] += part * alpha[2]
+    out[20, k] -= part * alpha[0]
+    out[21, k] -= part * alpha[1]
+    out[22, k] += part * alpha[0]
+
+
+@compiled
 def mean_motion(
     t: Floats, q_nt: Floats, omega_nt_t: Floats, edges: Floats, omega_ie_n: Floats, magnetic_n: Floats
 ) -> Floats:
@@ -184,36 +223,13 @@ def mean_motion(
                 rate = _sum3(1.0 / h, A, 2.0 * u / h, B, 3.0 * u * u / h, C)
                 second = _sum3(2.0 / (h * h), B, 6.0 * u / (h * h), C, 0.0, zero)
                 s, c1, c2, d1, d2 = _sine_terms(_dot(phi, phi))
-                once = _cross(phi, rate)
-                twice = _cross(phi, once)
-                wt = _sum3(1.0, rate, -c1, once, c2, twice)
-                # The derivative of the line above; a2' is the rate of phi.phi.
-                a2_rate = 2.0 * _dot(phi, rate)
-                bend = _cross(phi, second)
-                alpha = _sum3(1.0, second, -c1, bend, -d1 * a2_rate, once)
-                alpha = _sum3(1.0, alpha, d2 * a2_rate, twice, c2, _cross(rate, once))
-                alpha = _sum3(1.0, alpha, c2, _cross(phi, bend), 0.0, zero)
+                wt, alpha = _turn_of_body(phi, rate, second, c1, c2, d1, d2)
                 earth_t = _turn_back(earth, phi, s, c1)
                 down_t = _turn_back(down, phi, s, c1)
                 field_t = _turn_back(field, phi, s, c1)
                 w = _sum3(1.0, earth_t, 1.0, wt, 0.0, zero)
                 alpha = _sum3(1.0, alpha, -1.0, _cross(wt, earth_t), 0.0, zero)
                 part = weights[g] * (right - left) / length
-                w2 = _dot(w, w)
-                for i in range(3):
-                    out[i, k] += part * w[i]
-                    out[3 + i, k] += part * down_t[i]
-                    out[6 + i, k] += part * wt[i]
-                    out[9 + i, k] += part * alpha[i]
-                    out[12 + i, k] += part * field_t[i]
-                    for j in range(3):
-                        out[15 + 3 * i + j, k] += part * w[i] * w[j]
-                    out[15 + 4 * i, k] -= part * w2
-                out[16, k] -= part * alpha[2]
-                out[17, k] += part * alpha[1]
-                out[18, k] += part * alpha[2]
-                out[20, k] -= part * alpha[0]
-                out[21, k] -= part * alpha[1]
-                out[22, k] += part * alpha[0]
+                _add_means(out, k, part, w, down_t, wt, alpha, field_t)
             left = right
     return out
