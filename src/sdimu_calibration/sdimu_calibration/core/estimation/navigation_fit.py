@@ -369,10 +369,9 @@ class NavigationFit(Fit):
         if nis > MISFIT or (held_out is not None and held_out > MISFIT):
             text = f"NIS {nis:.3f}" + ("" if held_out is None else f", held-out error {held_out:.3f}")
             out.append(f"the model{white} does not fit ({text}{_in_noise(statistics)}){in_turn}; run: sdimu diagnose")
-        worst = stop_misfit(self.last.output.normalised, self.prepared)
-        if worst:
-            out.append(f"{white.strip()}, {worst}".removeprefix(", "))
-        return (*out, *self.contradicted_priors()[:1], *self.beyond_specification()[:1])
+        # Noise that was learned explains what a stop leaves in white noise.
+        worst = "" if self.noise else stop_misfit(self.last.output.normalised, self.prepared)
+        return (*out, *([worst] if worst else []), *self.contradicted_priors()[:1], *self.beyond_specification()[:1])
 
     def beyond_specification(self) -> list[str]:
         """Name coefficients far outside the IMU's file, one line each, the furthest first."""
