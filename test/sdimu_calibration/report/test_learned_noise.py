@@ -137,3 +137,13 @@ def test_p_takes_the_nis_in_white_noise_and_is_called_so(learned, diagnosis):
     assert p_value(done, SimpleNamespace(nis_p_value=0.0), noise=True) == 0.0
     assert "that a right model in white noise looks like this" in sections.numbers(learned)
     assert "that a right model looks like this" in sections.numbers(diagnosis)
+
+
+def test_noise_is_remarked_and_no_advice(learned):
+    line = "gyro white noise is 1.30 +- 0.02 times the specification"
+    told = first_screen.of_diagnosis(summarise(replace(learned, noise=(line,), sentence="The noise model is wrong.")))
+    assert not any(line in text for text in told.advice)
+    assert any("1.30" in text for text in told.remarks)
+    whole = replace(learned, noise=(line,), sentence=f"The noise is wrong: {line}.")
+    said = first_screen.of_diagnosis(summarise(whole))
+    assert not any("1.30" in text for text in said.remarks)

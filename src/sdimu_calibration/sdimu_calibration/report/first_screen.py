@@ -68,7 +68,7 @@ def of_diagnosis(summary: DiagnosisSummary, spell: Spell | None = None) -> Verdi
     bad = not d.adequate and d.verdict != "noise model wrong"
     tone = BAD if bad else GOOD if d.adequate and not doubts else DOUBTFUL
     head = _missing(summary) if named else prose(d.sentence)
-    advice = list(dict.fromkeys([*(f.text for f in d.findings), *doubts, *summary.advice, *d.noise]))
+    advice = list(dict.fromkeys([*(f.text for f in d.findings), *doubts, *summary.advice]))
     if d.adequate and not advice:
         advice = ["Use the coefficients of this page."]
     if d.adequate and summary.untestable:
@@ -76,7 +76,9 @@ def of_diagnosis(summary: DiagnosisSummary, spell: Spell | None = None) -> Verdi
     costs = _costs(summary)
     title = "What it costs to ignore it" if summary.found else "How well it predicts"
     told = tuple(advice_html(text, spell) for text in advice)
-    return Verdict(tone, head, costs, told, title, _remarks(d.after))
+    unsaid = [text for text in d.noise if named or text not in d.sentence]
+    noise = (prose(f"Noise: {'; '.join(unsaid)}."),) if unsaid else ()
+    return Verdict(tone, head, costs, told, title, (*_remarks(d.after), *noise))
 
 
 def _remarks(calibration: Calibration) -> tuple[str, ...]:
