@@ -73,12 +73,15 @@ def best_pair(
 
 
 def _physical(problem: Problem[E], allowed: Ints) -> Ints:
-    """Columns of effects that act by motion or temperature: two drifts, or two faults, imitate nearly anything."""
+    """Columns of effects that act by motion, temperature or at a constant rate of time.
+
+    Drifts of which a scan tries many times or time constants, and faults, imitate nearly anything two at a time.
+    """
 
     def fits(column: int) -> bool:
         candidate = problem.candidate(column)
         effect = candidate.effect
-        drifts = effect.bias_drift or effect.wander_like or effect.scope == "recording"
+        drifts = (effect.bias_drift and bool(effect.options)) or effect.wander_like or effect.scope == "recording"
         of_known_size = bool(np.isfinite(problem.evidence.prior[column - problem.p]))
         return of_known_size and not drifts and candidate.family != "own"
 
