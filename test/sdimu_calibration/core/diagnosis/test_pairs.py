@@ -79,6 +79,35 @@ def test_a_pair_takes_the_place_of_what_stood_for_both(evidence):
     assert found.worth > 0.0
 
 
+def fall_of_chi_square(problem: Problem, columns: list[int]) -> float:
+    """By least squares with and without columns, priors as rows."""
+    evidence = problem.evidence
+    known, weight, _ = problem.known(columns)
+    left = []
+    for keep in (slice(0, problem.p), slice(0, problem.p + len(columns))):
+        W = np.vstack([evidence.W[:, known[keep]], np.diag(np.sqrt(weight[keep]))])
+        e = np.concatenate([evidence.e, np.zeros(W.shape[1])])
+        unit = np.linalg.norm(W, axis=0)
+        left.append(np.sum((e - W @ (np.linalg.lstsq(W / unit, e, rcond=None)[0] / unit)) ** 2))
+    return float(left[0] - left[1])
+
+
+@pytest.mark.parametrize("scale", [1.0, 1.5])
+def test_a_pair_is_worth_the_likelihood_it_gains_less_the_cost_of_all_pairs(evidence, scale):
+    """A hundred to three hundred effects of motion make pairs that cost ln(m / 0.02) of 12.4 to 14.6."""
+    first, second = (evidence.names.index(name) for name in HIDDEN)
+    rng = np.random.default_rng(9)
+    e = evidence.W[:, [first, second]] @ np.array([-6.6e-3, 2.4e-4]) + rng.standard_normal(len(evidence.e))
+    changed = replace(evidence, e=e, shift=np.zeros(len(evidence.shift)))
+    changed.__dict__["information"] = replace(evidence.information, d=evidence.W.T @ e)
+    problem = Problem(changed)
+    found = best_pair(problem, [], np.arange(problem.p, len(evidence.names)), LIMIT, scale)
+    assert found is not None
+    gain = 0.5 * fall_of_chi_square(problem, list(found.pair)) / scale**2
+    assert gain > 20.0
+    assert 12.4 < gain - found.worth < 14.6
+
+
 def test_what_the_scale_of_the_noise_explains_is_no_pair(evidence):
     first, second = (evidence.names.index(name) for name in HIDDEN)
     e = evidence.W[:, [first, second]] @ np.array([-3.3e-3, 1.2e-4])
