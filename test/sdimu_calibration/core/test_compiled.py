@@ -88,3 +88,31 @@ def test_a_damaged_cache_is_compiled_anew(tmp_path, kind):
     file.write_bytes(content)
     assert run() == ["45", "0"]
     assert run() == ["45", "1"]
+
+
+def test_an_edited_kernel_compiles_only_the_kernels_that_use_it(tmp_path):
+    for name, source in {
+        "used.py": "from sdimu_calibration.core.compiled import compiled\n\n@compiled\ndef one(x):\n    return x + 1\n",
+        "using.py": "from sdimu_calibration.core.compiled import compiled\nfrom sdimu_kernels.used import one\n\n"
+        "@compiled\ndef two(x):\n    return 2 * one(x)\n",
+        "apart.py": "from sdimu_calibration.core.compiled import compiled\n\n@compiled\ndef three(x):\n    return 3 * x\n",
+        "__init__.py": "",
+    }.items():
+        (tmp_path / "sdimu_kernels").mkdir(exist_ok=True)
+        (tmp_path / "sdimu_kernels" / name).write_text(source)
+    call = (
+        "from sdimu_kernels.using import two; from sdimu_kernels.apart import three; print(two(1), three(1), "
+        "sum(two.stats.cache_hits.values()), sum(three.stats.cache_hits.values()))"
+    )
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(tmp_path), *sys.path])}
+    environment.pop("NUMBA_CACHE_DIR", None)
+
+    def run():
+        done = subprocess.run([sys.executable, "-c", call], env=environment, capture_output=True, text=True, check=True)
+        return done.stdout.split()
+
+    assert run() == ["4", "3", "0", "0"]
+    assert run() == ["4", "3", "1", "1"]
+    edited = tmp_path / "sdimu_kernels" / "used.py"
+    edited.write_text(edited.read_text().replace("x + 1", "x + 2"))
+    assert run() == ["6", "3", "0", "1"], "the kernel that uses the edited one is compiled anew, the other is not"

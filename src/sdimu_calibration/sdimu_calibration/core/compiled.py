@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import hashlib
+import importlib.util
 import os
+import re
 import zlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -18,7 +20,8 @@ from numba.core.runtime import rtsys
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-_CORE = Path(__file__).parent
+_IMPORT = re.compile(rb"^from ((?:sdimu_|rate_table_sim)[\w.]*) import (\([^)]*\)|.*)$", re.MULTILINE)
+"""An import from one of the three packages at the start of a line: module, names."""
 
 
 class _Checked(IndexDataCacheFile):  # type: ignore[misc]
@@ -74,14 +77,51 @@ def _is_whole(path: str) -> bool:
 
 
 @cache
-def _sources_digest(folder: Path) -> str:
-    """Digest of the sources of the core, and of a folder outside it, that have compiled functions."""
-    core = folder == _CORE
-    digest = hashlib.sha256(b"" if core else _sources_digest(_CORE).encode())
-    for file in sorted(folder.rglob("*.py") if core else folder.glob("*.py")):
+def _package(name: str) -> Path:
+    """Return the folder of a package of this repository."""
+    spec = importlib.util.find_spec(name)
+    return Path(spec.origin).parent if spec and spec.origin else Path(name)
+
+
+@cache
+def _source(file: Path) -> bytes:
+    """Return the text of a source with compiled functions; empty for any other file, or none."""
+    try:
         source = file.read_bytes()
-        if b"@compiled" in source:
-            digest.update(source)
+    except OSError:
+        return b""
+    return source if b"@compiled" in source else b""
+
+
+def _imported(source: bytes) -> Iterator[Path]:
+    """Files of this repository's packages that a source takes names from, whether or not they exist."""
+    for match in _IMPORT.finditer(source):
+        module, names = match.group(1).decode(), match.group(2).decode()
+        top, *rest = module.split(".")
+        folder = _package(top).joinpath(*rest)
+        yield folder.with_suffix(".py")
+        for name in re.findall(r"\w+", names):
+            yield folder / f"{name}.py"
+
+
+@cache
+def _compiled_into(file: Path) -> frozenset[Path]:
+    """Return the sources whose compiled functions can be part of those of a file, itself among them."""
+    found: set[Path] = set()
+    waiting = [file]
+    while waiting:
+        one = waiting.pop()
+        if one not in found and _source(one):
+            found.add(one)
+            waiting += _imported(_source(one))
+    return frozenset(found)
+
+
+def _digest(file: Path) -> str:
+    """Digest of a file and of all that is compiled into its functions."""
+    digest = hashlib.sha256()
+    for source in sorted(_compiled_into(file)):
+        digest.update(_source(source))
     return digest.hexdigest()[:16]
 
 
@@ -91,15 +131,14 @@ def compiled(function: F) -> F:
     Not `fastmath`: NaN must stay NaN, and the same data must give the same digits in every process.
 
     Numba's cache notices a change of the function's own file only, while functions of other files are compiled into it.
-    So the cache's folder is named by all sources of the core, and of the function's folder, that have compiled
-    functions. Constants that such a function takes from elsewhere must live in one of them too (there is a test).
+    So the cache's folder is named by the sources of the file and of every file with compiled functions that it imports
+    from, and they from others. Constants that such a function takes from elsewhere must live in one of them too (there
+    is a test). One kernel edited compiles the kernels that use it anew, and no others.
     """
-    folder = Path(function.__code__.co_filename).parent
-    place = folder / "__pycache__"
-    if "NUMBA_CACHE_DIR" not in os.environ and os.access(folder, os.W_OK):
-        # A room of the core has no sources besides those of the core: they are read once for all rooms.
-        sources = _CORE if folder.is_relative_to(_CORE) else folder
-        numba.config.CACHE_DIR = str(place / f"numba-{_sources_digest(sources)}")
+    file = Path(function.__code__.co_filename)
+    place = file.parent / "__pycache__"
+    if "NUMBA_CACHE_DIR" not in os.environ and os.access(file.parent, os.W_OK):
+        numba.config.CACHE_DIR = str(place / f"numba-{_digest(file)}")
     compiled_one = numba.njit(nogil=True, error_model="numpy")(function)
     if not numba.config.DISABLE_JIT:
         compiled_one._cache = _Cache(function)
