@@ -95,7 +95,8 @@ def test_an_edited_kernel_compiles_only_the_kernels_that_use_it(tmp_path):
         "used.py": "from sdimu_calibration.core.compiled import compiled\n\n@compiled\ndef one(x):\n    return x + 1\n",
         "using.py": "from sdimu_calibration.core.compiled import compiled\nfrom sdimu_kernels.used import one\n\n"
         "@compiled\ndef two(x):\n    return 2 * one(x)\n",
-        "apart.py": "from sdimu_calibration.core.compiled import compiled\n\n@compiled\ndef three(x):\n    return 3 * x\n",
+        "apart.py": "from sdimu_calibration.core.compiled import compiled\n\n@compiled\n"
+        "def three(x):\n    return 3 * x\n",
         "__init__.py": "",
     }.items():
         (tmp_path / "sdimu_kernels").mkdir(exist_ok=True)
