@@ -84,7 +84,6 @@ mutations: setup
 
 # The book, out/docs/index.html: it is read without a network. Every warning is an error.
 docs: $(BOOK)
-	$(BIN)/sdimu effects --markdown > doc/effects.md
 	$(BIN)/python -m sphinx -W --keep-going -q -b html doc out/docs
 
 # Minutes: every kind of fault in the data at five sizes.
