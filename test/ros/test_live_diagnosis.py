@@ -32,9 +32,9 @@ from sdimu_calibration.nodes.credits import HISTORY
 from sdimu_calibration.nodes.diagnosis_messages import diagnosis, heat_map
 from sdimu_calibration.nodes.diagnosis_worker import Answer, Diagnoser, Job, Picture, Request
 from sdimu_calibration.nodes.live_diagnosis import Worker
-from sdimu_calibration.storage.bag_writer import write_recording
-from sdimu_calibration.storage.config import load_imu, load_model, load_plan
-from sdimu_calibration.storage.journal import Journal, digest
+from sdimu_calibration.storage.bags.bag_writer import write_recording
+from sdimu_calibration.storage.files.config import load_imu, load_model, load_plan
+from sdimu_calibration.storage.files.journal import Journal, digest
 from sdimu_calibration.storage.opening import Source, open_test, opening_options
 from sdimu_sim.core.scenario import Scenario, generate
 

@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from sdimu_calibration.storage.recover import recover
+from sdimu_calibration.storage.bags.recover import recover
 
 pytestmark = pytest.mark.ros
 

@@ -9,7 +9,7 @@ import pytest
 
 import sdimu_calibration as sdimu
 from sdimu_calibration.core.recording import DataError
-from sdimu_calibration.storage.result_file import read_result
+from sdimu_calibration.storage.files.result_file import read_result
 
 HIDDEN = "accel_quadratic_x"
 

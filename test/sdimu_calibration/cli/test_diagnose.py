@@ -14,8 +14,8 @@ import pytest
 from sdimu_calibration.cli import main as cli
 from sdimu_calibration.core.effects import registry
 from sdimu_calibration.report.catalogue import page
-from sdimu_calibration.storage.bag_writer import write_recording
-from sdimu_calibration.storage.config import load_imu, load_plan, load_site
+from sdimu_calibration.storage.bags.bag_writer import write_recording
+from sdimu_calibration.storage.files.config import load_imu, load_plan, load_site
 from sdimu_sim.core.scenario import Scenario, generate
 
 OWN = """\

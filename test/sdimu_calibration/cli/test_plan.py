@@ -13,10 +13,10 @@ from sdimu_calibration.core.estimation.solve import solve
 from sdimu_calibration.core.evidence.known import Standing, known_of
 from sdimu_calibration.core.planning.nominal import nominal_recording
 from sdimu_calibration.core.recording import DataError
-from sdimu_calibration.storage.config import load_imu, load_plan, load_site
-from sdimu_calibration.storage.json_file import write_json
-from sdimu_calibration.storage.model_choice import named_model
-from sdimu_calibration.storage.standing_file import as_plain, read_standing
+from sdimu_calibration.storage.files.config import load_imu, load_plan, load_site
+from sdimu_calibration.storage.files.json_file import write_json
+from sdimu_calibration.storage.files.model_choice import named_model
+from sdimu_calibration.storage.files.standing_file import as_plain, read_standing
 
 OPEN = ("gyro_scale_asymmetry_y", "gyro_scale_quadratic_y")
 

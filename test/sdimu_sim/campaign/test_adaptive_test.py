@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from sdimu_calibration.core.adaptive import Menu
-from sdimu_calibration.storage.config import load_imu, load_model, load_plan, load_site
-from sdimu_calibration.storage.goal_file import load_goals
-from sdimu_calibration.storage.table_file import load_rate_table
+from sdimu_calibration.storage.files.config import load_imu, load_model, load_plan, load_site
+from sdimu_calibration.storage.files.goal_file import load_goals
+from sdimu_calibration.storage.files.table_file import load_rate_table
 from sdimu_sim.campaign.adaptive_test import FIRST_STOP_S, adaptive_test
 from sdimu_sim.campaign.run import simulate
 from sdimu_sim.core.scenario import Scenario, imu_truth

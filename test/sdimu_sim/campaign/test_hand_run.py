@@ -10,7 +10,7 @@ from sdimu_calibration.core.diagnosis.diagnose import climb
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.estimation.solve import solve
 from sdimu_calibration.core.specification import Site
-from sdimu_calibration.storage.config import load_imu, load_model
+from sdimu_calibration.storage.files.config import load_imu, load_model
 from sdimu_sim.campaign.hand_run import HandRun
 from sdimu_sim.core.by_hand import ByHand, by_hand_recording
 

@@ -12,7 +12,7 @@ from sdimu_calibration.core.effects.effect import CHANNELS, Timetable
 from sdimu_calibration.core.effects.motion import Motion
 from sdimu_calibration.core.evidence.candidate import split
 from sdimu_calibration.core.recording import DataError, Recording
-from sdimu_calibration.storage.config import load_imu
+from sdimu_calibration.storage.files.config import load_imu
 from sdimu_sim.campaign.hidden_draw import KINDS, TESTABLE, Draw, Truth, draw, hideable_names
 from sdimu_sim.campaign.hidden_outside import OUTSIDE, shapes
 from sdimu_sim.campaign.hidden_run import with_fault

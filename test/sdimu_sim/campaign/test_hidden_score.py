@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from sdimu_calibration.core.recording import DataError
-from sdimu_calibration.storage.config import load_imu, load_model
+from sdimu_calibration.storage.files.config import load_imu, load_model
 from sdimu_sim.campaign.hidden_draw import Draw, Truth
 from sdimu_sim.campaign.hidden_page import page
 from sdimu_sim.campaign.hidden_run import scenario_of

@@ -8,7 +8,7 @@ import pytest
 from sdimu_calibration.core.estimation.solve import solve
 from sdimu_calibration.core.noise_term import NoiseTerm
 from sdimu_calibration.core.specification import Site
-from sdimu_calibration.storage.config import load_imu, load_model
+from sdimu_calibration.storage.files.config import load_imu, load_model
 from sdimu_sim.campaign.grade_run import drawn_effect, simulated_test
 from sdimu_sim.campaign.noise_page import page
 from sdimu_sim.campaign.noise_run import NoiseRun

@@ -8,7 +8,7 @@ import pytest
 from rate_table_sim.core import TableSpecification
 from sdimu_calibration.core.estimation.outcome import calibrate
 from sdimu_calibration.core.plan import Plan, Turn
-from sdimu_calibration.storage.config import load_imu, load_model, load_site
+from sdimu_calibration.storage.files.config import load_imu, load_model, load_site
 from sdimu_sim.campaign.run import CHANNELS, CalibrationRun, lag_one, nees, simulate
 from sdimu_sim.core import Scenario, generate, imu_truth, in_body_frame
 

@@ -21,10 +21,10 @@ from sdimu_calibration.report import data, evidence_figures
 from sdimu_calibration.report.drawing import Figure
 from sdimu_calibration.report.page import write_report
 from sdimu_calibration.report.report_extras import report_extras
-from sdimu_calibration.storage.diagnosis_file import write_diagnosis
-from sdimu_calibration.storage.result_file import write_result
+from sdimu_calibration.storage.files.diagnosis_file import write_diagnosis
+from sdimu_calibration.storage.files.result_file import write_result
+from sdimu_calibration.storage.files.whole_file import written_together
 from sdimu_calibration.storage.trace import traced
-from sdimu_calibration.storage.whole_file import written_together
 
 
 class FitDiagnosis:

@@ -28,9 +28,9 @@ from sdimu_calibration.core.progress import Progress, silent
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.specification import ImuSpecification
 from sdimu_calibration.core.units import parse_quantity
-from sdimu_calibration.storage.config import load_imu, load_plan, load_site
-from sdimu_calibration.storage.effect_file import find_effects
-from sdimu_calibration.storage.model_choice import HANDHELD, named_estimator, named_model
+from sdimu_calibration.storage.files.config import load_imu, load_plan, load_site
+from sdimu_calibration.storage.files.effect_file import find_effects
+from sdimu_calibration.storage.files.model_choice import HANDHELD, named_estimator, named_model
 from sdimu_calibration.storage.opening import Source, open_test
 from sdimu_calibration.storage.recording_set import BagSource, load_set, set_of, set_options
 

@@ -12,7 +12,7 @@ from sdimu_calibration.cli.console import JsonOption, answer, plain, say
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from sdimu_calibration.storage.fleet_folder import Entry
+    from sdimu_calibration.storage.files.fleet_folder import Entry
 
 
 def datasheet(
@@ -41,11 +41,11 @@ def datasheet(
     from sdimu_calibration.cli.wide_table import print_table
     from sdimu_calibration.core.fleet import datasheet as core
     from sdimu_calibration.report.fleet.sheet import HEADINGS, rows, write_page
-    from sdimu_calibration.storage.datasheet_file import Certificate, hashed, write_datasheet
-    from sdimu_calibration.storage.fleet_folder import gather
-    from sdimu_calibration.storage.limits_file import read_limits
-    from sdimu_calibration.storage.noise_terms_file import read_noise_terms
-    from sdimu_calibration.storage.whole_file import written_together
+    from sdimu_calibration.storage.files.datasheet_file import Certificate, hashed, write_datasheet
+    from sdimu_calibration.storage.files.fleet_folder import gather
+    from sdimu_calibration.storage.files.limits_file import read_limits
+    from sdimu_calibration.storage.files.noise_terms_file import read_noise_terms
+    from sdimu_calibration.storage.files.whole_file import written_together
 
     console = plain(stderr=as_json)
     allowed = {} if limits is None else read_limits(limits, core.known_terms())
@@ -75,7 +75,7 @@ def datasheet(
 
 def _noise_below(folders: Sequence[Path]) -> list[Path]:
     """Every noise.json below the folders."""
-    from sdimu_calibration.storage.noise_terms_file import NAME
+    from sdimu_calibration.storage.files.noise_terms_file import NAME
 
     return [path for folder in folders if folder.is_dir() for path in sorted(folder.rglob(NAME))]
 

@@ -78,9 +78,9 @@ def opened(
     from sdimu_calibration.core.estimation.solve import AUTO
     from sdimu_calibration.core.recording import DataError
     from sdimu_calibration.core.units import parse_quantity
-    from sdimu_calibration.storage.config import load_imu, load_site
-    from sdimu_calibration.storage.effect_file import find_effects
-    from sdimu_calibration.storage.model_choice import HANDHELD, named_estimator, named_model
+    from sdimu_calibration.storage.files.config import load_imu, load_site
+    from sdimu_calibration.storage.files.effect_file import find_effects
+    from sdimu_calibration.storage.files.model_choice import HANDHELD, named_estimator, named_model
     from sdimu_calibration.storage.opening import open_test
 
     wanted = named_estimator(estimator, "--estimator")

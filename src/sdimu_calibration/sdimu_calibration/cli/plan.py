@@ -70,9 +70,9 @@ def plan(
     from sdimu_calibration.core.plan_search import Goal, Question, next_turn, search
     from sdimu_calibration.core.plan_search.bound import already, bounds
     from sdimu_calibration.core.plan_search.moves import Abilities
-    from sdimu_calibration.storage.config import load_imu, load_plan, load_site
-    from sdimu_calibration.storage.model_choice import named_model
-    from sdimu_calibration.storage.plan_file import write_plan
+    from sdimu_calibration.storage.files.config import load_imu, load_plan, load_site
+    from sdimu_calibration.storage.files.model_choice import named_model
+    from sdimu_calibration.storage.files.plan_file import write_plan
 
     console = plain(stderr=as_json)
     start = load_plan(plan)
@@ -128,7 +128,7 @@ def plan(
 def _write_backwards(console: Console, start: Plan, out: Path) -> None:
     """Write the plan whose recording tells what is of an attitude from what is of a time."""
     from sdimu_calibration.core.plan import backwards
-    from sdimu_calibration.storage.plan_file import write_plan
+    from sdimu_calibration.storage.files.plan_file import write_plan
 
     write_plan(out, backwards(start), [f"{start.name} in the opposite order, every turn in the other sense."])
     say(console, f"{start.name} backwards, {start.duration_s / 60.0:.1f} min; in {out}")

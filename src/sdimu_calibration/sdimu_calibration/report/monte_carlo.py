@@ -19,8 +19,8 @@ from sdimu_calibration.core.units import from_si
 from sdimu_calibration.report.design.sheet import document
 from sdimu_calibration.report.drawing import BAND, INK, Figure, html, lay_out
 from sdimu_calibration.report.markup import grid, quiet, section, sentence
-from sdimu_calibration.storage.json_file import read_json
-from sdimu_calibration.storage.whole_file import write_whole
+from sdimu_calibration.storage.files.json_file import read_json
+from sdimu_calibration.storage.files.whole_file import write_whole
 
 FORMAT = "sdimu-monte-carlo/1"
 

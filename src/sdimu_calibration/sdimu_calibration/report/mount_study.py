@@ -14,7 +14,7 @@ from sdimu_calibration.report.design.palette import SERIES
 from sdimu_calibration.report.design.sheet import document
 from sdimu_calibration.report.drawing import Figure, html, lay_out
 from sdimu_calibration.report.groups import title
-from sdimu_calibration.storage.whole_file import write_whole
+from sdimu_calibration.storage.files.whole_file import write_whole
 
 _DASHES = ("solid", "dash", "dot")
 _COLUMNS = 2

@@ -14,10 +14,10 @@ from sdimu_calibration.core.plain_text import one_line
 from sdimu_calibration.core.recording import DataError, Recording
 from sdimu_calibration.core.specification import ImuSpecification
 from sdimu_calibration.core.units import UnitError, parse_unit
-from sdimu_calibration.storage.bag_metadata import custom_data
-from sdimu_calibration.storage.bag_reader import read_recording
-from sdimu_calibration.storage.config import load_imu, load_site
-from sdimu_calibration.storage.topic_choice import TopicChoice
+from sdimu_calibration.storage.bags.bag_metadata import custom_data
+from sdimu_calibration.storage.bags.bag_reader import read_recording
+from sdimu_calibration.storage.bags.topic_choice import TopicChoice
+from sdimu_calibration.storage.files.config import load_imu, load_site
 
 DEFAULT_SITE = "daejeon"
 CLASSES = ("dtg", "fog_tactical", "mems_by_hand")

@@ -9,8 +9,8 @@ from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-from sdimu_calibration.storage.bag_metadata import custom_data
-from sdimu_calibration.storage.datasheet_file import file_hashes
+from sdimu_calibration.storage.bags.bag_metadata import custom_data
+from sdimu_calibration.storage.files.datasheet_file import file_hashes
 
 
 @dataclass(frozen=True)

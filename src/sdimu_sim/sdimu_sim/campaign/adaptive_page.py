@@ -9,8 +9,8 @@ import numpy as np
 
 from sdimu_calibration.core.planning.predict import predict
 from sdimu_calibration.core.specification import ImuSpecification, Model, Site
-from sdimu_calibration.storage.config import load_plan
-from sdimu_calibration.storage.goal_file import load_goals
+from sdimu_calibration.storage.files.config import load_plan
+from sdimu_calibration.storage.files.goal_file import load_goals
 from sdimu_sim.campaign.adaptive_run import FIXED, KINDS
 
 Row = dict[str, Any]

@@ -16,8 +16,8 @@ from sdimu_calibration.core.estimation.solve import solve
 from sdimu_calibration.core.joint.scope import is_shared
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.specification import ImuSpecification, Model, Site
-from sdimu_calibration.storage.config import load_plan
-from sdimu_calibration.storage.table_file import load_rate_table
+from sdimu_calibration.storage.files.config import load_plan
+from sdimu_calibration.storage.files.table_file import load_rate_table
 from sdimu_sim.campaign.adaptive_test import adaptive_test
 from sdimu_sim.campaign.hidden_draw import Truth, drawn_effect, hideable_names
 from sdimu_sim.campaign.hidden_score import baseline_z, same_effect

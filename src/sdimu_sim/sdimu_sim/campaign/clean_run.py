@@ -12,7 +12,7 @@ import numpy as np
 from sdimu_calibration.core.diagnosis.diagnose import climb
 from sdimu_calibration.core.estimation.solve import solve
 from sdimu_calibration.core.specification import Site
-from sdimu_calibration.storage.config import load_imu, load_model
+from sdimu_calibration.storage.files.config import load_imu, load_model
 from sdimu_sim.campaign.grade_run import HANDHELD, LATITUDES_DEG, scored_row, simulated_test
 from sdimu_sim.campaign.plan_draw import PLANS
 

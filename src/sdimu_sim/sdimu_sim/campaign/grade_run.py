@@ -25,7 +25,7 @@ from sdimu_calibration.core.noise_term import NoiseTerm
 from sdimu_calibration.core.recording import DataError, Recording
 from sdimu_calibration.core.specification import ImuSpecification, Model, Site
 from sdimu_calibration.core.units import STANDARD_GRAVITY
-from sdimu_calibration.storage.config import load_imu, load_model
+from sdimu_calibration.storage.files.config import load_imu, load_model
 from sdimu_sim.campaign.hidden_draw import PLAUSIBLE, TESTABLE, Truth, hideable_names
 from sdimu_sim.campaign.hidden_score import baseline_z, same_effect
 from sdimu_sim.campaign.plan_draw import FILED, study_plan, study_table

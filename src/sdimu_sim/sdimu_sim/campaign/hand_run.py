@@ -19,7 +19,7 @@ from sdimu_calibration.core.front_door import OpeningOptions, open_test
 from sdimu_calibration.core.recording import PhaseLog
 from sdimu_calibration.core.specification import ImuSpecification, Site
 from sdimu_calibration.core.units import STANDARD_GRAVITY, from_si
-from sdimu_calibration.storage.config import load_imu, load_model
+from sdimu_calibration.storage.files.config import load_imu, load_model
 from sdimu_sim.campaign.grade_run import LATITUDES_DEG, drawn_effect, scored_row
 from sdimu_sim.campaign.run import in_the_mean
 from sdimu_sim.core.by_hand import ByHand, against_gravity, by_hand_motion, by_hand_recording

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from sdimu_calibration.storage.json_file import read_json
-from sdimu_calibration.storage.whole_file import write_whole
+from sdimu_calibration.storage.files.json_file import read_json
+from sdimu_calibration.storage.files.whole_file import write_whole
 from sdimu_sim.campaign.hidden_summary import FORMAT
 
 _HEAD = """# Proof on hidden effects

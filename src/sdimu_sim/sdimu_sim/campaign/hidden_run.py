@@ -11,7 +11,7 @@ import numpy as np
 from sdimu_calibration.core.diagnosis.diagnose import diagnose
 from sdimu_calibration.core.recording import Recording
 from sdimu_calibration.core.specification import ImuSpecification, Model, Site
-from sdimu_calibration.storage.config import load_plan
+from sdimu_calibration.storage.files.config import load_plan
 from sdimu_sim.campaign.hidden_draw import Draw, draw, hideable_names
 from sdimu_sim.campaign.hidden_score import score
 from sdimu_sim.campaign.hidden_sizes import RATE_HZ, WARM_UP, Sizes

@@ -14,7 +14,7 @@ from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.estimation.solve import solve
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.specification import ImuSpecification, Model, Site
-from sdimu_calibration.storage.config import load_plan
+from sdimu_calibration.storage.files.config import load_plan
 from sdimu_sim.campaign.hidden_outside import shapes
 from sdimu_sim.campaign.run import simulate
 from sdimu_sim.core.scenario import Scenario, imu_truth

@@ -14,7 +14,7 @@ from sdimu_calibration.core.diagnosis.diagnose import climb
 from sdimu_calibration.core.diagnosis.found import found_effects
 from sdimu_calibration.core.estimation.solve import solve
 from sdimu_calibration.core.specification import Site
-from sdimu_calibration.storage.config import load_imu, load_model
+from sdimu_calibration.storage.files.config import load_imu, load_model
 from sdimu_sim.campaign.grade_run import LATITUDES_DEG, drawn_effect, simulated_test
 from sdimu_sim.campaign.hidden_draw import Truth
 from sdimu_sim.campaign.hidden_score import baseline_z, same_effect

@@ -14,7 +14,7 @@ from sdimu_calibration.core.effects import registry
 from sdimu_calibration.core.estimation.solve import solve
 from sdimu_calibration.core.recording import Recording
 from sdimu_calibration.core.specification import Site
-from sdimu_calibration.storage.config import load_imu, load_model
+from sdimu_calibration.storage.files.config import load_imu, load_model
 from sdimu_sim.campaign.grade_run import LATITUDES_DEG, PLANS, drawn_effect, scored_row, simulated_test
 from sdimu_sim.core.mean_bias import BIASES
 from sdimu_sim.core.truth import ImuTruth

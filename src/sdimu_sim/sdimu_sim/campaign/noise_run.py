@@ -15,7 +15,7 @@ from sdimu_calibration.core.estimation.solve import solve
 from sdimu_calibration.core.noise_term import NoiseTerm
 from sdimu_calibration.core.specification import ImuSpecification, Site
 from sdimu_calibration.core.units import from_si, to_si
-from sdimu_calibration.storage.config import load_imu, load_model
+from sdimu_calibration.storage.files.config import load_imu, load_model
 from sdimu_sim.campaign.grade_run import LATITUDES_DEG, PLANS, drawn_effect, simulated_test
 from sdimu_sim.campaign.hidden_score import baseline_z, same_effect
 from sdimu_sim.core.coloured import KINDS, parse_noise

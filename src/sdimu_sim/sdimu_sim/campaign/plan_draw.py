@@ -10,7 +10,7 @@ import numpy as np
 
 from rate_table_sim.core import TableSpecification
 from sdimu_calibration.core.plan import Plan, Turn
-from sdimu_calibration.storage.config import load_plan
+from sdimu_calibration.storage.files.config import load_plan
 
 FILED = ("kim18", "kim18_signed", "recommended")
 """Plans of config/plan."""

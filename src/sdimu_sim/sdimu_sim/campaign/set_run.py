@@ -22,7 +22,7 @@ from sdimu_calibration.core.joint.set_result import set_outcome
 from sdimu_calibration.core.plan import Plan, Turn
 from sdimu_calibration.core.plan_search import Question, next_turn
 from sdimu_calibration.core.results import Calibration
-from sdimu_calibration.storage.config import load_imu, load_model, load_plan
+from sdimu_calibration.storage.files.config import load_imu, load_model, load_plan
 from sdimu_sim.campaign.grade_run import PLANS, drawn_effect
 from sdimu_sim.campaign.hidden_draw import Truth
 from sdimu_sim.campaign.hidden_score import baseline_z, same_effect

@@ -14,7 +14,7 @@ from sdimu_calibration.core.joint.member import Job, Member, Report, tried
 from sdimu_calibration.core.plan import Plan
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.specification import ImuSpecification, Site
-from sdimu_calibration.storage.config import load_plan
+from sdimu_calibration.storage.files.config import load_plan
 from sdimu_sim.campaign.grade_run import LATITUDES_DEG
 from sdimu_sim.campaign.run import simulate
 from sdimu_sim.core.scenario import Scenario, imu_truth

@@ -19,7 +19,7 @@ import rate_table_sim
 import sdimu_calibration
 import sdimu_sim
 from sdimu_calibration.core.recording import DataError
-from sdimu_calibration.storage.json_file import read_json, write_json
+from sdimu_calibration.storage.files.json_file import read_json, write_json
 
 Row = dict[str, Any]
 

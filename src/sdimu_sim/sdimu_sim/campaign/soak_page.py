@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from sdimu_calibration.core.arrays import Floats
-from sdimu_calibration.storage.config import load_model
+from sdimu_calibration.storage.files.config import load_model
 from sdimu_sim.core.true_coefficients import POWERS
 
 Rows = Sequence[Mapping[str, Any]]

@@ -18,7 +18,7 @@ from sdimu_calibration.core.joint.set_result import set_outcome
 from sdimu_calibration.core.recording import Recording
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.specification import Model, Site
-from sdimu_calibration.storage.config import load_imu, load_model, load_plan
+from sdimu_calibration.storage.files.config import load_imu, load_model, load_plan
 from sdimu_sim.campaign.grade_run import PLANS
 from sdimu_sim.campaign.noise_run import drawn_noise
 from sdimu_sim.campaign.set_world import World, here, members_of, opened

@@ -13,7 +13,7 @@ from sdimu_calibration.core.plan import Plan
 from sdimu_calibration.core.recording import DataError, Recording
 from sdimu_calibration.core.rotation import rotation_vector
 from sdimu_calibration.core.specification import ImuSpecification, Site
-from sdimu_calibration.storage.config import load_model
+from sdimu_calibration.storage.files.config import load_model
 from sdimu_sim.campaign.run import simulate
 from sdimu_sim.campaign.set_world import World
 from sdimu_sim.core.hidden import size_unit

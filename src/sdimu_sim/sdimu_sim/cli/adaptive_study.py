@@ -24,9 +24,9 @@ def adaptive(
     """Let tests choose their turns: minutes to the limits, do the sigmas hold, is a hidden effect told apart."""
     import math
 
-    from sdimu_calibration.storage.config import load_imu, load_model, load_site
-    from sdimu_calibration.storage.goal_file import load_goals
-    from sdimu_calibration.storage.json_file import write_json
+    from sdimu_calibration.storage.files.config import load_imu, load_model, load_site
+    from sdimu_calibration.storage.files.goal_file import load_goals
+    from sdimu_calibration.storage.files.json_file import write_json
     from sdimu_sim.campaign.adaptive_page import fixed_minutes, page
     from sdimu_sim.campaign.adaptive_run import KINDS, AdaptiveRun
     from sdimu_sim.campaign.hidden_sizes import sizes
@@ -58,9 +58,9 @@ def adaptive_run(
 ) -> None:
     """Tell one adaptive test in full: each choice with its reason, how sigmas and errors fell."""
     from sdimu_calibration.core.adaptive import Menu
-    from sdimu_calibration.storage.config import load_imu, load_model, load_plan, load_site
-    from sdimu_calibration.storage.goal_file import load_goals
-    from sdimu_calibration.storage.table_file import load_rate_table
+    from sdimu_calibration.storage.files.config import load_imu, load_model, load_plan, load_site
+    from sdimu_calibration.storage.files.goal_file import load_goals
+    from sdimu_calibration.storage.files.table_file import load_rate_table
     from sdimu_sim.campaign.adaptive_picture import write_picture
     from sdimu_sim.campaign.adaptive_test import adaptive_test
     from sdimu_sim.campaign.hidden_sizes import RATE_HZ, WARM_UP

@@ -66,10 +66,10 @@ def measure(plan: str, rate: float, repeats: int, folder: Path) -> list[tuple[st
     from sdimu_calibration.core.alignment.prepared import first_attitude, reduce, set_up
     from sdimu_calibration.core.estimation.outcome import calibrate
     from sdimu_calibration.core.filter.passes import one_pass
-    from sdimu_calibration.storage.bag_reader import read_recording
-    from sdimu_calibration.storage.config import load_imu, load_model, load_plan, load_site
-    from sdimu_calibration.storage.diagnosis_file import write_diagnosis
-    from sdimu_calibration.storage.result_file import write_result
+    from sdimu_calibration.storage.bags.bag_reader import read_recording
+    from sdimu_calibration.storage.files.config import load_imu, load_model, load_plan, load_site
+    from sdimu_calibration.storage.files.diagnosis_file import write_diagnosis
+    from sdimu_calibration.storage.files.result_file import write_result
     from sdimu_sim.bag_file import write_test
     from sdimu_sim.campaign.run import CalibrationRun
     from sdimu_sim.core.scenario import Scenario, simulate_test

@@ -29,8 +29,8 @@ def hidden_campaign(
     """Hide effects at random, diagnose the recordings blindly, and score the findings by name."""
     # Inside the function: the help of `sdimu` must not wait for numerical libraries.
     from sdimu_calibration.cli.progress import bar
-    from sdimu_calibration.storage.config import load_imu, load_model
-    from sdimu_calibration.storage.json_file import write_json
+    from sdimu_calibration.storage.files.config import load_imu, load_model
+    from sdimu_calibration.storage.files.json_file import write_json
     from sdimu_sim.campaign.campaign import run_campaign
     from sdimu_sim.campaign.hidden_draw import KINDS
     from sdimu_sim.campaign.hidden_page import write_page

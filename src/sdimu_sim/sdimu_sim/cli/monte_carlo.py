@@ -43,8 +43,8 @@ def monte_carlo(
     from rate_table_sim.table_file import load_table
     from sdimu_calibration.cli.progress import bar
     from sdimu_calibration.report.monte_carlo import checks_table, coefficients_table, write_page
-    from sdimu_calibration.storage.config import load_imu, load_model, load_plan, load_site
-    from sdimu_calibration.storage.json_file import write_json
+    from sdimu_calibration.storage.files.config import load_imu, load_model, load_plan, load_site
+    from sdimu_calibration.storage.files.json_file import write_json
     from sdimu_sim.campaign.bound import plan_bound
     from sdimu_sim.campaign.campaign import run_campaign
     from sdimu_sim.campaign.run import CalibrationRun

@@ -57,7 +57,7 @@ def imu_files(asked: Sequence[str] | None, without: str = "") -> list[str]:
         When one is not in config/imu (worlds and folders of a study bear its name), or is `without`.
     """
     from sdimu_calibration.core.recording import DataError
-    from sdimu_calibration.storage.config import config_folder
+    from sdimu_calibration.storage.files.config import config_folder
 
     known = sorted(path.stem for path in (config_folder() / "imu").glob("*.yaml") if path.stem != without)
     unknown = [name for name in asked or () if name not in known]
@@ -80,7 +80,7 @@ def leave_page(console: Console, place: Path, rows: Any, text: str) -> None:
     text : str
         Markdown.
     """
-    from sdimu_calibration.storage.json_file import write_json
+    from sdimu_calibration.storage.files.json_file import write_json
 
     write_json(place.with_suffix(".json"), rows)
     place.with_suffix(".md").write_text(text, encoding="utf-8")

@@ -40,8 +40,8 @@ def mount(
     from sdimu_calibration.core.effects.imu_model import build
     from sdimu_calibration.core.units import from_si
     from sdimu_calibration.report.mount_study import write_page
-    from sdimu_calibration.storage.config import load_imu, load_model, load_plan, load_site
-    from sdimu_calibration.storage.json_file import write_json
+    from sdimu_calibration.storage.files.config import load_imu, load_model, load_plan, load_site
+    from sdimu_calibration.storage.files.json_file import write_json
     from sdimu_sim.campaign.mount_study import mount_study
     from sdimu_sim.core.scenario import Scenario
 
@@ -78,8 +78,8 @@ def faults(
 
     from sdimu_calibration.cli.progress import bar
     from sdimu_calibration.core.recording import DataError
-    from sdimu_calibration.storage.config import load_imu, load_model, load_plan, load_site
-    from sdimu_calibration.storage.json_file import write_json
+    from sdimu_calibration.storage.files.config import load_imu, load_model, load_plan, load_site
+    from sdimu_calibration.storage.files.json_file import write_json
     from sdimu_sim.campaign.fault_page import page
     from sdimu_sim.campaign.fault_run import TRACEBACK, WRONG
     from sdimu_sim.campaign.fault_study import content, fault_study, hurried, table, totals
@@ -241,7 +241,7 @@ def many(
     from rich.box import SIMPLE
     from rich.table import Table
 
-    from sdimu_calibration.storage.json_file import write_json
+    from sdimu_calibration.storage.files.json_file import write_json
     from sdimu_sim.campaign.grade_run import HANDHELD
     from sdimu_sim.campaign.many_run import ManyRun
 
@@ -280,7 +280,7 @@ def sets(
     from rich.box import SIMPLE
     from rich.table import Table
 
-    from sdimu_calibration.storage.json_file import write_json
+    from sdimu_calibration.storage.files.json_file import write_json
     from sdimu_sim.campaign import soak_page
     from sdimu_sim.campaign.grade_run import HANDHELD
     from sdimu_sim.campaign.set_page import headings, line
@@ -323,7 +323,7 @@ def hand(
     from rich.box import SIMPLE
     from rich.table import Table
 
-    from sdimu_calibration.storage.json_file import write_json
+    from sdimu_calibration.storage.files.json_file import write_json
     from sdimu_sim.campaign.hand_run import IMUS, HandRun
 
     console, seeds, results = plain(), range(seed, seed + runs), {}

@@ -14,7 +14,7 @@ from sdimu_calibration.core.estimation.outcome import outcome
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.estimation.solve import solve
 from sdimu_calibration.core.specification import Site
-from sdimu_calibration.storage.config import load_imu, load_model, load_plan
+from sdimu_calibration.storage.files.config import load_imu, load_model, load_plan
 from sdimu_sim.campaign.hidden_score import baseline_z
 from sdimu_sim.campaign.run import in_the_mean, simulate
 from sdimu_sim.core.scenario import Scenario, imu_truth

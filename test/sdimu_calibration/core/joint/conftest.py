@@ -15,7 +15,7 @@ from sdimu_calibration.core.joint.set_fit import SetOptions
 from sdimu_calibration.core.plan import Plan
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.specification import Site
-from sdimu_calibration.storage.config import load_imu, load_model, load_plan
+from sdimu_calibration.storage.files.config import load_imu, load_model, load_plan
 from sdimu_sim.campaign.run import simulate
 from sdimu_sim.core.scenario import Scenario, imu_truth
 from sdimu_sim.core.temperature import TemperatureProfile
