@@ -81,7 +81,7 @@ def opened(
     from sdimu_calibration.storage.config import load_imu, load_site
     from sdimu_calibration.storage.effect_file import find_effects
     from sdimu_calibration.storage.model_choice import HANDHELD, named_estimator, named_model
-    from sdimu_calibration.storage.opening import open_test
+    from sdimu_calibration.storage.opening import open_test, with_imu_file
 
     wanted = named_estimator(estimator, "--estimator")
     if noise not in {None, "estimated"}:
@@ -97,7 +97,7 @@ def opened(
     if site is not None:
         load_site(site)
     handheld = None if wanted == AUTO else wanted == HANDHELD
-    test = open_test(bag, site, specification, source, handheld, noise is not None)
+    test = with_imu_file(open_test(bag, site, specification, source, handheld, noise is not None), imu)
     if wanted == HANDHELD or (wanted == AUTO and test.why_handheld):
         if wanted == AUTO:
             console.print(HANDHELD_CHOSEN.format(why=test.why_handheld), soft_wrap=True)
