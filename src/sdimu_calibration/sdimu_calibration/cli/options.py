@@ -113,14 +113,32 @@ def tell(console: Console, notes: Iterable[str]) -> None:
         say(console, f"note: {note}")
 
 
-def leave(result: Calibration) -> None:
-    """Say on stderr which coefficients are one, and end with exit status 3 when a result is not to be trusted."""
+def leave(result: Calibration, diagnosed: tuple[str, str] | None = None) -> None:
+    """Say on stderr which coefficients are one, and end with exit status 3 when a result is not to be trusted.
+
+    `diagnosed` is the verdict of a diagnosis and its sentence. Where there is one, it judges what does not fit;
+    without, a misfit is enough.
+    """
     for line in result.inseparable:
         typer.echo(f"sdimu: {line}", err=True)
-    for line in result.not_to_be_trusted:
+    reasons = _reasons(result, diagnosed)
+    for line in reasons:
         typer.echo(f"sdimu: not to be trusted: {line}", err=True)
-    if result.not_to_be_trusted:
+    if reasons:
         raise typer.Exit(NOT_TRUSTED)
+
+
+def _reasons(result: Calibration, diagnosed: tuple[str, str] | None) -> list[str]:
+    """List why a result is not to be trusted, one line each, each said once."""
+    from sdimu_calibration.core.results import UNTRUSTED_VERDICTS
+
+    grave = result.not_to_be_trusted
+    if diagnosed is None:
+        return list(dict.fromkeys([*grave, *result.misfits]))
+    verdict, sentence = diagnosed
+    if verdict not in UNTRUSTED_VERDICTS:
+        return list(grave)
+    return [f"{verdict}: {sentence}", *(line for line in grave if line not in sentence)]
 
 
 @contextmanager
