@@ -1,13 +1,15 @@
 """Package the sdimu_sim ROS 2 package; the entry points are the nodes and the command-line verbs."""
 
 from pathlib import Path
+from xml.etree import ElementTree
 
 from setuptools import find_packages, setup
 
 NAME = "sdimu_sim"
 HERE = Path(__file__).resolve().parent
 LAUNCH = [str(path.relative_to(HERE)) for path in sorted((HERE / "launch").glob("*_launch.py"))]
-VERSION = "0.1.0"
+VERSION = ElementTree.parse(HERE / "package.xml").findtext("version")
+"""The package's one version: that of package.xml, which ROS reads; an installed package has it in its metadata."""
 
 setup(
     name=NAME,

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+import sdimu_calibration
 from sdimu_calibration.cli.console import JsonOption, answer, plain, say
 
 if TYPE_CHECKING:
@@ -36,7 +37,6 @@ def datasheet(
 ) -> None:
     """Make a data sheet from results; leaves datasheet.json and datasheet.html (prints on A4)."""
     from datetime import UTC, datetime
-    from importlib.metadata import version
 
     from sdimu_calibration.cli.wide_table import print_table
     from sdimu_calibration.core.fleet import datasheet as core
@@ -58,7 +58,7 @@ def datasheet(
     lines = tuple(line.against(allowed[line.term]) if line.term in allowed else line for line in lines)
     about = Certificate(
         serial=entries[0].unit if certificate else serial or "", date=datetime.now(UTC).strftime("%Y-%m-%d"),
-        operator=operator, plan=plan, version=version("sdimu_calibration"),
+        operator=operator, plan=plan, version=sdimu_calibration.__version__,
         recordings=hashed(entries, recording or []) if certificate else (),
     )  # fmt: skip
     print_table(console, HEADINGS, rows(lines, short=True), left=1)

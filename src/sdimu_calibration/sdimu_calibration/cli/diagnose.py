@@ -160,7 +160,7 @@ def diagnose(
     tell(console, (*notes, *(note for note in notes_of_diagnosis(found) if note not in notes)))
     say(console, f"results in {folder}")
     answer(folder / "diagnosis.json", as_json)
-    leave(found.after)
+    leave(found.after, (found.verdict, found.sentence))
 
 
 def _write(

@@ -67,7 +67,7 @@ def plan(
     from sdimu_calibration.cli.plan_after import After, standing_of, tell_gain
     from sdimu_calibration.cli.progress import bar
     from sdimu_calibration.cli.wide_table import print_table
-    from sdimu_calibration.core.plan_search import Goal, Question, next_turn, search
+    from sdimu_calibration.core.plan_search import Goal, Question, next_turn, search, untold
     from sdimu_calibration.core.plan_search.bound import already, bounds
     from sdimu_calibration.core.plan_search.moves import Abilities
     from sdimu_calibration.storage.files.config import load_imu, load_plan, load_site
@@ -92,9 +92,10 @@ def plan(
         onto = replace(start, dwell_s=start.dwell_s[:1], turns=()) if before else start
         with bar(console) as progress:
             ranked = next_turn(onto, asked, tell, rates_rad_s=speeds, progress=progress)
-        for one in ranked[:5]:
-            say(console, one.text)
-        answer(_ranking(start, tell, ranked), as_json)
+        none = untold(ranked, tell)
+        for text in [none] if none else [one.text for one in ranked[:5]]:
+            say(console, text)
+        answer(_ranking(start, tell, ranked) | ({"none": none} if none else {}), as_json)
         return
     able = Abilities(speeds, math.radians(acceleration), tuple(_numbers("--dwells", dwells)))
     with bar(console) as progress:

@@ -174,7 +174,7 @@ def diagnose_together(asked: SetRequest, extra: Sequence[Effect]) -> None:
     print_advice(console, found.advice, about)
     say(console, f"results in {folder}")
     answer(folder / "set.json", asked.as_json)
-    leave(after)
+    leave(after, (found.verdict, found.sentence))
 
 
 def diagnosed_set(

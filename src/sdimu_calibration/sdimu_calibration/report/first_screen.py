@@ -142,7 +142,7 @@ def of_fit(calibration: Calibration, spell: Spell | None = None) -> Verdict:
     costs = _fit_figures(calibration)
     if grave:
         tone, head = BAD, f"Not to be trusted: {prose(grave[0])}."
-    elif misfit := [line for line in doubts if "sdimu diagnose" in line]:
+    elif misfit := calibration.misfits:
         tone, head = BAD, prose(_capital(misfit[0].partition("; run")[0])) + "."
     elif doubts:
         tone, head = DOUBTFUL, prose(_capital(doubts[0])) + "."

@@ -128,7 +128,7 @@ def find_config(kind: str, name_or_path: str | Path) -> Path:
     """
     text = str(name_or_path)
     path = Path(text)
-    if isinstance(name_or_path, Path) or path.suffix in _SUFFIXES or path.name != text:
+    if isinstance(name_or_path, Path) or _is_path(text):
         if path.is_file():
             return path
         raise DataError(f"{path}: no such {kind} file")
@@ -138,6 +138,16 @@ def find_config(kind: str, name_or_path: str | Path) -> Path:
             return folder / f"{text}{suffix}"
     known = sorted(p.stem for p in folder.glob("*") if p.suffix in _SUFFIXES)
     raise DataError(f"no {kind} named '{text}' (there are: {', '.join(known) or 'none'}; or give a path to a file)")
+
+
+def _is_path(text: str) -> bool:
+    """Whether a text is the path of a file, and no bare name."""
+    return Path(text).suffix in _SUFFIXES or Path(text).name != text
+
+
+def stated_path(name_or_path: str | None) -> str:
+    """Path of a file of the user's own, from the root, so that it is found from any folder; empty for a bare name."""
+    return str(Path(name_or_path).resolve()) if name_or_path and _is_path(name_or_path) else ""
 
 
 class _UniqueKeys(yaml.SafeLoader):

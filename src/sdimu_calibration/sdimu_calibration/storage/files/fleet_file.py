@@ -19,6 +19,7 @@ from sdimu_calibration.core.units import from_si
 from sdimu_calibration.storage.files.config import find_config, read_mapping
 from sdimu_calibration.storage.files.fleet_folder import Gathered
 from sdimu_calibration.storage.files.json_file import write_json
+from sdimu_calibration.storage.files.result_file import plain_origin
 from sdimu_calibration.storage.files.whole_file import write_whole
 
 FORMAT = "sdimu-fleet/1"
@@ -43,7 +44,9 @@ def write_fleet(path: Path, gathered: Gathered, done: Study) -> None:
         "imu": first.origin.imu,
         "model": list(first.model),
         "body_frame": first.body_frame,
-        "results": [{"name": e.name, "unit": e.unit, "origin": asdict(e.result.origin)} for e in gathered.entries],
+        "results": [
+            {"name": e.name, "unit": e.unit, "origin": plain_origin(e.result.origin)} for e in gathered.entries
+        ],
         "apart": list(gathered.apart),
         "units": list(done.people.units),
         "coefficients": [

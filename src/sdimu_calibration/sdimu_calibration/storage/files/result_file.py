@@ -40,7 +40,7 @@ def write_result(path: Path, calibration: Calibration, verdict: str = "") -> Non
     content = {
         "format": FORMAT,
         **({"verdict": verdict} if verdict else {}),
-        "origin": asdict(calibration.origin),
+        "origin": plain_origin(calibration.origin),
         **({} if calibration.imu_noise is None else {imu_noise.KEY: imu_noise.as_plain(calibration.imu_noise)}),
         "estimator": calibration.estimator,
         "estimator_reason": calibration.estimator_reason,
@@ -138,6 +138,11 @@ def _calibration(content: Mapping[str, Any]) -> Calibration:
         of_set=set_result_file.from_plain(content, number),
         drift_means={name: float(mean) for name, mean in content.get("drift_means", {}).items()},
     )
+
+
+def plain_origin(origin: Origin) -> dict[str, Any]:
+    """Give an origin as plain data; paths only where the user named one."""
+    return {key: value for key, value in asdict(origin).items() if value or not key.endswith("_file")}
 
 
 def _origin(entry: Mapping[str, Any]) -> Origin:

@@ -31,7 +31,7 @@ def standing_of_result(path: Path, imu: str | None) -> Standing:
     """
     path = Path(path)
     result = read_result(path)
-    name = imu or result.origin.imu
+    name = imu or result.origin.imu_stated
     if not name:
         raise DataError(f"{path}: does not say its IMU file: state --imu")
     sensors = imu_model.build(result.model, load_imu(name))
@@ -47,4 +47,4 @@ def standing_of_result(path: Path, imu: str | None) -> Standing:
     for t in result.of_set.turn_on if result.of_set else ():
         scatter |= {n: min(t.sigma, size) for n, size in scatter.items() if n.startswith(f"{t.effect}_")}
     anew = np.array([scatter.get(n, 0.0) for n in known.names])
-    return Standing(replace(known, scatter=anew), imu=result.origin.imu, site=result.origin.site)
+    return Standing(replace(known, scatter=anew), imu=result.origin.imu_stated, site=result.origin.site_stated)
