@@ -33,7 +33,6 @@ setup(
         f"rate_table_sim=={VERSION}",
         f"sdimu_calibration=={VERSION}",
     ],
-    extras_require={"campaigns": ["dask", "distributed"]},
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),
@@ -45,10 +44,6 @@ setup(
         "sdimu_calibration.verbs": [
             "simulate = sdimu_sim.cli.simulate:simulate",
             "run = sdimu_sim.cli.run:run",
-            "monte-carlo = sdimu_sim.cli.monte_carlo:monte_carlo",
-            "study = sdimu_sim.cli.study:app",
-            "bench = sdimu_sim.cli.bench:bench",
-            "hidden-campaign = sdimu_sim.cli.hidden_campaign:hidden_campaign",
         ],
     },
 )

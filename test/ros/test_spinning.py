@@ -35,7 +35,6 @@ import sys
 from pathlib import Path
 
 from sdimu_calibration.nodes.recorder_node import RecorderNode
-from sdimu_calibration.nodes.spinning import run_node
 
 
 def full():

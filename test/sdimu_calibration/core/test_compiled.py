@@ -73,7 +73,6 @@ if __name__ == "__main__":
     print(*TOLD)
 """
 KERNEL = """
-from sdimu_calibration.core.compiled import compiled
 {imported}
 
 @compiled
