@@ -47,7 +47,7 @@ class FitDiagnosis:
     @property
     def verdict(self) -> str:
         """The verdict in a word or two."""
-        return self.core.verdict
+        return self.core.verdict.value
 
     @property
     def adequate(self) -> bool:

@@ -23,6 +23,7 @@ from sdimu_calibration.core.evidence.consistency import Noise
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.handheld.handheld_fit import FORCE, RATE, TURN
 from sdimu_calibration.core.results import Calibration
+from sdimu_calibration.core.verdict import Verdict
 from sdimu_calibration.storage.correlation_text import packed
 from sdimu_calibration.storage.json_file import read_json, write_json
 from sdimu_calibration.storage.standing_file import as_plain
@@ -59,7 +60,7 @@ def read_diagnosis(path: Path) -> dict[str, Any]:
 def content(summary: DiagnosisSummary) -> dict[str, Any]:
     """Give the diagnosis as plain data."""
     d = summary.diagnosis
-    is_unexplained = d.verdict == "unexplained"
+    is_unexplained = d.verdict == Verdict.UNEXPLAINED
     return {
         "format": FORMAT,
         "estimator": d.fit.estimator,
@@ -176,10 +177,10 @@ def candidate(f: Found, own: bool) -> dict[str, Any]:
 
 def _unexplained_fraction(d: Diagnosis) -> float:
     """Share of the misfit that is left: none without a misfit; all or none where no free inputs measure it."""
-    if d.verdict != "unexplained" and not len(d.found.chosen):
+    if d.verdict != Verdict.UNEXPLAINED and not len(d.found.chosen):
         return 0.0
     if np.isnan(d.explained):
-        return float(d.verdict == "unexplained")
+        return float(d.verdict == Verdict.UNEXPLAINED)
     return float(np.clip(1.0 - d.explained, 0.0, 1.0))
 
 

@@ -18,6 +18,7 @@ from sdimu_calibration.core.diagnosis.plan_seen import PlanSeen
 from sdimu_calibration.core.effects import references, registry, selection
 from sdimu_calibration.core.effects.effect import Effect, Excitation
 from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.verdict import Verdict
 
 _SLOW_MINUTES = 20.0
 """Length of the stay that is advised for a change with time (min): usual time constants of a warm-up lie within it."""
@@ -96,7 +97,7 @@ def _about_data(d: Diagnosis) -> list[str]:
 
 def _about_found(d: Diagnosis, found: tuple[Found, ...], plan: PlanSeen) -> list[str]:
     out: list[str] = []
-    if d.verdict == "unexplained":
+    if d.verdict == Verdict.UNEXPLAINED:
         worst = d.consistency.where[0] if d.consistency.where else None
         place = f", worst at stop {worst.stop} in {worst.channel}" if worst else ""
         if d.found.noise:

@@ -6,6 +6,7 @@ from sdimu_calibration.core.diagnosis.advice import keep, together
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.diagnosis.found import Found
 from sdimu_calibration.core.effects.effect import Excitation
+from sdimu_calibration.core.verdict import Verdict
 
 
 def handheld_advice(d: Diagnosis, found: tuple[Found, ...]) -> tuple[str, ...]:
@@ -20,7 +21,7 @@ def handheld_advice(d: Diagnosis, found: tuple[Found, ...]) -> tuple[str, ...]:
                 f"Which it is matters: with {s.other} instead of {label}, {s.coefficient} moves by {s.sigmas:+.0f} of "
                 "its sigmas." for s in one.coefficient_shifts[:3]
             ]  # fmt: skip
-    if d.verdict == "unexplained":
+    if d.verdict == Verdict.UNEXPLAINED:
         out.append(
             "Record the run again in another order, and diagnose both recordings together (sdimu diagnose FIRST "
             "SECOND): that says whether it comes back at the same attitude, time or temperature, or is of this run."

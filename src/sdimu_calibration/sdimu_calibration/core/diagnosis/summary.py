@@ -10,6 +10,7 @@ from sdimu_calibration.core.diagnosis.found import DetectableSize, Found, found_
 from sdimu_calibration.core.diagnosis.handheld_advice import handheld_advice
 from sdimu_calibration.core.diagnosis.plan_seen import PlanSeen, plan_seen
 from sdimu_calibration.core.evidence.navigation_evidence import NavigationEvidence
+from sdimu_calibration.core.verdict import Verdict
 
 
 @dataclass(frozen=True)
@@ -40,7 +41,7 @@ class DiagnosisSummary:
     @property
     def candidates(self) -> tuple[Found, ...]:
         """What counts as found, best first."""
-        if self.diagnosis.verdict == "unexplained":
+        if self.diagnosis.verdict == Verdict.UNEXPLAINED:
             return ()
         return tuple(sorted(self.found, key=lambda f: -f.log_likelihood_gain))
 
