@@ -21,6 +21,7 @@ from sdimu_calibration.report import data, evidence_figures
 from sdimu_calibration.report.drawing import Figure
 from sdimu_calibration.report.page import write_report
 from sdimu_calibration.report.report_extras import report_extras
+from sdimu_calibration.storage.advice_words import sentence
 from sdimu_calibration.storage.diagnosis_file import write_diagnosis
 from sdimu_calibration.storage.result_file import write_result
 from sdimu_calibration.storage.trace import traced
@@ -80,7 +81,7 @@ class FitDiagnosis:
     @property
     def advice(self) -> tuple[str, ...]:
         """What to do next, one sentence each."""
-        return self.summary.advice
+        return tuple(map(sentence, self.summary.advice))
 
     @property
     def known(self) -> Standing:

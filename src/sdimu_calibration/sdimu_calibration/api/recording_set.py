@@ -19,6 +19,7 @@ from sdimu_calibration.core.progress import Progress
 from sdimu_calibration.core.results import Calibration, SetSummary
 from sdimu_calibration.core.verdict import Verdict
 from sdimu_calibration.report.page import write_report
+from sdimu_calibration.storage.advice_words import sentence
 from sdimu_calibration.storage.recording_set import RecordingSet
 from sdimu_calibration.storage.result_file import write_result
 from sdimu_calibration.storage.set_result_file import write_set_diagnosis
@@ -167,7 +168,7 @@ class JointDiagnosis:
     @property
     def advice(self) -> tuple[str, ...]:
         """What to do next, one sentence each."""
-        return self.core.advice
+        return tuple(map(sentence, self.core.advice))
 
     @property
     def known(self) -> Standing:

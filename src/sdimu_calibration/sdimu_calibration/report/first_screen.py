@@ -10,6 +10,7 @@ from html import escape
 
 import numpy as np
 
+from sdimu_calibration.core.advice import Advice, Kind, Verb
 from sdimu_calibration.core.diagnosis.ladder import error_ladder, moved_coefficients
 from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary
 from sdimu_calibration.core.error_figures import by_hand, held_out, held_out_judged, nis_judged, noise_learned
@@ -69,14 +70,14 @@ def of_diagnosis(summary: DiagnosisSummary, spell: Spell | None = None) -> First
     bad = not d.adequate and d.verdict != Verdict.NOISE_MODEL_WRONG
     tone = BAD if bad else GOOD if d.adequate and not doubts else DOUBTFUL
     head = _missing(summary) if named else prose(d.sentence)
-    advice = list(dict.fromkeys([*(f.text for f in d.findings), *doubts, *summary.advice]))
+    advice: list[Advice | str] = list(dict.fromkeys([*(f.text for f in d.findings), *doubts, *summary.advice]))
     if d.adequate and not advice:
         advice = ["Use the coefficients of this page."]
     if d.adequate and summary.untestable:
         advice.append(_unseen(summary))
     costs = _costs(summary)
     title = "What it costs to ignore it" if summary.found else "How well it predicts"
-    told = tuple(advice_html(text, spell) for text in advice)
+    told = tuple(advice_html(one, spell) for one in advice)
     unsaid = [text for text in d.noise if named or text not in d.sentence]
     noise = (prose(f"Noise: {'; '.join(unsaid)}."),) if unsaid else ()
     return FirstScreen(tone, head, costs, told, title, (*_remarks(d.after), *noise))
@@ -149,10 +150,11 @@ def of_fit(calibration: Calibration, spell: Spell | None = None) -> FirstScreen:
         tone, head = DOUBTFUL, prose(_capital(doubts[0])) + "."
     else:
         tone, head = GOOD, "The model explains the recording as a whole."
-    bag = "BAG" if spell else calibration.origin.recording or "BAG"
-    says = f"Find {'which effect is missing' if tone == BAD else 'out whether smaller effects are missing'}"
-    advice = [*(["Check the IMU file, the site, units and axes."] if grave else []), f"{says}: sdimu diagnose {bag}"]
-    told = tuple(advice_html(text, spell) for text in advice)
+    kind = Kind.FIND_EFFECT if tone == BAD else Kind.FIND_SMALLER
+    bag = (calibration.origin.recording,) if calibration.origin.recording else ()
+    check = ["Check the IMU file, the site, units and axes."] if grave else []
+    advice = [*check, Advice(kind, (), Verb.DIAGNOSE, bag)]
+    told = tuple(advice_html(one, spell) for one in advice)
     return FirstScreen(tone, head, costs, told, "How well it predicts", _remarks(calibration))
 
 
@@ -176,8 +178,8 @@ def of_set(found: SetDiagnosis, spell: Spell | None = None) -> FirstScreen:
     before = after if found.error_without is None else found.error_without
     values = [f"{value:.2f}" for value in dict.fromkeys((before, after)) if np.isfinite(value)]
     costs = ((_ARROW.join(values), "sigma: held-out error, recordings left out; 1 is right"),) if values else ()
-    advice = found.advice or ("Nothing: use the coefficients of this page.",)
-    told = tuple(advice_html(text, spell) for text in advice)
+    advice: tuple[Advice | str, ...] = found.advice or ("Nothing: use the coefficients of this page.",)
+    told = tuple(advice_html(one, spell) for one in advice)
     title = "What it costs to ignore it" if found.findings else "How well it predicts"
     return FirstScreen(tone, prose(found.sentence), costs, told, title)
 

@@ -24,6 +24,7 @@ from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.handheld.handheld_fit import FORCE, RATE, TURN
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.verdict import Verdict
+from sdimu_calibration.storage.advice_words import sentence
 from sdimu_calibration.storage.correlation_text import packed
 from sdimu_calibration.storage.json_file import read_json, write_json
 from sdimu_calibration.storage.standing_file import as_plain
@@ -78,7 +79,7 @@ def content(summary: DiagnosisSummary) -> dict[str, Any]:
             "fraction": _unexplained_fraction(d),
             "best_variables": [f.candidate.label for f in summary.found] if is_unexplained or d.own else [],
         },
-        "advice": list(summary.advice),
+        "advice": [sentence(one) for one in summary.advice],
         "findings": [{"text": f.text, "grave": f.grave} for f in d.findings],
         "noise": {
             "wrong": list(d.noise),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from sdimu_calibration.core.advice import Advice
 from sdimu_calibration.core.diagnosis.advice import Untestable, advice, untestable_reasons
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.diagnosis.found import DetectableSize, Found, found_effects, reach
@@ -28,7 +29,7 @@ class DiagnosisSummary:
         Turns and stops of the table; None for a handheld run.
     untestable : tuple of Untestable
         What could not have been seen, by reason.
-    advice : tuple of str
+    advice : tuple of Advice
     """
 
     diagnosis: Diagnosis
@@ -36,7 +37,7 @@ class DiagnosisSummary:
     reached: tuple[DetectableSize, ...]
     plan: PlanSeen | None
     untestable: tuple[Untestable, ...]
-    advice: tuple[str, ...]
+    advice: tuple[Advice, ...]
 
     @property
     def candidates(self) -> tuple[Found, ...]:

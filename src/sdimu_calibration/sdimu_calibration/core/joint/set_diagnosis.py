@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from sdimu_calibration.core.advice import Advice, Kind, Verb
 from sdimu_calibration.core.diagnosis.search import Search
 from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.effects.selection import resolve
@@ -77,7 +78,7 @@ class SetDiagnosis:
         With the model as given, and with what was found.
     threshold : float
         Score that noise reaches in a scan.
-    advice : tuple of str
+    advice : tuple of Advice
     standing : Standing
         What the set knows of the unit: what a plan for the next recording begins with.
     first : Search
@@ -97,7 +98,7 @@ class SetDiagnosis:
     before: Calibration
     after: Calibration
     threshold: float
-    advice: tuple[str, ...]
+    advice: tuple[Advice, ...]
     standing: Standing
     first: Search[SetEvidence]
     recurrence: Recurrence | None
@@ -270,21 +271,16 @@ def _shown(value: float | None) -> str:
 def _advice(
     word: Verdict, findings: Sequence[SetFinding], closing: Sequence[tuple[tuple[str, ...], NextTurn]],
     again: Recurrence | None,
-) -> tuple[str, ...]:
+) -> tuple[Advice, ...]:
     out = next_steps(again)
     closed = {members[0] for members, _ in closing}
     for f in findings:
         if f.recording:
-            out.append(f"look what happened in {f.recording}, or leave it out of the set: {f.label}")
+            out.append(Advice(Kind.LOOK_AT_RECORDING, (f.recording, f.label)))
         elif f.alike and f.label not in closed:
-            out.append(
-                f"no plan tells {f.label} from {f.alike[0]}: record at another temperature, or after another warm-up"
-            )
+            out.append(Advice(Kind.NO_PLAN_TELLS, (f.label, f.alike[0])))
     for (label, *others), turn in closing:
-        out.append(
-            f"to tell {label} from {', '.join(others)}, record once more, rests of 100 s and between them: "
-            f"{turn.text}; a whole plan: sdimu plan --after"
-        )
+        out.append(Advice(Kind.RECORD_ONCE_MORE, (label, tuple(others), turn.text), Verb.CONTINUE))
     if word == Verdict.UNEXPLAINED:
-        out.append("diagnose the recordings one by one (sdimu diagnose BAG), the one with the largest deviates first")
+        out.append(Advice(Kind.ONE_BY_ONE))
     return tuple(out)

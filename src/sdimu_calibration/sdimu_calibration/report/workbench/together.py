@@ -15,6 +15,7 @@ from sdimu_calibration.core.verdict import Verdict
 from sdimu_calibration.report.table import with_sigma
 from sdimu_calibration.report.workbench.state import from_json
 from sdimu_calibration.report.workbench.task_progress import BUSY, TaskProgress
+from sdimu_calibration.storage.advice_words import sentence
 
 Judge = Callable[[Sequence[str], Callable[[str, float], None]], SetDiagnosis]
 
@@ -59,5 +60,5 @@ def shown(found: SetDiagnosis) -> list[Any]:
     tone = "good" if found.verdict == Verdict.CONSISTENT else "bad"
     return [
         html.P(f"{found.verdict}: {found.sentence}", className=f"verdict {tone}"), *([table] if rows else []),
-        *(html.P(f"Advice: {line}") for line in found.advice),
+        *(html.P(f"Advice: {sentence(one)}") for one in found.advice),
     ]  # fmt: skip
