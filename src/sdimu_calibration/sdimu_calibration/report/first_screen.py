@@ -152,8 +152,8 @@ def of_fit(calibration: Calibration, spell: Spell | None = None) -> FirstScreen:
         tone, head = GOOD, "The model explains the recording as a whole."
     kind = Kind.FIND_EFFECT if tone == BAD else Kind.FIND_SMALLER
     bag = (calibration.origin.recording,) if calibration.origin.recording else ()
-    check = ["Check the IMU file, the site, units and axes."] if grave else []
-    advice = [*check, Advice(kind, (), Verb.DIAGNOSE, bag)]
+    advice: list[Advice | str] = ["Check the IMU file, the site, units and axes."] if grave else []
+    advice.append(Advice(kind, (), Verb.DIAGNOSE, bag))
     told = tuple(advice_html(one, spell) for one in advice)
     return FirstScreen(tone, head, costs, told, "How well it predicts", _remarks(calibration))
 

@@ -99,7 +99,7 @@ def sentence(d: Diagnosis) -> str:
         return f"One effect is missing: {names}, or what looks the same here ({others}); {rest}."
     if len(d.chosen) > 1 and len(_families(d)) == 1:
         return f"One effect is missing on {len(d.chosen)} axes: {names}; {rest}."
-    return f"{'One effect is' if d.verdict == 'one effect' else 'Several effects are'} missing: {names}; {rest}."
+    return f"{'One effect is' if d.verdict == Verdict.ONE_EFFECT else 'Several effects are'} missing: {names}; {rest}."
 
 
 def _families(d: Diagnosis) -> list[list[Candidate]]:

@@ -180,8 +180,8 @@ def _findings(found: SetSearch) -> tuple[SetFinding, ...]:
 
 def _verdict(findings: Sequence[SetFinding], after: Calibration, fit: SetFit, again: Recurrence | None) -> Verdict:
     shared = [f for f in findings if not f.recording]
-    error = after.fit["held_out_rms"] or 0.0
-    still = error > _STILL_WRONG and held_out_chance(fit, error) < SCATTERS
+    error = after.fit["held_out_rms"]
+    still = error is not None and error > _STILL_WRONG and held_out_chance(fit, error) < SCATTERS
     # Noise does not come back: where something does, it is no noise, whatever each recording took it for.
     left = _scatter(after) < SCATTERS or still or (again is not None and len(again.answer) > 0)
     # A fault leaves traces in its recording that are no physics of the unit.
@@ -233,7 +233,7 @@ def _found(
     if word == Verdict.CLASS_OF_EFFECTS:
         others = ", ".join(findings[0].alike[:_LISTED])
         return f"One effect is missing: {names}, or what looks the same in these recordings ({others}); {falls}."
-    return f"{'One effect is' if word == 'one effect' else 'Several effects are'} missing: {names}; {falls}."
+    return f"{'One effect is' if word == Verdict.ONE_EFFECT else 'Several effects are'} missing: {names}; {falls}."
 
 
 def _named(f: SetFinding) -> str:
