@@ -23,7 +23,7 @@ from sdimu_calibration.core.diagnosis.search import FALSE_ALARM, MOST_STEPS, Sea
 from sdimu_calibration.core.diagnosis.verdict import Facts, sentence, verdict
 from sdimu_calibration.core.diagnosis.white_noise import without_memory
 from sdimu_calibration.core.effects.effect import Effect
-from sdimu_calibration.core.error_figures import held_out_judged
+from sdimu_calibration.core.error_figures import degrees_of_freedom, held_out_judged, nis_judged
 from sdimu_calibration.core.estimation.fit import NOT_CONVERGED, Fit
 from sdimu_calibration.core.estimation.noise_estimate import term_in_words
 from sdimu_calibration.core.estimation.noise_learning import in_white_noise
@@ -221,7 +221,7 @@ def climb(
     # Neighbouring epochs say what the noise is, but for a sensor that counts pulses.
     judged = not (base.learns_scatter or done.found.noise or stated.epoch_s > EPOCH_S)
     excess = misfit(after, consistency, stated, base.test.imu) if judged else 0.0
-    loud = excess > largest_misfit(float(after.fit["nis_dof"] or 1.0))
+    loud = excess > largest_misfit(float(np.fmax(degrees_of_freedom(after), 1.0)))
     still = not base.learns_scatter and held_out_judged(after) > STILL_WRONG
     # Wrong samples in turns leave noise that looks drawn anew in each turn.
     spoilt = any(finding.kind == "spike" for finding in findings)
@@ -292,8 +292,7 @@ def misfit(final: Calibration, consistency: Consistency, stated: ImuSpecificatio
     """
     gyro = consistency.gyro.spread * stated.gyro_white_noise / taken.gyro_white_noise
     accel = consistency.accel.spread * stated.accel_white_noise / taken.accel_white_noise
-    nis = final.fit.get("nis_in_noise") or final.fit["nis_mean"]
-    return float((nis or 0.0) / (0.5 * (gyro**2 + accel**2)) - 1.0)
+    return float(nis_judged(final) / (0.5 * (gyro**2 + accel**2)) - 1.0)
 
 
 def largest_misfit(dof: float) -> float:

@@ -190,7 +190,7 @@ def _error(fit: Fit, evidence: LinearEvidence, added: Sequence[str]) -> ModelErr
     """Error of the model of a fit; `evidence` about it, without candidates."""
     stops = np.unique(evidence.stop)
     held_out = Problem(evidence).held_out([], 1.0).rms if len(stops) >= _FEWEST_STOPS else float("nan")
-    return ModelError(tuple(added), held_out, float(fit.statistics()["nis_mean"] or np.nan))
+    return ModelError(tuple(added), held_out, fit.statistics().nis_mean or float("nan"))
 
 
 def _ranked(done: Diagnosis) -> tuple[Ranked, ...]:
