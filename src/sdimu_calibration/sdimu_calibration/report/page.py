@@ -74,7 +74,7 @@ def write_report(
     trace : Trace, optional
         Command, program, files and their hashes.
     spell : callable, optional
-        Parts an advice into words and the whole command that it means.
+        Writes the whole command that an advice means.
     """
     write_whole(path, page(calibration, title, truth, reference, summary, more, fit, of_set, trace, spell))
 

@@ -33,7 +33,7 @@ def test_an_azimuth_that_the_gyro_bias_put_wrong_is_found():
     truth = true_coefficients(sensor, "prior")
     true = {name: truth.get(name, 0.0) for name in build(model.effects, imu).names}
     fit = fit_about(test, model, "filter", true)
-    assert fit.statistics()["nis_mean"] < 1.05
+    assert fit.statistics().nis_mean < 1.05
     # It stands where it is: a second linearisation moves it by less than its sigma of some arcseconds.
     again = fit_about(test, model, "filter", true, fit.start)
     assert np.abs(rotation_vector(again.start.C_nb @ fit.start.C_nb.T)).max() < to_si(1.0, "arcsec")

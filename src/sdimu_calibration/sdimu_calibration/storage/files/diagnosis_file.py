@@ -23,6 +23,8 @@ from sdimu_calibration.core.evidence.consistency import Noise
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.handheld.handheld_fit import FORCE, RATE, TURN
 from sdimu_calibration.core.results import Calibration
+from sdimu_calibration.core.verdict import Verdict
+from sdimu_calibration.storage.files.advice_words import sentence
 from sdimu_calibration.storage.files.correlation_text import packed
 from sdimu_calibration.storage.files.json_file import read_json, write_json
 from sdimu_calibration.storage.files.standing_file import as_plain
@@ -59,7 +61,7 @@ def read_diagnosis(path: Path) -> dict[str, Any]:
 def content(summary: DiagnosisSummary) -> dict[str, Any]:
     """Give the diagnosis as plain data."""
     d = summary.diagnosis
-    is_unexplained = d.verdict == "unexplained"
+    is_unexplained = d.verdict == Verdict.UNEXPLAINED
     return {
         "format": FORMAT,
         "estimator": d.fit.estimator,
@@ -77,7 +79,7 @@ def content(summary: DiagnosisSummary) -> dict[str, Any]:
             "fraction": _unexplained_fraction(d),
             "best_variables": [f.candidate.label for f in summary.found] if is_unexplained or d.own else [],
         },
-        "advice": list(summary.advice),
+        "advice": [sentence(one) for one in summary.advice],
         "findings": [{"text": f.text, "grave": f.grave} for f in d.findings],
         "noise": {
             "wrong": list(d.noise),
@@ -176,10 +178,10 @@ def candidate(f: Found, own: bool) -> dict[str, Any]:
 
 def _unexplained_fraction(d: Diagnosis) -> float:
     """Share of the misfit that is left: none without a misfit; all or none where no free inputs measure it."""
-    if d.verdict != "unexplained" and not len(d.found.chosen):
+    if d.verdict != Verdict.UNEXPLAINED and not len(d.found.chosen):
         return 0.0
     if np.isnan(d.explained):
-        return float(d.verdict == "unexplained")
+        return float(d.verdict == Verdict.UNEXPLAINED)
     return float(np.clip(1.0 - d.explained, 0.0, 1.0))
 
 

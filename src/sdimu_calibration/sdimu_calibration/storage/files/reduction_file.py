@@ -11,6 +11,7 @@ import numpy as np
 
 from sdimu_calibration.core.effects.effect import Timetable
 from sdimu_calibration.core.estimation.fit import Start
+from sdimu_calibration.core.fit_statistics import FitStatistics
 from sdimu_calibration.core.joint.member import Report
 from sdimu_calibration.core.joint.reduction import Reduction
 from sdimu_calibration.core.joint.stretch_rows import Places
@@ -32,7 +33,7 @@ def write_report(path: Path, report: Report) -> None:
         "imu": vars(report.imu) | {"prior": dict(report.imu.prior), "prior_units": dict(report.imu.prior_units)},
         "start_names": start.names, "start_ns": report.start_ns, "temperature_degc": report.temperature_degc,
         "duration": report.times.duration, "stops": report.times.stops, "turns": report.times.turns,
-        "data": dict(report.data), "statistics": dict(report.statistics), "reported": report.names,
+        "data": dict(report.data), "statistics": report.statistics.entries(), "reported": report.names,
         "notes": report.notes, "warnings": report.warnings, "heading_rad": report.heading_rad,
         "noise": [vars(term) for term in report.noise], "widened": report.widened,
     }  # fmt: skip
@@ -78,7 +79,8 @@ def _report(words: dict[str, Any], arrays: dict[str, Any]) -> Report | None:
     heat = words["temperature_degc"]
     return Report(
         words["name"], "", "", reduction, words["estimator"], words["reason"], ImuSpecification(**words["imu"]), start,
-        int(words["start_ns"]), times, math.nan if heat is None else float(heat), words["data"], words["statistics"],
+        int(words["start_ns"]), times, math.nan if heat is None else float(heat), words["data"],
+        FitStatistics(**words["statistics"]),
         tuple(words["reported"]), arrays["values"], arrays["sigma"], tuple(words["notes"]), tuple(words["warnings"]),
         float(words["heading_rad"]), tuple(_term(entry) for entry in words["noise"]), bool(words["widened"]),
         _places(arrays),

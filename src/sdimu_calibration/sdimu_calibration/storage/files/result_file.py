@@ -16,6 +16,7 @@ from sdimu_calibration.core.origin import Origin
 from sdimu_calibration.core.plain_text import one_line
 from sdimu_calibration.core.recording import DataError, DataFault
 from sdimu_calibration.core.results import Calibration, History, Rest, without_advice
+from sdimu_calibration.core.verdict import Verdict
 from sdimu_calibration.storage.files import imu_noise, set_result_file
 from sdimu_calibration.storage.files.json_file import read_json, write_json
 
@@ -24,7 +25,7 @@ _LATEST_NS = 2**63
 """A stamp of 64 bits ends there."""
 
 
-def write_result(path: Path, calibration: Calibration, verdict: str = "") -> None:
+def write_result(path: Path, calibration: Calibration, verdict: Verdict | None = None) -> None:
     """Write result.json: SI numbers, ``null`` for what is not a finite number.
 
     Parameters
@@ -32,7 +33,7 @@ def write_result(path: Path, calibration: Calibration, verdict: str = "") -> Non
     path : Path
         File to make or replace; its folder is made too.
     calibration : Calibration
-    verdict : str
+    verdict : Verdict, optional
         Of a diagnosis, where one was made; no note then advises one.
     """
     conditional = calibration.conditional_sigma

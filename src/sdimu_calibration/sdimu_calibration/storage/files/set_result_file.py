@@ -20,6 +20,7 @@ from sdimu_calibration.core.results import (
     SetTrend,
     TurnOn,
 )
+from sdimu_calibration.storage.files.advice_words import sentence
 from sdimu_calibration.storage.files.diagnosis_file import alone
 from sdimu_calibration.storage.files.json_file import read_json, write_json
 from sdimu_calibration.storage.files.standing_file import as_plain as standing_as_plain
@@ -110,7 +111,7 @@ def write_set_diagnosis(path: Path, found: SetDiagnosis) -> None:
             "findings": [asdict(f) | {"alike": list(f.alike)} for f in found.findings],
             "refused": [f.label for f in found.refused],
             "held_out_before": found.error_without, "held_out_after": found.after.fit["held_out_rms"],
-            "advice": list(found.advice), "known": standing_as_plain(found.standing),
+            "advice": [sentence(one) for one in found.advice], "known": standing_as_plain(found.standing),
             "fit": {"before": {"model": list(found.before.model)}},
             "alone": alone(found.first.evidence, found.first.first), "recurrence": _recurrence(found.recurrence),
         },
