@@ -24,6 +24,7 @@ FOLDER = Path(__file__).resolve().parent
 OWN = ("sdimu-calibration", "rate-table-sim", "sdimu-sim")
 SETS = {
     "run": ("what `sdimu` and its nodes need, and setuptools, which installs them from a clone", [*OWN, "setuptools"]),
+    "extras": ("workbench, notebooks, pictures", ["sdimu-calibration[workbench,notebook,pictures]"]),
     "campaigns": ("many runs at once: monte-carlo, hidden-campaign, study", ["sdimu-sim[campaigns]"]),
     "test": ("style, types, tests", ["sdimu-calibration[test]"]),
     "build": ("colcon, as ROS users build", ["sdimu-calibration[build]"]),

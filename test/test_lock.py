@@ -11,8 +11,11 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 ROOT = Path(__file__).resolve().parents[1]
-FILES = ("run", "campaigns", "test", "build", "docs")
-EXTRAS = {"run": "", "campaigns": "campaigns", "test": "test", "build": "build", "docs": "docs"}
+FILES = ("run", "extras", "campaigns", "test", "build", "docs")
+EXTRAS = {
+    "run": ("",), "extras": ("workbench", "notebook", "pictures"), "campaigns": ("campaigns", "study"),
+    "test": ("test",), "build": ("build",), "docs": ("docs",),
+}  # fmt: skip
 OWN = ("sdimu-calibration", "rate-table-sim", "sdimu-sim")
 
 ENTRY = re.compile(r'[a-z0-9-]+==[\w.+!]+( ; python_version != "3\.\d+")?( +--hash=sha256:[0-9a-f]{64})+')
@@ -41,11 +44,17 @@ def test_what_setup_asks_for_is_in_its_file_or_in_what_is_installed_before(name)
     for package in OWN:
         for text in requires(package) or []:
             one = Requirement(text)
-            extra = one.marker is not None and one.marker.evaluate({"extra": EXTRAS[name]})
+            extra = one.marker is not None and any(one.marker.evaluate({"extra": extra}) for extra in EXTRAS[name])
             if (one.marker is None) if name == "run" else extra:
                 assert canonicalize_name(one.name) in {*there, *OWN}, one
 
 
-def test_what_runs_brings_no_tools_of_tests_builds_or_campaigns():
-    running = {entry.partition("==")[0] for entry in entries("run")}
-    assert not running & {"dask", "distributed", "mypy", "ruff", "hypothesis", "playwright", "colcon-core", "pandas"}
+TOOLS = {
+    "dask", "distributed", "mypy", "ruff", "hypothesis", "playwright", "colcon-core", "pandas", "pytest", "numpydoc",
+    "sphinx", "babel", "docutils", "allantools", "dash", "flask", "plotly", "matplotlib", "pillow",
+}  # fmt: skip
+"""Packages for tests, the book, campaigns, the workbench, notebooks and pictures."""
+
+
+def test_what_runs_brings_no_tools_and_no_extras():
+    assert not {entry.partition("==")[0] for entry in entries("run")} & TOOLS
