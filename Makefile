@@ -7,7 +7,7 @@ SETUPS := $(wildcard src/*/setup.py study/setup.py)
 # What runs, and what tests, builds and campaigns need beside it; every file by its hash.
 RUN    := $(VENV)/.run
 STAMP  := $(VENV)/.installed
-TOOLS  := campaigns test build
+TOOLS  := extras campaigns test build
 BOOK   := $(VENV)/.book
 OUT    ?= out/demo
 PACKAGES := rate_table_sim sdimu_calibration sdimu_sim
@@ -109,5 +109,6 @@ campaigns: setup
 # The lock files anew, from what is installed: after `.venv/bin/pip install` of something newer.
 lock: setup
 	$(BIN)/python requirements/lock.py
+	$(BIN)/python requirements/vendored.py
 
 .PHONY: setup demo check test colcon wheels bench study mutations docs faults grades pictures campaigns lock

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from sdimu_calibration.cli.console import plain
-from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.data_error import DataError
 from sdimu_sim.cli.simulate import EFFECT, TEMPERATURE
 
 if TYPE_CHECKING:
