@@ -17,8 +17,8 @@ from sdimu_calibration.core.joint.member import Job, Member, run
 from sdimu_calibration.core.rotation import rotation_matrix
 from sdimu_calibration.core.specification import Site
 from sdimu_calibration.storage.config import load_imu, load_model
-from sdimu_study.grade_run import simulated_test
-from sdimu_study.hidden_score import baseline_z
+from sdimu_study.score import baseline_z
+from sdimu_study.worlds import simulated_test
 
 SITE = Site(math.radians(52.0), 0.0)
 FLICKER = ("gyro_noise_flicker=25 deg/h", "accel_noise_flicker=150 ug")
