@@ -48,8 +48,8 @@ check: setup
 test: check
 	$(BIN)/python -m pytest -n 2 -m "not slow and not bench"
 
-# What linear algebra decides, once more with each of two other kernels of OpenBLAS: no test stands on the last digits of
-# a library. A core that a processor lacks is refused by OpenBLAS itself, which then takes the one it has.
+# What linear algebra decides, with each of two kernels of OpenBLAS (with AVX2 and without AVX): no test stands on the last
+# digits of a library.
 NUMERICAL := $(addprefix test/sdimu_calibration/core/,alignment batch/test_chain.py diagnosis/test_diagnose.py \
     estimation/test_inseparable.py estimation/test_prior_check.py evidence/test_influence.py evidence/test_signatures.py \
     filter/test_kalman.py fleet/test_population.py fleet/test_reml.py joint/test_combine.py joint/test_held_out.py \
