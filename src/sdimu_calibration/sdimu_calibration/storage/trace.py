@@ -6,10 +6,9 @@ import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from importlib.metadata import PackageNotFoundError
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-import sdimu_calibration
 from sdimu_calibration.storage.bag_metadata import custom_data
 from sdimu_calibration.storage.datasheet_file import file_hashes
 
@@ -64,6 +63,6 @@ def traced(bags: Sequence[Path] = (), arguments: Sequence[str] = (), **stated: s
 def program_version() -> str:
     """Version of the program; empty where it runs without being installed."""
     try:
-        return sdimu_calibration.__version__
+        return version("sdimu_calibration")
     except PackageNotFoundError:
         return ""
