@@ -40,6 +40,7 @@ from sdimu_calibration.core.recording import DataError, Recording
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.specification import EPOCH_S, ImuSpecification, Model, Site
 from sdimu_calibration.core.verdict import Verdict
+from sdimu_calibration.core.wording import Option
 
 STILL_WRONG = 1.25
 """Held-out error (sigma) from which a model is not called explained: 1 is right, and an effect that only imitates the
@@ -57,7 +58,7 @@ _MISFIT_SIGMAS = 5.0
 `_MISFIT`."""
 NOT_DIAGNOSABLE = (
     "the classical estimator gives coefficients in the axes of the table: a navigation about them shows the mount, and "
-    "no missing effect; diagnose with another --estimator (in Python estimator=...)"
+    f"no missing effect; diagnose with another {Option.ESTIMATOR} (in Python estimator=...)"
 )
 """Why a classical fit is not diagnosed."""
 

@@ -18,6 +18,7 @@ from sdimu_calibration.core.evidence.learned_noise import Wander
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.progress import Progress
 from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.wording import Option
 
 _PARALLEL = 1e-6
 """Share of its length by which a signature must differ from another to be its own: rounding is far below."""
@@ -127,7 +128,7 @@ def extended(request: Request, chosen: Sequence[Candidate], progress: Progress) 
         names = " and ".join(c.label for c in chosen)
         raise DataError(
             f"the search chose {names}, and the {base.estimator} estimator cannot fit it ({error}); diagnose with "
-            "another --estimator"
+            f"another {Option.ESTIMATOR}"
         ) from error
 
 

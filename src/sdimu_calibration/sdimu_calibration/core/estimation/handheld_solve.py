@@ -20,6 +20,7 @@ from sdimu_calibration.core.progress import Progress
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.specification import Model
 from sdimu_calibration.core.units import from_si
+from sdimu_calibration.core.wording import Option
 
 
 def solve_handheld(test: PreparedTest, model: Model, start: Start | None, progress: Progress) -> HandheldFit:
@@ -78,7 +79,7 @@ def _told(roomy: PreparedTest, test: PreparedTest, sensors: ImuModel, wider: Map
             parts.append(f"{name} {from_si(before, unit):.3g} -> {from_si(wider[name], unit):.2g} {unit}")
     note = (
         f"the data contradict priors of IMU '{test.imu.name}', which are widened: {', '.join(parts)}; if the IMU is of "
-        "another class, name its file (--imu)"
+        f"another class, name its file ({Option.IMU})"
     )
     return replace(roomy, recording=replace(roomy.recording, notes=(*roomy.recording.notes, note)))
 

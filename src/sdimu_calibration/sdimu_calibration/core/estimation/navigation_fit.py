@@ -47,6 +47,7 @@ from sdimu_calibration.core.second_order.second_order_passes import (
     SecondOrderPass,
 )
 from sdimu_calibration.core.side_by_side import side_by_side
+from sdimu_calibration.core.wording import Option, Work
 
 HELD_OUT_FOLDS = 3
 """Number of interleaved groups of stops, each held out once: two thirds of the stops are then in every fit."""
@@ -376,12 +377,12 @@ class NavigationFit(Fit):
         if nis > _ABSURD:
             raise DataError(
                 f"the recording contradicts the model: squared innovations are {nis:.3g} times what the noise explains"
-                f"{in_turn}; check --imu, --site, units and axes"
+                f"{in_turn}; check {Option.IMU}, {Option.SITE}, units and axes"
             )
         out = [] if self.converged else [NOT_CONVERGED]
         if nis > MISFIT or (held_out is not None and held_out > MISFIT):
             text = f"NIS {nis:.3f}" + ("" if held_out is None else f", held-out error {held_out:.3f}")
-            out.append(f"the model{white} does not fit ({text}{_in_noise(statistics)}){in_turn}; run: sdimu diagnose")
+            out.append(f"the model{white} does not fit ({text}{_in_noise(statistics)}){in_turn}; run: {Work.DIAGNOSE}")
         # Noise that was learned explains what a stop leaves in white noise.
         worst = "" if self.noise else stop_misfit(self.last.output.normalised, self.prepared)
         return (*out, *([worst] if worst else []), *self.contradicted_priors()[:1], *self.beyond_specification()[:1])

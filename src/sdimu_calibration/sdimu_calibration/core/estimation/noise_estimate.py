@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.noise_term import WORDS, NoiseTerm
 from sdimu_calibration.core.units import from_si
+from sdimu_calibration.core.wording import Work
 
 
 @dataclass(frozen=True)
@@ -41,7 +42,7 @@ class NoiseEstimate:
         terms = "; ".join(term_in_words(term) for term in self.terms)
         return (
             f"the noise is not white: {terms}; values and sigmas take it into account. A missing effect can look the "
-            "same: run sdimu diagnose"
+            f"same: run {Work.DIAGNOSE}"
         )
 
 

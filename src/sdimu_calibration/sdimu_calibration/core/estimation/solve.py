@@ -55,6 +55,7 @@ from sdimu_calibration.core.progress import Progress, silent
 from sdimu_calibration.core.recording import DataError, DivergedError
 from sdimu_calibration.core.second_order.second_order_passes import second_order_pass, solve_second_order
 from sdimu_calibration.core.specification import Model
+from sdimu_calibration.core.wording import Option, Work
 
 AUTO = "auto"
 NO_FRAME = (
@@ -131,7 +132,7 @@ def _check(test: PreparedTest, model: Model, estimator: str) -> None:
         )
     if test.held_out or test.excluded:
         raise DataError(
-            f"the estimator '{estimator}' takes every stop: cut the recording instead (sdimu bag cut), or use one of "
+            f"the estimator '{estimator}' takes every stop: cut the recording instead ({Work.CUT}), or use one of "
             f"{', '.join(_TAKES_PRIORS)}"
         )
 
@@ -211,8 +212,8 @@ def with_effects(model: Model, effects: Sequence[Effect | str]) -> Model:
 def _setup(test: PreparedTest, model: Model) -> TestSetup:
     if test.site is None:
         raise DataError(
-            "no site: the navigation needs the latitude and height of the test; state the site (--site, in Python "
-            "open(..., site=...))"
+            f"no site: the navigation needs the latitude and height of the test; state the site ({Option.SITE}, in "
+            "Python open(..., site=...))"
         )
     return set_up(test.site, test.imu, model, test.epoch_s(model.settle_s))
 

@@ -7,6 +7,7 @@ import numpy as np
 from sdimu_calibration.core.alignment.prepared import PreparedData
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.probability import normal_limit
+from sdimu_calibration.core.wording import Work
 
 _KINDS = ("position", "velocity", "gyro", "accelerometer")
 _FALSE_ALARM = 1e-4
@@ -47,5 +48,5 @@ def stop_misfit(normalised: Floats, prepared: PreparedData) -> str | None:
     kind = _KINDS[row // 3]
     return (
         f"stop {numbers[k]} does not fit: {kind} is off by {abs(z[k, row]):.1f} sigma (chance ends at {limit:.1f}); "
-        "look at the data there, or run: sdimu diagnose"
+        f"look at the data there, or run: {Work.DIAGNOSE}"
     )

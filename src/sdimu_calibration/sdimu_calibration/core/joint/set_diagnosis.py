@@ -28,6 +28,7 @@ from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.units import from_si
 from sdimu_calibration.core.verdict import Verdict
+from sdimu_calibration.core.wording import Work
 
 _STILL_WRONG = 1.25
 """Held-out error (sigma) from which a model is not called explained, as for one recording, where chance does not
@@ -118,7 +119,7 @@ def diagnose_set(
         When the set cannot be fitted, or holds one recording.
     """
     if len(members) < 2:
-        raise DataError("a set of one recording: diagnose it by itself (sdimu diagnose BAG)")
+        raise DataError(f"a set of one recording: diagnose it by itself ({Work.DIAGNOSE} BAG)")
     found = search_set(members, options, run, extra, progress, fitted=fitted)
     progress("report", 0.95)
     before = set_outcome(found.before)

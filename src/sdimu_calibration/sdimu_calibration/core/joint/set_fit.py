@@ -28,6 +28,7 @@ from sdimu_calibration.core.progress import Progress, silent
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.results import TurnOn
 from sdimu_calibration.core.specification import Model
+from sdimu_calibration.core.wording import Option, Work
 
 Run = Callable[[Sequence[Job]], Sequence[Report | DataError]]
 """Does jobs, in any process; in the order of the jobs a report, or why there is none."""
@@ -227,7 +228,7 @@ def check_members(members: Sequence[Member]) -> None:
     if len(serials) > 1:
         raise DataError(
             f"the recordings are of several units ({', '.join(serials)}): a joint fit is of one; calibrate each by "
-            "itself, then compare them with sdimu fleet"
+            f"itself, then compare them with {Work.FLEET}"
         )
 
 
@@ -265,8 +266,8 @@ def _check_one_grade(reports: Sequence[Report]) -> None:
     if len(first) > 1:
         told = ", ".join(f"{r.name}: {r.imu.name}, {grade}" for grade, r in first.items())
         raise DataError(
-            f"the recordings are of IMUs of different grades ({told}): a joint fit is of one unit; state its --imu if "
-            "it is one, else calibrate each by itself"
+            f"the recordings are of IMUs of different grades ({told}): a joint fit is of one unit; state its "
+            f"{Option.IMU} if it is one, else calibrate each by itself"
         )
 
 

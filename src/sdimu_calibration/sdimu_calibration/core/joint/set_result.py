@@ -26,6 +26,7 @@ from sdimu_calibration.core.results import (
     no_history,
 )
 from sdimu_calibration.core.units import from_si
+from sdimu_calibration.core.wording import Work
 
 _LISTED = 4
 """Number of recordings that a line names: the table of the page has all."""
@@ -154,7 +155,7 @@ def _warnings(fit: SetFit, varied: Variation, names: Sequence[str]) -> tuple[str
     trends = {t.name: t for t in varied.trends if t.p_value < SCATTERS}
     lines = [
         f"{name} is not the same in all recordings (p {p:.1g})"
-        + (f"; it follows {trends[name].covariate}" if name in trends else "") + "; run: sdimu diagnose"
+        + (f"; it follows {trends[name].covariate}" if name in trends else "") + f"; run: {Work.DIAGNOSE}"
         for p, name in sorted(odd)
     ]
     left_out = [f"{name} is left out: {why}" for name, why in fit.left_out]
@@ -170,7 +171,7 @@ def _misfit(fit: SetFit) -> list[str]:
     told = ", ".join(f"{name} {nis[name]:.3g}" for name in bad[:_LISTED]) + (" and others" if bad[_LISTED:] else "")
     return [
         f"the model in white noise does not fit (NIS of {told}; 1 is right): physics is missing, or the noise has a "
-        "memory; run: sdimu diagnose"
+        f"memory; run: {Work.DIAGNOSE}"
     ]
 
 
