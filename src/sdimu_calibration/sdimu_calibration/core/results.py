@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -294,12 +293,3 @@ class Calibration:
     def inseparable(self) -> tuple[str, ...]:
         """Pairs of coefficients that are one in this test, one line each."""
         return tuple(line for line in self.warnings if INSEPARABLE in line)
-
-
-_ADVICE = re.compile(r"[;:,](?: or)? run:? sdimu diagnose$")
-"""How a note of a fit ends that advises a diagnosis."""
-
-
-def without_advice(notes: Iterable[str]) -> tuple[str, ...]:
-    """Return the notes of a fit that was diagnosed: without the advice to diagnose it."""
-    return tuple(_ADVICE.sub("", note) for note in notes)

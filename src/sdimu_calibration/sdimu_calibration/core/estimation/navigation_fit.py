@@ -40,6 +40,7 @@ from sdimu_calibration.core.filter.passes import Pass
 from sdimu_calibration.core.fit_statistics import FitStatistics
 from sdimu_calibration.core.measurement_kind import ALL, HELD_ALL, HELD_SENSORS, SENSORS
 from sdimu_calibration.core.noise_term import NoiseTerm
+from sdimu_calibration.core.note import Note, Topic
 from sdimu_calibration.core.plain_text import counted
 from sdimu_calibration.core.recording import DataError, DataFault
 from sdimu_calibration.core.results import History
@@ -379,10 +380,11 @@ class NavigationFit(Fit):
                 f"the recording contradicts the model: squared innovations are {nis:.3g} times what the noise explains"
                 f"{in_turn}; check {Option.IMU}, {Option.SITE}, units and axes"
             )
-        out = [] if self.converged else [NOT_CONVERGED]
+        out: list[str] = [] if self.converged else [NOT_CONVERGED]
         if nis > MISFIT or (held_out is not None and held_out > MISFIT):
             text = f"NIS {nis:.3f}" + ("" if held_out is None else f", held-out error {held_out:.3f}")
-            out.append(f"the model{white} does not fit ({text}{_in_noise(statistics)}){in_turn}; run: {Work.DIAGNOSE}")
+            told = f"the model{white} does not fit ({text}{_in_noise(statistics)}){in_turn}"
+            out.append(Note(told, Topic.MISFIT, f"; run: {Work.DIAGNOSE}"))
         # Noise that was learned explains what a stop leaves in white noise.
         worst = "" if self.noise else stop_misfit(self.last.output.normalised, self.prepared)
         return (*out, *([worst] if worst else []), *self.contradicted_priors()[:1], *self.beyond_specification()[:1])

@@ -22,6 +22,7 @@ from sdimu_calibration.core.joint.set_fit import Run, SetFit, SetOptions
 from sdimu_calibration.core.joint.set_result import SCATTERS, base_fit, set_outcome
 from sdimu_calibration.core.joint.set_search import SetSearch, as_given, search_set
 from sdimu_calibration.core.joint.set_standing import next_recording
+from sdimu_calibration.core.note import Topic, topic_of, without_advice
 from sdimu_calibration.core.plan_search import NextTurn
 from sdimu_calibration.core.progress import Progress, silent
 from sdimu_calibration.core.recording import DataError
@@ -257,8 +258,8 @@ def _rises(before: Calibration, after: Calibration) -> bool:
 
 
 def _odd(result: Calibration) -> str:
-    lines = [line for line in result.warnings if "not the same in all" in line]
-    return f" {lines[0].split('; run:')[0]}." if lines else ""
+    lines = without_advice(line for line in result.warnings if topic_of(line) == Topic.DIFFERS)
+    return f" {lines[0]}." if lines else ""
 
 
 def _rms(result: Calibration) -> str:
