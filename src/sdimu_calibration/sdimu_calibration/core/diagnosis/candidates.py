@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections.abc import Callable
 from dataclasses import replace
@@ -84,16 +85,11 @@ def equations(has_temperature: bool) -> list[Effect]:
         return [(n, *rest) for n in range(total + 1) for rest in powers(total - n, kinds - 1)]
 
     out: list[Effect] = []
-    for force in range(4):
-        for rate in range(3):
-            if force + rate == 0 or force + rate > 3:
-                continue
-            for pa in powers(force, 3):
-                for pw in powers(rate, 3):
-                    out += _monomial(pa, pw, "")
-                    if force + rate == 1:
-                        out += _monomial(pa, pw, "t")
-                        out += _monomial(pa, pw, "T") if has_temperature else []
+    for force, rate in [(f, r) for f in range(4) for r in range(3) if 0 < f + r <= 3]:
+        grows = ("t", *(("T",) if has_temperature else ())) if force + rate == 1 else ()
+        for pa, pw in itertools.product(powers(force, 3), powers(rate, 3)):
+            for slow in ("", *grows):
+                out += _monomial(pa, pw, slow)
     for i in range(3):
         out += _plain(f"e{AXES[i]}^2", product(_east, i, _east, i))
         for j in range(3):

@@ -341,27 +341,29 @@ def _navigated(
     free = cycles[border:]
     start = np.array([site.latitude_rad, 0.0, site.height_m])
     excess = setup.gravity - float(earth.normal_gravity(site.latitude_rad, site.height_m))
-    place, velocity, C_nb = _navigate(
-        C_start.copy(), start.copy(), np.ascontiguousarray(free.alpha), np.ascontiguousarray(free.upsilon),
-        free.coning, free.sculling, free.dt, last - border, excess,
-    )  # fmt: skip
+    steps = _Steps(
+        np.ascontiguousarray(free.alpha), np.ascontiguousarray(free.upsilon), free.coning, free.sculling, free.dt
+    )
+    place, velocity, C_nb = _navigate(C_start.copy(), start.copy(), steps, last - border, excess)
     r_n, r_e = earth.radii(site.latitude_rad)
     north = (place[:, 0] - start[0]) * (r_n + site.height_m)
     east = place[:, 1] * (r_e + site.height_m) * np.cos(min(abs(site.latitude_rad), earth.POLE_LIMIT))
     return np.column_stack([north, east]), velocity[:, :2], C_nb
 
 
+class _Steps(NamedTuple):
+    """Increments of n cycles for the compiled loop: angle, velocity, their corrections (n, 3) and length (n,)."""
+
+    alpha: Floats
+    upsilon: Floats
+    coning: Floats
+    sculling: Floats
+    dt: Floats
+
+
 @compiled
 def _navigate(
-    C_nb: Floats,
-    position: Floats,
-    alpha: Floats,
-    upsilon: Floats,
-    coning: Floats,
-    sculling: Floats,
-    dt: Floats,
-    last: Ints,
-    gravity_excess: float,
+    C_nb: Floats, position: Floats, steps: _Steps, last: Ints, gravity_excess: float
 ) -> tuple[Floats, Floats, Floats]:
     """Position (rad, rad, m), velocity and attitude after the cycles ``last - 1``; height held; starts at rest."""
     k = last.shape[0]
@@ -372,8 +374,9 @@ def _navigate(
     for e in range(k):
         while c < last[e]:
             gravity = earth.normal_gravity(position[0], height) + gravity_excess
-            dv = velocity_increment(alpha[c], upsilon[c], sculling[c])
-            navigate_cycle(C_nb, velocity, position, alpha[c] + coning[c], dv, dt[c], gravity)
+            dv = velocity_increment(steps.alpha[c], steps.upsilon[c], steps.sculling[c])
+            turned = steps.alpha[c] + steps.coning[c]
+            navigate_cycle(C_nb, velocity, position, turned, dv, steps.dt[c], gravity)
             velocity[2], position[2] = 0.0, height
             c += 1
         place[e], speed[e], attitude[e] = position, velocity, C_nb

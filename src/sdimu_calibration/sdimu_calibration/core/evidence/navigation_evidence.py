@@ -21,7 +21,13 @@ from sdimu_calibration.core.effects.effect import Effect, Timetable
 from sdimu_calibration.core.effects.motion import Motion
 from sdimu_calibration.core.evidence.linear import LinearEvidence, candidate_priors
 from sdimu_calibration.core.evidence.noise_kernels import Stretches
-from sdimu_calibration.core.evidence.signatures import constant_signatures, measured_rows, signatures
+from sdimu_calibration.core.evidence.signatures import (
+    Epochs,
+    Regressors,
+    constant_signatures,
+    measured_rows,
+    signatures,
+)
 from sdimu_calibration.core.filter.filter_pass import NAV, PassOutput, PassState, new_output, run_pass
 from sdimu_calibration.core.filter.passes import Pass, check_finite, pass_settings, start_state
 from sdimu_calibration.core.navigation.track import motion
@@ -227,17 +233,15 @@ def columns(prepared: PreparedData, known: KnownPass, latitude: float, effects: 
     ndarray, shape (N, parameters)
         Change of each whitened innovation per SI unit of each parameter; rows in the order of `measured_rows`.
     """
-    epochs, seen = prepared.epochs, known.seen
+    epochs, seen = _epochs(prepared), known.seen
     blocks = [effects[start : start + _BLOCK] for start in range(0, len(effects), _BLOCK)]
     ends = np.cumsum([0, *(sum(len(effect.parameters) for effect in block) for block in blocks)])
     # Column by column in memory: what is chosen of them later is a few columns.
     W = np.zeros((int(np.isfinite(known.output.normalised).sum()), int(ends[-1])), order="F")
 
     def fill(number: int) -> None:
-        signatures(
-            seen, epochs.first, epochs.last, prepared.kind, known.output, *_terms(blocks[number], seen), latitude,
-            known.weight, W[:, ends[number] : ends[number + 1]],
-        )  # fmt: skip
+        part = W[:, ends[number] : ends[number + 1]]
+        signatures(seen, epochs, known.output, _terms(blocks[number], seen), latitude, known.weight, part)
 
     # The recursion of one column knows nothing of the others, and compiled loops run beside each other.
     side_by_side(fill, range(len(blocks)))
@@ -262,22 +266,26 @@ def constant_columns(prepared: PreparedData, known: KnownPass, latitude: float, 
         Change of each whitened innovation per rad/s or m/s^2; column ``6 stretch + axis``, rows in the order of
         `measured_rows`.
     """
-    epochs, blocks = prepared.epochs, range(0, len(cut), _BLOCK)
+    epochs, blocks = _epochs(prepared), range(0, len(cut), _BLOCK)
     W = np.zeros((int(np.isfinite(known.output.normalised).sum()), 6 * len(cut)), order="F")
 
     def fill(begin: int) -> None:
         part = slice(begin, min(begin + _BLOCK, len(cut)))
         constant_signatures(
-            known.seen, epochs.first, epochs.last, prepared.kind, known.output, cut.start[part], cut.end[part],
-            latitude, known.weight, W[:, 6 * part.start : 6 * part.stop],
+            known.seen, epochs, known.output, cut.start[part], cut.end[part], latitude, known.weight,
+            W[:, 6 * part.start : 6 * part.stop],
         )  # fmt: skip
 
     side_by_side(fill, blocks)
     return W
 
 
-def _terms(effects: Sequence[Effect], seen: Motion) -> tuple[Floats, Ints, Ints]:
-    """Regressor columns (n, m) of effects, and the sensor axis and parameter (m,) of each."""
+def _epochs(prepared: PreparedData) -> Epochs:
+    return Epochs(prepared.epochs.first, prepared.epochs.last, prepared.kind)
+
+
+def _terms(effects: Sequence[Effect], seen: Motion) -> Regressors:
+    """Regressors of effects along a motion."""
     values = np.empty((len(seen.t), sum(len(effect.terms) for effect in effects)))
     channel: list[int] = []
     parameter: list[int] = []
@@ -287,4 +295,4 @@ def _terms(effects: Sequence[Effect], seen: Motion) -> tuple[Floats, Ints, Ints]
         channel += [t.channel for t in effect.terms]
         parameter += [parameters + t.parameter for t in effect.terms]
         parameters += len(effect.parameters)
-    return values, np.array(channel, dtype=np.int64), np.array(parameter, dtype=np.int64)
+    return Regressors(values, np.array(channel, dtype=np.int64), np.array(parameter, dtype=np.int64))
