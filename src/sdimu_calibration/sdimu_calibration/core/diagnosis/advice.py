@@ -113,10 +113,7 @@ def _about_found(d: Diagnosis, found: tuple[Found, ...], plan: PlanSeen) -> list
 def _about_unknown(d: Diagnosis, found: tuple[Found, ...]) -> list[Advice]:
     worst = d.consistency.where[0] if d.consistency.where else None
     place = (worst.stop, worst.channel) if worst else (None, "")
-    out = [
-        Advice(Kind.UNKNOWN_CAUSE, (*place, bool(d.found.noise))),
-        Advice(Kind.RUN_BACKWARDS, (), Verb.REVERSE_PLAN),
-    ]
+    out = [Advice(Kind.UNKNOWN_CAUSE, (*place, bool(d.found.noise))), Advice(Kind.RUN_BACKWARDS, (), Verb.REVERSE_PLAN)]
     return out + ([Advice(Kind.TRY_EQUATION, tuple(f.candidate.label for f in found))] if found else [])
 
 

@@ -200,12 +200,14 @@ def _own(text: str, unit: str, shown: str, value: Callable[[Motion], Floats], us
     def triad(word: str, base: tuple[str, str], like: Effect) -> Effect:
         first = CHANNELS.index(f"{word}_x")
         return Effect(
-            name=f"{word}: {text}", title=OWN, equation=f"d{word}_i = k_i {text}",
+            name=f"{word}: {text}",
+            title=OWN,
+            equation=f"d{word}_i = k_i {text}",
             parameters=tuple(Parameter(f"{word}_{a}: {text}", base[0] + unit, base[1] + shown) for a in AXES),
             terms=tuple(Term(first + i, i) for i in range(3)),
             regressors=lambda m: np.repeat(value(m)[:, None], 3, axis=1),
             prior={grade: sigma / usual for grade, sigma in like.prior.items()},
-        )  # fmt: skip
+        )
 
     # A term whose variable is of its usual order is not larger than the bias is.
     return [triad("gyro", ("rad/s", "deg/h"), GYRO_BIAS), triad("accel", ("m/s^2", "ug"), ACCEL_BIAS)]

@@ -154,9 +154,14 @@ class Diagnosis:
 
 
 def diagnose(
-    recording: Recording, site: Site | None, imu: ImuSpecification, model: Model,
-    extra: Sequence[Effect] = (), progress: Progress = silent, estimator: str = AUTO,
-) -> Diagnosis:  # fmt: skip
+    recording: Recording,
+    site: Site | None,
+    imu: ImuSpecification,
+    model: Model,
+    extra: Sequence[Effect] = (),
+    progress: Progress = silent,
+    estimator: str = AUTO,
+) -> Diagnosis:
     """Solve, then `climb`; parameters as for `PreparedTest`, `solve` and `climb`.
 
     Raises
@@ -168,9 +173,13 @@ def diagnose(
 
 
 def climb(
-    fit: Fit, extra: Sequence[Effect] = (), progress: Progress = silent, alpha: float = FALSE_ALARM,
-    refits: bool = False, without: Collection[str] = (),
-) -> Diagnosis:  # fmt: skip
+    fit: Fit,
+    extra: Sequence[Effect] = (),
+    progress: Progress = silent,
+    alpha: float = FALSE_ALARM,
+    refits: bool = False,
+    without: Collection[str] = (),
+) -> Diagnosis:
     """Find what the model of a fit is missing.
 
     Parameters
@@ -234,10 +243,26 @@ def climb(
     word = verdict(facts)
     progress("done", 1.0)
     unspoken = Diagnosis(
-        word, "", word == Verdict.CONSISTENT, p_value(done, consistency, bool(noise) or loud), findings, noise,
-        consistency, as_given, widened, before, after, done.found, done.evidence, done.left_before, done.left_after,
-        done.free, own, unexplained, rungs,
-    )  # fmt: skip
+        word,
+        "",
+        word == Verdict.CONSISTENT,
+        p_value(done, consistency, bool(noise) or loud),
+        findings,
+        noise,
+        consistency,
+        as_given,
+        widened,
+        before,
+        after,
+        done.found,
+        done.evidence,
+        done.left_before,
+        done.left_after,
+        done.free,
+        own,
+        unexplained,
+        rungs,
+    )
     return replace(unspoken, sentence=sentence(unspoken))
 
 
@@ -261,9 +286,13 @@ def in_measured_noise(fit: Fit, progress: Progress = silent) -> tuple[Fit, Consi
     noise, imu = measured_noise(consistency, fit)
     if noise:
         again = solve(
-            fit.test.with_imu(imu), fit.model, fit.estimator, progress=progress, learn=False,
+            fit.test.with_imu(imu),
+            fit.model,
+            fit.estimator,
+            progress=progress,
+            learn=False,
             azimuth_free=fit.azimuth_free,
-        )  # fmt: skip
+        )
         fit = replace(again, reason=fit.reason)
     return in_white_noise(fit), consistency, noise
 

@@ -148,10 +148,7 @@ def candidates(request: Request, tried: Sequence[Candidate], own: bool) -> list[
     known = [*request.extra, *catalogue(times, set(base.labels), has_temperature), *more]
     known = [e for e in known if (e.family or e.name) not in request.without]
     if base.learns_scatter:
-        known = [
-            e for e in known
-            if not e.needs_table and not e.random_walk and e.decay_s is None
-        ]  # fmt: skip
+        known = [e for e in known if not e.needs_table and not e.random_walk and e.decay_s is None]
     return _untried(known, {c.label for c in tried} | base.labels)
 
 

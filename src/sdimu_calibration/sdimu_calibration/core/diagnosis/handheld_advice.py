@@ -15,8 +15,10 @@ def handheld_advice(d: Diagnosis, found: tuple[Found, ...]) -> tuple[Advice, ...
     out = [*mend(d), *keep(found), *together([(one, _more(one)) for one in found if one.alike])]
     out += [
         Advice(Kind.CHOICE_MATTERS_BY_HAND, (one.candidate.label, s.other, s.coefficient, s.sigmas))
-        for one in found if one.alike for s in one.coefficient_shifts[:3]
-    ]  # fmt: skip
+        for one in found
+        if one.alike
+        for s in one.coefficient_shifts[:3]
+    ]
     if d.verdict == Verdict.UNEXPLAINED:
         out.append(Advice(Kind.RECORD_IN_OTHER_ORDER))
     return tuple(dict.fromkeys(out))

@@ -200,9 +200,12 @@ def _ranked(done: Diagnosis) -> tuple[Ranked, ...]:
     columns = [k for k in range(p, len(first.z)) if np.isfinite(sigma[k])]
     rows = [
         Ranked(
-            evidence.names[k], float(first.z[k]), float(first.estimate[k]), float(sigma[k]),
+            evidence.names[k],
+            float(first.z[k]),
+            float(first.estimate[k]),
+            float(sigma[k]),
             evidence.candidates[k - p].parameter.display_unit,
         )
         for k in columns
-    ]  # fmt: skip
+    ]
     return tuple(sorted(rows, key=lambda r: -abs(r.z)))

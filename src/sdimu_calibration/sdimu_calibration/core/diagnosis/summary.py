@@ -55,6 +55,4 @@ def summarise(d: Diagnosis) -> DiagnosisSummary:
         reasons = (Untestable("the motion of this run does not excite it", hidden),) if hidden else ()
         return DiagnosisSummary(d, found, reached, None, reasons, handheld_advice(d, found))
     plan = plan_seen(d.evidence)
-    return DiagnosisSummary(
-        d, found, reached, plan, untestable_reasons(reached, plan), advice(d, found, reached, plan)
-    )
+    return DiagnosisSummary(d, found, reached, plan, untestable_reasons(reached, plan), advice(d, found, reached, plan))

@@ -166,9 +166,17 @@ class FilterFit(NavigationFit):
         """
         setup, sensors, cycles = self.setup, self.setup.sensors, prepared.cycles
         seen = motion(
-            cycles, prepared.rest, sensors, estimate, C_start.copy(), setup.site.latitude_rad, setup.gravity,
-            prepared.temperature, predicted=False, magnetic_n=setup.magnetic_n,
-        )  # fmt: skip
+            cycles,
+            prepared.rest,
+            sensors,
+            estimate,
+            C_start.copy(),
+            setup.site.latitude_rad,
+            setup.gravity,
+            prepared.temperature,
+            predicted=False,
+            magnetic_n=setup.magnetic_n,
+        )
         values = sensors.regressors(seen)
         # What fades is known where the fit ended, and fades away from there.
         fading = np.exp(-np.outer(np.abs(seen.t - end_of_fit), sensors.decay_rate[sensors.parameter]))

@@ -137,6 +137,11 @@ def part(prepared: PreparedData, first: int, last: int) -> PreparedData:
     phases = Phases(*(getattr(prepared.phases, field.name)[rows] for field in fields(Phases)))
     bridges = Bridges(*(getattr(prepared.bridges, field.name)[rows] for field in fields(Bridges)))
     return replace(
-        prepared, cycles=prepared.cycles[begin:end], epochs=Epochs(**cut), phases=phases, kind=prepared.kind[rows],
-        bridges=bridges, seconds=None,
-    )  # fmt: skip
+        prepared,
+        cycles=prepared.cycles[begin:end],
+        epochs=Epochs(**cut),
+        phases=phases,
+        kind=prepared.kind[rows],
+        bridges=bridges,
+        seconds=None,
+    )

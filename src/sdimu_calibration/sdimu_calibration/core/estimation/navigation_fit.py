@@ -18,12 +18,7 @@ from sdimu_calibration.core.data.blocks import let_go, pieces
 from sdimu_calibration.core.effects import bias
 from sdimu_calibration.core.effects.effect import Effect, Timetable
 from sdimu_calibration.core.estimation.fit import NOT_CONVERGED, Fit, Start, temperature_counts
-from sdimu_calibration.core.estimation.free_inertial import (
-    Compensated,
-    FreeInertialRun,
-    Navigator,
-    free_inertial_runs,
-)
+from sdimu_calibration.core.estimation.free_inertial import Compensated, FreeInertialRun, Navigator, free_inertial_runs
 from sdimu_calibration.core.estimation.noise_estimate import NoiseEstimate
 from sdimu_calibration.core.estimation.prior_check import contradicted, outside
 from sdimu_calibration.core.evidence.consistency import Consistency, check
@@ -44,9 +39,7 @@ from sdimu_calibration.core.note import Note, Topic
 from sdimu_calibration.core.plain_text import counted
 from sdimu_calibration.core.recording import DataError, DataFault
 from sdimu_calibration.core.results import History
-from sdimu_calibration.core.second_order.second_order_passes import (
-    SecondOrderPass,
-)
+from sdimu_calibration.core.second_order.second_order_passes import SecondOrderPass
 from sdimu_calibration.core.side_by_side import side_by_side
 from sdimu_calibration.core.wording import Option, Work
 
@@ -269,15 +262,19 @@ class NavigationFit(Fit):
         output = self.last.output
         dof = 3 * int(np.isfinite(output.nis).sum())
         white = FitStatistics(
-            float(output.log_likelihood.sum()), float(np.nansum(output.nis) / max(dof, 1)), float(dof),
+            float(output.log_likelihood.sum()),
+            float(np.nansum(output.nis) / max(dof, 1)),
+            float(dof),
             float(self.passes),
-        )  # fmt: skip
+        )
         if self.noise is None:
             return white
         return replace(
-            white, log_likelihood=white.log_likelihood + self.noise.gain, nis_in_noise=self.noise.nis,
+            white,
+            log_likelihood=white.log_likelihood + self.noise.gain,
+            nis_in_noise=self.noise.nis,
             held_out_in_noise=self.noise.held_out_rms,
-        )  # fmt: skip
+        )
 
     def held_out_rms(self) -> float | None:
         """RMS of normalised prediction errors at stops that the fit has not seen.
@@ -413,9 +410,15 @@ class NavigationFit(Fit):
         """History at epochs (k,), with values (k, p) and covariance (k, p, p) in the frame of the report."""
         phases = self.prepared.phases
         return History(
-            self.prepared.epochs.end[rows], values, np.sqrt(np.diagonal(covariance, axis1=1, axis2=2)),
-            output.sigma[rows, 6:9], phases.stop[rows], phases.dwell[rows], phases.used[rows], output.nis[rows],
-        )  # fmt: skip
+            self.prepared.epochs.end[rows],
+            values,
+            np.sqrt(np.diagonal(covariance, axis1=1, axis2=2)),
+            output.sigma[rows, 6:9],
+            phases.stop[rows],
+            phases.dwell[rows],
+            phases.used[rows],
+            output.nis[rows],
+        )
 
 
 def checksum(*arrays: Floats) -> float:

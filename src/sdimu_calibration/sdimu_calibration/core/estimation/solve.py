@@ -261,9 +261,7 @@ def _second_order(
         begin = StartPoint(last.smoothed_start, last.estimate)
         last, more, converged = solve_second_order(inner, prepared, alignment, begin, progress)
         count += more
-    return SecondOrderFit(
-        test, model, setup.sensors, inner, prepared, alignment, frame_model, last, count, converged
-    )
+    return SecondOrderFit(test, model, setup.sensors, inner, prepared, alignment, frame_model, last, count, converged)
 
 
 def _free_azimuth(test: PreparedTest, model: Model, start: Start | None, progress: Progress) -> Fit:
@@ -324,12 +322,8 @@ def _batch(test: PreparedTest, model: Model, _start: Start | None, progress: Pro
     else:
         frame, values = FRAME, frame_model.values(found.coefficients)
         covariance = frame_model.covariance(found.covariance, found.coefficients)
-    summary = FitStatistics(
-        found.log_evidence, found.chi2 / max(found.dof, 1), float(found.dof), float(found.steps)
-    )
-    about = _navigation_about(
-        test, model, replace(begun, setup=inner), frame_model, found.C_nb[0], found.coefficients
-    )
+    summary = FitStatistics(found.log_evidence, found.chi2 / max(found.dof, 1), float(found.dof), float(found.steps))
+    about = _navigation_about(test, model, replace(begun, setup=inner), frame_model, found.C_nb[0], found.coefficients)
     return BatchFit(test, model, setup.sensors, frame, values, covariance, summary, about)
 
 
@@ -389,9 +383,13 @@ def fit_about(
 
 
 def _navigation_about(
-    test: PreparedTest, model: Model, begun: _Reduced, frame_model: AccelerometerFrameModel | None,
-    C_nb: Floats, coefficients: Floats,
-) -> NavigationFit:  # fmt: skip
+    test: PreparedTest,
+    model: Model,
+    begun: _Reduced,
+    frame_model: AccelerometerFrameModel | None,
+    C_nb: Floats,
+    coefficients: Floats,
+) -> NavigationFit:
     """Navigate about coefficients that stay as they are; the attitude is the filter's own.
 
     Raises

@@ -152,10 +152,18 @@ def known_pass(prepared: PreparedData, setup: TestSetup, finished: Pass) -> Know
     run_pass(finished.data._replace(kind=prepared.kind), pass_settings(setup, closed_loop=False), state, output)
     check_finite(state)
     seen = motion(
-        prepared.cycles, prepared.rest, setup.sensors, finished.estimate, finished.C_start.copy(),
-        setup.site.latitude_rad, setup.gravity, prepared.temperature, predicted=True, magnetic_n=setup.magnetic_n,
+        prepared.cycles,
+        prepared.rest,
+        setup.sensors,
+        finished.estimate,
+        finished.C_start.copy(),
+        setup.site.latitude_rad,
+        setup.gravity,
+        prepared.temperature,
+        predicted=True,
+        magnetic_n=setup.magnetic_n,
         near=finished.data.values,
-    )  # fmt: skip
+    )
     return KnownPass(output, seen, None)
 
 
@@ -204,12 +212,24 @@ def navigation_evidence(
     epoch, channel = measured_rows(known.output)
     candidates, prior = candidate_priors(effects, setup.imu)
     return NavigationEvidence(
-        e=known.output.normalised[epoch, channel], W=columns(prepared, known, latitude, [*sensors.effects, *effects]),
-        stop=prepared.phases.stop[epoch], names=(*sensors.names, *(c.label for c in candidates)),
-        weight=sensors.weight, shift=sensors.mean - estimate, stated=sensors.stated, candidates=candidates, prior=prior,
-        imu=setup.imu, times=timetable(prepared), coefficients=len(sensors.prior) - _serving(sensors.names),
-        epoch=epoch, channel=channel, known=known, prepared=prepared, latitude=latitude,
-    )  # fmt: skip
+        e=known.output.normalised[epoch, channel],
+        W=columns(prepared, known, latitude, [*sensors.effects, *effects]),
+        stop=prepared.phases.stop[epoch],
+        names=(*sensors.names, *(c.label for c in candidates)),
+        weight=sensors.weight,
+        shift=sensors.mean - estimate,
+        stated=sensors.stated,
+        candidates=candidates,
+        prior=prior,
+        imu=setup.imu,
+        times=timetable(prepared),
+        coefficients=len(sensors.prior) - _serving(sensors.names),
+        epoch=epoch,
+        channel=channel,
+        known=known,
+        prepared=prepared,
+        latitude=latitude,
+    )
 
 
 def _serving(names: Sequence[str]) -> int:
@@ -272,9 +292,15 @@ def constant_columns(prepared: PreparedData, known: KnownPass, latitude: float, 
     def fill(begin: int) -> None:
         part = slice(begin, min(begin + _BLOCK, len(cut)))
         constant_signatures(
-            known.seen, epochs, known.output, cut.start[part], cut.end[part], latitude, known.weight,
+            known.seen,
+            epochs,
+            known.output,
+            cut.start[part],
+            cut.end[part],
+            latitude,
+            known.weight,
             W[:, 6 * part.start : 6 * part.stop],
-        )  # fmt: skip
+        )
 
     side_by_side(fill, blocks)
     return W

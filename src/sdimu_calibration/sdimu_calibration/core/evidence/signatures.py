@@ -177,9 +177,14 @@ def _signatures(
 
 
 def signatures(
-    seen: Motion, epochs: Epochs, output: PassOutput, regressors: Regressors, latitude: float, weight: Floats | None,
+    seen: Motion,
+    epochs: Epochs,
+    output: PassOutput,
+    regressors: Regressors,
+    latitude: float,
+    weight: Floats | None,
     W: Floats,
-) -> None:  # fmt: skip
+) -> None:
     """Signatures of q parameters in the whitened innovations of a navigation filter.
 
     Parameters
@@ -279,9 +284,15 @@ def _constant_signatures(
 
 
 def constant_signatures(
-    seen: Motion, epochs: Epochs, output: PassOutput, start: Floats, end: Floats, latitude: float,
-    weight: Floats | None, W: Floats,
-) -> None:  # fmt: skip
+    seen: Motion,
+    epochs: Epochs,
+    output: PassOutput,
+    start: Floats,
+    end: Floats,
+    latitude: float,
+    weight: Floats | None,
+    W: Floats,
+) -> None:
     """Signatures of a constant error of each sensor axis in each of s stretches of time.
 
     Parameters
@@ -301,9 +312,15 @@ def constant_signatures(
         Filled from the first stretch on, per rad/s or m/s^2, and left as it is before; column ``6 stretch + axis``.
     """
     _constant_signatures(
-        _cycles(seen), epochs, np.ascontiguousarray(start), np.ascontiguousarray(end), earth.earth_rate(latitude),
-        _or_none(weight), _filter(output), W,
-    )  # fmt: skip
+        _cycles(seen),
+        epochs,
+        np.ascontiguousarray(start),
+        np.ascontiguousarray(end),
+        earth.earth_rate(latitude),
+        _or_none(weight),
+        _filter(output),
+        W,
+    )
 
 
 def _or_none(weight: Floats | None) -> Floats:

@@ -109,9 +109,13 @@ class SetDiagnosis:
 
 
 def diagnose_set(
-    members: Sequence[Member], options: SetOptions, run: Run, extra: Sequence[Effect] = (),
-    progress: Progress = silent, fitted: SetFit | None = None,
-) -> SetDiagnosis:  # fmt: skip
+    members: Sequence[Member],
+    options: SetOptions,
+    run: Run,
+    extra: Sequence[Effect] = (),
+    progress: Progress = silent,
+    fitted: SetFit | None = None,
+) -> SetDiagnosis:
     """Find what the model of a set misses; parameters as for `search_set`.
 
     Raises
@@ -143,10 +147,19 @@ def diagnose_set(
     without = _error_without(found)
     sentence = f"{_sentence(word, findings, (without, after), again)} {taken_back}".strip()
     return SetDiagnosis(
-        word, sentence, findings, before, after, found.threshold,
-        _advice(word, findings, next_recording(found.after, standing, test), again), standing, found.first, again,
-        refused, without,
-    )  # fmt: skip
+        word,
+        sentence,
+        findings,
+        before,
+        after,
+        found.threshold,
+        _advice(word, findings, next_recording(found.after, standing, test), again),
+        standing,
+        found.first,
+        again,
+        refused,
+        without,
+    )
 
 
 def _error_without(found: SetSearch) -> float | None:
@@ -161,10 +174,17 @@ def _findings(found: SetSearch) -> tuple[SetFinding, ...]:
     values, sigma = found.after.estimate.values, np.sqrt(np.diag(found.after.estimate.covariance))
     names = list(found.after.names)
     shared = [
-        (c.label, c.effect.title, "", names.index(c.parameter.name if c.parameter.name in names else c.label), z,
-         c.parameter, found.alike.get(c.label, ()))
+        (
+            c.label,
+            c.effect.title,
+            "",
+            names.index(c.parameter.name if c.parameter.name in names else c.label),
+            z,
+            c.parameter,
+            found.alike.get(c.label, ()),
+        )
         for c, z in zip(found.chosen, found.z, strict=True)
-    ]  # fmt: skip
+    ]
     own = []
     for find in found.local:
         effect = resolve(find.key)
@@ -271,7 +291,9 @@ def _shown(value: float | None) -> str:
 
 
 def _advice(
-    word: Verdict, findings: Sequence[SetFinding], closing: Sequence[tuple[tuple[str, ...], NextTurn]],
+    word: Verdict,
+    findings: Sequence[SetFinding],
+    closing: Sequence[tuple[tuple[str, ...], NextTurn]],
     again: Recurrence | None,
 ) -> tuple[Advice, ...]:
     out = next_steps(again)

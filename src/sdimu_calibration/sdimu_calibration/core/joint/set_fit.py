@@ -13,14 +13,7 @@ from sdimu_calibration.core.effects.selection import resolve
 from sdimu_calibration.core.estimation.handheld_fit import HandheldFit
 from sdimu_calibration.core.estimation.second_order_fit import SecondOrderFit
 from sdimu_calibration.core.estimation.solve import AUTO, with_effects
-from sdimu_calibration.core.joint.combine import (
-    Combination,
-    Component,
-    JointEstimate,
-    Rows,
-    spread_out,
-    stacked,
-)
+from sdimu_calibration.core.joint.combine import Combination, Component, JointEstimate, Rows, spread_out, stacked
 from sdimu_calibration.core.joint.member import Job, Member, Report
 from sdimu_calibration.core.joint.scope import by_name, split_tag
 from sdimu_calibration.core.joint.turn_on import in_scatter, turn_on_scatter
@@ -271,9 +264,7 @@ def _check_one_grade(reports: Sequence[Report]) -> None:
         )
 
 
-def job_of(
-    member: Member, options: SetOptions, about: SetFit | None, estimator: str = "", learn: bool = True
-) -> Job:
+def job_of(member: Member, options: SetOptions, about: SetFit | None, estimator: str = "", learn: bool = True) -> Job:
     """Make the job of a recording.
 
     Parameters
@@ -294,8 +285,16 @@ def job_of(
     report = next((r for r in about.reports if r.name == member.name), None)
     if report is not None:
         return Job(
-            member, options.model, report.estimator, local, (), False, about.values_of(report),
-            report.imu, report.start, None if learn else report.noise,
+            member,
+            options.model,
+            report.estimator,
+            local,
+            (),
+            False,
+            about.values_of(report),
+            report.imu,
+            report.start,
+            None if learn else report.noise,
         )
     values = dict(zip(about.names, about.estimate.values.tolist(), strict=True))
     return Job(member, options.model, estimator or about.reports[0].estimator, local, about=values, noise=())
@@ -313,9 +312,7 @@ def with_own(fresh: Report, old: Report | None) -> Report:
     )
 
 
-def _one_estimator(
-    members: Sequence[Member], options: SetOptions, reports: Sequence[Report], run: Run
-) -> list[Report]:
+def _one_estimator(members: Sequence[Member], options: SetOptions, reports: Sequence[Report], run: Run) -> list[Report]:
     """Repeat the recordings of the filter by second-order passes where others need them: one frame for all."""
     kinds = {r.estimator for r in reports}
     if len(kinds) == 1 or kinds <= {HandheldFit.estimator, SecondOrderFit.estimator}:
@@ -377,8 +374,9 @@ def varying_effects(model: Model, scopes: Mapping[str, str], names: Sequence[str
             )
     varying = {
         name: tuple(p.name for p in effect.parameters if p.name in names)
-        for name, effect in effects.items() if scopes.get(name, effect.scope) == "power-on"
-    }  # fmt: skip
+        for name, effect in effects.items()
+        if scopes.get(name, effect.scope) == "power-on"
+    }
     return {name: own for name, own in varying.items() if own}
 
 
@@ -405,9 +403,15 @@ def _combined(members: Sequence[Member], options: SetOptions, reports: Sequence[
     estimate, turn_on = _estimated(reports, names, varying)
     used = {r.name for r in reports}
     return SetFit(
-        tuple(m for m in members if m.name in used), options.model, dict(options.local), varying, tuple(reports), names,
-        estimate, turn_on,
-    )  # fmt: skip
+        tuple(m for m in members if m.name in used),
+        options.model,
+        dict(options.local),
+        varying,
+        tuple(reports),
+        names,
+        estimate,
+        turn_on,
+    )
 
 
 def _estimated(
