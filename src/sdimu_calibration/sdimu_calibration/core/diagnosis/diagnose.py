@@ -162,13 +162,7 @@ def diagnose(
     progress: Progress = silent,
     estimator: str = AUTO,
 ) -> Diagnosis:
-    """Solve, then `climb`; parameters as for `PreparedTest`, `solve` and `climb`.
-
-    Raises
-    ------
-    DataError
-        When the recording or the options cannot be used.
-    """
+    """Solve, then `climb`; parameters as for `PreparedTest`, `solve` and `climb`."""
     return climb(solve(PreparedTest(recording, imu, site), model, estimator, progress=progress), extra, progress)
 
 
@@ -196,11 +190,6 @@ def climb(
         Also fit the model with the first, the first two, ... of what was found.
     without : collection of str
         Registry names of effects that are not tried, as if the catalogue lacked them.
-
-    Raises
-    ------
-    DataError
-        When the fit cannot be diagnosed, or an extended model cannot be fitted.
     """
     if not fit.diagnosable:
         raise DataError(NOT_DIAGNOSABLE)

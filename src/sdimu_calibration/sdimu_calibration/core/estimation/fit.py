@@ -214,13 +214,7 @@ class Fit(ABC):
 
     @abstractmethod
     def free_inertial(self, rivals: Sequence[tuple[str, Fit]]) -> tuple[FreeInertialRun, ...]:
-        """Navigate without aid, with this fit and with `rivals` (name, fit), on parts that no fit has seen.
-
-        Raises
-        ------
-        DataError
-            When there is no such part, or the estimator does not navigate.
-        """
+        """Navigate without aid, with this fit and with `rivals` (name, fit), on parts that no fit has seen."""
 
     @property
     def noise_terms(self) -> tuple[NoiseTerm, ...]:
@@ -241,13 +235,7 @@ class Fit(ABC):
         return ()
 
     def warnings(self, statistics: FitStatistics) -> tuple[str, ...]:
-        """Say what speaks against the estimate, one line each; `statistics` with the held-out error where it is known.
-
-        Raises
-        ------
-        DataError
-            When there is no fit at all.
-        """
+        """Say what speaks against the estimate, one line each; `statistics` have the held-out error where known."""
         del statistics
         return ()
 

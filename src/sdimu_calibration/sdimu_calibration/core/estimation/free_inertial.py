@@ -199,11 +199,6 @@ def free_inertial_runs(
         Of a fit to the whole recording: azimuth at the start, and what heading is compared with.
     wanted_s : float
         Length of the navigation (s).
-
-    Raises
-    ------
-    DataError
-        When there is no such segment, or the rest of the recording cannot be calibrated.
     """
     segments = holdout_segments(prepared, wanted_s)
     return tuple(side_by_side(lambda segment: _run(prepared, fits, reference, segment), segments))
@@ -248,11 +243,6 @@ def refit(fit: Navigator, seen: PreparedData, C_nb: Floats) -> Refit:
         The part.
     C_nb : ndarray, shape (3, 3)
         Attitude at the start of the part (dimensionless), by the fit of the whole.
-
-    Raises
-    ------
-    DataError
-        When the part cannot be calibrated.
     """
     alignment = first_attitude(seen.epochs, seen.phases, fit.setup)
     estimate, before, near = fit.estimate, np.inf, None

@@ -182,12 +182,6 @@ class HandheldFit(Fit):
         return rests_with_residuals(self.ready.run, self.priors, self.solution)
 
     def free_inertial(self, rivals: Sequence[tuple[str, Fit]]) -> tuple[FreeInertialRun, ...]:
-        """Refuse: a hand moves the IMU, so that its velocity and place are unknown.
-
-        Raises
-        ------
-        DataError
-            Always.
-        """
+        """Refuse: a hand moves the IMU, so that its velocity and place are unknown."""
         del rivals
         raise DataError("a handheld run has no known velocity and place to compare a free navigation with")

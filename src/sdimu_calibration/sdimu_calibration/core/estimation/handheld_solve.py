@@ -33,11 +33,6 @@ def solve_handheld(test: PreparedTest, model: Model, start: Start | None, progre
     start : Start or None
         Where a fit of nearly the same model ended: its priors stand. None tries wider ones too.
     progress : callable
-
-    Raises
-    ------
-    DataError
-        When the run fits no IMU, or the test was opened for navigation.
     """
     if test.assumed_site:
         raise DataError(

@@ -361,13 +361,7 @@ class NavigationFit(Fit):
         )
 
     def warnings(self, statistics: FitStatistics) -> tuple[str, ...]:
-        """Misfit as a whole and of single stops, and coefficients outside the specification.
-
-        Raises
-        ------
-        DataError
-            When there is no fit at all.
-        """
+        """Misfit as a whole and of single stops, and coefficients outside the specification."""
         nis, held_out = statistics.nis_mean, statistics.held_out_rms
         lost = int(self.prepared.cycles.lost.sum())
         white = "" if self.noise is None else " in white noise"
@@ -395,13 +389,7 @@ class NavigationFit(Fit):
         return contradicted(self.setup.sensors, self.settled, self.settled_covariance)
 
     def free_inertial(self, rivals: Sequence[tuple[str, Fit]]) -> tuple[FreeInertialRun, ...]:
-        """Navigate without aid, with this fit and with `rivals` (name, fit), on parts that no fit has seen.
-
-        Raises
-        ------
-        DataError
-            When there is no such part.
-        """
+        """Navigate without aid, with this fit and with `rivals` (name, fit), on parts that no fit has seen."""
         fits = [("model as given", self), *((name, fit) for name, fit in rivals if isinstance(fit, NavigationFit))]
         # A model that lacks an effect has a wrong azimuth, too: all start from that of the last, which knows most.
         return free_inertial_runs(self.prepared, fits, fits[-1][1].known.output)

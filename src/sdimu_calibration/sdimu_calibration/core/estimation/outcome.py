@@ -32,11 +32,6 @@ def outcome(fit: Fit, held_out: bool = True) -> Calibration:
     fit : Fit
     held_out : bool
         Also predict every stop from the others (costs some passes).
-
-    Raises
-    ------
-    DataError
-        When there is no fit at all.
     """
     statistics = replace(fit.statistics(), held_out_rms=fit.held_out_rms() if held_out else None)
     parameters = fit.sensors.parameters
@@ -136,11 +131,6 @@ def calibrate(
         As for `solve`.
     held_out : bool
         As for `outcome`.
-
-    Raises
-    ------
-    DataError
-        When the recording or the options cannot be used.
     """
     result = outcome(solve(PreparedTest(recording, imu, site), model, estimator, progress=progress), held_out)
     progress("done", 1.0)

@@ -94,11 +94,6 @@ def solve(
     azimuth_free : bool
         Estimate the horizontal Earth rate in the place of the azimuth, by second-order passes. Where the noise that is
         learned hides the azimuth this is done unasked, but for a request of another estimator.
-
-    Raises
-    ------
-    DataError
-        When the test, the model or the estimator cannot be used.
     """
     choice = choose_estimator(test, model) if estimator == AUTO else Choice(estimator, "by request")
     if choice.estimator not in ESTIMATORS:
@@ -154,13 +149,7 @@ class Choice:
 
 
 def choose_estimator(test: PreparedTest, model: Model) -> Choice:
-    """Choose between ``handheld``, ``second-order`` and ``filter``.
-
-    Raises
-    ------
-    DataError
-        When model and IMU do not fit together.
-    """
+    """Choose between ``handheld``, ``second-order`` and ``filter``."""
     if test.why_handheld:
         return Choice(HandheldFit.estimator, test.why_handheld)
     setup = _setup(test, model)
@@ -190,11 +179,6 @@ def extend(
     progress : callable
     learn : bool
         As for `solve`.
-
-    Raises
-    ------
-    DataError
-        When the extended model cannot be fitted.
     """
     model = with_effects(fit.model, effects)
     wider = solve(fit.test, model, fit.estimator, fit.start if warm else None, progress, learn, fit.azimuth_free)
@@ -270,13 +254,7 @@ def _free_azimuth(test: PreparedTest, model: Model, start: Start | None, progres
 
 
 def _in_accelerometer_frame(setup: TestSetup, azimuth_free: bool) -> AccelerometerFrameModel:
-    """Put the model of a setup into the accelerometers' frame, where asked with an Earth rate of any direction.
-
-    Raises
-    ------
-    DataError
-        When the model cannot turn.
-    """
+    """Put the model of a setup into the accelerometers' frame, where asked with an Earth rate of any direction."""
     latitude = setup.site.latitude_rad
     along = (horizontal_earth_rate(latitude),) if azimuth_free else ()
     found = accelerometer_frame_model(setup.sensors, setup.imu, along)
@@ -355,11 +333,6 @@ def fit_about(
     start : Start, optional
         Gives the attitude at the start where it is known. Of a fit without an azimuth it also gives the Earth rate in
         its place, and this fit does without one, too.
-
-    Raises
-    ------
-    DataError
-        When the filter diverges about them.
     """
     begun = _reduced(test, model, silent)
     here = {} if start is None else dict(zip(start.names, start.coefficients.tolist(), strict=True))
@@ -390,13 +363,7 @@ def _navigation_about(
     C_nb: Floats,
     coefficients: Floats,
 ) -> NavigationFit:
-    """Navigate about coefficients that stay as they are; the attitude is the filter's own.
-
-    Raises
-    ------
-    DataError
-        When the filter diverges about them.
-    """
+    """Navigate about coefficients that stay as they are; the attitude is the filter's own."""
     setup, prepared, alignment = begun.setup, begun.prepared, begun.alignment
     if frame_model is not None:
         at = second_order_pass(prepared, setup, alignment, C_nb, coefficients)

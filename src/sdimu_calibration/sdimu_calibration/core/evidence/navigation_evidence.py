@@ -139,13 +139,7 @@ def timetable(prepared: PreparedData) -> Timetable:
 
 
 def known_pass(prepared: PreparedData, setup: TestSetup, finished: Pass) -> KnownPass:
-    """Repeat the last pass of the filter with the coefficients known at their final values.
-
-    Raises
-    ------
-    DataError
-        When the filter diverges.
-    """
+    """Repeat the last pass of the filter with the coefficients known at their final values."""
     p = len(setup.sensors.prior)
     state = _with_known_coefficients(finished.start, p)._replace(used=finished.estimate.copy())
     output = new_output(len(prepared.epochs), p, True, len(prepared.epochs), navigation_only=True)
@@ -173,11 +167,6 @@ def known_second_order_pass(
     """Run a pass about samples corrected exactly at the final coefficients, which are known.
 
     Shifts of the attitude between stops change no covariance, so the recursion of the signatures holds as it stands.
-
-    Raises
-    ------
-    DataError
-        When the filter diverges.
     """
     firm, estimate = firm_setup(setup), finished.estimate
     at = linearise(prepared, firm, finished.smoothed_start, estimate)

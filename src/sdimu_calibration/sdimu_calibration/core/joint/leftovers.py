@@ -112,11 +112,6 @@ def leftovers(fit: SetFit, run: Run) -> Leftovers:
         With everything that was found.
     run : callable
         Does the jobs.
-
-    Raises
-    ------
-    DataError
-        When a recording cannot be read again.
     """
     reports = _asked(fit, run)
     fit = replace(fit, reports=tuple(reports))

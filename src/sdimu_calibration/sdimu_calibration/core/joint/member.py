@@ -169,13 +169,7 @@ class Report:
 
 
 def run(job: Job) -> Report:
-    """Do a job.
-
-    Raises
-    ------
-    DataError
-        When the recording cannot be used; it names the recording.
-    """
+    """Do a job."""
     try:
         return _report(job, fitted(job))
     except DataError as error:
@@ -191,13 +185,7 @@ def tried(job: Job) -> Report | DataError:
 
 
 def fitted(job: Job) -> Fit:
-    """Fit the recording of a job.
-
-    Raises
-    ------
-    DataError
-        When the recording cannot be used.
-    """
+    """Fit the recording of a job."""
     test = job.member.open()
     model = replace(job.model, effects=(*job.model.effects, *job.local))
     if job.imu is not None:

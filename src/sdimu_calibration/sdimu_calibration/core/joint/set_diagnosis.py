@@ -116,13 +116,7 @@ def diagnose_set(
     progress: Progress = silent,
     fitted: SetFit | None = None,
 ) -> SetDiagnosis:
-    """Find what the model of a set misses; parameters as for `search_set`.
-
-    Raises
-    ------
-    DataError
-        When the set cannot be fitted, or holds one recording.
-    """
+    """Find what the model of a set misses; parameters as for `search_set`."""
     if len(members) < 2:
         raise DataError(f"a set of one recording: diagnose it by itself ({Work.DIAGNOSE} BAG)")
     found = search_set(members, options, run, extra, progress, fitted=fitted)

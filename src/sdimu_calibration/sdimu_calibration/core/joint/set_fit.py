@@ -141,11 +141,6 @@ def fit_set(
     before : SetFit, optional
         Of the same members with nearly the same model: the recordings are linearised about it.
     progress : callable
-
-    Raises
-    ------
-    DataError
-        When the recordings are of several units, one stands twice, or fewer than two of several can be used.
     """
     check_members(members)
     if options.model.priors:
@@ -206,13 +201,7 @@ def _noise_of(late: Mapping[str, Report], fit: SetFit, options: SetOptions, run:
 
 
 def check_members(members: Sequence[Member]) -> None:
-    """Refuse recordings that are no set.
-
-    Raises
-    ------
-    DataError
-        When a name stands twice, or the recordings are of several units.
-    """
+    """Refuse recordings that are no set."""
     names = [m.name for m in members]
     for name in names:
         if names.count(name) > 1:
@@ -231,13 +220,7 @@ def _why(member: Member, error: DataError) -> str:
 
 
 def _check_different(reports: Sequence[Report]) -> None:
-    """Refuse a recording that stands twice, by another path or as a copy: it would count as two that agree.
-
-    Raises
-    ------
-    DataError
-        When two recordings start at the same time and have the same own fit.
-    """
+    """Refuse a recording that stands twice, by another path or as a copy: it would count as two that agree."""
     seen: dict[tuple[int, bytes], str] = {}
     for report in reports:
         first = seen.setdefault((report.start_ns, report.values.tobytes()), report.name)
@@ -246,13 +229,7 @@ def _check_different(reports: Sequence[Report]) -> None:
 
 
 def _check_one_grade(reports: Sequence[Report]) -> None:
-    """Refuse recordings of IMUs of different grades: they are of several units, whatever their serials say.
-
-    Raises
-    ------
-    DataError
-        When there are two grades.
-    """
+    """Refuse recordings of IMUs of different grades: they are of several units, whatever their serials say."""
     first: dict[str, Report] = {}
     for report in reports:
         first.setdefault(report.imu.grade, report)
@@ -359,11 +336,6 @@ def varying_effects(model: Model, scopes: Mapping[str, str], names: Sequence[str
         Scopes by name of effect, in place of those of their traits.
     names : sequence of str
         Coefficients that the estimator has.
-
-    Raises
-    ------
-    DataError
-        When a scope is none, or of an effect that the model lacks.
     """
     effects = {e.family or e.name: e for e in (resolve(e) if isinstance(e, str) else e for e in model.effects)}
     for name, scope in scopes.items():
