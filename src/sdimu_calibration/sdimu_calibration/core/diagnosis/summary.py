@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from sdimu_calibration.core.advice import Advice
-from sdimu_calibration.core.diagnosis.advice import Untestable, advice, untestable_reasons
+from sdimu_calibration.core.diagnosis.advice import Untestable, advice, handheld_advice, untestable_reasons
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.diagnosis.found import DetectableSize, Found, found_effects, reach
-from sdimu_calibration.core.diagnosis.handheld_advice import handheld_advice
 from sdimu_calibration.core.diagnosis.plan_seen import PlanSeen, plan_seen
 from sdimu_calibration.core.evidence.navigation_evidence import NavigationEvidence
 from sdimu_calibration.core.verdict import Verdict
