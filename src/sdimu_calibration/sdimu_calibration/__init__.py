@@ -18,6 +18,9 @@ import warnings
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from sdimu_calibration import shell_words
+from sdimu_calibration.core import wording
+
 # The matrices here are small (tens to hundreds of rows): a second thread costs more than it brings, and on a busy
 # machine it waits for its core a hundred times longer than the work takes. Only holds if numpy is not loaded yet.
 if "numpy" in sys.modules and "OPENBLAS_NUM_THREADS" not in os.environ:
@@ -27,6 +30,8 @@ if "numpy" in sys.modules and "OPENBLAS_NUM_THREADS" not in os.environ:
         RuntimeWarning, stacklevel=2,
     )  # fmt: skip
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+wording.speak(shell_words.option, shell_words.work)
 
 if TYPE_CHECKING:
     from sdimu_calibration.api.functions import (

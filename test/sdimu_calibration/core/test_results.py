@@ -2,7 +2,8 @@
 
 import pytest
 
-from sdimu_calibration.core.results import without_advice
+from sdimu_calibration.core.note import without_advice
+from sdimu_calibration.storage.files.result_file import as_note
 
 
 @pytest.mark.parametrize(
@@ -15,4 +16,4 @@ from sdimu_calibration.core.results import without_advice
     ],
 )
 def test_a_diagnosed_fit_is_not_told_to_be_diagnosed(note, left):
-    assert without_advice([note]) == (left,)
+    assert without_advice([as_note(note)]) == (left,)

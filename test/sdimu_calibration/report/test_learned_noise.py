@@ -22,6 +22,7 @@ from sdimu_calibration.report import first_screen, sections
 from sdimu_calibration.report.evidence_figures import rungs
 from sdimu_calibration.report.page import page
 from sdimu_calibration.report.report_extras import report_extras
+from sdimu_calibration.storage.files.result_file import as_note
 
 TERM = NoiseTerm("gyro", FLICKER, size=1e-4)
 IN_NOISE = {"nis_in_noise": 1.303, "held_out_in_noise": 1.076}
@@ -113,7 +114,8 @@ def test_a_page_says_before_its_numbers_that_headings_mean_nothing(learned):
 
 
 def test_the_shell_repeats_what_still_holds_and_no_finding_twice(learned):
-    warnings = ("the model in white noise does not fit (NIS 3); run: sdimu diagnose", "gyro_bias_x is far off")
+    misfit = as_note("the model in white noise does not fit (NIS 3); run: sdimu diagnose")
+    warnings = (misfit, "gyro_bias_x is far off")
     told = notes_of_diagnosis(replace(
         learned, after=replace(learned.after, warnings=warnings), findings=(SimpleNamespace(text=warnings[1]),),
     ))  # fmt: skip

@@ -12,7 +12,7 @@ import typer
 
 from sdimu_calibration.cli.console import JsonOption, answer, command, plain, say
 from sdimu_calibration.cli.exclusion_options import ExcludeStops, ExcludeTimes, left_out
-from sdimu_calibration.cli.next_commands import DIAGNOSE, Asked, spelled
+from sdimu_calibration.cli.next_commands import Asked, spelled
 from sdimu_calibration.cli.options import (
     EstimatorOption,
     HandOption,
@@ -53,6 +53,7 @@ from sdimu_calibration.cli.source_options import (
     TemperatureTopic,
     source,
 )
+from sdimu_calibration.core.note import topic_of
 
 
 def calibrate(
@@ -149,7 +150,7 @@ def calibrate(
         )  # fmt: skip
     console.print(rich_table(rows(result, true), f"body frame: {result.body_frame}"), soft_wrap=True)
     tell(console, (*notes, *(note for note in result.notes if note not in notes)))
-    if any(DIAGNOSE in note for note in result.notes):
+    if any(map(topic_of, result.notes)):
         say(console, "To learn what the model misses:")
         command(console, about.command("diagnose"))
     say(console, f"results in {folder}")

@@ -50,7 +50,7 @@ def notes_of_diagnosis(d: Diagnosis) -> tuple[str, ...]:
     What stands among the findings is not said twice.
     """
     from sdimu_calibration.core.estimation.second_order_fit import NO_AZIMUTH
-    from sdimu_calibration.core.results import without_advice
+    from sdimu_calibration.core.note import without_advice
 
     if d.fit.learns_scatter:
         return without_advice(d.after.notes)

@@ -21,8 +21,6 @@ if TYPE_CHECKING:
 
 PLAN = "plan.yaml"
 """File beside a diagnosis: the plan as the motion showed it."""
-DIAGNOSE = "run: sdimu diagnose"
-"""Words of a note that sends to a diagnosis."""
 _ACCELERATION = 1.0
 """Angular acceleration (rad/s^2) of a plan that was seen: the motion does not tell the limit, and no sum needs it."""
 

@@ -263,7 +263,7 @@ def _with_serial(result: Calibration, members: Sequence[Member]) -> Calibration:
 
 def _show(console: Console, result: Calibration, diagnosed: bool = False) -> None:
     """Print the table, the power-ons and what the user should know."""
-    from sdimu_calibration.core.results import without_advice
+    from sdimu_calibration.core.note import without_advice
     from sdimu_calibration.report.table import rich_table, rows
 
     console.print(rich_table(rows(result), table_heading(result)), soft_wrap=True)

@@ -1,4 +1,4 @@
-"""The canonical key of an effect: one spelling for `--add`, `simulate --effect`, `--try`, files and results.
+"""The canonical key of an effect: one spelling for options, files and results.
 
     accel_quadratic                         all coefficients of a registered effect
     accel_quadratic_x                       one coefficient

@@ -31,10 +31,11 @@ from sdimu_calibration.core.data.status_clock import aligned
 from sdimu_calibration.core.noise.quantisation import with_quantisation
 from sdimu_calibration.core.recording import DataError, Recording
 from sdimu_calibration.core.specification import ImuSpecification, Site
+from sdimu_calibration.core.wording import Option, Work
 
 ONE_ATTITUDE = (
     "the IMU is in one attitude all the time: that shows sums of coefficients, and hardly more of each than its file "
-    "says; turn it between rests (sdimu noise says what one rest tells)"
+    f"says; turn it between rests ({Work.NOISE} says what one rest tells)"
 )
 FEWEST = 100
 """Number of samples below which nothing can be recognised: a second of them."""
@@ -203,8 +204,8 @@ def _placed(recording: Recording, imu: ImuSpecification, options: OpeningOptions
             raise DataError(
                 f"{where}: the Earth turns the wrong way about the specific force for latitude "
                 f"{np.degrees(site.latitude_rad):+.1f} deg: either the site is in the other hemisphere (correct the "
-                "sign of its latitude), or the negative of the force was recorded (--accel-sign -1); --accel-sign 1 "
-                "takes both as they are"
+                f"sign of its latitude), or the negative of the force was recorded ({Option.ACCEL_SIGN} -1); "
+                f"{Option.ACCEL_SIGN} 1 takes both as they are"
             )
         notes += contradictions(seen, site)
     return replace(recording, notes=(*recording.notes, *notes))

@@ -255,7 +255,7 @@ class LiveCalibration:
         return (self._intake.phase_log() if status_known else None), np.inf
 
     def finish(self) -> Calibration:
-        """Calibrate on everything taken so far; what `sdimu calibrate` says of the same data.
+        """Calibrate on everything taken so far; what a calibration of the recording says of the same data.
 
         Raises
         ------

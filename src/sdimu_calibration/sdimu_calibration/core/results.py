@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from sdimu_calibration.core.arrays import Bools, Floats, Ints
 from sdimu_calibration.core.noise_term import NoiseTerm
+from sdimu_calibration.core.note import topic_of
 from sdimu_calibration.core.origin import Origin
 from sdimu_calibration.core.recording import DataFault
 from sdimu_calibration.core.specification import ImuSpecification
@@ -295,18 +295,9 @@ class Calibration:
     @property
     def misfits(self) -> tuple[str, ...]:
         """Where the model does not fit the data, one line each: those of the warnings that send to a diagnosis."""
-        return tuple(line for line in self.warnings if _ADVICE.search(line))
+        return tuple(line for line in self.warnings if topic_of(line))
 
     @property
     def inseparable(self) -> tuple[str, ...]:
         """Pairs of coefficients that are one in this test, one line each."""
         return tuple(line for line in self.warnings if INSEPARABLE in line)
-
-
-_ADVICE = re.compile(r"[;:,](?: or)? run:? sdimu diagnose$")
-"""How a note of a fit ends that advises a diagnosis."""
-
-
-def without_advice(notes: Iterable[str]) -> tuple[str, ...]:
-    """Return the notes of a fit that was diagnosed: without the advice to diagnose it."""
-    return tuple(_ADVICE.sub("", note) for note in notes)

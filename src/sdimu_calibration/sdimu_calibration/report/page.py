@@ -14,7 +14,8 @@ from sdimu_calibration.core.error_figures import noise_learned
 from sdimu_calibration.core.estimation.fit import Fit
 from sdimu_calibration.core.estimation.navigation_fit import NavigationFit
 from sdimu_calibration.core.joint.set_diagnosis import SetDiagnosis
-from sdimu_calibration.core.results import Calibration, without_advice
+from sdimu_calibration.core.note import without_advice
+from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.report import data, evidence_figures, experiment, first_screen, handheld_sections, sections
 from sdimu_calibration.report.advice import Spell
 from sdimu_calibration.report.coefficients import coefficients_section

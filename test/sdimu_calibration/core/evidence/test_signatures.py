@@ -12,7 +12,7 @@ from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.estimation.solve import extend, solve
 from sdimu_calibration.core.evidence.navigation_evidence import columns
 from sdimu_calibration.core.evidence.noise_kernels import stretch_effects, stretches
-from sdimu_calibration.core.evidence.signatures import signatures
+from sdimu_calibration.core.evidence.signatures import Epochs, Regressors, signatures
 from sdimu_calibration.core.navigation.correct_cycles import spread
 from sdimu_calibration.storage.files.config import load_imu
 from sdimu_sim.core.scenario import Scenario, generate
@@ -59,10 +59,8 @@ def test_corrected_samples_show_an_effect_as_it_goes_through_the_inverse_slope(s
         channel, parameter = np.array([(t.channel, t.parameter) for t in effect.terms]).T
         terms = spread(effect.regressors(known.seen), channel, parameter, known.weight)
         part = np.zeros((len(got), 3), order="F")
-        epochs = prepared.epochs
-        signatures(
-            known.seen, epochs.first, epochs.last, prepared.kind, known.output, *terms, latitude, None, part
-        )
+        epochs = Epochs(prepared.epochs.first, prepared.epochs.last, prepared.kind)
+        signatures(known.seen, epochs, known.output, Regressors(*terms), latitude, None, part)
         expected[:, 3 * place : 3 * place + 3] = part
     assert (np.abs(got - expected).max(axis=0) < 1e-10 * np.abs(expected).max(axis=0)).all()
 

@@ -22,6 +22,7 @@ from sdimu_calibration.core.estimation.navigation_fit import NavigationFit
 from sdimu_calibration.core.evidence.candidate import Candidate
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.verdict import Verdict
+from sdimu_calibration.core.wording import Option
 
 _MOST_ALIKE = 6
 """Number of look-alikes of a class that are simulated: those nearest to the one that was found."""
@@ -134,7 +135,9 @@ def fitted(fit: Fit, goals: Goals, alike: Sequence[Effect] = (), named: tuple[st
         When the fit does not navigate.
     """
     if not isinstance(fit, NavigationFit):
-        raise DataError(f"a {fit.estimator} fit says nothing of the next turn of a table: choose another --estimator")
+        raise DataError(
+            f"a {fit.estimator} fit says nothing of the next turn of a table: choose another {Option.ESTIMATOR}"
+        )
     at = so_far(fit, alike, _ROOM)
     limited, limit = goals.of(fit.names, fit.model.body_frame)
     # The doubt about the model is no noise: what is too small to be found stays so, however long a test is.

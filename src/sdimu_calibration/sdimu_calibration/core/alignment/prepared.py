@@ -32,6 +32,7 @@ from sdimu_calibration.core.navigation.strapdown import Cycles, Reducer
 from sdimu_calibration.core.navigation.track import MAGNETIC_FIELD
 from sdimu_calibration.core.recording import NOMINAL_FROM, DataError, DataFault, Recording, TemperatureLog
 from sdimu_calibration.core.specification import EPOCH_S, MOST_EPOCHS, ImuSpecification, Model, Site
+from sdimu_calibration.core.wording import Option
 
 _LISTED = 40
 """Number of stops that are listed one by one: more do not fit on a line."""
@@ -236,13 +237,13 @@ def first_attitude(epochs: Epochs, phases: Phases, setup: TestSetup) -> Alignmen
             )
         raise DataError(
             "/imu/data_raw: the IMU is never at rest (|f| near gravity and |w| near Earth rate within the IMU's "
-            "specification); check its units, and that --imu and --site fit"
+            f"specification); check its units, and that {Option.IMU} and {Option.SITE} fit"
         )
     start = int(np.argmax(phases.dwell))
     if start:
         raise DataError(
             f"/imu/data_raw: the recording starts in motion (first rest at {epochs.start[start]:.0f} s); "
-            "start it at rest, or cut it; noise beyond the IMU's specification looks the same: check --imu"
+            f"start it at rest, or cut it; noise beyond the IMU's specification looks the same: check {Option.IMU}"
         )
     moving = np.flatnonzero(~phases.dwell)
     end = int(moving[0]) if len(moving) else len(phases.dwell)

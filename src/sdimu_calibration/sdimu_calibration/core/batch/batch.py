@@ -50,6 +50,7 @@ from sdimu_calibration.core.navigation.track import motion
 from sdimu_calibration.core.progress import Progress
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.rotation import rotation_matrix
+from sdimu_calibration.core.wording import Option
 
 CONVERGED = 1e-2
 """Largest step of a coefficient (sigma) at which Gauss-Newton ends: smaller ones change no report."""
@@ -130,7 +131,7 @@ def solve_batch(prepared: PreparedData, setup: TestSetup, start: Alignment, prog
             if not np.isfinite(step).all() or taken > MOST_STEPS:
                 raise DataError(
                     "batch least squares does not converge: the recording contradicts the IMU's specification; "
-                    "check --imu and --site"
+                    f"check {Option.IMU} and {Option.SITE}"
                 )
             stretch = _stretch(step / setup.sensors.prior, last / setup.sensors.prior)
             last = np.zeros_like(step) if stretch > 1.0 else step

@@ -31,6 +31,7 @@ from sdimu_calibration.core.navigation.track import temperatures
 from sdimu_calibration.core.recording import DataError, Recording, TemperatureLog
 from sdimu_calibration.core.results import START_TEMPERATURE, Calibration
 from sdimu_calibration.core.specification import ImuSpecification
+from sdimu_calibration.core.wording import Option
 
 _ABSENT = {
     "alpha": "needs the angular acceleration",
@@ -152,7 +153,8 @@ def resolved(calibration: Calibration, own: Sequence[Effect] = ()) -> tuple[Effe
             [given[key] if key in given else selection.resolve(key) for key in calibration.model]
         )
     except DataError as error:
-        raise DataError(f"the result has an effect of no catalogue: {error}; name its file (--effect)") from error
+        told = f"the result has an effect of no catalogue: {error}; name its file ({Option.EFFECT})"
+        raise DataError(told) from error
     names = tuple(parameter.name for effect in effects for parameter in effect.parameters)
     if names != calibration.names:
         odd = sorted(set(names) ^ set(calibration.names)) or ["their order"]
@@ -258,7 +260,7 @@ def _reason(effect: Effect, key: str, has_temperature: bool, start_known: bool, 
     if "temperature" in needed and not start_known:
         return "needs the temperature at the start of the calibrated recording, which the result does not say"
     if "t" in needed and not same_start:
-        return "a function of time in the calibrated recording; --same-start where this recording is that one"
+        return f"a function of time in the calibrated recording; {Option.SAME_START} where this recording is that one"
     return ""
 
 

@@ -27,6 +27,7 @@ from sdimu_calibration.core.data.blocks import median_length
 from sdimu_calibration.core.data.windows import Windows, cut_windows, turned
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.units import STANDARD_GRAVITY, parse_unit
+from sdimu_calibration.core.wording import Option, Work
 
 DEGREE = float(np.pi / 180.0)
 _NEAR_GRAVITY = 0.3
@@ -125,8 +126,8 @@ def _accel_unit(f: Floats, stated: Stated) -> tuple[float, tuple[str, ...]]:
     if stated.accel is not None:
         if not _is_gravity(size * stated.accel):
             raise DataError(
-                f"linear_acceleration: with --accel-unit the median of |f| is {size * stated.accel:.4g} m/s^2, which "
-                "is not gravity; check --accel-unit"
+                f"linear_acceleration: with {Option.ACCEL_UNIT} the median of |f| is {size * stated.accel:.4g} m/s^2, "
+                f"which is not gravity; check {Option.ACCEL_UNIT}"
             )
         return stated.accel, ()
     if _is_gravity(size):
@@ -139,9 +140,9 @@ def _accel_unit(f: Floats, stated: Stated) -> tuple[float, tuple[str, ...]]:
             "specific force"
         )
     fitting = [unit for unit in _OTHER_UNITS if _is_gravity(size * parse_unit(unit).factor)]
-    advice = f"--accel-unit {fitting[0]} makes it gravity" if fitting else (
+    advice = f"{Option.ACCEL_UNIT} {fitting[0]} makes it gravity" if fitting else (
         f"no usual unit makes it gravity: raw counts, of which {size / STANDARD_GRAVITY:.4g} are 1 m/s^2 "
-        "(counts_per_unit in a map of sdimu import), or no rest"
+        f"(counts_per_unit in a map of {Work.IMPORT}), or no rest"
     )  # fmt: skip
     raise DataError(
         f"linear_acceleration: the median of |f| is {size:.4g}, neither near 9.8 (m/s^2) nor near 1 (g); {advice}"
@@ -187,7 +188,7 @@ def _beyond_measure(t: Floats, w: Floats) -> str:
     at = t[rows[side, axis]]
     return (
         f"angular_velocity.{'xyz'[axis]} is {largest:.4g} at {at:.1f} s, which is no rate in any unit: "
-        "check the driver, or cut the recording before or after it (sdimu bag cut)"
+        f"check the driver, or cut the recording before or after it ({Work.CUT})"
     )
 
 
@@ -265,7 +266,7 @@ class Turns:
         least = min(map(self.misfit, self.C))
         if best < _FITS and least > _FAILS * best:
             return _wrong_axes(axes * np.sign(reading))
-        options = "" if stated.gyro is not None else "; state the unit, such as --gyro-unit deg/s"
+        options = "" if stated.gyro is not None else f"; state the unit, such as {Option.GYRO_UNIT} deg/s"
         return (
             f"angular_velocity: the turns do not agree with the change of gravity's direction ({least:.0%} of it is "
             f"left){options}; check that rate and force are of one rigid IMU and no axis is wrong"

@@ -7,6 +7,7 @@ import numpy as np
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.data.axes_and_units import Reading, Stated, recognise
 from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.wording import Option
 
 _FIRST_S = 1.0
 """Time after the origin of the first attempt (s), and least time between two: the beat of the filter."""
@@ -90,7 +91,7 @@ class EarlyReading:
             self.gave_up, self._held = True, []
             self.notes.append(
                 f"no turn in {at_s:.0f} s: the filter on the way gives up; the end of the test is calibrated all the "
-                "same (--gyro-unit and --gyro-sign start it at once)"
+                f"same ({Option.GYRO_UNIT} and {Option.GYRO_SIGN} start it at once)"
             )
 
     def _attempt(self, at_s: float, final: bool) -> bool:
@@ -99,7 +100,7 @@ class EarlyReading:
         rows = slice(0, int(np.searchsorted(t, at_s + _TICK_S)))
         why = (
             "no turn has changed the direction of gravity yet, so unit and sign of the gyros are unknown; state both "
-            "(--gyro-unit, --gyro-sign) to start at once"
+            f"({Option.GYRO_UNIT}, {Option.GYRO_SIGN}) to start at once"
         )
         try:
             reading = recognise(t[rows], omega[rows], force[rows], self._stated) if rows.stop > 1 else None

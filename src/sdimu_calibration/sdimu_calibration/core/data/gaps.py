@@ -29,6 +29,7 @@ from sdimu_calibration.core.data.phases import Phases
 from sdimu_calibration.core.navigation.strapdown import Cycles
 from sdimu_calibration.core.plain_text import counted
 from sdimu_calibration.core.recording import DataError, DataFault
+from sdimu_calibration.core.wording import Work
 
 GAP_SHARE = 0.1
 """Uncertainty of a bridged angle, as a share of it: a turn need not run on evenly."""
@@ -195,7 +196,7 @@ def judge(
         raise DataError(
             f"/imu/data_raw: {what} {where} at {epochs.start[worst]:.1f} s (stop "
             f"{phases.stop[worst]}): the attitude after them is known only to {np.degrees(drift[worst]) * 60.0:.3g} "
-            f"arcmin; repeat the test, or cut the recording before or after (sdimu bag cut){because}"
+            f"arcmin; repeat the test, or cut the recording before or after ({Work.CUT}){because}"
         )
     epoch = np.minimum(np.searchsorted(epochs.last, at, side="right"), len(epochs) - 1)
     resting = _rests(phases.dwell, epoch)
@@ -232,7 +233,7 @@ def _long_gap(
                 worst = f"{triad} {'xyz'[int(np.argmax(z))]}"
                 raise DataError(
                     f"/imu/data_raw: {text}, and {worst} differs by {z.max():.0f} sigma after "
-                    "them: the IMU was moved or switched off; cut the recording there (sdimu bag cut), or repeat it"
+                    f"them: the IMU was moved or switched off; cut the recording there ({Work.CUT}), or repeat it"
                 )
     return DataFault(
         "long gap",

@@ -21,6 +21,7 @@ from sdimu_calibration.core.effects.bias import ACCEL_BIAS, GYRO_BIAS
 from sdimu_calibration.core.recording import DataError, Recording
 from sdimu_calibration.core.specification import ImuSpecification
 from sdimu_calibration.core.units import STANDARD_GRAVITY, from_si
+from sdimu_calibration.core.wording import Option
 
 _TAU_S = (2.0, 8.0)
 """Averaging times (s) beside the half second of static detection: long enough for pulses of a ring laser gyro."""
@@ -136,7 +137,7 @@ def propose(recording: Recording, classes: Sequence[ImuSpecification]) -> tuple[
     """
     shown = shown_at_rest(recording)
     if shown is None:
-        return classes[0], f"no --imu: {classes[0].name} is assumed; no rest shows what IMU it is"
+        return classes[0], f"no {Option.IMU}: {classes[0].name} is assumed; no rest shows what IMU it is"
     # Half way between two grades, in the ratio of their noise.
     borders = [np.sqrt(a.gyro_white_noise * b.gyro_white_noise) for a, b in pairwise(classes)]
     grade = int(np.searchsorted(borders, shown.gyro_noise))
@@ -144,7 +145,10 @@ def propose(recording: Recording, classes: Sequence[ImuSpecification]) -> tuple[
         grade += 1
     imu = classes[grade]
     with_what = "" if grade == 0 else " with this noise and priors for such biases"
-    note = f"no --imu: {imu.name} is assumed{with_what}, as the rests show {shown}; state your own file if there is one"
+    note = (
+        f"no {Option.IMU}: {imu.name} is assumed{with_what}, as the rests show {shown}; state your own file if there "
+        "is one"
+    )
     if grade == 0:
         return imu, note
     return shown.of_class(imu), note

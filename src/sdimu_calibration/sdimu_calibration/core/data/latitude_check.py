@@ -23,6 +23,7 @@ from sdimu_calibration.core.probability import normal_tail, student_limit
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.specification import ImuSpecification, Site
 from sdimu_calibration.core.units import STANDARD_GRAVITY
+from sdimu_calibration.core.wording import Option
 
 _FEWEST_STOPS = 6
 """Least number of stops: four unknowns, and two more for the misfit."""
@@ -110,12 +111,13 @@ def contradictions(seen: EarthRate, site: Site) -> tuple[str, ...]:
     """Say in what a stated place is not where the data were taken, one line each."""
     lines = []
     if seen.excludes(site):
-        lines.append(f"{latitude_in_data(seen)}, the site is at {_latitude(site)}: check --site{or_sign(seen, site)}")
+        what = f"check {Option.SITE}{or_sign(seen, site)}"
+        lines.append(f"{latitude_in_data(seen)}, the site is at {_latitude(site)}: {what}")
     gravity = site.gravity_m_s2 or float(earth.normal_gravity(site.latitude_rad, site.height_m))
     if abs(seen.gravity - gravity) > _SIGMAS * seen.gravity_sigma:
         lines.append(
             f"|f| at rest is {seen.gravity:.4f} m/s^2, gravity at the site {gravity:.4f}: they differ by more than the "
-            "IMU's specification allows; check --site (latitude, height) and --imu"
+            f"IMU's specification allows; check {Option.SITE} (latitude, height) and {Option.IMU}"
         )
     return tuple(lines)
 
@@ -148,11 +150,11 @@ def assumption(name: str, site: Site, seen: EarthRate | None, where: str) -> str
     if seen is not None and seen.excludes(site):
         raise DataError(
             f"{where}: {latitude_in_data(seen)}; no site was stated, and the assumed one ({name}) is at "
-            f"{_latitude(site)}: state yours{or_sign(seen, site)}. --site takes a name in config/site or a YAML file "
-            "with the lines 'format: sdimu-site/1', 'latitude_deg: ...' and 'height_m: ...' (Python: open(..., "
+            f"{_latitude(site)}: state yours{or_sign(seen, site)}. {Option.SITE} takes a name in config/site or a YAML "
+            "file with the lines 'format: sdimu-site/1', 'latitude_deg: ...' and 'height_m: ...' (Python: open(..., "
             "site=...); node: parameter site)"
         )
-    text = f"no --site: {name} is assumed (latitude {_latitude(site)}, height {site.height_m:.0f} m)"
+    text = f"no {Option.SITE}: {name} is assumed (latitude {_latitude(site)}, height {site.height_m:.0f} m)"
     if seen is None or not seen.seen:
         return f"{text}; the data do not show the Earth's rate well enough to say the latitude"
     return f"{text}; {latitude_in_data(seen)}"
@@ -166,7 +168,7 @@ def latitude_in_data(seen: EarthRate) -> str:
 
 def or_sign(seen: EarthRate, site: Site) -> str:
     """Advise to turn the sign of the force where that would fit; else nothing."""
-    return ", or the sign of the force (--accel-sign -1 would fit)" if reversed_force(seen, site) else ""
+    return f", or the sign of the force ({Option.ACCEL_SIGN} -1 would fit)" if reversed_force(seen, site) else ""
 
 
 def _latitude(site: Site) -> str:

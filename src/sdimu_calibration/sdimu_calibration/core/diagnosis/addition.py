@@ -140,9 +140,13 @@ def _raised(names: Sequence[str], before: Floats, after: Floats) -> tuple[str, f
 
 
 def _against(
-    labels: Sequence[str], value: Floats, sigma: Floats, prior: Floats, raised: tuple[str, float],
+    labels: Sequence[str],
+    value: Floats,
+    sigma: Floats,
+    prior: Floats,
+    raised: tuple[str, float],
     held_out: tuple[float, float],
-) -> list[str]:  # fmt: skip
+) -> list[str]:
     name, ratio = raised
     what = labels[0] if len(labels) == 1 else f"{labels[0]} and {len(labels) - 1} more"
     out = []
@@ -153,8 +157,9 @@ def _against(
         out.append(f"{what} is {z.max():.1f} of its sigmas: nothing says that it is there")
     out += [
         f"{label} is {size:.0f} times what physics gives it: something else stands behind it"
-        for label, size in zip(labels, np.abs(value) / prior, strict=True) if size > _CONTRADICTED
-    ]  # fmt: skip
+        for label, size in zip(labels, np.abs(value) / prior, strict=True)
+        if size > _CONTRADICTED
+    ]
     if held_out[1] > (1.0 - _FALLS) * held_out[0]:
         out.append(f"{what} does not lower the error at stops that the fit has not seen")
     return out
@@ -167,7 +172,13 @@ def _why(evidence: LinearEvidence, column: int) -> str:
         return "the motion of this run does not excite it"
     parameter = candidate.parameter
     size = DetectableSize(
-        candidate.label, candidate.family, parameter.unit, parameter.display_unit, float("inf"), 0.0, testable=False,
+        candidate.label,
+        candidate.family,
+        parameter.unit,
+        parameter.display_unit,
+        float("inf"),
+        0.0,
+        testable=False,
         partners=("model",),
-    )  # fmt: skip
+    )
     return reason(size, plan_seen(evidence))

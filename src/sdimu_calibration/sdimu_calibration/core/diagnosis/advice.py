@@ -113,10 +113,7 @@ def _about_found(d: Diagnosis, found: tuple[Found, ...], plan: PlanSeen) -> list
 def _about_unknown(d: Diagnosis, found: tuple[Found, ...]) -> list[Advice]:
     worst = d.consistency.where[0] if d.consistency.where else None
     place = (worst.stop, worst.channel) if worst else (None, "")
-    out = [
-        Advice(Kind.UNKNOWN_CAUSE, (*place, bool(d.found.noise))),
-        Advice(Kind.RUN_BACKWARDS, (), Verb.REVERSE_PLAN),
-    ]
+    out = [Advice(Kind.UNKNOWN_CAUSE, (*place, bool(d.found.noise))), Advice(Kind.RUN_BACKWARDS, (), Verb.REVERSE_PLAN)]
     return out + ([Advice(Kind.TRY_EQUATION, tuple(f.candidate.label for f in found))] if found else [])
 
 
@@ -200,3 +197,26 @@ def _senses(plan: PlanSeen) -> str:
 def _rates(plan: PlanSeen) -> str:
     axes = plan.one_rate()
     return "all turns have one rate" if len(axes) == 3 else f"all turns about {', '.join(axes)} have one rate"
+
+
+def handheld_advice(d: Diagnosis, found: tuple[Found, ...]) -> tuple[Advice, ...]:
+    """Advise, the most useful first."""
+    out = [*mend(d), *keep(found), *together([(one, _more_by_hand(one)) for one in found if one.alike])]
+    out += [
+        Advice(Kind.CHOICE_MATTERS_BY_HAND, (one.candidate.label, s.other, s.coefficient, s.sigmas))
+        for one in found
+        if one.alike
+        for s in one.coefficient_shifts[:3]
+    ]
+    if d.verdict == Verdict.UNEXPLAINED:
+        out.append(Advice(Kind.RECORD_IN_OTHER_ORDER))
+    return tuple(dict.fromkeys(out))
+
+
+def _more_by_hand(one: Found) -> Advice:
+    """Say what to do by hand that would tell a class apart."""
+    if Excitation.REPEATED_ATTITUDES in one.candidate.effect.excitation:
+        return Advice(Kind.COME_BACK)
+    if one.candidate.effect.terms[0].channel < 3:
+        return Advice(Kind.TURN_BOTH_WAYS)
+    return Advice(Kind.REST_BETWEEN)

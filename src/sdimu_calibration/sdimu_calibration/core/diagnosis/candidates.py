@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections.abc import Callable
 from dataclasses import replace
@@ -84,16 +85,11 @@ def equations(has_temperature: bool) -> list[Effect]:
         return [(n, *rest) for n in range(total + 1) for rest in powers(total - n, kinds - 1)]
 
     out: list[Effect] = []
-    for force in range(4):
-        for rate in range(3):
-            if force + rate == 0 or force + rate > 3:
-                continue
-            for pa in powers(force, 3):
-                for pw in powers(rate, 3):
-                    out += _monomial(pa, pw, "")
-                    if force + rate == 1:
-                        out += _monomial(pa, pw, "t")
-                        out += _monomial(pa, pw, "T") if has_temperature else []
+    for force, rate in [(f, r) for f in range(4) for r in range(3) if 0 < f + r <= 3]:
+        grows = ("t", *(("T",) if has_temperature else ())) if force + rate == 1 else ()
+        for pa, pw in itertools.product(powers(force, 3), powers(rate, 3)):
+            for slow in ("", *grows):
+                out += _monomial(pa, pw, slow)
     for i in range(3):
         out += _plain(f"e{AXES[i]}^2", product(_east, i, _east, i))
         for j in range(3):
@@ -204,12 +200,14 @@ def _own(text: str, unit: str, shown: str, value: Callable[[Motion], Floats], us
     def triad(word: str, base: tuple[str, str], like: Effect) -> Effect:
         first = CHANNELS.index(f"{word}_x")
         return Effect(
-            name=f"{word}: {text}", title=OWN, equation=f"d{word}_i = k_i {text}",
+            name=f"{word}: {text}",
+            title=OWN,
+            equation=f"d{word}_i = k_i {text}",
             parameters=tuple(Parameter(f"{word}_{a}: {text}", base[0] + unit, base[1] + shown) for a in AXES),
             terms=tuple(Term(first + i, i) for i in range(3)),
             regressors=lambda m: np.repeat(value(m)[:, None], 3, axis=1),
             prior={grade: sigma / usual for grade, sigma in like.prior.items()},
-        )  # fmt: skip
+        )
 
     # A term whose variable is of its usual order is not larger than the bias is.
     return [triad("gyro", ("rad/s", "deg/h"), GYRO_BIAS), triad("accel", ("m/s^2", "ug"), ACCEL_BIAS)]

@@ -40,6 +40,7 @@ from sdimu_calibration.core.recording import DataError, Recording
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.specification import EPOCH_S, ImuSpecification, Model, Site
 from sdimu_calibration.core.verdict import Verdict
+from sdimu_calibration.core.wording import Option
 
 STILL_WRONG = 1.25
 """Held-out error (sigma) from which a model is not called explained: 1 is right, and an effect that only imitates the
@@ -57,7 +58,7 @@ _MISFIT_SIGMAS = 5.0
 `_MISFIT`."""
 NOT_DIAGNOSABLE = (
     "the classical estimator gives coefficients in the axes of the table: a navigation about them shows the mount, and "
-    "no missing effect; diagnose with another --estimator (in Python estimator=...)"
+    f"no missing effect; diagnose with another {Option.ESTIMATOR} (in Python estimator=...)"
 )
 """Why a classical fit is not diagnosed."""
 
@@ -153,23 +154,26 @@ class Diagnosis:
 
 
 def diagnose(
-    recording: Recording, site: Site | None, imu: ImuSpecification, model: Model,
-    extra: Sequence[Effect] = (), progress: Progress = silent, estimator: str = AUTO,
-) -> Diagnosis:  # fmt: skip
-    """Solve, then `climb`; parameters as for `PreparedTest`, `solve` and `climb`.
-
-    Raises
-    ------
-    DataError
-        When the recording or the options cannot be used.
-    """
+    recording: Recording,
+    site: Site | None,
+    imu: ImuSpecification,
+    model: Model,
+    extra: Sequence[Effect] = (),
+    progress: Progress = silent,
+    estimator: str = AUTO,
+) -> Diagnosis:
+    """Solve, then `climb`; parameters as for `PreparedTest`, `solve` and `climb`."""
     return climb(solve(PreparedTest(recording, imu, site), model, estimator, progress=progress), extra, progress)
 
 
 def climb(
-    fit: Fit, extra: Sequence[Effect] = (), progress: Progress = silent, alpha: float = FALSE_ALARM,
-    refits: bool = False, without: Collection[str] = (),
-) -> Diagnosis:  # fmt: skip
+    fit: Fit,
+    extra: Sequence[Effect] = (),
+    progress: Progress = silent,
+    alpha: float = FALSE_ALARM,
+    refits: bool = False,
+    without: Collection[str] = (),
+) -> Diagnosis:
     """Find what the model of a fit is missing.
 
     Parameters
@@ -186,11 +190,6 @@ def climb(
         Also fit the model with the first, the first two, ... of what was found.
     without : collection of str
         Registry names of effects that are not tried, as if the catalogue lacked them.
-
-    Raises
-    ------
-    DataError
-        When the fit cannot be diagnosed, or an extended model cannot be fitted.
     """
     if not fit.diagnosable:
         raise DataError(NOT_DIAGNOSABLE)
@@ -233,10 +232,26 @@ def climb(
     word = verdict(facts)
     progress("done", 1.0)
     unspoken = Diagnosis(
-        word, "", word == Verdict.CONSISTENT, p_value(done, consistency, bool(noise) or loud), findings, noise,
-        consistency, as_given, widened, before, after, done.found, done.evidence, done.left_before, done.left_after,
-        done.free, own, unexplained, rungs,
-    )  # fmt: skip
+        word,
+        "",
+        word == Verdict.CONSISTENT,
+        p_value(done, consistency, bool(noise) or loud),
+        findings,
+        noise,
+        consistency,
+        as_given,
+        widened,
+        before,
+        after,
+        done.found,
+        done.evidence,
+        done.left_before,
+        done.left_after,
+        done.free,
+        own,
+        unexplained,
+        rungs,
+    )
     return replace(unspoken, sentence=sentence(unspoken))
 
 
@@ -260,9 +275,13 @@ def in_measured_noise(fit: Fit, progress: Progress = silent) -> tuple[Fit, Consi
     noise, imu = measured_noise(consistency, fit)
     if noise:
         again = solve(
-            fit.test.with_imu(imu), fit.model, fit.estimator, progress=progress, learn=False,
+            fit.test.with_imu(imu),
+            fit.model,
+            fit.estimator,
+            progress=progress,
+            learn=False,
             azimuth_free=fit.azimuth_free,
-        )  # fmt: skip
+        )
         fit = replace(again, reason=fit.reason)
     return in_white_noise(fit), consistency, noise
 

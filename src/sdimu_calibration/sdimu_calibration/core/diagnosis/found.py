@@ -179,10 +179,16 @@ def reach(d: Diagnosis) -> tuple[DetectableSize, ...]:
         partners = () if testable else _partners(evidence.names, full.J, evidence.weight, k)
         out.append(
             DetectableSize(
-                candidate.label, candidate.family, candidate.parameter.unit, candidate.parameter.display_unit,
-                float(smallest[k]), float(scanned.retention[k]), testable, partners,
+                candidate.label,
+                candidate.family,
+                candidate.parameter.unit,
+                candidate.parameter.display_unit,
+                float(smallest[k]),
+                float(scanned.retention[k]),
+                testable,
+                partners,
             )
-        )  # fmt: skip
+        )
     return tuple(out)
 
 

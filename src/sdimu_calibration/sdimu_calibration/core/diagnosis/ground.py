@@ -18,6 +18,7 @@ from sdimu_calibration.core.evidence.learned_noise import Wander
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.progress import Progress
 from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.wording import Option
 
 _PARALLEL = 1e-6
 """Share of its length by which a signature must differ from another to be its own: rounding is far below."""
@@ -127,7 +128,7 @@ def extended(request: Request, chosen: Sequence[Candidate], progress: Progress) 
         names = " and ".join(c.label for c in chosen)
         raise DataError(
             f"the search chose {names}, and the {base.estimator} estimator cannot fit it ({error}); diagnose with "
-            "another --estimator"
+            f"another {Option.ESTIMATOR}"
         ) from error
 
 
@@ -147,10 +148,7 @@ def candidates(request: Request, tried: Sequence[Candidate], own: bool) -> list[
     known = [*request.extra, *catalogue(times, set(base.labels), has_temperature), *more]
     known = [e for e in known if (e.family or e.name) not in request.without]
     if base.learns_scatter:
-        known = [
-            e for e in known
-            if not e.needs_table and not e.random_walk and e.decay_s is None
-        ]  # fmt: skip
+        known = [e for e in known if not e.needs_table and not e.random_walk and e.decay_s is None]
     return _untried(known, {c.label for c in tried} | base.labels)
 
 

@@ -107,11 +107,18 @@ def _rung(
     likelihood = log_likelihood(result)
     standard, velocity = jump(fit)
     rung = Rung(
-        added, True, "", likelihood, likelihood - below.log_likelihood if below else 0.0,
-        nis(result), error, standard, velocity,
+        added,
+        True,
+        "",
+        likelihood,
+        likelihood - below.log_likelihood if below else 0.0,
+        nis(result),
+        error,
+        standard,
+        velocity,
         moved_coefficients(earlier, result) if earlier else (),
         tuple(fit.scatter.tolist()) if isinstance(fit, HandheldFit) else None,
-    )  # fmt: skip
+    )
     reason = refused(rung, below)
     return replace(rung, accepted=not reason, reason=reason)
 
@@ -135,9 +142,7 @@ def jump(fit: Fit) -> tuple[float, float]:
     return float(np.sqrt(np.mean((nu / sigma) ** 2))), float(np.sqrt(np.mean(nu**2)))
 
 
-def moved_coefficients(
-    earlier: Calibration, later: Calibration, least: float = MOVED
-) -> tuple[tuple[str, float], ...]:
+def moved_coefficients(earlier: Calibration, later: Calibration, least: float = MOVED) -> tuple[tuple[str, float], ...]:
     """Coefficients of both results that differ by more than `least` of the earlier sigma, largest first."""
     index = {name: k for k, name in enumerate(later.names)}
     out = []

@@ -143,11 +143,6 @@ def so_far(
     diagnosis : LiveDiagnosis
     fit : Fit
         Which it is of: in white noise, of the size that the data show.
-
-    Raises
-    ------
-    DataError
-        When there is too little to fit, or the estimator cannot be diagnosed.
     """
     fit, noise = _fit(test, model)
     done = survey(fit, outcome(fit, held_out=False))
@@ -167,13 +162,7 @@ def so_far(
 
 
 def error_of(test: PreparedTest, model: Model, added: Sequence[str] = ()) -> ModelError:
-    """Say how large the error of a model is on a test; parameters as for `so_far`.
-
-    Raises
-    ------
-    DataError
-        When the model cannot be fitted.
-    """
+    """Say how large the error of a model is on a test; parameters as for `so_far`."""
     fit, _ = _fit(test, model)
     return _error(fit, fit.evidence(), added)
 
@@ -200,9 +189,12 @@ def _ranked(done: Diagnosis) -> tuple[Ranked, ...]:
     columns = [k for k in range(p, len(first.z)) if np.isfinite(sigma[k])]
     rows = [
         Ranked(
-            evidence.names[k], float(first.z[k]), float(first.estimate[k]), float(sigma[k]),
+            evidence.names[k],
+            float(first.z[k]),
+            float(first.estimate[k]),
+            float(sigma[k]),
             evidence.candidates[k - p].parameter.display_unit,
         )
         for k in columns
-    ]  # fmt: skip
+    ]
     return tuple(sorted(rows, key=lambda r: -abs(r.z)))

@@ -152,9 +152,14 @@ def _spread(
 
 
 def _exchanged(
-    fit: Fit, evidence: LinearEvidence, allowed: Ints, rivals: _Alternatives, weight: Floats, place: int,
+    fit: Fit,
+    evidence: LinearEvidence,
+    allowed: Ints,
+    rivals: _Alternatives,
+    weight: Floats,
+    place: int,
     told: Sequence[int],
-) -> Floats:  # fmt: skip
+) -> Floats:
     """Spread by other effects in the place of one, or none; shape (len(told), len(told)).
 
     The one is at `place` among the allowed; `weight` (a + 1,) is that of every allowed one, then of none. The variance
@@ -172,9 +177,7 @@ def _exchanged(
     return np.asarray((S * (w * rivals.variance[at[:-1]])) @ S.T + (apart * w) @ apart.T + without)
 
 
-def _add_means(
-    S: Floats, fit: Fit, evidence: LinearEvidence, columns: Ints, drifts_alone: bool = False
-) -> None:  # fmt: skip
+def _add_means(S: Floats, fit: Fit, evidence: LinearEvidence, columns: Ints, drifts_alone: bool = False) -> None:
     """Turn the slope of the biases (k, a) into that of their means over the dwells, where a column shifts a bias."""
     p = len(evidence.weight)
     for place, column in enumerate(columns.tolist()):

@@ -73,9 +73,7 @@ class _State:
 class _Ground(Generic[E]):
     """Evidence in white noise with its wander: what both ways search."""
 
-    def __init__(
-        self, evidence: E, allowed: Ints, wander: Wander, limit: float, earlier: Joint | None
-    ) -> None:  # fmt: skip
+    def __init__(self, evidence: E, allowed: Ints, wander: Wander, limit: float, earlier: Joint | None) -> None:
         self.evidence, self.allowed = evidence, allowed
         self.white = Problem(evidence)
         self.joint = Joint.of(evidence, wander, earlier)
@@ -149,9 +147,14 @@ class _Ground(Generic[E]):
 
 
 def search_with_noise(
-    evidence: E, allowed: Ints, wander: Wander, alpha: float = FALSE_ALARM, limit: float | None = None,
-    doubted: bool = True, earlier: Joint | None = None,
-) -> Search[E]:  # fmt: skip
+    evidence: E,
+    allowed: Ints,
+    wander: Wander,
+    alpha: float = FALSE_ALARM,
+    limit: float | None = None,
+    doubted: bool = True,
+    earlier: Joint | None = None,
+) -> Search[E]:
     """Grow the model from the allowed candidates, and the noise with it.
 
     Parameters
@@ -343,11 +346,20 @@ def _told(ground: _Ground[E], state: _State, white: Search[E]) -> Search[E]:
     gone = {s.label for s in steps}
     told = [
         replace(s, taken_out="noise with a memory explains the same") if s.accepted else s
-        for s in white.steps if s.label not in gone and s.accepted
-    ]  # fmt: skip
+        for s in white.steps
+        if s.label not in gone and s.accepted
+    ]
     columns = np.array(state.chosen, dtype=np.int64)
     terms = with_alike(ground.given(state.chosen).noise, ground.wander.cut, state.balance.terms)
     return Search(
-        (*told, *steps), columns, nothing, ground.limit, 1.0, evidence, terms, ground.net(state),
-        ground.evidence, ground.joint,
-    )  # fmt: skip
+        (*told, *steps),
+        columns,
+        nothing,
+        ground.limit,
+        1.0,
+        evidence,
+        terms,
+        ground.net(state),
+        ground.evidence,
+        ground.joint,
+    )

@@ -25,7 +25,6 @@ _ALPHA = 0.02
 are counted as if they were independent: 600 draws of noise for 15,568 pairs exceeded the cost in less than 1 %."""
 
 
-
 @dataclass(frozen=True)
 class PairTrial:
     """A pair beside what was chosen, or in the place of one effect of it.
@@ -47,7 +46,7 @@ class PairTrial:
 
 def best_pair(
     problem: Problem[E], chosen: Sequence[int], allowed: Ints, limit: float, scale: float = 1.0
-) -> PairTrial | None:  # fmt: skip
+) -> PairTrial | None:
     """Find the pair of effects that is worth most, beside what was chosen or in the place of one effect of it.
 
     Parameters
@@ -90,7 +89,7 @@ def _physical(problem: Problem[E], allowed: Ints) -> Ints:
 
 def _trial(
     problem: Problem[E], others: Sequence[int], out: int | None, pool: Ints, limit: float, scale: float
-) -> PairTrial | None:  # fmt: skip
+) -> PairTrial | None:
     """Find the likeliest pair beside others, in the place of the column `out`; None where there is none."""
     scanned = problem.scan(others, scale)
     columns = pool[np.isfinite(scanned.sigma[pool])]

@@ -91,10 +91,13 @@ def plan_seen(evidence: NavigationEvidence) -> PlanSeen:
         single = path > 0.0 and abs(angle[axis]) > _SINGLE_AXIS * path
         turns.append(
             TurnSeen(
-                stop, axis if single else None, float(angle[axis]),
-                float(np.median(rate[fast])) if fast.any() else 0.0, (end - start) / 60.0,
+                stop,
+                axis if single else None,
+                float(angle[axis]),
+                float(np.median(rate[fast])) if fast.any() else 0.0,
+                (end - start) / 60.0,
             )
-        )  # fmt: skip
+        )
     oblique = 0
     for _, start, end in times.stops:
         rows = (seen.t > start) & (seen.t <= end)

@@ -232,9 +232,14 @@ def run_round(
             return _round(ground, search(evidence, allowed, request.alpha, MOST_STEPS))
         return _round(ground, _without_wander(evidence, allowed, request.alpha, len(ground.tried) + 1))
     found = search_with_noise(
-        evidence, allowed, request.wander, request.alpha, limits.get(own), doubted,
+        evidence,
+        allowed,
+        request.wander,
+        request.alpha,
+        limits.get(own),
+        doubted,
         earlier.found.joint if earlier else None,
-    )  # fmt: skip
+    )
     limits.setdefault(own, found.threshold)
     return _round(ground, found)
 
@@ -253,9 +258,13 @@ def _round(ground: Ground, found: Search[LinearEvidence]) -> Round:
     fit, free = ground.fit, ground.free
     evidence, nothing = found.evidence, np.empty(0, dtype=np.int64)
     return Round(
-        fit, evidence, free, found,
-        left(evidence, nothing, free, found.scale), left(evidence, found.chosen, free, found.scale),
-    )  # fmt: skip
+        fit,
+        evidence,
+        free,
+        found,
+        left(evidence, nothing, free, found.scale),
+        left(evidence, found.chosen, free, found.scale),
+    )
 
 
 def left(evidence: LinearEvidence, chosen: Ints, free: Ints, scale: float) -> FreeInputTest:
@@ -274,5 +283,3 @@ def left(evidence: LinearEvidence, chosen: Ints, free: Ints, scale: float) -> Fr
     known = np.concatenate([evidence.model, chosen]).astype(np.int64)
     weight = np.concatenate([evidence.weight, np.zeros(len(chosen))])
     return free_input_test(evidence.information, known, weight, free, scale)
-
-

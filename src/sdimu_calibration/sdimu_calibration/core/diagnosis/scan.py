@@ -104,9 +104,7 @@ def scale_of(done: Scan) -> float:
     return float(done.sigma[one] * np.sqrt(done.J[one]))
 
 
-def threshold(
-    full: Information, known: Ints, weight: Floats, tested: Ints, alpha: float, seed: int = 1
-) -> float:  # fmt: skip
+def threshold(full: Information, known: Ints, weight: Floats, tested: Ints, alpha: float, seed: int = 1) -> float:
     """Size of the largest ``|z|`` that pure noise exceeds with probability `alpha`.
 
     The scores of pure noise are jointly normal with the correlation of the signatures, so the whole scan is simulated

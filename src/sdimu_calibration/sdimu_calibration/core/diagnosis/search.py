@@ -304,9 +304,15 @@ def _polish(problem: Problem[E], chosen: list[int]) -> list[int]:
 
 
 def judged(
-    problem: Problem[E], scanned: Scan, scores: Floats, chosen: Sequence[int], best: int, limit: float,
-    before: HeldOut, after: HeldOut,
-) -> Step:  # fmt: skip
+    problem: Problem[E],
+    scanned: Scan,
+    scores: Floats,
+    chosen: Sequence[int],
+    best: int,
+    limit: float,
+    before: HeldOut,
+    after: HeldOut,
+) -> Step:
     """Judge the addition of a column to a choice.
 
     Parameters
@@ -338,14 +344,25 @@ def judged(
     elif not won > (2.0 * error if candidate.family == "own" else 0.0):
         reason = "does not lower the error at stops that the fit has not seen"
     return Step(
-        label=candidate.label, family=candidate.family,
-        unit=candidate.parameter.unit, display_unit=candidate.parameter.display_unit,
-        z=float(scanned.z[best]), threshold=limit,
-        estimate=float(scanned.estimate[best]), sigma=float(scanned.sigma[best]),
-        log_likelihood_gain=0.5 * d * d / J, log_bayes_factor=bayes, held_out_before=before, held_out_after=after,
-        held_out_gain=won, held_out_error=error, alike=tuple(evidence.names[i] for i in alike(scores, best)),
-        accepted=not reason, reason=reason, moved=_moved(problem, chosen, best, float(scanned.estimate[best])),
-    )  # fmt: skip
+        label=candidate.label,
+        family=candidate.family,
+        unit=candidate.parameter.unit,
+        display_unit=candidate.parameter.display_unit,
+        z=float(scanned.z[best]),
+        threshold=limit,
+        estimate=float(scanned.estimate[best]),
+        sigma=float(scanned.sigma[best]),
+        log_likelihood_gain=0.5 * d * d / J,
+        log_bayes_factor=bayes,
+        held_out_before=before,
+        held_out_after=after,
+        held_out_gain=won,
+        held_out_error=error,
+        alike=tuple(evidence.names[i] for i in alike(scores, best)),
+        accepted=not reason,
+        reason=reason,
+        moved=_moved(problem, chosen, best, float(scanned.estimate[best])),
+    )
 
 
 def _moved(problem: Problem[E], chosen: Sequence[int], best: int, size: float) -> tuple[tuple[str, float], ...]:

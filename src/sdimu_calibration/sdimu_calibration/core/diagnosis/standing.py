@@ -52,8 +52,10 @@ def _of_power_on(effect: str | Effect) -> tuple[str, ...]:
 
 def _anew(known: Known, names: set[str]) -> Known:
     """Let coefficients differ by their priors in the next recording: how far they do, one recording cannot say."""
-    scatter: Floats = np.array([
-        prior if name in names and np.isfinite(prior) else 0.0
-        for name, prior in zip(known.names, known.prior.tolist(), strict=True)
-    ])
+    scatter: Floats = np.array(
+        [
+            prior if name in names and np.isfinite(prior) else 0.0
+            for name, prior in zip(known.names, known.prior.tolist(), strict=True)
+        ]
+    )
     return Known(known.names, known.J, known.prior, scatter)

@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from sdimu_calibration.core.advice import Advice
-from sdimu_calibration.core.diagnosis.advice import Untestable, advice, untestable_reasons
+from sdimu_calibration.core.diagnosis.advice import Untestable, advice, handheld_advice, untestable_reasons
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.diagnosis.found import DetectableSize, Found, found_effects, reach
-from sdimu_calibration.core.diagnosis.handheld_advice import handheld_advice
 from sdimu_calibration.core.diagnosis.plan_seen import PlanSeen, plan_seen
 from sdimu_calibration.core.evidence.navigation_evidence import NavigationEvidence
 from sdimu_calibration.core.verdict import Verdict
@@ -55,6 +54,4 @@ def summarise(d: Diagnosis) -> DiagnosisSummary:
         reasons = (Untestable("the motion of this run does not excite it", hidden),) if hidden else ()
         return DiagnosisSummary(d, found, reached, None, reasons, handheld_advice(d, found))
     plan = plan_seen(d.evidence)
-    return DiagnosisSummary(
-        d, found, reached, plan, untestable_reasons(reached, plan), advice(d, found, reached, plan)
-    )
+    return DiagnosisSummary(d, found, reached, plan, untestable_reasons(reached, plan), advice(d, found, reached, plan))

@@ -40,14 +40,32 @@ def survey(fit: Fit, result: Calibration, with_candidates: bool = True) -> Diagn
     adequate = with_candidates and standing == 0 and rest.p_value > UNEXPLAINED_P
     best = evidence.names[int(np.argmax(np.abs(found.first.z)))]
     sentence = (
-        "Nothing stands out of the noise." if adequate
-        else f"{standing} candidates stand out of the noise, {best} most." if standing
+        "Nothing stands out of the noise."
+        if adequate
+        else f"{standing} candidates stand out of the noise, {best} most."
+        if standing
         else "Something is left that no candidate stands for."
-    )  # fmt: skip
+    )
     return Diagnosis(
-        Verdict.CONSISTENT if adequate else Verdict.MISFIT, sentence, adequate, rest.p_value, (), (), fit.consistency(),
-        fit, fit, result, result, found, evidence, rest, rest, free_columns, own=False, unexplained=False,
-    )  # fmt: skip
+        Verdict.CONSISTENT if adequate else Verdict.MISFIT,
+        sentence,
+        adequate,
+        rest.p_value,
+        (),
+        (),
+        fit.consistency(),
+        fit,
+        fit,
+        result,
+        result,
+        found,
+        evidence,
+        rest,
+        rest,
+        free_columns,
+        own=False,
+        unexplained=False,
+    )
 
 
 def _nothing_added(evidence: LinearEvidence, columns: Ints) -> Search[LinearEvidence]:

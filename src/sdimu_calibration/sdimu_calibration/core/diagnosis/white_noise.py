@@ -16,7 +16,7 @@ _NORMAL_95 = 3.92
 """Width of a 95 % interval (sigma): of a normal distribution."""
 _NEIGHBOURS = Stretches(
     np.array([0.0, 1.0]), np.array([1.0, 2.0]), np.zeros(2, dtype=np.int64), np.zeros(2, dtype=np.bool_)
-)  # fmt: skip
+)
 """Two neighbouring seconds of one dwell."""
 
 

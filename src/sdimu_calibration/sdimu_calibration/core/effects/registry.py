@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.wording import Work
 
 _EFFECTS: dict[str, Effect] = {}
 
@@ -45,5 +46,5 @@ def get(name: str) -> Effect:
         When there is none of that name.
     """
     if name not in _EFFECTS:
-        raise DataError(f"unknown effect '{name}' (sdimu effects lists them)")
+        raise DataError(f"unknown effect '{name}' ({Work.EFFECTS} lists them)")
     return _EFFECTS[name]

@@ -8,6 +8,7 @@ from sdimu_calibration.core.effect_key import EffectKey, parse_key, read_options
 from sdimu_calibration.core.effects import registry
 from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.wording import Work
 
 
 def resolve(text: str) -> Effect:
@@ -43,7 +44,7 @@ def _find(name: str) -> tuple[Effect, tuple[str, ...]]:
             return effect, asked
     known = [*registry.names(), *(p.name for s in registry.names() for p in registry.get(s).parameters)]
     near = get_close_matches(name, known, n=3)
-    hint = f"did you mean {', '.join(near)}?" if near else "sdimu effects lists them"
+    hint = f"did you mean {', '.join(near)}?" if near else f"{Work.EFFECTS} lists them"
     raise DataError(f"unknown effect '{name}' ({hint})")
 
 

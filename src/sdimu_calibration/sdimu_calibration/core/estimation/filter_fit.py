@@ -166,9 +166,17 @@ class FilterFit(NavigationFit):
         """
         setup, sensors, cycles = self.setup, self.setup.sensors, prepared.cycles
         seen = motion(
-            cycles, prepared.rest, sensors, estimate, C_start.copy(), setup.site.latitude_rad, setup.gravity,
-            prepared.temperature, predicted=False, magnetic_n=setup.magnetic_n,
-        )  # fmt: skip
+            cycles,
+            prepared.rest,
+            sensors,
+            estimate,
+            C_start.copy(),
+            setup.site.latitude_rad,
+            setup.gravity,
+            prepared.temperature,
+            predicted=False,
+            magnetic_n=setup.magnetic_n,
+        )
         values = sensors.regressors(seen)
         # What fades is known where the fit ended, and fades away from there.
         fading = np.exp(-np.outer(np.abs(seen.t - end_of_fit), sensors.decay_rate[sensors.parameter]))
@@ -191,13 +199,7 @@ class FilterFit(NavigationFit):
         return (*super().notes(), *([heading] if heading else []))
 
     def warnings(self, statistics: FitStatistics) -> tuple[str, ...]:
-        """Misfit, an azimuth that is too little known, coefficients outside the specification.
-
-        Raises
-        ------
-        DataError
-            When there is no fit at all.
-        """
+        """Misfit, an azimuth that is too little known, coefficients outside the specification."""
         lost = azimuth_is_lost(self, self.noise_terms)
         azimuth = _LOST if lost else azimuth_warning(self.solution)
         return (*super().warnings(statistics), *([azimuth] if azimuth else []))

@@ -24,8 +24,9 @@ from sdimu_calibration.core.noise_term import NoiseTerm
 from sdimu_calibration.core.recording import DataFault, TemperatureLog
 from sdimu_calibration.core.results import NOT_TRUSTED, START_TEMPERATURE, History, Rest, no_history
 from sdimu_calibration.core.specification import Model
+from sdimu_calibration.core.wording import Option
 
-NOT_CONVERGED = f"the passes did not converge: the estimate is {NOT_TRUSTED}; check --imu and --site"
+NOT_CONVERGED = f"the passes did not converge: the estimate is {NOT_TRUSTED}; check {Option.IMU} and {Option.SITE}"
 
 
 def temperature_counts(log: TemperatureLog | None) -> dict[str, float]:
@@ -99,7 +100,7 @@ class Fit(ABC):
     doubt: Floats | None = field(default=None, kw_only=True)
 
     estimator = ""
-    """Name of the estimator, as `--estimator` takes it."""
+    """Name of the estimator."""
     learns_scatter = False
     """The estimator learns the noise beyond white noise from the residuals, a missing effect with it."""
     diagnosable = True
@@ -213,13 +214,7 @@ class Fit(ABC):
 
     @abstractmethod
     def free_inertial(self, rivals: Sequence[tuple[str, Fit]]) -> tuple[FreeInertialRun, ...]:
-        """Navigate without aid, with this fit and with `rivals` (name, fit), on parts that no fit has seen.
-
-        Raises
-        ------
-        DataError
-            When there is no such part, or the estimator does not navigate.
-        """
+        """Navigate without aid, with this fit and with `rivals` (name, fit), on parts that no fit has seen."""
 
     @property
     def noise_terms(self) -> tuple[NoiseTerm, ...]:
@@ -240,13 +235,7 @@ class Fit(ABC):
         return ()
 
     def warnings(self, statistics: FitStatistics) -> tuple[str, ...]:
-        """Say what speaks against the estimate, one line each; `statistics` with the held-out error where it is known.
-
-        Raises
-        ------
-        DataError
-            When there is no fit at all.
-        """
+        """Say what speaks against the estimate, one line each; `statistics` have the held-out error where known."""
         del statistics
         return ()
 

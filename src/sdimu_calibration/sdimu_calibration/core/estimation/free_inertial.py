@@ -199,11 +199,6 @@ def free_inertial_runs(
         Of a fit to the whole recording: azimuth at the start, and what heading is compared with.
     wanted_s : float
         Length of the navigation (s).
-
-    Raises
-    ------
-    DataError
-        When there is no such segment, or the rest of the recording cannot be calibrated.
     """
     segments = holdout_segments(prepared, wanted_s)
     return tuple(side_by_side(lambda segment: _run(prepared, fits, reference, segment), segments))
@@ -248,11 +243,6 @@ def refit(fit: Navigator, seen: PreparedData, C_nb: Floats) -> Refit:
         The part.
     C_nb : ndarray, shape (3, 3)
         Attitude at the start of the part (dimensionless), by the fit of the whole.
-
-    Raises
-    ------
-    DataError
-        When the part cannot be calibrated.
     """
     alignment = first_attitude(seen.epochs, seen.phases, fit.setup)
     estimate, before, near = fit.estimate, np.inf, None
@@ -341,27 +331,29 @@ def _navigated(
     free = cycles[border:]
     start = np.array([site.latitude_rad, 0.0, site.height_m])
     excess = setup.gravity - float(earth.normal_gravity(site.latitude_rad, site.height_m))
-    place, velocity, C_nb = _navigate(
-        C_start.copy(), start.copy(), np.ascontiguousarray(free.alpha), np.ascontiguousarray(free.upsilon),
-        free.coning, free.sculling, free.dt, last - border, excess,
-    )  # fmt: skip
+    steps = _Steps(
+        np.ascontiguousarray(free.alpha), np.ascontiguousarray(free.upsilon), free.coning, free.sculling, free.dt
+    )
+    place, velocity, C_nb = _navigate(C_start.copy(), start.copy(), steps, last - border, excess)
     r_n, r_e = earth.radii(site.latitude_rad)
     north = (place[:, 0] - start[0]) * (r_n + site.height_m)
     east = place[:, 1] * (r_e + site.height_m) * np.cos(min(abs(site.latitude_rad), earth.POLE_LIMIT))
     return np.column_stack([north, east]), velocity[:, :2], C_nb
 
 
+class _Steps(NamedTuple):
+    """Increments of n cycles for the compiled loop: angle, velocity, their corrections (n, 3) and length (n,)."""
+
+    alpha: Floats
+    upsilon: Floats
+    coning: Floats
+    sculling: Floats
+    dt: Floats
+
+
 @compiled
 def _navigate(
-    C_nb: Floats,
-    position: Floats,
-    alpha: Floats,
-    upsilon: Floats,
-    coning: Floats,
-    sculling: Floats,
-    dt: Floats,
-    last: Ints,
-    gravity_excess: float,
+    C_nb: Floats, position: Floats, steps: _Steps, last: Ints, gravity_excess: float
 ) -> tuple[Floats, Floats, Floats]:
     """Position (rad, rad, m), velocity and attitude after the cycles ``last - 1``; height held; starts at rest."""
     k = last.shape[0]
@@ -372,8 +364,9 @@ def _navigate(
     for e in range(k):
         while c < last[e]:
             gravity = earth.normal_gravity(position[0], height) + gravity_excess
-            dv = velocity_increment(alpha[c], upsilon[c], sculling[c])
-            navigate_cycle(C_nb, velocity, position, alpha[c] + coning[c], dv, dt[c], gravity)
+            dv = velocity_increment(steps.alpha[c], steps.upsilon[c], steps.sculling[c])
+            turned = steps.alpha[c] + steps.coning[c]
+            navigate_cycle(C_nb, velocity, position, turned, dv, steps.dt[c], gravity)
             velocity[2], position[2] = 0.0, height
             c += 1
         place[e], speed[e], attitude[e] = position, velocity, C_nb

@@ -15,12 +15,7 @@ from sdimu_calibration.core.estimation.fit import Fit, Start, temperature_counts
 from sdimu_calibration.core.estimation.free_inertial import FreeInertialRun
 from sdimu_calibration.core.estimation.navigation_fit import checksum
 from sdimu_calibration.core.evidence.consistency import NO_NOISE, Consistency
-from sdimu_calibration.core.evidence.handheld_evidence import (
-    HandheldEvidence,
-    handheld_evidence,
-    places,
-    timetable,
-)
+from sdimu_calibration.core.evidence.handheld_evidence import HandheldEvidence, handheld_evidence, places, timetable
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.fit_statistics import FitStatistics
 from sdimu_calibration.core.handheld.handheld import PreparedRun, handheld_notes
@@ -145,9 +140,14 @@ class HandheldFit(Fit):
         """
         about = evidence if isinstance(evidence, HandheldEvidence) else self.evidence()
         return Consistency(
-            self.statistics().nis_mean, 1.0, float("nan"), 1.0, NO_NOISE, NO_NOISE,
+            self.statistics().nis_mean,
+            1.0,
+            float("nan"),
+            1.0,
+            NO_NOISE,
+            NO_NOISE,
             places(about, np.empty(0, dtype=np.int64)),
-        )  # fmt: skip
+        )
 
     @cached_property
     def timetable(self) -> Timetable:
@@ -182,12 +182,6 @@ class HandheldFit(Fit):
         return rests_with_residuals(self.ready.run, self.priors, self.solution)
 
     def free_inertial(self, rivals: Sequence[tuple[str, Fit]]) -> tuple[FreeInertialRun, ...]:
-        """Refuse: a hand moves the IMU, so that its velocity and place are unknown.
-
-        Raises
-        ------
-        DataError
-            Always.
-        """
+        """Refuse: a hand moves the IMU, so that its velocity and place are unknown."""
         del rivals
         raise DataError("a handheld run has no known velocity and place to compare a free navigation with")

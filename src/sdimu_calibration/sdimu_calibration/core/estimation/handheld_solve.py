@@ -20,6 +20,7 @@ from sdimu_calibration.core.progress import Progress
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.specification import Model
 from sdimu_calibration.core.units import from_si
+from sdimu_calibration.core.wording import Option
 
 
 def solve_handheld(test: PreparedTest, model: Model, start: Start | None, progress: Progress) -> HandheldFit:
@@ -32,11 +33,6 @@ def solve_handheld(test: PreparedTest, model: Model, start: Start | None, progre
     start : Start or None
         Where a fit of nearly the same model ended: its priors stand. None tries wider ones too.
     progress : callable
-
-    Raises
-    ------
-    DataError
-        When the run fits no IMU, or the test was opened for navigation.
     """
     if test.assumed_site:
         raise DataError(
@@ -78,7 +74,7 @@ def _told(roomy: PreparedTest, test: PreparedTest, sensors: ImuModel, wider: Map
             parts.append(f"{name} {from_si(before, unit):.3g} -> {from_si(wider[name], unit):.2g} {unit}")
     note = (
         f"the data contradict priors of IMU '{test.imu.name}', which are widened: {', '.join(parts)}; if the IMU is of "
-        "another class, name its file (--imu)"
+        f"another class, name its file ({Option.IMU})"
     )
     return replace(roomy, recording=replace(roomy.recording, notes=(*roomy.recording.notes, note)))
 

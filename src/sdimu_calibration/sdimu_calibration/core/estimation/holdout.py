@@ -61,11 +61,6 @@ def holdout_segments(prepared: PreparedData, wanted_s: float = WANTED_S) -> tupl
     """Choose what to keep from the fit: `wanted_s` of navigation after a dwell, at the end and at the start.
 
     Of a recording too short for that, the longest segments that leave half of it to the fit.
-
-    Raises
-    ------
-    DataError
-        When no segment of `LEAST_S` begins with a dwell.
     """
     used, epochs = prepared.phases.used, prepared.epochs
     index = np.arange(len(used))
@@ -137,6 +132,11 @@ def part(prepared: PreparedData, first: int, last: int) -> PreparedData:
     phases = Phases(*(getattr(prepared.phases, field.name)[rows] for field in fields(Phases)))
     bridges = Bridges(*(getattr(prepared.bridges, field.name)[rows] for field in fields(Bridges)))
     return replace(
-        prepared, cycles=prepared.cycles[begin:end], epochs=Epochs(**cut), phases=phases, kind=prepared.kind[rows],
-        bridges=bridges, seconds=None,
-    )  # fmt: skip
+        prepared,
+        cycles=prepared.cycles[begin:end],
+        epochs=Epochs(**cut),
+        phases=phases,
+        kind=prepared.kind[rows],
+        bridges=bridges,
+        seconds=None,
+    )

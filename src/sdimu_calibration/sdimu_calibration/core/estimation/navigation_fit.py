@@ -18,12 +18,7 @@ from sdimu_calibration.core.data.blocks import let_go, pieces
 from sdimu_calibration.core.effects import bias
 from sdimu_calibration.core.effects.effect import Effect, Timetable
 from sdimu_calibration.core.estimation.fit import NOT_CONVERGED, Fit, Start, temperature_counts
-from sdimu_calibration.core.estimation.free_inertial import (
-    Compensated,
-    FreeInertialRun,
-    Navigator,
-    free_inertial_runs,
-)
+from sdimu_calibration.core.estimation.free_inertial import Compensated, FreeInertialRun, Navigator, free_inertial_runs
 from sdimu_calibration.core.estimation.noise_estimate import NoiseEstimate
 from sdimu_calibration.core.estimation.prior_check import contradicted, outside
 from sdimu_calibration.core.evidence.consistency import Consistency, check
@@ -40,13 +35,13 @@ from sdimu_calibration.core.filter.passes import Pass
 from sdimu_calibration.core.fit_statistics import FitStatistics
 from sdimu_calibration.core.measurement_kind import ALL, HELD_ALL, HELD_SENSORS, SENSORS
 from sdimu_calibration.core.noise_term import NoiseTerm
+from sdimu_calibration.core.note import Note, Topic
 from sdimu_calibration.core.plain_text import counted
 from sdimu_calibration.core.recording import DataError, DataFault
 from sdimu_calibration.core.results import History
-from sdimu_calibration.core.second_order.second_order_passes import (
-    SecondOrderPass,
-)
+from sdimu_calibration.core.second_order.second_order_passes import SecondOrderPass
 from sdimu_calibration.core.side_by_side import side_by_side
+from sdimu_calibration.core.wording import Option, Work
 
 HELD_OUT_FOLDS = 3
 """Number of interleaved groups of stops, each held out once: two thirds of the stops are then in every fit."""
@@ -267,15 +262,19 @@ class NavigationFit(Fit):
         output = self.last.output
         dof = 3 * int(np.isfinite(output.nis).sum())
         white = FitStatistics(
-            float(output.log_likelihood.sum()), float(np.nansum(output.nis) / max(dof, 1)), float(dof),
+            float(output.log_likelihood.sum()),
+            float(np.nansum(output.nis) / max(dof, 1)),
+            float(dof),
             float(self.passes),
-        )  # fmt: skip
+        )
         if self.noise is None:
             return white
         return replace(
-            white, log_likelihood=white.log_likelihood + self.noise.gain, nis_in_noise=self.noise.nis,
+            white,
+            log_likelihood=white.log_likelihood + self.noise.gain,
+            nis_in_noise=self.noise.nis,
             held_out_in_noise=self.noise.held_out_rms,
-        )  # fmt: skip
+        )
 
     def held_out_rms(self) -> float | None:
         """RMS of normalised prediction errors at stops that the fit has not seen.
@@ -362,13 +361,7 @@ class NavigationFit(Fit):
         )
 
     def warnings(self, statistics: FitStatistics) -> tuple[str, ...]:
-        """Misfit as a whole and of single stops, and coefficients outside the specification.
-
-        Raises
-        ------
-        DataError
-            When there is no fit at all.
-        """
+        """Misfit as a whole and of single stops, and coefficients outside the specification."""
         nis, held_out = statistics.nis_mean, statistics.held_out_rms
         lost = int(self.prepared.cycles.lost.sum())
         white = "" if self.noise is None else " in white noise"
@@ -376,12 +369,13 @@ class NavigationFit(Fit):
         if nis > _ABSURD:
             raise DataError(
                 f"the recording contradicts the model: squared innovations are {nis:.3g} times what the noise explains"
-                f"{in_turn}; check --imu, --site, units and axes"
+                f"{in_turn}; check {Option.IMU}, {Option.SITE}, units and axes"
             )
-        out = [] if self.converged else [NOT_CONVERGED]
+        out: list[str] = [] if self.converged else [NOT_CONVERGED]
         if nis > MISFIT or (held_out is not None and held_out > MISFIT):
             text = f"NIS {nis:.3f}" + ("" if held_out is None else f", held-out error {held_out:.3f}")
-            out.append(f"the model{white} does not fit ({text}{_in_noise(statistics)}){in_turn}; run: sdimu diagnose")
+            told = f"the model{white} does not fit ({text}{_in_noise(statistics)}){in_turn}"
+            out.append(Note(told, Topic.MISFIT, f"; run: {Work.DIAGNOSE}"))
         # Noise that was learned explains what a stop leaves in white noise.
         worst = "" if self.noise else stop_misfit(self.last.output.normalised, self.prepared)
         return (*out, *([worst] if worst else []), *self.contradicted_priors()[:1], *self.beyond_specification()[:1])
@@ -395,13 +389,7 @@ class NavigationFit(Fit):
         return contradicted(self.setup.sensors, self.settled, self.settled_covariance)
 
     def free_inertial(self, rivals: Sequence[tuple[str, Fit]]) -> tuple[FreeInertialRun, ...]:
-        """Navigate without aid, with this fit and with `rivals` (name, fit), on parts that no fit has seen.
-
-        Raises
-        ------
-        DataError
-            When there is no such part.
-        """
+        """Navigate without aid, with this fit and with `rivals` (name, fit), on parts that no fit has seen."""
         fits = [("model as given", self), *((name, fit) for name, fit in rivals if isinstance(fit, NavigationFit))]
         # A model that lacks an effect has a wrong azimuth, too: all start from that of the last, which knows most.
         return free_inertial_runs(self.prepared, fits, fits[-1][1].known.output)
@@ -410,9 +398,15 @@ class NavigationFit(Fit):
         """History at epochs (k,), with values (k, p) and covariance (k, p, p) in the frame of the report."""
         phases = self.prepared.phases
         return History(
-            self.prepared.epochs.end[rows], values, np.sqrt(np.diagonal(covariance, axis1=1, axis2=2)),
-            output.sigma[rows, 6:9], phases.stop[rows], phases.dwell[rows], phases.used[rows], output.nis[rows],
-        )  # fmt: skip
+            self.prepared.epochs.end[rows],
+            values,
+            np.sqrt(np.diagonal(covariance, axis1=1, axis2=2)),
+            output.sigma[rows, 6:9],
+            phases.stop[rows],
+            phases.dwell[rows],
+            phases.used[rows],
+            output.nis[rows],
+        )
 
 
 def checksum(*arrays: Floats) -> float:

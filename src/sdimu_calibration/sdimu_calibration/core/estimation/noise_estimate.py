@@ -6,7 +6,9 @@ from dataclasses import dataclass
 
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.noise_term import WORDS, NoiseTerm
+from sdimu_calibration.core.note import Note
 from sdimu_calibration.core.units import from_si
+from sdimu_calibration.core.wording import Work
 
 
 @dataclass(frozen=True)
@@ -36,13 +38,14 @@ class NoiseEstimate:
     held_out_rms: float
 
     @property
-    def note(self) -> str:
+    def note(self) -> Note:
         """What a user should know, with the terms and their sizes."""
         terms = "; ".join(term_in_words(term) for term in self.terms)
-        return (
+        told = (
             f"the noise is not white: {terms}; values and sigmas take it into account. A missing effect can look the "
-            "same: run sdimu diagnose"
+            "same"
         )
+        return Note(told, end=f": run {Work.DIAGNOSE}")
 
 
 def term_in_words(term: NoiseTerm) -> str:

@@ -138,9 +138,10 @@ def _with_mean(evidence: LinearEvidence, modes: Modes, fixed: Bools) -> tuple[Fl
     covariance[known], covariance[:, known], estimate[known] = 0.0, 0.0, 0.0
     T = np.hstack([np.eye(q), np.zeros((q, r))])
     moved = [
-        (channel, evidence.names.index(name)) for channel, name in enumerate(bias.NAMES)
+        (channel, evidence.names.index(name))
+        for channel, name in enumerate(bias.NAMES)
         if name in evidence.names and not fixed[evidence.names.index(name)]
-    ]  # fmt: skip
+    ]
     unseen = np.zeros((q, q))
     for channel, row in moved:
         T[row, q:] = modes.mean[channel]

@@ -32,11 +32,6 @@ def outcome(fit: Fit, held_out: bool = True) -> Calibration:
     fit : Fit
     held_out : bool
         Also predict every stop from the others (costs some passes).
-
-    Raises
-    ------
-    DataError
-        When there is no fit at all.
     """
     statistics = replace(fit.statistics(), held_out_rms=fit.held_out_rms() if held_out else None)
     parameters = fit.sensors.parameters
@@ -114,9 +109,7 @@ def doubted(result: Calibration, fit: Fit) -> Calibration:
         f"{result.names[worst]} is {ratio[worst]:.1f} times what it would be if this model were known to be right"
     )
     told = (note,) if ratio[worst] > _TOLD else ()
-    return replace(
-        result, covariance=fit.covariance, conditional_sigma=conditional, notes=(*result.notes, *told)
-    )
+    return replace(result, covariance=fit.covariance, conditional_sigma=conditional, notes=(*result.notes, *told))
 
 
 def calibrate(
@@ -138,11 +131,6 @@ def calibrate(
         As for `solve`.
     held_out : bool
         As for `outcome`.
-
-    Raises
-    ------
-    DataError
-        When the recording or the options cannot be used.
     """
     result = outcome(solve(PreparedTest(recording, imu, site), model, estimator, progress=progress), held_out)
     progress("done", 1.0)

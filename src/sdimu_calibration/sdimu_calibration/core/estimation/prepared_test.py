@@ -91,13 +91,7 @@ class PreparedTest:
         return replace(self, imu=imu)
 
     def data(self, setup: TestSetup) -> PreparedData:
-        """Cycles, epochs and phases for the navigation, made once.
-
-        Raises
-        ------
-        DataError
-            When there are too few samples, or the stops that are left give no attitude.
-        """
+        """Cycles, epochs and phases for the navigation, made once."""
         key = (setup.model.settle_s, setup.model.zero_velocity, setup.epoch_s)
         if key not in self._prepared:
             self._prepared[key] = reduce(self.recording, setup)
@@ -124,13 +118,7 @@ class PreparedTest:
 
     @property
     def run(self) -> PreparedRun:
-        """Rests and turns of a handheld run, made once.
-
-        Raises
-        ------
-        DataError
-            When there are too few rests.
-        """
+        """Rests and turns of a handheld run, made once."""
         if "run" not in self._prepared:
             self._prepared["run"] = prepare_run(self.recording, self.whole_turns)
         done: PreparedRun = self._prepared["run"]

@@ -62,5 +62,6 @@ def outside(sensors: ImuModel, estimate: Floats) -> list[str]:
     size = np.abs(estimate) / sensors.stated
     return [
         f"{sensors.names[i]} is {size[i]:.1f} times the sigma of the specification"
-        for i in np.argsort(-size) if size[i] > _FAR
-    ]  # fmt: skip
+        for i in np.argsort(-size)
+        if size[i] > _FAR
+    ]

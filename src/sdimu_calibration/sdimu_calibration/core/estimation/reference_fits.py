@@ -143,13 +143,7 @@ class ReferenceFit(Fit):
         return NavigationFit.notes(self.about)
 
     def free_inertial(self, rivals: Sequence[tuple[str, Fit]]) -> tuple[FreeInertialRun, ...]:
-        """Navigate without aid on parts that no fit has seen; each is fitted again by navigation.
-
-        Raises
-        ------
-        DataError
-            When there is no such part.
-        """
+        """Navigate without aid on parts that no fit has seen; each is fitted again by navigation."""
         return self.about.free_inertial(rivals)
 
 

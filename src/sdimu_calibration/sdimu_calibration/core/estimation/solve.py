@@ -55,6 +55,7 @@ from sdimu_calibration.core.progress import Progress, silent
 from sdimu_calibration.core.recording import DataError, DivergedError
 from sdimu_calibration.core.second_order.second_order_passes import second_order_pass, solve_second_order
 from sdimu_calibration.core.specification import Model
+from sdimu_calibration.core.wording import Option, Work
 
 AUTO = "auto"
 NO_FRAME = (
@@ -93,11 +94,6 @@ def solve(
     azimuth_free : bool
         Estimate the horizontal Earth rate in the place of the azimuth, by second-order passes. Where the noise that is
         learned hides the azimuth this is done unasked, but for a request of another estimator.
-
-    Raises
-    ------
-    DataError
-        When the test, the model or the estimator cannot be used.
     """
     choice = choose_estimator(test, model) if estimator == AUTO else Choice(estimator, "by request")
     if choice.estimator not in ESTIMATORS:
@@ -131,7 +127,7 @@ def _check(test: PreparedTest, model: Model, estimator: str) -> None:
         )
     if test.held_out or test.excluded:
         raise DataError(
-            f"the estimator '{estimator}' takes every stop: cut the recording instead (sdimu bag cut), or use one of "
+            f"the estimator '{estimator}' takes every stop: cut the recording instead ({Work.CUT}), or use one of "
             f"{', '.join(_TAKES_PRIORS)}"
         )
 
@@ -153,13 +149,7 @@ class Choice:
 
 
 def choose_estimator(test: PreparedTest, model: Model) -> Choice:
-    """Choose between ``handheld``, ``second-order`` and ``filter``.
-
-    Raises
-    ------
-    DataError
-        When model and IMU do not fit together.
-    """
+    """Choose between ``handheld``, ``second-order`` and ``filter``."""
     if test.why_handheld:
         return Choice(HandheldFit.estimator, test.why_handheld)
     setup = _setup(test, model)
@@ -189,11 +179,6 @@ def extend(
     progress : callable
     learn : bool
         As for `solve`.
-
-    Raises
-    ------
-    DataError
-        When the extended model cannot be fitted.
     """
     model = with_effects(fit.model, effects)
     wider = solve(fit.test, model, fit.estimator, fit.start if warm else None, progress, learn, fit.azimuth_free)
@@ -211,8 +196,8 @@ def with_effects(model: Model, effects: Sequence[Effect | str]) -> Model:
 def _setup(test: PreparedTest, model: Model) -> TestSetup:
     if test.site is None:
         raise DataError(
-            "no site: the navigation needs the latitude and height of the test; state the site (--site, in Python "
-            "open(..., site=...))"
+            f"no site: the navigation needs the latitude and height of the test; state the site ({Option.SITE}, in "
+            "Python open(..., site=...))"
         )
     return set_up(test.site, test.imu, model, test.epoch_s(model.settle_s))
 
@@ -260,9 +245,7 @@ def _second_order(
         begin = StartPoint(last.smoothed_start, last.estimate)
         last, more, converged = solve_second_order(inner, prepared, alignment, begin, progress)
         count += more
-    return SecondOrderFit(
-        test, model, setup.sensors, inner, prepared, alignment, frame_model, last, count, converged
-    )
+    return SecondOrderFit(test, model, setup.sensors, inner, prepared, alignment, frame_model, last, count, converged)
 
 
 def _free_azimuth(test: PreparedTest, model: Model, start: Start | None, progress: Progress) -> Fit:
@@ -271,13 +254,7 @@ def _free_azimuth(test: PreparedTest, model: Model, start: Start | None, progres
 
 
 def _in_accelerometer_frame(setup: TestSetup, azimuth_free: bool) -> AccelerometerFrameModel:
-    """Put the model of a setup into the accelerometers' frame, where asked with an Earth rate of any direction.
-
-    Raises
-    ------
-    DataError
-        When the model cannot turn.
-    """
+    """Put the model of a setup into the accelerometers' frame, where asked with an Earth rate of any direction."""
     latitude = setup.site.latitude_rad
     along = (horizontal_earth_rate(latitude),) if azimuth_free else ()
     found = accelerometer_frame_model(setup.sensors, setup.imu, along)
@@ -323,12 +300,8 @@ def _batch(test: PreparedTest, model: Model, _start: Start | None, progress: Pro
     else:
         frame, values = FRAME, frame_model.values(found.coefficients)
         covariance = frame_model.covariance(found.covariance, found.coefficients)
-    summary = FitStatistics(
-        found.log_evidence, found.chi2 / max(found.dof, 1), float(found.dof), float(found.steps)
-    )
-    about = _navigation_about(
-        test, model, replace(begun, setup=inner), frame_model, found.C_nb[0], found.coefficients
-    )
+    summary = FitStatistics(found.log_evidence, found.chi2 / max(found.dof, 1), float(found.dof), float(found.steps))
+    about = _navigation_about(test, model, replace(begun, setup=inner), frame_model, found.C_nb[0], found.coefficients)
     return BatchFit(test, model, setup.sensors, frame, values, covariance, summary, about)
 
 
@@ -360,11 +333,6 @@ def fit_about(
     start : Start, optional
         Gives the attitude at the start where it is known. Of a fit without an azimuth it also gives the Earth rate in
         its place, and this fit does without one, too.
-
-    Raises
-    ------
-    DataError
-        When the filter diverges about them.
     """
     begun = _reduced(test, model, silent)
     here = {} if start is None else dict(zip(start.names, start.coefficients.tolist(), strict=True))
@@ -388,16 +356,14 @@ def fit_about(
 
 
 def _navigation_about(
-    test: PreparedTest, model: Model, begun: _Reduced, frame_model: AccelerometerFrameModel | None,
-    C_nb: Floats, coefficients: Floats,
-) -> NavigationFit:  # fmt: skip
-    """Navigate about coefficients that stay as they are; the attitude is the filter's own.
-
-    Raises
-    ------
-    DataError
-        When the filter diverges about them.
-    """
+    test: PreparedTest,
+    model: Model,
+    begun: _Reduced,
+    frame_model: AccelerometerFrameModel | None,
+    C_nb: Floats,
+    coefficients: Floats,
+) -> NavigationFit:
+    """Navigate about coefficients that stay as they are; the attitude is the filter's own."""
     setup, prepared, alignment = begun.setup, begun.prepared, begun.alignment
     if frame_model is not None:
         at = second_order_pass(prepared, setup, alignment, C_nb, coefficients)

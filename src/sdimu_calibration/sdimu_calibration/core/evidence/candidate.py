@@ -35,7 +35,7 @@ class Candidate:
 
     @property
     def added(self) -> str:
-        """What `sdimu calibrate --add` takes: the label, or the parameter of an effect file."""
+        """What adds it to a model: the label, or the parameter of an effect file."""
         if not self.effect.file:
             return self.label
         return f"{self.effect.file}:{self.parameter.name.removeprefix(f'{self.effect.family}_')}"

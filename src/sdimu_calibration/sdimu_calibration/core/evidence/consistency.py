@@ -14,9 +14,19 @@ from sdimu_calibration.core.probability import chi2_head, chi2_tail
 from sdimu_calibration.core.specification import EPOCH_S, ImuSpecification
 
 CHANNEL_NAMES = (
-    "position_n", "position_e", "position_d", "velocity_n", "velocity_e", "velocity_d",
-    "gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z",
-)  # fmt: skip
+    "position_n",
+    "position_e",
+    "position_d",
+    "velocity_n",
+    "velocity_e",
+    "velocity_d",
+    "gyro_x",
+    "gyro_y",
+    "gyro_z",
+    "accel_x",
+    "accel_y",
+    "accel_z",
+)
 _GAUSS_MAD = 1.482602218505602
 """Factor from the median of |x| to the standard deviation: of Gaussian noise."""
 _LAGS = 20

@@ -20,9 +20,7 @@ from sdimu_calibration.core.handheld.handheld_data import HandheldRun, Turns, se
 from sdimu_calibration.core.handheld.handheld_fit import FitPriors, LinearisationPoint, equations, row_sigmas
 from sdimu_calibration.core.specification import ImuSpecification
 
-CHANNELS = (
-    "gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z", "turn_north", "turn_east", "turn_down",
-)  # fmt: skip
+CHANNELS = ("gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z", "turn_north", "turn_east", "turn_down")
 """What is measured: rate and force at each rest, and the turn that led to it (the heading of north is arbitrary)."""
 _DOWN = len(CHANNELS) - 1
 """Index of a channel (1): that of the heading, which a whole turn tells."""
@@ -110,19 +108,26 @@ def handheld_evidence(
     held[2] = float(np.sum(rows[-1] ** 2))
     names = tuple(scene.model.names[i] for i in scene.kept)
     begun = HandheldEvidence(
-        e=residual[data] / sigma[data], W=W,
+        e=residual[data] / sigma[data],
+        W=W,
         stop=np.concatenate([np.repeat(np.arange(k), 6), np.repeat(np.arange(1, k), 3), run.whole + 1]),
         names=(*names, *(f"Earth rate {i}" for i in range(3)), *(f"attitude {i // 3} {i % 3}" for i in range(3 * k))),
         weight=np.concatenate([1.0 / np.diag(scene.prior), scene.earth_sigma**-2, held]),
         shift=np.concatenate([-point.coefficients[scene.kept], scene.earth_mean - point.earth, np.zeros(3 * k)]),
         stated=np.concatenate([np.sqrt(np.diag(scene.prior)), scene.earth_sigma, held**-0.5]),
-        candidates=(), prior=np.zeros(0), imu=imu, times=timetable(run), coefficients=q,
-        channel=np.concatenate([
-            np.tile(np.arange(6), k), np.tile(np.arange(6, 9), k - 1), np.full(len(run.whole), _DOWN),
-        ]),
-        run=run, rests=seen_at_rest(run, point.C_nb, point.earth, scene.gravity),
-        gone=turns(run, scene.model, point.coefficients, point.C_nb, scene.gravity), sigma=sigma[data],
-    )  # fmt: skip
+        candidates=(),
+        prior=np.zeros(0),
+        imu=imu,
+        times=timetable(run),
+        coefficients=q,
+        channel=np.concatenate(
+            [np.tile(np.arange(6), k), np.tile(np.arange(6, 9), k - 1), np.full(len(run.whole), _DOWN)]
+        ),
+        run=run,
+        rests=seen_at_rest(run, point.C_nb, point.earth, scene.gravity),
+        gone=turns(run, scene.model, point.coefficients, point.C_nb, scene.gravity),
+        sigma=sigma[data],
+    )
     return begun.with_effects(effects)
 
 
@@ -188,8 +193,9 @@ def places(evidence: HandheldEvidence, chosen: Ints) -> tuple[StopMean, ...]:
     values = standardised(evidence, chosen)
     rows = [
         StopMean(CHANNELS[c], int(s), float(v))
-        for c, s, v in zip(evidence.channel, evidence.stop, values, strict=True) if np.isfinite(v)
-    ]  # fmt: skip
+        for c, s, v in zip(evidence.channel, evidence.stop, values, strict=True)
+        if np.isfinite(v)
+    ]
     return tuple(sorted(rows, key=lambda place: -abs(place.normalised_mean)))
 
 

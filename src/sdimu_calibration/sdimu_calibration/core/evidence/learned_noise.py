@@ -211,9 +211,10 @@ def learn(information: NoiseInformation, cut: Stretches, start: Sequence[NoiseTe
     while True:
         given = {triad: _given(information, cut, terms, triad) for triad in TRIADS}
         options = [
-            size for triad in TRIADS
+            size
+            for triad in TRIADS
             for size in _best_sizes(*given[triad], cut, [t for t in tried if t.triad == triad and _room(terms, t)])
-        ]  # fmt: skip
+        ]
         best = max(options, key=lambda t: t.gain, default=None)
         if best is None or best.gain < LEAST_GAIN:
             return _tuned(information, cut, terms)

@@ -176,10 +176,13 @@ class LinearEvidence(ABC):
         old, across = self.information, self.W.T @ weighed
         J = np.block([[old.J, across], [across.T, W.T @ weighed]])
         return replace(
-            self, W=np.hstack([self.W, W]), names=(*self.names, *(c.label for c in more)),
-            candidates=(*self.candidates, *more), prior=np.concatenate([self.prior, prior]),
+            self,
+            W=np.hstack([self.W, W]),
+            names=(*self.names, *(c.label for c in more)),
+            candidates=(*self.candidates, *more),
+            prior=np.concatenate([self.prior, prior]),
             worked_out=Information(J, np.concatenate([old.d, weighed.T @ self.e])),
-        )  # fmt: skip
+        )
 
     def only(self: E, columns: Ints) -> E:
         """Return the evidence with the model and some of the candidates alone.
@@ -194,10 +197,13 @@ class LinearEvidence(ABC):
         whole = np.array_equal(keep, np.arange(len(keep)))
         full = self.information
         return replace(
-            self, W=self.W[:, : len(keep)] if whole else self.W[:, keep], names=tuple(self.names[i] for i in keep),
-            candidates=tuple(self.candidates[i - p] for i in columns), prior=self.prior[columns - p],
+            self,
+            W=self.W[:, : len(keep)] if whole else self.W[:, keep],
+            names=tuple(self.names[i] for i in keep),
+            candidates=tuple(self.candidates[i - p] for i in columns),
+            prior=self.prior[columns - p],
             worked_out=Information(full.J[np.ix_(keep, keep)], full.d[keep]),
-        )  # fmt: skip
+        )
 
     def about(self: E, fresh: E, columns: Ints, tried: Sequence[Candidate]) -> E:
         """Return this evidence about another fit: its residuals and priors with the signatures as they are.
@@ -222,10 +228,18 @@ class LinearEvidence(ABC):
         d = self.W.T @ e
         d[:p] += weight * shift
         return replace(
-            fresh, e=e, W=self.W, names=self.names, weight=weight, shift=shift, stated=fresh.stated[stays],
-            candidates=self.candidates, prior=self.prior, coefficients=self.coefficients,
+            fresh,
+            e=e,
+            W=self.W,
+            names=self.names,
+            weight=weight,
+            shift=shift,
+            stated=fresh.stated[stays],
+            candidates=self.candidates,
+            prior=self.prior,
+            coefficients=self.coefficients,
             worked_out=Information(self.information.J, d),
-        )  # fmt: skip
+        )
 
     def as_candidates(self: E, columns: Ints, tried: Sequence[Candidate]) -> E:
         """Make candidates of coefficients of the model, as if the calibration had not known them.
@@ -248,12 +262,17 @@ class LinearEvidence(ABC):
         # Not the prior that the calibration had: it was widened where the data contradicted it.
         _, prior = candidate_priors([c.effect for c in tried], self.imu)
         return replace(
-            self, e=self.e - self.W[:, columns] @ self.shift[columns], W=np.ascontiguousarray(self.W[:, order]),
+            self,
+            e=self.e - self.W[:, columns] @ self.shift[columns],
+            W=np.ascontiguousarray(self.W[:, order]),
             names=(*(self.names[i] for i in stays), *(c.label for c in tried), *self.names[p:]),
-            weight=self.weight[stays], shift=self.shift[stays], stated=self.stated[stays],
-            candidates=(*tried, *self.candidates), prior=np.concatenate([prior, self.prior]),
+            weight=self.weight[stays],
+            shift=self.shift[stays],
+            stated=self.stated[stays],
+            candidates=(*tried, *self.candidates),
+            prior=np.concatenate([prior, self.prior]),
             coefficients=self.coefficients - len(columns),
-        )  # fmt: skip
+        )
 
 
 def candidate_priors(effects: Sequence[Effect], imu: ImuSpecification) -> tuple[tuple[Candidate, ...], Floats]:

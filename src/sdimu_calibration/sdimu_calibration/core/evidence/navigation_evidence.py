@@ -21,7 +21,13 @@ from sdimu_calibration.core.effects.effect import Effect, Timetable
 from sdimu_calibration.core.effects.motion import Motion
 from sdimu_calibration.core.evidence.linear import LinearEvidence, candidate_priors
 from sdimu_calibration.core.evidence.noise_kernels import Stretches
-from sdimu_calibration.core.evidence.signatures import constant_signatures, measured_rows, signatures
+from sdimu_calibration.core.evidence.signatures import (
+    Epochs,
+    Regressors,
+    constant_signatures,
+    measured_rows,
+    signatures,
+)
 from sdimu_calibration.core.filter.filter_pass import NAV, PassOutput, PassState, new_output, run_pass
 from sdimu_calibration.core.filter.passes import Pass, check_finite, pass_settings, start_state
 from sdimu_calibration.core.navigation.track import motion
@@ -133,23 +139,25 @@ def timetable(prepared: PreparedData) -> Timetable:
 
 
 def known_pass(prepared: PreparedData, setup: TestSetup, finished: Pass) -> KnownPass:
-    """Repeat the last pass of the filter with the coefficients known at their final values.
-
-    Raises
-    ------
-    DataError
-        When the filter diverges.
-    """
+    """Repeat the last pass of the filter with the coefficients known at their final values."""
     p = len(setup.sensors.prior)
     state = _with_known_coefficients(finished.start, p)._replace(used=finished.estimate.copy())
     output = new_output(len(prepared.epochs), p, True, len(prepared.epochs), navigation_only=True)
     run_pass(finished.data._replace(kind=prepared.kind), pass_settings(setup, closed_loop=False), state, output)
     check_finite(state)
     seen = motion(
-        prepared.cycles, prepared.rest, setup.sensors, finished.estimate, finished.C_start.copy(),
-        setup.site.latitude_rad, setup.gravity, prepared.temperature, predicted=True, magnetic_n=setup.magnetic_n,
+        prepared.cycles,
+        prepared.rest,
+        setup.sensors,
+        finished.estimate,
+        finished.C_start.copy(),
+        setup.site.latitude_rad,
+        setup.gravity,
+        prepared.temperature,
+        predicted=True,
+        magnetic_n=setup.magnetic_n,
         near=finished.data.values,
-    )  # fmt: skip
+    )
     return KnownPass(output, seen, None)
 
 
@@ -159,11 +167,6 @@ def known_second_order_pass(
     """Run a pass about samples corrected exactly at the final coefficients, which are known.
 
     Shifts of the attitude between stops change no covariance, so the recursion of the signatures holds as it stands.
-
-    Raises
-    ------
-    DataError
-        When the filter diverges.
     """
     firm, estimate = firm_setup(setup), finished.estimate
     at = linearise(prepared, firm, finished.smoothed_start, estimate)
@@ -198,12 +201,24 @@ def navigation_evidence(
     epoch, channel = measured_rows(known.output)
     candidates, prior = candidate_priors(effects, setup.imu)
     return NavigationEvidence(
-        e=known.output.normalised[epoch, channel], W=columns(prepared, known, latitude, [*sensors.effects, *effects]),
-        stop=prepared.phases.stop[epoch], names=(*sensors.names, *(c.label for c in candidates)),
-        weight=sensors.weight, shift=sensors.mean - estimate, stated=sensors.stated, candidates=candidates, prior=prior,
-        imu=setup.imu, times=timetable(prepared), coefficients=len(sensors.prior) - _serving(sensors.names),
-        epoch=epoch, channel=channel, known=known, prepared=prepared, latitude=latitude,
-    )  # fmt: skip
+        e=known.output.normalised[epoch, channel],
+        W=columns(prepared, known, latitude, [*sensors.effects, *effects]),
+        stop=prepared.phases.stop[epoch],
+        names=(*sensors.names, *(c.label for c in candidates)),
+        weight=sensors.weight,
+        shift=sensors.mean - estimate,
+        stated=sensors.stated,
+        candidates=candidates,
+        prior=prior,
+        imu=setup.imu,
+        times=timetable(prepared),
+        coefficients=len(sensors.prior) - _serving(sensors.names),
+        epoch=epoch,
+        channel=channel,
+        known=known,
+        prepared=prepared,
+        latitude=latitude,
+    )
 
 
 def _serving(names: Sequence[str]) -> int:
@@ -227,17 +242,15 @@ def columns(prepared: PreparedData, known: KnownPass, latitude: float, effects: 
     ndarray, shape (N, parameters)
         Change of each whitened innovation per SI unit of each parameter; rows in the order of `measured_rows`.
     """
-    epochs, seen = prepared.epochs, known.seen
+    epochs, seen = _epochs(prepared), known.seen
     blocks = [effects[start : start + _BLOCK] for start in range(0, len(effects), _BLOCK)]
     ends = np.cumsum([0, *(sum(len(effect.parameters) for effect in block) for block in blocks)])
     # Column by column in memory: what is chosen of them later is a few columns.
     W = np.zeros((int(np.isfinite(known.output.normalised).sum()), int(ends[-1])), order="F")
 
     def fill(number: int) -> None:
-        signatures(
-            seen, epochs.first, epochs.last, prepared.kind, known.output, *_terms(blocks[number], seen), latitude,
-            known.weight, W[:, ends[number] : ends[number + 1]],
-        )  # fmt: skip
+        part = W[:, ends[number] : ends[number + 1]]
+        signatures(seen, epochs, known.output, _terms(blocks[number], seen), latitude, known.weight, part)
 
     # The recursion of one column knows nothing of the others, and compiled loops run beside each other.
     side_by_side(fill, range(len(blocks)))
@@ -262,22 +275,32 @@ def constant_columns(prepared: PreparedData, known: KnownPass, latitude: float, 
         Change of each whitened innovation per rad/s or m/s^2; column ``6 stretch + axis``, rows in the order of
         `measured_rows`.
     """
-    epochs, blocks = prepared.epochs, range(0, len(cut), _BLOCK)
+    epochs, blocks = _epochs(prepared), range(0, len(cut), _BLOCK)
     W = np.zeros((int(np.isfinite(known.output.normalised).sum()), 6 * len(cut)), order="F")
 
     def fill(begin: int) -> None:
         part = slice(begin, min(begin + _BLOCK, len(cut)))
         constant_signatures(
-            known.seen, epochs.first, epochs.last, prepared.kind, known.output, cut.start[part], cut.end[part],
-            latitude, known.weight, W[:, 6 * part.start : 6 * part.stop],
-        )  # fmt: skip
+            known.seen,
+            epochs,
+            known.output,
+            cut.start[part],
+            cut.end[part],
+            latitude,
+            known.weight,
+            W[:, 6 * part.start : 6 * part.stop],
+        )
 
     side_by_side(fill, blocks)
     return W
 
 
-def _terms(effects: Sequence[Effect], seen: Motion) -> tuple[Floats, Ints, Ints]:
-    """Regressor columns (n, m) of effects, and the sensor axis and parameter (m,) of each."""
+def _epochs(prepared: PreparedData) -> Epochs:
+    return Epochs(prepared.epochs.first, prepared.epochs.last, prepared.kind)
+
+
+def _terms(effects: Sequence[Effect], seen: Motion) -> Regressors:
+    """Regressors of effects along a motion."""
     values = np.empty((len(seen.t), sum(len(effect.terms) for effect in effects)))
     channel: list[int] = []
     parameter: list[int] = []
@@ -287,4 +310,4 @@ def _terms(effects: Sequence[Effect], seen: Motion) -> tuple[Floats, Ints, Ints]
         channel += [t.channel for t in effect.terms]
         parameter += [parameters + t.parameter for t in effect.terms]
         parameters += len(effect.parameters)
-    return values, np.array(channel, dtype=np.int64), np.array(parameter, dtype=np.int64)
+    return Regressors(values, np.array(channel, dtype=np.int64), np.array(parameter, dtype=np.int64))

@@ -110,13 +110,17 @@ def constant_between(label: str, begin: float, end: float) -> Effect:
         return np.asarray(np.clip(overlap / motion.dt, 0.0, 1.0)[:, None].repeat(6, axis=1))
 
     return Effect(
-        name=label, title=label, equation="constant in this stretch",
+        name=label,
+        title=label,
+        equation="constant in this stretch",
         parameters=tuple(
             Parameter(f"{c} in {label}", "rad/s" if i < 3 else "m/s^2", "deg/h" if i < 3 else "ug")
             for i, c in enumerate(CHANNELS)
         ),
-        terms=tuple(Term(i, i) for i in range(6)), regressors=share, prior={},
-    )  # fmt: skip
+        terms=tuple(Term(i, i) for i in range(6)),
+        regressors=share,
+        prior={},
+    )
 
 
 def kernel(kind: str, tau: float, cut: Stretches) -> Floats:

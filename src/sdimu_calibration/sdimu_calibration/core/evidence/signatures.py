@@ -15,6 +15,8 @@ Willsky, H. Jones, "A generalized likelihood ratio approach ...", ibid. 21 (1976
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from sdimu_calibration.core import earth
@@ -90,13 +92,65 @@ def _add_weighed_columns(
             D[i, k] += d[i]
 
 
+class Epochs(NamedTuple):
+    """Epochs, as in `filter_pass.PassInput`.
+
+    Attributes
+    ----------
+    first, last : ndarray of int, shape (e,)
+        Cycles from `first` to before `last`.
+    kind : ndarray of int, shape (e,)
+        What each measures.
+    """
+
+    first: Ints
+    last: Ints
+    kind: Ints
+
+
+class Regressors(NamedTuple):
+    """Regressors of parameters.
+
+    Attributes
+    ----------
+    values : ndarray, shape (n, m)
+        Columns, of n cycles.
+    channel, parameter : ndarray of int, shape (m,)
+        Sensor axis and parameter of each column.
+    """
+
+    values: Floats
+    channel: Ints
+    parameter: Ints
+
+
+class _Cycles(NamedTuple):
+    """Motion over n cycles for the compiled loops: end (n,), attitude (n, 3, 3), force (n, 3), length (n,)."""
+
+    t: Floats
+    C_nb: Floats
+    f_b: Floats
+    dt: Floats
+
+
+class _Filter(NamedTuple):
+    """Matrices of the filter, one each an epoch."""
+
+    Phi: Floats
+    H: Floats
+    L: Floats
+    K: Floats
+
+
 @compiled
 def _signatures(
-    C_nb: Floats, f_b: Floats, dt: Floats, first: Ints, last: Ints, kind: Ints,
-    values: Floats, channel: Ints, parameter: Ints, q: int, w_ie: Floats,
-    weight: Floats, Phi: Floats, H: Floats, L: Floats, K: Floats, W: Floats,
-) -> None:  # fmt: skip
+    cycles: _Cycles, epochs: Epochs, regressors: Regressors, w_ie: Floats, weight: Floats, known: _Filter, W: Floats
+) -> None:
     """Fill W (rows, q), one row a measured scalar, in the order of epochs and channels."""
+    C_nb, f_b, dt = cycles.C_nb, cycles.f_b, cycles.dt
+    values, channel, parameter = regressors.values, regressors.channel, regressors.parameter
+    first, last, kind = epochs.first, epochs.last, epochs.kind
+    q = W.shape[1]
     V = np.zeros((NAV, q))
     G = np.zeros((NAV, q))
     D = np.zeros((6, q))
@@ -110,36 +164,38 @@ def _signatures(
             _add_weighed_columns(values[a:b], channel, parameter, R, direct, G, D)
         else:
             add_columns(values[a:b], channel, parameter, R, dt[a:b], G, D)
-        V = Phi[e] @ V + G
+        V = known.Phi[e] @ V + G
         if kind[e] == 0:
             continue
         low = 0 if abs(kind[e]) == 2 else 6
         m = MEASURED - low
-        S = np.ascontiguousarray(H[e, low:, :NAV]) @ V
+        S = np.ascontiguousarray(known.H[e, low:, :NAV]) @ V
         S[6 - low :] += D / dt[a:b].sum()
-        W[row : row + m] = whiten(np.ascontiguousarray(L[e, low:, low:]), S)
-        V -= np.ascontiguousarray(K[e, :NAV, low:]) @ S
+        W[row : row + m] = whiten(np.ascontiguousarray(known.L[e, low:, low:]), S)
+        V -= np.ascontiguousarray(known.K[e, :NAV, low:]) @ S
         row += m
 
 
 def signatures(
-    seen: Motion, first: Ints, last: Ints, kind: Ints, output: PassOutput,
-    values: Floats, channel: Ints, parameter: Ints, latitude: float, weight: Floats | None, W: Floats,
-) -> None:  # fmt: skip
+    seen: Motion,
+    epochs: Epochs,
+    output: PassOutput,
+    regressors: Regressors,
+    latitude: float,
+    weight: Floats | None,
+    W: Floats,
+) -> None:
     """Signatures of q parameters in the whitened innovations of a navigation filter.
 
     Parameters
     ----------
     seen : Motion
         Predicted motion, n cycles.
-    first, last, kind : ndarray of int, shape (e,)
-        Epochs, as in `filter_pass.PassInput`.
+    epochs : Epochs
     output : PassOutput
         Of the pass with known coefficients, with its matrices kept.
-    values : ndarray, shape (n, m)
-        Regressor columns.
-    channel, parameter : ndarray of int, shape (m,)
-        Sensor axis and parameter of each column.
+    regressors : Regressors
+        In m columns.
     latitude : float
         Of the site (rad).
     weight : ndarray, shape (n, 6, 6), or None
@@ -147,20 +203,48 @@ def signatures(
     W : ndarray, shape (rows, q)
         Filled; rows in the order of `measured_rows`.
     """
-    _signatures(
-        np.ascontiguousarray(seen.C_nb), np.ascontiguousarray(seen.f), seen.dt, first, last, kind,
-        np.ascontiguousarray(values), channel, parameter, W.shape[1], earth.earth_rate(latitude),
-        _or_none(weight), output.Phi, output.H, output.L, output.K, W,
-    )  # fmt: skip
+    whole = regressors._replace(values=np.ascontiguousarray(regressors.values))
+    _signatures(_cycles(seen), epochs, whole, earth.earth_rate(latitude), _or_none(weight), _filter(output), W)
+
+
+def _cycles(seen: Motion) -> _Cycles:
+    return _Cycles(seen.t, np.ascontiguousarray(seen.C_nb), np.ascontiguousarray(seen.f), seen.dt)
+
+
+def _filter(output: PassOutput) -> _Filter:
+    return _Filter(output.Phi, output.H, output.L, output.K)
+
+
+@compiled
+def _add_constant(share: float, column: int, response: Floats, V: Floats) -> None:
+    """Add a constant error of each axis over a `share` of a cycle to V (9, ...); response (6, 9)."""
+    for s in range(6):
+        for i in range(NAV):
+            V[i, column + s] += share * response[s, i]
+
+
+@compiled
+def _add_integral(share: float, column: int, direct: Floats, D: Floats) -> None:
+    """Add what it makes of the integrals of the corrected sensors to D (6, ...); direct (6, 6) (s)."""
+    for s in range(6):
+        for i in range(6):
+            D[i, column + s] += share * direct[s, i]
+
+
+@compiled
+def _add_own_integral(seconds: float, column: int, D: Floats) -> None:
+    """Add the integral of each sensor of its own constant error to D (6, ...)."""
+    for s in range(6):
+        D[s, column + s] += seconds
 
 
 @compiled
 def _constant_signatures(
-    t: Floats, C_nb: Floats, f_b: Floats, dt: Floats, first: Ints, last: Ints, kind: Ints,
-    start: Floats, end: Floats, w_ie: Floats, weight: Floats,
-    Phi: Floats, H: Floats, L: Floats, K: Floats, W: Floats,
-) -> None:  # fmt: skip
+    cycles: _Cycles, epochs: Epochs, start: Floats, end: Floats, w_ie: Floats, weight: Floats, known: _Filter, W: Floats
+) -> None:
     """Fill W (rows, 6 s): a constant error of each axis in each of s stretches, which follow each other."""
+    t, C_nb, f_b, dt = cycles.t, cycles.C_nb, cycles.f_b, cycles.dt
+    first, last, kind = epochs.first, epochs.last, epochs.kind
     count = start.shape[0]
     V = np.zeros((NAV, 6 * count))
     D = np.zeros((6, 6 * count))
@@ -175,7 +259,7 @@ def _constant_signatures(
             row += m
             continue
         _responses(C_nb[a:b], f_b[a:b], dt[a:b], w_ie, weight[a:b], f_n, R, direct)
-        V = Phi[e] @ V
+        V = known.Phi[e] @ V
         D[:, :] = 0.0
         for k in range(count):
             if t[b - 1] <= start[k] or t[a] - dt[a] >= end[k]:
@@ -185,35 +269,37 @@ def _constant_signatures(
                 if share <= 0.0:
                     continue
                 share = min(share, 1.0)
-                for s in range(6):
-                    for i in range(NAV):
-                        V[i, 6 * k + s] += share * R[c - a, s, i]
-                    if weight.shape[0]:
-                        for i in range(6):
-                            D[i, 6 * k + s] += share * direct[c - a, s, i]
-                    else:
-                        D[s, 6 * k + s] += share * dt[c]
+                _add_constant(share, 6 * k, R[c - a], V)
+                if weight.shape[0]:
+                    _add_integral(share, 6 * k, direct[c - a], D)
+                else:
+                    _add_own_integral(share * dt[c], 6 * k, D)
         if m == 0:
             continue
-        S = np.ascontiguousarray(H[e, low:, :NAV]) @ V
+        S = np.ascontiguousarray(known.H[e, low:, :NAV]) @ V
         S[6 - low :] += D / dt[a:b].sum()
-        W[row : row + m] = whiten(np.ascontiguousarray(L[e, low:, low:]), S)
-        V -= np.ascontiguousarray(K[e, :NAV, low:]) @ S
+        W[row : row + m] = whiten(np.ascontiguousarray(known.L[e, low:, low:]), S)
+        V -= np.ascontiguousarray(known.K[e, :NAV, low:]) @ S
         row += m
 
 
 def constant_signatures(
-    seen: Motion, first: Ints, last: Ints, kind: Ints, output: PassOutput,
-    start: Floats, end: Floats, latitude: float, weight: Floats | None, W: Floats,
-) -> None:  # fmt: skip
+    seen: Motion,
+    epochs: Epochs,
+    output: PassOutput,
+    start: Floats,
+    end: Floats,
+    latitude: float,
+    weight: Floats | None,
+    W: Floats,
+) -> None:
     """Signatures of a constant error of each sensor axis in each of s stretches of time.
 
     Parameters
     ----------
     seen : Motion
         Predicted motion, n cycles.
-    first, last, kind : ndarray of int, shape (e,)
-        Epochs, as in `filter_pass.PassInput`.
+    epochs : Epochs
     output : PassOutput
         Of the pass with known coefficients, with its matrices kept.
     start, end : ndarray, shape (s,)
@@ -226,10 +312,15 @@ def constant_signatures(
         Filled from the first stretch on, per rad/s or m/s^2, and left as it is before; column ``6 stretch + axis``.
     """
     _constant_signatures(
-        seen.t, np.ascontiguousarray(seen.C_nb), np.ascontiguousarray(seen.f), seen.dt, first, last, kind,
-        np.ascontiguousarray(start), np.ascontiguousarray(end), earth.earth_rate(latitude), _or_none(weight),
-        output.Phi, output.H, output.L, output.K, W,
-    )  # fmt: skip
+        _cycles(seen),
+        epochs,
+        np.ascontiguousarray(start),
+        np.ascontiguousarray(end),
+        earth.earth_rate(latitude),
+        _or_none(weight),
+        _filter(output),
+        W,
+    )
 
 
 def _or_none(weight: Floats | None) -> Floats:

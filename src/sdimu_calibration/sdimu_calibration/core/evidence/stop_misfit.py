@@ -6,14 +6,16 @@ import numpy as np
 
 from sdimu_calibration.core.alignment.prepared import PreparedData
 from sdimu_calibration.core.arrays import Floats
+from sdimu_calibration.core.note import Note, Topic
 from sdimu_calibration.core.probability import normal_limit
+from sdimu_calibration.core.wording import Work
 
 _KINDS = ("position", "velocity", "gyro", "accelerometer")
 _FALSE_ALARM = 1e-4
 """Share of sound tests with a false alarm: whoever is sent to look at a stop must find something there."""
 
 
-def stop_misfit(normalised: Floats, prepared: PreparedData) -> str | None:
+def stop_misfit(normalised: Floats, prepared: PreparedData) -> Note | None:
     """Name the stop and kind of measurement that fits worst, if it is no chance.
 
     The whitened innovations of a right model are independent standard normals, so their sum over a stop divided by
@@ -27,7 +29,7 @@ def stop_misfit(normalised: Floats, prepared: PreparedData) -> str | None:
 
     Returns
     -------
-    str or None
+    Note or None
         One line for people.
     """
     white, stop = normalised, prepared.phases.stop
@@ -45,7 +47,8 @@ def stop_misfit(normalised: Floats, prepared: PreparedData) -> str | None:
     if abs(z[k, row]) <= limit:
         return None
     kind = _KINDS[row // 3]
-    return (
+    told = (
         f"stop {numbers[k]} does not fit: {kind} is off by {abs(z[k, row]):.1f} sigma (chance ends at {limit:.1f}); "
-        "look at the data there, or run: sdimu diagnose"
+        "look at the data there"
     )
+    return Note(told, Topic.MISFIT, f", or run: {Work.DIAGNOSE}")

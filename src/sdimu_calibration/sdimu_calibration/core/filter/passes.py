@@ -34,6 +34,7 @@ from sdimu_calibration.core.navigation.track import motion
 from sdimu_calibration.core.progress import Progress
 from sdimu_calibration.core.recording import DataError, DivergedError
 from sdimu_calibration.core.rotation import rotation_matrix, rotation_vector
+from sdimu_calibration.core.wording import Option
 
 CONVERGED = 0.02
 """Largest movement of a coefficient (sigma) at which the passes end: smaller ones change no report."""
@@ -240,7 +241,8 @@ def check_finite(state: PassState) -> None:
     """
     if not (np.isfinite(state.x).all() and np.isfinite(state.P).all() and (np.diag(state.P) >= 0.0).all()):
         raise DivergedError(
-            "the filter diverged: the recording contradicts the IMU's specification; check --imu and --site"
+            f"the filter diverged: the recording contradicts the IMU's specification; check {Option.IMU} and "
+            f"{Option.SITE}"
         )
 
 

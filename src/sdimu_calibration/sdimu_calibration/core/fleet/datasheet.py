@@ -23,6 +23,7 @@ from sdimu_calibration.core.noise import Terms
 from sdimu_calibration.core.probability import normal_limit, student_limit
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.units import from_si
+from sdimu_calibration.core.wording import Option, Work
 
 _FIXED = 1e-6
 """Share of the largest sigma of an effect below which one is rounding: the body frame makes the coefficient zero."""
@@ -221,7 +222,7 @@ def _what_would(effects: Sequence[Effect]) -> str:
     first = effects[0]
     needs = [*sorted(e.value for e in first.excitation), *(["a recorded temperature"] if first.needs else [])]
     told = f"; needs {', '.join(needs)}" if needs else ""
-    return f"add it to the model: sdimu calibrate BAG --add {first.name}{told}"
+    return f"add it to the model: {Work.CALIBRATE} BAG {Option.ADD} {first.name}{told}"
 
 
 def _repeatability(term: str, effect: Effect, samples: Sequence[Sample]) -> Line:
@@ -241,7 +242,8 @@ def _repeatability(term: str, effect: Effect, samples: Sequence[Sample]) -> Line
     rows = _one_a_power_on(_rows([effect], samples))
     groups = rows.groups
     if len(set(groups)) == len(groups):
-        return replace(empty, missing="record the unit after two power-ons at least, and state them: --power-on")
+        missing = f"record the unit after two power-ons at least, and state them: {Option.POWER_ON}"
+        return replace(empty, missing=missing)
     found = random_effect(rows.value, rows.sigma, groups)
     repeated = {unit for unit, group in zip(rows.unit, groups, strict=True) if groups.count(group) > 1}
     return replace(
@@ -268,7 +270,7 @@ def _one_a_power_on(rows: _Rows) -> _Rows:
     )  # fmt: skip
 
 
-_LONG_REST = "record it at rest for hours: sdimu noise BAG, and give its folder with --noise"
+_LONG_REST = f"record it at rest for hours: {Work.NOISE} BAG, and give its folder with {Option.NOISE}"
 _NOISE = {
     ("gyro", "white"): Line("gyro angle random walk", "rad/s/sqrt(Hz)", "deg/sqrt(h)", missing=_LONG_REST),
     ("gyro", "instability"): Line("gyro bias in-run stability", "rad/s", "deg/h", missing=_LONG_REST),

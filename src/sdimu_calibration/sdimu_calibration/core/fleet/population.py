@@ -18,6 +18,7 @@ from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.fleet.reml import RandomEffect, random_effect, spread_and_mean
 from sdimu_calibration.core.probability import student_tail
 from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.wording import Option, Work
 
 FALSE_ALARM = 0.05
 """Probability that a clean population has a unit out, over all units and coefficients: as of a single test."""
@@ -173,7 +174,7 @@ def population(fleet: Measured) -> Population:
     if len(units) < FEWEST_UNITS:
         raise DataError(
             f"fleet: {len(fleet.serials)} results of {len(units)} units that fit together; a population needs "
-            f"{FEWEST_UNITS} units (state who is who with: sdimu calibrate --serial)"
+            f"{FEWEST_UNITS} units (state who is who with: {Work.CALIBRATE} {Option.SERIAL})"
         )
     found = tuple(_coefficient(fleet, k) for k in range(len(fleet.names)))
     return Population(units, found, _out(units, found))

@@ -38,6 +38,7 @@ from sdimu_calibration.core.handheld.whole_turns import whole_turns, with_whole_
 from sdimu_calibration.core.recording import DataError, DataFault, Recording
 from sdimu_calibration.core.specification import ImuSpecification, Site
 from sdimu_calibration.core.units import STANDARD_GRAVITY, from_si
+from sdimu_calibration.core.wording import Option, Work
 
 FEWEST_RESTS = 6
 """Number of rests at least: scale and bias of three accelerometers need as many attitudes."""
@@ -102,7 +103,7 @@ def _too_few(recording: Recording, count: int) -> str:
     return (
         f"{rests} in different attitudes, and no turn between them is recorded: a handheld calibration needs "
         f"{FEWEST_RESTS} rests and more, a navigated one the turns. Record on while the IMU is turned, add attitudes, "
-        "or part the attitudes (sdimu bag cut) and calibrate them as a set: sdimu calibrate A B ..."
+        f"or part the attitudes ({Work.CUT}) and calibrate them as a set: {Work.CALIBRATE} A B ..."
     )
 
 
@@ -186,7 +187,7 @@ def _whole_note(run: HandheldRun) -> list[str]:
         return []
     return [
         f"{len(found)} turns are about the vertical by nearly a multiple of 360 deg, which gravity does not show: if "
-        "the IMU was put back where it was, say how well, such as --whole-turns '1 deg'"
+        f"the IMU was put back where it was, say how well, such as {Option.WHOLE_TURNS} '1 deg'"
     ]
 
 

@@ -29,6 +29,7 @@ from sdimu_calibration.core.handheld.handheld_data import HandheldRun, seen_at_r
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.results import Rest
 from sdimu_calibration.core.rotation import rotation_matrix, rotation_vector, skew
+from sdimu_calibration.core.wording import Option
 
 CONVERGED = 1e-3
 """Largest step of a coefficient (sigma) at which Gauss-Newton ends: smaller ones change no report."""
@@ -174,8 +175,8 @@ def fit_run(run: HandheldRun, scene: FitPriors, start: LinearisationPoint) -> Ha
         if moved < CONVERGED and settled and steps > 2:
             return _finish(run, scene, point, steps)
     raise DataError(
-        "the handheld run does not fit any IMU of the specification: check the units, and that --imu is as wide as "
-        "the sensor's errors"
+        f"the handheld run does not fit any IMU of the specification: check the units, and that {Option.IMU} is as "
+        "wide as the sensor's errors"
     )
 
 

@@ -14,6 +14,7 @@ import numpy as np
 from sdimu_calibration.core.arrays import Ints
 from sdimu_calibration.core.handheld.handheld_data import HandheldRun
 from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.wording import Option
 
 _SAME_SIDE = np.radians(5.0)
 """Largest angle between the forces before and after (rad): the same side lies on the desk."""
@@ -65,7 +66,7 @@ def with_whole_turns(run: HandheldRun, sigma: float) -> HandheldRun:
     found = whole_turns(run)
     if not len(found):
         raise DataError(
-            "/imu/data_raw: --whole-turns: no turn about the vertical comes near a multiple of 360 deg, with rests on "
-            "the same side before and after it"
+            f"/imu/data_raw: {Option.WHOLE_TURNS}: no turn about the vertical comes near a multiple of 360 deg, with "
+            "rests on the same side before and after it"
         )
     return replace(run, whole=found, whole_sigma=sigma)

@@ -163,9 +163,11 @@ class Combination:
         d = self.d.sum(axis=0) - np.einsum("gvp,gv->p", right[:, :, :-1], X[:, :, -1])
         A = J + np.diag(self.weight)
         likelihood = 0.5 * (
-            np.einsum("gv,gv->", right[:, :, -1], X[:, :, -1]) - np.linalg.slogdet(M)[1].sum()
-            - np.linalg.slogdet(A)[1] + d @ np.linalg.solve(A, d)
-        )  # fmt: skip
+            np.einsum("gv,gv->", right[:, :, -1], X[:, :, -1])
+            - np.linalg.slogdet(M)[1].sum()
+            - np.linalg.slogdet(A)[1]
+            + d @ np.linalg.solve(A, d)
+        )
         return float(likelihood), Information(J, d), np.asarray(inverse), right
 
     def estimate(self, tau: Floats) -> JointEstimate:
@@ -185,6 +187,5 @@ class Combination:
         var_u = np.diagonal(inverse + gain @ covariance @ np.swapaxes(gain, 1, 2), axis1=1, axis2=2)
         unit = self.unit[self.varying] * D
         return JointEstimate(
-            values * self.unit, covariance * np.outer(self.unit, self.unit), u * unit, np.sqrt(var_u) * unit,
-            likelihood,
-        )  # fmt: skip
+            values * self.unit, covariance * np.outer(self.unit, self.unit), u * unit, np.sqrt(var_u) * unit, likelihood
+        )

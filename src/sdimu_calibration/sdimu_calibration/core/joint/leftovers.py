@@ -71,9 +71,12 @@ class Leftovers:
         """
         square = np.ix_(keep, keep)
         return Leftovers(
-            self.score[keep], self.gram[square], self.sensor[keep], self.recording[keep],
+            self.score[keep],
+            self.gram[square],
+            self.sensor[keep],
+            self.recording[keep],
             {kind: value[square] for kind, value in self.likeness.items()},
-        )  # fmt: skip
+        )
 
     def pairs(self, kind: str) -> int:
         """Count the pairs of dwells of two recordings that are alike in a kind."""
@@ -90,9 +93,12 @@ class Leftovers:
             a, b = self.likeness[first][square], self.likeness[second][square]
             both = [
                 b[row, theirs[int(np.argmax(a[row, theirs]))]] > _ALIKE
-                for row in range(len(mine)) for k in np.unique(of) if k != of[row]
-                for theirs in [np.flatnonzero(of == k)] if a[row, theirs].max() > _ALIKE
-            ]  # fmt: skip
+                for row in range(len(mine))
+                for k in np.unique(of)
+                if k != of[row]
+                for theirs in [np.flatnonzero(of == k)]
+                if a[row, theirs].max() > _ALIKE
+            ]
             shares.append(float(np.mean(both)) if both else 0.0)
         return max(shares)
 
@@ -106,11 +112,6 @@ def leftovers(fit: SetFit, run: Run) -> Leftovers:
         With everything that was found.
     run : callable
         Does the jobs.
-
-    Raises
-    ------
-    DataError
-        When a recording cannot be read again.
     """
     reports = _asked(fit, run)
     fit = replace(fit, reports=tuple(reports))
@@ -139,12 +140,18 @@ def _asked(fit: SetFit, run: Run) -> list[Report]:
     places = [k for k in range(len(columns)) if k in asked]
     jobs = [
         Job(
-            fit.members[k], fit.model, fit.reports[k].estimator, tuple(fit.local.get(fit.members[k].name, ())),
-            about=fit.values_of(fit.reports[k]), imu=fit.reports[k].imu, start=fit.reports[k].start,
-            noise=fit.reports[k].noise, stretches=True,
+            fit.members[k],
+            fit.model,
+            fit.reports[k].estimator,
+            tuple(fit.local.get(fit.members[k].name, ())),
+            about=fit.values_of(fit.reports[k]),
+            imu=fit.reports[k].imu,
+            start=fit.reports[k].start,
+            noise=fit.reports[k].noise,
+            stretches=True,
         )
         for k in places
-    ]  # fmt: skip
+    ]
     reports = list(fit.reports)
     for k, fresh in zip(places, run(jobs), strict=True):
         if isinstance(fresh, DataError):
@@ -184,10 +191,12 @@ def _scaled(J: Floats, d: Floats, reports: Sequence[Report], fit: SetFit) -> Lef
         unit[sensor == channel] = 1.0 / np.sqrt(size) if size > 0.0 else 0.0
     alike = likeness(up, t / max(r.times.duration for r in reports), heat)
     return Leftovers(
-        d * unit, J * np.outer(unit, unit), sensor,
+        d * unit,
+        J * np.outer(unit, unit),
+        sensor,
         np.repeat(np.arange(len(dwells)), [count * len(p) for p in dwells]),
         {kind: np.repeat(np.repeat(value, count, 0), count, 1) for kind, value in alike.items()},
-    )  # fmt: skip
+    )
 
 
 def likeness(up: Floats, t: Floats, temperature_degc: Floats) -> dict[str, Floats]:

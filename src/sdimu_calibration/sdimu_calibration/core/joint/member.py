@@ -169,13 +169,7 @@ class Report:
 
 
 def run(job: Job) -> Report:
-    """Do a job.
-
-    Raises
-    ------
-    DataError
-        When the recording cannot be used; it names the recording.
-    """
+    """Do a job."""
     try:
         return _report(job, fitted(job))
     except DataError as error:
@@ -191,13 +185,7 @@ def tried(job: Job) -> Report | DataError:
 
 
 def fitted(job: Job) -> Fit:
-    """Fit the recording of a job.
-
-    Raises
-    ------
-    DataError
-        When the recording cannot be used.
-    """
+    """Fit the recording of a job."""
     test = job.member.open()
     model = replace(job.model, effects=(*job.model.effects, *job.local))
     if job.imu is not None:
@@ -237,17 +225,29 @@ def _report(job: Job, fit: Fit) -> Report:
         found, places = reduced(fit.evidence([*shared, *own]), fit.noise_terms), None
     log = recording.temperature
     return Report(
-        name, job.member.serial, job.member.power_on, _named(found, job, shared), fit.estimator,
-        fit.reason, fit.test.imu, fit.start, recording.start_ns, fit.timetable,
+        name,
+        job.member.serial,
+        job.member.power_on,
+        _named(found, job, shared),
+        fit.estimator,
+        fit.reason,
+        fit.test.imu,
+        fit.start,
+        recording.start_ns,
+        fit.timetable,
         float("nan") if log is None or not len(log.t) else float(np.mean(log.value)),
-        fit.data_counts(), fit.statistics(), fit.names,
+        fit.data_counts(),
+        fit.statistics(),
+        fit.names,
         fit.values if job.about is None else np.empty(0),
         np.sqrt(np.diag(fit.covariance)) if job.about is None else np.empty(0),
         (*recording.notes, *map(term_in_words, fit.noise_terms), *((NO_AZIMUTH,) if fit.azimuth_free else ())),
         tuple(f.text for f in fit.faults if f.grave),
-        _heading(fit), fit.noise_terms,
-        _widened(fit), places,
-    )  # fmt: skip
+        _heading(fit),
+        fit.noise_terms,
+        _widened(fit),
+        places,
+    )
 
 
 def _heading(fit: Fit) -> float:

@@ -142,9 +142,13 @@ def recurrence(left: Leftovers) -> Recurrence | None:
     found = [kind for kind in KINDS if alone.largest(kind) > alone.limit]
     answer, apart = (found, True) if len(found) < 2 else _needed(left, main, found)
     return Recurrence(
-        tuple(answer), apart, tuple(_kind(left, main, alone, k) for k in KINDS), alone.limit,
-        tuple(CHANNELS[g] for g in main), min(1.0, len(tests) * min(t.p_value for t in tests.values())),
-    )  # fmt: skip
+        tuple(answer),
+        apart,
+        tuple(_kind(left, main, alone, k) for k in KINDS),
+        alone.limit,
+        tuple(CHANNELS[g] for g in main),
+        min(1.0, len(tests) * min(t.p_value for t in tests.values())),
+    )
 
 
 def _needed(left: Leftovers, main: Sequence[int], found: Sequence[str]) -> tuple[Sequence[str], bool]:

@@ -11,11 +11,7 @@ from sdimu_calibration.core.joint.recurrence import Kind, Recurrence
 
 _WORDS = {ATTITUDE: "attitude", TIME: "time after the start", TEMPERATURE: "temperature"}
 _BELONGS = {ATTITUDE: "the sensor", TIME: "the warm-up", TEMPERATURE: "the temperature"}
-_NEXT = {
-    ATTITUDE: Advice(Do.TRY_FORCE_EQUATION),
-    TIME: Advice(Do.BEGIN_LATER),
-    TEMPERATURE: Advice(Do.SOAK_MORE),
-}
+_NEXT = {ATTITUDE: Advice(Do.TRY_FORCE_EQUATION), TIME: Advice(Do.BEGIN_LATER), TEMPERATURE: Advice(Do.SOAK_MORE)}
 
 
 def answer_in_words(found: Recurrence, unexplained: bool) -> str:

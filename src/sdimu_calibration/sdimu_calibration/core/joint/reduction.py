@@ -75,9 +75,15 @@ def reduced(evidence: LinearEvidence, terms: tuple[NoiseTerm, ...] = ()) -> Redu
     A, y = compressed(W, e)
     point = -evidence.shift[:p]
     return Reduction(
-        evidence.names[:p], evidence.names[own:], A, y + A[:, :p] @ point, point, evidence.weight[:p],
-        len(evidence.e), float(e @ e - y @ y),
-    )  # fmt: skip
+        evidence.names[:p],
+        evidence.names[own:],
+        A,
+        y + A[:, :p] @ point,
+        point,
+        evidence.weight[:p],
+        len(evidence.e),
+        float(e @ e - y @ y),
+    )
 
 
 def compressed(W: Floats, e: Floats) -> tuple[Floats, Floats]:

@@ -22,12 +22,14 @@ from sdimu_calibration.core.joint.set_fit import Run, SetFit, SetOptions
 from sdimu_calibration.core.joint.set_result import SCATTERS, base_fit, set_outcome
 from sdimu_calibration.core.joint.set_search import SetSearch, as_given, search_set
 from sdimu_calibration.core.joint.set_standing import next_recording
+from sdimu_calibration.core.note import Topic, topic_of, without_advice
 from sdimu_calibration.core.plan_search import NextTurn
 from sdimu_calibration.core.progress import Progress, silent
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.units import from_si
 from sdimu_calibration.core.verdict import Verdict
+from sdimu_calibration.core.wording import Work
 
 _STILL_WRONG = 1.25
 """Held-out error (sigma) from which a model is not called explained, as for one recording, where chance does not
@@ -107,18 +109,16 @@ class SetDiagnosis:
 
 
 def diagnose_set(
-    members: Sequence[Member], options: SetOptions, run: Run, extra: Sequence[Effect] = (),
-    progress: Progress = silent, fitted: SetFit | None = None,
-) -> SetDiagnosis:  # fmt: skip
-    """Find what the model of a set misses; parameters as for `search_set`.
-
-    Raises
-    ------
-    DataError
-        When the set cannot be fitted, or holds one recording.
-    """
+    members: Sequence[Member],
+    options: SetOptions,
+    run: Run,
+    extra: Sequence[Effect] = (),
+    progress: Progress = silent,
+    fitted: SetFit | None = None,
+) -> SetDiagnosis:
+    """Find what the model of a set misses; parameters as for `search_set`."""
     if len(members) < 2:
-        raise DataError("a set of one recording: diagnose it by itself (sdimu diagnose BAG)")
+        raise DataError(f"a set of one recording: diagnose it by itself ({Work.DIAGNOSE} BAG)")
     found = search_set(members, options, run, extra, progress, fitted=fitted)
     progress("report", 0.95)
     before = set_outcome(found.before)
@@ -143,10 +143,19 @@ def diagnose_set(
     without = _error_without(found)
     sentence = f"{_sentence(word, findings, (without, after), again)} {taken_back}".strip()
     return SetDiagnosis(
-        word, sentence, findings, before, after, found.threshold,
-        _advice(word, findings, next_recording(found.after, standing, test), again), standing, found.first, again,
-        refused, without,
-    )  # fmt: skip
+        word,
+        sentence,
+        findings,
+        before,
+        after,
+        found.threshold,
+        _advice(word, findings, next_recording(found.after, standing, test), again),
+        standing,
+        found.first,
+        again,
+        refused,
+        without,
+    )
 
 
 def _error_without(found: SetSearch) -> float | None:
@@ -161,10 +170,17 @@ def _findings(found: SetSearch) -> tuple[SetFinding, ...]:
     values, sigma = found.after.estimate.values, np.sqrt(np.diag(found.after.estimate.covariance))
     names = list(found.after.names)
     shared = [
-        (c.label, c.effect.title, "", names.index(c.parameter.name if c.parameter.name in names else c.label), z,
-         c.parameter, found.alike.get(c.label, ()))
+        (
+            c.label,
+            c.effect.title,
+            "",
+            names.index(c.parameter.name if c.parameter.name in names else c.label),
+            z,
+            c.parameter,
+            found.alike.get(c.label, ()),
+        )
         for c, z in zip(found.chosen, found.z, strict=True)
-    ]  # fmt: skip
+    ]
     own = []
     for find in found.local:
         effect = resolve(find.key)
@@ -258,8 +274,8 @@ def _rises(before: Calibration, after: Calibration) -> bool:
 
 
 def _odd(result: Calibration) -> str:
-    lines = [line for line in result.warnings if "not the same in all" in line]
-    return f" {lines[0].split('; run:')[0]}." if lines else ""
+    lines = without_advice(line for line in result.warnings if topic_of(line) == Topic.DIFFERS)
+    return f" {lines[0]}." if lines else ""
 
 
 def _rms(result: Calibration) -> str:
@@ -271,7 +287,9 @@ def _shown(value: float | None) -> str:
 
 
 def _advice(
-    word: Verdict, findings: Sequence[SetFinding], closing: Sequence[tuple[tuple[str, ...], NextTurn]],
+    word: Verdict,
+    findings: Sequence[SetFinding],
+    closing: Sequence[tuple[tuple[str, ...], NextTurn]],
     again: Recurrence | None,
 ) -> tuple[Advice, ...]:
     out = next_steps(again)

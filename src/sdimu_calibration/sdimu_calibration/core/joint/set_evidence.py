@@ -66,11 +66,19 @@ def set_evidence(fit: SetFit, candidates: Sequence[Candidate], local: Sequence[C
     _, prior = candidate_priors([c.effect for c in tried], imu)
     weight = prior_weight(fit.reports, fit.names)
     return SetEvidence(
-        e=y - A[:, :P] @ fit.estimate.values, W=A,
-        stop=np.repeat(np.arange(len(folds)), [len(f.y) for f in folds]), names=names, weight=weight,
-        shift=-fit.estimate.values, stated=1.0 / np.sqrt(weight), candidates=tuple(tried), prior=prior, imu=imu,
-        times=fit.reports[0].times, coefficients=P,
-    )  # fmt: skip
+        e=y - A[:, :P] @ fit.estimate.values,
+        W=A,
+        stop=np.repeat(np.arange(len(folds)), [len(f.y) for f in folds]),
+        names=names,
+        weight=weight,
+        shift=-fit.estimate.values,
+        stated=1.0 / np.sqrt(weight),
+        candidates=tuple(tried),
+        prior=prior,
+        imu=imu,
+        times=fit.reports[0].times,
+        coefficients=P,
+    )
 
 
 def _folds(fit: SetFit) -> list[list[list[int]]]:

@@ -13,14 +13,7 @@ from sdimu_calibration.core.effects.selection import resolve
 from sdimu_calibration.core.estimation.handheld_fit import HandheldFit
 from sdimu_calibration.core.estimation.second_order_fit import SecondOrderFit
 from sdimu_calibration.core.estimation.solve import AUTO, with_effects
-from sdimu_calibration.core.joint.combine import (
-    Combination,
-    Component,
-    JointEstimate,
-    Rows,
-    spread_out,
-    stacked,
-)
+from sdimu_calibration.core.joint.combine import Combination, Component, JointEstimate, Rows, spread_out, stacked
 from sdimu_calibration.core.joint.member import Job, Member, Report
 from sdimu_calibration.core.joint.scope import by_name, split_tag
 from sdimu_calibration.core.joint.turn_on import in_scatter, turn_on_scatter
@@ -28,6 +21,7 @@ from sdimu_calibration.core.progress import Progress, silent
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.results import TurnOn
 from sdimu_calibration.core.specification import Model
+from sdimu_calibration.core.wording import Option, Work
 
 Run = Callable[[Sequence[Job]], Sequence[Report | DataError]]
 """Does jobs, in any process; in the order of the jobs a report, or why there is none."""
@@ -147,11 +141,6 @@ def fit_set(
     before : SetFit, optional
         Of the same members with nearly the same model: the recordings are linearised about it.
     progress : callable
-
-    Raises
-    ------
-    DataError
-        When the recordings are of several units, one stands twice, or fewer than two of several can be used.
     """
     check_members(members)
     if options.model.priors:
@@ -212,13 +201,7 @@ def _noise_of(late: Mapping[str, Report], fit: SetFit, options: SetOptions, run:
 
 
 def check_members(members: Sequence[Member]) -> None:
-    """Refuse recordings that are no set.
-
-    Raises
-    ------
-    DataError
-        When a name stands twice, or the recordings are of several units.
-    """
+    """Refuse recordings that are no set."""
     names = [m.name for m in members]
     for name in names:
         if names.count(name) > 1:
@@ -227,7 +210,7 @@ def check_members(members: Sequence[Member]) -> None:
     if len(serials) > 1:
         raise DataError(
             f"the recordings are of several units ({', '.join(serials)}): a joint fit is of one; calibrate each by "
-            "itself, then compare them with sdimu fleet"
+            f"itself, then compare them with {Work.FLEET}"
         )
 
 
@@ -237,13 +220,7 @@ def _why(member: Member, error: DataError) -> str:
 
 
 def _check_different(reports: Sequence[Report]) -> None:
-    """Refuse a recording that stands twice, by another path or as a copy: it would count as two that agree.
-
-    Raises
-    ------
-    DataError
-        When two recordings start at the same time and have the same own fit.
-    """
+    """Refuse a recording that stands twice, by another path or as a copy: it would count as two that agree."""
     seen: dict[tuple[int, bytes], str] = {}
     for report in reports:
         first = seen.setdefault((report.start_ns, report.values.tobytes()), report.name)
@@ -252,27 +229,19 @@ def _check_different(reports: Sequence[Report]) -> None:
 
 
 def _check_one_grade(reports: Sequence[Report]) -> None:
-    """Refuse recordings of IMUs of different grades: they are of several units, whatever their serials say.
-
-    Raises
-    ------
-    DataError
-        When there are two grades.
-    """
+    """Refuse recordings of IMUs of different grades: they are of several units, whatever their serials say."""
     first: dict[str, Report] = {}
     for report in reports:
         first.setdefault(report.imu.grade, report)
     if len(first) > 1:
         told = ", ".join(f"{r.name}: {r.imu.name}, {grade}" for grade, r in first.items())
         raise DataError(
-            f"the recordings are of IMUs of different grades ({told}): a joint fit is of one unit; state its --imu if "
-            "it is one, else calibrate each by itself"
+            f"the recordings are of IMUs of different grades ({told}): a joint fit is of one unit; state its "
+            f"{Option.IMU} if it is one, else calibrate each by itself"
         )
 
 
-def job_of(
-    member: Member, options: SetOptions, about: SetFit | None, estimator: str = "", learn: bool = True
-) -> Job:
+def job_of(member: Member, options: SetOptions, about: SetFit | None, estimator: str = "", learn: bool = True) -> Job:
     """Make the job of a recording.
 
     Parameters
@@ -293,8 +262,16 @@ def job_of(
     report = next((r for r in about.reports if r.name == member.name), None)
     if report is not None:
         return Job(
-            member, options.model, report.estimator, local, (), False, about.values_of(report),
-            report.imu, report.start, None if learn else report.noise,
+            member,
+            options.model,
+            report.estimator,
+            local,
+            (),
+            False,
+            about.values_of(report),
+            report.imu,
+            report.start,
+            None if learn else report.noise,
         )
     values = dict(zip(about.names, about.estimate.values.tolist(), strict=True))
     return Job(member, options.model, estimator or about.reports[0].estimator, local, about=values, noise=())
@@ -312,9 +289,7 @@ def with_own(fresh: Report, old: Report | None) -> Report:
     )
 
 
-def _one_estimator(
-    members: Sequence[Member], options: SetOptions, reports: Sequence[Report], run: Run
-) -> list[Report]:
+def _one_estimator(members: Sequence[Member], options: SetOptions, reports: Sequence[Report], run: Run) -> list[Report]:
     """Repeat the recordings of the filter by second-order passes where others need them: one frame for all."""
     kinds = {r.estimator for r in reports}
     if len(kinds) == 1 or kinds <= {HandheldFit.estimator, SecondOrderFit.estimator}:
@@ -361,11 +336,6 @@ def varying_effects(model: Model, scopes: Mapping[str, str], names: Sequence[str
         Scopes by name of effect, in place of those of their traits.
     names : sequence of str
         Coefficients that the estimator has.
-
-    Raises
-    ------
-    DataError
-        When a scope is none, or of an effect that the model lacks.
     """
     effects = {e.family or e.name: e for e in (resolve(e) if isinstance(e, str) else e for e in model.effects)}
     for name, scope in scopes.items():
@@ -376,8 +346,9 @@ def varying_effects(model: Model, scopes: Mapping[str, str], names: Sequence[str
             )
     varying = {
         name: tuple(p.name for p in effect.parameters if p.name in names)
-        for name, effect in effects.items() if scopes.get(name, effect.scope) == "power-on"
-    }  # fmt: skip
+        for name, effect in effects.items()
+        if scopes.get(name, effect.scope) == "power-on"
+    }
     return {name: own for name, own in varying.items() if own}
 
 
@@ -404,9 +375,15 @@ def _combined(members: Sequence[Member], options: SetOptions, reports: Sequence[
     estimate, turn_on = _estimated(reports, names, varying)
     used = {r.name for r in reports}
     return SetFit(
-        tuple(m for m in members if m.name in used), options.model, dict(options.local), varying, tuple(reports), names,
-        estimate, turn_on,
-    )  # fmt: skip
+        tuple(m for m in members if m.name in used),
+        options.model,
+        dict(options.local),
+        varying,
+        tuple(reports),
+        names,
+        estimate,
+        turn_on,
+    )
 
 
 def _estimated(

@@ -15,6 +15,7 @@ from sdimu_calibration.core.joint.member import Report, fitted
 from sdimu_calibration.core.joint.set_evidence import held_out
 from sdimu_calibration.core.joint.set_fit import SetFit, SetOptions, job_of
 from sdimu_calibration.core.joint.variation import Variation, variation
+from sdimu_calibration.core.note import Note, Topic
 from sdimu_calibration.core.origin import Origin, measured
 from sdimu_calibration.core.results import (
     START_TEMPERATURE,
@@ -26,6 +27,7 @@ from sdimu_calibration.core.results import (
     no_history,
 )
 from sdimu_calibration.core.units import from_si
+from sdimu_calibration.core.wording import Work
 
 _LISTED = 4
 """Number of recordings that a line names: the table of the page has all."""
@@ -153,15 +155,18 @@ def _warnings(fit: SetFit, varied: Variation, names: Sequence[str]) -> tuple[str
     ]  # fmt: skip
     trends = {t.name: t for t in varied.trends if t.p_value < SCATTERS}
     lines = [
-        f"{name} is not the same in all recordings (p {p:.1g})"
-        + (f"; it follows {trends[name].covariate}" if name in trends else "") + "; run: sdimu diagnose"
+        Note(
+            f"{name} is not the same in all recordings (p {p:.1g})"
+            + (f"; it follows {trends[name].covariate}" if name in trends else ""),
+            Topic.DIFFERS, f"; run: {Work.DIAGNOSE}",
+        )
         for p, name in sorted(odd)
-    ]
+    ]  # fmt: skip
     left_out = [f"{name} is left out: {why}" for name, why in fit.left_out]
     return (*left_out, *_misfit(fit), *lines, *(f"{r.name}: {text}" for r in fit.reports for text in r.warnings))
 
 
-def _misfit(fit: SetFit) -> list[str]:
+def _misfit(fit: SetFit) -> list[Note]:
     """Name the recordings whose innovations are larger than white noise makes them, the worst first."""
     nis = {r.name: r.statistics.nis_mean for r in fit.reports}
     bad = sorted((name for name, value in nis.items() if value > MISFIT), key=lambda name: -nis[name])
@@ -169,9 +174,12 @@ def _misfit(fit: SetFit) -> list[str]:
         return []
     told = ", ".join(f"{name} {nis[name]:.3g}" for name in bad[:_LISTED]) + (" and others" if bad[_LISTED:] else "")
     return [
-        f"the model in white noise does not fit (NIS of {told}; 1 is right): physics is missing, or the noise has a "
-        "memory; run: sdimu diagnose"
-    ]
+        Note(
+            f"the model in white noise does not fit (NIS of {told}; 1 is right): physics is missing, or the noise has "
+            "a memory",
+            Topic.MISFIT, f"; run: {Work.DIAGNOSE}",
+        )
+    ]  # fmt: skip
 
 
 def _summary(fit: SetFit, varied: Variation, names: Sequence[str], base: Fit) -> SetSummary:

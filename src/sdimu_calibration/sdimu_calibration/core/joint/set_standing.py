@@ -59,9 +59,11 @@ def set_standing(
     # With one power-on nobody knows how far the next one is off: as far as the prior says.
     scatter = np.minimum([sizes.get(name, 0.0) for name in known.names], known.prior)
     return Standing(
-        replace(known, scatter=np.where(np.isfinite(scatter), scatter, 0.0)), tuple(labels), tuple(classes),
+        replace(known, scatter=np.where(np.isfinite(scatter), scatter, 0.0)),
+        tuple(labels),
+        tuple(classes),
         fit.reports[0].imu.name,
-    )  # fmt: skip
+    )
 
 
 def next_recording(fit: SetFit, standing: Standing, test: PreparedTest) -> list[tuple[tuple[str, ...], NextTurn]]:

@@ -79,9 +79,10 @@ def stretch_rows(fit: Fit) -> tuple[Reduction, Places]:
     cut, own = _dwells(evidence.times), len(evidence.weight)
     labels = [f"{name} in dwell {k}" for k in range(len(cut)) for name in CHANNELS]
     wide = replace(
-        evidence, W=np.hstack([evidence.W[:, :own], evidence.constant_signature(cut)]),
+        evidence,
+        W=np.hstack([evidence.W[:, :own], evidence.constant_signature(cut)]),
         names=(*evidence.names[:own], *labels),
-    )  # fmt: skip
+    )
     return reduced(wide), _places(evidence, cut, fit.test.recording.temperature)
 
 

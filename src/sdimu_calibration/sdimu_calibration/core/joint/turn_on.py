@@ -70,8 +70,10 @@ def in_scatter(combined: Combination, found: Sequence[TurnOn]) -> JointEstimate:
             for w, e in zip(weight, each, strict=True)
         )
         middle = sum(w * e.deviation for w, e in zip(weight, each, strict=True))
-        spread = spread - best.deviation_sigma**2 + sum(
-            w * (e.deviation_sigma**2 + (e.deviation - middle) ** 2) for w, e in zip(weight, each, strict=True)
+        spread = (
+            spread
+            - best.deviation_sigma**2
+            + sum(w * (e.deviation_sigma**2 + (e.deviation - middle) ** 2) for w, e in zip(weight, each, strict=True))
         )
     return replace(best, covariance=best.covariance + more, deviation_sigma=np.sqrt(spread))
 
@@ -107,8 +109,10 @@ def _best(combined: Combination, tau: Floats, k: int, scale: float) -> float:
         return 0.0
     found = minimize_scalar(
         lambda x: -_profile(combined, tau, k, float(np.exp(x))),
-        bounds=(grid[top - 1], grid[min(top + 1, _GRID - 1)]), method="bounded", options={"xatol": 1e-3},
-    )  # fmt: skip
+        bounds=(grid[top - 1], grid[min(top + 1, _GRID - 1)]),
+        method="bounded",
+        options={"xatol": 1e-3},
+    )
     return float(np.exp(found.x)) if -found.fun > _profile(combined, tau, k, 0.0) else 0.0
 
 

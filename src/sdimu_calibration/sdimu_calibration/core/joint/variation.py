@@ -74,9 +74,9 @@ def variation(fit: SetFit) -> Variation:
         seen = own > _SEEN**2 * scores.alone
         z = np.where(seen, scores.d / np.sqrt(own), np.nan)
         deviation = np.where(seen, scores.d / own, np.nan)
-    p_value = np.array([
-        _scatter(scores.gram[c], scores.d[:, c], scores.alone[:, c], seen[:, c]) for c in range(len(shared))
-    ])
+    p_value = np.array(
+        [_scatter(scores.gram[c], scores.d[:, c], scores.alone[:, c], seen[:, c]) for c in range(len(shared))]
+    )
     return Variation(
         tuple(shared), tuple(r.name for r in fit.reports), z, deviation, p_value, _trends(fit, shared, scores)
     )
@@ -132,9 +132,10 @@ def covariates(reports: Sequence[Report]) -> Mapping[str, Floats]:
     days = np.array([r.start_ns for r in reports], dtype=np.float64) / 86400e9
     order = np.argsort(np.argsort(days, kind="stable"), kind="stable").astype(np.float64)
     all_of = {
-        "temperature (degC)": np.array([r.temperature_degc for r in reports]), "date (d)": days - days.min(),
+        "temperature (degC)": np.array([r.temperature_degc for r in reports]),
+        "date (d)": days - days.min(),
         "order": order,
-    }  # fmt: skip
+    }
     return {name: x for name, x in all_of.items() if np.isfinite(x).all() and np.ptp(x) > 0.0}
 
 

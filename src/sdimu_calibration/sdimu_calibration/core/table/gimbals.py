@@ -11,6 +11,7 @@ from sdimu_calibration.core.plan import Plan
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.rotation import rotation_matrix
 from sdimu_calibration.core.table.description import AXES
+from sdimu_calibration.core.wording import Option
 
 PARALLEL_RAD = 1e-9
 """Largest angle (rad) between a gimbal axis and the platform axis it turns about: rounding of stated angles."""
@@ -116,7 +117,7 @@ def assign_turns(
                 raise DataError(
                     f"turn {furthest + 1} of plan {plan.name}: no gimbal axis is along {turn.axis} there "
                     f"{'within its limits ' if bounded else ''}"
-                    f"(the table turns {', '.join(axes)}; use --table free, or axes: free in the table's file)"
+                    f"(the table turns {', '.join(axes)}; use {Option.TABLE} free, or axes: free in the table's file)"
                 )
             untried.pop()
             angles.pop()

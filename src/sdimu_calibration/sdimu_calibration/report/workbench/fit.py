@@ -27,9 +27,10 @@ from sdimu_calibration.core.estimation.outcome import outcome
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.estimation.solve import solve, with_effects
 from sdimu_calibration.core.measurement_kind import SKIP
+from sdimu_calibration.core.note import without_advice
 from sdimu_calibration.core.progress import silent
 from sdimu_calibration.core.recording import DataError
-from sdimu_calibration.core.results import Calibration, no_history, without_advice
+from sdimu_calibration.core.results import Calibration, no_history
 from sdimu_calibration.core.specification import Model
 from sdimu_calibration.report import data
 from sdimu_calibration.report.workbench.axes import axes

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import reprlib
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, fields
@@ -12,15 +13,18 @@ import numpy as np
 
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.noise_term import NoiseTerm
+from sdimu_calibration.core.note import Note, Topic, without_advice
 from sdimu_calibration.core.origin import Origin
 from sdimu_calibration.core.plain_text import one_line
 from sdimu_calibration.core.recording import DataError, DataFault
-from sdimu_calibration.core.results import Calibration, History, Rest, without_advice
+from sdimu_calibration.core.results import Calibration, History, Rest
 from sdimu_calibration.core.verdict import Verdict
 from sdimu_calibration.storage.files import imu_noise, set_result_file
 from sdimu_calibration.storage.files.json_file import read_json, write_json
 
 FORMAT = "sdimu-result/1"
+_ADVISES = re.compile(r"(.*)([;:,](?: or)? run:? sdimu diagnose)")
+"""How a line of a file ends that advises a diagnosis."""
 _LATEST_NS = 2**63
 """A stamp of 64 bits ends there."""
 
@@ -108,7 +112,17 @@ def _word(value: Any) -> str:
 
 
 def _said(values: Sequence[Any]) -> tuple[str, ...]:
-    return tuple(one_line(str(value), None) for value in values)
+    return tuple(as_note(one_line(str(value), None)) for value in values)
+
+
+def as_note(line: str) -> str:
+    """Recognise in a line of a file the end that advises a diagnosis, and what the line is then about."""
+    found = _ADVISES.fullmatch(line)
+    if found is None:
+        return line
+    topic = Topic.DIFFERS if "is not the same in all recordings" in line else Topic.MISFIT
+    # A note on noise says that the model fits.
+    return Note(found[1], None if found[2].startswith(":") else topic, found[2])
 
 
 def _calibration(content: Mapping[str, Any]) -> Calibration:

@@ -1,0 +1,13 @@
+"""How the command line says what messages of the core ask for."""
+
+from __future__ import annotations
+
+
+def option(name: str) -> str:
+    """Return an option of a verb, from the name of its parameter."""
+    return f"--{name.replace('_', '-')}"
+
+
+def work(name: str) -> str:
+    """Return the command that starts a work."""
+    return f"sdimu {name}"
