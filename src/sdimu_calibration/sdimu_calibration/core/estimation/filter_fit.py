@@ -190,13 +190,7 @@ class FilterFit(NavigationFit):
         return (*super().notes(), *([heading] if heading else []))
 
     def warnings(self, statistics: dict[str, float | None]) -> tuple[str, ...]:
-        """Misfit, an azimuth that is too little known, coefficients outside the specification.
-
-        Raises
-        ------
-        DataError
-            When there is no fit at all.
-        """
+        """Misfit, an azimuth that is too little known, coefficients outside the specification."""
         lost = azimuth_is_lost(self, self.noise_terms)
         azimuth = _LOST if lost else azimuth_warning(self.solution)
         return (*super().warnings(statistics), *([azimuth] if azimuth else []))

@@ -239,15 +239,14 @@ class Fit(ABC):
         return ()
 
     def warnings(self, statistics: dict[str, float | None]) -> tuple[str, ...]:
-        """Say what speaks against the estimate, one line each; `statistics` with ``held_out_rms`` where it is known.
-
-        Raises
-        ------
-        DataError
-            When there is no fit at all.
-        """
+        """Say what speaks against the estimate, one line each; `statistics` with ``held_out_rms`` where it is known."""
         del statistics
         return ()
+
+    def contradiction(self, statistics: dict[str, float | None]) -> str:
+        """Say that the model does not fit at all, with these `statistics`; empty where it does."""
+        del statistics
+        return ""
 
     def rests(self) -> tuple[Rest, ...]:
         """Rests of a run by hand with their residuals; none where stops are measured."""
