@@ -1,4 +1,4 @@
-# make setup | demo | test | check | other-blas | colcon | wheels | bench | study | mutations | docs | pictures | grades | campaigns | lock : each does its own set-up and needs nothing before it.
+# make setup | demo | test | check | thorough | other-blas | colcon | wheels | bench | study | mutations | docs | pictures | grades | campaigns | lock : each does its own set-up and needs nothing before it.
 PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
@@ -47,8 +47,13 @@ check: setup
 	$(BIN)/mypy $(foreach package,$(PACKAGES),src/$(package)/$(package)) study/sdimu_study
 	$(BIN)/lint-imports
 
+# What every change must pass at once: some minutes. A file's tests stay on one worker, which makes its fixtures once.
 test: check
-	$(BIN)/python -m pytest -n 2 -m "not slow and not bench"
+	$(BIN)/python -m pytest -n 2 --dist loadfile -m "not thorough and not slow and not bench"
+
+# The rest of what must hold (test/tiers.py): tutorials, browser, faults, damaged files, nodes over DDS, campaigns.
+thorough: setup
+	$(BIN)/python -m pytest -n 2 --dist loadfile -m "thorough and not slow and not bench"
 
 # What linear algebra decides, with each of two kernels of OpenBLAS (with AVX2 and without AVX): no test stands on the last
 # digits of a library.
@@ -123,4 +128,4 @@ lock: setup
 	$(BIN)/python requirements/lock.py
 	$(BIN)/python requirements/vendored.py
 
-.PHONY: setup demo check test other-blas colcon wheels bench study mutations docs faults grades pictures campaigns lock
+.PHONY: setup demo check test thorough other-blas colcon wheels bench study mutations docs faults grades pictures campaigns lock
