@@ -71,6 +71,6 @@ def check_one_grade(reports: Sequence[Report]) -> None:
     if len(first) > 1:
         told = ", ".join(f"{r.name}: {r.imu.name}, {grade}" for grade, r in first.items())
         raise DataError(
-            f"the recordings are of IMUs of different grades ({told}): a joint fit is of one unit; state its {Option.IMU} if "
-            "it is one, else calibrate each by itself"
+            f"the recordings are of IMUs of different grades ({told}): a joint fit is of one unit; state its "
+            f"{Option.IMU} if it is one, else calibrate each by itself"
         )
