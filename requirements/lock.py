@@ -21,11 +21,12 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 FOLDER = Path(__file__).resolve().parent
-OWN = ("sdimu-calibration", "rate-table-sim", "sdimu-sim")
+USED = ("sdimu-calibration", "rate-table-sim", "sdimu-sim")
+OWN = (*USED, "sdimu-study")
 SETS = {
-    "run": ("what `sdimu` and its nodes need, and setuptools, which installs them from a clone", [*OWN, "setuptools"]),
+    "run": ("what `sdimu` and its nodes need, and setuptools, which installs them from a clone", [*USED, "setuptools"]),
     "extras": ("workbench, notebooks, pictures", ["sdimu-calibration[workbench,notebook,pictures]"]),
-    "campaigns": ("many runs at once: monte-carlo, hidden-campaign, study", ["sdimu-sim[campaigns]"]),
+    "campaigns": ("many runs at once: monte-carlo, hidden-campaign, study", ["sdimu-study"]),
     "test": ("style, types, tests", ["sdimu-calibration[test]"]),
     "build": ("colcon, as ROS users build", ["sdimu-calibration[build]"]),
     "docs": ("the book: make docs", ["sdimu-calibration[docs]"]),

@@ -13,6 +13,8 @@ from pathlib import Path
 import pytest
 
 from sdimu_calibration.cli.next_commands import Asked, spelled
+from sdimu_calibration.core.advice import Advice, Kind, Verb
+from sdimu_calibration.storage.files.advice_words import sentence
 
 WIDTH = 80
 CONTROL = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]")
@@ -156,18 +158,24 @@ def test_advice_repeats_what_was_asked_for():
     given = {"site": "my site.yaml", "imu": "dtg", "model": None, "estimator": "auto", "gyro_sign": -1, "hand": False,
              "add": ["lever_arm"], "out": Path("out")}  # fmt: skip
     asked = Asked.of((Path("a bag"),), given, Path("out"))
-    words, command = spelled("Keep lever in the model: --add 'coupling.yaml:k1' --add 'x(tau=3 s)'.", asked)
-    assert words == "Keep lever in the model:"
+    kept = Advice(Kind.KEEP, ("lever",), Verb.ADD, ("coupling.yaml:k1", "x(tau=3 s)"))
+    command = spelled(kept, asked)
+    assert sentence(kept) == "Keep lever in the model: --add 'coupling.yaml:k1' --add 'x(tau=3 s)'."
     assert shlex.split(command) == [
         "sdimu", "calibrate", "a bag", "--site", "my site.yaml", "--imu", "dtg", "--gyro-sign", "-1", "--add",
         "lever_arm", "--add", "coupling.yaml:k1", "--add", "x(tau=3 s)",
     ]  # fmt: skip
-    _, command = spelled("Turns ranked by what they tell: sdimu plan --plan YOURS --tell 'a' --tell 'b'.", asked)
+    ranked = Advice(Kind.RANK_TURNS, (), Verb.RANK_TURNS, ("a", "b"))
+    assert sentence(ranked) == "Turns ranked by what they tell: sdimu plan --plan YOURS --tell 'a' --tell 'b'."
+    command = spelled(ranked, asked)
     assert shlex.split(command) == [
         "sdimu", "plan", "--plan", "out/plan.yaml", "--site", "my site.yaml", "--imu", "dtg",
         "--tell", "a", "--tell", "b",
     ]  # fmt: skip
-    _, command = spelled("a whole plan: sdimu plan --after", asked)
-    assert command == "sdimu plan --after out"
-    plain = "Run the plan again in another order: what comes back belongs to the sensor."
-    assert spelled(plain, asked) == (plain, "")
+    more = Advice(Kind.RECORD_ONCE_MORE, ("a", ("b",), "turn X"), Verb.CONTINUE)
+    assert sentence(more).endswith("turn X; a whole plan: sdimu plan --after")
+    assert spelled(more, asked) == "sdimu plan --after out"
+    back = Advice(Kind.RUN_BACKWARDS, (), Verb.REVERSE_PLAN)
+    assert sentence(back).endswith("The other order: sdimu plan --plan YOURS --backwards.")
+    assert shlex.split(spelled(back, asked))[2:4] == ["--plan", "out/plan.yaml"]
+    assert spelled(Advice(Kind.LOOK_AT_MOUNT), asked) == ""

@@ -17,12 +17,14 @@ from sdimu_calibration.core.joint.set_fit import SetFit, SetOptions, fit_set
 from sdimu_calibration.core.joint.set_result import set_outcome
 from sdimu_calibration.core.progress import Progress
 from sdimu_calibration.core.results import Calibration, SetSummary
+from sdimu_calibration.core.verdict import Verdict
 from sdimu_calibration.report.page import write_report
+from sdimu_calibration.storage.files.advice_words import sentence
+from sdimu_calibration.storage.files.result_file import write_result
+from sdimu_calibration.storage.files.set_result_file import write_set_diagnosis
+from sdimu_calibration.storage.files.whole_file import written_together
 from sdimu_calibration.storage.recording_set import RecordingSet
-from sdimu_calibration.storage.result_file import write_result
-from sdimu_calibration.storage.set_result_file import write_set_diagnosis
 from sdimu_calibration.storage.set_work import set_runner
-from sdimu_calibration.storage.whole_file import written_together
 
 if TYPE_CHECKING:
     from sdimu_calibration.core.evidence.known import Standing
@@ -151,12 +153,12 @@ class JointDiagnosis:
     @property
     def verdict(self) -> str:
         """The verdict in a word or two."""
-        return self.core.verdict
+        return self.core.verdict.value
 
     @property
     def adequate(self) -> bool:
         """Whether the model explains all recordings."""
-        return self.core.verdict == "consistent"
+        return self.core.verdict == Verdict.CONSISTENT
 
     @property
     def found(self) -> tuple[SetFinding, ...]:
@@ -166,7 +168,7 @@ class JointDiagnosis:
     @property
     def advice(self) -> tuple[str, ...]:
         """What to do next, one sentence each."""
-        return self.core.advice
+        return tuple(map(sentence, self.core.advice))
 
     @property
     def known(self) -> Standing:
@@ -184,7 +186,7 @@ class JointDiagnosis:
         title = f"Diagnosis of {len(self.of)} recordings"
         with written_together(folder) as part:
             write_set_diagnosis(part / "set.json", self.core)
-            write_result(part / "result.json", self.result, self.verdict)
+            write_result(part / "result.json", self.result, self.core.verdict)
             write_report(part / "report.html", self.result, title=title, of_set=self.core)
         return folder
 

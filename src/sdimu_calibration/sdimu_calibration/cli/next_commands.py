@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -10,10 +9,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sdimu_calibration.cli.console import command, say
+from sdimu_calibration.core.advice import Verb
+from sdimu_calibration.storage.files.advice_words import added, lead, plan_options
 
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from sdimu_calibration.core.advice import Advice
     from sdimu_calibration.core.diagnosis.plan_seen import PlanSeen
     from sdimu_calibration.core.plan import Plan
 
@@ -23,7 +25,6 @@ DIAGNOSE = "run: sdimu diagnose"
 """Words of a note that sends to a diagnosis."""
 _ACCELERATION = 1.0
 """Angular acceleration (rad/s^2) of a plan that was seen: the motion does not tell the limit, and no sum needs it."""
-_COMMAND = re.compile(r"^(.*?):? ((?:sdimu [a-z]+ |--add ).*?)\.?$")
 
 
 _REPEATED = (
@@ -71,33 +72,28 @@ class Asked:
         return shlex.join(["sdimu", verb, *map(str, self.bags), *self.options])
 
 
-def spelled(advice: str, asked: Asked) -> tuple[str, str]:
-    """Part an advice into words and the whole command that it means; no command where it names none.
+def spelled(advice: Advice, asked: Asked) -> str:
+    """Write the whole command that an advice means about what was asked; empty where it means none.
 
-    ``Keep X in the model: --add 'X'.`` becomes a calibration of the recording, ``sdimu plan --plan YOURS`` names
-    the plan that was seen and the same site and IMU.
+    What is to be kept becomes a calibration of the recording; a plan is that which was seen, at the same site and with
+    the same IMU.
     """
-    found = _COMMAND.match(advice)
-    if found is None:
-        return advice, ""
-    words, rest = found.groups()
-    if rest.startswith("--add"):
-        rest = f"{asked.command('calibrate')} {rest}"
-    elif rest.startswith("sdimu plan --after"):
-        rest = shlex.join(["sdimu", "plan", "--after", str(asked.folder)])
-    elif rest.startswith("sdimu plan --plan YOURS"):
-        plan = shlex.join(["--plan", str(asked.folder / PLAN), *asked.place])
-        rest = rest.replace("--plan YOURS", plan, 1)
-    elif rest.startswith("sdimu diagnose BAG"):
-        rest = rest.replace("sdimu diagnose BAG", replace(asked, bags=asked.bags[:1]).command("diagnose"), 1)
-    return f"{words}:", rest
+    if advice.verb == Verb.ADD:
+        return f"{asked.command('calibrate')} {added(advice)}"
+    if advice.verb == Verb.DIAGNOSE:
+        return replace(asked, bags=asked.bags[:1]).command("diagnose")
+    if advice.verb == Verb.CONTINUE:
+        return shlex.join(["sdimu", "plan", "--after", str(asked.folder)])
+    if advice.verb in {Verb.REVERSE_PLAN, Verb.RANK_TURNS}:
+        return f"sdimu plan {shlex.join(['--plan', str(asked.folder / PLAN), *asked.place])} {plan_options(advice)}"
+    return ""
 
 
-def print_advice(console: Console, advice: Sequence[str], asked: Asked) -> None:
+def print_advice(console: Console, advice: Sequence[Advice], asked: Asked) -> None:
     """Print each advice, its command on a line of its own."""
-    for text in advice:
-        words, whole = spelled(text, asked)
-        say(console, f"advice: {words}")
+    for one in advice:
+        whole = spelled(one, asked)
+        say(console, f"advice: {lead(one)}{':' if whole else ''}")
         if whole:
             command(console, whole)
 

@@ -11,6 +11,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Protocol
 
 from sdimu_calibration.cli.watch_diagnosis import picture
+from sdimu_calibration.core.verdict import Verdict
 from sdimu_calibration.report.live_text import SeenDiagnosis
 from sdimu_calibration.report.progress_text import Falling, falling, light, short, sigma_words
 
@@ -132,7 +133,7 @@ class Watch:
         from rich.table import Table
         from rich.text import Text
 
-        fine = seen.verdict.startswith("consistent") or not seen.nis
+        fine = seen.verdict == Verdict.CONSISTENT or not seen.nis
         stage = self._place(seen) if streaming else "last calibration"
         left = self.left(seen, wall_s) if streaming else "no more to come"
         head = Table.grid(padding=(0, 1))

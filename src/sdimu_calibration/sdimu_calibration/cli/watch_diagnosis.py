@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sdimu_calibration.report.live_text import MISFIT, SeenDiagnosis
+from sdimu_calibration.core.verdict import Verdict
+from sdimu_calibration.report.live_text import SeenDiagnosis
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -27,7 +28,7 @@ def picture(seen: SeenDiagnosis) -> RenderableType:
 
     if seen.stop < 0:
         return Text("no diagnosis yet", style="dim")
-    style = "bold yellow" if seen.verdict == MISFIT else "green" if seen.ladder else "dim"
+    style = "bold yellow" if seen.verdict == Verdict.MISFIT else "green" if seen.ladder else "dim"
     head = Text(f"diagnosis of stop {seen.stop}: {seen.sentence}", style=style)
     return Group(head, _heat_map(seen), _tables(seen)) if seen.ladder else head
 

@@ -23,6 +23,11 @@ def nis(result: Calibration) -> float:
     return _number(result.fit.get("nis_mean"))
 
 
+def degrees_of_freedom(result: Calibration) -> float:
+    """Count the innovations of `nis` (1); NaN if not computed."""
+    return _number(result.fit.get("nis_dof"))
+
+
 def noise_learned(result: Calibration) -> bool:
     """Whether the result has figures in noise with a memory, beside those in the white noise of the IMU's file."""
     return result.fit.get("held_out_in_noise") is not None

@@ -35,6 +35,7 @@ from sdimu_calibration.core.recording import NOMINAL_FROM, DataError, PhaseLog, 
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.rotation import quaternion
 from sdimu_calibration.core.specification import EPOCH_S, Model
+from sdimu_calibration.core.verdict import Verdict
 
 NS = 1_000_000_000
 """Stamps of a second (ns): header stamps are integers."""
@@ -416,4 +417,4 @@ def stop_verdict(total: Floats, dof: Floats) -> str:
         for channel, t, d in zip(NIS_CHANNELS, total, dof, strict=True)
         if d > 0 and abs(t - d) > _FAR * np.sqrt(2.0 * d)
     ]
-    return "inconsistent: " + ", ".join(far) + " of 1" if far else "consistent"
+    return "inconsistent: " + ", ".join(far) + " of 1" if far else Verdict.CONSISTENT

@@ -16,6 +16,8 @@ from sdimu_calibration.core.specification import ImuSpecification
 
 NOT_TRUSTED = "not to be trusted"
 """Words of a warning that forbids to use an estimate."""
+UNTRUSTED_VERDICTS = frozenset({"unexplained", "data fault"})
+"""Verdicts of a diagnosis after which no estimate is to be trusted: the model is wrong, and no effect mends it."""
 START_TEMPERATURE = "start_temperature_degc"
 """Key in the data section: temperature T0 from which temperature effects count (deg C), that at the start if no other
 was stated."""
@@ -289,6 +291,11 @@ class Calibration:
         """Why the estimate must not be used as it stands, one line each; empty where nothing forbids it."""
         grave = [fault.text for fault in self.faults if fault.grave]
         return tuple(dict.fromkeys([*grave, *(line for line in self.warnings if NOT_TRUSTED in line)]))
+
+    @property
+    def misfits(self) -> tuple[str, ...]:
+        """Where the model does not fit the data, one line each: those of the warnings that send to a diagnosis."""
+        return tuple(line for line in self.warnings if _ADVICE.search(line))
 
     @property
     def inseparable(self) -> tuple[str, ...]:

@@ -15,8 +15,9 @@ from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.live import EpochEstimate
 from sdimu_calibration.core.rotation import quaternion_matrix
 from sdimu_calibration.core.units import from_si
+from sdimu_calibration.core.verdict import Verdict
 from sdimu_calibration.nodes.credits import header
-from sdimu_calibration.storage.compensated_imu import frame_of
+from sdimu_calibration.storage.bags.compensated_imu import frame_of
 
 
 def coefficients(
@@ -91,7 +92,7 @@ def diagnostics(stamp_ns: int, estimate: EpochEstimate, name: str = "calibration
     values |= {f"nis_{channel}": f"{nis:.6g}" for channel, nis in estimate.nis.items()}
     values |= {f"stop_nis_{channel}": f"{nis:.6g}" for channel, nis in estimate.stop_nis.items()}
     values["verdict"] = estimate.verdict
-    level = DiagnosticStatus.OK if estimate.verdict == "consistent" else DiagnosticStatus.WARN
+    level = DiagnosticStatus.OK if estimate.verdict == Verdict.CONSISTENT else DiagnosticStatus.WARN
     status = DiagnosticStatus(level=level, name=name, message=phase, hardware_id="imu")
     status.values = [KeyValue(key=key, value=value) for key, value in values.items()]
     return DiagnosticArray(header=header(stamp_ns), status=[status])

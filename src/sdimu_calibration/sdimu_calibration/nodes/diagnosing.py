@@ -13,9 +13,9 @@ from rclpy.node import Node
 from sensor_msgs.msg import CompressedImage, JointState
 from std_msgs.msg import Float64MultiArray
 
-from sdimu_calibration.core.diagnosis.live_diagnosis import WAITING
 from sdimu_calibration.core.live import EpochEstimate
 from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.verdict import Verdict
 from sdimu_calibration.nodes import diagnosis_messages as messages
 from sdimu_calibration.nodes.credits import HISTORY, LATCHED, publish
 from sdimu_calibration.nodes.diagnosis_worker import Answer, Job
@@ -98,7 +98,7 @@ class Diagnosing:
 
     def _publish(self, answer: Answer, stamp_ns: int) -> None:
         found = answer.diagnosis
-        if found.verdict != WAITING:
+        if found.verdict != Verdict.WAITING:
             publish(self._ranking, messages.ranking(stamp_ns, found))
             publish(self._heat_map, messages.heat_map(stamp_ns, found))
         publish(self._diagnosis, messages.diagnosis(stamp_ns, found))

@@ -11,7 +11,8 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from sensor_msgs.msg import CompressedImage, JointState
 from std_msgs.msg import Float64MultiArray, MultiArrayDimension, MultiArrayLayout
 
-from sdimu_calibration.core.diagnosis.live_diagnosis import WAITING, LiveDiagnosis, Ranked
+from sdimu_calibration.core.diagnosis.live_diagnosis import LiveDiagnosis, Ranked
+from sdimu_calibration.core.verdict import Verdict
 from sdimu_calibration.nodes.credits import header
 from sdimu_calibration.report.data import places
 from sdimu_calibration.report.live_text import SeenDiagnosis, best_ranked, ladder_rows, model_name, size
@@ -22,9 +23,9 @@ _MOST_RANKED = 12
 
 def diagnosis(stamp_ns: int, found: LiveDiagnosis) -> DiagnosticArray:
     """Return verdict, where the last stop fails, ranking and ladder, one status each; all but the first are tables."""
-    level = DiagnosticStatus.OK if found.verdict == "consistent" else DiagnosticStatus.WARN
+    level = DiagnosticStatus.OK if found.verdict == Verdict.CONSISTENT else DiagnosticStatus.WARN
     parts = [_status("verdict", found.sentence, _verdict(found), level)]
-    if found.verdict != WAITING:
+    if found.verdict != Verdict.WAITING:
         reaches = f"noise reaches {found.threshold:.2f}"
         parts += [
             _status("where", f"stop {found.stop}: mean innovation over its sigma", _last_stop(found)),
@@ -85,7 +86,7 @@ def _verdict(found: LiveDiagnosis) -> Iterable[tuple[str, str]]:
     yield "stop", str(found.stop)
     yield "until_s", f"{found.until_s:.6g}"
     yield "model", model_name(found.added)
-    if found.verdict == WAITING:
+    if found.verdict == Verdict.WAITING:
         return
     yield "threshold", f"{found.threshold:.6g}"
     yield "candidates_above", str(len(found.standing))

@@ -17,7 +17,6 @@ from typing import Any
 
 from sdimu_calibration.core.data.arrival import in_order, until
 from sdimu_calibration.core.diagnosis.live_diagnosis import (
-    WAITING,
     LiveDiagnosis,
     ModelError,
     error_of,
@@ -28,9 +27,10 @@ from sdimu_calibration.core.estimation.fit import Fit
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.front_door import OpeningOptions, open_test
 from sdimu_calibration.core.recording import NOMINAL_FROM, DataError
+from sdimu_calibration.core.verdict import Verdict
 from sdimu_calibration.report.live_picture import live_picture
-from sdimu_calibration.storage.effect_file import extended_model
-from sdimu_calibration.storage.journal import read_journal
+from sdimu_calibration.storage.files.effect_file import extended_model
+from sdimu_calibration.storage.files.journal import read_journal
 
 Question = Callable[[Fit, LiveDiagnosis, Any], Any]
 """A further question of a fit: `Job.question`."""
@@ -127,7 +127,8 @@ class Picture:
 
 def picture(answer: Answer) -> Picture:
     """Draw the diagnosis of an answer."""
-    return Picture(answer.request, b"" if answer.diagnosis.verdict == WAITING else live_picture(answer.diagnosis))
+    waiting = answer.diagnosis.verdict == Verdict.WAITING
+    return Picture(answer.request, b"" if waiting else live_picture(answer.diagnosis))
 
 
 class Diagnoser:

@@ -1,6 +1,6 @@
 """The first screen: is the model right, what it costs if not, what to do next, how far the error falls, where it fails.
 
-A `Verdict` says it in words; the same parts stand on the page of a diagnosis, of a fit and of a set.
+A `FirstScreen` says it in words; the same parts stand on the page of a diagnosis, of a fit and of a set.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from html import escape
 
 import numpy as np
 
+from sdimu_calibration.core.advice import Advice, Kind, Verb
 from sdimu_calibration.core.diagnosis.ladder import error_ladder, moved_coefficients
 from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary
 from sdimu_calibration.core.error_figures import by_hand, held_out, held_out_judged, nis_judged, noise_learned
@@ -17,6 +18,7 @@ from sdimu_calibration.core.estimation.second_order_fit import NO_AZIMUTH
 from sdimu_calibration.core.joint.set_diagnosis import SetDiagnosis
 from sdimu_calibration.core.results import Calibration, without_advice
 from sdimu_calibration.core.units import from_si
+from sdimu_calibration.core.verdict import Verdict
 from sdimu_calibration.report.advice import Spell, advice_html
 from sdimu_calibration.report.effect_words import headline_of, title_of
 from sdimu_calibration.report.markup import prose
@@ -34,7 +36,7 @@ _WORST = 3
 
 
 @dataclass(frozen=True)
-class Verdict:
+class FirstScreen:
     """What a page says first, in HTML.
 
     Attributes
@@ -60,25 +62,25 @@ class Verdict:
     remarks: tuple[str, ...] = ()
 
 
-def of_diagnosis(summary: DiagnosisSummary, spell: Spell | None = None) -> Verdict:
+def of_diagnosis(summary: DiagnosisSummary, spell: Spell | None = None) -> FirstScreen:
     """Say what a diagnosis found; `spell` makes whole commands of its advice."""
     d = summary.diagnosis
-    named = bool(summary.candidates) and d.verdict != "data fault"
+    named = bool(summary.candidates) and d.verdict != Verdict.DATA_FAULT
     doubts = without_advice(d.after.warnings) if d.adequate else ()
-    bad = not d.adequate and d.verdict != "noise model wrong"
+    bad = not d.adequate and d.verdict != Verdict.NOISE_MODEL_WRONG
     tone = BAD if bad else GOOD if d.adequate and not doubts else DOUBTFUL
     head = _missing(summary) if named else prose(d.sentence)
-    advice = list(dict.fromkeys([*(f.text for f in d.findings), *doubts, *summary.advice]))
+    advice: list[Advice | str] = list(dict.fromkeys([*(f.text for f in d.findings), *doubts, *summary.advice]))
     if d.adequate and not advice:
         advice = ["Use the coefficients of this page."]
     if d.adequate and summary.untestable:
         advice.append(_unseen(summary))
     costs = _costs(summary)
     title = "What it costs to ignore it" if summary.found else "How well it predicts"
-    told = tuple(advice_html(text, spell) for text in advice)
+    told = tuple(advice_html(one, spell) for one in advice)
     unsaid = [text for text in d.noise if named or text not in d.sentence]
     noise = (prose(f"Noise: {'; '.join(unsaid)}."),) if unsaid else ()
-    return Verdict(tone, head, costs, told, title, (*_remarks(d.after), *noise))
+    return FirstScreen(tone, head, costs, told, title, (*_remarks(d.after), *noise))
 
 
 def _remarks(calibration: Calibration) -> tuple[str, ...]:
@@ -136,23 +138,24 @@ def _in_noise(error: float) -> tuple[str, str]:
     return f"{error:.2f}", "sigma: held-out error in the noise that was learned, a stop left out at a time; 1 is right"
 
 
-def of_fit(calibration: Calibration, spell: Spell | None = None) -> Verdict:
+def of_fit(calibration: Calibration, spell: Spell | None = None) -> FirstScreen:
     """Say whether a fit fits; what is missing is for a diagnosis to say. `spell` makes whole commands of advice."""
     grave, doubts = calibration.not_to_be_trusted, calibration.warnings
     costs = _fit_figures(calibration)
     if grave:
         tone, head = BAD, f"Not to be trusted: {prose(grave[0])}."
-    elif misfit := [line for line in doubts if "sdimu diagnose" in line]:
+    elif misfit := calibration.misfits:
         tone, head = BAD, prose(_capital(misfit[0].partition("; run")[0])) + "."
     elif doubts:
         tone, head = DOUBTFUL, prose(_capital(doubts[0])) + "."
     else:
         tone, head = GOOD, "The model explains the recording as a whole."
-    bag = "BAG" if spell else calibration.origin.recording or "BAG"
-    says = f"Find {'which effect is missing' if tone == BAD else 'out whether smaller effects are missing'}"
-    advice = [*(["Check the IMU file, the site, units and axes."] if grave else []), f"{says}: sdimu diagnose {bag}"]
-    told = tuple(advice_html(text, spell) for text in advice)
-    return Verdict(tone, head, costs, told, "How well it predicts", _remarks(calibration))
+    kind = Kind.FIND_EFFECT if tone == BAD else Kind.FIND_SMALLER
+    bag = (calibration.origin.recording,) if calibration.origin.recording else ()
+    advice: list[Advice | str] = ["Check the IMU file, the site, units and axes."] if grave else []
+    advice.append(Advice(kind, (), Verb.DIAGNOSE, bag))
+    told = tuple(advice_html(one, spell) for one in advice)
+    return FirstScreen(tone, head, costs, told, "How well it predicts", _remarks(calibration))
 
 
 def _fit_figures(calibration: Calibration) -> tuple[tuple[str, str], ...]:
@@ -168,34 +171,34 @@ def _fit_figures(calibration: Calibration) -> tuple[tuple[str, str], ...]:
     return tuple(out)
 
 
-def of_set(found: SetDiagnosis, spell: Spell | None = None) -> Verdict:
+def of_set(found: SetDiagnosis, spell: Spell | None = None) -> FirstScreen:
     """Say what was found in a set of recordings; `spell` makes whole commands of its advice."""
-    tone = GOOD if found.verdict == "consistent" else BAD
+    tone = GOOD if found.verdict == Verdict.CONSISTENT else BAD
     after = held_out(found.after)
     before = after if found.error_without is None else found.error_without
     values = [f"{value:.2f}" for value in dict.fromkeys((before, after)) if np.isfinite(value)]
     costs = ((_ARROW.join(values), "sigma: held-out error, recordings left out; 1 is right"),) if values else ()
-    advice = found.advice or ("Nothing: use the coefficients of this page.",)
-    told = tuple(advice_html(text, spell) for text in advice)
+    advice: tuple[Advice | str, ...] = found.advice or ("Nothing: use the coefficients of this page.",)
+    told = tuple(advice_html(one, spell) for one in advice)
     title = "What it costs to ignore it" if found.findings else "How well it predicts"
-    return Verdict(tone, prose(found.sentence), costs, told, title)
+    return FirstScreen(tone, prose(found.sentence), costs, told, title)
 
 
-def render(verdict: Verdict, *pictures: str) -> str:
+def render(first: FirstScreen, *pictures: str) -> str:
     """Return the first screen as HTML; `pictures` stand below the words."""
     costs = "".join(
         f'<li><span class="figure-number">{escape(number)}</span><span>{words}</span></li>'
-        for number, words in verdict.costs
+        for number, words in first.costs
     )
-    shown = "".join(f"<li>{text}</li>" for text in verdict.advice[:_WORST])
-    rest = "".join(f"<li>{text}</li>" for text in verdict.advice[_WORST:])
-    more = f"<details><summary>{len(verdict.advice) - _WORST} more</summary><ul>{rest}</ul></details>" if rest else ""
+    shown = "".join(f"<li>{text}</li>" for text in first.advice[:_WORST])
+    rest = "".join(f"<li>{text}</li>" for text in first.advice[_WORST:])
+    more = f"<details><summary>{len(first.advice) - _WORST} more</summary><ul>{rest}</ul></details>" if rest else ""
     return (
-        f'<section id="verdict"><h2 class="skip">Verdict</h2><div class="verdict {verdict.tone}" role="status">'
-        f'<p class="head"><span class="mark" aria-hidden="true">{_MARKS[verdict.tone]}</span> '
-        f'<span class="tag">{_WORDS[verdict.tone]}</span> {verdict.head}</p>'
-        f"{''.join(f'<p>{text}</p>' for text in verdict.remarks)}</div>"
-        f'<div class="columns"><section class="card"><h2>{verdict.cost_title}</h2>'
+        f'<section id="verdict"><h2 class="skip">Verdict</h2><div class="verdict {first.tone}" role="status">'
+        f'<p class="head"><span class="mark" aria-hidden="true">{_MARKS[first.tone]}</span> '
+        f'<span class="tag">{_WORDS[first.tone]}</span> {first.head}</p>'
+        f"{''.join(f'<p>{text}</p>' for text in first.remarks)}</div>"
+        f'<div class="columns"><section class="card"><h2>{first.cost_title}</h2>'
         f'<ul class="numbers">{costs}</ul></section>'
         f'<section class="card"><h2>What to do next</h2><ol>{shown}</ol>{more}</section></div>'
         f'<div class="pictures">{"".join(picture for picture in pictures if picture)}</div></section>'

@@ -9,15 +9,14 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from sdimu_calibration.core.arrays import Floats
-from sdimu_calibration.core.diagnosis.live_diagnosis import WAITING, LiveDiagnosis, ModelError, Ranked
+from sdimu_calibration.core.diagnosis.live_diagnosis import LiveDiagnosis, ModelError, Ranked
 from sdimu_calibration.core.units import from_si
+from sdimu_calibration.core.verdict import Verdict
 from sdimu_calibration.report.table import with_sigma
 
 Rows = tuple[tuple[str, str], ...]
 
 AS_GIVEN = "as given"
-MISFIT = "misfit"
-"""Verdict of a survey in which something stands out."""
 _NAMED = 2
 """Number of candidates that a line names."""
 
@@ -57,7 +56,7 @@ class SeenDiagnosis:
         errors = ", ".join(f"{name} {error}" for name, error in self.ladder)
         parts = (
             f"diagnosis of stop {self.stop}: {self.verdict}: {self.sentence}",
-            f"{named} ({self.reaches})" if named and self.verdict == MISFIT else "",
+            f"{named} ({self.reaches})" if named and self.verdict == Verdict.MISFIT else "",
             f"error with one stop left out: {errors}" if errors else "",
         )
         return "; ".join(part.rstrip(".") for part in parts if part)
@@ -93,7 +92,7 @@ def ladder_rows(ladder: Sequence[ModelError]) -> list[tuple[str, str]]:
 
 def diagnosis_line(found: LiveDiagnosis) -> str:
     """Say a diagnosis in one line: the verdict, what stands out, how far the error fell."""
-    if found.verdict == WAITING:
+    if found.verdict == Verdict.WAITING:
         return f"stop {found.stop}: {found.sentence}"
     named = ", ".join(f"{r.label} {r.z:+.1f}" for r in best_ranked(found.standing)[:_NAMED])
     above = f" ({named}; noise reaches {found.threshold:.1f})" if named else ""

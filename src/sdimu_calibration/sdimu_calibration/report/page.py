@@ -27,8 +27,8 @@ from sdimu_calibration.report.set_sections import recurrence_section, set_sectio
 from sdimu_calibration.report.statistics_section import noise_section
 from sdimu_calibration.report.traceability import recorded, traceability
 from sdimu_calibration.report.use_section import in_use
+from sdimu_calibration.storage.files.whole_file import write_whole
 from sdimu_calibration.storage.trace import Trace
-from sdimu_calibration.storage.whole_file import write_whole
 
 _HEADING = re.compile(r'<section class="card" id="([\w-]+)"><h2>(.*?)</h2>')
 _LADDER = 355
@@ -74,7 +74,7 @@ def write_report(
     trace : Trace, optional
         Command, program, files and their hashes.
     spell : callable, optional
-        Parts an advice into words and the whole command that it means.
+        Writes the whole command that an advice means.
     """
     write_whole(path, page(calibration, title, truth, reference, summary, more, fit, of_set, trace, spell))
 

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from sdimu_calibration.core.units import from_si
+from sdimu_calibration.core.verdict import Verdict
 from sdimu_calibration.report.groups import groups, title
 
 _FINE, _ALARM = "\N{BLACK CIRCLE}", "\N{BLACK UP-POINTING TRIANGLE}"
@@ -58,7 +59,7 @@ def light(nis: Mapping[str, float], verdict: str) -> str:
     """
     if not nis:
         return "innovations: none yet"
-    mark = _FINE if verdict.startswith("consistent") else _ALARM
+    mark = _FINE if verdict == Verdict.CONSISTENT else _ALARM
     numbers = " ".join(f"{channel} {value:.2f}" for channel, value in nis.items())
     return f"{mark} NIS of this stop {numbers}: {verdict}"
 

@@ -7,6 +7,7 @@ from html import escape
 
 import numpy as np
 
+from sdimu_calibration.core.advice import Kind
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.diagnosis.ladder import Rung
 from sdimu_calibration.core.diagnosis.search import Step
@@ -187,13 +188,13 @@ def confused(summary: DiagnosisSummary, spell: Spell | None = None) -> str:
         )
     if not rows:
         return ""
-    told = [text for text in summary.advice if text.startswith(("To tell", "Turns ranked"))]
+    told = [one for one in summary.advice if one.kind in {Kind.TELL_APART, Kind.RANK_TURNS}]
     return section(
         "What it would be confused with",
         '<div class="wide"><table class="words"><thead><tr><th class="text" scope="col">found</th>'
         '<th class="text" scope="col">looks the same in these data</th><th class="text" scope="col">what hangs on it'
         f"</th></tr></thead><tbody>{''.join(rows)}</tbody></table></div>",
-        *(f"<p>{advice_html(text, spell)}</p>" for text in told),
+        *(f"<p>{advice_html(one, spell)}</p>" for one in told),
     )
 
 

@@ -6,11 +6,13 @@ import shlex
 
 import pytest
 
+from sdimu_calibration.core.advice import Advice, Kind
 from sdimu_calibration.core.diagnosis.advice import keep, together
 from sdimu_calibration.core.diagnosis.found import Found
 from sdimu_calibration.core.effects import registry
 from sdimu_calibration.core.evidence.candidate import split
-from sdimu_calibration.storage.effect_file import find_effects
+from sdimu_calibration.storage.files.advice_words import _WORDS, sentence
+from sdimu_calibration.storage.files.effect_file import find_effects
 
 MIX = """
 format: sdimu-effect/1
@@ -28,8 +30,8 @@ def found(candidate, alike=()):
     return Found(candidate, 1.0, 0.1, 10.0, 50.0, 45.0, 1e-9, 1.0, 2.0, 1.0, tuple(alike), ())
 
 
-def added(line):
-    words = shlex.split(line.rstrip("."))
+def added(advice):
+    words = shlex.split(sentence(advice).rstrip("."))
     return [words[k + 1] for k, word in enumerate(words) if word == "--add"]
 
 
@@ -50,20 +52,25 @@ def test_effects_of_a_file_can_be_added_as_the_advice_says(tmp_path):
     path = tmp_path / "odd mix.yaml"
     path.write_text(MIX)
     candidates = [candidate for effect in find_effects(str(path)) for candidate in split(effect)]
-    (line,) = keep([found(candidate) for candidate in candidates])
-    assert line.startswith("Keep what was found in the model: ")
-    assert [find_effects(text)[0].labels for text in added(line)] == [c.effect.labels for c in candidates]
+    (advice,) = keep([found(candidate) for candidate in candidates])
+    assert sentence(advice).startswith("Keep what was found in the model: ")
+    assert [find_effects(text)[0].labels for text in added(advice)] == [c.effect.labels for c in candidates]
 
 
 def test_what_is_to_be_done_for_several_finds_is_said_once():
     x, y, z = split(registry.get("accel_quadratic"))
-    asked = [(found(x, ["a"]), "turn it"), (found(y, ["b", "c"]), "turn it"), (found(z, ["d"]), "rest longer")]
-    assert together(asked) == [
-        "To tell accel_quadratic_x from a, and accel_quadratic_y from b, c: turn it.",
-        "To tell accel_quadratic_z from d: rest longer.",
+    turn, rest = Advice(Kind.TURN_FASTER, (4.6,)), Advice(Kind.REST_BETWEEN)
+    asked = [(found(x, ["a"]), turn), (found(y, ["b", "c"]), turn), (found(z, ["d"]), rest)]
+    assert [sentence(one) for one in together(asked)] == [
+        f"To tell accel_quadratic_x from a, and accel_quadratic_y from b, c: {sentence(turn)}.",
+        f"To tell accel_quadratic_z from d: {sentence(rest)}.",
     ]
 
 
 def test_nothing_found_gives_no_advice():
     assert keep([]) == []
     assert together([]) == []
+
+
+def test_every_kind_of_advice_has_words():
+    assert set(_WORDS) == set(Kind)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
+from sdimu_calibration.core.advice import Kind, Verb
 from sdimu_calibration.core.diagnosis.advice import advice, untestable_reasons
 from sdimu_calibration.core.diagnosis.bootstrap import bootstrap
 from sdimu_calibration.core.diagnosis.candidates import own_equation
@@ -16,6 +17,7 @@ from sdimu_calibration.core.diagnosis.found import found_effects, reach
 from sdimu_calibration.core.diagnosis.ladder import jump, refused
 from sdimu_calibration.core.diagnosis.plan_seen import plan_seen
 from sdimu_calibration.core.units import to_si
+from sdimu_calibration.storage.files.advice_words import sentence
 
 SEEDS = (101, 102, 103)
 _EFFECTIVE = 150
@@ -112,8 +114,8 @@ def test_a_wrong_latitude_is_measured_and_sent_back_to_the_site_file(bench):
     assert not diagnosis.unexplained
     assert abs(one.value - np.radians(0.4)) < 3.5 * one.sigma
     told = advice(diagnosis, found, reach(diagnosis), plan_seen(diagnosis.evidence))
-    assert any("latitude" in line and "too far North" in line for line in told)
-    assert not any("--add" in line for line in told)
+    assert any("latitude" in line and "too far North" in line for line in map(sentence, told))
+    assert not any(one.kind == Kind.KEEP or one.verb == Verb.ADD for one in told)
 
 
 def test_turns_of_one_sign_hide_scale_asymmetry_and_the_reason_is_said(bench):

@@ -14,7 +14,7 @@ from sdimu_calibration.core.evidence.navigation_evidence import columns
 from sdimu_calibration.core.evidence.noise_kernels import stretch_effects, stretches
 from sdimu_calibration.core.evidence.signatures import signatures
 from sdimu_calibration.core.navigation.correct_cycles import spread
-from sdimu_calibration.storage.config import load_imu
+from sdimu_calibration.storage.files.config import load_imu
 from sdimu_sim.core.scenario import Scenario, generate
 
 
@@ -86,7 +86,7 @@ def test_the_score_is_the_fall_of_chi_square_of_a_refit(bench):
     column = evidence.names.index("accel_quadratic_x")
     scanned = scan(evidence.information, evidence.model, evidence.weight)
     effect = registry.get("accel_quadratic").only(("accel_quadratic_x",))
-    gain = extend(fit, [effect], learn=False).statistics()["log_likelihood"] - fit.statistics()["log_likelihood"]
+    gain = extend(fit, [effect], learn=False).statistics().log_likelihood - fit.statistics().log_likelihood
     # The filter's likelihood is marginal over the prior: log N(d; 0, J + w) against the score d^2 / J.
     J, d, w = scanned.J[column], scanned.d[column], effect.prior["navigation"] ** -2
     assert abs(scanned.z[column]) > 8.0

@@ -16,10 +16,11 @@ from sdimu_calibration.core.joint.set_diagnosis import diagnose_set
 from sdimu_calibration.core.joint.set_fit import SetOptions, fit_set
 from sdimu_calibration.core.plan import Plan, backwards
 from sdimu_calibration.report.set_sections import recurrence_section
-from sdimu_calibration.storage.config import load_model
-from sdimu_calibration.storage.json_file import read_json
-from sdimu_calibration.storage.reduction_file import read_report, write_report
-from sdimu_calibration.storage.set_result_file import FORMAT, write_set_diagnosis
+from sdimu_calibration.storage.files.advice_words import sentence
+from sdimu_calibration.storage.files.config import load_model
+from sdimu_calibration.storage.files.json_file import read_json
+from sdimu_calibration.storage.files.reduction_file import read_report, write_report
+from sdimu_calibration.storage.files.set_result_file import FORMAT, write_set_diagnosis
 from sdimu_sim.core.temperature import TemperatureProfile
 
 from .conftest import here, short, unit_set
@@ -119,7 +120,7 @@ def test_recordings_in_the_same_order_do_not_tell_attitude_from_time():
     assert found is not None
     assert (found.answer, found.apart) == ((ATTITUDE, TIME), False)
     assert "the order of the stops" in answer_in_words(found, True)
-    assert "--backwards" in next_steps(found)[0]
+    assert "--backwards" in sentence(next_steps(found)[0])
 
 
 @pytest.mark.slow
@@ -135,7 +136,7 @@ def test_a_set_says_what_comes_back(tmp_path):
     assert not found.findings
     assert "The model stays as given: with accel_" in found.sentence
     np.testing.assert_array_equal(found.after.values, found.before.values)
-    assert any("--try FILE" in line for line in found.advice)
+    assert any("--try FILE" in line for line in map(sentence, found.advice))
     write_set_diagnosis(tmp_path / "set.json", found)
     assert read_json(tmp_path / "set.json", FORMAT)["refused"]
     content = read_json(tmp_path / "set.json", FORMAT)["recurrence"]

@@ -13,7 +13,8 @@ from sdimu_calibration.core.joint.set_diagnosis import diagnose_set
 from sdimu_calibration.core.joint.set_search import as_given, search_set
 from sdimu_calibration.core.plan import Plan, Turn
 from sdimu_calibration.core.recording import DataError
-from sdimu_calibration.storage.config import load_model
+from sdimu_calibration.storage.files.advice_words import sentence
+from sdimu_calibration.storage.files.config import load_model
 
 from .conftest import here, short, unit_set
 
@@ -76,7 +77,7 @@ def test_what_two_recordings_leave_open_the_advised_third_one_closes(options):
     found = diagnose_set(two.members, options, here)
     assert found.verdict == "class of effects"
     assert set(found.standing.open[0]) >= {"gyro_scale_asymmetry_y", "gyro_scale_quadratic_y"}
-    line = next(a for a in found.advice if "gyro_scale_quadratic_y" in a)
+    line = next(a for a in map(sentence, found.advice) if "gyro_scale_quadratic_y" in a)
     assert "turn Y +90 deg at 10 deg/s" in line
     advised = Plan("advised", (100.0,) * 2, (Turn("Y", 0.5 * math.pi, math.radians(10.0)),), math.radians(20.0))
     three = unit_set(34, [plan, plan, advised], strong)

@@ -21,6 +21,7 @@ from sdimu_calibration.core.estimation.fit import Fit
 from sdimu_calibration.core.estimation.navigation_fit import NavigationFit
 from sdimu_calibration.core.evidence.candidate import Candidate
 from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.verdict import Verdict
 
 _MOST_ALIKE = 6
 """Number of look-alikes of a class that are simulated: those nearest to the one that was found."""
@@ -72,7 +73,7 @@ class Knowledge:
         The class to be told apart; None where none is open.
     named : tuple of str
         Labels of everything that was found.
-    verdict : str
+    verdict : Verdict
         Of the diagnosis.
     """
 
@@ -82,7 +83,7 @@ class Knowledge:
     noise: Floats
     open: OpenClass | None
     named: tuple[str, ...]
-    verdict: str
+    verdict: Verdict
 
     @property
     def holds(self) -> bool:
@@ -140,7 +141,7 @@ def fitted(fit: Fit, goals: Goals, alike: Sequence[Effect] = (), named: tuple[st
     ratio = np.sqrt(np.diag(fit.with_doubt(None).covariance)[limited]) / limit
     white = ratios(at, goals, at.covariance)
     names = tuple(name for name, has in zip(fit.names, limited, strict=True) if has)
-    return Knowledge(at, names, ratio, np.maximum(ratio / white, 1.0), None, named, "consistent")
+    return Knowledge(at, names, ratio, np.maximum(ratio / white, 1.0), None, named, Verdict.CONSISTENT)
 
 
 def ratios(at: SoFar, goals: Goals, covariance: Floats) -> Floats:

@@ -18,6 +18,7 @@ from sdimu_calibration.core.diagnosis.diagnose import climb
 from sdimu_calibration.core.diagnosis.live_diagnosis import LiveDiagnosis
 from sdimu_calibration.core.estimation.fit import Fit
 from sdimu_calibration.core.table import RateTable, Step, is_possible
+from sdimu_calibration.core.verdict import Verdict
 
 
 @dataclass(frozen=True)
@@ -93,7 +94,7 @@ def next_move(fit: Fit, diagnosis: LiveDiagnosis, about: Asked) -> Decision:
         When the fit does not navigate, or no coefficient of the model has a limit.
     """
     left = about.goals.minutes - about.elapsed_s / 60.0
-    searched = diagnosis.verdict != "consistent"
+    searched = diagnosis.verdict != Verdict.CONSISTENT
     known = knowledge(climb(fit), about.goals) if searched else fitted(fit, about.goals)
     chosen = _choose(known, about, left)
     if isinstance(chosen, End) and not searched:

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sdimu_calibration.core.advice import Advice
 from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.diagnosis.advice import reason, telling_turn
 from sdimu_calibration.core.diagnosis.found import DetectableSize
@@ -52,8 +53,8 @@ class Addition:
         How many times it raises the sigma of the coefficient that suffers most.
     alike : tuple of str
         What the data cannot tell from its first parameter.
-    tells : str
-        The turn or stop that would tell them apart; empty where nothing looks the same.
+    tells : Advice or None
+        The turn or stop that would tell them apart; None where nothing looks the same.
     objections : tuple of str
         What speaks against it, one line each.
     """
@@ -65,7 +66,7 @@ class Addition:
     held_out: tuple[float, float]
     raised: float
     alike: tuple[str, ...]
-    tells: str
+    tells: Advice | None
     objections: tuple[str, ...]
 
 
@@ -102,7 +103,7 @@ def addition(fit: Fit, evidence: LinearEvidence, columns: Sequence[int], allowed
     against = [f"{evidence.names[k]} {taken}: {_why(evidence, k)}" for k in hidden]
     against += _against(labels, estimate[p:], sigma, evidence.prior[np.array(chosen) - p], raised, error)
     effect = problem.candidate(chosen[0]).effect
-    tells = telling_turn(effect, plan_seen(evidence)) if alike and isinstance(evidence, NavigationEvidence) else ""
+    tells = telling_turn(effect, plan_seen(evidence)) if alike and isinstance(evidence, NavigationEvidence) else None
     return Addition(
         labels, np.array(chosen, dtype=np.int64), estimate[p:], sigma, error, raised[1], alike, tells, tuple(against)
     )

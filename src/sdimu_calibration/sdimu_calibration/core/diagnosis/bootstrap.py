@@ -80,8 +80,8 @@ def bootstrap(d: Diagnosis, draws: int, seed: int = 1, progress: Progress | None
         e = rng.standard_normal(len(evidence.e))
         if evidence.noise.size:
             e = e + evidence.noise @ rng.standard_normal(evidence.noise.shape[1])
-        part = replace(evidence, e=e, shift=np.zeros(len(evidence.weight)))
-        part.__dict__["information"] = Information(J, evidence.W.T @ part.residuals)
+        known = Information(J, evidence.W.T @ evidence.weighed(e[:, None])[:, 0])
+        part = replace(evidence, e=e, shift=np.zeros(len(evidence.weight)), worked_out=known)
         found = search(part, columns, FALSE_ALARM)
         finds += int(len(found.chosen) > 0)
         z = found.first.z[np.isfinite(found.first.sigma)]

@@ -20,10 +20,10 @@ from sdimu_calibration.core.diagnosis.problem import Problem
 from sdimu_calibration.core.diagnosis.rounds import UNEXPLAINED_P, Round, in_found_noise, search_until_stable
 from sdimu_calibration.core.diagnosis.screen import Finding, screen
 from sdimu_calibration.core.diagnosis.search import FALSE_ALARM, MOST_STEPS, Search, look_alikes, patchwork
-from sdimu_calibration.core.diagnosis.verdict import Verdict, sentence, verdict
+from sdimu_calibration.core.diagnosis.verdict import Facts, sentence, verdict
 from sdimu_calibration.core.diagnosis.white_noise import without_memory
 from sdimu_calibration.core.effects.effect import Effect
-from sdimu_calibration.core.error_figures import held_out_judged
+from sdimu_calibration.core.error_figures import degrees_of_freedom, held_out_judged, nis_judged
 from sdimu_calibration.core.estimation.fit import NOT_CONVERGED, Fit
 from sdimu_calibration.core.estimation.noise_estimate import term_in_words
 from sdimu_calibration.core.estimation.noise_learning import in_white_noise
@@ -39,6 +39,7 @@ from sdimu_calibration.core.progress import Progress, silent
 from sdimu_calibration.core.recording import DataError, Recording
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.specification import EPOCH_S, ImuSpecification, Model, Site
+from sdimu_calibration.core.verdict import Verdict
 
 STILL_WRONG = 1.25
 """Held-out error (sigma) from which a model is not called explained: 1 is right, and an effect that only imitates the
@@ -67,9 +68,8 @@ class Diagnosis:
 
     Attributes
     ----------
-    verdict : str
-        ``consistent``, ``noise model wrong``, ``one effect``, ``class of effects``, ``several effects``,
-        ``own equation``, ``unexplained``, ``data fault``; of a `survey`: ``consistent`` or ``misfit``.
+    verdict : Verdict
+        Of a `survey`: consistent or misfit.
     sentence : str
         The verdict for people.
     adequate : bool
@@ -98,7 +98,7 @@ class Diagnosis:
         The fit as given and with each found effect added; empty where it was not asked for.
     """
 
-    verdict: str
+    verdict: Verdict
     sentence: str
     adequate: bool
     p_value: float
@@ -221,7 +221,7 @@ def climb(
     # Neighbouring epochs say what the noise is, but for a sensor that counts pulses.
     judged = not (base.learns_scatter or done.found.noise or stated.epoch_s > EPOCH_S)
     excess = misfit(after, consistency, stated, base.test.imu) if judged else 0.0
-    loud = excess > largest_misfit(float(after.fit["nis_dof"] or 1.0))
+    loud = excess > largest_misfit(float(np.fmax(degrees_of_freedom(after), 1.0)))
     still = not base.learns_scatter and held_out_judged(after) > STILL_WRONG
     # Wrong samples in turns leave noise that looks drawn anew in each turn.
     spoilt = any(finding.kind == "spike" for finding in findings)
@@ -229,13 +229,13 @@ def climb(
     unexplained = done.left_after.p_value < UNEXPLAINED_P or still or loud or drawn or patched(done)
     noise += tuple(term_in_words(term) for term in done.found.noise)
     rungs = ladder(as_given, widened, done, progress) if refits or base.learns_scatter else ()
-    facts = Verdict(done.found, done.chosen, alike_first(done), findings, noise, own, unexplained)
+    facts = Facts(done.found, done.chosen, alike_first(done), findings, noise, own, unexplained)
     word = verdict(facts)
     progress("done", 1.0)
     unspoken = Diagnosis(
-        word, "", word == "consistent", p_value(done, consistency, bool(noise) or loud), findings, noise, consistency,
-        as_given, widened, before, after, done.found, done.evidence, done.left_before, done.left_after, done.free, own,
-        unexplained, rungs,
+        word, "", word == Verdict.CONSISTENT, p_value(done, consistency, bool(noise) or loud), findings, noise,
+        consistency, as_given, widened, before, after, done.found, done.evidence, done.left_before, done.left_after,
+        done.free, own, unexplained, rungs,
     )  # fmt: skip
     return replace(unspoken, sentence=sentence(unspoken))
 
@@ -292,8 +292,7 @@ def misfit(final: Calibration, consistency: Consistency, stated: ImuSpecificatio
     """
     gyro = consistency.gyro.spread * stated.gyro_white_noise / taken.gyro_white_noise
     accel = consistency.accel.spread * stated.accel_white_noise / taken.accel_white_noise
-    nis = final.fit.get("nis_in_noise") or final.fit["nis_mean"]
-    return float((nis or 0.0) / (0.5 * (gyro**2 + accel**2)) - 1.0)
+    return float(nis_judged(final) / (0.5 * (gyro**2 + accel**2)) - 1.0)
 
 
 def largest_misfit(dof: float) -> float:

@@ -23,9 +23,8 @@ from sdimu_calibration.core.evidence.consistency import StopMean
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.specification import Model
+from sdimu_calibration.core.verdict import Verdict
 
-WAITING = "waiting"
-"""Verdict while there is too little to fit."""
 _FEWEST_STOPS = 2
 """Number of stops at least: one is predicted from the others."""
 
@@ -81,7 +80,7 @@ class LiveDiagnosis:
         The last one.
     until_s : float
         Length of the data (s).
-    verdict : str
+    verdict : Verdict
         ``consistent``, ``misfit``, or ``waiting`` where nothing could be fitted.
     sentence : str
         The verdict for people; while it waits, for what.
@@ -103,7 +102,7 @@ class LiveDiagnosis:
 
     stop: int
     until_s: float
-    verdict: str
+    verdict: Verdict
     sentence: str
     added: tuple[str, ...] = ()
     threshold: float = float("inf")
@@ -121,7 +120,7 @@ class LiveDiagnosis:
 
 def waiting(stop: int, until_s: float, added: Sequence[str], why: str) -> LiveDiagnosis:
     """Return the diagnosis of a stop that cannot be fitted yet, which says why."""
-    return LiveDiagnosis(stop, until_s, WAITING, f"no diagnosis yet: {why}", tuple(added))
+    return LiveDiagnosis(stop, until_s, Verdict.WAITING, f"no diagnosis yet: {why}", tuple(added))
 
 
 def so_far(
@@ -191,7 +190,7 @@ def _error(fit: Fit, evidence: LinearEvidence, added: Sequence[str]) -> ModelErr
     """Error of the model of a fit; `evidence` about it, without candidates."""
     stops = np.unique(evidence.stop)
     held_out = Problem(evidence).held_out([], 1.0).rms if len(stops) >= _FEWEST_STOPS else float("nan")
-    return ModelError(tuple(added), held_out, float(fit.statistics()["nis_mean"] or np.nan))
+    return ModelError(tuple(added), held_out, fit.statistics().nis_mean or float("nan"))
 
 
 def _ranked(done: Diagnosis) -> tuple[Ranked, ...]:

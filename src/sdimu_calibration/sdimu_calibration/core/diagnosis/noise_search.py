@@ -136,9 +136,7 @@ class _Ground(Generic[E]):
         """Return the evidence in noise of these terms."""
         if not terms:
             return self.evidence
-        noisy = self.evidence.with_noise(self.wander.modes(terms).columns)
-        noisy.__dict__["information"] = self.joint.in_noise(terms)
-        return noisy
+        return self.evidence.with_noise(self.wander.modes(terms).columns, self.joint.in_noise(terms))
 
     def with_finer(self, terms: Sequence[NoiseTerm], chosen: Sequence[int], best: int) -> _Ground[E]:
         """Return the ground with a variant of the column `best` between those of the scan, where that is worth it."""

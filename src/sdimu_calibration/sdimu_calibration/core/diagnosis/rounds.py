@@ -125,7 +125,7 @@ def search_until_stable(request: Request, progress: Progress) -> Round:
 
 
 def _likelier(one: Fit, other: Fit) -> bool:
-    return (one.statistics()["log_likelihood"] or 0.0) > (other.statistics()["log_likelihood"] or 0.0)
+    return one.statistics().log_likelihood > other.statistics().log_likelihood
 
 
 def _with_choice(done: Round, chosen: Sequence[Candidate]) -> Round:

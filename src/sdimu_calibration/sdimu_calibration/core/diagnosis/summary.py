@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from sdimu_calibration.core.advice import Advice
 from sdimu_calibration.core.diagnosis.advice import Untestable, advice, untestable_reasons
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.diagnosis.found import DetectableSize, Found, found_effects, reach
 from sdimu_calibration.core.diagnosis.handheld_advice import handheld_advice
 from sdimu_calibration.core.diagnosis.plan_seen import PlanSeen, plan_seen
 from sdimu_calibration.core.evidence.navigation_evidence import NavigationEvidence
+from sdimu_calibration.core.verdict import Verdict
 
 
 @dataclass(frozen=True)
@@ -27,7 +29,7 @@ class DiagnosisSummary:
         Turns and stops of the table; None for a handheld run.
     untestable : tuple of Untestable
         What could not have been seen, by reason.
-    advice : tuple of str
+    advice : tuple of Advice
     """
 
     diagnosis: Diagnosis
@@ -35,12 +37,12 @@ class DiagnosisSummary:
     reached: tuple[DetectableSize, ...]
     plan: PlanSeen | None
     untestable: tuple[Untestable, ...]
-    advice: tuple[str, ...]
+    advice: tuple[Advice, ...]
 
     @property
     def candidates(self) -> tuple[Found, ...]:
         """What counts as found, best first."""
-        if self.diagnosis.verdict == "unexplained":
+        if self.diagnosis.verdict == Verdict.UNEXPLAINED:
             return ()
         return tuple(sorted(self.found, key=lambda f: -f.log_likelihood_gain))
 

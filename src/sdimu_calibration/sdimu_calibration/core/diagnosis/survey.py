@@ -14,6 +14,7 @@ from sdimu_calibration.core.diagnosis.search import FALSE_ALARM, Search
 from sdimu_calibration.core.estimation.fit import Fit
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.results import Calibration
+from sdimu_calibration.core.verdict import Verdict
 
 
 def survey(fit: Fit, result: Calibration, with_candidates: bool = True) -> Diagnosis:
@@ -44,7 +45,7 @@ def survey(fit: Fit, result: Calibration, with_candidates: bool = True) -> Diagn
         else "Something is left that no candidate stands for."
     )  # fmt: skip
     return Diagnosis(
-        "consistent" if adequate else "misfit", sentence, adequate, rest.p_value, (), (), fit.consistency(),
+        Verdict.CONSISTENT if adequate else Verdict.MISFIT, sentence, adequate, rest.p_value, (), (), fit.consistency(),
         fit, fit, result, result, found, evidence, rest, rest, free_columns, own=False, unexplained=False,
     )  # fmt: skip
 

@@ -18,6 +18,7 @@ from sdimu_calibration.core.evidence.consistency import SLOW_S, Consistency
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.handheld.handheld_fit import FORCE, RATE, TURN
 from sdimu_calibration.core.units import from_si
+from sdimu_calibration.core.verdict import Verdict
 
 if TYPE_CHECKING:
     from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
@@ -34,7 +35,7 @@ _LISTED = 4
 
 
 @dataclass(frozen=True)
-class Verdict:
+class Facts:
     """What the verdict follows from.
 
     Attributes
@@ -57,48 +58,48 @@ class Verdict:
     unexplained: bool
 
 
-def verdict(facts: Verdict) -> str:
-    """Give the verdict in a word or two, one of those of `Diagnosis`."""
+def verdict(facts: Facts) -> Verdict:
+    """Give the verdict."""
     chosen = facts.chosen
     if any(f.grave for f in facts.findings):
-        return "data fault"
+        return Verdict.DATA_FAULT
     if facts.unexplained:
-        return "unexplained"
+        return Verdict.UNEXPLAINED
     if chosen:
         if facts.own:
-            return "own equation"
+            return Verdict.OWN_EQUATION
         if len(chosen) > 1:
-            return "several effects"
+            return Verdict.SEVERAL_EFFECTS
         if chosen[0].effect.scope == "recording":
-            return "data fault"
-        return "class of effects" if facts.alike else "one effect"
+            return Verdict.DATA_FAULT
+        return Verdict.CLASS_OF_EFFECTS if facts.alike else Verdict.ONE_EFFECT
     if facts.noise:
-        return "noise model wrong"
+        return Verdict.NOISE_MODEL_WRONG
     # Something stood out of the noise and was refused or did not last.
-    return "unexplained" if facts.found.steps else "consistent"
+    return Verdict.UNEXPLAINED if facts.found.steps else Verdict.CONSISTENT
 
 
 def sentence(d: Diagnosis) -> str:
     """Put the verdict into one sentence."""
     names = _named(d)
-    if d.verdict == "consistent":
+    if d.verdict == Verdict.CONSISTENT:
         return _consistent(d)
-    if d.verdict == "noise model wrong":
+    if d.verdict == Verdict.NOISE_MODEL_WRONG:
         return f"The noise model is wrong, the physics is not: {'; '.join(d.noise)}."
-    if d.verdict == "data fault":
+    if d.verdict == Verdict.DATA_FAULT:
         faults = [f.text for f in d.findings if f.grave] or [f"{names} (a fault of this recording)"]
         return f"The data have a fault: {'; '.join(faults)}."
-    if d.verdict == "unexplained":
+    if d.verdict == Verdict.UNEXPLAINED:
         return _unexplained(d, names)
     rest = error_falls(d)
-    if d.verdict == "own equation":
+    if d.verdict == Verdict.OWN_EQUATION:
         return f"Something is missing that is not in the catalogue; it follows {names}; {rest}."
-    if d.verdict == "class of effects":
+    if d.verdict == Verdict.CLASS_OF_EFFECTS:
         others = ", ".join(d.alike[:_LISTED])
         return f"One effect is missing: {names}, or what looks the same here ({others}); {rest}."
     if len(d.chosen) > 1 and len(_families(d)) == 1:
         return f"One effect is missing on {len(d.chosen)} axes: {names}; {rest}."
-    return f"{'One effect is' if d.verdict == 'one effect' else 'Several effects are'} missing: {names}; {rest}."
+    return f"{'One effect is' if d.verdict == Verdict.ONE_EFFECT else 'Several effects are'} missing: {names}; {rest}."
 
 
 def _families(d: Diagnosis) -> list[list[Candidate]]:

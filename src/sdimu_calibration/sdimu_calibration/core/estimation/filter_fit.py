@@ -19,6 +19,7 @@ from sdimu_calibration.core.evidence.navigation_evidence import KnownPass, known
 from sdimu_calibration.core.filter.filter_pass import PassOutput, PassState, new_output, run_pass
 from sdimu_calibration.core.filter.passes import Pass, Solution, pass_settings
 from sdimu_calibration.core.filter.passes import solve as solve_filter
+from sdimu_calibration.core.fit_statistics import FitStatistics
 from sdimu_calibration.core.navigation.track import motion
 from sdimu_calibration.core.progress import silent
 from sdimu_calibration.core.results import History
@@ -189,7 +190,7 @@ class FilterFit(NavigationFit):
         heading = None if azimuth_is_lost(self, self.noise_terms) else azimuth_note(self.solution)
         return (*super().notes(), *([heading] if heading else []))
 
-    def warnings(self, statistics: dict[str, float | None]) -> tuple[str, ...]:
+    def warnings(self, statistics: FitStatistics) -> tuple[str, ...]:
         """Misfit, an azimuth that is too little known, coefficients outside the specification.
 
         Raises

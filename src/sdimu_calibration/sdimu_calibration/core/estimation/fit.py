@@ -19,6 +19,7 @@ from sdimu_calibration.core.evidence.consistency import Consistency
 from sdimu_calibration.core.evidence.learned_noise import Wander
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.evidence.stretch_length import wander_of
+from sdimu_calibration.core.fit_statistics import FitStatistics
 from sdimu_calibration.core.noise_term import NoiseTerm
 from sdimu_calibration.core.recording import DataFault, TemperatureLog
 from sdimu_calibration.core.results import NOT_TRUSTED, START_TEMPERATURE, History, Rest, no_history
@@ -164,7 +165,7 @@ class Fit(ABC):
         """Whether the estimate stood still at the end."""
 
     @abstractmethod
-    def statistics(self) -> dict[str, float | None]:
+    def statistics(self) -> FitStatistics:
         """``log_likelihood``, ``nis_mean``, ``nis_dof``, ``passes``."""
 
     @abstractmethod
@@ -238,8 +239,8 @@ class Fit(ABC):
         """Say what was assumed, learned and not determined, one line each."""
         return ()
 
-    def warnings(self, statistics: dict[str, float | None]) -> tuple[str, ...]:
-        """Say what speaks against the estimate, one line each; `statistics` with ``held_out_rms`` where it is known.
+    def warnings(self, statistics: FitStatistics) -> tuple[str, ...]:
+        """Say what speaks against the estimate, one line each; `statistics` with the held-out error where it is known.
 
         Raises
         ------

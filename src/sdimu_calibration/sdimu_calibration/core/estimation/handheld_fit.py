@@ -22,6 +22,7 @@ from sdimu_calibration.core.evidence.handheld_evidence import (
     timetable,
 )
 from sdimu_calibration.core.evidence.linear import LinearEvidence
+from sdimu_calibration.core.fit_statistics import FitStatistics
 from sdimu_calibration.core.handheld.handheld import PreparedRun, handheld_notes
 from sdimu_calibration.core.handheld.handheld_faults import data_faults
 from sdimu_calibration.core.handheld.handheld_fit import FitPriors, HandheldSolution, rests_with_residuals
@@ -114,13 +115,10 @@ class HandheldFit(Fit):
         point = self.solution.point
         return Start(self.names, point.coefficients, point.C_nb, np.concatenate([point.earth, point.extra]))
 
-    def statistics(self) -> dict[str, float | None]:
+    def statistics(self) -> FitStatistics:
         """Marginal log-likelihood, mean squared residual over its redundancy, steps."""
         found = self.solution
-        return {
-            "log_likelihood": found.log_likelihood, "nis_mean": found.chi2 / max(found.dof, 1.0),
-            "nis_dof": found.dof, "passes": float(found.steps),
-        }  # fmt: skip
+        return FitStatistics(found.log_likelihood, found.chi2 / max(found.dof, 1.0), found.dof, float(found.steps))
 
     def held_out_rms(self) -> float | None:
         """RMS of the normalised errors of the forces at each rest, predicted from everything else."""
@@ -147,7 +145,7 @@ class HandheldFit(Fit):
         """
         about = evidence if isinstance(evidence, HandheldEvidence) else self.evidence()
         return Consistency(
-            self.statistics()["nis_mean"] or 0.0, 1.0, float("nan"), 1.0, NO_NOISE, NO_NOISE,
+            self.statistics().nis_mean, 1.0, float("nan"), 1.0, NO_NOISE, NO_NOISE,
             places(about, np.empty(0, dtype=np.int64)),
         )  # fmt: skip
 

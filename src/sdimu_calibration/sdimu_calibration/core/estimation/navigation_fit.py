@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import InitVar, dataclass, field, replace
 from functools import cached_property
-from typing import Self
+from typing import Any, Self
 from zlib import crc32
 
 import numpy as np
@@ -37,6 +37,7 @@ from sdimu_calibration.core.evidence.navigation_evidence import (
 from sdimu_calibration.core.evidence.stop_misfit import stop_misfit
 from sdimu_calibration.core.filter.filter_pass import PassOutput
 from sdimu_calibration.core.filter.passes import Pass
+from sdimu_calibration.core.fit_statistics import FitStatistics
 from sdimu_calibration.core.measurement_kind import ALL, HELD_ALL, HELD_SENSORS, SENSORS
 from sdimu_calibration.core.noise_term import NoiseTerm
 from sdimu_calibration.core.plain_text import counted
@@ -57,7 +58,7 @@ within a few per cent of it."""
 _FAST = 3.0
 """NIS per degree of freedom (1) in learned noise from which sigmas are too small: in flicker errors are 1.0 of them at
 2, 1.2 at 4.5 and 3.8 at 12 (twelve tests of a FOG)."""
-_OF_THE_PASSES = {"known", "timetable", "wander", "centring", "_drifts", "_share_of_rest"}
+_OF_THE_PASSES = ("known", "timetable", "wander", "centring", "_drifts", "_share_of_rest")
 """Cached properties that neither noise nor doubt changes."""
 NO_FIELD = (
     "the site states no magnetic field: that of mid-northern latitudes is assumed; state magnetic_field_nt (north, "
@@ -78,12 +79,20 @@ class NavigationFit(Fit):
     alignment : Alignment
     noise : NoiseEstimate or None
         Noise with a memory that was learned; None where white noise was taken.
+    carried : mapping of str to object, or None
+        Cached properties that a fit by the same passes knows already.
     """
 
     setup: TestSetup
     prepared: PreparedData
     alignment: Alignment
     noise: NoiseEstimate | None = field(default=None, kw_only=True)
+    carried: InitVar[Mapping[str, Any] | None] = field(default=None, kw_only=True)
+
+    def __post_init__(self, carried: Mapping[str, Any] | None) -> None:
+        """Keep what is known."""
+        for name, value in (carried or {}).items():
+            object.__setattr__(self, name, value)
 
     @property
     @abstractmethod
@@ -218,17 +227,16 @@ class NavigationFit(Fit):
         """
         if doubt is not None:
             doubt = np.pad(doubt, (0, len(self.setup.sensors.names) - len(doubt)))
-        return self._with_passes(replace(self, doubt=doubt))
+        return replace(self, doubt=doubt, carried=self._of_the_passes())
 
     def with_noise(self, noise: NoiseEstimate | None) -> Self:
         """Return the fit in other noise; None is white noise."""
-        return self._with_passes(replace(self, noise=noise))
+        return replace(self, noise=noise, carried=self._of_the_passes())
 
-    def _with_passes(self, other: Self) -> Self:
-        """Hand over what is known of the passes to a fit by the same ones."""
-        for name in _OF_THE_PASSES & self.__dict__.keys():
-            other.__dict__[name] = self.__dict__[name]
-        return other
+    def _of_the_passes(self) -> dict[str, Any]:
+        """Collect what is known of the passes by now, for a fit by the same ones."""
+        known = vars(self)
+        return {name: known[name] for name in _OF_THE_PASSES if name in known}
 
     @property
     def noise_terms(self) -> tuple[NoiseTerm, ...]:
@@ -250,19 +258,24 @@ class NavigationFit(Fit):
         """Where a fit of nearly the same model begins."""
         return Start(self.setup.sensors.names, self.estimate, self.last.smoothed_start, np.empty(0))
 
-    def statistics(self) -> dict[str, float | None]:
+    def statistics(self) -> FitStatistics:
         """Log-likelihood and mean normalised innovation squared of the last pass, and in the noise that was learned.
 
         NIS and held-out error are those in the noise of the IMU's file, whatever was learned: so they compare between
         models.
         """
-        white = fit_statistics(self.last.output) | {"passes": float(self.passes)}
+        output = self.last.output
+        dof = 3 * int(np.isfinite(output.nis).sum())
+        white = FitStatistics(
+            float(output.log_likelihood.sum()), float(np.nansum(output.nis) / max(dof, 1)), float(dof),
+            float(self.passes),
+        )  # fmt: skip
         if self.noise is None:
             return white
-        return white | {
-            "log_likelihood": (white["log_likelihood"] or 0.0) + self.noise.gain, "nis_in_noise": self.noise.nis,
-            "held_out_in_noise": self.noise.held_out_rms,
-        }  # fmt: skip
+        return replace(
+            white, log_likelihood=white.log_likelihood + self.noise.gain, nis_in_noise=self.noise.nis,
+            held_out_in_noise=self.noise.held_out_rms,
+        )  # fmt: skip
 
     def held_out_rms(self) -> float | None:
         """RMS of normalised prediction errors at stops that the fit has not seen.
@@ -348,7 +361,7 @@ class NavigationFit(Fit):
             *((f"with a prior that the model states: {', '.join(other)}",) if other else ()),
         )
 
-    def warnings(self, statistics: dict[str, float | None]) -> tuple[str, ...]:
+    def warnings(self, statistics: FitStatistics) -> tuple[str, ...]:
         """Misfit as a whole and of single stops, and coefficients outside the specification.
 
         Raises
@@ -356,7 +369,7 @@ class NavigationFit(Fit):
         DataError
             When there is no fit at all.
         """
-        nis, held_out = statistics["nis_mean"] or 0.0, statistics.get("held_out_rms")
+        nis, held_out = statistics.nis_mean, statistics.held_out_rms
         lost = int(self.prepared.cycles.lost.sum())
         white = "" if self.noise is None else " in white noise"
         in_turn = f"; {counted(lost, 'sample is', 'samples are')} missing by their stamps" if lost else ""
@@ -402,16 +415,6 @@ class NavigationFit(Fit):
         )  # fmt: skip
 
 
-def fit_statistics(output: PassOutput) -> dict[str, float | None]:
-    """Log-likelihood and mean normalised innovation squared of a pass."""
-    dof = 3 * int(np.isfinite(output.nis).sum())
-    return {
-        "log_likelihood": float(output.log_likelihood.sum()),
-        "nis_mean": float(np.nansum(output.nis) / max(dof, 1)),
-        "nis_dof": float(dof),
-    }
-
-
 def checksum(*arrays: Floats) -> float:
     """Give a number that other samples do not have: the same recording is known again by it."""
     value = 0
@@ -429,9 +432,9 @@ def conditions(setup: TestSetup) -> float:
     return checksum(np.array([*place, imu.gyro_white_noise, imu.accel_white_noise]))
 
 
-def _in_noise(statistics: Mapping[str, float | None]) -> str:
+def _in_noise(statistics: FitStatistics) -> str:
     """Say which figure is right at 1: that in learned noise where any was, with what is not in that noise."""
-    nis, held_out = statistics.get("nis_in_noise"), statistics.get("held_out_in_noise")
+    nis, held_out = statistics.nis_in_noise, statistics.held_out_in_noise
     if nis is None or held_out is None:
         return "; 1 is right"
     fast = ": noise that moves within half a minute is not in it" if nis > MISFIT else ""

@@ -38,8 +38,7 @@ def outcome(fit: Fit, held_out: bool = True) -> Calibration:
     DataError
         When there is no fit at all.
     """
-    statistics = fit.statistics()
-    statistics["held_out_rms"] = fit.held_out_rms() if held_out else None
+    statistics = replace(fit.statistics(), held_out_rms=fit.held_out_rms() if held_out else None)
     parameters = fit.sensors.parameters
     covariance = fit.covariance
     grave = (f.text for f in fit.faults if f.grave)
@@ -53,7 +52,7 @@ def outcome(fit: Fit, held_out: bool = True) -> Calibration:
         display_units=tuple(p.display_unit for p in parameters),
         values=fit.values,
         covariance=covariance,
-        fit=statistics,
+        fit=statistics.entries(),
         data=fit.data_counts(),
         notes=(*fit.test.recording.notes, *fit.notes(), *light, *warnings),
         history=fit.history(),

@@ -18,6 +18,7 @@ from sdimu_calibration.core.estimation.navigation_fit import NavigationFit
 from sdimu_calibration.core.evidence.consistency import Consistency
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.evidence.navigation_evidence import NavigationEvidence
+from sdimu_calibration.core.fit_statistics import FitStatistics
 from sdimu_calibration.core.recording import DataFault
 
 
@@ -30,8 +31,8 @@ class ReferenceFit(Fit):
     frame : str
     coefficients, coefficient_covariance : ndarray, shapes (p,) and (p, p)
         SI, in `frame`.
-    summary : dict
-        ``log_likelihood``, ``nis_mean``, ``nis_dof``, ``passes`` of the least squares.
+    summary : FitStatistics
+        Of the least squares.
     about : NavigationFit
         About the coefficients of this fit.
     """
@@ -39,7 +40,7 @@ class ReferenceFit(Fit):
     frame: str
     coefficients: Floats
     coefficient_covariance: Floats
-    summary: dict[str, float | None]
+    summary: FitStatistics
     about: NavigationFit
 
     @property
@@ -97,9 +98,9 @@ class ReferenceFit(Fit):
         """Where a navigation of nearly the same model begins."""
         return self.about.start
 
-    def statistics(self) -> dict[str, float | None]:
+    def statistics(self) -> FitStatistics:
         """Chi-square of the least squares and its degrees of freedom."""
-        return dict(self.summary)
+        return self.summary
 
     def held_out_rms(self) -> float | None:
         """RMS of the normalised prediction errors at stops that a navigation has not seen."""

@@ -50,6 +50,7 @@ from sdimu_calibration.core.filter.filter_pass import NAV
 from sdimu_calibration.core.filter.known_coefficients import attitude_about
 from sdimu_calibration.core.filter.passes import MOST_WIDENINGS, Solution, one_pass, widen_contradicted_priors
 from sdimu_calibration.core.filter.passes import solve as solve_filter
+from sdimu_calibration.core.fit_statistics import FitStatistics
 from sdimu_calibration.core.progress import Progress, silent
 from sdimu_calibration.core.recording import DataError, DivergedError
 from sdimu_calibration.core.second_order.second_order_passes import second_order_pass, solve_second_order
@@ -322,10 +323,9 @@ def _batch(test: PreparedTest, model: Model, _start: Start | None, progress: Pro
     else:
         frame, values = FRAME, frame_model.values(found.coefficients)
         covariance = frame_model.covariance(found.covariance, found.coefficients)
-    summary: dict[str, float | None] = {
-        "log_likelihood": found.log_evidence, "nis_mean": found.chi2 / max(found.dof, 1),
-        "nis_dof": float(found.dof), "passes": float(found.steps),
-    }  # fmt: skip
+    summary = FitStatistics(
+        found.log_evidence, found.chi2 / max(found.dof, 1), float(found.dof), float(found.steps)
+    )
     about = _navigation_about(
         test, model, replace(begun, setup=inner), frame_model, found.C_nb[0], found.coefficients
     )
@@ -337,10 +337,7 @@ def _classical(test: PreparedTest, model: Model, _start: Start | None, progress:
     setup = begun.setup
     progress("least squares", 0.2)
     found = solve_classical(begun.prepared, setup, test.recording.table)
-    summary: dict[str, float | None] = {
-        "log_likelihood": -0.5 * found.chi2, "nis_mean": found.chi2 / max(found.dof, 1),
-        "nis_dof": float(found.dof), "passes": 1.0,
-    }  # fmt: skip
+    summary = FitStatistics(-0.5 * found.chi2, found.chi2 / max(found.dof, 1), float(found.dof), 1.0)
     # The mount stands in the misalignments: turned into the accelerometers' frame they are those of the sensors.
     turned = body_frame.values_in_frame(setup.sensors.names, found.values, FRAME)
     about = _navigation_about(test, model, begun, None, begun.alignment.C_nb, turned)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import InitVar, dataclass, field, replace
 from functools import cached_property
 from typing import TypeVar
 
@@ -58,6 +58,8 @@ class LinearEvidence(ABC):
         How many of the model's parameters, the first ones, are sensor coefficients.
     noise : ndarray, shape (N, r)
         Signatures of the modes of noise with a memory.
+    worked_out : Information or None
+        `information`, where whoever makes the evidence knows it more cheaply; evidence made from this one has its own.
     """
 
     e: Floats
@@ -73,6 +75,12 @@ class LinearEvidence(ABC):
     times: Timetable
     coefficients: int
     noise: Floats = field(default_factory=lambda: np.zeros((0, 0)), kw_only=True)
+    worked_out: InitVar[Information | None] = field(default=None, kw_only=True)
+
+    def __post_init__(self, worked_out: Information | None) -> None:
+        """Keep the information that is known."""
+        if worked_out is not None:
+            object.__setattr__(self, "information", worked_out)
 
     @abstractmethod
     def signature(self, effects: Sequence[Effect]) -> Floats:
@@ -147,31 +155,31 @@ class LinearEvidence(ABC):
         M = np.eye(self.noise.shape[1]) + self.noise.T @ self.noise
         return np.asarray(columns - self.noise @ np.linalg.solve(M, self.noise.T @ columns))
 
-    def with_noise(self: E, modes: Floats) -> E:
+    def with_noise(self: E, modes: Floats, worked_out: Information | None = None) -> E:
         """Return the evidence with other modes of noise with a memory.
 
         Parameters
         ----------
         modes : ndarray, shape (N, r)
             Signatures of the modes in the whitened residuals, each of unit variance.
+        worked_out : Information, optional
+            In that noise.
         """
-        return replace(self, noise=modes) if modes.size or self.noise.size else self
+        return replace(self, noise=modes, worked_out=worked_out) if modes.size or self.noise.size else self
 
     def with_effects(self: E, effects: Sequence[Effect]) -> E:
         """Return the evidence with the parameters of more effects behind the candidates it has."""
         more, prior = candidate_priors(effects, self.imu)
         W = self.signature(effects)
-        wider = replace(
-            self, W=np.hstack([self.W, W]), names=(*self.names, *(c.label for c in more)),
-            candidates=(*self.candidates, *more),
-            prior=np.concatenate([self.prior, prior]),
-        )  # fmt: skip
         # Only what is new is multiplied: the old columns are many.
         weighed = self.weighed(W)
         old, across = self.information, self.W.T @ weighed
         J = np.block([[old.J, across], [across.T, W.T @ weighed]])
-        wider.__dict__["information"] = Information(J, np.concatenate([old.d, weighed.T @ self.e]))
-        return wider
+        return replace(
+            self, W=np.hstack([self.W, W]), names=(*self.names, *(c.label for c in more)),
+            candidates=(*self.candidates, *more), prior=np.concatenate([self.prior, prior]),
+            worked_out=Information(J, np.concatenate([old.d, weighed.T @ self.e])),
+        )  # fmt: skip
 
     def only(self: E, columns: Ints) -> E:
         """Return the evidence with the model and some of the candidates alone.
@@ -184,13 +192,12 @@ class LinearEvidence(ABC):
         p = len(self.weight)
         keep = np.concatenate([self.model, columns]).astype(np.int64)
         whole = np.array_equal(keep, np.arange(len(keep)))
-        part = replace(
+        full = self.information
+        return replace(
             self, W=self.W[:, : len(keep)] if whole else self.W[:, keep], names=tuple(self.names[i] for i in keep),
             candidates=tuple(self.candidates[i - p] for i in columns), prior=self.prior[columns - p],
+            worked_out=Information(full.J[np.ix_(keep, keep)], full.d[keep]),
         )  # fmt: skip
-        full = self.information
-        part.__dict__["information"] = Information(full.J[np.ix_(keep, keep)], full.d[keep])
-        return part
 
     def about(self: E, fresh: E, columns: Ints, tried: Sequence[Candidate]) -> E:
         """Return this evidence about another fit: its residuals and priors with the signatures as they are.
@@ -210,15 +217,15 @@ class LinearEvidence(ABC):
         p, labels = len(self.weight), [c.label for c in self.candidates]
         places = [p + labels.index(c.label) for c in tried]
         stays = np.setdiff1d(fresh.model, columns)
-        moved = replace(
-            fresh, e=fresh.e - self.W[:, places] @ fresh.shift[columns], W=self.W, names=self.names,
-            weight=fresh.weight[stays], shift=fresh.shift[stays], stated=fresh.stated[stays],
+        e = fresh.e - self.W[:, places] @ fresh.shift[columns]
+        weight, shift = fresh.weight[stays], fresh.shift[stays]
+        d = self.W.T @ e
+        d[:p] += weight * shift
+        return replace(
+            fresh, e=e, W=self.W, names=self.names, weight=weight, shift=shift, stated=fresh.stated[stays],
             candidates=self.candidates, prior=self.prior, coefficients=self.coefficients,
+            worked_out=Information(self.information.J, d),
         )  # fmt: skip
-        d = moved.W.T @ moved.e
-        d[:p] += moved.weight * moved.shift
-        moved.__dict__["information"] = Information(self.information.J, d)
-        return moved
 
     def as_candidates(self: E, columns: Ints, tried: Sequence[Candidate]) -> E:
         """Make candidates of coefficients of the model, as if the calibration had not known them.

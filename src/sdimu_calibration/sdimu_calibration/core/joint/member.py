@@ -21,6 +21,7 @@ from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.estimation.second_order_fit import NO_AZIMUTH
 from sdimu_calibration.core.estimation.solve import AUTO, fit_about, solve
 from sdimu_calibration.core.evidence.stretch_length import wander_in
+from sdimu_calibration.core.fit_statistics import FitStatistics
 from sdimu_calibration.core.joint.reduction import Reduction, reduced
 from sdimu_calibration.core.joint.scope import is_local, tagged
 from sdimu_calibration.core.joint.stretch_rows import Places, stretch_rows
@@ -114,8 +115,9 @@ class Report:
     times : Timetable
     temperature_degc : float
         Mean; NaN where it is not recorded.
-    data, statistics : mapping
+    data : mapping
         As in a result.
+    statistics : FitStatistics
     names : tuple of str, length p
         Coefficients as reported.
     values, sigma : ndarray, shape (p,)
@@ -144,7 +146,7 @@ class Report:
     times: Timetable
     temperature_degc: float
     data: Mapping[str, float]
-    statistics: Mapping[str, float | None]
+    statistics: FitStatistics
     names: tuple[str, ...]
     values: Floats
     sigma: Floats

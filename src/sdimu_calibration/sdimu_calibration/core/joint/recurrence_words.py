@@ -1,24 +1,21 @@
-"""What comes back in a set, in words: a sentence, and what to do next."""
+"""What comes back in a set: a sentence, and what to do next."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
+from sdimu_calibration.core.advice import Advice
+from sdimu_calibration.core.advice import Kind as Do
 from sdimu_calibration.core.joint.leftovers import ATTITUDE, KINDS, TEMPERATURE, TIME
 from sdimu_calibration.core.joint.recurrence import Kind, Recurrence
 
 _WORDS = {ATTITUDE: "attitude", TIME: "time after the start", TEMPERATURE: "temperature"}
 _BELONGS = {ATTITUDE: "the sensor", TIME: "the warm-up", TEMPERATURE: "the temperature"}
-_ORDER = "record the plan in another order (sdimu plan --plan YOURS --backwards), and diagnose it with these"
 _NEXT = {
-    ATTITUDE: "what comes back at the same attitude is an error of the sensor that the catalogue lacks: try an "
-    "equation of the specific force (sdimu diagnose BAG --try FILE)",
-    TIME: "what comes back at the same time is over when the unit is warm: begin the plan later, or let the first "
-    "stop be longer",
-    TEMPERATURE: "what comes back at the same temperature is told by soaks: record at more temperatures that stand "
-    "still",
+    ATTITUDE: Advice(Do.TRY_FORCE_EQUATION),
+    TIME: Advice(Do.BEGIN_LATER),
+    TEMPERATURE: Advice(Do.SOAK_MORE),
 }
-_OF_EACH = "what does not come back is of each run: look at mount, cables and floor, and take it for scatter until then"
 
 
 def answer_in_words(found: Recurrence, unexplained: bool) -> str:
@@ -61,15 +58,15 @@ def answer_in_words(found: Recurrence, unexplained: bool) -> str:
     return f"{what}{where} does not come back at the same {_listed(found.told, 'or')}{of_each}."
 
 
-def next_steps(found: Recurrence | None) -> list[str]:
+def next_steps(found: Recurrence | None) -> list[Advice]:
     """Say what to do about what comes back, the most useful first."""
     if found is None:
         return []
     if found.answer:
-        return [_NEXT[kind] for kind in found.answer] if found.apart else [_ORDER]
+        return [_NEXT[kind] for kind in found.answer] if found.apart else [Advice(Do.REVERSE_AND_ADD)]
     if ATTITUDE not in found.told or found.doubtful:
-        return [_ORDER]
-    return [_OF_EACH]
+        return [Advice(Do.REVERSE_AND_ADD)]
+    return [Advice(Do.LOOK_AT_MOUNT)]
 
 
 def _figures(one: Kind, limit: float) -> str:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from sdimu_calibration.core.advice import Advice, Kind, Verb
 from sdimu_calibration.core.diagnosis.search import Search
 from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.effects.selection import resolve
@@ -26,6 +27,7 @@ from sdimu_calibration.core.progress import Progress, silent
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.units import from_si
+from sdimu_calibration.core.verdict import Verdict
 
 _STILL_WRONG = 1.25
 """Held-out error (sigma) from which a model is not called explained, as for one recording, where chance does not
@@ -69,15 +71,14 @@ class SetDiagnosis:
 
     Attributes
     ----------
-    verdict : str
-        ``consistent``, ``one effect``, ``class of effects``, ``several effects``, ``data fault``, ``unexplained``.
+    verdict : Verdict
     sentence : str
     findings : tuple of SetFinding
     before, after : Calibration
         With the model as given, and with what was found.
     threshold : float
         Score that noise reaches in a scan.
-    advice : tuple of str
+    advice : tuple of Advice
     standing : Standing
         What the set knows of the unit: what a plan for the next recording begins with.
     first : Search
@@ -91,13 +92,13 @@ class SetDiagnosis:
         them. By itself that model learns in each recording what it lacks as noise, and its own error hides it.
     """
 
-    verdict: str
+    verdict: Verdict
     sentence: str
     findings: tuple[SetFinding, ...]
     before: Calibration
     after: Calibration
     threshold: float
-    advice: tuple[str, ...]
+    advice: tuple[Advice, ...]
     standing: Standing
     first: Search[SetEvidence]
     recurrence: Recurrence | None
@@ -127,7 +128,7 @@ def diagnose_set(
     word = _verdict(findings, after, found.after, again)
     refused: tuple[SetFinding, ...] = ()
     taken_back = ""
-    if word == "unexplained" and found.chosen and _rises(before, after):
+    if word == Verdict.UNEXPLAINED and found.chosen and _rises(before, after):
         # What imitates the missing cause fits here and fails elsewhere: the coefficients are better without.
         refused = tuple(f for f in findings if not f.recording)
         taken_back = _taken_back(refused, before, after)
@@ -136,7 +137,9 @@ def diagnose_set(
         again = recurrence(leftovers(found.after, run))
         word = _verdict(findings, after, found.after, again)
     test = base_fit(found.after).test
-    standing = replace(found.standing, site=test.origin.site)
+    standing = replace(
+        found.standing, imu=test.origin.imu_file or found.standing.imu, site=test.origin.site_stated
+    )
     without = _error_without(found)
     sentence = f"{_sentence(word, findings, (without, after), again)} {taken_back}".strip()
     return SetDiagnosis(
@@ -177,20 +180,20 @@ def _findings(found: SetSearch) -> tuple[SetFinding, ...]:
     )
 
 
-def _verdict(findings: Sequence[SetFinding], after: Calibration, fit: SetFit, again: Recurrence | None) -> str:
+def _verdict(findings: Sequence[SetFinding], after: Calibration, fit: SetFit, again: Recurrence | None) -> Verdict:
     shared = [f for f in findings if not f.recording]
-    error = after.fit["held_out_rms"] or 0.0
-    still = error > _STILL_WRONG and held_out_chance(fit, error) < SCATTERS
+    error = after.fit["held_out_rms"]
+    still = error is not None and error > _STILL_WRONG and held_out_chance(fit, error) < SCATTERS
     # Noise does not come back: where something does, it is no noise, whatever each recording took it for.
     left = _scatter(after) < SCATTERS or still or (again is not None and len(again.answer) > 0)
     # A fault leaves traces in its recording that are no physics of the unit.
     if left and (shared or not findings):
-        return "unexplained"
+        return Verdict.UNEXPLAINED
     if len(shared) > 1:
-        return "several effects"
+        return Verdict.SEVERAL_EFFECTS
     if shared:
-        return "class of effects" if shared[0].alike else "one effect"
-    return "data fault" if findings else "consistent"
+        return Verdict.CLASS_OF_EFFECTS if shared[0].alike else Verdict.ONE_EFFECT
+    return Verdict.DATA_FAULT if findings else Verdict.CONSISTENT
 
 
 def _scatter(result: Calibration) -> float:
@@ -202,37 +205,37 @@ def _scatter(result: Calibration) -> float:
 
 
 def _sentence(
-    word: str, findings: Sequence[SetFinding], errors: tuple[float | None, Calibration], again: Recurrence | None
+    word: Verdict, findings: Sequence[SetFinding], errors: tuple[float | None, Calibration], again: Recurrence | None
 ) -> str:
     """Say what was found, then what comes back of that what the model leaves.
 
     `errors` are the one without what was found, in the noise of the result with it, and that result.
     """
-    more = answer_in_words(again, word == "unexplained") if again else ""
+    more = answer_in_words(again, word == Verdict.UNEXPLAINED) if again else ""
     return f"{_found(word, findings, *errors, again)} {more}".strip()
 
 
 def _found(
-    word: str, findings: Sequence[SetFinding], without: float | None, after: Calibration, again: Recurrence | None
+    word: Verdict, findings: Sequence[SetFinding], without: float | None, after: Calibration, again: Recurrence | None
 ) -> str:
     listed = [_named(f) for f in findings]
     names = " and ".join(listed[:_LISTED]) + (f" and {len(listed) - _LISTED} more" if len(listed) > _LISTED else "")
-    if word == "consistent" and again is not None:
+    if word == Verdict.CONSISTENT and again is not None:
         return "The model explains all recordings together, each in a noise of its own."
-    if word == "consistent":
+    if word == Verdict.CONSISTENT:
         return "The model explains all recordings together: nothing stands out of the noise."
-    if word == "data fault":
+    if word == Verdict.DATA_FAULT:
         return f"All recordings agree but for {names}."
-    if word == "unexplained":
+    if word == Verdict.UNEXPLAINED:
         most = f" Found, but not all: {names}." if names else ""
         shared = again is not None and again.answer and not _odd(after)
         what = "The recordings share something" if shared else "Something differs between the recordings"
         return f"{what} that no effect of the catalogue explains.{most}{_odd(after)}"
     falls = f"error at recordings held out, in one noise: {_shown(without)} -> {_rms(after)}"
-    if word == "class of effects":
+    if word == Verdict.CLASS_OF_EFFECTS:
         others = ", ".join(findings[0].alike[:_LISTED])
         return f"One effect is missing: {names}, or what looks the same in these recordings ({others}); {falls}."
-    return f"{'One effect is' if word == 'one effect' else 'Several effects are'} missing: {names}; {falls}."
+    return f"{'One effect is' if word == Verdict.ONE_EFFECT else 'Several effects are'} missing: {names}; {falls}."
 
 
 def _named(f: SetFinding) -> str:
@@ -268,23 +271,18 @@ def _shown(value: float | None) -> str:
 
 
 def _advice(
-    word: str, findings: Sequence[SetFinding], closing: Sequence[tuple[tuple[str, ...], NextTurn]],
+    word: Verdict, findings: Sequence[SetFinding], closing: Sequence[tuple[tuple[str, ...], NextTurn]],
     again: Recurrence | None,
-) -> tuple[str, ...]:
+) -> tuple[Advice, ...]:
     out = next_steps(again)
     closed = {members[0] for members, _ in closing}
     for f in findings:
         if f.recording:
-            out.append(f"look what happened in {f.recording}, or leave it out of the set: {f.label}")
+            out.append(Advice(Kind.LOOK_AT_RECORDING, (f.recording, f.label)))
         elif f.alike and f.label not in closed:
-            out.append(
-                f"no plan tells {f.label} from {f.alike[0]}: record at another temperature, or after another warm-up"
-            )
+            out.append(Advice(Kind.NO_PLAN_TELLS, (f.label, f.alike[0])))
     for (label, *others), turn in closing:
-        out.append(
-            f"to tell {label} from {', '.join(others)}, record once more, rests of 100 s and between them: "
-            f"{turn.text}; a whole plan: sdimu plan --after"
-        )
-    if word == "unexplained":
-        out.append("diagnose the recordings one by one (sdimu diagnose BAG), the one with the largest deviates first")
+        out.append(Advice(Kind.RECORD_ONCE_MORE, (label, tuple(others), turn.text), Verb.CONTINUE))
+    if word == Verdict.UNEXPLAINED:
+        out.append(Advice(Kind.ONE_BY_ONE))
     return tuple(out)

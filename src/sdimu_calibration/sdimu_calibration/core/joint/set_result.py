@@ -53,8 +53,8 @@ def set_outcome(fit: SetFit) -> Calibration:
     values, covariance = _reported(fit, base)
     varied = variation(fit)
     predicted = held_out(fit)
-    dof = sum(float(r.statistics["nis_dof"] or 0.0) for r in fit.reports)
-    nis = sum(float(r.statistics["nis_mean"] or 0.0) * float(r.statistics["nis_dof"] or 0.0) for r in fit.reports)
+    dof = sum(r.statistics.nis_dof for r in fit.reports)
+    nis = sum(r.statistics.nis_mean * r.statistics.nis_dof for r in fit.reports)
     parameters = base.sensors.parameters
     names = tuple(p.name for p in parameters)
     # What the frame of the report pins differs in no recording.
@@ -67,7 +67,7 @@ def set_outcome(fit: SetFit) -> Calibration:
         fit={
             "log_likelihood": fit.estimate.log_likelihood, "nis_mean": nis / max(dof, 1.0), "nis_dof": dof,
             "held_out_rms": None if predicted is None else predicted.rms,
-            "passes": max(float(r.statistics["passes"] or 0.0) for r in fit.reports),
+            "passes": max(r.statistics.passes for r in fit.reports),
         },
         data=_data(fit.reports, base), notes=(*_notes(fit, base), *warnings), history=no_history(len(names)),
         warnings=warnings, estimator=base.estimator, estimator_reason=fit.reports[0].reason,
@@ -163,7 +163,7 @@ def _warnings(fit: SetFit, varied: Variation, names: Sequence[str]) -> tuple[str
 
 def _misfit(fit: SetFit) -> list[str]:
     """Name the recordings whose innovations are larger than white noise makes them, the worst first."""
-    nis = {r.name: float(r.statistics["nis_mean"] or 0.0) for r in fit.reports}
+    nis = {r.name: r.statistics.nis_mean for r in fit.reports}
     bad = sorted((name for name, value in nis.items() if value > MISFIT), key=lambda name: -nis[name])
     if not bad:
         return []
@@ -183,7 +183,7 @@ def _summary(fit: SetFit, varied: Variation, names: Sequence[str], base: Fit) ->
     recordings = tuple(
         SetRecording(
             r.name, r.serial, r.power_on, r.start_ns, r.temperature_degc, r.data.get("duration_s", float("nan")),
-            r.data.get("samples", float("nan")), float(r.statistics["nis_mean"] or 0.0),
+            r.data.get("samples", float("nan")), r.statistics.nis_mean,
             *_own(r, names), in_order(varied.z[k]),
         )
         for k, r in enumerate(fit.reports)

@@ -220,7 +220,7 @@ def _singles(evidence: SetEvidence) -> Ints:
 
 def _far_off(fit: SetFit, found: Search[SetEvidence]) -> bool:
     """Whether what was found first is so strong that the others may be what its linear model leaves."""
-    worst = max(float(r.statistics["nis_mean"] or 0.0) for r in fit.reports)
+    worst = max(r.statistics.nis_mean for r in fit.reports)
     return abs(found.steps[0].z) > _STRONG or worst > _FAILS
 
 

@@ -13,6 +13,7 @@ from sdimu_calibration.report import data
 from sdimu_calibration.report.table import with_sigma
 from sdimu_calibration.report.workbench.fit import Fitted, Missing, Preview
 from sdimu_calibration.report.workbench.setting import Setting
+from sdimu_calibration.storage.files.advice_words import sentence
 
 _MOST_PARAMETERS = 9
 """Number of parameters of a candidate that are listed: a whole matrix of them."""
@@ -70,8 +71,9 @@ def candidate(found: Preview, name: str) -> list[Any]:
     effect, what = found.effect, found.what
     head = html.P(html.B(_capital(effect.title)), id="candidate-name", **{"data-name": name})
     cause = [html.P(effect.description)] if effect.description else []
+    tells = "" if what.tells is None else sentence(what.tells)
     alike = (
-        [html.P(["Looks the same here: ", ", ".join(what.alike), "."]), html.P(["To tell them: ", what.tells, "."])]
+        [html.P(["Looks the same here: ", ", ".join(what.alike), "."]), html.P(["To tell them: ", tells, "."])]
         if what.alike else [html.P("Nothing else looks the same here.")] if not what.objections else []
     )  # fmt: skip
     against = [html.Ul([html.Li(line) for line in what.objections], className="against")] if what.objections else []

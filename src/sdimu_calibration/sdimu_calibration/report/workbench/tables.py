@@ -9,6 +9,7 @@ import numpy as np
 from dash import html
 
 from sdimu_calibration.core.diagnosis.ladder import moved_coefficients
+from sdimu_calibration.core.error_figures import log_likelihood
 from sdimu_calibration.core.units import from_si, parse_quantity
 from sdimu_calibration.report.table import as_far
 from sdimu_calibration.report.workbench.fit import FitSession, Fitted
@@ -45,7 +46,7 @@ def _model(setting: Setting, fitted: Fitted, given: Fitted | None) -> list[str]:
     fit = fitted.calibration.fit
     gained, most = "", ""
     if given is not None and given is not fitted:
-        gained = f"{(fit['log_likelihood'] or 0.0) - (given.calibration.fit['log_likelihood'] or 0.0):+.1f}"
+        gained = f"{log_likelihood(fitted.calibration) - log_likelihood(given.calibration):+.1f}"
         sizes = moved_coefficients(given.calibration, fitted.calibration)[:2]
         most = ", ".join(f"{name} {size:+.1f} sigma" for name, size in sizes)
     return [

@@ -11,9 +11,11 @@ from dash import State as Kept
 from sdimu_calibration.core.joint.set_diagnosis import SetDiagnosis
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.units import UnitError, from_si
+from sdimu_calibration.core.verdict import Verdict
 from sdimu_calibration.report.table import with_sigma
 from sdimu_calibration.report.workbench.state import from_json
 from sdimu_calibration.report.workbench.task_progress import BUSY, TaskProgress
+from sdimu_calibration.storage.files.advice_words import sentence
 
 Judge = Callable[[Sequence[str], Callable[[str, float], None]], SetDiagnosis]
 
@@ -55,8 +57,8 @@ def shown(found: SetDiagnosis) -> list[Any]:
         html.Thead(html.Tr([html.Th(word) for word in heads])),
         html.Tbody([html.Tr([html.Td(text) for text in row]) for row in rows]),
     ])  # fmt: skip
-    tone = "good" if found.verdict == "consistent" else "bad"
+    tone = "good" if found.verdict == Verdict.CONSISTENT else "bad"
     return [
         html.P(f"{found.verdict}: {found.sentence}", className=f"verdict {tone}"), *([table] if rows else []),
-        *(html.P(f"Advice: {line}") for line in found.advice),
+        *(html.P(f"Advice: {sentence(one)}") for one in found.advice),
     ]  # fmt: skip

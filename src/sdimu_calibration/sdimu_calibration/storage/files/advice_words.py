@@ -1,0 +1,172 @@
+"""Advice in words, as files, pages and Python give it, with the commands of a shell in their general form."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+
+from sdimu_calibration.core.advice import Advice, Kind, Verb
+
+
+def sentence(advice: Advice) -> str:
+    """Return an advice as one sentence, its command included."""
+    command = general_command(advice)
+    if not command:
+        return lead(advice)
+    # Lines about a set are no sentences.
+    return f"{lead(advice)}: {command}" + ("." if lead(advice)[0].isupper() else "")
+
+
+def lead(advice: Advice) -> str:
+    """Return the words of an advice, without the command at their end."""
+    return _WORDS[advice.kind](*advice.arguments)
+
+
+def general_command(advice: Advice) -> str:
+    """Return the command that an advice means, with capitals for what is not known of the recording; empty for none."""
+    if advice.verb is None:
+        return ""
+    if advice.verb == Verb.ADD:
+        return added(advice)
+    if advice.verb == Verb.DIAGNOSE:
+        return f"sdimu diagnose {' '.join(advice.about) or 'BAG'}"
+    if advice.verb == Verb.CONTINUE:
+        return "sdimu plan --after"
+    return f"sdimu plan --plan YOURS {plan_options(advice)}"
+
+
+def added(advice: Advice) -> str:
+    """Return the options that add what an advice is about."""
+    return " ".join(f"--add {_quoted(key)}" for key in advice.about)
+
+
+def plan_options(advice: Advice) -> str:
+    """Return what the planner is asked for, besides the plan."""
+    if advice.verb == Verb.REVERSE_PLAN:
+        return "--backwards"
+    return " ".join(f"--tell {_quoted(label)}" for label in advice.about)
+
+
+def _quoted(label: str) -> str:
+    return f"'{label}'"
+
+
+def _unknown(stop: int | None, channel: str, learned: bool) -> str:
+    place = "" if stop is None else f", worst at stop {stop} in {channel}"
+    if learned:
+        return f"Something unknown acts{place}: the sigmas of the result take it in as scatter."
+    return f"Do not use coefficients of this test beyond their scatter: something unknown acts{place}."
+
+
+def _latitude(off: float, sigma: float) -> str:
+    off_deg, sigma_deg = (math.degrees(v) for v in (off, sigma))
+    sense = "North" if off_deg > 0.0 else "South"
+    return (
+        f"Look at the site: its latitude is {abs(off_deg):.2f} +- {sigma_deg:.2f} deg too far {sense}; correct it "
+        "there (--site) rather than add the effect."
+    )
+
+
+def _apart(pairs: Sequence[tuple[str, Sequence[str]]], what: Advice) -> str:
+    told = ", and ".join(f"{label} from {', '.join(others)}" for label, others in pairs)
+    return f"To tell {told}: {sentence(what)}."
+
+
+def _matters(label: str, stakes: Sequence[tuple[str, str, float]]) -> str:
+    parts = [f"with {other} instead, {name} moves by {sigmas:+.0f} of its sigmas" for other, name, sigmas in stakes]
+    return f"Which it is matters: {label} is taken; {'; '.join(parts)}."
+
+
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]
+
+
+_WORDS: dict[Kind, Callable[..., str]] = {
+    Kind.MEND_RECORDING: lambda text: f"Mend the recording first: {text}.",
+    Kind.REPEAT_STOPS: lambda: (
+        "The noise has a memory, which no compensation removes; values and sigmas take it into account. More "
+        "stops, or the same attitudes again later, lower its share."
+    ),
+    Kind.CORRECT_NOISE: lambda gyro, accel: (
+        f"Correct the noise in the IMU's file: gyro times {gyro:.2f}, accelerometer times {accel:.2f}; look for "
+        "outliers when the tails are heavy."
+    ),
+    Kind.UNKNOWN_CAUSE: _unknown,
+    Kind.RUN_BACKWARDS: lambda: (
+        "Run the plan again in another order, and diagnose both recordings together (sdimu diagnose FIRST SECOND): "
+        "that says whether it comes back at the same attitude, time or temperature, or is of this run. The other order"
+    ),
+    Kind.RECORD_IN_OTHER_ORDER: lambda: (
+        "Record the run again in another order, and diagnose both recordings together (sdimu diagnose FIRST SECOND): "
+        "that says whether it comes back at the same attitude, time or temperature, or is of this run."
+    ),
+    Kind.TRY_EQUATION: lambda *labels: (
+        f"Try an equation of your own (--try FILE); nearest in this test: {', '.join(labels)}."
+    ),
+    Kind.KEEP: lambda label: f"Keep {label or 'what was found'} in the model",
+    Kind.CORRECT_LATITUDE: _latitude,
+    Kind.RECORD_AGAIN: lambda label: f"{label} is a fault of this recording: record again and do not carry it over.",
+    Kind.TELL_APART: _apart,
+    Kind.RANK_TURNS: lambda: "Turns ranked by what they tell",
+    Kind.CHOICE_MATTERS: _matters,
+    Kind.CHOICE_MATTERS_BY_HAND: lambda label, other, name, sigmas: (
+        f"Which it is matters: with {other} instead of {label}, {name} moves by {sigmas:+.0f} of its sigmas."
+    ),
+    Kind.SIGNED_TURNS: lambda seen: (
+        f"{_capital(seen)}, so scale-factor asymmetry of the gyros cannot be seen: drive the second turn "
+        "of each 180 deg pair negative (0 min more; the plan 'kim18_signed')."
+    ),
+    Kind.TWO_RATES: lambda seen: (
+        f"{_capital(seen)}, so the shape of the scale factor cannot be seen: alternate 2 and 10 deg/s "
+        "(shorter; the plan 'recommended')."
+    ),
+    Kind.TURN_FASTER: lambda minutes: (
+        f"add a turn of 180 deg and back about that axis, level, at 10 deg/s ({minutes:.0f} min)"
+    ),
+    Kind.TURN_BACK: lambda minutes: f"add a turn of 180 deg about that axis in the other sense ({minutes:.0f} min)",
+    Kind.STAY_AND_RETURN: lambda stay, again: (
+        f"stay at the last stop for {stay:.0f} min more, then repeat the first stop ({again:.0f} min)"
+    ),
+    Kind.REST_ON_DIAGONAL: lambda minutes: (
+        f"add two stops on the body diagonal, X +45 deg and Y -35.3 deg and back ({minutes:.0f} min), or run the plan "
+        "'recommended'"
+    ),
+    Kind.REPEAT_TURN: lambda minutes: (
+        f"repeat the turn that shows it in the other sense and at 10 deg/s ({minutes:.0f} min)"
+    ),
+    Kind.COME_BACK: lambda: "come back to the first attitudes at the end, and rest there",
+    Kind.TURN_BOTH_WAYS: lambda: "turn about that axis both ways, slowly and fast",
+    Kind.REST_BETWEEN: lambda: "rest in more attitudes between the axes, both ends of that axis up",
+    Kind.REVERSE_AND_ADD: lambda: (
+        "record the plan in another order (sdimu plan --plan YOURS --backwards), and diagnose it with these"
+    ),
+    Kind.TRY_FORCE_EQUATION: lambda: (
+        "what comes back at the same attitude is an error of the sensor that the catalogue lacks: try an equation of "
+        "the specific force (sdimu diagnose BAG --try FILE)"
+    ),
+    Kind.BEGIN_LATER: lambda: (
+        "what comes back at the same time is over when the unit is warm: begin the plan later, or let the first stop "
+        "be longer"
+    ),
+    Kind.SOAK_MORE: lambda: (
+        "what comes back at the same temperature is told by soaks: record at more temperatures that stand still"
+    ),
+    Kind.LOOK_AT_MOUNT: lambda: (
+        "what does not come back is of each run: look at mount, cables and floor, and take it for scatter until then"
+    ),
+    Kind.LOOK_AT_RECORDING: lambda recording, label: (
+        f"look what happened in {recording}, or leave it out of the set: {label}"
+    ),
+    Kind.NO_PLAN_TELLS: lambda label, other: (
+        f"no plan tells {label} from {other}: record at another temperature, or after another warm-up"
+    ),
+    Kind.RECORD_ONCE_MORE: lambda label, others, turns: (
+        f"to tell {label} from {', '.join(others)}, record once more, rests of 100 s and between them: {turns}; a "
+        "whole plan"
+    ),
+    Kind.ONE_BY_ONE: lambda: (
+        "diagnose the recordings one by one (sdimu diagnose BAG), the one with the largest deviates first"
+    ),
+    Kind.FIND_EFFECT: lambda: "Find which effect is missing",
+    Kind.FIND_SMALLER: lambda: "Find out whether smaller effects are missing",
+}
