@@ -23,9 +23,11 @@ SHARED_CONFIG = [
 """The same once more where users of ROS look for them: layouts, tables, analyzers."""
 
 MESSAGES = [f"ros-{name}~=5.3.6" for name in (
-    "diagnostic-msgs", "geometry-msgs", "nav-msgs", "sensor-msgs", "std-msgs", "std-srvs", "trajectory-msgs"
+    "diagnostic-msgs", "geometry-msgs", "nav-msgs", "sensor-msgs", "std-msgs", "std-srvs", "trajectory-msgs",
+    "visualization-msgs",
 )]  # fmt: skip
-"""The messages that are sent; ros-jazzy-common-interfaces pins these, and brings five packages more."""
+"""The messages that are sent, and those whose libraries nodes/transform_type takes for tf2_msgs; without the rest of
+ros-jazzy-common-interfaces."""
 RUN_TIME = [
     "PyYAML",
     "lz4",
