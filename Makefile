@@ -22,20 +22,21 @@ export OPENBLAS_NUM_THREADS ?= 1
 setup: $(STAMP)
 
 $(RUN): requirements/run.lock $(SETUPS)
-	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
-	$(PIP) --require-hashes -r requirements/run.lock
-	$(PIP) --no-build-isolation --use-pep517 $(foreach package,$(PACKAGES),-e src/$(package))
-	touch $@
+	@test -x $(BIN)/python || { echo "making $(VENV)" && $(PYTHON) -m venv $(VENV); }
+	@$(BIN)/python requirements/install.py run
+	@echo "installing the three packages of src"
+	@$(PIP) --no-build-isolation --use-pep517 $(foreach package,$(PACKAGES),-e src/$(package))
+	@touch $@
 
 # Beside the lock files of tools: the studies, which are no part of what users install.
 $(STAMP): $(RUN) $(TOOLS:%=requirements/%.lock)
-	$(PIP) --require-hashes $(TOOLS:%=-r requirements/%.lock)
-	$(PIP) --no-build-isolation --use-pep517 -e study
-	touch $@
+	@$(BIN)/python requirements/install.py $(TOOLS)
+	@$(PIP) --no-build-isolation --use-pep517 -e study
+	@touch $@
 
 $(BOOK): $(STAMP) requirements/docs.lock
-	$(PIP) --require-hashes -r requirements/docs.lock
-	touch $@
+	@$(BIN)/python requirements/install.py docs
+	@touch $@
 
 # A whole simulated test over DDS, from the table to report.html.
 demo: $(RUN)
