@@ -16,7 +16,7 @@ setup(
     platforms=["Linux x86_64"],
     python_requires=">=3.10",
     packages=find_packages(),
-    package_data={NAME: ["py.typed"]},
+    package_data={NAME: ["py.typed", "heads/*.md"]},
     install_requires=[
         "dask",
         "distributed",

@@ -1,4 +1,4 @@
-"""The three wheels: what is in them is all that `pip install` brings to a machine without a clone."""
+"""The three wheels: what is in them is all that `pip install` brings to a machine without a clone; and the studies'."""
 
 from __future__ import annotations
 
@@ -18,6 +18,8 @@ from packaging.utils import canonicalize_name
 
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGES = ("rate_table_sim", "sdimu_calibration", "sdimu_sim")
+STUDY = "sdimu_study"
+SOURCES = {name: Path("src") / name for name in PACKAGES} | {STUDY: Path("study")}
 OPTIONAL = {"tf2_msgs", "dash", "flask", "werkzeug", "plotly", "pandas", "matplotlib", "PIL", "dask", "distributed"}
 """Imported where it is installed; nodes/transform_type stands in for the first, extras and `sdimu_study` bring the
 others, and whoever lacks them is told so."""
@@ -28,11 +30,11 @@ def wheels(tmp_path_factory):
     """Archive of each wheel, by name of the package; built from a copy, so that no build folder is left."""
     folder = tmp_path_factory.mktemp("wheels")
     leftovers = shutil.ignore_patterns("build", "*.egg-info", "__pycache__")
-    for part in ("config", "src"):
+    for part in ("config", "src", "study"):
         shutil.copytree(ROOT / part, folder / part, ignore=leftovers)
     shutil.copy(ROOT / "LICENSE", folder)
     options = ["--no-deps", "--no-build-isolation", "--no-index", "--disable-pip-version-check", "-q"]
-    sources = [str(folder / "src" / name) for name in PACKAGES]
+    sources = [str(folder / source) for source in SOURCES.values()]
     done = subprocess.run(
         [sys.executable, "-m", "pip", "wheel", *options, "-w", str(folder), *sources],
         capture_output=True,
@@ -73,10 +75,10 @@ def test_launch_files_are_in_the_share_folders_of_the_wheels(wheels):
         assert wheels[package].read(name) == file.read_bytes()
 
 
-@pytest.mark.parametrize("package", PACKAGES)
+@pytest.mark.parametrize("package", SOURCES)
 def test_every_module_type_marker_and_licence_is_in_the_wheel(wheels, package):
     inside = wheels[package].namelist()
-    source = ROOT / "src" / package
+    source = ROOT / SOURCES[package]
     modules = {path.relative_to(source).as_posix() for path in (source / package).rglob("*.py")}
     assert modules == {name for name in inside if name.endswith(".py") and name.startswith(f"{package}/")}
     assert f"{package}/py.typed" in inside
@@ -104,6 +106,15 @@ def test_version_and_licence_are_those_of_the_manifest(wheels, package):
         assert f"<{element}>{metadata(wheels[package])[field]}</{element}>" in manifest
 
 
+def test_studies_are_in_a_wheel_of_their_own_with_the_heads_of_their_pages(wheels):
+    heads = {f"{STUDY}/heads/{path.name}" for path in (ROOT / "study" / STUDY / "heads").glob("*.md")}
+    assert heads <= set(wheels[STUDY].namelist())
+    for package in PACKAGES:
+        points = [name for name in wheels[package].namelist() if name.endswith("/entry_points.txt")]
+        assert not any("campaign" in name or STUDY in name for name in wheels[package].namelist())
+        assert not any(STUDY in wheels[package].read(name).decode() for name in points)
+
+
 def test_the_simulator_brings_all_three(wheels):
     version = {name: metadata(wheel)["Version"] for name, wheel in wheels.items()}
     wanted = {canonicalize_name(r.name): str(r.specifier) for r in requirements(wheels["sdimu_sim"])}
@@ -111,13 +122,13 @@ def test_the_simulator_brings_all_three(wheels):
         assert wanted[canonicalize_name(other)] == f"=={version[other]}"
 
 
-@pytest.mark.parametrize("package", PACKAGES)
+@pytest.mark.parametrize("package", SOURCES)
 def test_whatever_is_imported_is_required(wheels, package):
     available = closure(requirements(wheels[package]), wheels)
     owners = packages_distributions()
     lacking = {
         module
-        for module in imported(ROOT / "src" / package / package) - set(sys.stdlib_module_names) - OPTIONAL - {package}
+        for module in imported(ROOT / SOURCES[package] / package) - set(sys.stdlib_module_names) - OPTIONAL - {package}
         if not {canonicalize_name(name) for name in owners.get(module, ())} & available
     }
     assert lacking == set()

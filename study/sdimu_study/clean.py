@@ -9,27 +9,13 @@ from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.storage.files.config import load_imu
 from sdimu_study.plans import PLANS
 from sdimu_study.score import scored
-from sdimu_study.study import Results, Study, largest_z, rms_cell
+from sdimu_study.study import Results, Study, head, largest_z, rms_cell
 from sdimu_study.worlds import HANDHELD, OneTest, diagnosed, drawn_site, model_of, rng_of, simulated_test
 
 BY_HAND = "by hand"
 """In the place of a plan: a run by hand."""
 RATES_HZ = (20.0, 50.0, 100.0)
 """Sample rates that are drawn (Hz): what is found in the samples, such as rests, depends on the rate."""
-_HEAD = """# Clean tests
-
-`sdimu study clean` simulates tests of every file of config/imu with nothing hidden in them, in white noise: on the
-plans of config/plan, in six positions, in 24 attitudes at random, and on kim18 in ten minutes and in three hours; at
-latitudes of 50 S to 60 N and sample rates of 20, 50 and 100 Hz (drawn). `mems_by_hand` makes runs by hand of 24
-attitudes. Each test is diagnosed with nothing but the IMU file and the site. Seeds from {first}.
-
-- effect: a physical effect was named
-- noise: no effect, but a noise with a memory was named
-- other: not consistent without a name (a misfit, an accused site or recording)
-- refused: the test could not be calibrated
-- RMS z: error over sigma of all coefficients
-
-"""
 
 
 def world(case: tuple[str, str], seed: int) -> OneTest:
@@ -86,4 +72,4 @@ def page(results: Results, first: int) -> str:
         if "error" in row
     ]
     why = "".join(["\nRefused:\n\n", *refused]) if refused else ""
-    return _HEAD.format(first=first) + STUDY.table(results, ("**all**", "")).markdown() + why
+    return head("clean", first=first) + STUDY.table(results, ("**all**", "")).markdown() + why

@@ -10,7 +10,7 @@ import numpy as np
 from sdimu_calibration.storage.files.config import load_imu
 from sdimu_study.plans import FILED
 from sdimu_study.score import scored
-from sdimu_study.study import Group, Key, Results, Rows, Study, Table, of, rms_z
+from sdimu_study.study import Group, Key, Results, Rows, Study, Table, head, of, rms_z
 from sdimu_study.worlds import (
     HANDHELD,
     OneTest,
@@ -26,14 +26,6 @@ from sdimu_study.worlds import (
 )
 
 CLEAN, HIDDEN = "clean", "hidden"
-_HEAD = """# Every IMU file, clean and with one hidden effect
-
-`sdimu study grades` simulates tests of every file of config/imu on the plans kim18, kim18_signed and recommended
-(drawn) at latitudes of 50 S to 60 N (drawn); `mems_by_hand` in runs by hand of 24 attitudes without a site. Each is
-diagnosed with nothing but the IMU file and the site. {runs} clean tests and {runs} with one effect of 10 to 30 sigma a
-file, seeds from {first}. The noise is white.
-
-"""
 
 
 def world(case: Key, seed: int) -> OneTest:
@@ -87,7 +79,7 @@ def page(results: Results, chosen: Mapping[str, Rows], first: int) -> str:
     lines = [[word, *(cell(Group((name,), results[name, kind])) for name in names)] for word, kind, cell in _LINES]
     lines.append(["choices of estimator, by plan", *(_choices(chosen.get(name, ())) for name in names)])
     runs = max(len(rows) for (_, kind), rows in results.items() if kind == CLEAN)
-    return _HEAD.format(runs=runs, first=first) + Table(["", *names], lines).markdown()
+    return head("grades", runs=runs, first=first) + Table(["", *names], lines).markdown()
 
 
 def _choices(rows: Rows) -> str:

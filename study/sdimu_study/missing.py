@@ -16,23 +16,11 @@ from sdimu_sim.core.hidden import effect_names
 from sdimu_sim.core.mean_bias import BIASES
 from sdimu_sim.core.truth import ImuTruth
 from sdimu_study.score import scored_row
-from sdimu_study.study import Group, Key, Results, Rows, Study, of, rms_cell
+from sdimu_study.study import Group, Key, Results, Rows, Study, head, of, rms_cell
 from sdimu_study.worlds import OneTest, drawn_effect, drawn_place, place_told, rng_of, simulated_test, with_effects
 
 _SPAN = (15.0, 30.0)
 """Size of the hidden effect, in the sigma of the clean test."""
-_HEAD = """# Physics that the catalogue lacks
-
-`sdimu study missing` hides one effect of 15 to 30 sigma in a test of `{imu}` (white noise; plans kim18, kim18_signed,
-recommended and latitudes of 50 S to 60 N drawn) and diagnoses the test twice: with the whole catalogue, and as if the
-catalogue lacked the effect. {runs} runs each, seeds from {first}; draws that the plan cannot show are left out.
-
-- named: the effect is in a class that was named
-- seen: without the effect in the catalogue the verdict is not `consistent`
-- noise: of these, the verdict is that the noise has a memory and nothing physical is missing
-- RMS z: error over sigma of all coefficients, with the effect in the catalogue and without
-
-"""
 
 
 @dataclass(frozen=True)
@@ -145,5 +133,5 @@ STUDY = Study(
 
 def page(imu: str, results: Results, first: int) -> str:
     """Make the page, doc/missing.md, of results by effect; `first` is the first seed."""
-    head = _HEAD.format(imu=imu, runs=max(map(len, results.values())), first=first)
-    return head + STUDY.table(results, ("**all**",)).markdown()
+    above = head("missing", imu=imu, runs=max(map(len, results.values())), first=first)
+    return above + STUDY.table(results, ("**all**",)).markdown()

@@ -15,7 +15,7 @@ from sdimu_calibration.core.units import from_si, to_si
 from sdimu_calibration.storage.files.config import load_imu, load_model
 from sdimu_sim.core.coloured import KINDS, parse_noise
 from sdimu_study.score import among, classes, errors
-from sdimu_study.study import Group, Results, Study, rms_cell
+from sdimu_study.study import Group, Results, Study, head, rms_cell
 from sdimu_study.worlds import OneTest, diagnosed, drawn_effect, drawn_place, rng_of, simulated_test, with_effects
 
 WHITE = "white"
@@ -25,21 +25,6 @@ _TAUS_S = (100.0, 1000.0)
 """Range of the time constant of Markov noise (s)."""
 _WALK_S = 1000.0
 """Averaging time (s) at which the Allan deviation of a random walk is the bias instability."""
-_HEAD = """# Noise with a memory
-
-`sdimu study noise` simulates tests of IMU files in one kind of noise of the size that the file states as bias
-instability, on the plans kim18, kim18_signed and recommended (drawn) at latitudes of 50 S to 60 N (drawn), and
-diagnoses each with nothing but the IMU file and the site. {runs} runs each, seeds from {first}.
-
-- seen: share of triads in which a term was found; what is below the white noise of a test cannot be
-- class: of these, the true kind was named or said to look the same
-- interval: of terms of the true kind, the true size inside the 95 % interval
-- named: of the runs that hide an effect, those whose effect is in a class that was named
-- effects: runs in which a physical effect was named that is not there; one that bears the name of the noise, as
-  gyro_bias_random_walk in rate random walk, is the noise
-- RMS z: error over sigma of all coefficients, biases in the mean over the dwells
-
-"""
 
 
 @dataclass(frozen=True)
@@ -160,4 +145,4 @@ def _inside(term: Any) -> bool:
 
 def page(results: Results, first: int) -> str:
     """Make the page, doc/noise.md, of results by IMU file and kind; `first` is the first seed."""
-    return _HEAD.format(runs=max(map(len, results.values())), first=first) + STUDY.table(results).markdown()
+    return head("noise", runs=max(map(len, results.values())), first=first) + STUDY.table(results).markdown()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from importlib.resources import files
 from typing import Any, Generic, TypeVar
 
 import numpy as np
@@ -115,6 +116,11 @@ class Table:
         for line in self.lines:
             table.add_row(*line)
         return table
+
+
+def head(name: str, **told: Any) -> str:
+    """Give the text above the table of a page, from the folder heads, with what is told put in."""
+    return (files(__package__) / "heads" / f"{name}.md").read_text(encoding="utf-8").format(**told)
 
 
 def good(rows: Rows) -> Rows:
