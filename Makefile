@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
 PIP    := $(BIN)/python -m pip install -qq --disable-pip-version-check --no-deps
-SETUPS := $(wildcard src/*/setup.py)
+SETUPS := $(wildcard src/*/setup.py study/setup.py)
 # What runs, and what tests, builds and campaigns need beside it; every file by its hash.
 RUN    := $(VENV)/.run
 STAMP  := $(VENV)/.installed
@@ -27,8 +27,10 @@ $(RUN): requirements/run.lock $(SETUPS)
 	$(PIP) --no-build-isolation --use-pep517 $(foreach package,$(PACKAGES),-e src/$(package))
 	touch $@
 
+# Beside the lock files of tools: the studies, which are no part of what users install.
 $(STAMP): $(RUN) $(TOOLS:%=requirements/%.lock)
 	$(PIP) --require-hashes $(TOOLS:%=-r requirements/%.lock)
+	$(PIP) --no-build-isolation --use-pep517 -e study
 	touch $@
 
 $(BOOK): $(STAMP) requirements/docs.lock
@@ -42,7 +44,7 @@ demo: $(RUN)
 # Style, types and the direction of imports.
 check: setup
 	$(BIN)/ruff check .
-	$(BIN)/mypy $(foreach package,$(PACKAGES),src/$(package)/$(package))
+	$(BIN)/mypy $(foreach package,$(PACKAGES),src/$(package)/$(package)) study/sdimu_study
 	$(BIN)/lint-imports
 
 test: check
@@ -84,7 +86,6 @@ mutations: setup
 
 # The book, out/docs/index.html: it is read without a network. Every warning is an error.
 docs: $(BOOK)
-	$(BIN)/sdimu effects --markdown > doc/effects.md
 	$(BIN)/python -m sphinx -W --keep-going -q -b html doc out/docs
 
 # Minutes: every kind of fault in the data at five sizes.

@@ -21,10 +21,11 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 FOLDER = Path(__file__).resolve().parent
-OWN = ("sdimu-calibration", "rate-table-sim", "sdimu-sim")
+USED = ("sdimu-calibration", "rate-table-sim", "sdimu-sim")
+OWN = (*USED, "sdimu-study")
 SETS = {
-    "run": ("what `sdimu` and its nodes need, and setuptools, which installs them from a clone", [*OWN, "setuptools"]),
-    "campaigns": ("many runs at once: monte-carlo, hidden-campaign, study", ["sdimu-sim[campaigns]"]),
+    "run": ("what `sdimu` and its nodes need, and setuptools, which installs them from a clone", [*USED, "setuptools"]),
+    "campaigns": ("many runs at once: monte-carlo, hidden-campaign, study", ["sdimu-study"]),
     "test": ("style, types, tests", ["sdimu-calibration[test]"]),
     "build": ("colcon, as ROS users build", ["sdimu-calibration[build]"]),
     "docs": ("the book: make docs", ["sdimu-calibration[docs]"]),

@@ -18,9 +18,9 @@ from sdimu_calibration.core.recording import Recording, TableLog
 from sdimu_calibration.core.results import Calibration, no_history
 from sdimu_calibration.core.units import to_si
 from sdimu_calibration.report.report_extras import ReportExtras, report_extras
-from sdimu_calibration.storage.bag_writer import write_recording
-from sdimu_calibration.storage.config import load_imu, load_model, load_plan, load_site
-from sdimu_calibration.storage.result_file import write_result
+from sdimu_calibration.storage.bags.bag_writer import write_recording
+from sdimu_calibration.storage.files.config import load_imu, load_model, load_plan, load_site
+from sdimu_calibration.storage.files.result_file import write_result
 
 START_NS = 1_700_000_000_000_000_000
 INTERVAL_NS = 10_000_000

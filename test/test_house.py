@@ -13,8 +13,8 @@ import yaml
 
 import sdimu_calibration.core.effects  # noqa: F401  (fills the registry)
 from sdimu_calibration.core.effects import registry
-from sdimu_calibration.storage.config import load_imu, load_model, load_plan, load_site
-from sdimu_calibration.storage.reference_file import read_reference
+from sdimu_calibration.storage.files.config import load_imu, load_model, load_plan, load_site
+from sdimu_calibration.storage.files.reference_file import read_reference
 
 ROOT = Path(__file__).resolve().parents[1]
 LOADERS = {"plan": load_plan, "imu": load_imu, "model": load_model, "site": load_site, "reference": read_reference}

@@ -1,4 +1,4 @@
-"""What is made at each build, below doc/generated: the command line, and the signature of every effect."""
+"""What is made at each build, below doc/generated: the command line, the catalogue, the signature of every effect."""
 
 from __future__ import annotations
 
@@ -13,8 +13,10 @@ from typing import Any
 
 from command_line import page
 
+from sdimu_calibration.report.catalogue import page as catalogue
+
 HEADING = re.compile(r"^### (\w+)\n", re.MULTILINE)
-CATALOGUE = "effects"
+CATALOGUE = "generated/effects"
 _CAPTION = (
     "Signature of `{coefficient}` over the stops of `kim18`: red up, blue down, full at its largest. {rest}"
 )
@@ -28,9 +30,10 @@ def write(path: Path, text: str) -> None:
 
 
 def make(app: Any) -> None:
-    """Make the page of the command line and the figures."""
+    """Make the pages of the command line and of the catalogue, and the figures."""
     folder = Path(app.srcdir) / "generated"
     write(folder / "cli.md", page())
+    write(folder / "effects.md", catalogue())
     program = Path(__file__).with_name("signature_figures.py")
     # The compiler is switched off in this process, and the figures need what it compiles.
     kept = {name: value for name, value in os.environ.items() if name != "NUMBA_DISABLE_JIT"}
@@ -38,7 +41,7 @@ def make(app: Any) -> None:
 
 
 def with_figures(app: Any, name: str, source: list[str]) -> None:
-    """Put the figure of each effect below its heading; the page in the repository is text alone."""
+    """Put the figure of each effect below its heading."""
     if name != CATALOGUE:
         return
     told = json.loads((Path(app.srcdir) / "generated" / "signatures" / "signatures.json").read_text(encoding="utf-8"))
@@ -50,7 +53,7 @@ def with_figures(app: Any, name: str, source: list[str]) -> None:
         left = told[effect]["left"]
         rest = "" if math.isnan(left) else f"The coefficients of the baseline leave {100.0 * left:.0f} % of it."
         caption = _CAPTION.format(coefficient=told[effect]["coefficient"], rest=rest).strip()
-        return f"{found.group()}\n![Signature of {effect}](generated/signatures/{effect}.svg)\n\n*{caption}*\n"
+        return f"{found.group()}\n![Signature of {effect}](signatures/{effect}.svg)\n\n*{caption}*\n"
 
     source[0] = HEADING.sub(figure, source[0])
 

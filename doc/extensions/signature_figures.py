@@ -23,7 +23,7 @@ from sdimu_calibration.core.evidence.navigation_evidence import NavigationEviden
 from sdimu_calibration.core.planning.nominal import nominal_recording
 from sdimu_calibration.core.recording import TemperatureLog
 from sdimu_calibration.report.catalogue import grouped
-from sdimu_calibration.storage.config import load_imu, load_model, load_plan, load_site
+from sdimu_calibration.storage.files.config import load_imu, load_model, load_plan, load_site
 
 PLAN, IMU, SITE, MODEL = "kim18", "dtg", "daejeon", "baseline"
 """What `sdimu predict` takes by default."""

@@ -1,9 +1,14 @@
 """Package the rate_table_sim ROS 2 package; the entry points are the nodes and the command-line verbs."""
 
+from pathlib import Path
+from xml.etree import ElementTree
+
 from setuptools import find_packages, setup
 
 NAME = "rate_table_sim"
-VERSION = "0.1.0"
+HERE = Path(__file__).resolve().parent
+VERSION = ElementTree.parse(HERE / "package.xml").findtext("version")
+"""The package's one version: that of package.xml, which ROS reads; an installed package has it in its metadata."""
 
 setup(
     name=NAME,

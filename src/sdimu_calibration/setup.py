@@ -3,6 +3,7 @@
 import os
 import shutil
 from pathlib import Path
+from xml.etree import ElementTree
 
 from setuptools import find_packages, setup
 from setuptools.command.build_py import build_py
@@ -11,6 +12,8 @@ NAME = "sdimu_calibration"
 CONFIG = Path(__file__).resolve().parents[2] / "config"
 """The repository's configuration files, which every copy that is installed takes along."""
 HERE = Path(__file__).resolve().parent
+VERSION = ElementTree.parse(HERE / "package.xml").findtext("version")
+"""The package's one version: that of package.xml, which ROS reads; an installed package has it in its metadata."""
 LAUNCH = [str(path.relative_to(HERE)) for path in sorted((HERE / "launch").glob("*_launch.py"))]
 SHARED_CONFIG = [
     (f"share/{NAME}/config/{folder.name}", [os.path.relpath(path, HERE) for path in sorted(folder.iterdir())])
@@ -95,7 +98,7 @@ class BuildWithConfig(build_py):
 
 setup(
     name=NAME,
-    version="0.1.0",
+    version=VERSION,
     description="Navigation-level calibration of a strapdown IMU on a rate table",
     maintainer="sdimu-calibration maintainers",
     maintainer_email="maintainers@sdimu-calibration.org",

@@ -1,13 +1,15 @@
 """Package the sdimu_sim ROS 2 package; the entry points are the nodes and the command-line verbs."""
 
 from pathlib import Path
+from xml.etree import ElementTree
 
 from setuptools import find_packages, setup
 
 NAME = "sdimu_sim"
 HERE = Path(__file__).resolve().parent
 LAUNCH = [str(path.relative_to(HERE)) for path in sorted((HERE / "launch").glob("*_launch.py"))]
-VERSION = "0.1.0"
+VERSION = ElementTree.parse(HERE / "package.xml").findtext("version")
+"""The package's one version: that of package.xml, which ROS reads; an installed package has it in its metadata."""
 
 setup(
     name=NAME,
@@ -31,7 +33,6 @@ setup(
         f"rate_table_sim=={VERSION}",
         f"sdimu_calibration=={VERSION}",
     ],
-    extras_require={"campaigns": ["dask", "distributed"]},
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),
@@ -43,10 +44,6 @@ setup(
         "sdimu_calibration.verbs": [
             "simulate = sdimu_sim.cli.simulate:simulate",
             "run = sdimu_sim.cli.run:run",
-            "monte-carlo = sdimu_sim.cli.monte_carlo:monte_carlo",
-            "study = sdimu_sim.cli.study:app",
-            "bench = sdimu_sim.cli.bench:bench",
-            "hidden-campaign = sdimu_sim.cli.hidden_campaign:hidden_campaign",
         ],
     },
 )

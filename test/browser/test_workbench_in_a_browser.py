@@ -109,7 +109,8 @@ def calibrated(workbench: Workbench, home: Path, out: Path) -> dict[str, Any]:
     assert said[:3] == ["sdimu", "calibrate", str(workbench.bag.resolve())]
     options = [str(home / word) if word == "model.yaml" else word for word in said[3:]]
     command = sdimu("calibrate", workbench.bag, *options, "--out", out)
-    subprocess.run(command, check=True, capture_output=True, timeout=START_S)
+    done = subprocess.run(command, check=False, capture_output=True, timeout=START_S)
+    assert done.returncode in (0, 3), done.stderr  # 3: done, and the model that was taken home lacks the effect
     return json.loads((out / "result.json").read_text(encoding="utf-8"))
 
 

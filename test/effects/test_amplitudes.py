@@ -8,8 +8,8 @@ import pytest
 
 from sdimu_calibration.core.estimation.outcome import calibrate
 from sdimu_calibration.core.units import to_si
-from sdimu_calibration.storage.config import load_imu, load_plan, load_site
-from sdimu_calibration.storage.effect_file import extended_model
+from sdimu_calibration.storage.files.config import load_imu, load_plan, load_site
+from sdimu_calibration.storage.files.effect_file import extended_model
 from sdimu_sim.core.scenario import Scenario, generate
 
 HIDDEN = {

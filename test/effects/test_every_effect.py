@@ -25,7 +25,7 @@ from sdimu_calibration.core.plan import Plan, Turn
 from sdimu_calibration.core.rotation import rotation_vector
 from sdimu_calibration.core.specification import ImuSpecification, Model, Site
 from sdimu_calibration.core.units import parse_unit, to_si
-from sdimu_calibration.storage.effect_file import find_effects
+from sdimu_calibration.storage.files.effect_file import find_effects
 from sdimu_sim.core.hidden import effect_names, parse_effects
 from sdimu_sim.core.scenario import Scenario, generate
 from sdimu_sim.core.temperature import TemperatureProfile

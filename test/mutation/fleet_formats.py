@@ -13,14 +13,14 @@ from sdimu_calibration.core.fleet.study import study
 from sdimu_calibration.core.noise import Terms
 from sdimu_calibration.core.origin import Origin
 from sdimu_calibration.report.fleet import page, sheet
-from sdimu_calibration.storage.correlation_text import packed
-from sdimu_calibration.storage.datasheet_file import Certificate, hashed, write_datasheet
-from sdimu_calibration.storage.fleet_file import write_fleet
-from sdimu_calibration.storage.fleet_folder import as_measured, candidates, gather
-from sdimu_calibration.storage.json_file import write_json
-from sdimu_calibration.storage.limits_file import read_limits
-from sdimu_calibration.storage.noise_terms_file import read_noise_terms, write_noise_terms
-from sdimu_calibration.storage.result_file import write_result
+from sdimu_calibration.storage.files.correlation_text import packed
+from sdimu_calibration.storage.files.datasheet_file import Certificate, hashed, write_datasheet
+from sdimu_calibration.storage.files.fleet_file import write_fleet
+from sdimu_calibration.storage.files.fleet_folder import as_measured, candidates, gather
+from sdimu_calibration.storage.files.json_file import write_json
+from sdimu_calibration.storage.files.limits_file import read_limits
+from sdimu_calibration.storage.files.noise_terms_file import read_noise_terms, write_noise_terms
+from sdimu_calibration.storage.files.result_file import write_result
 
 from .formats import Format, calibration, made, nothing
 from .mutators import damaged_json, damaged_text

@@ -20,26 +20,26 @@ from sdimu_calibration.core.effects import selection
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.results import Calibration, no_history
 from sdimu_calibration.report.table import rows
-from sdimu_calibration.storage import cdr
-from sdimu_calibration.storage.bag_info import read_info
-from sdimu_calibration.storage.bag_reader import read_recording
-from sdimu_calibration.storage.bag_writer import write_recording
-from sdimu_calibration.storage.config import config_folder, load_imu, load_model, load_plan, load_site
-from sdimu_calibration.storage.cut_bag import cut_bag
-from sdimu_calibration.storage.diagnosis_file import read_diagnosis
-from sdimu_calibration.storage.effect_file import load_effect
+from sdimu_calibration.storage.bags import cdr
+from sdimu_calibration.storage.bags.bag_info import read_info
+from sdimu_calibration.storage.bags.bag_reader import read_recording
+from sdimu_calibration.storage.bags.bag_writer import write_recording
+from sdimu_calibration.storage.bags.cut_bag import cut_bag
+from sdimu_calibration.storage.bags.mcap_file import McapFile
+from sdimu_calibration.storage.bags.recover import recover
+from sdimu_calibration.storage.bags.unpacking import unpacked
 from sdimu_calibration.storage.export import FORMS, export
-from sdimu_calibration.storage.import_map import load_import_map
-from sdimu_calibration.storage.importer import read_files
-from sdimu_calibration.storage.journal import Journal
-from sdimu_calibration.storage.json_file import write_json
-from sdimu_calibration.storage.mcap_file import McapFile
-from sdimu_calibration.storage.noise_file import load_noise
+from sdimu_calibration.storage.files.config import config_folder, load_imu, load_model, load_plan, load_site
+from sdimu_calibration.storage.files.diagnosis_file import read_diagnosis
+from sdimu_calibration.storage.files.effect_file import load_effect
+from sdimu_calibration.storage.files.journal import Journal
+from sdimu_calibration.storage.files.json_file import write_json
+from sdimu_calibration.storage.files.noise_file import load_noise
+from sdimu_calibration.storage.files.reference_file import read_reference, read_truth
+from sdimu_calibration.storage.files.result_file import read_result, write_result
+from sdimu_calibration.storage.importing.import_map import load_import_map
+from sdimu_calibration.storage.importing.importer import read_files
 from sdimu_calibration.storage.opening import open_recording
-from sdimu_calibration.storage.recover import recover
-from sdimu_calibration.storage.reference_file import read_reference, read_truth
-from sdimu_calibration.storage.result_file import read_result, write_result
-from sdimu_calibration.storage.unpacking import unpacked
 from sdimu_sim.temperature_file import load_temperature
 
 from .mutators import Random, damaged_bytes, damaged_json, damaged_text

@@ -6,7 +6,7 @@ from scipy.stats import chi2
 
 from sdimu_calibration.core.estimation.outcome import calibrate
 from sdimu_calibration.core.plan import Plan
-from sdimu_calibration.storage.config import load_imu, load_model, load_plan, load_site
+from sdimu_calibration.storage.files.config import load_imu, load_model, load_plan, load_site
 from sdimu_sim.core.scenario import Scenario, generate
 from sdimu_sim.core.truth import in_body_frame
 

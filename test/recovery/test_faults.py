@@ -10,11 +10,11 @@ import pytest
 from sdimu_calibration.core.data.arrival import arrange
 from sdimu_calibration.core.estimation.outcome import calibrate
 from sdimu_calibration.core.recording import DataError
-from sdimu_calibration.storage.config import load_imu, load_model, load_plan, load_site
-from sdimu_sim.campaign.fault_run import NOTED, OK, REFUSED, TRACEBACK, WARNED, WRONG, as_read, run_fault, spoilt
-from sdimu_sim.campaign.fault_study import fault_study, hurried
+from sdimu_calibration.storage.files.config import load_imu, load_model, load_plan, load_site
 from sdimu_sim.core.faults import FAULTS, Fault
 from sdimu_sim.core.scenario import Scenario
+from sdimu_study.fault_run import NOTED, OK, REFUSED, TRACEBACK, WARNED, WRONG, as_read, run_fault, spoilt
+from sdimu_study.fault_study import fault_study, hurried
 
 SCENARIO = Scenario(hurried(load_plan("kim18_signed")), load_imu("dtg"), load_site("daejeon"))
 MODEL = load_model("baseline")

@@ -9,7 +9,7 @@ from scipy.stats import chi2
 from sdimu_calibration.core.batch.batch import bound_covariance
 from sdimu_calibration.core.estimation.outcome import calibrate
 from sdimu_calibration.core.planning.predict import predict
-from sdimu_calibration.storage.config import config_folder, load_imu, load_model, load_plan, load_site
+from sdimu_calibration.storage.files.config import config_folder, load_imu, load_model, load_plan, load_site
 from sdimu_sim.core.scenario import Scenario, generate
 from sdimu_sim.core.truth import in_body_frame
 

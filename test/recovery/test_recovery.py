@@ -17,7 +17,7 @@ from sdimu_calibration.core.estimation.outcome import calibrate
 from sdimu_calibration.core.plan import Plan
 from sdimu_calibration.core.recording import Recording
 from sdimu_calibration.core.results import Calibration
-from sdimu_calibration.storage.config import load_imu, load_model, load_plan, load_site
+from sdimu_calibration.storage.files.config import load_imu, load_model, load_plan, load_site
 from sdimu_sim.core.scenario import Scenario, generate
 from sdimu_sim.core.truth import COEFFICIENTS, in_body_frame
 

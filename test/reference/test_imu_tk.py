@@ -7,7 +7,7 @@ import scipy.linalg
 from sdimu_calibration.core.data.static_detection import detect_static
 from sdimu_calibration.core.estimation.outcome import calibrate
 from sdimu_calibration.core.recording import Recording
-from sdimu_calibration.storage.config import load_imu, load_model
+from sdimu_calibration.storage.files.config import load_imu, load_model
 
 COUNTS, MIDDLE = (415.0, 4780.0), 32768.0
 GRAVITY = 9.81744

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from sdimu_calibration.core.planning.predict import largest_by_effect, predict
-from sdimu_calibration.storage.config import load_imu, load_model, load_plan, load_site
-from sdimu_calibration.storage.noise_file import load_noise
-from sdimu_calibration.storage.reference_file import read_columns, read_reference
+from sdimu_calibration.storage.files.config import load_imu, load_model, load_plan, load_site
+from sdimu_calibration.storage.files.noise_file import load_noise
+from sdimu_calibration.storage.files.reference_file import read_columns, read_reference
 
 
 @pytest.mark.parametrize("mount", read_columns("table33"))

@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 
 from sdimu_calibration.cli.processes import Children, own_domain
-from sdimu_calibration.storage.bag_file import raw_messages
-from sdimu_calibration.storage.cdr import IMU, decode_imu
+from sdimu_calibration.storage.bags.bag_file import raw_messages
+from sdimu_calibration.storage.bags.cdr import IMU, decode_imu
 
 RATE_HZ = 100
 DWELL_S = 40.0

@@ -193,7 +193,7 @@ def main() -> int:
     paths = [str(path) for path in sorted(prefix.glob(f"*/lib/{python}/site-packages"))]
     environment = os.environ | {"PYTHONPATH": ":".join(paths)}
     environment.pop("SDIMU_CONFIG", None)
-    ask = "import sdimu_calibration.storage.config as c; print(c.config_folder())"
+    ask = "import sdimu_calibration.storage.files.config as c; print(c.config_folder())"
     told = subprocess.run(
         [sys.executable, "-c", ask], env=environment, cwd="/", capture_output=True, text=True, check=True
     )

@@ -10,11 +10,11 @@ import pytest
 from sdimu_calibration.core.adaptive import Goals
 from sdimu_calibration.core.estimation.outcome import outcome
 from sdimu_calibration.core.estimation.solve import solve
-from sdimu_calibration.storage.config import load_imu, load_model
-from sdimu_calibration.storage.goal_file import load_goals
-from sdimu_calibration.storage.json_file import read_json
+from sdimu_calibration.storage.files.config import load_imu, load_model
+from sdimu_calibration.storage.files.goal_file import load_goals
+from sdimu_calibration.storage.files.json_file import read_json
+from sdimu_calibration.storage.files.result_file import read_result
 from sdimu_calibration.storage.opening import open_test
-from sdimu_calibration.storage.result_file import read_result
 
 from .conftest import DEADLINE_S, sdimu
 

@@ -18,7 +18,7 @@ from rclpy.parameter_client import AsyncParameterClient
 from rosbags.highlevel import AnyReader
 
 from sdimu_calibration.nodes.credits import HISTORY
-from sdimu_calibration.storage.result_file import read_result
+from sdimu_calibration.storage.files.result_file import read_result
 
 from .conftest import DEADLINE_S, FitSession, imu_stamps
 

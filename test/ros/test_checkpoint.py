@@ -13,11 +13,11 @@ from sdimu_calibration.core.estimation.outcome import calibrate
 from sdimu_calibration.core.front_door import OpeningOptions
 from sdimu_calibration.core.live import NS, LiveCalibration
 from sdimu_calibration.nodes.feed import AWAY_S, Feed
-from sdimu_calibration.storage.bag_reader import read_recording
-from sdimu_calibration.storage.cdr import encode_imu
-from sdimu_calibration.storage.config import load_imu, load_model, load_site
-from sdimu_calibration.storage.journal import Journal, digest
-from sdimu_calibration.storage.result_file import read_result
+from sdimu_calibration.storage.bags.bag_reader import read_recording
+from sdimu_calibration.storage.bags.cdr import encode_imu
+from sdimu_calibration.storage.files.config import load_imu, load_model, load_site
+from sdimu_calibration.storage.files.journal import Journal, digest
+from sdimu_calibration.storage.files.result_file import read_result
 
 from .conftest import FitSession, imu_stamps, samples_of, write_plan
 

@@ -24,8 +24,8 @@ from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.results import Calibration, no_history
 from sdimu_calibration.nodes.convert import encode_imu
 from sdimu_calibration.nodes.credits import STREAM, header, to_ns
-from sdimu_calibration.storage.config import load_imu, load_model
-from sdimu_calibration.storage.result_file import write_result
+from sdimu_calibration.storage.files.config import load_imu, load_model
+from sdimu_calibration.storage.files.result_file import write_result
 
 from .conftest import FitSession
 

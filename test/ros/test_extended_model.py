@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sdimu_calibration.storage.result_file import read_result
+from sdimu_calibration.storage.files.result_file import read_result
 
 from .conftest import FitSession, write_plan
 

@@ -10,11 +10,11 @@ import pytest
 
 from sdimu_calibration.core.plan import Plan
 from sdimu_calibration.core.recording import DataError
-from sdimu_calibration.storage.bag_file import raw_messages
-from sdimu_calibration.storage.bag_writer import write_recording
-from sdimu_calibration.storage.cdr import JOINT_STATE
-from sdimu_calibration.storage.config import load_imu, load_plan, load_site
-from sdimu_calibration.storage.result_file import read_result
+from sdimu_calibration.storage.bags.bag_file import raw_messages
+from sdimu_calibration.storage.bags.bag_writer import write_recording
+from sdimu_calibration.storage.bags.cdr import JOINT_STATE
+from sdimu_calibration.storage.files.config import load_imu, load_plan, load_site
+from sdimu_calibration.storage.files.result_file import read_result
 from sdimu_sim.core.scenario import Scenario, generate
 
 from .conftest import CALIBRATION, DEADLINE_S, RECORDER, FitSession, imu_stamps, sdimu

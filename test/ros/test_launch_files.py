@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from sdimu_calibration.storage.result_file import read_result
+from sdimu_calibration.storage.files.result_file import read_result
 
 from .conftest import FitSession, write_plan
 from .launch_stub import DeclareLaunchArgument, Node, description, started

@@ -12,7 +12,7 @@ from xml.etree import ElementTree
 import pytest
 from rosbags.highlevel import AnyReader
 
-from sdimu_calibration.storage.config import config_folder
+from sdimu_calibration.storage.files.config import config_folder
 
 from .conftest import Twins
 

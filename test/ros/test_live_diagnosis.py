@@ -32,9 +32,9 @@ from sdimu_calibration.nodes.credits import HISTORY
 from sdimu_calibration.nodes.diagnosis_messages import diagnosis, heat_map
 from sdimu_calibration.nodes.diagnosis_worker import Answer, Diagnoser, Job, Picture, Request
 from sdimu_calibration.nodes.live_diagnosis import Worker
-from sdimu_calibration.storage.bag_writer import write_recording
-from sdimu_calibration.storage.config import load_imu, load_model, load_plan
-from sdimu_calibration.storage.journal import Journal, digest
+from sdimu_calibration.storage.bags.bag_writer import write_recording
+from sdimu_calibration.storage.files.config import load_imu, load_model, load_plan
+from sdimu_calibration.storage.files.journal import Journal, digest
 from sdimu_calibration.storage.opening import Source, open_test, opening_options
 from sdimu_sim.core.scenario import Scenario, generate
 
@@ -42,6 +42,7 @@ from .conftest import DEADLINE_S, sdimu
 
 EFFECT = "gyro_scale_asymmetry_y"
 START = 1_700_000_000 * 10**9
+SHOWN = 1e-4  # an error is shown with three decimals
 PATIENCE_S = 300.0  # a first run on a new machine compiles
 OPTIONS = opening_options("daejeon", load_imu("dtg"), Source(gyro_unit="rad/s", gyro_sign=1))
 KIM18 = load_plan("kim18_signed")
@@ -105,7 +106,9 @@ def test_what_is_missing_stands_out_and_leaves_when_it_is_added(job, whole):
     added = Diagnoser(job).answer(Request(5, None, ((), (EFFECT,)))).diagnosis
     assert added.verdict == "consistent"
     assert [rung.added for rung in added.ladder] == [(), (EFFECT,)]
-    assert added.ladder[0] == whole.ladder[0]
+    # The same fit twice: BLAS rounds as the arrays happen to lie in memory.
+    assert added.ladder[0].nis == pytest.approx(whole.ladder[0].nis, rel=SHOWN)
+    assert added.ladder[0].held_out == pytest.approx(whole.ladder[0].held_out, rel=SHOWN)
     assert added.ladder[1].nis == pytest.approx(1.0, abs=0.1)
     assert added.ladder[1].held_out < added.ladder[0].held_out
 

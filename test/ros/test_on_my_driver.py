@@ -17,10 +17,10 @@ from sensor_msgs.msg import Imu
 from std_srvs.srv import Trigger
 
 from sdimu_calibration.core.plan import Plan, Turn
-from sdimu_calibration.storage.bag_writer import write_recording
-from sdimu_calibration.storage.cdr import encode_imu
-from sdimu_calibration.storage.config import load_imu, load_site
-from sdimu_calibration.storage.result_file import read_result
+from sdimu_calibration.storage.bags.bag_writer import write_recording
+from sdimu_calibration.storage.bags.cdr import encode_imu
+from sdimu_calibration.storage.files.config import load_imu, load_site
+from sdimu_calibration.storage.files.result_file import read_result
 from sdimu_sim.core.scenario import Scenario, generate
 
 from .conftest import CALIBRATION, DEADLINE_S, FitSession, sdimu

@@ -11,9 +11,9 @@ import pytest
 
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.nodes.monitor import Monitor
-from sdimu_calibration.storage.bag_reader import read_recording
-from sdimu_calibration.storage.recover import recover
-from sdimu_calibration.storage.result_file import read_result
+from sdimu_calibration.storage.bags.bag_reader import read_recording
+from sdimu_calibration.storage.bags.recover import recover
+from sdimu_calibration.storage.files.result_file import read_result
 
 from .conftest import RATE_HZ, FitSession, imu_stamps, samples_of, write_plan
 

@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from sdimu_calibration.storage.recover import recover
+from sdimu_calibration.storage.bags.recover import recover
 
 pytestmark = pytest.mark.ros
 
@@ -35,7 +35,6 @@ import sys
 from pathlib import Path
 
 from sdimu_calibration.nodes.recorder_node import RecorderNode
-from sdimu_calibration.nodes.spinning import run_node
 
 
 def full():

@@ -17,8 +17,8 @@ from std_msgs.msg import Header
 from std_srvs.srv import Trigger
 
 from sdimu_calibration.nodes.credits import HISTORY, LATCHED, STREAM, header
-from sdimu_calibration.storage.cdr import encode_imu, encode_status
-from sdimu_calibration.storage.result_file import read_result
+from sdimu_calibration.storage.bags.cdr import encode_imu, encode_status
+from sdimu_calibration.storage.files.result_file import read_result
 
 from .conftest import CALIBRATION, FitSession
 

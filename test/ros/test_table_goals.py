@@ -26,7 +26,7 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.nodes.credits import HISTORY, LATCHED, header, to_ns
-from sdimu_calibration.storage.result_file import read_result
+from sdimu_calibration.storage.files.result_file import read_result
 
 from .conftest import FitSession, imu_stamps, write_plan
 

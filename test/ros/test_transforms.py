@@ -16,7 +16,7 @@ from rosbags.typesys import Stores, get_typestore
 from sdimu_calibration.core.rotation import quaternion_matrix
 from sdimu_calibration.nodes.transform_type import HASH, TYPE_NAME
 from sdimu_calibration.nodes.transforms import TransformMessage, about, stamp_of_first
-from sdimu_calibration.storage.bag_reader import read_recording
+from sdimu_calibration.storage.bags.bag_reader import read_recording
 
 from .conftest import DWELL_S, TURN_S, Twins
 

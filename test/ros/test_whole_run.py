@@ -10,10 +10,10 @@ from rclpy.serialization import deserialize_message
 
 from sdimu_calibration.core.estimation.outcome import calibrate
 from sdimu_calibration.nodes.recorder_node import message_class
-from sdimu_calibration.storage.bag_file import raw_messages
-from sdimu_calibration.storage.bag_reader import read_recording
-from sdimu_calibration.storage.config import load_imu, load_model, load_site
-from sdimu_calibration.storage.result_file import read_result
+from sdimu_calibration.storage.bags.bag_file import raw_messages
+from sdimu_calibration.storage.bags.bag_reader import read_recording
+from sdimu_calibration.storage.files.config import load_imu, load_model, load_site
+from sdimu_calibration.storage.files.result_file import read_result
 
 from .conftest import DEADLINE_S, DWELL_S, RATE_HZ, Twins, imu_stamps, samples_of, sdimu
 

@@ -7,8 +7,8 @@ import yaml
 from rate_table_sim.core import TableSpecification
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.units import STANDARD_GRAVITY
-from sdimu_calibration.storage.config import load_imu, load_plan, load_site
-from sdimu_calibration.storage.reference_file import read_truth as read_reference_truth
+from sdimu_calibration.storage.files.config import load_imu, load_plan, load_site
+from sdimu_calibration.storage.files.reference_file import read_truth as read_reference_truth
 from sdimu_sim.core import ImuTruth, Scenario, in_body_frame
 from sdimu_sim.core.by_hand import against_gravity
 from sdimu_sim.core.generator import gravity_of

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from rate_table_sim.core.specification import Imperfections, TableSpecification
-from sdimu_calibration.storage.table_file import read_table
+from sdimu_calibration.storage.files.table_file import read_table
 
 
 def load_table(name_or_path: str | Path) -> TableSpecification:

@@ -45,6 +45,8 @@ if TYPE_CHECKING:
         simulate,
     )
 
+    __version__: str
+
 __all__ = ["calibrate", "compare", "diagnose", "open", "open_set", "plan", "predict", "simulate"]
 
 
@@ -52,6 +54,9 @@ def __getattr__(name: str) -> Any:
     # The functions load the numerical modules, which the start of the command line does not wait for.
     if name in __all__:
         return getattr(import_module("sdimu_calibration.api.functions"), name)
+    # The metadata of what is installed says the version; to read them takes longer than this import.
+    if name == "__version__":
+        return import_module("importlib.metadata").version(__name__)
     raise AttributeError(f"module 'sdimu_calibration' has no attribute '{name}'")
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from rate_table_sim.core import phase_changes
 from sdimu_calibration.core.arrays import Floats, Ints
-from sdimu_calibration.storage.bag_writer import write_recording
+from sdimu_calibration.storage.bags.bag_writer import write_recording
 from sdimu_sim.core.generator import ImuSamples
 from sdimu_sim.core.scenario import DEFAULT_START_NS, Scenario, SimulatedTest, table_log_rows, temperature_log
 

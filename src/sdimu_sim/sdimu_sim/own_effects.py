@@ -11,7 +11,7 @@ from pathlib import Path
 from sdimu_calibration.core.effect_key import EffectKey, parse_key, read_quantity
 from sdimu_calibration.core.expression import VARIABLES
 from sdimu_calibration.core.recording import DataError
-from sdimu_calibration.storage.effect_schema import EffectFile, constants_of, read_effect_file, si_unit
+from sdimu_calibration.storage.files.effect_schema import EffectFile, constants_of, read_effect_file, si_unit
 from sdimu_sim.core.expression import parse_expression, with_values
 from sdimu_sim.core.hidden import canonical, parse_effects
 

@@ -11,8 +11,8 @@ from pydantic import Field
 
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.specification import Site
-from sdimu_calibration.storage.config import Schema, read_yaml
-from sdimu_calibration.storage.whole_file import write_whole
+from sdimu_calibration.storage.files.config import Schema, read_yaml
+from sdimu_calibration.storage.files.whole_file import write_whole
 from sdimu_sim.core.true_coefficients import true_coefficients
 from sdimu_sim.core.truth import ImuTruth, Truth
 

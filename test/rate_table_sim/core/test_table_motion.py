@@ -7,7 +7,7 @@ from rate_table_sim.core import Imperfections, TableSpecification, phase_changes
 from sdimu_calibration.core.plan import Plan, Turn
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.rotation import quaternion_matrix, rotation_matrix
-from sdimu_calibration.storage.config import load_plan
+from sdimu_calibration.storage.files.config import load_plan
 
 # Directions of X, Y, Z at the nineteen stops: Kim, Song & Lyou, checked by the right-hand rule.
 PAPER = [

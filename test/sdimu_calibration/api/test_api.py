@@ -9,7 +9,7 @@ import pytest
 
 import sdimu_calibration as sdimu
 from sdimu_calibration.core.recording import DataError
-from sdimu_calibration.storage.result_file import read_result
+from sdimu_calibration.storage.files.result_file import read_result
 
 HIDDEN = "accel_quadratic_x"
 
@@ -53,6 +53,43 @@ def test_a_fit_is_shown_as_a_table_with_units(fit):
     assert list(frame.columns) == ["value", "sigma", "unit"]
     assert frame.loc["accel_scale_y", "unit"] == "ppm"
     assert frame.loc["accel_scale_y", "value"] == pytest.approx(1e6 * fit["accel_scale_y"].value)
+
+
+@pytest.fixture
+def notebook(monkeypatch):
+    """What rich shows by itself where it takes the program for a notebook's kernel."""
+    import builtins
+
+    class ZMQInteractiveShell:
+        """The name by which rich knows one."""
+
+    shown: list[object] = []
+    monkeypatch.setattr(builtins, "get_ipython", ZMQInteractiveShell, raising=False)
+    monkeypatch.setattr("rich.jupyter.display", lambda *what: shown.append(what))
+    return shown
+
+
+def test_a_notebook_shows_a_table_once(fit, notebook):
+    from rich.console import Console
+
+    assert Console().is_jupyter
+    ladder = sdimu.compare(fit, fit)
+    for thing in (fit, ladder):
+        assert "gyro_bias_x" in repr(thing) or "model 1" in repr(thing)
+        assert "<table>" in thing._repr_html_()
+    assert notebook == []
+
+
+def test_an_opened_test_says_what_it_is_of(bag):
+    test = sdimu.open(bag, site="daejeon", imu="dtg")
+    text = repr(test)
+    assert len(text) < 400
+    assert f"samples: {len(test.recording.t)} at 20 Hz" in text
+    for word in ("recording: bag", "duration: 2980.0 s (49.7 min)", "stops: 19", "IMU: dtg", "site: daejeon"):
+        assert word in text
+    assert all(line.partition(": ")[2] in test._repr_html_() for line in text.splitlines())
+    assert "stops: 19, without 3, 7" in repr(test.without_stops((3, 7)))
+    assert "(assumed)" in repr(sdimu.open(bag, imu="dtg"))
 
 
 def test_what_was_found_is_added_and_the_error_falls(fit, found):

@@ -10,9 +10,9 @@ import pytest
 import sdimu_calibration as sdimu
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.units import to_si
-from sdimu_calibration.storage.fleet_folder import candidates, gather
-from sdimu_calibration.storage.json_file import write_json
-from sdimu_calibration.storage.result_file import read_result
+from sdimu_calibration.storage.files.fleet_folder import candidates, gather
+from sdimu_calibration.storage.files.json_file import write_json
+from sdimu_calibration.storage.files.result_file import read_result
 
 
 @pytest.fixture(scope="module")

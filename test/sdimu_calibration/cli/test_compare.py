@@ -13,7 +13,7 @@ from sdimu_calibration.core.diagnosis.ladder import moved_coefficients
 from sdimu_calibration.core.noise_term import NoiseTerm
 from sdimu_calibration.core.results import Calibration, History, Rest
 from sdimu_calibration.core.units import to_si
-from sdimu_calibration.storage.result_file import write_result
+from sdimu_calibration.storage.files.result_file import write_result
 
 _NONE = np.empty(0)
 FIRST = Calibration(

@@ -14,13 +14,13 @@ from sdimu_calibration.core.compensation import compensator
 from sdimu_calibration.core.effects import selection
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.results import Calibration, no_history
-from sdimu_calibration.storage.bag_file import raw_messages
-from sdimu_calibration.storage.bag_reader import read_recording
-from sdimu_calibration.storage.bag_writer import write_recording
-from sdimu_calibration.storage.cdr import IMU, decode_doubles
-from sdimu_calibration.storage.config import load_imu
-from sdimu_calibration.storage.result_file import write_result
-from sdimu_calibration.storage.topics import Topics
+from sdimu_calibration.storage.bags.bag_file import raw_messages
+from sdimu_calibration.storage.bags.bag_reader import read_recording
+from sdimu_calibration.storage.bags.bag_writer import write_recording
+from sdimu_calibration.storage.bags.cdr import IMU, decode_doubles
+from sdimu_calibration.storage.bags.topics import Topics
+from sdimu_calibration.storage.files.config import load_imu
+from sdimu_calibration.storage.files.result_file import write_result
 
 
 def result(*effects: str) -> Calibration:

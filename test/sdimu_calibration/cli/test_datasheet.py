@@ -13,8 +13,8 @@ from sdimu_calibration.core.fleet.datasheet import known_terms
 from sdimu_calibration.core.noise import Terms
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.units import to_si
-from sdimu_calibration.storage.limits_file import read_limits
-from sdimu_calibration.storage.noise_terms_file import read_noise_terms, write_noise_terms
+from sdimu_calibration.storage.files.limits_file import read_limits
+from sdimu_calibration.storage.files.noise_terms_file import read_noise_terms, write_noise_terms
 
 
 def written(folder):

@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 import json
+import re
 import socket
 import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from sdimu_calibration.cli import main as cli
+from sdimu_calibration.core.effects import registry
 from sdimu_calibration.report.catalogue import page
-from sdimu_calibration.storage.bag_writer import write_recording
-from sdimu_calibration.storage.config import load_imu, load_plan, load_site
+from sdimu_calibration.storage.bags.bag_writer import write_recording
+from sdimu_calibration.storage.files.config import load_imu, load_plan, load_site
 from sdimu_sim.core.scenario import Scenario, generate
 
-ROOT = Path(__file__).resolve().parents[3]
 OWN = """\
 format: sdimu-effect/1
 name: bent
@@ -79,7 +79,10 @@ def test_the_loop_of_diagnosis_addition_and_comparison(sdimu, hidden, tmp_path):
     found = json.loads((tmp_path / "d" / "diagnosis.json").read_text())
     label = found["candidates"][0]["label"]
 
-    assert sdimu("calibrate", hidden, "--out", tmp_path / "base")[0] == 0
+    status, out, err = sdimu("calibrate", hidden, "--out", tmp_path / "base")
+    assert status == 3
+    assert "not to be trusted: the model" in err
+    assert "does not fit" in err
     assert sdimu("calibrate", hidden, "--add", label, "--out", tmp_path / "more")[0] == 0
     fits = [json.loads((tmp_path / n / "result.json").read_text())["fit"] for n in ("base", "more")]
     assert fits[1]["held_out_rms"] < fits[0]["held_out_rms"]
@@ -109,9 +112,10 @@ def test_bad_input_is_one_line(sdimu, hidden, tmp_path):
     assert not (tmp_path / "x").exists()
 
 
-def test_the_page_of_effects_is_what_the_registry_says():
-    # A change of the registry is followed by: sdimu effects --markdown > doc/effects.md
-    assert (ROOT / "doc" / "effects.md").read_text() == page()
+def test_the_page_of_effects_tells_every_effect_of_the_registry(sdimu):
+    status, out, _ = sdimu("effects", "--markdown")
+    assert (status, out.strip()) == (0, page().strip())
+    assert set(registry.names()) == set(re.findall(r"^### (\w+)$", out, re.MULTILINE))
 
 
 def _free_port() -> int:

@@ -12,11 +12,11 @@ from sdimu_calibration.cli.fleet import fleet
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.results import SetRecording, SetSummary
 from sdimu_calibration.core.units import to_si
-from sdimu_calibration.storage.config import load_imu
-from sdimu_calibration.storage.correlation_text import packed, unpacked
-from sdimu_calibration.storage.fleet_folder import candidates, gather
-from sdimu_calibration.storage.json_file import write_json
-from sdimu_calibration.storage.result_file import read_result, write_result
+from sdimu_calibration.storage.files.config import load_imu
+from sdimu_calibration.storage.files.correlation_text import packed, unpacked
+from sdimu_calibration.storage.files.fleet_folder import candidates, gather
+from sdimu_calibration.storage.files.json_file import write_json
+from sdimu_calibration.storage.files.result_file import read_result, write_result
 
 
 def test_the_unit_that_is_out_is_named_and_the_files_say_the_same(batch, capsys, tmp_path):

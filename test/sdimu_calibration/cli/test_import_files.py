@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from sdimu_calibration.cli import main as cli
-from sdimu_calibration.storage.bag_reader import read_recording
+from sdimu_calibration.storage.bags.bag_reader import read_recording
 
 MAP = """
 format: sdimu-import/1

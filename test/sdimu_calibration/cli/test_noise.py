@@ -10,9 +10,9 @@ import pytest
 from sdimu_calibration.cli.noise import noise
 from sdimu_calibration.core.noise import with_measured_noise
 from sdimu_calibration.core.units import to_si
-from sdimu_calibration.storage.bag_reader import read_recording
-from sdimu_calibration.storage.bag_writer import write_recording
-from sdimu_calibration.storage.config import load_imu
+from sdimu_calibration.storage.bags.bag_reader import read_recording
+from sdimu_calibration.storage.bags.bag_writer import write_recording
+from sdimu_calibration.storage.files.config import load_imu
 
 DT = 0.02
 GYRO, ACCEL = to_si(3.0, "deg/h/sqrt(Hz)"), to_si(50.0, "ug/sqrt(Hz)")

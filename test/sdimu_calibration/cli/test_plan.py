@@ -2,21 +2,26 @@
 
 from __future__ import annotations
 
+import shutil
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from sdimu_calibration.cli.plan import plan
+from sdimu_calibration.core.estimation.outcome import outcome
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.estimation.solve import solve
 from sdimu_calibration.core.evidence.known import Standing, known_of
 from sdimu_calibration.core.planning.nominal import nominal_recording
 from sdimu_calibration.core.recording import DataError
-from sdimu_calibration.storage.config import load_imu, load_plan, load_site
-from sdimu_calibration.storage.json_file import write_json
-from sdimu_calibration.storage.model_choice import named_model
-from sdimu_calibration.storage.standing_file import as_plain, read_standing
+from sdimu_calibration.storage.bags.bag_writer import write_recording
+from sdimu_calibration.storage.files.config import find_config, load_imu, load_plan, load_site
+from sdimu_calibration.storage.files.json_file import write_json
+from sdimu_calibration.storage.files.model_choice import named_model
+from sdimu_calibration.storage.files.result_file import plain_origin, write_result
+from sdimu_calibration.storage.files.standing_file import as_plain, read_standing
+from sdimu_calibration.storage.opening import said_of, with_imu_file
 
 OPEN = ("gyro_scale_asymmetry_y", "gyro_scale_quadratic_y")
 
@@ -73,3 +78,44 @@ def test_results_of_another_version_are_told(folder):
     write_json(folder / "set.json", {"format": "sdimu-set-diagnosis/1", "known": {"names": ["gyro_bias_x"]}})
     with pytest.raises(DataError, match="damaged"):
         plan(plan="kim18", after=[folder])
+
+
+HEAT = ("accel_bias_temperature_x", "accel_scale_temperature_x")
+
+
+def test_what_only_a_change_of_temperature_tells_is_said_so(capsys):
+    plan(plan="kim18", tell=list(HEAT))
+    told = capsys.readouterr().out
+    assert "0.0 sigma instead of 0.0" not in told
+    assert told.startswith(f"no turn tells {HEAT[0]} and {HEAT[1]} apart: ")
+    assert "only a change of temperature tells them" in " ".join(told.split())
+
+
+@pytest.fixture
+def elsewhere(tmp_path, monkeypatch):
+    """A site's and an IMU's file in one folder, and work that goes on in another."""
+    for kind, name in (("site", "daejeon"), ("imu", "dtg")):
+        shutil.copy(find_config(kind, name), tmp_path / f"{kind}_of_mine.yaml")
+    write_recording(tmp_path / "bag", start_ns=10**18, imu_ns=np.arange(1, 3) * 10**7, omega_ib_b=np.zeros((2, 3)),
+                    f_ib_b=np.zeros((2, 3)))
+    (tmp_path / "there").mkdir()
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_a_site_and_an_imu_of_the_users_own_are_found_again_from_the_results(elsewhere, monkeypatch, capsys):
+    site, imu = "site_of_mine.yaml", "imu_of_mine.yaml"
+    of_mine = PreparedTest(
+        nominal_recording(load_plan("kim18"), load_site(site)), load_imu(imu), load_site(site),
+        origin=said_of(elsewhere / "bag", site),
+    )  # fmt: skip
+    result = outcome(solve(with_imu_file(of_mine, imu), named_model("baseline", ()), "filter"))
+    write_result(elsewhere / "result.json", result)
+    assert result.origin.site == "site_of_mine"
+    monkeypatch.chdir(elsewhere / "there")
+    plan(plan="kim18", after=[elsewhere], tell=list(OPEN))
+    assert capsys.readouterr().out.startswith("turn Y")
+
+
+def test_names_in_config_leave_no_path_in_a_result(elsewhere):
+    assert "site_file" not in plain_origin(said_of(elsewhere / "bag", "daejeon"))

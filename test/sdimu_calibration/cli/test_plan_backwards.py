@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from sdimu_calibration.cli.plan import plan
 from sdimu_calibration.core.plan import backwards
-from sdimu_calibration.storage.config import load_plan
+from sdimu_calibration.storage.files.config import load_plan
 
 
 def test_a_plan_is_written_backwards(tmp_path, capsys):

@@ -9,8 +9,8 @@ import pytest
 
 from sdimu_calibration.cli import main as cli
 from sdimu_calibration.core.units import STANDARD_GRAVITY
-from sdimu_calibration.storage.config import load_imu, load_site
-from sdimu_calibration.storage.result_file import read_result
+from sdimu_calibration.storage.files.config import load_imu, load_site
+from sdimu_calibration.storage.files.result_file import read_result
 from sdimu_sim.core.by_hand import ByHand, against_gravity, by_hand_recording
 from sdimu_sim.core.generator import gravity_of
 from sdimu_sim.core.truth import in_body_frame

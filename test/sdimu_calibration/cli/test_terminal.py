@@ -14,7 +14,7 @@ import pytest
 
 from sdimu_calibration.cli.next_commands import Asked, spelled
 from sdimu_calibration.core.advice import Advice, Kind, Verb
-from sdimu_calibration.storage.advice_words import sentence
+from sdimu_calibration.storage.files.advice_words import sentence
 
 WIDTH = 80
 CONTROL = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]")

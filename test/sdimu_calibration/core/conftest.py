@@ -20,7 +20,7 @@ from sdimu_calibration.core.recording import Recording
 from sdimu_calibration.core.rotation import rotation_matrix
 from sdimu_calibration.core.specification import ImuSpecification, Model, Site
 from sdimu_calibration.core.units import to_si
-from sdimu_calibration.storage.config import load_imu, load_model, load_plan
+from sdimu_calibration.storage.files.config import load_imu, load_model, load_plan
 from sdimu_sim.core.scenario import Scenario, generate
 
 # The first call of a compiled function may compile it: no deadline says anything about the claim. The same examples

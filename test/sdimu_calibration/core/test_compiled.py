@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import ast
 import os
+import runpy
 import subprocess
 import sys
+from importlib import import_module
 from pathlib import Path
 
+import numba
 import pytest
 
 import sdimu_calibration.core
+from sdimu_calibration.core import compiled
 
 CORE = Path(sdimu_calibration.core.__file__).parent
 PACKAGE = "sdimu_calibration.core"
@@ -64,56 +68,72 @@ def triangle(n):
         total += k
     return total
 
-print(triangle(10), sum(triangle.stats.cache_hits.values()))
+TOLD = triangle(10), sum(triangle.stats.cache_hits.values())
+if __name__ == "__main__":
+    print(*TOLD)
+"""
+KERNEL = """
+{imported}
+
+@compiled
+def {name}(x):
+    return {value}
 """
 
 
 @pytest.mark.parametrize("kind", ["nbi", "nbc"])
-def test_a_damaged_cache_is_compiled_anew(tmp_path, kind):
+def test_a_damaged_cache_is_compiled_anew(tmp_path, monkeypatch, kind):
     script = tmp_path / "loop.py"
     script.write_text(LOOP)
-    environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path / "cache"), "PYTHONPATH": os.pathsep.join(sys.path)}
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "cache"))
+    monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path / "cache"))
 
     def run():
-        done = subprocess.run([sys.executable, script], env=environment, capture_output=True, text=True, check=False)
-        assert done.returncode == 0, done.stderr
-        return done.stdout.split()
+        return runpy.run_path(str(script))["TOLD"]
 
-    assert run() == ["45", "0"]
-    assert run() == ["45", "1"]
+    assert run() == (45, 0)
+    assert run() == (45, 1)
     (file,) = (tmp_path / "cache").rglob(f"*.{kind}")
     content = bytearray(file.read_bytes())
     for place in range(16, len(content), 64):
         content[place] ^= 0xFF
     file.write_bytes(content)
-    assert run() == ["45", "0"]
-    assert run() == ["45", "1"]
+    assert run() == (45, 0)
+    assert run() == (45, 1)
 
 
-def test_an_edited_kernel_compiles_only_the_kernels_that_use_it(tmp_path):
-    for name, source in {
-        "used.py": "from sdimu_calibration.core.compiled import compiled\n\n@compiled\ndef one(x):\n    return x + 1\n",
-        "using.py": "from sdimu_calibration.core.compiled import compiled\nfrom sdimu_kernels.used import one\n\n"
-        "@compiled\ndef two(x):\n    return 2 * one(x)\n",
-        "apart.py": "from sdimu_calibration.core.compiled import compiled\n\n@compiled\n"
-        "def three(x):\n    return 3 * x\n",
-        "__init__.py": "",
-    }.items():
-        (tmp_path / "sdimu_kernels").mkdir(exist_ok=True)
-        (tmp_path / "sdimu_kernels" / name).write_text(source)
-    call = (
-        "from sdimu_kernels.using import two; from sdimu_kernels.apart import three; print(two(1), three(1), "
-        "sum(two.stats.cache_hits.values()), sum(three.stats.cache_hits.values()))"
-    )
-    environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(tmp_path), *sys.path])}
-    environment.pop("NUMBA_CACHE_DIR", None)
+def test_processes_that_start_together_compile_a_function_once(tmp_path):
+    script = tmp_path / "loop.py"
+    script.write_text(LOOP)
+    environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path / "cache"), "PYTHONPATH": os.pathsep.join(sys.path)}
+    command = [sys.executable, script]
+    together = [subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True) for _ in range(2)]
+    told = [one.communicate(timeout=200)[0].split() for one in together]
+    assert sorted(told) == [["45", "0"], ["45", "1"]]
+
+
+def test_an_edited_kernel_compiles_only_the_kernels_that_use_it(tmp_path, monkeypatch):
+    package = tmp_path / "sdimu_kernels"
+    package.mkdir()
+    (package / "__init__.py").touch()
+    one, two, three = (package / f"{name}.py" for name in ("used", "using", "apart"))
+    one.write_text(KERNEL.format(imported="", name="one", value="x + 1"))
+    two.write_text(KERNEL.format(imported="from sdimu_kernels.used import one", name="two", value="2 * one(x)"))
+    three.write_text(KERNEL.format(imported="", name="three", value="3 * x"))
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
+    monkeypatch.setattr(numba.config, "CACHE_DIR", numba.config.CACHE_DIR)
 
     def run():
-        done = subprocess.run([sys.executable, "-c", call], env=environment, capture_output=True, text=True, check=True)
-        return done.stdout.split()
+        """Import the package as a new process does: results, hits in the cache."""
+        for name in [name for name in sys.modules if name.startswith("sdimu_kernels")]:
+            del sys.modules[name]
+        for kept in (compiled._package, compiled._source, compiled._compiled_into):
+            kept.cache_clear()
+        loops = [import_module("sdimu_kernels.using").two, import_module("sdimu_kernels.apart").three]
+        return [loop(1) for loop in loops] + [sum(loop.stats.cache_hits.values()) for loop in loops]
 
-    assert run() == ["4", "3", "0", "0"]
-    assert run() == ["4", "3", "1", "1"]
-    edited = tmp_path / "sdimu_kernels" / "used.py"
-    edited.write_text(edited.read_text().replace("x + 1", "x + 2"))
-    assert run() == ["6", "3", "0", "1"], "the kernel that uses the edited one is compiled anew, the other is not"
+    assert run() == [4, 3, 0, 0]
+    assert run() == [4, 3, 1, 1]
+    one.write_text(one.read_text().replace("x + 1", "x + 1000"))
+    assert run() == [2002, 3, 0, 1], "the kernel that uses the edited one is compiled anew, the other is not"

@@ -8,7 +8,7 @@ from sdimu_calibration.core.effect_key import EffectKey, parse_key, read_options
 from sdimu_calibration.core.effects.selection import resolve
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.units import to_si
-from sdimu_calibration.storage.effect_file import find_effects
+from sdimu_calibration.storage.files.effect_file import find_effects
 
 KEYS = [
     EffectKey("accel_quadratic_x"),

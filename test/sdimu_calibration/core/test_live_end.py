@@ -12,8 +12,8 @@ from sdimu_calibration.core.estimation.outcome import calibrate
 from sdimu_calibration.core.live import NS, LiveCalibration
 from sdimu_calibration.core.plan import Plan
 from sdimu_calibration.core.recording import UNNUMBERED, DataError
-from sdimu_calibration.storage.bag_writer import write_recording
-from sdimu_calibration.storage.config import load_imu, load_model, load_plan, load_site
+from sdimu_calibration.storage.bags.bag_writer import write_recording
+from sdimu_calibration.storage.files.config import load_imu, load_model, load_plan, load_site
 from sdimu_calibration.storage.opening import Source, open_test, opening_options
 from sdimu_sim.core.scenario import Scenario, generate
 

@@ -15,7 +15,7 @@ from sdimu_calibration.core.data.intake import Intake
 from sdimu_calibration.core.front_door import OpeningOptions
 from sdimu_calibration.core.live import NS, LiveCalibration
 from sdimu_calibration.core.specification import Model
-from sdimu_calibration.storage.effect_file import extended_model
+from sdimu_calibration.storage.files.effect_file import extended_model
 
 START = 1_700_000_000 * NS
 RATE = 20

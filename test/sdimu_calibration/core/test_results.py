@@ -3,7 +3,7 @@
 import pytest
 
 from sdimu_calibration.core.note import without_advice
-from sdimu_calibration.storage.result_file import as_note
+from sdimu_calibration.storage.files.result_file import as_note
 
 
 @pytest.mark.parametrize(

@@ -22,7 +22,7 @@ from sdimu_calibration.report import first_screen, sections
 from sdimu_calibration.report.evidence_figures import rungs
 from sdimu_calibration.report.page import page
 from sdimu_calibration.report.report_extras import report_extras
-from sdimu_calibration.storage.result_file import as_note
+from sdimu_calibration.storage.files.result_file import as_note
 
 TERM = NoiseTerm("gyro", FLICKER, size=1e-4)
 IN_NOISE = {"nis_in_noise": 1.303, "held_out_in_noise": 1.076}

@@ -8,7 +8,7 @@ import numpy as np
 
 from sdimu_calibration.core.results import Calibration, Rest, no_history
 from sdimu_calibration.report.page import page
-from sdimu_calibration.storage.result_file import read_result, write_result
+from sdimu_calibration.storage.files.result_file import read_result, write_result
 
 NONE = (float("nan"),) * 3
 RESTS = (

@@ -14,8 +14,8 @@ from rosbags.rosbag2 import Reader
 from rosbags.typesys import Stores, get_typestore
 
 from sdimu_calibration.core.recording import DataError
-from sdimu_calibration.storage import cdr
-from sdimu_calibration.storage.mcap_bag import McapBag
+from sdimu_calibration.storage.bags import cdr
+from sdimu_calibration.storage.bags.mcap_bag import McapBag
 
 TYPES = get_typestore(Stores.ROS2_JAZZY)
 START_NS = 1_700_000_000_000_000_000

@@ -10,7 +10,14 @@ from sdimu_calibration.core.effects.imu_model import build
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.estimation.solve import solve
 from sdimu_calibration.core.recording import DataError, Recording
-from sdimu_calibration.storage.config import config_folder, find_config, load_imu, load_model, load_plan, load_site
+from sdimu_calibration.storage.files.config import (
+    config_folder,
+    find_config,
+    load_imu,
+    load_model,
+    load_plan,
+    load_site,
+)
 
 PLAN = """
 format: sdimu-plan/1
@@ -159,10 +166,10 @@ def test_the_environment_names_another_config_folder(tmp_path, monkeypatch):
 def test_a_copy_that_is_installed_reads_the_files_that_it_brings(tmp_path, monkeypatch):
     (tmp_path / "config" / "plan").mkdir(parents=True)
     monkeypatch.delenv("SDIMU_CONFIG", raising=False)
-    monkeypatch.setattr("sdimu_calibration.storage.config._PACKAGE", tmp_path)
+    monkeypatch.setattr("sdimu_calibration.storage.files.config._PACKAGE", tmp_path)
     assert config_folder() == tmp_path / "config"
-    monkeypatch.setattr("sdimu_calibration.storage.config._PACKAGE", tmp_path / "without")
-    monkeypatch.setattr("sdimu_calibration.storage.config._REPOSITORY", tmp_path / "without")
+    monkeypatch.setattr("sdimu_calibration.storage.files.config._PACKAGE", tmp_path / "without")
+    monkeypatch.setattr("sdimu_calibration.storage.files.config._REPOSITORY", tmp_path / "without")
     with pytest.raises(DataError, match="SDIMU_CONFIG"):
         config_folder()
 

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from sdimu_calibration.core.recording import DataError
-from sdimu_calibration.storage import cdr
-from sdimu_calibration.storage.bag_reader import read_recording
-from sdimu_calibration.storage.bag_writer import write_recording
-from sdimu_calibration.storage.cut_bag import cut_bag
-from sdimu_calibration.storage.mcap_bag import McapBag
+from sdimu_calibration.storage.bags import cdr
+from sdimu_calibration.storage.bags.bag_reader import read_recording
+from sdimu_calibration.storage.bags.bag_writer import write_recording
+from sdimu_calibration.storage.bags.cut_bag import cut_bag
+from sdimu_calibration.storage.bags.mcap_bag import McapBag
 
 START = 1_700_000_000_000_000_000
 N = 1000

@@ -18,13 +18,13 @@ from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, W
 from rosbags.typesys import Stores, get_typestore
 
 from sdimu_calibration.core.recording import DataError
-from sdimu_calibration.storage import cdr
-from sdimu_calibration.storage.bag_info import read_info
-from sdimu_calibration.storage.bag_reader import read_recording
-from sdimu_calibration.storage.bag_writer import write_recording
-from sdimu_calibration.storage.cut_bag import cut_bag
-from sdimu_calibration.storage.mcap_file import McapFile
-from sdimu_calibration.storage.recover import recover
+from sdimu_calibration.storage.bags import cdr
+from sdimu_calibration.storage.bags.bag_info import read_info
+from sdimu_calibration.storage.bags.bag_reader import read_recording
+from sdimu_calibration.storage.bags.bag_writer import write_recording
+from sdimu_calibration.storage.bags.cut_bag import cut_bag
+from sdimu_calibration.storage.bags.mcap_file import McapFile
+from sdimu_calibration.storage.bags.recover import recover
 
 N = 9000
 CHUNK, STATISTICS, DATA_END, FOOTER = 6, 11, 15, 2
@@ -214,8 +214,8 @@ def bomb(kind):
 @pytest.mark.parametrize("kind", ["zstd", "lz4"])
 @pytest.mark.parametrize("said", [1 << 20, 1 << 26, 1 << 36])
 def test_a_chunk_unpacks_to_what_it_may_and_says(tmp_path, kind, said, monkeypatch):
-    monkeypatch.setattr("sdimu_calibration.storage.unpacking.BASE_BYTES", 1 << 20)
-    monkeypatch.setattr("sdimu_calibration.storage.unpacking.RATIO", 8)
+    monkeypatch.setattr("sdimu_calibration.storage.bags.unpacking.BASE_BYTES", 1 << 20)
+    monkeypatch.setattr("sdimu_calibration.storage.bags.unpacking.RATIO", 8)
     file = write_raw(tmp_path / "x.mcap", b"", kind, bomb(kind), said)
     with pytest.raises(DataError, match="unpack"):
         read_recording(file)
@@ -275,7 +275,7 @@ def test_messages_without_a_common_layout_are_read_where_they_stand(tmp_path):
 @pytest.mark.parametrize("plugin", [StoragePlugin.MCAP, StoragePlugin.SQLITE3])
 @pytest.mark.parametrize("mode", [CompressionMode.MESSAGE, CompressionMode.FILE])
 def test_a_packed_bag_unpacks_to_what_it_may(tmp_path, plugin, mode, monkeypatch):
-    monkeypatch.setattr("sdimu_calibration.storage.unpacking.BASE_BYTES", 1 << 20)
+    monkeypatch.setattr("sdimu_calibration.storage.bags.unpacking.BASE_BYTES", 1 << 20)
     writer = Writer(tmp_path / "b", version=9, storage_plugin=plugin)
     writer.set_compression(mode, CompressionFormat.ZSTD)
     with writer:
@@ -299,7 +299,7 @@ def test_chunks_of_every_kind_read_the_same(tmp_path, kind):
 
 
 def test_a_bag_of_ros_1_unpacks_to_what_it_may(tmp_path, monkeypatch):
-    monkeypatch.setattr("sdimu_calibration.storage.unpacking.BASE_BYTES", 1 << 20)
+    monkeypatch.setattr("sdimu_calibration.storage.bags.unpacking.BASE_BYTES", 1 << 20)
     types = get_typestore(Stores.ROS1_NOETIC)
     writer = Writer1(tmp_path / "x.bag")
     writer.set_compression(Writer1.CompressionFormat.BZ2)

@@ -12,9 +12,9 @@ from sdimu_calibration.core.diagnosis.summary import summarise
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.specification import Site
 from sdimu_calibration.core.units import to_si
-from sdimu_calibration.storage.config import load_imu, load_model, load_plan
-from sdimu_calibration.storage.correlation_text import unpacked
-from sdimu_calibration.storage.diagnosis_file import content, read_diagnosis, write_diagnosis
+from sdimu_calibration.storage.files.config import load_imu, load_model, load_plan
+from sdimu_calibration.storage.files.correlation_text import unpacked
+from sdimu_calibration.storage.files.diagnosis_file import content, read_diagnosis, write_diagnosis
 from sdimu_sim.core.scenario import Scenario, generate
 
 SITE = Site(latitude_rad=float(np.radians(36.4)))

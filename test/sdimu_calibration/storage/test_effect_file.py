@@ -18,9 +18,15 @@ from sdimu_calibration.core.plan import Plan, Turn
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.specification import Site
 from sdimu_calibration.core.units import parse_unit
-from sdimu_calibration.storage import effect_file
-from sdimu_calibration.storage.config import load_imu, load_model
-from sdimu_calibration.storage.effect_file import effects_of_result, extended_model, find_effects, load_effect, si_unit
+from sdimu_calibration.storage.files import effect_file
+from sdimu_calibration.storage.files.config import load_imu, load_model
+from sdimu_calibration.storage.files.effect_file import (
+    effects_of_result,
+    extended_model,
+    find_effects,
+    load_effect,
+    si_unit,
+)
 from sdimu_sim.core.scenario import Scenario, generate
 
 TWIN = """\

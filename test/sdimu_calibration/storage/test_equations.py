@@ -13,8 +13,8 @@ from sdimu_calibration.core.estimation.solve import solve
 from sdimu_calibration.core.plan import Plan, Turn
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.specification import Site
-from sdimu_calibration.storage.config import load_imu, load_model
-from sdimu_calibration.storage.effect_file import find_effects
+from sdimu_calibration.storage.files.config import load_imu, load_model
+from sdimu_calibration.storage.files.effect_file import find_effects
 from sdimu_sim.core.scenario import Scenario, generate
 from sdimu_sim.core.temperature import TemperatureProfile
 

@@ -3,7 +3,7 @@
 import pytest
 
 from sdimu_calibration.core.recording import DataError
-from sdimu_calibration.storage.goal_file import load_goals
+from sdimu_calibration.storage.files.goal_file import load_goals
 
 
 @pytest.mark.parametrize("text", ["0.016 ppm", "0.016", "small"])

@@ -17,14 +17,14 @@ from sdimu_calibration.core.plain_text import LONGEST_LINE, one_line
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.results import Calibration, no_history
 from sdimu_calibration.core.units import UnitError, parse_quantity, parse_unit
-from sdimu_calibration.storage import unpacking
-from sdimu_calibration.storage.array_table import read_mat, read_npz
-from sdimu_calibration.storage.config import load_imu, load_site, read_mapping
-from sdimu_calibration.storage.effect_schema import read_effect_file
+from sdimu_calibration.storage.bags import unpacking
 from sdimu_calibration.storage.export import FORMS, export
-from sdimu_calibration.storage.journal import Journal
-from sdimu_calibration.storage.reference_file import read_truth
-from sdimu_calibration.storage.result_file import read_result, write_result
+from sdimu_calibration.storage.files.config import load_imu, load_site, read_mapping
+from sdimu_calibration.storage.files.effect_schema import read_effect_file
+from sdimu_calibration.storage.files.journal import Journal
+from sdimu_calibration.storage.files.reference_file import read_truth
+from sdimu_calibration.storage.files.result_file import read_result, write_result
+from sdimu_calibration.storage.importing.array_table import read_mat, read_npz
 
 ESCAPE = "\x1b]0;owned\x07\r\n\x9b2J\u202e"
 

@@ -10,9 +10,9 @@ import pytest
 import yaml
 
 from sdimu_calibration.core.recording import DataError
-from sdimu_calibration.storage.bag_reader import read_recording
-from sdimu_calibration.storage.import_map import load_import_map
-from sdimu_calibration.storage.importer import APART_NS, read_files, write_imported
+from sdimu_calibration.storage.bags.bag_reader import read_recording
+from sdimu_calibration.storage.importing.import_map import load_import_map
+from sdimu_calibration.storage.importing.importer import APART_NS, read_files, write_imported
 
 G = 9.80665
 N = 400

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sdimu_calibration.storage.journal import Journal, Samples, Status, Temperature, digest
+from sdimu_calibration.storage.files.journal import Journal, Samples, Status, Temperature, digest
 
 OPTIONS = digest("site", "imu")
 

@@ -12,11 +12,11 @@ import pytest
 from sdimu_calibration.core.plan import Plan
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.specification import Site
-from sdimu_calibration.storage.bag_writer import write_recording
-from sdimu_calibration.storage.config import load_imu, load_plan, load_site
+from sdimu_calibration.storage.bags.bag_writer import write_recording
+from sdimu_calibration.storage.bags.topic_choice import TopicChoice
+from sdimu_calibration.storage.bags.topics import Topics
+from sdimu_calibration.storage.files.config import load_imu, load_plan, load_site
 from sdimu_calibration.storage.opening import Source, open_recording, open_test
-from sdimu_calibration.storage.topic_choice import TopicChoice
-from sdimu_calibration.storage.topics import Topics
 from sdimu_sim.core.scenario import Scenario, generate
 
 G = 9.80665

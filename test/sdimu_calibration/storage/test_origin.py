@@ -11,12 +11,12 @@ import pytest
 
 from sdimu_calibration.core.origin import Origin, measured
 from sdimu_calibration.core.recording import Recording, TemperatureLog
-from sdimu_calibration.storage.bag_metadata import custom_data
-from sdimu_calibration.storage.bag_writer import write_recording
-from sdimu_calibration.storage.cut_bag import cut_bag
+from sdimu_calibration.storage.bags.bag_metadata import custom_data
+from sdimu_calibration.storage.bags.bag_writer import write_recording
+from sdimu_calibration.storage.bags.cut_bag import cut_bag
+from sdimu_calibration.storage.bags.recover import recover
+from sdimu_calibration.storage.files.result_file import read_result, write_result
 from sdimu_calibration.storage.opening import said_of
-from sdimu_calibration.storage.recover import recover
-from sdimu_calibration.storage.result_file import read_result, write_result
 
 
 @pytest.fixture

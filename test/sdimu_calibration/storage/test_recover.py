@@ -12,16 +12,16 @@ import pytest
 from rosbags.rosbag2 import Reader
 
 from sdimu_calibration.core.recording import DataError
-from sdimu_calibration.storage.bag_info import read_info
-from sdimu_calibration.storage.bag_reader import read_recording
-from sdimu_calibration.storage.recover import recover
+from sdimu_calibration.storage.bags.bag_info import read_info
+from sdimu_calibration.storage.bags.bag_reader import read_recording
+from sdimu_calibration.storage.bags.recover import recover
 
 KILLED = """
     import os, sys, signal
     from pathlib import Path
     import numpy as np
-    from sdimu_calibration.storage import cdr
-    from sdimu_calibration.storage.mcap_bag import McapBag
+    from sdimu_calibration.storage.bags import cdr
+    from sdimu_calibration.storage.bags.mcap_bag import McapBag
 
     ns = (np.arange(1000) + 1) * 10_000_000
     bag = McapBag(Path(sys.argv[1]), live=True)

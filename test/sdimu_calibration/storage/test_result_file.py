@@ -10,8 +10,8 @@ import pytest
 
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.results import Calibration, History
-from sdimu_calibration.storage.config import load_imu
-from sdimu_calibration.storage.result_file import read_result, write_result
+from sdimu_calibration.storage.files.config import load_imu
+from sdimu_calibration.storage.files.result_file import read_result, write_result
 
 
 def calibration() -> Calibration:

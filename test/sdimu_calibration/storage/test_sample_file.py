@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from sdimu_calibration.core.recording import DataError
-from sdimu_calibration.storage import imu_messages, sample_file
-from sdimu_calibration.storage.bag_reader import read_recording
-from sdimu_calibration.storage.bag_writer import write_recording
-from sdimu_calibration.storage.sample_file import SampleFile
+from sdimu_calibration.storage.bags import imu_messages, sample_file
+from sdimu_calibration.storage.bags.bag_reader import read_recording
+from sdimu_calibration.storage.bags.bag_writer import write_recording
+from sdimu_calibration.storage.bags.sample_file import SampleFile
 
 
 @pytest.fixture

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from sdimu_calibration.core.recording import UNNUMBERED, seconds
-from sdimu_calibration.storage import cdr
-from sdimu_calibration.storage.bag_reader import read_recording
-from sdimu_calibration.storage.mcap_bag import McapBag
-from sdimu_calibration.storage.status_message import first_entry, phase_entry, stamp_ns
+from sdimu_calibration.storage.bags import cdr
+from sdimu_calibration.storage.bags.bag_reader import read_recording
+from sdimu_calibration.storage.bags.mcap_bag import McapBag
+from sdimu_calibration.storage.bags.status_message import first_entry, phase_entry, stamp_ns
 
 START = 1_700_000_000 * 10**9
 

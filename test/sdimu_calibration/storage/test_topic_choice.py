@@ -13,13 +13,13 @@ from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, W
 from rosbags.typesys import Stores, get_typestore
 
 from sdimu_calibration.core.recording import DataError
-from sdimu_calibration.storage import cdr
-from sdimu_calibration.storage.bag_info import read_info
-from sdimu_calibration.storage.bag_reader import read_recording
-from sdimu_calibration.storage.bag_writer import write_recording
-from sdimu_calibration.storage.mcap_bag import McapBag
-from sdimu_calibration.storage.topic_choice import TopicChoice
-from sdimu_calibration.storage.topics import Topics
+from sdimu_calibration.storage.bags import cdr
+from sdimu_calibration.storage.bags.bag_info import read_info
+from sdimu_calibration.storage.bags.bag_reader import read_recording
+from sdimu_calibration.storage.bags.bag_writer import write_recording
+from sdimu_calibration.storage.bags.mcap_bag import McapBag
+from sdimu_calibration.storage.bags.topic_choice import TopicChoice
+from sdimu_calibration.storage.bags.topics import Topics
 
 START_NS = 1_700_000_000_000_000_000
 TYPES = get_typestore(Stores.ROS2_JAZZY)

@@ -10,13 +10,13 @@ import pytest
 from sdimu_calibration.api import fit as api_fit
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.results import Calibration, no_history
-from sdimu_calibration.storage import cdr
-from sdimu_calibration.storage.bag_reader import read_recording
-from sdimu_calibration.storage.bag_writer import write_recording
-from sdimu_calibration.storage.cut_bag import cut_bag
-from sdimu_calibration.storage.mcap_bag import McapBag
-from sdimu_calibration.storage.recover import recover
-from sdimu_calibration.storage.whole_file import write_whole, written_together
+from sdimu_calibration.storage.bags import cdr
+from sdimu_calibration.storage.bags.bag_reader import read_recording
+from sdimu_calibration.storage.bags.bag_writer import write_recording
+from sdimu_calibration.storage.bags.cut_bag import cut_bag
+from sdimu_calibration.storage.bags.mcap_bag import McapBag
+from sdimu_calibration.storage.bags.recover import recover
+from sdimu_calibration.storage.files.whole_file import write_whole, written_together
 
 
 def names(folder):
@@ -70,7 +70,7 @@ def test_what_was_there_stays_until_the_new_bag_is_whole(bag, tmp_path, small_te
 
 
 def test_a_bag_that_is_interrupted_while_it_is_closed_is_not_there(tmp_path, monkeypatch):
-    monkeypatch.setattr("sdimu_calibration.storage.mcap_bag.put_in_place", stopped)
+    monkeypatch.setattr("sdimu_calibration.storage.bags.mcap_bag.put_in_place", stopped)
     with pytest.raises(Stopped), McapBag(tmp_path / "b") as bag:
         bag.topic("/imu/data_raw", cdr.IMU)
     assert names(tmp_path) == []

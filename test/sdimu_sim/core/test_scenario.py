@@ -9,7 +9,7 @@ from rate_table_sim.core import TableSpecification
 from sdimu_calibration.core import earth
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.specification import ImuSpecification
-from sdimu_calibration.storage.config import load_imu, load_plan, load_site
+from sdimu_calibration.storage.files.config import load_imu, load_plan, load_site
 from sdimu_sim.core import Scenario, TemperatureProfile, generate
 
 PERFECT = ImuSpecification("perfect", 0.0, 0.0)

@@ -29,7 +29,7 @@ from sdimu_calibration.nodes.credits import HISTORY, NS, Producer, header
 from sdimu_calibration.nodes.parameters import Declare
 from sdimu_calibration.nodes.spinning import run_node
 from sdimu_calibration.nodes.ticking import Ticker
-from sdimu_calibration.storage.config import load_plan
+from sdimu_calibration.storage.files.config import load_plan
 
 TICK_S = 0.005
 FAST_BLOCK = 50

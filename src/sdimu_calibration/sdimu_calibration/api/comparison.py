@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Sequence
 from html import escape
 
-from rich.console import Console
 from rich.table import Table
 
 from sdimu_calibration.api.fit import CalibrationFit
 from sdimu_calibration.report.comparison import comparison, headings, remarks
+from sdimu_calibration.report.table import as_text
 
 _WIDTH = 140
 """Columns of the table."""
@@ -40,9 +39,7 @@ class Comparison:
         table = Table(*self.headings)
         for row in self.rows:
             table.add_row(*row)
-        text = io.StringIO()
-        Console(file=text, width=_WIDTH, color_system=None).print(table)
-        return "\n".join([text.getvalue().rstrip("\n"), *self.remarks])
+        return "\n".join([as_text(table, _WIDTH).rstrip("\n"), *self.remarks])
 
     def _repr_html_(self) -> str:
         """Table of the models as HTML."""

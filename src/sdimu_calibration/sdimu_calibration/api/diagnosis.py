@@ -21,11 +21,11 @@ from sdimu_calibration.report import data, evidence_figures
 from sdimu_calibration.report.drawing import Figure
 from sdimu_calibration.report.page import write_report
 from sdimu_calibration.report.report_extras import report_extras
-from sdimu_calibration.storage.advice_words import sentence
-from sdimu_calibration.storage.diagnosis_file import write_diagnosis
-from sdimu_calibration.storage.result_file import write_result
+from sdimu_calibration.storage.files.advice_words import sentence
+from sdimu_calibration.storage.files.diagnosis_file import write_diagnosis
+from sdimu_calibration.storage.files.result_file import write_result
+from sdimu_calibration.storage.files.whole_file import written_together
 from sdimu_calibration.storage.trace import traced
-from sdimu_calibration.storage.whole_file import written_together
 
 
 class FitDiagnosis:

@@ -19,10 +19,10 @@ from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.estimation.solve import extend
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.report.page import write_report
-from sdimu_calibration.storage.effect_file import find_effects, new_parts
-from sdimu_calibration.storage.result_file import write_result
+from sdimu_calibration.storage.files.effect_file import find_effects, new_parts
+from sdimu_calibration.storage.files.result_file import write_result
+from sdimu_calibration.storage.files.whole_file import written_together
 from sdimu_calibration.storage.trace import traced
-from sdimu_calibration.storage.whole_file import written_together
 
 if TYPE_CHECKING:
     from sdimu_calibration.core.evidence.candidate import Candidate

@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-import io
 import math
 from collections.abc import Iterator
 from html import escape
 from typing import TYPE_CHECKING
 
 import numpy as np
-from rich.console import Console
 
 from sdimu_calibration.api.coefficient import Coefficient
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.error_figures import held_out, held_out_judged, nis, nis_judged, noise_learned
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.results import Calibration
-from sdimu_calibration.report.table import cells, headings, rich_table, rows
+from sdimu_calibration.report.table import as_text, cells, headings, rich_table, rows
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -70,10 +68,7 @@ class Fitted:
 
     def __repr__(self) -> str:
         """Table of coefficients with units, and how well the fit predicts."""
-        text = io.StringIO()
-        console = Console(file=text, width=_WIDTH, color_system=None)
-        console.print(rich_table(rows(self.result), self._heading))
-        return text.getvalue() + self._figures()
+        return as_text(rich_table(rows(self.result), self._heading), _WIDTH) + self._figures()
 
     def _repr_html_(self) -> str:
         """Table of coefficients as HTML."""

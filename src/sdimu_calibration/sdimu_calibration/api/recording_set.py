@@ -19,12 +19,12 @@ from sdimu_calibration.core.progress import Progress
 from sdimu_calibration.core.results import Calibration, SetSummary
 from sdimu_calibration.core.verdict import Verdict
 from sdimu_calibration.report.page import write_report
-from sdimu_calibration.storage.advice_words import sentence
+from sdimu_calibration.storage.files.advice_words import sentence
+from sdimu_calibration.storage.files.result_file import write_result
+from sdimu_calibration.storage.files.set_result_file import write_set_diagnosis
+from sdimu_calibration.storage.files.whole_file import written_together
 from sdimu_calibration.storage.recording_set import RecordingSet
-from sdimu_calibration.storage.result_file import write_result
-from sdimu_calibration.storage.set_result_file import write_set_diagnosis
 from sdimu_calibration.storage.set_work import set_runner
-from sdimu_calibration.storage.whole_file import written_together
 
 if TYPE_CHECKING:
     from sdimu_calibration.core.evidence.known import Standing

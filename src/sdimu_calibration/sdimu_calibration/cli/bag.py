@@ -23,7 +23,7 @@ Bag = Annotated[Path, typer.Argument(metavar="BAG", help="rosbag2 folder or .mca
 def info(bag: Bag, as_json: JsonOption = False) -> None:
     """Show topics, types and counts."""
     from sdimu_calibration.cli.wide_table import print_table
-    from sdimu_calibration.storage.bag_info import read_info
+    from sdimu_calibration.storage.bags.bag_info import read_info
 
     content = read_info(bag)
     rows = [(str(content.counts[topic]), one_line(topic), one_line(name)) for topic, name in content.types.items()]
@@ -48,7 +48,7 @@ def cut(
     replace: Annotated[bool, typer.Option(help="Delete what is there.")] = False,
 ) -> None:
     """Take a part of a recording: what comes before a power cycle, or after a push against the table."""
-    from sdimu_calibration.storage.cut_bag import cut_bag
+    from sdimu_calibration.storage.bags.cut_bag import cut_bag
 
     part = cut_bag(bag, out, first, last, replace=replace)
     kept = ", ".join(f"{one_line(topic)} {count}" for topic, count in sorted(part.counts.items()))
@@ -61,8 +61,8 @@ def cut(
 @app.command()
 def recover(bag: Bag) -> None:
     """Mend a bag that was cut while it was being written; the cut file stays as NAME.damaged."""
-    from sdimu_calibration.storage.bag_folder import DAMAGED_SUFFIX
-    from sdimu_calibration.storage.recover import recover as mend
+    from sdimu_calibration.storage.bags.bag_folder import DAMAGED_SUFFIX
+    from sdimu_calibration.storage.bags.recover import recover as mend
 
     console = plain()
     for salvage in mend(bag):

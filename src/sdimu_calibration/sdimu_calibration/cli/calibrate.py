@@ -102,10 +102,10 @@ def calibrate(
     from sdimu_calibration.core.units import STANDARD_GRAVITY
     from sdimu_calibration.report.page import write_report
     from sdimu_calibration.report.table import rich_table, rows
-    from sdimu_calibration.storage.reference_file import read_truth
-    from sdimu_calibration.storage.result_file import write_result
+    from sdimu_calibration.storage.files.reference_file import read_truth
+    from sdimu_calibration.storage.files.result_file import write_result
+    from sdimu_calibration.storage.files.whole_file import written_together
     from sdimu_calibration.storage.trace import traced
-    from sdimu_calibration.storage.whole_file import written_together
 
     console = plain(stderr=as_json)
     origin = source(

@@ -21,7 +21,7 @@ def compare(
     from sdimu_calibration.cli.wide_table import print_table
     from sdimu_calibration.core.recording import DataError
     from sdimu_calibration.report.comparison import comparison, headings, remarks
-    from sdimu_calibration.storage.result_file import read_result
+    from sdimu_calibration.storage.files.result_file import read_result
 
     if len(folders) < 2:
         raise DataError("compare: give at least two folders with a result.json each")
@@ -54,7 +54,7 @@ def _content(
 
 def _verdict(folder: Path) -> str:
     """Sentence of the diagnosis in a folder; empty when there is none."""
-    from sdimu_calibration.storage.diagnosis_file import read_diagnosis
+    from sdimu_calibration.storage.files.diagnosis_file import read_diagnosis
 
     if not (folder / "diagnosis.json").is_file():
         return ""

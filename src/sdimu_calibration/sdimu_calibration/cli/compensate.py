@@ -35,12 +35,12 @@ def compensate(
     from sdimu_calibration.cli.progress import bar
     from sdimu_calibration.core.compensation import compensator
     from sdimu_calibration.core.units import from_si
-    from sdimu_calibration.storage.bag_reader import read_recording
-    from sdimu_calibration.storage.compensated_bag import write_compensated
-    from sdimu_calibration.storage.compensated_imu import frame_of
-    from sdimu_calibration.storage.effect_file import effects_of_result
-    from sdimu_calibration.storage.imu_noise import noise_for
-    from sdimu_calibration.storage.result_file import read_result
+    from sdimu_calibration.storage.bags.bag_reader import read_recording
+    from sdimu_calibration.storage.bags.compensated_bag import write_compensated
+    from sdimu_calibration.storage.bags.compensated_imu import frame_of
+    from sdimu_calibration.storage.files.effect_file import effects_of_result
+    from sdimu_calibration.storage.files.imu_noise import noise_for
+    from sdimu_calibration.storage.files.result_file import read_result
 
     console = plain()
     calibration = read_result(result)

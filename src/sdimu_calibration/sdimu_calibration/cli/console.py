@@ -50,7 +50,7 @@ def answer(content: Path | Mapping[str, Any], asked: bool) -> None:
     if isinstance(content, Path):
         typer.echo(content.read_text(encoding="utf-8"), nl=False)
     else:
-        from sdimu_calibration.storage.json_file import json_text
+        from sdimu_calibration.storage.files.json_file import json_text
 
         typer.echo(json_text(content))
 

@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+import sdimu_calibration
 from sdimu_calibration.cli.console import JsonOption, answer, plain, say
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from sdimu_calibration.storage.fleet_folder import Entry
+    from sdimu_calibration.storage.files.fleet_folder import Entry
 
 
 def datasheet(
@@ -36,16 +37,15 @@ def datasheet(
 ) -> None:
     """Make a data sheet from results; leaves datasheet.json and datasheet.html (prints on A4)."""
     from datetime import UTC, datetime
-    from importlib.metadata import version
 
     from sdimu_calibration.cli.wide_table import print_table
     from sdimu_calibration.core.fleet import datasheet as core
     from sdimu_calibration.report.fleet.sheet import HEADINGS, rows, write_page
-    from sdimu_calibration.storage.datasheet_file import Certificate, hashed, write_datasheet
-    from sdimu_calibration.storage.fleet_folder import gather
-    from sdimu_calibration.storage.limits_file import read_limits
-    from sdimu_calibration.storage.noise_terms_file import read_noise_terms
-    from sdimu_calibration.storage.whole_file import written_together
+    from sdimu_calibration.storage.files.datasheet_file import Certificate, hashed, write_datasheet
+    from sdimu_calibration.storage.files.fleet_folder import gather
+    from sdimu_calibration.storage.files.limits_file import read_limits
+    from sdimu_calibration.storage.files.noise_terms_file import read_noise_terms
+    from sdimu_calibration.storage.files.whole_file import written_together
 
     console = plain(stderr=as_json)
     allowed = {} if limits is None else read_limits(limits, core.known_terms())
@@ -58,7 +58,7 @@ def datasheet(
     lines = tuple(line.against(allowed[line.term]) if line.term in allowed else line for line in lines)
     about = Certificate(
         serial=entries[0].unit if certificate else serial or "", date=datetime.now(UTC).strftime("%Y-%m-%d"),
-        operator=operator, plan=plan, version=version("sdimu_calibration"),
+        operator=operator, plan=plan, version=sdimu_calibration.__version__,
         recordings=hashed(entries, recording or []) if certificate else (),
     )  # fmt: skip
     print_table(console, HEADINGS, rows(lines, short=True), left=1)
@@ -75,7 +75,7 @@ def datasheet(
 
 def _noise_below(folders: Sequence[Path]) -> list[Path]:
     """Every noise.json below the folders."""
-    from sdimu_calibration.storage.noise_terms_file import NAME
+    from sdimu_calibration.storage.files.noise_terms_file import NAME
 
     return [path for folder in folders if folder.is_dir() for path in sorted(folder.rglob(NAME))]
 

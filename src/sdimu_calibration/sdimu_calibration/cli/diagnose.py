@@ -114,8 +114,8 @@ def diagnose(
     from sdimu_calibration.core.diagnosis.summary import summarise
     from sdimu_calibration.core.estimation.solve import solve
     from sdimu_calibration.core.recording import DataError
-    from sdimu_calibration.storage.effect_file import find_effects
-    from sdimu_calibration.storage.model_choice import HANDHELD, named_estimator
+    from sdimu_calibration.storage.files.effect_file import find_effects
+    from sdimu_calibration.storage.files.model_choice import HANDHELD, named_estimator
     from sdimu_calibration.storage.trace import traced
 
     console = plain(stderr=as_json)
@@ -160,7 +160,7 @@ def diagnose(
     tell(console, (*notes, *(note for note in notes_of_diagnosis(found) if note not in notes)))
     say(console, f"results in {folder}")
     answer(folder / "diagnosis.json", as_json)
-    leave(found.after)
+    leave(found.after, (found.verdict, found.sentence))
 
 
 def _write(
@@ -170,10 +170,10 @@ def _write(
     from sdimu_calibration.cli.next_commands import PLAN, as_plan, spelled
     from sdimu_calibration.report.page import write_report
     from sdimu_calibration.report.report_extras import report_extras
-    from sdimu_calibration.storage.diagnosis_file import write_diagnosis
-    from sdimu_calibration.storage.plan_file import write_plan
-    from sdimu_calibration.storage.result_file import write_result
-    from sdimu_calibration.storage.whole_file import written_together
+    from sdimu_calibration.storage.files.diagnosis_file import write_diagnosis
+    from sdimu_calibration.storage.files.plan_file import write_plan
+    from sdimu_calibration.storage.files.result_file import write_result
+    from sdimu_calibration.storage.files.whole_file import written_together
 
     found = summary.diagnosis
     with written_together(about.folder) as part:

@@ -21,7 +21,7 @@ def effects(
 ) -> None:
     """Show the catalogue: equation, unit, typical size, what an effect is confused with."""
     from sdimu_calibration.report.catalogue import grouped, page
-    from sdimu_calibration.storage.effect_file import register_plugins
+    from sdimu_calibration.storage.files.effect_file import register_plugins
 
     if markdown:
         typer.echo(page(), nl=False)
@@ -50,7 +50,7 @@ def _print_group(console: Console, title: str, found: list[Effect]) -> None:
 
 def _page(name: str) -> list[str]:
     from sdimu_calibration.report.catalogue import facts, sizes
-    from sdimu_calibration.storage.effect_file import find_effects
+    from sdimu_calibration.storage.files.effect_file import find_effects
 
     effect = find_effects(name)[0]
     lines = [f"{effect.name}: {effect.title}", "", effect.equation, "", effect.description, ""]
@@ -65,7 +65,7 @@ def _page(name: str) -> list[str]:
 def _content(name: str | None) -> dict[str, Any]:
     """Give the catalogue, or one effect of it, as plain data (SI)."""
     from sdimu_calibration.report.catalogue import grouped
-    from sdimu_calibration.storage.effect_file import find_effects
+    from sdimu_calibration.storage.files.effect_file import find_effects
 
     chosen = find_effects(name) if name else [effect for _, found in grouped() for effect in found]
     return {"format": "sdimu-catalogue/1", "effects": [

@@ -26,9 +26,9 @@ def fleet(
     from sdimu_calibration.core.fleet.study import study
     from sdimu_calibration.report.fleet import tables
     from sdimu_calibration.report.fleet.page import display_units, headline, write_page
-    from sdimu_calibration.storage.fleet_file import write_fleet, write_priors
-    from sdimu_calibration.storage.fleet_folder import as_measured, candidates, gather
-    from sdimu_calibration.storage.whole_file import written_together
+    from sdimu_calibration.storage.files.fleet_file import write_fleet, write_priors
+    from sdimu_calibration.storage.files.fleet_folder import as_measured, candidates, gather
+    from sdimu_calibration.storage.files.whole_file import written_together
 
     console = plain(stderr=as_json)
     gathered = gather(folders)

@@ -25,8 +25,8 @@ def import_files(
 
     import numpy as np
 
-    from sdimu_calibration.storage.import_map import load_import_map
-    from sdimu_calibration.storage.importer import read_files, write_imported
+    from sdimu_calibration.storage.importing.import_map import load_import_map
+    from sdimu_calibration.storage.importing.importer import read_files, write_imported
 
     console = plain()
     described = load_import_map(chart)

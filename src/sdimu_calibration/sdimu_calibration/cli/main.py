@@ -9,18 +9,18 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable
 from importlib import import_module
-from importlib.metadata import entry_points, version
+from importlib.metadata import entry_points
 from typing import Annotated, Any
 
 import typer
 from typer.core import TyperGroup
 from typer.main import get_command
 
+import sdimu_calibration
 from sdimu_calibration.core.plain_text import one_line
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.units import UnitError
 
-PACKAGE = "sdimu_calibration"
 ENTRY_POINTS = "sdimu_calibration.verbs"
 
 _PANELS = {
@@ -93,7 +93,7 @@ app = typer.Typer(
 
 def _say_version(asked: bool) -> None:
     if asked:
-        typer.echo(f"sdimu {version(PACKAGE)}")
+        typer.echo(f"sdimu {sdimu_calibration.__version__}")
         raise typer.Exit
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from sdimu_calibration.cli.console import command, say
 from sdimu_calibration.core.advice import Verb
-from sdimu_calibration.storage.advice_words import added, lead, plan_options
+from sdimu_calibration.storage.files.advice_words import added, lead, plan_options
 
 if TYPE_CHECKING:
     from rich.console import Console

@@ -30,11 +30,11 @@ def noise(
     from sdimu_calibration.core.noise import allan, fit_terms, rests, white_noise
     from sdimu_calibration.report.noise import CHANNELS, HEAD, misfits, write_page
     from sdimu_calibration.report.noise import rows as listed
-    from sdimu_calibration.storage.config import find_config
-    from sdimu_calibration.storage.imu_file import write_measured_imu
-    from sdimu_calibration.storage.noise_terms_file import write_noise_terms
+    from sdimu_calibration.storage.files.config import find_config
+    from sdimu_calibration.storage.files.imu_file import write_measured_imu
+    from sdimu_calibration.storage.files.noise_terms_file import write_noise_terms
+    from sdimu_calibration.storage.files.whole_file import written_together
     from sdimu_calibration.storage.opening import open_recording
-    from sdimu_calibration.storage.whole_file import written_together
 
     find_config("imu", imu)  # errors in it are reported before the work
     recording = open_recording(bag)

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from sdimu_calibration.core.estimation.prepared_test import PreparedTest
     from sdimu_calibration.core.results import Calibration
     from sdimu_calibration.core.specification import Model
+    from sdimu_calibration.core.verdict import Verdict
     from sdimu_calibration.storage.opening import Source
 
 ImuOption = Annotated[
@@ -78,10 +79,10 @@ def opened(
     from sdimu_calibration.core.estimation.solve import AUTO
     from sdimu_calibration.core.recording import DataError
     from sdimu_calibration.core.units import parse_quantity
-    from sdimu_calibration.storage.config import load_imu, load_site
-    from sdimu_calibration.storage.effect_file import find_effects
-    from sdimu_calibration.storage.model_choice import HANDHELD, named_estimator, named_model
-    from sdimu_calibration.storage.opening import open_test
+    from sdimu_calibration.storage.files.config import load_imu, load_site
+    from sdimu_calibration.storage.files.effect_file import find_effects
+    from sdimu_calibration.storage.files.model_choice import HANDHELD, named_estimator, named_model
+    from sdimu_calibration.storage.opening import open_test, with_imu_file
 
     wanted = named_estimator(estimator, "--estimator")
     if noise not in {None, "estimated"}:
@@ -97,7 +98,7 @@ def opened(
     if site is not None:
         load_site(site)
     handheld = None if wanted == AUTO else wanted == HANDHELD
-    test = open_test(bag, site, specification, source, handheld, noise is not None)
+    test = with_imu_file(open_test(bag, site, specification, source, handheld, noise is not None), imu)
     if wanted == HANDHELD or (wanted == AUTO and test.why_handheld):
         if wanted == AUTO:
             console.print(HANDHELD_CHOSEN.format(why=test.why_handheld), soft_wrap=True)
@@ -113,14 +114,32 @@ def tell(console: Console, notes: Iterable[str]) -> None:
         say(console, f"note: {note}")
 
 
-def leave(result: Calibration) -> None:
-    """Say on stderr which coefficients are one, and end with exit status 3 when a result is not to be trusted."""
+def leave(result: Calibration, diagnosed: tuple[Verdict, str] | None = None) -> None:
+    """Say on stderr which coefficients are one, and end with exit status 3 when a result is not to be trusted.
+
+    `diagnosed` is the verdict of a diagnosis and its sentence. Where there is one, it judges what does not fit;
+    without, a misfit is enough.
+    """
     for line in result.inseparable:
         typer.echo(f"sdimu: {line}", err=True)
-    for line in result.not_to_be_trusted:
+    reasons = _reasons(result, diagnosed)
+    for line in reasons:
         typer.echo(f"sdimu: not to be trusted: {line}", err=True)
-    if result.not_to_be_trusted:
+    if reasons:
         raise typer.Exit(NOT_TRUSTED)
+
+
+def _reasons(result: Calibration, diagnosed: tuple[Verdict, str] | None) -> list[str]:
+    """List why a result is not to be trusted, one line each, each said once."""
+    from sdimu_calibration.core.results import UNTRUSTED_VERDICTS
+
+    grave = result.not_to_be_trusted
+    if diagnosed is None:
+        return list(dict.fromkeys([*grave, *result.misfits]))
+    verdict, sentence = diagnosed
+    if verdict not in UNTRUSTED_VERDICTS:
+        return list(grave)
+    return [f"{verdict}: {sentence}", *(line for line in grave if line not in sentence)]
 
 
 @contextmanager

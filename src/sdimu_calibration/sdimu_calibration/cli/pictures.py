@@ -26,8 +26,8 @@ def pictures(
     from sdimu_calibration.core.estimation.solve import solve
     from sdimu_calibration.report.pictures import write_pictures
     from sdimu_calibration.report.report_extras import report_extras
-    from sdimu_calibration.storage.config import load_imu
-    from sdimu_calibration.storage.model_choice import named_model
+    from sdimu_calibration.storage.files.config import load_imu
+    from sdimu_calibration.storage.files.model_choice import named_model
     from sdimu_calibration.storage.opening import open_test
 
     console = plain()

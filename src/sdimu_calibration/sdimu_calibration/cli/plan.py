@@ -67,12 +67,12 @@ def plan(
     from sdimu_calibration.cli.plan_after import After, standing_of, tell_gain
     from sdimu_calibration.cli.progress import bar
     from sdimu_calibration.cli.wide_table import print_table
-    from sdimu_calibration.core.plan_search import Goal, Question, next_turn, search
+    from sdimu_calibration.core.plan_search import Goal, Question, next_turn, search, untold
     from sdimu_calibration.core.plan_search.bound import already, bounds
     from sdimu_calibration.core.plan_search.moves import Abilities
-    from sdimu_calibration.storage.config import load_imu, load_plan, load_site
-    from sdimu_calibration.storage.model_choice import named_model
-    from sdimu_calibration.storage.plan_file import write_plan
+    from sdimu_calibration.storage.files.config import load_imu, load_plan, load_site
+    from sdimu_calibration.storage.files.model_choice import named_model
+    from sdimu_calibration.storage.files.plan_file import write_plan
 
     console = plain(stderr=as_json)
     start = load_plan(plan)
@@ -92,9 +92,10 @@ def plan(
         onto = replace(start, dwell_s=start.dwell_s[:1], turns=()) if before else start
         with bar(console) as progress:
             ranked = next_turn(onto, asked, tell, rates_rad_s=speeds, progress=progress)
-        for one in ranked[:5]:
-            say(console, one.text)
-        answer(_ranking(start, tell, ranked), as_json)
+        none = untold(ranked, tell)
+        for text in [none] if none else [one.text for one in ranked[:5]]:
+            say(console, text)
+        answer(_ranking(start, tell, ranked) | ({"none": none} if none else {}), as_json)
         return
     able = Abilities(speeds, math.radians(acceleration), tuple(_numbers("--dwells", dwells)))
     with bar(console) as progress:
@@ -128,7 +129,7 @@ def plan(
 def _write_backwards(console: Console, start: Plan, out: Path) -> None:
     """Write the plan whose recording tells what is of an attitude from what is of a time."""
     from sdimu_calibration.core.plan import backwards
-    from sdimu_calibration.storage.plan_file import write_plan
+    from sdimu_calibration.storage.files.plan_file import write_plan
 
     write_plan(out, backwards(start), [f"{start.name} in the opposite order, every turn in the other sense."])
     say(console, f"{start.name} backwards, {start.duration_s / 60.0:.1f} min; in {out}")

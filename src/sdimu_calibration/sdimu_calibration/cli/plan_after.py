@@ -36,8 +36,8 @@ def standing_of(console: Console, asked: After) -> Standing:
     DataError
         When a path is neither, or results stand beside other paths.
     """
-    from sdimu_calibration.storage.result_standing import standing_of_result
-    from sdimu_calibration.storage.standing_file import holds_standing, read_standing
+    from sdimu_calibration.storage.files.result_standing import standing_of_result
+    from sdimu_calibration.storage.files.standing_file import holds_standing, read_standing
 
     results = [p for p in asked.paths if holds_standing(p) or (p / "result.json").is_file() or p.name == "result.json"]
     if results and len(asked.paths) > 1:
@@ -57,8 +57,8 @@ def _diagnosed(console: Console, asked: After) -> Standing:
     from sdimu_calibration.core.diagnosis.standing import standing
     from sdimu_calibration.core.diagnosis.summary import summarise
     from sdimu_calibration.core.estimation.solve import solve
-    from sdimu_calibration.storage.config import load_imu
-    from sdimu_calibration.storage.model_choice import named_model
+    from sdimu_calibration.storage.files.config import load_imu
+    from sdimu_calibration.storage.files.model_choice import named_model
     from sdimu_calibration.storage.opening import Source, open_test
 
     if len(asked.paths) > 1:

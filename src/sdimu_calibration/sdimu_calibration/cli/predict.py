@@ -37,10 +37,10 @@ def predict(
     from sdimu_calibration.core.batch.batch import bound_covariance
     from sdimu_calibration.core.planning.predict import predict as simulate
     from sdimu_calibration.report.prediction import COLUMNS, coefficient_rows, write_page
-    from sdimu_calibration.storage.config import load_imu, load_model, load_plan, load_site
-    from sdimu_calibration.storage.noise_file import load_noise
-    from sdimu_calibration.storage.prediction_file import write_prediction
-    from sdimu_calibration.storage.whole_file import written_together
+    from sdimu_calibration.storage.files.config import load_imu, load_model, load_plan, load_site
+    from sdimu_calibration.storage.files.noise_file import load_noise
+    from sdimu_calibration.storage.files.prediction_file import write_prediction
+    from sdimu_calibration.storage.files.whole_file import written_together
 
     console = plain(stderr=as_json)
     what = load_plan(plan), load_site(site), load_imu(imu), load_model(model)
@@ -68,7 +68,7 @@ def predict(
 
 def _published(noise: NoiseSet | None) -> dict[str, dict[str, float]]:
     """Columns of the published table that a noise set reproduces; none without."""
-    from sdimu_calibration.storage.reference_file import read_columns, read_reference
+    from sdimu_calibration.storage.files.reference_file import read_columns, read_reference
 
     if noise is None or not noise.reference:
         return {}

@@ -49,10 +49,10 @@ def replay(
     import time
 
     from sdimu_calibration.report.table import rich_table, rows
-    from sdimu_calibration.storage.bag_file import bag_parts
-    from sdimu_calibration.storage.config import load_imu
+    from sdimu_calibration.storage.bags.bag_file import bag_parts
+    from sdimu_calibration.storage.files.config import load_imu
+    from sdimu_calibration.storage.files.result_file import read_result
     from sdimu_calibration.storage.opening import opening_options
-    from sdimu_calibration.storage.result_file import read_result
 
     # Errors of bag or options are reported before anything is started.
     bag_parts(bag)

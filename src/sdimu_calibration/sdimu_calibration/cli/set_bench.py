@@ -10,7 +10,7 @@ from sdimu_calibration.core.joint.set_diagnosis import SetDiagnosis, diagnose_se
 from sdimu_calibration.core.joint.set_fit import SetOptions
 from sdimu_calibration.core.progress import Progress
 from sdimu_calibration.core.specification import Model
-from sdimu_calibration.storage.model_choice import named_model
+from sdimu_calibration.storage.files.model_choice import named_model
 from sdimu_calibration.storage.opening import Source
 from sdimu_calibration.storage.recording_set import BagSource, load_set, set_of
 from sdimu_calibration.storage.set_work import set_runner

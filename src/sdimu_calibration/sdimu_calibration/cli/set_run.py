@@ -133,8 +133,8 @@ def calibrate_together(asked: SetRequest) -> None:
     from sdimu_calibration.core.joint.set_fit import fit_set
     from sdimu_calibration.core.joint.set_result import set_outcome
     from sdimu_calibration.report.page import write_report
-    from sdimu_calibration.storage.result_file import write_result
-    from sdimu_calibration.storage.whole_file import written_together
+    from sdimu_calibration.storage.files.result_file import write_result
+    from sdimu_calibration.storage.files.whole_file import written_together
 
     console = plain(stderr=asked.as_json)
     with _begun(console, asked) as (members, options, run, progress):
@@ -153,9 +153,9 @@ def calibrate_together(asked: SetRequest) -> None:
 def diagnose_together(asked: SetRequest, extra: Sequence[Effect]) -> None:
     """Find what the model of a set misses; leaves set.json, result.json and report.html."""
     from sdimu_calibration.report.page import write_report
-    from sdimu_calibration.storage.result_file import write_result
-    from sdimu_calibration.storage.set_result_file import write_set_diagnosis
-    from sdimu_calibration.storage.whole_file import written_together
+    from sdimu_calibration.storage.files.result_file import write_result
+    from sdimu_calibration.storage.files.set_result_file import write_set_diagnosis
+    from sdimu_calibration.storage.files.whole_file import written_together
 
     console = plain(stderr=asked.as_json)
     found, members = diagnosed_set(console, asked, extra)
@@ -174,7 +174,7 @@ def diagnose_together(asked: SetRequest, extra: Sequence[Effect]) -> None:
     print_advice(console, found.advice, about)
     say(console, f"results in {folder}")
     answer(folder / "set.json", asked.as_json)
-    leave(after)
+    leave(after, (found.verdict, found.sentence))
 
 
 def diagnosed_set(
@@ -196,7 +196,7 @@ def _begun(
     """Members, options and runner of what is asked, with a bar that shows the recordings that are done."""
     from sdimu_calibration.cli.progress import bar
     from sdimu_calibration.core.units import parse_quantity
-    from sdimu_calibration.storage.model_choice import HANDHELD, named_estimator
+    from sdimu_calibration.storage.files.model_choice import HANDHELD, named_estimator
     from sdimu_calibration.storage.recording_set import BagSource, load_set, set_of, set_options
     from sdimu_calibration.storage.set_work import set_runner
 

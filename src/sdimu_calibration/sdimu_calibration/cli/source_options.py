@@ -38,8 +38,8 @@ def source(
     gyro_sign: int | None,
 ) -> Source:
     """Put the options together."""
+    from sdimu_calibration.storage.bags.topic_choice import TopicChoice
     from sdimu_calibration.storage.opening import Source
-    from sdimu_calibration.storage.topic_choice import TopicChoice
 
     topics = TopicChoice(imu_topic, status_topic, joint_topic, temperature_topic)
     return Source(topics, accel_unit, gyro_unit, accel_sign, gyro_sign)

@@ -22,7 +22,7 @@ def watch(
     from sdimu_calibration.cli.watch import Outline, Watch
     from sdimu_calibration.core.effects import selection
     from sdimu_calibration.core.recording import DataError
-    from sdimu_calibration.storage.effect_file import extended_model
+    from sdimu_calibration.storage.files.effect_file import extended_model
 
     chosen = extended_model(model, ())
     effects = [selection.resolve(e) if isinstance(e, str) else e for e in chosen.effects]

@@ -66,8 +66,8 @@ def workbench(
     from sdimu_calibration.report.workbench.fit import FitSession
     from sdimu_calibration.report.workbench.recording_cache import RecordingCache, neighbours
     from sdimu_calibration.report.workbench.setting import Setting
-    from sdimu_calibration.storage.config import load_imu, load_site
-    from sdimu_calibration.storage.model_choice import named_model
+    from sdimu_calibration.storage.files.config import load_imu, load_site
+    from sdimu_calibration.storage.files.model_choice import named_model
     from sdimu_calibration.storage.opening import open_test
 
     with socket.socket() as probe:

@@ -1,4 +1,4 @@
-"""What to do next, as data: words and commands are made of it outside the core (`storage.advice_words`)."""
+"""What to do next, as data: words and commands are made of it outside the core (`storage.files.advice_words`)."""
 
 from __future__ import annotations
 

@@ -2,23 +2,28 @@
 
 from __future__ import annotations
 
+import fcntl
 import hashlib
 import importlib.util
 import os
 import re
+import time
 import zlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cache
 from io import BytesIO
 from pathlib import Path
-from typing import Any, TypeVar, cast
+from typing import Any, BinaryIO, TypeVar, cast
 
 import numba
 from numba.core.caching import FunctionCache, IndexDataCacheFile
 from numba.core.runtime import rtsys
 
 F = TypeVar("F", bound=Callable[..., Any])
+
+_PATIENCE_S = 120.0
+"""Longest wait for another process that compiles (s): the slowest function takes 15 s, on a busy machine 60."""
 
 _IMPORT = re.compile(rb"^from ((?:sdimu_|rate_table_sim)[\w.]*) import (\([^)]*\)|.*)$", re.MULTILINE)
 """An import from one of the three packages at the start of a line: module, names."""
@@ -52,16 +57,68 @@ class _Cache(FunctionCache):  # type: ignore[misc]
 
     That takes 0.3 s in every process. What is not in the cache is compiled, and compiling gets the compiler ready
     itself; compiled code needs its memory functions alone.
+
+    Processes that start together (nodes, workers) want the same functions: one compiles a function, the others wait
+    for it. A function waits only for those that it calls, so no two processes wait for each other.
     """
 
     def __init__(self, function: Callable[..., Any]) -> None:
         super().__init__(function)
         self._cache_file = _Checked(self._cache_path, self._impl.filename_base, self._impl.locator.get_source_stamp())
+        self._turn = _Turn(Path(self._cache_path) / f"{self._impl.filename_base}.lock")
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         rtsys.initialize(target_context)
+        found = self._found(sig, target_context)
+        if found is None and self._turn.taken():
+            found = self._found(sig, target_context)  # what another process compiled meanwhile
+            if found is not None:
+                self._turn.pass_on()
+        return found
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        super().save_overload(sig, data)
+        self._turn.pass_on()
+
+    def _found(self, sig: Any, target_context: Any) -> Any:
         with self._guard_against_spurious_io_errors():
             return self._load_overload(sig, target_context)
+
+
+class _Turn:
+    """The right to compile one function, which one process has at a time; it ends with the process at the latest."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._file: BinaryIO | None = None
+
+    def taken(self) -> bool:
+        """Wait for the right and take it; False where this process has it already, or the folder cannot be written."""
+        if self._file is not None:
+            return False
+        try:
+            self._path.parent.mkdir(parents=True, exist_ok=True)
+            self._file = self._path.open("wb")
+        except OSError:
+            return False
+        until = time.monotonic() + _PATIENCE_S
+        while not _locked(self._file) and time.monotonic() < until:
+            time.sleep(0.02)
+        return True
+
+    def pass_on(self) -> None:
+        """Let the next process take the right."""
+        if self._file is not None:
+            self._file.close()
+            self._file = None
+
+
+def _locked(file: BinaryIO) -> bool:
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        return False
+    return True
 
 
 def _mark(content: bytes) -> bytes:

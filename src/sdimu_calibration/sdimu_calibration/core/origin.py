@@ -36,6 +36,8 @@ class Origin:
         Name of the bag.
     imu, site : str
         Names of their files.
+    imu_file, site_file : str
+        Paths of these files where the user named a path; empty for a name in config/.
     """
 
     serial: str = ""
@@ -48,6 +50,8 @@ class Origin:
     recording: str = ""
     imu: str = ""
     site: str = ""
+    imu_file: str = ""
+    site_file: str = ""
 
     def stated(self, serial: str | None, power_on: str | None) -> Origin:
         """Return it with what the user states; None leaves what the bag says."""
@@ -55,6 +59,16 @@ class Origin:
             self, serial=self.serial if serial is None else serial,
             power_on=self.power_on if power_on is None else power_on,
         )  # fmt: skip
+
+    @property
+    def imu_stated(self) -> str:
+        """The IMU's file as an option names it: path or name."""
+        return self.imu_file or self.imu
+
+    @property
+    def site_stated(self) -> str:
+        """The site's file as an option names it: path or name."""
+        return self.site_file or self.site
 
     @property
     def words(self) -> tuple[str, ...]:

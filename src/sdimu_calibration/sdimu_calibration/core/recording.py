@@ -73,11 +73,20 @@ class PhaseLog:
 
     def usual_dwell_s(self, until_s: float) -> float | None:
         """Median length of a dwell (s) in a recording that ends at `until_s`; None where there is no dwell."""
-        edge = np.diff(np.concatenate([[0], np.asarray(self.dwell, dtype=np.int8), [0]]))
+        edge = self._edges()
         if not edge.any():
             return None
         until = np.append(self.t, until_s)
         return float(np.median(until[edge < 0] - until[edge > 0]))
+
+    @property
+    def dwells(self) -> int:
+        """Number of dwells, from rotating to rotating."""
+        return int(np.count_nonzero(self._edges() > 0))
+
+    def _edges(self) -> Ints:
+        """Beginning (1) and end (-1) of every dwell, shape (m + 1,); what lies before and after is none."""
+        return np.diff(np.concatenate([[0], np.asarray(self.dwell, dtype=np.int8), [0]]))
 
 
 @dataclass(frozen=True)

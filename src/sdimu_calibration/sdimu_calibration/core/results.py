@@ -9,12 +9,16 @@ import numpy as np
 
 from sdimu_calibration.core.arrays import Bools, Floats, Ints
 from sdimu_calibration.core.noise_term import NoiseTerm
+from sdimu_calibration.core.note import topic_of
 from sdimu_calibration.core.origin import Origin
 from sdimu_calibration.core.recording import DataFault
 from sdimu_calibration.core.specification import ImuSpecification
+from sdimu_calibration.core.verdict import Verdict
 
 NOT_TRUSTED = "not to be trusted"
 """Words of a warning that forbids to use an estimate."""
+UNTRUSTED_VERDICTS = frozenset({Verdict.UNEXPLAINED, Verdict.DATA_FAULT})
+"""Verdicts of a diagnosis after which no estimate is to be trusted: the model is wrong, and no effect mends it."""
 START_TEMPERATURE = "start_temperature_degc"
 """Key in the data section: temperature T0 from which temperature effects count (deg C), that at the start if no other
 was stated."""
@@ -288,6 +292,11 @@ class Calibration:
         """Why the estimate must not be used as it stands, one line each; empty where nothing forbids it."""
         grave = [fault.text for fault in self.faults if fault.grave]
         return tuple(dict.fromkeys([*grave, *(line for line in self.warnings if NOT_TRUSTED in line)]))
+
+    @property
+    def misfits(self) -> tuple[str, ...]:
+        """Where the model does not fit the data, one line each: those of the warnings that send to a diagnosis."""
+        return tuple(line for line in self.warnings if topic_of(line))
 
     @property
     def inseparable(self) -> tuple[str, ...]:

@@ -35,8 +35,8 @@ from sdimu_calibration.nodes.opening_parameters import declare_opening
 from sdimu_calibration.nodes.parameters import Declare
 from sdimu_calibration.nodes.spinning import run_node
 from sdimu_calibration.nodes.table_driver import Arrival
-from sdimu_calibration.storage.goal_file import load_goals
-from sdimu_calibration.storage.json_file import write_json
+from sdimu_calibration.storage.files.goal_file import load_goals
+from sdimu_calibration.storage.files.json_file import write_json
 
 LATE_S = 1.5
 """Samples (s) that may still be on their way to the journal when a stop is looked at: an epoch and a block."""

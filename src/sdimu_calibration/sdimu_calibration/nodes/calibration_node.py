@@ -54,12 +54,12 @@ from sdimu_calibration.nodes.spinning import run_node
 from sdimu_calibration.nodes.ticking import Ticker
 from sdimu_calibration.report.live_text import model_name
 from sdimu_calibration.report.progress_text import falling, light, sigma_words
-from sdimu_calibration.storage.config import load_model
-from sdimu_calibration.storage.effect_file import SUFFIXES, extended_model
-from sdimu_calibration.storage.journal import Journal, digest
-from sdimu_calibration.storage.result_file import write_result
-from sdimu_calibration.storage.status_message import first_entry, phase_entry, stamp_ns
-from sdimu_calibration.storage.whole_file import written_together
+from sdimu_calibration.storage.bags.status_message import first_entry, phase_entry, stamp_ns
+from sdimu_calibration.storage.files.config import load_model
+from sdimu_calibration.storage.files.effect_file import SUFFIXES, extended_model
+from sdimu_calibration.storage.files.journal import Journal, digest
+from sdimu_calibration.storage.files.result_file import write_result
+from sdimu_calibration.storage.files.whole_file import written_together
 
 JOURNAL = "calibration.journal"
 BLOCK = 20

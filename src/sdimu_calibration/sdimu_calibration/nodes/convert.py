@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 from sdimu_calibration.core.arrays import Floats, Ints
-from sdimu_calibration.storage.cdr import Layout, as_bytes
+from sdimu_calibration.storage.bags.cdr import Layout, as_bytes
 
 NS = 1_000_000_000
 

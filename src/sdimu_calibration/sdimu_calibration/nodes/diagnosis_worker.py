@@ -28,8 +28,8 @@ from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.front_door import OpeningOptions, open_test
 from sdimu_calibration.core.recording import NOMINAL_FROM, DataError
 from sdimu_calibration.core.verdict import Verdict
-from sdimu_calibration.storage.effect_file import extended_model
-from sdimu_calibration.storage.journal import read_journal
+from sdimu_calibration.storage.files.effect_file import extended_model
+from sdimu_calibration.storage.files.journal import read_journal
 
 Question = Callable[[Fit, LiveDiagnosis, Any], Any]
 """A further question of a fit: `Job.question`."""

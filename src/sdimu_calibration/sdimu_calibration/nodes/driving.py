@@ -14,7 +14,7 @@ from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.nodes.parameters import Declare
 from sdimu_calibration.nodes.table_driver import JOINT_STATES, TableDriver
 from sdimu_calibration.nodes.ticking import Ticker
-from sdimu_calibration.storage.table_file import load_rate_table
+from sdimu_calibration.storage.files.table_file import load_rate_table
 
 FINISH = "rate_table/finish"
 PATIENCE_S = 300.0

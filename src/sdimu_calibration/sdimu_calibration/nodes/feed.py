@@ -16,8 +16,8 @@ from sdimu_calibration.core.recording import NOMINAL_FROM, DataError
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.nodes.gate import Companion
 from sdimu_calibration.nodes.remembered import Remembered
-from sdimu_calibration.storage.cdr import LayoutError, decode_imu
-from sdimu_calibration.storage.journal import Journal, Record, Samples, Status, Temperature
+from sdimu_calibration.storage.bags.cdr import LayoutError, decode_imu
+from sdimu_calibration.storage.files.journal import Journal, Record, Samples, Status, Temperature
 
 AWAY_S = 600.0
 """Samples that come so long after those of the journal are of another test."""

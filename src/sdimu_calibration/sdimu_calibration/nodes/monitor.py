@@ -18,7 +18,7 @@ from std_msgs.msg import Float64MultiArray
 from sdimu_calibration.nodes.credits import LATCHED, NS, to_ns
 from sdimu_calibration.nodes.diagnosis_messages import seen_diagnosis, seen_heat_map
 from sdimu_calibration.report.live_text import SeenDiagnosis
-from sdimu_calibration.storage.status_message import first_entry, phase_entry, stamp_ns
+from sdimu_calibration.storage.bags.status_message import first_entry, phase_entry, stamp_ns
 
 # Watching must never hold up what is watched.
 GLANCE = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)

@@ -26,7 +26,7 @@ from sdimu_calibration.nodes.ticking import Ticker
 from sdimu_calibration.nodes.transform_type import TYPE_NAME as TRANSFORM_TYPE
 from sdimu_calibration.nodes.transform_type import transform_class
 from sdimu_calibration.nodes.transforms import STATIC, TRANSFORMS, stamp_of_first
-from sdimu_calibration.storage.mcap_bag import McapBag
+from sdimu_calibration.storage.bags.mcap_bag import McapBag
 
 DIAGNOSTICS = "/diagnostics"
 TOPICS = (

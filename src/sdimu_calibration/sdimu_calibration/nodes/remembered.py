@@ -7,7 +7,7 @@ from collections import deque
 import numpy as np
 
 from sdimu_calibration.core.arrays import Bools
-from sdimu_calibration.storage.journal import Samples
+from sdimu_calibration.storage.files.journal import Samples
 
 _REMEMBERED = 100_000
 """Number of samples at each end of a journal that are known number for number, 6 MB: another test in the same folder

@@ -24,9 +24,9 @@ from sdimu_calibration.nodes.credits import HISTORY, STREAM, Producer, publish
 from sdimu_calibration.nodes.parameters import Declare
 from sdimu_calibration.nodes.spinning import run_node
 from sdimu_calibration.nodes.ticking import Ticker
-from sdimu_calibration.storage.bag_reader import read_messages
-from sdimu_calibration.storage.topic_choice import TopicChoice
-from sdimu_calibration.storage.topics import Topics
+from sdimu_calibration.storage.bags.bag_reader import read_messages
+from sdimu_calibration.storage.bags.topic_choice import TopicChoice
+from sdimu_calibration.storage.bags.topics import Topics
 
 WINDOW_SAMPLES = 200
 FAREWELL_S = 20.0

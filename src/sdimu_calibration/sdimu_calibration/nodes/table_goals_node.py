@@ -16,7 +16,7 @@ from sdimu_calibration.nodes.driving import Driving
 from sdimu_calibration.nodes.parameters import Declare
 from sdimu_calibration.nodes.spinning import run_node
 from sdimu_calibration.nodes.table_driver import Arrival
-from sdimu_calibration.storage.config import load_plan
+from sdimu_calibration.storage.files.config import load_plan
 
 
 class TableGoalsNode:

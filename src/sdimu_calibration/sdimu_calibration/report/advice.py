@@ -8,7 +8,7 @@ from html import escape
 
 from sdimu_calibration.core.advice import Advice
 from sdimu_calibration.report.markup import prose
-from sdimu_calibration.storage.advice_words import lead, sentence
+from sdimu_calibration.storage.files.advice_words import lead, sentence
 
 _COMMAND = re.compile(r"(sdimu [a-z-]+(?: --?[\w-]+(?: [A-Z]+\b| '[^']*')?)*|--\w+ '[^']*'(?: --\w+ '[^']*')*)")
 _MINUTES = re.compile(r"\((\d+ min)[^)]*\)")

@@ -14,7 +14,7 @@ Made by `sdimu effects --markdown` from the registry (`core/effects/`, one file 
 dw, df: measured minus true body rate and specific force; a = f/g; w: body rate against inertial space. Axis i is the
 sensor's own, j and k the others. Any name here, or one of its coefficients, can be given to `--add`; with a size behind
 it, a coefficient can be given to `simulate --effect`. How effects are written, those of one's own too, is in
-[diagnosis.md](diagnosis.md).
+[diagnosis.md](../diagnosis.md).
 """
 
 
@@ -65,7 +65,7 @@ def sizes(effect: Effect) -> str:
 
 
 def page() -> str:
-    """Make doc/effects.md."""
+    """Make the page of the catalogue, which the book holds as generated/effects.md."""
     parts = [_HEAD]
     for title, effects in grouped():
         parts.append(f"\n## {title}\n")

@@ -16,7 +16,7 @@ from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary
 from sdimu_calibration.core.error_figures import by_hand, held_out, held_out_judged, nis_judged, noise_learned
 from sdimu_calibration.core.estimation.second_order_fit import NO_AZIMUTH
 from sdimu_calibration.core.joint.set_diagnosis import SetDiagnosis
-from sdimu_calibration.core.note import topic_of, without_advice
+from sdimu_calibration.core.note import without_advice
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.units import from_si
 from sdimu_calibration.core.verdict import Verdict
@@ -145,7 +145,7 @@ def of_fit(calibration: Calibration, spell: Spell | None = None) -> FirstScreen:
     costs = _fit_figures(calibration)
     if grave:
         tone, head = BAD, f"Not to be trusted: {prose(grave[0])}."
-    elif misfit := without_advice(line for line in doubts if topic_of(line)):
+    elif misfit := without_advice(calibration.misfits):
         tone, head = BAD, prose(_capital(misfit[0])) + "."
     elif doubts:
         tone, head = DOUBTFUL, prose(_capital(doubts[0])) + "."

@@ -13,7 +13,7 @@ from sdimu_calibration.core.units import from_si
 from sdimu_calibration.report.design.sheet import document
 from sdimu_calibration.report.drawing import MUTED, Figure, html, lay_out
 from sdimu_calibration.report.markup import grid, quiet, section
-from sdimu_calibration.storage.whole_file import write_whole
+from sdimu_calibration.storage.files.whole_file import write_whole
 
 CHANNELS = ("gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z")
 UNITS = {

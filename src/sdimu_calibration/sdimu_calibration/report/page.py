@@ -28,8 +28,8 @@ from sdimu_calibration.report.set_sections import recurrence_section, set_sectio
 from sdimu_calibration.report.statistics_section import noise_section
 from sdimu_calibration.report.traceability import recorded, traceability
 from sdimu_calibration.report.use_section import in_use
+from sdimu_calibration.storage.files.whole_file import write_whole
 from sdimu_calibration.storage.trace import Trace
-from sdimu_calibration.storage.whole_file import write_whole
 
 _HEADING = re.compile(r'<section class="card" id="([\w-]+)"><h2>(.*?)</h2>')
 _LADDER = 355

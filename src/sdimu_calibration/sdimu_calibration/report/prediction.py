@@ -17,7 +17,7 @@ from sdimu_calibration.report.drawing import html
 from sdimu_calibration.report.figures import sigma_history
 from sdimu_calibration.report.groups import groups
 from sdimu_calibration.report.markup import grid, quiet, section
-from sdimu_calibration.storage.whole_file import write_whole
+from sdimu_calibration.storage.files.whole_file import write_whole
 
 _DEFINED = 1e-6
 """A sigma below this share of the prior is rounding: the body frame makes the coefficient zero."""

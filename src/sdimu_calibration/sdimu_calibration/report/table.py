@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import io
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from rich.box import SIMPLE_HEAD
+from rich.console import Console
 from rich.table import Table
 
 from sdimu_calibration.core.effect_key import effect_of
@@ -143,6 +145,13 @@ def rich_table(table: list[Row], title: str | None = None) -> Table:
     for row, line, following in zip(table, texts, [*table[1:], None], strict=True):
         laid.add_row(*line, end_section=following is not None and following.effect != row.effect)
     return laid
+
+
+def as_text(table: Table, width: int) -> str:
+    """Write a table as plain text; in a notebook, too, where rich would show it at once and return nothing."""
+    text = io.StringIO()
+    Console(file=text, width=width, color_system=None, force_jupyter=False).print(table)
+    return text.getvalue()
 
 
 def with_sigma(value: float, sigma: float, unit: str) -> str:

@@ -1,1 +1,1 @@
-"""Bags, configuration files and result files, to and from the dataclasses of the core."""
+"""Bags, configuration files and result files, to and from the dataclasses of the core: a room for each."""

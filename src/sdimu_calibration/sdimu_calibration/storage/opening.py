@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from sdimu_calibration.core.data.axes_and_units import Stated
@@ -14,10 +14,10 @@ from sdimu_calibration.core.plain_text import one_line
 from sdimu_calibration.core.recording import DataError, Recording
 from sdimu_calibration.core.specification import ImuSpecification
 from sdimu_calibration.core.units import UnitError, parse_unit
-from sdimu_calibration.storage.bag_metadata import custom_data
-from sdimu_calibration.storage.bag_reader import read_recording
-from sdimu_calibration.storage.config import load_imu, load_site
-from sdimu_calibration.storage.topic_choice import TopicChoice
+from sdimu_calibration.storage.bags.bag_metadata import custom_data
+from sdimu_calibration.storage.bags.bag_reader import read_recording
+from sdimu_calibration.storage.bags.topic_choice import TopicChoice
+from sdimu_calibration.storage.files.config import load_imu, load_site, stated_path
 
 DEFAULT_SITE = "daejeon"
 CLASSES = ("dtg", "fog_tactical", "mems_by_hand")
@@ -141,8 +141,13 @@ def said_of(path: Path, site: str) -> Origin:
     said = custom_data(path)
     return Origin(
         serial=one_line(said.get("serial", "")), power_on=one_line(said.get("power_on", "")),
-        recording=one_line(Path(path).resolve().name), site=one_line(Path(site).stem),
+        recording=one_line(Path(path).resolve().name), site=one_line(Path(site).stem), site_file=stated_path(site),
     )  # fmt: skip
+
+
+def with_imu_file(test: PreparedTest, imu: str | None) -> PreparedTest:
+    """Let a test remember where the IMU's file is, if `imu` is the path of one."""
+    return replace(test, origin=replace(test.origin, imu_file=stated_path(imu)))
 
 
 def open_recording(path: Path, source: Source | None = None) -> Recording:

@@ -17,11 +17,11 @@ from sdimu_calibration.core.estimation.solve import AUTO
 from sdimu_calibration.core.joint.member import Member
 from sdimu_calibration.core.joint.set_fit import SetOptions
 from sdimu_calibration.core.recording import DataError
-from sdimu_calibration.storage.bag_metadata import METADATA, custom_data
-from sdimu_calibration.storage.config import Schema, load_imu, quantity, read_yaml
-from sdimu_calibration.storage.model_choice import HANDHELD, named_estimator, named_model
-from sdimu_calibration.storage.opening import Source, open_test
-from sdimu_calibration.storage.whole_file import write_whole
+from sdimu_calibration.storage.bags.bag_metadata import METADATA, custom_data
+from sdimu_calibration.storage.files.config import Schema, load_imu, quantity, read_yaml
+from sdimu_calibration.storage.files.model_choice import HANDHELD, named_estimator, named_model
+from sdimu_calibration.storage.files.whole_file import write_whole
+from sdimu_calibration.storage.opening import Source, open_test, with_imu_file
 
 _KEPT_OPEN = 2
 """Number of recordings that a process keeps in memory: linearising again follows soon in small sets."""
@@ -66,7 +66,7 @@ class BagSource:
 def _opened(of: BagSource) -> PreparedTest:
     imu = None if of.imu is None else load_imu(of.imu)
     test = open_test(of.bag, of.site, imu, of.source, of.handheld, of.measured_noise)
-    return counted_from(test, of.reference_degc)
+    return counted_from(with_imu_file(test, of.imu), of.reference_degc)
 
 
 def counted_from(test: PreparedTest, degc: float | None) -> PreparedTest:

@@ -19,10 +19,10 @@ from typing import Any
 from sdimu_calibration.core.joint.member import Job, Report, tried
 from sdimu_calibration.core.joint.set_fit import Run
 from sdimu_calibration.core.recording import DataError
-from sdimu_calibration.storage.config import load_imu, load_site
+from sdimu_calibration.storage.files.config import load_imu, load_site
+from sdimu_calibration.storage.files.reduction_file import read_report, write_report
 from sdimu_calibration.storage.opening import CLASSES, DEFAULT_SITE
 from sdimu_calibration.storage.recording_set import BagSource
-from sdimu_calibration.storage.reduction_file import read_report, write_report
 
 FEW = 3
 """Number of recordings up to which one process is faster: starting another takes as long as two recordings."""

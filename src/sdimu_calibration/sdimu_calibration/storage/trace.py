@@ -9,8 +9,8 @@ from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-from sdimu_calibration.storage.bag_metadata import custom_data
-from sdimu_calibration.storage.datasheet_file import file_hashes
+from sdimu_calibration.storage.bags.bag_metadata import custom_data
+from sdimu_calibration.storage.files.datasheet_file import file_hashes
 
 
 @dataclass(frozen=True)
@@ -63,6 +63,6 @@ def traced(bags: Sequence[Path] = (), arguments: Sequence[str] = (), **stated: s
 def program_version() -> str:
     """Version of the program; empty where it runs without being installed."""
     try:
-        return version("sdimu_calibration")
+        return version("sdimu-calibration")
     except PackageNotFoundError:
         return ""

@@ -114,8 +114,8 @@ def _clear(out: Path) -> bool:
         When something is in the bag's place that is of no earlier run: it is never replaced, and nothing is removed.
     """
     from sdimu_calibration.core.recording import DataError
-    from sdimu_calibration.storage.bag_folder import check_room
-    from sdimu_calibration.storage.bag_metadata import METADATA
+    from sdimu_calibration.storage.bags.bag_folder import check_room
+    from sdimu_calibration.storage.bags.bag_metadata import METADATA
 
     bag, replace = out / "bag", (out / "log" / "rate_table.yaml").is_file()
     if not replace and (bag / METADATA).is_file():
@@ -131,8 +131,8 @@ def _check(options: dict[str, dict[str, Any]]) -> float:
     from rate_table_sim.core import table_motion
     from rate_table_sim.table_file import load_table
     from sdimu_calibration.core.recording import DataError
-    from sdimu_calibration.storage.config import load_imu, load_plan, load_site
-    from sdimu_calibration.storage.effect_file import extended_model
+    from sdimu_calibration.storage.files.config import load_imu, load_plan, load_site
+    from sdimu_calibration.storage.files.effect_file import extended_model
     from sdimu_sim.cli.simulate import mount_rad
     from sdimu_sim.temperature_file import load_temperature
 
@@ -155,7 +155,7 @@ def _check(options: dict[str, dict[str, Any]]) -> float:
 
 def _choosing(options: dict[str, dict[str, Any]], goals: str, ask: bool) -> float:
     """Let the table follow goals, and add the node that chooses them; longest length of the test (s)."""
-    from sdimu_calibration.storage.goal_file import load_goals
+    from sdimu_calibration.storage.files.goal_file import load_goals
 
     options["table"]["follow_goals"] = True
     given = {key: value for key, value in options["calibration"].items() if key != "diagnose"}
@@ -224,8 +224,8 @@ def _test(plan: str | None, model: str, duration: float) -> Outline:
     """Collect what is known of the test before it runs."""
     from sdimu_calibration.cli.watch import Outline
     from sdimu_calibration.core.effects import selection
-    from sdimu_calibration.storage.config import load_plan
-    from sdimu_calibration.storage.effect_file import extended_model
+    from sdimu_calibration.storage.files.config import load_plan
+    from sdimu_calibration.storage.files.effect_file import extended_model
 
     effects = [selection.resolve(e) if isinstance(e, str) else e for e in extended_model(model, ()).effects]
     units = {q.name: q.display_unit for effect in effects for q in effect.parameters}
@@ -243,14 +243,14 @@ def _report(console: Console, out: Path, site: str, imu: str, model: str, test_n
     from sdimu_calibration.report.page import write_report
     from sdimu_calibration.report.report_extras import report_extras
     from sdimu_calibration.report.table import rich_table, rows
-    from sdimu_calibration.storage.config import load_imu
-    from sdimu_calibration.storage.diagnosis_file import write_diagnosis
-    from sdimu_calibration.storage.effect_file import extended_model
+    from sdimu_calibration.storage.files.config import load_imu
+    from sdimu_calibration.storage.files.diagnosis_file import write_diagnosis
+    from sdimu_calibration.storage.files.effect_file import extended_model
+    from sdimu_calibration.storage.files.reference_file import read_reference, read_truth
+    from sdimu_calibration.storage.files.result_file import read_result
+    from sdimu_calibration.storage.files.whole_file import written_together
     from sdimu_calibration.storage.opening import open_test
-    from sdimu_calibration.storage.reference_file import read_reference, read_truth
-    from sdimu_calibration.storage.result_file import read_result
     from sdimu_calibration.storage.trace import traced
-    from sdimu_calibration.storage.whole_file import written_together
 
     result = read_result(out / "result.json")
     truth = read_truth(out / "truth.yaml", result.body_frame)
@@ -278,7 +278,7 @@ def _report(console: Console, out: Path, site: str, imu: str, model: str, test_n
 
 def _tell_choices(console: Console, path: Path) -> dict[str, Any]:
     """Print every choice with its reason, and give the last one, which ended the test."""
-    from sdimu_calibration.storage.json_file import read_json
+    from sdimu_calibration.storage.files.json_file import read_json
 
     choices: list[dict[str, Any]] = read_json(path, "sdimu-choices/1")["choices"]
     for choice in choices:
@@ -305,9 +305,9 @@ def _samples(bag: Path) -> tuple[int, int]:
     """Count the samples in a bag, and how many the gaps between their stamps leave room for."""
     import numpy as np
 
-    from sdimu_calibration.storage.bag_file import raw_messages
-    from sdimu_calibration.storage.cdr import IMU, decode_imu
-    from sdimu_calibration.storage.topics import Topics
+    from sdimu_calibration.storage.bags.bag_file import raw_messages
+    from sdimu_calibration.storage.bags.cdr import IMU, decode_imu
+    from sdimu_calibration.storage.bags.topics import Topics
 
     topic = Topics().imu
     stamps = np.unique(decode_imu(raw_messages(bag, {topic: IMU}, topic)[topic])[0])

@@ -59,7 +59,7 @@ def simulate(
     """Simulate a whole test into a bag, with the truth in a separate file."""
     # Inside the function: the help of `sdimu` must not wait for numerical libraries.
     from rate_table_sim.table_file import load_table
-    from sdimu_calibration.storage.config import load_imu, load_plan, load_site
+    from sdimu_calibration.storage.files.config import load_imu, load_plan, load_site
     from sdimu_sim.bag_file import write_test
     from sdimu_sim.core.scenario import Scenario, simulate_test
     from sdimu_sim.own_effects import simulated_effects

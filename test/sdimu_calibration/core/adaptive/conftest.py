@@ -8,8 +8,8 @@ from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.filter.passes import Solution, one_pass
 from sdimu_calibration.core.plan import Plan, Turn
 from sdimu_calibration.core.planning.predict import prepare
-from sdimu_calibration.storage.config import load_imu, load_site
-from sdimu_calibration.storage.model_choice import named_model
+from sdimu_calibration.storage.files.config import load_imu, load_site
+from sdimu_calibration.storage.files.model_choice import named_model
 
 ACCELERATION = math.radians(20.0)
 TURNS = tuple(

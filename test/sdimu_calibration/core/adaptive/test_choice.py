@@ -13,7 +13,7 @@ from sdimu_calibration.core.adaptive.worth import separation, worth
 from sdimu_calibration.core.effects.selection import resolve
 from sdimu_calibration.core.plan import Plan, Turn
 from sdimu_calibration.core.recording import DataError
-from sdimu_calibration.storage.goal_file import load_goals
+from sdimu_calibration.storage.files.goal_file import load_goals
 
 from .conftest import ACCELERATION, part, perfect_fit
 

@@ -7,8 +7,8 @@ from dataclasses import replace
 from sdimu_calibration.core.adaptive import Goals, Menu, fitted, question
 from sdimu_calibration.core.adaptive.question import Asked, next_move
 from sdimu_calibration.core.diagnosis.live_diagnosis import LiveDiagnosis
-from sdimu_calibration.storage.goal_file import load_goals
-from sdimu_calibration.storage.table_file import load_rate_table
+from sdimu_calibration.storage.files.goal_file import load_goals
+from sdimu_calibration.storage.files.table_file import load_rate_table
 
 from .conftest import part, perfect_fit
 

@@ -10,7 +10,7 @@ from sdimu_calibration.core.alignment.prepared import first_attitude, reduce, se
 from sdimu_calibration.core.plan import Plan
 from sdimu_calibration.core.rotation import rotation_matrix, rotation_vector
 from sdimu_calibration.core.units import to_si
-from sdimu_calibration.storage.config import load_plan
+from sdimu_calibration.storage.files.config import load_plan
 from sdimu_sim.core.scenario import Scenario, generate
 
 KIM18 = load_plan("kim18")

@@ -14,7 +14,7 @@ from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.estimation.solve import solve
 from sdimu_calibration.core.measurement_kind import ALL, SKIP
 from sdimu_calibration.core.recording import DataError
-from sdimu_calibration.storage.config import load_model
+from sdimu_calibration.storage.files.config import load_model
 
 
 @pytest.fixture(scope="module")

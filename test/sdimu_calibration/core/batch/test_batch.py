@@ -17,7 +17,7 @@ from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.rotation import rotation_matrix, rotation_vector
 from sdimu_calibration.core.specification import ImuSpecification
 from sdimu_calibration.core.units import to_si
-from sdimu_calibration.storage.config import load_plan
+from sdimu_calibration.storage.files.config import load_plan
 from sdimu_sim.core.scenario import Scenario, generate
 from sdimu_sim.core.truth import in_body_frame
 

@@ -9,10 +9,10 @@ from scipy.stats import chi2
 from sdimu_calibration.core.estimation.outcome import calibrate
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.units import to_si
-from sdimu_calibration.storage.config import load_plan
-from sdimu_sim.campaign.mount_study import turned
+from sdimu_calibration.storage.files.config import load_plan
 from sdimu_sim.core.scenario import Scenario, generate
 from sdimu_sim.core.truth import in_body_frame
+from sdimu_study.mount_study import turned
 
 KIM18 = load_plan("kim18")
 

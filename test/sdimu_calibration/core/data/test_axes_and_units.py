@@ -19,7 +19,7 @@ from sdimu_calibration.core.plan import Plan
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.rotation import rotation_matrix
 from sdimu_calibration.core.units import STANDARD_GRAVITY, parse_unit
-from sdimu_calibration.storage.config import load_imu, load_plan, load_site
+from sdimu_calibration.storage.files.config import load_imu, load_plan, load_site
 from sdimu_sim.core.by_hand import ByHand, by_hand_recording
 from sdimu_sim.core.scenario import Scenario, generate
 

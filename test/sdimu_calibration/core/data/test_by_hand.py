@@ -14,7 +14,7 @@ from sdimu_calibration.core.data.imu_class import propose, shown_at_rest
 from sdimu_calibration.core.front_door import OpeningOptions, open_test
 from sdimu_calibration.core.handheld.handheld import prepare_run
 from sdimu_calibration.core.recording import DataError, PhaseLog, Recording
-from sdimu_calibration.storage.config import load_imu, load_plan, load_site
+from sdimu_calibration.storage.files.config import load_imu, load_plan, load_site
 from sdimu_calibration.storage.opening import CLASSES, Source, opening_options
 from sdimu_sim.core.by_hand import ByHand, by_hand_recording
 from sdimu_sim.core.scenario import Scenario, generate

@@ -10,7 +10,7 @@ import pytest
 from sdimu_calibration.core.data.dwell_detection import GrowingDwells, detected_dwells, with_detected_dwells
 from sdimu_calibration.core.data.phases import rest_limits
 from sdimu_calibration.core.plan import Plan
-from sdimu_calibration.storage.config import load_imu, load_plan, load_site
+from sdimu_calibration.storage.files.config import load_imu, load_plan, load_site
 from sdimu_sim.core.scenario import Scenario, generate
 
 MEMS, DTG, KIM18 = load_imu("mems_industrial"), load_imu("dtg"), load_plan("kim18")

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from sdimu_calibration.core.alignment.prepared import reduce, set_up
-from sdimu_calibration.storage.config import load_imu, load_model, load_plan, load_site
+from sdimu_calibration.storage.files.config import load_imu, load_model, load_plan, load_site
 from sdimu_sim.core.scenario import Scenario, generate
 
 EVERY = 60

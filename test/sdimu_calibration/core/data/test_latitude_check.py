@@ -13,7 +13,7 @@ from sdimu_calibration.core import earth
 from sdimu_calibration.core.data.latitude_check import EarthRate, contradictions, observe_earth_rate, reversed_force
 from sdimu_calibration.core.plan import Plan
 from sdimu_calibration.core.specification import Site
-from sdimu_calibration.storage.config import load_imu, load_plan
+from sdimu_calibration.storage.files.config import load_imu, load_plan
 from sdimu_sim.core.by_hand import ByHand, by_hand_recording
 from sdimu_sim.core.scenario import Scenario, generate
 

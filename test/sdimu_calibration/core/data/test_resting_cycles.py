@@ -14,7 +14,7 @@ from sdimu_calibration.core.estimation import prepared_test
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.estimation.solve import solve
 from sdimu_calibration.core.navigation.strapdown import Cycles, navigate_cycle, velocity_increment
-from sdimu_calibration.storage.config import load_imu, load_model, load_plan, load_site
+from sdimu_calibration.storage.files.config import load_imu, load_model, load_plan, load_site
 from sdimu_sim.core.scenario import Scenario, generate
 
 SITE = load_site("daejeon")

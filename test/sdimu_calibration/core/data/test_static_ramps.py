@@ -10,7 +10,7 @@ import pytest
 from rate_table_sim.core import TableSpecification
 from sdimu_calibration.core.data.static_detection import detect_static, hides_earth_rate
 from sdimu_calibration.core.specification import Site
-from sdimu_calibration.storage.config import load_imu, load_plan
+from sdimu_calibration.storage.files.config import load_imu, load_plan
 from sdimu_sim.core.scenario import Scenario, generate
 
 SITE = Site(math.radians(36.4), 0.0)

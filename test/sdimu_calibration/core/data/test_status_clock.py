@@ -11,7 +11,7 @@ import pytest
 from sdimu_calibration.core.data.status_clock import aligned
 from sdimu_calibration.core.plan import Plan
 from sdimu_calibration.core.recording import PhaseLog
-from sdimu_calibration.storage.config import load_imu, load_plan, load_site
+from sdimu_calibration.storage.files.config import load_imu, load_plan, load_site
 from sdimu_sim.core.scenario import Scenario, generate
 
 KIM18 = load_plan("kim18")

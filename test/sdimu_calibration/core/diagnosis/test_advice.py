@@ -11,8 +11,8 @@ from sdimu_calibration.core.diagnosis.advice import keep, together
 from sdimu_calibration.core.diagnosis.found import Found
 from sdimu_calibration.core.effects import registry
 from sdimu_calibration.core.evidence.candidate import split
-from sdimu_calibration.storage.advice_words import _WORDS, sentence
-from sdimu_calibration.storage.effect_file import find_effects
+from sdimu_calibration.storage.files.advice_words import _WORDS, sentence
+from sdimu_calibration.storage.files.effect_file import find_effects
 
 MIX = """
 format: sdimu-effect/1

@@ -17,7 +17,7 @@ from sdimu_calibration.core.diagnosis.found import found_effects, reach
 from sdimu_calibration.core.diagnosis.ladder import jump, refused
 from sdimu_calibration.core.diagnosis.plan_seen import plan_seen
 from sdimu_calibration.core.units import to_si
-from sdimu_calibration.storage.advice_words import sentence
+from sdimu_calibration.storage.files.advice_words import sentence
 
 SEEDS = (101, 102, 103)
 _EFFECTIVE = 150

@@ -21,8 +21,8 @@ from sdimu_calibration.core.evidence.handheld_evidence import places
 from sdimu_calibration.core.handheld.handheld import fit_priors
 from sdimu_calibration.core.handheld.handheld_fit import FORCE, equations
 from sdimu_calibration.core.units import from_si, to_si
-from sdimu_calibration.storage.config import load_imu, load_model
-from sdimu_calibration.storage.diagnosis_file import content
+from sdimu_calibration.storage.files.config import load_imu, load_model
+from sdimu_calibration.storage.files.diagnosis_file import content
 from sdimu_sim.core.by_hand import ByHand, by_hand_recording
 
 IMU, MODEL = load_imu("mems_by_hand"), load_model("hand")
@@ -38,7 +38,7 @@ SHOWN = ("gyro_scale_asymmetry_x", "gyro_scale_cubic_z", "accel_quadratic_y", "a
 
 @cache
 def _recording(seed, effects=()):
-    from sdimu_calibration.storage.config import load_site
+    from sdimu_calibration.storage.files.config import load_site
 
     return by_hand_recording(ByHand(24, IMU, load_site("daejeon"), seed=seed, effects=effects))[0]
 

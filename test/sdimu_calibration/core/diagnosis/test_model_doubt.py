@@ -16,7 +16,7 @@ from sdimu_calibration.core.effects import registry
 from sdimu_calibration.core.estimation.fit import Fit
 from sdimu_calibration.core.evidence.candidate import split
 from sdimu_calibration.core.evidence.linear import LinearEvidence
-from sdimu_calibration.storage.config import load_imu
+from sdimu_calibration.storage.files.config import load_imu
 
 RNG = np.random.default_rng(5)
 PRIOR = np.array([2.0, 2.0, 2.0])

@@ -17,7 +17,7 @@ from sdimu_calibration.core.diagnosis.search import FALSE_ALARM
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.estimation.solve import solve
 from sdimu_calibration.core.specification import Site
-from sdimu_calibration.storage.config import load_imu, load_model, load_plan
+from sdimu_calibration.storage.files.config import load_imu, load_model, load_plan
 from sdimu_sim.core.scenario import Scenario, generate
 
 SITE = Site(math.radians(52.0), 0.0)

@@ -7,7 +7,7 @@ import pytest
 
 from rate_table_sim.core.motion import table_motion
 from rate_table_sim.table_file import load_table
-from sdimu_calibration.storage.config import load_plan
+from sdimu_calibration.storage.files.config import load_plan
 
 
 @pytest.mark.parametrize("name", ["kim18_signed", "recommended"])

@@ -9,8 +9,8 @@ from sdimu_calibration.core.effects import effect as kinds
 from sdimu_calibration.core.effects.imu_model import build, told_apart
 from sdimu_calibration.core.effects.selection import resolve
 from sdimu_calibration.core.recording import DataError
-from sdimu_calibration.storage.config import load_imu
-from sdimu_calibration.storage.effect_file import extended_model
+from sdimu_calibration.storage.files.config import load_imu
+from sdimu_calibration.storage.files.effect_file import extended_model
 
 STEPS = ("gyro_bias_step_y(t0=625 s)", "gyro_bias_step_y(t0=670 s)")
 NAMES = ("gyro_bias_step_y", STEPS[1], "accel_quadratic_x")

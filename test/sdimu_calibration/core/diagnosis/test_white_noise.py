@@ -8,7 +8,7 @@ import pytest
 from sdimu_calibration.core.diagnosis.white_noise import without_memory
 from sdimu_calibration.core.evidence.consistency import NO_NOISE, Consistency, Noise
 from sdimu_calibration.core.noise_term import FLICKER, MARKOV, RANDOM_WALK, SHIFT, STOP, NoiseTerm
-from sdimu_calibration.storage.config import load_imu
+from sdimu_calibration.storage.files.config import load_imu
 
 IMU = load_imu("mems_consumer")
 N = IMU.gyro_white_noise

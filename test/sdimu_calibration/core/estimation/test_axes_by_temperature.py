@@ -13,7 +13,7 @@ from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.estimation.solve import solve
 from sdimu_calibration.core.recording import TemperatureLog
 from sdimu_calibration.core.specification import Site
-from sdimu_calibration.storage.config import load_imu, load_model, load_plan
+from sdimu_calibration.storage.files.config import load_imu, load_model, load_plan
 from sdimu_sim.core.by_hand import ByHand, by_hand_recording
 from sdimu_sim.core.scenario import Scenario, generate
 from sdimu_sim.core.temperature import TemperatureProfile

@@ -9,7 +9,7 @@ from rate_table_sim.core.specification import TableSpecification
 from sdimu_calibration.core.estimation.outcome import calibrate
 from sdimu_calibration.core.plan import Plan, Turn
 from sdimu_calibration.core.specification import Site
-from sdimu_calibration.storage.config import load_imu, load_model
+from sdimu_calibration.storage.files.config import load_imu, load_model
 from sdimu_sim.core.scenario import Scenario, generate
 
 TURNS = tuple(Turn(axis, np.radians(90.0), np.radians(15.0)) for axis in "XYZXYZXYZ")

@@ -23,17 +23,17 @@ from sdimu_calibration.report.page import page
 from sdimu_calibration.report.report_extras import ReportExtras
 from sdimu_calibration.report.workbench.fit import FitSession
 from sdimu_calibration.report.workbench.setting import Setting
-from sdimu_calibration.storage.bag_reader import read_recording
-from sdimu_calibration.storage.config import load_imu, load_model, load_plan
-from sdimu_calibration.storage.diagnosis_file import read_diagnosis, write_diagnosis
-from sdimu_calibration.storage.effect_file import find_effects
+from sdimu_calibration.storage.bags.bag_reader import read_recording
 from sdimu_calibration.storage.export import FORMS, export
-from sdimu_calibration.storage.result_file import read_result, write_result
+from sdimu_calibration.storage.files.config import load_imu, load_model, load_plan
+from sdimu_calibration.storage.files.diagnosis_file import read_diagnosis, write_diagnosis
+from sdimu_calibration.storage.files.effect_file import find_effects
+from sdimu_calibration.storage.files.result_file import read_result, write_result
 from sdimu_sim.bag_file import write_test
-from sdimu_sim.campaign.grade_run import choice
-from sdimu_sim.campaign.run import CalibrationRun
 from sdimu_sim.core.by_hand import ByHand, by_hand_recording
 from sdimu_sim.core.scenario import Scenario, generate, simulate_test
+from sdimu_study.grade_run import choice
+from sdimu_study.run import CalibrationRun
 
 SITE = Site(latitude_rad=float(np.radians(36.4)))
 HANDHELD_IMU = "mems_by_hand"

@@ -16,9 +16,9 @@ from sdimu_calibration.core.estimation.solve import extend, fit_about, solve
 from sdimu_calibration.core.joint.member import Job, Member, run
 from sdimu_calibration.core.rotation import rotation_matrix
 from sdimu_calibration.core.specification import Site
-from sdimu_calibration.storage.config import load_imu, load_model
-from sdimu_sim.campaign.grade_run import simulated_test
-from sdimu_sim.campaign.hidden_score import baseline_z
+from sdimu_calibration.storage.files.config import load_imu, load_model
+from sdimu_study.grade_run import simulated_test
+from sdimu_study.hidden_score import baseline_z
 
 SITE = Site(math.radians(52.0), 0.0)
 FLICKER = ("gyro_noise_flicker=25 deg/h", "accel_noise_flicker=150 ug")

@@ -11,7 +11,7 @@ from sdimu_calibration.api.functions import diagnose
 from sdimu_calibration.core.estimation.outcome import inseparable, outcome
 from sdimu_calibration.core.estimation.solve import extend
 from sdimu_calibration.core.evidence.noise_kernels import constant_between
-from sdimu_calibration.storage.effect_file import find_effects
+from sdimu_calibration.storage.files.effect_file import find_effects
 
 
 def test_a_second_bias_is_told_with_the_one_it_is(bench):

@@ -12,11 +12,11 @@ from sdimu_calibration.core.estimation.solve import fit_about
 from sdimu_calibration.core.rotation import rotation_vector
 from sdimu_calibration.core.specification import Site
 from sdimu_calibration.core.units import to_si
-from sdimu_calibration.storage.config import load_imu, load_model, load_plan
-from sdimu_sim.campaign.run import simulate
+from sdimu_calibration.storage.files.config import load_imu, load_model, load_plan
 from sdimu_sim.core.scenario import Scenario, imu_truth
 from sdimu_sim.core.true_coefficients import true_coefficients
 from sdimu_sim.core.truth import draw_coefficients
+from sdimu_study.run import simulate
 
 
 def test_an_azimuth_that_the_gyro_bias_put_wrong_is_found():

@@ -9,7 +9,7 @@ import numpy as np
 from sdimu_calibration.core.effects.imu_model import ImuModel
 from sdimu_calibration.core.estimation.prior_check import contradicted
 from sdimu_calibration.core.planning.predict import prepare
-from sdimu_calibration.storage.config import load_imu, load_model, load_plan, load_site
+from sdimu_calibration.storage.files.config import load_imu, load_model, load_plan, load_site
 
 
 def stated(name: str, mean: float, sigma: float) -> tuple[ImuModel, int]:

@@ -14,7 +14,7 @@ from sdimu_calibration.core.evidence.navigation_evidence import columns
 from sdimu_calibration.core.evidence.noise_kernels import stretch_effects, stretches
 from sdimu_calibration.core.evidence.signatures import Epochs, Regressors, signatures
 from sdimu_calibration.core.navigation.correct_cycles import spread
-from sdimu_calibration.storage.config import load_imu
+from sdimu_calibration.storage.files.config import load_imu
 from sdimu_sim.core.scenario import Scenario, generate
 
 

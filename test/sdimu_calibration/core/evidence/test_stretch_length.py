@@ -14,8 +14,8 @@ from sdimu_calibration.core.evidence.noise_kernels import stretches
 from sdimu_calibration.core.evidence.stretch_length import moves_within, wander_in
 from sdimu_calibration.core.noise_term import NoiseTerm
 from sdimu_calibration.core.specification import Site
-from sdimu_calibration.storage.config import load_imu, load_model
-from sdimu_sim.campaign.grade_run import simulated_test
+from sdimu_calibration.storage.files.config import load_imu, load_model
+from sdimu_study.grade_run import simulated_test
 
 
 class Ideal:

@@ -10,8 +10,8 @@ from sdimu_calibration.core.estimation.solve import extend, solve
 from sdimu_calibration.core.filter.impossible_prior import impossible_prior
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.units import to_si
-from sdimu_calibration.storage.config import load_model
-from sdimu_calibration.storage.effect_file import find_effects, load_effect
+from sdimu_calibration.storage.files.config import load_model
+from sdimu_calibration.storage.files.effect_file import find_effects, load_effect
 
 EFFECT = """
 format: sdimu-effect/1

@@ -10,7 +10,7 @@ import pytest
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.estimation.solve import solve
 from sdimu_calibration.core.units import STANDARD_GRAVITY
-from sdimu_calibration.storage.config import load_imu, load_model
+from sdimu_calibration.storage.files.config import load_imu, load_model
 from sdimu_sim.core.by_hand import ByHand, against_gravity, by_hand_recording
 from sdimu_sim.core.generator import gravity_of
 from sdimu_sim.core.truth import in_body_frame

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from sdimu_calibration.core.estimation.outcome import calibrate
-from sdimu_calibration.storage.config import load_imu, load_site
-from sdimu_calibration.storage.effect_file import extended_model
+from sdimu_calibration.storage.files.config import load_imu, load_site
+from sdimu_calibration.storage.files.effect_file import extended_model
 from sdimu_sim.core.by_hand import ByHand, by_hand_recording
 
 MEMS = load_imu("mems_by_hand")

@@ -11,7 +11,7 @@ from sdimu_calibration.core.estimation.solve import solve
 from sdimu_calibration.core.recording import DataError, Recording
 from sdimu_calibration.core.specification import Model
 from sdimu_calibration.core.units import STANDARD_GRAVITY
-from sdimu_calibration.storage.config import load_imu
+from sdimu_calibration.storage.files.config import load_imu
 
 RATE_HZ, REST_S, TURN_S, APART_S = 100.0, 5.0, 6.0, 60.0
 SCALE, BIAS = np.array([0.013, -0.009, 0.02]), np.radians([0.3, -0.2, 0.1])

@@ -15,11 +15,11 @@ from sdimu_calibration.core.joint.set_fit import SetOptions
 from sdimu_calibration.core.plan import Plan
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.specification import Site
-from sdimu_calibration.storage.config import load_imu, load_model, load_plan
-from sdimu_sim.campaign.run import simulate
+from sdimu_calibration.storage.files.config import load_imu, load_model, load_plan
 from sdimu_sim.core.scenario import Scenario, imu_truth
 from sdimu_sim.core.temperature import TemperatureProfile
 from sdimu_sim.core.truth import draw_coefficients, turned_on
+from sdimu_study.run import simulate
 
 SITE = Site(latitude_rad=float(np.radians(36.4)), height_m=80.0)
 IMU = load_imu("dtg")

@@ -11,7 +11,7 @@ from sdimu_calibration.core.joint.set_diagnosis import diagnose_set
 from sdimu_calibration.core.joint.set_evidence import held_out, held_out_chance
 from sdimu_calibration.core.joint.set_fit import SetFit, SetOptions, fit_set, prior_weight, with_reports
 from sdimu_calibration.report import first_screen
-from sdimu_calibration.storage.config import load_model
+from sdimu_calibration.storage.files.config import load_model
 
 from .conftest import here, short, unit_set
 

@@ -16,11 +16,11 @@ from sdimu_calibration.core.joint.set_diagnosis import diagnose_set
 from sdimu_calibration.core.joint.set_fit import SetOptions, fit_set
 from sdimu_calibration.core.plan import Plan, backwards
 from sdimu_calibration.report.set_sections import recurrence_section
-from sdimu_calibration.storage.advice_words import sentence
-from sdimu_calibration.storage.config import load_model
-from sdimu_calibration.storage.json_file import read_json
-from sdimu_calibration.storage.reduction_file import read_report, write_report
-from sdimu_calibration.storage.set_result_file import FORMAT, write_set_diagnosis
+from sdimu_calibration.storage.files.advice_words import sentence
+from sdimu_calibration.storage.files.config import load_model
+from sdimu_calibration.storage.files.json_file import read_json
+from sdimu_calibration.storage.files.reduction_file import read_report, write_report
+from sdimu_calibration.storage.files.set_result_file import FORMAT, write_set_diagnosis
 from sdimu_sim.core.temperature import TemperatureProfile
 
 from .conftest import here, short, unit_set

@@ -13,8 +13,8 @@ from sdimu_calibration.core.joint.set_diagnosis import diagnose_set
 from sdimu_calibration.core.joint.set_search import as_given, search_set
 from sdimu_calibration.core.plan import Plan, Turn
 from sdimu_calibration.core.recording import DataError
-from sdimu_calibration.storage.advice_words import sentence
-from sdimu_calibration.storage.config import load_model
+from sdimu_calibration.storage.files.advice_words import sentence
+from sdimu_calibration.storage.files.config import load_model
 
 from .conftest import here, short, unit_set
 

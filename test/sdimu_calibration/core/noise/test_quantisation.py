@@ -16,10 +16,10 @@ from sdimu_calibration.core.noise import with_measured_noise
 from sdimu_calibration.core.noise.quantisation import with_quantisation
 from sdimu_calibration.core.recording import Recording
 from sdimu_calibration.core.units import to_si
-from sdimu_calibration.storage.config import load_imu, load_model, load_plan
-from sdimu_sim.campaign.hidden_score import baseline_z
-from sdimu_sim.campaign.run import simulate
+from sdimu_calibration.storage.files.config import load_imu, load_model, load_plan
 from sdimu_sim.core.scenario import Scenario, imu_truth
+from sdimu_study.hidden_score import baseline_z
+from sdimu_study.run import simulate
 
 DT = 0.01
 PULSE = to_si(3.0, "arcsec")

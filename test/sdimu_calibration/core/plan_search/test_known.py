@@ -18,8 +18,8 @@ from sdimu_calibration.core.plan_search.known import together
 from sdimu_calibration.core.plan_search.moves import Abilities
 from sdimu_calibration.core.planning.nominal import nominal_recording
 from sdimu_calibration.core.recording import DataError
-from sdimu_calibration.storage.config import load_imu, load_plan, load_site
-from sdimu_calibration.storage.model_choice import named_model
+from sdimu_calibration.storage.files.config import load_imu, load_plan, load_site
+from sdimu_calibration.storage.files.model_choice import named_model
 
 OPEN = ("gyro_scale_asymmetry_y", "gyro_scale_quadratic_y")
 BASELINE = Question(load_site("daejeon"), load_imu("dtg"), named_model("baseline", ()))

@@ -15,8 +15,8 @@ from sdimu_calibration.core.plan_search.bound import bounds
 from sdimu_calibration.core.plan_search.moves import Abilities, single, whole
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.rotation import rotation_matrix
-from sdimu_calibration.storage.config import load_imu, load_model, load_plan, load_site
-from sdimu_calibration.storage.plan_file import write_plan
+from sdimu_calibration.storage.files.config import load_imu, load_model, load_plan, load_site
+from sdimu_calibration.storage.files.plan_file import write_plan
 
 ASKED = Question(load_site("daejeon"), load_imu("dtg"), load_model("baseline"))
 ABLE = Abilities((math.radians(2.0), math.radians(10.0)), math.radians(20.0), (20.0, 40.0, 60.0, 100.0))

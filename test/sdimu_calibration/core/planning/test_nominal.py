@@ -10,7 +10,7 @@ from sdimu_calibration.core.plan import Plan, Turn
 from sdimu_calibration.core.planning.nominal import nominal_recording, ramp_length, turned
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.rotation import rotation_matrix
-from sdimu_calibration.storage.config import load_plan
+from sdimu_calibration.storage.files.config import load_plan
 from sdimu_sim.core.scenario import Scenario, generate
 
 # Directions of X, Y, Z at the 19 stops as Kim, Song & Lyou print them.

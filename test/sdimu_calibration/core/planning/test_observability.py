@@ -8,7 +8,7 @@ from sdimu_calibration.core.plan import Plan
 from sdimu_calibration.core.planning.nominal import nominal_recording
 from sdimu_calibration.core.planning.observability import unobservable
 from sdimu_calibration.core.planning.predict import predict
-from sdimu_calibration.storage.config import load_plan
+from sdimu_calibration.storage.files.config import load_plan
 
 
 def test_only_the_three_turns_of_the_body_frame_stay_unseen_on_the_papers_plan(imu, model, site):

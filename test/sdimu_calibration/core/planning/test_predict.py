@@ -11,7 +11,7 @@ from sdimu_calibration.core.planning.noise_set import NoiseSet, apply
 from sdimu_calibration.core.planning.predict import largest_by_effect, predict
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.units import to_si
-from sdimu_calibration.storage.config import load_plan
+from sdimu_calibration.storage.files.config import load_plan
 from sdimu_sim.core.scenario import Scenario, generate
 
 KIM18 = load_plan("kim18")

@@ -14,7 +14,7 @@ from sdimu_calibration.core.navigation.correct_cycles import correct_cycles, spr
 from sdimu_calibration.core.navigation.track import motion
 from sdimu_calibration.core.specification import ImuSpecification
 from sdimu_calibration.core.units import to_si
-from sdimu_calibration.storage.config import load_imu, load_plan
+from sdimu_calibration.storage.files.config import load_imu, load_plan
 from sdimu_sim.core.scenario import Scenario, generate
 from sdimu_sim.core.truth import in_body_frame
 

@@ -11,7 +11,7 @@ from rate_table_sim.core import TableSpecification
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.report.workbench.fit import FitSession
 from sdimu_calibration.report.workbench.setting import Setting
-from sdimu_calibration.storage.config import load_imu, load_model, load_plan, load_site
+from sdimu_calibration.storage.files.config import load_imu, load_model, load_plan, load_site
 from sdimu_sim.core.scenario import Scenario, generate
 
 LIMIT_S = 3.0

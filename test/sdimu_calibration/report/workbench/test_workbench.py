@@ -21,8 +21,8 @@ from sdimu_calibration.report.workbench.fit import FitSession
 from sdimu_calibration.report.workbench.parts import numbers
 from sdimu_calibration.report.workbench.recording_cache import RecordingCache, neighbours
 from sdimu_calibration.report.workbench.setting import Setting
-from sdimu_calibration.storage.config import load_imu, load_model, load_site
-from sdimu_calibration.storage.effect_file import extended_model
+from sdimu_calibration.storage.files.config import load_imu, load_model, load_site
+from sdimu_calibration.storage.files.effect_file import extended_model
 
 HIDDEN = "accel_quadratic_x"
 OWN = """format: sdimu-effect/1

@@ -9,7 +9,7 @@ from sdimu_calibration.core.data.arrival import RawStatus, RawTemperature, RawTe
 
 
 class KeptTest:
-    """Keeps a test in memory; a journal (`storage.journal`) keeps it on a disk."""
+    """Keeps a test in memory; a journal (`storage.files.journal`) keeps it on a disk."""
 
     def __init__(self) -> None:
         self._samples = [(np.empty(0, dtype=np.int64), np.empty((0, 3)), np.empty((0, 3)))]

@@ -37,9 +37,11 @@ def standing(d: Diagnosis, found: Sequence[Found]) -> Standing:
     known = known_of(evidence, np.array([place[label] for label in members], dtype=np.int64))
     effects: list[str | Effect] = [*d.fit.model.effects, *(c.effect for c in members.values())]
     of_power_on = {name for effect in effects for name in _of_power_on(effect)}
+    test = d.fit.test
     return Standing(
-        _anew(known, of_power_on), tuple(members), tuple(classes), d.fit.test.imu.name, d.fit.test.origin.site
-    )
+        _anew(known, of_power_on), tuple(members), tuple(classes), test.origin.imu_file or test.imu.name,
+        test.origin.site_stated,
+    )  # fmt: skip
 
 
 def _of_power_on(effect: str | Effect) -> tuple[str, ...]:

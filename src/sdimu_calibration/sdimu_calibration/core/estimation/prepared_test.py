@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from html import escape
 from typing import Any
 
 from sdimu_calibration.core.alignment.prepared import PreparedData, TestSetup, reduce
@@ -16,9 +18,9 @@ from sdimu_calibration.core.recording import Recording
 from sdimu_calibration.core.specification import EPOCH_S, LONGEST_EPOCH_S, MOST_EPOCHS, ImuSpecification, Site
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class PreparedTest:
-    """What every estimate of one test begins with.
+    """What every estimate of one test begins with; its ``repr`` says what it is of, in a notebook as HTML.
 
     Attributes
     ----------
@@ -48,6 +50,33 @@ class PreparedTest:
     whole_turns: float = 0.0
     origin: Origin = field(default_factory=Origin)
     _prepared: dict[Any, Any] = field(default_factory=dict, repr=False, compare=False)
+
+    @property
+    def words(self) -> tuple[tuple[str, str], ...]:
+        """What the test is of, as (heading, text): recording, samples, duration, stops, IMU, site."""
+        r, end = self.recording, float(self.recording.t[-1])
+        where = self.origin.site or self.assumed_site
+        return (
+            ("recording", ", ".join((self.origin.recording or "unnamed", *self.origin.words))),
+            ("samples", f"{len(r.t)} at {1.0 / r.interval_s:.4g} Hz"),
+            ("duration", f"{end:.1f} s ({end / 60.0:.1f} min)"),
+            ("stops", "none stated: the fit finds them" if r.phase is None else self._stops(r.phase.dwells)),
+            ("IMU", self.imu.name),
+            ("site", "none" if self.site is None else _place(self.site, where, bool(self.assumed_site))),
+        )
+
+    def _stops(self, number: int) -> str:
+        without = f", without {', '.join(map(str, self.held_out))}" if self.held_out else ""
+        return f"{number}{without}"
+
+    def __repr__(self) -> str:
+        """List recording, samples, duration, stops, IMU and site, one a line."""
+        return "\n".join(f"{heading}: {text}" for heading, text in self.words)
+
+    def _repr_html_(self) -> str:
+        """List recording, samples, duration, stops, IMU and site as an HTML table."""
+        lines = "".join(f"<tr><th>{escape(head)}</th><td>{escape(text)}</td></tr>" for head, text in self.words)
+        return f"<table>{lines}</table>"
 
     def without_stops(self, stops: tuple[int, ...]) -> PreparedTest:
         """Hold stops out of all fits."""
@@ -94,3 +123,10 @@ class PreparedTest:
             self._prepared["run"] = prepare_run(self.recording, self.whole_turns)
         done: PreparedRun = self._prepared["run"]
         return done
+
+
+def _place(site: Site, name: str, assumed: bool) -> str:
+    """Name a site, with its latitude and height."""
+    where = f"latitude {math.degrees(site.latitude_rad):.4f} deg, height {site.height_m:.0f} m"
+    named = f"{name} (assumed), " if assumed else f"{name}, " if name else ""
+    return f"{named}{where}"

@@ -175,7 +175,7 @@ class Standing:
     open : tuple of tuple of str
         Classes that the data leave open: labels, that of the one found first.
     imu, site : str
-        Names.
+        Their files as an option names them: names in config/ or paths.
     """
 
     known: Known

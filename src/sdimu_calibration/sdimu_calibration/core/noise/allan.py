@@ -1,7 +1,7 @@
 """Overlapping Allan deviation of rates (rad/s) or specific forces (m/s^2), pooled over stretches of rest.
 
 The overlapping Allan variance at an averaging time is a mean over differences; each stretch adds its differences, so
-that turns and gaps between stretches have no influence. Computed with allantools.
+that turns and gaps between stretches have no influence.
 """
 
 from __future__ import annotations
@@ -85,6 +85,31 @@ def factors(longest: int) -> Ints:
     return np.unique(np.rint(2.0 ** (steps / _PER_OCTAVE)).astype(np.int64))
 
 
+def overlapping(samples: Floats, m: Ints) -> Floats:
+    """Overlapping Allan deviation of one stretch.
+
+    Source: Riley, *Handbook of Frequency Stability Analysis*, NIST SP 1065 (2008), eq. 11.
+
+    Parameters
+    ----------
+    samples : ndarray, shape (n,)
+        Without gaps, any unit.
+    m : ndarray of int, shape (k,)
+        Averaging times (samples), each less than half of n.
+
+    Returns
+    -------
+    ndarray, shape (k,)
+        In the unit of the samples.
+    """
+    phase = np.concatenate([[0.0], np.cumsum(samples - samples.mean())])
+    deviation = np.empty(len(m))
+    for place, step in enumerate(m.tolist()):
+        second = phase[2 * step :] - 2.0 * phase[step:-step] + phase[: -2 * step]
+        deviation[place] = np.sqrt(np.sum(second * second) / (2.0 * len(second))) / step
+    return deviation
+
+
 def allan(stretches: Sequence[Floats], interval_s: float) -> Allan:
     """Allan deviation of a channel.
 
@@ -99,23 +124,15 @@ def allan(stretches: Sequence[Floats], interval_s: float) -> Allan:
     -------
     Allan
     """
-    import allantools  # noqa: PLC0415 (it brings scipy.signal along, which no other part of the core needs)
-
     m = factors(max(map(len, stretches)))
     total, pairs, freedom = np.zeros(len(m)), np.zeros(len(m)), np.zeros(len(m))
     for samples in stretches:
-        own = m[2 * m < len(samples)]
-        if not len(own):
-            continue
-        # In samples, so that no averaging time is lost to rounding.
-        tau, deviation, _, _ = allantools.oadev(
-            samples - samples.mean(), rate=1.0, data_type="freq", taus=own.astype(np.float64)
-        )
-        rows = np.searchsorted(m, np.rint(tau).astype(np.int64))
-        weight = len(samples) + 1.0 - 2.0 * tau
-        total[rows] += weight * deviation**2
+        rows = np.flatnonzero(2 * m < len(samples))
+        own = m[rows]
+        weight = len(samples) + 1.0 - 2.0 * own
+        total[rows] += weight * overlapping(samples - samples.mean(), own) ** 2
         pairs[rows] += weight
-        freedom[rows] += freedom_of(len(samples), tau)
+        freedom[rows] += freedom_of(len(samples), own.astype(np.float64))
     keep = freedom > LEAST_FREEDOM
     pooled: Floats = np.sqrt(total[keep] / pairs[keep])
     times: Floats = m[keep].astype(np.float64) * interval_s

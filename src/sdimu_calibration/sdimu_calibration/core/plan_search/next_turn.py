@@ -26,6 +26,8 @@ RATES_RAD_S = (math.radians(2.0), math.radians(10.0))
 """Rates of extra turns (rad/s): that of the plan kim18, and a fast one for effects of higher order in the rate."""
 _ANGLES_RAD = tuple(math.radians(a) for a in (90.0, -90.0, 180.0, -180.0))
 """Angles of extra turns (rad): both senses, ending on a cardinal direction."""
+_NOTHING = 0.05
+"""Significance (sigma) below which a turn tells nothing: it would be written as 0.0."""
 _ACCELERATION_RAD_S2 = math.radians(20.0)
 """Least acceleration of extra turns (rad/s^2): half a second to the fastest rate."""
 
@@ -122,6 +124,27 @@ def next_turn(
         if progress is not None:
             progress("next turn", count / len(extras))
     return tuple(sorted(out, key=lambda one: -one.gain))
+
+
+def untold(ranked: Sequence[NextTurn], alike: Sequence[str | Effect]) -> str:
+    """Say that no extra turn tells effects apart, and what would; empty where a turn does.
+
+    A plan is foreseen at one temperature, so an effect of temperature has no part in what it foresees.
+
+    Parameters
+    ----------
+    ranked : sequence of NextTurn
+        Every turn that was tried.
+    alike : sequence of str or Effect
+        As for `next_turn`.
+    """
+    if max((one.after for one in ranked), default=0.0) >= _NOTHING:
+        return ""
+    effects = [selection.resolve(e) if isinstance(e, str) else e for e in alike]
+    names = " and ".join(str(e) if isinstance(e, str) else e.name for e in alike)
+    heat = any(e.needs == "temperature" for e in effects)
+    why = ": a plan is foreseen at one temperature, and only a change of temperature tells them" if heat else ""
+    return f"no turn tells {names} apart{why}"
 
 
 def apart(told: Bounds, names: Sequence[str], sizes: Mapping[str, float] | None) -> float:

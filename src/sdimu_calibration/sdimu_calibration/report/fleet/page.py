@@ -14,8 +14,8 @@ from sdimu_calibration.report.fleet import tables
 from sdimu_calibration.report.fleet.figures import control_chart, heat_map
 from sdimu_calibration.report.groups import title as words_of
 from sdimu_calibration.report.markup import grid, prose, quiet, section
-from sdimu_calibration.storage.fleet_folder import Gathered
-from sdimu_calibration.storage.whole_file import write_whole
+from sdimu_calibration.storage.files.fleet_folder import Gathered
+from sdimu_calibration.storage.files.whole_file import write_whole
 
 _MOST_COMMON, _MOST_TRENDS = 12, 12
 """Rows of a table that are shown though nothing stands out in them."""

@@ -16,9 +16,9 @@ from sdimu_calibration.report.fleet.tables import three
 from sdimu_calibration.report.markup import grid, prose, quiet, section
 from sdimu_calibration.report.table import cells
 from sdimu_calibration.report.table import rows as coefficient_rows
-from sdimu_calibration.storage.datasheet_file import Certificate
-from sdimu_calibration.storage.fleet_folder import Entry
-from sdimu_calibration.storage.whole_file import write_whole
+from sdimu_calibration.storage.files.datasheet_file import Certificate
+from sdimu_calibration.storage.files.fleet_folder import Entry
+from sdimu_calibration.storage.files.whole_file import write_whole
 
 HEADINGS = ("term", "value", "95 %", "unit", "n", "limit", "verdict")
 _COEFFICIENTS = ("coefficient", "estimate", "sigma", "unit")

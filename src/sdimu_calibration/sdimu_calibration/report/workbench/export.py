@@ -21,8 +21,8 @@ from sdimu_calibration.report.page import write_report
 from sdimu_calibration.report.workbench.parts import span
 from sdimu_calibration.report.workbench.setting import Setting
 from sdimu_calibration.report.workbench.state import State
-from sdimu_calibration.storage.effect_file import find_effects
-from sdimu_calibration.storage.result_file import write_result
+from sdimu_calibration.storage.files.effect_file import find_effects
+from sdimu_calibration.storage.files.result_file import write_result
 
 
 def model_files(model: Model, setting: Setting) -> dict[str, str]:

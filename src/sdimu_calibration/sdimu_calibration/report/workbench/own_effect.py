@@ -13,7 +13,7 @@ from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.specification import ImuSpecification, Model, StatedPrior
 from sdimu_calibration.core.units import UnitError, parse_quantity
 from sdimu_calibration.report.workbench.setting import Prior
-from sdimu_calibration.storage.effect_file import find_effects, load_effect, new_parts
+from sdimu_calibration.storage.files.effect_file import find_effects, load_effect, new_parts
 
 
 def added_effects(model: Model, added: Sequence[str], imu: ImuSpecification) -> tuple[Effect, ...]:

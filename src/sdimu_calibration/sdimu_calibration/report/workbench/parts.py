@@ -13,7 +13,7 @@ from sdimu_calibration.report import data
 from sdimu_calibration.report.table import with_sigma
 from sdimu_calibration.report.workbench.fit import Fitted, Missing, Preview
 from sdimu_calibration.report.workbench.setting import Setting
-from sdimu_calibration.storage.advice_words import sentence
+from sdimu_calibration.storage.files.advice_words import sentence
 
 _MOST_PARAMETERS = 9
 """Number of parameters of a candidate that are listed: a whole matrix of them."""

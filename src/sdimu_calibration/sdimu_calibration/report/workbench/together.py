@@ -15,7 +15,7 @@ from sdimu_calibration.core.verdict import Verdict
 from sdimu_calibration.report.table import with_sigma
 from sdimu_calibration.report.workbench.state import from_json
 from sdimu_calibration.report.workbench.task_progress import BUSY, TaskProgress
-from sdimu_calibration.storage.advice_words import sentence
+from sdimu_calibration.storage.files.advice_words import sentence
 
 Judge = Callable[[Sequence[str], Callable[[str, float], None]], SetDiagnosis]
 

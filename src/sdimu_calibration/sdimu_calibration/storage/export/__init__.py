@@ -13,7 +13,7 @@ from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.specification import ImuSpecification
 from sdimu_calibration.storage.export import c_header, csv_table, imu_tk, kalibr, matrices, yaml_file
 from sdimu_calibration.storage.export.shared import Source
-from sdimu_calibration.storage.whole_file import write_whole
+from sdimu_calibration.storage.files.whole_file import write_whole
 
 
 class Form(NamedTuple):

@@ -1,0 +1,83 @@
+"""The place of a bag that is made: free, or held by a bag that may be replaced; never anything else."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterable
+from pathlib import Path
+
+from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.storage.bags.bag_metadata import METADATA, named_files, read_metadata
+from sdimu_calibration.storage.files.whole_file import beside, uninterrupted
+
+DAMAGED_SUFFIX = ".damaged"
+"""At the name of a file that was mended: the cut one, kept."""
+_SQLITE = ("-wal", "-shm", "-journal")
+"""At the names of what SQLite leaves beside its files."""
+
+
+def check_room(path: Path, replace: bool) -> None:
+    """Raise DataError unless a bag can be made at `path`: nothing is there, or a bag alone that is to be replaced."""
+    if path.is_file():
+        raise DataError(f"{path}: a file is in the way of the bag folder; choose another one")
+    if not path.is_dir() or not any(path.iterdir()):
+        return
+    if not (path / METADATA).is_file():
+        raise DataError(f"{path}: the folder is not empty and not a bag; choose another one")
+    if not replace:
+        raise DataError(f"{path}: a bag is already there; --replace replaces it, or choose another folder")
+    others = sorted(_names(path) - _own(path))
+    if others:
+        shown = ", ".join(others[:3]) + (", ..." if len(others) > 3 else "")
+        raise DataError(f"{path}: holds more than a bag ({shown}); move that away, or choose another folder")
+
+
+def check_apart(source: Path | Iterable[Path], target: Path) -> None:
+    """Raise DataError when what is read would be replaced by what is written.
+
+    Parameters
+    ----------
+    source : Path or iterable of Path
+        Files or folders that are read.
+    target : Path
+        Folder to make.
+    """
+    folder = Path(target).resolve()
+    for path in [source] if isinstance(source, Path) else source:
+        if folder in {path.resolve(), *path.resolve().parents}:
+            raise DataError(f"{target}: is where {path} is read from; choose another folder for --out")
+
+
+def put_in_place(folder: Path, path: Path, replace: bool) -> None:
+    """Rename `folder` to `path`; a bag that is there goes when it may be replaced, and only once the new one stands.
+
+    Raises
+    ------
+    DataError
+        When something has come in the way.
+    """
+    # Where a link leads, not the link.
+    path = path.resolve()
+    check_room(path, replace)
+    with uninterrupted():
+        if not path.is_dir():
+            folder.rename(path)
+            return
+        old = beside(path)
+        path.rename(old)
+        try:
+            folder.rename(path)
+        except OSError:
+            old.rename(path)
+            raise
+        shutil.rmtree(old)
+
+
+def _names(folder: Path) -> set[str]:
+    return {entry.name for entry in folder.iterdir()}
+
+
+def _own(folder: Path) -> set[str]:
+    """Names of what belongs to the bag in a folder."""
+    files = {*named_files(read_metadata(folder)), f"{folder.name}_0.mcap"}
+    return {METADATA, *(name + suffix for name in files for suffix in ("", DAMAGED_SUFFIX, *_SQLITE))}

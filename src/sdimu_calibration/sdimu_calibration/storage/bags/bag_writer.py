@@ -1,0 +1,94 @@
+"""A whole test written to a rosbag2 folder at once."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from sdimu_calibration.core.arrays import Bools, Floats, Ints
+from sdimu_calibration.storage.bags import cdr
+from sdimu_calibration.storage.bags.mcap_bag import McapBag
+from sdimu_calibration.storage.bags.topics import Topics
+
+Stamps = Ints
+
+
+def write_recording(
+    path: Path,
+    *,
+    start_ns: int,
+    imu_ns: Stamps,
+    omega_ib_b: Floats,
+    f_ib_b: Floats,
+    status: tuple[Stamps, Bools, Ints] | None = None,
+    joint_states: tuple[Stamps, tuple[str, ...], Floats, Floats] | None = None,
+    temperature: tuple[Stamps, Floats] | None = None,
+    topics: Topics | None = None,
+    replace: bool = False,
+    custom: Mapping[str, str] | None = None,
+) -> None:
+    """Write a test to a bag, all messages in the order of their stamps.
+
+    Parameters
+    ----------
+    path : Path
+        Folder to make.
+    start_ns : int
+        Added to every stamp: the time (ns since 1970) at which the test began.
+    imu_ns : ndarray, shape (n,)
+        End of each sample's interval (ns after `start_ns`).
+    omega_ib_b, f_ib_b : ndarray, shape (n, 3)
+        Mean rate (rad/s) and specific force (m/s^2) over the interval, in the frame of the IMU.
+    status : (ndarray (m,), ndarray of bool (m,), ndarray of int (m,)), optional
+        Stamp (ns after `start_ns`), True for dwell, index of the stop.
+    joint_states : (ndarray (l,), tuple of str (k), ndarray (l, k), ndarray (l, k)), optional
+        Stamp (ns after `start_ns`), axes, angles (rad), rates (rad/s).
+    temperature : (ndarray (o,), ndarray (o,)), optional
+        Stamp (ns after `start_ns`), temperature (deg C).
+    topics : Topics, optional
+    replace : bool
+        Delete a bag that is already there.
+    custom : mapping of str to str, optional
+        What the user says of the recording: ``serial``, ``power_on``.
+
+    Raises
+    ------
+    DataError
+        When something is in the way of the folder.
+    """
+    topics = topics or Topics()
+    streams = [_Stream(topics.imu, cdr.IMU, imu_ns, cdr.encode_imu(imu_ns + start_ns, omega_ib_b, f_ib_b))]
+    if status is not None:
+        ns, dwell, stop = status
+        streams.insert(0, _Stream(topics.status, cdr.STATUS, ns, cdr.encode_status(ns + start_ns, dwell, stop)))
+    if joint_states is not None:
+        ns, names, position, velocity = joint_states
+        encoded = cdr.encode_joint_states(ns + start_ns, names, position, velocity)
+        streams.append(_Stream(topics.joint_states, cdr.JOINT_STATE, ns, encoded))
+    if temperature is not None:
+        ns, value = temperature
+        encoded = cdr.encode_temperature(ns + start_ns, value)
+        streams.append(_Stream(topics.temperature, cdr.TEMPERATURE, ns, encoded))
+    _write(path, streams, start_ns, replace, custom)
+
+
+class _Stream:
+    """Encoded messages of one topic."""
+
+    def __init__(self, topic: str, type_name: str, ns: Stamps, encoded: list[bytes]) -> None:
+        self.topic = topic
+        self.type_name = type_name
+        self.ns = np.asarray(ns, np.int64)
+        self.encoded = encoded
+
+
+def _write(
+    path: Path, streams: list[_Stream], start_ns: int, replace: bool, custom: Mapping[str, str] | None
+) -> None:
+    with McapBag(path, replace=replace, custom=custom) as bag:
+        for stream in streams:
+            bag.topic(stream.topic, stream.type_name)
+        # At the same stamp the status goes first, as it holds from that stamp on.
+        bag.write_merged({stream.topic: (stream.ns + start_ns, stream.encoded) for stream in streams})

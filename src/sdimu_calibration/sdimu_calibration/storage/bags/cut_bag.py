@@ -1,0 +1,86 @@
+"""A part of a recording, as a bag of its own."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from sdimu_calibration.core.arrays import Ints
+from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.storage.bags import cdr
+from sdimu_calibration.storage.bags.bag_file import read_topics
+from sdimu_calibration.storage.bags.bag_folder import check_apart, check_room
+from sdimu_calibration.storage.bags.bag_metadata import custom_data
+from sdimu_calibration.storage.bags.mcap_bag import McapBag
+
+_TAKEN = (cdr.STATUS, cdr.IMU, cdr.JOINT_STATE, cdr.TEMPERATURE)
+"""In the order in which messages of one stamp are written: a status holds from its stamp on."""
+
+
+@dataclass(frozen=True)
+class Part:
+    """What a cut left: messages by topic, and the whole recording's length (s)."""
+
+    counts: dict[str, int]
+    whole_s: float
+
+
+def cut_bag(source: Path, target: Path, first_s: float, last_s: float, *, replace: bool = False) -> Part:
+    """Write the messages between two times into a bag; what the calibration does not read is left out.
+
+    A table says its phase when it changes: the last status before the cut is kept, with the stamp of the cut.
+
+    Parameters
+    ----------
+    source : Path
+        Bag of any kind that is read.
+    target : Path
+        Folder to make.
+    first_s, last_s : float
+        Seconds since the first stamp of an IMU, as errors and reports count them; both ends are kept.
+    replace : bool
+        Delete a bag that is already there.
+
+    Raises
+    ------
+    DataError
+        When there is no IMU in the bag, no sample between the times, or something in the way of the folder, such as
+        the source itself.
+    """
+    check_apart(source, target)
+    check_room(target, replace)
+    if not first_s < last_s:
+        raise DataError(f"--from {first_s:g} --to {last_s:g}: nothing lies between these times (s)")
+    every = read_topics(source, lambda _topic, kind: kind in _TAKEN)
+    found = {topic: content for topic, content in every.items() if content.type_name in _TAKEN}
+    ranked = sorted(found, key=lambda topic: _TAKEN.index(found[topic].type_name))
+    stamped = {topic: cdr.by_stamp(found[topic].raw, topic) for topic in ranked}
+    imu = [ns for topic, (ns, _) in stamped.items() if found[topic].type_name == cdr.IMU and len(ns)]
+    if not imu:
+        raise DataError(f"{source}: no message of {cdr.IMU} is in it")
+    start, end = min(int(ns[0]) for ns in imu), max(int(ns[-1]) for ns in imu)
+    low = start + round(first_s * 1e9)
+    high = start + round(last_s * 1e9) if math.isfinite(last_s) else np.iinfo(np.int64).max
+    kept = {topic: _between(*stamped[topic], low, high, found[topic].type_name == cdr.STATUS) for topic in ranked}
+    if not any(len(kept[topic][0]) for topic in ranked if found[topic].type_name == cdr.IMU):
+        raise DataError(
+            f"{source}: no sample between {first_s:g} and {last_s:g} s; it is {(end - start) * 1e-9:.1f} s long"
+        )
+    with McapBag(target, replace=replace, custom=custom_data(source)) as bag:
+        for topic, content in found.items():
+            bag.topic(topic, content.type_name)
+        bag.write_merged(kept)
+        counts = dict(bag.counts)
+    return Part(counts, (end - start) * 1e-9)
+
+
+def _between(ns: Ints, messages: list[bytes], low: int, high: int, holds: bool) -> tuple[Ints, list[bytes]]:
+    """Messages between two stamps; of what holds until the next message also the last one before, from `low` on."""
+    first, last = int(np.searchsorted(ns, low)), int(np.searchsorted(ns, high, side="right"))
+    if not holds or not first:
+        return ns[first:last], messages[first:last]
+    before = cdr.stamped(messages[first - 1], low)
+    return np.append(np.int64(low), ns[first:last]), [before, *messages[first:last]]

@@ -1,0 +1,97 @@
+"""Messages of an IMU decoded as they are read, so that a long recording needs the memory of its numbers only."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+
+import numpy as np
+
+from sdimu_calibration.storage.bags.cdr import LayoutError, decode_imu_block
+from sdimu_calibration.storage.bags.raw_messages import Block, RawMessages
+from sdimu_calibration.storage.bags.sample_file import SampleFile, Samples
+
+_IN_MEMORY = 1 << 21
+"""Number of samples from which they lie in a file: a hundred megabytes, three hours at 200 Hz."""
+_LOOSE = 4096
+"""Messages that are decoded at once where they come one by one."""
+
+
+class ImuMessages(RawMessages):
+    """Messages of an IMU that are decoded as they are read: 56 bytes of each are kept, not 350.
+
+    They can be counted and decoded, not gone through. Blocks that have no layout in common are kept as they are, for
+    a reader that takes messages one by one.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._decoded: list[Samples | Block] = []
+        self._file: SampleFile | None = None
+        self._waiting = 0
+        self._number = 0
+        self._ends: list[bytes] = []
+
+    def append(self, message: bytes) -> None:
+        """Append one message."""
+        super().append(message)
+        if len(self._loose) >= _LOOSE:
+            self._close()
+
+    def __len__(self) -> int:
+        """Return the number of messages."""
+        return self._number + len(self._loose)
+
+    def ends(self) -> tuple[bytes, bytes]:
+        """First and last message."""
+        self._close()
+        return self._ends[0], self._ends[-1]
+
+    def samples(self, one_by_one: Callable[[Sequence[bytes]], Samples]) -> Samples:
+        """Return stamps (n,) (ns), rates (n, 3) (rad/s) and specific forces (n, 3) (m/s^2).
+
+        Parameters
+        ----------
+        one_by_one : callable
+            Reads the messages of blocks that have no layout in common.
+        """
+        self._close()
+        found = [
+            one_by_one(list(_messages_of(part))) if isinstance(part, Block) else part for part in self._decoded
+        ]
+        self._decoded = []
+        if self._file is not None:
+            self._file.append(found)
+            return self._file.samples()
+        ns, omega, force = zip(*found, strict=True) if found else ((), (), ())
+        empty = np.empty((0, 3))
+        return (
+            np.concatenate([np.empty(0, np.int64), *ns]), np.concatenate([empty, *omega]),
+            np.concatenate([empty, *force]),
+        )  # fmt: skip
+
+    def _add(self, block: Block) -> None:
+        if not len(block.start):
+            return
+        first, last = (block.buffer[block.start[k] : block.start[k] + block.length[k]] for k in (0, -1))
+        self._ends = [self._ends[0] if self._ends else first, last]
+        self._number += len(block.start)
+        try:
+            self._decoded.append(decode_imu_block(block))
+        except LayoutError:
+            self._decoded.append(block)
+        self._waiting += len(block.start)
+        if self._waiting >= _IN_MEMORY:
+            self._put_away()
+
+    def _put_away(self) -> None:
+        """Write what was decoded to a file, up to the first block that waits for a reader of single messages."""
+        count = next((k for k, part in enumerate(self._decoded) if isinstance(part, Block)), len(self._decoded))
+        known, self._decoded = self._decoded[:count], self._decoded[count:]
+        self._file = self._file or SampleFile()
+        self._file.append([part for part in known if not isinstance(part, Block)])
+        self._waiting = 0
+
+
+def _messages_of(block: Block) -> Iterator[bytes]:
+    for start, length in zip(block.start.tolist(), block.length.tolist(), strict=True):
+        yield block.buffer[start : start + length]

@@ -1,0 +1,1 @@
+"""Configuration files and result files, to and from the dataclasses of the core."""

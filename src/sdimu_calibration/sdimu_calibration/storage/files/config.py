@@ -1,0 +1,416 @@
+"""Configuration files (YAML) <-> the core's dataclasses.
+
+A file is named by a path, or by its bare name in ``config/<kind>/``. Quantities are text with a unit
+(``"2 deg/s"``); every other spelling is refused with one line that names file and key.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import re
+import reprlib
+from collections.abc import Hashable, Mapping
+from pathlib import Path
+from typing import Annotated, Any, Literal, TypeVar, get_args
+
+import yaml
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+
+from sdimu_calibration.core.plan import Plan, Turn
+from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.specification import ImuSpecification, Model, Site, StatedPrior
+from sdimu_calibration.core.units import from_si, parse_quantity, parse_unit
+
+CONFIG_VARIABLE = "SDIMU_CONFIG"
+"""Environment variable that names the config folder."""
+
+LONGEST_PLAN_S = 7.0 * 86400.0
+"""A plan beyond a week is one with a wrong unit; its samples would not fit into the memory."""
+
+LONGEST_FILE = 1 << 20
+"""Bytes of a configuration at most: reading YAML takes ten seconds a megabyte."""
+
+DEEPEST = 32
+"""Lists in lists and keys under keys at most: a configuration needs five."""
+
+_PACKAGE = Path(__file__).resolve().parents[2]
+_REPOSITORY = _PACKAGE.parents[2]
+
+_SUFFIXES = (".yaml", ".yml", ".json")
+
+
+class Schema(BaseModel):
+    """Base of every file schema: no unknown keys, no infinities."""
+
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False, frozen=True, protected_namespaces=())
+
+
+S = TypeVar("S", bound=Schema)
+
+
+def quantity(expected: str) -> BeforeValidator:
+    """Read text such as ``"2 deg/s"`` into SI, refusing every dimension but that of `expected`."""
+    return BeforeValidator(lambda value: parse_quantity(_as_text(value, expected), expected))
+
+
+def _number_of(unit: str) -> BeforeValidator:
+    """Read a number of a key that names its unit; the unit may stand behind it once more."""
+
+    def read(value: Any) -> Any:
+        if not isinstance(value, str):
+            return value
+        try:
+            return float(value)
+        except ValueError:
+            return from_si(parse_quantity(value, unit), unit)
+
+    return BeforeValidator(read)
+
+
+def _as_text(value: Any, expected: str) -> str:
+    if isinstance(value, bool) or not isinstance(value, str | int | float):
+        raise ValueError(f"expected a number with a unit, something like '1 {expected}'")
+    return str(value)
+
+
+def _signed_quantity(value: Any) -> tuple[float, str]:
+    # The effect that owns a prior knows its dimension; the file reader does not know effects.
+    text = _as_text(value, "ppm")
+    unit, numbers = re.subn(r"^\s*[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?\s*", "", text)
+    if not numbers:
+        raise ValueError(f"'{text}' is not a number with a unit (expected something like '40 ppm' or '1 deg/h')")
+    return parse_quantity(text, unit or "1"), unit
+
+
+def _quantity_of_any_unit(value: Any) -> tuple[float, str]:
+    size, unit = _signed_quantity(value)
+    if size < 0.0:
+        raise ValueError(f"'{value}' is below zero (expected a sigma)")
+    return size, unit
+
+
+def config_folder() -> Path:
+    """Folder of the configuration: `SDIMU_CONFIG`, else the package's own, else the repository's.
+
+    A wheel and a build by colcon carry the files inside the package; an editable install leaves them in the repository.
+
+    Raises
+    ------
+    DataError
+        When there is none.
+    """
+    named = os.environ.get(CONFIG_VARIABLE)
+    if named:
+        if not Path(named).is_dir():
+            raise DataError(f"{named}: not a folder (environment variable {CONFIG_VARIABLE})")
+        return Path(named)
+    for parent in _PACKAGE, _REPOSITORY:
+        if (parent / "config" / "plan").is_dir():
+            return parent / "config"
+    raise DataError(f"no config folder found; set {CONFIG_VARIABLE} to the folder that holds plan/, imu/, model/")
+
+
+def find_config(kind: str, name_or_path: str | Path) -> Path:
+    """Path of a configuration file.
+
+    Parameters
+    ----------
+    kind : str
+        Folder inside the config folder: ``plan``, ``imu``, ``model``, ``site``, ``table``, ``temperature``.
+    name_or_path : str or Path
+        A bare name is looked up in the config folder; whatever looks like a path is taken as it is.
+
+    Raises
+    ------
+    DataError
+        When there is no such file; the text lists the names there are.
+    """
+    text = str(name_or_path)
+    path = Path(text)
+    if isinstance(name_or_path, Path) or _is_path(text):
+        if path.is_file():
+            return path
+        raise DataError(f"{path}: no such {kind} file")
+    folder = config_folder() / kind
+    for suffix in _SUFFIXES:
+        if (folder / f"{text}{suffix}").is_file():
+            return folder / f"{text}{suffix}"
+    known = sorted(p.stem for p in folder.glob("*") if p.suffix in _SUFFIXES)
+    raise DataError(f"no {kind} named '{text}' (there are: {', '.join(known) or 'none'}; or give a path to a file)")
+
+
+def _is_path(text: str) -> bool:
+    """Whether a text is the path of a file, and no bare name."""
+    return Path(text).suffix in _SUFFIXES or Path(text).name != text
+
+
+def stated_path(name_or_path: str | None) -> str:
+    """Path of a file of the user's own, from the root, so that it is found from any folder; empty for a bare name."""
+    return str(Path(name_or_path).resolve()) if name_or_path and _is_path(name_or_path) else ""
+
+
+class _UniqueKeys(yaml.SafeLoader):
+    """YAML of plain values: a key written twice is an error, and so is what can nest without end."""
+
+    _depth = 0
+
+    def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
+        mark = self.peek_event().start_mark  # type: ignore[no-untyped-call]
+        if self.check_event(yaml.AliasEvent):
+            raise yaml.composer.ComposerError(None, None, "aliases (*name) are not read, write it out", mark)
+        if self._depth > DEEPEST:
+            raise yaml.composer.ComposerError(None, None, f"nested more than {DEEPEST} deep", mark)
+        self._depth += 1
+        node = super().compose_node(parent, index)
+        self._depth -= 1
+        return node
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Hashable, Any]:
+        seen: set[Hashable] = set()
+        for key_node, _ in node.value:
+            key = self.construct_object(key_node, deep=True)
+            if isinstance(key, Hashable) and key in seen:
+                raise yaml.constructor.ConstructorError(None, None, f"key '{key}' is there twice", node.start_mark)
+            if isinstance(key, Hashable):
+                seen.add(key)
+        return super().construct_mapping(node, deep)
+
+
+def read_mapping(path: Path) -> dict[str, Any]:
+    """Content of a YAML file that holds keys and values; DataError with file and line otherwise."""
+    try:
+        if path.stat().st_size > LONGEST_FILE:
+            raise DataError(f"{path}: longer than {LONGEST_FILE} bytes, which no configuration is")
+        data = yaml.load(path.read_text(encoding="utf-8"), Loader=_UniqueKeys)
+    except DataError:
+        raise
+    except OSError as error:
+        raise DataError(f"{path}: cannot be read ({error.strerror})") from error
+    except UnicodeDecodeError as error:
+        raise DataError(f"{path}: is not text (expected YAML in UTF-8)") from error
+    except yaml.YAMLError as error:
+        mark = getattr(error, "problem_mark", None)
+        where = f" line {mark.line + 1}:" if mark else ""
+        what = getattr(error, "problem", None) or "cannot be read"
+        raise DataError(f"{path}:{where} not valid YAML: {what}") from error
+    except Exception as error:
+        # What text makes of a number or a date that is none: errors of int(), of datetime, of the stack.
+        raise DataError(f"{path}: not valid YAML: {error or type(error).__name__}") from error
+    if not isinstance(data, dict):
+        raise DataError(f"{path}: expected 'key: value' lines, found {'nothing' if data is None else 'something else'}")
+    return data
+
+
+def read_yaml(path: Path, schema: type[S]) -> S:
+    """Read a YAML file into a schema.
+
+    Raises
+    ------
+    DataError
+        One line: file, key path, what is wrong, what is expected.
+    """
+    return check(read_mapping(path), schema, str(path))
+
+
+def check(data: Mapping[str, Any], schema: type[S], source: str) -> S:
+    """Validate plain data against a schema; `source` names it in the DataError."""
+    try:
+        return schema.model_validate(data)
+    except ValidationError as error:
+        first = min(error.errors(), key=_rank)
+        key = ".".join(str(part) for part in first["loc"])
+        raise DataError(
+            f"{source}: {key}: {_message(first, schema)}" if key else f"{source}: {first['msg']}"
+        ) from error
+
+
+_SHAPES = {"dict_type": "write one line `name: value` for each, below the key", "list_type": "write a list [a, b, ...]"}
+"""What to write where a file has something else in the place of a mapping or list."""
+
+
+def _rank(error: Any) -> int:
+    """Order errors by what says best what to mend.
+
+    A file of another kind has hardly a key that is right. A misspelt key is unknown and leaves the right one missing.
+    """
+    if error["loc"] == ("format",) and error["type"] != "missing":
+        return 0
+    return 1 if error["type"] == "extra_forbidden" else 2
+
+
+def _message(error: Any, schema: type[BaseModel]) -> str:
+    kind, found = error["type"], error.get("input")
+    if kind == "extra_forbidden":
+        return f"unknown key (known keys: {', '.join(_known_keys(schema, error['loc'][:-1]))})"
+    if kind == "missing":
+        return "missing key"
+    if kind in _SHAPES:
+        return f"{_SHAPES[kind]} (found: {'nothing' if found is None else reprlib.repr(found)})"
+    text = str(error["msg"]).removeprefix("Value error, ")
+    text = text[:1].lower() + text[1:] if kind != "value_error" else text
+    return text if kind == "value_error" else f"{text} (found: {reprlib.repr(found)})"
+
+
+def _known_keys(schema: type[BaseModel], loc: tuple[Any, ...]) -> list[str]:
+    for part in loc:
+        if isinstance(part, str) and part in schema.model_fields:
+            annotation = schema.model_fields[part].annotation
+            for inner in (annotation, *get_args(annotation)):
+                if isinstance(inner, type) and issubclass(inner, BaseModel):
+                    schema = inner
+    return list(schema.model_fields)
+
+
+class _TurnFile(Schema):
+    axis: Literal["X", "Y", "Z"]
+    angle: Annotated[float, quantity("deg")]
+    rate: Annotated[float, quantity("deg/s"), Field(gt=0)] | None = None
+    dwell: Annotated[float, quantity("s"), Field(gt=0)] | None = None
+
+
+class _PlanFile(Schema):
+    format: Literal["sdimu-plan/1"] = "sdimu-plan/1"
+    name: str | None = None
+    dwell: Annotated[float, quantity("s"), Field(gt=0)]
+    first_dwell: Annotated[float, quantity("s"), Field(gt=0)] | None = None
+    rate: Annotated[float, quantity("deg/s"), Field(gt=0)]
+    acceleration: Annotated[float, quantity("deg/s^2"), Field(gt=0)]
+    turns: tuple[_TurnFile, ...]
+
+
+class _NoiseFile(Schema):
+    gyro: Annotated[float, quantity("deg/h/sqrt(Hz)"), Field(ge=0)]
+    accel: Annotated[float, quantity("ug/sqrt(Hz)"), Field(ge=0)]
+    gyro_random_walk: Annotated[float, quantity("deg/h/sqrt(h)"), Field(ge=0)] = 0.0
+    accel_random_walk: Annotated[float, quantity("ug/sqrt(h)"), Field(ge=0)] = 0.0
+    gyro_quantisation: Annotated[float, quantity("arcsec"), Field(ge=0)] = 0.0
+    accel_quantisation: Annotated[float, quantity("mm/s"), Field(ge=0)] = 0.0
+    gyro_bias_instability: Annotated[float, quantity("deg/h"), Field(ge=0)] = 0.0
+    accel_bias_instability: Annotated[float, quantity("ug"), Field(ge=0)] = 0.0
+
+
+class _ImuFile(Schema):
+    format: Literal["sdimu-imu/1"] = "sdimu-imu/1"
+    name: str | None = None
+    grade: Literal["navigation", "tactical", "mems"] = "navigation"
+    noise: _NoiseFile
+    prior: dict[str, Annotated[tuple[float, str], BeforeValidator(_quantity_of_any_unit)]] = {}
+
+
+class _PriorFile(Schema):
+    value: Annotated[tuple[float, str], BeforeValidator(_signed_quantity)]
+    sigma: Annotated[tuple[float, str], BeforeValidator(_quantity_of_any_unit)]
+
+
+class _ModelFile(Schema):
+    format: Literal["sdimu-model/1"] = "sdimu-model/1"
+    name: str | None = None
+    effects: tuple[str, ...] = Field(min_length=1)
+    velocity_sigma: Annotated[float, quantity("m/s"), Field(gt=0)] = Model.velocity_sigma
+    position_sigma: Annotated[float, quantity("m"), Field(gt=0)] = Model.position_sigma
+    settle: Annotated[float, quantity("s"), Field(ge=0)] = Model.settle_s
+    body_frame: Literal["accelerometer_triad", "prior"] = "accelerometer_triad"
+    priors: dict[str, _PriorFile] = {}
+
+
+class _SiteFile(Schema):
+    format: Literal["sdimu-site/1"] = "sdimu-site/1"
+    name: str | None = None
+    latitude_deg: Annotated[float, _number_of("deg"), Field(ge=-90.0, le=90.0)]
+    height_m: Annotated[float, _number_of("m"), Field(ge=-5000.0, le=20000.0)]
+    gravity_m_s2: Annotated[float, _number_of("m/s^2"), Field(gt=9.5, lt=10.0)] | None = None
+    initial_azimuth_deg: Annotated[float, _number_of("deg"), Field(ge=-360.0, le=360.0)] | None = None
+    magnetic_field_nt: tuple[float, float, float] | None = None
+    initial_azimuth_sigma_deg: Annotated[float, _number_of("deg"), Field(gt=0.0, le=360.0)] = math.degrees(
+        Site.initial_azimuth_sigma_rad
+    )
+
+
+def load_plan(name_or_path: str | Path) -> Plan:
+    """Read a test plan.
+
+    ``rate`` and ``dwell`` of a turn replace the plan's for that turn and for the stop after it;
+    ``first_dwell`` is the stop before the first turn.
+
+    Raises
+    ------
+    DataError
+        When the file is missing or wrong, a turn has no angle, or the whole lasts longer than `LONGEST_PLAN_S`.
+    """
+    path = find_config("plan", name_or_path)
+    file = read_yaml(path, _PlanFile)
+    for number, turn in enumerate(file.turns, start=1):
+        if turn.angle == 0.0:
+            raise DataError(f"{path}: turn {number}: angle is zero (expected a signed angle such as '90 deg')")
+    plan = Plan(
+        name=file.name or path.stem,
+        dwell_s=(file.first_dwell or file.dwell, *(t.dwell or file.dwell for t in file.turns)),
+        turns=tuple(Turn(t.axis, t.angle, t.rate or file.rate) for t in file.turns),
+        acceleration_rad_s2=file.acceleration,
+    )
+    if plan.duration_s > LONGEST_PLAN_S:
+        raise DataError(
+            f"{path}: lasts {plan.duration_s / 3600.0:.4g} h, more than {LONGEST_PLAN_S / 3600.0:g} h "
+            "(check the units of dwell, rate and angle)"
+        )
+    return plan
+
+
+def load_imu(name_or_path: str | Path) -> ImuSpecification:
+    """Read an IMU's specification; priors come in SI, with their units for `imu_model.build` to check."""
+    path = find_config("imu", name_or_path)
+    file = read_yaml(path, _ImuFile)
+    return ImuSpecification(
+        name=file.name or path.stem,
+        file=str(path),
+        gyro_white_noise=file.noise.gyro,
+        accel_white_noise=file.noise.accel,
+        prior={name: size for name, (size, _) in file.prior.items()},
+        prior_units={name: unit for name, (_, unit) in file.prior.items()},
+        grade=file.grade,
+        gyro_random_walk=file.noise.gyro_random_walk,
+        accel_random_walk=file.noise.accel_random_walk,
+        gyro_quantisation=file.noise.gyro_quantisation,
+        accel_quantisation=file.noise.accel_quantisation,
+        gyro_bias_instability=file.noise.gyro_bias_instability,
+        accel_bias_instability=file.noise.accel_bias_instability,
+    )
+
+
+def load_model(name_or_path: str | Path) -> Model:
+    """Read a model to estimate; whether its effects exist is the registry's to say."""
+    path = find_config("model", name_or_path)
+    file = read_yaml(path, _ModelFile)
+    repeated = sorted({e for e in file.effects if file.effects.count(e) > 1})
+    if repeated:
+        raise DataError(f"{path}: effects: '{repeated[0]}' is there twice (name every effect once)")
+    return Model(
+        effects=file.effects,
+        velocity_sigma=file.velocity_sigma,
+        position_sigma=file.position_sigma,
+        settle_s=file.settle,
+        body_frame=file.body_frame,
+        priors=tuple(_stated_prior(f"{path}: priors.{name}", name, one) for name, one in file.priors.items()),
+    )
+
+
+def _stated_prior(where: str, name: str, one: _PriorFile) -> StatedPrior:
+    (mean, unit), (sigma, other) = one.value, one.sigma
+    if parse_unit(unit or "1").dimension != parse_unit(other or "1").dimension or bool(unit) != bool(other):
+        raise DataError(f"{where}: value and sigma have different units, '{unit}' and '{other}'")
+    return StatedPrior(name, mean, sigma, unit)
+
+
+def load_site(name_or_path: str | Path) -> Site:
+    """Read a site."""
+    file = read_yaml(find_config("site", name_or_path), _SiteFile)
+    azimuth, field = file.initial_azimuth_deg, file.magnetic_field_nt
+    return Site(
+        latitude_rad=math.radians(file.latitude_deg),
+        height_m=file.height_m,
+        gravity_m_s2=file.gravity_m_s2,
+        initial_azimuth_rad=None if azimuth is None else math.radians(azimuth),
+        initial_azimuth_sigma_rad=math.radians(file.initial_azimuth_sigma_deg),
+        magnetic_field_t=None if field is None else (1e-9 * field[0], 1e-9 * field[1], 1e-9 * field[2]),
+    )

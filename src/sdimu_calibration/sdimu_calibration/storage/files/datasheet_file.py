@@ -1,0 +1,121 @@
+"""A data sheet as datasheet.json (format ``sdimu-datasheet/1``), and the files that a certificate vouches for."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from sdimu_calibration.core.fleet.sheet import Line
+from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.storage.files.fleet_folder import Entry
+from sdimu_calibration.storage.files.json_file import write_json
+
+FORMAT = "sdimu-datasheet/1"
+_READ = 1 << 20
+"""Bytes that are read at once."""
+
+
+@dataclass(frozen=True)
+class Certificate:
+    """Who vouches for what; empty where nobody said it.
+
+    Attributes
+    ----------
+    serial, date, operator, plan, version : str
+        Unit, day of the certificate, person, test plan, version of the program.
+    recordings : tuple of (str, str)
+        Name and SHA-256 of each file of the recordings; the second is empty where the file was not found.
+    """
+
+    serial: str = ""
+    date: str = ""
+    operator: str = ""
+    plan: str = ""
+    version: str = ""
+    recordings: tuple[tuple[str, str], ...] = ()
+
+
+def write_datasheet(path: Path, lines: Sequence[Line], about: Certificate, entries: Sequence[Entry]) -> None:
+    """Write datasheet.json: SI numbers, ``null`` for what was not measured.
+
+    Parameters
+    ----------
+    path : Path
+        File to make or replace; its folder is made too.
+    lines : sequence of Line
+    about : Certificate
+    entries : sequence of Entry
+        The results that it is made of.
+    """
+    write_json(path, {
+        "format": FORMAT,
+        **{key: value for key, value in asdict(about).items() if key != "recordings"},
+        "recordings": [{"file": name, "sha256": digest} for name, digest in about.recordings],
+        "results": [{"name": entry.name, "unit": entry.unit} for entry in entries],
+        "lines": [_line(line) for line in lines],
+    })  # fmt: skip
+
+
+def _line(line: Line) -> dict[str, Any]:
+    return asdict(line) | {"verdict": line.verdict}
+
+
+def hashed(entries: Sequence[Entry], given: Sequence[Path]) -> tuple[tuple[str, str], ...]:
+    """Hash the files of the recordings of some results.
+
+    Parameters
+    ----------
+    entries : sequence of Entry
+        A recording is looked for beside the folder of its result, where `sdimu calibrate` leaves it.
+    given : sequence of Path
+        Recordings that are elsewhere.
+
+    Raises
+    ------
+    DataError
+        When a path that was given is not there.
+    """
+    for path in given:
+        if not path.exists():
+            raise DataError(f"{path}: no such recording")
+    named = list(dict.fromkeys((name, entry.path) for entry in entries for name in recordings_of(entry)))
+    out: dict[Path, tuple[str, str]] = {}
+    missing: list[tuple[str, str]] = []
+    for name, folder in named:
+        places = [path for path in given if path.resolve().name == name] + [folder.parent / name, folder / name]
+        found = next((path for path in places if path.exists()), None)
+        if found is None:
+            missing.append((name, ""))
+        else:
+            out |= file_hashes(found)
+    for path in given:
+        out |= file_hashes(path)
+    return (*out.values(), *missing)
+
+
+def recordings_of(entry: Entry) -> list[str]:
+    """Names of the recordings that a result is of, as far as it says them."""
+    of_set = entry.result.of_set
+    if of_set is not None:
+        return [one.name for one in of_set.recordings]
+    return [entry.result.origin.recording] if entry.result.origin.recording else []
+
+
+def file_hashes(path: Path) -> dict[Path, tuple[str, str]]:
+    """Name and SHA-256 of a file, or of the files of a bag, by path."""
+    files = [path] if path.is_file() else sorted(file for file in path.iterdir() if file.is_file())
+    return {
+        file.resolve(): (file.name if path.is_file() else f"{path.resolve().name}/{file.name}", _sha256(file))
+        for file in files
+    }
+
+
+def _sha256(path: Path) -> str:
+    digest = hashlib.sha256()
+    with path.open("rb") as stream:
+        while block := stream.read(_READ):
+            digest.update(block)
+    return digest.hexdigest()

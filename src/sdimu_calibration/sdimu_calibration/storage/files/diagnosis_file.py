@@ -1,0 +1,245 @@
+"""The result of a diagnosis as diagnosis.json (format ``sdimu-diagnosis/1``): SI numbers, names as everywhere."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sdimu_calibration.core.diagnosis.bootstrap import Null
+from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
+from sdimu_calibration.core.diagnosis.found import DetectableSize, Found
+from sdimu_calibration.core.diagnosis.free_input_test import FreeInputTest
+from sdimu_calibration.core.diagnosis.ladder import Rung
+from sdimu_calibration.core.diagnosis.plan_seen import PlanSeen
+from sdimu_calibration.core.diagnosis.scan import Scan, scale_of, scan
+from sdimu_calibration.core.diagnosis.search import Step
+from sdimu_calibration.core.diagnosis.standing import standing
+from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary
+from sdimu_calibration.core.evidence.consistency import Noise
+from sdimu_calibration.core.evidence.linear import LinearEvidence
+from sdimu_calibration.core.handheld.handheld_fit import FORCE, RATE, TURN
+from sdimu_calibration.core.results import Calibration
+from sdimu_calibration.core.verdict import Verdict
+from sdimu_calibration.storage.files.advice_words import sentence
+from sdimu_calibration.storage.files.correlation_text import packed
+from sdimu_calibration.storage.files.json_file import read_json, write_json
+from sdimu_calibration.storage.files.standing_file import as_plain
+
+FORMAT = "sdimu-diagnosis/1"
+
+
+def write_diagnosis(path: Path, summary: DiagnosisSummary, null: Null | None = None) -> None:
+    """Write diagnosis.json.
+
+    Parameters
+    ----------
+    path : Path
+        File to make or replace; its folder is made too.
+    summary : DiagnosisSummary
+    null : Null, optional
+        Of a bootstrap.
+    """
+    write_json(path, content(summary) | ({"bootstrap": _null(null)} if null else {}))
+
+
+def read_diagnosis(path: Path) -> dict[str, Any]:
+    """Read diagnosis.json, or the diagnosis.json in a folder.
+
+    Raises
+    ------
+    DataError
+        When it is not there or not of this format.
+    """
+    path = Path(path)
+    return read_json(path / "diagnosis.json" if path.is_dir() else path, FORMAT)
+
+
+def content(summary: DiagnosisSummary) -> dict[str, Any]:
+    """Give the diagnosis as plain data."""
+    d = summary.diagnosis
+    is_unexplained = d.verdict == Verdict.UNEXPLAINED
+    return {
+        "format": FORMAT,
+        "estimator": d.fit.estimator,
+        "adequate": d.adequate,
+        "p_value": d.p_value,
+        "verdict": d.verdict,
+        "sentence": d.sentence,
+        "where": [
+            {"channel": w.channel, "stop": w.stop, "normalised_mean": w.normalised_mean} for w in d.consistency.where
+        ],
+        "candidates": [candidate(f, d.own) for f in summary.candidates],
+        "partial": [candidate(f, d.own) for f in summary.found] if is_unexplained else [],
+        "unexplained": {
+            "is": is_unexplained,
+            "fraction": _unexplained_fraction(d),
+            "best_variables": [f.candidate.label for f in summary.found] if is_unexplained or d.own else [],
+        },
+        "advice": [sentence(one) for one in summary.advice],
+        "findings": [{"text": f.text, "grave": f.grave} for f in d.findings],
+        "noise": {
+            "wrong": list(d.noise),
+            "terms": [asdict(term) | {"unit": term.unit, "words": term.words} for term in d.found.noise],
+            "gyro": _noise(d.consistency.gyro),
+            "accel": _noise(d.consistency.accel),
+        },
+        "consistency": {
+            "nis_mean": d.consistency.nis_mean,
+            "nis_p_value": d.consistency.nis_p_value,
+            "first_nis": d.consistency.first_nis,
+            "ljung_box_p": d.consistency.ljung_box_p,
+            "threshold": d.found.threshold,
+        },
+        "free_inputs": {
+            "before": _free_inputs(d.free_inputs_before),
+            "after": _free_inputs(d.free_inputs_after),
+        },
+        "alone": alone(d.evidence, d.found.first, d.free.tolist()),
+        "known": as_plain(standing(d, summary.found)),
+        "fit": {"before": fit_of(d.before), "after": fit_of(d.after)},
+        "ladder": [step_of(s) for s in d.found.steps],
+        "grown": [_rung(r) for r in d.rungs],
+        "plan": _plan(summary.plan),
+        "not_testable": [reach_of(r) | {"reason": _reason(summary, r)} for r in summary.reached if not r.testable],
+        "smallest_detectable": [reach_of(r) for r in summary.reached if r.testable],
+    }  # fmt: skip
+
+
+def alone(evidence: LinearEvidence, before: Scan, free: Sequence[int] = ()) -> dict[str, Any]:
+    """Give every candidate of the catalogue alone beside the given model, however small: many units make it large.
+
+    Parameters
+    ----------
+    evidence : LinearEvidence
+        Of a recording, or of a set.
+    before : Scan
+        Of the search, before anything was added: says how large the noise is.
+    free : sequence of int
+        Columns of the evidence that are no candidates.
+    """
+    first = scan(evidence.information, evidence.model, evidence.weight, scale_of(before))
+    J = evidence.information.given(evidence.model, evidence.weight).J
+    p = len(evidence.weight)
+    shown = [
+        (evidence.candidates[k - p], k) for k in range(p, len(evidence.names))
+        if k not in free and np.isfinite(first.sigma[k]) and evidence.candidates[k - p].family != "own"
+    ]
+    return {
+        "labels": [candidate.label for candidate, _ in shown],
+        "units": [candidate.parameter.unit for candidate, _ in shown],
+        "display_units": [candidate.parameter.display_unit for candidate, _ in shown],
+        "estimates": [float(first.estimate[k]) for _, k in shown],
+        "sigmas": [float(first.sigma[k]) for _, k in shown],
+        "correlations": packed(J[np.ix_(*[[k for _, k in shown]] * 2)]),
+    }  # fmt: skip
+
+
+def _plan(plan: PlanSeen | None) -> dict[str, Any] | None:
+    """Give the turns of a table as plain data; None where there is no table."""
+    if plan is None:
+        return None
+    return {
+        "turns": [
+            {"after_stop": t.after_stop, "axis": None if t.axis is None else "xyz"[t.axis],
+             "angle": t.angle, "rate": t.rate}
+            for t in plan.turns
+        ],
+        "oblique_stops": plan.oblique,
+    }  # fmt: skip
+
+
+def candidate(f: Found, own: bool) -> dict[str, Any]:
+    """Give an effect that was found as plain data."""
+    parameter = f.candidate.parameter
+    return {
+        "effect": f.candidate.label if own else f.candidate.family,
+        "label": f.candidate.label,
+        "parameters": [
+            {"name": parameter.name, "value": f.value, "sigma": f.sigma, "unit": parameter.unit,
+             "display_unit": parameter.display_unit}
+        ],
+        "z": f.z,
+        "delta_log_likelihood": f.log_likelihood_gain,
+        "log_bayes_factor": f.log_bayes_factor,
+        "p_value_adjusted": f.p_value_adjusted,
+        "explained": f.explained,
+        "held_out_rms_before": f.held_out_before,
+        "held_out_rms_after": f.held_out_after,
+        "indistinguishable_from": list(f.alike),
+        "depends_on_choice": [
+            {"instead": s.other, "coefficient": s.coefficient, "sigmas": s.sigmas} for s in f.coefficient_shifts
+        ],
+    }  # fmt: skip
+
+
+def _unexplained_fraction(d: Diagnosis) -> float:
+    """Share of the misfit that is left: none without a misfit; all or none where no free inputs measure it."""
+    if d.verdict != Verdict.UNEXPLAINED and not len(d.found.chosen):
+        return 0.0
+    if np.isnan(d.explained):
+        return float(d.verdict == Verdict.UNEXPLAINED)
+    return float(np.clip(1.0 - d.explained, 0.0, 1.0))
+
+
+def _noise(noise: Noise) -> dict[str, Any]:
+    return {
+        "ratio": noise.ratio, "sigma": noise.sigma, "kurtosis": noise.kurtosis, "outliers": len(noise.outliers),
+    }  # fmt: skip
+
+
+def fit_of(calibration: Calibration) -> dict[str, Any]:
+    """Give model and fit of a calibration as plain data."""
+    return {"model": list(calibration.model), **dict(calibration.fit)}
+
+
+def step_of(s: Step) -> dict[str, Any]:
+    """Give a step of the search as plain data."""
+    return {
+        "label": s.label, "effect": s.family, "accepted": s.accepted, "reason": s.reason,
+        "taken_out": s.taken_out, "z": s.z,
+        "threshold": s.threshold, "estimate": s.estimate, "sigma": s.sigma, "unit": s.unit,
+        "log_likelihood_gain": s.log_likelihood_gain, "log_bayes_factor": s.log_bayes_factor,
+        "one_stop_out_before": s.held_out_before.rms, "one_stop_out_after": s.held_out_after.rms,
+        "held_out_gain": s.held_out_gain, "held_out_error": s.held_out_error,
+        "indistinguishable_from": list(s.alike),
+        "moved": [{"name": name, "sigmas": size} for name, size in s.moved],
+    }  # fmt: skip
+
+
+def _null(null: Null) -> dict[str, Any]:
+    return {
+        "draws": null.draws, "false_finds": null.false_finds, "threshold": null.threshold, "rms_z": null.rms_z,
+        "largest": null.largest, "remainder_p": null.free_input_p,
+    }  # fmt: skip
+
+
+def _rung(r: Rung) -> dict[str, Any]:
+    return {
+        "added": r.added, "accepted": r.accepted, "reason": r.reason, "log_likelihood": r.log_likelihood,
+        "log_bayes_factor": r.log_bayes_factor, "nis_mean": r.nis_mean, "held_out_rms": r.held_out_rms,
+        "jump": r.jump, "jump_velocity": r.jump_velocity,
+        "moved": [{"name": name, "sigmas": size} for name, size in r.moved],
+        "beyond_white_noise": None if r.scatter is None else {
+            "force_m_s2": r.scatter[FORCE], "rate_rad_s": r.scatter[RATE], "turn_share": r.scatter[TURN],
+        },
+    }  # fmt: skip
+
+
+def reach_of(r: DetectableSize) -> dict[str, Any]:
+    """Give what could have been seen of one effect as plain data."""
+    return {
+        "label": r.label, "effect": r.family, "retention": r.retention, "smallest": r.smallest, "unit": r.unit,
+        "display_unit": r.display_unit, "taken_by": list(r.partners),
+    }  # fmt: skip
+
+
+def _reason(summary: DiagnosisSummary, r: DetectableSize) -> str:
+    return next((b.reason for b in summary.untestable if r.label in b.labels), "")
+
+
+def _free_inputs(test: FreeInputTest) -> dict[str, Any]:
+    return {"chi2": test.chi2, "dof": test.dof, "p": test.p_value}

@@ -1,0 +1,117 @@
+"""A study of a fleet as fleet.json (format ``sdimu-fleet/1``, SI), and its priors as an IMU file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from sdimu_calibration.core.effect_key import effect_of
+from sdimu_calibration.core.fleet.population import Coefficient
+from sdimu_calibration.core.fleet.priors import population_priors
+from sdimu_calibration.core.fleet.reml import RandomEffect
+from sdimu_calibration.core.fleet.study import Study
+from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.units import from_si
+from sdimu_calibration.storage.files.config import find_config, read_mapping
+from sdimu_calibration.storage.files.fleet_folder import Gathered
+from sdimu_calibration.storage.files.json_file import write_json
+from sdimu_calibration.storage.files.result_file import plain_origin
+from sdimu_calibration.storage.files.whole_file import write_whole
+
+FORMAT = "sdimu-fleet/1"
+
+
+def write_fleet(path: Path, gathered: Gathered, done: Study) -> None:
+    """Write fleet.json.
+
+    Parameters
+    ----------
+    path : Path
+        File to make or replace; its folder is made too.
+    gathered : Gathered
+        The results.
+    done : Study
+        What they say together.
+    """
+    first = gathered.entries[0].result
+    shown = dict(zip(first.names, zip(first.units, first.display_units, strict=True), strict=True))
+    write_json(path, {
+        "format": FORMAT,
+        "imu": first.origin.imu,
+        "model": list(first.model),
+        "body_frame": first.body_frame,
+        "results": [
+            {"name": e.name, "unit": e.unit, "origin": plain_origin(e.result.origin)} for e in gathered.entries
+        ],
+        "apart": list(gathered.apart),
+        "units": list(done.people.units),
+        "coefficients": [
+            _coefficient(one, inside.control_limits, *shown[one.name])
+            for one, inside in zip(done.people.coefficients, done.inside.coefficients, strict=True)
+        ],
+        "out": [asdict(one) for one in done.people.out],
+        "trends": [asdict(one) | {"per": "year", "unit": shown[one.coefficient][0]} for one in done.slopes],
+        "common_effects": [asdict(one) for one in done.common],
+    })  # fmt: skip
+
+
+def _coefficient(one: Coefficient, limits: tuple[float, float], unit: str, display_unit: str) -> dict[str, Any]:
+    low, high = one.between.mean_interval
+    return {
+        "name": one.name, "unit": unit, "display_unit": display_unit,
+        "mean": one.between.mean, "mean_low": low, "mean_high": high,
+        **_spread("spread", one.between), **({} if one.within is None else _spread("within", one.within)),
+        "q": one.between.q, "dof": one.between.dof, "p_value": one.between.p_value,
+        "control_low": limits[0], "control_high": limits[1],
+        "values": one.values, "sigmas": one.sigmas, "deviates": one.deviates,
+    }  # fmt: skip
+
+
+def _spread(name: str, found: RandomEffect) -> dict[str, float]:
+    return {name: found.spread, f"{name}_low": found.low, f"{name}_high": found.high}
+
+
+def write_priors(path: Path, base: str, gathered: Gathered, done: Study) -> Mapping[str, str]:
+    """Write an IMU file with the priors of the population, without units that are out.
+
+    Parameters
+    ----------
+    path : Path
+        File to make or replace.
+    base : str
+        IMU by name or path: grade, noise, and priors of effects that the population does not know.
+    gathered : Gathered
+    done : Study
+
+    Returns
+    -------
+    mapping of str to str
+        The priors written, as in the file, by effect.
+
+    Raises
+    ------
+    DataError
+        When the base cannot be read, or is the file to write.
+    """
+    source = find_config("imu", base)
+    if path.exists() and path.resolve() == source.resolve():
+        raise DataError(f"{path}: is the IMU file that the priors are added to; write them to another one")
+    first = gathered.entries[0].result
+    of = {name: effect_of(name, first.model) for name in first.names}
+    units = {of[name]: unit for name, unit in zip(first.names, first.display_units, strict=True)}
+    sizes = population_priors(done.inside, of)
+    priors = {effect: f"{from_si(size, units[effect]):.3g} {units[effect]}" for effect, size in sizes.items()}
+    content = dict(read_mapping(source))
+    content["name"] = path.stem
+    content["prior"] = {**content.get("prior", {}), **priors}
+    text = yaml.safe_dump(content, sort_keys=False, allow_unicode=True)
+    remark = (
+        f"# Priors of {len(done.inside.units)} units (sdimu fleet): root mean square of mean, spread and error of the\n"
+        f"# mean, over the coefficients of an effect. Grade, noise and all others are those of '{base}'.\n"
+    )
+    write_whole(path, remark + text)
+    return priors

@@ -1,0 +1,87 @@
+"""A specification of an IMU written as YAML, with measured noise in place of the data sheet's."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+import yaml
+
+from sdimu_calibration.core.noise import TERMS, Terms, WhiteNoise
+from sdimu_calibration.core.noise.white import white_beside
+from sdimu_calibration.core.units import from_si
+from sdimu_calibration.storage.files.config import find_config, read_mapping
+from sdimu_calibration.storage.files.whole_file import write_whole
+
+GYRO_UNIT, ACCEL_UNIT = "deg/h/sqrt(Hz)", "ug/sqrt(Hz)"
+
+
+_MEMORY = {
+    "quantisation": ("quantisation", {"gyro": "arcsec", "accel": "mm/s"}),
+    "instability": ("bias_instability", {"gyro": "deg/h", "accel": "ug"}),
+    "random_walk": ("random_walk", {"gyro": "deg/h/sqrt(h)", "accel": "ug/sqrt(h)"}),
+}
+"""Keys of an IMU file: of the terms beside white noise, and their units by triad."""
+_SHORT = ("quantisation",)
+"""Terms that are believed where the terms do not explain the deviation: they show in times shorter than any rocking."""
+
+
+def write_measured_imu(
+    path: Path, base: str, measured: WhiteNoise, terms: Mapping[str, Terms], remarks: Sequence[str]
+) -> None:
+    """Write an IMU file that ``--imu`` takes: grade and priors of `base`, the noise as measured.
+
+    Parameters
+    ----------
+    path : Path
+        File to make or replace; its folder is made too.
+    base : str
+        IMU by name or path.
+    measured : WhiteNoise
+        The noise of means over a second: what is left of it without quantisation is written as white noise.
+    terms : mapping of str to Terms
+        By channel; of each triad the root mean square of the axes that show a term is written.
+    remarks : sequence of str
+        Comments for the head of the file.
+
+    Raises
+    ------
+    DataError
+        When the base cannot be read.
+    """
+    content = dict(read_mapping(find_config("imu", base)))
+    content["name"] = path.stem
+    noise = {}
+    for triad, unit, white in (("gyro", GYRO_UNIT, measured.gyro), ("accel", ACCEL_UNIT, measured.accel)):
+        found = memory_of(terms, triad)
+        noise[triad] = f"{from_si(white_beside(white, found.get('quantisation', 0.0)), unit):.5g} {unit}"
+        for term, size in found.items():
+            key, units = _MEMORY[term]
+            noise[f"{triad}_{key}"] = f"{from_si(size, units[triad]):.3g} {units[triad]}"
+    content["noise"] = noise
+    lines = [f"# {remark}" for remark in remarks]
+    lines.append(f"# Grade and priors are those of '{base}': they are not measured here.")
+    text = yaml.safe_dump(content, sort_keys=False, allow_unicode=True)
+    write_whole(path, "\n".join(lines) + "\n" + text)
+
+
+def memory_of(terms: Mapping[str, Terms], triad: str) -> dict[str, float]:
+    """Sizes (SI) of the terms beside white noise that a triad shows, root mean square of its axes.
+
+    Parameters
+    ----------
+    terms : mapping of str to Terms
+        By channel.
+    triad : str
+        ``gyro`` or ``accel``.
+    """
+    axes = [t for channel, t in terms.items() if channel.startswith(triad)]
+    out = {}
+    for name in _MEMORY:
+        k = TERMS.index(name)
+        # A base that rocks looks like a wandering bias.
+        shown = [float(t.value[k]) if t.seen[k] and (not t.misfit or name in _SHORT) else 0.0 for t in axes]
+        if any(shown):
+            out[name] = float(np.sqrt(np.mean(np.square(shown))))
+    return out

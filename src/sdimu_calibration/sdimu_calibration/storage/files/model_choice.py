@@ -1,0 +1,52 @@
+"""Words for estimators and models: the same in the shell and in Python."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from sdimu_calibration.core.estimation.solve import AUTO, ESTIMATORS
+from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.specification import Model
+from sdimu_calibration.storage.files.effect_file import extended_model
+
+TABLE_MODEL, HANDHELD_MODEL = "baseline", "hand"
+"""Models that are taken where the user names none."""
+HANDHELD = "handheld"
+"""The estimator that navigates nothing."""
+_ESTIMATOR_ALIASES = {"hand": HANDHELD}
+_MODEL_ALIASES = {HANDHELD: HANDHELD_MODEL}
+
+
+def named_estimator(word: str, option: str = "estimator") -> str:
+    """Return the estimator that `word` means, ``auto`` included; ``hand`` means ``handheld``.
+
+    Raises
+    ------
+    DataError
+        When there is no such estimator; `option` is named in it.
+    """
+    name = _ESTIMATOR_ALIASES.get(word, word)
+    if name not in (AUTO, *ESTIMATORS):
+        raise DataError(f"{option} {word}: expected one of {', '.join((AUTO, *ESTIMATORS))}")
+    return name
+
+
+def named_model(word: str | None, added: Sequence[str], handheld: bool = False) -> Model:
+    """Read the model that `word` means, with effects added; ``handheld`` means ``hand``.
+
+    Parameters
+    ----------
+    word : str or None
+        Name in config/model or path; None takes the model for a table, or for a handheld run.
+    added : sequence of str
+        Effects to add.
+    handheld : bool
+        Moved by hand.
+
+    Raises
+    ------
+    DataError
+        When the model or an effect is unknown or cannot be read.
+    """
+    default = HANDHELD_MODEL if handheld else TABLE_MODEL
+    return extended_model(default if word is None else _MODEL_ALIASES.get(word, word), added)

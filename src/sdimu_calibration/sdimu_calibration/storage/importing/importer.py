@@ -1,0 +1,209 @@
+"""Files from elsewhere (CSV, MAT, NPZ) to the samples of an IMU, as a map says."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from fnmatch import fnmatch
+from pathlib import Path
+
+import numpy as np
+
+from sdimu_calibration.core.arrays import Floats
+from sdimu_calibration.core.data.resample import mean_over, same_stamps
+from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.storage.bags.bag_writer import write_recording
+from sdimu_calibration.storage.importing.array_table import read_mat, read_npz
+from sdimu_calibration.storage.importing.binary_table import BinaryTable
+from sdimu_calibration.storage.importing.import_map import ImportMap, SensorMap, TemperatureMap
+from sdimu_calibration.storage.importing.import_stamps import Stamps, Table, read_stamps
+from sdimu_calibration.storage.importing.text_table import TextTable
+
+_KELVIN = 273.15
+APART_NS = 60_000_000_000
+"""Distance (ns) of recordings whose times begin again: long enough to be a gap for every estimate."""
+
+
+@dataclass(frozen=True)
+class Imported:
+    """Samples as a bag holds them.
+
+    Attributes
+    ----------
+    ns : ndarray of int64, shape (n,)
+        Stamps (ns since 1970), as the file has them: gaps, jitter and repetitions stay.
+    omega_ib_b, f_ib_b : ndarray, shape (n, 3)
+        rad/s, m/s^2; NaN where the file says so.
+    temperature : (ndarray (m,), ndarray (m,)) or None
+        Stamps (ns), deg C.
+    notes : tuple of str
+        What was done beyond copying.
+    """
+
+    ns: Stamps
+    omega_ib_b: Floats
+    f_ib_b: Floats
+    temperature: tuple[Stamps, Floats] | None
+    notes: tuple[str, ...]
+
+    def later(self, by_ns: int) -> Imported:
+        """Return the same samples at later times."""
+        heat = self.temperature and (self.temperature[0] + by_ns, self.temperature[1])
+        return replace(self, ns=self.ns + by_ns, temperature=heat)
+
+
+def read_files(paths: Sequence[Path], chart: ImportMap) -> Imported:
+    """Read the files that a map describes.
+
+    Parameters
+    ----------
+    paths : sequence of Path
+        CSV (or any columns in text), MAT up to version 7, NPZ, bare numbers. Several files hold the parts that the map
+        names, or, where it names none, one stretch of time each, in this order.
+    chart : ImportMap
+
+    Returns
+    -------
+    Imported
+
+    Raises
+    ------
+    DataError
+        One line with file, line and column of what cannot be used.
+    """
+    named = (chart.accel.file, chart.gyro.file, chart.temperature.file if chart.temperature else None)
+    if len(paths) > 1 and not any(named):
+        return _in_a_row([_read([path], chart) for path in paths], [Path(path) for path in paths])
+    return _read(paths, chart)
+
+
+def _read(paths: Sequence[Path], chart: ImportMap) -> Imported:
+    """Read the files that hold one stretch of time together."""
+    tables = [_open(Path(path), chart) for path in paths]
+    accel_ns, f_ib_b, told = _sensor(tables, chart, chart.accel, "accel")
+    gyro_ns, omega_ib_b, more = _sensor(tables, chart, chart.gyro, "gyro")
+    notes = [note for table in tables if isinstance(table, TextTable) for note in table.notes]
+    notes += dict.fromkeys((*told, *more))
+    if not same_stamps(gyro_ns, accel_ns):
+        gyro_ns, omega_ib_b, f_ib_b, note = _joined(gyro_ns, omega_ib_b, accel_ns, f_ib_b)
+        notes.append(note)
+    temperature = None if chart.temperature is None else _temperature(tables, chart, chart.temperature)
+    return Imported(gyro_ns, omega_ib_b, f_ib_b, temperature, tuple(notes))
+
+
+def _in_a_row(parts: Sequence[Imported], paths: Sequence[Path]) -> Imported:
+    """Put recordings of one test one after the other, each apart from the one before where its times begin again."""
+    moved, notes = [parts[0]], list(parts[0].notes)
+    for part, path in zip(parts[1:], paths[1:], strict=True):
+        end = int(moved[-1].ns.max())
+        if int(part.ns.min()) > end:
+            moved.append(part)
+        else:
+            moved.append(part.later(end + APART_NS - int(part.ns.min())))
+            notes.append(
+                f"{path}: its times begin again, so it is put {APART_NS * 1e-9:.0f} s after the file before; what "
+                "happened between the two is taken as unknown"
+            )
+        notes += part.notes
+    heat = [part.temperature for part in moved if part.temperature is not None]
+    return Imported(
+        np.concatenate([part.ns for part in moved]), np.concatenate([part.omega_ib_b for part in moved]),
+        np.concatenate([part.f_ib_b for part in moved]),
+        (np.concatenate([ns for ns, _ in heat]), np.concatenate([value for _, value in heat])) if heat else None,
+        tuple(notes),
+    )  # fmt: skip
+
+
+def write_imported(path: Path, found: Imported, replace: bool = False) -> None:
+    """Write imported samples to a rosbag2 folder.
+
+    Raises
+    ------
+    DataError
+        When something is in the way of the folder.
+    """
+    write_recording(
+        path,
+        start_ns=0,
+        imu_ns=found.ns,
+        omega_ib_b=found.omega_ib_b,
+        f_ib_b=found.f_ib_b,
+        temperature=found.temperature,
+        replace=replace,
+    )
+
+
+def _open(path: Path, chart: ImportMap) -> Table:
+    if not path.is_file():
+        raise DataError(f"{path}: no such file")
+    kind = path.suffix.lower()
+    if kind == ".npz":
+        return read_npz(path)
+    arrays = read_mat(path) if kind == ".mat" else None
+    if arrays is None and chart.binary is not None:
+        return BinaryTable(path, chart.binary)
+    return arrays or TextTable(path, chart.delimiter, chart.decimal, chart.skip_lines)
+
+
+def _chosen(tables: list[Table], pattern: str | None, what: str) -> Table:
+    """Find the file that holds something.
+
+    Raises
+    ------
+    DataError
+        When it is none or not clear which.
+    """
+    names = ", ".join(str(table.path) for table in tables)
+    if pattern is None:
+        if len(tables) > 1:
+            raise DataError(f"import map: {what}.file: which of {names}? (a pattern such as '*_{what}.csv')")
+        return tables[0]
+    fitting = [table for table in tables if fnmatch(table.path.name, pattern)]
+    if len(fitting) != 1:
+        number = "none" if not fitting else f"{len(fitting)}"
+        raise DataError(f"import map: {what}.file: '{pattern}' fits {number} of the files {names}; expected one")
+    return fitting[0]
+
+
+def _sensor(
+    tables: list[Table], chart: ImportMap, part: SensorMap, what: str
+) -> tuple[Stamps, Floats, tuple[str, ...]]:
+    table = _chosen(tables, part.file, what)
+    raw = table.floats(part.columns)
+    if raw.shape[1] != 3:
+        raise DataError(f"{table.path}: {what}: {part.columns[0]} has {raw.shape[1]} columns, expected three")
+    column = part.time if part.time is not None else chart.time.column
+    ns, notes = read_stamps(table, column, chart.time, len(raw))
+    values = (raw - np.array(part.bias)) * part.factor
+    if part.increments:
+        values = values / _interval_s(table, ns)
+    return ns, values, notes
+
+
+def _interval_s(table: Table, ns: Stamps) -> float:
+    """Usual interval (s), over which increments have come together."""
+    interval = float(np.median(np.diff(ns))) if len(ns) > 1 else 0.0
+    if interval <= 0.0:
+        raise DataError(f"{table.path}: increments need the interval of the samples: state rate_hz in the map")
+    return interval * 1e-9
+
+
+def _temperature(tables: list[Table], chart: ImportMap, part: TemperatureMap) -> tuple[Stamps, Floats]:
+    table = _chosen(tables, part.file, "temperature")
+    raw = table.floats([part.column])[:, 0]
+    ns, _ = read_stamps(table, part.time if part.time is not None else chart.time.column, chart.time, len(raw))
+    value = (raw - part.bias) / part.counts_per_unit
+    return ns, value - (_KELVIN if part.unit == "K" else 0.0)
+
+
+def _joined(
+    gyro_ns: Stamps, omega_ib_b: Floats, accel_ns: Stamps, f_ib_b: Floats
+) -> tuple[Stamps, Floats, Floats, str]:
+    """Bring accelerometers with stamps of their own to the stamps of the gyros, keeping their integral."""
+    kept, force = mean_over(gyro_ns, accel_ns, f_ib_b)
+    if not kept.any():
+        raise DataError("import: accelerometer and gyro have no time in common; check their time columns and units")
+    lost = int(np.count_nonzero(~kept))
+    dropped = f"; {lost} gyro samples without accelerometer were dropped" if lost else ""
+    note = f"accelerometer and gyro have stamps of their own: specific force was averaged over the gyro's{dropped}"
+    return gyro_ns[kept], omega_ib_b[kept], force, note

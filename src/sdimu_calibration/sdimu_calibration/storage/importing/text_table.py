@@ -1,0 +1,235 @@
+"""A table in a text file: CSV, columns between blanks or tabs, with headings or without."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sdimu_calibration.core.arrays import Floats
+from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.storage.importing.novatel_log import HEADINGS, as_table, is_novatel
+
+_COMMENT = ("#", "%")
+_DELIMITERS = (";", "\t", ",")
+_WHOLE, _REAL = 1, 2
+_INTEGER = re.compile(r"[-+]?\d+")
+_Item = TypeVar("_Item")
+_SHOWN = 12
+_LOOKED_AT = 200
+"""Number of lines that say how many columns there are and how their numbers are written: a line more or less is no
+matter."""
+_MOST_HEADINGS = 10
+"""Number of numeric heading lines at most: what is longer is a table of its own."""
+
+
+class TextTable:
+    """Columns of a text file, found by number (from 1) or by heading.
+
+    Attributes
+    ----------
+    notes : tuple of str
+        What was recognised and may be wrong.
+
+    Parameters
+    ----------
+    path : Path
+    delimiter : str, optional
+        Recognised from the first line of data when left out.
+    decimal : str
+        ``.`` or ``,``.
+    skip_lines : int, optional
+        Lines before the data; recognised when left out: blank, comment, mostly not numbers, of another number of
+        columns than most, or real numbers where the data are integers (and the other way round).
+
+    Raises
+    ------
+    DataError
+        When it is not text, or there are no data in it.
+    """
+
+    def __init__(
+        self, path: Path, delimiter: str | None = None, decimal: str = ".", skip_lines: int | None = None
+    ) -> None:
+        self.path = path
+        self._decimal = decimal
+        try:
+            self._lines = path.read_text(encoding="utf-8-sig").splitlines()
+        except UnicodeDecodeError as error:
+            raise DataError(
+                f"{path}: is not text (expected CSV in UTF-8, MAT or NPZ); for bare numbers state their "
+                "type and number in the map, such as binary: {type: float64, columns: 7}"
+            ) from error
+        self._delimiter = delimiter
+        self.notes: tuple[str, ...] = ()
+        logged = is_novatel(self._lines)
+        if logged:
+            self._lines = as_table(self._lines)
+        self._begin = self._first_line() if skip_lines is None else skip_lines
+        if self._begin >= len(self._lines):
+            raise DataError(f"{path}: no line of numbers in it")
+        self._delimiter = delimiter or self._guess(self._lines[self._begin])
+        if skip_lines is None:
+            self._leave_out_numeric_headings()
+        self.headings = list(HEADINGS) if logged else self._find_headings()
+        self._width = len(self._cells(self._lines[self._begin]))
+
+    def floats(self, columns: Sequence[int | str]) -> Floats:
+        """Read columns as numbers, shape (n, k); a cell ``nan`` is NaN.
+
+        Raises
+        ------
+        DataError
+            With line and column of the first cell that is not a number.
+        """
+        places = [self._place(column) for column in columns]
+        lines = self._data()
+        if self._decimal == ",":
+            lines = [line.replace(",", ".") for line in lines]
+        try:
+            read = np.loadtxt(lines, usecols=places, ndmin=2, **self._options())
+        except (ValueError, IndexError) as error:
+            raise self._first_bad(columns, places) from error
+        return np.asarray(read, np.float64)
+
+    def texts(self, column: int | str) -> NDArray[np.str_]:
+        """Read a column as it is written, shape (n,)."""
+        place = self._place(column)
+        lines = self._data()
+        try:
+            read = np.loadtxt(lines, usecols=[place], ndmin=1, dtype=str, **self._options())
+        except (ValueError, IndexError) as error:
+            raise self._first_bad([column], [place], numbers=False) from error
+        cells = np.char.strip(np.asarray(read, np.str_), " \"'")
+        return np.char.replace(cells, ",", ".") if self._decimal == "," else cells
+
+    def line_of(self, row: int) -> str:
+        """Say where a row of data is."""
+        count = -1
+        for number, line in enumerate(self._lines[self._begin :], start=self._begin + 1):
+            count += not _skipped(line)
+            if count == row:
+                return f"line {number}"
+        return f"row {row + 1}"
+
+    def _data(self) -> list[str]:
+        """Lines of data."""
+        return [line for line in self._lines[self._begin :] if not _skipped(line)]
+
+    def _options(self) -> dict[str, Any]:
+        return {"delimiter": self._delimiter, "comments": _COMMENT}
+
+    def _place(self, column: int | str) -> int:
+        """Index of a column.
+
+        Raises
+        ------
+        DataError
+            When there is none, or several, of that name.
+        """
+        if isinstance(column, int):
+            if not 1 <= column <= self._width:
+                raise DataError(f"{self.path}: no column {column} (line {self._begin + 1} has {self._width})")
+            return column - 1
+        number = self.headings.count(column)
+        if number == 1:
+            return self.headings.index(column)
+        if number:
+            raise DataError(f"{self.path}: {number} columns are called '{column}'; use the column's number")
+        there = ", ".join(self.headings[:_SHOWN]) + (", ..." if len(self.headings) > _SHOWN else "")
+        known = f"there are: {there}" if there else "the file has no headings; use the column's number"
+        raise DataError(f"{self.path}: no column '{column}' ({known})")
+
+    def _first_line(self) -> int:
+        width = self._usual_width()
+        for number, line in enumerate(self._lines):
+            if _skipped(line):
+                continue
+            cells = self._cells(line, self._delimiter or self._guess(line))
+            if len(cells) == width and 2 * sum(_is_number(cell, self._decimal) for cell in cells) >= len(cells):
+                return number
+        return len(self._lines)
+
+    def _usual_width(self) -> int:
+        """Count the columns that most lines have."""
+        lines = _spread([line for line in self._lines if not _skipped(line)])
+        widths = Counter(len(self._cells(line, self._delimiter or self._guess(line))) for line in lines)
+        return widths.most_common(1)[0][0] if widths else 0
+
+    def _leave_out_numeric_headings(self) -> None:
+        """Begin behind the first lines when their numbers are written otherwise than those of the data."""
+        rows = [k for k in range(self._begin, len(self._lines)) if not _skipped(self._lines[k])]
+        first, rest = rows[:_MOST_HEADINGS], rows[_MOST_HEADINGS:]
+        if len(rest) < _LOOKED_AT:
+            return
+        forms = np.array([self._form(k) for k in _spread(rest)])
+        whole, real = (forms == _WHOLE).all(axis=0), (forms == _REAL).all(axis=0)
+        headings = [
+            k for k in first if (np.array(self._form(k)) == _REAL)[whole].any()
+            or (real.all() and (np.array(self._form(k)) == _WHOLE).all())
+        ]  # fmt: skip
+        if not headings:
+            return
+        self._begin = rows[rows.index(headings[-1]) + 1]
+        self.notes = (
+            f"{self.path}: lines up to {headings[-1] + 1} are headings in numbers, as they are written otherwise than "
+            "the lines below them; skip_lines in the map says it if not",
+        )
+
+    def _form(self, number: int) -> list[int]:
+        """How the numbers of a line are written."""
+        width = len(self._cells(self._lines[self._begin]))
+        cells = [*self._cells(self._lines[number]), *[""] * width][:width]
+        real = [_is_number(cell, self._decimal) and not _INTEGER.fullmatch(cell) for cell in cells]
+        return [_REAL if is_real else _WHOLE if cell else 0 for is_real, cell in zip(real, cells, strict=True)]
+
+    def _find_headings(self) -> list[str]:
+        """Read the headings off the last line with words before the data; none when the numbers do not match."""
+        width = len(self._cells(self._lines[self._begin]))
+        for line in reversed(self._lines[: self._begin]):
+            cells = self._cells(line.lstrip("#% "))
+            if len(cells) == width:
+                return cells
+        return []
+
+    def _guess(self, line: str) -> str | None:
+        known = (d for d in _DELIMITERS if d in line and d != self._decimal)
+        return next(known, None)
+
+    def _cells(self, line: str, delimiter: str | None = None) -> list[str]:
+        return [cell.strip(" \t\"'") for cell in line.split(delimiter or self._delimiter)]
+
+    def _first_bad(self, columns: Sequence[int | str], places: Sequence[int], numbers: bool = True) -> DataError:
+        """Find line and column of the first cell that cannot be read: slow, and only on the way out."""
+        for number, line in enumerate(self._lines[self._begin :], start=self._begin + 1):
+            if _skipped(line):
+                continue
+            cells = self._cells(line)
+            for column, place in zip(columns, places, strict=True):
+                if place >= len(cells):
+                    return DataError(f"{self.path}: line {number} has {len(cells)} columns, no column {column}")
+                if numbers and not _is_number(cells[place], self._decimal):
+                    return DataError(f"{self.path}: line {number}, column {column}: '{cells[place]}' is not a number")
+        return DataError(f"{self.path}: cannot be read as a table (state delimiter and skip_lines in the map)")
+
+
+def _spread(items: list[_Item]) -> list[_Item]:
+    """Take some of many, from all over."""
+    return items[:: max(len(items) // _LOOKED_AT, 1)]
+
+
+def _skipped(line: str) -> bool:
+    return not line.strip() or line.lstrip().startswith(_COMMENT)
+
+
+def _is_number(cell: str, decimal: str) -> bool:
+    try:
+        float(cell.replace(decimal, "."))
+    except ValueError:
+        return False
+    return True

@@ -1,1 +1,0 @@
-"""Many runs: shared out over processes or a cluster, kept in shards, and judged by statistics."""

@@ -1,0 +1,1 @@
+"""Claims of the method put to the test: many simulated tests, calibrated or diagnosed, scored by the truth."""

@@ -1,0 +1,1 @@
+"""The verbs of the studies: arguments, and what runs them."""

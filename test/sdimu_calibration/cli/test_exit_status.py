@@ -1,0 +1,132 @@
+"""Exit status 3: done, but the estimate is not to be trusted, and stderr says why."""
+
+from __future__ import annotations
+
+import json
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import typer
+
+from sdimu_calibration.cli import main as cli
+from sdimu_calibration.cli.options import leave
+from sdimu_calibration.core.diagnosis import diagnose as of_one
+from sdimu_calibration.core.joint import set_diagnosis as of_set
+from sdimu_calibration.core.recording import DataFault
+from sdimu_calibration.core.results import Calibration, no_history
+from sdimu_calibration.storage.files.result_file import as_note
+
+FITS = Calibration(
+    "prior", ("accel_bias",), ("accel_bias_x",), ("m/s^2",), ("ug",), np.array([1e-4]), np.array([[1e-12]]),
+    {"nis_mean": 1.0}, {}, (), no_history(1),
+)  # fmt: skip
+MISFITS = tuple(map(as_note, (
+    "the model in white noise does not fit (NIS 5.6; 1 is right); run: sdimu diagnose",
+    "stop 3 does not fit: gyro is off by 9.1 sigma (chance ends at 5); look at the data there, or run: sdimu diagnose",
+    "gyro_scale_y is not the same in all recordings (p 1e-09); run: sdimu diagnose",
+)))  # fmt: skip
+UNTRUSTED = ("unexplained", "data fault")
+TRUSTED = (
+    "consistent", "noise model wrong", "one effect", "class of effects", "several effects", "own equation",
+)  # fmt: skip
+PLAN = """format: sdimu-plan/1
+name: small
+dwell: 20 s
+rate: 10 deg/s
+acceleration: 20 deg/s^2
+turns:
+  - {axis: Y, angle: 90 deg}
+  - {axis: Y, angle: 180 deg}
+  - {axis: Y, angle: -180 deg}
+  - {axis: Z, angle: 90 deg}
+  - {axis: X, angle: 90 deg}
+  - {axis: X, angle: -180 deg}
+"""
+
+
+def left(capsys, *arguments):
+    """Exit status, and what was said on stderr."""
+    try:
+        leave(*arguments)
+    except typer.Exit as ending:
+        return ending.exit_code, capsys.readouterr().err
+    return 0, capsys.readouterr().err
+
+
+@pytest.mark.parametrize("warning", MISFITS)
+def test_a_misfit_that_a_calibration_notes_ends_with_3(capsys, warning):
+    assert left(capsys, replace(FITS, warnings=(warning,))) == (3, f"sdimu: not to be trusted: {warning}\n")
+
+
+def test_what_fits_ends_with_0_whatever_else_it_warns_of(capsys):
+    assert left(capsys, FITS) == (0, "")
+    assert left(capsys, replace(FITS, warnings=("accel_bias_x is 7 sigma outside the specification",))) == (0, "")
+
+
+@pytest.mark.parametrize("verdict", UNTRUSTED)
+def test_a_verdict_that_leaves_the_model_wrong_ends_with_3(capsys, verdict):
+    status, err = left(capsys, FITS, (verdict, "Something is wrong."))
+    assert (status, err) == (3, f"sdimu: not to be trusted: {verdict}: Something is wrong.\n")
+
+
+@pytest.mark.parametrize("verdict", TRUSTED)
+def test_a_diagnosis_that_ends_in_a_right_model_judges_the_misfit(capsys, verdict):
+    assert left(capsys, replace(FITS, warnings=MISFITS), (verdict, "It is found.")) == (0, "")
+
+
+def test_a_fault_of_the_data_is_said_once(capsys):
+    fault = DataFault("spike", "12 spikes", grave=True)
+    status, err = left(capsys, replace(FITS, faults=(fault,)), ("data fault", "The data have a fault: 12 spikes."))
+    assert (status, err.count("12 spikes")) == (3, 1)
+
+
+@pytest.fixture(scope="module")
+def bags(tmp_path_factory):
+    """Two short recordings of one unit, with the same hidden effect."""
+    folder = tmp_path_factory.mktemp("status")
+    (folder / "small.yaml").write_text(PLAN)
+    from sdimu_sim.cli.simulate import simulate
+
+    for number in (1, 2):
+        simulate(
+            plan=str(folder / "small.yaml"), rate=20.0, seed=number, unit=1, effect=["gyro_scale_asymmetry_y=200 ppm"],
+            out=folder / f"bag{number}",
+        )  # fmt: skip
+    return [folder / "bag1", folder / "bag2"]
+
+
+@pytest.fixture
+def sdimu(monkeypatch, capsys, tmp_path):
+    """Run `sdimu` in this process with --json; return exit status, the answer and stderr."""
+
+    def run(*arguments):
+        argv = ["sdimu", *map(str, arguments), "--imu", "dtg", "--json", "--out", str(tmp_path / "out")]
+        monkeypatch.setattr(sys, "argv", argv)
+        capsys.readouterr()
+        with pytest.raises(SystemExit) as ending:
+            cli.main()
+        captured = capsys.readouterr()
+        return int(ending.value.code or 0), json.loads(captured.out), captured.err
+
+    return run
+
+
+@pytest.mark.parametrize("number", [1, 2])
+def test_calibrate_without_the_effect_ends_with_3_and_with_it_with_0(sdimu, bags, number):
+    status, answer, err = sdimu("calibrate", *bags[:number])
+    assert (status, answer["format"]) == (3, "sdimu-result/1")
+    assert "not to be trusted: the model" in err
+    status, _, err = sdimu("calibrate", *bags[:number], "--add", "gyro_scale_asymmetry_y")
+    assert status == 0, err
+
+
+@pytest.mark.parametrize("verdict", ["unexplained", "one effect"])
+@pytest.mark.parametrize("number", [1, 2])
+def test_diagnose_ends_as_its_verdict_says(sdimu, bags, monkeypatch, number, verdict):
+    monkeypatch.setattr(of_one, "verdict", lambda *_: verdict)
+    monkeypatch.setattr(of_set, "_verdict", lambda *_: verdict)
+    status, _, err = sdimu("diagnose", *bags[:number])
+    assert status == (3 if verdict == "unexplained" else 0)
+    assert (f"not to be trusted: {verdict}: " in err) == (status == 3)
