@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from sdimu_calibration.core.verdict import Verdict
+
 Rows = Sequence[Mapping[str, Any]]
 
 _HEAD = """# Clean tests
@@ -50,7 +52,7 @@ def _line(imu: str, plan: str, rows: Rows) -> str:
     good = [row for row in rows if "error" not in row]
     effect = [row for row in good if row["named"]]
     noise = [row for row in good if not row["named"] and row["noise"]]
-    other = [row for row in good if not row["named"] and not row["noise"] and row["verdict"] != "consistent"]
+    other = [row for row in good if not row["named"] and not row["noise"] and row["verdict"] != Verdict.CONSISTENT]
     z2, count = sum(row["z2"] for row in good), sum(row["count"] for row in good)
     rms = f"{np.sqrt(z2 / count):.2f}" if count else ""
     largest = f"{max(row['largest_z'] for row in good):.1f}" if good else ""

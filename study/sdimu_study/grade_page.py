@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from sdimu_calibration.core.verdict import Verdict
+
 Rows = Sequence[Mapping[str, Any]]
 
 _HEAD = """# Every IMU file, clean and with one hidden effect
@@ -32,7 +34,7 @@ def page(clean: Mapping[str, Rows], hidden: Mapping[str, Rows], choices: Mapping
     names = list(clean)
     table = [
         ("estimator", [", ".join(sorted({r["estimator"] for r in _good(clean[n])})) for n in names]),
-        ("clean: consistent", [_share(clean[n], lambda r: r["verdict"] == "consistent") for n in names]),
+        ("clean: consistent", [_share(clean[n], lambda r: r["verdict"] == Verdict.CONSISTENT) for n in names]),
         ("clean: refused", [str(len(clean[n]) - len(_good(clean[n]))) for n in names]),
         ("clean: accuses site or recording", [str(sum(r["accuses"] for r in _good(clean[n]))) for n in names]),
         ("clean: RMS z of the coefficients", [_rms(clean[n]) for n in names]),

@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from sdimu_calibration.core.verdict import Verdict
+
 Rows = Sequence[Mapping[str, Any]]
 
 _HEAD = """# Physics that the catalogue lacks
@@ -44,8 +46,8 @@ def page(imu: str, results: Mapping[str, Rows], first: int) -> str:
 def _line(name: str, rows: Rows) -> str:
     known, lacking = [row["with"] for row in rows], [row["without"] for row in rows]
     named = sum(bool(row["in_class"]) for row in known)
-    seen = [row for row in lacking if row["verdict"] != "consistent"]
-    noise = sum(row["verdict"] == "noise model wrong" for row in seen)
+    seen = [row for row in lacking if row["verdict"] != Verdict.CONSISTENT]
+    noise = sum(row["verdict"] == Verdict.NOISE_MODEL_WRONG for row in seen)
     largest = max((row["largest_z"] for row in lacking), default=float("nan"))
     return (
         f"| {name} | {named} of {len(known)} | {_rms(known)} | {len(seen)} of {len(lacking)} | {noise} | "

@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from sdimu_calibration.core.verdict import Verdict
+
 Rows = Sequence[Mapping[str, Any]]
 
 
@@ -41,7 +43,7 @@ def _named(rows: Rows) -> tuple[int, int, str]:
 
 
 def _clean(rows: Rows) -> tuple[int, int, str]:
-    return sum(row["verdict"] == "consistent" for row in rows), len(rows), "consistent"
+    return sum(row["verdict"] == Verdict.CONSISTENT for row in rows), len(rows), "consistent"
 
 
 def _alone(rows: Rows) -> tuple[int, int, str]:
