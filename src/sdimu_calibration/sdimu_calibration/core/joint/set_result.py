@@ -15,7 +15,7 @@ from sdimu_calibration.core.joint.member import Report, fitted
 from sdimu_calibration.core.joint.set_evidence import held_out
 from sdimu_calibration.core.joint.set_fit import SetFit, SetOptions, job_of
 from sdimu_calibration.core.joint.variation import Variation, variation
-from sdimu_calibration.core.note import Note, Topic
+from sdimu_calibration.core.note import Note, Topic, prefixed
 from sdimu_calibration.core.origin import Origin, measured
 from sdimu_calibration.core.results import (
     START_TEMPERATURE,
@@ -163,7 +163,7 @@ def _warnings(fit: SetFit, varied: Variation, names: Sequence[str]) -> tuple[str
         for p, name in sorted(odd)
     ]  # fmt: skip
     left_out = [f"{name} is left out: {why}" for name, why in fit.left_out]
-    return (*left_out, *_misfit(fit), *lines, *(f"{r.name}: {text}" for r in fit.reports for text in r.warnings))
+    return (*left_out, *_misfit(fit), *lines, *(prefixed(r.name, text) for r in fit.reports for text in r.warnings))
 
 
 def _misfit(fit: SetFit) -> list[Note]:
