@@ -18,9 +18,9 @@ from packaging.utils import canonicalize_name
 
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGES = ("rate_table_sim", "sdimu_calibration", "sdimu_sim")
-OPTIONAL = {"pandas", "tf2_msgs", "dask", "distributed"}
-"""Imported where it is installed; nodes/transform_type stands in for the second, `sdimu_study` brings the last two, and
-whoever lacks them is told so."""
+OPTIONAL = {"tf2_msgs", "dash", "flask", "werkzeug", "plotly", "pandas", "matplotlib", "PIL", "dask", "distributed"}
+"""Imported where it is installed; nodes/transform_type stands in for the first, extras and `sdimu_study` bring the
+others, and whoever lacks them is told so."""
 
 
 @pytest.fixture(scope="module")

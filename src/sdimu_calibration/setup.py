@@ -22,19 +22,19 @@ SHARED_CONFIG = [
 ]
 """The same once more where users of ROS look for them: layouts, tables, analyzers."""
 
+MESSAGES = [f"ros-{name}~=5.3.6" for name in (
+    "diagnostic-msgs", "geometry-msgs", "nav-msgs", "sensor-msgs", "std-msgs", "std-srvs", "trajectory-msgs"
+)]  # fmt: skip
+"""The messages that are sent; ros-jazzy-common-interfaces pins these, and brings five packages more."""
 RUN_TIME = [
-    "AllanTools",
     "PyYAML",
-    "dash",
     "lz4",
-    "matplotlib",
     "mcap",
     "numba",
     "numpy>=2.0",
-    "plotly",
     "pydantic>=2",
     "rich",
-    "ros-jazzy-common-interfaces",
+    *MESSAGES,
     "ros-jazzy-rclpy[fastrtps]",
     "rosbags>=0.10",
     "scipy",
@@ -42,7 +42,12 @@ RUN_TIME = [
     "zstandard",
 ]
 EXTRAS = {
+    "workbench": ["dash"],
+    "notebook": ["pandas", "plotly"],
+    "pictures": ["matplotlib"],
+    "study": ["dask", "distributed", "matplotlib"],
     "test": [
+        "AllanTools",
         "axe-playwright-python",
         "hypothesis",
         "import-linter",
@@ -51,6 +56,7 @@ EXTRAS = {
         "numpydoc",
         "packaging",
         "pandas",
+        "pillow",
         "playwright",
         "psutil",
         "pytest",
@@ -107,7 +113,7 @@ setup(
     platforms=["Linux x86_64"],
     python_requires=">=3.10",
     packages=find_packages(),
-    package_data={NAME: ["py.typed", "report/*/*.css", "report/*/*.js"]},
+    package_data={NAME: ["py.typed", "report/*/*.css", "report/*/*.js", "report/*/*.gz", "report/*/*.npz"]},
     cmdclass={"build_py": BuildWithConfig},
     install_requires=RUN_TIME,
     extras_require=EXTRAS,

@@ -16,7 +16,7 @@ from sdimu_calibration.core.adaptive import Goals
 from sdimu_calibration.core.diagnosis.scan import INDISTINGUISHABLE
 from sdimu_calibration.report.design.palette import LIGHT, palette
 from sdimu_sim.core.truth import ImuTruth
-from sdimu_study.adaptive_run import limit_errors
+from sdimu_study.adaptive import limit_errors
 from sdimu_study.adaptive_test import AdaptiveTest
 
 _PALETTE = palette(LIGHT)

@@ -11,7 +11,8 @@ from typing import Any
 from sdimu_calibration.core.progress import silent
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage.cluster import cluster
-from sdimu_study.shards import Row, Shards
+from sdimu_study.shards import Shards
+from sdimu_study.study import Row
 
 Work = Callable[[int], dict[str, Any]]
 Progress = Callable[[str, float], None]
@@ -112,5 +113,3 @@ def _results(work: Work, groups: list[list[int]], scheduler: str | None, workers
 
 def _word(count: int, total: int, failures: int) -> str:
     return f"run {count} of {total}" + (f", {failures} failed" if failures else "")
-
-

@@ -1,54 +1,118 @@
-"""Draw what is hidden in a test: one effect, two, none, something outside the catalogue, or wrong noise."""
+"""What is hidden in a test: one effect, two, none, something outside the catalogue, or wrong noise; and how small."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from zlib import crc32
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sdimu_calibration.core.effect_key import parse_key, sized
-from sdimu_calibration.core.effects.selection import resolve
-from sdimu_sim.core.hidden import drawn_names, one_sided, size_unit
-from sdimu_study.hidden_outside import OUTSIDE
-from sdimu_study.hidden_sizes import PLANS, Sizes, between
+from sdimu_calibration.core.diagnosis.candidates import catalogue
+from sdimu_calibration.core.diagnosis.scan import scan
+from sdimu_calibration.core.effect_key import sized
+from sdimu_calibration.core.estimation.prepared_test import PreparedTest
+from sdimu_calibration.core.estimation.solve import solve
+from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.specification import ImuSpecification, Model, Site
+from sdimu_calibration.storage.files.config import load_plan
+from sdimu_sim.core.hidden import one_sided, size_unit
+from sdimu_sim.core.scenario import Scenario, imu_truth
+from sdimu_sim.core.temperature import TemperatureProfile
+from sdimu_study.hidden_outside import OUTSIDE, outside_kind, shapes
+from sdimu_study.plans import FILED
+from sdimu_study.worlds import PLAUSIBLE, TESTABLE, Truth, option_of, rng_of, simulate
 
 KINDS = ("weak", "strong", "pair", "clean", "outside", "noise")
 """One effect at 5 sigma; one at 8 to 30; two at 10 to 30 each; none; not in the catalogue at 15 to 40; wrong noise."""
 FAULTS = ("outliers 0.1 %", "outliers 1 %", "gyro noise x1.3", "accel noise x1.3")
-TESTABLE = 0.05
-"""Least share of the signature that the model must leave: less is as good as a coefficient of the model."""
-PLAUSIBLE = 3.0
-"""An effect is drawn only where this many of its physical one-sigma sizes reach the size to be drawn."""
 _SPAN = {"weak": (5.0, 5.0), "strong": (8.0, 30.0), "pair": (10.0, 30.0), "outside": (15.0, 40.0)}
+LATITUDES_DEG = (20.0, 40.0, 60.0)
+"""Latitudes at which sizes are computed; between them the logarithm of a size is interpolated."""
+RATE_HZ = 20.0
+"""Sample rate of the campaign: navigation cycles are 0.1 s at any rate, so this costs no information."""
+WARM_UP = TemperatureProfile(25.0, 8.0, 1200.0, 0.3, 900.0)
+"""Temperature in every test, so that what depends on it can be tested."""
+_SEED = 900_001
+_STEADY = 4.0
+"""Sigmas at the latitudes differ by less than this (horizontal earth rate alone: 1.9)."""
 
 
 @dataclass(frozen=True)
-class Truth:
-    """A hidden effect.
+class Sizes:
+    """One sigma of every candidate on a clean test.
 
     Attributes
     ----------
-    name : str
-        Of the parameter, as the registry has it.
-    family : str
-    option : tuple of (str, float) or None
-        What enters nonlinearly: ``("tau", 730.0)``.
-    value : float
-        SI.
-    sigmas : float
-        Size in the sigma of a clean test.
-    text : str
-        What the simulator takes.
+    plan : str
+    latitude_deg : float
+    family, label : tuple of str
+    sigma : tuple of float
+        SI; inf where a plan cannot test it.
+    retention : tuple of float
+        Share of the signature that the model's coefficients leave.
+    prior : tuple of float
+        Physical one-sigma size for the IMU's grade (SI).
+    stops : tuple of (int, float, float)
+        Index, start and end (s) of every dwell.
     """
 
-    name: str
-    family: str
-    option: tuple[str, float] | None
-    value: float
-    sigmas: float
-    text: str
+    plan: str
+    latitude_deg: float
+    family: tuple[str, ...]
+    label: tuple[str, ...]
+    sigma: tuple[float, ...]
+    retention: tuple[float, ...]
+    prior: tuple[float, ...]
+    stops: tuple[tuple[int, float, float], ...]
+
+
+def sizes(plan: str, latitude_deg: float, imu: ImuSpecification, model: Model) -> Sizes:
+    """Sigma of the whole catalogue, and of what is outside it, on a clean test of a plan at a latitude."""
+    site = Site(math.radians(latitude_deg), 0.0)
+    scenario = Scenario(
+        plan=load_plan(plan),
+        imu=imu,
+        site=site,
+        rate_hz=RATE_HZ,
+        seed=_SEED + round(latitude_deg),
+        temperature=WARM_UP,
+        coefficients={},
+    )
+    fit = solve(PreparedTest(simulate(scenario, imu_truth(scenario)), imu, site), model)
+    times = fit.timetable
+    known = catalogue(times, set(fit.labels), True)
+    evidence = fit.evidence([*known, *(s.effect() for s in shapes(times))])
+    scanned = scan(evidence.information, evidence.model, evidence.weight)
+    p = len(evidence.weight)
+    return Sizes(
+        plan, latitude_deg, tuple(c.family for c in evidence.candidates), tuple(c.label for c in evidence.candidates),
+        tuple(scanned.sigma[p:].tolist()), tuple(scanned.retention[p:].tolist()), tuple(evidence.prior.tolist()),
+        times.stops,
+    )  # fmt: skip
+
+
+def between(tables: Sequence[Sizes], plan: str, latitude_deg: float) -> Sizes:
+    """Sizes of a plan at any latitude between those of `tables`."""
+    own = sorted((t for t in tables if t.plan == plan), key=lambda t: t.latitude_deg)
+    if not own:
+        raise DataError(f"plan '{plan}': no sizes were computed for it")
+    grid = np.array([t.latitude_deg for t in own])
+    high = int(np.clip(np.searchsorted(grid, latitude_deg), 1, max(len(grid) - 1, 1))) if len(own) > 1 else 0
+    if not high:
+        return own[0]
+    low = high - 1
+    share = (latitude_deg - grid[low]) / (grid[high] - grid[low])
+    a, b = np.array(own[low].sigma), np.array(own[high].sigma)
+    every = np.array([t.sigma for t in own])
+    with np.errstate(invalid="ignore"):
+        # Each table has a mount of its own: what hangs on the mount (products that vanish without one) has no size.
+        steady = np.isfinite(every).all(axis=0) & (every.max(axis=0) < _STEADY * every.min(axis=0))
+        sigma = np.where(steady, np.exp((1 - share) * np.log(a) + share * np.log(b)), np.inf)
+    retention = np.minimum(own[low].retention, own[high].retention)
+    return replace(
+        own[low], latitude_deg=latitude_deg, sigma=tuple(sigma.tolist()), retention=tuple(retention.tolist())
+    )
 
 
 @dataclass(frozen=True)
@@ -75,8 +139,8 @@ def draw(kind: str, seed: int, tables: Sequence[Sizes], hideable: frozenset[str]
     hideable : frozenset of str
         Parameters that the simulator can hide (`hideable_names`).
     """
-    rng = np.random.default_rng(np.random.SeedSequence([seed, crc32(f"hidden {kind}".encode())]))
-    plan = str(rng.choice(PLANS))
+    rng = rng_of(seed, "hidden", kind)
+    plan = str(rng.choice(FILED))
     latitude = float(rng.uniform(20.0, 60.0))
     found = between(tables, plan, latitude)
     if kind == "clean":
@@ -88,18 +152,13 @@ def draw(kind: str, seed: int, tables: Sequence[Sizes], hideable: frozenset[str]
     truths: list[Truth] = []
     while len(truths) < count:
         size = float(np.exp(rng.uniform(np.log(low), np.log(high))))
-        one = _outside(rng, found, size) if kind == "outside" else drawn_effect(rng, found, size, hideable)
+        one = _outside(rng, found, size) if kind == "outside" else drawn_of(rng, found, size, hideable)
         if all(_sensor(one.name) != _sensor(other.name) for other in truths):
             truths.append(one)
     return Draw(kind, plan, latitude, tuple(truths))
 
 
-def hideable_names() -> frozenset[str]:
-    """Parameters that both the simulator and the registry have."""
-    return frozenset(drawn_names())
-
-
-def drawn_effect(rng: np.random.Generator, found: Sizes, size: float, hideable: frozenset[str]) -> Truth:
+def drawn_of(rng: np.random.Generator, found: Sizes, size: float, hideable: frozenset[str]) -> Truth:
     """Draw family, then parameter, then variant, so that every family is as frequent as any other.
 
     Parameters
@@ -125,7 +184,7 @@ def drawn_effect(rng: np.random.Generator, found: Sizes, size: float, hideable: 
     value = size * found.sigma[k] * float(rng.choice((-1.0, 1.0)))
     if one_sided(name):
         value = abs(value)
-    option = _option(found.label[k])
+    option = option_of(found.label[k])
     if option and option[0] == "tau":
         option = ("tau", option[1] * float(rng.uniform(2.0**-0.5, 2.0**0.5)))
     return Truth(name, family, option, value, size, _text(name, value, option))
@@ -143,20 +202,6 @@ def _outside(rng: np.random.Generator, found: Sizes, size: float) -> Truth:
     return Truth(found.label[k], OUTSIDE, None, value, size, f"{sensor}={value:.9e}*({formula})")
 
 
-def outside_kind(label: str) -> str:
-    """Word for a shape outside the catalogue: ``sine``, ``pulse``, ``rate product``, ``force product``."""
-    for word, mark in (("sine", "sin("), ("pulse", "sign("), ("rate product", "*w")):
-        if mark in label:
-            return word
-    return "force product"
-
-
-def _option(label: str) -> tuple[str, float] | None:
-    """Read the first option of a label: ``("tau", 300.0)``."""
-    options = parse_key(label).options
-    return next(((key, float(value.split()[0])) for key, value in options.items()), None)
-
-
 def _text(name: str, value: float, option: tuple[str, float] | None) -> str:
     """Canonical key with its size, in the unit that people use."""
     inside = "" if option is None else f"({option[0]}={option[1]:g}{'' if option[0] == 'turn' else ' s'})"
@@ -167,9 +212,3 @@ def _sensor(name: str) -> str:
     """Sensor axis that a parameter acts on, as near as its name says."""
     triad, _, rest = name.partition("_")
     return f"{triad} {rest.rpartition('_')[2][:1]}"
-
-
-def family_of(label: str) -> str:
-    """Registry name of the effect that a label of the catalogue belongs to."""
-    effect = resolve(label.partition("(")[0])
-    return effect.family or effect.name

@@ -76,11 +76,17 @@ def _product(sensor: str, a: str, w: str) -> Shape:
 
 def _pulse(sensor: str, start: float, end: float) -> Shape:
     formula = f"(sign(t - {start:.1f}) - sign(t - {end:.1f}))/2"
-    return _shape(
-        sensor, formula, lambda m: np.asarray(np.sign(_middle(m) - start) - np.sign(_middle(m) - end)) / 2.0
-    )
+    return _shape(sensor, formula, lambda m: np.asarray(np.sign(_middle(m) - start) - np.sign(_middle(m) - end)) / 2.0)
 
 
 def _force_product(sensor: str, i: str, j: str) -> Shape:
     a, b = "xyz".index(i), "xyz".index(j)
     return _shape(sensor, f"a{i}**2*a{j}", lambda m: m.a[:, a] ** 2 * m.a[:, b])
+
+
+def outside_kind(label: str) -> str:
+    """Word for a shape outside the catalogue: ``sine``, ``pulse``, ``rate product``, ``force product``."""
+    for word, mark in (("sine", "sin("), ("pulse", "sign("), ("rate product", "*w")):
+        if mark in label:
+            return word
+    return "force product"

@@ -9,10 +9,11 @@ from __future__ import annotations
 import hashlib
 import inspect
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import asdict, is_dataclass
 from functools import cache
 from pathlib import Path
+from types import CodeType, FunctionType
 from typing import Any
 
 import rate_table_sim
@@ -20,8 +21,7 @@ import sdimu_calibration
 import sdimu_sim
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage.files.json_file import read_json, write_json
-
-Row = dict[str, Any]
+from sdimu_study.study import Row, Runs
 
 FORMAT = "sdimu-campaign/1"
 
@@ -43,15 +43,66 @@ def settings_of(work: object) -> dict[str, Any]:
     kind = type(work) if is_dataclass(work) else work
     name = f"{getattr(kind, '__module__', '')}.{getattr(kind, '__qualname__', repr(kind))}"
     fields = asdict(work) if is_dataclass(work) and not isinstance(work, type) else {}
-    plain: dict[str, Any] = json.loads(json.dumps({"work": name, "settings": fields}, default=repr, sort_keys=True))
+    text = json.dumps({"work": name, "settings": fields}, default=_named, sort_keys=True)
+    plain: dict[str, Any] = json.loads(text)
     return plain
 
 
-def key_of(work: object) -> str:
-    """Digest of the settings of a piece of work, of the file it is written in, and of the program."""
-    file = inspect.getsourcefile(type(work) if is_dataclass(work) else work)  # type: ignore[arg-type]
-    own = Path(file).read_text(encoding="utf-8") if file else ""
-    text = json.dumps(settings_of(work), sort_keys=True) + own + program_digest()
+def _named(value: object) -> str:
+    """Name a function, whose repr would hold an address; anything else by its repr."""
+    return f"{value.__module__}.{value.__qualname__}" if isinstance(value, FunctionType) else repr(value)
+
+
+def sources_of(work: Callable[..., Any]) -> list[str]:
+    """List the sources of a piece of work and of all of its own package that it uses; its page is not among them.
+
+    Functions and classes as text, constants by their repr; those of the three cores are in `program_digest`.
+    """
+    waiting: list[Any] = [work.world, work.run, work.score] if isinstance(work, Runs) else [_defined(work)]
+    own = {one.__module__.partition(".")[0] for one in waiting}
+    found: dict[str, str] = {}
+    while waiting:
+        one = waiting.pop()
+        name = f"{one.__module__}.{one.__qualname__}"
+        if name in found:
+            continue
+        found[name] = inspect.getsource(one)
+        for word, used in _used(one):
+            value = getattr(used, "__wrapped__", used)
+            if isinstance(value, FunctionType | type):
+                if value.__module__.partition(".")[0] in own:
+                    waiting.append(value)
+            elif not inspect.ismodule(value) and not callable(value):
+                listed = sorted(map(repr, value)) if isinstance(value, set | frozenset) else value
+                found[f"{one.__module__}:{word}"] = repr(listed)
+    return [f"{name}\n{text}" for name, text in sorted(found.items())]
+
+
+def _defined(work: Callable[..., Any]) -> Any:
+    return work if isinstance(work, FunctionType | type) else type(work)
+
+
+def _used(one: Any) -> Iterator[tuple[str, Any]]:
+    """Names that a function, or the methods of a class, take from the module around, with their values."""
+    if isinstance(one, type):
+        methods = [getattr(value, "fget", value) for value in vars(one).values()]
+        functions = [m for m in methods if isinstance(m, FunctionType) and m.__module__ == one.__module__]
+        yield from ((base.__qualname__, base) for base in one.__bases__)
+    else:
+        functions = [inspect.unwrap(one)]
+    for function in functions:
+        around = function.__globals__
+        yield from ((name, around[name]) for name in sorted(_names(function.__code__)) if name in around)
+
+
+def _names(code: CodeType) -> set[str]:
+    inner = (part for part in code.co_consts if isinstance(part, CodeType))
+    return set(code.co_names).union(*map(_names, inner))
+
+
+def key_of(work: Callable[..., Any]) -> str:
+    """Digest of the settings of a piece of work, of the sources that it is made of, and of the program."""
+    text = json.dumps(settings_of(work), sort_keys=True) + "\n".join(sources_of(work)) + program_digest()
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
@@ -62,11 +113,11 @@ class Shards:
     ----------
     out : Path
         Folder of the campaigns; this one has a folder of its own inside, named by its key.
-    work : object
+    work : callable
         What is run for every seed; its settings are the key.
     """
 
-    def __init__(self, out: Path, work: object) -> None:
+    def __init__(self, out: Path, work: Callable[..., Any]) -> None:
         self.key = key_of(work)
         self.folder = Path(out) / f"runs-{self.key}"
         settings = {"format": FORMAT, "key": self.key, **settings_of(work)}

@@ -19,8 +19,8 @@ from sdimu_sim.core.scenario import Scenario, imu_truth
 from sdimu_sim.core.temperature import TemperatureProfile
 from sdimu_sim.core.true_coefficients import POWERS, accelerometer_frames
 from sdimu_sim.core.truth import ImuTruth
-from sdimu_study.run import simulate
-from sdimu_study.set_world import World
+from sdimu_study.set_world import Unit
+from sdimu_study.worlds import simulate
 
 SOAKS_DEGC = (-40.0, -10.0, 20.0, 45.0, 70.0)
 """Temperatures of the soaks (deg C): the range of a ramp, and near room temperature."""
@@ -42,26 +42,12 @@ close that its curve between two of them is below 1e-12 rad."""
 
 
 def polynomials(orders: int) -> tuple[str, ...]:
-    """Effects of the first powers of the temperature of the thirty coefficients.
-
-    Parameters
-    ----------
-    orders : int
-        Highest power, 1 to 3.
-    """
+    """Effects of the first powers, 1 to 3, of the temperature of the thirty coefficients."""
     return tuple(f"{base}_{power}" for power in POWERS[:orders] for base in load_model("baseline").effects)
 
 
 def drawn_polynomials(imu: ImuSpecification, orders: int, rng: np.random.Generator) -> tuple[str, ...]:
-    """Draw every coefficient of every polynomial: normal, of the size that the catalogue states for the IMU's grade.
-
-    Parameters
-    ----------
-    imu : ImuSpecification
-    orders : int
-        Highest power, 1 to 3.
-    rng : Generator
-    """
+    """Draw every coefficient of every polynomial: normal, of the size that the catalogue states for the IMU's grade."""
     effects = [registry.get(name) for name in polynomials(orders)]
     return tuple(
         sized(p.name, float(e.prior[imu.grade] * rng.standard_normal()), size_unit(p.name))
@@ -96,7 +82,7 @@ class SoakWorld:
 
     Attributes
     ----------
-    world : World
+    unit : Unit
     site : Site
     plan : Plan
         Of the soaks.
@@ -113,7 +99,7 @@ class SoakWorld:
         Noise with a memory.
     """
 
-    world: World
+    unit: Unit
     site: Site
     plan: Plan
     effects: tuple[str, ...]
@@ -133,7 +119,8 @@ class SoakWorld:
         return [*soaks, first, replace(again, coefficients=first.coefficients)]
 
     def _of(self, number: int, plan: Plan, profile: TemperatureProfile) -> Scenario:
-        return self.world.scenario(number, plan, self.site, self.turn_on, self.effects, self.noise, profile)
+        more = {"noise": self.noise, "temperature": profile}
+        return self.unit.scenario(number, plan, self.site, self.turn_on, self.effects, **more)
 
 
 def in_the_frame(scenario: Scenario) -> tuple[Floats, Floats]:

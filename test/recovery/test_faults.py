@@ -13,8 +13,19 @@ from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage.files.config import load_imu, load_model, load_plan, load_site
 from sdimu_sim.core.faults import FAULTS, Fault
 from sdimu_sim.core.scenario import Scenario
-from sdimu_study.fault_run import NOTED, OK, REFUSED, TRACEBACK, WARNED, WRONG, as_read, run_fault, spoilt
-from sdimu_study.fault_study import fault_study, hurried
+from sdimu_study.faults import (
+    NOTED,
+    OK,
+    REFUSED,
+    TRACEBACK,
+    WARNED,
+    WRONG,
+    as_read,
+    fault_study,
+    hurried,
+    run_fault,
+    spoilt,
+)
 
 SCENARIO = Scenario(hurried(load_plan("kim18_signed")), load_imu("dtg"), load_site("daejeon"))
 MODEL = load_model("baseline")

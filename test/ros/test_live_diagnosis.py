@@ -106,7 +106,7 @@ def test_what_is_missing_stands_out_and_leaves_when_it_is_added(job, whole):
     added = Diagnoser(job).answer(Request(5, None, ((), (EFFECT,)))).diagnosis
     assert added.verdict == "consistent"
     assert [rung.added for rung in added.ladder] == [(), (EFFECT,)]
-    # The same fit twice: BLAS rounds as the arrays happen to lie in memory.
+    # One is of evidence with every candidate, the other of evidence with none: other shapes round otherwise.
     assert added.ladder[0].nis == pytest.approx(whole.ladder[0].nis, rel=SHOWN)
     assert added.ladder[0].held_out == pytest.approx(whole.ladder[0].held_out, rel=SHOWN)
     assert added.ladder[1].nis == pytest.approx(1.0, abs=0.1)

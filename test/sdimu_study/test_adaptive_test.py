@@ -11,7 +11,7 @@ from sdimu_calibration.storage.files.goal_file import load_goals
 from sdimu_calibration.storage.files.table_file import load_rate_table
 from sdimu_sim.core.scenario import Scenario, imu_truth
 from sdimu_study.adaptive_test import FIRST_STOP_S, adaptive_test
-from sdimu_study.run import simulate
+from sdimu_study.worlds import simulate
 
 SCENARIO = Scenario(load_plan("kim18"), load_imu("dtg"), load_site("daejeon"), rate_hz=20.0, seed=11)
 

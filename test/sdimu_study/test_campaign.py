@@ -1,6 +1,9 @@
 """A campaign: every seed once, failures reported, shards reused, the same answer in processes."""
 
-from dataclasses import dataclass, field
+import os
+import subprocess
+import sys
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -12,11 +15,11 @@ from sdimu_calibration.core.plan import Plan, Turn
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage.files.config import load_imu, load_model, load_site
 from sdimu_sim.core import Scenario
-from sdimu_study import campaign
+from sdimu_study import campaign, clean
 from sdimu_study.campaign import CHUNK, HERE, run_campaign
-from sdimu_study.run import CalibrationRun
-from sdimu_study.shards import Shards, key_of
-from sdimu_study.summary import summarise
+from sdimu_study.monte_carlo import STUDY, Campaign, summarise
+from sdimu_study.shards import Shards, key_of, sources_of
+from sdimu_study.study import Study
 
 PLAN = Plan("short", (12.0,) * 4, tuple(Turn(a, np.pi / 2, np.radians(15)) for a in "YZX"), np.radians(30))
 SCENARIO = Scenario(PLAN, load_imu("dtg"), load_site("daejeon"), TableSpecification(axes=None), rate_hz=20.0)
@@ -109,9 +112,41 @@ def test_another_state_of_the_program_is_another_campaign(square, monkeypatch):
     assert key_of(square) != before
 
 
+def test_the_key_hangs_on_what_makes_a_row_and_not_on_what_makes_its_page():
+    """Draws and scores that another file defines count; a new column of the table does not throw runs away."""
+    work = clean.STUDY.of(("dtg", "kim18"))
+    texts = "\n".join(sources_of(work))
+    for part in ("def world", "def score", "def baseline_z", "def drawn_site", "LATITUDES_DEG", "def study_plan"):
+        assert part in texts
+    assert "def page" not in texts
+    more = Study("clean", clean.world, clean.STUDY.run, clean.score, (("other", str),))
+    assert key_of(more.of(("dtg", "kim18"))) == key_of(work)
+
+
+def test_another_draw_or_score_is_another_campaign(monkeypatch):
+    work = clean.STUDY.of(("dtg", "kim18"))
+    before = key_of(work)
+    monkeypatch.setattr("sdimu_study.clean.RATES_HZ", (20.0,))
+    assert key_of(work) != before
+    monkeypatch.undo()
+    assert key_of(work) == before
+    assert key_of(replace(work, score=clean.scored)) != before
+
+
+def test_the_key_is_that_of_another_process_too():
+    """Sets have another order in each process."""
+    script = "from sdimu_study import sets, shards; print(shards.key_of(sets.STUDY.of(('weak', 'dtg'))))"
+    keys = {
+        subprocess.run([sys.executable, "-c", script], env={**os.environ, "PYTHONHASHSEED": seed}, check=True,
+                       capture_output=True, text=True).stdout
+        for seed in ("1", "2", "3")
+    }  # fmt: skip
+    assert len(keys) == 1
+
+
 def test_every_field_of_a_scenario_is_a_setting():
     keys = {
-        key_of(CalibrationRun(scenario, load_model("baseline")))
+        key_of(STUDY.of(Campaign(scenario, load_model("baseline"))))
         for scenario in (SCENARIO, Scenario(PLAN, SCENARIO.imu, SCENARIO.site), Scenario(PLAN, SCENARIO.imu,
                          SCENARIO.site, SCENARIO.table, rate_hz=20.0, effects=("gyro_z=1e-9*t",)))
     }  # fmt: skip
@@ -150,14 +185,14 @@ def test_seeds_are_shared_out_once_each():
 
 def test_four_tests_calibrated_in_processes_are_those_calibrated_here(tmp_path):
     """The whole way: simulate, calibrate, keep, judge; with an effect that makes one coefficient wrong."""
-    work = CalibrationRun(SCENARIO, load_model("baseline"))
+    work = STUDY.of(Campaign(SCENARIO, load_model("baseline")))
     here = run_campaign(work, range(4), tmp_path / "here", HERE)
     apart = run_campaign(work, range(4), tmp_path / "apart", workers=2)
     assert [row.get("error") for row in apart] == [None] * 4
     for a, b in zip(here, apart, strict=True):
         assert a["estimate"] == b["estimate"]
         assert a["covariance"] == b["covariance"]
-    summary = summarise([*apart, {"seed": 9, "error": "DataError: no"}], work.model, SCENARIO.imu)
+    summary = summarise([*apart, {"seed": 9, "error": "DataError: no"}], work.case.model, SCENARIO.imu)
     assert summary["runs"] == 4
     assert summary["failed"] == [{"seed": 9, "error": "DataError: no"}]
     assert len(summary["coefficients"]) == summary["nees"]["dof"] == 27
@@ -166,11 +201,11 @@ def test_four_tests_calibrated_in_processes_are_those_calibrated_here(tmp_path):
 
 
 def test_a_run_that_took_all_passes_is_named():
-    work = CalibrationRun(SCENARIO, load_model("baseline"))
+    work = STUDY.of(Campaign(SCENARIO, load_model("baseline")))
     rows = [{**work(seed), "seed": seed, "wall_s": 1.0, "cpu_s": 1.0} for seed in (1, 2, 3)]
-    assert summarise(rows, work.model, SCENARIO.imu)["unconverged"] == []
+    assert summarise(rows, work.case.model, SCENARIO.imu)["unconverged"] == []
     rows[1]["passes"] = MOST_PASSES
-    assert summarise(rows, work.model, SCENARIO.imu)["unconverged"] == [2]
+    assert summarise(rows, work.case.model, SCENARIO.imu)["unconverged"] == [2]
 
 
 def test_a_campaign_of_failures_says_why():

@@ -7,10 +7,9 @@ import pytest
 
 from rate_table_sim.core import table_motion
 from sdimu_calibration.core.recording import DataError
-from sdimu_study.clean_page import page
-from sdimu_study.clean_run import BY_HAND, CleanRun, plans_of
-from sdimu_study.cli.shown_campaign import imu_files
-from sdimu_study.plan_draw import PLANS, study_plan, study_table
+from sdimu_study.clean import BY_HAND, STUDY, page, plans_of
+from sdimu_study.cli.conduct import imu_files
+from sdimu_study.plans import PLANS, study_plan, study_table
 
 
 @pytest.mark.parametrize("name", PLANS)
@@ -54,7 +53,7 @@ def test_runs_by_hand_have_no_plan():
 
 def test_a_clean_test_in_ten_minutes_is_consistent():
     """This grade and plan named an effect in seven of seventeen tests while the force was taken as measured."""
-    rows = [CleanRun("fog_tactical", "kim18_10_min")(seed) for seed in (55003, 55004, 55016)]
+    rows = [STUDY.of(("fog_tactical", "kim18_10_min"))(seed) for seed in (55003, 55004, 55016)]
     assert [row["verdict"] for row in rows] == ["consistent"] * 3
 
 

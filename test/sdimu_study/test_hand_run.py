@@ -12,7 +12,7 @@ from sdimu_calibration.core.estimation.solve import solve
 from sdimu_calibration.core.specification import Site
 from sdimu_calibration.storage.files.config import load_imu, load_model
 from sdimu_sim.core.by_hand import ByHand, by_hand_recording
-from sdimu_study.hand_run import HandRun
+from sdimu_study.hand import CLEAN, HIDDEN, STUDY
 
 # Seeds of their own: those of the study are 69001 and up.
 SEEDS = (71, 72, 73)
@@ -21,14 +21,14 @@ SITE = Site(latitude_rad=float(np.radians(36.4)))
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_clean_runs_are_clean_and_their_attitudes_are_counted_once(seed):
-    row = HandRun(hidden=False)(seed)
+    row = STUDY.of((CLEAN,))(seed)
     assert row["verdict"] == "consistent", row["sentence"]
     assert row["rests"] == row["attitudes"]
     assert np.sqrt(row["z2"] / row["count"]) < 2.0
 
 
 def test_a_hidden_effect_is_named():
-    rows = [HandRun(hidden=True)(seed) for seed in SEEDS]
+    rows = [STUDY.of((HIDDEN,))(seed) for seed in SEEDS]
     assert sum(row["in_class"] for row in rows) >= 2
 
 

@@ -16,10 +16,11 @@ from sdimu_calibration.storage.files.config import load_imu
 from sdimu_sim.core.equation import CONSTANTS
 from sdimu_sim.core.expression import parse_expression
 from sdimu_sim.core.hidden import VARIABLES, parse_effects
-from sdimu_study.hidden_draw import KINDS, TESTABLE, Draw, Truth, draw, hideable_names
+from sdimu_study.hidden import with_fault
+from sdimu_study.hidden_draw import KINDS, LATITUDES_DEG, Draw, Sizes, between, draw
 from sdimu_study.hidden_outside import OUTSIDE, shapes
-from sdimu_study.hidden_run import with_fault
-from sdimu_study.hidden_sizes import LATITUDES_DEG, PLANS, Sizes, between
+from sdimu_study.plans import FILED as PLANS
+from sdimu_study.worlds import TESTABLE, Truth, hideable_names
 
 STOPS = tuple((k, 150.0 * k, 150.0 * k + 100.0) for k in range(8))
 TURNS = tuple((k, 150.0 * k + 100.0, 150.0 * k + 150.0) for k in range(7))

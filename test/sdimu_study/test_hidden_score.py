@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -9,11 +10,11 @@ import pytest
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage.files.config import load_imu, load_model
 from sdimu_study.cli.hidden_campaign import check_options
-from sdimu_study.hidden_draw import Draw, Truth
-from sdimu_study.hidden_page import page
-from sdimu_study.hidden_run import scenario_of
-from sdimu_study.hidden_score import same_effect, score
-from sdimu_study.hidden_summary import confusion, outside_passed, share, summarise
+from sdimu_study.hidden import Hidden, run, scenario_of, score
+from sdimu_study.hidden_draw import Draw
+from sdimu_study.hidden_page import confusion, outside_passed, page, share, summarise
+from sdimu_study.score import same_effect
+from sdimu_study.worlds import Truth
 
 STOPS = ((0, 0.0, 100.0), (1, 145.0, 245.0), (2, 290.0, 390.0))
 
@@ -119,21 +120,22 @@ def test_an_unknown_kind_is_refused_with_the_known_ones() -> None:
 
 
 def test_a_hidden_quadratic_term_is_found_by_name_and_the_baseline_is_mended() -> None:
-    from sdimu_calibration.core.diagnosis.diagnose import diagnose
     from sdimu_sim.core.scenario import imu_truth
-    from sdimu_study.run import simulate
+    from sdimu_study.worlds import simulate
 
     # 40 ug/g^2 are some 40 sigma on this plan: one failure in 1e9 runs if the filter is right.
     truth = Truth("accel_quadratic_x", "accel_quadratic", None, 40e-6 * 9.80665, 40.0, "accel_quadratic_x=40 ug/g^2")
     drawn = Draw("strong", "kim18_signed", 45.0, (truth,))
     scenario = scenario_of(drawn, load_imu("dtg"), 31)
     sensor = imu_truth(scenario)
-    found = diagnose(simulate(scenario, sensor), scenario.site, load_imu("dtg"), load_model("baseline"))
-    row = score(drawn, found, sensor)
+    recording = simulate(scenario, sensor)
+    world = Hidden(drawn, recording, scenario.site, load_imu("dtg"), load_model("baseline"), sensor)
+    found = run(world)
+    row = score(world, found)
     assert row["truths"][0]["in_class"]
     assert abs(row["truths"][0]["error_sigmas"]) < 5.0
     # 27 coefficients: RMS z of 1 +- 0.14; five sigma.
     assert row["rms_z_after"] < 1.7 < row["rms_z_before"]
     # The truth hidden under another name is not found.
     other = Draw("strong", "kim18_signed", 45.0, (Truth("gyro_delay_x", "gyro_delay", None, 1e-3, 10.0, ""),))
-    assert not score(other, found, sensor)["truths"][0]["in_class"]
+    assert not score(replace(world, drawn=other), found)["truths"][0]["in_class"]

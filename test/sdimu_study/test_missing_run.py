@@ -7,8 +7,8 @@ import pytest
 
 from sdimu_calibration.core.recording import PhaseLog, Recording
 from sdimu_sim.core.truth import ImuTruth
-from sdimu_study.many_run import ManyRun
-from sdimu_study.missing_run import MissingRun, with_mean_error
+from sdimu_study import many, missing
+from sdimu_study.missing import with_mean_error
 
 
 def test_a_transient_counts_with_its_mean_over_the_dwells_alone():
@@ -28,14 +28,14 @@ def test_a_transient_counts_with_its_mean_over_the_dwells_alone():
 
 @pytest.mark.slow
 def test_a_transient_that_the_catalogue_lacks_is_seen_and_its_sigmas_hold():
-    rows = [MissingRun("dtg", "gyro_bias_settling")(seed) for seed in (21, 22, 23)]
+    rows = [missing.STUDY.of(("dtg", "gyro_bias_settling"))(seed) for seed in (21, 22, 23)]
     assert all(row["without"]["verdict"] != "consistent" for row in rows)
     assert sum(bool(row["with"]["in_class"]) for row in rows) >= 2
 
 
 @pytest.mark.slow
 def test_many_effects_at_once_are_scored_by_name():
-    row = ManyRun("dtg")(31)
+    row = many.STUDY.of(("dtg",))(31)
     large = [effect for effect in row["effects"] if effect["sigmas"] > 8.0]
     assert large
     assert sum(effect["named"] for effect in large) >= 0.8 * len(large)

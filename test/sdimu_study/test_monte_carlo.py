@@ -9,8 +9,8 @@ from typer.testing import CliRunner
 
 from sdimu_calibration.core.recording import DataError
 from sdimu_study.cli.monte_carlo import monte_carlo
+from sdimu_study.monte_carlo import FORMAT as WRITTEN
 from sdimu_study.monte_carlo_page import FORMAT, cells, check_cells, page
-from sdimu_study.summary import FORMAT as WRITTEN
 
 PLAN = """
 format: sdimu-plan/1

@@ -9,9 +9,8 @@ from sdimu_calibration.core.estimation.solve import solve
 from sdimu_calibration.core.noise_term import NoiseTerm
 from sdimu_calibration.core.specification import Site
 from sdimu_calibration.storage.files.config import load_imu, load_model
-from sdimu_study.grade_run import drawn_effect, simulated_test
-from sdimu_study.noise_page import page
-from sdimu_study.noise_run import NoiseRun
+from sdimu_study.noise import STUDY, NoiseCase, page
+from sdimu_study.worlds import drawn_effect, simulated_test
 
 
 def test_an_effect_of_ten_sigma_is_larger_where_noise_wanders():
@@ -46,5 +45,5 @@ def test_the_page_counts_what_was_hidden_apart_from_what_is_not_there():
 
 @pytest.mark.slow
 def test_an_effect_in_noise_is_named():
-    rows = [NoiseRun("dtg", "stop", 20.0)(seed) for seed in (31, 32, 33)]
+    rows = [STUDY.of(NoiseCase("dtg", "stop", 20.0))(seed) for seed in (31, 32, 33)]
     assert sum(row["named"] for row in rows) >= 2

@@ -10,7 +10,8 @@ from sdimu_calibration.core.estimation.outcome import calibrate
 from sdimu_calibration.core.plan import Plan, Turn
 from sdimu_calibration.storage.files.config import load_imu, load_model, load_site
 from sdimu_sim.core import Scenario, generate, imu_truth, in_body_frame
-from sdimu_study.run import CHANNELS, CalibrationRun, lag_one, nees, simulate
+from sdimu_study.monte_carlo import CHANNELS, STUDY, Campaign, lag_one, nees
+from sdimu_study.worlds import simulate
 
 PLAN = Plan("short", (12.0,) * 4, tuple(Turn(a, np.pi / 2, np.radians(15)) for a in "YZX"), np.radians(30))
 MODEL = load_model("baseline")
@@ -30,7 +31,7 @@ def test_a_run_simulates_what_the_simulator_gives():
 
 
 def test_a_run_is_the_calibration_of_its_recording_beside_its_truth():
-    row = CalibrationRun(SCENARIO, MODEL)(7)
+    row = STUDY.of(Campaign(SCENARIO, MODEL))(7)
     scenario = replace(SCENARIO, seed=7)
     recording, truth = generate(scenario)
     result = calibrate(recording, scenario.site, scenario.imu, MODEL, held_out=False)
@@ -43,7 +44,7 @@ def test_a_run_is_the_calibration_of_its_recording_beside_its_truth():
 
 
 def test_the_frame_takes_three_coefficients_away():
-    row = CalibrationRun(SCENARIO, MODEL)(3)
+    row = STUDY.of(Campaign(SCENARIO, MODEL))(3)
     fixed = {name for name, free in zip(row["names"], row["free"], strict=True) if not free}
     assert fixed == {f"accel_misalignment_{pair}" for pair in ("xy", "xz", "yx")}
 

@@ -14,29 +14,27 @@ from sdimu_calibration.core.joint.set_result import set_outcome
 from sdimu_sim.core.hidden import size_unit
 from sdimu_sim.core.true_coefficients import POWERS, RATES, SEEN_OF_TURNS, true_coefficients, with_lag
 from sdimu_sim.core.truth import ImuTruth
-from sdimu_study import soak_page
 from sdimu_study.set_world import here, members_of, opened
-from sdimu_study.soak_run import SOAK_KINDS, SoakRun, errors, of_power_on, ratios
 from sdimu_study.soak_world import T0_DEGC, in_the_frame, noise_of, ramp
+from sdimu_study.soaks import SOAK_KINDS, STUDY, drawn, errors, model_of, of_power_on, ratios, tables
 
 SEED = 3
 
 
-def short(run: SoakRun):
+def short(kind: str):
     """Draw a world whose soaks take twelve minutes, and whose ramp takes half an hour."""
-    world = run.drawn(SEED)
+    world = drawn((kind, "dtg"), SEED)
     plan = replace(world.plan, dwell_s=tuple(0.2 * dwell for dwell in world.plan.dwell_s))
     return replace(world, plan=plan, soaks_degc=(-40.0, 10.0, 70.0), rate_k_s=4.0 / 60.0)
 
 
 @pytest.fixture(scope="module")
 def fitted():
-    run = SoakRun("soaks", "dtg")
-    world = short(run)
+    world = short("soaks")
     scenarios = world.scenarios()
     tests = [opened(scenario) for scenario in scenarios]
     members = members_of(tests[:-1])
-    result = set_outcome(fit_set(members, SetOptions(run.model()), here))
+    result = set_outcome(fit_set(members, SetOptions(model_of("soaks")), here))
     return world, scenarios, tests, result, of_power_on(result, members[-1].name)
 
 
@@ -81,7 +79,7 @@ def test_the_truth_compensates_a_ramp_with_axes_that_bend(fitted):
     """What the gyros see of a frame that turns with the square of the temperature stands in the model."""
     world, scenarios, tests, result, _ = fitted
     scenario, test = scenarios[-1], tests[-1]
-    truth = true_coefficients(world.world.unit(world.effects), result.body_frame)
+    truth = true_coefficients(world.unit.sensor(world.effects), result.body_frame)
     truth |= {name: value for name, value in scenario.coefficients.items() if "bias" in name}
     whole = replace(result, values=np.array([truth.get(name, 0.0) for name in result.names]))
     bent = [name.startswith(SEEN_OF_TURNS[1]) for name in result.names]
@@ -117,10 +115,10 @@ def test_tables_sort_coefficients_by_power_and_kind():
               "gyro_misalignment_temperature_squared_xy": 3.0},
         "scatter": [{"low": 1.0, "high": 2.0, "true": 1.5}], "ramp": ratio, "other_ramp": ratio, "mean_bias": ratio,
     }  # fmt: skip
-    first, second = soak_page.tables("soaks", [row, {"seed": 4, "error": "no"}])
-    assert dict(first[1:])["sets"] == "1 of 2"
-    assert dict(first[1:])["true scatter inside its interval"] == "1 of 1"
-    cells = {line[0]: line[1:] for line in second[1:]}
+    first, second = tables("soaks", [row, {"seed": 4, "error": "no"}])
+    assert dict(first.lines)["sets"] == "1 of 2"
+    assert dict(first.lines)["true scatter inside its interval"] == "1 of 1"
+    cells = {line[0]: tuple(line[1:]) for line in second.lines}
     assert cells["all"] == ("2.00", "1.00", "3.00", "", "4.00")
     assert cells["gyro_bias"] == ("2.00", "", "", "", "4.00")
     assert cells["gyro_misalignment"] == ("", "", "3.00", "", "")
@@ -129,7 +127,7 @@ def test_tables_sort_coefficients_by_power_and_kind():
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", SOAK_KINDS[:1])
 def test_five_soaks_and_a_ramp_hold_their_sigmas_over_units_sites_and_plans(kind):
-    rows = [SoakRun(kind, "dtg")(seed) for seed in range(73_001, 73_009)]
+    rows = [STUDY.of((kind, "dtg"))(seed) for seed in range(73_001, 73_009)]
     z = np.array([value for row in rows for value in row["z"].values()])
     assert 0.85 < np.sqrt(np.mean(z**2)) < 1.15
     assert all(max(row["ramp"].values()) <= 1.2 for row in rows)

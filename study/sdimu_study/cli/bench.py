@@ -21,7 +21,6 @@ def bench(
     from rich.box import SIMPLE_HEAD
     from rich.table import Table
 
-
     with TemporaryDirectory() as folder:
         lines = [
             (what, f"{wall:.3f} s", f"{cpu:.3f} s", f"{count / wall:,.{0 if count > wall * 100 else 2}f} {noun}/s")
@@ -72,7 +71,7 @@ def measure(plan: str, rate: float, repeats: int, folder: Path) -> list[tuple[st
     from sdimu_calibration.storage.files.result_file import write_result
     from sdimu_sim.bag_file import write_test
     from sdimu_sim.core.scenario import Scenario, simulate_test
-    from sdimu_study.run import CalibrationRun
+    from sdimu_study.monte_carlo import STUDY, Campaign
 
     imu, model, site = load_imu("dtg"), load_model("baseline"), load_site("daejeon")
     scenario = Scenario(plan=load_plan(plan), imu=imu, site=site, table=load_table("ideal"), rate_hz=rate)
@@ -105,7 +104,7 @@ def measure(plan: str, rate: float, repeats: int, folder: Path) -> list[tuple[st
         ("bag to result.json", whole, n, "samples"),
         ("bag to diagnosis.json", diagnosis_alone, n, "samples"),
         ("the same with result.json and report.html", lambda: diagnosed().save(folder), n, "samples"),
-        ("one Monte-Carlo run", lambda: CalibrationRun(scenario, model)(1), 1, "runs"),
+        ("one Monte-Carlo run", lambda: STUDY.of(Campaign(scenario, model))(1), 1, "runs"),
     ]
     return [(what, *_best(work, repeats), count, noun) for what, work, count, noun in parts]
 

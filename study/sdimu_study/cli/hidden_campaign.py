@@ -31,12 +31,12 @@ def hidden_campaign(
     from sdimu_calibration.cli.progress import bar
     from sdimu_calibration.storage.files.config import load_imu, load_model
     from sdimu_calibration.storage.files.json_file import write_json
+    from sdimu_calibration.storage.files.whole_file import write_whole
     from sdimu_study.campaign import run_campaign
-    from sdimu_study.hidden_draw import KINDS
-    from sdimu_study.hidden_page import write_page
-    from sdimu_study.hidden_run import HiddenRun
-    from sdimu_study.hidden_sizes import LATITUDES_DEG, PLANS, sizes
-    from sdimu_study.hidden_summary import summarise
+    from sdimu_study.hidden import STUDY, HiddenCase
+    from sdimu_study.hidden_draw import KINDS, LATITUDES_DEG, sizes
+    from sdimu_study.hidden_page import page, summarise
+    from sdimu_study.plans import FILED
 
     kinds = tuple(kind or KINDS)
     check_options(kinds, KINDS, number, seed)
@@ -44,18 +44,18 @@ def hidden_campaign(
     specification, baseline = load_imu(imu), load_model(model)
     with bar(console) as progress:
         tables = []
-        for k, (plan, latitude) in enumerate((p, x) for p in PLANS for x in LATITUDES_DEG):
-            progress(f"sizes on {plan} at {latitude:.0f} deg", k / (len(PLANS) * len(LATITUDES_DEG)))
+        for k, (plan, latitude) in enumerate((p, x) for p in FILED for x in LATITUDES_DEG):
+            progress(f"sizes on {plan} at {latitude:.0f} deg", k / (len(FILED) * len(LATITUDES_DEG)))
             tables.append(sizes(plan, latitude, specification, baseline))
     rows = []
     for word in kinds:
-        work = HiddenRun(word, specification, baseline, tuple(tables))
+        work = STUDY.of(HiddenCase(word, specification, baseline, tuple(tables)))
         console.print(f"{word}:")
         with bar(console) as progress:
             rows += run_campaign(work, range(seed, seed + number), out, scheduler, progress, workers)
     summary = summarise(rows) | {"first_seed": seed}
     write_json(out / "hidden-effects.json", summary)
-    write_page(out / "hidden-effects.md", out / "hidden-effects.json")
+    write_whole(out / "hidden-effects.md", page(summary))
     for figure in summary["figures"]:
         if figure["value"] is not None:
             judged = f"{figure['value']:.3f} ({figure['of']} runs; wanted {figure['wanted']})"

@@ -4,16 +4,12 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from sdimu_calibration.cli.console import plain
-from sdimu_calibration.core.recording import DataError
 from sdimu_sim.cli.simulate import EFFECT, TEMPERATURE
-
-if TYPE_CHECKING:
-    from sdimu_study.run import CalibrationRun
 
 _SCHEDULER = "Address of a dask scheduler (tcp://host:8786); without it: processes on this machine."
 
@@ -39,6 +35,7 @@ def monte_carlo(
 ) -> None:
     """Simulate and calibrate many tests: bias, RMS against sigma and bound, NEES, NIS."""
     # Inside the function: the help of `sdimu` must not wait for numerical libraries.
+
     from rate_table_sim.table_file import load_table
     from sdimu_calibration.cli.progress import bar
     from sdimu_calibration.storage.files.config import load_imu, load_model, load_plan, load_site
@@ -47,11 +44,9 @@ def monte_carlo(
     from sdimu_sim.core.scenario import Scenario
     from sdimu_sim.own_effects import simulated_effects
     from sdimu_sim.temperature_file import load_temperature
-    from sdimu_study.bound import plan_bound
     from sdimu_study.campaign import run_campaign
+    from sdimu_study.monte_carlo import STUDY, Campaign, check, plan_bound, summarise
     from sdimu_study.monte_carlo_page import checks_table, coefficients_table, write_page
-    from sdimu_study.run import CalibrationRun
-    from sdimu_study.summary import summarise
 
     scenario = Scenario(
         plan=load_plan(plan),
@@ -64,13 +59,13 @@ def monte_carlo(
         effects=simulated_effects(effect or ()),
         temperature=None if temperature is None else load_temperature(temperature),
     )
-    work = CalibrationRun(scenario, load_model(model))
-    check_options(work, number, seed)
+    case = Campaign(scenario, load_model(model))
+    check(case, number, seed)
     console = plain()
     with bar(console) as progress:
-        rows = run_campaign(work, range(seed, seed + number), out, scheduler, progress, workers)
-    bound = plan_bound(work, range(seed, seed + number))
-    summary = summarise(rows, work.model, scenario.imu, bound, "batch least squares of this plan, IMU and mounts")
+        rows = run_campaign(STUDY.of(case), range(seed, seed + number), out, scheduler, progress, workers)
+    bound = plan_bound(case, range(seed, seed + number))
+    summary = summarise(rows, case.model, scenario.imu, bound, "batch least squares of this plan, IMU and mounts")
     write_json(out / "monte-carlo.json", summary)
     write_page(out / "monte-carlo.html", out / "monte-carlo.json")
     console.print(coefficients_table(summary), checks_table(summary), soft_wrap=True)
@@ -80,25 +75,3 @@ def monte_carlo(
         seeds = ", ".join(map(str, summary["unconverged"]))
         console.print(f"took all passes and may not have converged: seeds {seeds}", soft_wrap=True)
     console.print(f"results in {out}", soft_wrap=True)
-
-
-def check_options(work: CalibrationRun, number: int, seed: int) -> None:
-    """Refuse what would make every run fail.
-
-    Raises
-    ------
-    DataError
-        When the number of runs, the seed, the rate, an effect or the model cannot be used.
-    """
-    from sdimu_calibration.core.alignment.prepared import set_up
-    from sdimu_sim.core.hidden import parse_effects
-
-    if number < 2:
-        raise DataError(f"-n {number}: expected at least 2 runs")
-    if seed < 0:
-        raise DataError(f"--seed {seed}: expected a whole number from 0")
-    if not 10.0 <= work.scenario.rate_hz <= 1000.0:
-        raise DataError(f"--rate {work.scenario.rate_hz:g} Hz: expected 10 to 1000 Hz")
-    if parse_effects(work.scenario.effects).needs_temperature and work.scenario.temperature is None:
-        raise DataError("a hidden effect needs the temperature: give --temperature")
-    set_up(work.scenario.site, work.scenario.imu, work.model)

@@ -12,8 +12,8 @@ import numpy as np
 from sdimu_calibration.api.coefficient import Coefficient
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.error_figures import held_out, held_out_judged, nis, nis_judged, noise_learned
-from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.results import Calibration
+from sdimu_calibration.extras import needed
 from sdimu_calibration.report.table import as_text, cells, headings, rich_table, rows
 
 if TYPE_CHECKING:
@@ -100,12 +100,10 @@ class Fitted:
         DataError
             When pandas is not installed.
         """
-        try:
-            import pandas as pd  # noqa: PLC0415 (optional, and slow to load)
-        except ImportError as error:
-            raise DataError("to_dataframe needs pandas: pip install pandas") from error
         numbers = [(c.name, *c.to(c.display_unit), c.display_unit) for c in self]
-        return pd.DataFrame(numbers, columns=["name", "value", "sigma", "unit"]).set_index("name")
+        # Optional, and slow to load.
+        made: pd.DataFrame = needed("pandas").DataFrame(numbers, columns=["name", "value", "sigma", "unit"])
+        return made.set_index("name")
 
 
 def _errors(squared: float, error: float) -> str:

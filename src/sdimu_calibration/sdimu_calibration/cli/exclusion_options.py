@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.data_error import DataError
 
 if TYPE_CHECKING:
     from sdimu_calibration.core.estimation.prepared_test import PreparedTest

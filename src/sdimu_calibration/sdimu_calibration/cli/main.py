@@ -17,9 +17,10 @@ from typer.core import TyperGroup
 from typer.main import get_command
 
 import sdimu_calibration
+from sdimu_calibration.core.data_error import DataError
 from sdimu_calibration.core.plain_text import one_line
-from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.units import UnitError
+from sdimu_calibration.extras import lacking
 
 ENTRY_POINTS = "sdimu_calibration.verbs"
 
@@ -115,6 +116,11 @@ def main() -> None:
         app()
     except (DataError, UnitError) as error:
         sys.exit(_complain(str(error)))
+    except ModuleNotFoundError as error:
+        lack = lacking(error)
+        if lack is None:
+            raise
+        sys.exit(_complain(str(lack)))
     except (FileExistsError, NotADirectoryError) as error:
         sys.exit(_complain(f"{error.filename or 'system'}: a file is in the way of a folder; name another with --out"))
     except OSError as error:
@@ -137,10 +143,11 @@ def _added() -> dict[str, str]:
 
 def _unavailable(name: str, error: ImportError) -> Callable[[], None]:
     """Stand in for a verb whose package does not load, so that all others still work."""
-    reason = str(error)
+    lack = lacking(error)
+    reason = str(lack or error)
 
     def verb() -> None:
-        raise DataError(f"{name}: its package does not load ({reason}); install it again")
+        raise lack or DataError(f"{name}: its package does not load ({reason}); install it again")
 
     verb.__doc__ = f"(not available: {reason})"
     return verb

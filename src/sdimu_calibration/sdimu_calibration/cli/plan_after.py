@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from sdimu_calibration.cli.console import say
-from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.data_error import DataError
 
 if TYPE_CHECKING:
     from rich.console import Console

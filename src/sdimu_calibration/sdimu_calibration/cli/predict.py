@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from sdimu_calibration.cli.console import JsonOption, answer, plain, say
-from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.data_error import DataError
 
 if TYPE_CHECKING:
     from sdimu_calibration.core.plan import Plan

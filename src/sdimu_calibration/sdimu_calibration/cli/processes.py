@@ -18,7 +18,7 @@ from typing import IO, Any
 
 import yaml
 
-from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.data_error import DataError
 from sdimu_calibration.storage.files.config import config_folder
 
 # 0 is where everyone else is; above 101 the ports of DDS reach into the system's ephemeral ones.

@@ -335,6 +335,7 @@ class LiveCalibration:
         seen = motion(
             part, rest, sensors, np.zeros(len(sensors.prior)), self._track, setup.site.latitude_rad, setup.gravity,
             self._intake.temperature_log(), predicted=False, before=self._before, magnetic_n=setup.magnetic_n,
+            causal=True,
         )  # fmt: skip
         self._before = seen
         one = Phases(*(getattr(phases, n)[k : k + 1] for n in Phases.__dataclass_fields__))

@@ -8,19 +8,27 @@ from functools import cached_property
 import numpy as np
 
 from sdimu_calibration.core.arrays import Bools, Floats, Ints
-from sdimu_calibration.core.plain_text import one_line
+from sdimu_calibration.core.data_error import DataError
+
+__all__ = [
+    "NOMINAL_FROM",
+    "UNNUMBERED",
+    "DataError",
+    "DataFault",
+    "DivergedError",
+    "PhaseLog",
+    "Recording",
+    "TableLog",
+    "TemperatureLog",
+    "nominal_interval_ns",
+    "origin_ns",
+    "seconds",
+]
 
 NOMINAL_FROM = 50
 """Number of sample intervals that give the nominal one: the first ones, so that live and offline agree."""
 UNNUMBERED = -1
 """Stop of a phase that has no number: stops are then counted."""
-
-
-class DataError(ValueError):
-    """Data or options that cannot be used; its text is the one line shown to the user, whatever names are in it."""
-
-    def __init__(self, text: str) -> None:
-        super().__init__(one_line(text))
 
 
 class DivergedError(DataError):

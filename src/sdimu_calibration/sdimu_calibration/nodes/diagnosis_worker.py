@@ -28,6 +28,7 @@ from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.front_door import OpeningOptions, open_test
 from sdimu_calibration.core.recording import NOMINAL_FROM, DataError
 from sdimu_calibration.core.verdict import Verdict
+from sdimu_calibration.report.live_picture import live_picture
 from sdimu_calibration.storage.files.effect_file import extended_model
 from sdimu_calibration.storage.files.journal import read_journal
 
@@ -126,9 +127,6 @@ class Picture:
 
 def picture(answer: Answer) -> Picture:
     """Draw the diagnosis of an answer."""
-    # matplotlib takes half a second to load.
-    from sdimu_calibration.report.live_picture import live_picture  # noqa: PLC0415
-
     waiting = answer.diagnosis.verdict == Verdict.WAITING
     return Picture(answer.request, b"" if waiting else live_picture(answer.diagnosis))
 

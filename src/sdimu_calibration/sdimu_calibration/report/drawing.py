@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from sdimu_calibration.extras import needed
 from sdimu_calibration.report.design.library import as_script
 from sdimu_calibration.report.design.palette import LIGHT, paint
 from sdimu_calibration.report.design.plotly_template import template
@@ -118,9 +119,8 @@ class Figure:
 
     def as_plotly(self, theme: str = LIGHT) -> Any:
         """Return it as a `plotly.graph_objects.Figure`, for a notebook or the workbench."""
-        from plotly.graph_objects import Figure as PlotlyFigure  # noqa: PLC0415 (slow to load; reports do without)
-
-        return PlotlyFigure(
+        # Slow to load, and reports do without.
+        return needed("plotly.graph_objects").Figure(
             paint({"data": self.data, "layout": {"template": template(theme), **self.layout}}, theme)
         )
 

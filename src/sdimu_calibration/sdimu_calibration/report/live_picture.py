@@ -2,80 +2,146 @@
 
 from __future__ import annotations
 
-import io
-from typing import Any
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
 
-import matplotlib as mpl
 import numpy as np
-from matplotlib.figure import Figure
-from PIL import Image
 
 from sdimu_calibration.core.diagnosis.live_diagnosis import LiveDiagnosis
-from sdimu_calibration.report.data import places
-from sdimu_calibration.report.design.palette import LIGHT, palette
+from sdimu_calibration.report.data import Grid, places
+from sdimu_calibration.report.design.palette import DIVERGING, LIGHT, paint, palette
+from sdimu_calibration.report.evidence_figures import cell
 from sdimu_calibration.report.live_text import best_ranked, model_name, size
-from sdimu_calibration.report.pictures import STYLE, draw_heat_map
+from sdimu_calibration.report.raster import CENTRE, LEFT, RIGHT, Colour, Raster, colour
 
 _PALETTE = palette(LIGHT)
-_INK, _LINE, _AFTER = (_PALETTE[k] for k in ("ink", "line", "after"))
-_DPI = 100
-_COLOURS = 128
-"""Number of colours: a third of the bytes, in a bag that has one such picture a stop."""
+_INK, _LINE, _AFTER = (colour(_PALETTE[k]) for k in ("ink", "line", "after"))
+_WHITE: Colour = (255, 255, 255)
 _MOST_BARS = 8
 _TALLEST = 1.35
 """Share of the largest value that an axis shows: numbers stand beside bars."""
-_WIDTH, _HEIGHT, _BAR = 8.6, 4.3, 0.2
-"""Inches of the picture, of all of it but the bars, and of a bar. A layout that is worked out takes twice the time."""
+_FULL = 8.0
+"""Sigmas at which the colour of a heat map is full."""
+_WHITE_FROM = 6.0
+"""Sigmas from which the number in a cell is white."""
+_SHADES = 16
+"""Steps of the colour from nothing to full: few colours take few bytes, in a bag that has one such picture a stop."""
+_WIDTH, _LEFT, _RIGHT, _TOP = 860, 232, 843, 30
+"""Width of the picture, sides and top of its panels (px)."""
+_ROW, _BAR, _BELOW, _GAP = 27, 20, 44, 12
+"""Height of a row of the heat map and of a bar, room for the axis below a panel and between panels (px)."""
+_CELL, _SMALL, _TITLE = 9, 10, 13
+"""Heights of characters (px)."""
+_TICKS = 7
+"""Numbers that an axis has at most."""
 
 
 def live_picture(found: LiveDiagnosis) -> bytes:
     """Draw a diagnosis that does not wait, as PNG."""
-    bars = (len(best_ranked(found.ranking)[:_MOST_BARS]) or 1, len(found.ladder))
-    high = _HEIGHT + _BAR * sum(bars)
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(_WIDTH, high))
-        grid = figure.add_gridspec(
-            3, 1, height_ratios=(2.6, _BAR * bars[0], _BAR * bars[1]), left=0.27, right=0.98, top=1.0 - 0.3 / high,
-            bottom=0.5 / high, hspace=0.62,
-        )  # fmt: skip
-        above, middle, below = (figure.add_subplot(grid[row]) for row in range(3))
-        draw_heat_map(above, *places(found.where))
-        above.set_title(f"Up to stop {found.stop}, {model_name(found.added)}: mean innovation over its sigma")
-        above.set_xlabel("stop")
-        _ranking(middle, found)
-        _ladder(below, found)
-        drawn, small = io.BytesIO(), io.BytesIO()
-        figure.savefig(drawn, format="png", dpi=_DPI)
-    with Image.open(drawn) as picture:
-        picture.convert("RGB").quantize(_COLOURS, Image.Quantize.FASTOCTREE).save(small, "png")
-    return small.getvalue()
-
-
-def _ranking(axes: Any, found: LiveDiagnosis) -> None:
-    shown = best_ranked(found.ranking)[:_MOST_BARS]
-    at, scores = np.arange(len(shown)), [abs(r.z) for r in shown]
-    axes.barh(at, scores, color=_LINE, edgecolor=_INK, linewidth=0.6, height=0.75)
-    largest = max(scores, default=1.0)
-    if np.isfinite(found.threshold):
-        largest = max(largest, found.threshold)
-        axes.axvline(found.threshold, color=_INK, ls="--", lw=1.2)
-    for k, ranked in enumerate(shown):
-        axes.text(max(scores[k], min(found.threshold, largest)), k, f" {size(ranked)}", va="center", fontsize=7)
-    axes.set_yticks(at, [r.label for r in shown], fontsize=7.5)
-    axes.invert_yaxis()
-    axes.set_xlim(0.0, _TALLEST * largest)
-    axes.set_xlabel("score |z| (sigma); dashed: what noise reaches")
-
-
-def _ladder(axes: Any, found: LiveDiagnosis) -> None:
+    grid, channels = places(found.where)
+    ranked = best_ranked(found.ranking)[:_MOST_BARS]
+    heights = (_ROW * len(channels), _BAR * (len(ranked) or 1), _BAR * len(found.ladder))
+    drawn = Raster(_WIDTH, _TOP + sum(heights) + 3 * _BELOW + 2 * _GAP)
+    title = f"Up to stop {found.stop}, {model_name(found.added)}: mean innovation over its sigma"
+    drawn.text(_LEFT, _TOP / 2, title, _INK, _TITLE)
+    _heat_map(drawn, _TOP, grid, channels)
+    below = _TOP + heights[0] + _BELOW + _GAP
+    _Bars(drawn, below, [abs(r.z) for r in ranked], [f" {size(r)}" for r in ranked], [r.label for r in ranked],
+          found.threshold, _LINE).draw("score |z| (sigma); dashed: what noise reaches")  # fmt: skip
     errors = [rung.held_out if np.isfinite(rung.held_out) else 0.0 for rung in found.ladder]
-    at = np.arange(len(errors))
-    axes.barh(at, errors, color=_AFTER, height=0.6)
-    axes.axvline(1.0, color=_INK, ls="--", lw=1.2)
-    for k, rung in enumerate(found.ladder):
-        told = f" {rung.held_out:.3g}" if errors[k] else " too few stops"
-        axes.text(max(errors[k], 1.0), k, told, va="center", fontsize=7)
-    axes.set_yticks(at, [model_name(rung.added) for rung in found.ladder], fontsize=7.5)
-    axes.invert_yaxis()
-    axes.set_xlim(0.0, _TALLEST * max([1.0, *errors]))
-    axes.set_xlabel("error with one stop left out (sigma); dashed: 1 is right")
+    words = [f" {error:.3g}" if error else " too few stops" for error in errors]
+    names = [model_name(rung.added) for rung in found.ladder]
+    _Bars(drawn, below + heights[1] + _BELOW + _GAP, errors, words, names, 1.0, _AFTER).draw(
+        "error with one stop left out (sigma); dashed: 1 is right"
+    )
+    return drawn.png()
+
+
+def _shade(value: float) -> Colour:
+    """Colour of a signed value (sigma), in steps; white where there is none."""
+    if not np.isfinite(value):
+        return _WHITE
+    step = round(_SHADES * min(max(value / _FULL, -1.0), 1.0)) / _SHADES
+    scale = [(at, colour(written)) for at, written in paint(DIVERGING, LIGHT)]
+    at, inks = [place for place, _ in scale], np.array([ink for _, ink in scale], np.float64)
+    red, green, blue = (round(float(np.interp(0.5 + 0.5 * step, at, inks[:, k]))) for k in range(3))
+    return red, green, blue
+
+
+def _heat_map(drawn: Raster, top: int, grid: Grid, channels: Sequence[str]) -> None:
+    """Draw residual means, channel by stop: number and sign in each cell, colour besides."""
+    across = np.linspace(_LEFT, _RIGHT, len(grid.stops) + 1)
+    middle = 0.5 * (across[1:] + across[:-1])
+    for (row, column), value in np.ndenumerate(grid.value):
+        above = top + _ROW * row
+        drawn.box(across[column], above, across[column + 1], above + _ROW, _shade(float(value)))
+        ink = _WHITE if abs(value) > _WHITE_FROM else _INK
+        drawn.text(middle[column], above + _ROW / 2, cell(float(value)), ink, _CELL, CENTRE)
+    for row, name in enumerate(channels):
+        drawn.text(_LEFT - 6, top + _ROW * (row + 0.5), name.replace("_", " "), _INK, _SMALL, RIGHT)
+    bottom = top + _ROW * len(channels)
+    for place, stop in zip(middle, grid.stops, strict=True):
+        drawn.text(place, bottom + 9, str(stop), _INK, _SMALL, CENTRE)
+    drawn.text(0.5 * (_LEFT + _RIGHT), bottom + 28, "stop", _INK, _TITLE, CENTRE)
+
+
+@dataclass(frozen=True)
+class _Bars:
+    """Bars with a name before and words behind each, over an axis from zero, and a dashed line.
+
+    Attributes
+    ----------
+    drawn : Raster
+    top : int
+        Upper edge of the first bar (px).
+    values : sequence of float
+    words, names : sequence of str
+    line : float
+        Where the dashed line is; not finite leaves it out.
+    ink : tuple of int
+        Of the bars.
+    """
+
+    drawn: Raster
+    top: int
+    values: Sequence[float]
+    words: Sequence[str]
+    names: Sequence[str]
+    line: float
+    ink: Colour
+
+    def draw(self, caption: str) -> None:
+        """Draw the panel, with a caption below its axis."""
+        reach = self.line if math.isfinite(self.line) else 0.0
+        scale = (_RIGHT - _LEFT) / (_TALLEST * (max([*self.values, reach]) or 1.0))
+        bottom = self.top + _BAR * (len(self.names) or 1)
+        for row, (value, name) in enumerate(zip(self.values, self.names, strict=True)):
+            above = self.top + _BAR * row
+            self.drawn.box(_LEFT, above + 3, _LEFT + scale * value, above + _BAR - 3, self.ink)
+            self.drawn.frame(_LEFT, above + 3, _LEFT + scale * value, above + _BAR - 4, _INK)
+            self.drawn.text(_LEFT - 6, above + _BAR / 2, name, _INK, _SMALL, RIGHT)
+        if reach:
+            self.drawn.dashed(_LEFT + scale * reach, self.top, bottom, _INK)
+        for row, (value, words) in enumerate(zip(self.values, self.words, strict=True)):
+            start = _LEFT + scale * max(value, reach)
+            self.drawn.text(start + 3, self.top + _BAR * (row + 0.5), words, _INK, _SMALL, LEFT)
+        self._axis(bottom, scale)
+        self.drawn.text(0.5 * (_LEFT + _RIGHT), bottom + 30, caption, _INK, _TITLE, CENTRE)
+
+    def _axis(self, y: int, scale: float) -> None:
+        """Draw the axis, with round numbers."""
+        self.drawn.box(_LEFT, y, _RIGHT, y + 1, _INK)
+        self.drawn.box(_LEFT, self.top, _LEFT + 1, y, _INK)
+        largest = (_RIGHT - _LEFT) / scale
+        step = _round_step(largest / _TICKS)
+        for k in range(int(largest / step) + 1):
+            x = _LEFT + scale * step * k
+            self.drawn.box(x, y, x + 1, y + 4, _INK)
+            self.drawn.text(x, y + 11, f"{step * k:g}", _INK, _SMALL, CENTRE)
+
+
+def _round_step(least: float) -> float:
+    """Return the smallest of 1, 2 and 5 times a power of ten that is no less."""
+    power = 10.0 ** math.floor(math.log10(least))
+    return next(factor * power for factor in (1.0, 2.0, 5.0, 10.0) if factor * power >= least * (1.0 - 1e-9))

@@ -8,12 +8,9 @@ from contextlib import contextmanager
 from typing import Any
 
 from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.extras import needed
 
-try:
-    import dask
-    from distributed import Client, LocalCluster, as_completed
-except ModuleNotFoundError as error:
-    raise DataError(f"many runs at once need {error.name}: pip install dask distributed") from error
+dask, distributed = needed("dask"), needed("distributed")
 
 _ENVIRONMENT = {
     # One thread a worker: two libraries that each start a thread a core only wait for each other.
@@ -49,7 +46,7 @@ def cluster(scheduler: str | None, workers: int) -> Iterator[Run]:
 
         def run(function: Callable[[Any], Any], arguments: Sequence[Any]) -> Iterator[tuple[Any, Any]]:
             futures = {client.submit(function, argument, pure=False): argument for argument in arguments}
-            for future in as_completed(futures):
+            for future in distributed.as_completed(futures):
                 yield futures.pop(future), _result(future)
 
         yield run
@@ -59,7 +56,7 @@ def cluster(scheduler: str | None, workers: int) -> Iterator[Run]:
 def _client(scheduler: str | None, workers: int) -> Iterator[Any]:
     if scheduler is not None:
         try:
-            client = Client(scheduler, timeout=_ANSWER_S)
+            client = distributed.Client(scheduler, timeout=_ANSWER_S)
         except (OSError, TimeoutError, ValueError) as error:
             raise DataError(f"--scheduler {scheduler}: no dask scheduler answers there") from error
         with client:
@@ -68,11 +65,11 @@ def _client(scheduler: str | None, workers: int) -> Iterator[Any]:
     with (
         # The allocator reads its limits when the process starts.
         dask.config.set({"distributed.nanny.pre-spawn-environ": _ENVIRONMENT}),
-        LocalCluster(
+        distributed.LocalCluster(
             n_workers=workers, threads_per_worker=1, processes=True, dashboard_address="127.0.0.1:0",
             memory_limit=None, silence_logs=logging.CRITICAL,
         ) as local,
-        Client(local) as client,
+        distributed.Client(local) as client,
     ):  # fmt: skip
         yield client
 

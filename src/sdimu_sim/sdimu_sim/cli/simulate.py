@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from sdimu_calibration.cli.console import plain
-from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.data_error import DataError
 from sdimu_calibration.core.units import parse_quantity
 
 if TYPE_CHECKING:

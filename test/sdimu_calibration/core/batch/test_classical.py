@@ -12,7 +12,7 @@ from sdimu_calibration.core.units import to_si
 from sdimu_calibration.storage.files.config import load_plan
 from sdimu_sim.core.scenario import Scenario, generate
 from sdimu_sim.core.truth import in_body_frame
-from sdimu_study.mount_study import turned
+from sdimu_study.mount import turned
 
 KIM18 = load_plan("kim18")
 

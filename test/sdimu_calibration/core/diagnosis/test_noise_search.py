@@ -16,8 +16,8 @@ from sdimu_calibration.core.estimation.solve import solve
 from sdimu_calibration.core.specification import Site
 from sdimu_calibration.storage.files.config import load_imu, load_model, load_plan
 from sdimu_sim.core.scenario import Scenario, imu_truth
-from sdimu_study.hidden_score import baseline_z
-from sdimu_study.run import in_the_mean, simulate
+from sdimu_study.score import baseline_z
+from sdimu_study.worlds import in_the_mean, simulate
 
 FLICKER = ("gyro_noise_flicker=0.01 deg/h", "accel_noise_flicker=2 ug")
 

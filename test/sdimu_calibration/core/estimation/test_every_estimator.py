@@ -32,8 +32,8 @@ from sdimu_calibration.storage.files.result_file import read_result, write_resul
 from sdimu_sim.bag_file import write_test
 from sdimu_sim.core.by_hand import ByHand, by_hand_recording
 from sdimu_sim.core.scenario import Scenario, generate, simulate_test
-from sdimu_study.grade_run import choice
-from sdimu_study.run import CalibrationRun
+from sdimu_study.monte_carlo import STUDY, Campaign
+from sdimu_study.worlds import choice
 
 SITE = Site(latitude_rad=float(np.radians(36.4)))
 HANDHELD_IMU = "mems_by_hand"
@@ -178,7 +178,7 @@ def test_every_caller_gives_the_same_digits(imu, tmp_path):
     for other in (base, bench, live.finish()):
         np.testing.assert_array_equal(other.values, once.values)
         np.testing.assert_array_equal(other.covariance, once.covariance)
-    row, simulated = CalibrationRun(scenario(imu), model)(71), calibrate(recording_of(imu), SITE, test.imu, model)
+    row, simulated = STUDY.of(Campaign(scenario(imu), model))(71), calibrate(recording_of(imu), SITE, test.imu, model)
     np.testing.assert_array_equal(row["estimate"], simulated.values)
 
 

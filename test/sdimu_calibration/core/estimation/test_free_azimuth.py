@@ -17,8 +17,8 @@ from sdimu_calibration.core.joint.member import Job, Member, run
 from sdimu_calibration.core.rotation import rotation_matrix
 from sdimu_calibration.core.specification import Site
 from sdimu_calibration.storage.files.config import load_imu, load_model
-from sdimu_study.grade_run import simulated_test
-from sdimu_study.hidden_score import baseline_z
+from sdimu_study.score import baseline_z
+from sdimu_study.worlds import simulated_test
 
 SITE = Site(math.radians(52.0), 0.0)
 FLICKER = ("gyro_noise_flicker=25 deg/h", "accel_noise_flicker=150 ug")
@@ -55,11 +55,10 @@ def test_flicker_as_large_as_earth_rate_hides_the_azimuth_and_says_so(hidden):
 
 def test_a_misfit_is_told_of_white_noise_and_right_at_one_is_the_other(hidden):
     fit, _ = hidden[0]
-    (told,) = (line for line in fit.warnings(replace(fit.statistics(), held_out_rms=7.0)) if "the model" in line)
+    (told,) = (line for line in fit.warnings(fit.statistics() | {"held_out_rms": 7.0}) if "the model" in line)
     assert told.startswith("the model in white noise does not fit (NIS ")
     assert f"held-out error {fit.noise.held_out_rms:.3f}, 1 is right" in told
-    bare = fit.with_noise(None)
-    (white,) = (line for line in bare.warnings(replace(bare.statistics(), nis_mean=2.0)) if "the model" in line)
+    (white,) = (line for line in fit.with_noise(None).warnings({"nis_mean": 2.0}) if "the model" in line)
     assert white.startswith("the model does not fit (NIS 2.000; 1 is right)")
 
 

@@ -16,7 +16,7 @@ from sdimu_calibration.storage.files.config import load_imu, load_model, load_pl
 from sdimu_sim.core.scenario import Scenario, imu_truth
 from sdimu_sim.core.true_coefficients import true_coefficients
 from sdimu_sim.core.truth import draw_coefficients
-from sdimu_study.run import simulate
+from sdimu_study.worlds import simulate
 
 
 def test_an_azimuth_that_the_gyro_bias_put_wrong_is_found():

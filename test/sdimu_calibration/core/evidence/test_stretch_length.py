@@ -15,7 +15,7 @@ from sdimu_calibration.core.evidence.stretch_length import moves_within, wander_
 from sdimu_calibration.core.noise_term import NoiseTerm
 from sdimu_calibration.core.specification import Site
 from sdimu_calibration.storage.files.config import load_imu, load_model
-from sdimu_study.grade_run import simulated_test
+from sdimu_study.worlds import simulated_test
 
 
 class Ideal:

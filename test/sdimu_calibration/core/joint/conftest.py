@@ -19,7 +19,7 @@ from sdimu_calibration.storage.files.config import load_imu, load_model, load_pl
 from sdimu_sim.core.scenario import Scenario, imu_truth
 from sdimu_sim.core.temperature import TemperatureProfile
 from sdimu_sim.core.truth import draw_coefficients, turned_on
-from sdimu_study.run import simulate
+from sdimu_study.worlds import simulate
 
 SITE = Site(latitude_rad=float(np.radians(36.4)), height_m=80.0)
 IMU = load_imu("dtg")

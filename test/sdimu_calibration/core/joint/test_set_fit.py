@@ -14,7 +14,7 @@ from sdimu_calibration.core.joint.variation import _scatter, variation
 from sdimu_calibration.core.plan import Plan
 from sdimu_calibration.core.recording import DataError
 from sdimu_sim.core.truth import ImuTruth
-from sdimu_study.hidden_score import baseline_z
+from sdimu_study.score import baseline_z
 
 from .conftest import InMemory, _recorded, here, short, switched_on, unit_set
 

@@ -18,8 +18,8 @@ from sdimu_calibration.core.recording import Recording
 from sdimu_calibration.core.units import to_si
 from sdimu_calibration.storage.files.config import load_imu, load_model, load_plan
 from sdimu_sim.core.scenario import Scenario, imu_truth
-from sdimu_study.hidden_score import baseline_z
-from sdimu_study.run import simulate
+from sdimu_study.score import baseline_z
+from sdimu_study.worlds import simulate
 
 DT = 0.01
 PULSE = to_si(3.0, "arcsec")

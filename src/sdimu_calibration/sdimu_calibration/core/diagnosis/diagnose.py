@@ -56,6 +56,11 @@ _MISFIT = 0.05
 _MISFIT_SIGMAS = 5.0
 """Excess of the NIS (standard deviations of it) up to which a model fits: in a short test chance goes beyond
 `_MISFIT`."""
+_TO_AND_FRO = (
+    "the search for missing effects went to and fro between choices that explain about the same, and was ended: of "
+    "these one is named, and another may be right"
+)
+"""Finding where the search did not come to an end by itself."""
 NOT_DIAGNOSABLE = (
     "the classical estimator gives coefficients in the axes of the table: a navigation about them shows the mount, and "
     f"no missing effect; diagnose with another {Option.ESTIMATOR} (in Python estimator=...)"
@@ -202,6 +207,7 @@ def climb(
     # Beside what was found a prior may no longer stand against the data: the fit of the model as given tells it.
     odd = [*base.contradicted_priors(), *widened.beyond_specification()]
     findings = (*screen(base), *(Finding(text, grave=False) for text in odd))
+    findings += () if done.found.stood else (Finding(_TO_AND_FRO, grave=False),)
     findings += () if widened.converged else (Finding(NOT_CONVERGED, grave=True),)
     progress("report", 0.9)
     if base.learns_scatter:
@@ -211,7 +217,8 @@ def climb(
         noise, _ = measured_noise(consistency, base)
     # In the noise that was learned without the effects nothing would be seen to be missing.
     as_given = in_found_noise(request, base, done.found.noise) if done.chosen else done.fit
-    before = outcome(as_given)
+    # A missing effect that is found may be so large that without it there is no fit at all.
+    before = outcome(as_given, refuse=not done.chosen)
     after = doubted(outcome(done.fit) if done.chosen else before, widened)
     own = any(c.family == "own" for c in done.chosen)
     # What was added must also predict: an effect that only mimics the missing one fits here and fails elsewhere.

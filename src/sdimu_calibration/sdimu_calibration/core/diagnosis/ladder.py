@@ -77,7 +77,7 @@ def ladder(fit: Fit, final: Fit, done: Round, progress: Progress) -> tuple[Rung,
         fits.append(extend(fit, effects[:k], progress=progress))
     if effects:
         fits.append(final)
-    results = [outcome(one) for one in fits]
+    results = [outcome(one, refuse=one is fits[-1]) for one in fits]
     # Handheld fits learn their sigmas, so their errors compare in the sigmas of one fit only: the last.
     problem, chosen = Problem(done.evidence), [int(c) for c in done.found.chosen]
     rungs: list[Rung] = []

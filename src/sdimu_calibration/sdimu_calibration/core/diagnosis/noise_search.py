@@ -58,6 +58,9 @@ _CLEAR = 10.0
 by the effect as a whole."""
 _DOUBT = 3.0
 """Log-likelihood (1) by which a choice with an effect that noise imitates must beat noise: odds of 20 to 1."""
+_MOST_CHOICES = 2 * MOST_STEPS
+"""Number of choices that are gone through at most: one that adds an effect a step, and drops each again, needs no
+more."""
 _EXCHANGES = 3
 """Number of times that every chosen effect is compared with all others in its place: the second changes little."""
 
@@ -188,9 +191,10 @@ def search_with_noise(
     states = []
     for state in (from_white, bare):
         if ground.net(state) > max(ground.net(from_white), ground.net(bare)) - _HOPELESS:
-            ground, settled = _settled(ground, state)
-            states.append(settled)
-    return _told(ground, max(states, key=lambda s: ground.net(s) - _DOUBT * ground.doubtful(s)), white)
+            ground, settled, stood = _settled(ground, state)
+            states.append((settled, stood))
+    best, stood = max(states, key=lambda s: ground.net(s[0]) - _DOUBT * ground.doubtful(s[0]))
+    return replace(_told(ground, best, white), stood=stood)
 
 
 def imitated(found: Search[E], allowed: Ints) -> Ints:
@@ -236,16 +240,31 @@ def _triads(ground: _Ground[E], column: int) -> set[str]:
     return {TRIADS[term.channel // 3] for term in ground.white.candidate(column).effect.terms}
 
 
-def _settled(ground: _Ground[E], state: _State) -> tuple[_Ground[E], _State]:
-    """Drop, add and exchange until nothing changes."""
+def _settled(ground: _Ground[E], state: _State) -> tuple[_Ground[E], _State, bool]:
+    """Drop, add and exchange until nothing changes; whether that came to pass.
+
+    What is added is judged in the noise before it, what is dropped in the noise after it: the two may undo each other
+    for ever. Where a choice comes back the likeliest of the round trip is taken.
+    """
     state = _pruned(ground, state)
+    seen = {_labels(ground, state): state}
     while len(state.chosen) < MOST_STEPS:
         ground, wider = _grown(ground, state)
         wider = wider or _with_pair(ground, state)
         if wider is None:
             break
         state = _pruned(ground, wider)
-    return ground, _pruned(ground, _exchanged(ground, state))
+        labels = _labels(ground, state)
+        if labels in seen or len(seen) >= _MOST_CHOICES:
+            return ground, max(seen.values(), key=ground.net), False
+        seen[labels] = state
+    return ground, _pruned(ground, _exchanged(ground, state)), True
+
+
+def _labels(ground: _Ground[E], state: _State) -> frozenset[str]:
+    """Say what a state holds: its effects and its kinds of noise."""
+    effects = (ground.evidence.names[column] for column in state.chosen)
+    return frozenset((*effects, *(f"{term.triad} {term.kind} {term.tau}" for term in state.balance.terms)))
 
 
 def _grown(ground: _Ground[E], state: _State) -> tuple[_Ground[E], _State | None]:

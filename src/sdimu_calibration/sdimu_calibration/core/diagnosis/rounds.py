@@ -119,6 +119,8 @@ def search_until_stable(request: Request, progress: Progress) -> Round:
             done = _with_choice(done, ground.tried)
             break
         ground = next_ground(request, trial, done.chosen, own, done.found, ground.free)
+    else:
+        done = None if done is None else replace(done, found=replace(done.found, stood=False))
     if done is None:
         raise AssertionError("a search has one round at least")
     return drop_companions(request, replace(done, found=replace(done.found, steps=steps)), progress)

@@ -126,6 +126,8 @@ class Search(Generic[E]):
         Information on its columns and on wandering biases; None where noise was not learned.
     net : float
         Log-likelihood less what effects and noise terms cost; NaN where no noise was learned.
+    stood : bool
+        The choice stood at the end; False where the search went to and fro and the likeliest choice was taken.
     """
 
     steps: tuple[Step, ...]
@@ -138,6 +140,7 @@ class Search(Generic[E]):
     net: float = float("nan")
     white: E | None = None
     joint: Joint | None = None
+    stood: bool = True
 
 
 def search(

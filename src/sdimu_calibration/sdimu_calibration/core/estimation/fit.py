@@ -243,6 +243,11 @@ class Fit(ABC):
         del statistics
         return ()
 
+    def contradiction(self, statistics: FitStatistics) -> str:
+        """Say that the model does not fit at all, with these `statistics`; empty where it does."""
+        del statistics
+        return ""
+
     def rests(self) -> tuple[Rest, ...]:
         """Rests of a run by hand with their residuals; none where stops are measured."""
         return ()

@@ -37,7 +37,7 @@ from sdimu_calibration.core.measurement_kind import ALL, HELD_ALL, HELD_SENSORS,
 from sdimu_calibration.core.noise_term import NoiseTerm
 from sdimu_calibration.core.note import Note, Topic
 from sdimu_calibration.core.plain_text import counted
-from sdimu_calibration.core.recording import DataError, DataFault
+from sdimu_calibration.core.recording import DataFault
 from sdimu_calibration.core.results import History
 from sdimu_calibration.core.second_order.second_order_passes import SecondOrderPass
 from sdimu_calibration.core.side_by_side import side_by_side
@@ -360,17 +360,25 @@ class NavigationFit(Fit):
             *((f"with a prior that the model states: {', '.join(other)}",) if other else ()),
         )
 
+    def contradiction(self, statistics: FitStatistics) -> str:
+        """Say that there is no fit at all; empty where there is one."""
+        nis = statistics.nis_mean
+        if nis <= _ABSURD:
+            return ""
+        return (
+            f"the recording contradicts the model: squared innovations are {nis:.3g} times what the noise explains"
+            f"{self._lost_in_words()}; check {Option.IMU}, {Option.SITE}, units and axes"
+        )
+
+    def _lost_in_words(self) -> str:
+        lost = int(self.prepared.cycles.lost.sum())
+        return f"; {counted(lost, 'sample is', 'samples are')} missing by their stamps" if lost else ""
+
     def warnings(self, statistics: FitStatistics) -> tuple[str, ...]:
         """Misfit as a whole and of single stops, and coefficients outside the specification."""
         nis, held_out = statistics.nis_mean, statistics.held_out_rms
-        lost = int(self.prepared.cycles.lost.sum())
         white = "" if self.noise is None else " in white noise"
-        in_turn = f"; {counted(lost, 'sample is', 'samples are')} missing by their stamps" if lost else ""
-        if nis > _ABSURD:
-            raise DataError(
-                f"the recording contradicts the model: squared innovations are {nis:.3g} times what the noise explains"
-                f"{in_turn}; check {Option.IMU}, {Option.SITE}, units and axes"
-            )
+        in_turn = self._lost_in_words()
         out: list[str] = [] if self.converged else [NOT_CONVERGED]
         if nis > MISFIT or (held_out is not None and held_out > MISFIT):
             text = f"NIS {nis:.3f}" + ("" if held_out is None else f", held-out error {held_out:.3f}")

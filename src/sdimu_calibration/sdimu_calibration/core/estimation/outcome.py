@@ -15,7 +15,7 @@ from sdimu_calibration.core.estimation.solve import AUTO, solve
 from sdimu_calibration.core.note import Note, Topic
 from sdimu_calibration.core.origin import Origin, measured
 from sdimu_calibration.core.progress import Progress, silent
-from sdimu_calibration.core.recording import Recording
+from sdimu_calibration.core.recording import DataError, Recording
 from sdimu_calibration.core.results import INSEPARABLE, Calibration
 from sdimu_calibration.core.specification import ImuSpecification, Model, Site
 
@@ -25,7 +25,7 @@ _TOLD = 1.2
 """Ratio of a sigma to the one if the model is right, from which a note reports it: less is seen in no use of it."""
 
 
-def outcome(fit: Fit, held_out: bool = True) -> Calibration:
+def outcome(fit: Fit, held_out: bool = True, refuse: bool = True) -> Calibration:
     """Put a result together, in the body frame of the fit.
 
     Parameters
@@ -33,12 +33,18 @@ def outcome(fit: Fit, held_out: bool = True) -> Calibration:
     fit : Fit
     held_out : bool
         Also predict every stop from the others (costs some passes).
+    refuse : bool
+        Refuse a model that does not fit at all; False warns of it, for one whose missing effect is known.
     """
     statistics = replace(fit.statistics(), held_out_rms=fit.held_out_rms() if held_out else None)
     parameters = fit.sensors.parameters
     covariance = fit.covariance
     grave = (f.text for f in fit.faults if f.grave)
-    warnings = (*grave, *fit.warnings(statistics), *inseparable(fit.names, covariance))
+    against = fit.contradiction(statistics)
+    if against and refuse:
+        raise DataError(against)
+    absurd = (against,) if against else ()
+    warnings = (*grave, *absurd, *fit.warnings(statistics), *inseparable(fit.names, covariance))
     light = tuple(f.text for f in fit.faults if not f.grave)
     return Calibration(
         body_frame=fit.body_frame,

@@ -211,6 +211,7 @@ def one_pass(
     seen = motion(
         prepared.cycles, prepared.rest, sensors, reference, C_nb.copy(), setup.site.latitude_rad, setup.gravity,
         prepared.temperature, predicted=not closed_loop, magnetic_n=setup.magnetic_n, near=near,
+        causal=closed_loop,
     )  # fmt: skip
     values = sensors.regressors(seen)
     if not np.isfinite(values).all():

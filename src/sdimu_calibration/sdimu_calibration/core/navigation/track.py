@@ -109,6 +109,7 @@ def motion(
     before: Motion | None = None,
     magnetic_n: Floats = MAGNETIC_FIELD,
     near: Floats | None = None,
+    causal: bool = False,
 ) -> Motion:
     """Motion of each cycle, as the effects see it.
 
@@ -133,6 +134,10 @@ def motion(
         Magnetic field in NED (T).
     near : ndarray, shape (n, m), optional
         Regressors along nearly the same motion: the compensation begins with them.
+    causal : bool
+        Take the rate of the temperature and the angular acceleration from what came before, as a filter must that
+        runs while the samples arrive. Both are then late, by 30 s and by half a cycle; whoever has the whole
+        recording takes them about the cycle.
 
     Returns
     -------
@@ -140,7 +145,7 @@ def motion(
     """
     dt = cycles.dt
     w_measured, f_measured = cycles.alpha / dt[:, None], cycles.upsilon / dt[:, None]
-    heat, heat_rate = temperatures(temperature, cycles.t - 0.5 * dt, causal=not predicted)
+    heat, heat_rate = temperatures(temperature, cycles.t - 0.5 * dt, causal)
     C0 = C_start.copy()
     rounds = _COMPENSATIONS if np.any(coefficients) else 0
     error = model.errors(near, coefficients) if rounds and near is not None else np.zeros((len(dt), 6))
@@ -154,7 +159,7 @@ def motion(
         w_seen, f_seen, w_table, turned, leant, since_turn, wound = _seen(
             C_nb, w, f, rest, cycles.t, dt, w_ie, gravity, predicted, earlier
         )
-        alpha = _acceleration(w_table, rest, cycles, before, causal=not predicted)
+        alpha = _acceleration(w_table, rest, cycles, before, causal)
         seen = Motion(
             cycles.t, dt, w_seen, f_seen, C_nb, w_table, alpha, rest, heat, heat_rate, turned, leant,
             since_turn, magnetic_n, wound, past,

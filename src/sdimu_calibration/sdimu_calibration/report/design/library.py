@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import gzip
 import json
 from base64 import b64encode
 from functools import cache
 from importlib.resources import files
-from importlib.util import find_spec
-from pathlib import Path
 from typing import Any
 
 from sdimu_calibration.report.design.palette import THEMES, palette
@@ -19,24 +16,12 @@ CONFIG = {"responsive": True, "displaylogo": False, "modeBarButtonsToRemove": ["
 """Buttons of a figure."""
 PRINT = (_HERE / "print.js").read_text(encoding="utf-8")
 """Fits the figures of a page to the sheet while it is printed."""
-_LEVEL = 5
-"""Level of compression (1): 1 % larger than the highest level, in half the time."""
 
 
 @cache
 def library() -> str:
-    """Scripts that draw the figures of a page; found without loading the Python package, which takes long.
-
-    Raises
-    ------
-    ModuleNotFoundError
-        When plotly is not installed.
-    """
-    spec = find_spec("plotly")
-    if spec is None or spec.origin is None:
-        raise ModuleNotFoundError("figures need the Python package plotly: pip install plotly", name="plotly")
-    script = (Path(spec.origin).parent / "package_data" / "plotly.min.js").read_bytes()
-    packed = b64encode(gzip.compress(script, _LEVEL, mtime=0)).decode("ascii")
+    """Scripts that draw the figures of a page: plotly.js, brought by requirements/vendored.py, and what starts it."""
+    packed = b64encode((_HERE / "plotly.min.js.gz").read_bytes()).decode("ascii")
     values = {
         "FIGURE_COLOURS": {theme: palette(theme) for theme in THEMES},
         "FIGURE_TEMPLATES": {theme: template(theme) for theme in THEMES}, "FIGURE_CONFIG": CONFIG,

@@ -1,34 +1,99 @@
-"""Score a finished diagnosis against what was hidden, by name."""
+"""Hidden effects drawn at random: simulate, diagnose blindly, score what was found by name."""
 
 from __future__ import annotations
 
+import math
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from sdimu_calibration.core.arrays import Floats
-from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
-from sdimu_calibration.core.diagnosis.found import found_effects
+from sdimu_calibration.core.diagnosis.diagnose import Diagnosis, diagnose
 from sdimu_calibration.core.diagnosis.scan import Scan, scan
-from sdimu_calibration.core.effects import body_frame
+from sdimu_calibration.core.recording import Recording
 from sdimu_calibration.core.results import Calibration
-from sdimu_sim.core.truth import COEFFICIENTS, ImuTruth, in_body_frame
-from sdimu_study.hidden_draw import Draw, Truth
+from sdimu_calibration.core.specification import ImuSpecification, Model, Site
+from sdimu_calibration.storage.files.config import load_plan
+from sdimu_sim.core.scenario import Scenario, imu_truth
+from sdimu_sim.core.truth import ImuTruth, child_rng
+from sdimu_study.hidden_draw import RATE_HZ, WARM_UP, Draw, Sizes, draw
 from sdimu_study.hidden_outside import OUTSIDE, shapes
+from sdimu_study.score import baseline_z, classes, same_effect
+from sdimu_study.study import Study
+from sdimu_study.worlds import Truth, hideable_names, in_the_mean, simulate
 
-SAME_TAU = 2.0
-"""Time constants within this factor are the same finding."""
+WRONG_DENSITY = 1.3
+"""Noise of the sensor over its specification, where that is the fault."""
+_OUTLIER_SIGMAS = 20.0
 
 
-def score(drawn: Draw, found: Diagnosis, sensor: ImuTruth) -> dict[str, Any]:
+@dataclass(frozen=True)
+class HiddenCase:
+    """A kind of `hidden_draw.KINDS`, the model that is to be found wanting, how small an effect a plan can see."""
+
+    kind: str
+    imu: ImuSpecification
+    model: Model
+    tables: tuple[Sizes, ...]
+
+
+@dataclass(frozen=True)
+class Hidden:
+    """A recording of what was drawn; the sensor's biases are those in the mean over the dwells."""
+
+    drawn: Draw
+    recording: Recording
+    site: Site
+    imu: ImuSpecification
+    model: Model
+    sensor: ImuTruth
+
+
+def world(case: HiddenCase, seed: int) -> Hidden:
+    """Draw a test and simulate it."""
+    drawn = draw(case.kind, seed, case.tables, hideable_names())
+    scenario = scenario_of(drawn, case.imu, seed)
+    sensor = imu_truth(scenario)
+    recording = with_fault(simulate(scenario, sensor), drawn, case.imu, seed)
+    return Hidden(drawn, recording, scenario.site, case.imu, case.model, in_the_mean(sensor, recording, seed))
+
+
+def run(world: Hidden) -> Diagnosis:
+    """Diagnose the recording with nothing but IMU file and site."""
+    return diagnose(world.recording, world.site, world.imu, world.model)
+
+
+def scenario_of(drawn: Draw, imu: ImuSpecification, seed: int) -> Scenario:
+    """Scenario of a draw; wrong densities are put into the sensor, not into the specification it is judged by."""
+    true = imu
+    if drawn.fault.startswith("gyro noise"):
+        true = replace(imu, gyro_white_noise=WRONG_DENSITY * imu.gyro_white_noise)
+    elif drawn.fault.startswith("accel noise"):
+        true = replace(imu, accel_white_noise=WRONG_DENSITY * imu.accel_white_noise)
+    return Scenario(
+        plan=load_plan(drawn.plan), imu=true, site=Site(math.radians(drawn.latitude_deg), 0.0), rate_hz=RATE_HZ,
+        seed=seed, effects=tuple(t.text for t in drawn.truths), temperature=WARM_UP,
+    )  # fmt: skip
+
+
+def with_fault(recording: Recording, drawn: Draw, imu: ImuSpecification, seed: int) -> Recording:
+    """Add outliers of 20 sample sigmas, either sign, to a share of the samples, where that is the fault."""
+    if not drawn.fault.startswith("outliers"):
+        return recording
+    share = float(drawn.fault.split()[1]) / 100.0
+    rng = child_rng(seed, "outliers")
+    hit = rng.random(len(recording.t)) < share
+    sign = rng.choice((-1.0, 1.0), size=(len(recording.t), 6)) * hit[:, None]
+    size = _OUTLIER_SIGMAS / np.sqrt(recording.interval_s)
+    return replace(
+        recording,
+        omega_ib_b=recording.omega_ib_b + sign[:, :3] * size * imu.gyro_white_noise,
+        f_ib_b=recording.f_ib_b + sign[:, 3:] * size * imu.accel_white_noise,
+    )
+
+
+def score(world: Hidden, found: Diagnosis) -> dict[str, Any]:
     """Row of a run.
-
-    Parameters
-    ----------
-    drawn : Draw
-    found : Diagnosis
-        Made without the draw.
-    sensor : ImuTruth
 
     Returns
     -------
@@ -40,6 +105,7 @@ def score(drawn: Draw, found: Diagnosis, sensor: ImuTruth) -> dict[str, Any]:
         ``stops_before`` and ``_after`` (leave one stop out), ``remainder_p``, ``scan_z2`` and ``scan_count``
         (catalogue), ``threshold``.
     """
+    drawn, sensor = world.drawn, world.sensor
     scanned = scan(found.evidence.information, found.evidence.model, found.evidence.weight)
     named = classes(found)
     accepted = [s for s in found.found.steps if s.accepted]
@@ -57,7 +123,7 @@ def score(drawn: Draw, found: Diagnosis, sensor: ImuTruth) -> dict[str, Any]:
             {"label": s.label, "z": s.z, "accepted": s.accepted, "reason": s.reason, "log_bayes": s.log_bayes_factor,
              "gain": s.held_out_gain, "error": s.held_out_error} for s in found.found.steps
         ],
-        "rms_z_before": baseline_rms_z(found.before, sensor), "rms_z_after": baseline_rms_z(found.after, sensor),
+        "rms_z_before": _rms_z(found.before, sensor), "rms_z_after": _rms_z(found.after, sensor),
         "held_out_before": found.before.fit["held_out_rms"], "held_out_after": found.after.fit["held_out_rms"],
         "stops_before": accepted[0].held_out_before.rms if accepted else None,
         "stops_after": accepted[-1].held_out_after.rms if accepted else None,
@@ -67,28 +133,8 @@ def score(drawn: Draw, found: Diagnosis, sensor: ImuTruth) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def classes(found: Diagnosis) -> list[list[str]]:
-    """Labels of every class that was named: what was found, and what the data cannot tell from it."""
-    return [[f.candidate.label, *f.alike] for f in found_effects(found)]
-
-
-def same_effect(label: str, truth: Truth, stops: tuple[tuple[int, float, float], ...]) -> bool:
-    """Whether a label of the catalogue names a hidden effect, its time constant or time near enough."""
-    name, _, inside = label.partition("(")
-    if name != truth.name:
-        return False
-    if truth.option is None or not inside:
-        return True
-    key, value = truth.option
-    labelled = float(inside.rstrip(")").partition(",")[0].partition("=")[2].split()[0])
-    if key == "tau":
-        return 1.0 / SAME_TAU <= labelled / value <= SAME_TAU
-    if key != "t0":
-        return labelled == value
-    # The same dwell or turn; stamps are rounded to seconds.
-    edges = sorted({0.0, *(t for _, a, b in stops for t in (a, b))})
-    next_to = [e for e in edges if e <= value + 1.0][-1:] + [e for e in edges if e >= value - 1.0][:1]
-    return next_to[0] - 1.5 <= labelled <= next_to[-1] + 1.5
+def _rms_z(calibration: Calibration, sensor: ImuTruth) -> float:
+    return float(np.sqrt(np.mean(baseline_z(calibration, sensor) ** 2)))
 
 
 def _judge(truth: Truth, found: Diagnosis, scanned: Scan, named: list[list[str]]) -> dict[str, Any]:
@@ -153,17 +199,4 @@ def _signature_left(truth: Truth, found: Diagnosis) -> tuple[float, float]:
     return left[0], left[1]
 
 
-def baseline_rms_z(calibration: Calibration, sensor: ImuTruth) -> float:
-    """RMS of error over sigma of the baseline coefficients that the body frame leaves free."""
-    return float(np.sqrt(np.mean(baseline_z(calibration, sensor) ** 2)))
-
-
-def baseline_z(calibration: Calibration, sensor: ImuTruth) -> Floats:
-    """Error over sigma of the baseline coefficients that the body frame leaves free, shape (k,)."""
-    truth = in_body_frame(sensor.coefficients, calibration.body_frame)
-    rows = [i for i, name in enumerate(calibration.names) if name in COEFFICIENTS]
-    error = np.array([calibration.values[i] - truth[calibration.names[i]] for i in rows])
-    sigma = np.sqrt(np.abs(np.diag(calibration.covariance)[rows]))
-    pinned = [calibration.names[i] in body_frame.pinned_names(calibration.body_frame) for i in rows]
-    free = ~np.array(pinned) & (sigma > 0.0)
-    return np.asarray(error[free] / sigma[free])
+STUDY = Study("hidden", world, run, score)

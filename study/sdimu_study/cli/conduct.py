@@ -2,29 +2,47 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+from sdimu_calibration.cli.console import plain
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from sdimu_study.campaign import Work
-    from sdimu_study.shards import Row
+    from sdimu_study.study import Key, Row, Study, Table
 
 
 def shown_campaign(
-    console: Console, name: str, work: Work, seeds: Sequence[int], out: Path, workers: int
-) -> list[Row]:  # fmt: skip
+    console: Console, name: str, work: Callable[[int], Row], seeds: Sequence[int], out: Path, workers: int
+) -> list[Row]:
     """Run a campaign and show how far it is; parameters as for `run_campaign`, `name` goes before each word."""
     from sdimu_calibration.cli.progress import bar
     from sdimu_study.campaign import HERE, run_campaign
 
     with bar(console) as progress:
         return run_campaign(
-            work, seeds, out, HERE if workers == 1 else None, workers=workers,
+            work,
+            seeds,
+            out,
+            HERE if workers == 1 else None,
+            workers=workers,
             progress=lambda word, share: progress(f"{name}: {word}", share),
-        )  # fmt: skip
+        )
+
+
+def conduct(
+    study: Study[Any, Any, Any], cases: Mapping[Any, Any], seeds: Sequence[int], out: Path, workers: int
+) -> dict[Key, list[Row]]:
+    """Run every case of a study; runs are kept in folders below `out` that bear the words of the case's key."""
+    console = plain()
+    return {
+        key: shown_campaign(
+            console, ", ".join(key), study.of(case), seeds, out.joinpath(*(w.replace(" ", "_") for w in key)), workers
+        )
+        for key, case in cases.items()
+    }
 
 
 def check_kinds(asked: Collection[str] | None, known: Collection[str]) -> None:
@@ -67,22 +85,26 @@ def imu_files(asked: Sequence[str] | None, without: str = "") -> list[str]:
     return list(dict.fromkeys(asked or known))
 
 
-def leave_page(console: Console, place: Path, rows: Any, text: str) -> None:
-    """Write what a study found as data and as a page, and show the page.
+def leave(place: Path, results: Any, *shown: str | Table) -> None:
+    """Write what a study found: rows as JSON, text as a page, tables on the terminal alone.
 
     Parameters
     ----------
-    console : Console
     place : Path
         Of both files, without their endings.
-    rows : dict or list
-        As JSON takes it.
-    text : str
-        Markdown.
+    results : dict
+        Rows by key, or as JSON takes them.
+    shown : str or Table
+        Markdown; what is printed.
     """
     from sdimu_calibration.storage.files.json_file import write_json
 
-    write_json(place.with_suffix(".json"), rows)
-    place.with_suffix(".md").write_text(text, encoding="utf-8")
-    console.print(text, soft_wrap=True, markup=False, highlight=False)
+    console = plain()
+    write_json(place.with_suffix(".json"), {" ".join(k) if isinstance(k, tuple) else k: v for k, v in results.items()})
+    for one in shown:
+        if isinstance(one, str):
+            place.with_suffix(".md").write_text(one, encoding="utf-8")
+            console.print(one, soft_wrap=True, markup=False, highlight=False)
+        else:
+            console.print(one.terminal())
     console.print(f"results in {place.parent}", soft_wrap=True)
