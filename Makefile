@@ -1,4 +1,4 @@
-# make setup | demo | test | check | other-blas | colcon | wheels | bench | study | mutations | docs | pictures | grades | campaigns | lock : each does its own set-up and needs nothing before it.
+# make setup | demo | test | check | thorough | other-blas | colcon | wheels | bench | study | mutations | docs | pictures | grades | campaigns | lock : each does its own set-up and needs nothing before it.
 PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
@@ -22,20 +22,21 @@ export OPENBLAS_NUM_THREADS ?= 1
 setup: $(STAMP)
 
 $(RUN): requirements/run.lock $(SETUPS)
-	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
-	$(PIP) --require-hashes -r requirements/run.lock
-	$(PIP) --no-build-isolation --use-pep517 $(foreach package,$(PACKAGES),-e src/$(package))
-	touch $@
+	@test -x $(BIN)/python || { echo "making $(VENV)" && $(PYTHON) -m venv $(VENV); }
+	@$(BIN)/python requirements/install.py run
+	@echo "installing the three packages of src"
+	@$(PIP) --no-build-isolation --use-pep517 $(foreach package,$(PACKAGES),-e src/$(package))
+	@touch $@
 
 # Beside the lock files of tools: the studies, which are no part of what users install.
 $(STAMP): $(RUN) $(TOOLS:%=requirements/%.lock)
-	$(PIP) --require-hashes $(TOOLS:%=-r requirements/%.lock)
-	$(PIP) --no-build-isolation --use-pep517 -e study
-	touch $@
+	@$(BIN)/python requirements/install.py $(TOOLS)
+	@$(PIP) --no-build-isolation --use-pep517 -e study
+	@touch $@
 
 $(BOOK): $(STAMP) requirements/docs.lock
-	$(PIP) --require-hashes -r requirements/docs.lock
-	touch $@
+	@$(BIN)/python requirements/install.py docs
+	@touch $@
 
 # A whole simulated test over DDS, from the table to report.html.
 demo: $(RUN)
@@ -47,8 +48,13 @@ check: setup
 	$(BIN)/mypy $(foreach package,$(PACKAGES),src/$(package)/$(package)) study/sdimu_study
 	$(BIN)/lint-imports
 
+# What every change must pass at once: some minutes. A file's tests stay on one worker, which makes its fixtures once.
 test: check
-	$(BIN)/python -m pytest -n 2 -m "not slow and not bench"
+	$(BIN)/python -m pytest -n 2 --dist loadfile -m "not thorough and not slow and not bench"
+
+# The rest of what must hold (test/tiers.py): tutorials, browser, faults, damaged files, nodes over DDS, campaigns.
+thorough: setup
+	$(BIN)/python -m pytest -n 2 --dist loadfile -m "thorough and not slow and not bench"
 
 # What linear algebra decides, with each of two kernels of OpenBLAS (with AVX2 and without AVX): no test stands on the last
 # digits of a library.
@@ -123,4 +129,4 @@ lock: setup
 	$(BIN)/python requirements/lock.py
 	$(BIN)/python requirements/vendored.py
 
-.PHONY: setup demo check test other-blas colcon wheels bench study mutations docs faults grades pictures campaigns lock
+.PHONY: setup demo check test thorough other-blas colcon wheels bench study mutations docs faults grades pictures campaigns lock

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tiers import is_thorough
 
 from rate_table_sim.core import TableSpecification
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis, diagnose
@@ -29,6 +30,13 @@ INTERVAL_NS = 10_000_000
 _WORKER = int("".join(filter(str.isdigit, os.environ.get("PYTEST_XDIST_WORKER", "0"))) or 0)
 os.environ["ROS_DOMAIN_ID"] = str(40 + _WORKER % 60)
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark what `make test` leaves to `.ci/run`."""
+    for item in items:
+        if is_thorough(item.nodeid, over_dds=item.get_closest_marker("ros") is not None):
+            item.add_marker("thorough")
 
 
 class SmallTest:

@@ -13,7 +13,7 @@ from packaging.utils import canonicalize_name
 ROOT = Path(__file__).resolve().parents[1]
 FILES = ("run", "extras", "campaigns", "test", "build", "docs")
 EXTRAS = {
-    "run": ("",), "extras": ("workbench", "notebook", "pictures"), "campaigns": ("",),
+    "run": ("",), "extras": ("workbench", "notebook", "pictures"), "campaigns": ("study",),
     "test": ("test",), "build": ("build",), "docs": ("docs",),
 }  # fmt: skip
 OWN = ("sdimu-calibration", "rate-table-sim", "sdimu-sim", "sdimu-study")
@@ -61,3 +61,8 @@ TOOLS = {
 
 def test_what_runs_brings_no_tools_and_no_extras():
     assert not {entry.partition("==")[0] for entry in entries("run")} & TOOLS
+
+
+def test_what_stands_in_for_transforms_is_brought():
+    # nodes/transform_type opens the libraries of this package, which no import shows.
+    assert any(entry.startswith("ros-visualization-msgs==") for entry in entries("run"))

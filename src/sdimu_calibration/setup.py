@@ -22,10 +22,6 @@ SHARED_CONFIG = [
 ]
 """The same once more where users of ROS look for them: layouts, tables, analyzers."""
 
-MESSAGES = [f"ros-{name}~=5.3.6" for name in (
-    "diagnostic-msgs", "geometry-msgs", "nav-msgs", "sensor-msgs", "std-msgs", "std-srvs", "trajectory-msgs"
-)]  # fmt: skip
-"""The messages that are sent; ros-jazzy-common-interfaces pins these, and brings five packages more."""
 RUN_TIME = [
     "PyYAML",
     "lz4",
@@ -34,7 +30,7 @@ RUN_TIME = [
     "numpy>=2.0",
     "pydantic>=2",
     "rich",
-    *MESSAGES,
+    "ros-jazzy-common-interfaces",
     "ros-jazzy-rclpy[fastrtps]",
     "rosbags>=0.10",
     "scipy",

@@ -137,3 +137,13 @@ def test_an_edited_kernel_compiles_only_the_kernels_that_use_it(tmp_path, monkey
     assert run() == [4, 3, 1, 1]
     one.write_text(one.read_text().replace("x + 1", "x + 1000"))
     assert run() == [2002, 3, 0, 1], "the kernel that uses the edited one is compiled anew, the other is not"
+
+
+def test_a_copy_is_compiled_once_a_kernel_is_kept(tmp_path, monkeypatch):
+    from sdimu_calibration.core.compiled import never_compiled
+
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    assert never_compiled()
+    (tmp_path / "room").mkdir()
+    (tmp_path / "room" / "loop.1.nbc").touch()
+    assert not never_compiled()

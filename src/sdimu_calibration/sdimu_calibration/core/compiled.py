@@ -200,3 +200,10 @@ def compiled(function: F) -> F:
     if not numba.config.DISABLE_JIT:
         compiled_one._cache = _Cache(function)
     return cast(F, compiled_one)
+
+
+def never_compiled() -> bool:
+    """Whether no loop of this copy has been compiled on this machine yet, which takes about a minute."""
+    place = os.environ.get("NUMBA_CACHE_DIR")
+    folder = Path(place) if place else _package("sdimu_calibration")
+    return next(folder.rglob("*.nbc"), None) is None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -71,8 +72,8 @@ def _shade(value: float) -> Colour:
 
 def _heat_map(drawn: Raster, top: int, grid: Grid, channels: Sequence[str]) -> None:
     """Draw residual means, channel by stop: number and sign in each cell, colour besides."""
-    across = np.linspace(_LEFT, _RIGHT, len(grid.stops) + 1)
-    middle = 0.5 * (across[1:] + across[:-1])
+    across = np.linspace(_LEFT, _RIGHT, len(grid.stops) + 1).tolist()
+    middle = [0.5 * (left + right) for left, right in itertools.pairwise(across)]
     for (row, column), value in np.ndenumerate(grid.value):
         above = top + _ROW * row
         drawn.box(across[column], above, across[column + 1], above + _ROW, _shade(float(value)))

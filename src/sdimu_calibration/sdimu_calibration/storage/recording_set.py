@@ -17,7 +17,7 @@ from sdimu_calibration.core.estimation.solve import AUTO
 from sdimu_calibration.core.joint.member import Member
 from sdimu_calibration.core.joint.set_fit import SetOptions
 from sdimu_calibration.core.recording import DataError
-from sdimu_calibration.storage.bags.bag_metadata import METADATA, custom_data
+from sdimu_calibration.storage.bags.bag_metadata import METADATA, custom_data, read_metadata
 from sdimu_calibration.storage.files.config import Schema, load_imu, quantity, read_yaml
 from sdimu_calibration.storage.files.model_choice import HANDHELD, named_estimator, named_model
 from sdimu_calibration.storage.files.whole_file import write_whole
@@ -193,11 +193,26 @@ def set_options(wanted: RecordingSet, model: str | None, add: Sequence[str], est
 
 
 def _moved_by_hand(members: Sequence[Member]) -> bool:
-    """Whether the first recording that can be opened was moved by hand; fitting tells of those that cannot."""
-    for member in members:
+    """Whether the first recording that can be opened was moved by hand; fitting tells of those that cannot.
+
+    The first is the one that began first, whatever the order in which they are named.
+    """
+    for member in sorted(members, key=_began):
         with suppress(DataError):
             return bool(member.open().why_handheld)
     return False
+
+
+def _began(member: Member) -> tuple[int, int]:
+    """Start of a bag (ns) by its metadata, 0 where it says none, and its size (bytes): what is known without a look."""
+    source = member.open
+    if not isinstance(source, BagSource):
+        return 0, 0
+    bag = source.bag
+    said = read_metadata(bag).get("starting_time") if bag.is_dir() else None
+    start = said.get("nanoseconds_since_epoch") if isinstance(said, dict) else None
+    files = bag.glob("*.mcap") if bag.is_dir() else [bag]
+    return start if isinstance(start, int) else 0, sum(file.stat().st_size for file in files)
 
 
 def _named(folder: Path, word: str | None) -> str | None:

@@ -53,6 +53,7 @@ def run(
 
     from sdimu_calibration.cli.console import console as make_console
     from sdimu_calibration.cli.processes import Children, own_domain, own_folder
+    from sdimu_calibration.core.compiled import never_compiled
     from sdimu_sim.own_effects import simulated_effects
 
     _check_choosing(adaptive, ask, plan)
@@ -79,6 +80,8 @@ def run(
         with own_domain(out / "log", domain) as used, Children(out / "log") as children:
             replace = _clear(out)
             console.print(f"ROS domain {used}", highlight=False)
+            if never_compiled():
+                console.print("compiling the numerical loops, once on this machine: about a minute without samples")
             _start(children, options, out / "bag", replace)
             streamed = _watch(console, children, _test(None if adaptive else plan, model, duration))
         wall = time.monotonic() - begun

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sdimu_calibration.core.joint.member import Member, fitted
+from sdimu_calibration.core.joint.member import Member, fitted, run
 from sdimu_calibration.core.joint.set_fit import SetOptions, fit_set, job_of
 from sdimu_calibration.core.joint.set_result import set_outcome
 from sdimu_calibration.core.joint.variation import _scatter, variation
@@ -177,3 +177,73 @@ def test_imus_of_different_grades_are_one_clear_error(options):
     other = Member("other", InMemory(test.with_imu(replace(test.imu, name="cheap", grade="mems"))))
     with pytest.raises(DataError, match=r"different grades \(r0: dtg, navigation, other: cheap, mems\)"):
         fit_set((some.members[0], other), options, here)
+
+
+RAMP = "gyro_bias_ramp_x"
+
+
+def ramps(*sizes):
+    """Recordings of a unit, each with a ramp of its own (deg/h/h)."""
+    return tuple(
+        unit_set(51, [short(stops=12)] * len(sizes), (f"{RAMP}={size} deg/h/h",)).members[k]
+        for k, size in enumerate(sizes)
+    )
+
+
+def test_a_recording_has_its_own_value_of_an_effect_that_all_have(options):
+    members = ramps(10.0, 10.0, -10.0)
+    model = replace(options.model, effects=(*options.model.effects, RAMP))
+    fit = fit_set(members, SetOptions(model, local={"r2": (RAMP,)}, scopes={"gyro_bias_ramp": "unit"}), here)
+    sigma = np.sqrt(np.diag(fit.estimate.covariance))
+    size = np.radians(10.0) / 3600.0**2
+    for name, truth in ((RAMP, size), (f"{RAMP}@r2", -size)):
+        k = fit.names.index(name)
+        assert fit.estimate.values[k] == pytest.approx(truth, abs=4.0 * sigma[k])
+        assert sigma[k] < 0.2 * size
+
+
+def test_another_variant_in_one_recording_is_not_taken_for_that_of_all(options):
+    slow, fast = "gyro_bias_warm_up_x(tau=900 s)", "gyro_bias_warm_up_x(tau=200 s)"
+    model = replace(options.model, effects=(*options.model.effects, slow))
+    job = job_of(ramps(1.0)[0], SetOptions(model, local={"r0": (fast,)}), None)
+    names = run(job).reduction.names
+    assert {"gyro_bias_warm_up_x", f"{fast}@r0"} <= set(names)
+    assert len(set(names)) == len(names)
+
+
+def same(one, other):
+    """Whether two results are one to the last digit."""
+    for name in ("values", "covariance"):
+        np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
+    np.testing.assert_array_equal(one.of_set.scatter_p, other.of_set.scatter_p)
+    assert (one.fit, one.of_set.turn_on, one.of_set.trends) == (other.fit, other.of_set.turn_on, other.of_set.trends)
+
+
+def renamed(members, names):
+    return tuple(replace(m, name=name) for m, name in zip(members, names, strict=True))
+
+
+def test_the_result_depends_on_neither_order_nor_names(options):
+    plans = [short(stops=12), short("kim18_signed", stops=12), short(stops=8), short("kim18", stops=12)]
+    members = unit_set(8, plans).members
+    first = set_outcome(fit_set(members, options, here))
+    other = set_outcome(fit_set(renamed(members[::-1], "dacb"), options, here))
+    same(first, other)
+    assert [r.name for r in other.of_set.recordings] == ["b", "c", "a", "d"]
+    assert [d.power_on for d in other.of_set.deviations[::6]] == [f"that of {name}" for name in "bcad"]
+    for one, its in zip(first.of_set.recordings, other.of_set.recordings, strict=True):
+        np.testing.assert_array_equal(one.deviate, its.deviate)
+
+
+def test_recordings_that_say_no_time_keep_their_order_in_tables_alone(options):
+    # A logger without a clock: each begins at zero.
+    tests = [m.open() for m in unit_set(8, [short(stops=12), short("kim18_signed", stops=12), short(stops=8)]).members]
+    members = tuple(
+        Member(f"r{k}", InMemory(replace(test, recording=replace(test.recording, start_ns=0))))
+        for k, test in enumerate(tests)
+    )
+    results = [set_outcome(fit_set(some, options, here)) for some in (members, members[::-1])]
+    same(*results)
+    assert [r.name for r in results[0].of_set.recordings] == ["r0", "r1", "r2"]
+    assert [r.name for r in results[1].of_set.recordings] == ["r2", "r1", "r0"]
+    assert not any(t.covariate in {"order", "date (d)"} for t in results[0].of_set.trends)

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import cast
 
 import numpy as np
 
 from sdimu_calibration.core.arrays import Floats
-from sdimu_calibration.core.diagnosis.candidates import catalogue
+from sdimu_calibration.core.diagnosis.candidates import catalogue, without
 from sdimu_calibration.core.diagnosis.diagnose import measured_noise
 from sdimu_calibration.core.effects import selection
 from sdimu_calibration.core.effects.effect import Effect, Timetable
+from sdimu_calibration.core.effects.imu_model import told_apart
 from sdimu_calibration.core.estimation.fit import Fit, Start
 from sdimu_calibration.core.estimation.handheld_fit import HandheldFit
 from sdimu_calibration.core.estimation.navigation_fit import NavigationFit
@@ -23,7 +25,7 @@ from sdimu_calibration.core.estimation.solve import AUTO, fit_about, solve
 from sdimu_calibration.core.evidence.stretch_length import wander_in
 from sdimu_calibration.core.fit_statistics import FitStatistics
 from sdimu_calibration.core.joint.reduction import Reduction, reduced
-from sdimu_calibration.core.joint.scope import is_local, tagged
+from sdimu_calibration.core.joint.scope import by_name, is_local, tagged
 from sdimu_calibration.core.joint.stretch_rows import Places, stretch_rows
 from sdimu_calibration.core.noise_term import NoiseTerm
 from sdimu_calibration.core.recording import DataError
@@ -65,7 +67,8 @@ class Job:
         With the effects that were found in all recordings.
     estimator : str
     local : tuple of str
-        Keys of effects of this recording alone, in the model behind the others.
+        Keys of effects of this recording alone, in the model behind the others. What all have of them it has not: its
+        own value stands in the place of theirs.
     candidates : tuple of str or Effect
         Effects whose signatures are wanted.
     with_local : bool
@@ -187,7 +190,7 @@ def tried(job: Job) -> Report | DataError:
 def fitted(job: Job) -> Fit:
     """Fit the recording of a job."""
     test = job.member.open()
-    model = replace(job.model, effects=(*job.model.effects, *job.local))
+    model = replace(job.model, effects=(*_of_all(job.model.effects, job), *job.local))
     if job.imu is not None:
         test = test.with_imu(job.imu)
     if job.about is None or test.why_handheld or job.estimator == HandheldFit.estimator:
@@ -198,6 +201,16 @@ def fitted(job: Job) -> Fit:
         return with_noise_learned(fit)
     evidence = fit.evidence()
     return in_noise(fit, evidence, wander_in(evidence, job.noise), job.noise) if job.noise else fit
+
+
+def _of_all(effects: Sequence[str | Effect], job: Job) -> tuple[str, ...]:
+    """Leave out of effects that all recordings have what this one has for itself."""
+    own = {label for key in job.local for label in selection.resolve(key).labels}
+    kept: list[str | Effect] = []
+    for effect in effects:
+        whole = selection.resolve(effect) if isinstance(effect, str) else effect
+        kept += [effect] if own.isdisjoint(whole.labels) else map(by_name, without(whole, own))
+    return cast("tuple[str, ...]", tuple(kept))
 
 
 def _own(test: PreparedTest, model: Model, job: Job) -> Fit:
@@ -217,7 +230,8 @@ def _untagged(about: Mapping[str, float], name: str) -> dict[str, float]:
 
 def _report(job: Job, fit: Fit) -> Report:
     name, recording = job.member.name, fit.test.recording
-    shared = [selection.resolve(e) if isinstance(e, str) else e for e in job.candidates]
+    tried_in_all = _of_all(job.candidates, job)
+    shared = [selection.resolve(e) if isinstance(e, str) else e for e in tried_in_all]
     own = _local_candidates(fit) if job.with_local else []
     if job.stretches:
         found, places = stretch_rows(fit)
@@ -272,12 +286,17 @@ def _local_candidates(fit: Fit) -> list[Effect]:
 def _named(found: Reduction, job: Job, shared: Sequence[Effect]) -> Reduction:
     """Put the name of the recording behind what is of the recording alone."""
     name = job.member.name
-    local = {p for key in job.local for p in _parameter_names(key)}
+    local = _local_names(job)
     count = sum(len(effect.parameters) for effect in shared)
     labels = tuple(label if k < count else tagged(label, name) for k, label in enumerate(found.labels))
     return replace(found, names=tuple(tagged(n, name) if n in local else n for n in found.names), labels=labels)
 
 
-def _parameter_names(key: str) -> tuple[str, ...]:
-    effect = selection.resolve(key)
-    return (*(p.name for p in effect.parameters), *effect.labels)
+def _local_names(job: Job) -> set[str]:
+    """Names that the model of a job has for coefficients of its recording alone.
+
+    Beside another variant that all recordings have it is not the plain one.
+    """
+    shared = _of_all(job.model.effects, job)
+    effects = told_apart([selection.resolve(e) if isinstance(e, str) else e for e in (*shared, *job.local)])
+    return {p.name for effect in effects[len(shared) :] for p in effect.parameters}

@@ -20,7 +20,7 @@ from sdimu_calibration.core.joint.scope import tagged
 from sdimu_calibration.core.joint.set_evidence import SetEvidence, held_out, held_out_chance
 from sdimu_calibration.core.joint.set_fit import Run, SetFit, SetOptions
 from sdimu_calibration.core.joint.set_result import SCATTERS, base_fit, set_outcome
-from sdimu_calibration.core.joint.set_search import SetSearch, as_given, search_set
+from sdimu_calibration.core.joint.set_search import SetSearch, as_given, place_of, search_set
 from sdimu_calibration.core.joint.set_standing import next_recording
 from sdimu_calibration.core.note import Topic, topic_of, without_advice
 from sdimu_calibration.core.plan_search import NextTurn
@@ -161,7 +161,7 @@ def diagnose_set(
 def _error_without(found: SetSearch) -> float | None:
     """Held-out error without what was chosen, in the noise of the fit with it; None where nothing can be held out."""
     names = found.after.names
-    lacks = [c.parameter.name if c.parameter.name in names else c.label for c in found.chosen]
+    lacks = [names[place_of(names, c)] for c in found.chosen]
     told = held_out(found.after, lacks)
     return None if told is None else told.rms
 
@@ -170,23 +170,15 @@ def _findings(found: SetSearch) -> tuple[SetFinding, ...]:
     values, sigma = found.after.estimate.values, np.sqrt(np.diag(found.after.estimate.covariance))
     names = list(found.after.names)
     shared = [
-        (
-            c.label,
-            c.effect.title,
-            "",
-            names.index(c.parameter.name if c.parameter.name in names else c.label),
-            z,
-            c.parameter,
-            found.alike.get(c.label, ()),
-        )
+        (c.label, c.effect.title, "", place_of(names, c), z, c.parameter, found.alike.get(c.label, ()))
         for c, z in zip(found.chosen, found.z, strict=True)
     ]
     own = []
     for find in found.local:
         effect = resolve(find.key)
         parameter = effect.parameters[0]
-        called = {tagged(name, find.recording) for name in (parameter.name, find.key)}
-        place = next(k for k, name in enumerate(names) if name in called)
+        called = (tagged(name, find.recording) for name in (find.key, parameter.name))
+        place = next(names.index(name) for name in called if name in names)
         own.append((find.key, effect.title, find.recording, place, find.z, parameter, ()))
     return tuple(
         SetFinding(

@@ -16,12 +16,12 @@ from sdimu_calibration.core.estimation.solve import AUTO, with_effects
 from sdimu_calibration.core.joint.combine import Combination, Component, JointEstimate, Rows, spread_out, stacked
 from sdimu_calibration.core.joint.member import Job, Member, Report
 from sdimu_calibration.core.joint.scope import by_name, split_tag
+from sdimu_calibration.core.joint.set_order import check_different, check_members, check_one_grade, in_order
 from sdimu_calibration.core.joint.turn_on import in_scatter, turn_on_scatter
 from sdimu_calibration.core.progress import Progress, silent
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.results import TurnOn
 from sdimu_calibration.core.specification import Model
-from sdimu_calibration.core.wording import Option, Work
 
 Run = Callable[[Sequence[Job]], Sequence[Report | DataError]]
 """Does jobs, in any process; in the order of the jobs a report, or why there is none."""
@@ -45,13 +45,14 @@ class SetFit:
     Attributes
     ----------
     members : tuple of Member
-        Those that could be used.
+        Those that could be used, in the order of `reports`.
     model : Model
     local : mapping of str to tuple of str
         By recording, the keys of effects of this recording alone.
     varying : mapping of str to tuple of str
         Effects that differ from power-on to power-on, with their coefficients.
     reports : tuple of Report
+        By start and samples, whatever the order in which they were named and their names: so are all digits.
     names : tuple of str, length P
         Coefficients of the estimator, then those of single recordings.
     estimate : JointEstimate
@@ -59,6 +60,8 @@ class SetFit:
         Empty with one power-on.
     left_out : tuple of (str, str)
         Recordings that could not be used, and why.
+    asked : tuple of str
+        Names of the recordings in the order of the user.
     """
 
     members: tuple[Member, ...]
@@ -70,11 +73,21 @@ class SetFit:
     estimate: JointEstimate
     turn_on: tuple[TurnOn, ...]
     left_out: tuple[tuple[str, str], ...] = ()
+    asked: tuple[str, ...] = ()
 
     @cached_property
     def power_ons(self) -> tuple[str, ...]:
         """Names of the power-ons, in the order of their first recordings."""
         return tuple(dict.fromkeys(map(power_on, self.reports)))
+
+    @cached_property
+    def shown(self) -> tuple[int, ...]:
+        """Places of the reports as tables list them: by start, those of one start in the order of the user."""
+
+        def place(k: int) -> tuple[int, int]:
+            return self.reports[k].start_ns, self.asked.index(self.reports[k].name)
+
+        return tuple(sorted(range(len(self.reports)), key=place))
 
     @property
     def tau(self) -> Floats:
@@ -159,8 +172,9 @@ def fit_set(
     if not reports:
         first, why = next(iter(left.items()))
         raise DataError(f"no recording of the set can be used: {first}: {why}")
-    _check_different(reports)
-    _check_one_grade(reports)
+    reports = in_order(reports)
+    check_different(reports)
+    check_one_grade(reports)
     reports = _one_estimator(members, options, reports, run)
     firm, late = [r for r in reports if r.stands_alone], {}
     if firm and before is None:
@@ -200,45 +214,9 @@ def _noise_of(late: Mapping[str, Report], fit: SetFit, options: SetOptions, run:
     return with_reports(fit, [with_own(fresh.get(r.name, r), r) for r in fit.reports])
 
 
-def check_members(members: Sequence[Member]) -> None:
-    """Refuse recordings that are no set."""
-    names = [m.name for m in members]
-    for name in names:
-        if names.count(name) > 1:
-            raise DataError(f"two recordings of the set are called '{name}': state each one once, under its own name")
-    serials = sorted({m.serial for m in members if m.serial})
-    if len(serials) > 1:
-        raise DataError(
-            f"the recordings are of several units ({', '.join(serials)}): a joint fit is of one; calibrate each by "
-            f"itself, then compare them with {Work.FLEET}"
-        )
-
-
 def _why(member: Member, error: DataError) -> str:
     """Say why a recording cannot be used, without its name."""
     return str(error).removeprefix(f"{member.name}: ")
-
-
-def _check_different(reports: Sequence[Report]) -> None:
-    """Refuse a recording that stands twice, by another path or as a copy: it would count as two that agree."""
-    seen: dict[tuple[int, bytes], str] = {}
-    for report in reports:
-        first = seen.setdefault((report.start_ns, report.values.tobytes()), report.name)
-        if first != report.name and len(report.values):
-            raise DataError(f"'{first}' and '{report.name}' are the same recording: name it once")
-
-
-def _check_one_grade(reports: Sequence[Report]) -> None:
-    """Refuse recordings of IMUs of different grades: they are of several units, whatever their serials say."""
-    first: dict[str, Report] = {}
-    for report in reports:
-        first.setdefault(report.imu.grade, report)
-    if len(first) > 1:
-        told = ", ".join(f"{r.name}: {r.imu.name}, {grade}" for grade, r in first.items())
-        raise DataError(
-            f"the recordings are of IMUs of different grades ({told}): a joint fit is of one unit; state its "
-            f"{Option.IMU} if it is one, else calibrate each by itself"
-        )
 
 
 def job_of(member: Member, options: SetOptions, about: SetFit | None, estimator: str = "", learn: bool = True) -> Job:
@@ -370,20 +348,15 @@ def columns_of(varying: Mapping[str, tuple[str, ...]], names: Sequence[str]) -> 
 
 
 def _combined(members: Sequence[Member], options: SetOptions, reports: Sequence[Report]) -> SetFit:
+    reports = in_order(reports)
     names = joint_names(reports)
     varying = varying_effects(options.model, options.scopes, names)
     estimate, turn_on = _estimated(reports, names, varying)
-    used = {r.name for r in reports}
+    by_name = {m.name: m for m in members}
     return SetFit(
-        tuple(m for m in members if m.name in used),
-        options.model,
-        dict(options.local),
-        varying,
-        tuple(reports),
-        names,
-        estimate,
-        turn_on,
-    )
+        tuple(by_name[r.name] for r in reports), options.model, dict(options.local), varying, tuple(reports), names,
+        estimate, turn_on, asked=tuple(by_name),
+    )  # fmt: skip
 
 
 def _estimated(

@@ -13,7 +13,7 @@ from sdimu_calibration.core.estimation.navigation_fit import MISFIT, NavigationF
 from sdimu_calibration.core.estimation.outcome import inseparable
 from sdimu_calibration.core.joint.member import Report, fitted
 from sdimu_calibration.core.joint.set_evidence import held_out
-from sdimu_calibration.core.joint.set_fit import SetFit, SetOptions, job_of
+from sdimu_calibration.core.joint.set_fit import SetFit, SetOptions, job_of, power_on
 from sdimu_calibration.core.joint.variation import Variation, variation
 from sdimu_calibration.core.note import Note, Topic, prefixed
 from sdimu_calibration.core.origin import Origin, measured
@@ -81,7 +81,8 @@ def set_outcome(fit: SetFit) -> Calibration:
 def base_fit(fit: SetFit) -> Fit:
     """Fit of one recording about the joint estimate: it gives the names and the frame of the report."""
     by_name = {m.name: m for m in fit.members}
-    report = max(fit.reports, key=lambda r: (len(r.times.stops), r.name))
+    # The last of those with most stops: the frame needs a recording that shows much, and one is as good as the other.
+    report = max(reversed(fit.reports), key=lambda r: len(r.times.stops))
     job = job_of(by_name[report.name], SetOptions(fit.model), fit)
     return fitted(job)
 
@@ -92,7 +93,8 @@ def _reported(fit: SetFit, base: Fit) -> tuple[Floats, Floats]:
     places = [fit.names.index(n) for n in names]
     values, covariance = fit.estimate.values[places], fit.estimate.covariance[np.ix_(places, places)]
     if isinstance(base, NavigationFit):
-        T = base.centring
+        # What only serves the fit of this recording, as the Earth rate in the place of its azimuth, is behind them.
+        T = base.centring[: len(names), : len(names)]
         values, covariance = T @ values, T @ covariance @ T.T
     return base.reported_values(values), base.reported_covariance(covariance)
 
@@ -127,7 +129,12 @@ def _notes(fit: SetFit, base: Fit) -> tuple[str, ...]:
     scatter = [_scatter(t) for t in with_units(fit, base)]
     files = sorted({r.imu.name for r in fit.reports})
     mixed = [f"the recordings state different IMUs ({', '.join(files)}): a set is of one unit"] if files[1:] else []
-    return (*mixed, *of_one, *scatter, *(f"{r.name}: {note}" for r in fit.reports for note in r.notes))
+    return (*mixed, *of_one, *scatter, *_told(fit, [r.notes for r in fit.reports]))
+
+
+def _told(fit: SetFit, lines: Sequence[Sequence[str]]) -> list[str]:
+    """Put the name of each recording before its lines."""
+    return [prefixed(fit.reports[k].name, text) for k in fit.shown for text in lines[k]]
 
 
 def _scatter(t: TurnOn) -> str:
@@ -163,7 +170,7 @@ def _warnings(fit: SetFit, varied: Variation, names: Sequence[str]) -> tuple[str
         for p, name in sorted(odd)
     ]  # fmt: skip
     left_out = [f"{name} is left out: {why}" for name, why in fit.left_out]
-    return (*left_out, *_misfit(fit), *lines, *(prefixed(r.name, text) for r in fit.reports for text in r.warnings))
+    return (*left_out, *_misfit(fit), *lines, *_told(fit, [r.warnings for r in fit.reports]))
 
 
 def _misfit(fit: SetFit) -> list[Note]:
@@ -188,20 +195,22 @@ def _summary(fit: SetFit, varied: Variation, names: Sequence[str], base: Fit) ->
     def in_order(row: Floats) -> Floats:
         return np.array([row[where[n]] if n in where else np.nan for n in names])
 
+    listed = [(k, fit.reports[k]) for k in fit.shown]
     recordings = tuple(
         SetRecording(
             r.name, r.serial, r.power_on, r.start_ns, r.temperature_degc, r.data.get("duration_s", float("nan")),
             r.data.get("samples", float("nan")), r.statistics.nis_mean,
             *_own(r, names), in_order(varied.z[k]),
         )
-        for k, r in enumerate(fit.reports)
+        for k, r in listed
     )  # fmt: skip
+    rows = [fit.power_ons.index(name) for name in dict.fromkeys(power_on(r) for _, r in listed)]
     deviations = tuple(
-        PowerOnDeviation(power_on, name, float(value), float(sigma))
-        for power_on, row, sigmas in zip(
-            fit.power_ons, fit.estimate.deviation, fit.estimate.deviation_sigma, strict=True
+        PowerOnDeviation(fit.power_ons[row], name, float(value), float(sigma))
+        for row in rows
+        for name, value, sigma in zip(
+            fit.varying_names, fit.estimate.deviation[row], fit.estimate.deviation_sigma[row], strict=True
         )
-        for name, value, sigma in zip(fit.varying_names, row, sigmas, strict=True)
     )
     return SetSummary(
         recordings, tuple(with_units(fit, base)), deviations, in_order(varied.p_value), varied.trends, fit.left_out

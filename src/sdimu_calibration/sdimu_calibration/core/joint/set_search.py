@@ -283,7 +283,7 @@ def _alike(evidence: SetEvidence, found: Mapping[str, Candidate]) -> dict[str, t
     It is asked where the model has all of them: before, a strong effect hides what tells another one apart.
     """
     tried = [replace(c, effect=replace(c.effect, nearer=None)) for c in found.values()]
-    columns = np.array([_place(evidence.names, c) for c in tried], dtype=np.int64)
+    columns = np.array([place_of(evidence.names, c) for c in tried], dtype=np.int64)
     open_again = evidence.as_candidates(columns, tried)
     problem = Problem(open_again)
     chosen = list(range(problem.p, problem.p + len(tried)))
@@ -373,7 +373,7 @@ def _without_small(
         sigma = np.sqrt(np.diag(fit.estimate.covariance))
         size = {
             label: float(np.abs(fit.estimate.values[k]) / sigma[k])
-            for label, c in chosen.items() if (k := _place(fit.names, c)) >= 0
+            for label, c in chosen.items() if (k := place_of(fit.names, c)) >= 0
         }  # fmt: skip
         weakest = min(size, key=lambda label: size[label])
         if size[weakest] >= _KEEP:
@@ -386,9 +386,10 @@ def _without_small(
     return fit, chosen
 
 
-def _place(names: Sequence[str], candidate: Candidate) -> int:
+def place_of(names: Sequence[str], candidate: Candidate) -> int:
     """Place of a coefficient that was found among those of a fit; -1 where it is not there."""
-    for name in (candidate.parameter.name, candidate.label):
+    # Beside another variant it is called by its label: the plain name is then that of the other one.
+    for name in (candidate.label, candidate.parameter.name):
         if name in names:
             return list(names).index(name)
     return -1

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
-
-import numpy as np
 
 from sdimu_calibration.core.advice import Advice, Kind, Verb
 
@@ -60,7 +59,7 @@ def _unknown(stop: int | None, channel: str, learned: bool) -> str:
 
 
 def _latitude(off: float, sigma: float) -> str:
-    off_deg, sigma_deg = (np.degrees(v) for v in (off, sigma))
+    off_deg, sigma_deg = (math.degrees(v) for v in (off, sigma))
     sense = "North" if off_deg > 0.0 else "South"
     return (
         f"Look at the site: its latitude is {abs(off_deg):.2f} +- {sigma_deg:.2f} deg too far {sense}; correct it "

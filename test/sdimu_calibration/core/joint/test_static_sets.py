@@ -1,0 +1,70 @@
+"""Static recordings as one set: every grade, in noise with a memory that hides the azimuth."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sdimu_calibration.core.joint.set_diagnosis import diagnose_set
+from sdimu_calibration.core.joint.set_fit import SetOptions, fit_set
+from sdimu_calibration.core.joint.set_result import set_outcome
+from sdimu_calibration.storage.files.config import load_model
+
+from .conftest import here
+from .static_sets import CUBE, GRADES, PAIR, rests
+
+OPTIONS = SetOptions(load_model("baseline"))
+SEEDS = [pytest.param(seed, marks=pytest.mark.slow) for seed in (2, 3, 4, 5)]
+
+
+def without_azimuth(fit):
+    """Names of the recordings whose fit does without one: it has two unknowns more than the set."""
+    return [r.name for r in fit.reports if len(r.start.names) > len(r.reduction.names)]
+
+
+def checked(members):
+    """Fit recordings together; see that all are used and that the result is one."""
+    fit = fit_set(members, OPTIONS, here)
+    result = set_outcome(fit)
+    assert not fit.left_out
+    assert len(result.values) == len(result.names) == len(result.covariance)
+    assert np.isfinite(result.values).all()
+    sigma = np.sqrt(np.diag(result.covariance))
+    free = sigma > 0.0
+    unit = result.covariance[np.ix_(free, free)] / np.outer(sigma[free], sigma[free])
+    assert np.linalg.eigvalsh(unit).min() > -1e-6
+    return fit, result
+
+
+@pytest.mark.parametrize("seed", [1, *SEEDS])
+@pytest.mark.parametrize("grade", GRADES)
+def test_up_and_down_are_a_set_whatever_their_order_and_names(grade, seed):
+    up, down = rests(grade, seed, PAIR)
+    _, result = checked((up, down))
+    _, other = checked((replace(down, name="a"), replace(up, name="b")))
+    np.testing.assert_array_equal(other.values, result.values)
+    np.testing.assert_array_equal(other.covariance, result.covariance)
+    assert other.fit == result.fit
+
+
+@pytest.mark.parametrize("seed", [1, *SEEDS])
+def test_recordings_of_which_none_knows_an_azimuth_are_a_set(seed):
+    """Each has two unknowns in the place of its azimuth, which the set has not."""
+    fit, _ = checked(rests("mems_by_hand", seed, PAIR))
+    assert without_azimuth(fit) == ["r0", "r1"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [1, *SEEDS])
+@pytest.mark.parametrize("grade", GRADES)
+def test_six_rests_of_a_cube_are_a_set(grade, seed):
+    checked(rests(grade, seed, CUBE))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("grade", GRADES)
+def test_static_recordings_are_diagnosed(grade):
+    found = diagnose_set(rests(grade, 1, PAIR), OPTIONS, here)
+    assert np.isfinite(found.after.values).all()
