@@ -6,6 +6,7 @@ import math
 from typing import Any
 
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
+from sdimu_calibration.core.verdict import Verdict
 from sdimu_calibration.storage.files.config import load_imu
 from sdimu_study.plans import PLANS
 from sdimu_study.score import scored
@@ -55,7 +56,7 @@ STUDY = Study(
 
 
 def _other(row: Any) -> bool:
-    return not row["named"] and not row["noise"] and row["verdict"] != "consistent"
+    return not row["named"] and not row["noise"] and row["verdict"] != Verdict.CONSISTENT
 
 
 def plans_of(imu: str) -> tuple[str, ...]:

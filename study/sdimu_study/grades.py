@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from sdimu_calibration.core.verdict import Verdict
 from sdimu_calibration.storage.files.config import load_imu
 from sdimu_study.plans import FILED
 from sdimu_study.score import scored
@@ -61,7 +62,7 @@ def _median(group: Group) -> str:
 
 _LINES: tuple[tuple[str, str, Any], ...] = (
     ("estimator", CLEAN, lambda g: ", ".join(sorted({r["estimator"] for r in g.good}))),
-    ("clean: consistent", CLEAN, lambda g: _share(g, lambda r: r["verdict"] == "consistent")),
+    ("clean: consistent", CLEAN, lambda g: _share(g, lambda r: r["verdict"] == Verdict.CONSISTENT)),
     ("clean: refused", CLEAN, lambda g: str(len(g.rows) - len(g.good))),
     ("clean: accuses site or recording", CLEAN, lambda g: str(g.count(lambda r: r["accuses"]))),
     ("clean: RMS z of the coefficients", CLEAN, lambda g: f"{rms_z(g.good):.2f}"),

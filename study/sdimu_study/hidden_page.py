@@ -10,6 +10,7 @@ import numpy as np
 from scipy.stats import beta
 
 from sdimu_calibration.core.effects.selection import resolve
+from sdimu_calibration.core.verdict import Verdict
 from sdimu_study.hidden_outside import outside_kind
 from sdimu_study.study import Table, good, head
 
@@ -103,7 +104,7 @@ def _clean(rows: Sequence[Row]) -> list[dict[str, Any]]:
     clean = [r for r in rows if r["kind"] == "clean"]
     z = [float(np.sqrt(r["scan_z2"] / r["scan_count"])) for r in clean]
     return [
-        share("nothing hidden: something found", [r["verdict"] != "consistent" for r in clean], 0.05, most=True),
+        share("nothing hidden: something found", [r["verdict"] != Verdict.CONSISTENT for r in clean], 0.05, most=True),
         number("nothing hidden: RMS z of all candidates", z, 0.95, 1.05),
     ]
 
@@ -113,14 +114,14 @@ def outside_passed(row: Row) -> bool:
 
     Right is what takes nearly all of the signature: an equation, or two steps that make a pulse.
     """
-    if row["verdict"] == "unexplained":
+    if row["verdict"] == Verdict.UNEXPLAINED:
         return True
     return bool(row["named"]) and (row["truths"][0]["share"] or 0.0) >= EXPLAINED
 
 
 def _worse(row: Row) -> bool:
     # What was tried on the way to "unexplained" is not accepted.
-    accepted = bool(row["named"]) and row["verdict"] != "unexplained"
+    accepted = bool(row["named"]) and row["verdict"] != Verdict.UNEXPLAINED
     return accepted and row["stops_after"] is not None and row["stops_after"] > row["stops_before"]
 
 
@@ -135,7 +136,7 @@ def _outside(rows: Sequence[Row]) -> list[dict[str, Any]]:
 def _noise(rows: Sequence[Row]) -> list[dict[str, Any]]:
     noise = [r for r in rows if r["kind"] == "noise"]
     # Outliers that the screen takes away are told in its findings; what is left may well be as specified.
-    hits = [not r["named"] and (r["verdict"] == "noise model wrong" or "spike" in r["data"]) for r in noise]
+    hits = [not r["named"] and (r["verdict"] == Verdict.NOISE_MODEL_WRONG or "spike" in r["data"]) for r in noise]
     return [share("wrong noise: found as such, no effect named", hits, 0.95)]
 
 
@@ -173,7 +174,7 @@ def confusion(rows: Sequence[Row]) -> list[dict[str, Any]]:
 
 def _first_family(row: Row) -> str:
     if not row["named"]:
-        return NOTHING if row["verdict"] == "consistent" else str(row["verdict"])
+        return NOTHING if row["verdict"] == Verdict.CONSISTENT else str(row["verdict"])
     return "own equation" if row["own"] else family_of(row["named"][0])
 
 
@@ -183,7 +184,7 @@ def _outside_table(rows: Sequence[Row]) -> list[dict[str, Any]]:
         if row["kind"] != "outside":
             continue
         word = row["verdict"]
-        if row["named"] and word != "unexplained":
+        if row["named"] and word != Verdict.UNEXPLAINED:
             what = "equation" if row["own"] else "catalogue terms"
             word = f"{'right' if outside_passed(row) else 'other'} {what}"
         table.setdefault(outside_kind(row["truths"][0]["name"]), Counter())[word] += 1

@@ -11,6 +11,7 @@ from sdimu_calibration.core.diagnosis.diagnose import Diagnosis, climb
 from sdimu_calibration.core.effects import registry
 from sdimu_calibration.core.estimation.solve import solve
 from sdimu_calibration.core.recording import DataError, Recording
+from sdimu_calibration.core.verdict import Verdict
 from sdimu_calibration.storage.files.config import load_imu, load_model
 from sdimu_sim.core.hidden import effect_names
 from sdimu_sim.core.mean_bias import BIASES
@@ -111,7 +112,7 @@ def _rows(g: Group, word: str) -> Rows:
 
 
 def _seen(g: Group) -> Rows:
-    return [row for row in _rows(g, "without") if row["verdict"] != "consistent"]
+    return [row for row in _rows(g, "without") if row["verdict"] != Verdict.CONSISTENT]
 
 
 STUDY = Study(
@@ -124,7 +125,7 @@ STUDY = Study(
         ("named", lambda g: of(g.count(lambda row: row["with"]["in_class"]), g.good)),
         ("RMS z", lambda g: rms_cell(_rows(g, "with"))),
         ("seen without it", lambda g: of(len(_seen(g)), g.good)),
-        ("noise", lambda g: str(sum(row["verdict"] == "noise model wrong" for row in _seen(g)))),
+        ("noise", lambda g: str(sum(row["verdict"] == Verdict.NOISE_MODEL_WRONG for row in _seen(g)))),
         ("RMS z without it", lambda g: rms_cell(_rows(g, "without"))),
         ("largest", lambda g: f"{max((row['largest_z'] for row in _rows(g, 'without')), default=float('nan')):.1f}"),
     ),

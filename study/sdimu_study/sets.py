@@ -20,6 +20,7 @@ from sdimu_calibration.core.joint.set_result import set_outcome
 from sdimu_calibration.core.plan import Plan, Turn
 from sdimu_calibration.core.plan_search import Question, next_turn
 from sdimu_calibration.core.specification import Site
+from sdimu_calibration.core.verdict import Verdict
 from sdimu_calibration.storage.files.config import load_imu, load_model, load_plan
 from sdimu_study.plans import FILED
 from sdimu_study.score import among, classes, errors
@@ -202,7 +203,7 @@ def _right(g: Group) -> tuple[int, int, str]:
         single = sum(row["in_one"] for row in rows)
         return sum(row["named"] for row in rows), len(rows), f"named in the set (in one recording: {single})"
     if kind == "clean":
-        return sum(row["verdict"] == "consistent" for row in rows), len(rows), "consistent"
+        return sum(row["verdict"] == Verdict.CONSISTENT for row in rows), len(rows), "consistent"
     if kind == "class":
         asked = [row for row in rows if len(row["open"]) > 1]
         told = f"the right one alone ({len(rows)} drawn, these open in one)"

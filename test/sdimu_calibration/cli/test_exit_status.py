@@ -16,16 +16,17 @@ from sdimu_calibration.core.diagnosis import diagnose as of_one
 from sdimu_calibration.core.joint import set_diagnosis as of_set
 from sdimu_calibration.core.recording import DataFault
 from sdimu_calibration.core.results import Calibration, no_history
+from sdimu_calibration.storage.files.result_file import as_note
 
 FITS = Calibration(
     "prior", ("accel_bias",), ("accel_bias_x",), ("m/s^2",), ("ug",), np.array([1e-4]), np.array([[1e-12]]),
     {"nis_mean": 1.0}, {}, (), no_history(1),
 )  # fmt: skip
-MISFITS = (
+MISFITS = tuple(map(as_note, (
     "the model in white noise does not fit (NIS 5.6; 1 is right); run: sdimu diagnose",
     "stop 3 does not fit: gyro is off by 9.1 sigma (chance ends at 5); look at the data there, or run: sdimu diagnose",
     "gyro_scale_y is not the same in all recordings (p 1e-09); run: sdimu diagnose",
-)
+)))  # fmt: skip
 UNTRUSTED = ("unexplained", "data fault")
 TRUSTED = (
     "consistent", "noise model wrong", "one effect", "class of effects", "several effects", "own equation",

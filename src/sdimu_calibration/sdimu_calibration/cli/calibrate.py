@@ -53,7 +53,7 @@ from sdimu_calibration.cli.source_options import (
     TemperatureTopic,
     source,
 )
-from sdimu_calibration.core.note import topic_of
+from sdimu_calibration.core.note import MISFITS, topic_of
 
 
 def calibrate(
@@ -150,7 +150,7 @@ def calibrate(
         )  # fmt: skip
     console.print(rich_table(rows(result, true), f"body frame: {result.body_frame}"), soft_wrap=True)
     tell(console, (*notes, *(note for note in result.notes if note not in notes)))
-    if any(map(topic_of, result.notes)):
+    if any(topic_of(note) in MISFITS for note in result.notes):
         say(console, "To learn what the model misses:")
         command(console, about.command("diagnose"))
     say(console, f"results in {folder}")

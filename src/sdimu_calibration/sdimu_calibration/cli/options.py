@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from sdimu_calibration.core.estimation.prepared_test import PreparedTest
     from sdimu_calibration.core.results import Calibration
     from sdimu_calibration.core.specification import Model
+    from sdimu_calibration.core.verdict import Verdict
     from sdimu_calibration.storage.opening import Source
 
 ImuOption = Annotated[
@@ -113,7 +114,7 @@ def tell(console: Console, notes: Iterable[str]) -> None:
         say(console, f"note: {note}")
 
 
-def leave(result: Calibration, diagnosed: tuple[str, str] | None = None) -> None:
+def leave(result: Calibration, diagnosed: tuple[Verdict, str] | None = None) -> None:
     """Say on stderr which coefficients are one, and end with exit status 3 when a result is not to be trusted.
 
     `diagnosed` is the verdict of a diagnosis and its sentence. Where there is one, it judges what does not fit;
@@ -128,7 +129,7 @@ def leave(result: Calibration, diagnosed: tuple[str, str] | None = None) -> None
         raise typer.Exit(NOT_TRUSTED)
 
 
-def _reasons(result: Calibration, diagnosed: tuple[str, str] | None) -> list[str]:
+def _reasons(result: Calibration, diagnosed: tuple[Verdict, str] | None) -> list[str]:
     """List why a result is not to be trusted, one line each, each said once."""
     from sdimu_calibration.core.results import UNTRUSTED_VERDICTS
 

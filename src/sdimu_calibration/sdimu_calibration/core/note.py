@@ -13,10 +13,18 @@ class Topic(StrEnum):
     """The model does not fit."""
     DIFFERS = auto()
     """A coefficient is not the same in all recordings of a set."""
+    NOT_TRUSTED = auto()
+    """The estimate must not be used as it stands."""
+    INSEPARABLE = auto()
+    """Two coefficients are one in a test."""
+
+
+MISFITS = frozenset({Topic.MISFIT, Topic.DIFFERS})
+"""Topics that a diagnosis answers."""
 
 
 class Note(str):
-    """A line whose end advises a diagnosis.
+    """A line of which programs ask what it is about; its end may advise a diagnosis.
 
     Attributes
     ----------
@@ -38,6 +46,12 @@ class Note(str):
 def topic_of(line: str) -> Topic | None:
     """Say what a line is about; None for one of which no program asks."""
     return line.topic if isinstance(line, Note) else None
+
+
+def prefixed(name: str, line: str) -> str:
+    """Put a name before a line, which stays about what it is about."""
+    told = f"{name}: {line}"
+    return Note(told, line.topic) if isinstance(line, Note) else told
 
 
 def without_advice(notes: Iterable[str]) -> tuple[str, ...]:

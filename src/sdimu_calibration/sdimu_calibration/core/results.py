@@ -9,20 +9,21 @@ import numpy as np
 
 from sdimu_calibration.core.arrays import Bools, Floats, Ints
 from sdimu_calibration.core.noise_term import NoiseTerm
-from sdimu_calibration.core.note import topic_of
+from sdimu_calibration.core.note import MISFITS, Topic, topic_of
 from sdimu_calibration.core.origin import Origin
 from sdimu_calibration.core.recording import DataFault
 from sdimu_calibration.core.specification import ImuSpecification
+from sdimu_calibration.core.verdict import Verdict
 
 NOT_TRUSTED = "not to be trusted"
-"""Words of a warning that forbids to use an estimate."""
-UNTRUSTED_VERDICTS = frozenset({"unexplained", "data fault"})
+"""Words of a warning that forbids to use an estimate, by which a file tells it."""
+UNTRUSTED_VERDICTS = frozenset({Verdict.UNEXPLAINED, Verdict.DATA_FAULT})
 """Verdicts of a diagnosis after which no estimate is to be trusted: the model is wrong, and no effect mends it."""
 START_TEMPERATURE = "start_temperature_degc"
 """Key in the data section: temperature T0 from which temperature effects count (deg C), that at the start if no other
 was stated."""
 INSEPARABLE = "cannot be told from each other"
-"""Words of a warning that two coefficients are one in a test."""
+"""Words of a warning that two coefficients are one in a test, by which a file tells it."""
 NO_AXES = (float("nan"),) * 3
 """Three axes without a number."""
 
@@ -290,14 +291,17 @@ class Calibration:
     def not_to_be_trusted(self) -> tuple[str, ...]:
         """Why the estimate must not be used as it stands, one line each; empty where nothing forbids it."""
         grave = [fault.text for fault in self.faults if fault.grave]
-        return tuple(dict.fromkeys([*grave, *(line for line in self.warnings if NOT_TRUSTED in line)]))
+        return tuple(dict.fromkeys([*grave, *self._about(Topic.NOT_TRUSTED)]))
 
     @property
     def misfits(self) -> tuple[str, ...]:
         """Where the model does not fit the data, one line each: those of the warnings that send to a diagnosis."""
-        return tuple(line for line in self.warnings if topic_of(line))
+        return self._about(*MISFITS)
 
     @property
     def inseparable(self) -> tuple[str, ...]:
         """Pairs of coefficients that are one in this test, one line each."""
-        return tuple(line for line in self.warnings if INSEPARABLE in line)
+        return self._about(Topic.INSEPARABLE)
+
+    def _about(self, *topics: Topic) -> tuple[str, ...]:
+        return tuple(line for line in self.warnings if topic_of(line) in topics)

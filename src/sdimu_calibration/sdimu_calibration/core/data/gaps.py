@@ -27,8 +27,10 @@ from sdimu_calibration.core.arrays import Bools, Floats, Ints
 from sdimu_calibration.core.data.epochs import Epochs
 from sdimu_calibration.core.data.phases import Phases
 from sdimu_calibration.core.navigation.strapdown import Cycles
+from sdimu_calibration.core.note import Note, Topic
 from sdimu_calibration.core.plain_text import counted
 from sdimu_calibration.core.recording import DataError, DataFault
+from sdimu_calibration.core.results import NOT_TRUSTED
 from sdimu_calibration.core.wording import Work
 
 GAP_SHARE = 0.1
@@ -235,9 +237,10 @@ def _long_gap(
                     f"/imu/data_raw: {text}, and {worst} differs by {z.max():.0f} sigma after "
                     f"them: the IMU was moved or switched off; cut the recording there ({Work.CUT}), or repeat it"
                 )
+    told = f"{text}: if the IMU was switched off, its biases may have changed, and the estimate is {NOT_TRUSTED}"
     return DataFault(
         "long gap",
-        f"{text}: if the IMU was switched off, its biases may have changed, and the estimate is not to be trusted",
+        Note(told, Topic.NOT_TRUSTED),
         int(cycles.lost[cycle]), at, float(cycles.t[cycle]), grave=True,
     )  # fmt: skip
 

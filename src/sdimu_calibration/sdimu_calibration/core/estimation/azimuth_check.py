@@ -14,6 +14,8 @@ from sdimu_calibration.core import earth
 from sdimu_calibration.core.effects.bias import GYRO_BIAS
 from sdimu_calibration.core.filter.filter_pass import NAV
 from sdimu_calibration.core.filter.passes import Solution
+from sdimu_calibration.core.note import Note, Topic
+from sdimu_calibration.core.results import NOT_TRUSTED
 
 _SIGMAS = 3.0
 """Error of the azimuth (sigma) that is reckoned with: chance ends there."""
@@ -33,10 +35,11 @@ def azimuth_warning(solution: Solution) -> str | None:
     """
     attitudes = _attitudes(solution)
     if attitudes < _LEAST_ATTITUDES:
-        return (
+        told = (
             f"the IMU was at rest in {attitudes} attitude{'s' if attitudes > 1 else ''} only: azimuth and gyro biases "
-            "cannot be separated, and their sigmas are not to be trusted; use a plan with more attitudes"
+            f"cannot be separated, and their sigmas are {NOT_TRUSTED}; use a plan with more attitudes"
         )
+        return Note(told, Topic.NOT_TRUSTED)
     P, names = solution.last.state.P, solution.setup.sensors.names
     sigma = np.sqrt(np.diag(P))
     biases = [sigma[NAV + i] for i, name in enumerate(names) if name in GYRO_BIAS.labels]

@@ -21,12 +21,16 @@ from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.evidence.stretch_length import wander_of
 from sdimu_calibration.core.fit_statistics import FitStatistics
 from sdimu_calibration.core.noise_term import NoiseTerm
+from sdimu_calibration.core.note import Note, Topic
 from sdimu_calibration.core.recording import DataFault, TemperatureLog
 from sdimu_calibration.core.results import NOT_TRUSTED, START_TEMPERATURE, History, Rest, no_history
 from sdimu_calibration.core.specification import Model
 from sdimu_calibration.core.wording import Option
 
-NOT_CONVERGED = f"the passes did not converge: the estimate is {NOT_TRUSTED}; check {Option.IMU} and {Option.SITE}"
+NOT_CONVERGED = Note(
+    f"the passes did not converge: the estimate is {NOT_TRUSTED}; check {Option.IMU} and {Option.SITE}",
+    Topic.NOT_TRUSTED,
+)
 
 
 def temperature_counts(log: TemperatureLog | None) -> dict[str, float]:

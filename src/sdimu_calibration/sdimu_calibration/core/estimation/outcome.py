@@ -12,6 +12,7 @@ from sdimu_calibration.core.data.blocks import let_go
 from sdimu_calibration.core.estimation.fit import Fit
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.estimation.solve import AUTO, solve
+from sdimu_calibration.core.note import Note, Topic
 from sdimu_calibration.core.origin import Origin, measured
 from sdimu_calibration.core.progress import Progress, silent
 from sdimu_calibration.core.recording import DataError, Recording
@@ -77,7 +78,7 @@ def _origin(fit: Fit) -> Origin:
     return out
 
 
-def inseparable(names: Sequence[str], covariance: Floats) -> list[str]:
+def inseparable(names: Sequence[str], covariance: Floats) -> list[Note]:
     """Name the coefficients that the data do not tell from each other, one line for a pair.
 
     Parameters
@@ -90,8 +91,11 @@ def inseparable(names: Sequence[str], covariance: Floats) -> list[str]:
     unit = np.divide(1.0, sigma, out=np.zeros_like(sigma), where=sigma > 0.0)
     correlation = np.triu(np.abs(covariance * np.outer(unit, unit)), 1)
     return [
-        f"{names[i]} and {names[j]} {INSEPARABLE} in this test (correlation "
-        f"{correlation[i, j]:.5f}): their sum is known, neither of them is; take one out of the model"
+        Note(
+            f"{names[i]} and {names[j]} {INSEPARABLE} in this test (correlation "
+            f"{correlation[i, j]:.5f}): their sum is known, neither of them is; take one out of the model",
+            Topic.INSEPARABLE,
+        )
         for i, j in np.argwhere(correlation > _ONE).tolist()
     ]
 

@@ -15,8 +15,10 @@ from sdimu_calibration.core.arrays import Bools
 from sdimu_calibration.core.data.sample_screening import CHANNELS
 from sdimu_calibration.core.handheld.handheld_data import HandheldRun
 from sdimu_calibration.core.handheld.handheld_fit import FORCE, TURN, HandheldSolution
+from sdimu_calibration.core.note import Note, Topic
 from sdimu_calibration.core.plain_text import counted
 from sdimu_calibration.core.recording import DataFault, Recording
+from sdimu_calibration.core.results import NOT_TRUSTED
 from sdimu_calibration.core.units import STANDARD_GRAVITY, from_si
 
 _BEYOND = 10.0
@@ -103,15 +105,15 @@ def _in_a_row(flags: Bools) -> Bools:
 def _misfit(found: HandheldSolution) -> list[DataFault]:
     """Warn when what the model leaves over is no noise of any sensor."""
     because = (
-        "far more than any sensor: the estimate is not to be trusted; look for samples that are clipped, stuck or "
+        f"far more than any sensor: the estimate is {NOT_TRUSTED}; look for samples that are clipped, stuck or "
         "missing, an axis without its sign, an IMU switched off in between"
     )
     out = []
     extra = found.point.extra
     if extra[TURN] > _TURN_MISFIT:
         text = f"turns have errors of {100.0 * extra[TURN]:.2g} % of their angle, {because}"
-        out.append(DataFault("misfit", text, grave=True))
+        out.append(DataFault("misfit", Note(text, Topic.NOT_TRUSTED), grave=True))
     if extra[FORCE] > _FORCE_MISFIT:
         text = f"force at rest has errors of {from_si(float(extra[FORCE]), 'mg'):.3g} mg, {because}"
-        out.append(DataFault("misfit", text, grave=True))
+        out.append(DataFault("misfit", Note(text, Topic.NOT_TRUSTED), grave=True))
     return out

@@ -15,7 +15,7 @@ from sdimu_calibration.core.joint.member import Report, fitted
 from sdimu_calibration.core.joint.set_evidence import held_out
 from sdimu_calibration.core.joint.set_fit import SetFit, SetOptions, job_of, power_on
 from sdimu_calibration.core.joint.variation import Variation, variation
-from sdimu_calibration.core.note import Note, Topic
+from sdimu_calibration.core.note import Note, Topic, prefixed
 from sdimu_calibration.core.origin import Origin, measured
 from sdimu_calibration.core.results import (
     START_TEMPERATURE,
@@ -134,7 +134,7 @@ def _notes(fit: SetFit, base: Fit) -> tuple[str, ...]:
 
 def _told(fit: SetFit, lines: Sequence[Sequence[str]]) -> list[str]:
     """Put the name of each recording before its lines."""
-    return [f"{fit.reports[k].name}: {text}" for k in fit.shown for text in lines[k]]
+    return [prefixed(fit.reports[k].name, text) for k in fit.shown for text in lines[k]]
 
 
 def _scatter(t: TurnOn) -> str:

@@ -17,6 +17,7 @@ from sdimu_calibration.core.joint.reduction import Reduction
 from sdimu_calibration.core.joint.stretch_rows import Places
 from sdimu_calibration.core.noise_term import NoiseTerm
 from sdimu_calibration.core.specification import ImuSpecification
+from sdimu_calibration.storage.files.result_file import as_note
 from sdimu_calibration.storage.files.whole_file import beside
 
 FORMAT = "sdimu-reduction/1"
@@ -81,7 +82,8 @@ def _report(words: dict[str, Any], arrays: dict[str, Any]) -> Report | None:
         words["name"], "", "", reduction, words["estimator"], words["reason"], ImuSpecification(**words["imu"]), start,
         int(words["start_ns"]), times, math.nan if heat is None else float(heat), words["data"],
         FitStatistics(**words["statistics"]),
-        tuple(words["reported"]), arrays["values"], arrays["sigma"], tuple(words["notes"]), tuple(words["warnings"]),
+        tuple(words["reported"]), arrays["values"], arrays["sigma"], tuple(words["notes"]),
+        tuple(map(as_note, words["warnings"])),
         float(words["heading_rad"]), tuple(_term(entry) for entry in words["noise"]), bool(words["widened"]),
         _places(arrays),
     )  # fmt: skip

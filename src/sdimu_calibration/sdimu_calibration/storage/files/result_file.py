@@ -17,7 +17,7 @@ from sdimu_calibration.core.note import Note, Topic, without_advice
 from sdimu_calibration.core.origin import Origin
 from sdimu_calibration.core.plain_text import one_line
 from sdimu_calibration.core.recording import DataError, DataFault
-from sdimu_calibration.core.results import Calibration, History, Rest
+from sdimu_calibration.core.results import INSEPARABLE, NOT_TRUSTED, Calibration, History, Rest
 from sdimu_calibration.core.verdict import Verdict
 from sdimu_calibration.storage.files import imu_noise, set_result_file
 from sdimu_calibration.storage.files.json_file import read_json, write_json
@@ -25,6 +25,8 @@ from sdimu_calibration.storage.files.json_file import read_json, write_json
 FORMAT = "sdimu-result/1"
 _ADVISES = re.compile(r"(.*)([;:,](?: or)? run:? sdimu diagnose)")
 """How a line of a file ends that advises a diagnosis."""
+_TOPICS = {NOT_TRUSTED: Topic.NOT_TRUSTED, INSEPARABLE: Topic.INSEPARABLE}
+"""What a line of a file is about, by its words."""
 _LATEST_NS = 2**63
 """A stamp of 64 bits ends there."""
 
@@ -116,10 +118,11 @@ def _said(values: Sequence[Any]) -> tuple[str, ...]:
 
 
 def as_note(line: str) -> str:
-    """Recognise in a line of a file the end that advises a diagnosis, and what the line is then about."""
+    """Recognise in a line of a file what it is about, and the end that advises a diagnosis."""
     found = _ADVISES.fullmatch(line)
     if found is None:
-        return line
+        topics = (topic for words, topic in _TOPICS.items() if words in line)
+        return Note(line, topic) if (topic := next(topics, None)) else line
     topic = Topic.DIFFERS if "is not the same in all recordings" in line else Topic.MISFIT
     # A note on noise says that the model fits.
     return Note(found[1], None if found[2].startswith(":") else topic, found[2])
