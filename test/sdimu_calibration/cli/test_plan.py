@@ -16,7 +16,7 @@ from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage.files.config import load_imu, load_plan, load_site
 from sdimu_calibration.storage.files.json_file import write_json
 from sdimu_calibration.storage.files.model_choice import named_model
-from sdimu_calibration.storage.files.standing_file import as_plain, read_standing
+from sdimu_calibration.storage.files.standing_file import KnownEntry, read_standing
 
 OPEN = ("gyro_scale_asymmetry_y", "gyro_scale_quadratic_y")
 
@@ -33,7 +33,7 @@ def standing() -> Standing:
 
 @pytest.fixture
 def folder(standing, tmp_path):
-    write_json(tmp_path / "set.json", {"format": "sdimu-set-diagnosis/1", "known": as_plain(standing)})
+    write_json(tmp_path / "set.json", {"format": "sdimu-set-diagnosis/1", "known": KnownEntry.of(standing).plain()})
     return tmp_path
 
 

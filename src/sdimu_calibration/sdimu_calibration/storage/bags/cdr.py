@@ -139,11 +139,6 @@ def by_stamp(raw: Sequence[bytes], topic: str) -> tuple[Stamps, list[bytes]]:
     stamp_ns : ndarray, shape (n,)
         Ascending (ns).
     messages : list of bytes, length n
-
-    Raises
-    ------
-    DataError
-        When a message is too short for a stamp.
     """
     messages = list(raw)
     if any(len(message) < _STAMP_END for message in messages):

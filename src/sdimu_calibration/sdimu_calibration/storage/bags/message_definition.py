@@ -40,11 +40,6 @@ def definition(type_name: str) -> str:
     Returns
     -------
     str
-
-    Raises
-    ------
-    DataError
-        When the .msg file of it or of a type in it is not installed.
     """
     package, name = _split(type_name)
     texts = {(package, name): _text(package, name)}
