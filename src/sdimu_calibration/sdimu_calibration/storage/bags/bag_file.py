@@ -96,10 +96,6 @@ def read_topics(path: Path, takes: Takes, kept: Keep = lambda _: RawMessages()) 
         Asked with name and type of every topic.
     kept : callable
         Makes what the messages of a topic go into, from its type.
-
-    Returns
-    -------
-    dict of str to TopicContent
     """
     content: dict[str, TopicContent] = {}
 

@@ -36,10 +36,6 @@ def definition(type_name: str) -> str:
     ----------
     type_name : str
         Such as ``sensor_msgs/msg/Imu``.
-
-    Returns
-    -------
-    str
     """
     package, name = _split(type_name)
     texts = {(package, name): _text(package, name)}

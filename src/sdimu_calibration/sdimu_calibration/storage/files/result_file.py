@@ -189,16 +189,7 @@ def _of_set(of_set: SetSummary) -> dict[str, Any]:
 
 
 def read_result(path: Path) -> Calibration:
-    """Read result.json, or the result.json in a folder.
-
-    Parameters
-    ----------
-    path : Path
-
-    Returns
-    -------
-    Calibration
-    """
+    """Read result.json, or the result.json in a folder."""
     path = Path(path) / "result.json" if Path(path).is_dir() else Path(path)
     file = read_model(path, ResultFile)
     with complete(path, FORMAT):

@@ -142,13 +142,7 @@ def _is_text(head: bytes) -> bool:
 
 
 class BinaryTable(ArrayTable):
-    """Columns of a file of bare numbers, by number from 1.
-
-    Parameters
-    ----------
-    path : Path
-    form : BinaryMap
-    """
+    """Columns of a file of bare numbers, by number from 1."""
 
     def __init__(self, path: Path, form: BinaryMap) -> None:
         kind = np.dtype(form.type).newbyteorder(">" if form.big_endian else "<")

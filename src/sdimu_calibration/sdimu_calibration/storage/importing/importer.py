@@ -60,10 +60,6 @@ def read_files(paths: Sequence[Path], chart: ImportMap) -> Imported:
         CSV (or any columns in text), MAT up to version 7, NPZ, bare numbers. Several files hold the parts that the map
         names, or, where it names none, one stretch of time each, in this order.
     chart : ImportMap
-
-    Returns
-    -------
-    Imported
     """
     named = (chart.accel.file, chart.gyro.file, chart.temperature.file if chart.temperature else None)
     if len(paths) > 1 and not any(named):
