@@ -13,8 +13,8 @@ from sdimu_calibration.core.fleet.study import study
 from sdimu_calibration.core.noise import Terms
 from sdimu_calibration.core.origin import Origin
 from sdimu_calibration.report.fleet import page, sheet
-from sdimu_calibration.storage.files.correlation_text import packed
 from sdimu_calibration.storage.files.datasheet_file import Certificate, hashed, write_datasheet
+from sdimu_calibration.storage.files.diagnosis_file import packed
 from sdimu_calibration.storage.files.fleet_file import write_fleet
 from sdimu_calibration.storage.files.fleet_folder import as_measured, candidates, gather
 from sdimu_calibration.storage.files.json_file import write_json

@@ -18,7 +18,7 @@ from sdimu_calibration.storage.bags.bag_file import raw_messages
 from sdimu_calibration.storage.bags.bag_reader import read_recording
 from sdimu_calibration.storage.bags.bag_writer import write_recording
 from sdimu_calibration.storage.bags.cdr import IMU, decode_doubles
-from sdimu_calibration.storage.bags.topics import Topics
+from sdimu_calibration.storage.bags.topic_choice import Topics
 from sdimu_calibration.storage.files.config import load_imu
 from sdimu_calibration.storage.files.result_file import write_result
 

@@ -13,7 +13,7 @@ from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.results import SetRecording, SetSummary
 from sdimu_calibration.core.units import to_si
 from sdimu_calibration.storage.files.config import load_imu
-from sdimu_calibration.storage.files.correlation_text import packed, unpacked
+from sdimu_calibration.storage.files.diagnosis_file import packed, unpacked
 from sdimu_calibration.storage.files.fleet_folder import candidates, gather
 from sdimu_calibration.storage.files.json_file import write_json
 from sdimu_calibration.storage.files.result_file import read_result, write_result

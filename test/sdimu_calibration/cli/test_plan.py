@@ -20,7 +20,7 @@ from sdimu_calibration.storage.files.config import find_config, load_imu, load_p
 from sdimu_calibration.storage.files.json_file import write_json
 from sdimu_calibration.storage.files.model_choice import named_model
 from sdimu_calibration.storage.files.result_file import plain_origin, write_result
-from sdimu_calibration.storage.files.standing_file import as_plain, read_standing
+from sdimu_calibration.storage.files.standing_file import KnownEntry, read_standing
 from sdimu_calibration.storage.opening import said_of, with_imu_file
 
 OPEN = ("gyro_scale_asymmetry_y", "gyro_scale_quadratic_y")
@@ -38,7 +38,7 @@ def standing() -> Standing:
 
 @pytest.fixture
 def folder(standing, tmp_path):
-    write_json(tmp_path / "set.json", {"format": "sdimu-set-diagnosis/1", "known": as_plain(standing)})
+    write_json(tmp_path / "set.json", {"format": "sdimu-set-diagnosis/1", "known": KnownEntry.of(standing).plain()})
     return tmp_path
 
 

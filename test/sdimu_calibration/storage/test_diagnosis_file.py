@@ -13,8 +13,7 @@ from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.specification import Site
 from sdimu_calibration.core.units import to_si
 from sdimu_calibration.storage.files.config import load_imu, load_model, load_plan
-from sdimu_calibration.storage.files.correlation_text import unpacked
-from sdimu_calibration.storage.files.diagnosis_file import content, read_diagnosis, write_diagnosis
+from sdimu_calibration.storage.files.diagnosis_file import content, read_diagnosis, unpacked, write_diagnosis
 from sdimu_sim.core.scenario import Scenario, generate
 
 SITE = Site(latitude_rad=float(np.radians(36.4)))
@@ -31,7 +30,7 @@ def told():
 
 def test_the_file_has_every_name_of_the_interface(told, tmp_path):
     write_diagnosis(tmp_path / "diagnosis.json", told)
-    read = read_diagnosis(tmp_path)
+    read = read_diagnosis(tmp_path).plain()
     assert read["format"] == "sdimu-diagnosis/1"
     assert isinstance(read["adequate"], bool)
     assert 0.0 <= read["p_value"] <= 1.0

@@ -8,7 +8,7 @@ import pytest
 
 from sdimu_calibration.core.origin import Origin
 from sdimu_calibration.storage.files.config import load_imu
-from sdimu_calibration.storage.files.imu_noise import noise_for
+from sdimu_calibration.storage.files.result_file import noise_for
 
 
 @pytest.mark.parametrize(("estimator", "name"), [("handheld", "mems_by_hand"), ("filter", "dtg"), ("", "dtg")])

@@ -13,8 +13,7 @@ from sdimu_calibration.core.plan import Plan
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.specification import Site
 from sdimu_calibration.storage.bags.bag_writer import write_recording
-from sdimu_calibration.storage.bags.topic_choice import TopicChoice
-from sdimu_calibration.storage.bags.topics import Topics
+from sdimu_calibration.storage.bags.topic_choice import TopicChoice, Topics
 from sdimu_calibration.storage.files.config import load_imu, load_plan, load_site
 from sdimu_calibration.storage.opening import Source, open_recording, open_test
 from sdimu_sim.core.scenario import Scenario, generate

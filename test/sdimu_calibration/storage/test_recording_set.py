@@ -15,10 +15,9 @@ from sdimu_calibration.core.joint.set_result import set_outcome
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage.files.config import load_imu, load_plan, load_site
 from sdimu_calibration.storage.files.model_choice import named_model
-from sdimu_calibration.storage.files.reduction_file import read_report, write_report
 from sdimu_calibration.storage.files.result_file import read_result, write_result
 from sdimu_calibration.storage.recording_set import BagSource, bags_below, load_set, set_of, write_set
-from sdimu_calibration.storage.set_work import job_number, set_runner
+from sdimu_calibration.storage.set_work import job_number, read_report, set_runner, write_report
 from sdimu_sim.bag_file import write_test
 from sdimu_sim.core.scenario import Scenario, simulate_test
 

@@ -117,3 +117,32 @@ def test_the_noise_of_the_imu_is_kept_with_its_units_and_refused_where_it_is_non
     del content["imu_noise"]
     (tmp_path / "result.json").write_text(json.dumps(content))
     assert read_result(tmp_path / "result.json").imu_noise is None
+
+
+def test_a_file_that_is_read_and_written_again_is_the_same(tmp_path):
+    write_result(tmp_path / "result.json", calibration())
+    write_result(tmp_path / "again.json", read_result(tmp_path / "result.json"))
+    assert (tmp_path / "again.json").read_bytes() == (tmp_path / "result.json").read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("key", "told"),
+    [
+        (("coefficients", 1, "value"), r"coefficients\.1\.value: "),
+        (("covariance",), "covariance: "),
+        (("data", "faults"), r"data\.faults: "),
+        (("history", "nis"), r"history\.nis: "),
+        (("origin", "start_ns"), r"origin\.start_ns: "),
+        (("imu_noise", "gyro_quantisation_rad"), r"imu_noise\.gyro_quantisation_rad: "),
+    ],
+)
+def test_what_is_wrong_in_a_result_is_told_with_its_key(tmp_path, key, told):
+    write_result(tmp_path / "result.json", calibration())
+    content = json.loads((tmp_path / "result.json").read_text())
+    place = content
+    for part in key[:-1]:
+        place = place[part]
+    place[key[-1]] = "loud"
+    (tmp_path / "result.json").write_text(json.dumps(content))
+    with pytest.raises(DataError, match=rf"result\.json: not a complete sdimu-result/1 file \({told}"):
+        read_result(tmp_path)

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from sdimu_calibration.core.recording import DataError
-from sdimu_calibration.storage.bags import imu_messages, sample_file
+from sdimu_calibration.storage.bags import imu_messages
 from sdimu_calibration.storage.bags.bag_reader import read_recording
 from sdimu_calibration.storage.bags.bag_writer import write_recording
-from sdimu_calibration.storage.bags.sample_file import SampleFile
+from sdimu_calibration.storage.bags.imu_messages import SampleFile
 
 
 @pytest.fixture
@@ -48,6 +48,6 @@ def test_a_full_temporary_folder_is_one_line(monkeypatch):
         def write(self, _: object) -> int:
             raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(sample_file, "TemporaryFile", lambda **_: Full())
+    monkeypatch.setattr(imu_messages, "TemporaryFile", lambda **_: Full())
     with pytest.raises(DataError, match="set TMPDIR"):
         SampleFile().append([(np.zeros(1, np.int64), np.zeros((1, 3)), np.zeros((1, 3)))])

@@ -18,8 +18,7 @@ from sdimu_calibration.storage.bags.bag_info import read_info
 from sdimu_calibration.storage.bags.bag_reader import read_recording
 from sdimu_calibration.storage.bags.bag_writer import write_recording
 from sdimu_calibration.storage.bags.mcap_bag import McapBag
-from sdimu_calibration.storage.bags.topic_choice import TopicChoice
-from sdimu_calibration.storage.bags.topics import Topics
+from sdimu_calibration.storage.bags.topic_choice import TopicChoice, Topics
 
 START_NS = 1_700_000_000_000_000_000
 TYPES = get_typestore(Stores.ROS2_JAZZY)

@@ -20,8 +20,8 @@ from sdimu_calibration.core.results import Calibration, SetSummary
 from sdimu_calibration.core.verdict import Verdict
 from sdimu_calibration.report.page import write_report
 from sdimu_calibration.storage.files.advice_words import sentence
+from sdimu_calibration.storage.files.diagnosis_file import write_set_diagnosis
 from sdimu_calibration.storage.files.result_file import write_result
-from sdimu_calibration.storage.files.set_result_file import write_set_diagnosis
 from sdimu_calibration.storage.files.whole_file import written_together
 from sdimu_calibration.storage.recording_set import RecordingSet
 from sdimu_calibration.storage.set_work import set_runner

@@ -58,5 +58,4 @@ def _verdict(folder: Path) -> str:
 
     if not (folder / "diagnosis.json").is_file():
         return ""
-    content: dict[str, Any] = read_diagnosis(folder)
-    return str(content.get("sentence", ""))
+    return read_diagnosis(folder).sentence

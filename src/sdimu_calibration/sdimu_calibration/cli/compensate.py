@@ -39,8 +39,7 @@ def compensate(
     from sdimu_calibration.storage.bags.compensated_bag import write_compensated
     from sdimu_calibration.storage.bags.compensated_imu import frame_of
     from sdimu_calibration.storage.files.effect_file import effects_of_result
-    from sdimu_calibration.storage.files.imu_noise import noise_for
-    from sdimu_calibration.storage.files.result_file import read_result
+    from sdimu_calibration.storage.files.result_file import noise_for, read_result
 
     console = plain()
     calibration = read_result(result)

@@ -33,8 +33,7 @@ def export(
     from sdimu_calibration.storage.export import FORMS
     from sdimu_calibration.storage.export import export as write
     from sdimu_calibration.storage.files.effect_file import effects_of_result
-    from sdimu_calibration.storage.files.imu_noise import noise_for
-    from sdimu_calibration.storage.files.result_file import read_result
+    from sdimu_calibration.storage.files.result_file import noise_for, read_result
 
     calibration = read_result(result)
     own = effects_of_result(calibration.model, effect or [])

@@ -36,8 +36,7 @@ def standing_of(console: Console, asked: After) -> Standing:
     DataError
         When a path is neither, or results stand beside other paths.
     """
-    from sdimu_calibration.storage.files.result_standing import standing_of_result
-    from sdimu_calibration.storage.files.standing_file import holds_standing, read_standing
+    from sdimu_calibration.storage.files.standing_file import holds_standing, read_standing, standing_of_result
 
     results = [p for p in asked.paths if holds_standing(p) or (p / "result.json").is_file() or p.name == "result.json"]
     if results and len(asked.paths) > 1:

@@ -153,8 +153,8 @@ def calibrate_together(asked: SetRequest) -> None:
 def diagnose_together(asked: SetRequest, extra: Sequence[Effect]) -> None:
     """Find what the model of a set misses; leaves set.json, result.json and report.html."""
     from sdimu_calibration.report.page import write_report
+    from sdimu_calibration.storage.files.diagnosis_file import write_set_diagnosis
     from sdimu_calibration.storage.files.result_file import write_result
-    from sdimu_calibration.storage.files.set_result_file import write_set_diagnosis
     from sdimu_calibration.storage.files.whole_file import written_together
 
     console = plain(stderr=asked.as_json)

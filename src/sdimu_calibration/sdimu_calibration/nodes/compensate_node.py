@@ -36,8 +36,7 @@ from sdimu_calibration.nodes.ticking import Ticker
 from sdimu_calibration.storage.bags.cdr import LayoutError, Stamps, decode_imu
 from sdimu_calibration.storage.bags.compensated_imu import encode_compensated, frame_of
 from sdimu_calibration.storage.files.effect_file import effects_of_result
-from sdimu_calibration.storage.files.imu_noise import noise_for
-from sdimu_calibration.storage.files.result_file import read_result
+from sdimu_calibration.storage.files.result_file import noise_for, read_result
 
 RAW, COMPENSATED, TEMPERATURE = "imu/data_raw", "imu/data", "imu/temperature"
 FAREWELL_S = 10.0

@@ -6,7 +6,7 @@ from rclpy.node import Node
 
 from sdimu_calibration.core.front_door import OpeningOptions
 from sdimu_calibration.nodes.parameters import Declare
-from sdimu_calibration.storage.bags.topics import Topics
+from sdimu_calibration.storage.bags.topic_choice import Topics
 from sdimu_calibration.storage.files.config import load_imu
 from sdimu_calibration.storage.opening import Source, opening_options
 

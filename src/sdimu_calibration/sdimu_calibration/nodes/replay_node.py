@@ -25,8 +25,7 @@ from sdimu_calibration.nodes.parameters import Declare
 from sdimu_calibration.nodes.spinning import run_node
 from sdimu_calibration.nodes.ticking import Ticker
 from sdimu_calibration.storage.bags.bag_reader import read_messages
-from sdimu_calibration.storage.bags.topic_choice import TopicChoice
-from sdimu_calibration.storage.bags.topics import Topics
+from sdimu_calibration.storage.bags.topic_choice import TopicChoice, Topics
 
 WINDOW_SAMPLES = 200
 FAREWELL_S = 20.0

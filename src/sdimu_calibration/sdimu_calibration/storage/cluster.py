@@ -36,11 +36,6 @@ def cluster(scheduler: str | None, workers: int) -> Iterator[Run]:
         Address of a dask scheduler; None starts processes on this machine, which end with the context.
     workers : int
         Number of local processes.
-
-    Raises
-    ------
-    DataError
-        When the scheduler does not answer.
     """
     with _client(scheduler, workers) as client:
 

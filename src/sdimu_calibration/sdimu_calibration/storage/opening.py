@@ -46,13 +46,7 @@ class Source:
 
     @property
     def stated(self) -> Stated:
-        """The same in SI.
-
-        Raises
-        ------
-        DataError
-            When a unit is none of its kind, or a sign neither 1 nor -1.
-        """
+        """The same in SI."""
         for option, sign in (("--accel-sign", self.accel_sign), ("--gyro-sign", self.gyro_sign)):
             if sign not in {None, 1, -1}:
                 raise DataError(f"{option} {sign}: expected 1 or -1")
@@ -91,11 +85,6 @@ def opening_options(
         Moved by hand; None decides by the turns and the noise of the gyros.
     measured_noise : bool
         Replace the white noise of the specification by that of the rests.
-
-    Raises
-    ------
-    DataError
-        When there is no such site, or a unit or a sign is none.
     """
     assumed = DEFAULT_SITE if site is None else ""
     classes = tuple(map(load_imu, CLASSES)) if imu is None else ()
@@ -122,11 +111,6 @@ def open_test(
     -------
     PreparedTest
         Its site is None where a handheld run states none.
-
-    Raises
-    ------
-    DataError
-        When bag or options cannot be used, or physics does not decide and the user has to.
     """
     source = source or Source()
     options = opening_options(site, imu, source, handheld, measured_noise)
@@ -151,13 +135,7 @@ def with_imu_file(test: PreparedTest, imu: str | None) -> PreparedTest:
 
 
 def open_recording(path: Path, source: Source | None = None) -> Recording:
-    """Read a bag and bring it to SI, right-handed axes and one clock; no site is needed.
-
-    Raises
-    ------
-    DataError
-        When the bag cannot be used, or physics does not decide and the user has to.
-    """
+    """Read a bag and bring it to SI, right-handed axes and one clock; no site is needed."""
     source = source or Source()
     stated = source.stated
     return in_si(read_recording(path, source.topics), stated, str(path))

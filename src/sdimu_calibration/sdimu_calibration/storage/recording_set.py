@@ -52,13 +52,7 @@ class BagSource:
     reference_degc: float | None = None
 
     def __call__(self) -> PreparedTest:
-        """Open the bag.
-
-        Raises
-        ------
-        DataError
-            When the bag or an option cannot be used.
-        """
+        """Open the bag."""
         return _opened(self)
 
 
@@ -127,11 +121,6 @@ def load_set(path: Path, like: BagSource) -> RecordingSet:
         Bags are named from its folder.
     like : BagSource
         What the user states for all recordings; the file's own site and IMU come before it.
-
-    Raises
-    ------
-    DataError
-        When the file is missing or wrong; one line with file and key.
     """
     path = Path(path)
     file = read_yaml(path, _SetFile)
@@ -181,11 +170,6 @@ def set_options(wanted: RecordingSet, model: str | None, add: Sequence[str], est
         Effects to add.
     estimator : str
         ``auto`` is that of the file.
-
-    Raises
-    ------
-    DataError
-        When the model or an effect is unknown.
     """
     chosen = estimator if estimator != AUTO else wanted.estimator
     by_hand = chosen == HANDHELD or (chosen == AUTO and _moved_by_hand(wanted.members))
@@ -229,13 +213,7 @@ def _member(source: BagSource, name: str, serial: str, power_on: str) -> Member:
 
 
 def bags_below(folder: Path) -> list[Path]:
-    """Bags in a folder and the folders in it, in the order of their names.
-
-    Raises
-    ------
-    DataError
-        When there is none.
-    """
+    """Bags in a folder and the folders in it, in the order of their names."""
     folder = Path(folder)
     found = {path.parent for path in folder.rglob(METADATA)}
     found |= {path for path in folder.rglob("*.mcap") if path.parent not in found}
@@ -252,11 +230,6 @@ def write_set(path: Path, bags: Sequence[Path]) -> None:
     path : Path
         File to make; bags are named from its folder.
     bags : sequence of Path
-
-    Raises
-    ------
-    DataError
-        When the file is there already.
     """
     path = Path(path)
     if path.exists():

@@ -7,6 +7,8 @@ tenth recording costs one, and a run that was killed goes on where it was.
 from __future__ import annotations
 
 import hashlib
+import json
+import math
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from contextlib import contextmanager, suppress
@@ -16,14 +18,26 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from sdimu_calibration.core.effects.effect import Timetable
+from sdimu_calibration.core.estimation.fit import Start
+from sdimu_calibration.core.fit_statistics import FitStatistics
 from sdimu_calibration.core.joint.member import Job, Report, tried
+from sdimu_calibration.core.joint.reduction import Reduction
 from sdimu_calibration.core.joint.set_fit import Run
+from sdimu_calibration.core.joint.stretch_rows import Places
+from sdimu_calibration.core.noise_term import NoiseTerm
 from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.specification import ImuSpecification
 from sdimu_calibration.storage.files.config import load_imu, load_site
-from sdimu_calibration.storage.files.reduction_file import read_report, write_report
+from sdimu_calibration.storage.files.result_file import as_note
+from sdimu_calibration.storage.files.whole_file import beside
 from sdimu_calibration.storage.opening import CLASSES, DEFAULT_SITE
 from sdimu_calibration.storage.recording_set import BagSource
 
+REPORT_FORMAT = "sdimu-reduction/1"
+"""What a recording says, as an NPZ file of plain arrays: no code is loaded from it."""
 FEW = 3
 """Number of recordings up to which one process is faster: starting another takes as long as two recordings."""
 _PART = 16
@@ -54,11 +68,6 @@ def set_runner(
         Address of a dask scheduler that does the work instead; its workers read the bags by the same paths.
     told : callable, optional
         Called with the number of jobs done and of all.
-
-    Raises
-    ------
-    DataError
-        When no scheduler answers.
     """
     if scheduler is not None:
         from sdimu_calibration.storage.cluster import cluster  # noqa: PLC0415 (dask is for those who name a scheduler)
@@ -115,11 +124,7 @@ def _kept(work: Callable[[Sequence[Job]], Sequence[Report | DataError]], folder:
         found: list[Report | DataError | None] = [None if place is None else read_report(place) for place in places]
         for part in _parts([k for k, report in enumerate(found) if report is None]):
             for k, fresh in zip(part, work([jobs[k] for k in part]), strict=True):
-                place = places[k]
-                if place is not None and not isinstance(fresh, DataError):
-                    # A folder that cannot be written (a mounted archive) costs the time of another run, no result.
-                    with suppress(OSError):
-                        write_report(place, fresh)
+                _keep(places[k], fresh)
                 found[k] = fresh
         return [
             replace(done, serial=job.member.serial, power_on=job.member.power_on) if isinstance(done, Report) else done
@@ -127,6 +132,13 @@ def _kept(work: Callable[[Sequence[Job]], Sequence[Report | DataError]], folder:
         ]  # fmt: skip
 
     return do
+
+
+def _keep(place: Path | None, fresh: Report | DataError) -> None:
+    """Write a report; a folder that cannot be written (a mounted archive) costs the time of another run, no result."""
+    if place is not None and not isinstance(fresh, DataError):
+        with suppress(OSError):
+            write_report(place, fresh)
 
 
 def _parts(places: Sequence[int]) -> list[Sequence[int]]:
@@ -179,3 +191,82 @@ def bag_checksum(bag: Path) -> str:
             while block := file.read(_BLOCK):
                 total.update(block)
     return total.hexdigest()
+
+
+def write_report(path: Path, report: Report) -> None:
+    """Write a report beside its place and rename it; the folder is made too."""
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    found, start = report.reduction, report.start
+    words = {
+        "format": REPORT_FORMAT, "name": report.name, "estimator": report.estimator, "reason": report.reason,
+        "names": found.names, "labels": found.labels, "rows": found.rows, "unexplained": found.unexplained,
+        "imu": vars(report.imu) | {"prior": dict(report.imu.prior), "prior_units": dict(report.imu.prior_units)},
+        "start_names": start.names, "start_ns": report.start_ns, "temperature_degc": report.temperature_degc,
+        "duration": report.times.duration, "stops": report.times.stops, "turns": report.times.turns,
+        "data": dict(report.data), "statistics": report.statistics.entries(), "reported": report.names,
+        "notes": report.notes, "warnings": report.warnings, "heading_rad": report.heading_rad,
+        "noise": [vars(term) for term in report.noise], "widened": report.widened,
+    }  # fmt: skip
+    places = {} if report.places is None else {f"dwell_{key}": value for key, value in vars(report.places).items()}
+    part = beside(path)
+    try:
+        with part.open("wb") as file:
+            np.savez(
+                file, words=np.frombuffer(json.dumps(words).encode(), dtype=np.uint8), A=found.A, y=found.y,
+                point=found.point, weight=found.weight, start=start.coefficients, C_nb=start.C_nb, more=start.more,
+                values=report.values, sigma=report.sigma, **places,
+            )  # fmt: skip
+        part.replace(path)
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def read_report(path: Path) -> Report | None:
+    """Read a report; None where there is none, or the file is damaged: it is then made again."""
+    path = Path(path)
+    if not path.is_file():
+        return None
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            words = json.loads(file["words"].tobytes())
+            return _report(words, {key: file[key] for key in file.files if key != "words"})
+    except Exception:
+        # Damage shows as errors of zipfile (a member that seems encrypted), of NumPy's headers and of the tokenizer.
+        return None
+
+
+def _report(words: dict[str, Any], arrays: dict[str, Any]) -> Report | None:
+    if words["format"] != REPORT_FORMAT:
+        return None
+    reduction = Reduction(
+        tuple(words["names"]), tuple(words["labels"]), arrays["A"], arrays["y"], arrays["point"], arrays["weight"],
+        int(words["rows"]), float(words["unexplained"]),
+    )  # fmt: skip
+    if reduction.A.shape != (len(reduction.y), len(reduction.names) + len(reduction.labels)):
+        return None
+    start = Start(tuple(words["start_names"]), arrays["start"], arrays["C_nb"], arrays["more"])
+    times = Timetable(words["duration"], _spans(words["stops"]), _spans(words["turns"]))
+    heat = words["temperature_degc"]
+    return Report(
+        words["name"], "", "", reduction, words["estimator"], words["reason"], ImuSpecification(**words["imu"]), start,
+        int(words["start_ns"]), times, math.nan if heat is None else float(heat), words["data"],
+        FitStatistics(**words["statistics"]),
+        tuple(words["reported"]), arrays["values"], arrays["sigma"], tuple(words["notes"]),
+        tuple(map(as_note, words["warnings"])),
+        float(words["heading_rad"]), tuple(_term(entry) for entry in words["noise"]), bool(words["widened"]),
+        _places(arrays),
+    )  # fmt: skip
+
+
+def _places(arrays: dict[str, Any]) -> Places | None:
+    own = {key.removeprefix("dwell_"): value for key, value in arrays.items() if key.startswith("dwell_")}
+    return Places(**own) if own else None
+
+
+def _term(entry: dict[str, Any]) -> NoiseTerm:
+    return NoiseTerm(**(entry | {"alike": tuple(entry["alike"])}))
+
+
+def _spans(rows: list[list[float]]) -> tuple[tuple[int, float, float], ...]:
+    return tuple((int(k), float(a), float(b)) for k, a, b in rows)

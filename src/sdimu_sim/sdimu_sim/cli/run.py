@@ -310,7 +310,7 @@ def _samples(bag: Path) -> tuple[int, int]:
 
     from sdimu_calibration.storage.bags.bag_file import raw_messages
     from sdimu_calibration.storage.bags.cdr import IMU, decode_imu
-    from sdimu_calibration.storage.bags.topics import Topics
+    from sdimu_calibration.storage.bags.topic_choice import Topics
 
     topic = Topics().imu
     stamps = np.unique(decode_imu(raw_messages(bag, {topic: IMU}, topic)[topic])[0])

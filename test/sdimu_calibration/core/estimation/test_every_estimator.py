@@ -136,7 +136,7 @@ def test_a_fit_is_diagnosed_and_shown(case, tmp_path):
         return
     summary = summarise(climb(fit_of(case)))
     write_diagnosis(tmp_path / "diagnosis.json", summary)
-    read = read_diagnosis(tmp_path)
+    read = read_diagnosis(tmp_path).plain()
     assert read["estimator"] == case.estimator
     assert read["where"]
     text = page(summary.diagnosis.after, "A test", summary=summary, more=ReportExtras())

@@ -18,9 +18,9 @@ from sdimu_calibration.core.plan import Plan, backwards
 from sdimu_calibration.report.set_sections import recurrence_section
 from sdimu_calibration.storage.files.advice_words import sentence
 from sdimu_calibration.storage.files.config import load_model
+from sdimu_calibration.storage.files.diagnosis_file import SET_FORMAT, write_set_diagnosis
 from sdimu_calibration.storage.files.json_file import read_json
-from sdimu_calibration.storage.files.reduction_file import read_report, write_report
-from sdimu_calibration.storage.files.set_result_file import FORMAT, write_set_diagnosis
+from sdimu_calibration.storage.set_work import read_report, write_report
 from sdimu_sim.core.temperature import TemperatureProfile
 
 from .conftest import here, short, unit_set
@@ -138,8 +138,8 @@ def test_a_set_says_what_comes_back(tmp_path):
     np.testing.assert_array_equal(found.after.values, found.before.values)
     assert any("--try FILE" in line for line in map(sentence, found.advice))
     write_set_diagnosis(tmp_path / "set.json", found)
-    assert read_json(tmp_path / "set.json", FORMAT)["refused"]
-    content = read_json(tmp_path / "set.json", FORMAT)["recurrence"]
+    assert read_json(tmp_path / "set.json", SET_FORMAT)["refused"]
+    content = read_json(tmp_path / "set.json", SET_FORMAT)["recurrence"]
     assert content["answer"] == [ATTITUDE]
     assert content["kinds"][0]["sensors"][0] == "accel_x"
 

@@ -66,11 +66,6 @@ def raw_messages(
     -------
     dict of str to RawMessages
         Messages in the order of the bag.
-
-    Raises
-    ------
-    DataError
-        When the bag cannot be read, a topic has another type, or the required topic is not there.
     """
 
     def takes(topic: str, type_name: str) -> bool:
@@ -101,15 +96,6 @@ def read_topics(path: Path, takes: Takes, kept: Keep = lambda _: RawMessages()) 
         Asked with name and type of every topic.
     kept : callable
         Makes what the messages of a topic go into, from its type.
-
-    Returns
-    -------
-    dict of str to TopicContent
-
-    Raises
-    ------
-    DataError
-        When the bag cannot be read.
     """
     content: dict[str, TopicContent] = {}
 
@@ -133,11 +119,6 @@ def unpacked_parts(path: Path) -> Iterator[tuple[list[Path], Unpack | None]]:
     """Yield files that the readers below can open, and how each message is packed in them; None when not at all.
 
     Those that were packed as files are there while the context lasts.
-
-    Raises
-    ------
-    DataError
-        When there is nothing of a bag at `path`, or it cannot be unpacked.
     """
     parts = bag_parts(path)
     information = read_metadata(path) if path.is_dir() else {}
@@ -184,11 +165,6 @@ def bag_parts(path: Path) -> list[Path]:
 
     MCAP files say all that is needed themselves. They are opened directly because a metadata.yaml that is
     missing or does not repeat their QoS exactly makes folder readers fail or, worse, yield nothing.
-
-    Raises
-    ------
-    DataError
-        When there is nothing of a bag at `path`.
     """
     if not path.exists():
         raise DataError(f"{path}: no such file or folder")

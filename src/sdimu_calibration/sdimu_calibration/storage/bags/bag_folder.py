@@ -49,13 +49,7 @@ def check_apart(source: Path | Iterable[Path], target: Path) -> None:
 
 
 def put_in_place(folder: Path, path: Path, replace: bool) -> None:
-    """Rename `folder` to `path`; a bag that is there goes when it may be replaced, and only once the new one stands.
-
-    Raises
-    ------
-    DataError
-        When something has come in the way.
-    """
+    """Rename `folder` to `path`; a bag that is there goes when it may be replaced, and only once the new one stands."""
     # Where a link leads, not the link.
     path = path.resolve()
     check_room(path, replace)

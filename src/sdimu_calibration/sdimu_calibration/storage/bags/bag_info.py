@@ -42,13 +42,7 @@ class BagInfo:
 
 
 def read_info(path: Path) -> BagInfo:
-    """Count what is in a bag, damaged or not.
-
-    Raises
-    ------
-    DataError
-        When there is no bag at `path`, or it cannot be unpacked.
-    """
+    """Count what is in a bag, damaged or not."""
     info, path = BagInfo(), Path(path)
     if path.is_file() and path.suffix == ROS1:
         # Its counts are there without the conversion that a reader of messages makes.

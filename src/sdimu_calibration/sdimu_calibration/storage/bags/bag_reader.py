@@ -20,8 +20,7 @@ from sdimu_calibration.storage.bags.cdr import LayoutError, Stamps
 from sdimu_calibration.storage.bags.imu_messages import ImuMessages
 from sdimu_calibration.storage.bags.raw_messages import RawMessages
 from sdimu_calibration.storage.bags.status_message import phase_entry, phase_of, stamp_ns
-from sdimu_calibration.storage.bags.topic_choice import KINDS, TopicChoice, choose
-from sdimu_calibration.storage.bags.topics import Topics
+from sdimu_calibration.storage.bags.topic_choice import KINDS, TopicChoice, Topics, choose
 
 _WITH_STAMP = 12
 """Bytes of a message that has a stamp, at least."""
@@ -44,11 +43,6 @@ def read_recording(path: Path, topics: Topics | TopicChoice | None = None) -> Re
     -------
     Recording
         Time counts from one nominal sample interval before the first stamp.
-
-    Raises
-    ------
-    DataError
-        When it is not a bag, has no IMU topic, or no usable sample; one line that says what to do.
     """
     path = Path(path)
     notes: list[str] = []
@@ -79,11 +73,6 @@ def read_messages(
     topics : Topics
     messages : dict of str to RawMessages
         By topic, as recorded (CDR).
-
-    Raises
-    ------
-    DataError
-        When it is not a bag, has no IMU topic, or several topics could be the IMU or the status.
     """
     if isinstance(topics, Topics):
         wanted = {getattr(topics, kind): type_name for kind, type_name in KINDS.items()}
@@ -177,13 +166,7 @@ def _imu_values(message: Any) -> list[float]:
 def _one_by_one(
     raw: Sequence[bytes], type_name: str, values: Callable[[Any], Any], where: str
 ) -> tuple[Stamps, Floats]:
-    """Decode messages that share no layout; slow, and right for every encoding rosbags knows.
-
-    Raises
-    ------
-    DataError
-        With the number of the first message that cannot be read; `where` says of which topic.
-    """
+    """Decode messages that share no layout; slow, and right for every encoding rosbags knows."""
     messages = [_message(data, type_name, f"{where}: message {k}") for k, data in enumerate(raw, 1)]
     stamps = np.array([stamp_ns(message) for message in messages], np.int64)
     return stamps, np.array([values(message) for message in messages], float)

@@ -10,7 +10,7 @@ import numpy as np
 from sdimu_calibration.core.arrays import Bools, Floats, Ints
 from sdimu_calibration.storage.bags import cdr
 from sdimu_calibration.storage.bags.mcap_bag import McapBag
-from sdimu_calibration.storage.bags.topics import Topics
+from sdimu_calibration.storage.bags.topic_choice import Topics
 
 Stamps = Ints
 
@@ -52,11 +52,6 @@ def write_recording(
         Delete a bag that is already there.
     custom : mapping of str to str, optional
         What the user says of the recording: ``serial``, ``power_on``.
-
-    Raises
-    ------
-    DataError
-        When something is in the way of the folder.
     """
     topics = topics or Topics()
     streams = [_Stream(topics.imu, cdr.IMU, imu_ns, cdr.encode_imu(imu_ns + start_ns, omega_ib_b, f_ib_b))]

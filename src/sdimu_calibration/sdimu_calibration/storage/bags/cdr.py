@@ -30,6 +30,8 @@ _ENCAPSULATION = b"\x00\x01\x00\x00"
 _STAMP_END = 12
 # Places among the 37 doubles of an Imu message: orientation 4, covariance 9, rate 3, covariance 9, force 3, ...
 _IMU_DOUBLES, _RATE, _FORCE = 37, slice(13, 16), slice(25, 28)
+
+
 class LayoutError(ValueError):
     """Messages that do not share a layout; they must be decoded one by one."""
 
@@ -139,11 +141,6 @@ def by_stamp(raw: Sequence[bytes], topic: str) -> tuple[Stamps, list[bytes]]:
     stamp_ns : ndarray, shape (n,)
         Ascending (ns).
     messages : list of bytes, length n
-
-    Raises
-    ------
-    DataError
-        When a message is too short for a stamp.
     """
     messages = list(raw)
     if any(len(message) < _STAMP_END for message in messages):
@@ -165,7 +162,10 @@ def _order(message: bytes) -> Literal["little", "big"]:
     return "little" if message[1] & 1 else "big"
 
 
-def encode_imu(stamp_ns: Stamps, omega_ib_b: Floats, f_ib_b: Floats, frame_id: str = "imu_link") -> list[bytes]:
+def encode_imu(
+    stamp_ns: Stamps, omega_ib_b: Floats, f_ib_b: Floats, frame_id: str = "imu_link",
+    covariances: tuple[Floats, Floats] | None = None,
+) -> list[bytes]:  # fmt: skip
     """Encode sensor_msgs/Imu without an orientation.
 
     Parameters
@@ -175,16 +175,20 @@ def encode_imu(stamp_ns: Stamps, omega_ib_b: Floats, f_ib_b: Floats, frame_id: s
     omega_ib_b, f_ib_b : ndarray, shape (n, 3)
         Rate (rad/s) and specific force (m/s^2), in the frame of the IMU.
     frame_id : str
+    covariances : (ndarray, ndarray), each of shape (n, 3, 3), optional
+        Of rate and force; zero, which is not known, when left out.
 
     Returns
     -------
     list of bytes, length n
     """
     messages = Layout(frame_id).doubles("values", _IMU_DOUBLES).rows(stamp_ns)
-    messages["values"][:, 3] = 1.0
-    messages["values"][:, 4] = -1.0  # "no orientation", by the definition of the message
-    messages["values"][:, _RATE] = omega_ib_b
-    messages["values"][:, _FORCE] = f_ib_b
+    values = messages["values"]
+    values[:, 3] = 1.0
+    values[:, 4] = -1.0  # "no orientation", by the definition of the message
+    values[:, _RATE], values[:, _FORCE] = omega_ib_b, f_ib_b
+    for place, covariance in zip((_RATE, _FORCE), covariances or (), strict=False):
+        values[:, place.stop : place.stop + 9] = covariance.reshape(-1, 9)
     return as_bytes(messages)
 
 

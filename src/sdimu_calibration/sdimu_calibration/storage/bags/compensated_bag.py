@@ -57,11 +57,6 @@ def write_compensated(
     replace : bool
         Delete a bag that is already there.
     progress : callable, optional
-
-    Raises
-    ------
-    DataError
-        When something is in the way of the folder, such as the source itself, or the errors cannot be inverted.
     """
     check_apart(source, target)
     check_room(target, replace)

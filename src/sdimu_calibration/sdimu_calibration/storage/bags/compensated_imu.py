@@ -5,11 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from sdimu_calibration.core.compensation import Compensated
-from sdimu_calibration.storage.bags.cdr import Layout, Stamps, as_bytes
-
-_DOUBLES = 37
-_RATE, _FORCE = 13, 25
-"""Places among the 37 doubles of an Imu message; a covariance of 9 follows each."""
+from sdimu_calibration.storage.bags.cdr import Stamps, encode_imu
 
 
 def frame_of(body_frame: str) -> str:
@@ -31,13 +27,5 @@ def encode_compensated(stamp_ns: Stamps, samples: Compensated, frame_id: str) ->
     -------
     list of bytes, length n
     """
-    n = len(stamp_ns)
-    messages = Layout(frame_id).doubles("values", _DOUBLES).rows(np.asarray(stamp_ns))
-    values = messages["values"]
-    values[:, 3] = 1.0
-    values[:, 4] = -1.0  # "no orientation", by the definition of the message
-    parts = ((_RATE, samples.omega_ib_b, samples.omega_covariance), (_FORCE, samples.f_ib_b, samples.f_covariance))
-    for place, mean, covariance in parts:
-        values[:, place : place + 3] = mean
-        values[:, place + 3 : place + 12] = covariance.reshape(n, 9)
-    return as_bytes(messages)
+    covariances = samples.omega_covariance, samples.f_covariance
+    return encode_imu(np.asarray(stamp_ns), samples.omega_ib_b, samples.f_ib_b, frame_id, covariances)

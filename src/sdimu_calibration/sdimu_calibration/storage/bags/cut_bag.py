@@ -43,12 +43,6 @@ def cut_bag(source: Path, target: Path, first_s: float, last_s: float, *, replac
         Seconds since the first stamp of an IMU, as errors and reports count them; both ends are kept.
     replace : bool
         Delete a bag that is already there.
-
-    Raises
-    ------
-    DataError
-        When there is no IMU in the bag, no sample between the times, or something in the way of the folder, such as
-        the source itself.
     """
     check_apart(source, target)
     check_room(target, replace)

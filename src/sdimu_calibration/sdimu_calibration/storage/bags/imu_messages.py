@@ -2,18 +2,57 @@
 
 from __future__ import annotations
 
+import mmap
 from collections.abc import Callable, Iterator, Sequence
+from tempfile import TemporaryFile, gettempdir
+from typing import Any
 
 import numpy as np
 
+from sdimu_calibration.core.arrays import Floats, Ints
+from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage.bags.cdr import LayoutError, decode_imu_block
 from sdimu_calibration.storage.bags.raw_messages import Block, RawMessages
-from sdimu_calibration.storage.bags.sample_file import SampleFile, Samples
 
+Samples = tuple[Ints, Floats, Floats]
+"""Stamps (n,) (ns), rates (n, 3) (rad/s), specific forces (n, 3) (m/s^2)."""
 _IN_MEMORY = 1 << 21
 """Number of samples from which they lie in a file: a hundred megabytes, three hours at 200 Hz."""
 _LOOSE = 4096
 """Messages that are decoded at once where they come one by one."""
+
+
+class SampleFile:
+    """Takes samples block by block and gives them back as arrays that the system may leave on the disk."""
+
+    def __init__(self) -> None:
+        self._files = [TemporaryFile(prefix="sdimu-") for _ in range(3)]  # noqa: SIM115 (they last as long as the arrays)
+        self._count = 0
+
+    def append(self, blocks: Sequence[Samples]) -> None:
+        """Append blocks of samples."""
+        try:
+            for block in blocks:
+                for file, column in zip(self._files, block, strict=True):
+                    file.write(np.ascontiguousarray(column).data)
+                self._count += len(block[0])
+        except OSError as error:
+            raise DataError(
+                f"{gettempdir()}: no room for the samples of a long recording ({error.strerror or error}); set TMPDIR "
+                "to a folder with 60 bytes a sample"
+            ) from error
+
+    def samples(self) -> Samples:
+        """Return all samples; the files go with the arrays."""
+        for file in self._files:
+            file.flush()
+        ns, omega, force = (
+            self._mapped(file, dtype) for file, dtype in zip(self._files, (np.int64, float, float), strict=True)
+        )
+        return ns, omega.reshape(-1, 3), force.reshape(-1, 3)
+
+    def _mapped(self, file: Any, dtype: type) -> Any:
+        return np.frombuffer(mmap.mmap(file.fileno(), 0), dtype)
 
 
 class ImuMessages(RawMessages):

@@ -47,11 +47,6 @@ class McapBag:
         Write in place.
     custom : mapping of str to str, optional
         What the user says of the recording, for its metadata.
-
-    Raises
-    ------
-    DataError
-        When the folder exists and is not to be replaced, holds something else than a bag, or cannot be written.
     """
 
     def __init__(
@@ -94,11 +89,6 @@ class McapBag:
         -------
         int
             MCAP channel.
-
-        Raises
-        ------
-        DataError
-            When the type is not installed, or the topic is already there with another type.
         """
         known = self._topics.get(name)
         if known is not None:

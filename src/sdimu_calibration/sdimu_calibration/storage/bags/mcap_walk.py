@@ -162,6 +162,7 @@ class McapWalk:
         self.profile = ""
         self.channels: dict[int, Channel] = {}
         self.schemas: dict[int, Schema] = {}
+        self._expected: int | None = None
         self._allowance = Allowance(allowed(path) if most is None else most)
 
     def type_name(self, channel: int) -> str:
@@ -187,16 +188,15 @@ class McapWalk:
 
     def _blocks(self, stream: BinaryIO) -> Iterator[Messages]:
         source = _Source(stream, self.path.stat().st_size)
-        count, expected, damage = 0, None, ""
+        count, damage = 0, ""
         if source.read(len(MAGIC)) != MAGIC:
             raise DamagedError("not an MCAP file")
-        while True:
+        kind = 0
+        while kind != _FOOTER:
             before = source.checksum
             head = source.read(_HEAD.size)
             kind, length = _HEAD.unpack(head)
-            if kind in {_HEADER, _SCHEMA, _CHANNEL}:
-                self._register(head + source.read(length))
-            elif kind in {_CHUNK, _MESSAGE}:
+            if kind in {_CHUNK, _MESSAGE}:
                 record = source.read(length)
                 content, beyond = self._unpacked(record) if kind == _CHUNK else (head + record, 0)
                 if beyond:
@@ -206,27 +206,33 @@ class McapWalk:
                 block = self._found(content)
                 count += len(block)
                 yield block
-            elif kind == _STATISTICS:
-                (expected,) = struct.unpack_from("<Q", source.read(length))
-            elif kind == _DATA_END:
-                (checksum,) = struct.unpack_from("<I", source.read(length))
-                source.checksum = before
-                source.check(checksum, "data")
-            elif kind == _FOOTER:
-                source.read(16)
-                before = source.checksum
-                (checksum,) = struct.unpack_from("<I", source.read(length - 16))
-                source.checksum = before
-                source.check(checksum, "summary")
-                if source.read(len(MAGIC)) != MAGIC:
-                    raise DamagedError("the file ends without its magic")
-                break
+            elif kind in {_HEADER, _SCHEMA, _CHANNEL}:
+                self._register(head + source.read(length))
             else:
-                source.skip(length)
-        if expected is not None and expected != count:
-            damage = damage or f"{count} messages are in the file, its statistics say {expected}"
+                self._close(source, kind, length, before)
+        if self._expected is not None and self._expected != count:
+            damage = damage or f"{count} messages are in the file, its statistics say {self._expected}"
         if damage:
             raise DamagedError(damage)
+
+    def _close(self, source: _Source, kind: int, length: int, before: int) -> None:
+        """Take in a record behind the messages; `before` is the checksum up to its head."""
+        if kind == _STATISTICS:
+            (self._expected,) = struct.unpack_from("<Q", source.read(length))
+        elif kind == _DATA_END:
+            (checksum,) = struct.unpack_from("<I", source.read(length))
+            source.checksum = before
+            source.check(checksum, "data")
+        elif kind == _FOOTER:
+            source.read(16)
+            before = source.checksum
+            (checksum,) = struct.unpack_from("<I", source.read(length - 16))
+            source.checksum = before
+            source.check(checksum, "summary")
+            if source.read(len(MAGIC)) != MAGIC:
+                raise DamagedError("the file ends without its magic")
+        else:
+            source.skip(length)
 
     def _unpacked(self, record: bytes) -> tuple[bytes, int]:
         """Return the records of a chunk, and how many bytes of its own record lie beyond it."""

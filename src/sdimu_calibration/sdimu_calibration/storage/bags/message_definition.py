@@ -36,15 +36,6 @@ def definition(type_name: str) -> str:
     ----------
     type_name : str
         Such as ``sensor_msgs/msg/Imu``.
-
-    Returns
-    -------
-    str
-
-    Raises
-    ------
-    DataError
-        When the .msg file of it or of a type in it is not installed.
     """
     package, name = _split(type_name)
     texts = {(package, name): _text(package, name)}

@@ -32,11 +32,6 @@ def run(program: Path, source: Path, target: Path, most: int, patience_s: float,
         Time (s) that it may take.
     failure : str
         What to say when it fails, such as ``the bag cannot be read``.
-
-    Raises
-    ------
-    DataError
-        When it fails, dies, or takes too long; the last line that it wrote says why.
     """
     command = [sys.executable, str(program), str(source), str(target)]
 

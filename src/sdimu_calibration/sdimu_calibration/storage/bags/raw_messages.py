@@ -58,12 +58,7 @@ class Block:
 
 
 class RawMessages(Sequence[bytes]):
-    """Messages (CDR bytes) of one topic in the order of the bag.
-
-    Parameters
-    ----------
-    messages : sequence of bytes
-    """
+    """Messages (CDR bytes) of one topic in the order of the bag."""
 
     def __init__(self, messages: Sequence[bytes] = ()) -> None:
         self._blocks: list[Block] = []

@@ -59,11 +59,6 @@ def recover(path: Path) -> tuple[Salvage, ...]:
     -------
     tuple of Salvage
         One a file.
-
-    Raises
-    ------
-    DataError
-        When it is not an MCAP bag, or not one message can be saved.
     """
     parts = bag_parts(Path(path))
     for part in parts:

@@ -13,7 +13,29 @@ from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage.bags import cdr
 from sdimu_calibration.storage.bags.bag_file import TopicContent, absent, check_filled, check_type
 from sdimu_calibration.storage.bags.raw_messages import RawMessages
-from sdimu_calibration.storage.bags.topics import Topics
+
+
+@dataclass(frozen=True)
+class Topics:
+    """Topics of a recording.
+
+    Attributes
+    ----------
+    imu : str
+        sensor_msgs/Imu; the only one that must be there.
+    status : str
+        diagnostic_msgs/DiagnosticArray of the rate table.
+    joint_states : str
+        sensor_msgs/JointState of the rate table.
+    temperature : str
+        sensor_msgs/Temperature of the IMU.
+    """
+
+    imu: str = "/imu/data_raw"
+    status: str = "/rate_table/status"
+    joint_states: str = "/rate_table/joint_states"
+    temperature: str = "/imu/temperature"
+
 
 _OWN = Topics()
 KINDS = {
@@ -59,12 +81,6 @@ def choose(
     -------
     Topics
         A topic that is not there keeps the project's name.
-
-    Raises
-    ------
-    DataError
-        When a topic that was asked for is not there or of another type, when there is no IMU, or when several topics
-        could be the IMU or the status: then the line lists them with counts and rates.
     """
     for kind in KINDS:
         asked = getattr(choice, kind)

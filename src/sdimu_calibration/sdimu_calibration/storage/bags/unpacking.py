@@ -63,10 +63,6 @@ def unpacked(compression: str, data: bytes, most: int) -> bytes:
     most : int
         Bytes that may come out.
 
-    Returns
-    -------
-    bytes
-
     Raises
     ------
     UnpackError

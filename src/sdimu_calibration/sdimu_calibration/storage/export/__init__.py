@@ -67,12 +67,6 @@ def export(
         Sample rate, where the form has a place for it.
     temperature_degc : float, optional
         Temperature at which matrices and biases are stated (deg C); that from which the coefficients count by default.
-
-    Raises
-    ------
-    DataError
-        When there is no such form, the result does not fit its effects, or does not say from which temperature its
-        coefficients count.
     """
     if form not in FORMS:
         raise DataError(f"--format {form}: expected one of {', '.join(FORMS)}")

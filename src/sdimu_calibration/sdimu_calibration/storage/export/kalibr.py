@@ -24,13 +24,7 @@ _TRIANGULAR = 1e-12
 
 
 def texts(source: Source) -> dict[str, str]:
-    """Return the text of the file.
-
-    Raises
-    ------
-    DataError
-        When the result is in another frame than the accelerometers'.
-    """
+    """Return the text of the file."""
     linear = source.linear
     if np.abs(np.triu(linear.accel, 1)).max() > _TRIANGULAR:
         raise DataError(

@@ -94,11 +94,6 @@ def config_folder() -> Path:
     """Folder of the configuration: `SDIMU_CONFIG`, else the package's own, else the repository's.
 
     A wheel and a build by colcon carry the files inside the package; an editable install leaves them in the repository.
-
-    Raises
-    ------
-    DataError
-        When there is none.
     """
     named = os.environ.get(CONFIG_VARIABLE)
     if named:
@@ -120,11 +115,6 @@ def find_config(kind: str, name_or_path: str | Path) -> Path:
         Folder inside the config folder: ``plan``, ``imu``, ``model``, ``site``, ``table``, ``temperature``.
     name_or_path : str or Path
         A bare name is looked up in the config folder; whatever looks like a path is taken as it is.
-
-    Raises
-    ------
-    DataError
-        When there is no such file; the text lists the names there are.
     """
     text = str(name_or_path)
     path = Path(text)
@@ -203,13 +193,7 @@ def read_mapping(path: Path) -> dict[str, Any]:
 
 
 def read_yaml(path: Path, schema: type[S]) -> S:
-    """Read a YAML file into a schema.
-
-    Raises
-    ------
-    DataError
-        One line: file, key path, what is wrong, what is expected.
-    """
+    """Read a YAML file into a schema."""
     return check(read_mapping(path), schema, str(path))
 
 
@@ -332,11 +316,6 @@ def load_plan(name_or_path: str | Path) -> Plan:
 
     ``rate`` and ``dwell`` of a turn replace the plan's for that turn and for the stop after it;
     ``first_dwell`` is the stop before the first turn.
-
-    Raises
-    ------
-    DataError
-        When the file is missing or wrong, a turn has no angle, or the whole lasts longer than `LONGEST_PLAN_S`.
     """
     path = find_config("plan", name_or_path)
     file = read_yaml(path, _PlanFile)

@@ -72,11 +72,6 @@ def hashed(entries: Sequence[Entry], given: Sequence[Path]) -> tuple[tuple[str, 
         A recording is looked for beside the folder of its result, where `sdimu calibrate` leaves it.
     given : sequence of Path
         Recordings that are elsewhere.
-
-    Raises
-    ------
-    DataError
-        When a path that was given is not there.
     """
     for path in given:
         if not path.exists():

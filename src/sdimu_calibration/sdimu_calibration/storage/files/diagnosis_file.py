@@ -1,14 +1,17 @@
-"""The result of a diagnosis as diagnosis.json (format ``sdimu-diagnosis/1``): SI numbers, names as everywhere."""
+"""The result of a diagnosis as diagnosis.json, that of a set as set.json: SI numbers, names as everywhere."""
 
 from __future__ import annotations
 
+import zlib
+from base64 import b64decode, b64encode
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
 
+from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.diagnosis.bootstrap import Null
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.diagnosis.found import DetectableSize, Found
@@ -21,15 +24,66 @@ from sdimu_calibration.core.diagnosis.standing import standing
 from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary
 from sdimu_calibration.core.evidence.consistency import Noise
 from sdimu_calibration.core.evidence.linear import LinearEvidence
+from sdimu_calibration.core.fleet.common import STEPS, Bytes
 from sdimu_calibration.core.handheld.handheld_fit import FORCE, RATE, TURN
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.verdict import Verdict
 from sdimu_calibration.storage.files.advice_words import sentence
-from sdimu_calibration.storage.files.correlation_text import packed
-from sdimu_calibration.storage.files.json_file import read_json, write_json
-from sdimu_calibration.storage.files.standing_file import as_plain
+from sdimu_calibration.storage.files.result_model import Array, Line, Number, ResultModel, Said, read_model
+from sdimu_calibration.storage.files.standing_file import KnownEntry
 
-FORMAT = "sdimu-diagnosis/1"
+if TYPE_CHECKING:
+    # A diagnosis of one recording does not load what joins several.
+    from sdimu_calibration.core.joint.set_diagnosis import SetDiagnosis
+
+FORMAT: Final = "sdimu-diagnosis/1"
+SET_FORMAT: Final = "sdimu-set-diagnosis/1"
+_MOST = 5000
+"""Number of estimates at most: a catalogue has hundreds, and what is unpacked must be bounded."""
+
+
+Row = dict[str, Any] | None
+Rows = tuple[dict[str, Any], ...]
+
+
+class Alone(ResultModel):
+    """Entry ``alone``: every candidate of the catalogue alone beside the given model (SI), however small."""
+
+    labels: tuple[Line, ...]
+    units: tuple[Line, ...]
+    display_units: tuple[Line, ...]
+    estimates: Array
+    sigmas: Array
+    correlations: str
+
+
+class DiagnosisFile(ResultModel):
+    """diagnosis.json, in the order of its keys; what stands in them only for people is not looked into."""
+
+    format: Literal["sdimu-diagnosis/1"] = FORMAT
+    estimator: Line = ""
+    adequate: bool = False
+    p_value: Number = np.nan
+    verdict: Line = ""
+    sentence: Said = ""
+    where: Rows = ()
+    candidates: Rows = ()
+    partial: Rows = ()
+    unexplained: Row = None
+    advice: tuple[Said, ...] = ()
+    findings: Rows = ()
+    noise: Row = None
+    consistency: Row = None
+    free_inputs: Row = None
+    alone: Any = None
+    known: Any = None
+    fit: Any = None
+    ladder: Rows = ()
+    grown: Rows = ()
+    plan: Row = None
+    not_testable: Rows = ()
+    smallest_detectable: Rows = ()
+    bootstrap: Row = None
 
 
 def write_diagnosis(path: Path, summary: DiagnosisSummary, null: Null | None = None) -> None:
@@ -43,73 +97,94 @@ def write_diagnosis(path: Path, summary: DiagnosisSummary, null: Null | None = N
     null : Null, optional
         Of a bootstrap.
     """
-    write_json(path, content(summary) | ({"bootstrap": _null(null)} if null else {}))
+    _file(summary, **({"bootstrap": _null(null)} if null else {})).write(path)
 
 
-def read_diagnosis(path: Path) -> dict[str, Any]:
-    """Read diagnosis.json, or the diagnosis.json in a folder.
-
-    Raises
-    ------
-    DataError
-        When it is not there or not of this format.
-    """
+def read_diagnosis(path: Path) -> DiagnosisFile:
+    """Read diagnosis.json, or the diagnosis.json in a folder."""
     path = Path(path)
-    return read_json(path / "diagnosis.json" if path.is_dir() else path, FORMAT)
+    return read_model(path / "diagnosis.json" if path.is_dir() else path, DiagnosisFile)
 
 
 def content(summary: DiagnosisSummary) -> dict[str, Any]:
     """Give the diagnosis as plain data."""
+    return _file(summary).plain()
+
+
+def _file(summary: DiagnosisSummary, **more: Any) -> DiagnosisFile:
     d = summary.diagnosis
     is_unexplained = d.verdict == Verdict.UNEXPLAINED
-    return {
-        "format": FORMAT,
-        "estimator": d.fit.estimator,
-        "adequate": d.adequate,
-        "p_value": d.p_value,
-        "verdict": d.verdict,
-        "sentence": d.sentence,
-        "where": [
+    return DiagnosisFile.model_construct(
+        format=FORMAT,
+        estimator=d.fit.estimator,
+        adequate=d.adequate,
+        p_value=d.p_value,
+        verdict=d.verdict,
+        sentence=d.sentence,
+        where=[
             {"channel": w.channel, "stop": w.stop, "normalised_mean": w.normalised_mean} for w in d.consistency.where
         ],
-        "candidates": [candidate(f, d.own) for f in summary.candidates],
-        "partial": [candidate(f, d.own) for f in summary.found] if is_unexplained else [],
-        "unexplained": {
+        candidates=[candidate(f, d.own) for f in summary.candidates],
+        partial=[candidate(f, d.own) for f in summary.found] if is_unexplained else [],
+        unexplained={
             "is": is_unexplained,
             "fraction": _unexplained_fraction(d),
             "best_variables": [f.candidate.label for f in summary.found] if is_unexplained or d.own else [],
         },
-        "advice": [sentence(one) for one in summary.advice],
-        "findings": [{"text": f.text, "grave": f.grave} for f in d.findings],
-        "noise": {
+        advice=tuple(map(sentence, summary.advice)),
+        findings=[{"text": f.text, "grave": f.grave} for f in d.findings],
+        noise={
             "wrong": list(d.noise),
             "terms": [asdict(term) | {"unit": term.unit, "words": term.words} for term in d.found.noise],
             "gyro": _noise(d.consistency.gyro),
             "accel": _noise(d.consistency.accel),
         },
-        "consistency": {
+        consistency={
             "nis_mean": d.consistency.nis_mean,
             "nis_p_value": d.consistency.nis_p_value,
             "first_nis": d.consistency.first_nis,
             "ljung_box_p": d.consistency.ljung_box_p,
             "threshold": d.found.threshold,
         },
-        "free_inputs": {
-            "before": _free_inputs(d.free_inputs_before),
-            "after": _free_inputs(d.free_inputs_after),
-        },
-        "alone": alone(d.evidence, d.found.first, d.free.tolist()),
-        "known": as_plain(standing(d, summary.found)),
-        "fit": {"before": fit_of(d.before), "after": fit_of(d.after)},
-        "ladder": [step_of(s) for s in d.found.steps],
-        "grown": [_rung(r) for r in d.rungs],
-        "plan": _plan(summary.plan),
-        "not_testable": [reach_of(r) | {"reason": _reason(summary, r)} for r in summary.reached if not r.testable],
-        "smallest_detectable": [reach_of(r) for r in summary.reached if r.testable],
-    }  # fmt: skip
+        free_inputs={"before": _free_inputs(d.free_inputs_before), "after": _free_inputs(d.free_inputs_after)},
+        alone=alone(d.evidence, d.found.first, d.free.tolist()),
+        known=KnownEntry.of(standing(d, summary.found)),
+        fit={"before": fit_of(d.before), "after": fit_of(d.after)},
+        ladder=[step_of(s) for s in d.found.steps],
+        grown=[_rung(r) for r in d.rungs],
+        plan=_plan(summary.plan),
+        not_testable=[reach_of(r) | {"reason": _reason(summary, r)} for r in summary.reached if not r.testable],
+        smallest_detectable=[reach_of(r) for r in summary.reached if r.testable],
+        **more,
+    )
 
 
-def alone(evidence: LinearEvidence, before: Scan, free: Sequence[int] = ()) -> dict[str, Any]:
+def packed(J: Floats) -> str:
+    """Pack the correlations of estimates ``d_i / J_ii`` whose information is `J`, shape (k, k)."""
+    unit = 1.0 / np.sqrt(np.diag(J))
+    whole = np.rint(np.clip(J * np.outer(unit, unit), -1.0, 1.0) * STEPS).astype(np.int8)
+    return b64encode(zlib.compress(whole[np.tril_indices(len(J), -1)].tobytes(), 9)).decode("ascii")
+
+
+def unpacked(text: str, k: int) -> Bytes | None:
+    """Unpack correlations of `k` estimates, times `STEPS`, shape (k, k); None for what is no such text."""
+    if not 0 < k <= _MOST:
+        return None
+    count = k * (k - 1) // 2
+    try:
+        raw = zlib.decompressobj().decompress(b64decode(text), count + 1)
+    except (ValueError, zlib.error):
+        return None
+    if len(raw) != count:
+        return None
+    out = np.zeros((k, k), np.int8)
+    out[np.tril_indices(k, -1)] = np.frombuffer(raw, np.int8)
+    out += out.T
+    np.fill_diagonal(out, round(STEPS))
+    return out
+
+
+def alone(evidence: LinearEvidence, before: Scan, free: Sequence[int] = ()) -> Alone:
     """Give every candidate of the catalogue alone beside the given model, however small: many units make it large.
 
     Parameters
@@ -128,14 +203,14 @@ def alone(evidence: LinearEvidence, before: Scan, free: Sequence[int] = ()) -> d
         (evidence.candidates[k - p], k) for k in range(p, len(evidence.names))
         if k not in free and np.isfinite(first.sigma[k]) and evidence.candidates[k - p].family != "own"
     ]
-    return {
-        "labels": [candidate.label for candidate, _ in shown],
-        "units": [candidate.parameter.unit for candidate, _ in shown],
-        "display_units": [candidate.parameter.display_unit for candidate, _ in shown],
-        "estimates": [float(first.estimate[k]) for _, k in shown],
-        "sigmas": [float(first.sigma[k]) for _, k in shown],
-        "correlations": packed(J[np.ix_(*[[k for _, k in shown]] * 2)]),
-    }  # fmt: skip
+    return Alone.model_construct(
+        labels=[candidate.label for candidate, _ in shown],
+        units=[candidate.parameter.unit for candidate, _ in shown],
+        display_units=[candidate.parameter.display_unit for candidate, _ in shown],
+        estimates=[float(first.estimate[k]) for _, k in shown],
+        sigmas=[float(first.sigma[k]) for _, k in shown],
+        correlations=packed(J[np.ix_(*[[k for _, k in shown]] * 2)]),
+    )
 
 
 def _plan(plan: PlanSeen | None) -> dict[str, Any] | None:
@@ -243,3 +318,46 @@ def _reason(summary: DiagnosisSummary, r: DetectableSize) -> str:
 
 def _free_inputs(test: FreeInputTest) -> dict[str, Any]:
     return {"chi2": test.chi2, "dof": test.dof, "p": test.p_value}
+
+
+class SetDiagnosisFile(ResultModel):
+    """set.json, in the order of its keys."""
+
+    format: Literal["sdimu-set-diagnosis/1"] = SET_FORMAT
+    verdict: Line = ""
+    sentence: Said = ""
+    threshold: Number = np.nan
+    findings: Rows = ()
+    refused: tuple[Line, ...] = ()
+    held_out_before: Number = np.nan
+    held_out_after: Number = np.nan
+    advice: tuple[Said, ...] = ()
+    known: Any = None
+    fit: Any = None
+    alone: Any = None
+    recurrence: Row = None
+
+
+def write_set_diagnosis(path: Path, found: SetDiagnosis) -> None:
+    """Write set.json: verdict, sentence, findings (SI), advice, what is known of the unit, and what comes back."""
+    SetDiagnosisFile.model_construct(
+        format=SET_FORMAT,
+        verdict=found.verdict,
+        sentence=found.sentence,
+        threshold=found.threshold,
+        findings=[asdict(f) | {"alike": list(f.alike)} for f in found.findings],
+        refused=[f.label for f in found.refused],
+        held_out_before=found.error_without,
+        held_out_after=found.after.fit["held_out_rms"],
+        advice=tuple(map(sentence, found.advice)),
+        known=KnownEntry.of(found.standing),
+        fit={"before": {"model": list(found.before.model)}},
+        alone=alone(found.first.evidence, found.first.first),
+        # None where the model leaves nothing in the stops.
+        recurrence=None if found.recurrence is None else asdict(found.recurrence),
+    ).write(Path(path))
+
+
+def read_set_diagnosis(path: Path) -> SetDiagnosisFile:
+    """Read set.json."""
+    return read_model(path, SetDiagnosisFile)

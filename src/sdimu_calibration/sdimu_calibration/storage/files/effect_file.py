@@ -63,11 +63,6 @@ def load_effect(path: Path) -> tuple[Effect, ...]:
     -------
     tuple of Effect
         One a parameter, all of one family: each has a prior of its own. Parameters are named ``NAME_PARAMETER``.
-
-    Raises
-    ------
-    DataError
-        One line with file and sensor: what cannot be read, is not linear in the parameters, or has the wrong unit.
     """
     file = read_effect_file(path)
     if file.name in registry.names():
@@ -84,11 +79,6 @@ def find_effects(text: str) -> tuple[Effect, ...]:
     An equation is ``SENSOR: FORMULA``, as a diagnosis proposes it (``gyro_x: ey^2``) or in the names of an effect
     file (``accel_z: ax * wty``); its one parameter is the factor before it. ``my.yaml`` gives all parameters of a file,
     ``my.yaml:k`` one.
-
-    Raises
-    ------
-    DataError
-        When there is none, or the key has a size.
     """
     key = parse_key(text)
     selection.refuse_size(key)
@@ -172,11 +162,6 @@ def extended_model(name: str, added: Sequence[str]) -> Model:
         Model by name or path; its effects may be paths of YAML files too, seen from the folder of the model.
     added : sequence of str
         As for `find_effects`.
-
-    Raises
-    ------
-    DataError
-        When the model or an effect is unknown or cannot be read, or the model has an effect already.
     """
     model = load_model(name)
     folder = find_config("model", name).parent
@@ -203,11 +188,6 @@ def new_parts(effects: Sequence[Effect], model: Sequence[Effect], name: str) -> 
     effects, model : sequence of Effect
     name : str
         Of what is added, for the error.
-
-    Raises
-    ------
-    DataError
-        When the model has all of it.
     """
     new = _parts(effects, model)
     if not new:
@@ -230,13 +210,7 @@ def _parts(effects: Sequence[Effect], model: Sequence[Effect]) -> list[Effect]:
 
 
 def register_plugins() -> tuple[str, ...]:
-    """Register the effects that other packages offer; return the names that are new.
-
-    Raises
-    ------
-    DataError
-        When one does not load or is no effect.
-    """
+    """Register the effects that other packages offer; return the names that are new."""
     new = []
     for point in _installed():
         if point.name in _LOADED:

@@ -46,13 +46,7 @@ class EffectFile(Schema):
 
 
 def read_effect_file(path: Path) -> EffectFile:
-    """Read an effect of one's own and check it.
-
-    Raises
-    ------
-    DataError
-        One line with file and sensor: what cannot be read, is not linear in the parameters, or has the wrong unit.
-    """
+    """Read an effect of one's own and check it."""
     path = Path(path)
     if not path.is_file():
         raise DataError(f"{path}: no such effect file")
@@ -65,13 +59,7 @@ def read_effect_file(path: Path) -> EffectFile:
 
 
 def formulas_of(file: EffectFile) -> dict[str, Expression]:
-    """Read the formula of each sensor, held to its unit and to linearity in the parameters.
-
-    Raises
-    ------
-    DataError
-        When a formula or a name cannot be used.
-    """
+    """Read the formula of each sensor, held to its unit and to linearity in the parameters."""
     _check_names(file)
     constants = constants_of(file)
     known = frozenset({*VARIABLES, *file.parameters, *constants})

@@ -91,11 +91,6 @@ def write_priors(path: Path, base: str, gathered: Gathered, done: Study) -> Mapp
     -------
     mapping of str to str
         The priors written, as in the file, by effect.
-
-    Raises
-    ------
-    DataError
-        When the base cannot be read, or is the file to write.
     """
     source = find_config("imu", base)
     if path.exists() and path.resolve() == source.resolve():

@@ -15,13 +15,19 @@ from sdimu_calibration.core.fleet.population import Measured, measured
 from sdimu_calibration.core.fleet.study import Candidates
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.results import Calibration
-from sdimu_calibration.storage.files.correlation_text import unpacked
-from sdimu_calibration.storage.files.diagnosis_file import read_diagnosis
+from sdimu_calibration.storage.files.diagnosis_file import (
+    Alone,
+    DiagnosisFile,
+    SetDiagnosisFile,
+    read_diagnosis,
+    read_set_diagnosis,
+    unpacked,
+)
 from sdimu_calibration.storage.files.result_file import read_result
-from sdimu_calibration.storage.files.set_result_file import read_set_diagnosis
 from sdimu_calibration.storage.files.whole_file import RESULT
 
 DIAGNOSIS, SET = "diagnosis.json", "set.json"
+Diagnosis = DiagnosisFile | SetDiagnosisFile
 
 
 @dataclass(frozen=True)
@@ -35,14 +41,14 @@ class Entry:
     path : Path
         Its folder.
     result : Calibration
-    diagnosis : mapping or None
+    diagnosis : DiagnosisFile or SetDiagnosisFile or None
         Content of diagnosis.json or set.json beside it.
     """
 
     name: str
     path: Path
     result: Calibration
-    diagnosis: dict[str, Any] | None
+    diagnosis: Diagnosis | None
 
     @property
     def unit(self) -> str:
@@ -83,11 +89,6 @@ def gather(folders: Sequence[Path], one_model: bool = True) -> Gathered:
         Folders, or result.json files.
     one_model : bool
         Set results of other models apart, not those of other IMU files and body frames alone.
-
-    Raises
-    ------
-    DataError
-        When there is no result, or none that can be used.
     """
     apart: list[str] = []
     usable = [entry for name, path in _found(folders) if (entry := _read(name, path, apart)) is not None]
@@ -123,7 +124,7 @@ def _given(usable: Sequence[Entry], main: tuple[str, tuple[str, ...], str]) -> t
 def _model_before(entry: Entry) -> tuple[str, ...]:
     """Model that a diagnosis began with; empty where the file does not say it."""
     try:
-        return tuple(map(str, (entry.diagnosis or {})["fit"]["before"]["model"]))
+        return tuple(map(str, entry.diagnosis.fit["before"]["model"])) if entry.diagnosis else ()
     except (KeyError, TypeError):
         return ()
 
@@ -157,7 +158,7 @@ def _read(name: str, path: Path, apart: list[str]) -> Entry | None:
     return entry
 
 
-def _diagnosis_beside(folder: Path) -> dict[str, Any] | None:
+def _diagnosis_beside(folder: Path) -> Diagnosis | None:
     """Read the diagnosis of a recording, or of a set, beside its result; None where there is none."""
     if (folder / DIAGNOSIS).is_file():
         return read_diagnosis(folder / DIAGNOSIS)
@@ -205,13 +206,7 @@ def _part_of_set(entry: Entry, every: Sequence[Entry]) -> str:
 
 
 def as_measured(entries: Sequence[Entry]) -> Measured:
-    """Put results of one type into arrays, coefficients in the order of the first.
-
-    Raises
-    ------
-    DataError
-        When a coefficient is missing in one of them, or a number is not finite.
-    """
+    """Put results of one type into arrays, coefficients in the order of the first."""
     names = entries[0].result.names
     values, covariances = [], []
     for entry in entries:
@@ -231,9 +226,9 @@ def candidates(entries: Sequence[Entry]) -> Candidates:
     known: dict[str, str] = {}
     units: dict[str, list[_Alone]] = {}
     for entry in entries:
-        alone = _alone((entry.diagnosis or {}).get("alone"))
+        alone = _alone(entry.diagnosis and entry.diagnosis.alone)
         if alone is not None:
-            for label, unit in zip(alone.labels, alone.units, strict=True):
+            for label, unit in zip(alone.file.labels, alone.file.display_units, strict=True):
                 known.setdefault(label, unit)
             units.setdefault(entry.unit, []).append(alone)
     names = {name: k for k, name in enumerate(known)}
@@ -242,39 +237,35 @@ def candidates(entries: Sequence[Entry]) -> Candidates:
     for row, found in enumerate(units.values()):
         table[:, row] = _mean(found, names)
         # Of the first: recordings of one plan have the same.
-        places = [names[label] for label in found[0].labels]
+        places = [names[label] for label in found[0].file.labels]
         between[np.ix_([row], places, places)] = found[0].correlations
     return Candidates(tuple(known), tuple(known.values()), table[0], table[1], between)
 
 
 @dataclass(frozen=True)
 class _Alone:
-    """Entry ``alone`` of a diagnosis."""
+    """Entry ``alone`` of a diagnosis, its correlations unpacked."""
 
-    labels: tuple[str, ...]
-    units: tuple[str, ...]
-    estimates: Floats
-    sigmas: Floats
+    file: Alone
     correlations: Bytes
 
 
 def _alone(content: Any) -> _Alone | None:
     """Read the entry; None where there is none that is whole, as in older files."""
     try:
-        labels, units = (tuple(map(str, content[key])) for key in ("labels", "display_units"))
-        estimates, sigmas = (np.array(content[key], float) for key in ("estimates", "sigmas"))
-        correlations = unpacked(content["correlations"], len(labels))
-    except (KeyError, TypeError, ValueError, OverflowError):
+        file = Alone.model_validate(content)
+    except ValueError:
         return None
-    if correlations is None or not len({*labels}) == len(units) == len(estimates) == len(sigmas):
-        return None
-    return _Alone(labels, units, estimates, sigmas, correlations)
+    k = len(file.labels)
+    correlations = unpacked(file.correlations, k)
+    lengths = {k, len({*file.labels}), len(file.display_units), *file.estimates.shape, *file.sigmas.shape}
+    return _Alone(file, correlations) if correlations is not None and lengths == {k} else None
 
 
 def _mean(found: Sequence[_Alone], names: Mapping[str, int]) -> Floats:
     """Weighted means of the estimates of a unit and their sigmas, shape (2, k); NaN where none knows an effect."""
     weight, total = np.zeros(len(names)), np.zeros(len(names))
-    for one in found:
+    for one in (each.file for each in found):
         known = np.flatnonzero(np.isfinite(one.estimates) & np.isfinite(one.sigmas) & (one.sigmas > 0.0))
         places = [names[one.labels[k]] for k in known.tolist()]
         weight[places] += one.sigmas[known] ** -2.0

@@ -22,13 +22,7 @@ class _GoalFile(Schema):
 
 
 def load_goals(name_or_path: str | Path) -> Goals:
-    """Read goals: a name in config/goal or a path.
-
-    Raises
-    ------
-    DataError
-        When the file is missing or wrong; one line with file and key.
-    """
+    """Read goals: a name in config/goal or a path."""
     path = find_config("goal", name_or_path)
     file = read_yaml(path, _GoalFile)
     limits = {}

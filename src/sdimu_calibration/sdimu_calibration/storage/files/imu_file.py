@@ -44,11 +44,6 @@ def write_measured_imu(
         By channel; of each triad the root mean square of the axes that show a term is written.
     remarks : sequence of str
         Comments for the head of the file.
-
-    Raises
-    ------
-    DataError
-        When the base cannot be read.
     """
     content = dict(read_mapping(find_config("imu", base)))
     content["name"] = path.stem

@@ -205,13 +205,7 @@ class Journal:
 
 
 def read_journal(path: Path) -> RawTest:
-    """Read what another process has written so far, in the order of arrival.
-
-    Raises
-    ------
-    DataError
-        When it is no journal, or gone.
-    """
+    """Read what another process has written so far, in the order of arrival."""
     try:
         content = np.fromfile(path, np.uint8)
     except OSError as error:

@@ -27,13 +27,7 @@ def json_text(content: Any) -> str:
 
 
 def read_json(path: Path, expected_format: str) -> dict[str, Any]:
-    """Read an object whose key ``format`` is `expected_format`.
-
-    Raises
-    ------
-    DataError
-        When there is no such file, or it is something else.
-    """
+    """Read an object whose key ``format`` is `expected_format`."""
     path = Path(path)
     try:
         content = json.loads(path.read_text(encoding="utf-8"))

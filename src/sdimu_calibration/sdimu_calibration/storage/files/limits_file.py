@@ -31,11 +31,6 @@ def read_limits(path: Path, terms: Mapping[str, str]) -> dict[str, float]:
     -------
     dict of str to float
         Largest size allowed (SI) by term.
-
-    Raises
-    ------
-    DataError
-        When the file cannot be read, or names an unknown term, a wrong unit or a size that is not above zero.
     """
     if not path.is_file():
         raise DataError(f"{path}: no such file of limits")

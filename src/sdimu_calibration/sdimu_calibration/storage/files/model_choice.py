@@ -18,13 +18,7 @@ _MODEL_ALIASES = {HANDHELD: HANDHELD_MODEL}
 
 
 def named_estimator(word: str, option: str = "estimator") -> str:
-    """Return the estimator that `word` means, ``auto`` included; ``hand`` means ``handheld``.
-
-    Raises
-    ------
-    DataError
-        When there is no such estimator; `option` is named in it.
-    """
+    """Return the estimator that `word` means, ``auto`` included; ``hand`` means ``handheld``."""
     name = _ESTIMATOR_ALIASES.get(word, word)
     if name not in (AUTO, *ESTIMATORS):
         raise DataError(f"{option} {word}: expected one of {', '.join((AUTO, *ESTIMATORS))}")
@@ -42,11 +36,6 @@ def named_model(word: str | None, added: Sequence[str], handheld: bool = False) 
         Effects to add.
     handheld : bool
         Moved by hand.
-
-    Raises
-    ------
-    DataError
-        When the model or an effect is unknown or cannot be read.
     """
     default = HANDHELD_MODEL if handheld else TABLE_MODEL
     return extended_model(default if word is None else _MODEL_ALIASES.get(word, word), added)

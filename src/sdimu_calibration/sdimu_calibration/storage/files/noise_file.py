@@ -40,13 +40,7 @@ class _NoiseSetFile(Schema):
 
 
 def load_noise(name_or_path: str | Path) -> NoiseSet:
-    """Read a noise set: a name in config/noise or a path.
-
-    Raises
-    ------
-    DataError
-        When the file is missing or wrong; one line with file and key.
-    """
+    """Read a noise set: a name in config/noise or a path."""
     path = find_config("noise", name_or_path)
     file = read_yaml(path, _NoiseSetFile)
     return NoiseSet(

@@ -2,19 +2,43 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Final, Literal
 
 import numpy as np
 
 from sdimu_calibration.core.fleet.datasheet import NoiseOfUnit
 from sdimu_calibration.core.noise import TERMS, Terms
-from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage.files.config import load_imu
-from sdimu_calibration.storage.files.json_file import read_json, write_json
+from sdimu_calibration.storage.files.result_model import Array, Line, Number, ResultModel, complete, read_model
 
-FORMAT = "sdimu-noise-terms/1"
+FORMAT: Final = "sdimu-noise-terms/1"
 NAME = "noise.json"
+
+
+class Channel(ResultModel):
+    """Terms of one channel, in the order of `TERMS` (SI)."""
+
+    value: Array
+    sigma: Array
+    misfit: float
+
+    @property
+    def terms(self) -> Terms:
+        """The same as an object of the core; ValueError where it is not one number a term."""
+        k = len(TERMS)
+        return Terms(self.value.reshape(k), self.sigma.reshape(k), self.misfit)
+
+
+class NoiseTermsFile(ResultModel):
+    """noise.json, in the order of its keys."""
+
+    format: Literal["sdimu-noise-terms/1"] = FORMAT
+    recording: Line
+    duration_s: Number = np.nan
+    terms: tuple[Line, ...] = TERMS
+    channels: dict[str, Channel]
 
 
 def write_noise_terms(path: Path, recording: str, duration_s: float, terms: Mapping[str, Terms]) -> None:
@@ -31,38 +55,24 @@ def write_noise_terms(path: Path, recording: str, duration_s: float, terms: Mapp
     terms : mapping of str to Terms
         By channel.
     """
-    write_json(path, {
-        "format": FORMAT, "recording": recording, "duration_s": duration_s, "terms": list(TERMS),
-        "channels": {
-            channel: {"value": one.value, "sigma": one.sigma, "misfit": one.misfit} for channel, one in terms.items()
+    NoiseTermsFile.model_construct(
+        format=FORMAT, recording=recording, duration_s=duration_s, terms=TERMS,
+        channels={
+            channel: Channel.model_construct(value=one.value, sigma=one.sigma, misfit=one.misfit)
+            for channel, one in terms.items()
         },
-    })  # fmt: skip
+    ).write(path)  # fmt: skip
 
 
 def read_noise_terms(path: Path) -> NoiseOfUnit:
-    """Read noise.json, the noise.json in a folder, or the noise of an IMU file, which has no errors.
-
-    Raises
-    ------
-    DataError
-        When it is none of them.
-    """
+    """Read noise.json, the noise.json in a folder, or the noise of an IMU file, which has no errors."""
     path = Path(path)
     if path.suffix in {".yaml", ".yml"}:
         return _stated(path)
     path = path / NAME if path.is_dir() else path
-    content = read_json(path, FORMAT)
-    try:
-        return NoiseOfUnit(str(content["recording"]), {
-            str(channel): Terms(_four(one["value"]), _four(one["sigma"]), float(one["misfit"]))
-            for channel, one in content["channels"].items()
-        })  # fmt: skip
-    except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
-        raise DataError(f"{path}: not a complete {FORMAT} file ({type(error).__name__}: {error})") from error
-
-
-def _four(values: Sequence[float]) -> np.ndarray:
-    return np.array(values, float).reshape(len(TERMS))
+    file = read_model(path, NoiseTermsFile)
+    with complete(path, FORMAT):
+        return NoiseOfUnit(file.recording, {channel: one.terms for channel, one in file.channels.items()})
 
 
 def _stated(path: Path) -> NoiseOfUnit:

@@ -39,11 +39,6 @@ def read_reference(name_or_path: str | Path = "table33", mount: str = "1 deg") -
     -------
     dict of str to float
         Sigma (SI) by effect name.
-
-    Raises
-    ------
-    DataError
-        When the file or the column is not there.
     """
     path = find_config("reference", name_or_path)
     columns = _columns(path)
@@ -55,13 +50,7 @@ def read_reference(name_or_path: str | Path = "table33", mount: str = "1 deg") -
 
 
 def read_columns(name_or_path: str | Path) -> tuple[str, ...]:
-    """Read the names of the columns of a published table.
-
-    Raises
-    ------
-    DataError
-        When it is no such file.
-    """
+    """Read the names of the columns of a published table."""
     path = find_config("reference", name_or_path)
     return tuple(map(str, _columns(path)))
 
@@ -90,11 +79,6 @@ def read_truth(path: Path, body_frame: str, gravity: float | None = None) -> dic
     -------
     dict of str to float
         True value (SI) by coefficient name.
-
-    Raises
-    ------
-    DataError
-        When it is no such file or does not know the frame.
     """
     path = Path(path)
     if not path.is_file():

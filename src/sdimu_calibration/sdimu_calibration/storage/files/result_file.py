@@ -1,34 +1,146 @@
-"""The result of a calibration as result.json (format ``sdimu-result/1``)."""
+"""The result of a calibration as result.json (format ``sdimu-result/1``), of a recording or of a set."""
 
 from __future__ import annotations
 
 import re
 import reprlib
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, fields
+from dataclasses import fields, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Final, Literal
 
 import numpy as np
+from pydantic import AfterValidator, ConfigDict, Field, SerializerFunctionWrapHandler, model_serializer
 
-from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.noise_term import NoiseTerm
 from sdimu_calibration.core.note import Note, Topic, without_advice
 from sdimu_calibration.core.origin import Origin
-from sdimu_calibration.core.plain_text import one_line
-from sdimu_calibration.core.recording import DataError, DataFault
-from sdimu_calibration.core.results import INSEPARABLE, NOT_TRUSTED, Calibration, History, Rest
+from sdimu_calibration.core.recording import DataFault
+from sdimu_calibration.core.results import (
+    INSEPARABLE,
+    NOT_TRUSTED,
+    Calibration,
+    History,
+    PowerOnDeviation,
+    Rest,
+    SetRecording,
+    SetSummary,
+    SetTrend,
+    TurnOn,
+    no_history,
+)
+from sdimu_calibration.core.specification import ImuSpecification
 from sdimu_calibration.core.verdict import Verdict
-from sdimu_calibration.storage.files import imu_noise, set_result_file
-from sdimu_calibration.storage.files.json_file import read_json, write_json
+from sdimu_calibration.storage.files.config import config_folder, load_imu
+from sdimu_calibration.storage.files.result_model import (
+    Array,
+    Entry,
+    Line,
+    Number,
+    ResultModel,
+    Said,
+    complete,
+    read_model,
+)
 
-FORMAT = "sdimu-result/1"
+FORMAT: Final = "sdimu-result/1"
+PATHS = ("site_file", "imu_file")
+"""Entries of an origin that stand in a file only where the user named a path."""
 _ADVISES = re.compile(r"(.*)([;:,](?: or)? run:? sdimu diagnose)")
 """How a line of a file ends that advises a diagnosis."""
 _TOPICS = {NOT_TRUSTED: Topic.NOT_TRUSTED, INSEPARABLE: Topic.INSEPARABLE}
 """What a line of a file is about, by its words."""
 _LATEST_NS = 2**63
 """A stamp of 64 bits ends there."""
+
+
+def _is_word(value: str) -> str:
+    if not value.isprintable():
+        raise ValueError(f"{reprlib.repr(value)} is no name or unit")
+    return value
+
+
+def _is_stamped(origin: Origin) -> Origin:
+    if not 0 <= origin.start_ns < _LATEST_NS:
+        raise ValueError(f"start_ns is {reprlib.repr(origin.start_ns)}, which is no stamp")
+    return origin
+
+
+Word = Annotated[str, AfterValidator(_is_word)]
+"""A name or a unit: text without anything that a terminal or a file would obey."""
+Size = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
+
+
+class Coefficient(ResultModel):
+    """A coefficient; files of others need not carry display units: then people see SI."""
+
+    name: Word
+    value: Number
+    sigma: Number = np.nan
+    unit: Word
+    display_unit: Word = ""
+    conditional_sigma: Number = np.nan
+
+
+class Data(ResultModel):
+    """What was counted in the data, and their faults, which come last."""
+
+    model_config = ConfigDict(extra="allow")
+    faults: tuple[Annotated[DataFault, Entry()], ...] = ()
+
+    @model_serializer(mode="wrap")
+    def _faults_last(self, write: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        plain: dict[str, Any] = write(self)
+        faults = {"faults": plain.pop("faults")} if "faults" in plain else {}
+        return plain | faults
+
+
+class ImuNoise(ResultModel):
+    """Name, grade and noise (SI) of the specification with which samples were weighed."""
+
+    name: Line
+    grade: Line
+    gyro_white_noise: Size = Field(alias="gyro_white_noise_rad_s_sqrt_hz")
+    accel_white_noise: Size = Field(alias="accel_white_noise_m_s2_sqrt_hz")
+    gyro_random_walk: Size = Field(alias="gyro_random_walk_rad_s_sqrt_s")
+    accel_random_walk: Size = Field(alias="accel_random_walk_m_s2_sqrt_s")
+    gyro_quantisation: Size = Field(alias="gyro_quantisation_rad")
+    accel_quantisation: Size = Field(alias="accel_quantisation_m_s")
+    gyro_bias_instability: Size = Field(alias="gyro_bias_instability_rad_s")
+    accel_bias_instability: Size = Field(alias="accel_bias_instability_m_s2")
+
+    @property
+    def specification(self) -> ImuSpecification:
+        """The same as an object of the core, without priors."""
+        return replace(ImuSpecification("", 0.0, 0.0), **dict(self))
+
+
+class ResultFile(ResultModel):
+    """result.json, in the order of its keys; those of a set stand from `turn_on` to `left_out`."""
+
+    format: Literal["sdimu-result/1"] = FORMAT
+    verdict: str = ""
+    origin: Annotated[Origin, Entry(seldom=PATHS), AfterValidator(_is_stamped)] = Origin()
+    imu_noise: ImuNoise | None = None
+    estimator: Line = ""
+    estimator_reason: Line = ""
+    body_frame: Word
+    drift_means: dict[str, float] = Field(default_factory=dict)
+    model: tuple[Word, ...]
+    coefficients: tuple[Coefficient, ...]
+    covariance: Array
+    fit: dict[str, Any]
+    data: Data
+    noise: tuple[Annotated[NoiseTerm, Entry({"unit": lambda term: term.unit})], ...] = ()
+    rests: tuple[Annotated[Rest, Entry()], ...] = ()
+    turn_on: tuple[Annotated[TurnOn, Entry({"triad": lambda one: one.effect.partition("_")[0]})], ...] = ()
+    recordings: tuple[Annotated[SetRecording, Entry()], ...] = ()
+    power_ons: tuple[Annotated[PowerOnDeviation, Entry()], ...] = ()
+    scatter_p: Array = np.zeros(0)
+    trends: tuple[Annotated[SetTrend, Entry()], ...] = ()
+    left_out: tuple[tuple[Line, Line], ...] = ()
+    notes: tuple[Said, ...] = ()
+    warnings: tuple[Said, ...] = ()
+    history: Annotated[History, Entry()] | None = None
 
 
 def write_result(path: Path, calibration: Calibration, verdict: Verdict | None = None) -> None:
@@ -42,79 +154,101 @@ def write_result(path: Path, calibration: Calibration, verdict: Verdict | None =
     verdict : Verdict, optional
         Of a diagnosis, where one was made; no note then advises one.
     """
-    conditional = calibration.conditional_sigma
-    told = without_advice if verdict else tuple
-    content = {
-        "format": FORMAT,
-        **({"verdict": verdict} if verdict else {}),
-        "origin": plain_origin(calibration.origin),
-        **({} if calibration.imu_noise is None else {imu_noise.KEY: imu_noise.as_plain(calibration.imu_noise)}),
-        "estimator": calibration.estimator,
-        "estimator_reason": calibration.estimator_reason,
-        "body_frame": calibration.body_frame,
-        "drift_means": dict(calibration.drift_means),
-        "model": list(calibration.model),
-        "coefficients": [
-            {"name": name, "value": value, "sigma": sigma, "unit": unit, "display_unit": display, **alone}
-            for name, value, sigma, unit, display, alone in zip(
-                calibration.names,
-                calibration.values.tolist(),
-                np.sqrt(np.diag(calibration.covariance)).tolist(),
-                calibration.units,
-                calibration.display_units,
-                [{} for _ in calibration.names] if conditional is None
-                else [{"conditional_sigma": sigma} for sigma in conditional.tolist()],
-                strict=True,
-            )
-        ],
-        "covariance": calibration.covariance.tolist(),
-        "fit": dict(calibration.fit),
-        "data": {**calibration.data, "faults": [asdict(fault) for fault in calibration.faults]},
-        "noise": [asdict(term) | {"unit": term.unit} for term in calibration.noise],
-        **({"rests": [asdict(rest) for rest in calibration.rests]} if calibration.rests else {}),
-        **({} if calibration.of_set is None else set_result_file.as_plain(calibration.of_set)),
-        "notes": told(calibration.notes),
-        "warnings": told(calibration.warnings),
-        "history": {entry.name: getattr(calibration.history, entry.name).tolist() for entry in fields(History)},
-    }
-    write_json(path, content)
+    c, told = calibration, without_advice if verdict else tuple
+    seldom: dict[str, Any] = {"verdict": verdict, "rests": c.rests, "imu_noise": c.imu_noise and _noise_of(c.imu_noise)}
+    ResultFile.model_construct(
+        format=FORMAT,
+        **{key: value for key, value in seldom.items() if value},
+        origin=c.origin,
+        estimator=c.estimator,
+        estimator_reason=c.estimator_reason,
+        body_frame=c.body_frame,
+        drift_means=dict(c.drift_means),
+        model=c.model,
+        coefficients=_coefficients(c),
+        covariance=c.covariance,
+        fit=dict(c.fit),
+        data=Data.model_construct(**dict[str, Any](c.data), faults=c.faults),
+        noise=c.noise,
+        **({} if c.of_set is None else _of_set(c.of_set)),
+        notes=told(c.notes),
+        warnings=told(c.warnings),
+        history=c.history,
+    ).write(path)
+
+
+def _noise_of(imu: ImuSpecification) -> ImuNoise:
+    return ImuNoise.model_construct(**{name: getattr(imu, name) for name in ImuNoise.model_fields})
+
+
+def _coefficients(c: Calibration) -> tuple[Coefficient, ...]:
+    columns: dict[str, Any] = {
+        "name": c.names, "value": c.values.tolist(), "sigma": np.sqrt(np.diag(c.covariance)).tolist(), "unit": c.units,
+        "display_unit": c.display_units,
+    }  # fmt: skip
+    if c.conditional_sigma is not None:
+        columns["conditional_sigma"] = c.conditional_sigma.tolist()
+    rows = zip(*columns.values(), strict=True)
+    return tuple(Coefficient.model_construct(**dict(zip(columns, row, strict=True))) for row in rows)
+
+
+def _of_set(of_set: SetSummary) -> dict[str, Any]:
+    """Keys that a joint fit has beyond those of a recording."""
+    own = {each.name: getattr(of_set, each.name) for each in fields(of_set)}
+    return own | {"power_ons": own.pop("deviations")}
 
 
 def read_result(path: Path) -> Calibration:
-    """Read result.json, or the result.json in a folder.
-
-    Parameters
-    ----------
-    path : Path
-
-    Returns
-    -------
-    Calibration
-
-    Raises
-    ------
-    DataError
-        When it is not there or not of this format.
-    """
-    path = Path(path)
-    if path.is_dir():
-        path = path / "result.json"
-    content = read_json(path, FORMAT)
-    try:
-        return _calibration(content)
-    except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
-        raise DataError(f"{path}: not a complete {FORMAT} file ({type(error).__name__}: {error})") from error
+    """Read result.json, or the result.json in a folder."""
+    path = Path(path) / "result.json" if Path(path).is_dir() else Path(path)
+    file = read_model(path, ResultFile)
+    with complete(path, FORMAT):
+        return _calibration(file)
 
 
-def _word(value: Any) -> str:
-    """Return a name or a unit: text without anything that a terminal or a file would obey."""
-    if not isinstance(value, str) or not value.isprintable():
-        raise ValueError(f"{reprlib.repr(value)} is no name or unit")
-    return value
+def _calibration(file: ResultFile) -> Calibration:
+    coefficients, p = file.coefficients, len(file.coefficients)
+    conditional = all("conditional_sigma" in c.model_fields_set for c in coefficients)
+    return Calibration(
+        body_frame=file.body_frame,
+        model=file.model,
+        names=tuple(c.name for c in coefficients),
+        units=tuple(c.unit for c in coefficients),
+        display_units=tuple(c.display_unit if "display_unit" in c.model_fields_set else c.unit for c in coefficients),
+        values=np.array([c.value for c in coefficients], float),
+        covariance=file.covariance.reshape(p, p),
+        fit=file.fit,
+        data=file.data.model_extra or {},
+        notes=tuple(map(as_note, file.notes)),
+        history=no_history(p) if file.history is None else _whole_history(file.history, p),
+        warnings=tuple(map(as_note, file.warnings)),
+        faults=file.data.faults,
+        estimator=file.estimator,
+        estimator_reason=file.estimator_reason,
+        noise=file.noise,
+        conditional_sigma=np.array([c.conditional_sigma for c in coefficients], float) if conditional else None,
+        rests=file.rests,
+        origin=file.origin,
+        imu_noise=None if file.imu_noise is None else file.imu_noise.specification,
+        of_set=_set_summary(file, p) if file.recordings else None,
+        drift_means=file.drift_means,
+    )
 
 
-def _said(values: Sequence[Any]) -> tuple[str, ...]:
-    return tuple(as_note(one_line(str(value), None)) for value in values)
+def _whole_history(history: History, p: int) -> History:
+    """History with its arrays in their shapes; those that are missing are empty."""
+    m = len(history.t)
+    widths = {"value": p, "sigma": p, "attitude_sigma": 3, "nis": 4}
+    shaped: dict[str, Any] = {name: getattr(history, name).reshape(m, width) for name, width in widths.items()}
+    return replace(history, **shaped)
+
+
+def _set_summary(file: ResultFile, p: int) -> SetSummary:
+    arrays = [file.scatter_p, *(a for r in file.recordings for a in (r.values, r.sigma, r.deviate))]
+    for array in arrays:
+        if array.shape != (p,):
+            raise ValueError(f"expected {p} numbers, found {len(array)}")
+    return SetSummary(file.recordings, file.turn_on, file.power_ons, file.scatter_p, file.trends, file.left_out)
 
 
 def as_note(line: str) -> str:
@@ -128,98 +262,34 @@ def as_note(line: str) -> str:
     return Note(found[1], None if found[2].startswith(":") else topic, found[2])
 
 
-def _calibration(content: Mapping[str, Any]) -> Calibration:
-    coefficients = content["coefficients"]
-    number = len(coefficients)
-    return Calibration(
-        body_frame=_word(content["body_frame"]),
-        model=tuple(map(_word, content["model"])),
-        names=tuple(_word(c["name"]) for c in coefficients),
-        units=tuple(_word(c["unit"]) for c in coefficients),
-        # Files written by others need not carry display units: then people see SI.
-        display_units=tuple(_word(c.get("display_unit", c["unit"])) for c in coefficients),
-        values=_array([c["value"] for c in coefficients], (number,)),
-        covariance=_array(content["covariance"], (number, number)),
-        fit=dict(content["fit"]),
-        data={key: value for key, value in content["data"].items() if key != "faults"},
-        notes=_said(content.get("notes", ())),
-        history=_history(content.get("history") or {}, number),
-        warnings=_said(content.get("warnings", ())),
-        faults=tuple(_fault(entry) for entry in content["data"].get("faults", ())),
-        estimator=one_line(str(content.get("estimator", ""))),
-        estimator_reason=one_line(str(content.get("estimator_reason", ""))),
-        noise=tuple(_term(entry) for entry in content.get("noise", ())),
-        conditional_sigma=_conditional(coefficients),
-        rests=tuple(_rest(entry) for entry in content.get("rests", ())),
-        origin=_origin(content.get("origin", {})),
-        imu_noise=imu_noise.from_plain(content.get(imu_noise.KEY)),
-        of_set=set_result_file.from_plain(content, number),
-        drift_means={name: float(mean) for name, mean in content.get("drift_means", {}).items()},
-    )
-
-
 def plain_origin(origin: Origin) -> dict[str, Any]:
     """Give an origin as plain data; paths only where the user named one."""
-    return {key: value for key, value in asdict(origin).items() if value or not key.endswith("_file")}
+    return Entry(seldom=PATHS).plain(origin)
 
 
-def _origin(entry: Mapping[str, Any]) -> Origin:
-    """Origin of a result; empty in older files, NaN for ``null``."""
+def noise_for(result: Calibration, imu: str | None) -> tuple[ImuSpecification, str]:
+    """Find the noise that goes with a result: of the IMU file that is named, else of the calibration itself.
 
-    def read(name: str, default: Any) -> Any:
-        value = entry.get(name, default)
-        if isinstance(default, str):
-            return one_line(str(value))
-        return default if value is None else type(default)(value)
+    A result that does not hold it (of an older version, or of others) has that of the file in config/imu that it names,
+    or of a usual IMU: a run by hand is one of a cheap sensor, and a table gyro would say thousands of times less noise.
 
-    found = Origin(**{each.name: read(each.name, each.default) for each in fields(Origin)})
-    if not 0 <= found.start_ns < _LATEST_NS:
-        raise ValueError(f"origin.start_ns is {reprlib.repr(found.start_ns)}, which is no stamp")
-    return found
+    Parameters
+    ----------
+    result : Calibration
+    imu : str or None
+        Name or path of an IMU file; None or empty where nobody names one.
 
-
-def _conditional(coefficients: Sequence[Mapping[str, Any]]) -> Floats | None:
-    if not all("conditional_sigma" in entry for entry in coefficients):
-        return None
-    return _array([entry["conditional_sigma"] for entry in coefficients], (len(coefficients),))
-
-
-def _term(entry: Mapping[str, Any]) -> NoiseTerm:
-    given = {key: value for key, value in entry.items() if key != "unit"}
-    return NoiseTerm(**given | {"alike": tuple(given.get("alike", ()))})
-
-
-def _rest(entry: Mapping[str, Any]) -> Rest:
-    """Rest of a result; ``null`` is NaN."""
-
-    def number(value: Any) -> Any:
-        return tuple(map(number, value)) if isinstance(value, list) else float("nan") if value is None else float(value)
-
-    return Rest(**{key: number(value) for key, value in entry.items()})
-
-
-def _fault(entry: Mapping[str, Any]) -> DataFault:
-    values: dict[str, Any] = {key: float("nan") if value is None else value for key, value in entry.items()}
-    return DataFault(**values)
-
-
-def _history(content: Mapping[str, Any], number: int) -> History:
-    """History of a result; empty when the file, written by others, has none."""
-    m = len(content.get("t", ()))
-    return History(
-        t=_array(content.get("t", []), (m,)),
-        value=_array(content.get("value", []), (m, number)),
-        sigma=_array(content.get("sigma", []), (m, number)),
-        attitude_sigma=_array(content.get("attitude_sigma", []), (m, 3)),
-        stop=np.array(content.get("stop", []), np.int64),
-        dwell=np.array(content.get("dwell", []), np.bool_),
-        used=np.array(content.get("used", []), np.bool_),
-        nis=_array(content.get("nis", []), (m, 4)),
-    )
-
-
-def _array(values: list[Any], shape: tuple[int, ...]) -> Floats:
-    """Numbers with null for NaN as an array of that shape; ValueError when they do not fit."""
-    return np.array(values, float).reshape(shape)
-
-
+    Returns
+    -------
+    specification : ImuSpecification
+    whose : str
+        Whose noise it is, for people.
+    """
+    if imu:
+        return load_imu(imu), f"'{imu}' (--imu)"
+    if result.imu_noise is not None:
+        return result.imu_noise, f"'{result.imu_noise.name}', with which the result was calibrated"
+    if result.origin.imu in {path.stem for path in (config_folder() / "imu").glob("*.yaml")}:
+        return load_imu(result.origin.imu), f"'{result.origin.imu}', the IMU that the result names"
+    name = "mems_by_hand" if result.estimator == "handheld" else "dtg"
+    return load_imu(name), f"'{name}', as the result does not hold its noise and no --imu is given: state your own"

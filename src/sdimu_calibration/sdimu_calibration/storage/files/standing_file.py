@@ -1,30 +1,55 @@
-"""What is known of a unit after a diagnosis, as entry ``known`` of diagnosis.json and set.json (SI)."""
+"""What is known of a unit: entry ``known`` of diagnosis.json and set.json (SI), and what a result alone knows."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from sdimu_calibration.core.evidence.known import Known, Standing
-from sdimu_calibration.core.plain_text import one_line
+from sdimu_calibration.core.effects import body_frame, imu_model
+from sdimu_calibration.core.evidence.known import Known, Standing, known_from
 from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.storage.files.config import load_imu
 from sdimu_calibration.storage.files.json_file import read_json
+from sdimu_calibration.storage.files.result_file import read_result
+from sdimu_calibration.storage.files.result_model import Array, Line, ResultModel, wrong
 
 FILES = {"set.json": "sdimu-set-diagnosis/1", "diagnosis.json": "sdimu-diagnosis/1"}
 """Files that hold what is known, and their formats."""
 
 
-def as_plain(standing: Standing) -> dict[str, Any]:
-    """Give what is known as plain data: information of the data alone (1/SI^2), priors, changes at a power-on (SI)."""
-    known = standing.known
-    return {
-        "names": list(known.names), "information": known.J, "prior": known.prior.tolist(),
-        "scatter": known.scatter.tolist(), "added": list(standing.added), "open": [list(c) for c in standing.open],
-        "imu": standing.imu, "site": standing.site,
-    }  # fmt: skip
+class KnownEntry(ResultModel):
+    """Entry ``known``: information of the data alone (1/SI^2), priors (``null``: none), changes at a power-on (SI)."""
+
+    names: tuple[Line, ...]
+    information: Array
+    prior: Array
+    scatter: Array
+    added: tuple[Line, ...]
+    open: tuple[tuple[Line, ...], ...]
+    imu: Line
+    site: Line
+
+    @classmethod
+    def of(cls, standing: Standing) -> KnownEntry:
+        """Make the entry of what is known."""
+        known = standing.known
+        return cls.model_construct(
+            names=known.names, information=known.J, prior=known.prior, scatter=known.scatter, added=standing.added,
+            open=standing.open, imu=standing.imu, site=standing.site,
+        )  # fmt: skip
+
+    @property
+    def standing(self) -> Standing:
+        """What is known; ValueError where its arrays do not fit together."""
+        k = len(self.names)
+        shapes = self.information.shape, self.prior.shape, self.scatter.shape
+        if shapes != ((k, k), (k,), (k,)) or not np.isfinite(self.information).all():
+            raise ValueError(f"expected {k} finite rows and columns")
+        prior = np.where(np.isnan(self.prior), np.inf, self.prior)
+        known = Known(self.names, self.information, prior, self.scatter)
+        return Standing(known, self.added, self.open, self.imu, self.site)
 
 
 def holds_standing(path: Path) -> bool:
@@ -40,11 +65,6 @@ def read_standing(path: Path) -> Standing:
     ----------
     path : Path
         Folder of its results, or set.json or diagnosis.json in it.
-
-    Raises
-    ------
-    DataError
-        When there is none, or it was written by a version that did not keep it.
     """
     path = Path(path)
     file = path if path.is_file() else next((path / n for n in FILES if (path / n).is_file()), path / "diagnosis.json")
@@ -52,23 +72,37 @@ def read_standing(path: Path) -> Standing:
     if not content.get("known"):
         raise DataError(f"{file}: does not say what is known of the unit; run sdimu diagnose again")
     try:
-        return _standing(content["known"])
-    except (KeyError, TypeError, ValueError) as error:
-        raise DataError(f"{file}: known: damaged ({error}); run sdimu diagnose again") from error
+        return KnownEntry.model_validate(content["known"]).standing
+    except ValueError as error:
+        raise DataError(f"{file}: known: damaged ({wrong(error)}); run sdimu diagnose again") from error
 
 
-def _standing(entry: Mapping[str, Any]) -> Standing:
-    names = _words(entry["names"])
-    k = len(names)
-    prior = np.array([np.inf if v is None else float(v) for v in entry["prior"]])
-    scatter, J = np.array(entry["scatter"], dtype=float), np.array(entry["information"], dtype=float)
-    if J.shape != (k, k) or prior.shape != (k,) or scatter.shape != (k,) or not np.isfinite(J).all():
-        raise ValueError(f"expected {k} finite rows and columns")
-    return Standing(
-        Known(names, J, prior, scatter), _words(entry["added"]), tuple(_words(c) for c in entry["open"]),
-        one_line(str(entry["imu"])), one_line(str(entry["site"])),
-    )  # fmt: skip
+def standing_of_result(path: Path, imu: str | None) -> Standing:
+    """Take what a result knows of the coefficients of its model; its classes are not in it.
 
-
-def _words(values: Any) -> tuple[str, ...]:
-    return tuple(one_line(str(value)) for value in values)
+    Parameters
+    ----------
+    path : Path
+        Folder with result.json, or the file.
+    imu : str or None
+        Name or path in place of the name in the result.
+    """
+    path = Path(path)
+    result = read_result(path)
+    name = imu or result.origin.imu_stated
+    if not name:
+        raise DataError(f"{path}: does not say its IMU file: state --imu")
+    sensors = imu_model.build(result.model, load_imu(name))
+    if sensors.names != result.names:
+        raise DataError(f"{path}: its coefficients are not those of its model; run sdimu calibrate again")
+    known = known_from(
+        sensors.names, result.covariance, sensors.prior, body_frame.frame_jacobian(sensors.names, result.body_frame)
+    )
+    scatter = {
+        p.name: prior for e in sensors.effects if e.scope == "power-on" for p in e.parameters
+        for prior in [float(sensors.prior[sensors.names.index(p.name)])]
+    }  # fmt: skip
+    for t in result.of_set.turn_on if result.of_set else ():
+        scatter |= {n: min(t.sigma, size) for n, size in scatter.items() if n.startswith(f"{t.effect}_")}
+    anew = np.array([scatter.get(n, 0.0) for n in known.names])
+    return Standing(replace(known, scatter=anew), imu=result.origin.imu_stated, site=result.origin.site_stated)

@@ -55,13 +55,7 @@ class TableFile(Schema):
 
 
 def read_table(name_or_path: str | Path) -> tuple[RateTable, TableFile]:
-    """Read a rate table: what drives it needs, and the whole file.
-
-    Raises
-    ------
-    DataError
-        When the file is missing or wrong, or adjacent axes are the same letter.
-    """
+    """Read a rate table: what drives it needs, and the whole file."""
     path = find_config("table", name_or_path)
     file = read_yaml(path, TableFile)
     axes = None if file.axes == "free" else (file.axes.outer, file.axes.middle, file.axes.inner)

@@ -1,4 +1,4 @@
-"""A table in a file of arrays: MATLAB's MAT up to version 7, numpy's NPZ."""
+"""A table in a file of arrays: MATLAB's MAT up to version 7, numpy's NPZ, or bare numbers as a map says."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage.bags.own_process import run
 from sdimu_calibration.storage.bags.unpacking import allowed
+from sdimu_calibration.storage.importing.import_map import BinaryMap
 from sdimu_calibration.storage.importing.mat_reader import OBJECT, PREFIX
 
 _HDF5 = b"\x89HDF\r\n\x1a\n"
@@ -35,13 +36,7 @@ class ArrayTable:
         self._objects = dict(objects or {})
 
     def floats(self, columns: Sequence[int | str]) -> Floats:
-        """Read columns as numbers, shape (n, k); one matrix may hold all of them, either way round.
-
-        Raises
-        ------
-        DataError
-            When one is not there, is not numbers, or has another length than the first.
-        """
+        """Read columns as numbers, shape (n, k); one matrix may hold all of them, either way round."""
         parts = [self._array(column).astype(np.float64) for column in columns]
         for column, part in zip(columns, parts, strict=True):
             if len(part) != len(parts[0]):
@@ -82,13 +77,7 @@ class ArrayTable:
         return array[:, place - 1 : place]
 
     def _refuse_object(self, column: str) -> None:
-        """Say how numbers get out of an object of MATLAB: scipy reads its name and its class alone.
-
-        Raises
-        ------
-        DataError
-            When `column` is of one, or the file holds nothing else.
-        """
+        """Say how numbers get out of an object of MATLAB: scipy reads its name and its class alone."""
         for name, kind in self._objects.items():
             if column.split(".", maxsplit=1)[0] == name or len(self._objects) == len(self._arrays):
                 raise DataError(
@@ -99,13 +88,7 @@ class ArrayTable:
 
 
 def read_npz(path: Path) -> ArrayTable:
-    """Read a file of numpy.
-
-    Raises
-    ------
-    DataError
-        When it is none, or unpacks to more than it may.
-    """
+    """Read a file of numpy."""
     try:
         with zipfile.ZipFile(path) as packed:
             size = sum(entry.file_size for entry in packed.infolist())
@@ -135,11 +118,6 @@ def read_mat(path: Path) -> ArrayTable | None:
 
     The reader of scipy trusts what the file says of itself; it works in a process of its own, which may end as it
     likes and gets the memory that the file may unpack to.
-
-    Raises
-    ------
-    DataError
-        When it is of version 7.3, or damaged.
     """
     with path.open("rb") as stream:
         head = stream.read(_HDF5_AT + len(_HDF5))
@@ -161,3 +139,25 @@ def read_mat(path: Path) -> ArrayTable | None:
 def _is_text(head: bytes) -> bool:
     """Tell numbers in text: a MAT file of version 5 begins with words, one of version 4 with binary zeros."""
     return not head.startswith(b"MATLAB") and b"\x00" not in head
+
+
+class BinaryTable(ArrayTable):
+    """Columns of a file of bare numbers, by number from 1."""
+
+    def __init__(self, path: Path, form: BinaryMap) -> None:
+        kind = np.dtype(form.type).newbyteorder(">" if form.big_endian else "<")
+        size, row = path.stat().st_size - form.skip_bytes, form.columns * kind.itemsize
+        if size < row or size % row:
+            raise DataError(
+                f"{path}: {max(size, 0)} bytes are no whole rows of {form.columns} {form.type} ({row} bytes each); "
+                "check binary.type, columns and skip_bytes in the map"
+            )
+        numbers = np.fromfile(path, kind, offset=form.skip_bytes).reshape(-1, form.columns)
+        super().__init__(path, {})
+        self._numbers: NDArray[Any] = numbers.astype(kind.newbyteorder("="))
+
+    def _array(self, column: int | str) -> NDArray[Any]:
+        width = self._numbers.shape[1]
+        if not isinstance(column, int) or not 1 <= column <= width:
+            raise DataError(f"{self.path}: no column {column} (a binary file has columns 1 to {width})")
+        return self._numbers[:, column - 1 : column]

@@ -212,13 +212,7 @@ class ImportMap(Schema):
 
 
 def load_import_map(name_or_path: str | Path) -> ImportMap:
-    """Read a map: a name in config/import, or a path.
-
-    Raises
-    ------
-    DataError
-        When the file is missing or wrong; one line with file and key.
-    """
+    """Read a map: a name in config/import, or a path."""
     path = find_config("import", name_or_path)
     found = read_yaml(path, ImportMap)
     if found.decimal == "," and found.delimiter == ",":

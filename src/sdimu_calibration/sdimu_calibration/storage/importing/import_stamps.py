@@ -50,11 +50,6 @@ def read_stamps(
         Since 1970 (ns).
     notes : tuple of str
         What the stamps are, where it is not what the file says.
-
-    Raises
-    ------
-    DataError
-        With line and column of the first time that is none, or lies before 1970.
     """
     notes: tuple[str, ...] = ()
     if column is None:
@@ -98,11 +93,6 @@ def counted(
         Times of the file (ns), for the rate and the beginning.
     rate_hz : float or None
         Of the samples; None takes that of `ns` in the mean.
-
-    Raises
-    ------
-    DataError
-        When the column does not count.
     """
     raw = table.floats([column])[:, 0]
     whole = np.isfinite(raw) & (raw == np.rint(raw))

@@ -13,8 +13,7 @@ from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.data.resample import mean_over, same_stamps
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage.bags.bag_writer import write_recording
-from sdimu_calibration.storage.importing.array_table import read_mat, read_npz
-from sdimu_calibration.storage.importing.binary_table import BinaryTable
+from sdimu_calibration.storage.importing.array_table import BinaryTable, read_mat, read_npz
 from sdimu_calibration.storage.importing.import_map import ImportMap, SensorMap, TemperatureMap
 from sdimu_calibration.storage.importing.import_stamps import Stamps, Table, read_stamps
 from sdimu_calibration.storage.importing.text_table import TextTable
@@ -61,15 +60,6 @@ def read_files(paths: Sequence[Path], chart: ImportMap) -> Imported:
         CSV (or any columns in text), MAT up to version 7, NPZ, bare numbers. Several files hold the parts that the map
         names, or, where it names none, one stretch of time each, in this order.
     chart : ImportMap
-
-    Returns
-    -------
-    Imported
-
-    Raises
-    ------
-    DataError
-        One line with file, line and column of what cannot be used.
     """
     named = (chart.accel.file, chart.gyro.file, chart.temperature.file if chart.temperature else None)
     if len(paths) > 1 and not any(named):
@@ -115,13 +105,7 @@ def _in_a_row(parts: Sequence[Imported], paths: Sequence[Path]) -> Imported:
 
 
 def write_imported(path: Path, found: Imported, replace: bool = False) -> None:
-    """Write imported samples to a rosbag2 folder.
-
-    Raises
-    ------
-    DataError
-        When something is in the way of the folder.
-    """
+    """Write imported samples to a rosbag2 folder."""
     write_recording(
         path,
         start_ns=0,
@@ -146,13 +130,7 @@ def _open(path: Path, chart: ImportMap) -> Table:
 
 
 def _chosen(tables: list[Table], pattern: str | None, what: str) -> Table:
-    """Find the file that holds something.
-
-    Raises
-    ------
-    DataError
-        When it is none or not clear which.
-    """
+    """Find the file that holds something."""
     names = ", ".join(str(table.path) for table in tables)
     if pattern is None:
         if len(tables) > 1:

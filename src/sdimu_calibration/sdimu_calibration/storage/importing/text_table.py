@@ -1,4 +1,10 @@
-"""A table in a text file: CSV, columns between blanks or tabs, with headings or without."""
+"""A table in a text file: CSV, columns between blanks or tabs, with headings or without.
+
+Logs of NovAtel receivers in ASCII, long (``#RAWIMUA``) and short (``%RAWIMUSA``), are read as such a table. After the
+header come week and seconds of GPS time, the status of the IMU, then increments in counts: accelerometers Z, -Y, X,
+gyros Z, -Y, X. Source: OEM7 Commands and Logs Reference Manual, RAWIMU and RAWIMUS. The size of a count is that of the
+IMU (table "Raw IMU Scale Factors" there).
+"""
 
 from __future__ import annotations
 
@@ -13,7 +19,6 @@ from numpy.typing import NDArray
 
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.recording import DataError
-from sdimu_calibration.storage.importing.novatel_log import HEADINGS, as_table, is_novatel
 
 _COMMENT = ("#", "%")
 _DELIMITERS = (";", "\t", ",")
@@ -46,11 +51,6 @@ class TextTable:
     skip_lines : int, optional
         Lines before the data; recognised when left out: blank, comment, mostly not numbers, of another number of
         columns than most, or real numbers where the data are integers (and the other way round).
-
-    Raises
-    ------
-    DataError
-        When it is not text, or there are no data in it.
     """
 
     def __init__(
@@ -67,26 +67,20 @@ class TextTable:
             ) from error
         self._delimiter = delimiter
         self.notes: tuple[str, ...] = ()
-        logged = is_novatel(self._lines)
+        logged = _is_novatel(self._lines)
         if logged:
-            self._lines = as_table(self._lines)
+            self._lines = _as_table(self._lines)
         self._begin = self._first_line() if skip_lines is None else skip_lines
         if self._begin >= len(self._lines):
             raise DataError(f"{path}: no line of numbers in it")
         self._delimiter = delimiter or self._guess(self._lines[self._begin])
         if skip_lines is None:
             self._leave_out_numeric_headings()
-        self.headings = list(HEADINGS) if logged else self._find_headings()
+        self.headings = list(_NOVATEL) if logged else self._find_headings()
         self._width = len(self._cells(self._lines[self._begin]))
 
     def floats(self, columns: Sequence[int | str]) -> Floats:
-        """Read columns as numbers, shape (n, k); a cell ``nan`` is NaN.
-
-        Raises
-        ------
-        DataError
-            With line and column of the first cell that is not a number.
-        """
+        """Read columns as numbers, shape (n, k); a cell ``nan`` is NaN."""
         places = [self._place(column) for column in columns]
         lines = self._data()
         if self._decimal == ",":
@@ -125,13 +119,7 @@ class TextTable:
         return {"delimiter": self._delimiter, "comments": _COMMENT}
 
     def _place(self, column: int | str) -> int:
-        """Index of a column.
-
-        Raises
-        ------
-        DataError
-            When there is none, or several, of that name.
-        """
+        """Index of a column."""
         if isinstance(column, int):
             if not 1 <= column <= self._width:
                 raise DataError(f"{self.path}: no column {column} (line {self._begin + 1} has {self._width})")
@@ -233,3 +221,31 @@ def _is_number(cell: str, decimal: str) -> bool:
     except ValueError:
         return False
     return True
+
+
+_NOVATEL = (
+    "week", "seconds", "status", "accel_z", "-accel_y", "accel_x", "gyro_z", "-gyro_y", "gyro_x", "gps",
+)  # fmt: skip
+"""Names of the columns: those of the log, and `gps`, seconds of GPS time since its beginning on 1980-01-06."""
+_NOVATEL_LOG = re.compile(r"[#%]RAWIMUS?A,[^;]*;(\d+),(\d+)(\.\d+)?,([0-9a-fA-F]+)((?:,-?\d+){6})\*[0-9a-fA-F]{8}\s*")
+_WEEK_S = 604_800
+"""Length of a GPS week (s): definition."""
+
+
+def _is_novatel(lines: Sequence[str]) -> bool:
+    """Whether some of the first lines are RAWIMU logs."""
+    return any(_NOVATEL_LOG.fullmatch(line) for line in lines[:100])
+
+
+def _as_table(lines: Sequence[str]) -> list[str]:
+    """Return the logs as lines of numbers in the order of `_NOVATEL`; other lines come out empty: numbers stay."""
+    return [_novatel_row(line) for line in lines]
+
+
+def _novatel_row(line: str) -> str:
+    match = _NOVATEL_LOG.fullmatch(line)
+    if match is None:
+        return ""
+    week, second, fraction, status, counts = match.groups()
+    gps = int(week) * _WEEK_S + int(second)
+    return f"{week},{second}{fraction or ''},{int(status, 16)}{counts},{gps}{fraction or ''}"
