@@ -147,11 +147,6 @@ def adaptive_test(
         Length of test (s) after which the data are looked at anew; between, the covariance alone says what is known.
     told : callable
         Is told every choice in words.
-
-    Raises
-    ------
-    DataError
-        When the scenario, the model or the goals cannot be used.
     """
     bench = _Bench(scenario, sensor, table, Plan("adaptive", (FIRST_STOP_S,), (), menu.acceleration_rad_s2))
     looks: list[Look] = []

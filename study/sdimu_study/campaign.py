@@ -55,11 +55,6 @@ def run_campaign(
     list of dict
         One row a seed, in the order of `seeds`: ``seed``, ``wall_s``, ``cpu_s`` and what `work` gave; a run that
         failed has ``error`` (its text) instead. Failed runs are tried again when the campaign is run again.
-
-    Raises
-    ------
-    DataError
-        When the scheduler does not answer or a shard cannot be used.
     """
     if workers < 1:
         raise DataError(f"--workers {workers}: expected a whole number from 1")

@@ -89,13 +89,7 @@ def with_mean_error(sensor: ImuTruth, clean: Recording, disturbed: Recording) ->
 
 
 def families(asked: list[str] | None) -> list[str]:
-    """Effects of the catalogue that the simulator can hide, or those that are asked for.
-
-    Raises
-    ------
-    DataError
-        When one is not in the catalogue.
-    """
+    """Effects of the catalogue that the simulator can hide, or those that are asked for."""
     unknown = sorted(set(asked or ()) - set(registry.names()))
     if unknown:
         whole = [n for n in registry.names() if unknown[0] in {p.name for p in registry.get(n).parameters}]

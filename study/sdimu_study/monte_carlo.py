@@ -81,11 +81,6 @@ def score(world: Simulated, fit: Fit) -> dict[str, Any]:
         ``sigma`` (SI) and ``covariance`` (lower triangle by rows); ``free``: coefficients that the frame does not
         make zero; ``nees`` over these; ``nis`` and ``nis_dof`` (sum and number) by `KINDS`; ``lag1`` and
         ``lag1_count`` by `CHANNELS`; ``passes``.
-
-    Raises
-    ------
-    DataError
-        Of a handheld fit.
     """
     if not isinstance(fit, NavigationFit):
         raise DataError(f"IMU '{world.test.imu.name}': a handheld fit has no innovations to study; choose another")
@@ -153,11 +148,6 @@ def plan_bound(case: Campaign, seeds: Iterable[int]) -> dict[str, float]:
     -------
     dict of str to float
         Sigma (SI) by coefficient name, in the reported body frame.
-
-    Raises
-    ------
-    DataError
-        When plan, IMU and model do not fit together.
     """
     scenario = case.scenario
     variances = []
@@ -171,13 +161,7 @@ def plan_bound(case: Campaign, seeds: Iterable[int]) -> dict[str, float]:
 
 
 def check(case: Campaign, number: int, seed: int) -> None:
-    """Refuse what would make every run fail.
-
-    Raises
-    ------
-    DataError
-        When the number of runs, the seed, the rate, an effect or the model cannot be used.
-    """
+    """Refuse what would make every run fail."""
     scenario = case.scenario
     if number < 2:
         raise DataError(f"-n {number}: expected at least 2 runs")
@@ -214,11 +198,6 @@ def summarise(
     -------
     dict
         Content of the data file; SI.
-
-    Raises
-    ------
-    DataError
-        When fewer than two runs were finished.
     """
     done = good(rows)
     if len(done) < 2:

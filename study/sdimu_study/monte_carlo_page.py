@@ -72,13 +72,7 @@ def _laid(columns: tuple[str, ...], lines: list[list[str]], text: set[int], titl
 
 
 def write_page(path: Path, data: Path) -> None:
-    """Write the page of a campaign from its data file.
-
-    Raises
-    ------
-    DataError
-        When `data` is no such file.
-    """
+    """Write the page of a campaign from its data file."""
     text = page(read_json(data, FORMAT))
     write_whole(path, text)
 

@@ -131,13 +131,7 @@ class Shards:
         return path
 
     def read(self) -> dict[int, Row]:
-        """All kept runs by seed; a run that failed once and was done later counts as done.
-
-        Raises
-        ------
-        DataError
-            When a shard is not one, or belongs to other settings.
-        """
+        """All kept runs by seed; a run that failed once and was done later counts as done."""
         found: dict[int, Row] = {}
         for path in sorted(self.folder.glob("seeds-*.json")):
             content = read_json(path, FORMAT)

@@ -136,11 +136,6 @@ def in_the_frame(scenario: Scenario) -> tuple[Floats, Floats]:
     omega, force : ndarray, shape (n, 3)
         rad/s, m/s^2: those of an IMU without errors, resolved in the frame that turns with the temperature. The rate
         is that of this frame.
-
-    Raises
-    ------
-    DataError
-        When the scenario has no temperature.
     """
     sensor, profile = imu_truth(scenario), scenario.temperature
     if profile is None:

@@ -96,11 +96,6 @@ def coefficient_statistics(
         Estimate minus truth, and reported sigma, by run.
     bound : mapping of str to float, optional
         Least possible sigma; by default, and for names that it does not have, the mean reported one.
-
-    Raises
-    ------
-    DataError
-        When there are fewer than two runs.
     """
     n = len(errors)
     if n < 2:

@@ -276,11 +276,6 @@ def drawn_effect(
         Draw effects with a time constant or the like, too: those that the scan tries.
     noise : sequence of NoiseTerm
         Noise with a memory that the sigmas count.
-
-    Raises
-    ------
-    DataError
-        When the test sees none of them.
     """
     known = catalogue(fit.timetable, set(fit.labels), has_temperature=False)
     evidence = fit.evidence([e for e in known if not (fit.learns_scatter and (e.options or e.needs_table))])

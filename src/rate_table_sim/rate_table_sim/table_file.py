@@ -9,13 +9,7 @@ from sdimu_calibration.storage.files.table_file import read_table
 
 
 def load_table(name_or_path: str | Path) -> TableSpecification:
-    """Read a rate table.
-
-    Raises
-    ------
-    DataError
-        When the file is missing or wrong, or adjacent axes are the same letter.
-    """
+    """Read a rate table."""
     table, file = read_table(name_or_path)
     sizes = file.imperfections.model_dump()
     return TableSpecification(

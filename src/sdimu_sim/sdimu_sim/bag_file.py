@@ -18,13 +18,7 @@ def write_test(
     path: Path, scenario: Scenario, test: SimulatedTest, *, replace: bool = False,
     custom: Mapping[str, str] | None = None,
 ) -> None:  # fmt: skip
-    """Write a simulated test to a rosbag2 folder; `custom` is what its metadata says of the unit.
-
-    Raises
-    ------
-    DataError
-        When something is in the way of the folder.
-    """
+    """Write a simulated test to a rosbag2 folder; `custom` is what its metadata says of the unit."""
     motion = test.motion
     t, dwell, stop = phase_changes(motion)
     rows = table_log_rows(motion)
@@ -46,13 +40,7 @@ def write_test(
 def write_by_hand(
     path: Path, samples: ImuSamples, *, replace: bool = False, custom: Mapping[str, str] | None = None
 ) -> None:
-    """Write a handheld run to a rosbag2 folder: samples of the IMU and nothing else.
-
-    Raises
-    ------
-    DataError
-        When something is in the way of the folder.
-    """
+    """Write a handheld run to a rosbag2 folder: samples of the IMU and nothing else."""
     write_recording(
         path,
         start_ns=DEFAULT_START_NS,

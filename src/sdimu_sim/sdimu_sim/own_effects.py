@@ -23,11 +23,6 @@ def simulated_effects(texts: Iterable[str]) -> tuple[str, ...]:
     ----------
     texts : iterable of str
         Keys with sizes. An effect file with one parameter is named by its path, else ``PATH:PARAMETER``.
-
-    Raises
-    ------
-    DataError
-        When a file or an effect cannot be read, or has no size.
     """
     out = tuple(text for given in texts for text in _written(given))
     parse_effects(out)

@@ -60,11 +60,6 @@ def load_temperature(text: str | Path) -> TemperatureProfile:
     text : str or Path
         Name in config/temperature/, path, or the temperature of a soak with its unit, such as ``-20 degC``: its
         coefficients are stated at `ROOM_DEGC`.
-
-    Raises
-    ------
-    DataError
-        When the file is missing or wrong, or the number has no unit of temperature.
     """
     if _NUMBER.fullmatch(str(text)):
         try:

@@ -106,13 +106,7 @@ def write_truth(path: Path, truth: Truth) -> None:
 
 
 def read_truth(path: Path) -> Truth:
-    """Read the truth of a test; the same file gives the same recording again.
-
-    Raises
-    ------
-    DataError
-        When the file is missing or wrong.
-    """
+    """Read the truth of a test; the same file gives the same recording again."""
     if not path.is_file():
         raise DataError(f"{path}: no such truth file")
     file = read_yaml(path, _TruthFile)

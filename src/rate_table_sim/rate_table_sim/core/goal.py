@@ -104,11 +104,6 @@ def goal_samples(
     -------
     angle, rate : ndarray, shape (n, 3)
         At the samples 1 ... n after `at` (rad, rad/s); the last at or after the last point, at rest.
-
-    Raises
-    ------
-    DataError
-        When the points are no trajectory, or break a limit; the text says which joint, how much and when.
     """
     kept = _checked(points, at, names)
     parts: list[tuple[Floats, Floats]] = []

@@ -63,11 +63,6 @@ def table_motion(plan: Plan, table: TableSpecification, seed: int = 0) -> TableM
     table : TableSpecification
     seed : int
         Of the encoder noise; nothing else is random.
-
-    Raises
-    ------
-    DataError
-        When a turn exceeds the acceleration limit or no gimbal axis can make it.
     """
     if table.axes is None:
         columns = tuple((AXES.index(turn.axis), 1.0) for turn in plan.turns)

@@ -75,11 +75,6 @@ def trapezoid(turn: Turn, acceleration_rad_s2: float, sample_rate_hz: float, num
         The grid.
     number : int
         Of the turn in the plan, from 1, for the error message.
-
-    Raises
-    ------
-    DataError
-        When no ramp within the limit reaches the mean rate.
     """
     size = abs(turn.angle_rad)
     samples = round(size / turn.rate_rad_s * sample_rate_hz)

@@ -138,11 +138,6 @@ class GoalProgramme:
         -------
         Goal or None
             The goal that it replaces.
-
-        Raises
-        ------
-        DataError
-            When the goal cannot be carried out; nothing has changed then.
         """
         if self.halted == "stopped":
             raise DataError("the table was stopped: call the service resume first")

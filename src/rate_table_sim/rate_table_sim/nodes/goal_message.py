@@ -32,11 +32,6 @@ def goal_of(
         Stamp at which the table's time began.
     allow_partial : bool
         Take a trajectory that leaves joints out.
-
-    Raises
-    ------
-    DataError
-        When it is no trajectory of these joints; the text says what to mend.
     """
     given = list(message.joint_names)
     if not given:

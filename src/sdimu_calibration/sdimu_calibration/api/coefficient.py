@@ -29,13 +29,7 @@ class Coefficient:
     display_unit: str
 
     def to(self, unit: str) -> tuple[float, float]:
-        """Value and sigma in another unit, such as ``deg/h``.
-
-        Raises
-        ------
-        DataError
-            When the unit is of another kind.
-        """
+        """Value and sigma in another unit, such as ``deg/h``."""
         if parse_unit(unit).dimension != parse_unit(self.unit).dimension:
             raise DataError(f"{self.name}: '{unit}' is of another kind than '{self.display_unit}'")
         return from_si(self.value, unit), from_si(self.sigma, unit)

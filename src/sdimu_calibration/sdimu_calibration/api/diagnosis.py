@@ -62,13 +62,7 @@ class FitDiagnosis:
 
     @property
     def best(self) -> Candidate:
-        """The effect that explains most, for `CalibrationFit.add`.
-
-        Raises
-        ------
-        DataError
-            When nothing was found.
-        """
+        """The effect that explains most, for `CalibrationFit.add`."""
         if not self.found:
             raise DataError(f"nothing was found: {self.core.sentence}")
         return self.found[0].candidate

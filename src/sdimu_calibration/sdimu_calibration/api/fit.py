@@ -85,11 +85,6 @@ class CalibrationFit(Fitted):
         ----------
         effect : str, Effect or Candidate
             As `--add` takes it, or what a diagnosis found.
-
-        Raises
-        ------
-        DataError
-            When there is no such effect, the model has it already, or the extended model cannot be fitted.
         """
         return CalibrationFit(extend(self.core, _effects(effect, self.core), warm=True))
 
@@ -104,11 +99,6 @@ class CalibrationFit(Fitted):
         -------
         Compensated
             Rates (rad/s) and specific forces (m/s^2), shape (n, 3) each, with covariances.
-
-        Raises
-        ------
-        DataError
-            When the result has no effect that samples can be freed of.
         """
         recording = test.recording
         own = [e for e in self.core.sensors.effects if not isinstance(e, str)]

@@ -93,13 +93,7 @@ class Fitted:
         return "; ".join([right, *self.result.inseparable])
 
     def to_dataframe(self) -> pd.DataFrame:
-        """Coefficients as a table: name, value, sigma, unit (customary).
-
-        Raises
-        ------
-        DataError
-            When pandas is not installed.
-        """
+        """Coefficients as a table: name, value, sigma, unit (customary)."""
         numbers = [(c.name, *c.to(c.display_unit), c.display_unit) for c in self]
         # Optional, and slow to load.
         made: pd.DataFrame = needed("pandas").DataFrame(numbers, columns=["name", "value", "sigma", "unit"])

@@ -75,11 +75,6 @@ def parse_key(text: str) -> EffectKey:
     """Read a key.
 
     The former spelling of the simulator, ``NAME=VALUE; option=value``, is read too.
-
-    Raises
-    ------
-    DataError
-        When `text` has none of the forms.
     """
     left, size = _split(text)
     size, *older = (part.strip() for part in size.split(";"))
@@ -130,11 +125,6 @@ def read_options(key: EffectKey, expected: Mapping[str, str]) -> dict[str, float
     -------
     dict of str to float
         Value of each option (SI), in the order of `expected`.
-
-    Raises
-    ------
-    DataError
-        When an option is missing or unknown, or its value has not the unit of its dimension.
     """
     if set(key.options) != set(expected):
         example = variant({name: f"1 {unit}".removesuffix(" 1") for name, unit in expected.items()})
@@ -144,13 +134,7 @@ def read_options(key: EffectKey, expected: Mapping[str, str]) -> dict[str, float
 
 
 def read_quantity(what: str, text: str, unit: str) -> float:
-    """Read a quantity whose unit must be written (SI); ppm and % count as units, only counts go without.
-
-    Raises
-    ------
-    DataError
-        One line that begins with `what` and says which unit is expected.
-    """
+    """Read a quantity whose unit must be written (SI); ppm and % count as units, only counts go without."""
     if unit != "1" and _PURE.fullmatch(text):
         raise DataError(f"{what}: '{text}' has no unit (expected something like '{text or 1} {unit}')")
     try:

@@ -94,13 +94,7 @@ class Expression:
             return _evaluate(self.tree, values)
 
     def dimension(self, units: Mapping[str, Dimension]) -> Dimension:
-        """Find the unit of the value, for given units of the names.
-
-        Raises
-        ------
-        DataError
-            When unlike quantities are added, or a function is taken of what is not a number.
-        """
+        """Find the unit of the value, for given units of the names."""
         return _dimension(self.tree, units)
 
 
@@ -131,13 +125,7 @@ def equation_text(formula: str) -> str:
 
 
 def parse_expression(text: str, known: frozenset[str]) -> Expression:
-    """Read a formula in the `known` names.
-
-    Raises
-    ------
-    DataError
-        When it is not one, or uses anything that is not allowed.
-    """
+    """Read a formula in the `known` names."""
     if len(text) > _LONGEST:
         raise DataError(f"expression is longer than {_LONGEST} characters")
     try:

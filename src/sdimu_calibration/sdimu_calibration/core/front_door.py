@@ -93,11 +93,6 @@ def in_si(recording: Recording, stated: Stated, where: str = IMU_TOPIC) -> Recor
     -------
     Recording
         What was recognised and changed is in its notes.
-
-    Raises
-    ------
-    DataError
-        When an axis is dead, or physics contradicts what was stated or does not decide.
     """
     if len(recording.t) < FEWEST:
         return recording
@@ -159,11 +154,6 @@ def open_test(recording: Recording, options: OpeningOptions, where: str = IMU_TO
     -------
     OpenedTest
         What was recognised, changed, assumed or contradicted is in the notes of its recording.
-
-    Raises
-    ------
-    DataError
-        When the data cannot be used, or physics does not decide and the user has to.
     """
     recording, imu = in_si(recording, options.stated, where), options.imu
     if one_attitude(recording):

@@ -107,11 +107,6 @@ class LiveCalibration:
     options : OpeningOptions
         IMU, site, and what the user states of units and signs.
     model : Model
-
-    Raises
-    ------
-    DataError
-        When model and IMU do not fit together.
     """
 
     def __init__(self, options: OpeningOptions, model: Model) -> None:
@@ -255,24 +250,12 @@ class LiveCalibration:
         return (self._intake.phase_log() if status_known else None), np.inf
 
     def finish(self) -> Calibration:
-        """Calibrate on everything taken so far; what a calibration of the recording says of the same data.
-
-        Raises
-        ------
-        DataError
-            When there is too little of it.
-        """
+        """Calibrate on everything taken so far; what a calibration of the recording says of the same data."""
         test = self.opened()
         return calibrate(test.recording, test.site, test.imu, self.setup.model)
 
     def opened(self) -> OpenedTest:
-        """Everything taken so far, opened as a recording is.
-
-        Raises
-        ------
-        DataError
-            When there is too little of it, or physics does not decide and the user has to.
-        """
+        """Everything taken so far, opened as a recording is."""
         raw = self._raw()
         if len(raw.ns) <= NOMINAL_FROM:
             raise DataError("/imu/data_raw: too few samples have come to calibrate")

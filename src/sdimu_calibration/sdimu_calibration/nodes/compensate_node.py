@@ -84,13 +84,7 @@ class CompensateNode:
         """Nothing to leave behind."""
 
     def _load(self) -> tuple[Compensator, str]:
-        """Read the result that the parameters name.
-
-        Raises
-        ------
-        DataError
-            When it cannot be used.
-        """
+        """Read the result that the parameters name."""
         parameter = self.node.get_parameter
         path = str(parameter("result").value)
         if not path:

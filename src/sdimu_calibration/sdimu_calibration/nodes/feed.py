@@ -141,13 +141,7 @@ class Feed:
         return len(self._raw)
 
     def decode(self) -> int:
-        """Decode what waits; the newest stamp (ns), or 0 while there is too little to know the origin.
-
-        Raises
-        ------
-        DataError
-            When messages are not of type Imu.
-        """
+        """Decode what waits; the newest stamp (ns), or 0 while there is too little to know the origin."""
         if self._first_ns is None and len(self._raw) <= NOMINAL_FROM:
             return 0
         if not self._raw:
@@ -231,13 +225,7 @@ class Feed:
         return notes
 
     def finish(self) -> Calibration:
-        """Calibrate on everything that has come.
-
-        Raises
-        ------
-        DataError
-            When nothing, or too little, has come.
-        """
+        """Calibrate on everything that has come."""
         if self._first_ns is None:
             raise DataError("the IMU topic: no samples have come; is the IMU running and its topic remapped?")
         self.decode()

@@ -57,13 +57,7 @@ class Worker:
                 self._pipe.send(self._busy)
 
     def answer(self) -> Answer | Picture | None:
-        """Return what has come: an answer, then the picture of it where the job wants one.
-
-        Raises
-        ------
-        DataError
-            When the process has ended.
-        """
+        """Return what has come: an answer, then the picture of it where the job wants one."""
         try:
             if self._busy is None or not self._pipe.poll():
                 return None

@@ -15,11 +15,6 @@ def declare_opening(node: Node) -> tuple[OpeningOptions, Topics]:
     """Declare site, imu, accel_unit, gyro_unit, accel_sign, gyro_sign and the names of the topics.
 
     ROS parameters keep their type: nothing stated is an empty string, or a sign of 0.
-
-    Raises
-    ------
-    DataError
-        When there is no such site or IMU, or a unit or sign is none.
     """
     declare = Declare(node)
 

@@ -47,11 +47,6 @@ def comparison(names: Sequence[str], results: Sequence[Calibration]) -> list[lis
     names : sequence of str
     results : sequence of Calibration
         Of one recording, the simplest model first.
-
-    Raises
-    ------
-    DataError
-        When there are fewer than two, or they are of different recordings or body frames.
     """
     if len(results) < 2:
         raise DataError("compare: give at least two results of one recording")

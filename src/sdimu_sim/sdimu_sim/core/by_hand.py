@@ -74,13 +74,7 @@ class ByHand:
 
 
 def simulate_by_hand(run: ByHand) -> tuple[ImuSamples, Truth]:
-    """Simulate a run.
-
-    Raises
-    ------
-    DataError
-        When the numbers make no run.
-    """
+    """Simulate a run."""
     if run.rests < 2:
         raise DataError(f"{run.rests} attitudes by hand: expected 2 and more")
     if not 10.0 <= run.rate_hz <= 1000.0:

@@ -42,13 +42,7 @@ class NoiseKey:
 
 
 def parse_noise(text: str) -> NoiseKey:
-    """Read a noise term.
-
-    Raises
-    ------
-    DataError
-        When it names no term, or its size has no unit.
-    """
+    """Read a noise term."""
     key = parse_key(text)
     triad, _, kind = key.name.partition("_noise_")
     if triad not in _UNITS or kind not in KINDS:

@@ -49,11 +49,6 @@ def read_equation(key: EffectKey, sensor: str, formula: str) -> tuple[str, Expre
     -------
     (str, Expression, float)
         Name that an estimate has; formula times k in the variables of `sdimu_sim.core.hidden`; k (SI).
-
-    Raises
-    ------
-    DataError
-        When the formula cannot be read, or the size has not its unit.
     """
     text = equation_text(_QUANTITY.sub(r"(\1*\2)", formula))
     known = frozenset(_DIMENSIONS)

@@ -68,11 +68,6 @@ def parse_expression(text: str, known: Collection[str]) -> Expression:
         Numbers, the `known` names, ``+ - * / **`` and sin, cos, tan, exp, log, abs, sign, sqrt, tanh, min, max.
     known : collection of str
         Names that may be used.
-
-    Raises
-    ------
-    DataError
-        For everything else.
     """
     if len(text) > _LONGEST:
         raise DataError(f"expression is longer than {_LONGEST} characters")

@@ -78,13 +78,7 @@ class ImuGenerator:
         self._emitted = 0
 
     def advance(self, block: PlatformMotion) -> ImuSamples:
-        """Take the next motion samples and return the IMU samples that end within them.
-
-        Raises
-        ------
-        DataError
-            When times do not ascend.
-        """
+        """Take the next motion samples and return the IMU samples that end within them."""
         self._append(block)
         first, last = self._emitted + 1, self._emitted
         if len(self._motion.t) > 1:
@@ -195,11 +189,6 @@ def simulate_imu(
     seed : int
         Of the noise.
     temperature : TemperatureProfile, optional
-
-    Raises
-    ------
-    DataError
-        When the hidden effects cannot be read or evaluated.
     """
     generator = ImuGenerator(truth, site, rate_hz, seed, temperature)
     parts = [

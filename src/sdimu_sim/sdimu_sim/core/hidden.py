@@ -262,13 +262,7 @@ class Hidden:
 
 
 def register_row(row: Row) -> None:
-    """Add a family of effects that a plug-in brings.
-
-    Raises
-    ------
-    DataError
-        When one of its names is taken or its formula cannot be read.
-    """
+    """Add a family of effects that a plug-in brings."""
     for name, entry in expand(row):
         if (name in _TABLE and _TABLE[name] != entry) or name in _UNITS:
             raise DataError(f"simulated effect '{name}' is there already")
@@ -283,13 +277,7 @@ _LOADED: set[str] = set()
 
 
 def load_plugins(name: str) -> bool:
-    """Register what other packages bring, once; tell whether `name` is known then.
-
-    Raises
-    ------
-    DataError
-        When one does not load.
-    """
+    """Register what other packages bring, once; tell whether `name` is known then."""
     for point in entry_points(group=ENTRY_POINTS):
         if point.name in _LOADED:
             continue
@@ -353,11 +341,6 @@ def parse_effects(texts: Iterable[str]) -> Hidden:
     ----------
     texts : iterable of str
         Canonical keys with a size; files of effects of one's own are put in before (`sdimu_sim.own_effects`).
-
-    Raises
-    ------
-    DataError
-        Names the effect and says what was expected.
     """
     found = _Found()
     for text in texts:

@@ -121,13 +121,7 @@ class SimulatedTest:
 
 
 def simulate_test(scenario: Scenario) -> SimulatedTest:
-    """Simulate a test, with the table's motion kept.
-
-    Raises
-    ------
-    DataError
-        When the rate, the plan on this table, or an effect cannot be used.
-    """
+    """Simulate a test, with the table's motion kept."""
     if not 10.0 <= scenario.rate_hz <= 1000.0:
         raise DataError(f"sample rate {scenario.rate_hz:g} Hz: expected 10 to 1000 Hz")
     if scenario.seed < 0:
@@ -145,13 +139,7 @@ def simulate_test(scenario: Scenario) -> SimulatedTest:
 
 
 def generate(scenario: Scenario) -> tuple[Recording, Truth]:
-    """Simulate a test into the recording that the topics would give, and its truth.
-
-    Raises
-    ------
-    DataError
-        When the rate, the plan on this table, or an effect cannot be used.
-    """
+    """Simulate a test into the recording that the topics would give, and its truth."""
     test = simulate_test(scenario)
     t, dwell, stop = phase_changes(test.motion)
     recording = Recording(

@@ -49,11 +49,6 @@ def true_coefficients(truth: ImuTruth, frame: str) -> dict[str, float]:
     -------
     dict of str to float
         The thirty coefficients and the size of every named effect, SI.
-
-    Raises
-    ------
-    DataError
-        For another frame.
     """
     sizes = dict(parse_effects(truth.effects).sizes)
     out = in_body_frame(truth.coefficients, frame) | sizes

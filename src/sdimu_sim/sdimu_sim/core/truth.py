@@ -132,11 +132,6 @@ def turned_on(coefficients: Mapping[str, float], sigma: Mapping[str, float], see
         By group, such as ``gyro_bias``, how far each of its coefficients differs (SI).
     seed : int
         Of the power-on.
-
-    Raises
-    ------
-    DataError
-        When there is no such group.
     """
     out = dict(coefficients)
     for group, size in sigma.items():
@@ -220,11 +215,6 @@ def in_body_frame(coefficients: Mapping[str, float], frame: str) -> dict[str, fl
     dict of str to float
         The thirty coefficients, SI. Mass unbalance that the rotation moves outside the six terms (an
         arcminute of it) is left out.
-
-    Raises
-    ------
-    DataError
-        For another frame.
     """
     if frame not in ("prior", "accelerometer_triad"):
         raise DataError(f"unknown body frame '{frame}' (expected accelerometer_triad or prior)")

@@ -160,11 +160,6 @@ def choose(
     -------
     Choice or End
         The end when nothing is lacking, or no move brings anything in the time that is left.
-
-    Raises
-    ------
-    DataError
-        When no limit is of a coefficient of the model.
     """
     here = known.at if at is None else at
     now = worth(known, goals, here.covariance[None], known.at.covariance)

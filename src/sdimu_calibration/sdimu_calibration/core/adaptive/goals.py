@@ -43,11 +43,6 @@ class Goals:
         limited : ndarray of bool, shape (p,)
         limit : ndarray, shape (limited,)
             SI.
-
-        Raises
-        ------
-        DataError
-            When no coefficient has a limit.
         """
         pinned = body_frame.pinned_in(names, frame)
         limit = np.array([np.nan if n in pinned else self.limits.get(_effect(n), np.nan) for n in names])

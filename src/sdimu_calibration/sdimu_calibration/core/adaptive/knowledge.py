@@ -100,11 +100,6 @@ def knowledge(found: Diagnosis, goals: Goals) -> Knowledge:
     found : Diagnosis
         Of what was recorded so far.
     goals : Goals
-
-    Raises
-    ------
-    DataError
-        When the fit does not navigate.
     """
     alike, sizes, needed, place = _class(found)
     named = tuple(c.label for c in found.chosen)
@@ -128,11 +123,6 @@ def fitted(fit: Fit, goals: Goals, alike: Sequence[Effect] = (), named: tuple[st
         Candidates that are estimated along in `Knowledge.at`.
     named : tuple of str
         Labels of what the model of the fit has beyond the one that was given.
-
-    Raises
-    ------
-    DataError
-        When the fit does not navigate.
     """
     if not isinstance(fit, NavigationFit):
         raise DataError(

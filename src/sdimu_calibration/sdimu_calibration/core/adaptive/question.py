@@ -87,11 +87,6 @@ def next_move(fit: Fit, diagnosis: LiveDiagnosis, about: Asked) -> Decision:
     diagnosis : LiveDiagnosis
         About it.
     about : Asked
-
-    Raises
-    ------
-    DataError
-        When the fit does not navigate, or no coefficient of the model has a limit.
     """
     left = about.goals.minutes - about.elapsed_s / 60.0
     searched = diagnosis.verdict != Verdict.CONSISTENT

@@ -109,11 +109,6 @@ def so_far(fit: NavigationFit, more: Sequence[Effect] = (), room: float = 1.0) -
         Candidates that are estimated along.
     room : float
         Prior of the candidates, as a multiple of the size that physics gives them.
-
-    Raises
-    ------
-    DataError
-        When an effect is not finite on this recording.
     """
     model = replace(fit.model, effects=cast("tuple[str, ...]", (*fit.sensors.effects, *more)))
     setup = set_up(fit.test.site or fit.setup.site, fit.test.imu, model, fit.setup.epoch_s)
@@ -147,11 +142,6 @@ def ahead(at: SoFar, turn: Turn | None, dwell_s: float, acceleration_rad_s2: flo
     dwell_s : float
         Longest stop after it.
     acceleration_rad_s2 : float
-
-    Raises
-    ------
-    DataError
-        When the turn needs more acceleration.
     """
     setup, sensors = at.setup, at.setup.sensors
     turns = () if turn is None else (turn,)

@@ -114,11 +114,6 @@ def align(w_mean: Floats, f_mean: Floats, duration_s: float, site: Site, imu: Im
     Returns
     -------
     Alignment
-
-    Raises
-    ------
-    DataError
-        When there is no specific force to level by.
     """
     norm = float(np.linalg.norm(f_mean))
     if not norm > 1.0:

@@ -116,11 +116,6 @@ def set_up(site: Site, imu: ImuSpecification, model: Model, epoch_s: float | Non
     site, imu, model : Site, ImuSpecification, Model
     epoch_s : float, optional
         Length of an epoch at rest (s); by default what the quantisation of the IMU asks for.
-
-    Raises
-    ------
-    DataError
-        When a noise or a prior is zero, or model and IMU do not fit together.
     """
     counted, epoch_s = imu.epoch_s > EPOCH_S, imu.epoch_s if epoch_s is None else epoch_s
     check_priors(imu)
@@ -134,13 +129,7 @@ def set_up(site: Site, imu: ImuSpecification, model: Model, epoch_s: float | Non
 
 
 def check_priors(imu: ImuSpecification) -> None:
-    """Refuse a prior of zero: it leaves nothing to estimate, and nothing to weigh a candidate by.
-
-    Raises
-    ------
-    DataError
-        When there is one.
-    """
+    """Refuse a prior of zero: it leaves nothing to estimate, and nothing to weigh a candidate by."""
     for name, size in imu.prior.items():
         if not size > 0.0:
             raise DataError(
@@ -181,11 +170,6 @@ def reduce(recording: Recording, setup: TestSetup, screened: bool = True) -> Pre
     setup : TestSetup
     screened : bool
         Take away samples that are no measurement; not for the perfect ones of `nominal`, which stand still at rest.
-
-    Raises
-    ------
-    DataError
-        When there is too little of it, or so much is missing that nobody knows the attitude after it.
     """
     recording, unsound = sound(recording) if screened else (recording, ())
     if len(recording.t) < NOMINAL_FROM + 1:
@@ -222,13 +206,7 @@ def reduce(recording: Recording, setup: TestSetup, screened: bool = True) -> Pre
 
 
 def first_attitude(epochs: Epochs, phases: Phases, setup: TestSetup) -> Alignment:
-    """Coarse alignment from the first dwell.
-
-    Raises
-    ------
-    DataError
-        When the IMU is never at rest, or turns before its first rest.
-    """
+    """Coarse alignment from the first dwell."""
     if not phases.dwell.any():
         if phases.denied.any():
             raise DataError(

@@ -25,11 +25,6 @@ def without(
         Numbers of stops.
     spans : sequence of (float, float)
         Begin and end (s): every epoch that one touches is left out.
-
-    Raises
-    ------
-    DataError
-        When a stop or a span is none of the recording, or what is left gives no attitude.
     """
     if not stops and not spans:
         return prepared

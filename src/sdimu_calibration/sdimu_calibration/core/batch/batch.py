@@ -110,11 +110,6 @@ def solve_batch(prepared: PreparedData, setup: TestSetup, start: Alignment, prog
 
     First with stops that need not stand quite still: far from the solution the second order of large errors is much
     more than the sigma of a stop's velocity, and would be taken for knowledge.
-
-    Raises
-    ------
-    DataError
-        When an effect of the model changes at random by itself, or the steps do not end.
     """
     coarse = coarse_start(prepared, setup, start)
     point, where = _begin(prepared, setup, coarse.C_nb, coarse.coefficients)

@@ -66,11 +66,6 @@ def solve_classical(
         Angles of the table's axes (rad).
     gimbals : tuple of str
         Axis letters of outer, middle and inner axis.
-
-    Raises
-    ------
-    DataError
-        When the table's angles are missing or of a table without gimbals, or the test does not show all coefficients.
     """
     log = _gimbal_log(table)
     seen = reference_motion(prepared, setup, log, gimbals)

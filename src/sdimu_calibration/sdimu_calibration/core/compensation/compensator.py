@@ -141,11 +141,6 @@ def resolved(calibration: Calibration, own: Sequence[Effect] = ()) -> tuple[Effe
     Returns
     -------
     tuple of Effect
-
-    Raises
-    ------
-    DataError
-        When an effect is unknown, or the coefficients are not those of the effects.
     """
     given = {effect.key: effect for effect in own}
     try:
@@ -191,11 +186,6 @@ def compensator(
     Returns
     -------
     Compensator
-
-    Raises
-    ------
-    DataError
-        When the result does not fit its effects, or has a coefficient that is no number.
     """
     effects = resolved(calibration, own)
     start = start_temperature if start_temperature is not None else calibration.data.get(START_TEMPERATURE)
@@ -338,11 +328,6 @@ def compensate(
     Returns
     -------
     Compensated
-
-    Raises
-    ------
-    DataError
-        When the errors cannot be inverted at a sample.
     """
     n = len(t)
     zero = np.zeros(n)
@@ -375,13 +360,7 @@ def compensate(
 
 
 def compensate_recording(using: Compensator, recording: Recording) -> Compensated:
-    """Take the errors out of all samples of a recording.
-
-    Raises
-    ------
-    DataError
-        When the errors cannot be inverted at a sample.
-    """
+    """Take the errors out of all samples of a recording."""
     t, interval = recording.t, recording.interval_s
     heat = heat_since(recording.temperature, t - 0.5 * interval, using.start_temperature, causal=False)
     return compensate(using, t, interval, recording.omega_ib_b, recording.f_ib_b, heat)

@@ -108,11 +108,6 @@ class LinearModel(Part):
         ----------
         degc : float
             The new T0 (deg C).
-
-        Raises
-        ------
-        DataError
-            When the result does not say from which temperature its coefficients count.
         """
         if not self.parts:
             return self
@@ -152,11 +147,6 @@ def linear_model(calibration: Calibration, own: Sequence[Effect] = ()) -> Linear
     Returns
     -------
     LinearModel
-
-    Raises
-    ------
-    DataError
-        When the result does not fit its effects.
     """
     sums = {_CONSTANT: Part(np.eye(6), np.zeros(6))}
     left: list[str] = []

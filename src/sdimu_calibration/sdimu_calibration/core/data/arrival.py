@@ -159,11 +159,6 @@ def arrange(ns: Stamps, omega_ib_b: Floats, f_ib_b: Floats, where: str) -> Arran
         rad/s, m/s^2.
     where : str
         Named in errors.
-
-    Raises
-    ------
-    DataError
-        When nothing can be used, or the clock of the stamps was set back: then one stamp means two times.
     """
     if len(ns) >= _MINIMUM_SAMPLES and ascending(ns) and all_finite(omega_ib_b) and all_finite(f_ib_b):
         return Arranged(np.arange(len(ns)), dict.fromkeys(("not_finite", "out_of_order", "repeated"), 0), ())
@@ -228,13 +223,7 @@ def _refuse_clock_set_back(ns: Stamps, omega_ib_b: Floats, f_ib_b: Floats, where
 
 
 def in_order(raw: RawTest) -> Recording:
-    """Order samples and logs by their stamps and count seconds from one nominal interval before the first sample.
-
-    Raises
-    ------
-    DataError
-        When no sample can be used, or the clock of the stamps was set back.
-    """
+    """Order samples and logs by their stamps and count seconds from one nominal interval before the first sample."""
     bursts = _bursts(raw)
     stamps = raw.ns if bursts is None else bursts.ns
     arranged = arrange(stamps, raw.omega_ib_b, raw.f_ib_b, raw.where)

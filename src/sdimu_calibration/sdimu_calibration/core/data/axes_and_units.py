@@ -110,11 +110,6 @@ def recognise(t: Floats, w: Floats, f: Floats, stated: Stated) -> Reading:
     Returns
     -------
     Reading
-
-    Raises
-    ------
-    DataError
-        When physics contradicts what was stated, or does not decide.
     """
     accel, notes = _accel_unit(f, stated)
     gyro, more, turned_enough = _gyro_reading(t, w, f, stated)
@@ -247,13 +242,7 @@ class Turns:
         return best if decided else None
 
     def check_axes(self, reading: float) -> None:
-        """Refuse axes of which one disagrees: the median does not see it when the IMU seldom turns about it.
-
-        Raises
-        ------
-        DataError
-            When the turns fit axes that are exchanged or of opposite sense, and not those of the recording.
-        """
+        """Refuse axes of which one disagrees: the median does not see it when the IMU seldom turns about it."""
         if self.misfit(reading, share=_NEARLY_ALL) < _FITS:
             return
         best, sense, axes = self._other_axes(_NEARLY_ALL)

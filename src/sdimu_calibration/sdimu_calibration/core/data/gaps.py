@@ -180,11 +180,6 @@ def judge(
         White noise densities of gyro (rad/s/sqrt(Hz)) and accelerometer (m/s^2/sqrt(Hz)).
     unsound : tuple of DataFault
         Why samples were taken away; said with a refusal.
-
-    Raises
-    ------
-    DataError
-        When an angle is missing that nobody knows, or readings differ across a gap at rest.
     """
     at = np.flatnonzero(cycles.lost > 0)
     length = epochs.end - epochs.start

@@ -141,11 +141,6 @@ def assumption(name: str, site: Site, seen: EarthRate | None, where: str) -> str
     seen : EarthRate or None
     where : str
         File or topic, for errors.
-
-    Raises
-    ------
-    DataError
-        When the data exclude the site: an estimate would put the difference into the sensors, or diverge.
     """
     if seen is not None and seen.excludes(site):
         raise DataError(

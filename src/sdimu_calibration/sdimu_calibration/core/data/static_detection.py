@@ -77,13 +77,7 @@ class StaticIntervals:
 
 
 def detect_static(recording: Recording) -> StaticIntervals:
-    """Find where the IMU rests.
-
-    Raises
-    ------
-    DataError
-        When the recording is shorter than a few windows, or never at rest.
-    """
+    """Find where the IMU rests."""
     dt = recording.interval_s
     width = max(round(WINDOW_S / dt), 4)
     if len(recording.t) < 10 * width:

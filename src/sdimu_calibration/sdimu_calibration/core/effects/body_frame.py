@@ -101,11 +101,6 @@ def values_in_frame(names: Sequence[str], values: Floats, frame: str) -> Floats:
     ndarray, shape (..., p)
         In `frame`, SI. Coefficients other than scale, misalignment and mass unbalance, their polynomials, and what the
         gyros see of a frame that turns with the temperature are as given.
-
-    Raises
-    ------
-    DataError
-        When the frame has no such name.
     """
     _check(frame)
     given = np.asarray(values, dtype=float)
@@ -258,11 +253,6 @@ def frame_jacobian(names: Sequence[str], frame: str, by_temperature: bool = True
     ndarray, shape (p, p)
         Change of each coefficient in `frame` (row) per change of each in the prior's frame (column), SI; the identity
         where nothing turns.
-
-    Raises
-    ------
-    DataError
-        When the frame has no such name.
     """
     _check(frame)
     p = len(names)
@@ -313,11 +303,6 @@ def jacobian_at(names: Sequence[str], values: Floats, frame: str) -> Floats:
     ndarray, shape (p, p)
         Change of each coefficient in `frame` (row) per change of each in the prior's frame (column), SI; rows of pinned
         coefficients are zero.
-
-    Raises
-    ------
-    DataError
-        When the frame has no such name.
     """
     J = _differences(lambda rows: values_in_frame(names, rows, frame), values)
     if pinned_in(names, frame):
@@ -363,11 +348,6 @@ def check_priors(stated: Sequence[str], names: Sequence[str], frame: str) -> Non
         Of the model.
     frame : str
         One of `FRAMES`.
-
-    Raises
-    ------
-    DataError
-        When there is one.
     """
     for name in set(stated) & set(pinned_in(names, frame)):
         raise DataError(

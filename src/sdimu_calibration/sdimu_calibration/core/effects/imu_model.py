@@ -132,11 +132,6 @@ def build(effects: Sequence[str | Effect], imu: ImuSpecification) -> ImuModel:
         Registered names, or effects of one's own.
     imu : ImuSpecification
         Gives the priors: by effect name, else the effect's own for the IMU's grade.
-
-    Raises
-    ------
-    DataError
-        When a name is unknown, stands twice, or has no prior, or a prior is of no effect or in a wrong unit.
     """
     chosen = told_apart([selection.resolve(e) if isinstance(e, str) else e for e in effects])
     _check_priors(chosen, imu)
@@ -175,11 +170,6 @@ def restate(sensors: ImuModel, priors: Sequence[StatedPrior]) -> ImuModel:
     ----------
     sensors : ImuModel
     priors : sequence of StatedPrior
-
-    Raises
-    ------
-    DataError
-        When a coefficient is none of the model's, stands twice or has a wrong unit, or a sigma is below zero.
     """
     prior, mean, restated = sensors.prior.copy(), sensors.mean.copy(), sensors.restated.copy()
     for one in priors:

@@ -38,13 +38,7 @@ def find(name: str) -> Effect | None:
 
 
 def get(name: str) -> Effect:
-    """Look an effect up.
-
-    Raises
-    ------
-    DataError
-        When there is none of that name.
-    """
+    """Look an effect up."""
     if name not in _EFFECTS:
         raise DataError(f"unknown effect '{name}' ({Work.EFFECTS} lists them)")
     return _EFFECTS[name]

@@ -12,13 +12,7 @@ from sdimu_calibration.core.wording import Work
 
 
 def resolve(text: str) -> Effect:
-    """Find the effect that `text` names.
-
-    Raises
-    ------
-    DataError
-        When the name or an option is unknown, or an option has not its unit.
-    """
+    """Find the effect that `text` names."""
     key = parse_key(text)
     refuse_size(key)
     effect, parameters = _find(key.name)

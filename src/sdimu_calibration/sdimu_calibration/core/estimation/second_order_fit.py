@@ -159,11 +159,6 @@ class SecondOrderFit(NavigationFit):
             The part.
         C_nb : ndarray, shape (3, 3)
             Attitude at its start, b to n (dimensionless).
-
-        Raises
-        ------
-        DataError
-            When the part cannot be aligned, or the filter diverges.
         """
         begin = StartPoint(np.ascontiguousarray(C_nb), self.estimate)
         alignment = first_attitude(prepared.epochs, prepared.phases, self.setup)

@@ -33,11 +33,6 @@ def attitude_about(
     -------
     ndarray, shape (3, 3)
         `C_nb` itself where it fits.
-
-    Raises
-    ------
-    DataError
-        When the filter diverges.
     """
     if not misfits(one_pass(prepared, setup, start, C_nb, reference, closed_loop=False)):
         return C_nb

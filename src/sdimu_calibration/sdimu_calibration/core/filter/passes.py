@@ -201,11 +201,6 @@ def one_pass(
         Keep the matrices of every epoch in the output.
     near : ndarray, shape (n, m), optional
         Regressors of a pass about nearly the same coefficients.
-
-    Raises
-    ------
-    DataError
-        When an effect is not finite on this recording, or the filter diverges.
     """
     sensors = setup.sensors
     seen = motion(
@@ -262,11 +257,6 @@ def refine(
     passes : int
         Number of all passes, the first one counted.
     converged : bool
-
-    Raises
-    ------
-    DataError
-        When the filter diverges.
     """
     last, loose, settling, tight = first, loosened(setup), misfits(first), 0
     for count in range(2, MOST_PASSES + 1):
@@ -320,13 +310,7 @@ def furthest_move(step: Floats, covariance: Floats) -> float:
 
 
 def coarse_pass(prepared: PreparedData, setup: TestSetup, start: Alignment) -> Pass:
-    """Run a closed-loop pass from the coarse start: where `refine` begins when one dwell may have misled the first.
-
-    Raises
-    ------
-    DataError
-        When the filter diverges.
-    """
+    """Run a closed-loop pass from the coarse start: where `refine` begins when one dwell may have misled the first."""
     coarse = coarse_start(prepared, setup, start)
     return one_pass(prepared, setup, start, coarse.C_nb, coarse.coefficients, closed_loop=True)
 
@@ -401,11 +385,6 @@ def solve(setup: TestSetup, prepared: PreparedData, begin: StartPoint | None, pr
         Where a fit of nearly the same model ended: the passes go on from there, without a closed-loop pass. None
         begins with the first dwell.
     progress : callable
-
-    Raises
-    ------
-    DataError
-        When the recording cannot be aligned, or contradicts the specification.
     """
     start = first_attitude(prepared.epochs, prepared.phases, setup)
     progress("passes", 0.2)

@@ -71,11 +71,6 @@ def measured(
     serials : sequence of str, length m
     dates_s : ndarray, shape (m,)
         As of `Measured` (s).
-
-    Raises
-    ------
-    DataError
-        When a number is not finite.
     """
     variances = np.diagonal(covariances, axis1=1, axis2=2)
     if not (np.isfinite(values).all() and np.isfinite(variances).all()):
@@ -163,13 +158,7 @@ class Population:
 
 
 def population(fleet: Measured) -> Population:
-    """Estimate mean and spread of every coefficient over units, and find who is out.
-
-    Raises
-    ------
-    DataError
-        When there are fewer than `FEWEST_UNITS` units.
-    """
+    """Estimate mean and spread of every coefficient over units, and find who is out."""
     units = fleet.units
     if len(units) < FEWEST_UNITS:
         raise DataError(

@@ -108,11 +108,6 @@ def random_effect(
     Returns
     -------
     RandomEffect
-
-    Raises
-    ------
-    DataError
-        When fewer values are left than a variance needs, or an error is not a number above zero.
     """
     problem = _problem(values, sigmas, groups, x)
     fit, unit, dof, tau2 = problem.fit, problem.unit, problem.dof, problem.tau2
@@ -134,11 +129,6 @@ def spread_and_mean(values: Floats, sigmas: Floats) -> tuple[float, float]:
     ----------
     values, sigmas : ndarray, shape (n,)
         As for `random_effect`, in one unit.
-
-    Raises
-    ------
-    DataError
-        As `random_effect`.
     """
     problem = _problem(values, sigmas, None, None)
     mean = float(problem.fit(np.array([problem.tau2])).mean[0])

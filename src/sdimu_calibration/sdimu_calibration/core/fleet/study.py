@@ -71,11 +71,6 @@ def study(fleet: Measured, model: Sequence[str], candidates: Candidates) -> Stud
         Effects that all results have.
     candidates : Candidates
         Of the diagnoses; empty without any.
-
-    Raises
-    ------
-    DataError
-        When there are too few units.
     """
     people = population(fleet)
     left = without_those_out(fleet, people)

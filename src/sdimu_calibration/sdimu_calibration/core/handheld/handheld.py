@@ -82,11 +82,6 @@ def prepare_run(recording: Recording, whole_sigma: float = 0.0) -> PreparedRun:
     recording : Recording
     whole_sigma : float
         How well the IMU was put back after whole turns about the vertical (rad); 0 where none is stated.
-
-    Raises
-    ------
-    DataError
-        When there are too few rests.
     """
     recording, impossible = without_impossible(recording)
     rests = detect_static(recording)
@@ -108,13 +103,7 @@ def _too_few(recording: Recording, count: int) -> str:
 
 
 def fit_priors(sensors: ImuModel, imu: ImuSpecification, site: Site | None, rests: StaticIntervals) -> FitPriors:
-    """Say what is known before the fit.
-
-    Raises
-    ------
-    DataError
-        When an effect changes at random by itself.
-    """
+    """Say what is known before the fit."""
     changing = (sensors.decay_rate > 0) | (sensors.drive > 0)
     if changing.any():
         name = sensors.names[int(np.argmax(changing))]

@@ -139,13 +139,7 @@ class HandheldSolution:
 
 
 def fit_run(run: HandheldRun, scene: FitPriors, start: LinearisationPoint) -> HandheldSolution:
-    """Gauss-Newton with the sigmas learned on the way.
-
-    Raises
-    ------
-    DataError
-        When there are too many rests for a dense solution, or the steps do not end.
-    """
+    """Gauss-Newton with the sigmas learned on the way."""
     if len(run.t) > MOST_RESTS:
         raise DataError(
             f"/imu/data_raw: {len(run.t)} rests; a handheld run may have {MOST_RESTS}: cut the recording in parts"

@@ -57,11 +57,6 @@ def with_whole_turns(run: HandheldRun, sigma: float) -> HandheldRun:
     run : HandheldRun
     sigma : float
         How well the IMU was put back (rad, one sigma).
-
-    Raises
-    ------
-    DataError
-        When no turn is one.
     """
     found = whole_turns(run)
     if not len(found):

@@ -10,13 +10,7 @@ from sdimu_calibration.core.wording import Option, Work
 
 
 def check_members(members: Sequence[Member]) -> None:
-    """Refuse recordings that are no set.
-
-    Raises
-    ------
-    DataError
-        When a name stands twice, or the recordings are of several units.
-    """
+    """Refuse recordings that are no set."""
     names = [m.name for m in members]
     for name in names:
         if names.count(name) > 1:
@@ -43,13 +37,7 @@ def in_order(reports: Sequence[Report]) -> list[Report]:
 
 
 def check_different(reports: Sequence[Report]) -> None:
-    """Refuse a recording that stands twice, by another path or as a copy: it would count as two that agree.
-
-    Raises
-    ------
-    DataError
-        When two recordings start at the same time and have the same own fit.
-    """
+    """Refuse a recording that stands twice, by another path or as a copy: it would count as two that agree."""
     seen: dict[tuple[int, bytes], str] = {}
     for report in reports:
         first = seen.setdefault((report.start_ns, report.values.tobytes()), report.name)
@@ -58,13 +46,7 @@ def check_different(reports: Sequence[Report]) -> None:
 
 
 def check_one_grade(reports: Sequence[Report]) -> None:
-    """Refuse recordings of IMUs of different grades: they are of several units, whatever their serials say.
-
-    Raises
-    ------
-    DataError
-        When there are two grades.
-    """
+    """Refuse recordings of IMUs of different grades: they are of several units, whatever their serials say."""
     first: dict[str, Report] = {}
     for report in reports:
         first.setdefault(report.imu.grade, report)

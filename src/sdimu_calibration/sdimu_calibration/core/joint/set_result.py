@@ -45,11 +45,6 @@ def set_outcome(fit: SetFit) -> Calibration:
     Parameters
     ----------
     fit : SetFit
-
-    Raises
-    ------
-    DataError
-        When the recording that gives the frame of the report cannot be opened again.
     """
     base = base_fit(fit)
     values, covariance = _reported(fit, base)

@@ -123,11 +123,6 @@ def search_set(
         False-alarm probability of a whole scan.
     fitted : SetFit, optional
         The set with the model as given, where it was fitted already.
-
-    Raises
-    ------
-    DataError
-        When the set cannot be fitted.
     """
     before = fit = fitted or fit_set(members, options, run, progress=progress)
     chosen: dict[str, Candidate] = {}

@@ -39,11 +39,6 @@ def rests(recording: Recording) -> tuple[slice, ...]:
     -------
     tuple of slice
         Rows of the recording, in order.
-
-    Raises
-    ------
-    DataError
-        When there is no rest.
     """
     size = _window(recording)
     first, last = runs(at_rest(recording))

@@ -56,11 +56,6 @@ def white_noise(recording: Recording, rows: Sequence[slice] | None = None) -> Wh
     recording : Recording
     rows : sequence of slice, optional
         The rests; all that `rests` finds by default.
-
-    Raises
-    ------
-    DataError
-        When there is no rest, or a sensor does not scatter at all.
     """
     rows = rests(recording) if rows is None else rows
     interval = recording.interval_s
@@ -89,11 +84,6 @@ def with_measured_noise(imu: ImuSpecification, recording: Recording) -> tuple[Im
     imu : ImuSpecification
     note : str
         What was measured, and what the specification said.
-
-    Raises
-    ------
-    DataError
-        When there is no rest, or a sensor does not scatter at all.
     """
     rows = rests(recording)
     found = white_noise(recording, rows)

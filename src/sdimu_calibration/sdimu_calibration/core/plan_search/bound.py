@@ -91,11 +91,6 @@ def bounds(plan: Plan, asked: Question) -> Bounds:
     Returns
     -------
     Bounds
-
-    Raises
-    ------
-    DataError
-        When a turn needs more acceleration than the plan allows, or an effect changes at random.
     """
     nominal = prepare(plan, asked.site, asked.imu, asked.model, None, None)
     sensors = nominal.setup.sensors

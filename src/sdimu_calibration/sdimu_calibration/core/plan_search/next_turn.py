@@ -92,11 +92,6 @@ def next_turn(
     -------
     tuple of NextTurn
         Best first: by gain a minute.
-
-    Raises
-    ------
-    DataError
-        When there are fewer than two parameters to separate, or an effect is unknown.
     """
     effects = [selection.resolve(e) if isinstance(e, str) else e for e in alike]
     names = tuple(p.name for e in effects for p in e.parameters)

@@ -81,12 +81,6 @@ def search(
     -------
     Found
         The start itself when no change improves it.
-
-    Raises
-    ------
-    DataError
-        When the start cannot be evaluated, a limit names an effect that is not in the model, or there is neither a
-        limit nor a time.
     """
     if not goal.limits and goal.minutes is None:
         raise DataError("a plan needs a goal: state limits, or the minutes available")

@@ -59,11 +59,6 @@ def apply(noise: NoiseSet, imu: ImuSpecification, model: Model) -> tuple[ImuSpec
     Returns
     -------
     ImuSpecification, Model
-
-    Raises
-    ------
-    DataError
-        When R of a mean over a second is smaller than the part of it that Q implies.
     """
     for what, sigma, density in (
         ("rate_sigma", noise.rate_sigma, noise.gyro_density),

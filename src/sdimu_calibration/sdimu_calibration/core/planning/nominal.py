@@ -46,11 +46,6 @@ def ramp_length(turn: Turn, acceleration_rad_s2: float, number: int) -> float:
     -------
     float
         s.
-
-    Raises
-    ------
-    DataError
-        When the acceleration is too small for the mean rate.
     """
     size = abs(turn.angle_rad)
     length = size / turn.rate_rad_s
@@ -113,11 +108,6 @@ def nominal_recording(
     -------
     Recording
         With the phases of the table, as in the status topic.
-
-    Raises
-    ------
-    DataError
-        When a turn needs more acceleration than the plan allows, or the first stop is too short to level at.
     """
     if plan.dwell_s[0] < _LEAST_DWELL_S:
         raise DataError(

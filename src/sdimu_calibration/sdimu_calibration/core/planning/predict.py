@@ -113,11 +113,6 @@ def prepare(
     Returns
     -------
     Nominal
-
-    Raises
-    ------
-    DataError
-        When plan, IMU, model or noise set do not fit together.
     """
     told, weighed = (imu, model) if noise is None else apply(noise, imu, model)
     setup = set_up(site, told, weighed)
@@ -160,11 +155,6 @@ def predict(
     Returns
     -------
     Prediction
-
-    Raises
-    ------
-    DataError
-        When plan, IMU, model or noise set do not fit together.
     """
     nominal = prepare(plan, site, imu, model, mount_rad, noise)
     setup = nominal.setup

@@ -128,11 +128,6 @@ def solve_second_order(
     last : SecondOrderPass
     passes : int
     converged : bool
-
-    Raises
-    ------
-    DataError
-        When the filter diverges.
     """
     first = begin or coarse_start(prepared, setup, start)
     reference, C_nb, loose = first.coefficients, first.C_nb, begin is None
@@ -229,11 +224,6 @@ def second_order_pass(
         Initial attitude about which the pass is linearised, b to n.
     reference : ndarray, shape (q,)
         Coefficients at which the samples are corrected (SI).
-
-    Raises
-    ------
-    DataError
-        When the filter diverges.
     """
     at = linearise(prepared, setup, C_nb, reference)
     begin = start_state(setup, start, at.C_stop[0], reference)._replace(used=np.zeros(len(reference)))
@@ -243,13 +233,7 @@ def second_order_pass(
 def run_linearised(
     at: Linearisation, setup: TestSetup, begin: PassState, prepared: PreparedData, keep: bool = False
 ) -> SecondOrderPass:
-    """Run the filter about a linearisation from the state `begin`; `keep` the matrices of every epoch.
-
-    Raises
-    ------
-    DataError
-        When the filter diverges.
-    """
+    """Run the filter about a linearisation from the state `begin`; `keep` the matrices of every epoch."""
     state, output, rows = run_stops(at.data, setup, begin, prepared, at.where, at.C_stop, keep)
     check_finite(state)
     return SecondOrderPass(at.reference, at.C_stop[0], begin, state, output, rows, at.data, at.C_stop, at.where)

@@ -95,11 +95,6 @@ def assign_turns(
     -------
     tuple of (int, float)
         Gimbal axis (0 outer, 1 middle, 2 inner) and sign, one per turn.
-
-    Raises
-    ------
-    DataError
-        When no choice allows a turn; it names the furthest one that could be reached.
     """
     bounded = any(map(math.isfinite, reach_rad))
     dead_ends: set[tuple[int, tuple[float, ...]]] = set()

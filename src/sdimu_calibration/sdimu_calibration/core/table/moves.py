@@ -124,11 +124,6 @@ def plan_move(
         within its limits.
     tolerance_rad : float
         How far from the platform axis a gimbal axis may be (rad).
-
-    Raises
-    ------
-    DataError
-        When no joint can make the turn; the text says which limit is broken, or that no axis is along it.
     """
     here = np.asarray(angles, dtype=np.float64)
     if not (math.isfinite(step.dwell_s) and step.dwell_s >= 0.0):
@@ -187,11 +182,6 @@ def moves_of(table: RateTable, angles: Floats, plan: Plan) -> tuple[Move, ...]:
     angles : ndarray, shape (3,)
         Where the joints are at the start (rad).
     plan : Plan
-
-    Raises
-    ------
-    DataError
-        As `assign_turns` and `plan_move`.
     """
     here = np.asarray(angles, dtype=np.float64)
     axes: tuple[tuple[int, float] | None, ...] = (None,) * len(plan.dwell_s)

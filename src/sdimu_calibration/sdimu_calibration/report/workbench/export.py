@@ -26,13 +26,7 @@ from sdimu_calibration.storage.files.result_file import write_result
 
 
 def model_files(model: Model, setting: Setting) -> dict[str, str]:
-    """Return model.yaml, and a file for each effect of one's own, by name.
-
-    Raises
-    ------
-    DataError
-        When the model to start from has effects that only a file of its own can say.
-    """
+    """Return model.yaml, and a file for each effect of one's own, by name."""
     added = setting.added
     own = {f"effect-{k}.yaml": text for k, text in enumerate(added, 1) if "\n" in text.strip()}
     by_text = {text: name for name, text in own.items()}

@@ -150,13 +150,7 @@ class FitSession:
         return self._fits.get(setting)
 
     def fit(self, setting: Setting, tell: Tell = silent) -> Fitted:
-        """Fit what a setting says; `tell` gets a word and the share done.
-
-        Raises
-        ------
-        DataError
-            When an effect or a prior cannot be read, a stop is none of the recording, or nothing is left to fit.
-        """
+        """Fit what a setting says; `tell` gets a word and the share done."""
         with self._lock:
             if setting not in self._fits:
                 _keep(self._fits, setting, self._numbers(self._solved(setting, tell)))
@@ -175,13 +169,7 @@ class FitSession:
             return self._missing[setting]
 
     def preview(self, setting: Setting, text: str, tell: Tell = silent) -> Preview:
-        """Look at an effect before it is added.
-
-        Raises
-        ------
-        DataError
-            When it cannot be read, or is in the model already.
-        """
+        """Look at an effect before it is added."""
         with self._lock:
             effects = added_effects(self._extended(setting), [text], self.test.imu)
             scores = self._survey(setting, tell)

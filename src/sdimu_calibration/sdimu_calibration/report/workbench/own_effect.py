@@ -17,13 +17,7 @@ from sdimu_calibration.storage.files.effect_file import find_effects, load_effec
 
 
 def added_effects(model: Model, added: Sequence[str], imu: ImuSpecification) -> tuple[Effect, ...]:
-    """Effects that a page adds to a model: by name, or by the text of an effect file.
-
-    Raises
-    ------
-    DataError
-        When one cannot be read, or is in the model already.
-    """
+    """Effects that a page adds to a model: by name, or by the text of an effect file."""
     effects = list(imu_model.build(model.effects, imu).effects)
     given = len(effects)
     for text in added:
@@ -39,11 +33,6 @@ def stated_priors(given: Sequence[StatedPrior], changed: Sequence[Prior]) -> tup
     given : sequence of StatedPrior
     changed : sequence of (str, str, str)
         Coefficient, mean and sigma as a page holds them.
-
-    Raises
-    ------
-    DataError
-        When a quantity cannot be read, or mean and sigma have different units.
     """
     names = {name for name, _, _ in changed}
     return (*(one for one in given if one.name not in names), *(_stated(*one) for one in changed))
@@ -58,13 +47,7 @@ def _stated(name: str, mean: str, sigma: str) -> StatedPrior:
 
 
 def read_effect(text: str) -> tuple[Effect, ...]:
-    """Read an effect by name or by the text of an effect file (several lines).
-
-    Raises
-    ------
-    DataError
-        One line without the name of the temporary file. A page names no files: those of the server are not its own.
-    """
+    """Read an effect by name or by the text of an effect file (several lines)."""
     if "\n" not in text.strip():
         if parse_key(text.strip()).file:
             raise DataError("an effect file is given by its text: use the button for files, or paste it")

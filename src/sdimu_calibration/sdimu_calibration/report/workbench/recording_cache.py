@@ -48,13 +48,7 @@ class RecordingCache:
         return str(self._places.get(wanted, wanted))
 
     def bench(self, name: str = "") -> FitSession:
-        """Return the bench of a recording; the first one's when no name is given.
-
-        Raises
-        ------
-        DataError
-            When there is none of that name any more, or it cannot be read.
-        """
+        """Return the bench of a recording; the first one's when no name is given."""
         wanted = name or self.names[0]
         if wanted not in self._names:
             raise DataError(f"no recording '{wanted}' here (choose one of: {', '.join(self.names)})")

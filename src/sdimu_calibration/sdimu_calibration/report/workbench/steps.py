@@ -25,11 +25,6 @@ def step(now: State, what: str, controls: Controls) -> State:
         What was clicked: one of `STEPS`.
     controls : mapping
         Values of the controls of the page by their names.
-
-    Raises
-    ------
-    DataError
-        When a control holds nothing that can be used.
     """
     return STEPS[what](now, controls) if what in STEPS else now
 
