@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 
 from sdimu_calibration.cli.next_commands import Asked, spelled
+from sdimu_calibration.cli.options import Opening, Request
 
 WIDTH = 80
 CONTROL = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]")
@@ -153,9 +154,8 @@ def test_advice_can_be_pasted(sdimu):
 
 
 def test_advice_repeats_what_was_asked_for():
-    given = {"site": "my site.yaml", "imu": "dtg", "model": None, "estimator": "auto", "gyro_sign": -1, "hand": False,
-             "add": ["lever_arm"], "out": Path("out")}  # fmt: skip
-    asked = Asked.of((Path("a bag"),), given, Path("out"))
+    request = Request(add=["lever_arm"], out=Path("out"), workers=3)
+    asked = Asked.of((Path("a bag"),), Path("out"), Opening("my site.yaml", "dtg", gyro_sign=-1), request)
     words, command = spelled("Keep lever in the model: --add 'coupling.yaml:k1' --add 'x(tau=3 s)'.", asked)
     assert words == "Keep lever in the model:"
     assert shlex.split(command) == [

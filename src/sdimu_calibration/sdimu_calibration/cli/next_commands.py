@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import re
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from sdimu_calibration.cli.console import command, say
+from sdimu_calibration.cli.option_groups import words_of
+from sdimu_calibration.cli.options import Fitted, Place
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -24,16 +26,6 @@ DIAGNOSE = "run: sdimu diagnose"
 _ACCELERATION = 1.0
 """Angular acceleration (rad/s^2) of a plan that was seen: the motion does not tell the limit, and no sum needs it."""
 _COMMAND = re.compile(r"^(.*?):? ((?:sdimu [a-z]+ |--add ).*?)\.?$")
-
-
-_REPEATED = (
-    "site", "imu", "model", "noise", "estimator", "whole_turns", "exclude_stops", "exclude_times", "serial", "power_on",
-    "reference_temperature", "imu_topic", "status_topic", "joint_topic", "temperature_topic", "accel_unit", "gyro_unit",
-    "accel_sign", "gyro_sign",
-)  # fmt: skip
-"""Options that calibrate and diagnose share, and that the next of them has to repeat."""
-_USUAL = (None, False, "auto")
-"""Values of options that nobody stated."""
 
 
 @dataclass(frozen=True)
@@ -57,13 +49,10 @@ class Asked:
     folder: Path
 
     @classmethod
-    def of(cls, bags: Sequence[Path], given: Mapping[str, Any], folder: Path) -> Asked:
-        """Take the arguments of a verb, by name."""
-        options = [word for name in _REPEATED if given.get(name) not in _USUAL
-                   for word in (f"--{name.replace('_', '-')}", str(given[name]))]  # fmt: skip
-        options += ["--hand"] if given.get("hand") else []
-        options += [word for effect in given.get("add") or () for word in ("--add", effect)]
-        place = [word for name in ("site", "imu") if given.get(name) for word in (f"--{name}", str(given[name]))]
+    def of(cls, bags: Sequence[Path], folder: Path, opening: Place, fitted: Fitted | None = None) -> Asked:
+        """Take how a recording was opened, and what was fitted to it."""
+        place = words_of(Place(opening.site, opening.imu), Place)
+        options = words_of(opening, type(opening)) + ([] if fitted is None else words_of(fitted, Fitted))
         return cls(bags, options, place, folder)
 
     def command(self, verb: str) -> str:

@@ -51,21 +51,20 @@ def standing_of(console: Console, asked: After) -> Standing:
 
 
 def _diagnosed(console: Console, asked: After) -> Standing:
+    from sdimu_calibration.cli.options import Opening, Request
     from sdimu_calibration.cli.progress import bar
-    from sdimu_calibration.cli.set_run import WORKERS, SetRequest, diagnosed_set
+    from sdimu_calibration.cli.set_run import SetRequest, diagnosed_set
     from sdimu_calibration.core.diagnosis.diagnose import climb
     from sdimu_calibration.core.diagnosis.standing import standing
     from sdimu_calibration.core.diagnosis.summary import summarise
     from sdimu_calibration.core.estimation.solve import solve
     from sdimu_calibration.storage.config import load_imu
     from sdimu_calibration.storage.model_choice import named_model
-    from sdimu_calibration.storage.opening import Source, open_test
+    from sdimu_calibration.storage.opening import open_test
 
     if len(asked.paths) > 1:
-        found = diagnosed_set(console, SetRequest(
-            asked.paths, None, asked.model, asked.site, asked.imu, (), Source(), "auto", None, None, WORKERS, None,
-            None, None,
-        ), ())[0]  # fmt: skip
+        request = SetRequest(asked.paths, Opening(asked.site, asked.imu), Request(asked.model))
+        found = diagnosed_set(console, request, ())[0]
         say(console, f"{found.verdict}: {found.sentence}")
         return found.standing
     test = open_test(asked.paths[0], asked.site, None if asked.imu is None else load_imu(asked.imu))
