@@ -30,7 +30,7 @@ def say(console: Console, text: str) -> None:
     if console.is_terminal:
         line = textwrap.fill(
             line, console.width, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False
-        )  # fmt: skip
+        )
     console.print(line, soft_wrap=True, highlight=False)
 
 

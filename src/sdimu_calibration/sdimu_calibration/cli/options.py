@@ -233,11 +233,18 @@ class Opening(Reading, Stated):
         if self.site is not None:
             load_site(self.site)
         return Read(
-            self.site, self.specification, self.source, handheld, self.measured_noise, self.whole_turns_rad,
+            self.site,
+            self.specification,
+            self.source,
+            handheld,
+            self.measured_noise,
+            self.whole_turns_rad,
             () if self.exclude_stops is None else read_stops(self.exclude_stops),
             () if self.exclude_times is None else read_spans(self.exclude_times),
-            self.serial, self.power_on, self.reference_degc,
-        )  # fmt: skip
+            self.serial,
+            self.power_on,
+            self.reference_degc,
+        )
 
 
 @dataclass(frozen=True)

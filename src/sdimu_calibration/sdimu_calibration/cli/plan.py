@@ -251,10 +251,14 @@ def _content(
     """Give the plan that was found as plain data (SI); `file` is null where none is better."""
     sigma = {"before": first.largest(), "found": found.bounds.largest(), "limit": dict(limits)}
     return {
-        "format": "sdimu-plan-search/1", "plan": start.name, "file": None if out is None else str(out),
-        "minutes": {"before": start.duration_s / 60.0, "found": found.minutes}, "worst": found.worst,
-        "tried": found.tried, "sigma": sigma | ({"known": known.largest()} if known else {}),
-    }  # fmt: skip
+        "format": "sdimu-plan-search/1",
+        "plan": start.name,
+        "file": None if out is None else str(out),
+        "minutes": {"before": start.duration_s / 60.0, "found": found.minutes},
+        "worst": found.worst,
+        "tried": found.tried,
+        "sigma": sigma | ({"known": known.largest()} if known else {}),
+    }
 
 
 def _ranking(start: Plan, tell: Sequence[str], ranked: Sequence[NextTurn]) -> dict[str, object]:

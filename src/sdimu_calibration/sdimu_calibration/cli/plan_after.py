@@ -75,9 +75,12 @@ def _diagnosed(console: Console, asked: After) -> Standing:
 
 
 def tell_gain(
-    console: Console, start: Plan, found: Found, classes: Sequence[Sequence[str]],
+    console: Console,
+    start: Plan,
+    found: Found,
+    classes: Sequence[Sequence[str]],
     sigmas: tuple[Bounds, Bounds, Bounds],
-) -> None:  # fmt: skip
+) -> None:
     """Say what the plan tells beyond what is known, beside the plan that the search began with.
 
     Parameters
@@ -109,4 +112,3 @@ def tell_gain(
             f"{labels[0]} from {', '.join(labels[1:])}, each as large as its prior: apart by {sizes[0]:.1f} sigma now, "
             f"{sizes[1]:.1f} after {start.name}, {sizes[2]:.1f} after the plan found",
         )
-

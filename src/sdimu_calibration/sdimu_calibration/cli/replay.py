@@ -97,9 +97,7 @@ def replay(bag: BagArgument, playing: Playing, opening: Recorded) -> None:
     leave(calibration)
 
 
-def _play(
-    log: Path, calibrating: dict[str, Any], player: dict[str, Any], patience: float, domain: int | None
-) -> int:
+def _play(log: Path, calibrating: dict[str, Any], player: dict[str, Any], patience: float, domain: int | None) -> int:
     """Run the calibration node and the player until both have ended; the ROS domain they ran in."""
     import time
 

@@ -152,9 +152,7 @@ def diagnosed_set(
 
 
 @contextmanager
-def _begun(
-    console: Console, asked: SetRequest
-) -> Iterator[tuple[tuple[Member, ...], SetOptions, Run, Progress]]:
+def _begun(console: Console, asked: SetRequest) -> Iterator[tuple[tuple[Member, ...], SetOptions, Run, Progress]]:
     """Members, options and runner of what is asked, with a bar that shows the recordings that are done."""
     from sdimu_calibration.cli.progress import bar
     from sdimu_calibration.storage.recording_set import BagSource, load_set, set_of, set_options
@@ -175,6 +173,7 @@ def _begun(
     members = tuple(m if serial is None else replace(m, serial=serial) for m in wanted.members)
     options = set_options(replace(wanted, members=members), request.model, request.add or [], request.asked_estimator)
     with bar(console) as progress:
+
         def told(done: int, of: int) -> None:
             progress(f"recordings {done} of {of}", done / of)
 

@@ -22,7 +22,6 @@ def bench(
     from rich.box import SIMPLE_HEAD
     from rich.table import Table
 
-
     with TemporaryDirectory() as folder:
         lines = [
             (what, f"{wall:.3f} s", f"{cpu:.3f} s", f"{count / wall:,.{0 if count > wall * 100 else 2}f} {noun}/s")

@@ -18,6 +18,7 @@ RateOption = Annotated[float, typer.Option(help="Sample rate of the IMU (Hz), 10
 DrawnImuOption = Annotated[str, typer.Option(help="IMU specification: true errors are drawn from it.")]
 SeedOption = Annotated[int, typer.Option(min=0, help="Of coefficients, mount and noise.")]
 
+
 @dataclass(frozen=True)
 class Spread:
     """Where the runs of a campaign are computed.

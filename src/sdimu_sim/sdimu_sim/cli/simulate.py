@@ -33,9 +33,9 @@ class Drawn:
     noise : list of str or None
     """
 
-    unit: Annotated[
-        int | None, typer.Option(min=0, help="Seed of the coefficients alone: recordings of one unit.")
-    ] = None
+    unit: Annotated[int | None, typer.Option(min=0, help="Seed of the coefficients alone: recordings of one unit.")] = (
+        None
+    )
     turn_on: Annotated[
         list[str] | None,
         typer.Option(
