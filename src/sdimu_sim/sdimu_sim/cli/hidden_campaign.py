@@ -9,24 +9,22 @@ from typing import Annotated
 import typer
 
 from sdimu_calibration.cli.console import plain
-from sdimu_calibration.cli.option_groups import with_options
-from sdimu_sim.cli.options import DrawnImuOption, Spread
 
 _KIND = "Kind of draw: weak, strong, pair, clean, outside or noise; repeatable; all of them without it."
+_SCHEDULER = "Address of a dask scheduler (tcp://host:8786); without it: processes on this machine."
 
 
-@with_options
 def hidden_campaign(
     number: Annotated[int, typer.Option("-n", "--runs", help="How many runs of each kind.")] = 30,
     kind: Annotated[list[str] | None, typer.Option(help=_KIND)] = None,
     out: Annotated[Path, typer.Option(help="Folder of runs and results; run again to go on where it stood.")] = Path(
         "out/hidden-campaign"
     ),
-    imu: DrawnImuOption = "dtg",
+    imu: Annotated[str, typer.Option(help="IMU specification: true errors are drawn from it.")] = "dtg",
     model: Annotated[str, typer.Option(help="Model that is to be found wanting.")] = "baseline",
     seed: Annotated[int, typer.Option(help="Seed of the first run of each kind; the others follow.")] = 1,
-    *,
-    spread: Spread,
+    scheduler: Annotated[str | None, typer.Option(help=_SCHEDULER)] = None,
+    workers: Annotated[int, typer.Option(help="Local processes.")] = 2,
 ) -> None:
     """Hide effects at random, diagnose the recordings blindly, and score the findings by name."""
     # Inside the function: the help of `sdimu` must not wait for numerical libraries.
@@ -54,7 +52,7 @@ def hidden_campaign(
         work = HiddenRun(word, specification, baseline, tuple(tables))
         console.print(f"{word}:")
         with bar(console) as progress:
-            rows += run_campaign(work, range(seed, seed + number), out, spread.scheduler, progress, spread.workers)
+            rows += run_campaign(work, range(seed, seed + number), out, scheduler, progress, workers)
     summary = summarise(rows) | {"first_seed": seed}
     write_json(out / "hidden-effects.json", summary)
     write_page(out / "hidden-effects.md", out / "hidden-effects.json")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -11,10 +12,27 @@ from sdimu_calibration.cli.console import plain
 from sdimu_calibration.cli.option_groups import with_options
 from sdimu_calibration.cli.options import ModelOption
 from sdimu_calibration.core.recording import DataError
-from sdimu_sim.cli.options import DrawnImuOption, PlanOption, Spread, World
+from sdimu_sim.cli.options import PlanOption, World
 
 if TYPE_CHECKING:
     from sdimu_sim.campaign.run import CalibrationRun
+
+
+@dataclass(frozen=True)
+class Spread:
+    """Where the runs of a campaign are computed.
+
+    Attributes
+    ----------
+    scheduler : str or None
+    workers : int
+    """
+
+    scheduler: Annotated[
+        str | None,
+        typer.Option(help="Address of a dask scheduler (tcp://host:8786); without it: processes on this machine."),
+    ] = None
+    workers: Annotated[int, typer.Option(help="Local processes.")] = 2
 
 
 @with_options
@@ -24,7 +42,7 @@ def monte_carlo(
         "out/monte-carlo"
     ),
     plan: PlanOption = "kim18",
-    imu: DrawnImuOption = "dtg",
+    imu: Annotated[str, typer.Option(help="IMU specification: true errors are drawn from it.")] = "dtg",
     model: ModelOption = "baseline",
     seed: Annotated[int, typer.Option(help="Seed of the first run; the others follow.")] = 1,
     *,

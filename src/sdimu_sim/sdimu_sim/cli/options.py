@@ -14,26 +14,7 @@ if TYPE_CHECKING:
     from sdimu_sim.core.scenario import Scenario
 
 PlanOption = Annotated[str, typer.Option(help="Test plan: name in config/plan or path.")]
-RateOption = Annotated[float, typer.Option(help="Sample rate of the IMU (Hz), 10 to 1000.")]
-DrawnImuOption = Annotated[str, typer.Option(help="IMU specification: true errors are drawn from it.")]
 SeedOption = Annotated[int, typer.Option(min=0, help="Of coefficients, mount and noise.")]
-
-
-@dataclass(frozen=True)
-class Spread:
-    """Where the runs of a campaign are computed.
-
-    Attributes
-    ----------
-    scheduler : str or None
-    workers : int
-    """
-
-    scheduler: Annotated[
-        str | None,
-        typer.Option(help="Address of a dask scheduler (tcp://host:8786); without it: processes on this machine."),
-    ] = None
-    workers: Annotated[int, typer.Option(help="Local processes.")] = 2
 
 
 @dataclass(frozen=True)
@@ -55,7 +36,7 @@ class World:
 
     site: Annotated[str, typer.Option(help="Site.")] = "daejeon"
     table: Annotated[str, typer.Option(help="Rate table.")] = "ideal"
-    rate: RateOption = 100.0
+    rate: Annotated[float, typer.Option(help="Sample rate of the IMU (Hz), 10 to 1000.")] = 100.0
     mount: Annotated[str | None, typer.Option(help="Rotation of the IMU on the table: 'X,Y,Z' (deg).")] = None
     mount_max: Annotated[float, typer.Option(help="Without --mount: drawn up to this about every axis (deg).")] = 3.0
     effect: Annotated[
