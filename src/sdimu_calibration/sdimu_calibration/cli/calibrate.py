@@ -20,13 +20,7 @@ from sdimu_calibration.cli.set_run import SetRequest, calibrate_together, refuse
 
 @dataclass(frozen=True)
 class CalibrationRequest(Request):
-    """What `sdimu calibrate` is asked.
-
-    Attributes
-    ----------
-    truth : Path or None
-        Of a simulation.
-    """
+    """What `sdimu calibrate` is asked."""
 
     truth: Annotated[Path | None, typer.Option(help="Truth of a simulation, to show the errors.")] = None
 

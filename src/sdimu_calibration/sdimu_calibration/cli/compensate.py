@@ -15,17 +15,7 @@ from sdimu_calibration.cli.options import BagArgument, OwnEffectOption, ReplaceO
 
 @dataclass(frozen=True)
 class Taken:
-    """What is taken out of the samples, and what is known of their temperature.
-
-    Attributes
-    ----------
-    imu, frame_id : str or None
-    effect : list of str or None
-        Effects of the user's own.
-    same_start : bool
-    start_temperature : float or None
-        deg C.
-    """
+    """What is taken out of the samples, and what is known of their temperature."""
 
     imu: Annotated[
         str | None,

@@ -20,16 +20,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Certified:
-    """What a certificate says of a unit and its test.
-
-    Attributes
-    ----------
-    certificate : bool
-    serial : str or None
-    operator, plan : str
-    recording : list of Path or None
-        Not beside their results.
-    """
+    """What a certificate says of a unit and its test."""
 
     certificate: Annotated[bool, typer.Option("--certificate", help="Of one unit: --serial, with hashes.")] = False
     serial: Annotated[str | None, typer.Option(help="Results of this unit alone.")] = None

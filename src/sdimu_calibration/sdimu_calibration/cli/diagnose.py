@@ -28,16 +28,7 @@ NO_BOOTSTRAP = "--bootstrap: a handheld run learns its scatter, so there is no n
 
 @dataclass(frozen=True)
 class DiagnosisRequest(Request):
-    """What `sdimu diagnose` is asked.
-
-    Attributes
-    ----------
-    attempt : list of str or None
-        Effects to try with the catalogue.
-    grow : bool
-    bootstrap : int
-        Number of searches on pure noise.
-    """
+    """What `sdimu diagnose` is asked."""
 
     add: Annotated[
         list[str] | None, typer.Option(metavar="EFFECT", help="Effect to add to the model: name or YAML file.")

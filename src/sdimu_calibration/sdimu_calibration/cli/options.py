@@ -64,13 +64,7 @@ def _read(metavar: str, text: str) -> OptionInfo:
 
 @dataclass(frozen=True)
 class Place:
-    """Where and with what a recording was made.
-
-    Attributes
-    ----------
-    site, imu : str or None
-        Names or paths.
-    """
+    """Where and with what a recording was made."""
 
     site: Annotated[
         str | None, typer.Option(help="Where the test was: name in config/site or path; daejeon when left out.")
@@ -95,13 +89,7 @@ class Place:
 
 @dataclass(frozen=True)
 class Reading:
-    """How samples are to be read, where that is not to be recognised.
-
-    Attributes
-    ----------
-    imu_topic, status_topic, joint_topic, temperature_topic, accel_unit, gyro_unit : str or None
-    accel_sign, gyro_sign : int or None
-    """
+    """How samples are to be read, where that is not to be recognised."""
 
     imu_topic: Annotated[str | None, _read("TOPIC", "sensor_msgs/Imu.")] = None
     status_topic: Annotated[str | None, _read("TOPIC", "diagnostic_msgs/DiagnosticArray with a phase.")] = None
@@ -129,12 +117,7 @@ class Recorded(Reading, Place):
 
 @dataclass(frozen=True)
 class Stated(Place):
-    """What else is stated of a recording.
-
-    Attributes
-    ----------
-    noise, whole_turns, exclude_stops, exclude_times, serial, power_on, reference_temperature : str or None
-    """
+    """What else is stated of a recording."""
 
     site: Annotated[
         str | None, typer.Option(help="Where the test was: name in config/site or path; daejeon (handheld: none).")
@@ -249,18 +232,7 @@ class Opening(Reading, Stated):
 
 @dataclass(frozen=True)
 class Fitted:
-    """What is fitted, and how.
-
-    Attributes
-    ----------
-    model : str or None
-        Name or path.
-    estimator : str
-    hand : bool
-        The handheld estimator, in one word.
-    add : list of str or None
-        Effects added to the model.
-    """
+    """What is fitted, and how."""
 
     model: Annotated[
         str | None, typer.Option(help="Model to estimate: name in config/model or path; baseline (handheld: hand).")
@@ -302,20 +274,7 @@ class Fitted:
 
 @dataclass(frozen=True)
 class Request(Fitted):
-    """What is asked of a recording, or of a set.
-
-    Attributes
-    ----------
-    set_file : Path or None
-        In the place of bags.
-    workers : int
-    scheduler : str or None
-        Address.
-    out : Path or None
-        Folder of the results.
-    as_json : bool
-        Print the answer as JSON; words go to stderr.
-    """
+    """What is asked of a recording, or of a set."""
 
     set_file: SetOption = None
     workers: Annotated[

@@ -25,16 +25,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Planned:
-    """What a plan is for.
-
-    Attributes
-    ----------
-    plan : str
-        To begin with.
-    imu, site : str or None
-    model : str
-    add : list of str or None
-    """
+    """What a plan is for."""
 
     plan: Annotated[str, typer.Option(help="Plan to begin with: name in config/plan or path.")] = "kim18"
     imu: Annotated[
@@ -51,21 +42,7 @@ class Planned:
 
 @dataclass(frozen=True)
 class Allowed:
-    """What a plan may take, and what the table can do.
-
-    Attributes
-    ----------
-    minutes : float or None
-    limit : list of str or None
-    slack : float
-    rates : str
-        deg/s.
-    acceleration : float
-        deg/s^2.
-    dwells : str
-        s.
-    tries : int
-    """
+    """What a plan may take, and what the table can do."""
 
     minutes: Annotated[
         float | None, typer.Option(min=1.0, help="Time available: the best sigmas in it. Without: the shortest plan.")
@@ -112,18 +89,7 @@ class Allowed:
 
 @dataclass(frozen=True)
 class PlanRequest:
-    """What is asked beside the shortest plan, and where the answer goes.
-
-    Attributes
-    ----------
-    tell : list of str or None
-        Coefficients to tell apart.
-    after : list of Path or None
-        What is known already.
-    backwards : bool
-    out : Path
-    as_json : bool
-    """
+    """What is asked beside the shortest plan, and where the answer goes."""
 
     tell: Annotated[
         list[str] | None,

@@ -23,19 +23,7 @@ from sdimu_calibration.cli.options import (
 
 @dataclass(frozen=True)
 class Playing:
-    """How a recording is played into the node.
-
-    Attributes
-    ----------
-    model : str
-    speed : float
-        Times real time.
-    out : Path or None
-    domain : int or None
-    patience : float
-        s.
-    diagnose : bool
-    """
+    """How a recording is played into the node."""
 
     model: ModelOption = "baseline"
     speed: Annotated[float, typer.Option(help="Times real time; 0 is as fast as the calibration allows.")] = 0.0

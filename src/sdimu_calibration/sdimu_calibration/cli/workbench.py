@@ -21,15 +21,7 @@ HOST = "127.0.0.1"
 
 @dataclass(frozen=True)
 class Served:
-    """Where the page is served, and what it begins with.
-
-    Attributes
-    ----------
-    port : int
-    host : str
-    model : str or None
-    set_file : Path or None
-    """
+    """Where the page is served, and what it begins with."""
 
     port: Annotated[int, typer.Option(min=1, max=65535, help="Port on this machine.")] = 8050
     host: Annotated[str, typer.Option(help="Address to listen on; others than this machine only when asked.")] = HOST

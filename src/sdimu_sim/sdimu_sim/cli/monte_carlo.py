@@ -20,13 +20,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Spread:
-    """Where the runs of a campaign are computed.
-
-    Attributes
-    ----------
-    scheduler : str or None
-    workers : int
-    """
+    """Where the runs of a campaign are computed."""
 
     scheduler: Annotated[
         str | None,

@@ -19,20 +19,7 @@ SeedOption = Annotated[int, typer.Option(min=0, help="Of coefficients, mount and
 
 @dataclass(frozen=True)
 class World:
-    """The world of a simulated test: where, on which table, what is hidden in it.
-
-    Attributes
-    ----------
-    site, table : str
-    rate : float
-        Hz.
-    mount : str or None
-        deg.
-    mount_max : float
-        deg.
-    effect : list of str or None
-    temperature : str or None
-    """
+    """The world of a simulated test: where, on which table, what is hidden in it."""
 
     site: Annotated[str, typer.Option(help="Site.")] = "daejeon"
     table: Annotated[str, typer.Option(help="Rate table.")] = "ideal"

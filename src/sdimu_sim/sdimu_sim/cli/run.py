@@ -30,18 +30,7 @@ DEFAULT_MODEL = "baseline"
 
 @dataclass(frozen=True)
 class LiveTest:
-    """What is run, and how it is followed.
-
-    Attributes
-    ----------
-    plan, adaptive : str or None
-        One of them.
-    imu, model : str
-    speed : float
-        Times real time.
-    seed : int
-    diagnose, ask : bool
-    """
+    """What is run, and how it is followed."""
 
     plan: Annotated[
         str | None, typer.Option(help="Test plan: name in config/plan or path; kim18. Not with --adaptive.")

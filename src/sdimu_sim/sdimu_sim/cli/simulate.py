@@ -22,16 +22,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Drawn:
-    """What is drawn for a test.
-
-    Attributes
-    ----------
-    unit : int or None
-        Seed of the coefficients alone.
-    turn_on : list of str or None
-    seed : int
-    noise : list of str or None
-    """
+    """What is drawn for a test."""
 
     unit: Annotated[int | None, typer.Option(min=0, help="Seed of the coefficients alone: recordings of one unit.")] = (
         None
@@ -56,15 +47,7 @@ class Drawn:
 
 @dataclass(frozen=True)
 class Kept:
-    """What is written beside the samples.
-
-    Attributes
-    ----------
-    truth : Path or None
-    serial, power_on : str
-    replace : bool
-        A bag that is there.
-    """
+    """What is written beside the samples."""
 
     truth: Annotated[Path | None, typer.Option(help="Truth file; default: OUT.truth.yaml beside the bag.")] = None
     serial: Annotated[str, typer.Option(help="Serial number of the unit, kept in the bag's metadata.")] = ""
