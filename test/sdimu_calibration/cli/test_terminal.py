@@ -162,6 +162,10 @@ def test_advice_repeats_what_was_asked_for():
         "sdimu", "calibrate", "a bag", "--site", "my site.yaml", "--imu", "dtg", "--gyro-sign", "-1", "--add",
         "lever_arm", "--add", "coupling.yaml:k1", "--add", "x(tau=3 s)",
     ]  # fmt: skip
+    request = Request("m", "filter", hand=True, add=["x"])
+    full = Asked.of((), Path(), Opening("s", noise="estimated", serial="7"), request)
+    words = shlex.join(full.options)
+    assert words == "--site s --model m --noise estimated --estimator filter --serial 7 --hand --add x"
     _, command = spelled("Turns ranked by what they tell: sdimu plan --plan YOURS --tell 'a' --tell 'b'.", asked)
     assert shlex.split(command) == [
         "sdimu", "plan", "--plan", "out/plan.yaml", "--site", "my site.yaml", "--imu", "dtg",

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from sdimu_calibration.cli.console import command, say
-from sdimu_calibration.cli.option_groups import words_of
+from sdimu_calibration.cli.option_groups import words_by_option, words_of
 from sdimu_calibration.cli.options import Fitted, Place
 
 if TYPE_CHECKING:
@@ -25,6 +25,8 @@ DIAGNOSE = "run: sdimu diagnose"
 """Words of a note that sends to a diagnosis."""
 _ACCELERATION = 1.0
 """Angular acceleration (rad/s^2) of a plan that was seen: the motion does not tell the limit, and no sum needs it."""
+_FIRST = ("site", "imu", "model", "noise", "estimator")
+"""Options that a command names first; the others stand as their groups have them."""
 _COMMAND = re.compile(r"^(.*?):? ((?:sdimu [a-z]+ |--add ).*?)\.?$")
 
 
@@ -52,8 +54,9 @@ class Asked:
     def of(cls, bags: Sequence[Path], folder: Path, opening: Place, fitted: Fitted | None = None) -> Asked:
         """Take how a recording was opened, and what was fitted to it."""
         place = words_of(Place(opening.site, opening.imu), Place)
-        options = words_of(opening, type(opening)) + ([] if fitted is None else words_of(fitted, Fitted))
-        return cls(bags, options, place, folder)
+        by_option = words_by_option(opening, type(opening)) | words_by_option(fitted or Fitted(), Fitted)
+        order = sorted(by_option, key=lambda name: _FIRST.index(name) if name in _FIRST else len(_FIRST))
+        return cls(bags, [word for name in order for word in by_option[name]], place, folder)
 
     def command(self, verb: str) -> str:
         """Write the command of a verb about the same recording, with the same options."""

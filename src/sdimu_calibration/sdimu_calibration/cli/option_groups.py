@@ -48,7 +48,7 @@ def _options(group: type) -> Iterator[Parameter]:
         yield Parameter(one.name, Parameter.POSITIONAL_OR_KEYWORD, default=usual, annotation=kinds[one.name])
 
 
-def words_of(stated: Any, group: Any) -> list[str]:
+def words_by_option(stated: Any, group: Any) -> dict[str, list[str]]:
     """Write what is stated of the options in a group as words of a command; nothing for those left as they are.
 
     Parameters
@@ -56,12 +56,23 @@ def words_of(stated: Any, group: Any) -> list[str]:
     stated : dataclass
         The group itself, or one with more options.
     group : dataclass type
+
+    Returns
+    -------
+    dict of str to list of str
+        Words by option, in the order of the group.
     """
-    words = []
+    words: dict[str, list[str]] = {}
     for one in fields(group):
         value, name = getattr(stated, one.name), f"--{one.name.replace('_', '-')}"
         if isinstance(value, bool):
-            words += [name] if value else []
+            words[one.name] = [name] if value else []
         elif value not in (None, one.default):
-            words += [word for part in (value if isinstance(value, list) else [value]) for word in (name, str(part))]
+            parts = value if isinstance(value, list) else [value]
+            words[one.name] = [word for part in parts for word in (name, str(part))]
     return words
+
+
+def words_of(stated: Any, group: Any) -> list[str]:
+    """Write the same one after the other."""
+    return [word for words in words_by_option(stated, group).values() for word in words]
