@@ -21,21 +21,13 @@ MANY_ARGUMENTS: dict[Place, str] = {
     ("sdimu_calibration/report/page.py", "write_report"): "keyword arguments of doc/report.md",
     ("sdimu_calibration/core/batch/preintegration.py", "_navigate"): "compiled: arrays, not objects",
     ("sdimu_calibration/core/data/resting_cycles.py", "_join"): "compiled",
-    ("sdimu_calibration/core/estimation/free_inertial.py", "_navigate"): "compiled",
-    ("sdimu_calibration/core/evidence/signatures.py", "_signatures"): "compiled",
-    ("sdimu_calibration/core/evidence/signatures.py", "_constant_signatures"): "compiled",
     ("sdimu_calibration/core/filter/filter_pass.py", "_navigate_epoch"): "compiled",
     ("sdimu_calibration/core/navigation/track.py", "_seen"): "compiled",
     ("sdimu_calibration/core/navigation/track.py", "motion"): "not yet grouped",
-    ("sdimu_calibration/core/evidence/signatures.py", "signatures"): "not yet grouped",
-    ("sdimu_calibration/core/evidence/signatures.py", "constant_signatures"): "not yet grouped",
-    ("sdimu_calibration/storage/bag_writer.py", "write_recording"): "not yet grouped",
+    ("sdimu_calibration/storage/bags/bag_writer.py", "write_recording"): "not yet grouped",
 }
 """Functions with more arguments, and why."""
-DEEP: dict[Place, str] = {
-    ("sdimu_calibration/core/diagnosis/candidates.py", "equations"): "not yet parted",
-    ("sdimu_calibration/core/evidence/signatures.py", "_constant_signatures"): "compiled: loops over matrices",
-}
+DEEP: dict[Place, str] = {}
 """Functions that nest deeper, and why."""
 
 

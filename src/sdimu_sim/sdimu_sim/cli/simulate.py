@@ -77,7 +77,6 @@ def simulate(
 ) -> None:
     """Simulate a whole test into a bag, with the truth in a separate file."""
     # Inside the function: the help of `sdimu` must not wait for numerical libraries.
-    from sdimu_calibration.storage.files.config import load_imu, load_site
     from sdimu_sim.bag_file import write_test
     from sdimu_sim.core.scenario import simulate_test
     from sdimu_sim.truth_file import write_truth
