@@ -11,7 +11,7 @@ import pytest
 import typer
 
 from sdimu_calibration.cli import main as cli
-from sdimu_calibration.cli.options import leave
+from sdimu_calibration.cli.opened import leave
 from sdimu_calibration.core.diagnosis import diagnose as of_one
 from sdimu_calibration.core.joint import set_diagnosis as of_set
 from sdimu_calibration.core.recording import DataFault

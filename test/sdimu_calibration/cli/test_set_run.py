@@ -11,7 +11,7 @@ import pytest
 
 from sdimu_calibration.cli.set_run import page_title, table_heading
 from sdimu_calibration.core.results import Calibration, SetSummary, no_history
-from sdimu_calibration.report.page import page
+from sdimu_calibration.report.page import Contents, page
 
 RESULT = Calibration(
     "prior", ("accel_bias",), ("accel_bias_x",), ("m/s^2",), ("ug",), np.array([1e-4]), np.array([[1e-12]]),
@@ -44,5 +44,5 @@ def test_the_table_names_what_was_refused():
 
 def test_the_page_names_it_above_the_table():
     told = replace(RESULT, of_set=replace(RESULT.of_set, left_out=(("c.mcap", "no samples"),)))
-    text = page(told, "x")
+    text = page(told, Contents("x"))
     assert text.index("Without c.mcap, which is left out: no samples.") < text.index("accel_bias_x")

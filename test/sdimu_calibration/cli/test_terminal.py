@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 
 from sdimu_calibration.cli.next_commands import Asked, spelled
+from sdimu_calibration.cli.options import Opening, Request
 from sdimu_calibration.core.advice import Advice, Kind, Verb
 from sdimu_calibration.storage.files.advice_words import sentence
 
@@ -155,9 +156,8 @@ def test_advice_can_be_pasted(sdimu):
 
 
 def test_advice_repeats_what_was_asked_for():
-    given = {"site": "my site.yaml", "imu": "dtg", "model": None, "estimator": "auto", "gyro_sign": -1, "hand": False,
-             "add": ["lever_arm"], "out": Path("out")}  # fmt: skip
-    asked = Asked.of((Path("a bag"),), given, Path("out"))
+    request = Request(add=["lever_arm"], out=Path("out"), workers=3)
+    asked = Asked.of((Path("a bag"),), Path("out"), Opening("my site.yaml", "dtg", gyro_sign=-1), request)
     kept = Advice(Kind.KEEP, ("lever",), Verb.ADD, ("coupling.yaml:k1", "x(tau=3 s)"))
     command = spelled(kept, asked)
     assert sentence(kept) == "Keep lever in the model: --add 'coupling.yaml:k1' --add 'x(tau=3 s)'."
@@ -165,6 +165,10 @@ def test_advice_repeats_what_was_asked_for():
         "sdimu", "calibrate", "a bag", "--site", "my site.yaml", "--imu", "dtg", "--gyro-sign", "-1", "--add",
         "lever_arm", "--add", "coupling.yaml:k1", "--add", "x(tau=3 s)",
     ]  # fmt: skip
+    request = Request("m", "filter", hand=True, add=["x"])
+    full = Asked.of((), Path(), Opening("s", noise="estimated", serial="7"), request)
+    words = shlex.join(full.options)
+    assert words == "--site s --model m --noise estimated --estimator filter --serial 7 --hand --add x"
     ranked = Advice(Kind.RANK_TURNS, (), Verb.RANK_TURNS, ("a", "b"))
     assert sentence(ranked) == "Turns ranked by what they tell: sdimu plan --plan YOURS --tell 'a' --tell 'b'."
     command = spelled(ranked, asked)

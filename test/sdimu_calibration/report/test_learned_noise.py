@@ -20,7 +20,7 @@ from sdimu_calibration.core.noise_term import FLICKER, NoiseTerm
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.report import first_screen, sections
 from sdimu_calibration.report.evidence_figures import rungs
-from sdimu_calibration.report.page import page
+from sdimu_calibration.report.page import Contents, page
 from sdimu_calibration.report.report_extras import report_extras
 from sdimu_calibration.storage.files.result_file import as_note
 
@@ -107,7 +107,7 @@ def test_nothing_is_shown_with_what_was_found_where_nothing_was(learned, diagnos
 
 
 def test_a_page_says_before_its_numbers_that_headings_mean_nothing(learned):
-    body = page(learned.after, "x", summary=summarise(learned)).partition("<body>")[2]
+    body = page(learned.after, Contents("x", summary=summarise(learned))).partition("<body>")[2]
     assert body.index("headings of this test mean nothing") < body.index("How well it predicts")
     assert first_screen.of_fit(learned.after).remarks
     assert not first_screen.of_fit(replace(learned.after, notes=())).remarks

@@ -26,14 +26,14 @@ from sdimu_calibration.report import (
 )
 from sdimu_calibration.report.export import as_csv, as_yaml
 from sdimu_calibration.report.markup import prose
-from sdimu_calibration.report.page import page
+from sdimu_calibration.report.page import Contents, page
 from sdimu_calibration.report.report_extras import ReportExtras
 from sdimu_calibration.report.table import rows
 
 
 @pytest.fixture(scope="module")
 def text(diagnosis: Diagnosis, more: ReportExtras) -> str:
-    return page(diagnosis.after, "A test", summary=summarise(diagnosis), more=more)
+    return page(diagnosis.after, Contents("A test", summary=summarise(diagnosis), more=more))
 
 
 def all_figures(diagnosis: Diagnosis, more: ReportExtras) -> dict[str, object]:
@@ -132,7 +132,7 @@ def test_the_page_says_what_it_means_in_use(text, more):
 
 
 def test_the_page_says_why_nothing_was_navigated(diagnosis):
-    text = page(diagnosis.after, "x", summary=summarise(diagnosis), more=ReportExtras(no_trial="too short"))
+    text = page(diagnosis.after, Contents("x", summary=summarise(diagnosis), more=ReportExtras(no_trial="too short")))
     assert "Not tried: too short." in text
 
 
@@ -142,7 +142,7 @@ def test_the_ladder_of_refits_tells_every_rung(diagnosis):
         Rung("some_effect", True, "", 20.0, 30.0, 1.01, 0.98, 1.0, 0.001, (("gyro_bias_x", 7.1),)),
         Rung("other_effect", False, "does not lower it", 21.0, 1.0, 1.01, 0.99, 1.0, 0.001, ()),
     )
-    text = page(diagnosis.after, "x", summary=summarise(replace(diagnosis, rungs=rungs)))
+    text = page(diagnosis.after, Contents("x", summary=summarise(replace(diagnosis, rungs=rungs))))
     for word in ("+ some_effect", "+30.0", "gyro_bias_x +7.1", "refused: does not lower it"):
         assert word in text
 
@@ -171,7 +171,7 @@ def test_a_diagnosis_of_a_right_model_makes_a_page_too(diagnosis):
         diagnosis.evidence,
     )
     quiet = type(diagnosis)(**{**vars(diagnosis), "found": empty, "adequate": True, "verdict": "consistent"})
-    text = page(diagnosis.before, "x", summary=summarise(quiet))
+    text = page(diagnosis.before, Contents("x", summary=summarise(quiet)))
     assert "No candidate stands out" in text
     assert 'class="verdict good"' in text
 

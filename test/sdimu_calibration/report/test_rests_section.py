@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from sdimu_calibration.core.results import Calibration, Rest, no_history
-from sdimu_calibration.report.page import page
+from sdimu_calibration.report.page import Contents, page
 from sdimu_calibration.storage.files.result_file import read_result, write_result
 
 NONE = (float("nan"),) * 3
@@ -37,7 +37,7 @@ def test_rests_come_back_from_a_result_file(tmp_path):
 
 
 def test_the_page_lists_rests_with_residuals_in_units_and_sigmas():
-    text = page(BY_HAND, "by hand")
+    text = page(BY_HAND, Contents("by hand"))
     assert "Rests and their residuals" in text
     row = text.split("<td>60.0</td><td>64.5</td>")[1].split("</tr>")[0]
     # 1 mg of force on one axis is 9.8 mm/s^2: of 1 mm/s^2 sigma, RMS of three axes 5.66; one arcmin is 2.9 of 1e-4 rad.
@@ -45,4 +45,4 @@ def test_the_page_lists_rests_with_residuals_in_units_and_sigmas():
     assert row.replace("\N{EM SPACE}", " ") == (
         "<td>0 0 1000</td><td>5.66</td><td>62 0 0</td><td>0.87</td><td>1.00 0.00 0.00</td><td>1.68</td>"
     )
-    assert "Rests and their residuals" not in page(PLAIN, "on a table")
+    assert "Rests and their residuals" not in page(PLAIN, Contents("on a table"))

@@ -14,7 +14,7 @@ from sdimu_calibration.core.results import Calibration, History
 from sdimu_calibration.core.units import to_si
 from sdimu_calibration.report.figures import rotations, sigma_history, spread
 from sdimu_calibration.report.groups import groups, short_name
-from sdimu_calibration.report.page import page
+from sdimu_calibration.report.page import Contents, page
 from sdimu_calibration.report.table import cells, headings, rich_table, rows, with_sigma
 
 
@@ -94,7 +94,7 @@ def test_the_longest_effect_name_wins():
 
 
 def test_the_page_needs_no_network_and_escapes_what_is_not_its_own(calibration):
-    text = page(calibration, "<Calibration>")
+    text = page(calibration, Contents("<Calibration>"))
     assert "&lt;Calibration&gt;" in text
     assert "2 &lt; 3 &amp; more" in text
     assert not re.search(r"<(script|link|img)[^>]+(src|href)=", text)
@@ -104,9 +104,9 @@ def test_the_page_needs_no_network_and_escapes_what_is_not_its_own(calibration):
 def test_the_page_without_a_history_draws_none(calibration):
     h = calibration.history
     empty = replace(h, **{name: getattr(h, name)[:0] for name in h.__dataclass_fields__})
-    text = page(replace(calibration, history=empty), "x")
+    text = page(replace(calibration, history=empty), Contents("x"))
     assert "gyro_bias_x" in text
-    assert "against time" in page(calibration, "x")
+    assert "against time" in page(calibration, Contents("x"))
     assert "against time" not in text
 
 
@@ -139,7 +139,7 @@ def test_labels_are_pushed_apart_no_further_than_needed():
 
 
 def test_a_page_without_diagnosis_says_where_the_verdict_is(calibration):
-    assert "sdimu diagnose" in page(calibration, "x")
+    assert "sdimu diagnose" in page(calibration, Contents("x"))
 
 
 @pytest.mark.parametrize(

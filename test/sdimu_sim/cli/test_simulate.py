@@ -9,7 +9,8 @@ from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage.bags.bag_metadata import custom_data
 from sdimu_calibration.storage.bags.bag_reader import read_recording
 from sdimu_calibration.storage.files.config import load_imu, load_plan, load_site
-from sdimu_sim.cli.simulate import mount_rad, simulate
+from sdimu_sim.cli.options import mount_rad
+from sdimu_sim.cli.simulate import simulate
 from sdimu_sim.core import Scenario, generate
 from sdimu_sim.truth_file import read_truth
 

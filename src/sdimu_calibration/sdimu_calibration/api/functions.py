@@ -31,7 +31,7 @@ from sdimu_calibration.core.units import parse_quantity
 from sdimu_calibration.storage.files.config import load_imu, load_plan, load_site
 from sdimu_calibration.storage.files.effect_file import find_effects
 from sdimu_calibration.storage.files.model_choice import HANDHELD, named_estimator, named_model
-from sdimu_calibration.storage.opening import Source, open_test, with_imu_file
+from sdimu_calibration.storage.opening import Opening, Source
 from sdimu_calibration.storage.recording_set import BagSource, load_set, set_of, set_options
 
 _ABLE = Abilities((math.radians(2.0), math.radians(10.0)), math.radians(20.0), (20.0, 40.0, 60.0, 80.0, 100.0, 130.0))
@@ -79,11 +79,17 @@ def open(  # noqa: A001 (as every library of files has it)
     DataError
         When the bag, the site or the IMU cannot be used.
     """
-    specification = load_imu(imu) if isinstance(imu, str) else imu
-    opened = open_test(Path(bag), site, specification, source, handheld, measured_noise)
-    opened = with_imu_file(opened, imu if isinstance(imu, str) else None)
-    opened = opened.without_stops(tuple(exclude_stops)).without_times(tuple(exclude_times))
-    return opened if whole_turns is None else replace(opened, whole_turns=parse_quantity(whole_turns, "deg"))
+    return Opening(
+        site,
+        load_imu(imu) if isinstance(imu, str) else imu,
+        source or Source(),
+        handheld,
+        measured_noise,
+        0.0 if whole_turns is None else parse_quantity(whole_turns, "deg"),
+        tuple(exclude_stops),
+        tuple(exclude_times),
+        imu_file=imu if isinstance(imu, str) else None,
+    ).test(Path(bag))
 
 
 def open_set(

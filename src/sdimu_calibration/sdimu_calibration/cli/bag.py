@@ -9,18 +9,17 @@ from typing import Annotated
 
 import typer
 
-from sdimu_calibration.cli.console import JsonOption, answer, command, plain, say
+from sdimu_calibration.cli.console import answer, command, plain, say
+from sdimu_calibration.cli.options import BagArgument, JsonOption
 from sdimu_calibration.core.plain_text import one_line
 
 app = typer.Typer(
     help="Look into a recording, take a part of it, or mend one that was cut short.", no_args_is_help=True
 )
 
-Bag = Annotated[Path, typer.Argument(metavar="BAG", help="rosbag2 folder or .mcap file.")]
-
 
 @app.command()
-def info(bag: Bag, as_json: JsonOption = False) -> None:
+def info(bag: BagArgument, as_json: JsonOption = False) -> None:
     """Show topics, types and counts."""
     from sdimu_calibration.cli.wide_table import print_table
     from sdimu_calibration.storage.bags.bag_info import read_info
@@ -35,13 +34,13 @@ def info(bag: Bag, as_json: JsonOption = False) -> None:
         command(console, shlex.join(["sdimu", "bag", "recover", str(bag)]))
     topics = {topic: {"type": name, "messages": content.counts[topic]} for topic, name in content.types.items()}
     damaged = [str(part) for part in content.damaged]
-    answer({"format": "sdimu-bag-info/1", "first_ns": content.first_ns, "last_ns": content.last_ns,
-            "topics": topics, "damaged": damaged}, as_json)  # fmt: skip
+    span = {"first_ns": content.first_ns, "last_ns": content.last_ns}
+    answer({"format": "sdimu-bag-info/1", **span, "topics": topics, "damaged": damaged}, as_json)
 
 
 @app.command()
 def cut(
-    bag: Bag,
+    bag: BagArgument,
     out: Annotated[Path, typer.Option(help="Bag to write.")],
     first: Annotated[float, typer.Option("--from", help="Seconds since the first sample.")] = 0.0,
     last: Annotated[float, typer.Option("--to", help="Seconds since the first sample; the end without it.")] = math.inf,
@@ -59,7 +58,7 @@ def cut(
 
 
 @app.command()
-def recover(bag: Bag) -> None:
+def recover(bag: BagArgument) -> None:
     """Mend a bag that was cut while it was being written; the cut file stays as NAME.damaged."""
     from sdimu_calibration.storage.bags.bag_folder import DAMAGED_SUFFIX
     from sdimu_calibration.storage.bags.recover import recover as mend

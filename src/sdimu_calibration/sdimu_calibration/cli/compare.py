@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from sdimu_calibration.cli.console import JsonOption, answer, plain, say
+from sdimu_calibration.cli.console import answer, plain, say
+from sdimu_calibration.cli.options import JsonOption
 
 if TYPE_CHECKING:
     from sdimu_calibration.core.results import Calibration
@@ -41,9 +42,7 @@ def compare(
     answer(_content(folders, rungs, results), as_json)
 
 
-def _content(
-    folders: list[Path], rungs: list[dict[str, str]], results: list[Calibration]
-) -> dict[str, Any]:  # fmt: skip
+def _content(folders: list[Path], rungs: list[dict[str, str]], results: list[Calibration]) -> dict[str, Any]:
     """Give the ladder as plain data: what the table says, with the numbers of each fit as its file has them."""
     models = [
         {"folder": str(folder), "model": list(result.model), "fit": dict(result.fit), "table": rung}

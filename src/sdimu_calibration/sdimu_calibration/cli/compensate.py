@@ -2,34 +2,42 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from sdimu_calibration.cli.console import plain
+from sdimu_calibration.cli.option_groups import with_options
+from sdimu_calibration.cli.options import BagArgument, OwnEffectOption, ReplaceOption
 
 
-def compensate(
-    bag: Annotated[Path, typer.Argument(metavar="BAG", help="rosbag2 folder or .mcap file.")],
-    result: Annotated[Path, typer.Option(help="result.json of a calibration, or its folder.")],
-    out: Annotated[Path, typer.Option(help="Bag (folder) to write: /imu/data and the other topics of BAG.")],
+@dataclass(frozen=True)
+class Taken:
+    """What is taken out of the samples, and what is known of their temperature."""
+
     imu: Annotated[
         str | None,
         typer.Option(help="IMU whose noise goes in the covariances: name or path. That of the calibration by default."),
-    ] = None,
-    effect: Annotated[
-        list[str] | None,
-        typer.Option(metavar="FILE", help="Effect of your own (YAML) that the result has; may be repeated."),
-    ] = None,
-    frame_id: Annotated[str | None, typer.Option(help="Frame of the samples; imu_ and the body frame.")] = None,
+    ] = None
+    effect: OwnEffectOption = None
+    frame_id: Annotated[str | None, typer.Option(help="Frame of the samples; imu_ and the body frame.")] = None
     same_start: Annotated[
         bool, typer.Option("--same-start", help="Switched on as the calibrated recording was: functions of time hold.")
-    ] = False,
+    ] = False
     start_temperature: Annotated[
         float | None, typer.Option(metavar="DEGC", help="Temperature at the start of the calibrated recording.")
-    ] = None,
-    replace: Annotated[bool, typer.Option("--replace", help="Overwrite the bag if it exists.")] = False,
+    ] = None
+
+
+@with_options
+def compensate(
+    bag: BagArgument,
+    result: Annotated[Path, typer.Option(help="result.json of a calibration, or its folder.")],
+    out: Annotated[Path, typer.Option(help="Bag (folder) to write: /imu/data and the other topics of BAG.")],
+    taken: Taken,
+    replace: ReplaceOption = False,
 ) -> None:
     """Take the errors out of a recording: /imu/data_raw to /imu/data with covariances."""
     from sdimu_calibration.cli.progress import bar
@@ -43,14 +51,18 @@ def compensate(
 
     console = plain()
     calibration = read_result(result)
-    own = effects_of_result(calibration.model, effect or [])
-    specification, whose = noise_for(calibration, imu)
+    own = effects_of_result(calibration.model, taken.effect or [])
+    specification, whose = noise_for(calibration, taken.imu)
     recording = read_recording(bag)
     using = compensator(
-        calibration, specification, own=own, has_temperature=recording.temperature is not None,
-        same_start=same_start, start_temperature=start_temperature,
-    )  # fmt: skip
-    frame = frame_id or frame_of(calibration.body_frame)
+        calibration,
+        specification,
+        own=own,
+        has_temperature=recording.temperature is not None,
+        same_start=taken.same_start,
+        start_temperature=taken.start_temperature,
+    )
+    frame = taken.frame_id or frame_of(calibration.body_frame)
     with bar(console) as progress:
         done = write_compensated(bag, recording, using, out, frame, replace=replace, progress=progress)
     rate, force = from_si(done.largest_rate, "deg/h"), from_si(done.largest_force, "ug")
@@ -61,6 +73,7 @@ def compensate(
         console.print(f"not compensated: {reason}", soft_wrap=True, markup=False, highlight=False)
     console.print(
         f"{out}: {done.samples} samples in frame {frame}; changed by up to {rate:.4g} deg/h and {force:.4g} ug",
-        soft_wrap=True, highlight=False,
-    )  # fmt: skip
+        soft_wrap=True,
+        highlight=False,
+    )
     console.print(f"noise in the covariances is that of {whose}", soft_wrap=True, markup=False, highlight=False)

@@ -5,17 +5,13 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import typer
 from rich.console import Console, ConsoleOptions, ConsoleRenderable, RenderHook, RenderResult
 from rich.segment import Segment
 
 from sdimu_calibration.core.plain_text import one_line, printable
-
-JsonOption = Annotated[
-    bool, typer.Option("--json", help="Print the answer as JSON, as its file has it; words go to stderr.")
-]
 
 _PIPE_WIDTH = 140
 """Columns when it is unknown how wide the output is: a file or a pipe must not cut the table."""
@@ -34,7 +30,7 @@ def say(console: Console, text: str) -> None:
     if console.is_terminal:
         line = textwrap.fill(
             line, console.width, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False
-        )  # fmt: skip
+        )
     console.print(line, soft_wrap=True, highlight=False)
 
 

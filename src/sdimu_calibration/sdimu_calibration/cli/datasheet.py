@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 import sdimu_calibration
-from sdimu_calibration.cli.console import JsonOption, answer, plain, say
+from sdimu_calibration.cli.console import answer, plain, say
+from sdimu_calibration.cli.option_groups import with_options
+from sdimu_calibration.cli.options import FoldersArgument, JsonOption, results_in
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -16,8 +19,22 @@ if TYPE_CHECKING:
     from sdimu_calibration.storage.files.fleet_folder import Entry
 
 
+@dataclass(frozen=True)
+class Certified:
+    """What a certificate says of a unit and its test."""
+
+    certificate: Annotated[bool, typer.Option("--certificate", help="Of one unit: --serial, with hashes.")] = False
+    serial: Annotated[str | None, typer.Option(help="Results of this unit alone.")] = None
+    operator: Annotated[str, typer.Option(help="Who made the test, for the certificate.")] = ""
+    plan: Annotated[str, typer.Option(help="Test plan, for the conditions.")] = ""
+    recording: Annotated[
+        list[Path] | None, typer.Option(metavar="BAG", help="Recording to hash that is not beside its result.")
+    ] = None
+
+
+@with_options
 def datasheet(
-    folders: Annotated[list[Path], typer.Argument(metavar="FOLDER ...", help="Every result.json below is taken.")],
+    folders: FoldersArgument,
     limits: Annotated[
         Path | None, typer.Option(metavar="FILE", help="YAML with the largest size of each term: pass or fail.")
     ] = None,
@@ -25,14 +42,9 @@ def datasheet(
         list[Path] | None,
         typer.Option(metavar="FILE", help="noise.json of sdimu noise (or its folder), or an IMU file; repeatable."),
     ] = None,
-    certificate: Annotated[bool, typer.Option("--certificate", help="Of one unit: --serial, with hashes.")] = False,
-    serial: Annotated[str | None, typer.Option(help="Results of this unit alone.")] = None,
-    operator: Annotated[str, typer.Option(help="Who made the test, for the certificate.")] = "",
-    plan: Annotated[str, typer.Option(help="Test plan, for the conditions.")] = "",
-    recording: Annotated[
-        list[Path] | None, typer.Option(metavar="BAG", help="Recording to hash that is not beside its result.")
-    ] = None,
-    out: Annotated[Path | None, typer.Option(file_okay=False, help="Folder of the pages; FOLDER by default.")] = None,
+    *,
+    certified: Certified,
+    out: Annotated[Path | None, results_in("pages; FOLDER")] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Make a data sheet from results; leaves datasheet.json and datasheet.html (prints on A4)."""
@@ -53,19 +65,22 @@ def datasheet(
     gathered = gather(folders, one_model=False)
     for line in gathered.apart:
         say(console, f"set apart: {line}")
-    entries = _of_unit(gathered.entries, serial, certificate)
+    entries = _of_unit(gathered.entries, certified.serial, certified.certificate)
     lines = core.datasheet([core.Sample(entry.unit, entry.result) for entry in entries], rests)
     lines = tuple(line.against(allowed[line.term]) if line.term in allowed else line for line in lines)
     about = Certificate(
-        serial=entries[0].unit if certificate else serial or "", date=datetime.now(UTC).strftime("%Y-%m-%d"),
-        operator=operator, plan=plan, version=sdimu_calibration.__version__,
-        recordings=hashed(entries, recording or []) if certificate else (),
-    )  # fmt: skip
+        serial=entries[0].unit if certified.certificate else certified.serial or "",
+        date=datetime.now(UTC).strftime("%Y-%m-%d"),
+        operator=certified.operator,
+        plan=certified.plan,
+        version=sdimu_calibration.__version__,
+        recordings=hashed(entries, certified.recording or []) if certified.certificate else (),
+    )
     print_table(console, HEADINGS, rows(lines, short=True), left=1)
     folder = out or (folders[0] if folders[0].is_dir() else folders[0].parent)
     with written_together(folder) as part:
         write_datasheet(part / "datasheet.json", lines, about, entries)
-        write_page(part / "datasheet.html", lines, about, entries, certificate)
+        write_page(part / "datasheet.html", lines, about, entries, certified.certificate)
     for name, digest in about.recordings:
         if not digest:
             say(console, f"note: {name} was not found, so it has no hash: --recording BAG")

@@ -3,55 +3,18 @@
 from __future__ import annotations
 
 import sys
-from dataclasses import replace
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from sdimu_calibration.cli.console import JsonOption, answer, plain, say
-from sdimu_calibration.cli.exclusion_options import ExcludeStops, ExcludeTimes, left_out
-from sdimu_calibration.cli.options import (
-    EstimatorOption,
-    HandOption,
-    ImuOption,
-    ModelOption,
-    NoiseOption,
-    PowerOnOption,
-    SerialOption,
-    SiteOption,
-    WholeTurnsOption,
-    default_folder,
-    explained,
-    leave,
-    opened,
-    tell,
-)
-from sdimu_calibration.cli.set_run import (
-    WORKERS,
-    Bags,
-    ReferenceOption,
-    SchedulerOption,
-    SetOption,
-    SetRequest,
-    WorkersOption,
-    about_reference,
-    diagnose_together,
-    refuse_for_sets,
-    single,
-)
-from sdimu_calibration.cli.source_options import (
-    AccelSign,
-    AccelUnit,
-    GyroSign,
-    GyroUnit,
-    ImuTopic,
-    JointTopic,
-    StatusTopic,
-    TemperatureTopic,
-    source,
-)
+from sdimu_calibration.cli.console import answer, plain, say
+from sdimu_calibration.cli.opened import default_folder, explained, leave, opened, tell
+from sdimu_calibration.cli.option_groups import with_options
+from sdimu_calibration.cli.options import BagsArgument, Opening, Request, results_in
+from sdimu_calibration.cli.set_run import SetRequest, diagnose_together, refuse_for_sets, single
 
 if TYPE_CHECKING:
     from sdimu_calibration.cli.next_commands import Asked
@@ -63,49 +26,27 @@ if TYPE_CHECKING:
 NO_BOOTSTRAP = "--bootstrap: a handheld run learns its scatter, so there is no noise to draw; leave it out"
 
 
-def diagnose(
-    bags: Bags = None,
-    model: ModelOption = None,
-    site: SiteOption = None,
-    imu: ImuOption = None,
+@dataclass(frozen=True)
+class DiagnosisRequest(Request):
+    """What `sdimu diagnose` is asked."""
+
     add: Annotated[
         list[str] | None, typer.Option(metavar="EFFECT", help="Effect to add to the model: name or YAML file.")
-    ] = None,
+    ] = None
+    out: Annotated[Path | None, results_in("results; BAG_diagnosis")] = None
     attempt: Annotated[
         list[str] | None,
         typer.Option("--try", metavar="FILE", help="Effect of your own (YAML) to try with the catalogue."),
-    ] = None,
-    grow: Annotated[bool, typer.Option("--grow", help="Refit with one found effect more at a time.")] = False,
+    ] = None
+    grow: Annotated[bool, typer.Option("--grow", help="Refit with one found effect more at a time.")] = False
     bootstrap: Annotated[
         int, typer.Option(min=0, metavar="N", help="Repeat the search on N draws of pure noise: how often it errs.")
-    ] = 0,
-    noise: NoiseOption = None,
-    estimator: EstimatorOption = "auto",
-    hand: HandOption = False,
-    whole_turns: WholeTurnsOption = None,
-    exclude_stops: ExcludeStops = None,
-    exclude_times: ExcludeTimes = None,
-    serial: SerialOption = None,
-    power_on: PowerOnOption = None,
-    out: Annotated[
-        Path | None, typer.Option(file_okay=False, help="Folder of the results; BAG_diagnosis by default.")
-    ] = None,
-    set_file: SetOption = None,
-    reference_temperature: ReferenceOption = None,
-    workers: WorkersOption = WORKERS,
-    scheduler: SchedulerOption = None,
-    as_json: JsonOption = False,
-    imu_topic: ImuTopic = None,
-    status_topic: StatusTopic = None,
-    joint_topic: JointTopic = None,
-    temperature_topic: TemperatureTopic = None,
-    accel_unit: AccelUnit = None,
-    gyro_unit: GyroUnit = None,
-    accel_sign: AccelSign = None,
-    gyro_sign: GyroSign = None,
-) -> None:
+    ] = 0
+
+
+@with_options
+def diagnose(bags: BagsArgument = None, *, request: DiagnosisRequest, opening: Opening) -> None:
     """Find what the model is missing; leaves diagnosis.json and report.html, and result.json of the model found."""
-    given = dict(locals())
     from sdimu_calibration.cli.diagnosis_text import notes_of_diagnosis, print_summary
     from sdimu_calibration.cli.next_commands import Asked
     from sdimu_calibration.cli.progress import bar
@@ -115,51 +56,41 @@ def diagnose(
     from sdimu_calibration.core.estimation.solve import solve
     from sdimu_calibration.core.recording import DataError
     from sdimu_calibration.storage.files.effect_file import find_effects
-    from sdimu_calibration.storage.files.model_choice import HANDHELD, named_estimator
+    from sdimu_calibration.storage.files.model_choice import HANDHELD
     from sdimu_calibration.storage.trace import traced
 
-    console = plain(stderr=as_json)
-    asked = HANDHELD if hand else named_estimator(estimator, "--estimator")
+    console, asked = plain(stderr=request.as_json), request.asked_estimator
     if asked == "classical":
         raise DataError(NOT_DIAGNOSABLE)
-    if bootstrap and asked == HANDHELD:
+    if request.bootstrap and asked == HANDHELD:
         raise DataError(NO_BOOTSTRAP)
-    extra = [effect for text in attempt or [] for effect in find_effects(text)]
-    origin = source(
-        imu_topic, status_topic, joint_topic, temperature_topic, accel_unit, gyro_unit, accel_sign, gyro_sign
-    )
-    bag = single(bags, set_file)
+    extra = [effect for text in request.attempt or [] for effect in find_effects(text)]
+    bag = single(bags, request.set_file)
     if bag is None:
-        refuse_for_sets(bootstrap=bootstrap, grow=grow, whole_turns=whole_turns, power_on=power_on,
-                         exclude_stops=exclude_stops, exclude_times=exclude_times)
-        diagnose_together(SetRequest(
-            bags or [], set_file, model, site, imu, add or [], origin, asked, noise, out, workers, scheduler, serial,
-            reference_temperature, as_json,
-        ), extra)  # fmt: skip
+        refuse_for_sets(opening, bootstrap=request.bootstrap, grow=request.grow)
+        diagnose_together(SetRequest(bags or [], opening, request), extra)
         return
-    test, wanted, chosen = opened(console, bag, model, site, imu, add, origin, asked, noise, whole_turns)
-    test = left_out(test, exclude_stops, exclude_times)
-    test = about_reference(replace(test, origin=test.origin.stated(serial, power_on)), reference_temperature)
-    if bootstrap and chosen == "auto" and test.why_handheld:
+    test, wanted, chosen = opened(console, bag, opening, request)
+    if request.bootstrap and chosen == "auto" and test.why_handheld:
         raise DataError(NO_BOOTSTRAP)
     notes = test.recording.notes
     with explained(console, notes), bar(console) as progress:
-        found = climb(solve(test, wanted, chosen, progress=progress), extra, progress, refits=grow)
+        found = climb(solve(test, wanted, chosen, progress=progress), extra, progress, refits=request.grow)
     summary = summarise(found)
-    folder = out or default_folder(bag, "diagnosis")
-    about = Asked.of((bag,), given, folder)
+    folder = request.out or default_folder(bag, "diagnosis")
+    about = Asked.of((bag,), folder, opening, request)
     print_summary(console, summary, about)
     null = None
-    if bootstrap:
+    if request.bootstrap:
         with bar(console) as progress:
-            null = repeat_on_noise(found, bootstrap, progress=progress)
+            null = repeat_on_noise(found, request.bootstrap, progress=progress)
         say(console, f"bootstrap: {null.sentence}")
     with bar(console) as progress:
-        trace = traced([bag], sys.argv[1:], site=site, imu=imu, model=model)
+        trace = traced([bag], sys.argv[1:], site=opening.site, imu=opening.imu, model=request.model)
         _write(about, f"Diagnosis of {bag.name}", summary, null, progress, trace)
     tell(console, (*notes, *(note for note in notes_of_diagnosis(found) if note not in notes)))
     say(console, f"results in {folder}")
-    answer(folder / "diagnosis.json", as_json)
+    answer(folder / "diagnosis.json", request.as_json)
     leave(found.after, (found.verdict, found.sentence))
 
 
@@ -184,6 +115,11 @@ def _write(
         progress("navigation without aid", 0.5)
         more = report_extras(found)
         write_report(
-            part / "report.html", found.after, title=title, summary=summary, more=more, trace=trace,
+            part / "report.html",
+            found.after,
+            title=title,
+            summary=summary,
+            more=more,
+            trace=trace,
             spell=partial(spelled, asked=about),
-        )  # fmt: skip
+        )

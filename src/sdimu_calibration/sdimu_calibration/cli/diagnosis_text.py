@@ -85,10 +85,14 @@ def _candidates(console: Console, summary: DiagnosisSummary) -> None:
         unit = f.candidate.parameter.display_unit
         lines.append(
             [
-                f.candidate.label, amount(f.value, unit, 4), amount(f.sigma, unit, 2), unit, f"{f.z:+.1f}",
+                f.candidate.label,
+                amount(f.value, unit, 4),
+                amount(f.sigma, unit, 2),
+                unit,
+                f"{f.z:+.1f}",
                 f"{100 * f.explained:.0f} %",
             ]
-        )  # fmt: skip
+        )
     headings = ("effect", "estimate", "+-", "unit", "z", "explains")
     title = "found" if summary.candidates else "tried, but not enough to explain the misfit"
     print_table(console, headings, lines, title)
@@ -170,9 +174,12 @@ def _rung(r: Rung) -> list[str]:
     if not r.accepted:
         name, moved = f"{name} (refused)", r.reason
     row = [
-        name, f"{r.log_likelihood:.1f}", f"{r.log_bayes_factor:+.1f}" if r.added else "", f"{r.nis_mean:.3f}",
+        name,
+        f"{r.log_likelihood:.1f}",
+        f"{r.log_bayes_factor:+.1f}" if r.added else "",
+        f"{r.nis_mean:.3f}",
         f"{r.held_out_rms:.3f}",
-    ]  # fmt: skip
+    ]
     if r.scatter is not None:
         return [*row, beyond(r.scatter)]
     return [*row, f"{r.jump:.2f} sigma, {1e3 * r.jump_velocity:.2f} mm/s", moved]

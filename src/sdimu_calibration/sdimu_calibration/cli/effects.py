@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from sdimu_calibration.cli.console import JsonOption, answer, plain, say
+from sdimu_calibration.cli.console import answer, plain, say
+from sdimu_calibration.cli.options import JsonOption
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -68,9 +69,19 @@ def _content(name: str | None) -> dict[str, Any]:
     from sdimu_calibration.storage.files.effect_file import find_effects
 
     chosen = find_effects(name) if name else [effect for _, found in grouped() for effect in found]
-    return {"format": "sdimu-catalogue/1", "effects": [
-        {"name": effect.name, "title": effect.title, "equation": effect.equation, "description": effect.description,
-         "typical": effect.typical, "scope": effect.scope, "prior": dict(effect.prior),
-         "coefficients": [{"name": p.name, "unit": p.unit, "display_unit": p.display_unit} for p in effect.parameters]}
+    listed = [
+        {
+            "name": effect.name,
+            "title": effect.title,
+            "equation": effect.equation,
+            "description": effect.description,
+            "typical": effect.typical,
+            "scope": effect.scope,
+            "prior": dict(effect.prior),
+            "coefficients": [
+                {"name": p.name, "unit": p.unit, "display_unit": p.display_unit} for p in effect.parameters
+            ],
+        }
         for effect in chosen
-    ]}  # fmt: skip
+    ]
+    return {"format": "sdimu-catalogue/1", "effects": listed}

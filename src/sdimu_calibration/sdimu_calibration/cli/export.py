@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from sdimu_calibration.cli.console import plain
+from sdimu_calibration.cli.options import OwnEffectOption
 
 
 def export(
@@ -24,10 +25,7 @@ def export(
     temperature: Annotated[
         float | None, typer.Option(metavar="DEGC", help="Temperature at which matrices and biases are stated.")
     ] = None,
-    effect: Annotated[
-        list[str] | None,
-        typer.Option(metavar="FILE", help="Effect of your own (YAML) that the result has; may be repeated."),
-    ] = None,
+    effect: OwnEffectOption = None,
 ) -> None:
     """Write a result as matrices, Kalibr YAML, imu_tk files, a C header, YAML or CSV."""
     from sdimu_calibration.storage.export import FORMS

@@ -7,18 +7,19 @@ from typing import Annotated
 
 import typer
 
-from sdimu_calibration.cli.console import JsonOption, answer, plain, say
+from sdimu_calibration.cli.console import answer, plain, say
+from sdimu_calibration.cli.options import FoldersArgument, JsonOption, results_in
 
 
 def fleet(
-    folders: Annotated[list[Path], typer.Argument(metavar="FOLDER ...", help="Every result.json below is taken.")],
+    folders: FoldersArgument,
     priors: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Write an IMU file with the priors of the population.")
     ] = None,
     imu: Annotated[
         str | None, typer.Option(help="IMU whose noise and grade go into --priors; that of the results by default.")
     ] = None,
-    out: Annotated[Path | None, typer.Option(file_okay=False, help="Folder of the pages; FOLDER by default.")] = None,
+    out: Annotated[Path | None, results_in("pages; FOLDER")] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Compare all units of a type: mean and spread, who is out, what is common; leaves fleet.json and fleet.html."""

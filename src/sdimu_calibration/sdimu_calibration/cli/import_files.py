@@ -41,5 +41,7 @@ def import_files(
     console.print(
         f"{out}: {len(found.ns)} samples, {seconds:.1f} s; half of the time |f| is below {force:.3f} m/s^2 "
         f"and |w| below {rate:.3f} deg/s",
-        soft_wrap=True, markup=False, highlight=False,
-    )  # fmt: skip
+        soft_wrap=True,
+        markup=False,
+        highlight=False,
+    )

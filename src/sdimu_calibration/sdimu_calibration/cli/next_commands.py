@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from sdimu_calibration.cli.console import command, say
+from sdimu_calibration.cli.option_groups import words_by_option, words_of
+from sdimu_calibration.cli.options import Fitted, Place
 from sdimu_calibration.core.advice import Verb
 from sdimu_calibration.storage.files.advice_words import added, lead, plan_options
 
@@ -23,16 +25,8 @@ PLAN = "plan.yaml"
 """File beside a diagnosis: the plan as the motion showed it."""
 _ACCELERATION = 1.0
 """Angular acceleration (rad/s^2) of a plan that was seen: the motion does not tell the limit, and no sum needs it."""
-
-
-_REPEATED = (
-    "site", "imu", "model", "noise", "estimator", "whole_turns", "exclude_stops", "exclude_times", "serial", "power_on",
-    "reference_temperature", "imu_topic", "status_topic", "joint_topic", "temperature_topic", "accel_unit", "gyro_unit",
-    "accel_sign", "gyro_sign",
-)  # fmt: skip
-"""Options that calibrate and diagnose share, and that the next of them has to repeat."""
-_USUAL = (None, False, "auto")
-"""Values of options that nobody stated."""
+_FIRST = ("site", "imu", "model", "noise", "estimator")
+"""Options that a command names first; the others stand as their groups have them."""
 
 
 @dataclass(frozen=True)
@@ -56,14 +50,12 @@ class Asked:
     folder: Path
 
     @classmethod
-    def of(cls, bags: Sequence[Path], given: Mapping[str, Any], folder: Path) -> Asked:
-        """Take the arguments of a verb, by name."""
-        options = [word for name in _REPEATED if given.get(name) not in _USUAL
-                   for word in (f"--{name.replace('_', '-')}", str(given[name]))]  # fmt: skip
-        options += ["--hand"] if given.get("hand") else []
-        options += [word for effect in given.get("add") or () for word in ("--add", effect)]
-        place = [word for name in ("site", "imu") if given.get(name) for word in (f"--{name}", str(given[name]))]
-        return cls(bags, options, place, folder)
+    def of(cls, bags: Sequence[Path], folder: Path, opening: Place, fitted: Fitted | None = None) -> Asked:
+        """Take how a recording was opened, and what was fitted to it."""
+        place = words_of(Place(opening.site, opening.imu), Place)
+        by_option = words_by_option(opening, type(opening)) | words_by_option(fitted or Fitted(), Fitted)
+        order = sorted(by_option, key=lambda name: _FIRST.index(name) if name in _FIRST else len(_FIRST))
+        return cls(bags, [word for name in order for word in by_option[name]], place, folder)
 
     def command(self, verb: str) -> str:
         """Write the command of a verb about the same recording, with the same options."""

@@ -8,23 +8,22 @@ from typing import Annotated
 
 import typer
 
-from sdimu_calibration.cli.console import JsonOption, answer, command, plain, say
+from sdimu_calibration.cli.console import answer, command, plain, say
+from sdimu_calibration.cli.options import BagArgument, JsonOption, results_in
 
 
 def noise(
-    bag: Annotated[Path, typer.Argument(metavar="BAG", help="rosbag2 folder or .mcap file.")],
+    bag: BagArgument,
     imu: Annotated[str, typer.Option(help="IMU whose grade and priors go into the new file: name or path.")] = "dtg",
     longest: Annotated[bool, typer.Option("--longest", help="The longest rest alone, not all of them.")] = False,
     seed: Annotated[int, typer.Option(help="Of the draws behind the standard errors.")] = 1,
-    out: Annotated[
-        Path | None, typer.Option(file_okay=False, help="Folder of the results; BAG_noise by default.")
-    ] = None,
+    out: Annotated[Path | None, results_in("results; BAG_noise")] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Find the noise terms from the rests of a recording; leaves noise.html, noise.json, imu.yaml for --imu."""
     import numpy as np
 
-    from sdimu_calibration.cli.options import default_folder
+    from sdimu_calibration.cli.opened import default_folder
     from sdimu_calibration.cli.progress import bar
     from sdimu_calibration.cli.wide_table import print_table
     from sdimu_calibration.core.noise import allan, fit_terms, rests, white_noise

@@ -1,160 +1,317 @@
-"""Options that several verbs have, checked before a long recording is read, and where results go."""
+"""Options that several verbs have, each declared once: `Opening` and `Request` are what the user states with them."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
-from dataclasses import replace
+import re
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
+from typer.models import OptionInfo
 
-from sdimu_calibration.cli.console import say
+from sdimu_calibration.core.data_error import DataError
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
-    from sdimu_calibration.core.estimation.prepared_test import PreparedTest
-    from sdimu_calibration.core.results import Calibration
-    from sdimu_calibration.core.specification import Model
-    from sdimu_calibration.core.verdict import Verdict
+    from sdimu_calibration.core.specification import ImuSpecification
+    from sdimu_calibration.storage import opening
     from sdimu_calibration.storage.opening import Source
 
-ImuOption = Annotated[
-    str | None, typer.Option(help="Specification of the IMU: name in config/imu or path; proposed when left out.")
+_OF_SETS = "Several recordings of one unit"
+_SPAN = re.compile(r"\s*(\d+(?:\.\d+)?)\s*-\s*(\d+(?:\.\d+)?)\s*")
+WORKERS = 2
+"""Number of processes by default: the cores of a small machine."""
+
+BagArgument = Annotated[Path, typer.Argument(metavar="BAG", help="rosbag2 folder or .mcap file.")]
+BagsArgument = Annotated[
+    list[Path] | None,
+    typer.Argument(metavar="BAG...", help="rosbag2 folder or .mcap file; several are fitted together as one unit."),
 ]
-SiteOption = Annotated[
-    str | None, typer.Option(help="Where the test was: name in config/site or path; daejeon (handheld: none).")
-]
-ModelOption = Annotated[
-    str | None, typer.Option(help="Model to estimate: name in config/model or path; baseline (handheld: hand).")
-]
-NoiseOption = Annotated[
-    str | None, typer.Option(help="estimated: white noise from the rests of the recording, not from --imu.")
-]
-EstimatorOption = Annotated[
-    str, typer.Option(help="filter, second-order, handheld, batch, classical; auto chooses one of the first three.")
-]
-WholeTurnsOption = Annotated[
-    str | None,
-    typer.Option(
-        metavar="ANGLE", help="By hand: turns of about 360 deg about the vertical are whole to this, such as 1 deg."
-    ),
-]
-SerialOption = Annotated[
-    str | None, typer.Option(metavar="NUMBER", help="Serial number of the unit; taken from the bag where it says it.")
-]
-PowerOnOption = Annotated[
-    str | None, typer.Option(metavar="NAME", help="Which switch-on of the unit; taken from the bag where it says it.")
-]
-HandOption = Annotated[bool, typer.Option("--hand", help="Moved by hand: the same as --estimator handheld.")]
+FoldersArgument = Annotated[list[Path], typer.Argument(metavar="FOLDER ...", help="Every result.json below is taken.")]
+ModelOption = Annotated[str, typer.Option(help="Model to estimate: name in config/model or path.")]
+ImuNameOption = Annotated[str, typer.Option(help="Specification of the IMU: name in config/imu or path.")]
 DomainOption = Annotated[
     int | None,
     typer.Option(metavar="N", help="ROS domain of the nodes; that of ROS_DOMAIN_ID, or a free one, when left out."),
 ]
-NOT_TRUSTED = 3
-"""Exit status of a run that is done, and whose estimate is not to be trusted."""
-HANDHELD_CHOSEN = "handheld: {why}, so nothing is navigated (--estimator filter forces navigation)"
+EachStopOption = Annotated[bool, typer.Option(help="Publish a diagnosis at the end of each stop.")]
+OwnEffectOption = Annotated[
+    list[str] | None,
+    typer.Option(metavar="FILE", help="Effect of your own (YAML) that the result has; may be repeated."),
+]
+SetOption = Annotated[
+    Path | None,
+    typer.Option("--set", metavar="FILE", help="Set of recordings (sdimu set init).", rich_help_panel=_OF_SETS),
+]
+ReplaceOption = Annotated[bool, typer.Option("--replace", help="Overwrite the bag if it exists.")]
+JsonOption = Annotated[
+    bool, typer.Option("--json", help="Print the answer as JSON, as its file has it; words go to stderr.")
+]
 
 
-def opened(
-    console: Console, bag: Path, model: str | None, site: str | None, imu: str | None, add: list[str] | None,
-    source: Source, estimator: str, noise: str | None, whole_turns: str | None = None,
-) -> tuple[PreparedTest, Model, str]:  # fmt: skip
-    """Open the test of a bag, read its model and check its estimator.
+def results_in(default: str) -> OptionInfo:
+    """Declare ``--out`` of a verb that leaves several files."""
+    option: OptionInfo = typer.Option(file_okay=False, help=f"Folder of the {default} by default.")
+    return option
 
-    Returns
-    -------
-    test : PreparedTest
-    model : Model
-    estimator : str
-        As it was asked for, ``auto`` included.
+
+def _read(metavar: str, text: str) -> OptionInfo:
+    """Declare an option of how samples are to be read; its panel says that none is needed."""
+    panel = "How the recording is to be read (recognised when left out)"
+    option: OptionInfo = typer.Option(metavar=metavar, help=text, rich_help_panel=panel)
+    return option
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where and with what a recording was made."""
+
+    site: Annotated[
+        str | None, typer.Option(help="Where the test was: name in config/site or path; daejeon when left out.")
+    ] = None
+    imu: Annotated[
+        str | None, typer.Option(help="Specification of the IMU: name in config/imu or path; proposed when left out.")
+    ] = None
+
+    @property
+    def specification(self) -> ImuSpecification | None:
+        """The IMU's file, read.
+
+        Raises
+        ------
+        DataError
+            When there is none of that name.
+        """
+        from sdimu_calibration.storage.files.config import load_imu
+
+        return None if self.imu is None else load_imu(self.imu)
+
+
+@dataclass(frozen=True)
+class Reading:
+    """How samples are to be read, where that is not to be recognised."""
+
+    imu_topic: Annotated[str | None, _read("TOPIC", "sensor_msgs/Imu.")] = None
+    status_topic: Annotated[str | None, _read("TOPIC", "diagnostic_msgs/DiagnosticArray with a phase.")] = None
+    joint_topic: Annotated[str | None, _read("TOPIC", "sensor_msgs/JointState.")] = None
+    temperature_topic: Annotated[str | None, _read("TOPIC", "sensor_msgs/Temperature.")] = None
+    accel_unit: Annotated[str | None, _read("UNIT", "Of linear_acceleration, such as g.")] = None
+    gyro_unit: Annotated[str | None, _read("UNIT", "Of angular_velocity, such as deg/s.")] = None
+    accel_sign: Annotated[int | None, _read("SIGN", "-1: the negative of the specific force.")] = None
+    gyro_sign: Annotated[int | None, _read("SIGN", "-1: the negative of the body rate.")] = None
+
+    @property
+    def source(self) -> Source:
+        """Topics, units and signs together."""
+        from sdimu_calibration.storage.bags.topic_choice import TopicChoice
+        from sdimu_calibration.storage.opening import Source
+
+        topics = TopicChoice(self.imu_topic, self.status_topic, self.joint_topic, self.temperature_topic)
+        return Source(topics, self.accel_unit, self.gyro_unit, self.accel_sign, self.gyro_sign)
+
+
+@dataclass(frozen=True)
+class Recorded(Reading, Place):
+    """A recording of which verbs ask no more than its place and how it is read."""
+
+
+@dataclass(frozen=True)
+class Stated(Place):
+    """What else is stated of a recording."""
+
+    site: Annotated[
+        str | None, typer.Option(help="Where the test was: name in config/site or path; daejeon (handheld: none).")
+    ] = None
+    noise: Annotated[
+        str | None, typer.Option(help="estimated: white noise from the rests of the recording, not from --imu.")
+    ] = None
+    whole_turns: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ANGLE",
+            help="By hand: turns of about 360 deg about the vertical are whole to this, such as 1 deg.",
+        ),
+    ] = None
+    exclude_stops: Annotated[
+        str | None, typer.Option(metavar="STOPS", help="Stops the fit does not see, such as 4,7; not the first.")
+    ] = None
+    exclude_times: Annotated[
+        str | None,
+        typer.Option(metavar="SPANS", help="Spans of s in which nothing is measured: 812-815,900-910."),
+    ] = None
+    serial: Annotated[
+        str | None,
+        typer.Option(metavar="NUMBER", help="Serial number of the unit; taken from the bag where it says it."),
+    ] = None
+    power_on: Annotated[
+        str | None,
+        typer.Option(metavar="NAME", help="Which switch-on of the unit; taken from the bag where it says it."),
+    ] = None
+    reference_temperature: Annotated[
+        str | None,
+        typer.Option(
+            metavar="T", help="From which temperature effects count, such as 20 degC.", rich_help_panel=_OF_SETS
+        ),
+    ] = None
+
+    @property
+    def measured_noise(self) -> bool:
+        """White noise is that of the rests.
+
+        Raises
+        ------
+        DataError
+            When anything else is asked for.
+        """
+        if self.noise not in {None, "estimated"}:
+            raise DataError(f"--noise {self.noise}: expected 'estimated' (or leave it out: the noise of --imu)")
+        return self.noise is not None
+
+    @property
+    def whole_turns_rad(self) -> float:
+        """How well turns by hand are whole (rad); 0 where nobody says it.
+
+        Raises
+        ------
+        DataError
+            When it is no angle above zero.
+        """
+        from sdimu_calibration.core.units import parse_quantity
+
+        if self.whole_turns is None:
+            return 0.0
+        whole = parse_quantity(self.whole_turns, "deg")
+        if whole <= 0.0:
+            raise DataError(f"--whole-turns {self.whole_turns}: expected an angle above zero")
+        return whole
+
+    @property
+    def reference_degc(self) -> float | None:
+        """Temperature from which effects count (deg C); None is that at the start."""
+        from sdimu_calibration.core.units import parse_quantity
+
+        return None if self.reference_temperature is None else parse_quantity(self.reference_temperature, "degC")
+
+
+@dataclass(frozen=True)
+class Opening(Reading, Stated):
+    """How a recording is opened, as the options state it."""
+
+    def read(self, handheld: bool | None) -> opening.Opening:
+        """Read all of it, so that a wrong option is told before a long recording is read.
+
+        Parameters
+        ----------
+        handheld : bool or None
+            As `Request.handheld`.
+
+        Raises
+        ------
+        DataError
+            When a name is unknown, or a number, an angle or a unit is none.
+        """
+        from sdimu_calibration.storage.files.config import load_site
+        from sdimu_calibration.storage.opening import Opening as Read
+
+        if self.site is not None:
+            load_site(self.site)
+        return Read(
+            self.site,
+            self.specification,
+            self.source,
+            handheld,
+            self.measured_noise,
+            self.whole_turns_rad,
+            () if self.exclude_stops is None else read_stops(self.exclude_stops),
+            () if self.exclude_times is None else read_spans(self.exclude_times),
+            self.serial,
+            self.power_on,
+            self.reference_degc,
+            self.imu,
+        )
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """What is fitted, and how."""
+
+    model: Annotated[
+        str | None, typer.Option(help="Model to estimate: name in config/model or path; baseline (handheld: hand).")
+    ] = None
+    estimator: Annotated[
+        str, typer.Option(help="filter, second-order, handheld, batch, classical; auto chooses one of the first three.")
+    ] = "auto"
+    hand: Annotated[bool, typer.Option("--hand", help="Moved by hand: the same as --estimator handheld.")] = False
+    add: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="EFFECT",
+            help="Effect to add to the model: a name, one of its coefficients, or a YAML file; may be repeated.",
+        ),
+    ] = None
+
+    @property
+    def asked_estimator(self) -> str:
+        """One of the names of estimators, ``auto`` included.
+
+        Raises
+        ------
+        DataError
+            When it is none.
+        """
+        from sdimu_calibration.storage.files.model_choice import HANDHELD, named_estimator
+
+        return HANDHELD if self.hand else named_estimator(self.estimator, "--estimator")
+
+    @property
+    def handheld(self) -> bool | None:
+        """Moved by hand, so far as the estimator says it; None leaves it to the data."""
+        from sdimu_calibration.core.estimation.solve import AUTO
+        from sdimu_calibration.storage.files.model_choice import HANDHELD
+
+        asked = self.asked_estimator
+        return None if asked == AUTO else asked == HANDHELD
+
+
+@dataclass(frozen=True)
+class Request(Fitted):
+    """What is asked of a recording, or of a set."""
+
+    set_file: SetOption = None
+    workers: Annotated[
+        int, typer.Option(min=1, help="Processes that read recordings of a set.", rich_help_panel=_OF_SETS)
+    ] = WORKERS
+    scheduler: Annotated[
+        str | None,
+        typer.Option(metavar="ADDRESS", help="dask scheduler that reads them instead.", rich_help_panel=_OF_SETS),
+    ] = None
+    out: Annotated[Path | None, results_in("results; BAG_calibration")] = None
+    as_json: JsonOption = False
+
+
+def read_stops(text: str) -> tuple[int, ...]:
+    """Read numbers of stops, such as ``4,7``.
 
     Raises
     ------
     DataError
-        When an option names nothing, or the bag cannot be used.
+        When one is no number.
     """
-    from sdimu_calibration.core.estimation.solve import AUTO
-    from sdimu_calibration.core.recording import DataError
-    from sdimu_calibration.core.units import parse_quantity
-    from sdimu_calibration.storage.files.config import load_imu, load_site
-    from sdimu_calibration.storage.files.effect_file import find_effects
-    from sdimu_calibration.storage.files.model_choice import HANDHELD, named_estimator, named_model
-    from sdimu_calibration.storage.opening import open_test, with_imu_file
-
-    wanted = named_estimator(estimator, "--estimator")
-    if noise not in {None, "estimated"}:
-        raise DataError(f"--noise {noise}: expected 'estimated' (or leave it out: the noise of --imu)")
-    whole = 0.0 if whole_turns is None else parse_quantity(whole_turns, "deg")
-    if whole < 0.0 or (whole_turns is not None and whole == 0.0):
-        raise DataError(f"--whole-turns {whole_turns}: expected an angle above zero")
-    # A wrong name is reported before a long recording is read; which model it is added to, the recording may decide.
-    specification = None if imu is None else load_imu(imu)
-    named_model(model, [])
-    for text in add or []:
-        find_effects(text)
-    if site is not None:
-        load_site(site)
-    handheld = None if wanted == AUTO else wanted == HANDHELD
-    test = with_imu_file(open_test(bag, site, specification, source, handheld, noise is not None), imu)
-    if wanted == HANDHELD or (wanted == AUTO and test.why_handheld):
-        if wanted == AUTO:
-            console.print(HANDHELD_CHOSEN.format(why=test.why_handheld), soft_wrap=True)
-        return replace(test, whole_turns=whole), named_model(model, add or [], handheld=True), wanted
-    if whole:
-        raise DataError("--whole-turns is of runs by hand, and this one is navigated: leave it out, or state --hand")
-    return test, named_model(model, add or []), wanted
+    words = [word.strip() for word in text.split(",")]
+    if not all(word.isdecimal() for word in words):
+        raise DataError(f"--exclude-stops {text}: expected numbers of stops such as 4,7")
+    return tuple(sorted({int(word) for word in words}))
 
 
-def tell(console: Console, notes: Iterable[str]) -> None:
-    """Print notes, one line each."""
-    for note in notes:
-        say(console, f"note: {note}")
+def read_spans(text: str) -> tuple[tuple[float, float], ...]:
+    """Read spans of time (s), such as ``812-815,900-910``.
 
-
-def leave(result: Calibration, diagnosed: tuple[Verdict, str] | None = None) -> None:
-    """Say on stderr which coefficients are one, and end with exit status 3 when a result is not to be trusted.
-
-    `diagnosed` is the verdict of a diagnosis and its sentence. Where there is one, it judges what does not fit;
-    without, a misfit is enough.
+    Raises
+    ------
+    DataError
+        When one is no span.
     """
-    for line in result.inseparable:
-        typer.echo(f"sdimu: {line}", err=True)
-    reasons = _reasons(result, diagnosed)
-    for line in reasons:
-        typer.echo(f"sdimu: not to be trusted: {line}", err=True)
-    if reasons:
-        raise typer.Exit(NOT_TRUSTED)
-
-
-def _reasons(result: Calibration, diagnosed: tuple[Verdict, str] | None) -> list[str]:
-    """List why a result is not to be trusted, one line each, each said once."""
-    from sdimu_calibration.core.results import UNTRUSTED_VERDICTS
-
-    grave = result.not_to_be_trusted
-    if diagnosed is None:
-        return list(dict.fromkeys([*grave, *result.misfits]))
-    verdict, sentence = diagnosed
-    if verdict not in UNTRUSTED_VERDICTS:
-        return list(grave)
-    return [f"{verdict}: {sentence}", *(line for line in grave if line not in sentence)]
-
-
-@contextmanager
-def explained(console: Console, notes: Iterable[str]) -> Iterator[None]:
-    """Print the notes of a recording when an estimate refuses it: they may say why."""
-    from sdimu_calibration.core.recording import DataError
-
-    try:
-        yield
-    except DataError:
-        tell(console, notes)
-        raise
-
-
-def default_folder(bag: Path, what: str = "calibration") -> Path:
-    """Folder of the results of a bag: beside it, its stem with ``_calibration``."""
-    bag = bag.resolve()
-    return bag.with_name(f"{bag.stem if bag.is_file() else bag.name}_{what}")
+    found = [_SPAN.fullmatch(word) for word in text.split(",")]
+    if not all(found):
+        raise DataError(f"--exclude-times {text}: expected spans of seconds such as 812-815,900-910")
+    return tuple(sorted((float(match[1]), float(match[2])) for match in found if match))

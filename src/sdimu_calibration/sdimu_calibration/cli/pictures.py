@@ -8,19 +8,18 @@ from typing import Annotated
 import typer
 
 from sdimu_calibration.cli.console import plain
+from sdimu_calibration.cli.options import BagArgument, ImuNameOption, results_in
 
 
 def pictures(
-    bag: Annotated[Path, typer.Argument(metavar="BAG", help="rosbag2 folder or .mcap file.")],
+    bag: BagArgument,
     model: Annotated[str, typer.Option(help="Model to examine: name in config/model or path.")] = "baseline",
     site: Annotated[str, typer.Option(help="Where the test was: name in config/site or path.")] = "daejeon",
-    imu: Annotated[str, typer.Option(help="Specification of the IMU: name in config/imu or path.")] = "dtg",
-    out: Annotated[
-        Path | None, typer.Option(file_okay=False, help="Folder of the pictures; BAG_pictures by default.")
-    ] = None,
+    imu: ImuNameOption = "dtg",
+    out: Annotated[Path | None, results_in("pictures; BAG_pictures")] = None,
 ) -> None:
     """Draw a diagnosis as PNG files: heat map before and after, candidates, ladder, drift in use."""
-    from sdimu_calibration.cli.options import default_folder
+    from sdimu_calibration.cli.opened import default_folder
     from sdimu_calibration.cli.progress import bar
     from sdimu_calibration.core.diagnosis.diagnose import climb
     from sdimu_calibration.core.estimation.solve import solve

@@ -5,63 +5,120 @@ from __future__ import annotations
 import math
 import shlex
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from sdimu_calibration.cli.console import JsonOption, answer, command, plain, say
+from sdimu_calibration.cli.console import answer, command, plain, say
+from sdimu_calibration.cli.option_groups import with_options
+from sdimu_calibration.cli.options import JsonOption, ModelOption
 
 if TYPE_CHECKING:
     from rich.console import Console
 
     from sdimu_calibration.core.plan import Plan
     from sdimu_calibration.core.plan_search import Bounds, Found, NextTurn
+    from sdimu_calibration.core.plan_search.moves import Abilities
 
-_LIMIT = "Largest sigma allowed, EFFECT='0.005 deg/h'; may be repeated. By default what --plan reaches, times --slack."
+
+@dataclass(frozen=True)
+class Planned:
+    """What a plan is for."""
+
+    plan: Annotated[str, typer.Option(help="Plan to begin with: name in config/plan or path.")] = "kim18"
+    imu: Annotated[
+        str | None, typer.Option(help="Specification of the IMU: name in config/imu or path; that of --after, or dtg.")
+    ] = None
+    site: Annotated[
+        str | None, typer.Option(help="Where the test will be: name in config/site or path; of --after, or daejeon.")
+    ] = None
+    model: ModelOption = "baseline"
+    add: Annotated[
+        list[str] | None, typer.Option(metavar="EFFECT", help="Effect that the plan should also show; may be repeated.")
+    ] = None
 
 
+@dataclass(frozen=True)
+class Allowed:
+    """What a plan may take, and what the table can do."""
+
+    minutes: Annotated[
+        float | None, typer.Option(min=1.0, help="Time available: the best sigmas in it. Without: the shortest plan.")
+    ] = None
+    limit: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="EFFECT=SIGMA",
+            help="Largest sigma allowed, EFFECT='0.005 deg/h'; may be repeated. By default what --plan reaches, times "
+            "--slack.",
+        ),
+    ] = None
+    slack: Annotated[float, typer.Option(min=0.01, help="Factor on the sigmas of --plan that are the limits.")] = 1.2
+    rates: Annotated[str, typer.Option(help="Mean rates the table can do (deg/s).")] = "2,10"
+    acceleration: Annotated[float, typer.Option(help="Acceleration the table can do (deg/s^2).")] = 20.0
+    dwells: Annotated[str, typer.Option(help="Lengths of stops to choose from (s).")] = "20,40,60,80,100,130"
+    tries: Annotated[int, typer.Option(min=1, help="Most plans to evaluate.")] = 150
+
+    @property
+    def rates_rad_s(self) -> tuple[float, ...]:
+        """Mean rates in SI.
+
+        Raises
+        ------
+        DataError
+            When one is no number above zero.
+        """
+        return tuple(math.radians(v) for v in _numbers("--rates", self.rates))
+
+    @property
+    def abilities(self) -> Abilities:
+        """Of the table, in SI.
+
+        Raises
+        ------
+        DataError
+            When a rate or a dwell is no number above zero.
+        """
+        from sdimu_calibration.core.plan_search.moves import Abilities
+
+        rates, dwells = self.rates_rad_s, tuple(_numbers("--dwells", self.dwells))
+        return Abilities(rates, math.radians(self.acceleration), dwells)
+
+
+@dataclass(frozen=True)
+class PlanRequest:
+    """What is asked beside the shortest plan, and where the answer goes."""
+
+    tell: Annotated[
+        list[str] | None,
+        typer.Option(metavar="COEFFICIENT", help="Rank extra turns that tell these apart, and search no plan."),
+    ] = None
+    after: Annotated[
+        list[Path] | None,
+        typer.Option(
+            metavar="BAG or FOLDER",
+            help="What is known already: recordings of the unit, or results of calibrate or "
+            "diagnose. Searches the plan that tells most beyond it in --minutes (those of --plan).",
+        ),
+    ] = None
+    backwards: Annotated[
+        bool, typer.Option("--backwards", help="Write --plan in the opposite order, and search no plan.")
+    ] = False
+    out: Annotated[Path, typer.Option(help="Plan file to write.")] = Path("out/plan/found.yaml")
+    as_json: JsonOption = False
+
+
+@with_options
 def plan(
     more: Annotated[
         list[Path] | None, typer.Argument(metavar="[BAG...]", help="More recordings behind --after.")
     ] = None,
-    plan: Annotated[str, typer.Option(help="Plan to begin with: name in config/plan or path.")] = "kim18",
-    imu: Annotated[
-        str | None, typer.Option(help="Specification of the IMU: name in config/imu or path; that of --after, or dtg.")
-    ] = None,
-    site: Annotated[
-        str | None, typer.Option(help="Where the test will be: name in config/site or path; of --after, or daejeon.")
-    ] = None,
-    model: Annotated[str, typer.Option(help="Model to estimate: name in config/model or path.")] = "baseline",
-    add: Annotated[
-        list[str] | None, typer.Option(metavar="EFFECT", help="Effect that the plan should also show; may be repeated.")
-    ] = None,
-    minutes: Annotated[
-        float | None, typer.Option(min=1.0, help="Time available: the best sigmas in it. Without: the shortest plan.")
-    ] = None,
-    limit: Annotated[list[str] | None, typer.Option(metavar="EFFECT=SIGMA", help=_LIMIT)] = None,
-    slack: Annotated[float, typer.Option(min=0.01, help="Factor on the sigmas of --plan that are the limits.")] = 1.2,
-    rates: Annotated[str, typer.Option(help="Mean rates the table can do (deg/s).")] = "2,10",
-    acceleration: Annotated[float, typer.Option(help="Acceleration the table can do (deg/s^2).")] = 20.0,
-    dwells: Annotated[str, typer.Option(help="Lengths of stops to choose from (s).")] = "20,40,60,80,100,130",
-    tries: Annotated[int, typer.Option(min=1, help="Most plans to evaluate.")] = 150,
-    tell: Annotated[
-        list[str] | None,
-        typer.Option(metavar="COEFFICIENT", help="Rank extra turns that tell these apart, and search no plan."),
-    ] = None,
-    after: Annotated[
-        list[Path] | None,
-        typer.Option(
-            metavar="BAG or FOLDER", help="What is known already: recordings of the unit, or results of calibrate or "
-            "diagnose. Searches the plan that tells most beyond it in --minutes (those of --plan).",
-        ),
-    ] = None,
-    backwards: Annotated[
-        bool, typer.Option("--backwards", help="Write --plan in the opposite order, and search no plan.")
-    ] = False,
-    out: Annotated[Path, typer.Option(help="Plan file to write.")] = Path("out/plan/found.yaml"),
-    as_json: JsonOption = False,
+    *,
+    planned: Planned,
+    allowed: Allowed,
+    request: PlanRequest,
 ) -> None:
     """Search for a plan with the bound of the data; leaves a plan file for --plan."""
     from sdimu_calibration.cli.plan_after import After, standing_of, tell_gain
@@ -69,42 +126,43 @@ def plan(
     from sdimu_calibration.cli.wide_table import print_table
     from sdimu_calibration.core.plan_search import Goal, Question, next_turn, search, untold
     from sdimu_calibration.core.plan_search.bound import already, bounds
-    from sdimu_calibration.core.plan_search.moves import Abilities
     from sdimu_calibration.storage.files.config import load_imu, load_plan, load_site
     from sdimu_calibration.storage.files.model_choice import named_model
     from sdimu_calibration.storage.files.plan_file import write_plan
 
-    console = plain(stderr=as_json)
-    start = load_plan(plan)
-    if backwards:
+    console, out, as_json = plain(stderr=request.as_json), request.out, request.as_json
+    start = load_plan(planned.plan)
+    if request.backwards:
         _write_backwards(console, start, out)
         answer({"plan": str(out), "minutes": start.duration_s / 60.0}, as_json)
         return
-    if more and not after:
+    if more and not request.after:
         raise typer.BadParameter("recordings stand behind --after", param_hint="BAG")
-    before = standing_of(console, After([*after, *(more or [])], imu, site, model)) if after else None
-    imu, site = imu or (before and before.imu) or "dtg", site or (before and before.site) or "daejeon"
-    wanted = named_model(model, [*(before.added if before else ()), *(add or [])])
+    paths = [*(request.after or []), *(more or [])]
+    before = standing_of(console, After(paths, planned.imu, planned.site, planned.model)) if request.after else None
+    imu = planned.imu or (before and before.imu) or "dtg"
+    site = planned.site or (before and before.site) or "daejeon"
+    wanted = named_model(planned.model, [*(before.added if before else ()), *(planned.add or [])])
     asked = Question(load_site(site), load_imu(imu), wanted, before.known if before else None)
-    speeds = tuple(math.radians(v) for v in _numbers("--rates", rates))
-    if tell:
+    if request.tell:
         # The next recording is one of its own: the shortest that tells these apart.
         onto = replace(start, dwell_s=start.dwell_s[:1], turns=()) if before else start
+        speeds = allowed.rates_rad_s
         with bar(console) as progress:
-            ranked = next_turn(onto, asked, tell, rates_rad_s=speeds, progress=progress)
-        none = untold(ranked, tell)
+            ranked = next_turn(onto, asked, request.tell, rates_rad_s=speeds, progress=progress)
+        none = untold(ranked, request.tell)
         for text in [none] if none else [one.text for one in ranked[:5]]:
             say(console, text)
-        answer(_ranking(start, tell, ranked) | ({"none": none} if none else {}), as_json)
+        answer(_ranking(start, request.tell, ranked) | ({"none": none} if none else {}), as_json)
         return
-    able = Abilities(speeds, math.radians(acceleration), tuple(_numbers("--dwells", dwells)))
+    able, minutes = allowed.abilities, allowed.minutes
     with bar(console) as progress:
         first = bounds(start, asked)
-        usual = {} if before else {e: slack * sigma for e, sigma in first.largest().items()}
-        limits = usual | _limits(limit or [])
+        usual = {} if before else {e: allowed.slack * sigma for e, sigma in first.largest().items()}
+        limits = usual | _limits(allowed.limit or [])
         if not limits and minutes is None:
             minutes = start.duration_s / 60.0
-        found = search(start, asked, able, Goal(limits, minutes), tries, progress)
+        found = search(start, asked, able, Goal(limits, minutes), allowed.tries, progress)
     title = f"sigma, the largest of the axes: {start.name} and {out.stem}"
     known = already(asked) if before else None
     print_table(console, *_table(start, known, first, found, limits), title)
@@ -160,10 +218,14 @@ def _content(
     """Give the plan that was found as plain data (SI); `file` is null where none is better."""
     sigma = {"before": first.largest(), "found": found.bounds.largest(), "limit": dict(limits)}
     return {
-        "format": "sdimu-plan-search/1", "plan": start.name, "file": None if out is None else str(out),
-        "minutes": {"before": start.duration_s / 60.0, "found": found.minutes}, "worst": found.worst,
-        "tried": found.tried, "sigma": sigma | ({"known": known.largest()} if known else {}),
-    }  # fmt: skip
+        "format": "sdimu-plan-search/1",
+        "plan": start.name,
+        "file": None if out is None else str(out),
+        "minutes": {"before": start.duration_s / 60.0, "found": found.minutes},
+        "worst": found.worst,
+        "tried": found.tried,
+        "sigma": sigma | ({"known": known.largest()} if known else {}),
+    }
 
 
 def _ranking(start: Plan, tell: Sequence[str], ranked: Sequence[NextTurn]) -> dict[str, object]:

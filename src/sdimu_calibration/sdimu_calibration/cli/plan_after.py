@@ -50,21 +50,20 @@ def standing_of(console: Console, asked: After) -> Standing:
 
 
 def _diagnosed(console: Console, asked: After) -> Standing:
+    from sdimu_calibration.cli.options import Opening, Request
     from sdimu_calibration.cli.progress import bar
-    from sdimu_calibration.cli.set_run import WORKERS, SetRequest, diagnosed_set
+    from sdimu_calibration.cli.set_run import SetRequest, diagnosed_set
     from sdimu_calibration.core.diagnosis.diagnose import climb
     from sdimu_calibration.core.diagnosis.standing import standing
     from sdimu_calibration.core.diagnosis.summary import summarise
     from sdimu_calibration.core.estimation.solve import solve
     from sdimu_calibration.storage.files.config import load_imu
     from sdimu_calibration.storage.files.model_choice import named_model
-    from sdimu_calibration.storage.opening import Source, open_test
+    from sdimu_calibration.storage.opening import open_test
 
     if len(asked.paths) > 1:
-        found = diagnosed_set(console, SetRequest(
-            asked.paths, None, asked.model, asked.site, asked.imu, (), Source(), "auto", None, None, WORKERS, None,
-            None, None,
-        ), ())[0]  # fmt: skip
+        request = SetRequest(asked.paths, Opening(asked.site, asked.imu), Request(asked.model))
+        found = diagnosed_set(console, request, ())[0]
         say(console, f"{found.verdict}: {found.sentence}")
         return found.standing
     test = open_test(asked.paths[0], asked.site, None if asked.imu is None else load_imu(asked.imu))
@@ -75,9 +74,12 @@ def _diagnosed(console: Console, asked: After) -> Standing:
 
 
 def tell_gain(
-    console: Console, start: Plan, found: Found, classes: Sequence[Sequence[str]],
+    console: Console,
+    start: Plan,
+    found: Found,
+    classes: Sequence[Sequence[str]],
     sigmas: tuple[Bounds, Bounds, Bounds],
-) -> None:  # fmt: skip
+) -> None:
     """Say what the plan tells beyond what is known, beside the plan that the search began with.
 
     Parameters
@@ -109,4 +111,3 @@ def tell_gain(
             f"{labels[0]} from {', '.join(labels[1:])}, each as large as its prior: apart by {sizes[0]:.1f} sigma now, "
             f"{sizes[1]:.1f} after {start.name}, {sizes[2]:.1f} after the plan found",
         )
-

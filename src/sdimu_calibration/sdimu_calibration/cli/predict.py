@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from sdimu_calibration.cli.console import JsonOption, answer, plain, say
+from sdimu_calibration.cli.console import answer, plain, say
+from sdimu_calibration.cli.options import ImuNameOption, JsonOption, ModelOption
 from sdimu_calibration.core.data_error import DataError
 
 if TYPE_CHECKING:
@@ -24,9 +25,9 @@ _NOISE = "Noise that the filter assumes: name in config/noise (paper) or path; b
 
 def predict(
     plan: Annotated[str, typer.Option(help="Test plan: name in config/plan or path.")] = "kim18",
-    imu: Annotated[str, typer.Option(help="Specification of the IMU: name in config/imu or path.")] = "dtg",
+    imu: ImuNameOption = "dtg",
     site: Annotated[str, typer.Option(help="Where the test will be: name in config/site or path.")] = "daejeon",
-    model: Annotated[str, typer.Option(help="Model to estimate: name in config/model or path.")] = "baseline",
+    model: ModelOption = "baseline",
     mount: Annotated[str | None, typer.Option(metavar="DEG", help=_MOUNT)] = None,
     noise: Annotated[str | None, typer.Option(help=_NOISE)] = None,
     out: Annotated[Path, typer.Option(file_okay=False, help="Folder of the results.")] = Path("out/predict"),

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
+from sdimu_calibration.cli.options import Recorded
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.joint.set_diagnosis import SetDiagnosis, diagnose_set
 from sdimu_calibration.core.joint.set_fit import SetOptions
 from sdimu_calibration.core.progress import Progress
 from sdimu_calibration.core.specification import Model
 from sdimu_calibration.storage.files.model_choice import named_model
-from sdimu_calibration.storage.opening import Source
 from sdimu_calibration.storage.recording_set import BagSource, load_set, set_of
 from sdimu_calibration.storage.set_work import set_runner
 
@@ -19,7 +19,7 @@ Judge = Callable[[Sequence[str], Progress], SetDiagnosis]
 
 
 def bench_of_set(
-    bags: Sequence[Path], file: Path | None, model: str | None, site: str | None, imu: str | None, source: Source
+    bags: Sequence[Path], file: Path | None, model: str | None, opening: Recorded
 ) -> tuple[Mapping[str, Callable[[], PreparedTest]], Model, Judge]:
     """Read a set for the workbench.
 
@@ -28,9 +28,9 @@ def bench_of_set(
     bags : sequence of Path
     file : Path or None
         Set file, in the place of bags.
-    model, site, imu : str or None
-        As the options of the same names.
-    source : Source
+    model : str or None
+        As the option of the same name.
+    opening : Recorded
 
     Returns
     -------
@@ -46,7 +46,7 @@ def bench_of_set(
     DataError
         When the set or the model cannot be read.
     """
-    like = BagSource(Path(), site, imu, source)
+    like = BagSource(Path(), opening.site, opening.imu, opening.source)
     wanted = set_of(bags, like) if file is None else load_set(file, like)
     named = model or wanted.model
 

@@ -28,5 +28,7 @@ def init(
     found = bags_below(folder)
     path = out or folder / "set.yaml"
     write_set(path, found)
-    plain().print(f"{path}: {len(found)} recordings; complete serial and power_on, then: sdimu calibrate --set {path}",
-                  soft_wrap=True)
+    plain().print(
+        f"{path}: {len(found)} recordings; complete serial and power_on, then: sdimu calibrate --set {path}",
+        soft_wrap=True,
+    )

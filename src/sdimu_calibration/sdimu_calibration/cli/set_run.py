@@ -8,84 +8,48 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
 from sdimu_calibration.cli.console import answer, plain, say
 from sdimu_calibration.cli.next_commands import Asked, print_advice, spelled
-from sdimu_calibration.cli.options import leave, tell
+from sdimu_calibration.cli.opened import leave, tell
+from sdimu_calibration.cli.options import Opening, Place, Request
 
 if TYPE_CHECKING:
     from rich.console import Console
 
     from sdimu_calibration.core.effects.effect import Effect
-    from sdimu_calibration.core.estimation.prepared_test import PreparedTest
     from sdimu_calibration.core.joint.member import Member
     from sdimu_calibration.core.joint.set_diagnosis import SetDiagnosis
     from sdimu_calibration.core.joint.set_fit import Run, SetOptions
     from sdimu_calibration.core.progress import Progress
     from sdimu_calibration.core.results import Calibration
-    from sdimu_calibration.storage.opening import Source
     from sdimu_calibration.storage.trace import Trace
-
-_PANEL = "Several recordings of one unit"
-Bags = Annotated[
-    list[Path] | None,
-    typer.Argument(metavar="BAG...", help="rosbag2 folder or .mcap file; several are fitted together as one unit."),
-]
-SetOption = Annotated[
-    Path | None,
-    typer.Option("--set", metavar="FILE", help="Set of recordings (sdimu set init).", rich_help_panel=_PANEL),
-]
-WorkersOption = Annotated[
-    int, typer.Option(min=1, help="Processes that read recordings of a set.", rich_help_panel=_PANEL)
-]
-SchedulerOption = Annotated[
-    str | None, typer.Option(metavar="ADDRESS", help="dask scheduler that reads them instead.", rich_help_panel=_PANEL)
-]
-ReferenceOption = Annotated[
-    str | None,
-    typer.Option(
-        "--reference-temperature", metavar="T", help="From which temperature effects count, such as 20 degC.",
-        rich_help_panel=_PANEL,
-    ),
-]  # fmt: skip
-WORKERS = 2
-"""Number of processes by default: the cores of a small machine."""
 
 
 @dataclass(frozen=True)
 class SetRequest:
-    """What the user asks of a set; entries as the options of the same names.
+    """What the user asks of a set.
 
     Attributes
     ----------
     bags : sequence of Path
-    file : Path or None
-    model, site, imu, estimator, noise, out, scheduler, serial, reference
-    add : list of str
-    source : Source
-    workers : int
-    as_json : bool
-        Print the answer as JSON; words go to stderr.
+        None where a set file names them.
+    opening : Opening
+        Of all recordings; what a set file says of one comes first.
+    request : Request
     """
 
     bags: Sequence[Path]
-    file: Path | None
-    model: str | None
-    site: str | None
-    imu: str | None
-    add: Sequence[str]
-    source: Source
-    estimator: str
-    noise: str | None
-    out: Path | None
-    workers: int
-    scheduler: str | None
-    serial: str | None
-    reference: str | None
-    as_json: bool = False
+    opening: Opening
+    request: Request
+
+    @property
+    def file(self) -> Path | None:
+        """Set file, in the place of bags."""
+        return self.request.set_file
 
 
 def single(bags: list[Path] | None, file: Path | None) -> Path | None:
@@ -103,26 +67,20 @@ def single(bags: list[Path] | None, file: Path | None) -> Path | None:
     return bags[0] if file is None and bags is not None and len(bags) == 1 else None
 
 
-def about_reference(test: PreparedTest, reference: str | None) -> PreparedTest:
-    """Let the temperature effects of a single recording count from ``--reference-temperature``."""
-    from sdimu_calibration.core.units import parse_quantity
-    from sdimu_calibration.storage.recording_set import counted_from
-
-    return test if reference is None else counted_from(test, parse_quantity(reference, "degC"))
-
-
-def refuse_for_sets(**options: object) -> None:
-    """Refuse options that are of one recording.
+def refuse_for_sets(opening: Opening, **options: object) -> None:
+    """Refuse options that are of one recording: those of an opening, and others by name.
 
     Raises
     ------
     BadParameter
         When one of them is stated.
     """
-    for name, value in options.items():
+    own = {name: getattr(opening, name) for name in ("whole_turns", "power_on", "exclude_stops", "exclude_times")}
+    for name, value in (options | own).items():
         if value:
             raise typer.BadParameter(
-                "is of one recording: state it for each in the set file (--set)" if name == "power_on"
+                "is of one recording: state it for each in the set file (--set)"
+                if name == "power_on"
                 else "is of one recording: run it with that bag alone, or leave it out",
                 param_hint=f"--{name.replace('_', '-')}",
             )
@@ -136,7 +94,7 @@ def calibrate_together(asked: SetRequest) -> None:
     from sdimu_calibration.storage.files.result_file import write_result
     from sdimu_calibration.storage.files.whole_file import written_together
 
-    console = plain(stderr=asked.as_json)
+    console = plain(stderr=asked.request.as_json)
     with _begun(console, asked) as (members, options, run, progress):
         result = _with_serial(set_outcome(fit_set(members, options, run, progress=progress)), members)
         progress("done", 1.0)
@@ -146,7 +104,7 @@ def calibrate_together(asked: SetRequest) -> None:
         write_report(part / "report.html", result, title=page_title(asked, "Calibration", result), trace=_trace(asked))
     _show(console, result)
     say(console, f"results in {folder}")
-    answer(folder / "result.json", asked.as_json)
+    answer(folder / "result.json", asked.request.as_json)
     leave(result)
 
 
@@ -157,23 +115,27 @@ def diagnose_together(asked: SetRequest, extra: Sequence[Effect]) -> None:
     from sdimu_calibration.storage.files.result_file import write_result
     from sdimu_calibration.storage.files.whole_file import written_together
 
-    console = plain(stderr=asked.as_json)
+    console = plain(stderr=asked.request.as_json)
     found, members = diagnosed_set(console, asked, extra)
     after = _with_serial(found.after, members)
     folder = _folder(asked, "diagnosis")
-    about = Asked.of(asked.bags, {"site": asked.site, "imu": asked.imu}, folder)
+    about = Asked.of(asked.bags, folder, Place(asked.opening.site, asked.opening.imu))
     with written_together(folder) as part:
         write_set_diagnosis(part / "set.json", found)
         write_result(part / "result.json", after, found.verdict)
         write_report(
-            part / "report.html", after, title=page_title(asked, "Diagnosis", after), of_set=found, trace=_trace(asked),
+            part / "report.html",
+            after,
+            title=page_title(asked, "Diagnosis", after),
+            of_set=found,
+            trace=_trace(asked),
             spell=partial(spelled, asked=about),
-        )  # fmt: skip
+        )
     _show(console, after, diagnosed=True)
     say(console, f"{found.verdict}: {found.sentence}")
     print_advice(console, found.advice, about)
     say(console, f"results in {folder}")
-    answer(folder / "set.json", asked.as_json)
+    answer(folder / "set.json", asked.request.as_json)
     leave(after, (found.verdict, found.sentence))
 
 
@@ -190,39 +152,40 @@ def diagnosed_set(
 
 
 @contextmanager
-def _begun(
-    console: Console, asked: SetRequest
-) -> Iterator[tuple[tuple[Member, ...], SetOptions, Run, Progress]]:
+def _begun(console: Console, asked: SetRequest) -> Iterator[tuple[tuple[Member, ...], SetOptions, Run, Progress]]:
     """Members, options and runner of what is asked, with a bar that shows the recordings that are done."""
     from sdimu_calibration.cli.progress import bar
-    from sdimu_calibration.core.units import parse_quantity
-    from sdimu_calibration.storage.files.model_choice import HANDHELD, named_estimator
     from sdimu_calibration.storage.recording_set import BagSource, load_set, set_of, set_options
     from sdimu_calibration.storage.set_work import set_runner
 
-    estimator = named_estimator(asked.estimator, "--estimator")
-    reference = None if asked.reference is None else parse_quantity(asked.reference, "degC")
-    handheld = None if estimator == "auto" else estimator == HANDHELD
+    opening, request = asked.opening, asked.request
     like = BagSource(
-        Path(), asked.site, asked.imu, asked.source, handheld, asked.noise is not None, reference,
-    )  # fmt: skip
+        Path(),
+        opening.site,
+        opening.imu,
+        opening.source,
+        request.handheld,
+        opening.measured_noise,
+        opening.reference_degc,
+    )
     wanted = set_of(asked.bags, like) if asked.file is None else load_set(asked.file, like)
-    serial = asked.serial
+    serial = opening.serial
     members = tuple(m if serial is None else replace(m, serial=serial) for m in wanted.members)
-    options = set_options(replace(wanted, members=members), asked.model, asked.add, estimator)
+    options = set_options(replace(wanted, members=members), request.model, request.add or [], request.asked_estimator)
     with bar(console) as progress:
+
         def told(done: int, of: int) -> None:
             progress(f"recordings {done} of {of}", done / of)
 
         kept = _folder(asked, "evidence")
-        with set_runner(len(members), asked.workers, kept, asked.scheduler, told) as run:
+        with set_runner(len(members), request.workers, kept, request.scheduler, told) as run:
             yield members, options, run, progress
 
 
 def _folder(asked: SetRequest, what: str) -> Path:
     """Folder of results: --out, or beside the first bag or the set file; that of evidence inside --out."""
-    if asked.out is not None:
-        return asked.out / what if what == "evidence" else asked.out
+    if asked.request.out is not None:
+        return asked.request.out / what if what == "evidence" else asked.request.out
     first = (asked.file or asked.bags[0]).resolve()
     return first.with_name(f"{first.stem if asked.file else first.name}_set_{what}")
 
@@ -230,7 +193,8 @@ def _folder(asked: SetRequest, what: str) -> Path:
 def _trace(asked: SetRequest) -> Trace:
     from sdimu_calibration.storage.trace import traced
 
-    return traced(asked.bags, sys.argv[1:], set=asked.file, site=asked.site, imu=asked.imu, model=asked.model)
+    place, model = asked.opening, asked.request.model
+    return traced(asked.bags, sys.argv[1:], set=asked.file, site=place.site, imu=place.imu, model=model)
 
 
 def page_title(asked: SetRequest, word: str, result: Calibration) -> str:

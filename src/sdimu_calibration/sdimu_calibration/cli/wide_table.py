@@ -34,9 +34,13 @@ def print_table(
 
 
 def _table(
-    headings: Sequence[str], widths: Sequence[int], lines: Sequence[Sequence[str]], title: str | None, left: int,
+    headings: Sequence[str],
+    widths: Sequence[int],
+    lines: Sequence[Sequence[str]],
+    title: str | None,
+    left: int,
     gap: int,
-) -> Table:  # fmt: skip
+) -> Table:
     from rich.box import SIMPLE_HEAD
     from rich.table import Table
 
@@ -49,9 +53,7 @@ def _table(
     return table
 
 
-def _paragraphs(
-    console: Console, headings: Sequence[str], lines: Sequence[Sequence[str]], title: str | None
-) -> None:
+def _paragraphs(console: Console, headings: Sequence[str], lines: Sequence[Sequence[str]], title: str | None) -> None:
     """Print each line as its name, and below it what each column says."""
     if title:
         say(console, title)

@@ -2,25 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from sdimu_calibration.cli.console import plain
-from sdimu_calibration.cli.options import ImuOption
-from sdimu_calibration.cli.set_run import Bags, SetOption, single
-from sdimu_calibration.cli.source_options import (
-    AccelSign,
-    AccelUnit,
-    GyroSign,
-    GyroUnit,
-    ImuTopic,
-    JointTopic,
-    StatusTopic,
-    TemperatureTopic,
-    source,
-)
+from sdimu_calibration.cli.option_groups import with_options, words_of
+from sdimu_calibration.cli.options import BagsArgument, Recorded, SetOption
+from sdimu_calibration.cli.set_run import single
 
 if TYPE_CHECKING:
     from sdimu_calibration.core.estimation.prepared_test import PreparedTest
@@ -28,29 +19,21 @@ if TYPE_CHECKING:
 HOST = "127.0.0.1"
 
 
-def workbench(
-    bags: Bags = None,
-    port: Annotated[int, typer.Option(min=1, max=65535, help="Port on this machine.")] = 8050,
+@dataclass(frozen=True)
+class Served:
+    """Where the page is served, and what it begins with."""
+
+    port: Annotated[int, typer.Option(min=1, max=65535, help="Port on this machine.")] = 8050
+    host: Annotated[str, typer.Option(help="Address to listen on; others than this machine only when asked.")] = HOST
     model: Annotated[
         str | None, typer.Option(help="Model to start from: name in config/model or path; baseline when left out.")
-    ] = None,
-    site: Annotated[
-        str | None, typer.Option(help="Where the test was: name in config/site or path; daejeon when left out.")
-    ] = None,
-    imu: ImuOption = None,
-    host: Annotated[str, typer.Option(help="Address to listen on; others than this machine only when asked.")] = HOST,
-    set_file: SetOption = None,
-    imu_topic: ImuTopic = None,
-    status_topic: StatusTopic = None,
-    joint_topic: JointTopic = None,
-    temperature_topic: TemperatureTopic = None,
-    accel_unit: AccelUnit = None,
-    gyro_unit: GyroUnit = None,
-    accel_sign: AccelSign = None,
-    gyro_sign: GyroSign = None,
-) -> None:
+    ] = None
+    set_file: SetOption = None
+
+
+@with_options
+def workbench(bags: BagsArgument = None, *, served: Served, opening: Recorded) -> None:
     """Open recordings in the browser; runs until it is stopped with Ctrl-C."""
-    given = {name: value for name, value in locals().items() if name != "model"}
     import logging
     import socket
     from collections.abc import Callable, Mapping
@@ -58,7 +41,6 @@ def workbench(
 
     from werkzeug.serving import make_server
 
-    from sdimu_calibration.cli.next_commands import Asked
     from sdimu_calibration.cli.progress import bar
     from sdimu_calibration.cli.set_bench import bench_of_set
     from sdimu_calibration.core.recording import DataError
@@ -66,31 +48,29 @@ def workbench(
     from sdimu_calibration.report.workbench.fit import FitSession
     from sdimu_calibration.report.workbench.recording_cache import RecordingCache, neighbours
     from sdimu_calibration.report.workbench.setting import Setting
-    from sdimu_calibration.storage.files.config import load_imu, load_site
+    from sdimu_calibration.storage.files.config import load_site
     from sdimu_calibration.storage.files.model_choice import named_model
     from sdimu_calibration.storage.opening import open_test
 
+    host, port, set_file = served.host, served.port, served.set_file
     with socket.socket() as probe:
         if probe.connect_ex((host, port)) == 0:
             raise DataError(f"port {port} is taken (choose another with --port)")
-    specification, wanted = None if imu is None else load_imu(imu), named_model(model, [])
-    if site is not None:
-        load_site(site)
-    origin = source(
-        imu_topic, status_topic, joint_topic, temperature_topic, accel_unit, gyro_unit, accel_sign, gyro_sign
-    )
+    specification, wanted = opening.specification, named_model(served.model, [])
+    if opening.site is not None:
+        load_site(opening.site)
     bag, judge, around = single(bags, set_file), None, dict[str, Path]()
     openers: Mapping[str, Callable[[], PreparedTest]]
     if bag is None:
-        openers, wanted, judge = bench_of_set(bags or [], set_file, model, site, imu, origin)
+        openers, wanted, judge = bench_of_set(bags or [], set_file, served.model, opening)
     else:
-        around = neighbours(bag)
-        openers = {name: partial(open_test, path, site, specification, origin) for name, path in around.items()}
+        around, source = neighbours(bag), opening.source
+        openers = {name: partial(open_test, path, opening.site, specification, source) for name, path in around.items()}
 
     def session(name: str) -> FitSession:
         return FitSession(navigated(name, openers[name]()), wanted)
 
-    shelf = RecordingCache(list(openers), session, around, Asked.of((), given, Path()).options)
+    shelf = RecordingCache(list(openers), session, around, words_of(opening, Recorded))
     console = plain()
     with bar(plain(stderr=True)) as progress:
         progress("reading", 0.0)

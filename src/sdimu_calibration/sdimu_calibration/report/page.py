@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from html import escape
 from pathlib import Path
 from typing import Any
@@ -34,6 +35,21 @@ from sdimu_calibration.storage.trace import Trace
 _HEADING = re.compile(r'<section class="card" id="([\w-]+)"><h2>(.*?)</h2>')
 _LADDER = 355
 """Height of the ladder on the first screen (px): that of the heat map beside it."""
+
+
+@dataclass(frozen=True)
+class Contents:
+    """What a page shows besides the coefficients of a calibration; entries as the arguments of `write_report`."""
+
+    title: str = "Calibration"
+    truth: Mapping[str, float] | None = None
+    reference: Mapping[str, float] | None = None
+    summary: DiagnosisSummary | None = None
+    more: ReportExtras | None = None
+    fit: Fit | None = None
+    of_set: SetDiagnosis | None = None
+    trace: Trace | None = None
+    spell: Spell | None = None
 
 
 def write_report(
@@ -77,7 +93,8 @@ def write_report(
     spell : callable, optional
         Writes the whole command that an advice means.
     """
-    write_whole(path, page(calibration, title, truth, reference, summary, more, fit, of_set, trace, spell))
+    contents = Contents(title, truth, reference, summary, more, fit, of_set, trace, spell)
+    write_whole(path, page(calibration, contents))
 
 
 class _Drawing:
@@ -91,25 +108,15 @@ class _Drawing:
         return html(figure, self._count)
 
 
-def page(
-    calibration: Calibration,
-    title: str,
-    truth: Mapping[str, float] | None = None,
-    reference: Mapping[str, float] | None = None,
-    summary: DiagnosisSummary | None = None,
-    more: ReportExtras | None = None,
-    fit: Fit | None = None,
-    of_set: SetDiagnosis | None = None,
-    trace: Trace | None = None,
-    spell: Spell | None = None,
-) -> str:
-    """Make the page as HTML text; parameters as in `write_report`."""
-    draw, more = _Drawing(), more or ReportExtras()
+def page(calibration: Calibration, contents: Contents) -> str:
+    """Make the page as HTML text."""
+    summary, fit, of_set, spell = contents.summary, contents.fit, contents.of_set, contents.spell
+    draw, more = _Drawing(), contents.more or ReportExtras()
     if summary is not None:
         fit = summary.diagnosis.extended
     parts = [
         _first(calibration, summary, fit, of_set, spell, draw),
-        coefficients_section(calibration, fit, truth, reference, _lacks(calibration, summary), draw),
+        coefficients_section(calibration, fit, contents.truth, contents.reference, _lacks(calibration, summary), draw),
         recurrence_section(of_set.recurrence) if of_set is not None and of_set.recurrence else "",
         *([] if calibration.of_set is None else set_sections(calibration, calibration.of_set, draw)),
         *([] if summary is None else _evidence(summary, more, spell, draw)),
@@ -117,15 +124,17 @@ def page(
         noise_section(fit, draw) if isinstance(fit, NavigationFit) else "",
         experiment.data_section(fit, draw) if fit is not None else "",
         _notes(without_advice(calibration.notes) if summary or of_set else calibration.notes),
-        traceability(calibration, trace),
+        traceability(calibration, contents.trace),
     ]
     body = "\n".join(part for part in parts if part)
     headings = [("verdict", "Verdict"), *_HEADING.findall(body)]
-    contents = [(anchor, words.partition(":")[0]) for anchor, words in headings]
     return document(
-        title, body, under=_under(calibration), contents=contents,
+        contents.title,
+        body,
+        under=_under(calibration),
+        contents=[(anchor, words.partition(":")[0]) for anchor, words in headings],
         script=experiment.ATTITUDE_SCRIPT if fit is not None else "",
-    )  # fmt: skip
+    )
 
 
 def _first(
@@ -163,9 +172,7 @@ def _ladder(rungs: Sequence[tuple[str, float]], learned: bool, draw: Draw) -> st
     return f'<section class="card"><h2>How far the error falls</h2>{figure}{told}</section>'
 
 
-def _evidence(
-    summary: DiagnosisSummary, more: ReportExtras, spell: Spell | None, draw: Draw
-) -> list[str]:
+def _evidence(summary: DiagnosisSummary, more: ReportExtras, spell: Spell | None, draw: Draw) -> list[str]:
     """Tell what is missing, what it would be confused with, what it does in use, and where it shows."""
     diagnosis = summary.diagnosis
     if diagnosis.fit.learns_scatter:

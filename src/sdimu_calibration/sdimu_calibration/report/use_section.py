@@ -98,9 +98,10 @@ def figure(trials: Sequence[FreeInertialRun]) -> Figure:
             for row, (values, unit) in enumerate(
                 ((drift.distance, "m"), (drift.speed, "m/s"), (heading, "arcmin")), start=1
             ):
-                _line(made, drift.t[rows], values[rows], f"{drift.name}|{unit}", ink, dash, row, column)
+                _line(made, drift.t[rows], values[rows], f"{drift.name}|{unit}", (ink, dash), (row, column))
             if np.isfinite(drift.promised).any():
-                _line(made, drift.t[rows], drift.promised[rows], f"{drift.name}, promised|m", ink, dash, 1, column, 0.9)
+                name = f"{drift.name}, promised|m"
+                _line(made, drift.t[rows], drift.promised[rows], name, (ink, dash), (1, column), 0.9)
     for row, title in enumerate(("position (m)", "velocity (m/s)", "heading (arcmin)"), start=1):
         made.y_axes(type="log", title=title, dtick=1, exponentformat="power", row=row, col=1)
         made.y_axes(type="log", dtick=1, exponentformat="power", row=row)
@@ -112,8 +113,10 @@ def figure(trials: Sequence[FreeInertialRun]) -> Figure:
 
 
 def _line(
-    made: Figure, t: Floats, y: Floats, name: str, ink: str, dash: str, row: int, column: int, width: float = 2.2
+    made: Figure, t: Floats, y: Floats, name: str, pen: tuple[str, str], at: tuple[int, int], width: float = 2.2
 ) -> None:
+    """Draw a line: `pen` is ink and dash, `at` row and column."""
+    (ink, dash), (row, column) = pen, at
     said, _, unit = name.partition("|")
     thin = width < 1.0
     made.add(

@@ -120,6 +120,56 @@ def open_test(
     return PreparedTest(*opened, assumed_site=assumed, origin=origin)
 
 
+@dataclass(frozen=True)
+class Opening:
+    """How a recording is opened: what is stated of it, read; what is left out is recognised, assumed or in the bag.
+
+    Attributes
+    ----------
+    site, imu, source, handheld, measured_noise
+        As for `open_test`.
+    whole_turns : float
+        By hand: how well turns of about 360 deg about the vertical are whole ones (rad); 0 for none.
+    exclude_stops : tuple of int
+        Stops that no fit sees.
+    exclude_times : tuple of (float, float)
+        Spans of time (s) in which no fit takes a measurement.
+    serial, power_on : str or None
+        Of the unit, in place of what the bag says.
+    reference_degc : float or None
+        Temperature from which temperature effects count (deg C); None is that at the start of the recording.
+    imu_file : str or None
+        Name or path that `imu` was read from.
+    """
+
+    site: str | None = None
+    imu: ImuSpecification | None = None
+    source: Source = field(default_factory=Source)
+    handheld: bool | None = None
+    measured_noise: bool = False
+    whole_turns: float = 0.0
+    exclude_stops: tuple[int, ...] = ()
+    exclude_times: tuple[tuple[float, float], ...] = ()
+    serial: str | None = None
+    power_on: str | None = None
+    reference_degc: float | None = None
+    imu_file: str | None = None
+
+    def test(self, path: Path) -> PreparedTest:
+        """Open a bag so.
+
+        Raises
+        ------
+        DataError
+            As `open_test`.
+        """
+        test = open_test(path, self.site, self.imu, self.source, self.handheld, self.measured_noise)
+        test = with_imu_file(test, self.imu_file)
+        origin = test.origin.stated(self.serial, self.power_on)
+        test = replace(test, whole_turns=self.whole_turns, origin=origin).counted_from(self.reference_degc)
+        return test.without_stops(self.exclude_stops).without_times(self.exclude_times)
+
+
 def said_of(path: Path, site: str) -> Origin:
     """Give unit and power-on as the bag says them, with its name and that of the site."""
     said = custom_data(path)

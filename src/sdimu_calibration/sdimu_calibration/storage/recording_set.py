@@ -60,15 +60,7 @@ class BagSource:
 def _opened(of: BagSource) -> PreparedTest:
     imu = None if of.imu is None else load_imu(of.imu)
     test = open_test(of.bag, of.site, imu, of.source, of.handheld, of.measured_noise)
-    return counted_from(with_imu_file(test, of.imu), of.reference_degc)
-
-
-def counted_from(test: PreparedTest, degc: float | None) -> PreparedTest:
-    """Let temperature effects count from a temperature (deg C); from that at the start where None is given."""
-    log = test.recording.temperature
-    if log is None or degc is None:
-        return test
-    return replace(test, recording=replace(test.recording, temperature=replace(log, reference_degc=degc)))
+    return with_imu_file(test, of.imu).counted_from(of.reference_degc)
 
 
 @dataclass(frozen=True)

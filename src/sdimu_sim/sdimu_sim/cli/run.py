@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import sys
 from contextlib import nullcontext
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from sdimu_calibration.cli.options import NOT_TRUSTED, DomainOption
-from sdimu_sim.cli.simulate import EFFECT, TEMPERATURE
+from sdimu_calibration.cli.opened import NOT_TRUSTED
+from sdimu_calibration.cli.option_groups import with_options
+from sdimu_calibration.cli.options import DomainOption, EachStopOption, Fitted, Place
+from sdimu_sim.cli.options import SeedOption, World
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -25,26 +28,39 @@ DEFAULT_PLAN = "kim18"
 DEFAULT_MODEL = "baseline"
 
 
-def run(
+@dataclass(frozen=True)
+class LiveTest:
+    """What is run, and how it is followed."""
+
     plan: Annotated[
         str | None, typer.Option(help="Test plan: name in config/plan or path; kim18. Not with --adaptive.")
-    ] = None,
-    imu: Annotated[str, typer.Option(help="IMU specification, from which the true errors are drawn.")] = "dtg",
-    model: Annotated[str, typer.Option(help="Model to estimate.")] = DEFAULT_MODEL,
-    site: Annotated[str, typer.Option(help="Site.")] = "daejeon",
-    table: Annotated[str, typer.Option(help="Rate table.")] = "ideal",
-    speed: Annotated[float, typer.Option(help="Times real time; 0 is as fast as nothing gets lost.")] = 0.0,
-    seed: Annotated[int, typer.Option(min=0, help="Of coefficients, mount and noise.")] = 1,
-    rate: Annotated[float, typer.Option(help="Sample rate of the IMU (Hz), 10 to 1000.")] = 100.0,
-    mount: Annotated[str | None, typer.Option(help="Rotation of the IMU on the table: 'X,Y,Z' (deg).")] = None,
-    mount_max: Annotated[float, typer.Option(help="Without --mount: drawn up to this about every axis (deg).")] = 3.0,
-    effect: Annotated[list[str] | None, typer.Option(help=EFFECT)] = None,
-    temperature: Annotated[str | None, typer.Option(help=TEMPERATURE)] = None,
-    diagnose: Annotated[bool, typer.Option(help="Publish a diagnosis at the end of each stop.")] = True,
+    ] = None
+    imu: Annotated[str, typer.Option(help="IMU specification, from which the true errors are drawn.")] = "dtg"
+    model: Annotated[str, typer.Option(help="Model to estimate.")] = DEFAULT_MODEL
+    speed: Annotated[float, typer.Option(help="Times real time; 0 is as fast as nothing gets lost.")] = 0.0
+    seed: SeedOption = 1
+    diagnose: EachStopOption = True
     adaptive: Annotated[
         str | None, typer.Option(metavar="GOALS", help="Choose each turn by what is known; limits as in config/goal.")
-    ] = None,
-    ask: Annotated[bool, typer.Option(help="With --adaptive: each turn waits for a yes on /adaptive/confirm.")] = False,
+    ] = None
+    ask: Annotated[bool, typer.Option(help="With --adaptive: each turn waits for a yes on /adaptive/confirm.")] = False
+
+    @property
+    def followed(self) -> str:
+        """The plan that the table begins with."""
+        return self.plan or DEFAULT_PLAN
+
+    @property
+    def title(self) -> str:
+        """What the test is called on its page."""
+        course = f"adaptive to {self.adaptive}" if self.adaptive else f"plan {self.followed}"
+        return f"Simulated test: {course}, model {self.model}"
+
+
+@with_options
+def run(
+    test: LiveTest,
+    world: World,
     domain: DomainOption = None,
     out: Annotated[Path, typer.Option(file_okay=False, help="Folder of the results.")] = Path("out/run"),
 ) -> None:
@@ -54,26 +70,12 @@ def run(
     from sdimu_calibration.cli.console import console as make_console
     from sdimu_calibration.cli.processes import Children, own_domain, own_folder
     from sdimu_calibration.core.compiled import never_compiled
-    from sdimu_sim.own_effects import simulated_effects
 
-    _check_choosing(adaptive, ask, plan)
-    plan = plan or DEFAULT_PLAN
-    options: dict[str, dict[str, Any]] = {
-        "table": {"plan": plan, "table": table, "seed": seed, "speed": speed},
-        "imu": {
-            "imu": imu, "site": site, "plan": plan, "seed": seed, "rate_hz": rate, "mount": mount or "",
-            "mount_max_deg": mount_max, "effects": list(simulated_effects(effect or ())),
-            "temperature": temperature or "", "truth_file": str(out / "truth.yaml"),
-        },
-        # What the simulated gyros send is known, so the filter on the way need not wait for a turn.
-        "calibration": {
-            "site": site, "imu": imu, "model": model, "out": str(out), "gyro_unit": "rad/s", "gyro_sign": 1,
-            "diagnose": diagnose,
-        },
-    }  # fmt: skip
+    _check_choosing(test.adaptive, test.ask, test.plan)
+    options = _parameters(test, world, out)
     duration = _check(options)
-    if adaptive is not None:
-        duration = _choosing(options, adaptive, ask)
+    if test.adaptive is not None:
+        duration = _choosing(options, test.adaptive, test.ask)
     console = make_console()
     with own_folder(out):
         begun = time.monotonic()
@@ -83,12 +85,43 @@ def run(
             if never_compiled():
                 console.print("compiling the numerical loops, once on this machine: about a minute without samples")
             _start(children, options, out / "bag", replace)
-            streamed = _watch(console, children, _test(None if adaptive else plan, model, duration))
+            shown = _test(None if test.adaptive else test.followed, test.model, duration)
+            streamed = _watch(console, children, shown)
         wall = time.monotonic() - begun
-        end = _tell_choices(console, out / "choices.json") if adaptive is not None else None
-        result = _report(console, out, site, imu, model, f"adaptive to {adaptive}" if adaptive else f"plan {plan}")
+        end = _tell_choices(console, out / "choices.json") if test.adaptive is not None else None
+        result = _report(console, out, world.site, test)
         _say_measured(console, out, result, streamed, wall)
-    _leave(adaptive, end)
+    _leave(test.adaptive, end)
+
+
+def _parameters(test: LiveTest, world: World, out: Path) -> dict[str, dict[str, Any]]:
+    """Parameters of table, IMU and calibration node."""
+    plan = test.followed
+    return {
+        "table": {"plan": plan, "table": world.table, "seed": test.seed, "speed": test.speed},
+        "imu": {
+            "imu": test.imu,
+            "site": world.site,
+            "plan": plan,
+            "seed": test.seed,
+            "rate_hz": world.rate,
+            "mount": world.mount or "",
+            "mount_max_deg": world.mount_max,
+            "effects": list(world.effects),
+            "temperature": world.temperature or "",
+            "truth_file": str(out / "truth.yaml"),
+        },
+        # What the simulated gyros send is known, so the filter on the way need not wait for a turn.
+        "calibration": {
+            "site": world.site,
+            "imu": test.imu,
+            "model": test.model,
+            "out": str(out),
+            "gyro_unit": "rad/s",
+            "gyro_sign": 1,
+            "diagnose": test.diagnose,
+        },
+    }
 
 
 def _leave(goals: str | None, end: dict[str, Any] | None) -> None:
@@ -136,7 +169,7 @@ def _check(options: dict[str, dict[str, Any]]) -> float:
     from sdimu_calibration.core.recording import DataError
     from sdimu_calibration.storage.files.config import load_imu, load_plan, load_site
     from sdimu_calibration.storage.files.effect_file import extended_model
-    from sdimu_sim.cli.simulate import mount_rad
+    from sdimu_sim.cli.options import mount_rad
     from sdimu_sim.temperature_file import load_temperature
 
     table, imu, calibration = options["table"], options["imu"], options["calibration"]
@@ -163,8 +196,13 @@ def _choosing(options: dict[str, dict[str, Any]], goals: str, ask: bool) -> floa
     options["table"]["follow_goals"] = True
     given = {key: value for key, value in options["calibration"].items() if key != "diagnose"}
     options["adaptive"] = {
-        **given, "goals": goals, "table": options["table"]["table"], "allow_motion": True, "ask": ask, "finish": True,
-    }  # fmt: skip
+        **given,
+        "goals": goals,
+        "table": options["table"]["table"],
+        "allow_motion": True,
+        "ask": ask,
+        "finish": True,
+    }
     return 60.0 * load_goals(goals).minutes
 
 
@@ -236,7 +274,7 @@ def _test(plan: str | None, model: str, duration: float) -> Outline:
     return Outline(duration, stops, [effect.key for effect in effects], units)
 
 
-def _report(console: Console, out: Path, site: str, imu: str, model: str, test_name: str) -> Calibration:
+def _report(console: Console, out: Path, site: str, test: LiveTest) -> Calibration:
     """Diagnose the bag, print the table with the truth, write diagnosis and page."""
     from sdimu_calibration.cli.diagnosis_text import print_out_of_sight
     from sdimu_calibration.cli.next_commands import Asked, print_advice, spelled
@@ -257,20 +295,25 @@ def _report(console: Console, out: Path, site: str, imu: str, model: str, test_n
 
     result = read_result(out / "result.json")
     truth = read_truth(out / "truth.yaml", result.body_frame)
+    imu, model = test.imu, test.model
     with console.status("diagnosing") if console.is_terminal else nullcontext():
-        test = open_test(out / "bag", site, load_imu(imu))
-        diagnosis = climb(solve(test, extended_model(model, ())))
+        opened = open_test(out / "bag", site, load_imu(imu))
+        diagnosis = climb(solve(opened, extended_model(model, ())))
         summary, more = summarise(diagnosis), report_extras(diagnosis)
-    title = f"Simulated test: {test_name}, model {model}"
-    named = None if model == DEFAULT_MODEL else model
-    asked = Asked.of((out / "bag",), {"site": site, "imu": imu, "model": named}, out)
+    asked = Asked.of((out / "bag",), out, Place(site, imu), Fitted(None if model == DEFAULT_MODEL else model))
     with written_together(out) as part:
         write_diagnosis(part / "diagnosis.json", summary)
         write_report(
-            part / "report.html", result, title=title, truth=truth, reference=read_reference(), summary=summary,
-            more=more, trace=traced([out / "bag"], sys.argv[1:], site=site, imu=imu, model=model),
+            part / "report.html",
+            result,
+            title=test.title,
+            truth=truth,
+            reference=read_reference(),
+            summary=summary,
+            more=more,
+            trace=traced([out / "bag"], sys.argv[1:], site=site, imu=imu, model=model),
             spell=partial(spelled, asked=asked),
-        )  # fmt: skip
+        )
     shown = rich_table(rows(result, truth, read_reference()), f"body frame: {result.body_frame}")
     console.print(shown, soft_wrap=True)
     console.print(diagnosis.sentence, soft_wrap=True, highlight=False)

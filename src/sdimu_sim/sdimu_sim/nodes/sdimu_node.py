@@ -30,7 +30,7 @@ from sdimu_calibration.nodes.ticking import Ticker
 from sdimu_calibration.nodes.transform_type import transform_class
 from sdimu_calibration.nodes.transforms import IDENTITY, PLATFORM, STATIC, TransformMessage
 from sdimu_calibration.storage.files.config import load_imu, load_plan, load_site
-from sdimu_sim.cli.simulate import mount_rad
+from sdimu_sim.cli.options import mount_rad
 from sdimu_sim.core.generator import ImuGenerator
 from sdimu_sim.core.platform import PlatformMotion
 from sdimu_sim.core.scenario import Scenario, imu_truth

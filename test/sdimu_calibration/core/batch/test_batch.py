@@ -154,9 +154,7 @@ def test_responses_of_a_motion_are_its_derivatives(imu, model, site, share):
             prepared.cycles, at_rest, setup.sensors, c, C_nb.copy(), site.latitude_rad, setup.gravity, None, True
         )
         values, slope = setup.sensors.regressors(seen), error_slope(setup.sensors, seen, rows, c)
-        return preintegrate(
-            prepared, rows, setup.sensors, values, slope, c, C, site.latitude_rad, site.height_m, 0.0, (1e-12, 1e-8)
-        )
+        return preintegrate(prepared, rows, setup, values, slope, c, C)
 
     def difference(ahead, behind) -> np.ndarray:
         return np.concatenate([rotation_vector(ahead.C_nb @ behind.C_nb.T), ahead.moved - behind.moved])

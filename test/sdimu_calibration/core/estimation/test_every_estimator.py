@@ -19,7 +19,7 @@ from sdimu_calibration.core.front_door import open_test as open_read
 from sdimu_calibration.core.live import LiveCalibration
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.specification import Site
-from sdimu_calibration.report.page import page
+from sdimu_calibration.report.page import Contents, page
 from sdimu_calibration.report.report_extras import ReportExtras
 from sdimu_calibration.report.workbench.fit import FitSession
 from sdimu_calibration.report.workbench.setting import Setting
@@ -139,7 +139,7 @@ def test_a_fit_is_diagnosed_and_shown(case, tmp_path):
     read = read_diagnosis(tmp_path).plain()
     assert read["estimator"] == case.estimator
     assert read["where"]
-    text = page(summary.diagnosis.after, "A test", summary=summary, more=ReportExtras())
+    text = page(summary.diagnosis.after, Contents("A test", summary=summary, more=ReportExtras()))
     assert "Where it fails" in text
     assert summary.diagnosis.verdict == "consistent", summary.diagnosis.sentence
 

@@ -195,14 +195,9 @@ def _travel(
     k: int,
 ) -> Preintegration:
     """Integrate the motion from stop k to the next."""
-    site = setup.site
-    excess = setup.gravity - float(earth.normal_gravity(site.latitude_rad, site.height_m))
     rows = slice(int(where.stop_last[k]), int(where.stop_first[k + 1]))
     slope = error_slope(setup.sensors, seen, rows, point.coefficients)
-    return preintegrate(
-        prepared, rows, setup.sensors, values, slope, point.coefficients, point.C_nb[k], site.latitude_rad,
-        site.height_m, excess, (setup.imu.gyro_white_noise**2, setup.imu.accel_white_noise**2),
-    )  # fmt: skip
+    return preintegrate(prepared, rows, setup, values, slope, point.coefficients, point.C_nb[k])
 
 
 def _links(

@@ -13,11 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from sdimu_calibration.core import earth
-from sdimu_calibration.core.alignment.prepared import PreparedData
+from sdimu_calibration.core.alignment.prepared import PreparedData, TestSetup
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.compiled import compiled
 from sdimu_calibration.core.data.gaps import GAP_SHARE
-from sdimu_calibration.core.effects.imu_model import ImuModel
 from sdimu_calibration.core.navigation.strapdown import navigate_cycle, velocity_increment
 from sdimu_calibration.core.rotation import rotation_matrix, skew
 
@@ -77,10 +76,14 @@ def _navigate(
 
 
 def preintegrate(
-    prepared: PreparedData, rows: slice, model: ImuModel, values: Floats, slope: Floats,
-    coefficients: Floats, C_nb: Floats,
-    latitude: float, height: float, gravity_excess: float, densities: tuple[float, float],
-) -> Preintegration:  # fmt: skip
+    prepared: PreparedData,
+    rows: slice,
+    setup: TestSetup,
+    values: Floats,
+    slope: Floats,
+    coefficients: Floats,
+    C_nb: Floats,
+) -> Preintegration:
     """Integrate one motion and linearise it.
 
     The linear responses are taken in the frame that does not turn and coincides with n at the end of the motion. There,
@@ -92,7 +95,8 @@ def preintegrate(
     prepared : PreparedData
     rows : slice
         Cycles of the motion.
-    model : ImuModel
+    setup : TestSetup
+        Site, gravity, white noise and the model of the sensors.
     values : ndarray, shape (n, m)
         Regressors of all cycles.
     slope : ndarray, shape (rows, 6, 6)
@@ -101,15 +105,14 @@ def preintegrate(
         Coefficients for which the samples are corrected.
     C_nb : ndarray, shape (3, 3)
         Attitude at the start.
-    latitude, height, gravity_excess : float
-        Site (rad, m), gravity beyond normal (m/s^2).
-    densities : tuple of float
-        White noise of gyros and accelerometers ((rad/s)^2/Hz, (m/s^2)^2/Hz).
 
     Returns
     -------
     Preintegration
     """
+    model, latitude, height = setup.sensors, setup.site.latitude_rad, setup.site.height_m
+    gravity_excess = setup.gravity - float(earth.normal_gravity(latitude, height))
+    densities = setup.imu.gyro_white_noise**2, setup.imu.accel_white_noise**2
     c = prepared.cycles[rows]
     own = values[rows]
     error = model.errors(own, coefficients) * c.dt[:, None]

@@ -7,11 +7,12 @@ angle on two accelerometers. Signs are those of a misalignment: +e about x is +q
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
 from sdimu_calibration.core.arrays import Floats
-from sdimu_calibration.core.effects.effect import ACCEL, AXES, Effect, Excitation, Parameter, Scope, Term
+from sdimu_calibration.core.effects.effect import ACCEL, AXES, Effect, Excitation, Parameter, Term
 from sdimu_calibration.core.effects.motion import Motion
 from sdimu_calibration.core.effects.registry import register
 from sdimu_calibration.core.units import to_si
@@ -38,39 +39,60 @@ def _prior(unit: str, navigation: float, tactical: float, mems: float) -> dict[s
 
 
 def _whole(
-    name: str, title: str, equation: str, size: Callable[[Motion], Floats], unit: tuple[str, str],
-    prior: tuple[float, float, float], typical: str, description: str, alike: tuple[str, ...], scope: Scope,
-    needs: str = "",
-) -> Effect:  # fmt: skip
+    name: str,
+    title: str,
+    equation: str,
+    size: Callable[[Motion], Floats],
+    unit: tuple[str, str],
+    prior: tuple[float, float, float],
+    **traits: Any,
+) -> Effect:
+    """One angle about each axis; `traits` are further ones of `Effect`."""
     parameters, terms = _on_two(name, tuple(AXES), (0, 1, 2), unit)
     return Effect(
-        name=name, title=title, equation=equation, parameters=parameters, terms=terms,
+        name=name,
+        title=title,
+        equation=equation,
+        parameters=parameters,
+        terms=terms,
         regressors=lambda m: np.hstack([_turned(m.f, size(m), i) for i in range(3)]),
-        prior=_prior(unit[1], *prior), scope=scope, needs=needs, excitation=_OVER_TIME,
-        typical=typical, description=description, confused_with=alike,
-    )  # fmt: skip
+        prior=_prior(unit[1], *prior),
+        excitation=_OVER_TIME,
+        **traits,
+    )
 
 
 RAMP = register(
     _whole(
-        "accel_triad_ramp", "turn of the accelerometer triad with time", "df = -t sum_i k_i (e_i x f)",
-        lambda m: m.t - 0.5 * m.dt, ("rad/s", "arcsec/h"), (5, 30, 300),
-        "navigation 0.5-5, MEMS 10-300 arcsec/h",
-        "Glue and frame between the two triads that give way, most while the unit warms up. The gyros see no such "
-        "turn, so the tilt of gravity against them drifts.",
-        ("accel_triad_temperature", "gyro_bias_ramp", "accel_bias_ramp"), "power-on",
+        "accel_triad_ramp",
+        "turn of the accelerometer triad with time",
+        "df = -t sum_i k_i (e_i x f)",
+        lambda m: m.t - 0.5 * m.dt,
+        ("rad/s", "arcsec/h"),
+        (5, 30, 300),
+        typical="navigation 0.5-5, MEMS 10-300 arcsec/h",
+        description="Glue and frame between the two triads that give way, most while the unit warms up. The gyros see "
+        "no such turn, so the tilt of gravity against them drifts.",
+        confused_with=("accel_triad_temperature", "gyro_bias_ramp", "accel_bias_ramp"),
+        scope="power-on",
     )
-)  # fmt: skip
+)
 
 TEMPERATURE = register(
     _whole(
-        "accel_triad_temperature", "turn of the accelerometer triad with temperature",
-        "df = -(T - T0) sum_i k_i (e_i x f)", lambda m: m.temperature, ("rad/K", "arcsec/degC"), (0.5, 3, 20),
-        "navigation 0.05-0.5, MEMS 1-20 arcsec/C",
-        "The frame between the two triads expands unevenly. T0 is the temperature at the start.",
-        ("accel_triad_ramp", "accel_bias_temperature"), "unit", "temperature",
+        "accel_triad_temperature",
+        "turn of the accelerometer triad with temperature",
+        "df = -(T - T0) sum_i k_i (e_i x f)",
+        lambda m: m.temperature,
+        ("rad/K", "arcsec/degC"),
+        (0.5, 3, 20),
+        typical="navigation 0.05-0.5, MEMS 1-20 arcsec/C",
+        description="The frame between the two triads expands unevenly. T0 is the temperature at the start.",
+        confused_with=("accel_triad_ramp", "accel_bias_temperature"),
+        scope="unit",
+        needs="temperature",
     )
-)  # fmt: skip
+)
 
 _PAIRS = tuple((i, j) for i in range(3) for j in range(3))
 _FLEXURE = "accel_triad_flexure"

@@ -86,6 +86,13 @@ class PreparedTest:
         """Take no measurement within spans of time (s)."""
         return replace(self, excluded=tuple(spans))
 
+    def counted_from(self, degc: float | None) -> PreparedTest:
+        """Let temperature effects count from a temperature (deg C); from that at the start where None is given."""
+        log = self.recording.temperature
+        if log is None or degc is None:
+            return self
+        return replace(self, recording=replace(self.recording, temperature=replace(log, reference_degc=degc)))
+
     def with_imu(self, imu: ImuSpecification) -> PreparedTest:
         """Take other white noise or priors for the fits; phases and data faults stay as they were decided."""
         return replace(self, imu=imu)

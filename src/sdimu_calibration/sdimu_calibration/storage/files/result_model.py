@@ -128,7 +128,7 @@ class Entry:
     def plain(self, value: Any) -> dict[str, Any]:
         """Give a dataclass as plain data."""
         own = {each.name: getattr(value, each.name) for each in fields(value)}
-        own = {name: entry for name, entry in own.items() if entry or name not in self.seldom}
+        own = {name: entry for name, entry in own.items() if name not in self.seldom or entry}
         return own | {key: of(value) for key, of in self.also.items()}
 
 

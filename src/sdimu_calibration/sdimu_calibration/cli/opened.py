@@ -1,0 +1,112 @@
+"""A recording opened for a verb, with what it is fitted by; and what a verb says at its end."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import typer
+
+from sdimu_calibration.cli.console import say
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from sdimu_calibration.cli.options import Fitted, Opening
+    from sdimu_calibration.core.estimation.prepared_test import PreparedTest
+    from sdimu_calibration.core.results import Calibration
+    from sdimu_calibration.core.specification import Model
+    from sdimu_calibration.core.verdict import Verdict
+
+NOT_TRUSTED = 3
+"""Exit status of a run that is done, and whose estimate is not to be trusted."""
+HANDHELD_CHOSEN = "handheld: {why}, so nothing is navigated (--estimator filter forces navigation)"
+
+
+def opened(console: Console, bag: Path, opening: Opening, request: Fitted) -> tuple[PreparedTest, Model, str]:
+    """Open the test of a bag, read its model and check its estimator.
+
+    Returns
+    -------
+    test : PreparedTest
+    model : Model
+    estimator : str
+        As it was asked for, ``auto`` included.
+
+    Raises
+    ------
+    DataError
+        When an option names nothing, or the bag cannot be used.
+    """
+    from sdimu_calibration.core.estimation.solve import AUTO
+    from sdimu_calibration.core.recording import DataError
+    from sdimu_calibration.storage.files.effect_file import find_effects
+    from sdimu_calibration.storage.files.model_choice import HANDHELD, named_model
+
+    wanted, added = request.asked_estimator, request.add or []
+    # A wrong name is reported before a long recording is read; which model it is added to, the recording may decide.
+    stated = opening.read(request.handheld)
+    named_model(request.model, [])
+    for text in added:
+        find_effects(text)
+    test = stated.test(bag)
+    handheld = wanted == HANDHELD or (wanted == AUTO and bool(test.why_handheld))
+    if handheld and wanted == AUTO:
+        console.print(HANDHELD_CHOSEN.format(why=test.why_handheld), soft_wrap=True)
+    if stated.whole_turns and not handheld:
+        raise DataError("--whole-turns is of runs by hand, and this one is navigated: leave it out, or state --hand")
+    return test, named_model(request.model, added, handheld=handheld), wanted
+
+
+def tell(console: Console, notes: Iterable[str]) -> None:
+    """Print notes, one line each."""
+    for note in notes:
+        say(console, f"note: {note}")
+
+
+def leave(result: Calibration, diagnosed: tuple[Verdict, str] | None = None) -> None:
+    """Say on stderr which coefficients are one, and end with exit status 3 when a result is not to be trusted.
+
+    `diagnosed` is the verdict of a diagnosis and its sentence. Where there is one, it judges what does not fit;
+    without, a misfit is enough.
+    """
+    for line in result.inseparable:
+        typer.echo(f"sdimu: {line}", err=True)
+    reasons = _reasons(result, diagnosed)
+    for line in reasons:
+        typer.echo(f"sdimu: not to be trusted: {line}", err=True)
+    if reasons:
+        raise typer.Exit(NOT_TRUSTED)
+
+
+def _reasons(result: Calibration, diagnosed: tuple[Verdict, str] | None) -> list[str]:
+    """List why a result is not to be trusted, one line each, each said once."""
+    from sdimu_calibration.core.results import UNTRUSTED_VERDICTS
+
+    grave = result.not_to_be_trusted
+    if diagnosed is None:
+        return list(dict.fromkeys([*grave, *result.misfits]))
+    verdict, sentence = diagnosed
+    if verdict not in UNTRUSTED_VERDICTS:
+        return list(grave)
+    return [f"{verdict}: {sentence}", *(line for line in grave if line not in sentence)]
+
+
+@contextmanager
+def explained(console: Console, notes: Iterable[str]) -> Iterator[None]:
+    """Print the notes of a recording when an estimate refuses it: they may say why."""
+    from sdimu_calibration.core.recording import DataError
+
+    try:
+        yield
+    except DataError:
+        tell(console, notes)
+        raise
+
+
+def default_folder(bag: Path, what: str = "calibration") -> Path:
+    """Folder of the results of a bag: beside it, its stem with ``_calibration``."""
+    bag = bag.resolve()
+    return bag.with_name(f"{bag.stem if bag.is_file() else bag.name}_{what}")
