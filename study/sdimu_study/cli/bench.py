@@ -53,11 +53,6 @@ def measure(plan: str, rate: float, repeats: int, folder: Path) -> list[tuple[st
     -------
     list of (str, float, float, int, str)
         What, wall and processor time (s; the smallest of `repeats`), how many of what it worked on.
-
-    Raises
-    ------
-    DataError
-        When the plan or the rate cannot be used.
     """
     from rate_table_sim.table_file import load_table
     from sdimu_calibration.api import functions as api

@@ -46,13 +46,7 @@ def conduct(
 
 
 def check_kinds(asked: Collection[str] | None, known: Collection[str]) -> None:
-    """Refuse a kind of test that there is not.
-
-    Raises
-    ------
-    DataError
-        When one is unknown.
-    """
+    """Refuse a kind of test that there is not."""
     from sdimu_calibration.core.recording import DataError
 
     unknown = sorted(set(asked or ()) - set(known))
@@ -68,11 +62,6 @@ def imu_files(asked: Sequence[str] | None, without: str = "") -> list[str]:
     asked : sequence of str, optional
     without : str
         One that the study does not take, because its runs are by hand.
-
-    Raises
-    ------
-    DataError
-        When one is not in config/imu (worlds and folders of a study bear its name), or is `without`.
     """
     from sdimu_calibration.core.recording import DataError
     from sdimu_calibration.storage.files.config import config_folder

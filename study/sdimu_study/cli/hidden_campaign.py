@@ -64,13 +64,7 @@ def hidden_campaign(
 
 
 def check_options(kinds: Sequence[str], known: Sequence[str], number: int, seed: int) -> None:
-    """Refuse what cannot be run.
-
-    Raises
-    ------
-    DataError
-        For an unknown kind, too few runs or a negative seed.
-    """
+    """Refuse what cannot be run."""
     from sdimu_calibration.core.recording import DataError
 
     for word in kinds:

@@ -73,11 +73,6 @@ def open(  # noqa: A001 (as every library of files has it)
         Stops that no fit sees.
     exclude_times : sequence of (float, float)
         Spans of time (s) in which no fit takes a measurement.
-
-    Raises
-    ------
-    DataError
-        When the bag, the site or the IMU cannot be used.
     """
     return Opening(
         site,
@@ -120,11 +115,6 @@ def open_set(
         Processes that read recordings: a script that asks for more than one needs ``if __name__ == "__main__"``.
     keep : str or Path, optional
         Folder in which what each recording says is kept: a tenth recording then costs one.
-
-    Raises
-    ------
-    DataError
-        When a bag or the set file cannot be used.
     """
     reference = None if reference_temperature is None else parse_quantity(reference_temperature, "degC")
     like = BagSource(Path(), site, imu, source or Source(), reference_degc=reference)
@@ -171,11 +161,6 @@ def calibrate(
         ``auto``, ``filter``, ``second-order``, ``handheld`` (or ``hand``), ``batch`` or ``classical``.
     progress : callable
         Called with a word and the fraction done.
-
-    Raises
-    ------
-    DataError
-        When the test, the model or the estimator cannot be used.
     """
     wanted = named_estimator(estimator)
     if isinstance(test, OpenedSet):
@@ -207,11 +192,6 @@ def diagnose(
         Also fit with one found effect more at a time.
     progress : callable
         Called with a word and the fraction done.
-
-    Raises
-    ------
-    DataError
-        When an effect cannot be read, or an extended model cannot be fitted.
     """
     extra = [effect for text in _listed(attempt) for effect in find_effects(text)]
     if isinstance(fit, JointFit):
@@ -223,13 +203,7 @@ def diagnose(
 
 
 def compare(*fits: CalibrationFit) -> Comparison:
-    """Compare models fitted to one recording, the simplest first.
-
-    Raises
-    ------
-    DataError
-        When there are fewer than two, or they are of different recordings or body frames.
-    """
+    """Compare models fitted to one recording, the simplest first."""
     for fit in fits:
         _expect("compare", "fit", fit, CalibrationFit, "what calibrate(...) returns")
     return Comparison(fits)
@@ -238,13 +212,7 @@ def compare(*fits: CalibrationFit) -> Comparison:
 def predict(
     plan: str | Plan = "kim18", imu: str = "dtg", site: str = "daejeon", model: str = "baseline",
 ) -> Prediction:  # fmt: skip
-    """Simulate the covariance of a test before it is run; names as for `sdimu predict`.
-
-    Raises
-    ------
-    DataError
-        When a name is unknown.
-    """
+    """Simulate the covariance of a test before it is run; names as for `sdimu predict`."""
     chosen = load_plan(plan) if isinstance(plan, str) else plan
     what = (chosen, load_site(site), load_imu(imu), named_model(model, []))
     return predict_test(*what, bound=bound_covariance)
@@ -274,11 +242,6 @@ def plan(
     after : Standing, optional
         What is known already (`known` of a diagnosis): the plan that tells most beyond it, in the time of `start`
         where `minutes` are left out.
-
-    Raises
-    ------
-    DataError
-        When a name is unknown.
     """
     first = load_plan(start) if isinstance(start, str) else start
     if after is not None:
@@ -298,11 +261,6 @@ def simulate(out: str | Path, **options: Any) -> Path:
     -------
     Path
         The bag; the truth lies beside it.
-
-    Raises
-    ------
-    DataError
-        When the simulator is not installed, or an option cannot be used.
     """
     points = {point.name: point for point in entry_points(group="sdimu_calibration.verbs")}
     if "simulate" not in points:

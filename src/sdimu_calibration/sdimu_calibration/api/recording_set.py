@@ -72,24 +72,12 @@ class OpenedSet:
         return next((m.serial for m in self.members if m.serial), "")
 
     def fit(self, options: SetOptions, progress: Progress) -> JointFit:
-        """Fit all recordings together.
-
-        Raises
-        ------
-        DataError
-            When they are of several units, or none can be used.
-        """
+        """Fit all recordings together."""
         with set_runner(len(self), self.workers, self.kept) as run:
             return JointFit(self, options, fit_set(self.members, options, run, progress=progress))
 
     def diagnose(self, fit: JointFit, extra: Sequence[Effect], progress: Progress) -> JointDiagnosis:
-        """Find what the model of a fit of this set misses.
-
-        Raises
-        ------
-        DataError
-            When there is one recording, or an extended model cannot be fitted.
-        """
+        """Find what the model of a fit of this set misses."""
         with set_runner(len(self), self.workers, self.kept) as run:
             return JointDiagnosis(
                 self, diagnose_set(self.members, fit.options, run, extra, progress, fitted=fit.core)

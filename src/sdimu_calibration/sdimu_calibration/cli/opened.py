@@ -34,11 +34,6 @@ def opened(console: Console, bag: Path, opening: Opening, request: Fitted) -> tu
     model : Model
     estimator : str
         As it was asked for, ``auto`` included.
-
-    Raises
-    ------
-    DataError
-        When an option names nothing, or the bag cannot be used.
     """
     from sdimu_calibration.core.estimation.solve import AUTO
     from sdimu_calibration.core.recording import DataError

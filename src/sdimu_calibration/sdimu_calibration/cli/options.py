@@ -75,13 +75,7 @@ class Place:
 
     @property
     def specification(self) -> ImuSpecification | None:
-        """The IMU's file, read.
-
-        Raises
-        ------
-        DataError
-            When there is none of that name.
-        """
+        """The IMU's file, read."""
         from sdimu_calibration.storage.files.config import load_imu
 
         return None if self.imu is None else load_imu(self.imu)
@@ -156,26 +150,14 @@ class Stated(Place):
 
     @property
     def measured_noise(self) -> bool:
-        """White noise is that of the rests.
-
-        Raises
-        ------
-        DataError
-            When anything else is asked for.
-        """
+        """White noise is that of the rests."""
         if self.noise not in {None, "estimated"}:
             raise DataError(f"--noise {self.noise}: expected 'estimated' (or leave it out: the noise of --imu)")
         return self.noise is not None
 
     @property
     def whole_turns_rad(self) -> float:
-        """How well turns by hand are whole (rad); 0 where nobody says it.
-
-        Raises
-        ------
-        DataError
-            When it is no angle above zero.
-        """
+        """How well turns by hand are whole (rad); 0 where nobody says it."""
         from sdimu_calibration.core.units import parse_quantity
 
         if self.whole_turns is None:
@@ -204,11 +186,6 @@ class Opening(Reading, Stated):
         ----------
         handheld : bool or None
             As `Request.handheld`.
-
-        Raises
-        ------
-        DataError
-            When a name is unknown, or a number, an angle or a unit is none.
         """
         from sdimu_calibration.storage.files.config import load_site
         from sdimu_calibration.storage.opening import Opening as Read
@@ -252,13 +229,7 @@ class Fitted:
 
     @property
     def asked_estimator(self) -> str:
-        """One of the names of estimators, ``auto`` included.
-
-        Raises
-        ------
-        DataError
-            When it is none.
-        """
+        """One of the names of estimators, ``auto`` included."""
         from sdimu_calibration.storage.files.model_choice import HANDHELD, named_estimator
 
         return HANDHELD if self.hand else named_estimator(self.estimator, "--estimator")
@@ -290,13 +261,7 @@ class Request(Fitted):
 
 
 def read_stops(text: str) -> tuple[int, ...]:
-    """Read numbers of stops, such as ``4,7``.
-
-    Raises
-    ------
-    DataError
-        When one is no number.
-    """
+    """Read numbers of stops, such as ``4,7``."""
     words = [word.strip() for word in text.split(",")]
     if not all(word.isdecimal() for word in words):
         raise DataError(f"--exclude-stops {text}: expected numbers of stops such as 4,7")
@@ -304,13 +269,7 @@ def read_stops(text: str) -> tuple[int, ...]:
 
 
 def read_spans(text: str) -> tuple[tuple[float, float], ...]:
-    """Read spans of time (s), such as ``812-815,900-910``.
-
-    Raises
-    ------
-    DataError
-        When one is no span.
-    """
+    """Read spans of time (s), such as ``812-815,900-910``."""
     found = [_SPAN.fullmatch(word) for word in text.split(",")]
     if not all(found):
         raise DataError(f"--exclude-times {text}: expected spans of seconds such as 812-815,900-910")

@@ -63,24 +63,12 @@ class Allowed:
 
     @property
     def rates_rad_s(self) -> tuple[float, ...]:
-        """Mean rates in SI.
-
-        Raises
-        ------
-        DataError
-            When one is no number above zero.
-        """
+        """Mean rates in SI."""
         return tuple(math.radians(v) for v in _numbers("--rates", self.rates))
 
     @property
     def abilities(self) -> Abilities:
-        """Of the table, in SI.
-
-        Raises
-        ------
-        DataError
-            When a rate or a dwell is no number above zero.
-        """
+        """Of the table, in SI."""
         from sdimu_calibration.core.plan_search.moves import Abilities
 
         rates, dwells = self.rates_rad_s, tuple(_numbers("--dwells", self.dwells))

@@ -29,13 +29,7 @@ class After:
 
 
 def standing_of(console: Console, asked: After) -> Standing:
-    """Read what results know; recordings are diagnosed first, several as one set.
-
-    Raises
-    ------
-    DataError
-        When a path is neither, or results stand beside other paths.
-    """
+    """Read what results know; recordings are diagnosed first, several as one set."""
     from sdimu_calibration.storage.files.standing_file import holds_standing, read_standing, standing_of_result
 
     results = [p for p in asked.paths if holds_standing(p) or (p / "result.json").is_file() or p.name == "result.json"]

@@ -46,11 +46,6 @@ def own_domain(log: Path, domain: int | None = None) -> Iterator[int]:
     ------
     int
         The domain.
-
-    Raises
-    ------
-    DataError
-        When all domains are taken, or the stated one is not 0 to 232 or holds another run.
     """
     stated = domain if domain is not None else stated_domain()
     domain, lock = _free_domain() if stated is None else _stated_domain(stated)
@@ -77,11 +72,6 @@ def own_folder(out: Path) -> Iterator[None]:
     Parameters
     ----------
     out : Path
-
-    Raises
-    ------
-    DataError
-        When another run holds it.
     """
     (out / "log").mkdir(parents=True, exist_ok=True)
     lock = _lock(out / "log" / "run.lock")
@@ -199,13 +189,7 @@ class Children:
         self._children[name] = _Child(process, path)
 
     def running(self) -> list[str]:
-        """Names of those still running.
-
-        Raises
-        ------
-        DataError
-            When one has ended with an error; the text is the last line it wrote.
-        """
+        """Names of those still running."""
         for name, child in self._children.items():
             code = child.process.poll()
             if code:

@@ -40,11 +40,6 @@ def bench_of_set(
         To start from.
     judge : callable
         Diagnoses the set with effects added; it gets their names and a progress function.
-
-    Raises
-    ------
-    DataError
-        When the set or the model cannot be read.
     """
     like = BagSource(Path(), opening.site, opening.imu, opening.source)
     wanted = set_of(bags, like) if file is None else load_set(file, like)

@@ -85,13 +85,7 @@ def workbench(bags: BagsArgument = None, *, served: Served, opening: Recorded) -
 
 
 def navigated(name: str, test: PreparedTest) -> PreparedTest:
-    """Return a test that is navigated.
-
-    Raises
-    ------
-    DataError
-        When a hand turned the IMU: there are no stops to navigate between.
-    """
+    """Return a test that is navigated."""
     from sdimu_calibration.core.recording import DataError
 
     if test.why_handheld:

@@ -156,13 +156,7 @@ class Opening:
     imu_file: str | None = None
 
     def test(self, path: Path) -> PreparedTest:
-        """Open a bag so.
-
-        Raises
-        ------
-        DataError
-            As `open_test`.
-        """
+        """Open a bag so."""
         test = open_test(path, self.site, self.imu, self.source, self.handheld, self.measured_noise)
         test = with_imu_file(test, self.imu_file)
         origin = test.origin.stated(self.serial, self.power_on)

@@ -38,13 +38,7 @@ class World:
 
     @property
     def effects(self) -> tuple[str, ...]:
-        """What is hidden, as the simulator takes it.
-
-        Raises
-        ------
-        DataError
-            When an effect cannot be read.
-        """
+        """What is hidden, as the simulator takes it."""
         from sdimu_sim.own_effects import simulated_effects
 
         return tuple(simulated_effects(self.effect or ()))
@@ -58,11 +52,6 @@ class World:
             Names or paths.
         **drawn
             What else the scenario takes.
-
-        Raises
-        ------
-        DataError
-            When a name or a number cannot be used.
         """
         from rate_table_sim.table_file import load_table
         from sdimu_calibration.storage.files.config import load_imu, load_plan, load_site

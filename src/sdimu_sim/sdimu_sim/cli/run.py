@@ -142,13 +142,7 @@ def _check_choosing(adaptive: str | None, ask: bool, plan: str | None) -> None:
 
 
 def _clear(out: Path) -> bool:
-    """Remove the results of an earlier run, once nothing refuses this one; whether its bag may be replaced.
-
-    Raises
-    ------
-    DataError
-        When something is in the bag's place that is of no earlier run: it is never replaced, and nothing is removed.
-    """
+    """Remove the results of an earlier run, once nothing refuses this one; whether its bag may be replaced."""
     from sdimu_calibration.core.recording import DataError
     from sdimu_calibration.storage.bags.bag_folder import check_room
     from sdimu_calibration.storage.bags.bag_metadata import METADATA
@@ -223,13 +217,7 @@ def _start(children: Children, options: dict[str, dict[str, Any]], bag: Path, re
 
 
 def _watch(console: Console, children: Children, test: Outline) -> float:
-    """Show the progress until every node has left; wall time (s) that the data took.
-
-    Raises
-    ------
-    DataError
-        When a node fails, or nothing moves for `STALL_S`.
-    """
+    """Show the progress until every node has left; wall time (s) that the data took."""
     import time
 
     from sdimu_calibration.cli.watch import Watch
