@@ -35,6 +35,6 @@ setup(
             "hidden-campaign = sdimu_study.cli.hidden_campaign:hidden_campaign",
             "study = sdimu_study.cli.study:app",
             "bench = sdimu_study.cli.bench:bench",
-        ],
+        ]
     },
 )

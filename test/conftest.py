@@ -108,10 +108,18 @@ def draw(rng: np.random.Generator, own: np.ndarray, effects: tuple[str, ...] = E
     size = np.array([registry.get(name).prior["navigation"] for name in effects for _ in registry.get(name).parameters])
     sigma = 0.01 * size
     return Calibration(
-        "accelerometer_triad", effects, tuple(p.name for p in parameters), tuple(p.unit for p in parameters),
-        tuple(p.display_unit for p in parameters), size * own + sigma * rng.standard_normal(len(size)),
-        np.diag(sigma**2), {"nis_mean": 1.0}, {"samples": 1000.0, "duration_s": 60.0}, (), no_history(len(size)),
-    )  # fmt: skip
+        "accelerometer_triad",
+        effects,
+        tuple(p.name for p in parameters),
+        tuple(p.unit for p in parameters),
+        tuple(p.display_unit for p in parameters),
+        size * own + sigma * rng.standard_normal(len(size)),
+        np.diag(sigma**2),
+        {"nis_mean": 1.0},
+        {"samples": 1000.0, "duration_s": 60.0},
+        (),
+        no_history(len(size)),
+    )
 
 
 @pytest.fixture
@@ -128,9 +136,17 @@ def batch(tmp_path: Path) -> Callable[..., Path]:
             for power_on in range(each):
                 result = draw(rng, own + turn_on * biases * rng.standard_normal(len(biases)))
                 origin = Origin(
-                    f"SN{unit}", str(power_on), 10**18 + (10 * unit + power_on) * DAY_NS, 21.0 + power_on, 20.0, 25.0,
-                    to_si(2.0, "deg/s"), f"bag_{unit}_{power_on}", "dtg", "daejeon",
-                )  # fmt: skip
+                    f"SN{unit}",
+                    str(power_on),
+                    10**18 + (10 * unit + power_on) * DAY_NS,
+                    21.0 + power_on,
+                    20.0,
+                    25.0,
+                    to_si(2.0, "deg/s"),
+                    f"bag_{unit}_{power_on}",
+                    "dtg",
+                    "daejeon",
+                )
                 folder = tmp_path / "batch" / f"unit{unit}_{power_on}"
                 write_result(folder / "result.json", replace(result, origin=origin))
         return tmp_path / "batch"
@@ -151,9 +167,14 @@ def recording() -> Recording:
     from sdimu_sim.core.scenario import Scenario, generate
 
     scenario = Scenario(
-        load_plan("kim18"), load_imu("dtg"), load_site("daejeon"), TableSpecification(axes=None), rate_hz=20.0,
-        seed=SEED, effects=(f"{HIDDEN}=40 ug/g^2",),
-    )  # fmt: skip
+        load_plan("kim18"),
+        load_imu("dtg"),
+        load_site("daejeon"),
+        TableSpecification(axes=None),
+        rate_hz=20.0,
+        seed=SEED,
+        effects=(f"{HIDDEN}=40 ug/g^2",),
+    )
     return generate(scenario)[0]
 
 

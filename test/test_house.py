@@ -45,7 +45,9 @@ def test_every_configuration_file_loads_by_its_name(path):
 
 def test_no_file_names_a_host_of_packages():
     # A lock file or a document that names a host breaks wherever that host is not reachable.
-    host = re.compile(r"--(extra-)?index-url|--find-links|--trusted-host|pypi\.|files\.pythonhosted|https?://\S*/simple\b")
+    host = re.compile(
+        r"--(extra-)?index-url|--find-links|--trusted-host|pypi\.|files\.pythonhosted|https?://\S*/simple\b"
+    )
     guilty = [
         f"{path.relative_to(ROOT)}: {match.group()}"
         for path in tracked_files()
@@ -155,7 +157,10 @@ def test_a_name_of_an_effect_is_noticed(code):
 @pytest.mark.parametrize(
     "code",
     [
-        '"""gyro_bias"""', 'x = "the gyro_bias is large"', 'x = f"{stem}_{axis}"', 'x = "gyro_white_noise"',
+        '"""gyro_bias"""',
+        'x = "the gyro_bias is large"',
+        'x = f"{stem}_{axis}"',
+        'x = "gyro_white_noise"',
         'x = "accel"',
     ],
 )

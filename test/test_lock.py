@@ -13,9 +13,13 @@ from packaging.utils import canonicalize_name
 ROOT = Path(__file__).resolve().parents[1]
 FILES = ("run", "extras", "campaigns", "test", "build", "docs")
 EXTRAS = {
-    "run": ("",), "extras": ("workbench", "notebook", "pictures"), "campaigns": ("study",),
-    "test": ("test",), "build": ("build",), "docs": ("docs",),
-}  # fmt: skip
+    "run": ("",),
+    "extras": ("workbench", "notebook", "pictures"),
+    "campaigns": ("study",),
+    "test": ("test",),
+    "build": ("build",),
+    "docs": ("docs",),
+}
 OWN = ("sdimu-calibration", "rate-table-sim", "sdimu-sim", "sdimu-study")
 STUDY = OWN[-1]
 """Not installed by users: what it needs alone is in the file of campaigns."""
@@ -53,9 +57,26 @@ def test_what_setup_asks_for_is_in_its_file_or_in_what_is_installed_before(name)
 
 
 TOOLS = {
-    "dask", "distributed", "mypy", "ruff", "hypothesis", "playwright", "colcon-core", "pandas", "pytest", "numpydoc",
-    "sphinx", "babel", "docutils", "allantools", "dash", "flask", "plotly", "matplotlib", "pillow",
-}  # fmt: skip
+    "dask",
+    "distributed",
+    "mypy",
+    "ruff",
+    "hypothesis",
+    "playwright",
+    "colcon-core",
+    "pandas",
+    "pytest",
+    "numpydoc",
+    "sphinx",
+    "babel",
+    "docutils",
+    "allantools",
+    "dash",
+    "flask",
+    "plotly",
+    "matplotlib",
+    "pillow",
+}
 """Packages for tests, the book, campaigns, the workbench, notebooks and pictures."""
 
 

@@ -17,9 +17,7 @@ from sdimu_calibration.report.catalogue import page as catalogue
 
 HEADING = re.compile(r"^### (\w+)\n", re.MULTILINE)
 CATALOGUE = "generated/effects"
-_CAPTION = (
-    "Signature of `{coefficient}` over the stops of `kim18`: red up, blue down, full at its largest. {rest}"
-)
+_CAPTION = "Signature of `{coefficient}` over the stops of `kim18`: red up, blue down, full at its largest. {rest}"
 
 
 def write(path: Path, text: str) -> None:

@@ -129,6 +129,6 @@ setup(
             "recorder_node = sdimu_calibration.nodes.recorder_node:main",
             "replay_node = sdimu_calibration.nodes.replay_node:main",
             "table_goals = sdimu_calibration.nodes.table_goals_node:main",
-        ],
+        ]
     },
 )

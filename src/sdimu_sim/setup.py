@@ -41,9 +41,6 @@ setup(
     zip_safe=False,
     entry_points={
         "console_scripts": ["sdimu_node = sdimu_sim.nodes.sdimu_node:main"],
-        "sdimu_calibration.verbs": [
-            "simulate = sdimu_sim.cli.simulate:simulate",
-            "run = sdimu_sim.cli.run:run",
-        ],
+        "sdimu_calibration.verbs": ["simulate = sdimu_sim.cli.simulate:simulate", "run = sdimu_sim.cli.run:run"],
     },
 )

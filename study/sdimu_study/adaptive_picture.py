@@ -22,9 +22,14 @@ from sdimu_study.adaptive_test import AdaptiveTest
 _PALETTE = palette(LIGHT)
 _INK, _MUTED, _LINE, _BEFORE, _AFTER = (_PALETTE[k] for k in ("ink", "muted", "line", "before", "after"))
 _STYLE = {
-    "font.family": "DejaVu Sans", "font.size": 9, "axes.spines.top": False, "axes.spines.right": False,
-    "axes.titlesize": 10, "axes.titlelocation": "left", "savefig.facecolor": "white",
-}  # fmt: skip
+    "font.family": "DejaVu Sans",
+    "font.size": 9,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.titlesize": 10,
+    "axes.titlelocation": "left",
+    "savefig.facecolor": "white",
+}
 _DPI = 110
 
 

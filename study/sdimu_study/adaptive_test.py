@@ -127,9 +127,15 @@ _ARRAYS = ("t", "omega_ib_b", "f_ib_b")
 
 
 def adaptive_test(
-    scenario: Scenario, sensor: ImuTruth, table: RateTable, model: Model, goals: Goals, menu: Menu, look_s: float,
+    scenario: Scenario,
+    sensor: ImuTruth,
+    table: RateTable,
+    model: Model,
+    goals: Goals,
+    menu: Menu,
+    look_s: float,
     told: Callable[[str], None] = lambda _: None,
-) -> AdaptiveTest:  # fmt: skip
+) -> AdaptiveTest:
     """Simulate a test that chooses its turns.
 
     Parameters

@@ -71,9 +71,14 @@ def scenario_of(drawn: Draw, imu: ImuSpecification, seed: int) -> Scenario:
     elif drawn.fault.startswith("accel noise"):
         true = replace(imu, accel_white_noise=WRONG_DENSITY * imu.accel_white_noise)
     return Scenario(
-        plan=load_plan(drawn.plan), imu=true, site=Site(math.radians(drawn.latitude_deg), 0.0), rate_hz=RATE_HZ,
-        seed=seed, effects=tuple(t.text for t in drawn.truths), temperature=WARM_UP,
-    )  # fmt: skip
+        plan=load_plan(drawn.plan),
+        imu=true,
+        site=Site(math.radians(drawn.latitude_deg), 0.0),
+        rate_hz=RATE_HZ,
+        seed=seed,
+        effects=tuple(t.text for t in drawn.truths),
+        temperature=WARM_UP,
+    )
 
 
 def with_fault(recording: Recording, drawn: Draw, imu: ImuSpecification, seed: int) -> Recording:
@@ -109,28 +114,47 @@ def score(world: Hidden, found: Diagnosis) -> dict[str, Any]:
     scanned = scan(found.evidence.information, found.evidence.model, found.evidence.weight)
     named = classes(found)
     accepted = [s for s in found.found.steps if s.accepted]
-    catalogue = [
-        k for k in range(len(found.evidence.weight), int(found.free[0])) if np.isfinite(scanned.sigma[k])
-    ]  # fmt: skip
+    catalogue = [k for k in range(len(found.evidence.weight), int(found.free[0])) if np.isfinite(scanned.sigma[k])]
     return {
-        "kind": drawn.kind, "plan": drawn.plan, "latitude_deg": drawn.latitude_deg, "fault": drawn.fault,
+        "kind": drawn.kind,
+        "plan": drawn.plan,
+        "latitude_deg": drawn.latitude_deg,
+        "fault": drawn.fault,
         "truths": [_judge(t, found, scanned, named) for t in drawn.truths],
-        "verdict": found.verdict, "sentence": found.sentence,
-        "named": [c.label for c in found.chosen], "families": [c.family for c in found.chosen],
-        "classes": named, "noise": list(found.noise), "data": [f.kind for f in found.findings],
-        "own": found.own, "unexplained": found.unexplained,
+        "verdict": found.verdict,
+        "sentence": found.sentence,
+        "named": [c.label for c in found.chosen],
+        "families": [c.family for c in found.chosen],
+        "classes": named,
+        "noise": list(found.noise),
+        "data": [f.kind for f in found.findings],
+        "own": found.own,
+        "unexplained": found.unexplained,
         "steps": [
-            {"label": s.label, "z": s.z, "accepted": s.accepted, "reason": s.reason, "log_bayes": s.log_bayes_factor,
-             "gain": s.held_out_gain, "error": s.held_out_error} for s in found.found.steps
+            {
+                "label": s.label,
+                "z": s.z,
+                "accepted": s.accepted,
+                "reason": s.reason,
+                "log_bayes": s.log_bayes_factor,
+                "gain": s.held_out_gain,
+                "error": s.held_out_error,
+            }
+            for s in found.found.steps
         ],
-        "rms_z_before": _rms_z(found.before, sensor), "rms_z_after": _rms_z(found.after, sensor),
-        "held_out_before": found.before.fit["held_out_rms"], "held_out_after": found.after.fit["held_out_rms"],
+        "rms_z_before": _rms_z(found.before, sensor),
+        "rms_z_after": _rms_z(found.after, sensor),
+        "held_out_before": found.before.fit["held_out_rms"],
+        "held_out_after": found.after.fit["held_out_rms"],
         "stops_before": accepted[0].held_out_before.rms if accepted else None,
         "stops_after": accepted[-1].held_out_after.rms if accepted else None,
-        "remainder_p": found.free_inputs_after.p_value, "remainder_p_before": found.free_inputs_before.p_value,
-        "scan_z2": float(np.sum(scanned.z[catalogue] ** 2)), "scan_count": len(catalogue),
-        "threshold": found.found.threshold, "explained": found.explained,
-    }  # fmt: skip
+        "remainder_p": found.free_inputs_after.p_value,
+        "remainder_p_before": found.free_inputs_before.p_value,
+        "scan_z2": float(np.sum(scanned.z[catalogue] ** 2)),
+        "scan_count": len(catalogue),
+        "threshold": found.found.threshold,
+        "explained": found.explained,
+    }
 
 
 def _rms_z(calibration: Calibration, sensor: ImuTruth) -> float:
@@ -146,12 +170,19 @@ def _judge(truth: Truth, found: Diagnosis, scanned: Scan, named: list[list[str]]
     """
     stops = found.evidence.times.stops
     row: dict[str, Any] = {
-        "name": truth.name, "family": truth.family, "option": truth.option, "value": truth.value,
-        "sigmas": truth.sigmas, "text": truth.text,
+        "name": truth.name,
+        "family": truth.family,
+        "option": truth.option,
+        "value": truth.value,
+        "sigmas": truth.sigmas,
+        "text": truth.text,
         "in_class": any(same_effect(x, truth, stops) for c in named for x in c) or _seen_in_samples(truth, found),
-        "best": any(same_effect(c.label, truth, stops) for c in found.chosen), "share": None, "realised": None,
-        "z": None, "error_sigmas": None,
-    }  # fmt: skip
+        "best": any(same_effect(c.label, truth, stops) for c in found.chosen),
+        "share": None,
+        "realised": None,
+        "z": None,
+        "error_sigmas": None,
+    }
     if truth.family == OUTSIDE:
         before, after = (max(left, 0.0) for left in _signature_left(truth, found))
         return row | {"share": 1.0 - after / before if before else None, "realised": abs(truth.value) * before**0.5}

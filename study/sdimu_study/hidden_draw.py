@@ -86,10 +86,15 @@ def sizes(plan: str, latitude_deg: float, imu: ImuSpecification, model: Model) -
     scanned = scan(evidence.information, evidence.model, evidence.weight)
     p = len(evidence.weight)
     return Sizes(
-        plan, latitude_deg, tuple(c.family for c in evidence.candidates), tuple(c.label for c in evidence.candidates),
-        tuple(scanned.sigma[p:].tolist()), tuple(scanned.retention[p:].tolist()), tuple(evidence.prior.tolist()),
+        plan,
+        latitude_deg,
+        tuple(c.family for c in evidence.candidates),
+        tuple(c.label for c in evidence.candidates),
+        tuple(scanned.sigma[p:].tolist()),
+        tuple(scanned.retention[p:].tolist()),
+        tuple(evidence.prior.tolist()),
         times.stops,
-    )  # fmt: skip
+    )
 
 
 def between(tables: Sequence[Sizes], plan: str, latitude_deg: float) -> Sizes:

@@ -40,9 +40,15 @@ class Shape:
         channel = CHANNELS.index(self.sensor)
         unit = "rad/s" if channel < 3 else "m/s^2"
         return Effect(
-            name=self.label, title=OUTSIDE, equation=self.formula, parameters=(Parameter(self.label, unit, unit),),
-            terms=(Term(channel, 0),), regressors=lambda m: self.value(m)[:, None], prior={}, family=OUTSIDE,
-        )  # fmt: skip
+            name=self.label,
+            title=OUTSIDE,
+            equation=self.formula,
+            parameters=(Parameter(self.label, unit, unit),),
+            terms=(Term(channel, 0),),
+            regressors=lambda m: self.value(m)[:, None],
+            prior={},
+            family=OUTSIDE,
+        )
 
 
 def shapes(times: Timetable) -> list[Shape]:

@@ -74,8 +74,15 @@ def number(name: str, values: Sequence[float], low: float, high: float) -> dict[
         return nothing | {"name": name, "of": 0, "wanted": f"{low} to {high}", "reached": False}
     rms = float(np.sqrt(x.mean()))
     error = float(x.std() / np.sqrt(len(x)) / (2.0 * rms)) if rms else 0.0
-    return {"name": name, "of": len(x), "value": rms, "low": rms - 2 * error, "high": rms + 2 * error,
-            "wanted": f"{low} to {high}", "reached": low <= rms <= high}  # fmt: skip
+    return {
+        "name": name,
+        "of": len(x),
+        "value": rms,
+        "low": rms - 2 * error,
+        "high": rms + 2 * error,
+        "wanted": f"{low} to {high}",
+        "reached": low <= rms <= high,
+    }
 
 
 def _all_named(row: Row) -> bool:
@@ -143,9 +150,10 @@ def _noise(rows: Sequence[Row]) -> list[dict[str, Any]]:
 def _mended(rows: Sequence[Row]) -> list[dict[str, Any]]:
     """Tell what adding the right effect does; without those whose time is scanned, which fit as the scan is fine."""
     right = [
-        r for r in rows
+        r
+        for r in rows
         if _is_strong(r) and r["truths"][0]["best"] and len(r["named"]) == 1 and r["truths"][0]["option"] is None
-    ]  # fmt: skip
+    ]
     wanted = (
         ("RMS z of the baseline coefficients before", "rms_z_before", 1.15, 99.0),
         ("RMS z of the baseline coefficients after", "rms_z_after", 0.85, 1.15),
@@ -164,12 +172,13 @@ def confusion(rows: Sequence[Row]) -> list[dict[str, Any]]:
             drawn.setdefault(row["truths"][0]["family"], []).append(row)
     return [
         {
-            "family": family, "draws": len(own),
+            "family": family,
+            "draws": len(own),
             "in_class": sum(bool(r["truths"][0]["in_class"]) for r in own),
             "named_first": dict(Counter(_first_family(r) for r in own).most_common()),
         }
         for family, own in sorted(drawn.items())
-    ]  # fmt: skip
+    ]
 
 
 def _first_family(row: Row) -> str:
@@ -193,10 +202,15 @@ def _outside_table(rows: Sequence[Row]) -> list[dict[str, Any]]:
 
 def _miss(row: Row) -> dict[str, Any]:
     return {
-        "seed": row["seed"], "kind": row["kind"], "plan": row["plan"], "hidden": [t["text"] for t in row["truths"]],
-        "realised": [t["realised"] for t in row["truths"]], "verdict": row["verdict"], "named": row["named"],
+        "seed": row["seed"],
+        "kind": row["kind"],
+        "plan": row["plan"],
+        "hidden": [t["text"] for t in row["truths"]],
+        "realised": [t["realised"] for t in row["truths"]],
+        "verdict": row["verdict"],
+        "named": row["named"],
         "steps": row["steps"],
-    }  # fmt: skip
+    }
 
 
 def family_of(label: str) -> str:

@@ -64,11 +64,7 @@ def score(world: Disturbed, found: tuple[Diagnosis, Diagnosis]) -> dict[str, Any
     (truth,), meant = world.truths, world.sensor
     if registry.get(truth.family).wander_like and world.clean is not None:
         meant = with_mean_error(world.sensor, world.clean, world.test.recording)
-    return {
-        "with": scored_row(known, world.sensor, truth),
-        "without": scored_row(lacking, meant, truth),
-        **world.told,
-    }
+    return {"with": scored_row(known, world.sensor, truth), "without": scored_row(lacking, meant, truth), **world.told}
 
 
 def with_mean_error(sensor: ImuTruth, clean: Recording, disturbed: Recording) -> ImuTruth:

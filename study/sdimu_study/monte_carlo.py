@@ -236,7 +236,8 @@ def summarise(
         "coefficients": _coefficients(names, found, model, imu),
         "nees": {"dof": p, "values": nees},
         "nis": {
-            "values": nis.sum(axis=1) / dof.sum(axis=1), "dof": dof.sum(axis=1),
+            "values": nis.sum(axis=1) / dof.sum(axis=1),
+            "dof": dof.sum(axis=1),
             "by_kind": dict(zip(KINDS, _ratio(nis.sum(axis=0), dof.sum(axis=0)), strict=True)),
         },
         "autocorrelation": _autocorrelation(lag1, counts),
@@ -244,7 +245,7 @@ def summarise(
             name: float(np.mean([row[key] for row in done]))
             for name, key in (("wall_s_per_run", "wall_s"), ("cpu_s_per_run", "cpu_s"), ("passes", "passes"))
         },
-    }  # fmt: skip
+    }
 
 
 def _coefficients(
@@ -254,12 +255,18 @@ def _coefficients(
     units = {q.name: (q.unit, q.display_unit) for q in imu_model.build(model.effects, imu).parameters}
     return [
         {
-            "name": name, "unit": units[name][0], "display_unit": units[name][1], "bias": found.bias[k],
-            "bias_error": found.bias_error[k], "rms": found.rms[k], "sigma": found.sigma[k],
-            "bound": found.bound[k], "rms_z": found.rms_z[k],
+            "name": name,
+            "unit": units[name][0],
+            "display_unit": units[name][1],
+            "bias": found.bias[k],
+            "bias_error": found.bias_error[k],
+            "rms": found.rms[k],
+            "sigma": found.sigma[k],
+            "bound": found.bound[k],
+            "rms_z": found.rms_z[k],
         }
         for k, name in enumerate(names)
-    ]  # fmt: skip
+    ]
 
 
 def _autocorrelation(lag1: Floats, counts: Floats) -> list[dict[str, Any]]:

@@ -36,9 +36,14 @@ def cells(coefficient: Mapping[str, Any]) -> list[str]:
     values = [from_si(coefficient[key], unit) for key in ("bias", "bias_error", "rms", "sigma", "bound")]
     ratio = coefficient["rms"] / coefficient["bound"]
     return [
-        coefficient["name"], f"{values[0]:+.2g}", *(f"{v:.2g}" for v in values[1:2]), *(f"{v:.3g}" for v in values[2:]),
-        unit, f"{coefficient['rms_z']:.3f}", f"{ratio:.3f}",
-    ]  # fmt: skip
+        coefficient["name"],
+        f"{values[0]:+.2g}",
+        *(f"{v:.2g}" for v in values[1:2]),
+        *(f"{v:.3g}" for v in values[2:]),
+        unit,
+        f"{coefficient['rms_z']:.3f}",
+        f"{ratio:.3f}",
+    ]
 
 
 def coefficients_table(content: Mapping[str, Any]) -> Table:
@@ -50,9 +55,11 @@ def coefficients_table(content: Mapping[str, Any]) -> Table:
 def check_cells(check: Mapping[str, Any]) -> list[str]:
     """Texts of one check: name, value, interval, verdict."""
     return [
-        check["name"], f"{check['value']:.4g}", f"{check['low']:.4g} ... {check['high']:.4g}",
+        check["name"],
+        f"{check['value']:.4g}",
+        f"{check['low']:.4g} ... {check['high']:.4g}",
         "yes" if check["passed"] else "NO",
-    ]  # fmt: skip
+    ]
 
 
 def checks_table(content: Mapping[str, Any]) -> Table:
@@ -90,17 +97,19 @@ def page(content: Mapping[str, Any]) -> str:
         f'<div class="verdict {"bad" if bad else "good"}"><p class="head">{verdict}</p></div>',
         section("Checks", grid(_CHECK_COLUMNS, [check_cells(c) for c in content["checks"]], {0}), quiet(told)),
         section(
-            "Coefficients", grid(_COLUMNS, [cells(c) for c in content["coefficients"]], {0, 6}),
+            "Coefficients",
+            grid(_COLUMNS, [cells(c) for c in content["coefficients"]], {0, 6}),
             quiet(f"RMS over the runs; bound: {content['bound_from']}."),
         ),
         section("Distributions", figure),
         section(unconverged, sentence(f"seeds {', '.join(map(str, slow))}")) if slow else "",
         section("Failed runs", *(sentence(f"seed {run['seed']}: {run['error']}") for run in lost)) if lost else "",
-    ]  # fmt: skip
+    ]
     words = (
         f"body frame: {str(content['body_frame']).replace('_', ' ')}",
-        f"{content['time']['cpu_s_per_run']:.2f} s of processor a run", f"{len(lost)} failed",
-    )  # fmt: skip
+        f"{content['time']['cpu_s_per_run']:.2f} s of processor a run",
+        f"{len(lost)} failed",
+    )
     return document(heading, "\n".join(part for part in parts if part), under=escape(" · ".join(words)))
 
 
@@ -124,9 +133,10 @@ def _dots(figure: Figure, names: list[str], values: list[float], interval: Any, 
     inside = [low <= value <= high for value in values]
     row, col = place
     marker = {
-        "color": [_INK if ok else _WARN for ok in inside], "size": 8,
+        "color": [_INK if ok else _WARN for ok in inside],
+        "size": 8,
         "symbol": ["circle" if ok else "x" for ok in inside],
-    }  # fmt: skip
+    }
     figure.add("scatter", x=names, y=values, mode="markers", marker=marker, row=row, col=col)
     figure.shape("rect", y0=low, y1=high, fillcolor=BAND, line={"width": 0}, layer="below", row=row, col=col)
     figure.x_axes(tickangle=-60, row=row, col=col)

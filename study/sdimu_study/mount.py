@@ -184,17 +184,27 @@ def figure(content: Mapping[str, Any], units: Mapping[str, str]) -> Figure:
         for order, (estimator, by_effect) in enumerate(content["rms"].items()):
             factor = from_si(1.0, units[effect])
             drawn.add(
-                "scatter", x=mounts, y=np.asarray(by_effect[effect]) * factor, mode="lines+markers", name=estimator,
-                legendgroup=estimator, showlegend=panel == 0,
+                "scatter",
+                x=mounts,
+                y=np.asarray(by_effect[effect]) * factor,
+                mode="lines+markers",
+                name=estimator,
+                legendgroup=estimator,
+                showlegend=panel == 0,
                 error_y={"type": "data", "array": np.asarray(content["spread"][estimator][effect]) * factor},
-                line={"color": SERIES[order % 3], "dash": _DASHES[order % 3]}, **place,
-            )  # fmt: skip
+                line={"color": SERIES[order % 3], "dash": _DASHES[order % 3]},
+                **place,
+            )
         drawn.y_axes(type="log", dtick=1, exponentformat="power", title=f"RMS ({units[effect]})", **place)
         drawn.x_axes(title="mount (deg)" if panel >= len(effects) - _COLUMNS else None, **place)
     return lay_out(
-        drawn, 260 * rows + 80, font={"size": 12}, showlegend=True,
-        legend={"orientation": "h", "y": 1.06}, margin={"l": 70, "r": 30, "t": 60, "b": 50},
-    )  # fmt: skip
+        drawn,
+        260 * rows + 80,
+        font={"size": 12},
+        showlegend=True,
+        legend={"orientation": "h", "y": 1.06},
+        margin={"l": 70, "r": 30, "t": 60, "b": 50},
+    )
 
 
 def write_page(path: Path, content: Mapping[str, Any], units: Mapping[str, str]) -> None:

@@ -51,15 +51,14 @@ def drawn_polynomials(imu: ImuSpecification, orders: int, rng: np.random.Generat
     effects = [registry.get(name) for name in polynomials(orders)]
     return tuple(
         sized(p.name, float(e.prior[imu.grade] * rng.standard_normal()), size_unit(p.name))
-        for e in effects for p in e.parameters
-    )  # fmt: skip
+        for e in effects
+        for p in e.parameters
+    )
 
 
 def soak(degc: float, lag_s: float = 0.0) -> TemperatureProfile:
     """Make a chamber that stands at a temperature (deg C)."""
-    return TemperatureProfile(
-        degc, reference_degc=T0_DEGC, sensor_lag_s=lag_s, noise=_NOISE_K, resolution=_STEP_K
-    )  # fmt: skip
+    return TemperatureProfile(degc, reference_degc=T0_DEGC, sensor_lag_s=lag_s, noise=_NOISE_K, resolution=_STEP_K)
 
 
 def ramp(start_degc: float, end_degc: float, rate_k_s: float = _RAMP_K_S, lag_s: float = 0.0) -> TemperatureProfile:

@@ -26,15 +26,7 @@ from sdimu_study.noise import drawn_noise
 from sdimu_study.plans import FILED
 from sdimu_study.set_world import Unit, here, members_of, opened
 from sdimu_study.sets import covered
-from sdimu_study.soak_world import (
-    TURN_ON,
-    SoakWorld,
-    block_rms,
-    drawn_polynomials,
-    in_the_frame,
-    noise_of,
-    polynomials,
-)
+from sdimu_study.soak_world import TURN_ON, SoakWorld, block_rms, drawn_polynomials, in_the_frame, noise_of, polynomials
 from sdimu_study.study import Key, Rows, Study, Table, good, of
 from sdimu_study.worlds import place_told, rng_of
 
@@ -210,10 +202,14 @@ def place_of(name: str) -> tuple[str, int]:
 
 def _of(rows: Rows, place: int, base: str | None = None) -> Floats:
     places = {name: place_of(name) for name in {n for row in rows for n in row["z"]}}
-    return np.array([
-        value for row in rows for name, value in row["z"].items()
-        if places[name][1] == place and base in (None, places[name][0])
-    ])  # fmt: skip
+    return np.array(
+        [
+            value
+            for row in rows
+            for name, value in row["z"].items()
+            if places[name][1] == place and base in (None, places[name][0])
+        ]
+    )
 
 
 def _rms(z: Floats) -> str:

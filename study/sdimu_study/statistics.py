@@ -117,8 +117,12 @@ def bias_check(found: CoefficientStatistics, runs: int) -> Check:
     z = np.abs(found.bias) / found.bias_error
     worst = int(np.argmax(z))
     tail = 0.5 * (1.0 - family_level(len(z)))
-    return Check(f"largest bias in standard errors ({found.names[worst]})", float(z[worst]), 0.0,
-                 float(stats.t.ppf(1.0 - tail, runs - 1)))  # fmt: skip
+    return Check(
+        f"largest bias in standard errors ({found.names[worst]})",
+        float(z[worst]),
+        0.0,
+        float(stats.t.ppf(1.0 - tail, runs - 1)),
+    )
 
 
 def sigma_checks(found: CoefficientStatistics, runs: int) -> tuple[Check, Check]:
@@ -147,8 +151,12 @@ def nees_check(nees: Floats, dof: int) -> Check:
 def nis_check(nis: Floats, dof: Floats) -> Check:
     """Normalised innovation squared per degree of freedom; sums and numbers by run, shape (n,)."""
     low, high = chi_square_interval(float(dof.sum()))
-    return Check("NIS per degree of freedom", float(nis.sum() / dof.sum()), min(low, 1.0 - NIS_TOLERANCE),
-                 max(high, 1.0 + NIS_TOLERANCE))  # fmt: skip
+    return Check(
+        "NIS per degree of freedom",
+        float(nis.sum() / dof.sum()),
+        min(low, 1.0 - NIS_TOLERANCE),
+        max(high, 1.0 + NIS_TOLERANCE),
+    )
 
 
 def lag_check(products: Floats, counts: Floats, channels: Sequence[str]) -> Check:

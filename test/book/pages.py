@@ -64,9 +64,14 @@ def run(blocks: Iterable[Block], folder: Path) -> str:
     for block in blocks:
         shell = ["bash", "-eu", "-c"] if block.language == "bash" else [sys.executable, "-c"]
         done = subprocess.run(
-            [*shell, block.text], cwd=folder, env=environment, capture_output=True, text=True, timeout=DEADLINE_S,
+            [*shell, block.text],
+            cwd=folder,
+            env=environment,
+            capture_output=True,
+            text=True,
+            timeout=DEADLINE_S,
             check=False,
-        )  # fmt: skip
+        )
         assert done.returncode == 0, f"{block.text}\n{done.stdout}{done.stderr}"
         said.append(done.stdout)
     return "\n".join(said)

@@ -17,8 +17,11 @@ STAYS = ("sdimu workbench", "sdimu watch")
 """Run until they are stopped: the tests in a browser and those of the live diagnosis hold them."""
 
 
-@pytest.mark.parametrize("page", [pytest.param(p, marks=pytest.mark.ros if p.stem == LIVE else ()) for p in TUTORIALS],
-                         ids=lambda page: page.stem)  # fmt: skip
+@pytest.mark.parametrize(
+    "page",
+    [pytest.param(p, marks=pytest.mark.ros if p.stem == LIVE else ()) for p in TUTORIALS],
+    ids=lambda page: page.stem,
+)
 def test_a_tutorial_runs_as_it_stands(page, tmp_path):
     blocks = fenced(page)
     assert blocks

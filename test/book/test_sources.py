@@ -48,9 +48,12 @@ def test_every_link_leads_to_a_file(page):
 
 def test_every_function_that_a_page_names_exists():
     names = {
-        name for page in DOC.rglob("*.md") for pattern in (ROLE, DIRECTIVE)
-        for name in pattern.findall(page.read_text(encoding="utf-8")) if "." in name
-    }  # fmt: skip
+        name
+        for page in DOC.rglob("*.md")
+        for pattern in (ROLE, DIRECTIVE)
+        for name in pattern.findall(page.read_text(encoding="utf-8"))
+        if "." in name
+    }
     assert len(names) > 50
     for name in names:
         assert (getattr(found(name), "__doc__", "") or "").strip(), name

@@ -19,9 +19,14 @@ import pytest
 START_S = 300.0  # a first run on a new machine compiles
 PLACES = ("chromium", "chromium-browser", "google-chrome")
 FLAGS = (
-    "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking",
-    "--disable-component-update", "--disable-sync",
-)  # fmt: skip
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+)
 HIDDEN = "accel_quadratic_x"
 SEED = 5
 SIZE = "40 ug/g^2"  # forty times what this plan sees at one sigma

@@ -26,8 +26,14 @@ def test_a_perfect_test_with_fast_turns_gives_the_size_back(name):
     site, imu = load_site("daejeon"), load_imu("dtg")
     perfect = replace(imu, gyro_white_noise=0.0, accel_white_noise=0.0)
     scenario = Scenario(
-        load_plan("recommended"), perfect, site, seed=4, rate_hz=20.0, mount_rad=(0.02, 0.03, -0.03), coefficients={},
+        load_plan("recommended"),
+        perfect,
+        site,
+        seed=4,
+        rate_hz=20.0,
+        mount_rad=(0.02, 0.03, -0.03),
+        coefficients={},
         effects=(f"{name}={text}",),
-    )  # fmt: skip
+    )
     result = calibrate(generate(scenario)[0], site, imu, extended_model("baseline", [name]), held_out=False)
     assert result.values[result.names.index(name)] == pytest.approx(size, rel=0.01)

@@ -48,11 +48,15 @@ PLAN = Plan(
     "every effect",
     (12.0, *[4.0] * 6),
     (
-        Turn("X", 1.2, 0.2), Turn("Z", -0.8, 0.2), Turn("Y", 1.5, 0.25),
-        Turn("X", -1.0, 0.2), Turn("Z", 1.4, 0.2), Turn("Y", -0.8, 0.2),
+        Turn("X", 1.2, 0.2),
+        Turn("Z", -0.8, 0.2),
+        Turn("Y", 1.5, 0.25),
+        Turn("X", -1.0, 0.2),
+        Turn("Z", 1.4, 0.2),
+        Turn("Y", -0.8, 0.2),
     ),
     0.5,
-)  # fmt: skip
+)
 STEP_AT, TURN = 27.0, 2
 """Onset of the steps (s), and the turn in which data are lost."""
 
@@ -60,8 +64,15 @@ STEP_AT, TURN = 27.0, 2
 def of(name):
     """The effect, with what is fixed in it set to values that mean something in a test of two minutes."""
     effect = registry.get(name)
-    values = {"tau": 40.0, "t0": STEP_AT, "span": 80.0, "turn": TURN, "at": 23.0, "r": to_si(0.3, "g"),
-              "threshold": to_si(5.0, "degC/min")}
+    values = {
+        "tau": 40.0,
+        "t0": STEP_AT,
+        "span": 80.0,
+        "turn": TURN,
+        "at": 23.0,
+        "r": to_si(0.3, "g"),
+        "threshold": to_si(5.0, "degC/min"),
+    }
     if effect.with_options is None:
         return effect
     return effect.with_options(**{key: values[key] for key in effect.options})
@@ -69,10 +80,15 @@ def of(name):
 
 def simulated(**truth):
     scenario = Scenario(
-        PLAN, replace(IMU, gyro_white_noise=0.0, accel_white_noise=0.0), truth.pop("site", SITE),
+        PLAN,
+        replace(IMU, gyro_white_noise=0.0, accel_white_noise=0.0),
+        truth.pop("site", SITE),
         TableSpecification(axes=None),
-        mount_rad=(0.8, -0.5, 1.7), coefficients=truth.pop("coefficients", {}), temperature=TEMPERATURE, **truth,
-    )  # fmt: skip
+        mount_rad=(0.8, -0.5, 1.7),
+        coefficients=truth.pop("coefficients", {}),
+        temperature=TEMPERATURE,
+        **truth,
+    )
     return generate(scenario)[0]
 
 
@@ -161,24 +177,37 @@ def test_what_can_be_estimated_can_be_simulated_by_the_same_key(name):
 
 NOT_OF_THE_MEAN = {
     # Derivatives of the motion: a cycle of 0.1 s and its neighbours smooth the ramps of the rate.
-    "gyro_acceleration_sensitivity": 0.2, "gyro_delay": 0.2, "accel_delay": 0.02, "accel_triad_delay": 0.02,
-    "accel_size": 0.2, "lever_arm": 0.2,
+    "gyro_acceleration_sensitivity": 0.2,
+    "gyro_delay": 0.2,
+    "accel_delay": 0.02,
+    "accel_triad_delay": 0.02,
+    "accel_size": 0.2,
+    "lever_arm": 0.2,
     **{name: 0.05 for name in EFFECTS if "_temperature_rate" in name or "_temperature_hysteresis" in name},
     # Switches: they change inside a cycle, and are softened where noise decides.
-    "gyro_dead_band": 0.1, "gyro_hysteresis": 0.1, "accel_hysteresis": 0.1, "gyro_bias_in_motion": 0.1,
-    "accel_bias_in_motion": 0.1, "accel_bias_asymmetry": 0.05,
+    "gyro_dead_band": 0.1,
+    "gyro_hysteresis": 0.1,
+    "accel_hysteresis": 0.1,
+    "gyro_bias_in_motion": 0.1,
+    "accel_bias_in_motion": 0.1,
+    "accel_bias_asymmetry": 0.05,
     # Powers and kinks: the mean over a cycle of a ramp is not that of its mean.
-    "gyro_scale_cubic": 0.01, "gyro_scale_quadratic": 0.01, "gyro_scale_asymmetry": 0.01, "gyro_anisoinertia": 0.01,
+    "gyro_scale_cubic": 0.01,
+    "gyro_scale_quadratic": 0.01,
+    "gyro_scale_asymmetry": 0.01,
+    "gyro_anisoinertia": 0.01,
     "gyro_misalignment_asymmetry": 0.01,
     # Play is a kink where the sweep turns about; settled ones begin at the end of the turn, within a cycle.
-    "accel_play": 0.01, "accel_creep": 0.1, "gyro_creep": 0.1,
+    "accel_play": 0.01,
+    "accel_creep": 0.1,
+    "gyro_creep": 0.1,
     # The next order is L^2/(4 w^2), and up to a tenth for L^2 = 1.5 deg^2/h^2.
     "gyro_lock_in": 0.1,
     # The full rate of the turn is the median over it, in a rate that a mount of a radian spreads over three axes.
     "gyro_lost_data": 0.01,
     # Second order of up to 7.5 mrad of latitude.
     "reference_latitude": 4e-3,
-}  # fmt: skip
+}
 """Share of the signal that regressors may miss because they are functions of a cycle's mean motion. For all others the
 second order of the coefficients and of half a cycle, 2e-3. A wrong sign or axis misses 100 %."""
 
@@ -249,8 +278,7 @@ def test_an_effect_file_is_simulated_as_it_is_estimated(parameter, perfect, tmp_
 
 
 @pytest.mark.parametrize(
-    "label",
-    ["gyro_x: ey^2", "accel_y: ax wtz", "gyro_z: T", "accel_x: ax^2 ay", "gyro_y: sin(2 pi t / 31 s + 40 deg)"],
+    "label", ["gyro_x: ey^2", "accel_y: ax wtz", "gyro_z: T", "accel_x: ax^2 ay", "gyro_y: sin(2 pi t / 31 s + 40 deg)"]
 )
 def test_an_equation_is_simulated_by_the_label_by_which_it_is_added(label, perfect):
     (effect,) = find_effects(label)
@@ -326,11 +354,7 @@ def test_filter_matrices_are_the_derivative_of_compensation_and_navigation(name,
         dz = -(z_up - z_down)[measured] / (2 * step[j])
         moved = down.position - up.position
         nav = np.concatenate(
-            [
-                moved * [r_n, r_e * cos, -1.0],
-                down.velocity - up.velocity,
-                -rotation_vector(down.C_nb @ up.C_nb.T),
-            ]
+            [moved * [r_n, r_e * cos, -1.0], down.velocity - up.velocity, -rotation_vector(down.C_nb @ up.C_nb.T)]
         ) / (2 * step[j])
         for k, rows in enumerate((slice(0, 3), slice(3, 6), slice(6, 9))):
             atol = 5e-3 * largest[rows, j].max() + NOTHING[k] / step[j]

@@ -45,13 +45,15 @@ def make_result(folder: Path) -> bytes:
 
 def make_diagnosis(folder: Path) -> bytes:
     alone = {
-        "labels": ["a", "b", "c"], "units": ["1"] * 3, "display_units": ["ppm"] * 3, "estimates": [1e-6, 2e-6, 3e-6],
-        "sigmas": [1e-6] * 3, "correlations": packed(np.eye(3)),
-    }  # fmt: skip
+        "labels": ["a", "b", "c"],
+        "units": ["1"] * 3,
+        "display_units": ["ppm"] * 3,
+        "estimates": [1e-6, 2e-6, 3e-6],
+        "sigmas": [1e-6] * 3,
+        "correlations": packed(np.eye(3)),
+    }
     model = list(calibration().model)
-    write_json(
-        folder / "d.json", {"format": "sdimu-diagnosis/1", "fit": {"before": {"model": model}}, "alone": alone}
-    )
+    write_json(folder / "d.json", {"format": "sdimu-diagnosis/1", "fit": {"before": {"model": model}}, "alone": alone})
     return (folder / "d.json").read_bytes()
 
 

@@ -84,11 +84,15 @@ def write_bag(folder: Path) -> Path:
     ns = np.arange(1, SAMPLES + 1) * 10_000_000
     slow = ns[::40]
     write_recording(
-        folder, start_ns=1_700_000_000_000_000_000, imu_ns=ns, omega_ib_b=rng.standard_normal((SAMPLES, 3)),
-        f_ib_b=rng.standard_normal((SAMPLES, 3)), status=(slow, slow % 3 > 0, np.arange(len(slow))),
+        folder,
+        start_ns=1_700_000_000_000_000_000,
+        imu_ns=ns,
+        omega_ib_b=rng.standard_normal((SAMPLES, 3)),
+        f_ib_b=rng.standard_normal((SAMPLES, 3)),
+        status=(slow, slow % 3 > 0, np.arange(len(slow))),
         joint_states=(slow, ("outer", "inner"), np.zeros((len(slow), 2)), np.zeros((len(slow), 2))),
         temperature=(slow, 20.0 + rng.standard_normal(len(slow))),
-    )  # fmt: skip
+    )
     return folder
 
 
@@ -255,10 +259,12 @@ def read_metadata_bag(path: Path) -> Hashable:
 # ---- tables ---------------------------------------------------------------------------------------------------------
 
 MAP = {
-    "format": "sdimu-import/1", "time": {"column": "t", "unit": "s"},
-    "accel": {"columns": ["ax", "ay", "az"], "unit": "m/s^2"}, "gyro": {"columns": ["gx", "gy", "gz"], "unit": "deg/s"},
+    "format": "sdimu-import/1",
+    "time": {"column": "t", "unit": "s"},
+    "accel": {"columns": ["ax", "ay", "az"], "unit": "m/s^2"},
+    "gyro": {"columns": ["gx", "gy", "gz"], "unit": "deg/s"},
     "temperature": {"column": "T", "unit": "K"},
-}  # fmt: skip
+}
 COLUMNS = ("t", "ax", "ay", "az", "gx", "gy", "gz", "T")
 
 
@@ -351,11 +357,19 @@ def calibration() -> Calibration:
     effects = [selection.resolve(name) for name in ("gyro_bias", "gyro_scale", "accel_bias", "accel_quadratic")]
     parameters = [p for e in effects for p in e.parameters]
     return Calibration(
-        "accelerometer_triad", tuple(e.key for e in effects), tuple(p.name for p in parameters),
-        tuple(p.unit for p in parameters), tuple(p.display_unit for p in parameters),
-        1e-4 * np.arange(len(parameters)), np.eye(len(parameters)), {"nis": 1.0}, {"duration_s": 3.0}, ("a note",),
-        no_history(len(parameters)), drift_means={"gyro_bias_x": 1.0},
-    )  # fmt: skip
+        "accelerometer_triad",
+        tuple(e.key for e in effects),
+        tuple(p.name for p in parameters),
+        tuple(p.unit for p in parameters),
+        tuple(p.display_unit for p in parameters),
+        1e-4 * np.arange(len(parameters)),
+        np.eye(len(parameters)),
+        {"nis": 1.0},
+        {"duration_s": 3.0},
+        ("a note",),
+        no_history(len(parameters)),
+        drift_means={"gyro_bias_x": 1.0},
+    )
 
 
 def make_result(folder: Path) -> bytes:

@@ -12,17 +12,75 @@ import numpy as np
 Random = np.random.Generator
 EXTREMES = tuple(value.to_bytes(8, "little") for value in (0, 1, 22, 2**31 - 1, 2**32 - 1, 2**40, 2**63, 2**64 - 1))
 WORDS = (
-    "", "null", "true", "nan", "inf", "-1", "0", "1e400", "-1e-400", "9" * 400, "9" * 5000, "1" * 30, "٣", "½",
-    "!!int x", "!!float y", "!!python/object:os.system x", "2024-99-99", "2024-01-01", "*a", "&a [*a]", "[" * 60,
-    "{" * 60, "[[1, 2], [3]]", "{a: {b: c}}", "ax**(1/0)", "k**k", "1/0", "sin(", "__import__('os')", "\x1b[2J",
-    "\u202e", "\x00", "a\tb", "\r\n", "deg/h/h/h", "deg^99", "1 deg/s", "5 parsec", "../../x", "-", "?", "#", ": :",
-    "'", '"', "|", "%YAML 9",
-)  # fmt: skip
+    "",
+    "null",
+    "true",
+    "nan",
+    "inf",
+    "-1",
+    "0",
+    "1e400",
+    "-1e-400",
+    "9" * 400,
+    "9" * 5000,
+    "1" * 30,
+    "٣",
+    "½",
+    "!!int x",
+    "!!float y",
+    "!!python/object:os.system x",
+    "2024-99-99",
+    "2024-01-01",
+    "*a",
+    "&a [*a]",
+    "[" * 60,
+    "{" * 60,
+    "[[1, 2], [3]]",
+    "{a: {b: c}}",
+    "ax**(1/0)",
+    "k**k",
+    "1/0",
+    "sin(",
+    "__import__('os')",
+    "\x1b[2J",
+    "\u202e",
+    "\x00",
+    "a\tb",
+    "\r\n",
+    "deg/h/h/h",
+    "deg^99",
+    "1 deg/s",
+    "5 parsec",
+    "../../x",
+    "-",
+    "?",
+    "#",
+    ": :",
+    "'",
+    '"',
+    "|",
+    "%YAML 9",
+)
 """What stands in files of people who err, and of people who attack."""
 VALUES: tuple[Any, ...] = (
-    None, True, -1, 0, 10**400, 1e308, float("nan"), "", "x" * 10_000, "\x1b[2J\n", [], {}, [[]], [None], {"a": 1},
-    [1, "a"], "2024-99-99",
-)  # fmt: skip
+    None,
+    True,
+    -1,
+    0,
+    10**400,
+    1e308,
+    float("nan"),
+    "",
+    "x" * 10_000,
+    "\x1b[2J\n",
+    [],
+    {},
+    [[]],
+    [None],
+    {"a": 1},
+    [1, "a"],
+    "2024-99-99",
+)
 
 
 def damaged_bytes(content: bytes, rng: Random) -> bytes:
@@ -88,8 +146,17 @@ def _zero(out: bytearray, rng: Random) -> None:
 
 
 _BYTES: tuple[Callable[[bytearray, Random], None], ...] = (
-    _flip, _flip, _overwrite, _overwrite, _cut, _leave_out, _repeat, _insert, _move, _zero,
-)  # fmt: skip
+    _flip,
+    _flip,
+    _overwrite,
+    _overwrite,
+    _cut,
+    _leave_out,
+    _repeat,
+    _insert,
+    _move,
+    _zero,
+)
 
 
 def damaged_text(content: bytes, rng: Random) -> bytes:

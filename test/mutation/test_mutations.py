@@ -27,8 +27,14 @@ LONGEST_S = 10.0
 """Time (s) of one case beyond which it hangs: the slowest sound file takes one."""
 SHORT = {"MAT": 4, "MAT, packed": 4, "bag, SQLite": 15}
 """Cases in the short run; those with a process of their own take half a second each."""
-LONG = {"MAT": 250, "MAT, packed": 250, "bag": 1500, "bag, right checksums": 1500, "bag, right records": 1500,
-        "bag, right layouts": 1500}  # fmt: skip
+LONG = {
+    "MAT": 250,
+    "MAT, packed": 250,
+    "bag": 1500,
+    "bag, right checksums": 1500,
+    "bag, right records": 1500,
+    "bag, right layouts": 1500,
+}
 
 
 class HangError(Exception):

@@ -58,10 +58,17 @@ def test_a_sound_test_has_nothing_to_say():
 @pytest.mark.parametrize(
     ("name", "size"),
     [
-        ("gap_at_rest", 0.5), ("gap_in_turn", 0.05), ("dropouts", 0.01), ("nan", 0.01), ("gyro_stuck", 0.03),
-        ("gyro_spikes", 100.0), ("accel_spikes", 100.0), ("bump", 3.0), ("status_stops", 0.5),
+        ("gap_at_rest", 0.5),
+        ("gap_in_turn", 0.05),
+        ("dropouts", 0.01),
+        ("nan", 0.01),
+        ("gyro_stuck", 0.03),
+        ("gyro_spikes", 100.0),
+        ("accel_spikes", 100.0),
+        ("bump", 3.0),
+        ("status_stops", 0.5),
     ],
-)  # fmt: skip
+)
 def test_what_was_wrong_is_named_in_the_data_section(name, size):
     recording = spoilt(replace(SCENARIO, seed=5), FAULT[name], size)
     result = calibrate(recording, SCENARIO.site, SCENARIO.imu, MODEL, held_out=False)

@@ -129,12 +129,14 @@ def modules() -> Iterator[None]:
         "launch.actions": {"DeclareLaunchArgument": DeclareLaunchArgument},
         "launch.conditions": {"IfCondition": IfCondition},
         "launch.substitutions": {
-            "LaunchConfiguration": LaunchConfiguration, "PathJoinSubstitution": PathJoinSubstitution,
+            "LaunchConfiguration": LaunchConfiguration,
+            "PathJoinSubstitution": PathJoinSubstitution,
             "PythonExpression": PythonExpression,
         },
-        "launch_ros": {}, "launch_ros.actions": {"Node": Node},
+        "launch_ros": {},
+        "launch_ros.actions": {"Node": Node},
         "launch_ros.parameter_descriptions": {"ParameterValue": ParameterValue},
-    }  # fmt: skip
+    }
     for name, content in made.items():
         sys.modules[name] = types.ModuleType(name)
         vars(sys.modules[name]).update(content)
@@ -203,10 +205,11 @@ def main() -> int:
         processes = [
             subprocess.Popen(
                 [str(prefix / node.package / "lib" / node.package / node.executable), *words],
-                env=environment, cwd=folder,
+                env=environment,
+                cwd=folder,
             )
             for node, words in started(file, given)
-        ]  # fmt: skip
+        ]
         try:
             return watched(processes)
         finally:

@@ -90,7 +90,7 @@ def test_an_effect_that_is_added_while_the_samples_come_lowers_the_error(bench: 
         more = {
             "calibration": {"diagnose": True, "gyro_unit": "rad/s", "gyro_sign": 1},
             "sdimu": {"rate_hz": RATE_HZ, "effects": [f"{EFFECT}=400 ppm"], "seed": 7},
-        }  # fmt: skip
+        }
         bench.start(name, **more.get(name, {}))
     operator = Operator()
     try:

@@ -44,10 +44,18 @@ def drawn(seed: int, *more: str, **data: float) -> Calibration:
     sigma = np.array([imu_model.prior_size(e, imu) for e in effects for _ in e.parameters])
     n = len(parameters)
     return Calibration(
-        "accelerometer_triad", tuple(e.name for e in effects), tuple(p.name for p in parameters),
-        tuple(p.unit for p in parameters), tuple(p.display_unit for p in parameters),
-        sigma * rng.standard_normal(n), np.diag((0.01 * sigma) ** 2), {}, dict(data), (), no_history(n),
-    )  # fmt: skip
+        "accelerometer_triad",
+        tuple(e.name for e in effects),
+        tuple(p.name for p in parameters),
+        tuple(p.unit for p in parameters),
+        tuple(p.display_unit for p in parameters),
+        sigma * rng.standard_normal(n),
+        np.diag((0.01 * sigma) ** 2),
+        {},
+        dict(data),
+        (),
+        no_history(n),
+    )
 
 
 class Rig:
@@ -136,9 +144,7 @@ def test_the_node_compensates_as_the_core_does_and_keeps_a_good_result(bench: Fi
             found = rig.out[int(stamps[k])]
             rate, acceleration = found.angular_velocity, found.linear_acceleration
             np.testing.assert_allclose([rate.x, rate.y, rate.z], expected.omega_ib_b[k], rtol=1e-12)
-            np.testing.assert_allclose(
-                [acceleration.x, acceleration.y, acceleration.z], expected.f_ib_b[k], rtol=1e-12
-            )
+            np.testing.assert_allclose([acceleration.x, acceleration.y, acceleration.z], expected.f_ib_b[k], rtol=1e-12)
             np.testing.assert_allclose(
                 found.angular_velocity_covariance, expected.omega_covariance[k].ravel(), rtol=1e-9, atol=1e-25
             )
@@ -150,8 +156,12 @@ def test_the_node_compensates_as_the_core_does_and_keeps_a_good_result(bench: Fi
 
 
 def test_the_node_follows_the_temperature_by_its_polynomial(bench: FitSession, rig: Rig) -> None:
-    warm = ("gyro_scale_temperature", "gyro_bias_temperature_squared", "accel_misalignment_temperature_cubed",
-            "accel_bias_temperature_rate")  # fmt: skip
+    warm = (
+        "gyro_scale_temperature",
+        "gyro_bias_temperature_squared",
+        "accel_misalignment_temperature_cubed",
+        "accel_bias_temperature_rate",
+    )
     result = drawn(4, *warm, start_temperature_degc=25.0)
     write_result(bench.folder / "warm" / "result.json", result)
     given = {"result": str(bench.folder / "warm")}

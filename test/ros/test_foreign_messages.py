@@ -42,9 +42,13 @@ def driver(path: Path, status: bool) -> np.ndarray:
     row = np.searchsorted(r.phase.t, second, side="right") - 1
     at = (second * 1e9).astype(np.int64)
     write_recording(
-        path, start_ns=START, imu_ns=ns, omega_ib_b=np.degrees(r.omega_ib_b), f_ib_b=r.f_ib_b / G,
+        path,
+        start_ns=START,
+        imu_ns=ns,
+        omega_ib_b=np.degrees(r.omega_ib_b),
+        f_ib_b=r.f_ib_b / G,
         status=(at, r.phase.dwell[row], r.phase.stop[row]) if status else None,
-    )  # fmt: skip
+    )
     return START + ns
 
 

@@ -132,10 +132,7 @@ def test_foxglove_topics_of_other_panels_are_there(messages: dict[str, list[Any]
 
 def test_plotjuggler_finds_what_it_draws(messages: dict[str, list[Any]]) -> None:
     there = {
-        name
-        for topic, some in messages.items()
-        for message in some
-        for name, _ in plotjuggler_series(topic, message)
+        name for topic, some in messages.items() for message in some for name, _ in plotjuggler_series(topic, message)
     }
     curves = {curve.attrib["name"] for curve in ElementTree.parse(PLOTJUGGLER).iter("curve")}
     assert len(curves) > 30

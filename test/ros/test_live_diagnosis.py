@@ -81,9 +81,13 @@ def stop_end(raw: RawTest, stop: int) -> int:
 
 def test_all_data_are_ranked_as_the_first_scan_of_a_diagnosis_of_the_bag(raw, whole, tmp_path, monkeypatch):
     write_recording(
-        tmp_path / "bag", start_ns=START, imu_ns=raw.ns - START, omega_ib_b=raw.omega_ib_b, f_ib_b=raw.f_ib_b,
+        tmp_path / "bag",
+        start_ns=START,
+        imu_ns=raw.ns - START,
+        omega_ib_b=raw.omega_ib_b,
+        f_ib_b=raw.f_ib_b,
         status=(raw.status.ns - START, raw.status.dwell, raw.status.stop),
-    )  # fmt: skip
+    )
     searches = []
 
     def seen(evidence, allowed, *arguments):
@@ -95,7 +99,8 @@ def test_all_data_are_ranked_as_the_first_scan_of_a_diagnosis_of_the_bag(raw, wh
     evidence, first = searches[0][0], searches[0][1].first
     assert {r.label: (r.z, r.estimate, r.sigma) for r in whole.ranking} == {
         evidence.names[k]: (first.z[k], first.estimate[k], first.sigma[k])
-        for k in range(len(evidence.weight), len(first.z)) if np.isfinite(first.sigma[k])
+        for k in range(len(evidence.weight), len(first.z))
+        if np.isfinite(first.sigma[k])
     }
     assert whole.threshold == Problem(evidence).threshold(first, FALSE_ALARM)
 
@@ -133,10 +138,10 @@ def test_a_stop_that_cannot_be_fitted_says_what_it_waits_for(job):
     assert "too few samples" in answer.diagnosis.sentence
 
 
-QUESTION = '''
+QUESTION = """
 def largest_score(fit, diagnosis, about):
     return about, fit.estimator, diagnosis.ranking[0].label
-'''
+"""
 
 
 @pytest.fixture

@@ -41,9 +41,11 @@ def test_a_driver_of_best_effort_with_jitter_and_without_phases_is_calibrated(be
     jitter = np.random.default_rng(8).uniform(-1e-3, 1e-3, len(r.t))
     ns = np.rint((r.t + jitter) * 1e9).astype(np.int64)
     sent = encode_imu(START + ns, r.omega_ib_b, r.f_ib_b)
-    bench.children.start("calibration", CALIBRATION, {
-        "imu_topic": "/my_imu/data", "imu": "dtg", "site": "daejeon", "out": str(bench.folder), "stay": True,
-    })  # fmt: skip
+    bench.children.start(
+        "calibration",
+        CALIBRATION,
+        {"imu_topic": "/my_imu/data", "imu": "dtg", "site": "daejeon", "out": str(bench.folder), "stay": True},
+    )
     context = Context()
     rclpy.init(context=context, signal_handler_options=SignalHandlerOptions.NO)
     node = Node("driver", context=context)

@@ -135,8 +135,12 @@ def test_a_plan_is_carried_out_and_the_driver_tells_the_phases(bench: FitSession
     assert np.degrees(controller.fastest) < 45.0
     changes = [p for k, p in enumerate(controller.phases) if k == 0 or p[1:] != controller.phases[k - 1][1:]]
     assert [p[1:] for p in changes] == [
-        ("dwell", "0"), ("rotating", "0"), ("dwell", "1"), ("rotating", "1"), ("dwell", "2"),
-    ]  # fmt: skip
+        ("dwell", "0"),
+        ("rotating", "0"),
+        ("dwell", "1"),
+        ("rotating", "1"),
+        ("dwell", "2"),
+    ]
     starts, arrivals = [changes[k][0] for k in (1, 3)], [changes[k][0] for k in (2, 4)]
     for begin, end in zip(starts, arrivals, strict=True):
         assert 3.0 <= end - begin < 3.0 + 0.1 * FASTER

@@ -83,10 +83,18 @@ def test_a_node_that_stays_takes_what_comes_after_an_end_and_begins_anew_on_requ
     bench: FitSession, checkpoint: bool
 ) -> None:
     bench.children.start(
-        "calibration", CALIBRATION,
-        {"out": str(bench.folder), "stay": True, "checkpoint": checkpoint, "accel_unit": "m/s^2", "gyro_unit": "rad/s",
-         "accel_sign": 1, "gyro_sign": 1},
-    )  # fmt: skip
+        "calibration",
+        CALIBRATION,
+        {
+            "out": str(bench.folder),
+            "stay": True,
+            "checkpoint": checkpoint,
+            "accel_unit": "m/s^2",
+            "gyro_unit": "rad/s",
+            "accel_sign": 1,
+            "gyro_sign": 1,
+        },
+    )
     driver = Driver()
     try:
         driver.wait_for_listeners()

@@ -84,9 +84,7 @@ class Person:
     def trigger(self, name: str) -> Any:
         return self.call(Trigger, f"rate_table/{name}", Trigger.Request())
 
-    def send(
-        self, *points: tuple[float, list[float]], name: str = "", joints: list[str] | None = None
-    ) -> None:
+    def send(self, *points: tuple[float, list[float]], name: str = "", joints: list[str] | None = None) -> None:
         message = JointTrajectory(header=header(0, name), joint_names=NAMES if joints is None else joints)
         for seconds, degrees in points:
             at = Duration(sec=int(seconds), nanosec=round(seconds % 1.0 * 1e9))

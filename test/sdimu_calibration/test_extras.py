@@ -52,10 +52,13 @@ def test_the_extra_that_is_named_brings_the_package(module, extra):
     assert owners & brought
 
 
-@pytest.mark.parametrize(("arguments", "absent", "extra"), [
-    (["workbench", "bag"], {"dash", "flask", "werkzeug", "plotly"}, "workbench"),
-    (["pictures", "bag"], {"matplotlib", "PIL"}, "pictures"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("arguments", "absent", "extra"),
+    [
+        (["workbench", "bag"], {"dash", "flask", "werkzeug", "plotly"}, "workbench"),
+        (["pictures", "bag"], {"matplotlib", "PIL"}, "pictures"),
+    ],
+)
 def test_a_verb_that_needs_an_extra_says_so_in_one_line(arguments, absent, extra):
     done = without(absent, f"sys.argv = {['sdimu', *arguments]!r}\nfrom sdimu_calibration.cli.main import main\nmain()")
     assert done.returncode == 1

@@ -19,9 +19,14 @@ SCENARIO = Scenario(load_plan("kim18"), load_imu("dtg"), load_site("daejeon"), r
 @pytest.fixture(scope="module")
 def done():
     return adaptive_test(
-        SCENARIO, imu_truth(SCENARIO), load_rate_table("ideal"), load_model("baseline"), load_goals("table33"), Menu(),
+        SCENARIO,
+        imu_truth(SCENARIO),
+        load_rate_table("ideal"),
+        load_model("baseline"),
+        load_goals("table33"),
+        Menu(),
         60.0,
-    )  # fmt: skip
+    )
 
 
 def test_samples_made_stop_by_stop_are_those_of_the_same_plan_made_at_once(done):

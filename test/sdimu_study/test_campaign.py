@@ -137,19 +137,27 @@ def test_the_key_is_that_of_another_process_too():
     """Sets have another order in each process."""
     script = "from sdimu_study import sets, shards; print(shards.key_of(sets.STUDY.of(('weak', 'dtg'))))"
     keys = {
-        subprocess.run([sys.executable, "-c", script], env={**os.environ, "PYTHONHASHSEED": seed}, check=True,
-                       capture_output=True, text=True).stdout
+        subprocess.run(
+            [sys.executable, "-c", script],
+            env={**os.environ, "PYTHONHASHSEED": seed},
+            check=True,
+            capture_output=True,
+            text=True,
+        ).stdout
         for seed in ("1", "2", "3")
-    }  # fmt: skip
+    }
     assert len(keys) == 1
 
 
 def test_every_field_of_a_scenario_is_a_setting():
     keys = {
         key_of(STUDY.of(Campaign(scenario, load_model("baseline"))))
-        for scenario in (SCENARIO, Scenario(PLAN, SCENARIO.imu, SCENARIO.site), Scenario(PLAN, SCENARIO.imu,
-                         SCENARIO.site, SCENARIO.table, rate_hz=20.0, effects=("gyro_z=1e-9*t",)))
-    }  # fmt: skip
+        for scenario in (
+            SCENARIO,
+            Scenario(PLAN, SCENARIO.imu, SCENARIO.site),
+            Scenario(PLAN, SCENARIO.imu, SCENARIO.site, SCENARIO.table, rate_hz=20.0, effects=("gyro_z=1e-9*t",)),
+        )
+    }
     assert len(keys) == 3
 
 

@@ -60,9 +60,12 @@ def test_a_clean_test_in_ten_minutes_is_consistent():
 def test_the_page_counts_effects_noise_and_refusals_apart():
     good = {"named": [], "noise": [], "verdict": "consistent", "z2": 27.0, "count": 27, "largest_z": 2.0}
     rows = [
-        good, good | {"named": [["gyro_delay_x"]]}, good | {"noise": ["flicker"], "verdict": "unexplained"},
-        good | {"verdict": "data fault", "largest_z": 4.0}, {"error": "DataError: why", "seed": 7},
-    ]  # fmt: skip
+        good,
+        good | {"named": [["gyro_delay_x"]]},
+        good | {"noise": ["flicker"], "verdict": "unexplained"},
+        good | {"verdict": "data fault", "largest_z": 4.0},
+        {"error": "DataError: why", "seed": 7},
+    ]
     lines = page({("dtg", "kim18"): rows}, 1).splitlines()
     one, total = lines[-6:-4]
     assert one == "| dtg | kim18 | 5 | 1 | 1 | 1 | 1 | 1.00 | 4.0 |"

@@ -92,9 +92,7 @@ def test_both_signs_all_plans_and_most_families_are_drawn() -> None:
 
 def test_an_effect_that_the_plan_cannot_test_is_never_drawn() -> None:
     only = "accel_quadratic_x"
-    tables = tuple(
-        replace(t, retention=tuple(0.5 if x == only else 0.99 * TESTABLE for x in t.label)) for t in TABLES
-    )
+    tables = tuple(replace(t, retention=tuple(0.5 if x == only else 0.99 * TESTABLE for x in t.label)) for t in TABLES)
     assert {d.truths[0].name for d in _draws("strong", tables)} == {only}
 
 
@@ -131,10 +129,23 @@ def _motion() -> Motion:
     three = rng.standard_normal((3, n, 3))
     zeros = np.zeros((n, 3))
     return Motion(
-        np.cumsum(dt), dt, three[0], 9.8 * three[1], np.broadcast_to(np.eye(3), (n, 3, 3)), three[2], zeros,
-        np.ones(n, dtype=bool), np.zeros(n), np.zeros(n), zeros, zeros, np.full(n, np.inf), np.zeros(3), zeros,
+        np.cumsum(dt),
+        dt,
+        three[0],
+        9.8 * three[1],
+        np.broadcast_to(np.eye(3), (n, 3, 3)),
+        three[2],
+        zeros,
+        np.ones(n, dtype=bool),
+        np.zeros(n),
+        np.zeros(n),
+        zeros,
+        zeros,
+        np.full(n, np.inf),
+        np.zeros(3),
+        zeros,
         np.zeros((0, 4)),
-    )  # fmt: skip
+    )
 
 
 def test_outliers_hit_the_share_of_samples_that_the_fault_says_by_twenty_sample_sigmas() -> None:

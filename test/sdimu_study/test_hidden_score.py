@@ -47,12 +47,35 @@ def test_a_label_names_an_effect_when_parameter_and_option_agree(label: str, tru
 
 def _row(kind: str, **more: Any) -> dict[str, Any]:
     base: dict[str, Any] = {
-        "seed": 1, "kind": kind, "plan": "kim18", "verdict": "one effect", "named": ["accel_quadratic_x"], "own": False,
-        "steps": [], "rms_z_before": 4.0, "rms_z_after": 1.0, "held_out_before": 1.3, "held_out_after": 1.0,
-        "stops_before": 1.2, "stops_after": 1.0, "scan_z2": 400.0, "scan_count": 400,
-        "truths": [{"name": "accel_quadratic_x", "family": "accel_quadratic", "option": None, "in_class": True,
-                    "best": True, "realised": 12.0, "error_sigmas": 0.5, "share": 0.99, "text": "accel_quadratic_x=1"}],
-    }  # fmt: skip
+        "seed": 1,
+        "kind": kind,
+        "plan": "kim18",
+        "verdict": "one effect",
+        "named": ["accel_quadratic_x"],
+        "own": False,
+        "steps": [],
+        "rms_z_before": 4.0,
+        "rms_z_after": 1.0,
+        "held_out_before": 1.3,
+        "held_out_after": 1.0,
+        "stops_before": 1.2,
+        "stops_after": 1.0,
+        "scan_z2": 400.0,
+        "scan_count": 400,
+        "truths": [
+            {
+                "name": "accel_quadratic_x",
+                "family": "accel_quadratic",
+                "option": None,
+                "in_class": True,
+                "best": True,
+                "realised": 12.0,
+                "error_sigmas": 0.5,
+                "share": 0.99,
+                "text": "accel_quadratic_x=1",
+            }
+        ],
+    }
     return base | more
 
 

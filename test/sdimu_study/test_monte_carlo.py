@@ -71,19 +71,31 @@ def test_what_would_make_every_run_fail_is_refused_before_the_first(run, options
 def content(failed=()):
     rng = np.random.default_rng(3)
     coefficient = {
-        "name": "gyro_bias_x", "unit": "rad/s", "display_unit": "deg/h", "bias": 1e-9, "bias_error": 2e-9,
-        "rms": np.radians(0.003) / 3600, "sigma": np.radians(0.002) / 3600, "bound": np.radians(0.0015) / 3600,
+        "name": "gyro_bias_x",
+        "unit": "rad/s",
+        "display_unit": "deg/h",
+        "bias": 1e-9,
+        "bias_error": 2e-9,
+        "rms": np.radians(0.003) / 3600,
+        "sigma": np.radians(0.002) / 3600,
+        "bound": np.radians(0.0015) / 3600,
         "rms_z": 1.5,
-    }  # fmt: skip
+    }
     check = {"name": "bias", "value": 1.0, "low": 0.0, "high": 3.0, "passed": True}
     return {
-        "format": FORMAT, "runs": 10, "failed": list(failed), "body_frame": "accelerometer_triad", "level": 0.99,
-        "bound_from": "<batch>", "checks": [check, {**check, "name": "lag", "passed": False}],
-        "rms_z_interval": [0.6, 1.4], "coefficients": [coefficient],
+        "format": FORMAT,
+        "runs": 10,
+        "failed": list(failed),
+        "body_frame": "accelerometer_triad",
+        "level": 0.99,
+        "bound_from": "<batch>",
+        "checks": [check, {**check, "name": "lag", "passed": False}],
+        "rms_z_interval": [0.6, 1.4],
+        "coefficients": [coefficient],
         "nees": {"dof": 1, "values": rng.chisquare(1, 10).tolist()},
         "autocorrelation": [{"channel": "rate_x", "value": 0.0, "standard_errors": 0.0, "pairs": 100}],
         "time": {"cpu_s_per_run": 0.5},
-    }  # fmt: skip
+    }
 
 
 def test_numbers_stand_in_the_units_of_their_column():

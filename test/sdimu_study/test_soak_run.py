@@ -70,9 +70,7 @@ def without_noise(sensor_of, scenario, test):
     # The estimator takes the rate as its mean over a minute.
     still &= np.abs(test.recording.t[:, None] - corners).min(axis=1) > 60.0
     assert np.mean(still) > 0.3
-    return tuple(
-        float(np.sqrt(np.mean(left[still] ** 2))) for left in (done.omega_ib_b - omega, done.f_ib_b - force)
-    )
+    return tuple(float(np.sqrt(np.mean(left[still] ** 2))) for left in (done.omega_ib_b - omega, done.f_ib_b - force))
 
 
 def test_the_truth_compensates_a_ramp_with_axes_that_bend(fitted):
@@ -111,10 +109,17 @@ def test_a_lag_shows_as_rate_terms():
 def test_tables_sort_coefficients_by_power_and_kind():
     ratio = {"gyro": 1.0, "accel": 1.1}
     row = {
-        "z": {"gyro_bias_x": 2.0, "accel_scale_temperature_y": 1.0, "gyro_bias_temperature_rate_z": 4.0,
-              "gyro_misalignment_temperature_squared_xy": 3.0},
-        "scatter": [{"low": 1.0, "high": 2.0, "true": 1.5}], "ramp": ratio, "other_ramp": ratio, "mean_bias": ratio,
-    }  # fmt: skip
+        "z": {
+            "gyro_bias_x": 2.0,
+            "accel_scale_temperature_y": 1.0,
+            "gyro_bias_temperature_rate_z": 4.0,
+            "gyro_misalignment_temperature_squared_xy": 3.0,
+        },
+        "scatter": [{"low": 1.0, "high": 2.0, "true": 1.5}],
+        "ramp": ratio,
+        "other_ramp": ratio,
+        "mean_bias": ratio,
+    }
     first, second = tables("soaks", [row, {"seed": 4, "error": "no"}])
     assert dict(first.lines)["sets"] == "1 of 2"
     assert dict(first.lines)["true scatter inside its interval"] == "1 of 1"

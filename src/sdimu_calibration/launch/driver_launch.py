@@ -57,36 +57,56 @@ def generate_launch_description():
         table, drive = LaunchConfiguration("table"), LaunchConfiguration("drive")
         return IfCondition(PythonExpression(["'", table, "' != '' and '", drive, f"' == '{way}'"]))
 
-    driving = {
-        "table": argument("table"), "allow_motion": argument("allow_motion", bool), "ask": argument("ask", bool),
-    }  # fmt: skip
+    driving = {"table": argument("table"), "allow_motion": argument("allow_motion", bool), "ask": argument("ask", bool)}
     joints = ("rate_table/joint_states", LaunchConfiguration("joint_states"))
     trajectory = ("rate_table/joint_trajectory", LaunchConfiguration("joint_trajectory"))
     samples = [
-        ("imu/data_raw", LaunchConfiguration("imu_topic")), ("rate_table/status", LaunchConfiguration("status_topic")),
+        ("imu/data_raw", LaunchConfiguration("imu_topic")),
+        ("rate_table/status", LaunchConfiguration("status_topic")),
         ("imu/temperature", LaunchConfiguration("temperature_topic")),
-    ]  # fmt: skip
-    return LaunchDescription([
-        *(DeclareLaunchArgument(name, default_value=default, description=text) for name, default, text in ARGUMENTS),
-        Node(
-            package="sdimu_calibration", executable="calibration_node", name="calibration", namespace=namespace,
-            parameters=[
-                reading | {"out": out, "stay": True, "diagnose": argument("diagnose", bool)},
-            ],
-            output="screen",
-        ),
-        Node(
-            package="sdimu_calibration", executable="recorder_node", name="recorder", namespace=namespace,
-            parameters=[{"out": PathJoinSubstitution([out, "bag"])}], remappings=[*samples, joints], output="screen",
-        ),
-        Node(
-            package="sdimu_calibration", executable="table_goals", name="table_goals", namespace=namespace,
-            parameters=[driving | {"plan": argument("plan")}], remappings=[joints, trajectory], output="screen",
-            condition=driven("plan"),
-        ),
-        Node(
-            package="sdimu_calibration", executable="adaptive", name="adaptive", namespace=namespace,
-            parameters=[driving | reading | {"goals": argument("goals"), "out": out}],
-            remappings=[joints, trajectory], output="screen", condition=driven("adaptive"),
-        ),
-    ])  # fmt: skip
+    ]
+    return LaunchDescription(
+        [
+            *(
+                DeclareLaunchArgument(name, default_value=default, description=text)
+                for name, default, text in ARGUMENTS
+            ),
+            Node(
+                package="sdimu_calibration",
+                executable="calibration_node",
+                name="calibration",
+                namespace=namespace,
+                parameters=[reading | {"out": out, "stay": True, "diagnose": argument("diagnose", bool)}],
+                output="screen",
+            ),
+            Node(
+                package="sdimu_calibration",
+                executable="recorder_node",
+                name="recorder",
+                namespace=namespace,
+                parameters=[{"out": PathJoinSubstitution([out, "bag"])}],
+                remappings=[*samples, joints],
+                output="screen",
+            ),
+            Node(
+                package="sdimu_calibration",
+                executable="table_goals",
+                name="table_goals",
+                namespace=namespace,
+                parameters=[driving | {"plan": argument("plan")}],
+                remappings=[joints, trajectory],
+                output="screen",
+                condition=driven("plan"),
+            ),
+            Node(
+                package="sdimu_calibration",
+                executable="adaptive",
+                name="adaptive",
+                namespace=namespace,
+                parameters=[driving | reading | {"goals": argument("goals"), "out": out}],
+                remappings=[joints, trajectory],
+                output="screen",
+                condition=driven("adaptive"),
+            ),
+        ]
+    )

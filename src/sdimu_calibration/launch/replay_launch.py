@@ -1,5 +1,7 @@
 """Play a recording into the live calibration.
 
+For example:
+
     ros2 launch sdimu_calibration replay_launch.py bag:=my_bag speed:=10.0
 """
 
@@ -31,14 +33,27 @@ def generate_launch_description():
     namespace = LaunchConfiguration("namespace")
     calibrating = {name: argument(name) for name in ("imu", "site", "model")} | {"out": LaunchConfiguration("out")}
     playing = {"bag": argument("bag"), "speed": argument("speed", float), "consumers": 1}
-    return LaunchDescription([
-        *(DeclareLaunchArgument(name, default_value=default, description=text) for name, default, text in ARGUMENTS),
-        Node(
-            package="sdimu_calibration", executable="calibration_node", name="calibration", namespace=namespace,
-            parameters=[calibrating], output="screen",
-        ),
-        Node(
-            package="sdimu_calibration", executable="replay_node", name="replay", namespace=namespace,
-            parameters=[playing], output="screen",
-        ),
-    ])  # fmt: skip
+    return LaunchDescription(
+        [
+            *(
+                DeclareLaunchArgument(name, default_value=default, description=text)
+                for name, default, text in ARGUMENTS
+            ),
+            Node(
+                package="sdimu_calibration",
+                executable="calibration_node",
+                name="calibration",
+                namespace=namespace,
+                parameters=[calibrating],
+                output="screen",
+            ),
+            Node(
+                package="sdimu_calibration",
+                executable="replay_node",
+                name="replay",
+                namespace=namespace,
+                parameters=[playing],
+                output="screen",
+            ),
+        ]
+    )

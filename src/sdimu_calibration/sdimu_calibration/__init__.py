@@ -27,8 +27,9 @@ if "numpy" in sys.modules and "OPENBLAS_NUM_THREADS" not in os.environ:
     warnings.warn(
         "numpy was imported before sdimu_calibration and uses several threads, which makes a diagnosis several times "
         "slower: import sdimu_calibration first, or set OPENBLAS_NUM_THREADS=1",
-        RuntimeWarning, stacklevel=2,
-    )  # fmt: skip
+        RuntimeWarning,
+        stacklevel=2,
+    )
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 wording.speak(shell_words.option, shell_words.work)

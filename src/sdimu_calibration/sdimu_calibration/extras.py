@@ -8,9 +8,16 @@ from typing import Any
 from sdimu_calibration.core.data_error import DataError
 
 _EXTRAS = {
-    "dash": "workbench", "flask": "workbench", "werkzeug": "workbench", "plotly": "notebook", "pandas": "notebook",
-    "matplotlib": "pictures", "PIL": "pictures", "dask": "study", "distributed": "study",
-}  # fmt: skip
+    "dash": "workbench",
+    "flask": "workbench",
+    "werkzeug": "workbench",
+    "plotly": "notebook",
+    "pandas": "notebook",
+    "matplotlib": "pictures",
+    "PIL": "pictures",
+    "dask": "study",
+    "distributed": "study",
+}
 """Extra that brings a package."""
 
 
@@ -23,9 +30,7 @@ def lacking(error: ImportError) -> ExtraError | None:
     module = (error.name or "").partition(".")[0]
     if module not in _EXTRAS:
         return None
-    return ExtraError(
-        f'this needs the package {module}: pip install "sdimu_calibration[{_EXTRAS[module]}]"'
-    )
+    return ExtraError(f'this needs the package {module}: pip install "sdimu_calibration[{_EXTRAS[module]}]"')
 
 
 def needed(module: str) -> Any:

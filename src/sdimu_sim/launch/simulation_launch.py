@@ -1,5 +1,7 @@
 """A whole simulated test: table, IMU, calibration and recorder.
 
+For example:
+
     ros2 launch sdimu_sim simulation_launch.py plan:=recommended out:=out/run
     ros2 launch sdimu_sim simulation_launch.py drive:=plan allow_motion:=true        # the plan by trajectories
     ros2 launch sdimu_sim simulation_launch.py drive:=adaptive allow_motion:=true    # the test chooses its turns
@@ -42,46 +44,103 @@ def generate_launch_description():
 
     def node(package, executable, name, parameters, condition=None):
         return Node(
-            package=package, executable=executable, name=name, namespace=namespace, parameters=[parameters],
-            output="screen", condition=condition,
-        )  # fmt: skip
+            package=package,
+            executable=executable,
+            name=name,
+            namespace=namespace,
+            parameters=[parameters],
+            output="screen",
+            condition=condition,
+        )
 
     table = {
-        "plan": argument("plan"), "table": argument("table"), "seed": argument("seed", int),
-        "speed": argument("speed", float), "consumers": 1, "status_peers": 2, "joint_peers": 1,
-    }  # fmt: skip
+        "plan": argument("plan"),
+        "table": argument("table"),
+        "seed": argument("seed", int),
+        "speed": argument("speed", float),
+        "consumers": 1,
+        "status_peers": 2,
+        "joint_peers": 1,
+    }
 
     def driven(*ways):
         drive = LaunchConfiguration("drive")
         return IfCondition(PythonExpression(["'", drive, "' in ", repr(ways)]))
 
     driving = {
-        "table": argument("table"), "finish": True, "allow_motion": argument("allow_motion", bool),
+        "table": argument("table"),
+        "finish": True,
+        "allow_motion": argument("allow_motion", bool),
         "ask": argument("ask", bool),
-    }  # fmt: skip
-    return LaunchDescription([
-        *(DeclareLaunchArgument(name, default_value=default, description=text) for name, default, text in ARGUMENTS),
-        node("sdimu_calibration", "recorder_node", "recorder", {
-            "out": PathJoinSubstitution([out, "bag"]),
-            "wait_for": ["imu/data_raw", "rate_table/status", "calibration/coefficients"],
-        }),
-        node("sdimu_calibration", "calibration_node", "calibration", {
-            "site": argument("site"), "imu": argument("imu"), "model": argument("model"), "out": out,
-            "gyro_unit": "rad/s", "gyro_sign": 1,
-        }),
-        node("sdimu_sim", "sdimu_node", "sdimu", {
-            "imu": argument("imu"), "site": argument("site"), "plan": argument("plan"),
-            "seed": argument("seed", int), "rate_hz": argument("rate_hz", float),
-            "truth_file": PathJoinSubstitution([out, "truth.yaml"]), "consumers": 2,
-        }),
-        node("rate_table_sim", "rate_table_node", "rate_table", table, driven("")),
-        node(
-            "rate_table_sim", "rate_table_node", "rate_table", table | {"follow_goals": True},
-            driven("plan", "adaptive"),
-        ),
-        node("sdimu_calibration", "table_goals", "table_goals", driving | {"plan": argument("plan")}, driven("plan")),
-        node("sdimu_calibration", "adaptive", "adaptive", driving | {
-            "imu": argument("imu"), "site": argument("site"), "model": argument("model"), "goals": argument("goals"),
-            "gyro_unit": "rad/s", "gyro_sign": 1, "out": out,
-        }, driven("adaptive")),
-    ])  # fmt: skip
+    }
+    return LaunchDescription(
+        [
+            *(
+                DeclareLaunchArgument(name, default_value=default, description=text)
+                for name, default, text in ARGUMENTS
+            ),
+            node(
+                "sdimu_calibration",
+                "recorder_node",
+                "recorder",
+                {
+                    "out": PathJoinSubstitution([out, "bag"]),
+                    "wait_for": ["imu/data_raw", "rate_table/status", "calibration/coefficients"],
+                },
+            ),
+            node(
+                "sdimu_calibration",
+                "calibration_node",
+                "calibration",
+                {
+                    "site": argument("site"),
+                    "imu": argument("imu"),
+                    "model": argument("model"),
+                    "out": out,
+                    "gyro_unit": "rad/s",
+                    "gyro_sign": 1,
+                },
+            ),
+            node(
+                "sdimu_sim",
+                "sdimu_node",
+                "sdimu",
+                {
+                    "imu": argument("imu"),
+                    "site": argument("site"),
+                    "plan": argument("plan"),
+                    "seed": argument("seed", int),
+                    "rate_hz": argument("rate_hz", float),
+                    "truth_file": PathJoinSubstitution([out, "truth.yaml"]),
+                    "consumers": 2,
+                },
+            ),
+            node("rate_table_sim", "rate_table_node", "rate_table", table, driven("")),
+            node(
+                "rate_table_sim",
+                "rate_table_node",
+                "rate_table",
+                table | {"follow_goals": True},
+                driven("plan", "adaptive"),
+            ),
+            node(
+                "sdimu_calibration", "table_goals", "table_goals", driving | {"plan": argument("plan")}, driven("plan")
+            ),
+            node(
+                "sdimu_calibration",
+                "adaptive",
+                "adaptive",
+                driving
+                | {
+                    "imu": argument("imu"),
+                    "site": argument("site"),
+                    "model": argument("model"),
+                    "goals": argument("goals"),
+                    "gyro_unit": "rad/s",
+                    "gyro_sign": 1,
+                    "out": out,
+                },
+                driven("adaptive"),
+            ),
+        ]
+    )

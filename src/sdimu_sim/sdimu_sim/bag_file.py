@@ -15,9 +15,13 @@ from sdimu_sim.core.scenario import DEFAULT_START_NS, Scenario, SimulatedTest, t
 
 
 def write_test(
-    path: Path, scenario: Scenario, test: SimulatedTest, *, replace: bool = False,
+    path: Path,
+    scenario: Scenario,
+    test: SimulatedTest,
+    *,
+    replace: bool = False,
     custom: Mapping[str, str] | None = None,
-) -> None:  # fmt: skip
+) -> None:
     """Write a simulated test to a rosbag2 folder; `custom` is what its metadata says of the unit."""
     motion = test.motion
     t, dwell, stop = phase_changes(motion)

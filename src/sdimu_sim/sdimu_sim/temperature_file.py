@@ -68,10 +68,18 @@ def load_temperature(text: str | Path) -> TemperatureProfile:
             raise DataError(f"temperature '{text}': {error}") from error
     file = read_yaml(find_config("temperature", text), _TemperatureFile)
     return TemperatureProfile(
-        file.start, file.rise, file.tau, file.ripple, file.ripple_period,
-        knots=_knots(file.start, file.segments), reference_degc=file.reference, sensor_lag_s=file.sensor_lag,
-        offset=file.thermometer_offset, noise=file.thermometer_noise, resolution=file.thermometer_resolution,
-    )  # fmt: skip
+        file.start,
+        file.rise,
+        file.tau,
+        file.ripple,
+        file.ripple_period,
+        knots=_knots(file.start, file.segments),
+        reference_degc=file.reference,
+        sensor_lag_s=file.sensor_lag,
+        offset=file.thermometer_offset,
+        noise=file.thermometer_noise,
+        resolution=file.thermometer_resolution,
+    )
 
 
 def _knots(start: float, segments: tuple[_Segment, ...]) -> tuple[tuple[float, float], ...]:

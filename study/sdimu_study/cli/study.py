@@ -257,8 +257,7 @@ def many(
     runs: Annotated[int, typer.Option("-n", min=1, help="Tests of each IMU file.")] = 50,
     seed: Seed = 67_001,
     imu: Annotated[
-        list[str] | None,
-        typer.Option(help="IMU file of a rate table; repeatable. dtg, rlg_navigation by default."),
+        list[str] | None, typer.Option(help="IMU file of a rate table; repeatable. dtg, rlg_navigation by default.")
     ] = None,
     workers: Workers = 2,
 ) -> None:

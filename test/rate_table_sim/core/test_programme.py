@@ -87,8 +87,14 @@ def test_points_without_velocities_are_turned_to_from_rest_to_rest_within_the_li
         ([point(0.5, [0, 90, 0])], r"middle: 90 deg about middle at a mean of 180 deg/s needs .* 40 deg/s\^2"),
         ([point(2.0, [0, 100, 0], [0, 0, 0])], r"middle: 150 deg/s\^2 is above the limit of 40 deg/s\^2"),
         ([point(30.0, [0, 0, 600])], r"inner: 600 deg at 30 s is beyond the 1.5 turns that the cable allows"),
-        ([point(2.0, [65, 0, 0], [65, 0, 0]), point(8.0, [400, 0, 0], [65, 0, 0]), point(12.0, [500, 0, 0], [0, 0, 0])],
-         r"outer: 65 deg/s at 2 s is above the limit of 60 deg/s"),
+        (
+            [
+                point(2.0, [65, 0, 0], [65, 0, 0]),
+                point(8.0, [400, 0, 0], [65, 0, 0]),
+                point(12.0, [500, 0, 0], [0, 0, 0]),
+            ],
+            r"outer: 65 deg/s at 2 s is above the limit of 60 deg/s",
+        ),
         ([point(3.0, [0, 1, 0]), point(3.0, [0, 2, 0])], "time_from_start does not ascend strictly"),
         ([point(3.0, [0, 10, 0], [0, 5, 0])], r"the last point has a velocity of 5 deg/s \(expected 0\)"),
         ([point(3.0, [0, np.nan, 0])], "not finite"),
@@ -96,7 +102,7 @@ def test_points_without_velocities_are_turned_to_from_rest_to_rest_within_the_li
         ([point(1e9, [0, 5, 0])], "time_from_start"),
         ([point(-1.0, [0, 5, 0])], "time_from_start"),
     ],
-)  # fmt: skip
+)
 def test_a_goal_that_cannot_be_is_refused_with_the_reason_and_changes_nothing(points, message):
     programme = GoalProgramme(TABLE, 1)
     played(programme)

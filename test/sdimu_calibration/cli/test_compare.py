@@ -17,14 +17,27 @@ from sdimu_calibration.storage.files.result_file import write_result
 
 _NONE = np.empty(0)
 FIRST = Calibration(
-    body_frame="prior", model=("accel_bias",), names=("accel_bias_x", "accel_bias_y"), units=("m/s^2",) * 2,
-    display_units=("ug",) * 2, values=np.array([1e-4, 2e-4]), covariance=np.diag([1e-12, 4e-12]),
+    body_frame="prior",
+    model=("accel_bias",),
+    names=("accel_bias_x", "accel_bias_y"),
+    units=("m/s^2",) * 2,
+    display_units=("ug",) * 2,
+    values=np.array([1e-4, 2e-4]),
+    covariance=np.diag([1e-12, 4e-12]),
     fit={"log_likelihood": 100.0, "nis_mean": 1.5, "held_out_rms": 2.0},
     data={"samples": 10, "duration_s": 1.0, "checksum": 5.0, "conditions": 7.0},
     notes=(),
-    history=History(_NONE, np.empty((0, 2)), np.empty((0, 2)), np.empty((0, 3)), _NONE.astype(int), _NONE.astype(bool),
-                    _NONE.astype(bool), np.empty((0, 4))),
-)  # fmt: skip
+    history=History(
+        _NONE,
+        np.empty((0, 2)),
+        np.empty((0, 2)),
+        np.empty((0, 3)),
+        _NONE.astype(int),
+        _NONE.astype(bool),
+        _NONE.astype(bool),
+        np.empty((0, 4)),
+    ),
+)
 SECOND = replace(
     FIRST,
     model=("accel_bias", "accel_quadratic_x"),

@@ -28,10 +28,18 @@ def result(*effects: str) -> Calibration:
     parameters = [p for e in found for p in e.parameters]
     values = 1e-4 * np.random.default_rng(1).standard_normal(len(parameters))
     return Calibration(
-        "accelerometer_triad", tuple(effects), tuple(p.name for p in parameters), tuple(p.unit for p in parameters),
-        tuple(p.display_unit for p in parameters), values, np.diag(np.full(len(values), 1e-14)), {},
-        {"start_temperature_degc": 20.0}, (), no_history(len(values)),
-    )  # fmt: skip
+        "accelerometer_triad",
+        tuple(effects),
+        tuple(p.name for p in parameters),
+        tuple(p.unit for p in parameters),
+        tuple(p.display_unit for p in parameters),
+        values,
+        np.diag(np.full(len(values), 1e-14)),
+        {},
+        {"start_temperature_degc": 20.0},
+        (),
+        no_history(len(values)),
+    )
 
 
 def test_a_compensated_bag_has_every_sample_and_the_other_topics_as_they_were(bag: Path, tmp_path: Path) -> None:
@@ -63,10 +71,14 @@ def test_a_result_that_is_none_is_one_line(bag: Path, tmp_path: Path) -> None:
 
 def test_a_bag_with_topics_of_other_names_is_compensated_too(tmp_path: Path, small_test) -> None:
     write_recording(
-        tmp_path / "other", start_ns=10**18, imu_ns=small_test.ns, omega_ib_b=small_test.omega_ib_b,
-        f_ib_b=small_test.f_ib_b, temperature=(small_test.slow_ns, small_test.temperature),
+        tmp_path / "other",
+        start_ns=10**18,
+        imu_ns=small_test.ns,
+        omega_ib_b=small_test.omega_ib_b,
+        f_ib_b=small_test.f_ib_b,
+        temperature=(small_test.slow_ns, small_test.temperature),
         topics=Topics(imu="/xsens/imu", temperature="/xsens/warmth"),
-    )  # fmt: skip
+    )
     write_result(tmp_path / "result.json", result("gyro_bias", "accel_bias"))
     compensate(tmp_path / "other", result=tmp_path / "result.json", out=tmp_path / "new")
     new = read_recording(tmp_path / "new", Topics(imu="/imu/data", temperature="/xsens/warmth"))

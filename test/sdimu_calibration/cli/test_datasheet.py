@@ -53,9 +53,14 @@ def test_the_certificate_is_of_one_unit_with_the_hashes_of_its_recordings(batch,
     datasheet([folder], certificate=True, serial="SN1", operator="A. Person", plan="kim18", out=tmp_path / "out")
     assert "bag_1_1 was not found" in capsys.readouterr().out
     datasheet(
-        [folder], certificate=True, serial="SN1", operator="A. Person", plan="kim18", recording=[elsewhere],
+        [folder],
+        certificate=True,
+        serial="SN1",
+        operator="A. Person",
+        plan="kim18",
+        recording=[elsewhere],
         out=tmp_path / "out",
-    )  # fmt: skip
+    )
     content = json.loads((tmp_path / "out" / "datasheet.json").read_text())
     assert (content["serial"], content["operator"], content["plan"]) == ("SN1", "A. Person", "kim18")
     assert {one["file"]: one["sha256"] for one in content["recordings"]} == {
@@ -73,8 +78,9 @@ def test_noise_of_a_recording_at_rest_comes_back_and_into_the_sheet(batch):
     folder = batch(units=1)
     terms = {
         f"{triad}_{axis}": Terms(np.array([0.0, 2e-7, 3e-8, 0.0]), np.array([1e-9, 2e-9, 1e-9, 1e-10]))
-        for triad in ("gyro", "accel") for axis in "xyz"
-    }  # fmt: skip
+        for triad in ("gyro", "accel")
+        for axis in "xyz"
+    }
     write_noise_terms(folder / "still_noise" / "noise.json", "still", 3600.0, terms)
     again = read_noise_terms(folder / "still_noise")
     assert all(np.array_equal(again.terms[c].value, terms[c].value) for c in terms)

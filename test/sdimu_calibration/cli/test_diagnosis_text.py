@@ -14,9 +14,24 @@ NOISE = "noise with a memory explains the same"
 def step(label, **more):
     told = HeldOut(np.arange(3), np.zeros(3), 1.0)
     moved = (("gyro_bias_x", 4.2), ("gyro_bias_y", 0.3))
-    return Step(label, label, "1", "ppm", 9.0, 4.0, 1.0, 0.1, 50.0, 40.0, told, told, 30.0, 10.0, (), **{
-        "accepted": True, "reason": "", "moved": moved, **more,
-    })  # fmt: skip
+    return Step(
+        label,
+        label,
+        "1",
+        "ppm",
+        9.0,
+        4.0,
+        1.0,
+        0.1,
+        50.0,
+        40.0,
+        told,
+        told,
+        30.0,
+        10.0,
+        (),
+        **{"accepted": True, "reason": "", "moved": moved, **more},
+    )
 
 
 def test_what_was_taken_out_stands_behind_what_stays_and_keeps_its_number():

@@ -19,18 +19,31 @@ from sdimu_calibration.core.results import Calibration, no_history
 from sdimu_calibration.storage.files.result_file import as_note
 
 FITS = Calibration(
-    "prior", ("accel_bias",), ("accel_bias_x",), ("m/s^2",), ("ug",), np.array([1e-4]), np.array([[1e-12]]),
-    {"nis_mean": 1.0}, {}, (), no_history(1),
-)  # fmt: skip
-MISFITS = tuple(map(as_note, (
-    "the model in white noise does not fit (NIS 5.6; 1 is right); run: sdimu diagnose",
-    "stop 3 does not fit: gyro is off by 9.1 sigma (chance ends at 5); look at the data there, or run: sdimu diagnose",
-    "gyro_scale_y is not the same in all recordings (p 1e-09); run: sdimu diagnose",
-)))  # fmt: skip
+    "prior",
+    ("accel_bias",),
+    ("accel_bias_x",),
+    ("m/s^2",),
+    ("ug",),
+    np.array([1e-4]),
+    np.array([[1e-12]]),
+    {"nis_mean": 1.0},
+    {},
+    (),
+    no_history(1),
+)
+MISFITS = tuple(
+    map(
+        as_note,
+        (
+            "the model in white noise does not fit (NIS 5.6; 1 is right); run: sdimu diagnose",
+            "stop 3 does not fit: gyro is off by 9.1 sigma (chance ends at 5); look at the data there, or run: "
+            "sdimu diagnose",
+            "gyro_scale_y is not the same in all recordings (p 1e-09); run: sdimu diagnose",
+        ),
+    )
+)
 UNTRUSTED = ("unexplained", "data fault")
-TRUSTED = (
-    "consistent", "noise model wrong", "one effect", "class of effects", "several effects", "own equation",
-)  # fmt: skip
+TRUSTED = ("consistent", "noise model wrong", "one effect", "class of effects", "several effects", "own equation")
 PLAN = """format: sdimu-plan/1
 name: small
 dwell: 20 s
@@ -91,9 +104,13 @@ def bags(tmp_path_factory):
 
     for number in (1, 2):
         simulate(
-            plan=str(folder / "small.yaml"), rate=20.0, seed=number, unit=1, effect=["gyro_scale_asymmetry_y=200 ppm"],
+            plan=str(folder / "small.yaml"),
+            rate=20.0,
+            seed=number,
+            unit=1,
+            effect=["gyro_scale_asymmetry_y=200 ppm"],
             out=folder / f"bag{number}",
-        )  # fmt: skip
+        )
     return [folder / "bag1", folder / "bag2"]
 
 

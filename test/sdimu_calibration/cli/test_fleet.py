@@ -64,8 +64,14 @@ def test_what_does_not_fit_is_set_apart_with_a_line_each(batch, capsys):
     fleet([folder])
     told = [line for line in capsys.readouterr().out.splitlines() if line.startswith("set apart")]
     assert len(told) == 6
-    for word in ("body frame is prior", "IMU file is fog_tactical", "+ accel_quadratic", "is of the recording of",
-                 "not to be trusted", "not a JSON file"):  # fmt: skip
+    for word in (
+        "body frame is prior",
+        "IMU file is fog_tactical",
+        "+ accel_quadratic",
+        "is of the recording of",
+        "not to be trusted",
+        "not a JSON file",
+    ):
         assert sum(word in line for line in told) == 1, word
 
 
@@ -131,15 +137,21 @@ def test_an_effect_too_weak_for_one_unit_is_found_in_their_diagnoses(batch, caps
     labels = [f"accel_quadratic_{axis}" for axis in "xyz"] + [f"accel_cubic_{axis}" for axis in "xyz"]
     for path in folder.rglob("result.json"):
         estimates = unit * (rng.standard_normal(6) + np.array([0.0, 2.0, 0.0, 0.0, 0.0, 0.0]))
-        write_json(path.with_name("diagnosis.json"), {
-            "format": "sdimu-diagnosis/1",
-            "fit": {"before": {"model": list(read_result(path).model)}},
-            "alone": {
-                "labels": labels, "units": ["m/s^2/g^2"] * 3 + ["m/s^2/g^3"] * 3,
-                "display_units": ["ug/g^2"] * 3 + ["ug/g^3"] * 3,
-                "estimates": estimates.tolist(), "sigmas": [unit] * 6, "correlations": packed(np.eye(6)),
+        write_json(
+            path.with_name("diagnosis.json"),
+            {
+                "format": "sdimu-diagnosis/1",
+                "fit": {"before": {"model": list(read_result(path).model)}},
+                "alone": {
+                    "labels": labels,
+                    "units": ["m/s^2/g^2"] * 3 + ["m/s^2/g^3"] * 3,
+                    "display_units": ["ug/g^2"] * 3 + ["ug/g^3"] * 3,
+                    "estimates": estimates.tolist(),
+                    "sigmas": [unit] * 6,
+                    "correlations": packed(np.eye(6)),
+                },
             },
-        })  # fmt: skip
+        )
     alone = candidates(gather([folder]).given)
     assert alone.estimates.shape == (12, 6)
     fleet([folder], out=tmp_path / "pages")

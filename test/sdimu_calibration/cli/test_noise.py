@@ -25,9 +25,12 @@ def still(tmp_path: Path) -> Path:
     n = round(300.0 / DT)
     force = ACCEL / np.sqrt(DT) * rng.standard_normal((n, 3)) + np.array([0.0, 0.0, -9.8])
     write_recording(
-        tmp_path / "still", start_ns=10**18, imu_ns=np.arange(1, n + 1) * round(DT * 1e9),
-        omega_ib_b=GYRO / np.sqrt(DT) * rng.standard_normal((n, 3)), f_ib_b=force,
-    )  # fmt: skip
+        tmp_path / "still",
+        start_ns=10**18,
+        imu_ns=np.arange(1, n + 1) * round(DT * 1e9),
+        omega_ib_b=GYRO / np.sqrt(DT) * rng.standard_normal((n, 3)),
+        f_ib_b=force,
+    )
     return tmp_path / "still"
 
 
@@ -52,9 +55,12 @@ def test_pulses_and_wandering_bias_go_into_the_file(tmp_path: Path) -> None:
     counted = np.diff(pulse * np.round(np.cumsum(rate * DT, axis=0) / pulse), axis=0, prepend=0.0) / DT
     force = ACCEL / np.sqrt(DT) * rng.standard_normal((n, 3)) + np.array([0.0, 0.0, -9.8])
     write_recording(
-        tmp_path / "still", start_ns=10**18, imu_ns=np.arange(1, n + 1) * round(DT * 1e9), omega_ib_b=counted,
+        tmp_path / "still",
+        start_ns=10**18,
+        imu_ns=np.arange(1, n + 1) * round(DT * 1e9),
+        omega_ib_b=counted,
         f_ib_b=force,
-    )  # fmt: skip
+    )
     noise(tmp_path / "still", out=tmp_path / "out")
     found = load_imu(tmp_path / "out" / "imu.yaml")
     assert found.gyro_quantisation == pytest.approx(pulse / np.sqrt(12.0), rel=0.1)

@@ -96,8 +96,13 @@ def elsewhere(tmp_path, monkeypatch):
     """A site's and an IMU's file in one folder, and work that goes on in another."""
     for kind, name in (("site", "daejeon"), ("imu", "dtg")):
         shutil.copy(find_config(kind, name), tmp_path / f"{kind}_of_mine.yaml")
-    write_recording(tmp_path / "bag", start_ns=10**18, imu_ns=np.arange(1, 3) * 10**7, omega_ib_b=np.zeros((2, 3)),
-                    f_ib_b=np.zeros((2, 3)))
+    write_recording(
+        tmp_path / "bag",
+        start_ns=10**18,
+        imu_ns=np.arange(1, 3) * 10**7,
+        omega_ib_b=np.zeros((2, 3)),
+        f_ib_b=np.zeros((2, 3)),
+    )
     (tmp_path / "there").mkdir()
     monkeypatch.chdir(tmp_path)
     return tmp_path
@@ -106,9 +111,11 @@ def elsewhere(tmp_path, monkeypatch):
 def test_a_site_and_an_imu_of_the_users_own_are_found_again_from_the_results(elsewhere, monkeypatch, capsys):
     site, imu = "site_of_mine.yaml", "imu_of_mine.yaml"
     of_mine = PreparedTest(
-        nominal_recording(load_plan("kim18"), load_site(site)), load_imu(imu), load_site(site),
+        nominal_recording(load_plan("kim18"), load_site(site)),
+        load_imu(imu),
+        load_site(site),
         origin=said_of(elsewhere / "bag", site),
-    )  # fmt: skip
+    )
     result = outcome(solve(with_imu_file(of_mine, imu), named_model("baseline", ()), "filter"))
     write_result(elsewhere / "result.json", result)
     assert result.origin.site == "site_of_mine"

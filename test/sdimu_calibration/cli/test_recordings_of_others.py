@@ -62,15 +62,14 @@ def test_a_run_by_hand_whose_stamps_come_in_packets(sdimu, tmp_path):
     assert result.estimator == "handheld"
     assert result.data["lost"] == 0
     assert len(result.rests) == 24
-    true = in_body_frame(
-        against_gravity(truth, STANDARD_GRAVITY, gravity_of(site)).imu.coefficients, result.body_frame
-    )
+    true = in_body_frame(against_gravity(truth, STANDARD_GRAVITY, gravity_of(site)).imu.coefficients, result.body_frame)
     sigma = np.sqrt(np.diag(result.covariance))
     # The force sensitivity of this IMU's gyros is simulated as mass unbalance, and estimated as nine elements.
     z = [
-        (value - true[name]) / s for name, value, s in zip(result.names, result.values, sigma, strict=True)
+        (value - true[name]) / s
+        for name, value, s in zip(result.names, result.values, sigma, strict=True)
         if s > 0.0 and "g_sensitivity" not in name
-    ]  # fmt: skip
+    ]
     assert len(z) == 21
     assert np.sqrt(np.mean(np.square(z))) < 2.0
 

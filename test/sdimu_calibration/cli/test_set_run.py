@@ -14,9 +14,19 @@ from sdimu_calibration.core.results import Calibration, SetSummary, no_history
 from sdimu_calibration.report.page import Contents, page
 
 RESULT = Calibration(
-    "prior", ("accel_bias",), ("accel_bias_x",), ("m/s^2",), ("ug",), np.array([1e-4]), np.array([[1e-12]]),
-    {"nis_mean": 1.0}, {}, (), no_history(1), of_set=SetSummary((), (), (), np.array([1.0]), ()),
-)  # fmt: skip
+    "prior",
+    ("accel_bias",),
+    ("accel_bias_x",),
+    ("m/s^2",),
+    ("ug",),
+    np.array([1e-4]),
+    np.array([[1e-12]]),
+    {"nis_mean": 1.0},
+    {},
+    (),
+    no_history(1),
+    of_set=SetSummary((), (), (), np.array([1.0]), ()),
+)
 
 
 def of(used, *refused):
@@ -28,11 +38,12 @@ def of(used, *refused):
 @pytest.mark.parametrize(
     ("file", "refused", "title"),
     [
-        (None, (), "Diagnosis of 2 recordings"), (None, ("c.mcap",), "Diagnosis of 2 of 3 recordings"),
+        (None, (), "Diagnosis of 2 recordings"),
+        (None, ("c.mcap",), "Diagnosis of 2 of 3 recordings"),
         (Path("set.yaml"), (), "Diagnosis of set.yaml"),
         (Path("set.yaml"), ("c.mcap",), "Diagnosis of set.yaml (2 of 3 recordings)"),
     ],
-)  # fmt: skip
+)
 def test_a_title_counts_what_was_used(file, refused, title):
     assert page_title(SimpleNamespace(file=file), "Diagnosis", of(2, *refused)) == title
 

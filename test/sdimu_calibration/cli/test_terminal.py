@@ -43,9 +43,14 @@ class Terminal:
 
     def __call__(self, *arguments: object, terminal: bool = False) -> subprocess.CompletedProcess[str]:
         return subprocess.run(
-            [sys.executable, "-m", "sdimu_calibration.cli.main", *map(str, arguments)], cwd=self.folder,
-            env=self.environment(terminal), capture_output=True, text=True, timeout=300, check=False,
-        )  # fmt: skip
+            [sys.executable, "-m", "sdimu_calibration.cli.main", *map(str, arguments)],
+            cwd=self.folder,
+            env=self.environment(terminal),
+            capture_output=True,
+            text=True,
+            timeout=300,
+            check=False,
+        )
 
     @staticmethod
     def environment(terminal: bool) -> dict[str, str]:
@@ -62,8 +67,23 @@ def sdimu(tmp_path_factory: pytest.TempPathFactory) -> Terminal:
     run = Terminal(folder)
     # Two recordings of one unit, and two more units.
     for number, unit in ((1, 1), (2, 1), (3, 3), (4, 4)):
-        making = ("simulate", "--plan", "small.yaml", "--rate", 20, "--seed", number, "--unit", unit, "--serial",
-                  f"SN{unit}", "--effect", f"{EFFECT}=200 ppm", "--out", f"bag{number}")  # fmt: skip
+        making = (
+            "simulate",
+            "--plan",
+            "small.yaml",
+            "--rate",
+            20,
+            "--seed",
+            number,
+            "--unit",
+            unit,
+            "--serial",
+            f"SN{unit}",
+            "--effect",
+            f"{EFFECT}=200 ppm",
+            "--out",
+            f"bag{number}",
+        )
         assert run(*making).returncode == 0
         if number != 2:
             made = run("calibrate", f"bag{number}", "--imu", "dtg", "--out", f"results/base{number}")
@@ -81,13 +101,15 @@ ANSWERS = {
     "effect": (("effects", "gyro_scale"), "sdimu-catalogue/1"),
     "predict": (("predict", "--plan", "small.yaml"), "sdimu-prediction/1"),
     "plan": (("plan", "--plan", "small.yaml", "--tries", 2), "sdimu-plan-search/1"),
-    "tell": (("plan", "--plan", "small.yaml", "--tell", EFFECT, "--tell", "gyro_scale_quadratic_y"),
-             "sdimu-next-turn/1"),
+    "tell": (
+        ("plan", "--plan", "small.yaml", "--tell", EFFECT, "--tell", "gyro_scale_quadratic_y"),
+        "sdimu-next-turn/1",
+    ),
     "noise": (("noise", "bag1", "--out", "noise"), "sdimu-noise-terms/1"),
     "info": (("bag", "info", "bag1"), "sdimu-bag-info/1"),
     "fleet": (("fleet", "results", "--out", "fleet"), "sdimu-fleet/1"),
     "datasheet": (("datasheet", "results", "--out", "sheet"), "sdimu-datasheet/1"),
-}  # fmt: skip
+}
 """What prints figures, with small data, and the format of its answer."""
 
 
@@ -162,9 +184,22 @@ def test_advice_repeats_what_was_asked_for():
     command = spelled(kept, asked)
     assert sentence(kept) == "Keep lever in the model: --add 'coupling.yaml:k1' --add 'x(tau=3 s)'."
     assert shlex.split(command) == [
-        "sdimu", "calibrate", "a bag", "--site", "my site.yaml", "--imu", "dtg", "--gyro-sign", "-1", "--add",
-        "lever_arm", "--add", "coupling.yaml:k1", "--add", "x(tau=3 s)",
-    ]  # fmt: skip
+        "sdimu",
+        "calibrate",
+        "a bag",
+        "--site",
+        "my site.yaml",
+        "--imu",
+        "dtg",
+        "--gyro-sign",
+        "-1",
+        "--add",
+        "lever_arm",
+        "--add",
+        "coupling.yaml:k1",
+        "--add",
+        "x(tau=3 s)",
+    ]
     request = Request("m", "filter", hand=True, add=["x"])
     full = Asked.of((), Path(), Opening("s", noise="estimated", serial="7"), request)
     words = shlex.join(full.options)
@@ -173,9 +208,19 @@ def test_advice_repeats_what_was_asked_for():
     assert sentence(ranked) == "Turns ranked by what they tell: sdimu plan --plan YOURS --tell 'a' --tell 'b'."
     command = spelled(ranked, asked)
     assert shlex.split(command) == [
-        "sdimu", "plan", "--plan", "out/plan.yaml", "--site", "my site.yaml", "--imu", "dtg",
-        "--tell", "a", "--tell", "b",
-    ]  # fmt: skip
+        "sdimu",
+        "plan",
+        "--plan",
+        "out/plan.yaml",
+        "--site",
+        "my site.yaml",
+        "--imu",
+        "dtg",
+        "--tell",
+        "a",
+        "--tell",
+        "b",
+    ]
     more = Advice(Kind.RECORD_ONCE_MORE, ("a", ("b",), "turn X"), Verb.CONTINUE)
     assert sentence(more).endswith("turn X; a whole plan: sdimu plan --after")
     assert spelled(more, asked) == "sdimu plan --after out"

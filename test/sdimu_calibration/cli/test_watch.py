@@ -42,8 +42,15 @@ def told(terminal: bool, *shown: tuple[Now, bool]) -> str:
 def test_stop_phase_time_left_sigmas_and_light_are_told(terminal):
     text = told(terminal, (Now(), True))
     # 300 s of data in 3 s: the 600 s that are left take 6 s.
-    for word in ("stop 1 of 3 dwell", "300 of 900 s", "6 s left at 100 times real time", "75 ppm", "50 %", "rate 1.02",
-                 "consistent"):  # fmt: skip
+    for word in (
+        "stop 1 of 3 dwell",
+        "300 of 900 s",
+        "6 s left at 100 times real time",
+        "75 ppm",
+        "50 %",
+        "rate 1.02",
+        "consistent",
+    ):
         assert word in text
 
 
@@ -77,11 +84,16 @@ def test_what_has_fallen_least_comes_first():
 
 
 MISFIT = SeenDiagnosis(
-    3, "misfit", "2 candidates stand out of the noise, asymmetry most.", "noise reaches 3.82",
+    3,
+    "misfit",
+    "2 candidates stand out of the noise, asymmetry most.",
+    "noise reaches 3.82",
     (("asymmetry", "+27.4 sigma, 41 ppm"), ("quadratic", "+12.1 sigma, 3 ppm")),
     (("as given", "2.42"), ("+ asymmetry", "0.98")),
-    ("gyro_x", "gyro_y"), ("0", "1", "2", "3"), np.array([[0.4, -4.2, 0.1, np.nan], [0.0, 1.0, 11.7, -2.9]]),
-)  # fmt: skip
+    ("gyro_x", "gyro_y"),
+    ("0", "1", "2", "3"),
+    np.array([[0.4, -4.2, 0.1, np.nan], [0.0, 1.0, 11.7, -2.9]]),
+)
 
 
 def test_heat_map_ranking_and_ladder_are_shown():

@@ -75,8 +75,9 @@ def test_the_estimator_refuses_a_number_without_its_unit_and_a_size(text, messag
 
 def test_a_count_has_no_unit():
     assert read_options(parse_key("gyro_lost_data(turn=2, at=1 min)"), {"turn": "1", "at": "s"}) == {
-        "turn": 2.0, "at": 60.0
-    }  # fmt: skip
+        "turn": 2.0,
+        "at": 60.0,
+    }
 
 
 def test_a_size_is_written_to_the_last_digit():

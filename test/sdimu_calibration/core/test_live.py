@@ -32,9 +32,11 @@ def recording(memory, recorded_test, three_stops):
         made = recorded_test(three_stops, seed=21)
         # Times as they come out of stamps: whole nanoseconds, by the one conversion there is.
         memory["recording"] = replace(
-            made, start_ns=START, t=seconds(stamps(made.t), START),
+            made,
+            start_ns=START,
+            t=seconds(stamps(made.t), START),
             phase=replace(made.phase, t=seconds(stamps(made.phase.t), START)),
-        )  # fmt: skip
+        )
     return memory["recording"]
 
 
@@ -68,9 +70,7 @@ def options(imu, site):
 
 
 @settings(
-    max_examples=12,
-    suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
-    deadline=None,
+    max_examples=12, suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow], deadline=None
 )
 @given(lengths=st.lists(st.one_of(st.integers(1, 30), st.integers(100, 1500)), min_size=1, max_size=25))
 def test_estimates_do_not_depend_on_how_samples_came(lengths, memory, recording, options, model):

@@ -53,9 +53,12 @@ def messages(imu):
     row = np.searchsorted(r.phase.t, second, side="right") - 1
     at = START + (second * NS).astype(np.int64)
     return Messages(
-        START + np.rint(r.t * NS).astype(np.int64), r.omega_ib_b, r.f_ib_b,
-        (at, r.phase.dwell[row], r.phase.stop[row]), (at, 20.0 + 1e-3 * second),
-    )  # fmt: skip
+        START + np.rint(r.t * NS).astype(np.int64),
+        r.omega_ib_b,
+        r.f_ib_b,
+        (at, r.phase.dwell[row], r.phase.stop[row]),
+        (at, 20.0 + 1e-3 * second),
+    )
 
 
 def foreign_units(m):
@@ -123,17 +126,32 @@ def stray_status(m):
 
 
 CASES = (
-    stray_status, foreign_units, negated_force, negated_rate, jitter, bursts, other_clock, no_numbers, no_status,
-    spikes_and_a_stuck_axis, torn, warm_another_day,
-)  # fmt: skip
+    stray_status,
+    foreign_units,
+    negated_force,
+    negated_rate,
+    jitter,
+    bursts,
+    other_clock,
+    no_numbers,
+    no_status,
+    spikes_and_a_stuck_axis,
+    torn,
+    warm_another_day,
+)
 
 
 def recorded(path, m):
     status = None if m.status is None else (m.status[0] - START, *m.status[1:])
     write_recording(
-        path, start_ns=START, imu_ns=m.ns - START, omega_ib_b=m.w, f_ib_b=m.f, status=status,
+        path,
+        start_ns=START,
+        imu_ns=m.ns - START,
+        omega_ib_b=m.w,
+        f_ib_b=m.f,
+        status=status,
         temperature=(m.temperature[0] - START, m.temperature[1]),
-    )  # fmt: skip
+    )
     return path
 
 

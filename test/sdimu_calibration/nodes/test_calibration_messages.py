@@ -22,9 +22,12 @@ def test_the_twist_of_the_navigation_is_along_the_axes_of_the_child_frame():
     q_nb = np.array([0.5, 0.5, -0.5, 0.5])
     P = np.diag(np.arange(1.0, 10.0))
     estimate = SimpleNamespace(
-        position_error_m=np.zeros(3), velocity=np.array([1.0, 2.0, 3.0]), q_nb=q_nb, navigation_covariance=P,
+        position_error_m=np.zeros(3),
+        velocity=np.array([1.0, 2.0, 3.0]),
+        q_nb=q_nb,
+        navigation_covariance=P,
         body_frame="accelerometer_triad",
-    )  # fmt: skip
+    )
     message = navigation(7, estimate)
     assert (message.header.frame_id, message.child_frame_id) == ("ned", "imu_accelerometer_triad")
     assert navigation(7, estimate, "map_ned", "my_imu").child_frame_id == "my_imu"

@@ -22,9 +22,14 @@ def test_panels_lie_where_the_python_package_puts_them(rows, cols, share_x, shar
     titles = [f"panel {k}" for k in range(rows * cols)]
     figure = Figure(rows, cols, titles=titles, share_x=share_x, share_y=share_y, gap_x=0.08, gap_y=0.05)
     expected = make_subplots(
-        rows, cols, subplot_titles=titles, shared_xaxes=share_x, shared_yaxes=share_y, horizontal_spacing=0.08,
+        rows,
+        cols,
+        subplot_titles=titles,
+        shared_xaxes=share_x,
+        shared_yaxes=share_y,
+        horizontal_spacing=0.08,
         vertical_spacing=0.05,
-    ).to_plotly_json()["layout"]  # fmt: skip
+    ).to_plotly_json()["layout"]
     for key in (key for key in expected if "axis" in key):
         axis = figure.layout[key]
         assert axis.pop("domain") == pytest.approx(expected[key].pop("domain"), abs=1e-12), key

@@ -116,9 +116,9 @@ def test_a_page_says_before_its_numbers_that_headings_mean_nothing(learned):
 def test_the_shell_repeats_what_still_holds_and_no_finding_twice(learned):
     misfit = as_note("the model in white noise does not fit (NIS 3); run: sdimu diagnose")
     warnings = (misfit, "gyro_bias_x is far off")
-    told = notes_of_diagnosis(replace(
-        learned, after=replace(learned.after, warnings=warnings), findings=(SimpleNamespace(text=warnings[1]),),
-    ))  # fmt: skip
+    told = notes_of_diagnosis(
+        replace(learned, after=replace(learned.after, warnings=warnings), findings=(SimpleNamespace(text=warnings[1]),))
+    )
     assert told == (NO_AZIMUTH, "the model in white noise does not fit (NIS 3)")
 
 

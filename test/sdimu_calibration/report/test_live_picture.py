@@ -27,9 +27,15 @@ def diagnosis(threshold: float = 4.0, held_out: float = 1.7) -> LiveDiagnosis:
     )
     ranking = tuple(Ranked(f"effect_{z}", float(z), 1e-6 * z, 1e-6, "ppm") for z in (12, 6, 3))
     return LiveDiagnosis(
-        4, 600.0, "misfit", "", threshold=threshold, where=where, ranking=ranking,
+        4,
+        600.0,
+        "misfit",
+        "",
+        threshold=threshold,
+        where=where,
+        ranking=ranking,
         ladder=(ModelError((), 2.0, held_out),),
-    )  # fmt: skip
+    )
 
 
 def points(png: bytes) -> np.ndarray:
@@ -83,9 +89,10 @@ def test_bars_are_as_long_as_their_scores():
     np.testing.assert_allclose(lengths, lengths[0] * np.array([12, 6, 3]) / 12.0, atol=2.0)
 
 
-@pytest.mark.parametrize("found", [
-    diagnosis(threshold=float("inf")), diagnosis(held_out=float("nan")), LiveDiagnosis(0, 10.0, "consistent", ""),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "found",
+    [diagnosis(threshold=float("inf")), diagnosis(held_out=float("nan")), LiveDiagnosis(0, 10.0, "consistent", "")],
+)
 def test_what_is_not_known_yet_leaves_a_picture(found):
     assert points(live_picture(found)).shape[1] == module._WIDTH
 

@@ -45,8 +45,20 @@ def test_what_the_sensors_say_at_rest_is_gravity_and_earth_rate(laid_out):
 def test_one_jump_stands_for_each_turn_with_its_axis_and_angle(diagnosis, found):
     jumps = measured.jumps(diagnosis, found)
     # kim18: axes and angles of the plan, the mount of up to 3 deg aside.
-    plan = [(1, 90), (1, 180), (1, 180), (2, 90), (2, 180), (2, 180), (0, 90), (0, 180), (0, 180), *[(0, 90)] * 3,
-            *[(2, 90)] * 3, *[(1, 90)] * 3]  # fmt: skip
+    plan = [
+        (1, 90),
+        (1, 180),
+        (1, 180),
+        (2, 90),
+        (2, 180),
+        (2, 180),
+        (0, 90),
+        (0, 180),
+        (0, 180),
+        *[(0, 90)] * 3,
+        *[(2, 90)] * 3,
+        *[(1, 90)] * 3,
+    ]
     assert list(jumps.axis) == [axis for axis, _ in plan]
     assert jumps.angle == pytest.approx(np.array([angle for _, angle in plan]), rel=0.01)
     assert list(jumps.stop) == list(range(1, 19))

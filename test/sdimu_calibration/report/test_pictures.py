@@ -34,8 +34,9 @@ def test_pictures_of_one_diagnosis_are_the_same_bytes(drawn, diagnosis, more, tm
 def test_cells_say_their_number_before_and_after(diagnosis):
     before, after = heat_maps(diagnosis).axes
     for axes, grid in (
-        (before, data.where(diagnosis.consistency)), (after, data.stop_grid(data.residuals(diagnosis), after=True))
-    ):  # fmt: skip
+        (before, data.where(diagnosis.consistency)),
+        (after, data.stop_grid(data.residuals(diagnosis), after=True)),
+    ):
         assert [text.get_text() for text in axes.texts] == [cell(float(v)) for v in grid.value.ravel()]
 
 

@@ -22,9 +22,14 @@ def bag(tmp_path):
     ns = 10_000_000 * np.arange(1, N + 1)
     status = (np.array([0, 3_000_000_000, 6_000_000_000]), np.array([True, False, True]), np.array([0, 0, 1]))
     write_recording(
-        tmp_path / "bag", start_ns=START, imu_ns=ns, omega_ib_b=rng.normal(size=(N, 3)), f_ib_b=rng.normal(size=(N, 3)),
-        status=status, temperature=(np.array([0, 5_000_000_000]), np.array([20.0, 21.0])),
-    )  # fmt: skip
+        tmp_path / "bag",
+        start_ns=START,
+        imu_ns=ns,
+        omega_ib_b=rng.normal(size=(N, 3)),
+        f_ib_b=rng.normal(size=(N, 3)),
+        status=status,
+        temperature=(np.array([0, 5_000_000_000]), np.array([20.0, 21.0])),
+    )
     return tmp_path / "bag"
 
 

@@ -235,9 +235,12 @@ def test_a_recording_without_noise_unpacks(tmp_path):
     # Nothing of a sensor compresses better than one that says the same all the time.
     n = 30_000
     write_recording(
-        tmp_path / "b", start_ns=10**18, imu_ns=np.arange(1, n + 1) * 10_000_000, omega_ib_b=np.zeros((n, 3)),
+        tmp_path / "b",
+        start_ns=10**18,
+        imu_ns=np.arange(1, n + 1) * 10_000_000,
+        omega_ib_b=np.zeros((n, 3)),
         f_ib_b=np.zeros((n, 3)),
-    )  # fmt: skip
+    )
     file = next((tmp_path / "b").glob("*.mcap"))
     assert n * 356 < 60 * file.stat().st_size
     assert len(read_recording(tmp_path / "b").t) == n
@@ -248,9 +251,14 @@ def test_reading_needs_the_memory_of_the_numbers(tmp_path, small_test):
     n = 60_000
     made = type(small_test)(n)
     write_recording(
-        tmp_path / "long", start_ns=10**18, imu_ns=made.ns, omega_ib_b=made.omega_ib_b, f_ib_b=made.f_ib_b,
-        status=(made.slow_ns, made.dwell, made.stop), temperature=(made.slow_ns, made.temperature),
-    )  # fmt: skip
+        tmp_path / "long",
+        start_ns=10**18,
+        imu_ns=made.ns,
+        omega_ib_b=made.omega_ib_b,
+        f_ib_b=made.f_ib_b,
+        status=(made.slow_ns, made.dwell, made.stop),
+        temperature=(made.slow_ns, made.temperature),
+    )
     tracemalloc.start()
     try:
         assert len(read_recording(tmp_path / "long").t) == n
@@ -291,9 +299,11 @@ def test_chunks_of_every_kind_read_the_same(tmp_path, kind):
     samples = cdr.encode_imu(np.arange(1, 60) * 10**7, np.full((59, 3), 2.0), np.ones((59, 3)))
     body = schema(1, cdr.IMU) + channel(1, 1, "/imu/data_raw") + b"".join(message(1, data) for data in samples)
     pack = {
-        "": lambda data: data, "lz4": lz4.frame.compress, "zstd": zstandard.compress,
+        "": lambda data: data,
+        "lz4": lz4.frame.compress,
+        "zstd": zstandard.compress,
         "zstd without its size": zstandard.ZstdCompressor(write_content_size=False).compress,
-    }[kind]  # fmt: skip
+    }[kind]
     recording = read_recording(write_raw(tmp_path / "x.mcap", body, kind[:4], pack(body)))
     assert recording.omega_ib_b.tolist() == [[2.0] * 3] * 59
 

@@ -38,9 +38,15 @@ def test_the_file_has_every_name_of_the_interface(told, tmp_path):
     assert set(read["unexplained"]) == {"is", "fraction", "best_variables"}
     assert all(isinstance(text, str) for text in read["advice"])
     names = {
-        "effect", "parameters", "delta_log_likelihood", "p_value_adjusted", "explained", "held_out_rms_before",
-        "held_out_rms_after", "indistinguishable_from",
-    }  # fmt: skip
+        "effect",
+        "parameters",
+        "delta_log_likelihood",
+        "p_value_adjusted",
+        "explained",
+        "held_out_rms_before",
+        "held_out_rms_after",
+        "indistinguishable_from",
+    }
     for candidate in read["candidates"]:
         assert names <= set(candidate)
         assert {"name", "value", "sigma", "unit"} <= set(candidate["parameters"][0])

@@ -148,10 +148,16 @@ def test_an_absent_file_is_told_by_its_name(tmp_path):
         find_effects(str(tmp_path / "nowhere.yaml"))
 
 
-@pytest.mark.parametrize(("model", "added"), [
-    ("baseline", ["gyro_bias"]), ("baseline", ["accel_scale_y"]), ("hand", ["gyro_g_sensitivity_xx"]),
-    ("baseline", ["accel_quadratic", "accel_quadratic_z"]), ("baseline", ["gyro_x: ey^2", "gyro_x: ey^2"]),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("model", "added"),
+    [
+        ("baseline", ["gyro_bias"]),
+        ("baseline", ["accel_scale_y"]),
+        ("hand", ["gyro_g_sensitivity_xx"]),
+        ("baseline", ["accel_quadratic", "accel_quadratic_z"]),
+        ("baseline", ["gyro_x: ey^2", "gyro_x: ey^2"]),
+    ],
+)
 def test_adding_what_a_model_has_is_refused(model, added):
     with pytest.raises(DataError, match=re.escape(f"'{added[-1]}' is in the model already")):
         extended_model(model, added)

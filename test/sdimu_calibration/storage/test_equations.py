@@ -25,9 +25,14 @@ SITE = Site(latitude_rad=float(np.radians(36.4)))
 def motion():
     turns = tuple(Turn(a, np.radians(90.0), np.radians(15.0)) for a in "XYZX")
     scenario = Scenario(
-        Plan("four turns", (20.0,) * 5, turns, np.radians(60.0)), load_imu("dtg"), SITE, rate_hz=20.0, seed=8,
-        table=TableSpecification(axes=None), temperature=TemperatureProfile(rise=5.0, tau_s=100.0),
-    )  # fmt: skip
+        Plan("four turns", (20.0,) * 5, turns, np.radians(60.0)),
+        load_imu("dtg"),
+        SITE,
+        rate_hz=20.0,
+        seed=8,
+        table=TableSpecification(axes=None),
+        temperature=TemperatureProfile(rise=5.0, tau_s=100.0),
+    )
     return solve(PreparedTest(generate(scenario)[0], load_imu("dtg"), SITE), load_model("baseline")).known.seen
 
 

@@ -86,9 +86,11 @@ def test_keys_written_twice_are_found_among_many(tmp_path):
 
 
 EFFECT = {
-    "format": "sdimu-effect/1", "name": "mine", "expressions": {"accel_x": "k * ax"},
+    "format": "sdimu-effect/1",
+    "name": "mine",
+    "expressions": {"accel_x": "k * ax"},
     "parameters": {"k": {"unit": "m/s^2/g", "prior": "10 ug/g"}},
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize(
@@ -113,22 +115,36 @@ def test_units_and_numbers_beyond_all_measure_are_one_line(tmp_path):
 
 def result(**changes):
     made = {
-        "body_frame": "prior", "model": ("gyro_bias",), "names": ("gyro_bias_x", "gyro_bias_y", "gyro_bias_z"),
-        "units": ("rad/s",) * 3, "display_units": ("deg/h",) * 3,
-    } | changes  # fmt: skip
-    return Calibration(**made, values=np.zeros(3), covariance=np.eye(3), fit={}, data={}, notes=(),
-                       history=no_history(3))  # fmt: skip
+        "body_frame": "prior",
+        "model": ("gyro_bias",),
+        "names": ("gyro_bias_x", "gyro_bias_y", "gyro_bias_z"),
+        "units": ("rad/s",) * 3,
+        "display_units": ("deg/h",) * 3,
+    } | changes
+    return Calibration(
+        **made, values=np.zeros(3), covariance=np.eye(3), fit={}, data={}, notes=(), history=no_history(3)
+    )
 
 
 @pytest.mark.parametrize(
     "edit",
     [
-        {"coefficients": 3}, {"coefficients": [3]}, {"covariance": [[int("9" * 400)] * 3] * 3}, {"data": None},
-        {"history": {"t": 5}}, {"drift_means": [1]}, {"noise": [7]}, {"model": [ESCAPE]}, {"body_frame": ESCAPE},
-        {"notes": 5}, {"model": 5}, {"history": [1]}, {"data": {"faults": [{"kind": "x", "nothing": 1}]}},
+        {"coefficients": 3},
+        {"coefficients": [3]},
+        {"covariance": [[int("9" * 400)] * 3] * 3},
+        {"data": None},
+        {"history": {"t": 5}},
+        {"drift_means": [1]},
+        {"noise": [7]},
+        {"model": [ESCAPE]},
+        {"body_frame": ESCAPE},
+        {"notes": 5},
+        {"model": 5},
+        {"history": [1]},
+        {"data": {"faults": [{"kind": "x", "nothing": 1}]}},
     ],
     ids=lambda edit: next(iter(edit)),
-)  # fmt: skip
+)
 def test_a_result_that_is_none_is_one_line(tmp_path, edit):
     write_result(tmp_path / "result.json", result())
     content = json.loads((tmp_path / "result.json").read_text())
@@ -157,7 +173,7 @@ def test_notes_of_a_result_are_shown_as_text(tmp_path):
 
 
 def test_no_name_ends_the_comment_of_a_c_header_or_breaks_a_table(tmp_path):
-    name = 'k */ int x; /* "\', #'
+    name = "k */ int x; /* \"', #"
     made = result(body_frame="prior */ #error", names=("gyro_bias_x", "gyro_bias_y", name))
     linear = Calibration(**vars(result()))
     texts = {}

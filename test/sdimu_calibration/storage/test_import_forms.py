@@ -19,9 +19,11 @@ N = 400
 T = np.arange(1, N + 1) * 0.01
 COUNTS = np.random.default_rng(11).integers(-500, 500, (N, 6))
 NUMBERED = {
-    "format": "sdimu-import/1", "time": {"rate_hz": 100.0}, "gyro": {"columns": [1, 2, 3], "unit": "deg/s"},
+    "format": "sdimu-import/1",
+    "time": {"rate_hz": 100.0},
+    "gyro": {"columns": [1, 2, 3], "unit": "deg/s"},
     "accel": {"columns": [4, 5, 6], "unit": "mg"},
-}  # fmt: skip
+}
 
 
 def chart(folder: Path, **changes):

@@ -175,9 +175,10 @@ def test_accelerometers_with_stamps_of_their_own_keep_their_integral(tmp_path):
     slow, fast = np.arange(1, 101) * 0.01, np.arange(1, 401) * 0.0025 + 0.001
     f = np.cumsum(np.random.default_rng(2).standard_normal((400, 3)), axis=0)
     np.savez(tmp_path / "a.npz", t=slow, ta=fast, acc=f, gyr=np.zeros((100, 3)))
-    found = read_files([tmp_path / "a.npz"], chart(
-        tmp_path, accel={"columns": "acc", "time": "ta", "unit": "m/s^2"}, gyro={"columns": "gyr"},
-    ))  # fmt: skip
+    found = read_files(
+        [tmp_path / "a.npz"],
+        chart(tmp_path, accel={"columns": "acc", "time": "ta", "unit": "m/s^2"}, gyro={"columns": "gyr"}),
+    )
     assert "stamps of their own" in found.notes[0]
     # Over whole intervals of the gyro the velocity is that of the fast samples, but for where it begins and ends:
     # within less than one fast interval of the largest force at each end.

@@ -47,10 +47,15 @@ def write(path, w=1.0, f=1.0, late_s=0.0, warm_at_s=0.0, topics=None, r=None):
     second = np.arange(0.0, r.t[-1])
     row = np.searchsorted(r.phase.t, second, side="right") - 1
     write_recording(
-        path, start_ns=START_NS, imu_ns=ns(r.t), omega_ib_b=r.omega_ib_b * w, f_ib_b=r.f_ib_b * f,
+        path,
+        start_ns=START_NS,
+        imu_ns=ns(r.t),
+        omega_ib_b=r.omega_ib_b * w,
+        f_ib_b=r.f_ib_b * f,
         status=(ns(second + late_s), r.phase.dwell[row], r.phase.stop[row]),
-        temperature=(ns(second + warm_at_s), 20.0 + 0.0 * second), topics=topics,
-    )  # fmt: skip
+        temperature=(ns(second + warm_at_s), 20.0 + 0.0 * second),
+        topics=topics,
+    )
     return path
 
 

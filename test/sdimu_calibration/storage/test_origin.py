@@ -24,10 +24,13 @@ def bag(tmp_path):
     n = 1000
     rng = np.random.default_rng(1)
     write_recording(
-        tmp_path / "bag", start_ns=10**18, imu_ns=np.arange(1, n + 1) * 10**7,
-        omega_ib_b=1e-4 * rng.standard_normal((n, 3)), f_ib_b=rng.standard_normal((n, 3)),
+        tmp_path / "bag",
+        start_ns=10**18,
+        imu_ns=np.arange(1, n + 1) * 10**7,
+        omega_ib_b=1e-4 * rng.standard_normal((n, 3)),
+        f_ib_b=rng.standard_normal((n, 3)),
         custom={"serial": "SN 17", "power_on": "3", "room": "B"},
-    )  # fmt: skip
+    )
     return tmp_path / "bag"
 
 

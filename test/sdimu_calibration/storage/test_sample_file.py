@@ -19,9 +19,12 @@ def bag(tmp_path):
     rng = np.random.default_rng(2)
     ns = np.arange(1, 20_001) * 10_000_000
     write_recording(
-        tmp_path / "bag", start_ns=10**18, imu_ns=ns, omega_ib_b=rng.standard_normal((20_000, 3)),
+        tmp_path / "bag",
+        start_ns=10**18,
+        imu_ns=ns,
+        omega_ib_b=rng.standard_normal((20_000, 3)),
         f_ib_b=rng.standard_normal((20_000, 3)),
-    )  # fmt: skip
+    )
     return tmp_path / "bag"
 
 

@@ -28,10 +28,16 @@ ELSEWHERE = Topics("/xsens/imu", "/table/state", "/table/axes", "/xsens/temp")
 
 def write(path: Path, test, topics: Topics) -> Path:
     write_recording(
-        path, start_ns=START_NS, imu_ns=test.ns, omega_ib_b=test.omega_ib_b, f_ib_b=test.f_ib_b,
-        status=(test.slow_ns, test.dwell, test.stop), joint_states=(test.ns, test.names, test.angle, test.rate),
-        temperature=(test.slow_ns, test.temperature), topics=topics,
-    )  # fmt: skip
+        path,
+        start_ns=START_NS,
+        imu_ns=test.ns,
+        omega_ib_b=test.omega_ib_b,
+        f_ib_b=test.f_ib_b,
+        status=(test.slow_ns, test.dwell, test.stop),
+        joint_states=(test.ns, test.names, test.angle, test.rate),
+        temperature=(test.slow_ns, test.temperature),
+        topics=topics,
+    )
     return path
 
 
@@ -154,9 +160,14 @@ def test_a_bag_of_ros_1_reads_the_same(tmp_path, small_test, method):
         for k, ns in enumerate(small_test.ns.tolist()):
             time = stamp(*divmod(ns + START_NS, 1_000_000_000))
             message = types[cdr.IMU](
-                header(k, time, "imu"), quaternion(0.0, 0.0, 0.0, 1.0), np.zeros(9),
-                vector(*small_test.omega_ib_b[k]), np.zeros(9), vector(*small_test.f_ib_b[k]), np.zeros(9),
-            )  # fmt: skip
+                header(k, time, "imu"),
+                quaternion(0.0, 0.0, 0.0, 1.0),
+                np.zeros(9),
+                vector(*small_test.omega_ib_b[k]),
+                np.zeros(9),
+                vector(*small_test.f_ib_b[k]),
+                np.zeros(9),
+            )
             writer.write(connection, ns + START_NS, TYPES_1.serialize_ros1(message, cdr.IMU))
     r = read_recording(path)
     assert np.array_equal(r.f_ib_b, small_test.f_ib_b)

@@ -102,9 +102,13 @@ def test_a_bag_with_something_else_beside_it_is_not_replaced(bag, small_test):
     (bag / "notes.txt").write_text("the only copy")
     with pytest.raises(DataError, match=r"notes\.txt"):
         write_recording(
-            bag, start_ns=0, imu_ns=small_test.ns, omega_ib_b=small_test.omega_ib_b, f_ib_b=small_test.f_ib_b,
+            bag,
+            start_ns=0,
+            imu_ns=small_test.ns,
+            omega_ib_b=small_test.omega_ib_b,
+            f_ib_b=small_test.f_ib_b,
             replace=True,
-        )  # fmt: skip
+        )
     assert (bag / "notes.txt").read_text() == "the only copy"
     assert len(read_recording(bag).t) == len(small_test.ns)
 
@@ -130,9 +134,18 @@ def test_a_full_disk_is_one_line_that_names_the_bag(tmp_path):
 
 def result():
     return Calibration(
-        "prior", ("gyro_bias",), ("gyro_bias_x",), ("rad/s",), ("deg/h",), np.zeros(1), np.eye(1), {}, {}, (),
+        "prior",
+        ("gyro_bias",),
+        ("gyro_bias_x",),
+        ("rad/s",),
+        ("deg/h",),
+        np.zeros(1),
+        np.eye(1),
+        {},
+        {},
+        (),
         no_history(1),
-    )  # fmt: skip
+    )
 
 
 def test_a_result_without_its_report_is_not_left(tmp_path, monkeypatch):

@@ -114,17 +114,19 @@ def test_the_former_spelling_is_read_and_the_canonical_one_is_written():
 def test_two_variants_of_one_effect_have_the_names_that_their_estimates_have():
     keys = ("gyro_bias_step_x(t0=100 s)=1 deg/h", "gyro_bias_step_x(t0=300 s)=2 deg/h")
     assert parse_effects(keys).sizes == {
-        "gyro_bias_step_x": pytest.approx(DEGPH), "gyro_bias_step_x(t0=300 s)": pytest.approx(2 * DEGPH)
-    }  # fmt: skip
+        "gyro_bias_step_x": pytest.approx(DEGPH),
+        "gyro_bias_step_x(t0=300 s)": pytest.approx(2 * DEGPH),
+    }
     effects = told_apart([resolve(key.rpartition("=")[0]) for key in keys])
     assert set(parse_effects(keys).sizes) == {e.parameters[0].name for e in effects}
 
 
 def test_a_coefficient_of_the_baseline_and_the_lever_arm_are_set_to_their_size():
     drawn = ImuTruth(
-        coefficients={"gyro_scale_x": 1e-4, "gyro_scale_y": 3e-4}, lever_arm_m=(0.1, 0.2, 0.3),
+        coefficients={"gyro_scale_x": 1e-4, "gyro_scale_y": 3e-4},
+        lever_arm_m=(0.1, 0.2, 0.3),
         effects=("gyro_scale_x=20 ppm", "lever_arm_y=5 mm"),
-    )  # fmt: skip
+    )
     truth = with_hidden(drawn)
     assert truth.coefficients == {"gyro_scale_x": pytest.approx(20e-6), "gyro_scale_y": 3e-4}
     assert truth.lever_arm_m == (0.1, pytest.approx(0.005), 0.3)

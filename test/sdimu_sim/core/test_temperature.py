@@ -24,8 +24,11 @@ def test_a_constant_profile_is_constant():
 
 def test_a_chamber_goes_straight_from_knot_to_knot_and_stays_at_the_last():
     profile = TemperatureProfile(-40.0, knots=CHAMBER)
-    np.testing.assert_allclose(profile.value(np.array([0.0, 300.0, 1050.0, 2100.0, 2550.0, 9e9])),
-                               [-40.0, -40.0, -10.0, 20.0, 12.5, 5.0], rtol=1e-14)  # fmt: skip
+    np.testing.assert_allclose(
+        profile.value(np.array([0.0, 300.0, 1050.0, 2100.0, 2550.0, 9e9])),
+        [-40.0, -40.0, -10.0, 20.0, 12.5, 5.0],
+        rtol=1e-14,
+    )
     np.testing.assert_allclose(profile.rate(np.array([10.0, 1000.0, 2500.0, 3000.0])), [0.0, 0.04, -0.05, 0.0])
 
 
@@ -36,9 +39,14 @@ def test_the_sensors_follow_the_thermometer_through_a_first_order_lag(knots, lag
     profile = TemperatureProfile(-40.0, 8.0, 1200.0, 0.5, 600.0, knots=knots, sensor_lag_s=lag)
     t = np.linspace(0.0, 4000.0, 81)
     found = solve_ivp(
-        lambda now, y: (profile.value(np.array([now])) - y) / lag, (0.0, 4000.0), [-40.0], t_eval=t, rtol=1e-9,
-        atol=1e-9, max_step=5.0,
-    )  # fmt: skip
+        lambda now, y: (profile.value(np.array([now])) - y) / lag,
+        (0.0, 4000.0),
+        [-40.0],
+        t_eval=t,
+        rtol=1e-9,
+        atol=1e-9,
+        max_step=5.0,
+    )
     np.testing.assert_allclose(profile.sensor_value(t), found.y[0], rtol=0, atol=2e-5)
     slope = (profile.sensor_value(t[1:] + 0.1) - profile.sensor_value(t[1:] - 0.1)) / 0.2
     np.testing.assert_allclose(profile.sensor_rate(t[1:]), slope, rtol=0, atol=1e-4)

@@ -60,9 +60,16 @@ class PlanProgramme:
         self._next += count
         m = self._motion
         return TableMotion(
-            m.t[here], m.angle[here], m.rate[here], m.encoder_angle[here], m.stop[here], m.dwell[here], m.q_nt[here],
-            m.omega_nt_t[here], m.names,
-        )  # fmt: skip
+            m.t[here],
+            m.angle[here],
+            m.rate[here],
+            m.encoder_angle[here],
+            m.stop[here],
+            m.dwell[here],
+            m.q_nt[here],
+            m.omega_nt_t[here],
+            m.names,
+        )
 
 
 @dataclass(frozen=True)
@@ -206,9 +213,16 @@ class GoalProgramme:
         self._stop, self._dwelling = int(stop[-1]), bool(still[-1])
         self._sent, self._last, self._ahead = self._sent + count, taken.part(-1), rest
         return TableMotion(
-            t, taken.angle, taken.rate, self._encoder.read(taken.angle), stop, still, taken.q_nt, taken.omega,
+            t,
+            taken.angle,
+            taken.rate,
+            self._encoder.read(taken.angle),
+            stop,
+            still,
+            taken.q_nt,
+            taken.omega,
             self._table.axis_names,
-        )  # fmt: skip
+        )
 
     def reached(self) -> Goal | None:
         """Return the goal whose last sample has been sent, once."""

@@ -58,8 +58,9 @@ def _point(point: JointTrajectoryPoint, number: int, at: Sequence[int], here: Fl
             raise DataError(f"point {number}: {len(values)} {name} for {len(at)} joints")
     if len(point.accelerations) and not len(point.velocities):
         raise DataError(f"point {number}: accelerations without velocities")
-    angle, rate, acceleration = (_in_order(values, at, base) for values, base in zip(
-        fields, (here, np.zeros(3), np.zeros(3)), strict=True))  # fmt: skip
+    angle, rate, acceleration = (
+        _in_order(values, at, base) for values, base in zip(fields, (here, np.zeros(3), np.zeros(3)), strict=True)
+    )
     assert angle is not None
     return GoalPoint(duration_ns(point) / NS, angle, rate, acceleration)
 

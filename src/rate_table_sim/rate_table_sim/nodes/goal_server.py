@@ -39,8 +39,11 @@ class GoalServer:
         # Depth as the controller's: a trajectory is a command, the newest counts.
         node.create_subscription(JointTrajectory, "rate_table/joint_trajectory", self._take, 10)
         for name, action in (
-            ("hold", self._hold), ("resume", self._resume), ("stop", self._stop), ("finish", self._finish),
-        ):  # fmt: skip
+            ("hold", self._hold),
+            ("resume", self._resume),
+            ("stop", self._stop),
+            ("finish", self._finish),
+        ):
             node.create_service(Trigger, f"~/{name}", action)
 
     def sent(self) -> None:

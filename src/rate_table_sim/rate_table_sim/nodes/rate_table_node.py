@@ -72,15 +72,21 @@ class RateTableNode:
         self._begun = False
         ticker = Ticker(self.node)
         self._true_motion = Producer(
-            self.node, ticker, Float64MultiArray, "rate_table/true_motion", window_ns=int(WINDOW_S * NS),
+            self.node,
+            ticker,
+            Float64MultiArray,
+            "rate_table/true_motion",
+            window_ns=int(WINDOW_S * NS),
             on_credit=self._pump,
-        )  # fmt: skip
+        )
         self._status = Producer(self.node, ticker, DiagnosticArray, "rate_table/status", qos=HISTORY)
         self._joints = self.node.create_publisher(JointState, "rate_table/joint_states", HISTORY)
         self._frames = TableFrames(self.node, table)
-        self._server = None if self._goals is None else GoalServer(
-            self.node, self._goals, table, self._start_ns, allow_partial=partial
-        )  # fmt: skip
+        self._server = (
+            None
+            if self._goals is None
+            else GoalServer(self.node, self._goals, table, self._start_ns, allow_partial=partial)
+        )
         self._timer = self.node.create_timer(TICK_S, self._pump)
 
     def close(self) -> None:

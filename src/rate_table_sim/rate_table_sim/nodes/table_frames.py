@@ -37,9 +37,11 @@ class TableFrames:
 
     def __init__(self, node: Node, table: TableSpecification) -> None:
         self._axes = None if table.axes is None else [unit(letter) for letter in table.axes]
-        chain = [(BASE, PLATFORM)] if table.axes is None else [
-            *zip((BASE, *_AXES[:2]), _AXES, strict=True), (_AXES[2], PLATFORM),
-        ]  # fmt: skip
+        chain = (
+            [(BASE, PLATFORM)]
+            if table.axes is None
+            else [*zip((BASE, *_AXES[:2]), _AXES, strict=True), (_AXES[2], PLATFORM)]
+        )
         self._message = TransformMessage(chain)
         self._count, self._moved = 0, True
         self._publisher = None

@@ -45,6 +45,4 @@ class Comparison:
         """Table of the models as HTML."""
         lines = "".join("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in self.rows)
         head = "".join(f"<th>{escape(text)}</th>" for text in self.headings)
-        return f"<table><tr>{head}</tr>{lines}</table>" + "".join(
-            f"<p>{escape(remark)}</p>" for remark in self.remarks
-        )
+        return f"<table><tr>{head}</tr>{lines}</table>" + "".join(f"<p>{escape(remark)}</p>" for remark in self.remarks)

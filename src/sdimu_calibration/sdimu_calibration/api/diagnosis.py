@@ -108,9 +108,13 @@ class FitDiagnosis:
             write_diagnosis(part / "diagnosis.json", self.summary)
             write_result(part / "result.json", self.core.after, self.core.verdict)
             write_report(
-                part / "report.html", self.core.after, title="Diagnosis", summary=self.summary,
-                more=report_extras(self.core), trace=traced(),
-            )  # fmt: skip
+                part / "report.html",
+                self.core.after,
+                title="Diagnosis",
+                summary=self.summary,
+                more=report_extras(self.core),
+                trace=traced(),
+            )
         return folder
 
     def _told(self) -> list[str]:

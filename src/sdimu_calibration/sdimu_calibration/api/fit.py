@@ -103,9 +103,12 @@ class CalibrationFit(Fitted):
         recording = test.recording
         own = [e for e in self.core.sensors.effects if not isinstance(e, str)]
         using = compensator(
-            self.result, test.imu, own=own, has_temperature=recording.temperature is not None,
+            self.result,
+            test.imu,
+            own=own,
+            has_temperature=recording.temperature is not None,
             same_start=recording.start_ns == self.test.recording.start_ns,
-        )  # fmt: skip
+        )
         return compensate_recording(using, recording)
 
     def save(self, folder: str | Path) -> Path:

@@ -79,9 +79,7 @@ class Fitted:
             "<tr>" + "".join(f"<td>{escape(text)}</td>" for text in cells(row, columns)) + "</tr>" for row in entries
         )
         table = f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
-        return f"<p>{escape(self._heading)}</p>{table}" + (
-            f"<p>{escape(self._figures())}</p>"
-        )
+        return f"<p>{escape(self._heading)}</p>{table}" + (f"<p>{escape(self._figures())}</p>")
 
     def _figures(self) -> str:
         right = _errors(nis_judged(self.result), held_out_judged(self.result))

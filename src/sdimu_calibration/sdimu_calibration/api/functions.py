@@ -136,17 +136,23 @@ def _listed(texts: str | Sequence[str]) -> list[str]:
 
 @overload
 def calibrate(
-    test: PreparedTest, model: str | None = ..., add: Sequence[str] = ..., estimator: str = ...,
+    test: PreparedTest,
+    model: str | None = ...,
+    add: Sequence[str] = ...,
+    estimator: str = ...,
     progress: Progress = ...,
-) -> CalibrationFit: ...  # fmt: skip
+) -> CalibrationFit: ...
 @overload
 def calibrate(
-    test: OpenedSet, model: str | None = ..., add: Sequence[str] = ..., estimator: str = ..., progress: Progress = ...,
-) -> JointFit: ...  # fmt: skip
+    test: OpenedSet, model: str | None = ..., add: Sequence[str] = ..., estimator: str = ..., progress: Progress = ...
+) -> JointFit: ...
 def calibrate(
-    test: PreparedTest | OpenedSet, model: str | None = None, add: Sequence[str] = (), estimator: str = AUTO,
+    test: PreparedTest | OpenedSet,
+    model: str | None = None,
+    add: Sequence[str] = (),
+    estimator: str = AUTO,
     progress: Progress = silent,
-) -> CalibrationFit | JointFit:  # fmt: skip
+) -> CalibrationFit | JointFit:
     """Fit a model to a test, or to a set of recordings together.
 
     Parameters
@@ -209,9 +215,7 @@ def compare(*fits: CalibrationFit) -> Comparison:
     return Comparison(fits)
 
 
-def predict(
-    plan: str | Plan = "kim18", imu: str = "dtg", site: str = "daejeon", model: str = "baseline",
-) -> Prediction:  # fmt: skip
+def predict(plan: str | Plan = "kim18", imu: str = "dtg", site: str = "daejeon", model: str = "baseline") -> Prediction:
     """Simulate the covariance of a test before it is run; names as for `sdimu predict`."""
     chosen = load_plan(plan) if isinstance(plan, str) else plan
     what = (chosen, load_site(site), load_imu(imu), named_model(model, []))
@@ -219,10 +223,17 @@ def predict(
 
 
 def plan(
-    start: str | Plan = "kim18", imu: str = "dtg", site: str = "daejeon", model: str = "baseline",
-    add: Sequence[str] = (), minutes: float | None = None, slack: float = 1.2, tries: int = 150,
-    progress: Progress = silent, after: Standing | None = None,
-) -> Found:  # fmt: skip
+    start: str | Plan = "kim18",
+    imu: str = "dtg",
+    site: str = "daejeon",
+    model: str = "baseline",
+    add: Sequence[str] = (),
+    minutes: float | None = None,
+    slack: float = 1.2,
+    tries: int = 150,
+    progress: Progress = silent,
+    after: Standing | None = None,
+) -> Found:
     """Search for a shorter or more telling plan with the bound of the data.
 
     Parameters

@@ -79,9 +79,7 @@ class OpenedSet:
     def diagnose(self, fit: JointFit, extra: Sequence[Effect], progress: Progress) -> JointDiagnosis:
         """Find what the model of a fit of this set misses."""
         with set_runner(len(self), self.workers, self.kept) as run:
-            return JointDiagnosis(
-                self, diagnose_set(self.members, fit.options, run, extra, progress, fitted=fit.core)
-            )
+            return JointDiagnosis(self, diagnose_set(self.members, fit.options, run, extra, progress, fitted=fit.core))
 
 
 class JointFit(Fitted):

@@ -26,7 +26,8 @@ ENTRY_POINTS = "sdimu_calibration.verbs"
 
 _PANELS = {
     "Simulate and record": {
-        "simulate": "", "run": "",
+        "simulate": "",
+        "run": "",
         "import": "sdimu_calibration.cli.import_files:import_files",
         "bag": "sdimu_calibration.cli.bag:app",
         "set": "sdimu_calibration.cli.set_files:app",
@@ -44,10 +45,7 @@ _PANELS = {
         "workbench": "sdimu_calibration.cli.workbench:workbench",
         "pictures": "sdimu_calibration.cli.pictures:pictures",
     },
-    "Plan": {
-        "predict": "sdimu_calibration.cli.predict:predict",
-        "plan": "sdimu_calibration.cli.plan:plan",
-    },
+    "Plan": {"predict": "sdimu_calibration.cli.predict:predict", "plan": "sdimu_calibration.cli.plan:plan"},
     "Use": {
         "compensate": "sdimu_calibration.cli.compensate:compensate",
         "export": "sdimu_calibration.cli.export:export",
@@ -55,7 +53,7 @@ _PANELS = {
         "fleet": "sdimu_calibration.cli.fleet:fleet",
     },
     "Study": {"monte-carlo": "", "hidden-campaign": "", "study": "", "bench": ""},
-}  # fmt: skip
+}
 """Verbs in the order of work, as ``module:attribute``; empty: of another package, which may not be installed."""
 _VERBS = {name: place for verbs in _PANELS.values() for name, place in verbs.items() if place}
 _MORE = "More"

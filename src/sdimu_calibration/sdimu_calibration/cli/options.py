@@ -122,16 +122,14 @@ class Stated(Place):
     whole_turns: Annotated[
         str | None,
         typer.Option(
-            metavar="ANGLE",
-            help="By hand: turns of about 360 deg about the vertical are whole to this, such as 1 deg.",
+            metavar="ANGLE", help="By hand: turns of about 360 deg about the vertical are whole to this, such as 1 deg."
         ),
     ] = None
     exclude_stops: Annotated[
         str | None, typer.Option(metavar="STOPS", help="Stops the fit does not see, such as 4,7; not the first.")
     ] = None
     exclude_times: Annotated[
-        str | None,
-        typer.Option(metavar="SPANS", help="Spans of s in which nothing is measured: 812-815,900-910."),
+        str | None, typer.Option(metavar="SPANS", help="Spans of s in which nothing is measured: 812-815,900-910.")
     ] = None
     serial: Annotated[
         str | None,

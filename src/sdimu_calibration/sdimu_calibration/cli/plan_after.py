@@ -68,11 +68,7 @@ def _diagnosed(console: Console, asked: After) -> Standing:
 
 
 def tell_gain(
-    console: Console,
-    start: Plan,
-    found: Found,
-    classes: Sequence[Sequence[str]],
-    sigmas: tuple[Bounds, Bounds, Bounds],
+    console: Console, start: Plan, found: Found, classes: Sequence[Sequence[str]], sigmas: tuple[Bounds, Bounds, Bounds]
 ) -> None:
     """Say what the plan tells beyond what is known, beside the plan that the search began with.
 

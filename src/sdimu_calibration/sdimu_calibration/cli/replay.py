@@ -11,14 +11,7 @@ import typer
 from sdimu_calibration.cli.console import plain
 from sdimu_calibration.cli.opened import default_folder, leave
 from sdimu_calibration.cli.option_groups import with_options
-from sdimu_calibration.cli.options import (
-    BagArgument,
-    DomainOption,
-    EachStopOption,
-    ModelOption,
-    Recorded,
-    results_in,
-)
+from sdimu_calibration.cli.options import BagArgument, DomainOption, EachStopOption, ModelOption, Recorded, results_in
 
 
 @dataclass(frozen=True)

@@ -104,9 +104,11 @@ class Watch:
     def line(self, seen: Seen, wall_s: float) -> str:
         """Return the whole of it in one line."""
         parts = [
-            self._place(seen), f"{self._time(seen)}, {self.left(seen, wall_s)}",
-            sigma_words(self._falling(seen)), light(seen.nis, seen.verdict),
-        ]  # fmt: skip
+            self._place(seen),
+            f"{self._time(seen)}, {self.left(seen, wall_s)}",
+            sigma_words(self._falling(seen)),
+            light(seen.nis, seen.verdict),
+        ]
         return "; ".join(part for part in parts if part)
 
     def _place(self, seen: Seen) -> str:
@@ -138,9 +140,10 @@ class Watch:
         left = self.left(seen, wall_s) if streaming else "no more to come"
         head = Table.grid(padding=(0, 1))
         head.add_row(
-            Text(stage, style="bold"), ProgressBar(self._test.duration_s or None, seen.table_s, width=30),
+            Text(stage, style="bold"),
+            ProgressBar(self._test.duration_s or None, seen.table_s, width=30),
             f"{self._time(seen)}, {left}",
-        )  # fmt: skip
+        )
         sigmas = Table.grid(padding=(0, 2))
         for f in self._falling(seen):
             sigmas.add_row(f.effect, f"{short(f.sigma)} {f.unit}", _gauge(f), f"{short(100.0 * f.share)} %")

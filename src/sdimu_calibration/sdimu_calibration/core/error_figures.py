@@ -64,9 +64,10 @@ def held_out_ladder(results: Sequence[Calibration]) -> list[float]:
     scale = np.array([rest.ahead_sigma for rest in results[-1].rests])
     return [
         float(np.sqrt(np.mean((np.array([rest.ahead for rest in result.rests]) / scale) ** 2)))
-        if 0 < len(result.rests) == len(scale) else float("nan")
+        if 0 < len(result.rests) == len(scale)
+        else float("nan")
         for result in results
-    ]  # fmt: skip
+    ]
 
 
 def by_hand(result: Calibration) -> bool:

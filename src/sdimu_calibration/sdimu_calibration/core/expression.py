@@ -23,12 +23,20 @@ Dimension = dict[str, Fraction]
 """Powers of the base units; zero powers and ``rad`` left out."""
 
 _OPERATORS: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
-    ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv,
+    ast.Add: operator.add,
+    ast.Sub: operator.sub,
+    ast.Mult: operator.mul,
+    ast.Div: operator.truediv,
     ast.Pow: operator.pow,
-}  # fmt: skip
+}
 _OF_NUMBERS: dict[str, Callable[[Any], Any]] = {
-    "sin": np.sin, "cos": np.cos, "tan": np.tan, "exp": np.exp, "log": np.log, "tanh": np.tanh,
-}  # fmt: skip
+    "sin": np.sin,
+    "cos": np.cos,
+    "tan": np.tan,
+    "exp": np.exp,
+    "log": np.log,
+    "tanh": np.tanh,
+}
 _ONE: dict[str, Callable[[Any], Any]] = {**_OF_NUMBERS, "abs": np.abs, "sqrt": np.sqrt, "sign": np.sign}
 _TWO: dict[str, Callable[[Any, Any], Any]] = {"min": np.minimum, "max": np.maximum}
 _LONGEST = 2000
@@ -239,7 +247,5 @@ def _of_power(node: ast.BinOp, base: Dimension, exponent: Dimension) -> Dimensio
 
 def _same(node: ast.expr, parts: list[Dimension]) -> Dimension:
     if parts[0] != parts[1]:
-        raise DataError(
-            f"'{ast.unparse(node)}' joins {written(parts[0])} and {written(parts[1])}, which are not alike"
-        )
+        raise DataError(f"'{ast.unparse(node)}' joins {written(parts[0])} and {written(parts[1])}, which are not alike")
     return parts[0]

@@ -316,25 +316,47 @@ class LiveCalibration:
         part = cycles[slice(int(epochs.first[k]), int(epochs.last[k]))]
         rest = np.full(len(part), phases.dwell[k])
         seen = motion(
-            part, rest, sensors, np.zeros(len(sensors.prior)), self._track, setup.site.latitude_rad, setup.gravity,
-            self._intake.temperature_log(), predicted=False, before=self._before, magnetic_n=setup.magnetic_n,
+            part,
+            rest,
+            sensors,
+            np.zeros(len(sensors.prior)),
+            self._track,
+            setup.site.latitude_rad,
+            setup.gravity,
+            self._intake.temperature_log(),
+            predicted=False,
+            before=self._before,
+            magnetic_n=setup.magnetic_n,
             causal=True,
-        )  # fmt: skip
+        )
         self._before = seen
         one = Phases(*(getattr(phases, n)[k : k + 1] for n in Phases.__dataclass_fields__))
         kind = measurement_kinds(one, setup.model.zero_velocity == "every_epoch")
         # The largest acceleration so far; a first gap in the first turn knows no more than that turn's beginning.
         self._acceleration = max(self._acceleration, largest_acceleration(part))
         alone = Epochs(
-            np.zeros(1, dtype=np.int64), np.full(1, len(part), dtype=np.int64),
+            np.zeros(1, dtype=np.int64),
+            np.full(1, len(part), dtype=np.int64),
             *(getattr(epochs, n)[k : k + 1] for n in ("start", "end", "peak_rate", "f_mean", "w_mean")),
-        )  # fmt: skip
+        )
         gap = bridges(part, alone, one.dwell, self._intake.interval_s, self._acceleration, setup.gravity)
         data = PassInput(
-            part.dt, part.alpha, part.upsilon, part.coning, part.sculling, alone.first, alone.last,
-            gap.white, gap.angle, gap.velocity, kind, np.zeros(1, dtype=bool),
-            sensors.regressors(seen), sensors.channel, sensors.parameter,
-        )  # fmt: skip
+            part.dt,
+            part.alpha,
+            part.upsilon,
+            part.coning,
+            part.sculling,
+            alone.first,
+            alone.last,
+            gap.white,
+            gap.angle,
+            gap.velocity,
+            kind,
+            np.zeros(1, dtype=bool),
+            sensors.regressors(seen),
+            sensors.channel,
+            sensors.parameter,
+        )
         out = new_output(1, len(sensors.prior), False, 1)
         run_pass(data, self._settings, self._state, out)
         measured = np.isfinite(out.nis[0])
@@ -354,28 +376,38 @@ class LiveCalibration:
         site = self.setup.site
         radius = 6.371e6 + site.height_m
         return EpochEstimate(
-            ns=origin_ns + round(float(epochs.end[k]) * 1e9), t=float(epochs.end[k]),
-            dwell=bool(phases.dwell[k]), used=bool(phases.used[k]), stop=int(phases.stop[k]),
-            body_frame=frame, names=sensors.names,
+            ns=origin_ns + round(float(epochs.end[k]) * 1e9),
+            t=float(epochs.end[k]),
+            dwell=bool(phases.dwell[k]),
+            used=bool(phases.used[k]),
+            stop=int(phases.stop[k]),
+            body_frame=frame,
+            names=sensors.names,
             units=tuple(q.unit for q in sensors.parameters),
             display_units=tuple(q.display_unit for q in sensors.parameters),
             coefficients=body_frame.values_in_frame(sensors.names, estimate, frame),
             covariance=self._J @ state.P[NAV : NAV + p, NAV : NAV + p] @ self._J.T,
-            position_error_m=np.array([
-                (state.position[0] - site.latitude_rad) * radius,
-                state.position[1] * radius * np.cos(site.latitude_rad),
-                site.height_m - state.position[2],
-            ]),
-            velocity=state.velocity.copy(), q_nb=quaternion(state.C_nb),
+            position_error_m=np.array(
+                [
+                    (state.position[0] - site.latitude_rad) * radius,
+                    state.position[1] * radius * np.cos(site.latitude_rad),
+                    site.height_m - state.position[2],
+                ]
+            ),
+            velocity=state.velocity.copy(),
+            q_nb=quaternion(state.C_nb),
             navigation_covariance=state.P[:NAV, :NAV].copy(),
             verdict=stop_verdict(*self._stop_nis),
-            nis=_by_channel(self._nis_sum, self._nis_count), stop_nis=_by_channel(*self._stop_nis),
+            nis=_by_channel(self._nis_sum, self._nis_count),
+            stop_nis=_by_channel(*self._stop_nis),
             counts={
-                "samples": self._intake.taken, "late": self._intake.late, "lost": self._lost,
+                "samples": self._intake.taken,
+                "late": self._intake.late,
+                "lost": self._lost,
                 "rejected": self._intake.rejected,
                 "contradicted": self._contradicted,
             },
-        )  # fmt: skip
+        )
 
 
 def _by_channel(total: Floats, dof: Floats) -> dict[str, float]:

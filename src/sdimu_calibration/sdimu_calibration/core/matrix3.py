@@ -24,10 +24,16 @@ def rotation3(x: float, y: float, z: float) -> Matrix3:
         a = np.sqrt(a2)
         s, c = np.sin(a) / a, (1.0 - np.cos(a)) / a2
     return (
-        1.0 - c * (y * y + z * z), c * x * y - s * z, c * x * z + s * y,
-        c * x * y + s * z, 1.0 - c * (x * x + z * z), c * y * z - s * x,
-        c * x * z - s * y, c * y * z + s * x, 1.0 - c * (x * x + y * y),
-    )  # fmt: skip
+        1.0 - c * (y * y + z * z),
+        c * x * y - s * z,
+        c * x * z + s * y,
+        c * x * y + s * z,
+        1.0 - c * (x * x + z * z),
+        c * y * z - s * x,
+        c * x * z - s * y,
+        c * y * z + s * x,
+        1.0 - c * (x * x + y * y),
+    )
 
 
 @compiled
@@ -66,13 +72,16 @@ def transposed(m: Matrix3) -> Matrix3:
 def multiplied(a: Matrix3, b: Matrix3) -> Matrix3:
     """Product ``a @ b``."""
     return (
-        a[0] * b[0] + a[1] * b[3] + a[2] * b[6], a[0] * b[1] + a[1] * b[4] + a[2] * b[7],
+        a[0] * b[0] + a[1] * b[3] + a[2] * b[6],
+        a[0] * b[1] + a[1] * b[4] + a[2] * b[7],
         a[0] * b[2] + a[1] * b[5] + a[2] * b[8],
-        a[3] * b[0] + a[4] * b[3] + a[5] * b[6], a[3] * b[1] + a[4] * b[4] + a[5] * b[7],
+        a[3] * b[0] + a[4] * b[3] + a[5] * b[6],
+        a[3] * b[1] + a[4] * b[4] + a[5] * b[7],
         a[3] * b[2] + a[4] * b[5] + a[5] * b[8],
-        a[6] * b[0] + a[7] * b[3] + a[8] * b[6], a[6] * b[1] + a[7] * b[4] + a[8] * b[7],
+        a[6] * b[0] + a[7] * b[3] + a[8] * b[6],
+        a[6] * b[1] + a[7] * b[4] + a[8] * b[7],
         a[6] * b[2] + a[7] * b[5] + a[8] * b[8],
-    )  # fmt: skip
+    )
 
 
 @compiled
@@ -86,10 +95,16 @@ def orthonormal3(m: Matrix3) -> Matrix3:
     """Rotation matrix nearest to one with rounding errors: ``1.5 m - 0.5 m m' m`` (one Newton step)."""
     b = multiplied(multiplied(m, transposed(m)), m)
     return (
-        1.5 * m[0] - 0.5 * b[0], 1.5 * m[1] - 0.5 * b[1], 1.5 * m[2] - 0.5 * b[2],
-        1.5 * m[3] - 0.5 * b[3], 1.5 * m[4] - 0.5 * b[4], 1.5 * m[5] - 0.5 * b[5],
-        1.5 * m[6] - 0.5 * b[6], 1.5 * m[7] - 0.5 * b[7], 1.5 * m[8] - 0.5 * b[8],
-    )  # fmt: skip
+        1.5 * m[0] - 0.5 * b[0],
+        1.5 * m[1] - 0.5 * b[1],
+        1.5 * m[2] - 0.5 * b[2],
+        1.5 * m[3] - 0.5 * b[3],
+        1.5 * m[4] - 0.5 * b[4],
+        1.5 * m[5] - 0.5 * b[5],
+        1.5 * m[6] - 0.5 * b[6],
+        1.5 * m[7] - 0.5 * b[7],
+        1.5 * m[8] - 0.5 * b[8],
+    )
 
 
 @compiled

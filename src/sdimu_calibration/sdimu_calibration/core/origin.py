@@ -56,9 +56,10 @@ class Origin:
     def stated(self, serial: str | None, power_on: str | None) -> Origin:
         """Return it with what the user states; None leaves what the bag says."""
         return replace(
-            self, serial=self.serial if serial is None else serial,
+            self,
+            serial=self.serial if serial is None else serial,
             power_on=self.power_on if power_on is None else power_on,
-        )  # fmt: skip
+        )
 
     @property
     def imu_stated(self) -> str:
@@ -75,11 +76,14 @@ class Origin:
         """Unit, power-on and temperature for the head of a page; nothing that is unknown."""
         heat = self.temperature_degc
         return tuple(
-            word for word in (
-                self.serial and f"serial {self.serial}", self.power_on and f"power-on {self.power_on}",
+            word
+            for word in (
+                self.serial and f"serial {self.serial}",
+                self.power_on and f"power-on {self.power_on}",
                 "" if math.isnan(heat) else f"{heat:.1f} deg C",
-            ) if word
-        )  # fmt: skip
+            )
+            if word
+        )
 
 
 def measured(origin: Origin, recording: Recording, imu: str) -> Origin:
@@ -96,9 +100,14 @@ def measured(origin: Origin, recording: Recording, imu: str) -> Origin:
     heat = (math.nan,) * 3 if log is None else (log.value.mean(), log.value.min(), log.value.max())
     mean, low, high = map(float, heat)
     return replace(
-        origin, start_ns=max(recording.start_ns, 0), temperature_degc=mean, temperature_low_degc=low,
-        temperature_high_degc=high, rate_rad_s=_largest_rate(recording.omega_ib_b, recording.interval_s), imu=imu,
-    )  # fmt: skip
+        origin,
+        start_ns=max(recording.start_ns, 0),
+        temperature_degc=mean,
+        temperature_low_degc=low,
+        temperature_high_degc=high,
+        rate_rad_s=_largest_rate(recording.omega_ib_b, recording.interval_s),
+        imu=imu,
+    )
 
 
 def _largest_rate(omega: Floats, interval_s: float) -> float:

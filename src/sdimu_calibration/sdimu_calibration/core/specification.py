@@ -101,18 +101,19 @@ class ImuSpecification:
 
         White noise gives a mean over T the variance N^2 / T, a residue Q gives it 2 Q^2 / T^2.
         """
-        pairs = (
-            (self.gyro_quantisation, self.gyro_white_noise), (self.accel_quantisation, self.accel_white_noise),
-        )  # fmt: skip
+        pairs = ((self.gyro_quantisation, self.gyro_white_noise), (self.accel_quantisation, self.accel_white_noise))
         ratio = max((q / n) ** 2 if n > 0.0 else 0.0 for q, n in pairs)
         return float(np.clip(np.ceil(4.0 * ratio), EPOCH_S, LONGEST_EPOCH_S))
 
     def with_noise_times(self, gyro: float, accel: float) -> ImuSpecification:
         """Return the specification with white noise and quantisation of both triads times a factor."""
         return replace(
-            self, gyro_white_noise=gyro * self.gyro_white_noise, gyro_quantisation=gyro * self.gyro_quantisation,
-            accel_white_noise=accel * self.accel_white_noise, accel_quantisation=accel * self.accel_quantisation,
-        )  # fmt: skip
+            self,
+            gyro_white_noise=gyro * self.gyro_white_noise,
+            gyro_quantisation=gyro * self.gyro_quantisation,
+            accel_white_noise=accel * self.accel_white_noise,
+            accel_quantisation=accel * self.accel_quantisation,
+        )
 
     def in_means_over(self, seconds: float) -> ImuSpecification:
         """Return the specification whose white noise gives means over `seconds` their variance, quantisation included.
@@ -125,9 +126,12 @@ class ImuSpecification:
         gyro = np.sqrt(self.gyro_white_noise**2 + 2.0 * self.gyro_quantisation**2 / seconds)
         accel = np.sqrt(self.accel_white_noise**2 + 2.0 * self.accel_quantisation**2 / seconds)
         return replace(
-            self, gyro_white_noise=float(gyro), accel_white_noise=float(accel),
-            gyro_quantisation=0.0, accel_quantisation=0.0,
-        )  # fmt: skip
+            self,
+            gyro_white_noise=float(gyro),
+            accel_white_noise=float(accel),
+            gyro_quantisation=0.0,
+            accel_quantisation=0.0,
+        )
 
 
 @dataclass(frozen=True)

@@ -143,10 +143,14 @@ class AdaptiveNode:
     def _publish(self, decision: Decision) -> None:
         words = "" if decision.step is None else decision.step.words
         values = {
-            "move": words, "reason": decision.reason, "minutes": f"{decision.until_s / 60.0:.2f}",
-            "worst": f"{decision.worst:.3f}", "named": ", ".join(decision.named), "open": ", ".join(decision.alike),
+            "move": words,
+            "reason": decision.reason,
+            "minutes": f"{decision.until_s / 60.0:.2f}",
+            "worst": f"{decision.worst:.3f}",
+            "named": ", ".join(decision.named),
+            "open": ", ".join(decision.alike),
             "reached": str(decision.reached).lower(),
-        }  # fmt: skip
+        }
         status = DiagnosticStatus(level=DiagnosticStatus.OK, name="choice", message=decision.text)
         status.values = [KeyValue(key=key, value=value) for key, value in values.items()]
         self._choices.publish(DiagnosticArray(header=header(self._end_ns), status=[status]))

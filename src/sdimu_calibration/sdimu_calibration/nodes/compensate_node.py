@@ -94,9 +94,13 @@ class CompensateNode:
         start = float(parameter("start_temperature").value)
         specification, whose = noise_for(calibration, str(parameter("imu").value))
         using = compensator(
-            calibration, specification, own=own, has_temperature=True,
-            same_start=bool(parameter("same_start").value), start_temperature=None if math.isnan(start) else start,
-        )  # fmt: skip
+            calibration,
+            specification,
+            own=own,
+            has_temperature=True,
+            same_start=bool(parameter("same_start").value),
+            start_temperature=None if math.isnan(start) else start,
+        )
         logger = self.node.get_logger()
         logger.info(f"noise in the covariances is that of {whose}")
         for reason in using.left_out:

@@ -14,12 +14,7 @@ _RATE, _FORCE = 13, 25  # places among the 37 doubles of an Imu message; a covar
 
 
 def encode_imu(
-    stamp_ns: Ints,
-    omega_ib_b: Floats,
-    f_ib_b: Floats,
-    frame_id: str,
-    omega_variance: float,
-    f_variance: float,
+    stamp_ns: Ints, omega_ib_b: Floats, f_ib_b: Floats, frame_id: str, omega_variance: float, f_variance: float
 ) -> list[bytes]:
     """Encode samples as sensor_msgs/Imu with the variances of their white noise.
 

@@ -68,10 +68,14 @@ def seen_diagnosis(message: DiagnosticArray, before: SeenDiagnosis) -> SeenDiagn
     tables = {name: tuple((v.key, v.value) for v in status.values) for name, status in parts.items()}
     about = dict(tables["verdict"])
     return replace(
-        before, stop=int(about["stop"]), verdict=about["verdict"], sentence=parts["verdict"].message,
+        before,
+        stop=int(about["stop"]),
+        verdict=about["verdict"],
+        sentence=parts["verdict"].message,
         reaches=parts["ranking"].message if "ranking" in parts else "",
-        ranking=tables.get("ranking", ()), ladder=tables.get("ladder", ()),
-    )  # fmt: skip
+        ranking=tables.get("ranking", ()),
+        ladder=tables.get("ladder", ()),
+    )
 
 
 def seen_heat_map(message: Float64MultiArray, before: SeenDiagnosis) -> SeenDiagnosis:

@@ -16,13 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from sdimu_calibration.core.data.arrival import in_order, until
-from sdimu_calibration.core.diagnosis.live_diagnosis import (
-    LiveDiagnosis,
-    ModelError,
-    error_of,
-    so_far,
-    waiting,
-)
+from sdimu_calibration.core.diagnosis.live_diagnosis import LiveDiagnosis, ModelError, error_of, so_far, waiting
 from sdimu_calibration.core.estimation.fit import Fit
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.front_door import OpeningOptions, open_test

@@ -38,9 +38,7 @@ class Heartbeat:
         Newest stamp (ns) of the data, 0 or less before the first.
     """
 
-    def __init__(
-        self, node: Node, ticker: Ticker, publisher: Any, period_s: float, reached: Callable[[], int]
-    ) -> None:
+    def __init__(self, node: Node, ticker: Ticker, publisher: Any, period_s: float, reached: Callable[[], int]) -> None:
         self.name = node.get_fully_qualified_name().lstrip("/")
         """Name of the node as diagnostics carry it: with its namespace, so that two IMUs stay apart."""
         self._node, self._publisher, self._reached = node, publisher, reached

@@ -30,8 +30,10 @@ class Worker:
         # A new interpreter, not a fork: the threads of DDS do not survive one.
         self._process = subprocess.Popen(
             [sys.executable, "-c", _PROGRAM, str(far.fileno())],
-            pass_fds=[far.fileno()], stdin=subprocess.DEVNULL, env=dict(os.environ),
-        )  # fmt: skip
+            pass_fds=[far.fileno()],
+            stdin=subprocess.DEVNULL,
+            env=dict(os.environ),
+        )
         # The only other end is the worker's: it reads the end of the pipe when this process is gone.
         far.close()
         self._pipe.send(job)

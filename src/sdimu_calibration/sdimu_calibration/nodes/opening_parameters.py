@@ -30,13 +30,16 @@ def declare_opening(node: Node) -> tuple[OpeningOptions, Topics]:
 
     own = Topics()
     topics = Topics(
-        imu=topic("imu_topic", own.imu, "samples"), status=topic("status_topic", own.status, "phases of the table"),
+        imu=topic("imu_topic", own.imu, "samples"),
+        status=topic("status_topic", own.status, "phases of the table"),
         temperature=topic("temperature_topic", own.temperature, "temperature"),
-    )  # fmt: skip
+    )
     source = Source(
-        accel_unit=unit("accel_unit", "specific force"), gyro_unit=unit("gyro_unit", "body rate"),
-        accel_sign=sign("accel_sign", "specific force"), gyro_sign=sign("gyro_sign", "body rate"),
-    )  # fmt: skip
+        accel_unit=unit("accel_unit", "specific force"),
+        gyro_unit=unit("gyro_unit", "body rate"),
+        accel_sign=sign("accel_sign", "specific force"),
+        gyro_sign=sign("gyro_sign", "body rate"),
+    )
     imu = declare.text("imu", "", "data sheet of the IMU: name in config/imu or path; its grade is learned when empty")
     site = declare.text("site", "", "place of the test: name in config/site or path; daejeon when empty")
     return opening_options(site or None, load_imu(imu) if imu else None, source), topics

@@ -54,9 +54,15 @@ class Declare:
         return int(self._declare(name, default, described))
 
     def number(
-        self, name: str, default: float, description: str, *, least: float = -math.inf, most: float = math.inf,
+        self,
+        name: str,
+        default: float,
+        description: str,
+        *,
+        least: float = -math.inf,
+        most: float = math.inf,
         live: bool = False,
-    ) -> float:  # fmt: skip
+    ) -> float:
         """Declare a number between `least` and `most`."""
         span = FloatingPointRange(from_value=max(least, -_LARGEST), to_value=min(most, _LARGEST), step=0.0)
         described = ParameterDescriptor(description=description, read_only=not live, floating_point_range=[span])

@@ -33,8 +33,11 @@ PEERS_PATIENCE_S = 5.0
 TICK_S = 0.005
 BURST = 400
 _CLASSES: dict[str, type] = {
-    "status": DiagnosticArray, "temperature": Temperature, "joint_states": JointState, "imu": Imu,
-}  # fmt: skip
+    "status": DiagnosticArray,
+    "temperature": Temperature,
+    "joint_states": JointState,
+    "imu": Imu,
+}
 """In the order in which messages of one stamp are sent: a status holds from its stamp on."""
 
 

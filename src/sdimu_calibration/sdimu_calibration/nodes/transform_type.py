@@ -29,9 +29,13 @@ class _Support(Structure):
     """rosidl_message_type_support_t."""
 
     _fields_: ClassVar = [
-        ("identifier", c_char_p), ("data", c_void_p), ("find", _FIND), ("hash", _GET), ("description", c_void_p),
+        ("identifier", c_char_p),
+        ("data", c_void_p),
+        ("find", _FIND),
+        ("hash", _GET),
+        ("description", c_void_p),
         ("sources", c_void_p),
-    ]  # fmt: skip
+    ]
 
 
 class _Callbacks(Structure):
@@ -44,19 +48,32 @@ class _Member(Structure):
     """rosidl_typesupport_introspection_c__MessageMember."""
 
     _fields_: ClassVar = [
-        ("name", c_char_p), ("type_id", c_uint8), ("string_upper_bound", c_size_t), ("members", c_void_p),
-        ("is_key", c_uint8), ("is_array", c_uint8), ("array_size", c_size_t), ("is_upper_bound", c_uint8),
-        ("offset", c_uint32), ("default_value", c_void_p), ("functions", c_void_p * 6),
-    ]  # fmt: skip
+        ("name", c_char_p),
+        ("type_id", c_uint8),
+        ("string_upper_bound", c_size_t),
+        ("members", c_void_p),
+        ("is_key", c_uint8),
+        ("is_array", c_uint8),
+        ("array_size", c_size_t),
+        ("is_upper_bound", c_uint8),
+        ("offset", c_uint32),
+        ("default_value", c_void_p),
+        ("functions", c_void_p * 6),
+    ]
 
 
 class _Members(Structure):
     """rosidl_typesupport_introspection_c__MessageMembers."""
 
     _fields_: ClassVar = [
-        ("namespace", c_char_p), ("name", c_char_p), ("count", c_uint32), ("size", c_size_t), ("has_key", c_uint8),
-        ("members", POINTER(_Member)), ("functions", c_void_p * 2),
-    ]  # fmt: skip
+        ("namespace", c_char_p),
+        ("name", c_char_p),
+        ("count", c_uint32),
+        ("size", c_size_t),
+        ("has_key", c_uint8),
+        ("members", POINTER(_Member)),
+        ("functions", c_void_p * 2),
+    ]
 
 
 class _Hash(Structure):

@@ -20,7 +20,7 @@ _BOXES = {
     "outcome": (7.7, 1.25, 2.3, "outcome", f"coefficients, covariance\n{_TO} Calibration"),
     "evidence": (4.05, 0.1, 2.3, "Fit.evidence", "residuals, signatures\nof the effects"),
     "climb": (7.7, 0.1, 2.3, "climb", f"which effect is missing\n{_TO} Diagnosis"),
-}  # fmt: skip
+}
 """Left, bottom, width, name, what it does; all are one high."""
 _DATA = (
     ("table", "right", "imu", "left", "true motion"),

@@ -33,9 +33,11 @@ def _heading(effect: Effect) -> str:
 
 
 _SCOPES = {
-    "unit": "the unit", "power-on": "the time from switch-on to switch-off", "setup": "site and mount of the test",
+    "unit": "the unit",
+    "power-on": "the time from switch-on to switch-off",
+    "setup": "site and mount of the test",
     "recording": "one recording: a fault of its data",
-}  # fmt: skip
+}
 
 
 def facts(effect: Effect) -> list[str]:

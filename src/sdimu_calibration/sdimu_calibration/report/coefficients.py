@@ -28,9 +28,13 @@ _TRIADS = ("Gyros", "Accelerometers", "Others")
 
 
 def coefficients_section(
-    calibration: Calibration, fit: Fit | None, truth: Mapping[str, float] | None,
-    reference: Mapping[str, float] | None, lacking: Sequence[str], draw: Draw,
-) -> str:  # fmt: skip
+    calibration: Calibration,
+    fit: Fit | None,
+    truth: Mapping[str, float] | None,
+    reference: Mapping[str, float] | None,
+    lacking: Sequence[str],
+    draw: Draw,
+) -> str:
     """Return the table with what belongs to it: prior against posterior, correlations, history, influence of stops.
 
     `lacking` are the coefficients that the diagnosis found and that these do not have.
@@ -108,9 +112,13 @@ def _line(row: table.Row, columns: list[str], kinds: Sequence[str]) -> str:
 def _triad(key: str) -> str:
     effect = effect_of_key(key)
     channels = {term.channel for term in effect.terms} if effect else set()
-    return "Gyros" if channels and channels <= set(GYRO) else "Accelerometers" if channels and channels <= set(
-        ACCEL
-    ) else "Others"  # fmt: skip
+    return (
+        "Gyros"
+        if channels and channels <= set(GYRO)
+        else "Accelerometers"
+        if channels and channels <= set(ACCEL)
+        else "Others"
+    )
 
 
 def prior_and_posterior(calibration: Calibration, prior: Mapping[str, float]) -> Figure:
@@ -122,10 +130,15 @@ def prior_and_posterior(calibration: Calibration, prior: Mapping[str, float]) ->
     figure = Figure()
     figure.shape("rect", x0=-1.0, x1=1.0, fillcolor=BAND, line={"width": 0}, layer="below")
     figure.add(
-        "scatter", x=calibration.values[shown] / size, y=names, mode="markers", marker={"color": AFTER, "size": 7},
+        "scatter",
+        x=calibration.values[shown] / size,
+        y=names,
+        mode="markers",
+        marker={"color": AFTER, "size": 7},
         error_x={"array": sigma, "color": AFTER, "thickness": 1.5},
-        text=[_words(calibration, k) for k in shown], hovertemplate="%{y}<br>%{text}<extra></extra>",
-    )  # fmt: skip
+        text=[_words(calibration, k) for k in shown],
+        hovertemplate="%{y}<br>%{text}<extra></extra>",
+    )
     figure.x_axes(title="estimate (sigma of the prior)")
     figure.y_axes(range=[len(names) - 0.5, -0.5], title="coefficient", ticks="")
     return lay_out(figure, 18 * len(names) + 110, margin={"l": 60, "r": 20, "t": 20, "b": 55})

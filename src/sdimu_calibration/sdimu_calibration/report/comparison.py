@@ -52,9 +52,7 @@ def comparison(names: Sequence[str], results: Sequence[Calibration]) -> list[lis
         raise DataError("compare: give at least two results of one recording")
     _check_same_data(names, results)
     held_out = held_out_ladder(results)
-    lines = [
-        _row(names[k], result, results[k - 1] if k else None, held_out[k]) for k, result in enumerate(results)
-    ]
+    lines = [_row(names[k], result, results[k - 1] if k else None, held_out[k]) for k, result in enumerate(results)]
     if _NOISE in headings(results):
         for line, result in zip(lines, results, strict=True):
             line.insert(2, _noise(result))

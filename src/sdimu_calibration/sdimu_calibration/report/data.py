@@ -20,9 +20,15 @@ from sdimu_calibration.report.groups import is_free
 CHANNEL_UNITS = ("mm",) * 3 + ("mm/s",) * 3 + ("deg/h",) * 3 + ("ug",) * 3
 """Customary unit of each measurement channel."""
 VARIABLES = (
-    ("a x", "g"), ("a y", "g"), ("a z", "g"), ("w x", "deg/h"), ("w y", "deg/h"), ("w z", "deg/h"),
-    ("time", "min"), ("dT", "degC"),
-)  # fmt: skip
+    ("a x", "g"),
+    ("a y", "g"),
+    ("a z", "g"),
+    ("w x", "deg/h"),
+    ("w y", "deg/h"),
+    ("w z", "deg/h"),
+    ("time", "min"),
+    ("dT", "degC"),
+)
 """Physical variables against which residuals are shown: specific force, body rate at rest, time, temperature."""
 
 
@@ -173,16 +179,16 @@ def scored(diagnosis: Diagnosis) -> list[Scored]:
     evidence = diagnosis.navigation
     p, free = len(evidence.weight), set(diagnosis.free.tolist())
     first = scan(evidence.information, evidence.model, evidence.weight, scale_of(diagnosis.found.first))
-    last = first if not len(diagnosis.found.chosen) else scan(
-        evidence.information, *added(diagnosis), diagnosis.found.scale
-    )  # fmt: skip
+    last = (
+        first
+        if not len(diagnosis.found.chosen)
+        else scan(evidence.information, *added(diagnosis), diagnosis.found.scale)
+    )
     looked_at = [i for i in range(p, len(evidence.names)) if i not in free]
     return scores(evidence, first, last, looked_at, diagnosis.found.chosen)
 
 
-def scores(
-    evidence: LinearEvidence, first: Scan, last: Scan, columns: Sequence[int], chosen: Ints
-) -> list[Scored]:
+def scores(evidence: LinearEvidence, first: Scan, last: Scan, columns: Sequence[int], chosen: Ints) -> list[Scored]:
     """Candidates at some columns, largest score first, from the scans without and with what was chosen."""
     rows = [_scored(evidence, i, first, last, i in chosen) for i in columns]
     return sorted(rows, key=lambda row: -abs(row.z))
@@ -203,11 +209,18 @@ def _scored(evidence: LinearEvidence, index: int, first: Scan, last: Scan, chose
     unit = candidate.parameter.display_unit
     factor = from_si(1.0, unit)
     return Scored(
-        candidate.label, candidate.family, unit, float(first.z[index]), float(last.z[index]),
-        float(first.estimate[index]) * factor, float(first.sigma[index]) * factor,
-        float(first.smallest[index]) * factor, float(evidence.prior[index - len(evidence.weight)]) * factor,
-        float(first.retention[index]), chosen,
-    )  # fmt: skip
+        candidate.label,
+        candidate.family,
+        unit,
+        float(first.z[index]),
+        float(last.z[index]),
+        float(first.estimate[index]) * factor,
+        float(first.sigma[index]) * factor,
+        float(first.smallest[index]) * factor,
+        float(evidence.prior[index - len(evidence.weight)]) * factor,
+        float(first.retention[index]),
+        chosen,
+    )
 
 
 @dataclass(frozen=True)
@@ -255,9 +268,9 @@ def variables(diagnosis: Diagnosis) -> Floats:
     """Physical variables of `VARIABLES`, means over each epoch, shape (e, 8)."""
     evidence = diagnosis.navigation
     seen, epochs = evidence.seen, evidence.prepared.epochs
-    columns = np.column_stack([
-        seen.a, seen.w * from_si(1.0, "deg/h"), (seen.t - 0.5 * seen.dt) * from_si(1.0, "min"), seen.temperature,
-    ])  # fmt: skip
+    columns = np.column_stack(
+        [seen.a, seen.w * from_si(1.0, "deg/h"), (seen.t - 0.5 * seen.dt) * from_si(1.0, "min"), seen.temperature]
+    )
     length = np.add.reduceat(seen.dt, epochs.first)
     return np.asarray(np.add.reduceat(columns * seen.dt[:, None], epochs.first) / length[:, None])
 

@@ -44,9 +44,16 @@ class Figure:
     """
 
     def __init__(
-        self, rows: int = 1, cols: int = 1, *, titles: Sequence[str] = (), share_x: bool = False,
-        share_y: bool = False, gap_x: float = 0.0, gap_y: float = 0.0,
-    ) -> None:  # fmt: skip
+        self,
+        rows: int = 1,
+        cols: int = 1,
+        *,
+        titles: Sequence[str] = (),
+        share_x: bool = False,
+        share_y: bool = False,
+        gap_x: float = 0.0,
+        gap_y: float = 0.0,
+    ) -> None:
         self.rows, self.cols = rows, cols
         self.data: list[dict[str, Any]] = []
         self.layout: dict[str, Any] = {"annotations": [], "shapes": []}
@@ -64,9 +71,15 @@ class Figure:
         for title, (row, col) in zip(titles, self._panels(None, None), strict=False):
             across, up = (self.axis(letter, row, col)["domain"] for letter in "xy")
             self.annotate(
-                title, x=0.5 * sum(across), y=up[1], xref="paper", yref="paper", xanchor="center", yanchor="bottom",
+                title,
+                x=0.5 * sum(across),
+                y=up[1],
+                xref="paper",
+                yref="paper",
+                xanchor="center",
+                yanchor="bottom",
                 font={"size": 16},
-            )  # fmt: skip
+            )
 
     def _number(self, row: int, col: int) -> str:
         """Return what plotly.js appends to the names of the axes of a panel: nothing for the first."""
@@ -135,11 +148,13 @@ def _single(value: Any) -> Any:
 def lay_out(figure: Figure, height: int, **more: Any) -> Figure:
     """Give a figure the look of the house."""
     figure.layout |= {
-        "height": height, "hoverlabel": {"namelength": -1},
-        "showlegend": False, "margin": {"l": 80, "r": 30, "t": 40, "b": 60},
+        "height": height,
+        "hoverlabel": {"namelength": -1},
+        "showlegend": False,
+        "margin": {"l": 80, "r": 30, "t": 40, "b": 60},
         "legend": {"orientation": "h", "yanchor": "bottom", "y": 1.02, "x": 0},
         **more,
-    }  # fmt: skip
+    }
     return figure
 
 

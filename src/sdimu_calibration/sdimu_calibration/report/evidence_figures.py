@@ -59,11 +59,21 @@ def deviates(
     text = [[cell(v) if numbered else _sign(v) for v in row] for row in value]
     figure = Figure()
     figure.add(
-        "heatmap", x=list(columns), y=[c.replace("_", " ") for c in lines], z=value,
-        text=text, texttemplate="%{text}", textfont={"size": 12}, zmin=-_FULL, zmax=_FULL, colorscale=list(DIVERGING),
-        xgap=2, ygap=2, colorbar={"title": {"text": _ABOVE.format("sigma"), "side": "top"}, "thickness": 12},
+        "heatmap",
+        x=list(columns),
+        y=[c.replace("_", " ") for c in lines],
+        z=value,
+        text=text,
+        texttemplate="%{text}",
+        textfont={"size": 12},
+        zmin=-_FULL,
+        zmax=_FULL,
+        colorscale=list(DIVERGING),
+        xgap=2,
+        ygap=2,
+        colorbar={"title": {"text": _ABOVE.format("sigma"), "side": "top"}, "thickness": 12},
         hovertemplate=f"%{{y}} at {column} %{{x}}: %{{z:+.1f}} sigma<extra></extra>",
-    )  # fmt: skip
+    )
     figure.x_axes(title=column, type="category", showgrid=False, ticks="")
     figure.y_axes(autorange="reversed", ticks="", title=line)
     return lay_out(figure, height, margin={"l": 120 if line == "channel" else 190, "r": 20, "t": 40, "b": 55})
@@ -93,23 +103,37 @@ def ranking(entries: Sequence[data.Scored], threshold: float) -> Figure:
     sizes = [with_sigma(s.estimate, s.sigma, s.unit) for s in shown]
     figure = Figure()
     figure.add(
-        "bar", y=names, x=[abs(s.z) for s in shown], orientation="h", name="model as given",
+        "bar",
+        y=names,
+        x=[abs(s.z) for s in shown],
+        orientation="h",
+        name="model as given",
         marker={"color": [MUTED if s.chosen else PALE for s in shown], "line": {"color": INK, "width": 1}},
-        customdata=sizes, hovertemplate="%{y}<br>|z| = %{x:.1f}<br>%{customdata}<extra></extra>",
-    )  # fmt: skip
+        customdata=sizes,
+        hovertemplate="%{y}<br>|z| = %{x:.1f}<br>%{customdata}<extra></extra>",
+    )
     # Beside the bar, but never under the line of the noise.
     figure.add(
-        "scatter", y=names, x=[max(abs(s.z), threshold) for s in shown], mode="text",
-        text=[f"\N{NO-BREAK SPACE}{size}" for size in sizes], textposition="middle right", cliponaxis=False,
-        hoverinfo="skip", showlegend=False,
-    )  # fmt: skip
+        "scatter",
+        y=names,
+        x=[max(abs(s.z), threshold) for s in shown],
+        mode="text",
+        text=[f"\N{NO-BREAK SPACE}{size}" for size in sizes],
+        textposition="middle right",
+        cliponaxis=False,
+        hoverinfo="skip",
+        showlegend=False,
+    )
     if any(s.chosen for s in shown):
         figure.add(
-            "scatter", y=names, x=[abs(s.left) for s in shown], mode="markers",
+            "scatter",
+            y=names,
+            x=[abs(s.left) for s in shown],
+            mode="markers",
             name="left when what was found is added",
             marker={"symbol": "diamond-open", "color": AFTER, "size": 9, "line": {"width": 2}},
             hovertemplate="%{y}<br>left: |z| = %{x:.1f}<extra></extra>",
-        )  # fmt: skip
+        )
     figure.shape("line", x0=threshold, x1=threshold, line=_LIMIT, opacity=1.0)
     figure.annotate(
         f"noise reaches {threshold:.1f}", x=threshold, y=1, yref="y domain", xanchor="center", yanchor="bottom"
@@ -131,16 +155,28 @@ def rungs(names: Sequence[str], values: Sequence[float], height: int = 300, whit
     for k, (name, value) in enumerate(zip(names, values, strict=True)):
         color, symbol = (AFTER, "circle") if k else (BEFORE, "triangle-up")
         figure.add(
-            "scatter", x=[1.0, value], y=[k, k], mode="lines+markers", line={"color": color, "width": 2},
+            "scatter",
+            x=[1.0, value],
+            y=[k, k],
+            mode="lines+markers",
+            line={"color": color, "width": 2},
             marker={"size": [0, 12], "color": color, "symbol": symbol, "opacity": 1.0},
-            text=[name, name], cliponaxis=False,
+            text=[name, name],
+            cliponaxis=False,
             hovertemplate="%{text}: %{x:.3f} sigma<extra></extra>",
-        )  # fmt: skip
+        )
     for k, (name, value) in enumerate(zip(names, values, strict=True)):
         figure.annotate(
-            f"<b>{value:.3f}</b>  {name}", x=0, y=k, xref="x domain", xanchor="left", yanchor="bottom", yshift=8,
-            align="left", bgcolor="@card",
-        )  # fmt: skip
+            f"<b>{value:.3f}</b>  {name}",
+            x=0,
+            y=k,
+            xref="x domain",
+            xanchor="left",
+            yanchor="bottom",
+            yshift=8,
+            align="left",
+            bgcolor="@card",
+        )
     figure.shape("line", x0=1.0, x1=1.0, line=_LIMIT)
     known = [v for v in (*values, 1.0) if np.isfinite(v)]
     room = max(0.08 * (max(known) - min(known)), 0.02)
@@ -157,15 +193,24 @@ def explained(parts: Sequence[data.Explained]) -> Figure:
         x, mean, error = data.binned(part.predicted, part.misfit, _BINS)
         ends = [float(x.min()), float(x.max())] if len(x) else [0.0, 0.0]
         figure.add(
-            "scatter", x=ends, y=ends, mode="lines", line={"color": INK, "dash": "dash", "width": 1},
-            hoverinfo="skip", col=column,
-        )  # fmt: skip
+            "scatter",
+            x=ends,
+            y=ends,
+            mode="lines",
+            line={"color": INK, "dash": "dash", "width": 1},
+            hoverinfo="skip",
+            col=column,
+        )
         figure.add(
-            "scatter", x=x, y=mean, mode="markers",
+            "scatter",
+            x=x,
+            y=mean,
+            mode="markers",
             error_y={"array": error, "color": BEFORE, "thickness": 1.5},
             marker={"color": BEFORE, "size": 7},
-            hovertemplate="predicted %{x:.2f}, found %{y:.2f} sigma<extra></extra>", col=column,
-        )  # fmt: skip
+            hovertemplate="predicted %{x:.2f}, found %{y:.2f} sigma<extra></extra>",
+            col=column,
+        )
         figure.x_axes(title="effect predicts (sigma)", col=column)
     figure.y_axes(title="misfit found (sigma)", col=1)
     return lay_out(figure, 360)
@@ -174,15 +219,27 @@ def explained(parts: Sequence[data.Explained]) -> Figure:
 def correlation(names: Sequence[str], C: Floats) -> Figure:
     """Correlation of the coefficients; cells beyond one half carry their number."""
     shown = [name.replace("_", " ") for name in names]
-    text = [[f"{v:+.1f}".replace("-", "\N{MINUS SIGN}") if abs(v) > 0.5 and i != j else "" for j, v in enumerate(row)]
-            for i, row in enumerate(C)]  # fmt: skip
+    text = [
+        [f"{v:+.1f}".replace("-", "\N{MINUS SIGN}") if abs(v) > 0.5 and i != j else "" for j, v in enumerate(row)]
+        for i, row in enumerate(C)
+    ]
     figure = Figure()
     figure.add(
-        "heatmap", x=shown, y=shown, z=C, text=text, texttemplate="%{text}", textfont={"size": 11}, zmin=-1, zmax=1,
-        colorscale=list(DIVERGING), xgap=1, ygap=1,
+        "heatmap",
+        x=shown,
+        y=shown,
+        z=C,
+        text=text,
+        texttemplate="%{text}",
+        textfont={"size": 11},
+        zmin=-1,
+        zmax=1,
+        colorscale=list(DIVERGING),
+        xgap=1,
+        ygap=1,
         colorbar={"title": {"text": _ABOVE.format("correlation"), "side": "top"}, "thickness": 12},
         hovertemplate="%{y} \u00b7 %{x}: %{z:.2f}<extra></extra>",
-    )  # fmt: skip
+    )
     figure.x_axes(tickangle=-60)
     figure.y_axes(autorange="reversed")
     for update in (figure.x_axes, figure.y_axes):

@@ -69,8 +69,8 @@ def envelope(t: Floats, y: Floats, blocks: int = _BLOCKS) -> tuple[Floats, Float
 def raw_data(recording: Recording, fit: Fit) -> Figure:
     """Envelope of the six sensors in time with the stops shaded."""
     figure = Figure(
-        rows=2, cols=3, titles=[name.replace("_", " ") for name in CHANNELS], gap_x=0.07, gap_y=0.14, share_x=True,
-    )  # fmt: skip
+        rows=2, cols=3, titles=[name.replace("_", " ") for name in CHANNELS], gap_x=0.07, gap_y=0.14, share_x=True
+    )
     t, *rate = envelope(recording.t, recording.omega_ib_b)
     _, *force = envelope(recording.t, recording.f_ib_b)
     low, high = (np.hstack([np.degrees(w), f / STANDARD_GRAVITY]) for w, f in zip(rate, force, strict=True))
@@ -79,11 +79,17 @@ def raw_data(recording: Recording, fit: Fit) -> Figure:
         place = {"row": channel // 3 + 1, "col": channel % 3 + 1}
         unit, ink = ("deg/s", "g")[channel // 3], f"@{AXES[channel % 3]}"
         figure.add(
-            "scatter", x=np.concatenate([minutes, minutes[::-1]]),
-            y=np.concatenate([high[:, channel], low[::-1, channel]]), mode="lines", fill="toself", fillcolor=ink,
-            line={"color": ink, "width": 1}, hoveron="points",
-            hovertemplate=f"%{{x:.2f}} min: %{{y:.4g}} {unit}<extra></extra>", **place,
-        )  # fmt: skip
+            "scatter",
+            x=np.concatenate([minutes, minutes[::-1]]),
+            y=np.concatenate([high[:, channel], low[::-1, channel]]),
+            mode="lines",
+            fill="toself",
+            fillcolor=ink,
+            line={"color": ink, "width": 1},
+            hoveron="points",
+            hovertemplate=f"%{{x:.2f}} min: %{{y:.4g}} {unit}<extra></extra>",
+            **place,
+        )
         for _, start, end in fit.timetable.stops:
             figure.shape(
                 "rect", x0=start / 60.0, x1=end / 60.0, fillcolor=BAND, line={"width": 0}, layer="below", **place
@@ -100,10 +106,14 @@ def sequence(table: TableLog, fit: Fit) -> Figure:
     rows = np.unique(np.linspace(0, len(table.t) - 1, min(len(table.t), _MOST_ANGLES)).astype(np.int64))
     for k, name in enumerate(table.names):
         figure.add(
-            "scatter", x=table.t[rows] / 60.0, y=np.degrees(table.angle[rows, k]), mode="lines",
-            name=name.replace("_", " "), line={"color": f"@{AXES[k % 3]}", "dash": ("solid", "dash", "dot")[k % 3]},
+            "scatter",
+            x=table.t[rows] / 60.0,
+            y=np.degrees(table.angle[rows, k]),
+            mode="lines",
+            name=name.replace("_", " "),
+            line={"color": f"@{AXES[k % 3]}", "dash": ("solid", "dash", "dot")[k % 3]},
             hovertemplate="%{x:.1f} min: %{y:.2f} deg<extra>" + escape(name) + "</extra>",
-        )  # fmt: skip
+        )
     for _, start, end in fit.timetable.stops:
         figure.shape("rect", x0=start / 60.0, x1=end / 60.0, fillcolor=BAND, line={"width": 0}, layer="below")
     figure.x_axes(title="time (min)", showgrid=False)
@@ -135,12 +145,17 @@ def attitudes(fit: Fit) -> Attitudes:
 def attitude_view(fit: Fit) -> str:
     """Return the IMU in space at a stop of one's choice; heading is arbitrary by hand."""
     found = attitudes(fit)
-    content = as_script({
-        "C": np.round(found.C_nb.reshape(-1, 9), 4).tolist(), "words": found.words, "latitude": found.latitude,
-        "arbitrary": found.latitude is None,
-    })  # fmt: skip
+    content = as_script(
+        {
+            "C": np.round(found.C_nb.reshape(-1, 9), 4).tolist(),
+            "words": found.words,
+            "latitude": found.latitude,
+            "arbitrary": found.latitude is None,
+        }
+    )
     told = "x, y, z: axes of the IMU; g: gravity; " + (
-        "\N{GREEK CAPITAL LETTER OMEGA}: the Earth's rate; N, E: horizon." if found.latitude is not None
+        "\N{GREEK CAPITAL LETTER OMEGA}: the Earth's rate; N, E: horizon."
+        if found.latitude is not None
         else "the heading is arbitrary."
     )
     head = (

@@ -55,9 +55,8 @@ def sigma_history(calibration: Calibration) -> Figure:
                 "rect", x0=start / 60.0, x1=stop / 60.0, fillcolor=BAND, line={"width": 0}, layer="below", **place
             )
     return lay_out(
-        figure, _PANEL_HEIGHT * rows + 60, margin={"l": 70, "r": 50, "t": 40, "b": 50},
-        font={"size": 12}, hovermode="x",
-    )  # fmt: skip
+        figure, _PANEL_HEIGHT * rows + 60, margin={"l": 70, "r": 50, "t": 40, "b": 50}, font={"size": 12}, hovermode="x"
+    )
 
 
 def _draw(
@@ -74,9 +73,15 @@ def _draw(
         sigma, ink = np.where(sigma > 0, sigma, np.nan), SERIES[order % 6]
         drawn.append((short_name(calibration.names[index], effect), sigma, ink))
         figure.add(
-            "scatter", x=history.t[kept] / 60.0, y=sigma, mode="lines", name=calibration.names[index],
-            line={"color": ink, "dash": _DASHES[order % 6], "width": 1.6}, hovertemplate=f"%{{y:.3g}} {unit}", **place,
-        )  # fmt: skip
+            "scatter",
+            x=history.t[kept] / 60.0,
+            y=sigma,
+            mode="lines",
+            name=calibration.names[index],
+            line={"color": ink, "dash": _DASHES[order % 6], "width": 1.6},
+            hovertemplate=f"%{{y:.3g}} {unit}",
+            **place,
+        )
     return drawn
 
 

@@ -35,7 +35,6 @@ _WORST = 3
 """Number of coefficients that are named as off, and of pieces of advice that are shown at once."""
 
 
-
 @dataclass(frozen=True)
 class FirstScreen:
     """What a page says first, in HTML.
@@ -128,10 +127,12 @@ def _costs(summary: DiagnosisSummary) -> tuple[tuple[str, str], ...]:
     for name, sigmas in moved_coefficients(d.before, d.after)[:_WORST]:
         off = -sigmas * np.sqrt(d.before.covariance[at[name], at[name]])
         unit = units[name]
-        out.append((
-            f"{from_si(float(off), unit):+.3g} {unit}".replace("-", "\N{MINUS SIGN}"),
-            f"<code>{name}</code> is off without it: {abs(sigmas):.0f} of its sigmas",
-        ))  # fmt: skip
+        out.append(
+            (
+                f"{from_si(float(off), unit):+.3g} {unit}".replace("-", "\N{MINUS SIGN}"),
+                f"<code>{name}</code> is off without it: {abs(sigmas):.0f} of its sigmas",
+            )
+        )
     return tuple(out)
 
 

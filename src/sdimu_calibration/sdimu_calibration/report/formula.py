@@ -10,10 +10,27 @@ import re
 from html import escape
 
 _SYMBOLS = {
-    "alpha": "\u03b1", "tau": "\u03c4", "eta": "\u03b7", "pi": "\u03c0", "sigma": "\u03c3", "theta": "\u03b8",
-    "w": "\u03c9", "wt": "\u03c9\u209c", "dw": "\u03b4\u03c9", "df": "\u03b4f", "dg": "\u03b4g", "dlat": "\u03b4\u03c6",
-    "dT": "dT", "dt": "dt", "dy": "dy", "own": "own", "cross": "cross", "nb": "nb", "bn": "bn", "ie": "ie",
-}  # fmt: skip
+    "alpha": "\u03b1",
+    "tau": "\u03c4",
+    "eta": "\u03b7",
+    "pi": "\u03c0",
+    "sigma": "\u03c3",
+    "theta": "\u03b8",
+    "w": "\u03c9",
+    "wt": "\u03c9\u209c",
+    "dw": "\u03b4\u03c9",
+    "df": "\u03b4f",
+    "dg": "\u03b4g",
+    "dlat": "\u03b4\u03c6",
+    "dT": "dT",
+    "dt": "dt",
+    "dy": "dy",
+    "own": "own",
+    "cross": "cross",
+    "nb": "nb",
+    "bn": "bn",
+    "ie": "ie",
+}
 _FUNCTIONS = {"exp", "sin", "cos", "tan", "tanh", "log", "sgn", "sqrt", "max", "min", "abs", "sum", "dx"}
 _TOKEN = re.compile(r"[A-Za-z]+'?(?:_[A-Za-z0-9]+)*|\d+(?:\.\d+)?(?:e[-+]?\d+)?|\.\.|\*\*|\s+|.")
 _NAME = re.compile(r"[A-Za-z]+'?(?:_[A-Za-z0-9]+)*")

@@ -23,9 +23,14 @@ def evidence(summary: DiagnosisSummary, draw: Draw) -> list[str]:
 
 
 _RUNGS = (
-    "model", "estimate", "held-out RMS", "force beyond noise (ug)", "rate beyond noise (deg/s)", "turns (% of angle)",
+    "model",
+    "estimate",
+    "held-out RMS",
+    "force beyond noise (ug)",
+    "rate beyond noise (deg/s)",
+    "turns (% of angle)",
     "log-likelihood",
-)  # fmt: skip
+)
 
 
 def _ladder(summary: DiagnosisSummary) -> str:
@@ -34,11 +39,16 @@ def _ladder(summary: DiagnosisSummary) -> str:
     sizes = ["", *(_size(f.value, f.sigma, f.candidate.parameter.display_unit) for f in summary.found)]
     rows = [
         [
-            name, size, f"{r.held_out_rms:.3f}", shown(from_si(_scatter(r)[FORCE], "ug")),
-            shown(float(np.degrees(_scatter(r)[RATE]))), shown(100.0 * _scatter(r)[TURN]), f"{r.log_likelihood:.1f}",
+            name,
+            size,
+            f"{r.held_out_rms:.3f}",
+            shown(from_si(_scatter(r)[FORCE], "ug")),
+            shown(float(np.degrees(_scatter(r)[RATE]))),
+            shown(100.0 * _scatter(r)[TURN]),
+            f"{r.log_likelihood:.1f}",
         ]
         for name, size, r in zip(names, sizes, d.rungs, strict=True)
-    ]  # fmt: skip
+    ]
     tried = [grid(STEP_COLUMNS, [step_row(step) for step in d.found.steps], {0, 6})] if d.found.steps else []
     return section(
         "Ladder of models",
@@ -50,8 +60,9 @@ def _ladder(summary: DiagnosisSummary) -> str:
         ),
         *tried,
         quiet("Steps are in sigmas of the fit on which they were tried; the missing effect makes these larger.")
-        if tried else sentence("No candidate exceeds the scatter: the model stays as it is."),
-    )  # fmt: skip
+        if tried
+        else sentence("No candidate exceeds the scatter: the model stays as it is."),
+    )
 
 
 def _size(value: float, sigma: float, unit: str) -> str:

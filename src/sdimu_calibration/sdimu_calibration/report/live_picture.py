@@ -48,8 +48,15 @@ def live_picture(found: LiveDiagnosis) -> bytes:
     drawn.text(_LEFT, _TOP / 2, title, _INK, _TITLE)
     _heat_map(drawn, _TOP, grid, channels)
     below = _TOP + heights[0] + _BELOW + _GAP
-    _Bars(drawn, below, [abs(r.z) for r in ranked], [f" {size(r)}" for r in ranked], [r.label for r in ranked],
-          found.threshold, _LINE).draw("score |z| (sigma); dashed: what noise reaches")  # fmt: skip
+    _Bars(
+        drawn,
+        below,
+        [abs(r.z) for r in ranked],
+        [f" {size(r)}" for r in ranked],
+        [r.label for r in ranked],
+        found.threshold,
+        _LINE,
+    ).draw("score |z| (sigma); dashed: what noise reaches")
     errors = [rung.held_out if np.isfinite(rung.held_out) else 0.0 for rung in found.ladder]
     words = [f" {error:.3g}" if error else " too few stops" for error in errors]
     names = [model_name(rung.added) for rung in found.ladder]

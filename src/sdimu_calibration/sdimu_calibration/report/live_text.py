@@ -85,8 +85,7 @@ def ladder_rows(ladder: Sequence[ModelError]) -> list[tuple[str, str]]:
     """Name each model and write its error with one stop left out, which needs two stops."""
     known = "{:.4g}".format
     return [
-        (model_name(rung.added), known(rung.held_out) if math.isfinite(rung.held_out) else "not yet")
-        for rung in ladder
+        (model_name(rung.added), known(rung.held_out) if math.isfinite(rung.held_out) else "not yet") for rung in ladder
     ]
 
 

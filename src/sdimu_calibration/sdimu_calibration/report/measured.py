@@ -98,6 +98,9 @@ def jumps(diagnosis: Diagnosis, found: Residuals) -> Jumps:
             taken.append((turn.axis, float(np.degrees(turn.angle)), int(rows[0])))
     row = np.array([r for _, _, r in taken], dtype=np.int64)
     return Jumps(
-        np.array([a for a, _, _ in taken], dtype=np.int64), np.array([b for _, b, _ in taken]), found.stop[row],
-        found.before[row, 3:6], found.after[row, 3:6],
-    )  # fmt: skip
+        np.array([a for a, _, _ in taken], dtype=np.int64),
+        np.array([b for _, b, _ in taken]),
+        found.stop[row],
+        found.before[row, 3:6],
+        found.after[row, 3:6],
+    )

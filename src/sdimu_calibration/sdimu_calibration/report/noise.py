@@ -18,16 +18,19 @@ from sdimu_calibration.storage.files.whole_file import write_whole
 CHANNELS = ("gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z")
 UNITS = {
     "gyro": {
-        "quantisation": "arcsec", "white": "deg/h/sqrt(Hz)", "instability": "deg/h", "random_walk": "deg/h/sqrt(h)",
+        "quantisation": "arcsec",
+        "white": "deg/h/sqrt(Hz)",
+        "instability": "deg/h",
+        "random_walk": "deg/h/sqrt(h)",
     },
-    "accel": {
-        "quantisation": "mm/s", "white": "ug/sqrt(Hz)", "instability": "ug", "random_walk": "ug/sqrt(h)",
-    },
-}  # fmt: skip
+    "accel": {"quantisation": "mm/s", "white": "ug/sqrt(Hz)", "instability": "ug", "random_walk": "ug/sqrt(h)"},
+}
 WORDS = {
-    "quantisation": "quantisation", "white": "white noise",
-    "instability": "bias instability", "random_walk": "random walk of bias",
-}  # fmt: skip
+    "quantisation": "quantisation",
+    "white": "white noise",
+    "instability": "bias instability",
+    "random_walk": "random walk of bias",
+}
 HEAD = ("channel", "term", "value", "sigma", "unit")
 _SHOWN = {"gyro": "deg/h", "accel": "ug"}
 _INK = ("@x", "@y", "@z")
@@ -90,16 +93,30 @@ def figure(deviations: Mapping[str, Allan], found: Mapping[str, Terms]) -> Figur
         factor = from_si(1.0, unit)
         error = {"type": "data", "array": factor * one.sigma, "thickness": 1, "width": 2}
         made.add(
-            "scatter", x=one.tau, y=factor * one.deviation, mode="markers", name=f"{axis}, measured", error_y=error,
-            marker={"color": _INK[k], "symbol": ("circle", "square", "diamond")[k], "size": 6}, col=column,
-            legendgroup=axis, showlegend=triad == "gyro",
-        )  # fmt: skip
+            "scatter",
+            x=one.tau,
+            y=factor * one.deviation,
+            mode="markers",
+            name=f"{axis}, measured",
+            error_y=error,
+            marker={"color": _INK[k], "symbol": ("circle", "square", "diamond")[k], "size": 6},
+            col=column,
+            legendgroup=axis,
+            showlegend=triad == "gyro",
+        )
         fine = np.geomspace(one.tau[0], one.tau[-1], 100)
         made.add(
-            "scatter", x=fine, y=factor * found[channel].deviation(fine), mode="lines", name=f"{axis}, terms",
-            line={"color": _INK[k], "dash": _DASH[k], "width": 1.5}, hoverinfo="skip", col=column,
-            legendgroup=axis, showlegend=triad == "gyro",
-        )  # fmt: skip
+            "scatter",
+            x=fine,
+            y=factor * found[channel].deviation(fine),
+            mode="lines",
+            name=f"{axis}, terms",
+            line={"color": _INK[k], "dash": _DASH[k], "width": 1.5},
+            hoverinfo="skip",
+            col=column,
+            legendgroup=axis,
+            showlegend=triad == "gyro",
+        )
     for column, triad in ((1, "gyro"), (2, "accel")):
         _slopes(made, column, [d for c, d in deviations.items() if c.startswith(triad)], from_si(1.0, _SHOWN[triad]))
     made.x_axes(type="log", title="averaging time (s)", exponentformat="power")
@@ -116,12 +133,16 @@ def _slopes(made: Figure, column: int, deviations: Sequence[Allan], factor: floa
     for word, slope in _SLOPES:
         x, y = low + _DECADE * np.array([0.0, 1.0]), bottom + _DECADE * np.array([0.0, slope])
         made.add(
-            "scatter", x=10.0**x, y=10.0**y, mode="lines", line={"color": MUTED, "width": 1}, hoverinfo="skip",
-            showlegend=False, col=column,
-        )  # fmt: skip
-        made.annotate(
-            word, x=float(x[1]), y=float(y[1]), xanchor="left", font={"size": 10, "color": MUTED}, col=column,
-        )  # fmt: skip
+            "scatter",
+            x=10.0**x,
+            y=10.0**y,
+            mode="lines",
+            line={"color": MUTED, "width": 1},
+            hoverinfo="skip",
+            showlegend=False,
+            col=column,
+        )
+        made.annotate(word, x=float(x[1]), y=float(y[1]), xanchor="left", font={"size": 10, "color": MUTED}, col=column)
 
 
 _SLOPES = (("-1 quantisation", -1.0), ("-1/2 white", -0.5), ("0 instability", 0.0), ("+1/2 random walk", 0.5))

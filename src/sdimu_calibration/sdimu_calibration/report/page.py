@@ -138,9 +138,13 @@ def page(calibration: Calibration, contents: Contents) -> str:
 
 
 def _first(
-    calibration: Calibration, summary: DiagnosisSummary | None, fit: Fit | None, of_set: SetDiagnosis | None,
-    spell: Spell | None, draw: Draw,
-) -> str:  # fmt: skip
+    calibration: Calibration,
+    summary: DiagnosisSummary | None,
+    fit: Fit | None,
+    of_set: SetDiagnosis | None,
+    spell: Spell | None,
+    draw: Draw,
+) -> str:
     """Verdict, costs, advice, ladder and heat map."""
     if summary is not None:
         verdict = first_screen.of_diagnosis(summary, spell)
@@ -191,10 +195,13 @@ def _under(calibration: Calibration) -> str:
     """Say which recording it is of, beside the title."""
     origin, counts = calibration.origin, calibration.data
     words = [
-        origin.recording, recorded(origin.start_ns),
+        origin.recording,
+        recorded(origin.start_ns),
         f"{counts['duration_s'] / 60.0:.1f} min" if "duration_s" in counts else "",
-        f"IMU {origin.imu}" if origin.imu else "", *origin.words, origin.site,
-    ]  # fmt: skip
+        f"IMU {origin.imu}" if origin.imu else "",
+        *origin.words,
+        origin.site,
+    ]
     return escape(" \N{MIDDLE DOT} ".join(word for word in words if word))
 
 

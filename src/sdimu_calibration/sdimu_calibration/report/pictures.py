@@ -27,9 +27,14 @@ from sdimu_calibration.report.evidence_figures import cell
 from sdimu_calibration.report.table import with_sigma
 
 STYLE = {
-    "font.family": "DejaVu Sans", "font.size": 9, "axes.spines.top": False, "axes.spines.right": False,
-    "axes.titlesize": 10, "axes.titlelocation": "left", "savefig.facecolor": "white",
-}  # fmt: skip
+    "font.family": "DejaVu Sans",
+    "font.size": 9,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.titlesize": 10,
+    "axes.titlelocation": "left",
+    "savefig.facecolor": "white",
+}
 _PALETTE = palette(LIGHT)
 _INK, _MUTED, _LINE, _BEFORE, _AFTER = (_PALETTE[k] for k in ("ink", "muted", "line", "before", "after"))
 _DPI = 110
@@ -59,9 +64,10 @@ def write_pictures(folder: Path, diagnosis: Diagnosis, trials: Sequence[FreeIner
     folder.mkdir(parents=True, exist_ok=True)
     with mpl.rc_context(STYLE):
         figures = {
-            "heat-map": heat_maps(diagnosis), "candidates": candidates(diagnosis),
+            "heat-map": heat_maps(diagnosis),
+            "candidates": candidates(diagnosis),
             "architecture": architecture_figure(),
-        }  # fmt: skip
+        }
         if diagnosis.found.steps:
             figures["ladder"] = ladder(diagnosis)
         if trials:
@@ -120,8 +126,15 @@ def candidates(diagnosis: Diagnosis) -> Figure:
     figure = Figure(figsize=(8.6, 2.7), layout="constrained")
     axes = figure.add_subplot()
     at = np.arange(len(shown))
-    axes.barh(at, [abs(s.z) for s in shown], color=[_MUTED if s.chosen else _LINE for s in shown], edgecolor=_INK,
-              linewidth=0.6, height=0.75, label="added alone")  # fmt: skip
+    axes.barh(
+        at,
+        [abs(s.z) for s in shown],
+        color=[_MUTED if s.chosen else _LINE for s in shown],
+        edgecolor=_INK,
+        linewidth=0.6,
+        height=0.75,
+        label="added alone",
+    )
     axes.plot([abs(s.left) for s in shown], at, "D", mfc="white", mec=_AFTER, ms=5, label="left with what was found")
     axes.axvline(diagnosis.found.threshold, color=_INK, ls="--", lw=1.2, label="what noise reaches")
     for k, s in enumerate(shown):

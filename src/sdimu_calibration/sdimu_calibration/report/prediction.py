@@ -31,12 +31,17 @@ def coefficient_rows(prediction: Prediction) -> list[tuple[str, ...]]:
         sigma, bound, in_noise = prediction.sigma[k], prediction.bound[k], prediction.in_noise[k]
         defined = sigma < _DEFINED * prediction.prior[k]
         over = "" if defined or not np.isfinite(bound) else f"{sigma / bound:.2f}"
-        rows.append((
-            name, _short(from_si(prediction.prior[k], unit)),
-            "0" if defined else _short(from_si(sigma, unit)),
-            "0" if defined else _short(from_si(in_noise, unit)),
-            "0" if defined else _short(from_si(bound, unit)), over, unit,
-        ))  # fmt: skip
+        rows.append(
+            (
+                name,
+                _short(from_si(prediction.prior[k], unit)),
+                "0" if defined else _short(from_si(sigma, unit)),
+                "0" if defined else _short(from_si(in_noise, unit)),
+                "0" if defined else _short(from_si(bound, unit)),
+                over,
+                unit,
+            )
+        )
     return rows
 
 
@@ -117,13 +122,28 @@ def as_history(prediction: Prediction) -> Calibration:
     none = np.zeros((m, p))
     stop = np.zeros(m, dtype=np.int64)
     history = History(
-        prediction.t, none, prediction.history, prediction.attitude, stop, prediction.dwell, prediction.dwell,
+        prediction.t,
+        none,
+        prediction.history,
+        prediction.attitude,
+        stop,
+        prediction.dwell,
+        prediction.dwell,
         np.zeros((m, 4)),
-    )  # fmt: skip
+    )
     return Calibration(
-        prediction.body_frame, prediction.model, prediction.names, prediction.units, prediction.display_units,
-        np.zeros(p), prediction.covariance, {}, {}, (), history,
-    )  # fmt: skip
+        prediction.body_frame,
+        prediction.model,
+        prediction.names,
+        prediction.units,
+        prediction.display_units,
+        np.zeros(p),
+        prediction.covariance,
+        {},
+        {},
+        (),
+        history,
+    )
 
 
 def display_units(prediction: Prediction) -> dict[str, str]:
@@ -136,8 +156,10 @@ def display_units(prediction: Prediction) -> dict[str, str]:
 def _unobservable(prediction: Prediction) -> str:
     if not prediction.unobservable:
         return "<p>Everything is seen better than the prior knew it.</p>"
-    items = (f"<li>{escape(c.text)} ({100.0 * c.left:.0f} % of the prior variance is left)</li>"
-             for c in prediction.unobservable)  # fmt: skip
+    items = (
+        f"<li>{escape(c.text)} ({100.0 * c.left:.0f} % of the prior variance is left)</li>"
+        for c in prediction.unobservable
+    )
     return f"<ul>{''.join(items)}</ul>"
 
 

@@ -85,7 +85,7 @@ class Raster:
 
     def text(
         self, x: float, y: float, words: str, ink: Colour, size: int, across: float = LEFT, down: float = CENTRE
-    ) -> None:  # fmt: skip
+    ) -> None:
         """Write a line of text; what lies outside of the picture is cut off.
 
         Parameters

@@ -52,10 +52,17 @@ def innovations(found: data.Residuals, two: bool) -> Figure:
             )
             good = np.isfinite(y)
             figure.add(
-                "scatter", x=t[good], y=y[good], mode="markers", name=name, legendgroup=name,
-                showlegend=channel == 0, marker={"color": ink, "symbol": symbol, "size": 7},
-                hovertemplate=f"%{{x:.1f}} min: %{{y:.3g}} {data.CHANNEL_UNITS[channel]}<extra>{name}</extra>", **place,
-            )  # fmt: skip
+                "scatter",
+                x=t[good],
+                y=y[good],
+                mode="markers",
+                name=name,
+                legendgroup=name,
+                showlegend=channel == 0,
+                marker={"color": ink, "symbol": symbol, "size": 7},
+                hovertemplate=f"%{{x:.1f}} min: %{{y:.3g}} {data.CHANNEL_UNITS[channel]}<extra>{name}</extra>",
+                **place,
+            )
         reach = _reach([found.before[:, channel], found.after[:, channel]], found.sigma[:, channel], channel < 6)
         reach *= from_si(1.0, data.CHANNEL_UNITS[channel])
         figure.y_axes(range=[-reach, reach], title=data.CHANNEL_UNITS[channel], standoff=2, **place)
@@ -82,26 +89,46 @@ def _reach(normalised: Sequence[Floats], sigma: Floats, all_of_it: bool) -> floa
 def _bars(figure: Figure, minutes: Floats, sigma: Floats, place: dict[str, int]) -> None:
     good = np.isfinite(sigma)
     figure.add(
-        "scatter", x=minutes[good], y=np.zeros(int(good.sum())), mode="markers",
-        marker={"size": 1, "color": PALE}, hoverinfo="skip", showlegend=False,
-        error_y={"array": (3.0 * sigma[good]), "color": PALE, "thickness": 5, "width": 0}, **place,
-    )  # fmt: skip
+        "scatter",
+        x=minutes[good],
+        y=np.zeros(int(good.sum())),
+        mode="markers",
+        marker={"size": 1, "color": PALE},
+        hoverinfo="skip",
+        showlegend=False,
+        error_y={"array": (3.0 * sigma[good]), "color": PALE, "thickness": 5, "width": 0},
+        **place,
+    )
 
 
 def _band(figure: Figure, minutes: Floats, sigma: Floats, place: dict[str, int]) -> None:
     t, s = data.envelope(minutes, 3.0 * sigma, 60)
     figure.add(
-        "scatter", x=np.concatenate([t, t[::-1]]), y=np.concatenate([s, -s[::-1]]),
-        fill="toself", fillcolor=BAND, line={"width": 0}, mode="lines", hoverinfo="skip", showlegend=False, **place,
-    )  # fmt: skip
+        "scatter",
+        x=np.concatenate([t, t[::-1]]),
+        y=np.concatenate([s, -s[::-1]]),
+        fill="toself",
+        fillcolor=BAND,
+        line={"width": 0},
+        mode="lines",
+        hoverinfo="skip",
+        showlegend=False,
+        **place,
+    )
 
 
 def _raw(figure: Figure, minutes: Floats, y: Floats, place: dict[str, int]) -> None:
     t, thin = data.interrupted(*data.envelope(minutes, y, _MOST_POINTS), _GAP_MIN)
     figure.add(
-        "scatter", x=t, y=thin, mode="lines", line={"color": PALE, "width": 0.7},
-        hoverinfo="skip", showlegend=False, **place,
-    )  # fmt: skip
+        "scatter",
+        x=t,
+        y=thin,
+        mode="lines",
+        line={"color": PALE, "width": 0.7},
+        hoverinfo="skip",
+        showlegend=False,
+        **place,
+    )
 
 
 def _stop_means(found: data.Residuals, y: Floats) -> tuple[Floats, Floats]:
@@ -132,21 +159,26 @@ def against_variables(
     used = [k for k in columns if np.ptp(variables[rest, k]) > 0]
     if not used:
         return None
-    figure = Figure(
-        rows=6, cols=len(used), share_x=True, share_y=True, gap_y=0.02, gap_x=0.012,
-    )  # fmt: skip
+    figure = Figure(rows=6, cols=len(used), share_x=True, share_y=True, gap_y=0.02, gap_x=0.012)
     for row in range(6):
         for column, k in enumerate(used, 1):
             name, unit = names[k]
             for values, ink, symbol, of in _layers(found, two):
                 x, mean, error = data.binned(variables[:, k], values[:, 6 + row], _BINS)
                 figure.add(
-                    "scatter", x=x, y=mean, mode="markers", name=of, legendgroup=of,
-                    showlegend=row == 0 and column == 1, marker={"color": ink, "symbol": symbol, "size": 6},
+                    "scatter",
+                    x=x,
+                    y=mean,
+                    mode="markers",
+                    name=of,
+                    legendgroup=of,
+                    showlegend=row == 0 and column == 1,
+                    marker={"color": ink, "symbol": symbol, "size": 6},
                     error_y={"array": error, "color": ink, "thickness": 1, "width": 0},
                     hovertemplate=f"{name} = %{{x:.3g}} {unit}: %{{y:+.2f}} sigma<extra>{of}</extra>",
-                    row=row + 1, col=column,
-                )  # fmt: skip
+                    row=row + 1,
+                    col=column,
+                )
         figure.y_axes(title=f"{CHANNELS[row].replace('_', ' ')}<br>(sigma)", row=row + 1, col=1)
     for column, k in enumerate(used, 1):
         figure.x_axes(title=f"{names[k][0]} ({names[k][1]})", row=6, col=column)
@@ -165,25 +197,47 @@ def free_inputs(found: data.FreeInputs, two: bool) -> Figure:
         unit = "deg/h" if channel < 3 else "ug"
         far = np.abs(found.z[:, channel]) > data.NOTABLE
         figure.add(
-            "bar", x=middle, y=found.before[:, channel], width=width,
+            "bar",
+            x=middle,
+            y=found.before[:, channel],
+            width=width,
             marker={
-                "color": BEFORE_PALE, "line": {"color": BEFORE, "width": 0.5},
+                "color": BEFORE_PALE,
+                "line": {"color": BEFORE, "width": 0.5},
                 "pattern": {"shape": ["/" if turn else "" for turn in found.turn], "size": 4, "fgcolor": INK},
             },
-            text=["\u2217" if f else "" for f in far], textposition="outside", cliponaxis=False, name="model as given",
-            legendgroup="before", showlegend=channel == 0, customdata=found.z[:, channel],
-            hovertemplate=f"%{{x:.1f}} min: %{{y:.3g}} {unit}, z = %{{customdata:.1f}}<extra></extra>", **place,
-        )  # fmt: skip
+            text=["\u2217" if f else "" for f in far],
+            textposition="outside",
+            cliponaxis=False,
+            name="model as given",
+            legendgroup="before",
+            showlegend=channel == 0,
+            customdata=found.z[:, channel],
+            hovertemplate=f"%{{x:.1f}} min: %{{y:.3g}} {unit}, z = %{{customdata:.1f}}<extra></extra>",
+            **place,
+        )
         if two:
             figure.add(
-                "scatter", x=middle, y=found.after[:, channel], mode="markers",
-                marker={"color": AFTER, "symbol": "circle", "size": 5}, name="with what was found", legendgroup="after",
-                showlegend=channel == 0, hovertemplate=f"%{{x:.1f}} min: %{{y:.3g}} {unit}<extra></extra>", **place,
-            )  # fmt: skip
+                "scatter",
+                x=middle,
+                y=found.after[:, channel],
+                mode="markers",
+                marker={"color": AFTER, "symbol": "circle", "size": 5},
+                name="with what was found",
+                legendgroup="after",
+                showlegend=channel == 0,
+                hovertemplate=f"%{{x:.1f}} min: %{{y:.3g}} {unit}<extra></extra>",
+                **place,
+            )
         figure.y_axes(title=unit, standoff=2, **place)
     figure.x_axes(title="time (min)", row=2)
     figure.y_axes(zeroline=True, zerolinecolor=MUTED, zerolinewidth=1)
     return lay_out(
-        figure, 560, showlegend=True, bargap=0, barmode="overlay", margin={"l": 60, "r": 20, "t": 95, "b": 55},
+        figure,
+        560,
+        showlegend=True,
+        bargap=0,
+        barmode="overlay",
+        margin={"l": 60, "r": 20, "t": 95, "b": 55},
         legend={"orientation": "h", "yanchor": "bottom", "y": 1.09, "x": 0},
-    )  # fmt: skip
+    )

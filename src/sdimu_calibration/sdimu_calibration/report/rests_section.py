@@ -12,9 +12,16 @@ from sdimu_calibration.report.markup import grid, quiet, section
 from sdimu_calibration.report.table import as_far
 
 _COLUMNS = (
-    "rest", "from (s)", "to (s)", "force x y z (ug)", "in sigmas", "rate x y z (deg/h)", "in sigmas",
-    "turn to it N E D (arcmin)", "in sigmas",
-)  # fmt: skip
+    "rest",
+    "from (s)",
+    "to (s)",
+    "force x y z (ug)",
+    "in sigmas",
+    "rate x y z (deg/h)",
+    "in sigmas",
+    "turn to it N E D (arcmin)",
+    "in sigmas",
+)
 
 
 def rests_section(rests: Sequence[Rest]) -> str:
@@ -34,9 +41,10 @@ def rests_section(rests: Sequence[Rest]) -> str:
 def _row(number: int, rest: Rest) -> list[str]:
     out = [str(number), f"{rest.start_s:.1f}", f"{rest.end_s:.1f}"]
     for residual, sigma, unit in (
-        (rest.force, rest.force_sigma, "ug"), (rest.rate, rest.rate_sigma, "deg/h"),
+        (rest.force, rest.force_sigma, "ug"),
+        (rest.rate, rest.rate_sigma, "deg/h"),
         (rest.turn, rest.turn_sigma, "arcmin"),
-    ):  # fmt: skip
+    ):
         seen = bool(np.isfinite(residual).all())
         shown = as_far([from_si(value, unit) for value in residual], from_si(sigma, unit)) if seen else []
         out.append("\N{EM SPACE}".join(shown))

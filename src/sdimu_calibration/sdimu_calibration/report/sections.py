@@ -45,9 +45,14 @@ def _probability(p: float) -> str:
 
 
 STEP_COLUMNS = (
-    "step", "estimate", "|z| (noise reaches)", "log-likelihood gain", "log Bayes factor", "held-out log score",
+    "step",
+    "estimate",
+    "|z| (noise reaches)",
+    "log-likelihood gain",
+    "log Bayes factor",
+    "held-out log score",
     "verdict",
-)  # fmt: skip
+)
 
 
 def ladder(diagnosis: Diagnosis) -> str:
@@ -58,12 +63,14 @@ def ladder(diagnosis: Diagnosis) -> str:
     told = [item for step in steps for item in _told(step)]
     return (
         grid(STEP_COLUMNS, [step_row(step) for step in steps], {0, 6})
-        + "<ul>" + "".join(f"<li>{prose(text)}</li>" for text in told) + "</ul>"
+        + "<ul>"
+        + "".join(f"<li>{prose(text)}</li>" for text in told)
+        + "</ul>"
         + quiet(
             "Estimates are those of the step, with all before it. Log score: gain in the predictive density of stops "
             "left out one at a time, over all stops; in-sample likelihood rises with every parameter, this does not."
         )
-    )  # fmt: skip
+    )
 
 
 def _no_step(diagnosis: Diagnosis) -> str:
@@ -75,9 +82,15 @@ def _no_step(diagnosis: Diagnosis) -> str:
 
 
 _REFITS = (
-    "model", "log-likelihood", "log Bayes factor", "NIS", "held-out RMS", "velocity after turns", "verdict",
+    "model",
+    "log-likelihood",
+    "log Bayes factor",
+    "NIS",
+    "held-out RMS",
+    "velocity after turns",
+    "verdict",
     "moved most (sigma)",
-)  # fmt: skip
+)
 
 
 def refits(rungs: Sequence[Rung]) -> str:
@@ -92,22 +105,29 @@ def refits(rungs: Sequence[Rung]) -> str:
 def _refit(r: Rung) -> list[str]:
     moved = ", ".join(f"{name} {size:+.1f}" for name, size in r.moved[:3])
     return [
-        f"+ {r.added}" if r.added else "model as given", f"{r.log_likelihood:.1f}",
-        f"{r.log_bayes_factor:+.1f}" if r.added else "", f"{r.nis_mean:.3f}", f"{r.held_out_rms:.3f}",
+        f"+ {r.added}" if r.added else "model as given",
+        f"{r.log_likelihood:.1f}",
+        f"{r.log_bayes_factor:+.1f}" if r.added else "",
+        f"{r.nis_mean:.3f}",
+        f"{r.held_out_rms:.3f}",
         f"{r.jump:.2f} sigma, {1e3 * r.jump_velocity:.2f} mm/s",
-        "accepted" if r.accepted else f"refused: {r.reason}", moved,
-    ]  # fmt: skip
+        "accepted" if r.accepted else f"refused: {r.reason}",
+        moved,
+    ]
 
 
 def step_row(step: Step) -> list[str]:
     """Return a step of the search as a row of `STEP_COLUMNS`."""
     factor = from_si(1.0, step.display_unit)
     return [
-        f"+ {step.label}", with_sigma(step.estimate * factor, step.sigma * factor, step.display_unit),
-        f"{abs(step.z):.1f} ({step.threshold:.1f})", f"{step.log_likelihood_gain:.1f}", f"{step.log_bayes_factor:.1f}",
+        f"+ {step.label}",
+        with_sigma(step.estimate * factor, step.sigma * factor, step.display_unit),
+        f"{abs(step.z):.1f} ({step.threshold:.1f})",
+        f"{step.log_likelihood_gain:.1f}",
+        f"{step.log_bayes_factor:.1f}",
         f"{step.held_out_gain:+.0f} \u00b1 {step.held_out_error:.0f}",
         step.fate,
-    ]  # fmt: skip
+    ]
 
 
 def _told(step: Step) -> list[str]:
@@ -122,10 +142,14 @@ def effects(summary: DiagnosisSummary, entries: Sequence[data.Scored], draw: Dra
     """Return what was found with sizes, how each was found, and every candidate that was looked at."""
     d = summary.diagnosis
     parts = data.explained(d)
-    fits = [
-        draw(evidence_figures.explained(parts)),
-        quiet("Misfit against the prediction of each effect, all else estimated with it: on the line it is right."),
-    ] if parts else []
+    fits = (
+        [
+            draw(evidence_figures.explained(parts)),
+            quiet("Misfit against the prediction of each effect, all else estimated with it: on the line it is right."),
+        ]
+        if parts
+        else []
+    )
     return section(
         "Effects: what is missing, how large",
         sentence(d.sentence),
@@ -142,7 +166,7 @@ def effects(summary: DiagnosisSummary, entries: Sequence[data.Scored], draw: Dra
         folded("Steps of the search", ladder(d)),
         folded("Ladder of refits: one effect at a time", refits(d.rungs)) if d.rungs else "",
         quiet(numbers(d)),
-    )  # fmt: skip
+    )
 
 
 _FOUND = ("effect", "coefficient", "size", "z", "explains", "log Bayes factor", "held-out error")
@@ -159,9 +183,12 @@ def found_table(summary: DiagnosisSummary) -> str:
             size = with_sigma(from_si(one.value, unit), from_si(one.sigma, unit), unit)
             fall = (one.held_out_before, one.held_out_after)
             cells = (
-                size, f"{one.z:+.1f}", f"{100 * one.explained:.0f} %", f"{one.log_bayes_factor:.0f}",
+                size,
+                f"{one.z:+.1f}",
+                f"{100 * one.explained:.0f} %",
+                f"{one.log_bayes_factor:.0f}",
                 f"{fall[0]:.3f} \u2192 {fall[1]:.3f}" if np.isfinite(fall).all() else "",
-            )  # fmt: skip
+            )
             name = f'<td class="text">{family_words(group) if not k else ""}</td>'
             label = f'<td class="text"><code>{escape(one.candidate.label)}</code></td>'
             lines.append(f"<tr>{name}{label}{''.join(f'<td>{escape(text)}</td>' for text in cells)}</tr>")
@@ -181,7 +208,7 @@ def confused(summary: DiagnosisSummary, spell: Spell | None = None) -> str:
         stake = "; ".join(
             f"with {s.other} instead, {s.coefficient} moves by {s.sigmas:+.1f} of its sigmas"
             for s in one.coefficient_shifts[:3]
-        )  # fmt: skip
+        )
         rows.append(
             f'<tr><td class="text"><code>{escape(one.candidate.label)}</code></td><td class="text">{others}</td>'
             f'<td class="text">{prose(stake) or "nothing that matters"}</td></tr>'
@@ -263,7 +290,7 @@ def residuals(diagnosis: Diagnosis, found: data.Residuals, more: ReportExtras, d
 
 def _variables(
     diagnosis: Diagnosis, found: data.Residuals, more: ReportExtras, two: bool, marks: str, draw: Draw
-) -> str:  # fmt: skip
+) -> str:
     """Residuals against what could cause them: motion, then time, temperature and table, then turns."""
     values, names = data.variables(diagnosis), list(data.VARIABLES)
     if more.table is not None:

@@ -22,9 +22,11 @@ _TRENDS = 8
 def set_sections(calibration: Calibration, of_set: SetSummary, draw: Draw) -> list[str]:
     """List the recordings, what differs between them, and what it follows."""
     return [
-        _recordings(of_set), _deviates(calibration, of_set, draw), *_turn_on(calibration, of_set),
+        _recordings(of_set),
+        _deviates(calibration, of_set, draw),
+        *_turn_on(calibration, of_set),
         *_trends(calibration, of_set),
-    ]  # fmt: skip
+    ]
 
 
 def _recordings(of_set: SetSummary) -> str:
@@ -39,19 +41,27 @@ def _line(r: SetRecording) -> list[str]:
     began = datetime.fromtimestamp(r.start_ns * 1e-9, UTC).strftime("%Y-%m-%d %H:%M") if r.start_ns else ""
     seen = r.deviate[np.isfinite(r.deviate)]
     return [
-        r.name, r.power_on or "its own", began, f"{r.duration_s / 60.0:.1f}",
-        "" if np.isnan(r.temperature_degc) else f"{r.temperature_degc:.1f}", f"{r.nis:.3f}",
+        r.name,
+        r.power_on or "its own",
+        began,
+        f"{r.duration_s / 60.0:.1f}",
+        "" if np.isnan(r.temperature_degc) else f"{r.temperature_degc:.1f}",
+        f"{r.nis:.3f}",
         f"{np.abs(seen).max():.1f}" if len(seen) else "",
-    ]  # fmt: skip
+    ]
 
 
 def _deviates(calibration: Calibration, of_set: SetSummary, draw: Draw) -> str:
     shown = [k for k in range(len(calibration.names)) if is_free(calibration, k)]
     value = np.array([r.deviate[shown] for r in of_set.recordings]).T
     figure = deviates(
-        [r.name for r in of_set.recordings], [calibration.names[k] for k in shown], value, "recording",
-        "coefficient", 120 + 20 * len(shown),
-    )  # fmt: skip
+        [r.name for r in of_set.recordings],
+        [calibration.names[k] for k in shown],
+        value,
+        "recording",
+        "coefficient",
+        120 + 20 * len(shown),
+    )
     return section(
         "Every coefficient in every recording",
         quiet(
@@ -66,14 +76,19 @@ def _turn_on(calibration: Calibration, of_set: SetSummary) -> list[str]:
     if not of_set.turn_on:
         return []
     rows = [
-        [t.effect, *(f"{from_si(v, t.display_unit):.3g}" for v in (t.sigma, t.low, t.high)), t.display_unit,
-         f"{t.power_ons:.0f}"]
+        [
+            t.effect,
+            *(f"{from_si(v, t.display_unit):.3g}" for v in (t.sigma, t.low, t.high)),
+            t.display_unit,
+            f"{t.power_ons:.0f}",
+        ]
         for t in of_set.turn_on
-    ]  # fmt: skip
+    ]
     units = dict(zip(calibration.names, calibration.display_units, strict=True))
     own = [
         [d.power_on, d.name, with_sigma(from_si(d.value, unit), from_si(d.sigma, unit), unit)]
-        for d in of_set.deviations if (unit := units.get(d.name))
+        for d in of_set.deviations
+        if (unit := units.get(d.name))
     ]
     return [
         section(
@@ -89,8 +104,9 @@ def _trends(calibration: Calibration, of_set: SetSummary) -> list[str]:
     units = dict(zip(calibration.names, calibration.display_units, strict=True))
     rows = [
         [t.name, t.covariate, with_sigma(from_si(t.slope, unit), from_si(t.sigma, unit), unit), f"{t.p_value:.2g}"]
-        for t in of_set.trends[:_TRENDS] if (unit := units.get(t.name))
-    ]  # fmt: skip
+        for t in of_set.trends[:_TRENDS]
+        if (unit := units.get(t.name))
+    ]
     if not rows:
         return []
     return [
@@ -107,12 +123,13 @@ def recurrence_section(found: Recurrence) -> str:
     rows = [
         [f"same {one.kind}", str(one.pairs), _number(one.correlation, 2), _number(one.score, 1), ", ".join(one.sensors)]
         for one in found.kinds
-    ]  # fmt: skip
+    ]
     sensors = ", ".join(found.sensors)
     chance = (
         f"Chance reaches {found.limit:.1f} sigma in one set of a hundred. Empty: the recordings say nothing of it."
-        if math.isfinite(found.limit) else "The recordings share too few stops to say more."
-    )  # fmt: skip
+        if math.isfinite(found.limit)
+        else "The recordings share too few stops to say more."
+    )
     return section(
         "What comes back",
         grid(("at the", "pairs of stops", "correlation", "sigma", "sensors"), rows, {0, 4}),

@@ -84,11 +84,19 @@ def whiteness(fit: NavigationFit) -> Whiteness:
     low, high = (chdtri(dof, p) / dof for p in (0.5 + 0.5 * LEVEL, 0.5 - 0.5 * LEVEL))
     middle = np.array([fit.prepared.epochs.end[used & (stop == one)].mean() for one in stops]) / 60.0
     return Whiteness(
-        0.5 * (_BINS[1:] + _BINS[:-1]), np.array(density), tuple(e for e, _ in quantiles),
-        tuple(f for _, f in quantiles), np.arange(1, _LAGS + 1), correlation,
+        0.5 * (_BINS[1:] + _BINS[:-1]),
+        np.array(density),
+        tuple(e for e, _ in quantiles),
+        tuple(f for _, f in quantiles),
+        np.arange(1, _LAGS + 1),
+        correlation,
         float(normal_limit(0.5 - 0.5 * LEVEL) / np.sqrt(max(pairs, 1))),
-        middle, stops, mean, low, high,
-    )  # fmt: skip
+        middle,
+        stops,
+        mean,
+        low,
+        high,
+    )
 
 
 def _quantiles(values: Floats) -> tuple[Floats, Floats]:

@@ -56,23 +56,44 @@ def distribution(found: Whiteness) -> Figure:
             continue
         look: dict[str, Any] = {"name": kind, "legendgroup": kind}
         figure.add(
-            "scatter", x=found.bins, y=found.density[k], mode="lines", line={"color": _INK[k], "shape": "hvh"},
-            hovertemplate="%{x:.2f} sigma: %{y:.3f}<extra>" + kind + "</extra>", **look,
-        )  # fmt: skip
+            "scatter",
+            x=found.bins,
+            y=found.density[k],
+            mode="lines",
+            line={"color": _INK[k], "shape": "hvh"},
+            hovertemplate="%{x:.2f} sigma: %{y:.3f}<extra>" + kind + "</extra>",
+            **look,
+        )
         figure.add(
-            "scatter", x=found.expected[k], y=found.found[k], mode="markers", showlegend=False, col=2,
+            "scatter",
+            x=found.expected[k],
+            y=found.found[k],
+            mode="markers",
+            showlegend=False,
+            col=2,
             marker={"color": _INK[k], "symbol": _SYMBOL[k], "size": 5},
-            hovertemplate="normal %{x:.2f}, found %{y:.2f} sigma<extra>" + kind + "</extra>", **look,
-        )  # fmt: skip
+            hovertemplate="normal %{x:.2f}, found %{y:.2f} sigma<extra>" + kind + "</extra>",
+            **look,
+        )
     figure.add(
-        "scatter", x=found.bins, y=np.exp(-0.5 * found.bins**2) / np.sqrt(2.0 * np.pi), mode="lines", name="normal",
+        "scatter",
+        x=found.bins,
+        y=np.exp(-0.5 * found.bins**2) / np.sqrt(2.0 * np.pi),
+        mode="lines",
+        name="normal",
         line={"color": INK, "dash": "dash"},
-    )  # fmt: skip
+    )
     ends = np.array([-4.0, 4.0])
     figure.add(
-        "scatter", x=ends, y=ends, mode="lines", line={"color": INK, "dash": "dash"}, showlegend=False,
-        hoverinfo="skip", col=2,
-    )  # fmt: skip
+        "scatter",
+        x=ends,
+        y=ends,
+        mode="lines",
+        line={"color": INK, "dash": "dash"},
+        showlegend=False,
+        hoverinfo="skip",
+        col=2,
+    )
     figure.x_axes(title="innovation (sigma)", col=1)
     figure.y_axes(title="density (1/sigma)", col=1)
     figure.x_axes(title="quantile of the normal distribution (sigma)", col=2)
@@ -88,14 +109,28 @@ def over_time(found: Whiteness) -> Figure:
         low, high = (np.where(good, v[:, k], np.nan)[good] for v in (found.low, found.high))
         t = found.t[good]
         figure.add(
-            "scatter", x=np.concatenate([t, t[::-1]]), y=np.concatenate([low, high[::-1]]), fill="toself",
-            fillcolor=BAND, line={"width": 0}, mode="lines", hoverinfo="skip", showlegend=False, col=k + 1,
-        )  # fmt: skip
+            "scatter",
+            x=np.concatenate([t, t[::-1]]),
+            y=np.concatenate([low, high[::-1]]),
+            fill="toself",
+            fillcolor=BAND,
+            line={"width": 0},
+            mode="lines",
+            hoverinfo="skip",
+            showlegend=False,
+            col=k + 1,
+        )
         figure.add(
-            "scatter", x=t, y=found.nis[good, k], mode="markers", showlegend=False, col=k + 1,
-            text=[str(s) for s in found.stop[good]], marker={"color": _INK[k], "symbol": _SYMBOL[k], "size": 7},
+            "scatter",
+            x=t,
+            y=found.nis[good, k],
+            mode="markers",
+            showlegend=False,
+            col=k + 1,
+            text=[str(s) for s in found.stop[good]],
+            marker={"color": _INK[k], "symbol": _SYMBOL[k], "size": 7},
             hovertemplate="stop %{text}: %{y:.2f}<extra></extra>",
-        )  # fmt: skip
+        )
         figure.shape("line", y0=1.0, y1=1.0, line={"color": MUTED, "dash": "dash", "width": 1}, col=k + 1)
         figure.x_axes(title="time (min)", col=k + 1)
     figure.y_axes(title="mean NIS of a stop (1)", col=1)
@@ -105,16 +140,25 @@ def over_time(found: Whiteness) -> Figure:
 def autocorrelation(found: Whiteness) -> Figure:
     """Autocorrelation of the six sensor axes with the band of white noise."""
     figure = Figure(
-        rows=2, cols=3, titles=[name.replace("_", " ") for name in CHANNELS], gap_x=0.06, gap_y=0.2, share_x=True,
+        rows=2,
+        cols=3,
+        titles=[name.replace("_", " ") for name in CHANNELS],
+        gap_x=0.06,
+        gap_y=0.2,
+        share_x=True,
         share_y=True,
-    )  # fmt: skip
+    )
     for channel in range(6):
         place = {"row": channel // 3 + 1, "col": channel % 3 + 1}
         figure.shape("rect", y0=-found.band, y1=found.band, fillcolor=BAND, line={"width": 0}, layer="below", **place)
         figure.add(
-            "bar", x=found.lags, y=found.correlation[:, channel], marker={"color": _AXIS_INK[channel % 3]},
-            hovertemplate="lag %{x}: %{y:+.3f}<extra></extra>", **place,
-        )  # fmt: skip
+            "bar",
+            x=found.lags,
+            y=found.correlation[:, channel],
+            marker={"color": _AXIS_INK[channel % 3]},
+            hovertemplate="lag %{x}: %{y:+.3f}<extra></extra>",
+            **place,
+        )
     figure.x_axes(title="lag (epochs)", row=2)
     figure.y_axes(title="correlation (1)", col=1)
     return lay_out(figure, 420, margin={"l": 70, "r": 20, "t": 45, "b": 55})
@@ -124,9 +168,13 @@ def of_stops(found: Influence) -> Figure:
     """Heat map of what each stop does to each coefficient."""
     order = _most_first(found.moved)
     return deviates(
-        [str(s) for s in found.stops], [found.names[k] for k in order], found.moved.T[order], "stop", "coefficient",
+        [str(s) for s in found.stops],
+        [found.names[k] for k in order],
+        found.moved.T[order],
+        "stop",
+        "coefficient",
         120 + 18 * len(order),
-    )  # fmt: skip
+    )
 
 
 def _most_first(moved: Floats) -> list[int]:

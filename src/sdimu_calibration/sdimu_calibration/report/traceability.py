@@ -14,24 +14,36 @@ from sdimu_calibration.storage.trace import Trace
 def traceability(calibration: Calibration, trace: Trace | None) -> str:
     """Return the section that lets a reader make the result again."""
     origin, counts = calibration.origin, calibration.data
-    made = [] if trace is None else [
-        ("command", f"<code>{escape(trace.command)}</code>" if trace.command else "from Python"),
-        ("program", escape(trace.program)), ("made", escape(trace.made)),
-        *((key, f"<code>{escape(value)}</code>") for key, value in trace.stated),
-    ]  # fmt: skip
+    made = (
+        []
+        if trace is None
+        else [
+            ("command", f"<code>{escape(trace.command)}</code>" if trace.command else "from Python"),
+            ("program", escape(trace.program)),
+            ("made", escape(trace.made)),
+            *((key, f"<code>{escape(value)}</code>") for key, value in trace.stated),
+        ]
+    )
     length = f"{counts['duration_s'] / 60.0:.1f} min" if "duration_s" in counts else ""
     numbers = [f"{counts[key]:.0f} {key}" for key in ("stops", "samples", "lost", "rejected") if key in counts]
     heat = f"{origin.temperature_degc:.1f} deg C" if origin.temperature_degc == origin.temperature_degc else ""
     rows = [
-        ("recording", escape(origin.recording)), ("recorded", escape(recorded(origin.start_ns))),
+        ("recording", escape(origin.recording)),
+        ("recorded", escape(recorded(origin.start_ns))),
         ("content", escape(", ".join(word for word in (length, *numbers, heat) if word))),
-        *(("SHA-256", f"<code>{escape(digest)}</code><br><code>{escape(path)}</code>") for path, digest in
-          (trace.files if trace else ())),
-        ("IMU", escape(origin.imu)), ("serial", escape(origin.serial)), ("power-on", escape(origin.power_on)),
+        *(
+            ("SHA-256", f"<code>{escape(digest)}</code><br><code>{escape(path)}</code>")
+            for path, digest in (trace.files if trace else ())
+        ),
+        ("IMU", escape(origin.imu)),
+        ("serial", escape(origin.serial)),
+        ("power-on", escape(origin.power_on)),
         ("site", escape(origin.site)),
         ("estimator", escape(", ".join(w for w in (calibration.estimator, calibration.estimator_reason) if w))),
-        ("model", escape(", ".join(calibration.model))), ("body frame", escape(calibration.body_frame)), *made,
-    ]  # fmt: skip
+        ("model", escape(", ".join(calibration.model))),
+        ("body frame", escape(calibration.body_frame)),
+        *made,
+    ]
     return section("Traceability", _facts(rows))
 
 

@@ -20,9 +20,14 @@ _PLACES = {"end": "end of the recording", "start": "start of the recording"}
 _SKIP_S = 30.0
 """Logarithmic axes begin here: before there is nothing to see and much room for it."""
 _COLUMNS = (
-    "compensation", "segment", "position error (m)", "rate (nmi/h)", "predicted by the fit (m, 1 sigma)",
-    "velocity error (m/s)", "heading drift (arcmin)",
-)  # fmt: skip
+    "compensation",
+    "segment",
+    "position error (m)",
+    "rate (nmi/h)",
+    "predicted by the fit (m, 1 sigma)",
+    "velocity error (m/s)",
+    "heading drift (arcmin)",
+)
 
 
 def in_use(report_extras: ReportExtras, draw: Draw) -> str:
@@ -43,10 +48,13 @@ def in_use(report_extras: ReportExtras, draw: Draw) -> str:
             "height held. The table stays in its place, so the whole drift is error. Heading is compared with a fit "
             "to the whole recording. Predicted: by the covariance of that fit; one segment is one draw, so up to two "
             "or three times the prediction is chance, more is not."
-            + (" The recording is too short for 10 minutes: the segments are as long as half of it allows." if short
-               else "")
+            + (
+                " The recording is too short for 10 minutes: the segments are as long as half of it allows."
+                if short
+                else ""
+            )
         ),
-    )  # fmt: skip
+    )
 
 
 def trial_sentence(trial: FreeInertialRun) -> str:
@@ -70,10 +78,14 @@ def _row(trial: FreeInertialRun, drift: Drift) -> list[str]:
     stretch = trial.segment
     span = f"{stretch.begin_s / 60.0:.1f} to {(stretch.begin_s + stretch.length_s) / 60.0:.1f} min"
     return [
-        drift.name, f"{stretch.place}: {span}", f"{drift.distance[-1]:.4g}", f"{_rate(drift):.2g}",
-        f"{promised:.3g}" if np.isfinite(promised) else "", f"{drift.speed[-1]:.2g}",
+        drift.name,
+        f"{stretch.place}: {span}",
+        f"{drift.distance[-1]:.4g}",
+        f"{_rate(drift):.2g}",
+        f"{promised:.3g}" if np.isfinite(promised) else "",
+        f"{drift.speed[-1]:.2g}",
         f"{from_si(float(drift.heading[-1]), 'arcmin'):+.2g}",
-    ]  # fmt: skip
+    ]
 
 
 def _rate(drift: Drift) -> float:
@@ -88,9 +100,14 @@ def _metres(value: float) -> str:
 def figure(trials: Sequence[FreeInertialRun]) -> Figure:
     """Errors of position, velocity and heading against time, a column a stretch, a dash a compensation."""
     made = Figure(
-        rows=3, cols=len(trials), titles=[f"unseen {_PLACES[t.segment.place]}" for t in trials],
-        share_x=True, share_y=True, gap_y=0.06, gap_x=0.04,
-    )  # fmt: skip
+        rows=3,
+        cols=len(trials),
+        titles=[f"unseen {_PLACES[t.segment.place]}" for t in trials],
+        share_x=True,
+        share_y=True,
+        gap_y=0.06,
+        gap_x=0.04,
+    )
     for column, trial in enumerate(trials, 1):
         for (ink, dash), drift in zip(_INK, trial.drifts, strict=False):
             rows = drift.t >= _SKIP_S
@@ -107,9 +124,12 @@ def figure(trials: Sequence[FreeInertialRun]) -> Figure:
         made.y_axes(type="log", dtick=1, exponentformat="power", row=row)
     made.x_axes(title="time without aid (min)", row=3)
     return lay_out(
-        made, 640, showlegend=True, margin={"l": 80, "r": 20, "t": 85, "b": 55},
+        made,
+        640,
+        showlegend=True,
+        margin={"l": 80, "r": 20, "t": 85, "b": 55},
         legend={"orientation": "h", "yanchor": "bottom", "y": 1.05, "x": 0},
-    )  # fmt: skip
+    )
 
 
 def _line(
@@ -120,8 +140,15 @@ def _line(
     said, _, unit = name.partition("|")
     thin = width < 1.0
     made.add(
-        "scatter", x=(t[::5] / 60.0), y=np.where(y > 0.0, y, np.nan)[::5], mode="lines",
-        name=said, legendgroup=said, showlegend=row == 1 and column == 1,
+        "scatter",
+        x=(t[::5] / 60.0),
+        y=np.where(y > 0.0, y, np.nan)[::5],
+        mode="lines",
+        name=said,
+        legendgroup=said,
+        showlegend=row == 1 and column == 1,
         line={"color": ink, "dash": "longdashdot" if thin else dash, "width": 1.2 if thin else width},
-        hovertemplate=f"%{{x:.1f}} min: %{{y:.3g}} {unit}<extra>{said}</extra>", row=row, col=column,
-    )  # fmt: skip
+        hovertemplate=f"%{{x:.1f}} min: %{{y:.3g}} {unit}<extra>{said}</extra>",
+        row=row,
+        col=column,
+    )

@@ -61,11 +61,15 @@ def _client(scheduler: str | None, workers: int) -> Iterator[Any]:
         # The allocator reads its limits when the process starts.
         dask.config.set({"distributed.nanny.pre-spawn-environ": _ENVIRONMENT}),
         distributed.LocalCluster(
-            n_workers=workers, threads_per_worker=1, processes=True, dashboard_address="127.0.0.1:0",
-            memory_limit=None, silence_logs=logging.CRITICAL,
+            n_workers=workers,
+            threads_per_worker=1,
+            processes=True,
+            dashboard_address="127.0.0.1:0",
+            memory_limit=None,
+            silence_logs=logging.CRITICAL,
         ) as local,
         distributed.Client(local) as client,
-    ):  # fmt: skip
+    ):
         yield client
 
 

@@ -51,9 +51,11 @@ class Source:
             if sign not in {None, 1, -1}:
                 raise DataError(f"{option} {sign}: expected 1 or -1")
         return Stated(
-            _factor("--accel-unit", self.accel_unit, "m/s^2"), _factor("--gyro-unit", self.gyro_unit, "deg/s"),
-            self.accel_sign, self.gyro_sign,
-        )  # fmt: skip
+            _factor("--accel-unit", self.accel_unit, "m/s^2"),
+            _factor("--gyro-unit", self.gyro_unit, "deg/s"),
+            self.accel_sign,
+            self.gyro_sign,
+        )
 
 
 def _factor(option: str, unit: str | None, expected: str) -> float | None:
@@ -69,9 +71,12 @@ def _factor(option: str, unit: str | None, expected: str) -> float | None:
 
 
 def opening_options(
-    site: str | None, imu: ImuSpecification | None, source: Source, handheld: bool | None = None,
+    site: str | None,
+    imu: ImuSpecification | None,
+    source: Source,
+    handheld: bool | None = None,
     measured_noise: bool = False,
-) -> OpeningOptions:  # fmt: skip
+) -> OpeningOptions:
     """Put what the user says of a test together; command line and live node use this one function.
 
     Parameters
@@ -94,9 +99,13 @@ def opening_options(
 
 
 def open_test(
-    path: Path, site: str | None, imu: ImuSpecification | None, source: Source | None = None,
-    handheld: bool | None = None, measured_noise: bool = False,
-) -> PreparedTest:  # fmt: skip
+    path: Path,
+    site: str | None,
+    imu: ImuSpecification | None,
+    source: Source | None = None,
+    handheld: bool | None = None,
+    measured_noise: bool = False,
+) -> PreparedTest:
     """Read a bag and make it ready for an estimator.
 
     Parameters
@@ -168,9 +177,12 @@ def said_of(path: Path, site: str) -> Origin:
     """Give unit and power-on as the bag says them, with its name and that of the site."""
     said = custom_data(path)
     return Origin(
-        serial=one_line(said.get("serial", "")), power_on=one_line(said.get("power_on", "")),
-        recording=one_line(Path(path).resolve().name), site=one_line(Path(site).stem), site_file=stated_path(site),
-    )  # fmt: skip
+        serial=one_line(said.get("serial", "")),
+        power_on=one_line(said.get("power_on", "")),
+        recording=one_line(Path(path).resolve().name),
+        site=one_line(Path(site).stem),
+        site_file=stated_path(site),
+    )
 
 
 def with_imu_file(test: PreparedTest, imu: str | None) -> PreparedTest:

@@ -123,10 +123,12 @@ def load_set(path: Path, like: BagSource) -> RecordingSet:
     for entry in file.recordings:
         bag = (path.parent / entry.bag).resolve()
         source = replace(
-            like, bag=bag, site=_named(path.parent, entry.site or file.site) or like.site,
+            like,
+            bag=bag,
+            site=_named(path.parent, entry.site or file.site) or like.site,
             imu=_named(path.parent, entry.imu or file.imu) or like.imu,
             reference_degc=like.reference_degc if file.reference_temperature is None else file.reference_temperature,
-        )  # fmt: skip
+        )
         serial = str(entry.serial) or str(file.serial)
         members.append(_member(source, entry.name or bag.name, serial, str(entry.power_on)))
     return RecordingSet(tuple(members), file.model, estimator, file.scopes)

@@ -128,8 +128,9 @@ def _kept(work: Callable[[Sequence[Job]], Sequence[Report | DataError]], folder:
                 found[k] = fresh
         return [
             replace(done, serial=job.member.serial, power_on=job.member.power_on) if isinstance(done, Report) else done
-            for done, job in zip(found, jobs, strict=True) if done is not None
-        ]  # fmt: skip
+            for done, job in zip(found, jobs, strict=True)
+            if done is not None
+        ]
 
     return do
 
@@ -158,16 +159,29 @@ def job_number(job: Job) -> str:
     if not isinstance(source, BagSource) or any(not isinstance(e, str) for e in effects):
         return ""
     asked = (
-        _program(), bag_checksum(source.bag), job.member.name,
+        _program(),
+        bag_checksum(source.bag),
+        job.member.name,
         tuple(map(load_imu, CLASSES if source.imu is None else (source.imu,))),
-        load_site(source.site or DEFAULT_SITE), source.site,
-        source.source, source.handheld, source.measured_noise, source.reference_degc, job.model, job.estimator,
-        job.local, job.candidates, job.with_local, job.stretches, job.noise, job.imu,
+        load_site(source.site or DEFAULT_SITE),
+        source.site,
+        source.source,
+        source.handheld,
+        source.measured_noise,
+        source.reference_degc,
+        job.model,
+        job.estimator,
+        job.local,
+        job.candidates,
+        job.with_local,
+        job.stretches,
+        job.noise,
+        job.imu,
         None if job.about is None else sorted(job.about.items()),
-        None if job.start is None else (
-            job.start.names, job.start.coefficients.tobytes(), job.start.C_nb.tobytes(), job.start.more.tobytes()
-        ),
-    )  # fmt: skip
+        None
+        if job.start is None
+        else (job.start.names, job.start.coefficients.tobytes(), job.start.C_nb.tobytes(), job.start.more.tobytes()),
+    )
     return hashlib.sha256(repr(asked).encode()).hexdigest()[:40]
 
 
@@ -199,24 +213,48 @@ def write_report(path: Path, report: Report) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     found, start = report.reduction, report.start
     words = {
-        "format": REPORT_FORMAT, "name": report.name, "estimator": report.estimator, "reason": report.reason,
-        "names": found.names, "labels": found.labels, "rows": found.rows, "unexplained": found.unexplained,
+        "format": REPORT_FORMAT,
+        "name": report.name,
+        "estimator": report.estimator,
+        "reason": report.reason,
+        "names": found.names,
+        "labels": found.labels,
+        "rows": found.rows,
+        "unexplained": found.unexplained,
         "imu": vars(report.imu) | {"prior": dict(report.imu.prior), "prior_units": dict(report.imu.prior_units)},
-        "start_names": start.names, "start_ns": report.start_ns, "temperature_degc": report.temperature_degc,
-        "duration": report.times.duration, "stops": report.times.stops, "turns": report.times.turns,
-        "data": dict(report.data), "statistics": report.statistics.entries(), "reported": report.names,
-        "notes": report.notes, "warnings": report.warnings, "heading_rad": report.heading_rad,
-        "noise": [vars(term) for term in report.noise], "widened": report.widened,
-    }  # fmt: skip
+        "start_names": start.names,
+        "start_ns": report.start_ns,
+        "temperature_degc": report.temperature_degc,
+        "duration": report.times.duration,
+        "stops": report.times.stops,
+        "turns": report.times.turns,
+        "data": dict(report.data),
+        "statistics": report.statistics.entries(),
+        "reported": report.names,
+        "notes": report.notes,
+        "warnings": report.warnings,
+        "heading_rad": report.heading_rad,
+        "noise": [vars(term) for term in report.noise],
+        "widened": report.widened,
+    }
     places = {} if report.places is None else {f"dwell_{key}": value for key, value in vars(report.places).items()}
     part = beside(path)
     try:
         with part.open("wb") as file:
             np.savez(
-                file, words=np.frombuffer(json.dumps(words).encode(), dtype=np.uint8), A=found.A, y=found.y,
-                point=found.point, weight=found.weight, start=start.coefficients, C_nb=start.C_nb, more=start.more,
-                values=report.values, sigma=report.sigma, **places,
-            )  # fmt: skip
+                file,
+                words=np.frombuffer(json.dumps(words).encode(), dtype=np.uint8),
+                A=found.A,
+                y=found.y,
+                point=found.point,
+                weight=found.weight,
+                start=start.coefficients,
+                C_nb=start.C_nb,
+                more=start.more,
+                values=report.values,
+                sigma=report.sigma,
+                **places,
+            )
         part.replace(path)
     finally:
         part.unlink(missing_ok=True)
@@ -240,23 +278,44 @@ def _report(words: dict[str, Any], arrays: dict[str, Any]) -> Report | None:
     if words["format"] != REPORT_FORMAT:
         return None
     reduction = Reduction(
-        tuple(words["names"]), tuple(words["labels"]), arrays["A"], arrays["y"], arrays["point"], arrays["weight"],
-        int(words["rows"]), float(words["unexplained"]),
-    )  # fmt: skip
+        tuple(words["names"]),
+        tuple(words["labels"]),
+        arrays["A"],
+        arrays["y"],
+        arrays["point"],
+        arrays["weight"],
+        int(words["rows"]),
+        float(words["unexplained"]),
+    )
     if reduction.A.shape != (len(reduction.y), len(reduction.names) + len(reduction.labels)):
         return None
     start = Start(tuple(words["start_names"]), arrays["start"], arrays["C_nb"], arrays["more"])
     times = Timetable(words["duration"], _spans(words["stops"]), _spans(words["turns"]))
     heat = words["temperature_degc"]
     return Report(
-        words["name"], "", "", reduction, words["estimator"], words["reason"], ImuSpecification(**words["imu"]), start,
-        int(words["start_ns"]), times, math.nan if heat is None else float(heat), words["data"],
+        words["name"],
+        "",
+        "",
+        reduction,
+        words["estimator"],
+        words["reason"],
+        ImuSpecification(**words["imu"]),
+        start,
+        int(words["start_ns"]),
+        times,
+        math.nan if heat is None else float(heat),
+        words["data"],
         FitStatistics(**words["statistics"]),
-        tuple(words["reported"]), arrays["values"], arrays["sigma"], tuple(words["notes"]),
+        tuple(words["reported"]),
+        arrays["values"],
+        arrays["sigma"],
+        tuple(words["notes"]),
         tuple(map(as_note, words["warnings"])),
-        float(words["heading_rad"]), tuple(_term(entry) for entry in words["noise"]), bool(words["widened"]),
+        float(words["heading_rad"]),
+        tuple(_term(entry) for entry in words["noise"]),
+        bool(words["widened"]),
         _places(arrays),
-    )  # fmt: skip
+    )
 
 
 def _places(arrays: dict[str, Any]) -> Places | None:

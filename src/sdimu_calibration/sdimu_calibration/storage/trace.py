@@ -54,10 +54,12 @@ def traced(bags: Sequence[Path] = (), arguments: Sequence[str] = (), **stated: s
     plan = next((said for bag in bags if (said := custom_data(bag).get("plan"))), None)
     named = {**stated, "plan": plan} if plan else stated
     return Trace(
-        datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"), f"sdimu {program_version()}",
+        datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
+        f"sdimu {program_version()}",
         shlex.join(["sdimu", *arguments]) if arguments else "",
-        tuple((key, str(value)) for key, value in named.items() if value), tuple(files),
-    )  # fmt: skip
+        tuple((key, str(value)) for key, value in named.items() if value),
+        tuple(files),
+    )
 
 
 def program_version() -> str:

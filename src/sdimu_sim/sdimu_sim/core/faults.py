@@ -328,5 +328,5 @@ FAULTS: tuple[Fault, ...] = (
     Fault("bump", "the IMU tips in 0.2 s of a dwell", "arcmin", (0.03, 0.3, 3.0, 30.0, 300.0), motion=_tilted(0.2)),
     Fault("creep", "the base tilts all through a dwell", "arcmin", (0.003, 0.03, 0.3, 3.0, 30.0), motion=_tilted(1e9)),
     Fault("table_stops", "the table stands still after", "of test", (0.95, 0.7, 0.4, 0.15, 0.03), motion=_table_stops),
-)  # fmt: skip
+)
 """Every kind, by rising size."""

@@ -49,12 +49,7 @@ class ImuGenerator:
     """Makes samples as motion comes in; the same digits however the motion is cut into blocks."""
 
     def __init__(
-        self,
-        truth: ImuTruth,
-        site: Site,
-        rate_hz: float,
-        seed: int,
-        temperature: TemperatureProfile | None = None,
+        self, truth: ImuTruth, site: Site, rate_hz: float, seed: int, temperature: TemperatureProfile | None = None
     ) -> None:
         self._truth, self._hidden = truth, parse_effects(truth.effects)
         if self._hidden.needs_temperature and temperature is None:
@@ -193,11 +188,7 @@ def simulate_imu(
     generator = ImuGenerator(truth, site, rate_hz, seed, temperature)
     parts = [
         generator.advance(
-            PlatformMotion(
-                motion.t[k : k + _BLOCK],
-                motion.q_nt[k : k + _BLOCK],
-                motion.omega_nt_t[k : k + _BLOCK],
-            )
+            PlatformMotion(motion.t[k : k + _BLOCK], motion.q_nt[k : k + _BLOCK], motion.omega_nt_t[k : k + _BLOCK])
         )
         for k in range(0, len(motion.t), _BLOCK)
     ]

@@ -110,21 +110,26 @@ _ROWS: tuple[Row, ...] = (
             Row(f"{triad}_scale_ramp_{{i}}", "ppm/h", f"k*t*{signal}"),
             # The first four modes of a random walk (Karhunen-Loeve): a size each.
             *(
-                Row(f"{triad}_bias_random_walk_{{i}}{m}", unit, f"k*sin({m - 0.5}*pi*min(t/span, 1))/({m - 0.5}*pi)",
-                    {"span": "s"}, drawn=False)
+                Row(
+                    f"{triad}_bias_random_walk_{{i}}{m}",
+                    unit,
+                    f"k*sin({m - 0.5}*pi*min(t/span, 1))/({m - 0.5}*pi)",
+                    {"span": "s"},
+                    drawn=False,
+                )
                 for m in (1, 2, 3, 4)
             ),
         )
     ),
     # The centre of mass moves at a constant rate: d along the axis named, q in quadrature to it.
-    *(
-        Row(f"gyro_mass_unbalance_ramp_{kind}{{i}}", "deg/h/g/h", f"k*t*a{{{kind}}}", drawn=False) for kind in "dq"
-    ),
+    *(Row(f"gyro_mass_unbalance_ramp_{kind}{{i}}", "deg/h/g/h", f"k*t*a{{{kind}}}", drawn=False) for kind in "dq"),
     *(
         row
         for word, per, power in (
-            ("temperature", "degC", "dT"), ("temperature_squared", "degC^2", "dT**2"),
-            ("temperature_cubed", "degC^3", "dT**3"), ("temperature_rate", "degC*min", "dTdt"),
+            ("temperature", "degC", "dT"),
+            ("temperature_squared", "degC^2", "dT**2"),
+            ("temperature_cubed", "degC^3", "dT**3"),
+            ("temperature_rate", "degC*min", "dTdt"),
             ("temperature_rate_linear", "degC^2*min", "dT*dTdt"),
         )
         for row in _by_temperature(word, per, power)
@@ -132,10 +137,15 @@ _ROWS: tuple[Row, ...] = (
     ),
     # The triad is turned by the angle k about axis i: the next axis turns towards the one after it, that away from it.
     *(
-        Row(f"accel_triad_{name}", unit, {"accel_{n}": f"k*{angle}*f{{m}}", "accel_{m}": f"-k*{angle}*f{{n}}"},
-            drawn=False)
+        Row(
+            f"accel_triad_{name}",
+            unit,
+            {"accel_{n}": f"k*{angle}*f{{m}}", "accel_{m}": f"-k*{angle}*f{{n}}"},
+            drawn=False,
+        )
         for name, unit, angle in (
-            ("ramp_{i}", "arcsec/h", "t"), ("temperature_{i}", "arcsec/degC", "dT"),
+            ("ramp_{i}", "arcsec/h", "t"),
+            ("temperature_{i}", "arcsec/degC", "dT"),
             ("flexure_{i}{any}", "arcsec/g", "a{any}"),
         )
     ),
@@ -152,13 +162,23 @@ _ROWS: tuple[Row, ...] = (
             Row(f"{triad}_bias_wrap_{{i}}{{any}}", unit, "k*wound{any}/(2*pi)", drawn=False),
             Row(f"{triad}_scale_temperature_rate_{{i}}", "ppm*min/degC", f"k*dTdt*{signal}", drawn=False),
             # Heating and cooling go along the two sides of a loop.
-            Row(f"{triad}_bias_temperature_hysteresis_{{i}}", unit, "k*tanh(slow/threshold)",
-                {"threshold": "degC/min"}, drawn=False),
-            Row(f"{triad}_scale_temperature_hysteresis_{{i}}", "ppm", f"k*tanh(slow/threshold)*{signal}",
-                {"threshold": "degC/min"}, drawn=False),
+            Row(
+                f"{triad}_bias_temperature_hysteresis_{{i}}",
+                unit,
+                "k*tanh(slow/threshold)",
+                {"threshold": "degC/min"},
+                drawn=False,
+            ),
+            Row(
+                f"{triad}_scale_temperature_hysteresis_{{i}}",
+                "ppm",
+                f"k*tanh(slow/threshold)*{signal}",
+                {"threshold": "degC/min"},
+                drawn=False,
+            ),
         )
     ),
-)  # fmt: skip
+)
 
 
 _TABLE: dict[str, Entry] = {name: entry for row in _ROWS for name, entry in expand(row)}
@@ -411,9 +431,7 @@ def _named_terms(key: EffectKey, size: float) -> list[Term]:
         if options.get(name, 1.0) <= 0.0:
             raise DataError(f"effect {key.name}: {name} must be positive")
     values = {"k": size, **options}
-    return [
-        Term(key.name, SENSORS.index(part.sensor), _parsed(part, values), values, part.memory) for part in parts
-    ]  # fmt: skip
+    return [Term(key.name, SENSORS.index(part.sensor), _parsed(part, values), values, part.memory) for part in parts]
 
 
 def _parsed(part: Part, values: Iterable[str]) -> Expression:

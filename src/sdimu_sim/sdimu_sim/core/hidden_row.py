@@ -68,7 +68,13 @@ def expand(row: Row) -> Iterable[tuple[str, Entry]]:
             letters |= {"n": n, "m": m}
             formulas = {f"{triad}_{i}": row.formula} if isinstance(row.formula, str) else row.formula
             memory = tuple(word.format(**letters) for word in row.memory)
-            yield row.names.format(**letters), Entry(row, tuple(
-                Part(sensor.format(**letters), formula.format(**letters), memory)
-                for sensor, formula in formulas.items()
-            ))  # fmt: skip
+            yield (
+                row.names.format(**letters),
+                Entry(
+                    row,
+                    tuple(
+                        Part(sensor.format(**letters), formula.format(**letters), memory)
+                        for sensor, formula in formulas.items()
+                    ),
+                ),
+            )

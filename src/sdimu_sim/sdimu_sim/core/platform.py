@@ -46,11 +46,7 @@ def _dot(a: Vector, b: Vector) -> float:
 
 @compiled
 def _sum3(a: float, x: Vector, b: float, y: Vector, c: float, z: Vector) -> Vector:
-    return (
-        a * x[0] + b * y[0] + c * z[0],
-        a * x[1] + b * y[1] + c * z[1],
-        a * x[2] + b * y[2] + c * z[2],
-    )
+    return (a * x[0] + b * y[0] + c * z[0], a * x[1] + b * y[1] + c * z[1], a * x[2] + b * y[2] + c * z[2])
 
 
 @compiled

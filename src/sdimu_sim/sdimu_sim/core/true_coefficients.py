@@ -158,9 +158,10 @@ def _small_errors(triad: str, part: Mapping[str, float]) -> Floats:
 def _of_power(sizes: Mapping[str, float], power: str) -> dict[str, float]:
     """Sizes of one power of the temperature, by the names that the baseline has."""
     return {
-        name.replace(f"_{power}_", "_"): size for name, size in sizes.items()
+        name.replace(f"_{power}_", "_"): size
+        for name, size in sizes.items()
         if name.rpartition("_")[0].endswith(f"_{power}")
-    }  # fmt: skip
+    }
 
 
 def _named(name: str, power: str) -> str:

@@ -41,9 +41,7 @@ from sdimu_sim.truth_file import write_truth
 
 WINDOW_SAMPLES = 200
 KEPT = 1000
-PATIENT = QoSProfile(
-    depth=KEPT, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
-)
+PATIENT = QoSProfile(depth=KEPT, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 """Keeps more than a window: a successor finds all that its predecessor had not acknowledged."""
 FAREWELL_S = 20.0
 TRUE_MOTION = "rate_table/true_motion"
@@ -71,9 +69,13 @@ class SdimuNode:
         _warm_up(ImuGenerator(imu, scenario.site, self._rate_hz, scenario.seed, profile))
         if truth_file:
             truth = Truth(
-                imu, scenario.site, scenario.seed, self._rate_hz, scenario.plan.name,
+                imu,
+                scenario.site,
+                scenario.seed,
+                self._rate_hz,
+                scenario.plan.name,
                 reference_degc=scenario.reference_degc,
-            )  # fmt: skip
+            )
             write_truth(Path(truth_file), truth)
 
         self._ready: deque[tuple[int, Any, Any]] = deque()  # stamp, publisher, message: in the order of stamps
@@ -84,9 +86,15 @@ class SdimuNode:
         ticker = Ticker(self.node)
         window = round(WINDOW_SAMPLES / self._rate_hz * NS)
         self._imu = Producer(
-            self.node, ticker, Imu, "imu/data_raw", window_ns=window, on_credit=self._pump, qos=stream,
+            self.node,
+            ticker,
+            Imu,
+            "imu/data_raw",
+            window_ns=window,
+            on_credit=self._pump,
+            qos=stream,
             patience_s=patience_s,
-        )  # fmt: skip
+        )
         # Without a profile there must be no publisher: the calibrator would wait for it.
         if self._thermometer is not None:
             self._temperature = self.node.create_publisher(Temperature, "imu/temperature", stream)

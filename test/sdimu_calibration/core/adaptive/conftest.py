@@ -25,9 +25,13 @@ def perfect_fit(plan: Plan, add: tuple[str, ...] = ()) -> FilterFit:
     nominal = prepare(plan, site, imu, model, None, None)
     setup = nominal.setup
     done = one_pass(
-        nominal.prepared, setup, nominal.start, nominal.start.C_nb, np.zeros(len(setup.sensors.prior)),
+        nominal.prepared,
+        setup,
+        nominal.start,
+        nominal.start.C_nb,
+        np.zeros(len(setup.sensors.prior)),
         closed_loop=False,
-    )  # fmt: skip
+    )
     solution = Solution(setup, nominal.prepared, nominal.start, done, done, 1, converged=True)
     test = PreparedTest(nominal.recording, imu, site)
     return FilterFit(test, model, setup.sensors, setup, nominal.prepared, nominal.start, solution)

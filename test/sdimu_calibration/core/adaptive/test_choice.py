@@ -19,10 +19,14 @@ from .conftest import ACCELERATION, part, perfect_fit
 
 GOALS = load_goals("table33")
 BOTH_SENSES = Plan(
-    "both senses", (30.0,) * 6,
-    tuple(Turn(axis, math.radians(angle), math.radians(10.0)) for axis, angle in
-          (("Y", 90.0), ("Y", -90.0), ("X", 90.0), ("Z", -90.0), ("Y", 90.0))), ACCELERATION,
-)  # fmt: skip
+    "both senses",
+    (30.0,) * 6,
+    tuple(
+        Turn(axis, math.radians(angle), math.radians(10.0))
+        for axis, angle in (("Y", 90.0), ("Y", -90.0), ("X", 90.0), ("Z", -90.0), ("Y", 90.0))
+    ),
+    ACCELERATION,
+)
 PAIR = ("gyro_scale_asymmetry_y", "gyro_scale_quadratic_y")
 
 

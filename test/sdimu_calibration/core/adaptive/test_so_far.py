@@ -9,9 +9,13 @@ from sdimu_calibration.core.effects.selection import resolve
 from .conftest import ACCELERATION, DWELLS, TURNS, part, perfect_fit
 
 MEMORIES = (
-    "gyro_bias_ramp_x", "gyro_bias_settling_y(tau=32 s)", "accel_play_y(r=0.3 g)", "accel_hysteresis_z",
-    "gyro_creep_z(tau=32 s)", "gyro_bias_wrap_xy",
-)  # fmt: skip
+    "gyro_bias_ramp_x",
+    "gyro_bias_settling_y(tau=32 s)",
+    "accel_play_y(r=0.3 g)",
+    "accel_hysteresis_z",
+    "gyro_creep_z(tau=32 s)",
+    "gyro_bias_wrap_xy",
+)
 
 
 @pytest.mark.parametrize("added", [(), MEMORIES], ids=["baseline", "effects that remember"])

@@ -15,9 +15,7 @@ from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.rotation import quaternion_matrix, rotation_matrix, rotation_vector
 from sdimu_calibration.core.specification import Site
 
-quaternions = (
-    st.tuples(*[st.floats(-1.0, 1.0)] * 4).map(np.array).filter(lambda q: np.linalg.norm(q) > 0.1)
-)
+quaternions = st.tuples(*[st.floats(-1.0, 1.0)] * 4).map(np.array).filter(lambda q: np.linalg.norm(q) > 0.1)
 FIXTURE = settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 
 

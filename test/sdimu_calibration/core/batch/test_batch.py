@@ -23,9 +23,11 @@ from sdimu_sim.core.truth import in_body_frame
 
 KIM18 = load_plan("kim18")
 SHORT = Plan(
-    "kim18 in a hurry", (20.0,) * 19,
-    tuple(replace(turn, rate_rad_s=np.radians(9.0)) for turn in KIM18.turns), np.radians(9.0),
-)  # fmt: skip
+    "kim18 in a hurry",
+    (20.0,) * 19,
+    tuple(replace(turn, rate_rad_s=np.radians(9.0)) for turn in KIM18.turns),
+    np.radians(9.0),
+)
 """The same orientations in ten minutes."""
 
 PERCENTS = ImuSpecification(

@@ -14,12 +14,15 @@ def random_chain(generator):
         steps = 0 if last else 3
         links.append(
             Link(
-                generator.standard_normal((6, OWN)), generator.standard_normal((6, COMMON)),
+                generator.standard_normal((6, OWN)),
+                generator.standard_normal((6, COMMON)),
                 generator.standard_normal(6),
-                generator.standard_normal((steps, OWN)), generator.standard_normal((steps, OWN)),
-                generator.standard_normal((steps, COMMON)), generator.standard_normal(steps),
+                generator.standard_normal((steps, OWN)),
+                generator.standard_normal((steps, OWN)),
+                generator.standard_normal((steps, COMMON)),
+                generator.standard_normal(steps),
             )
-        )  # fmt: skip
+        )
     return links
 
 

@@ -11,9 +11,14 @@ from sdimu_calibration.core.effects import selection
 from sdimu_calibration.core.results import Calibration, no_history
 
 BASELINE = (
-    "gyro_bias", "gyro_scale", "gyro_misalignment", "gyro_mass_unbalance", "accel_bias", "accel_scale",
+    "gyro_bias",
+    "gyro_scale",
+    "gyro_misalignment",
+    "gyro_mass_unbalance",
+    "accel_bias",
+    "accel_scale",
     "accel_misalignment",
-)  # fmt: skip
+)
 
 
 def made(effects: Sequence[str], size: float = 1.0, seed: int = 1, **data: float) -> Calibration:
@@ -28,10 +33,18 @@ def made(effects: Sequence[str], size: float = 1.0, seed: int = 1, **data: float
             values[k] = 0.0
     root = 0.01 * sigma[:, None] * rng.standard_normal((len(parameters), len(parameters)))
     return Calibration(
-        "accelerometer_triad", tuple(effects), tuple(p.name for p in parameters),
-        tuple(p.unit for p in parameters), tuple(p.display_unit for p in parameters), values, root @ root.T,
-        {}, dict(data), (), no_history(len(parameters)),
-    )  # fmt: skip
+        "accelerometer_triad",
+        tuple(effects),
+        tuple(p.name for p in parameters),
+        tuple(p.unit for p in parameters),
+        tuple(p.display_unit for p in parameters),
+        values,
+        root @ root.T,
+        {},
+        dict(data),
+        (),
+        no_history(len(parameters)),
+    )
 
 
 @pytest.fixture

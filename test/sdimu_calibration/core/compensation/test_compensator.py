@@ -187,9 +187,13 @@ def test_covariance_is_what_draws_of_coefficients_and_noise_scatter(make_result)
         gyro, accel, by_force, gyro_bias, accel_bias = (
             np.tensordot(drawn, np.array([getattr(part, name) for part in parts]) - base, axes=1) + base
             for name, base in (
-                ("gyro", np.eye(3)), ("accel", np.eye(3)), ("by_force", 0.0), ("gyro_bias", 0.0), ("accel_bias", 0.0),
+                ("gyro", np.eye(3)),
+                ("accel", np.eye(3)),
+                ("by_force", 0.0),
+                ("gyro_bias", 0.0),
+                ("accel_bias", 0.0),
             )
-        )  # fmt: skip
+        )
         noise = rng.standard_normal(6) * np.sqrt(using.noise / DT)
         f = np.linalg.solve(accel, force[0] + noise[3:] - accel_bias)
         w = np.linalg.solve(gyro, omega[0] + noise[:3] - gyro_bias - by_force @ f)

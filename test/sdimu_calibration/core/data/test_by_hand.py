@@ -24,9 +24,10 @@ FILES = tuple(map(load_imu, CLASSES))
 KIM18 = replace(load_plan("kim18"), dwell_s=(12.0,) * 19)
 # Turns so brisk that the table speeds up half of the way and slows down the other half.
 BRISK = replace(
-    KIM18, turns=tuple(replace(turn, rate_rad_s=np.radians(28.0)) for turn in KIM18.turns),
+    KIM18,
+    turns=tuple(replace(turn, rate_rad_s=np.radians(28.0)) for turn in KIM18.turns),
     acceleration_rad_s2=np.radians(40.0),
-)  # fmt: skip
+)
 
 
 @cache
@@ -67,10 +68,13 @@ def test_a_good_imu_in_a_hand_is_not_navigated():
 @pytest.mark.parametrize(
     ("imu", "proposed"),
     [
-        ("dtg", "dtg"), ("rlg_navigation", "dtg"), ("fog_tactical", "fog_tactical"),
-        ("mems_industrial", "mems_by_hand"), ("mems_consumer", "mems_by_hand"),
+        ("dtg", "dtg"),
+        ("rlg_navigation", "dtg"),
+        ("fog_tactical", "fog_tactical"),
+        ("mems_industrial", "mems_by_hand"),
+        ("mems_consumer", "mems_by_hand"),
     ],
-)  # fmt: skip
+)
 def test_the_grade_of_the_gyros_is_that_of_their_noise(imu, proposed):
     for recording in (by_hand(imu), on_table(imu)):
         found, note = propose(recording, FILES)

@@ -60,9 +60,7 @@ def test_a_sigma_of_few_rests_raises_no_more_false_alarms_than_one_of_many():
     rng = np.random.default_rng(8)
     sigma = 0.02 * earth.RATE
     drawn = zip(rng.standard_normal(3000), rng.chisquare(2.0, 3000), strict=True)
-    alarms = [
-        EarthRate(sigma * z, sigma * np.sqrt(c / 2.0), 9.8, 0.01, 6, 2.0).excludes(Site(0.0)) for z, c in drawn
-    ]
+    alarms = [EarthRate(sigma * z, sigma * np.sqrt(c / 2.0), 9.8, 0.01, 6, 2.0).excludes(Site(0.0)) for z, c in drawn]
     assert np.mean(alarms) < 0.002
     many = EarthRate(5.0 * sigma, sigma, 9.8, 0.01, 600, 596.0)
     assert many.excludes(Site(0.0))

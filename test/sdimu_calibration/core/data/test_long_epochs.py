@@ -16,9 +16,14 @@ def made(used, stop, first):
     none = np.zeros(m, bool)
     at = np.arange(m)
     epochs = Epochs(
-        10 * at, 10 * at + 10, at + 0.0, at + 1.0, rng.random(m), rng.standard_normal((m, 3)),
+        10 * at,
+        10 * at + 10,
+        at + 0.0,
+        at + 1.0,
+        rng.random(m),
         rng.standard_normal((m, 3)),
-    )  # fmt: skip
+        rng.standard_normal((m, 3)),
+    )
     gaps = Bridges(1.0 + rng.random(m), rng.random(m), rng.random(m))
     return epochs, Phases(used, used, first, stop, none, none), gaps
 

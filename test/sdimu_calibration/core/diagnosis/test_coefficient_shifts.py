@@ -43,8 +43,9 @@ def test_a_step_says_how_wrong_the_coefficients_were_and_in_which_sense(diagnosi
     sigma = before.conditional_sigma if before.conditional_sigma is not None else np.sqrt(np.diag(before.covariance))
     wrong = {
         name: (before.values[k] - after.values[after.names.index(name)]) / sigma[k]
-        for k, name in enumerate(before.names) if sigma[k] > 0.0
-    }  # fmt: skip
+        for k, name in enumerate(before.names)
+        if sigma[k] > 0.0
+    }
     told = [(name, size) for name, size in step.moved if abs(size) > 3.0 and name in wrong]
     assert told
     for name, size in told:

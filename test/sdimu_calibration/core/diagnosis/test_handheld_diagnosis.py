@@ -27,13 +27,31 @@ from sdimu_sim.core.by_hand import ByHand, by_hand_recording
 
 IMU, MODEL = load_imu("mems_by_hand"), load_model("hand")
 HIDDEN = (
-    "gyro_scale_asymmetry", "gyro_scale_quadratic", "gyro_scale_cubic", "gyro_misalignment_asymmetry", "gyro_g_squared",
-    "gyro_g_product", "accel_bias_asymmetry", "accel_quadratic", "accel_scale_asymmetry", "accel_cubic",
-    "accel_odd_quadratic", "accel_cross_coupling", "accel_cross_product", "accel_cross_square",
-)  # fmt: skip
+    "gyro_scale_asymmetry",
+    "gyro_scale_quadratic",
+    "gyro_scale_cubic",
+    "gyro_misalignment_asymmetry",
+    "gyro_g_squared",
+    "gyro_g_product",
+    "accel_bias_asymmetry",
+    "accel_quadratic",
+    "accel_scale_asymmetry",
+    "accel_cubic",
+    "accel_odd_quadratic",
+    "accel_cross_coupling",
+    "accel_cross_product",
+    "accel_cross_square",
+)
 SEEDS = (201, 202, 203)
-SHOWN = ("gyro_scale_asymmetry_x", "gyro_scale_cubic_z", "accel_quadratic_y", "accel_cross_coupling_xz",
-         "gyro_g_squared_xy", "accel_bias_ramp_z", "gyro_bias_ramp_y")  # fmt: skip
+SHOWN = (
+    "gyro_scale_asymmetry_x",
+    "gyro_scale_cubic_z",
+    "accel_quadratic_y",
+    "accel_cross_coupling_xz",
+    "gyro_g_squared_xy",
+    "accel_bias_ramp_z",
+    "gyro_bias_ramp_y",
+)
 
 
 @cache
@@ -155,8 +173,9 @@ def test_the_file_has_the_keys_of_every_diagnosis():
     assert one["parameters"][0]["unit"] == "m/s^2/g^2"
     assert written["where"][0]["normalised_mean"] == told.diagnosis.consistency.where[0].normalised_mean
     assert written["unexplained"] == {"is": False, "fraction": 0.0, "best_variables": []}
-    assert written["grown"][1]["beyond_white_noise"]["force_m_s2"] < (
-        written["grown"][0]["beyond_white_noise"]["force_m_s2"]
+    assert (
+        written["grown"][1]["beyond_white_noise"]["force_m_s2"]
+        < (written["grown"][0]["beyond_white_noise"]["force_m_s2"])
     )
 
 
@@ -189,9 +208,11 @@ def _draw(clean, rng):
     able = [
         (r, size)
         for r, prior in zip(clean.reached, evidence.prior, strict=True)
-        if r.testable and r.retention > 0.1 and r.family in HIDDEN
+        if r.testable
+        and r.retention > 0.1
+        and r.family in HIDDEN
         and (size := rng.uniform(8.0, 30.0) * r.smallest / POWER_80) < 3.0 * prior
-    ]  # fmt: skip
+    ]
     if not able:
         return None
     r, size = able[rng.integers(len(able))]

@@ -46,10 +46,19 @@ def linear_model(truth: Floats, noise: float = 1.0, ratio: float = 1.0) -> Bare:
     candidates = tuple(split(registry.get(name))[0] for name in names)
     e = W @ truth + noise * RNG.standard_normal(rows)
     return Bare(
-        e=e, W=W, stop=np.arange(rows) // 10, names=("a", "b", *(c.label for c in candidates)),
-        weight=np.full(2, 1e-6), shift=np.zeros(2), stated=np.ones(2), candidates=candidates, prior=ratio * PRIOR,
-        imu=load_imu("dtg"), times=cast("Any", None), coefficients=2,
-    )  # fmt: skip
+        e=e,
+        W=W,
+        stop=np.arange(rows) // 10,
+        names=("a", "b", *(c.label for c in candidates)),
+        weight=np.full(2, 1e-6),
+        shift=np.zeros(2),
+        stated=np.ones(2),
+        candidates=candidates,
+        prior=ratio * PRIOR,
+        imu=load_imu("dtg"),
+        times=cast("Any", None),
+        coefficients=2,
+    )
 
 
 def posterior(model: Bare, columns: list[int]) -> tuple[float, Floats, Floats]:

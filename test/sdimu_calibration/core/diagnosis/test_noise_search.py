@@ -24,9 +24,14 @@ FLICKER = ("gyro_noise_flicker=0.01 deg/h", "accel_noise_flicker=2 ug")
 
 def world(effects=(), noise=(), seed=1):
     scenario = Scenario(
-        load_plan("kim18_signed"), load_imu("dtg"), Site(math.radians(36.4), 0.0), rate_hz=20.0, seed=seed,
-        effects=effects, noise=noise,
-    )  # fmt: skip
+        load_plan("kim18_signed"),
+        load_imu("dtg"),
+        Site(math.radians(36.4), 0.0),
+        rate_hz=20.0,
+        seed=seed,
+        effects=effects,
+        noise=noise,
+    )
     sensor = imu_truth(scenario)
     recording = simulate(scenario, sensor)
     return PreparedTest(recording, scenario.imu, scenario.site), in_the_mean(sensor, recording, seed)

@@ -29,9 +29,14 @@ LIMIT = 4.0
 
 def fitted(seed: int, effects: dict[str, str]):
     scenario = Scenario(
-        load_plan("recommended"), load_imu("dtg"), SITE, TableSpecification(axes=None), rate_hz=20.0, seed=seed,
+        load_plan("recommended"),
+        load_imu("dtg"),
+        SITE,
+        TableSpecification(axes=None),
+        rate_hz=20.0,
+        seed=seed,
         effects=tuple(f"{name}={size}" for name, size in effects.items()),
-    )  # fmt: skip
+    )
     return solve(PreparedTest(generate(scenario)[0], load_imu("dtg"), SITE), load_model("baseline"), learn=False)
 
 
@@ -54,9 +59,7 @@ def test_noise_makes_no_pairs(evidence):
     made = 0
     for _ in range(100):
         problem = Problem(replace(evidence, e=rng.standard_normal(len(evidence.e))))
-        problem.evidence.__dict__["information"] = replace(
-            evidence.information, d=evidence.W.T @ problem.evidence.e
-        )  # fmt: skip
+        problem.evidence.__dict__["information"] = replace(evidence.information, d=evidence.W.T @ problem.evidence.e)
         columns = np.arange(problem.p, len(evidence.names))
         made += best_pair(problem, [], columns, LIMIT) is not None
     assert made < 6

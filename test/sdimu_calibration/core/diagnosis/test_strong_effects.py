@@ -21,9 +21,12 @@ from sdimu_calibration.storage.files.config import load_imu, load_model, load_pl
 from sdimu_sim.core.scenario import Scenario, generate
 
 HIDDEN = {
-    "accel_quadratic_z": "-50 ug/g^2", "accel_delay_z": "0.97 ms", "gyro_scale_quadratic_y": "-22 ppm*s/deg",
-    "gyro_scale_quadratic_z": "-18 ppm*s/deg", "gyro_magnetic_yz": "0.13 deg/h/G",
-}  # fmt: skip
+    "accel_quadratic_z": "-50 ug/g^2",
+    "accel_delay_z": "0.97 ms",
+    "gyro_scale_quadratic_y": "-22 ppm*s/deg",
+    "gyro_scale_quadratic_z": "-18 ppm*s/deg",
+    "gyro_magnetic_yz": "0.13 deg/h/G",
+}
 """Forty to fifty sigma each, the last one twenty."""
 SITE = Site(math.radians(60.0), 0.0)
 
@@ -31,9 +34,14 @@ SITE = Site(math.radians(60.0), 0.0)
 @pytest.fixture(scope="module")
 def fit():
     scenario = Scenario(
-        load_plan("kim18_signed"), load_imu("dtg"), SITE, TableSpecification(axes=None), rate_hz=20.0, seed=2,
+        load_plan("kim18_signed"),
+        load_imu("dtg"),
+        SITE,
+        TableSpecification(axes=None),
+        rate_hz=20.0,
+        seed=2,
         effects=tuple(f"{name}={size}" for name, size in HIDDEN.items()),
-    )  # fmt: skip
+    )
     return solve(PreparedTest(generate(scenario)[0], load_imu("dtg"), SITE), load_model("baseline"), learn=False)
 
 
@@ -76,9 +84,10 @@ def test_the_variants_of_a_cause_share_its_odds(fit):
 def look(chosen: int, chi2: float, net: float) -> SimpleNamespace:
     """A round that chose some effects without noise, with what is left."""
     return SimpleNamespace(
-        found=SimpleNamespace(chosen=range(chosen), noise=(), net=net), free=range(9),
+        found=SimpleNamespace(chosen=range(chosen), noise=(), net=net),
+        free=range(9),
         left_after=SimpleNamespace(chi2=chi2, dof=250, p_value=0.4),
-    )  # fmt: skip
+    )
 
 
 def test_an_equation_must_be_likelier_than_the_effects_it_stands_for():

@@ -33,9 +33,16 @@ def test_regressors_of_measured_motion_make_a_dead_band_of_noise(bench):
         setup, effect = fit.setup, registry.get("gyro_dead_band")
         evidence = _evidence(fit, ["gyro_dead_band"])
         measured = motion(
-            fit.prepared.cycles, fit.prepared.rest, setup.sensors, fit.estimate, fit.last.C_start.copy(),
-            setup.site.latitude_rad, setup.gravity, None, predicted=False,
-        )  # fmt: skip
+            fit.prepared.cycles,
+            fit.prepared.rest,
+            setup.sensors,
+            fit.estimate,
+            fit.last.C_start.copy(),
+            setup.site.latitude_rad,
+            setup.gravity,
+            None,
+            predicted=False,
+        )
         p = len(evidence.weight)
         noisy = columns(fit.prepared, replace(evidence.known, seen=measured), evidence.latitude, [effect])
         right.append(_scores(evidence))

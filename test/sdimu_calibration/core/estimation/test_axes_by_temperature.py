@@ -22,10 +22,12 @@ from sdimu_sim.core.true_coefficients import true_coefficients
 SITE = Site(latitude_rad=float(np.radians(36.4)))
 TURNING = ("gyro_misalignment_temperature", "accel_misalignment_temperature")
 EFFECTS = (
-    "accel_misalignment_temperature_xy=9 arcsec/degC", "accel_misalignment_temperature_yz=-14 arcsec/degC",
-    "accel_misalignment_temperature_zx=11 arcsec/degC", "gyro_misalignment_temperature_xz=-12 arcsec/degC",
+    "accel_misalignment_temperature_xy=9 arcsec/degC",
+    "accel_misalignment_temperature_yz=-14 arcsec/degC",
+    "accel_misalignment_temperature_zx=11 arcsec/degC",
+    "gyro_misalignment_temperature_xz=-12 arcsec/degC",
     "gyro_misalignment_temperature_zy=8 arcsec/degC",
-)  # fmt: skip
+)
 
 
 @pytest.mark.parametrize(
@@ -36,10 +38,15 @@ def test_a_ramp_gives_the_axes_of_every_temperature(imu, estimator):
     plan = load_plan("kim18_signed")
     recording, truth = generate(
         Scenario(
-            replace(plan, dwell_s=(40.0,) * len(plan.dwell_s)), imu, SITE, rate_hz=20.0, seed=5, effects=EFFECTS,
+            replace(plan, dwell_s=(40.0,) * len(plan.dwell_s)),
+            imu,
+            SITE,
+            rate_hz=20.0,
+            seed=5,
+            effects=EFFECTS,
             temperature=TemperatureProfile(rise=60.0, tau_s=1000.0),
         )
-    )  # fmt: skip
+    )
     model = load_model("baseline")
     # Gyros that see 0.01 deg/h see the case turn, unless their bias may follow the rate of the temperature.
     model = replace(model, effects=(*model.effects, *TURNING, "gyro_bias_temperature_rate"))

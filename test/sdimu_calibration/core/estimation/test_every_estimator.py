@@ -46,9 +46,13 @@ class Case:
 
 
 CASES = (
-    Case("dtg", "filter"), Case("mems_industrial", "second-order"), Case(HANDHELD_IMU, "handheld"),
-    Case("dtg", "batch"), Case("mems_industrial", "batch"), Case("dtg", "classical"),
-)  # fmt: skip
+    Case("dtg", "filter"),
+    Case("mems_industrial", "second-order"),
+    Case(HANDHELD_IMU, "handheld"),
+    Case("dtg", "batch"),
+    Case("mems_industrial", "batch"),
+    Case("dtg", "classical"),
+)
 TABLE_IMUS = ("dtg", "rlg_navigation", "fog_tactical", "mems_industrial", "mems_consumer")
 
 

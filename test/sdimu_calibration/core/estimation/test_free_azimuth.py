@@ -82,9 +82,12 @@ def test_an_effect_more_keeps_the_azimuth_free(hidden):
 def test_the_answer_is_the_same_for_every_azimuth_that_is_assumed(hidden, turned_deg):
     first, _ = hidden[0]
     turn = rotation_matrix(np.array([0.0, 0.0, math.radians(turned_deg)]))
-    sensors = np.array([0.0 if name in NAMES else value for name, value in zip(
-        first.start.names, first.start.coefficients, strict=True
-    )])  # fmt: skip
+    sensors = np.array(
+        [
+            0.0 if name in NAMES else value
+            for name, value in zip(first.start.names, first.start.coefficients, strict=True)
+        ]
+    )
     start = replace(first.start, coefficients=sensors, C_nb=turn @ first.start.C_nb)
     other = solve(first.test, first.model, "second-order", start, azimuth_free=True)
     sigma = np.sqrt(np.diag(first.covariance))
@@ -117,9 +120,7 @@ def test_a_filter_by_request_stays_and_warns():
 
 @pytest.mark.parametrize(("sigma_deg", "free"), [(3.0, False), (60.0, True)])
 def test_an_azimuth_that_the_site_states_counts_where_it_is_known_well_enough(sigma_deg, free):
-    stated = Site(
-        SITE.latitude_rad, 0.0, initial_azimuth_rad=0.0, initial_azimuth_sigma_rad=math.radians(sigma_deg)
-    )
+    stated = Site(SITE.latitude_rad, 0.0, initial_azimuth_rad=0.0, initial_azimuth_sigma_rad=math.radians(sigma_deg))
     fit, _ = solved(1, FLICKER, stated)
     assert fit.azimuth_free == free
 
@@ -154,10 +155,14 @@ def test_a_set_takes_each_recording_without_its_azimuth(hidden):
 def test_a_navigation_without_aid_drifts_as_promised_in_the_noise_that_was_learned(hidden):
     """White noise promises a ninth: it knows neither that the biases wander nor that their wander bent the fit."""
     learned, white = (
-        [(d.distance[-1] / d.promised[-1]) ** 2 for fit in fits for trial in fit.free_inertial([])
-         for d in trial.drifts[1:]]
+        [
+            (d.distance[-1] / d.promised[-1]) ** 2
+            for fit in fits
+            for trial in fit.free_inertial([])
+            for d in trial.drifts[1:]
+        ]
         for fits in ([fit for fit, _ in hidden], [fit.with_noise(None) for fit, _ in hidden])
-    )  # fmt: skip
+    )
     assert np.sqrt(np.mean(white)) > 4.0
     assert 0.3 < np.sqrt(np.mean(learned)) < 2.5
 

@@ -27,10 +27,15 @@ def test_a_lag_is_seen_as_a_rate_coefficient_of_minus_the_lag_times_the_temperat
     )
     recording, truth = generate(
         Scenario(
-            replace(plan, dwell_s=(40.0,) * len(plan.dwell_s)), imu, SITE, rate_hz=20.0, seed=9, temperature=profile,
+            replace(plan, dwell_s=(40.0,) * len(plan.dwell_s)),
+            imu,
+            SITE,
+            rate_hz=20.0,
+            seed=9,
+            temperature=profile,
             effects=tuple(f"{name}={size} {unit}" for name, (size, unit) in COEFFICIENTS.items()),
         )
-    )  # fmt: skip
+    )
     assert truth.reference_degc == 20.0
     assert recording.temperature.origin_degc == 20.0
     model = load_model("baseline")

@@ -49,10 +49,11 @@ def hand_run(imu):
 @pytest.mark.parametrize(
     ("imu", "made", "estimator"),
     [
-        ("dtg", table_test, "filter"), ("mems_industrial", table_test, "second-order"),
+        ("dtg", table_test, "filter"),
+        ("mems_industrial", table_test, "second-order"),
         ("mems_by_hand", hand_run, "handheld"),
     ],
-)  # fmt: skip
+)
 def test_another_reference_moves_the_biases_by_the_coefficient_and_no_prediction(imu, made, estimator):
     recording, site, model = made(load_imu(imu))
     imu = open_minded(load_imu(imu))
@@ -76,9 +77,7 @@ def test_another_reference_moves_the_biases_by_the_coefficient_and_no_prediction
     kept = [i for name, i in of.items() if "_bias_" not in name and sigma[i] > 0.0]
     assert np.all(np.abs(after.values - before.values)[kept] < 0.01 * sigma[kept])
 
-    used = [
-        compensate_recording(compensator(r, imu, has_temperature=True), recording) for r in (before, after)
-    ]
+    used = [compensate_recording(compensator(r, imu, has_temperature=True), recording) for r in (before, after)]
     for field, size in (("omega_ib_b", "gyro_bias_x"), ("f_ib_b", "accel_bias_x")):
         difference = getattr(used[1], field) - getattr(used[0], field)
         assert np.abs(difference).max() < 0.02 * sigma[of[size]]

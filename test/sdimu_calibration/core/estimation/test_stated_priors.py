@@ -78,9 +78,9 @@ def test_an_estimator_that_takes_no_prior_says_so(prepared):
 def test_a_model_file_states_priors_in_customary_units(tmp_path):
     path = tmp_path / "model.yaml"
     path.write_text(
-        "format: sdimu-model/1\neffects: [gyro_bias]\npriors:\n"
-        "  gyro_bias_x: {value: -2 deg/h, sigma: 0 deg/h}\n", encoding="utf-8",
-    )  # fmt: skip
+        "format: sdimu-model/1\neffects: [gyro_bias]\npriors:\n  gyro_bias_x: {value: -2 deg/h, sigma: 0 deg/h}\n",
+        encoding="utf-8",
+    )
     (one,) = load_model(path).priors
     assert one.mean == pytest.approx(-2.0 * np.pi / 180.0 / 3600.0)
     assert (one.name, one.sigma, one.unit) == ("gyro_bias_x", 0.0, "deg/h")

@@ -24,9 +24,20 @@ SIZES = np.array([DEG_H] * 3 + [100 * PPM] * 3)
 def result(values: np.ndarray, sigmas: np.ndarray, power_on: str = "", **more: object) -> Calibration:
     origin = Origin("A", power_on, temperature_low_degc=20.0, temperature_high_degc=30.0, rate_rad_s=0.1, site="lab")
     return Calibration(
-        "accelerometer_triad", ("gyro_bias", "gyro_scale"), NAMES, ("rad/s",) * 3 + ("1",) * 3,
-        ("deg/h",) * 3 + ("ppm",) * 3, values, np.diag(sigmas**2), {}, {}, (), no_history(6), origin=origin, **more,
-    )  # fmt: skip
+        "accelerometer_triad",
+        ("gyro_bias", "gyro_scale"),
+        NAMES,
+        ("rad/s",) * 3 + ("1",) * 3,
+        ("deg/h",) * 3 + ("ppm",) * 3,
+        values,
+        np.diag(sigmas**2),
+        {},
+        {},
+        (),
+        no_history(6),
+        origin=origin,
+        **more,
+    )
 
 
 def sheet_of(results: list[Calibration], **more: object) -> dict[str, Line]:
@@ -99,10 +110,13 @@ def test_noise_comes_from_rests_first_then_from_what_was_learned_then_from_a_fil
     term = "gyro bias in-run stability"
     learned = result(SIZES, 0.1 * SIZES, noise=(NoiseTerm("gyro", "flicker", 0.0, 2e-8, 1e-8, 3e-8),))
     stated = NoiseOfUnit("dtg.yaml", stated={("gyro", "instability"): 5e-8})
-    rests = NoiseOfUnit("still", {
-        f"gyro_{axis}": Terms(np.array([0.0, 1e-7, size, 0.0]), np.array([1e-9, 1e-9, 1e-9, 1e-10]))
-        for axis, size in zip("xyz", (6e-8, 7e-8, 0.0), strict=True)
-    })  # fmt: skip
+    rests = NoiseOfUnit(
+        "still",
+        {
+            f"gyro_{axis}": Terms(np.array([0.0, 1e-7, size, 0.0]), np.array([1e-9, 1e-9, 1e-9, 1e-10]))
+            for axis, size in zip("xyz", (6e-8, 7e-8, 0.0), strict=True)
+        },
+    )
     assert sheet_of([learned], noise=[stated, rests])[term].value == 7e-8
     assert sheet_of([learned], noise=[stated])[term].value == 2e-8
     alone = sheet_of([result(SIZES, 0.1 * SIZES)], noise=[stated])[term]

@@ -96,7 +96,8 @@ def test_an_extra_force_at_rest_is_learned_and_widens_the_sigmas(site):
     moved = np.concatenate([[0.0], np.cumsum(np.linalg.norm(recording.omega_ib_b, axis=1) > 0.3)])[1:]
     level = rng.standard_normal((int(moved[-1]) + 1, 3)) * 0.05
     shaken = calibrate(
-        replace(recording, f_ib_b=recording.f_ib_b + level[moved.astype(int)]), None, MEMS, MODEL, estimator="handheld")
+        replace(recording, f_ib_b=recording.f_ib_b + level[moved.astype(int)]), None, MEMS, MODEL, estimator="handheld"
+    )
     i = plain.names.index("accel_bias_x")
     # 0.05 m/s^2 against 150 ug of noise over 3 s: 60 times as much.
     assert 20.0 < np.sqrt(shaken.covariance[i, i] / plain.covariance[i, i]) < 180.0
@@ -146,9 +147,7 @@ def test_turns_that_nobody_saw_say_nothing_and_spoil_nothing(site, every):
     total, dof = 0.0, 0
     for seed in (11, 12, 13):
         recording, truth = by_hand_recording(ByHand(24, MEMS, site, seed=seed))
-        found = calibrate(
-            without_turns(recording, lambda i: i % every == 0), None, MEMS, MODEL, estimator="handheld"
-        )
+        found = calibrate(without_turns(recording, lambda i: i % every == 0), None, MEMS, MODEL, estimator="handheld")
         true = in_body_frame(
             against_gravity(truth, STANDARD_GRAVITY, gravity_of(site)).imu.coefficients, found.body_frame
         )
@@ -174,6 +173,8 @@ def test_rests_are_listed_and_their_residuals_in_sigmas_make_the_chi_square_of_t
     assert np.isnan(found.rests[0].turn).all()
     squares = [
         np.sum(np.square(getattr(r, name)) / getattr(r, f"{name}_sigma") ** 2)
-        for r in found.rests for name in ("rate", "force", "turn") if np.isfinite(getattr(r, name)).all()
-    ]  # fmt: skip
+        for r in found.rests
+        for name in ("rate", "force", "turn")
+        if np.isfinite(getattr(r, name)).all()
+    ]
     assert np.sum(squares) == pytest.approx(found.fit["nis_mean"] * found.fit["nis_dof"], rel=1e-9)

@@ -56,24 +56,42 @@ def switched_on(seed: int, power_on: int) -> dict[str, float]:
 
 @lru_cache(maxsize=8)
 def _recorded(
-    seed: int, number: int, plan: Plan, effects: tuple[str, ...], shift: tuple[tuple[str, float], ...],
-    mount: tuple[float, float, float] | None, power_on: int, noise: tuple[str, ...] = (),
+    seed: int,
+    number: int,
+    plan: Plan,
+    effects: tuple[str, ...],
+    shift: tuple[tuple[str, float], ...],
+    mount: tuple[float, float, float] | None,
+    power_on: int,
+    noise: tuple[str, ...] = (),
     temperature: TemperatureProfile | None = None,
-) -> PreparedTest:  # fmt: skip
+) -> PreparedTest:
     own = switched_on(seed, power_on)
     own |= {name: own[name] + size for name, size in shift}
     scenario = Scenario(
-        plan, IMU, SITE, rate_hz=10.0, seed=1000 * seed + number, coefficients=own, effects=effects, mount_rad=mount,
-        start_ns=(1_700_000_000 + 86_400 * number) * 10**9, noise=noise, temperature=temperature,
-    )  # fmt: skip
+        plan,
+        IMU,
+        SITE,
+        rate_hz=10.0,
+        seed=1000 * seed + number,
+        coefficients=own,
+        effects=effects,
+        mount_rad=mount,
+        start_ns=(1_700_000_000 + 86_400 * number) * 10**9,
+        noise=noise,
+        temperature=temperature,
+    )
     return PreparedTest(simulate(scenario, imu_truth(scenario)), IMU, SITE)
 
 
 def unit_set(
-    seed: int, plans: Sequence[Plan], effects: tuple[str, ...] = (),
-    shift: Mapping[int, Mapping[str, float]] | None = None, noise: tuple[str, ...] = (),
+    seed: int,
+    plans: Sequence[Plan],
+    effects: tuple[str, ...] = (),
+    shift: Mapping[int, Mapping[str, float]] | None = None,
+    noise: tuple[str, ...] = (),
     temperature: Sequence[TemperatureProfile] = (),
-) -> UnitSet:  # fmt: skip
+) -> UnitSet:
     members = []
     for k, plan in enumerate(plans):
         own = tuple((shift or {}).get(k, {}).items())

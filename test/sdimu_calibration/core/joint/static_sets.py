@@ -62,10 +62,13 @@ def cut(recording: Recording, start_s: float, end_s: float, stop: int) -> Record
     """Return the part of a recording that lies in one of its stops."""
     rows = (recording.t > start_s) & (recording.t <= end_s)
     return replace(
-        recording, start_ns=recording.start_ns + round(start_s * 1e9), t=recording.t[rows] - start_s,
-        omega_ib_b=recording.omega_ib_b[rows], f_ib_b=recording.f_ib_b[rows],
+        recording,
+        start_ns=recording.start_ns + round(start_s * 1e9),
+        t=recording.t[rows] - start_s,
+        omega_ib_b=recording.omega_ib_b[rows],
+        f_ib_b=recording.f_ib_b[rows],
         phase=PhaseLog(np.zeros(1), np.ones(1, dtype=bool), np.array([stop])),
-    )  # fmt: skip
+    )
 
 
 def rests(grade: str, seed: int, turns: Sequence[Turn] = CUBE) -> tuple[Member, ...]:

@@ -159,7 +159,7 @@ def _found(answer: tuple[str, ...], apart: bool, scores: tuple[float, float, flo
         (_found((), True, (0.1, 2.5, np.nan)), "is open: nearest is the same time after the start", "--backwards"),
         (_found((), True, (np.nan, np.nan, np.nan)), "share too few stops", "--backwards"),
     ],
-)  # fmt: skip
+)
 def test_words_say_what_it_belongs_to_and_what_to_do(found, words, step):
     assert words in answer_in_words(found, True)
     assert step in sentence(next_steps(found)[0])
@@ -216,10 +216,12 @@ def _answers(
 @pytest.mark.parametrize(
     ("effects", "kind"),
     [
-        (OF_ATTITUDE, ATTITUDE), (("gyro_x: sin(7 fx/g + 4 fy/g)=0.2 deg/h",), ATTITUDE), (OF_TIME, TIME),
+        (OF_ATTITUDE, ATTITUDE),
+        (("gyro_x: sin(7 fx/g + 4 fy/g)=0.2 deg/h",), ATTITUDE),
+        (OF_TIME, TIME),
         (("gyro_x: sin(2 pi t/700 s)=0.2 deg/h",), TIME),
     ],
-)  # fmt: skip
+)
 def test_two_recordings_say_what_comes_back(effects, kind):
     answers = _answers(range(1, 11), [FORTH, BACK], effects)
     assert answers.count((kind,)) >= 8

@@ -42,9 +42,7 @@ def coning_attitude(t):
 
 def coning_angle(t):
     """Integral of its body rate: (-W sin c sin Wt, W sin c cos Wt, -W (1 - cos c))."""
-    return np.array(
-        [np.sin(CONE) * np.cos(SPIN * t), np.sin(CONE) * np.sin(SPIN * t), -SPIN * (1 - np.cos(CONE)) * t]
-    )
+    return np.array([np.sin(CONE) * np.cos(SPIN * t), np.sin(CONE) * np.sin(SPIN * t), -SPIN * (1 - np.cos(CONE)) * t])
 
 
 def coning_drift(rate_hz, C_nb, seconds=4.0):
@@ -101,9 +99,10 @@ def sculling_error(rate_hz, C_nb, seconds=4.0):
     assert count * period == pytest.approx(end, abs=1e-12)
 
     def over_period(function):
-        return count * quad(
-            lambda t: PUSH * np.sin(SPIN * t) * function(ROCK * np.sin(SPIN * t)), 0.0, period, epsabs=1e-13
-        )[0]
+        return (
+            count
+            * quad(lambda t: PUSH * np.sin(SPIN * t) * function(ROCK * np.sin(SPIN * t)), 0.0, period, epsabs=1e-13)[0]
+        )
 
     exact = C_nb @ np.array([0.0, over_period(np.cos), over_period(np.sin)])
     return float(np.linalg.norm(v - exact)) / seconds
@@ -164,9 +163,7 @@ def test_cycles_end_on_tenths_of_a_second_and_close_early_in_fast_motion():
 
 
 @given(
-    st.lists(st.integers(0, 40), min_size=1, max_size=30),
-    st.integers(0, 2**32 - 1),
-    st.sampled_from([0.0, 0.1, 3.0]),
+    st.lists(st.integers(0, 40), min_size=1, max_size=30), st.integers(0, 2**32 - 1), st.sampled_from([0.0, 0.1, 3.0])
 )
 def test_cycles_do_not_depend_on_how_samples_were_cut(lengths, seed, rate):
     rng = np.random.default_rng(seed)

@@ -75,7 +75,7 @@ def test_a_jump_between_rests_does_not_enter():
     first, second = rng.standard_normal((2, 4_000))
     apart, moved = (allan([first, second + jump], DT) for jump in (0.0, 100.0))
     np.testing.assert_allclose(apart.deviation, moved.deviation, rtol=1e-9)
-    own = [allan([stretch], DT).deviation**2 for stretch in (first, second)]
+    own = [allan([stretch], DT).deviation ** 2 for stretch in (first, second)]
     np.testing.assert_allclose(apart.deviation[: len(own[0])] ** 2, np.mean(own, axis=0), rtol=1e-9)
 
 
@@ -165,8 +165,9 @@ def test_white_noise_is_found_with_the_error_claimed():
     for seed in range(SEEDS):
         found = white_noise(recording(np.random.default_rng(seed)))
         for value, sigma, truth in (
-            (found.gyro, found.gyro_sigma, 1e-4 * np.sqrt(DT)), (found.accel, found.accel_sigma, 1e-3 * np.sqrt(DT))
-        ):  # fmt: skip
+            (found.gyro, found.gyro_sigma, 1e-4 * np.sqrt(DT)),
+            (found.accel, found.accel_sigma, 1e-3 * np.sqrt(DT)),
+        ):
             z.append((value - truth) / sigma)
     # 80 numbers: one sigma of their RMS is 0.08, of their mean 0.11; three and four of them.
     assert 0.76 < np.sqrt(np.mean(np.square(z))) < 1.24

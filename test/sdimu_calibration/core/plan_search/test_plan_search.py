@@ -70,10 +70,15 @@ def test_a_limit_on_what_is_not_estimated_is_refused():
 
 def test_asymmetry_and_quadratic_term_are_told_apart_by_another_rate_about_their_axis():
     short = Plan(
-        "short", (60.0,) * 4,
-        (Turn("Y", math.pi, math.radians(2.0)), Turn("Y", -math.pi, math.radians(2.0)),
-         Turn("Z", 0.5 * math.pi, math.radians(2.0))), math.radians(1.0),
-    )  # fmt: skip
+        "short",
+        (60.0,) * 4,
+        (
+            Turn("Y", math.pi, math.radians(2.0)),
+            Turn("Y", -math.pi, math.radians(2.0)),
+            Turn("Z", 0.5 * math.pi, math.radians(2.0)),
+        ),
+        math.radians(1.0),
+    )
     ranked = next_turn(short, ASKED, ("gyro_scale_asymmetry_y", "gyro_scale_quadratic_y"))
     best = ranked[0]
     assert {turn.axis for turn in best.turns} == {"Y"}

@@ -15,9 +15,26 @@ from sdimu_sim.core.scenario import Scenario, generate
 
 # Directions of X, Y, Z at the 19 stops as Kim, Song & Lyou print them.
 STOPS = (
-    "NED", "UEN", "DES", "UEN", "EDN", "WUN", "EDN", "ENU", "ESD", "ENU",
-    "EUS", "ESD", "EDN", "DWN", "WUN", "UEN", "SEU", "DES", "NED",
-)  # fmt: skip
+    "NED",
+    "UEN",
+    "DES",
+    "UEN",
+    "EDN",
+    "WUN",
+    "EDN",
+    "ENU",
+    "ESD",
+    "ENU",
+    "EUS",
+    "ESD",
+    "EDN",
+    "DWN",
+    "WUN",
+    "UEN",
+    "SEU",
+    "DES",
+    "NED",
+)
 DIRECTION = {"N": (1, 0, 0), "S": (-1, 0, 0), "E": (0, 1, 0), "W": (0, -1, 0), "D": (0, 0, 1), "U": (0, 0, -1)}
 
 

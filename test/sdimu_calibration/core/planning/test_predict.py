@@ -65,10 +65,14 @@ def test_gyro_scale_is_seen_only_after_a_turn_about_its_axis(imu, model, site):
 def test_every_site_but_the_poles_reaches_the_figures_of_the_paper_by_far(imu, model, latitude_deg, height_m, site):
     found = predict(KIM18, replace(site, latitude_rad=np.radians(latitude_deg), height_m=height_m), imu, model)
     limits = {
-        "gyro_bias": "0.003 deg/h", "gyro_scale": "1.0 ppm", "gyro_misalignment": "0.01 arcmin",
-        "gyro_mass_unbalance": "0.0045 deg/h/g", "accel_bias": "0.45 ug", "accel_scale": "0.5 ppm",
+        "gyro_bias": "0.003 deg/h",
+        "gyro_scale": "1.0 ppm",
+        "gyro_misalignment": "0.01 arcmin",
+        "gyro_mass_unbalance": "0.0045 deg/h/g",
+        "accel_bias": "0.45 ug",
+        "accel_scale": "0.5 ppm",
         "accel_misalignment": "0.008 arcmin",
-    }  # fmt: skip
+    }
     largest = largest_by_effect(found)
     for effect, text in limits.items():
         value, unit = text.split()

@@ -84,9 +84,15 @@ def test_errors_are_undone_exactly(imu, model, site):
     perfect = replace(imu, gyro_white_noise=0.0, accel_white_noise=0.0)
     recording, truth = generate(Scenario(KIM18, perfect, site, seed=7, rate_hz=20.0, coefficients={}))
     bent, bent_truth = generate(
-        Scenario(KIM18, replace(PERCENTS, gyro_white_noise=0.0, accel_white_noise=0.0), site, seed=7, rate_hz=20.0,
-                 mount_rad=truth.imu.mount_rad)
-    )  # fmt: skip
+        Scenario(
+            KIM18,
+            replace(PERCENTS, gyro_white_noise=0.0, accel_white_noise=0.0),
+            site,
+            seed=7,
+            rate_hz=20.0,
+            mount_rad=truth.imu.mount_rad,
+        )
+    )
     setup = set_up(site, PERCENTS, model)
     true, measured = reduce(recording, setup).cycles, reduce(bent, setup).cycles
     n = min(len(true), len(measured))
@@ -159,9 +165,7 @@ def test_what_speaks_against_a_result_is_in_it(model, site):
     recording, _ = generate(Scenario(KIM18, PERCENTS, site, seed=201, rate_hz=20.0))
     kept = np.ones(len(recording.t), dtype=bool)
     kept[1000] = False
-    gap = replace(
-        recording, t=recording.t[kept], omega_ib_b=recording.omega_ib_b[kept], f_ib_b=recording.f_ib_b[kept]
-    )
+    gap = replace(recording, t=recording.t[kept], omega_ib_b=recording.omega_ib_b[kept], f_ib_b=recording.f_ib_b[kept])
     found = calibrate(gap, site, PERCENTS, model, held_out=False)
     assert found.faults
     assert found.data["lost"] == 1.0

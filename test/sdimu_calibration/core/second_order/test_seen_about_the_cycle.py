@@ -42,9 +42,16 @@ def test_second_order_passes_see_the_rates_that_the_passes_of_the_filter_see(per
     nothing = np.zeros(len(setup.sensors.prior))
     seen = linearise(prepared, setup, np.eye(3), nothing).seen
     expected = motion(
-        prepared.cycles, prepared.rest, setup.sensors, nothing, np.eye(3), setup.site.latitude_rad, setup.gravity,
-        prepared.temperature, predicted=True,
-    )  # fmt: skip
+        prepared.cycles,
+        prepared.rest,
+        setup.sensors,
+        nothing,
+        np.eye(3),
+        setup.site.latitude_rad,
+        setup.gravity,
+        prepared.temperature,
+        predicted=True,
+    )
     assert np.abs(expected.alpha).max() > np.radians(100.0)
     assert seen.alpha == pytest.approx(expected.alpha, abs=1e-6)
     assert np.array_equal(seen.temperature_rate, expected.temperature_rate)
@@ -57,9 +64,17 @@ def test_a_filter_that_runs_while_samples_arrive_sees_no_later_temperature_or_ra
 
     def seen(cycles, log):
         return motion(
-            cycles, prepared.rest[: len(cycles)], setup.sensors, nothing, np.eye(3), setup.site.latitude_rad,
-            setup.gravity, log, predicted=False, causal=True,
-        )  # fmt: skip
+            cycles,
+            prepared.rest[: len(cycles)],
+            setup.sensors,
+            nothing,
+            np.eye(3),
+            setup.site.latitude_rad,
+            setup.gravity,
+            log,
+            predicted=False,
+            causal=True,
+        )
 
     log, until = prepared.temperature, float(prepared.cycles.t[here - 1])
     so_far = TemperatureLog(log.t[log.t <= until], log.value[log.t <= until])

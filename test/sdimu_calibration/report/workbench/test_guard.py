@@ -33,9 +33,18 @@ def test_names_of_this_machine_are_answered(server, host):
 
 @pytest.mark.parametrize(
     "host",
-    ["evil.example", "evil.example:8050", "127.0.0.1.evil.example", "localhost.evil.example", "192.168.1.7", "0.0.0.0",
-     "", "127.0.0.1@evil.example", "evil.example#127.0.0.1"],
-)  # fmt: skip
+    [
+        "evil.example",
+        "evil.example:8050",
+        "127.0.0.1.evil.example",
+        "localhost.evil.example",
+        "192.168.1.7",
+        "0.0.0.0",
+        "",
+        "127.0.0.1@evil.example",
+        "evil.example#127.0.0.1",
+    ],
+)
 @pytest.mark.parametrize("path", ["/", "/_dash-layout", "/_dash-dependencies"])
 def test_other_names_are_refused_on_every_path(server, host, path):
     assert server.test_client().get(path, headers={"Host": host}).status_code in {400, 403}

@@ -77,8 +77,10 @@ class Page:
         told = {k.replace("__", "-").replace("_at_", "."): v for k, v in values.items()}
         known = {"state.data": self.state, "look.data": look, **told}
         (callback,) = [
-            c for c in self.callbacks
-            if output in c["output"] and c["clientside_function"] is None
+            c
+            for c in self.callbacks
+            if output in c["output"]
+            and c["clientside_function"] is None
             and changed in {f"{one['id']}.{one['property']}" for one in c["inputs"]}
         ]
         parts = [o.rsplit(".", 1) for o in callback["output"].strip(".").split("...")]
@@ -88,9 +90,12 @@ class Page:
             return [{**p, "value": known.get(f"{p['id']}.{p['property']}")} for p in places]
 
         body = {
-            "output": callback["output"], "outputs": outputs if callback["output"].startswith("..") else outputs[0],
-            "inputs": filled(callback["inputs"]), "state": filled(callback["state"]), "changedPropIds": [changed],
-        }  # fmt: skip
+            "output": callback["output"],
+            "outputs": outputs if callback["output"].startswith("..") else outputs[0],
+            "inputs": filled(callback["inputs"]),
+            "state": filled(callback["state"]),
+            "changedPropIds": [changed],
+        }
         done = self.client.post("/_dash-update-component", data=json.dumps(body), content_type="application/json")
         assert done.status_code == 200
         return done.get_json()
@@ -359,9 +364,7 @@ def test_a_prior_that_the_data_contradict_gets_no_tick_and_is_named(app, bench):
     prior = ("gyro_scale_y", "-2000 ppm", "10 ppm")
     page = Page(app)
     page.add(HIDDEN)
-    page.click(
-        "set-prior.n_clicks", coefficient_at_value=prior[0], mean_at_value=prior[1], sigma_at_value=prior[2]
-    )  # fmt: skip
+    page.click("set-prior.n_clicks", coefficient_at_value=prior[0], mean_at_value=prior[1], sigma_at_value=prior[2])
     shown = page.shown()
     assert shown["verdict"]["className"] != "verdict good"
     (told,) = (line for line in bench.fit(Setting((HIDDEN,), priors=(prior,))).calibration.warnings if "stated" in line)

@@ -21,9 +21,14 @@ from sdimu_calibration.core.specification import ImuSpecification
 from sdimu_calibration.storage.export import FORMS, export
 
 BASELINE = (
-    "gyro_bias", "gyro_scale", "gyro_misalignment", "gyro_mass_unbalance", "accel_bias", "accel_scale",
+    "gyro_bias",
+    "gyro_scale",
+    "gyro_misalignment",
+    "gyro_mass_unbalance",
+    "accel_bias",
+    "accel_scale",
     "accel_misalignment",
-)  # fmt: skip
+)
 IMU = ImuSpecification("mems", 1e-4, 1e-3, grade="mems")
 ROUNDING = 1e-12
 Apply = Callable[[Path, np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
@@ -38,10 +43,18 @@ def result(*effects: str, seed: int = 1) -> Calibration:
     pinned = [p.name.startswith("accel_misalignment_") and p.name.endswith(("xy", "xz", "yx")) for p in parameters]
     values[np.array(pinned)] = 0.0
     return Calibration(
-        "accelerometer_triad", tuple(effects), tuple(p.name for p in parameters), tuple(p.unit for p in parameters),
-        tuple(p.display_unit for p in parameters), values, np.diag((0.01 * values) ** 2), {}, {}, (),
+        "accelerometer_triad",
+        tuple(effects),
+        tuple(p.name for p in parameters),
+        tuple(p.unit for p in parameters),
+        tuple(p.display_unit for p in parameters),
+        values,
+        np.diag((0.01 * values) ** 2),
+        {},
+        {},
+        (),
         no_history(len(values)),
-    )  # fmt: skip
+    )
 
 
 def raw(n: int = 50) -> tuple[np.ndarray, np.ndarray]:
@@ -119,8 +132,13 @@ def by_c(path: Path, w: np.ndarray, f: np.ndarray) -> tuple[np.ndarray, np.ndarr
 
 
 READERS: dict[str, Apply] = {
-    "matrices": by_matrices, "yaml": by_yaml, "csv": by_csv, "kalibr": by_kalibr, "imu_tk": by_imu_tk, "c-header": by_c
-}  # fmt: skip
+    "matrices": by_matrices,
+    "yaml": by_yaml,
+    "csv": by_csv,
+    "kalibr": by_kalibr,
+    "imu_tk": by_imu_tk,
+    "c-header": by_c,
+}
 
 
 @pytest.mark.parametrize("form", FORMS)
@@ -138,10 +156,14 @@ def test_a_form_applied_to_raw_samples_gives_the_numbers_of_the_core(form: str, 
 
 
 WARM = (
-    *(f"{base}_temperature" for base in BASELINE), *(f"{base}_temperature_squared" for base in BASELINE),
-    *(f"{base}_temperature_cubed" for base in BASELINE), "gyro_bias_temperature_rate", "accel_scale_temperature_rate",
-    "gyro_bias_temperature_rate_linear", "gyro_bias_temperature_rate_quadratic",
-)  # fmt: skip
+    *(f"{base}_temperature" for base in BASELINE),
+    *(f"{base}_temperature_squared" for base in BASELINE),
+    *(f"{base}_temperature_cubed" for base in BASELINE),
+    "gyro_bias_temperature_rate",
+    "accel_scale_temperature_rate",
+    "gyro_bias_temperature_rate_linear",
+    "gyro_bias_temperature_rate_quadratic",
+)
 START, NOW, RATE = 22.0, 47.5, 0.02
 
 

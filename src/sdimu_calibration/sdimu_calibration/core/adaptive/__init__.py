@@ -6,6 +6,19 @@ from sdimu_calibration.core.adaptive.knowledge import Knowledge, OpenClass, fitt
 from sdimu_calibration.core.adaptive.so_far import Ahead, SoFar, ahead, so_far
 
 __all__ = [
-    "FIRST_STOP_S", "Ahead", "Choice", "End", "Goals", "Knowledge", "Menu", "OpenClass", "SoFar", "ahead", "choose",
-    "fitted", "knowledge", "nearest_other", "so_far",
-]  # fmt: skip
+    "FIRST_STOP_S",
+    "Ahead",
+    "Choice",
+    "End",
+    "Goals",
+    "Knowledge",
+    "Menu",
+    "OpenClass",
+    "SoFar",
+    "ahead",
+    "choose",
+    "fitted",
+    "knowledge",
+    "nearest_other",
+    "so_far",
+]

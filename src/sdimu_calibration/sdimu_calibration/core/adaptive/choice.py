@@ -138,9 +138,13 @@ class _Option:
 
 
 def choose(
-    known: Knowledge, goals: Goals, menu: Menu, minutes_left: float,
-    possible: Callable[[Step], bool] = lambda _: True, at: SoFar | None = None,
-) -> Choice | End:  # fmt: skip
+    known: Knowledge,
+    goals: Goals,
+    menu: Menu,
+    minutes_left: float,
+    possible: Callable[[Step], bool] = lambda _: True,
+    at: SoFar | None = None,
+) -> Choice | End:
     """Choose the next move.
 
     Parameters
@@ -226,10 +230,15 @@ def _choice(known: Knowledge, best: _Option, now: Worth, here: SoFar, menu: Menu
     dwell = float(round(best.ahead.dwell_s[best.row]))
     reached = ahead(here, best.turn, dwell, menu.acceleration_rad_s2).end
     return Choice(
-        Step(best.turn, dwell, menu.acceleration_rad_s2), (dwell + _length(best.turn)) / 60.0,
-        float(now.lacking[0] - best.worth.lacking[best.row]), _reason(known, best, now), reached,
-        best.worth.ratio[best.row], float(_told(known, best, now).sum()), best.done,
-    )  # fmt: skip
+        Step(best.turn, dwell, menu.acceleration_rad_s2),
+        (dwell + _length(best.turn)) / 60.0,
+        float(now.lacking[0] - best.worth.lacking[best.row]),
+        _reason(known, best, now),
+        reached,
+        best.worth.ratio[best.row],
+        float(_told(known, best, now).sum()),
+        best.done,
+    )
 
 
 def _lacking(known: Knowledge, now: Worth) -> str:

@@ -190,9 +190,10 @@ def _class(found: Diagnosis) -> tuple[tuple[Candidate, ...], Floats, Floats, int
     for place, column in enumerate(chosen):
         name = problem.candidate(column).parameter.name
         near = [
-            i for i in look_alikes(problem, chosen, column, allowed, scale)
+            i
+            for i in look_alikes(problem, chosen, column, allowed, scale)
             if problem.candidate(i).parameter.name != name
-        ][:_MOST_ALIKE]  # fmt: skip
+        ][:_MOST_ALIKE]
         if not near:
             continue
         others = [c for c in chosen if c != column]

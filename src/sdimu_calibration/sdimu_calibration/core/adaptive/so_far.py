@@ -121,9 +121,17 @@ def so_far(fit: NavigationFit, more: Sequence[Effect] = (), room: float = 1.0) -
     start = first_attitude(prepared.epochs, prepared.phases, setup) if fit.azimuth_free else fit.alignment
     begin = start_state(setup, start, C_nb, reference)
     seen = motion(
-        prepared.cycles, prepared.rest, sensors, reference, C_nb, setup.site.latitude_rad, setup.gravity,
-        prepared.temperature, predicted=True, magnetic_n=setup.magnetic_n,
-    )  # fmt: skip
+        prepared.cycles,
+        prepared.rest,
+        sensors,
+        reference,
+        C_nb,
+        setup.site.latitude_rad,
+        setup.gravity,
+        prepared.temperature,
+        predicted=True,
+        magnetic_n=setup.magnetic_n,
+    )
     data = pass_input(prepared, sensors.regressors(seen), sensors.channel, sensors.parameter)
     output = new_output(len(prepared.epochs), len(prior), False, len(prepared.epochs))
     run_pass(data, pass_settings(setup, closed_loop=False), begin, output)
@@ -155,12 +163,19 @@ def ahead(at: SoFar, turn: Turn | None, dwell_s: float, acceleration_rad_s2: flo
     cycles = replace(cycles, t=cycles.t - _BEFORE_S + at.seen.t[-1])
     C_nb = at.state.C_nb.copy()
     seen = motion(
-        cycles, prepared.rest[skipped:], sensors, np.zeros(len(sensors.prior)), C_nb, setup.site.latitude_rad,
-        setup.gravity, at.temperature, predicted=True, before=at.seen, magnetic_n=setup.magnetic_n,
-    )  # fmt: skip
-    data = pass_input(
-        replace(prepared, cycles=cycles), sensors.regressors(seen), sensors.channel, sensors.parameter
+        cycles,
+        prepared.rest[skipped:],
+        sensors,
+        np.zeros(len(sensors.prior)),
+        C_nb,
+        setup.site.latitude_rad,
+        setup.gravity,
+        at.temperature,
+        predicted=True,
+        before=at.seen,
+        magnetic_n=setup.magnetic_n,
     )
+    data = pass_input(replace(prepared, cycles=cycles), sensors.regressors(seen), sensors.channel, sensors.parameter)
     data = data._replace(**{name: getattr(data, name)[new] for name in _BY_EPOCH})
     data = data._replace(first=data.first - skipped, last=data.last - skipped)
     state = PassState(*(v.copy() for v in at.state))
@@ -171,9 +186,8 @@ def ahead(at: SoFar, turn: Turn | None, dwell_s: float, acceleration_rad_s2: flo
     rows = np.flatnonzero(data.kind != SKIP)
     elapsed = epochs.end[new][rows] - _BEFORE_S
     return Ahead(
-        elapsed, elapsed - moved, output.covariance[rows],
-        replace(at, state=_at_rest(setup, state, C_nb), seen=seen),
-    )  # fmt: skip
+        elapsed, elapsed - moved, output.covariance[rows], replace(at, state=_at_rest(setup, state, C_nb), seen=seen)
+    )
 
 
 def _parameters(state: PassState) -> Floats:
@@ -184,6 +198,4 @@ def _parameters(state: PassState) -> Floats:
 def _at_rest(setup: TestSetup, state: PassState, C_nb: Floats) -> PassState:
     """Keep the covariance, at a navigation without errors in the attitude that was reached."""
     position = np.array([setup.site.latitude_rad, 0.0, setup.site.height_m])
-    return PassState(
-        np.zeros_like(state.x), state.P, C_nb.copy(), np.zeros(3), position, np.zeros_like(state.used)
-    )
+    return PassState(np.zeros_like(state.x), state.P, C_nb.copy(), np.zeros(3), position, np.zeros_like(state.used))

@@ -176,10 +176,12 @@ def reduce(recording: Recording, setup: TestSetup, screened: bool = True) -> Pre
         raise DataError(f"/imu/data_raw: {len(recording.t)} usable samples are too few to calibrate")
     nominal = nominal_interval(recording.t)
     reducer = Reducer(nominal)
-    cycles = Cycles.concatenate([
-        reducer.add(recording.t[rows], recording.omega_ib_b[rows], recording.f_ib_b[rows])
-        for rows in pieces(len(recording.t))
-    ])
+    cycles = Cycles.concatenate(
+        [
+            reducer.add(recording.t[rows], recording.omega_ib_b[rows], recording.f_ib_b[rows])
+            for rows in pieces(len(recording.t))
+        ]
+    )
     # From here on cycles are looked at, and samples hardly.
     let_go(recording.omega_ib_b, recording.f_ib_b)
     epochs = cut(cycles, nominal)
@@ -227,9 +229,7 @@ def first_attitude(epochs: Epochs, phases: Phases, setup: TestSetup) -> Alignmen
     end = int(moving[0]) if len(moving) else len(phases.dwell)
     rows = slice(0, max(1, min(end, int(np.searchsorted(epochs.end, epochs.start[0] + ALIGN_S + 1e-6)))))
     weight = (epochs.end - epochs.start)[rows]
-    w_mean, f_mean = (
-        (v[rows] * weight[:, None]).sum(axis=0) / weight.sum() for v in (epochs.w_mean, epochs.f_mean)
-    )
+    w_mean, f_mean = ((v[rows] * weight[:, None]).sum(axis=0) / weight.sum() for v in (epochs.w_mean, epochs.f_mean))
     return align(w_mean, f_mean, float(weight.sum()), setup.site, setup.imu)
 
 
@@ -244,4 +244,3 @@ def stops_line(recording: Recording, prepared: PreparedData) -> tuple[str, ...]:
     ]
     listed = ", ".join(f"{a:.0f}-{b:.0f}" for a, b in spans[:_LISTED]) + (", ..." if len(spans) > _LISTED else "")
     return (f"no status: {len(spans)} stops were found from the IMU, at (s) {listed}",)
-

@@ -13,9 +13,7 @@ from sdimu_calibration.core.measurement_kind import ALL, SKIP
 from sdimu_calibration.core.recording import DataError
 
 
-def without(
-    prepared: PreparedData, stops: Sequence[int], spans: Sequence[tuple[float, float]]
-) -> PreparedData:
+def without(prepared: PreparedData, stops: Sequence[int], spans: Sequence[tuple[float, float]]) -> PreparedData:
     """Leave measurements out; the samples are still navigated.
 
     Parameters

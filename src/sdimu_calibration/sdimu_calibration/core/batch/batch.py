@@ -172,9 +172,17 @@ def _seen(prepared: PreparedData, setup: TestSetup, where: Layout, point: Linear
     # Rest that is part of a travel (settling) counts as motion here: what is seen must follow the samples there, as
     # their derivatives do.
     seen = motion(
-        prepared.cycles, at_stop, setup.sensors, point.coefficients, point.C_nb[0].copy(), latitude, setup.gravity,
-        prepared.temperature, predicted=True, magnetic_n=setup.magnetic_n,
-    )  # fmt: skip
+        prepared.cycles,
+        at_stop,
+        setup.sensors,
+        point.coefficients,
+        point.C_nb[0].copy(),
+        latitude,
+        setup.gravity,
+        prepared.temperature,
+        predicted=True,
+        magnetic_n=setup.magnetic_n,
+    )
     drift = point.C_nb @ np.transpose(seen.C_nb[where.stop_last - 1], (0, 2, 1))
     C_nb = np.where(at_stop[:, None, None], point.C_nb[stop], drift[stop] @ seen.C_nb)
     w_earth = np.einsum("kij,i->kj", C_nb, earth.earth_rate(latitude))

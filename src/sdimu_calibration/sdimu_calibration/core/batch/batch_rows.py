@@ -154,11 +154,13 @@ def step_rows(
     own[:, :3] = -gone.by_attitude
     own[3:6, 3:6] = own[6:9, 6:9] = -np.eye(3)
     own[6:9, 3:6] = -seconds * np.eye(3)
-    residual = np.concatenate([
-        rotation_vector(point.C_nb[k + 1] @ gone.C_nb.T),
-        point.velocity[k + 1] - point.velocity[k] - gone.moved[:3],
-        point.position[k + 1] - point.position[k] - seconds * point.velocity[k] - gone.moved[3:],
-    ])  # fmt: skip
+    residual = np.concatenate(
+        [
+            rotation_vector(point.C_nb[k + 1] @ gone.C_nb.T),
+            point.velocity[k + 1] - point.velocity[k] - gone.moved[:3],
+            point.position[k + 1] - point.position[k] - seconds * point.velocity[k] - gone.moved[3:],
+        ]
+    )
     white = np.linalg.solve(L, np.hstack([own, np.eye(9), -gone.by_coefficient * prior, residual[:, None]]))
     rows = (white[:, :9], white[:, 9:18], white[:, 18:-1], white[:, -1])
     return rows, -float(np.sum(np.log(np.diag(L))))

@@ -89,10 +89,12 @@ def solve(links: list[Link]) -> Solution:
         if last:
             block = here
         else:
-            block = np.vstack([
-                np.hstack([here[:, :q], np.zeros((len(here), q)), here[:, q:]]),
-                np.hstack([link.step_own, link.step_next, link.step_common, -link.step_residual[:, None]]),
-            ])  # fmt: skip
+            block = np.vstack(
+                [
+                    np.hstack([here[:, :q], np.zeros((len(here), q)), here[:, q:]]),
+                    np.hstack([link.step_own, link.step_next, link.step_common, -link.step_residual[:, None]]),
+                ]
+            )
         R: Floats = np.asarray(np.linalg.qr(block, mode="r"))
         eliminated.append(R[:q])
         log_det += float(np.sum(np.log(np.abs(np.diag(R[:q, :q])))))

@@ -136,9 +136,23 @@ def reference_motion(prepared: PreparedData, setup: TestSetup, log: TableLog, gi
     alpha = np.gradient(w_table, c.t - 0.5 * c.dt, axis=0)
     never = np.full(len(w), np.inf)
     return Motion(
-        c.t, c.dt, w, f, middle, w_table, alpha, prepared.rest, heat, heat_rate, none, none, never, MAGNETIC_FIELD,
-        none, NO_PAST,
-    )  # fmt: skip
+        c.t,
+        c.dt,
+        w,
+        f,
+        middle,
+        w_table,
+        alpha,
+        prepared.rest,
+        heat,
+        heat_rate,
+        none,
+        none,
+        never,
+        MAGNETIC_FIELD,
+        none,
+        NO_PAST,
+    )
 
 
 def _fit(prepared: PreparedData, setup: TestSetup, seen: Motion) -> tuple[Floats, Floats, float, int]:
@@ -147,10 +161,14 @@ def _fit(prepared: PreparedData, setup: TestSetup, seen: Motion) -> tuple[Floats
     where = layout(prepared)
     inner = np.column_stack([where.stop_first, where.stop_last]).ravel()
     first, last = inner[:-1], inner[1:]
-    sums = np.hstack([
-        c.dt[:, None], c.alpha - seen.w * c.dt[:, None], c.upsilon - seen.f * c.dt[:, None],
-        model.regressors(seen) * c.dt[:, None],
-    ])  # fmt: skip
+    sums = np.hstack(
+        [
+            c.dt[:, None],
+            c.alpha - seen.w * c.dt[:, None],
+            c.upsilon - seen.f * c.dt[:, None],
+            model.regressors(seen) * c.dt[:, None],
+        ]
+    )
     total = np.vstack([np.zeros(sums.shape[1]), np.cumsum(sums, axis=0)])
     block = total[last] - total[first]
     seconds = block[:, 0]

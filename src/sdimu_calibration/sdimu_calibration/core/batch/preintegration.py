@@ -51,9 +51,16 @@ class Preintegration:
 
 @compiled
 def _navigate(
-    C_nb: Floats, dt: Floats, alpha: Floats, upsilon: Floats, coning: Floats, sculling: Floats,
-    latitude: float, height: float, gravity_excess: float,
-) -> tuple[Floats, Floats]:  # fmt: skip
+    C_nb: Floats,
+    dt: Floats,
+    alpha: Floats,
+    upsilon: Floats,
+    coning: Floats,
+    sculling: Floats,
+    latitude: float,
+    height: float,
+    gravity_excess: float,
+) -> tuple[Floats, Floats]:
     """Attitude before each cycle and after the last (n + 1, 3, 3); velocity and displacement at the end (6,)."""
     n = dt.shape[0]
     track = np.empty((n + 1, 3, 3))

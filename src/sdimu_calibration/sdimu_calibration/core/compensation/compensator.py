@@ -217,9 +217,17 @@ def compensator(
     warm = any("temperature" in reads(effect) for effect in taken)
     known = (calibration.origin.temperature_low_degc, calibration.origin.temperature_high_degc)
     return Compensator(
-        model, values, covariance, inverse, power, residue, calibration.body_frame, tuple(left),
-        start if warm else None, known if warm and np.isfinite(known).all() else None,
-    )  # fmt: skip
+        model,
+        values,
+        covariance,
+        inverse,
+        power,
+        residue,
+        calibration.body_frame,
+        tuple(left),
+        start if warm else None,
+        known if warm and np.isfinite(known).all() else None,
+    )
 
 
 def _origin(model: ImuModel, drift_means: Mapping[str, float]) -> Floats:

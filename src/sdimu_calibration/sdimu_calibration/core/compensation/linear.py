@@ -28,9 +28,7 @@ class Factor(NamedTuple):
 
 
 _CONSTANT = Factor(0, 0)
-_FACTORS = (
-    _CONSTANT, Factor(1, 0), Factor(2, 0), Factor(3, 0), Factor(0, 1), Factor(1, 1), Factor(2, 1),
-)  # fmt: skip
+_FACTORS = (_CONSTANT, Factor(1, 0), Factor(2, 0), Factor(3, 0), Factor(0, 1), Factor(1, 1), Factor(2, 1))
 """Factors that a form of export may have a place for."""
 
 
@@ -170,9 +168,14 @@ def linear_model(calibration: Calibration, own: Sequence[Effect] = ()) -> Linear
         left.append("sensitivity of the accelerometers to rate")
     at_start = sums.pop(_CONSTANT)
     return LinearModel(
-        at_start.matrix, at_start.bias, calibration.body_frame, tuple(dict.fromkeys(left)), _ascending(sums),
-        tuple(warm), calibration.data.get(START_TEMPERATURE),
-    )  # fmt: skip
+        at_start.matrix,
+        at_start.bias,
+        calibration.body_frame,
+        tuple(dict.fromkeys(left)),
+        _ascending(sums),
+        tuple(warm),
+        calibration.data.get(START_TEMPERATURE),
+    )
 
 
 def _shape(effect: Effect) -> tuple[Floats, Floats, Ints]:

@@ -12,9 +12,22 @@ from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.effects.motion import NO_PAST, Motion
 
 FIELDS = (
-    "w", "f", "t", "temperature", "temperature_rate", "alpha", "w_table", "rest", "C_nb", "magnetic_n", "turned",
-    "leant", "since_turn", "wound", "past",
-)  # fmt: skip
+    "w",
+    "f",
+    "t",
+    "temperature",
+    "temperature_rate",
+    "alpha",
+    "w_table",
+    "rest",
+    "C_nb",
+    "magnetic_n",
+    "turned",
+    "leant",
+    "since_turn",
+    "wound",
+    "past",
+)
 _ROWS = 2000
 """Number of rows of the random motion: enough to cross the thresholds of effects."""
 _SPAN_S = 20_000.0
@@ -54,12 +67,24 @@ def any_motion(rng: np.random.Generator) -> Motion:
     n = _ROWS
     C_nb = np.linalg.qr(any_of(n, 3, 3))[0]
     return Motion(
-        np.linspace(1.0, _SPAN_S, n), np.full(n, _SPAN_S / n), any_of(n, 3), 10.0 * any_of(n, 3), C_nb, any_of(n, 3),
-        any_of(n, 3), rng.random(n) < 0.5, 10.0 * any_of(n), 0.01 * any_of(n), np.sign(any_of(n, 3)),
-        np.sign(any_of(n, 3)), 100.0 * rng.random(n), 1e-5 * any_of(3), any_of(n, 3),
+        np.linspace(1.0, _SPAN_S, n),
+        np.full(n, _SPAN_S / n),
+        any_of(n, 3),
+        10.0 * any_of(n, 3),
+        C_nb,
+        any_of(n, 3),
+        any_of(n, 3),
+        rng.random(n) < 0.5,
+        10.0 * any_of(n),
+        0.01 * any_of(n),
+        np.sign(any_of(n, 3)),
+        np.sign(any_of(n, 3)),
+        100.0 * rng.random(n),
+        1e-5 * any_of(3),
+        any_of(n, 3),
         # Far beyond any force: play forgets all but the side from which it was drawn.
         _AnyMemory(1e3 * any_of(3)),
-    )  # fmt: skip
+    )
 
 
 class _AnyMemory(Mapping[tuple[str, float], Floats]):

@@ -118,9 +118,13 @@ def until(raw: RawTest, ns: int) -> RawTest:
     """
     rows = raw.ns <= ns
     return replace(
-        raw, ns=raw.ns[rows], omega_ib_b=raw.omega_ib_b[rows], f_ib_b=raw.f_ib_b[rows],
-        status=_until(raw.status, ns), temperature=_until(raw.temperature, ns),
-    )  # fmt: skip
+        raw,
+        ns=raw.ns[rows],
+        omega_ib_b=raw.omega_ib_b[rows],
+        f_ib_b=raw.f_ib_b[rows],
+        status=_until(raw.status, ns),
+        temperature=_until(raw.temperature, ns),
+    )
 
 
 def _until(messages: M | None, ns: int) -> M | None:
@@ -233,11 +237,15 @@ def in_order(raw: RawTest) -> Recording:
     ns = stamps[rows]
     start_ns = origin_ns(ns)
     return Recording(
-        start_ns=start_ns, t=seconds(ns, start_ns),
-        omega_ib_b=raw.omega_ib_b[rows], f_ib_b=raw.f_ib_b[rows],
-        phase=_phase(raw, ns, start_ns, notes), temperature=_temperature(raw, ns, start_ns, notes),
-        rejected=len(raw.ns) - len(ns), notes=tuple(notes),
-    )  # fmt: skip
+        start_ns=start_ns,
+        t=seconds(ns, start_ns),
+        omega_ib_b=raw.omega_ib_b[rows],
+        f_ib_b=raw.f_ib_b[rows],
+        phase=_phase(raw, ns, start_ns, notes),
+        temperature=_temperature(raw, ns, start_ns, notes),
+        rejected=len(raw.ns) - len(ns),
+        notes=tuple(notes),
+    )
 
 
 def _bursts(raw: RawTest) -> Bursts | None:

@@ -135,10 +135,14 @@ def _accel_unit(f: Floats, stated: Stated) -> tuple[float, tuple[str, ...]]:
             "specific force"
         )
     fitting = [unit for unit in _OTHER_UNITS if _is_gravity(size * parse_unit(unit).factor)]
-    advice = f"{Option.ACCEL_UNIT} {fitting[0]} makes it gravity" if fitting else (
-        f"no usual unit makes it gravity: raw counts, of which {size / STANDARD_GRAVITY:.4g} are 1 m/s^2 "
-        f"(counts_per_unit in a map of {Work.IMPORT}), or no rest"
-    )  # fmt: skip
+    advice = (
+        f"{Option.ACCEL_UNIT} {fitting[0]} makes it gravity"
+        if fitting
+        else (
+            f"no usual unit makes it gravity: raw counts, of which {size / STANDARD_GRAVITY:.4g} are 1 m/s^2 "
+            f"(counts_per_unit in a map of {Work.IMPORT}), or no rest"
+        )
+    )
     raise DataError(
         f"linear_acceleration: the median of |f| is {size:.4g}, neither near 9.8 (m/s^2) nor near 1 (g); {advice}"
     )
@@ -301,5 +305,3 @@ _ROTATIONS = _signed_permutations()
 
 def _named(P: Floats) -> str:
     return ", ".join(f"{'-' if row[k] < 0 else ''}{'xyz'[k]}" for row in P for k in np.flatnonzero(row))
-
-

@@ -73,8 +73,11 @@ def cut(cycles: Cycles, nominal_s: float) -> Epochs:
         return Epochs(first, last, none, none, none, none3, none3)
     length = np.add.reduceat(cycles.dt[used], first)
     return Epochs(
-        first, last, cycles.t[first] - cycles.dt[first], cycles.t[last - 1],
+        first,
+        last,
+        cycles.t[first] - cycles.dt[first],
+        cycles.t[last - 1],
         np.maximum.reduceat(rate, first),
         np.add.reduceat(cycles.upsilon[used], first) / length[:, None],
         np.add.reduceat(cycles.alpha[used], first) / length[:, None],
-    )  # fmt: skip
+    )

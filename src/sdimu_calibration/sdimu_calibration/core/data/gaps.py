@@ -96,9 +96,8 @@ def _nearby(cycles: Cycles) -> Floats:
 
 
 def bridges(
-    cycles: Cycles, epochs: Epochs, dwell: Bools, nominal_s: float, acceleration: float,
-    gravity: float,
-) -> Bridges:  # fmt: skip
+    cycles: Cycles, epochs: Epochs, dwell: Bools, nominal_s: float, acceleration: float, gravity: float
+) -> Bridges:
     """Uncertainty that missing samples leave in each epoch.
 
     Parameters
@@ -166,9 +165,14 @@ def _rests(dwell: Bools, epoch: Ints) -> Bools:
 
 
 def judge(
-    cycles: Cycles, epochs: Epochs, phases: Phases, nominal_s: float, found: Bridges, noise: tuple[float, float],
+    cycles: Cycles,
+    epochs: Epochs,
+    phases: Phases,
+    nominal_s: float,
+    found: Bridges,
+    noise: tuple[float, float],
     unsound: tuple[DataFault, ...] = (),
-) -> tuple[DataFault, ...]:  # fmt: skip
+) -> tuple[DataFault, ...]:
     """Say what is missing, and refuse what cannot be bridged.
 
     Parameters
@@ -198,8 +202,10 @@ def judge(
     epoch = np.minimum(np.searchsorted(epochs.last, at, side="right"), len(epochs) - 1)
     resting = _rests(phases.dwell, epoch)
     long = cycles.lost[at] * nominal_s >= _LONG_S
-    faults = [_long_gap(cycles, epochs, phases, int(k), int(e), nominal_s, noise)
-              for k, e in zip(at[resting & long], epoch[resting & long], strict=True)]  # fmt: skip
+    faults = [
+        _long_gap(cycles, epochs, phases, int(k), int(e), nominal_s, noise)
+        for k, e in zip(at[resting & long], epoch[resting & long], strict=True)
+    ]
     for rows, where in ((at[resting], "at rest"), (at[~resting], "while the IMU turned")):
         if len(rows):
             lost = int(cycles.lost[rows].sum())
@@ -211,9 +217,8 @@ def judge(
 
 
 def _long_gap(
-    cycles: Cycles, epochs: Epochs, phases: Phases, cycle: int, epoch: int, nominal_s: float,
-    noise: tuple[float, float],
-) -> DataFault:  # fmt: skip
+    cycles: Cycles, epochs: Epochs, phases: Phases, cycle: int, epoch: int, nominal_s: float, noise: tuple[float, float]
+) -> DataFault:
     """Compare what is before a long gap at rest with what is after it."""
     seconds = float(cycles.lost[cycle]) * nominal_s
     at = float(cycles.t[cycle]) - seconds
@@ -234,10 +239,8 @@ def _long_gap(
                 )
     told = f"{text}: if the IMU was switched off, its biases may have changed, and the estimate is {NOT_TRUSTED}"
     return DataFault(
-        "long gap",
-        Note(told, Topic.NOT_TRUSTED),
-        int(cycles.lost[cycle]), at, float(cycles.t[cycle]), grave=True,
-    )  # fmt: skip
+        "long gap", Note(told, Topic.NOT_TRUSTED), int(cycles.lost[cycle]), at, float(cycles.t[cycle]), grave=True
+    )
 
 
 def _beside(dwell: Bools, epoch: int, step: int) -> Ints:

@@ -95,10 +95,8 @@ def shown_at_rest(recording: Recording) -> RestsShown | None:
     )
     gyro, accel = (
         min([usual, *_densities(data, found, recording.interval_s)])
-        for data, usual in (
-            (recording.omega_ib_b, found.gyro_white_noise), (recording.f_ib_b, found.accel_white_noise),
-        )
-    )  # fmt: skip
+        for data, usual in ((recording.omega_ib_b, found.gyro_white_noise), (recording.f_ib_b, found.accel_white_noise))
+    )
     error = np.abs(force - STANDARD_GRAVITY)
     return RestsShown(gyro, accel, float(np.median(rate)), float(np.median(error)), float(error.max()))
 

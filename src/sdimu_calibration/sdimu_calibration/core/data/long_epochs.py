@@ -14,9 +14,7 @@ from sdimu_calibration.core.data.gaps import Bridges
 from sdimu_calibration.core.data.phases import Phases
 
 
-def long_epochs(
-    epochs: Epochs, phases: Phases, bridges: Bridges, seconds: float
-) -> tuple[Epochs, Phases, Bridges]:
+def long_epochs(epochs: Epochs, phases: Phases, bridges: Bridges, seconds: float) -> tuple[Epochs, Phases, Bridges]:
     """Join the epochs that measure, stop by stop.
 
     Parameters
@@ -42,13 +40,22 @@ def long_epochs(
 
     last = np.append(begin[1:], len(epochs)) - 1
     joined = Epochs(
-        epochs.first[begin], epochs.last[last], epochs.start[begin], epochs.end[last],
-        np.maximum.reduceat(epochs.peak_rate, begin), mean(epochs.f_mean), mean(epochs.w_mean),
-    )  # fmt: skip
+        epochs.first[begin],
+        epochs.last[last],
+        epochs.start[begin],
+        epochs.end[last],
+        np.maximum.reduceat(epochs.peak_rate, begin),
+        mean(epochs.f_mean),
+        mean(epochs.w_mean),
+    )
     seen = Phases(
-        phases.dwell[begin], phases.used[begin], np.logical_or.reduceat(phases.first, begin), phases.stop[begin],
-        np.logical_or.reduceat(phases.contradicted, begin), np.logical_or.reduceat(phases.denied, begin),
-    )  # fmt: skip
+        phases.dwell[begin],
+        phases.used[begin],
+        np.logical_or.reduceat(phases.first, begin),
+        phases.stop[begin],
+        np.logical_or.reduceat(phases.contradicted, begin),
+        np.logical_or.reduceat(phases.denied, begin),
+    )
     bridged = Bridges(
         mean(bridges.white),
         np.sqrt(np.add.reduceat(bridges.angle**2, begin)),

@@ -135,12 +135,7 @@ def numbers_make_sense(log: PhaseLog) -> bool:
 
 
 def classify(
-    epochs: Epochs,
-    log: PhaseLog | None,
-    limits: RestLimits,
-    gravity: float,
-    settle_s: float,
-    state: PhaseState,
+    epochs: Epochs, log: PhaseLog | None, limits: RestLimits, gravity: float, settle_s: float, state: PhaseState
 ) -> Phases:
     """Decide the phase of each epoch.
 

@@ -67,18 +67,33 @@ def join(cycles: Cycles, epochs: Epochs, still: Bools) -> tuple[Cycles, Epochs]:
     coning, sculling = cycles.coning[begin], cycles.sculling[begin]
     _join(cycles.alpha, cycles.upsilon, cycles.coning, cycles.sculling, begin, last, alpha, upsilon, coning, sculling)
     joined = Cycles(
-        cycles.t[last], total(cycles.dt), alpha, upsilon, coning, sculling, total(cycles.samples), total(cycles.lost),
+        cycles.t[last],
+        total(cycles.dt),
+        alpha,
+        upsilon,
+        coning,
+        sculling,
+        total(cycles.samples),
+        total(cycles.lost),
         total(cycles.gap_angle),
-    )  # fmt: skip
+    )
     end = np.cumsum(np.where(still, 1, count))
     return joined, replace(epochs, first=np.append(0, end[:-1]), last=end)
 
 
 @compiled
 def _join(
-    alpha: Floats, upsilon: Floats, coning: Floats, sculling: Floats, begin: Ints, last: Ints,
-    alpha_sum: Floats, upsilon_sum: Floats, coning_sum: Floats, sculling_sum: Floats,
-) -> None:  # fmt: skip
+    alpha: Floats,
+    upsilon: Floats,
+    coning: Floats,
+    sculling: Floats,
+    begin: Ints,
+    last: Ints,
+    alpha_sum: Floats,
+    upsilon_sum: Floats,
+    coning_sum: Floats,
+    sculling_sum: Floats,
+) -> None:
     """Fill coning (rad) and sculling (m/s) of joined cycles, given their sums; of single ones they stay."""
     C, none = np.empty((3, 3)), np.zeros(3)
     for k in range(begin.shape[0]):

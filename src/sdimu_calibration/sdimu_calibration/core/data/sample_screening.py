@@ -87,9 +87,12 @@ def sound(recording: Recording) -> tuple[Recording, tuple[DataFault, ...]]:
         return recording, ()
     keep = ~bad
     mended = replace(
-        recording, t=recording.t[keep], omega_ib_b=recording.omega_ib_b[keep], f_ib_b=recording.f_ib_b[keep],
+        recording,
+        t=recording.t[keep],
+        omega_ib_b=recording.omega_ib_b[keep],
+        f_ib_b=recording.f_ib_b[keep],
         rejected=recording.rejected + int(bad.sum()),
-    )  # fmt: skip
+    )
     return mended, faults
 
 
@@ -263,9 +266,9 @@ def _stand_out(x: Floats, size: Floats, sigma: float, width: int) -> Ints:
         return np.empty(0, dtype=np.int64)
     last = len(x) - width - 1
     # Few samples are far from the line; the rest is asked of these alone.
-    at = np.concatenate([
-        rows.start + np.flatnonzero(np.abs(_off_line(x, rows, 1, width)) > _SPIKE * sigma) for rows in pieces(last)
-    ])
+    at = np.concatenate(
+        [rows.start + np.flatnonzero(np.abs(_off_line(x, rows, 1, width)) > _SPIKE * sigma) for rows in pieces(last)]
+    )
     off = np.abs([_off_line(x, at, j, width) for j in range(1, width + 1)]).min(axis=0)
     good = (off > _SPIKE * sigma) & (np.abs(x[at + width + 1] - x[at]) < 0.5 * off)
     at, off = at[good], off[good]

@@ -174,11 +174,16 @@ def cut_windows(
         return np.asarray((total[rows[0]] - total[rows[1]]) / (end - begin)[:, None] + offset)
 
     return Windows(
-        start=t[first - 1], end=t[first + m - 1], first=first, length=m, interval_s=dt,
+        start=t[first - 1],
+        end=t[first + m - 1],
+        first=first,
+        length=m,
+        interval_s=dt,
         up_first=_unit(mean(total_f, offset_f, first - q, first + q)),
         up_last=_unit(mean(total_f, offset_f, first + m - q, first + m + q)),
-        w_mean=mean(total_w, offset_w, first, first + m), f_mean=mean(total_f, offset_f, first, first + m),
-    )  # fmt: skip
+        w_mean=mean(total_w, offset_w, first, first + m),
+        f_mean=mean(total_f, offset_f, first, first + m),
+    )
 
 
 def samples_of(length_s: float, interval_s: float) -> tuple[int, int]:

@@ -39,9 +39,12 @@ def standing(d: Diagnosis, found: Sequence[Found]) -> Standing:
     of_power_on = {name for effect in effects for name in _of_power_on(effect)}
     test = d.fit.test
     return Standing(
-        _anew(known, of_power_on), tuple(members), tuple(classes), test.origin.imu_file or test.imu.name,
+        _anew(known, of_power_on),
+        tuple(members),
+        tuple(classes),
+        test.origin.imu_file or test.imu.name,
         test.origin.site_stated,
-    )  # fmt: skip
+    )
 
 
 def _of_power_on(effect: str | Effect) -> tuple[str, ...]:

@@ -25,9 +25,9 @@ def _turned(f: Floats, size: Floats, i: int) -> Floats:
     return np.column_stack([size * f[:, (i + 2) % 3], -size * f[:, (i + 1) % 3]])
 
 
-def _on_two(name: str, parts: tuple[str, ...], turn: tuple[int, ...], unit: tuple[str, str]) -> tuple[
-    tuple[Parameter, ...], tuple[Term, ...]
-]:  # fmt: skip
+def _on_two(
+    name: str, parts: tuple[str, ...], turn: tuple[int, ...], unit: tuple[str, str]
+) -> tuple[tuple[Parameter, ...], tuple[Term, ...]]:
     """Parameters by suffix, and the two accelerometers that an angle about axis ``turn[k]`` changes."""
     parameters = tuple(Parameter(f"{name}_{part}", *unit) for part in parts)
     terms = tuple(Term(ACCEL[(i + n) % 3], k) for k, i in enumerate(turn) for n in (1, 2))

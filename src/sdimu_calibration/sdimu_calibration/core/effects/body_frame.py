@@ -30,10 +30,13 @@ FRAMES = ("accelerometer_triad", "prior")
 
 # (row, column, sign) of each misalignment in the error matrix, from the equations of doc/conventions.md.
 _MISALIGNMENT = {
-    "xy": (0, 2, -1.0), "xz": (0, 1, 1.0),
-    "yx": (1, 2, 1.0), "yz": (1, 0, -1.0),
-    "zx": (2, 1, -1.0), "zy": (2, 0, 1.0),
-}  # fmt: skip
+    "xy": (0, 2, -1.0),
+    "xz": (0, 1, 1.0),
+    "yx": (1, 2, 1.0),
+    "yz": (1, 0, -1.0),
+    "zx": (2, 1, -1.0),
+    "zy": (2, 0, 1.0),
+}
 _UNBALANCE = {"dx": (0, 0), "qx": (0, 1), "dy": (1, 1), "qy": (1, 0), "dz": (2, 2), "qz": (2, 1)}
 _PINNED = ("xy", "xz", "yx")
 _BY_TEMPERATURE = ("_temperature", "_temperature_squared", "_temperature_cubed")
@@ -143,9 +146,10 @@ def at_every_temperature(names: Sequence[str], values: Floats) -> Floats:
         return out
     powers = ("", *_BY_TEMPERATURE)
     groups = [
-        [_places("accel", power) for power in powers], [_places("gyro", power) for power in powers],
+        [_places("accel", power) for power in powers],
+        [_places("gyro", power) for power in powers],
         [_unbalance_places(power) for power in powers],
-    ]  # fmt: skip
+    ]
     parts = [[_matrix(places, names, given) for places in group] for group in groups]
     for triad in (0, 1):
         parts[triad][0] = np.eye(3) + parts[triad][0]
@@ -173,11 +177,9 @@ def _seen(gyro: list[Floats], turns: list[Floats], theta: Floats) -> list[Floats
     """
     rate = [theta[1], 2.0 * theta[2], 3.0 * theta[3] - 0.5 * np.cross(theta[1], theta[2])]
     return [
-        np.asarray(sum(
-            np.einsum("...ij,...j->...i", _of_power(gyro, turns, k - n), rate[n]) for n in range(k + 1)
-        ))
+        np.asarray(sum(np.einsum("...ij,...j->...i", _of_power(gyro, turns, k - n), rate[n]) for n in range(k + 1)))
         for k in range(len(rate))
-    ]  # fmt: skip
+    ]
 
 
 def _cross(theta: Floats) -> Floats:
@@ -383,9 +385,10 @@ def _turning_powers(names: Sequence[str]) -> tuple[str, ...]:
     Where the model holds the gyros' axes still, those of the accelerometers turn against them: nothing is free then.
     """
     return tuple(
-        power for power in _BY_TEMPERATURE
+        power
+        for power in _BY_TEMPERATURE
         if {*_pinned(power), *(f"gyro_misalignment{power}_{pair}" for pair in _MISALIGNMENT)} <= set(names)
-    )  # fmt: skip
+    )
 
 
 def _check(frame: str) -> None:

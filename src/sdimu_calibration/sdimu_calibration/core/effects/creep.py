@@ -40,9 +40,14 @@ def creep(stem: str, tau: float, ratio: float = 2.0) -> Effect:
         return np.asarray(decay[:, None] * sense(motion))
 
     return family(
-        f"{stem}_creep", f"{word} creep after a turn", f"{equation}, s: time since the turn ended",
-        per_axis_columns(triad, column), units, _PRIOR[stem],
-        needs_table=True, wander_like=True,
+        f"{stem}_creep",
+        f"{word} creep after a turn",
+        f"{equation}, s: time since the turn ended",
+        per_axis_columns(triad, column),
+        units,
+        _PRIOR[stem],
+        needs_table=True,
+        wander_like=True,
         typical="gyro 0.01-0.1 deg/h with 5-200 s, accelerometer 1-20 ug",
         description="Wind-up of leads and suspension that decays after the turn. Turns of the other sense change its "
         "sign; without them it is settling.",
@@ -53,7 +58,7 @@ def creep(stem: str, tau: float, ratio: float = 2.0) -> Effect:
         nearer=(lambda: tuple(creep(stem, float(f"{tau * ratio**k:.3g}"), ratio**0.5) for k in (-0.5, 0.0, 0.5)))
         if ratio > 1.1
         else None,
-    )  # fmt: skip
+    )
 
 
 for _stem in _TRIADS:

@@ -20,12 +20,16 @@ def _sign(motion: Motion) -> Floats:
 
 DEAD_BAND = register(
     family(
-        "gyro_dead_band", "gyro dead band (dead zone, lock-in residual)", "dw_i = -d_i sgn(w_i), |w_i| > d_i",
-        per_axis_columns(GYRO, _sign), ("rad/s", "deg/h"), (0.02, 0.05, 1),
+        "gyro_dead_band",
+        "gyro dead band (dead zone, lock-in residual)",
+        "dw_i = -d_i sgn(w_i), |w_i| > d_i",
+        per_axis_columns(GYRO, _sign),
+        ("rad/s", "deg/h"),
+        (0.02, 0.05, 1),
         typical="DTG 0.001-0.01, RLG residual, MEMS none (deg/h)",
         description="The gyro stands still below a rate and is short by it above. Its sign at stops where an axis "
         "points "
         "East-West hangs on noise.",
         confused_with=("gyro_magnetic", "gyro_lock_in"),
     )
-)  # fmt: skip
+)

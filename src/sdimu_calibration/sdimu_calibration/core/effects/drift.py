@@ -48,9 +48,15 @@ def warm_up(stem: str, tau: float, ratio: float = 2.0) -> Effect:
     """Warm-up transient of a bias with time constant `tau` (s), a factor `ratio` from the next ones that are tried."""
     triad, word, letter, units, prior = _TRIADS[stem]
     return family(
-        f"{stem}_bias_warm_up", f"{word} warm-up transient", f"d{letter}_i = k_i exp(-t/tau)",
-        per_axis_columns(triad, lambda m: _columns(np.exp(-_time(m) / tau))), units, prior,
-        scope="power-on", excitation=_OVER_TIME, bias_drift=True,
+        f"{stem}_bias_warm_up",
+        f"{word} warm-up transient",
+        f"d{letter}_i = k_i exp(-t/tau)",
+        per_axis_columns(triad, lambda m: _columns(np.exp(-_time(m) / tau))),
+        units,
+        prior,
+        scope="power-on",
+        excitation=_OVER_TIME,
+        bias_drift=True,
         typical="gyro 0.05-1 deg/h with 300-1800 s, accelerometer 5-50 ug",
         description="Turn-on transient. Early stops against later ones in the same orientation.",
         confused_with=(f"{stem}_bias_temperature", f"{stem}_bias_ramp", f"{stem}_bias_random_walk"),
@@ -60,7 +66,7 @@ def warm_up(stem: str, tau: float, ratio: float = 2.0) -> Effect:
         nearer=(lambda: tuple(warm_up(stem, float(f"{tau * ratio**k:.3g}"), ratio**0.5) for k in (-0.5, 0.0, 0.5)))
         if ratio > 1.1
         else None,
-    )  # fmt: skip
+    )
 
 
 def _times(factor: float, prior: tuple[float, float, float]) -> tuple[float, float, float]:
@@ -71,10 +77,15 @@ def step(stem: str, t0: float, spacing: float = 60.0) -> Effect:
     """Step of a bias at `t0` (s), `spacing` (s) from the next moments that are tried."""
     triad, word, letter, units, prior = _TRIADS[stem]
     return family(
-        f"{stem}_bias_step", f"{word} bias step", f"d{letter}_i = k_i (t > t0)",
-        per_axis_columns(triad, lambda m: _columns(np.clip((m.t - t0) / m.dt, 0.0, 1.0))), units,
+        f"{stem}_bias_step",
+        f"{word} bias step",
+        f"d{letter}_i = k_i (t > t0)",
+        per_axis_columns(triad, lambda m: _columns(np.clip((m.t - t0) / m.dt, 0.0, 1.0))),
+        units,
         _times(0.3, prior),
-        scope="power-on", excitation=_OVER_TIME, bias_drift=True,
+        scope="power-on",
+        excitation=_OVER_TIME,
+        bias_drift=True,
         typical="any size; after a shock, a power dip, a turn",
         description="Bias that changes at one moment. Scanned over the starts and ends of the turns.",
         confused_with=(f"{stem}_bias_ramp", f"{stem}_bias_temperature_rate", f"{stem}_bias_wrap"),
@@ -84,7 +95,7 @@ def step(stem: str, t0: float, spacing: float = 60.0) -> Effect:
         nearer=(lambda: tuple(step(stem, round(t0 + side * spacing, 1), 0.5 * spacing) for side in (-0.5, 0.0, 0.5)))
         if spacing > 2.0
         else None,
-    )  # fmt: skip
+    )
 
 
 def random_walk(stem: str, span: float) -> Effect:
@@ -101,35 +112,46 @@ def random_walk(stem: str, span: float) -> Effect:
 
     columns = {f"{a}{k}": (triad[i], mode(k)) for i, a in enumerate(AXES) for k in range(1, _MODES + 1)}
     return family(
-        f"{stem}_bias_random_walk", f"{word} bias random walk (rate random walk)",
+        f"{stem}_bias_random_walk",
+        f"{word} bias random walk (rate random walk)",
         f"d{letter}_i = sum_k c_ik sin((k - 1/2) pi t/T) / ((k - 1/2) pi), k = 1..4",
-        columns, units, prior,
-        scope="power-on", excitation=_OVER_TIME, bias_drift=True,
+        columns,
+        units,
+        prior,
+        scope="power-on",
+        excitation=_OVER_TIME,
+        bias_drift=True,
         typical="see the Allan deviation",
         description="Slow wander, by its first four Karhunen-Loeve modes over the test.",
-        confused_with=(
-            f"{stem}_bias_ramp", f"{stem}_bias_warm_up", f"{stem}_bias_temperature", f"{stem}_bias_wrap",
-        ),
+        confused_with=(f"{stem}_bias_ramp", f"{stem}_bias_warm_up", f"{stem}_bias_temperature", f"{stem}_bias_wrap"),
         options={"span": f"{span:g} s"},
         with_options=lambda span: random_walk(stem, span),
         scan=lambda times: (random_walk(stem, round(times.duration)),),
-    )  # fmt: skip
+    )
 
 
 def _ramp(stem: str) -> Effect:
     triad, word, letter, (si, shown), prior = _TRIADS[stem]
     return family(
-        f"{stem}_bias_ramp", f"{word} bias ramp", f"d{letter}_i = k_i t",
-        per_axis_columns(triad, lambda m: _columns(_time(m))), (f"{si}/s", f"{shown}/h"),
+        f"{stem}_bias_ramp",
+        f"{word} bias ramp",
+        f"d{letter}_i = k_i t",
+        per_axis_columns(triad, lambda m: _columns(_time(m))),
+        (f"{si}/s", f"{shown}/h"),
         _times(0.4, prior),
-        scope="power-on", excitation=_OVER_TIME, bias_drift=True,
+        scope="power-on",
+        excitation=_OVER_TIME,
+        bias_drift=True,
         typical="accelerometer 1-20 ug/h",
         description="Bias that runs away at a constant rate.",
         confused_with=(
-            f"{stem}_bias_warm_up", f"{stem}_bias_temperature", f"{stem}_bias_random_walk", f"{stem}_bias_wrap",
+            f"{stem}_bias_warm_up",
+            f"{stem}_bias_temperature",
+            f"{stem}_bias_random_walk",
+            f"{stem}_bias_wrap",
             "accel_triad_ramp",
         ),
-    )  # fmt: skip
+    )
 
 
 def _scale_ramp(stem: str, per_hour: tuple[float, float, float]) -> Effect:
@@ -139,13 +161,18 @@ def _scale_ramp(stem: str, per_hour: tuple[float, float, float]) -> Effect:
         return _columns(_time(motion)) * (motion.w if stem == "gyro" else motion.f)
 
     return family(
-        f"{stem}_scale_ramp", f"{word} scale-factor ramp", f"d{letter}_i = k_i t {letter}_i",
-        per_axis_columns(triad, signal), ("1/s", "ppm/h"), per_hour,
-        scope="power-on", excitation=_OVER_TIME,
+        f"{stem}_scale_ramp",
+        f"{word} scale-factor ramp",
+        f"d{letter}_i = k_i t {letter}_i",
+        per_axis_columns(triad, signal),
+        ("1/s", "ppm/h"),
+        per_hour,
+        scope="power-on",
+        excitation=_OVER_TIME,
         typical="as the temperature coefficient times the warm-up",
         description="Scale factor that runs away at a constant rate.",
         confused_with=(f"{stem}_scale_temperature", f"{stem}_scale_temperature_rate"),
-    )  # fmt: skip
+    )
 
 
 for _stem in _TRIADS:
@@ -161,18 +188,22 @@ _UNBALANCE = GYRO_MASS_UNBALANCE.regressors
 MASS_UNBALANCE_RAMP = register(
     replace(
         family(
-            "gyro_mass_unbalance_ramp", "gyro mass-unbalance drift", "dw = t (m'_d a_own + m'_q a_cross)",
+            "gyro_mass_unbalance_ramp",
+            "gyro mass-unbalance drift",
+            "dw = t (m'_d a_own + m'_q a_cross)",
             {
                 name: (GYRO[i // 2], pick(lambda m: _columns(_time(m))[:, :1] * _UNBALANCE(m), i))
                 for i, name in enumerate(TERMS)
             },
-            ("rad/s/g/s", "deg/h/g/h"), (0.1, 0.5, 5),
+            ("rad/s/g/s", "deg/h/g/h"),
+            (0.1, 0.5, 5),
         ),
-        scope="power-on", excitation=_OVER_TIME,
+        scope="power-on",
+        excitation=_OVER_TIME,
         typical="DTG 0.005-0.05 deg/h/g/h",
         description="The rotor's centre of mass moves with the temperature of the suspension.",
         confused_with=("gyro_bias_ramp", "gyro_mass_unbalance_temperature"),
     )
-)  # fmt: skip
+)
 
 __all__ = ["MASS_UNBALANCE_RAMP", "Timetable", "random_walk", "step", "warm_up"]

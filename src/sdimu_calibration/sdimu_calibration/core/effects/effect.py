@@ -370,12 +370,7 @@ def matrix_columns(
     diagonal : bool
         Whether xx, yy and zz are among them.
     """
-    return {
-        AXES[i] + AXES[j]: (triad[i], pick(of, j))
-        for i in range(3)
-        for j in range(3)
-        if diagonal or i != j
-    }
+    return {AXES[i] + AXES[j]: (triad[i], pick(of, j)) for i in range(3) for j in range(3) if diagonal or i != j}
 
 
 def own_axis(triad: tuple[int, ...]) -> tuple[Term, ...]:

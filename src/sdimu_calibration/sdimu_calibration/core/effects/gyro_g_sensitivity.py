@@ -16,8 +16,12 @@ def _force(motion: Motion) -> Floats:
 
 G_SENSITIVITY = register(
     family(
-        "gyro_g_sensitivity", "gyro g-sensitivity, full matrix", "dw_i = D_ij a_j",
-        matrix_columns(GYRO, lambda m: m.a), ("rad/s/g", "deg/h/g"), (0.3, 1, 50),
+        "gyro_g_sensitivity",
+        "gyro g-sensitivity, full matrix",
+        "dw_i = D_ij a_j",
+        matrix_columns(GYRO, lambda m: m.a),
+        ("rad/s/g", "deg/h/g"),
+        (0.3, 1, 50),
         sheet="g-sensitivity",
         typical="DTG spin axis 0.05-0.5, optical below 0.1, tactical 0.1-1, MEMS 1-100 deg/h/g",
         description="Drift in proportion to force along any axis. Six of nine are the mass unbalance of the "
@@ -25,42 +29,49 @@ G_SENSITIVITY = register(
         "spin axes (xz, yz, zx) are not.",
         confused_with=("gyro_mass_unbalance",),
     )
-)  # fmt: skip
+)
 
 G_SQUARED = register(
     family(
-        "gyro_g_squared", "gyro g-squared drift (anisoelastic), squares", "dw_i = D_ijj a_j^2",
-        matrix_columns(GYRO, lambda m: m.a**2), ("rad/s/g^2", "deg/h/g^2"), (0.03, 0.1, 3),
+        "gyro_g_squared",
+        "gyro g-squared drift (anisoelastic), squares",
+        "dw_i = D_ijj a_j^2",
+        matrix_columns(GYRO, lambda m: m.a**2),
+        ("rad/s/g^2", "deg/h/g^2"),
+        (0.03, 0.1, 3),
         sheet="g-squared sensitivity",
         typical="DTG 0.005-0.05, tactical 0.05-0.2, MEMS 0.1-3 deg/h/g^2",
         description="Suspension of unequal stiffness. The three squares of one gyro sum to a bias.",
         confused_with=("gyro_bias", "gyro_g_dependent_scale"),
     )
-)  # fmt: skip
+)
 
 G_PRODUCT = register(
     family(
-        "gyro_g_product", "gyro g-squared drift (anisoelastic), products", "dw_i = D_ijk a_j a_k",
-        {
-            AXES[i] + AXES[j] + AXES[k]: (GYRO[i], product(_force, j, _force, k))
-            for i in range(3) for j, k in _PAIRS
-        },
-        ("rad/s/g^2", "deg/h/g^2"), (0.03, 0.1, 3),
+        "gyro_g_product",
+        "gyro g-squared drift (anisoelastic), products",
+        "dw_i = D_ijk a_j a_k",
+        {AXES[i] + AXES[j] + AXES[k]: (GYRO[i], product(_force, j, _force, k)) for i in range(3) for j, k in _PAIRS},
+        ("rad/s/g^2", "deg/h/g^2"),
+        (0.03, 0.1, 3),
         excitation=frozenset({Excitation.OBLIQUE_STOPS}),
         sheet="g-squared sensitivity",
         typical="DTG 0.005-0.05, tactical 0.05-0.2, MEMS 0.1-3 deg/h/g^2",
         description="Zero at cardinal stops; little time in turns. Stops at 45 deg make it visible.",
         confused_with=("gyro_misalignment_asymmetry",),
     )
-)  # fmt: skip
+)
 
 G_DEPENDENT_SCALE = register(
     family(
-        "gyro_g_dependent_scale", "gyro g-dependent scale factor", "dw_i = k_i a_i w_i",
+        "gyro_g_dependent_scale",
+        "gyro g-dependent scale factor",
+        "dw_i = k_i a_i w_i",
         {AXES[i]: (GYRO[i], product(_force, i, lambda m: m.w, i)) for i in range(3)},
-        ("1/g", "ppm/g"), (10, 100, 1000),
+        ("1/g", "ppm/g"),
+        (10, 100, 1000),
         typical="small",
         description="Scale factor that changes with the force along the axis.",
         confused_with=("gyro_g_squared",),
     )
-)  # fmt: skip
+)

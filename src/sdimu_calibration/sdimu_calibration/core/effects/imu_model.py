@@ -157,10 +157,17 @@ def build(effects: Sequence[str | Effect], imu: ImuSpecification) -> ImuModel:
         decay += [1.0 / effect.decay_s if effect.decay_s else 0.0] * len(effect.parameters)
         drive += [effect.random_walk.get(imu.grade, 0.0) ** 2] * len(effect.parameters)
     return ImuModel(
-        chosen, tuple(parameters), np.array(channel, dtype=np.int64), np.array(parameter, dtype=np.int64),
-        np.array(prior), np.zeros(len(prior)), np.zeros(len(prior), dtype=bool), np.array(prior), np.array(decay),
+        chosen,
+        tuple(parameters),
+        np.array(channel, dtype=np.int64),
+        np.array(parameter, dtype=np.int64),
+        np.array(prior),
+        np.zeros(len(prior)),
+        np.zeros(len(prior), dtype=bool),
+        np.array(prior),
+        np.array(decay),
         np.array(drive),
-    )  # fmt: skip
+    )
 
 
 def restate(sensors: ImuModel, priors: Sequence[StatedPrior]) -> ImuModel:

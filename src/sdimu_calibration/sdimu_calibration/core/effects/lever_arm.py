@@ -11,16 +11,19 @@ from sdimu_calibration.core.effects.registry import register
 
 SIZE = register(
     family(
-        "accel_size", "size effect (inner lever arm)", "df_i = [(alpha x + w x w x) r_i]_i",
+        "accel_size",
+        "size effect (inner lever arm)",
+        "df_i = [(alpha x + w x w x) r_i]_i",
         {AXES[i] + AXES[j]: (ACCEL[i], pick(lambda m: m.lever, i, j)) for i in range(3) for j in range(3)},
-        ("m", "mm"), (20, 20, 20),
+        ("m", "mm"),
+        (20, 20, 20),
         typical="5-50 mm",
         description="Each accelerometer has its own place. Grows with the square of the rate: fast turns show it. A "
         "common place "
         "of all three is a lever arm and moves only the position.",
         confused_with=("accel_bias_in_motion", "accel_rate_sensitivity"),
     )
-)  # fmt: skip
+)
 
 
 def _lever(motion: Motion) -> Floats:

@@ -26,9 +26,12 @@ def _pull(motion: Motion) -> Floats:
 
 LOCK_IN = register(
     family(
-        "gyro_lock_in", "gyro lock-in (ring laser)",
+        "gyro_lock_in",
+        "gyro lock-in (ring laser)",
         "dw_i = sqrt(w_i^2 - L_i^2) sgn(w_i) - w_i, about -k_i w_i/(2 (w_i^2 + s^2)), k = L^2, s = 2 deg/h",
-        per_axis_columns(GYRO, _pull), ("rad^2/s^2", "deg^2/h^2"), (1, 2, 10),
+        per_axis_columns(GYRO, _pull),
+        ("rad^2/s^2", "deg^2/h^2"),
+        (1, 2, 10),
         positive=True,
         typical="RLG with dither L = 0.05-1 deg/h, others none",
         description="The rate is short by L^2/(2 w), L the lock-in rate that is left with dither: strongest at stops "
@@ -37,4 +40,4 @@ LOCK_IN = register(
         "one class with a dead band; stops between the axes tell them apart.",
         confused_with=("gyro_dead_band", "gyro_magnetic"),
     )
-)  # fmt: skip
+)

@@ -14,23 +14,29 @@ def _moving(motion: Motion) -> Floats:
 
 GYRO_BIAS_IN_MOTION = register(
     family(
-        "gyro_bias_in_motion", "gyro bias in motion", "dw_i = k_i while the table turns",
-        per_axis_columns(GYRO, _moving), ("rad/s", "deg/h"), (0.1, 1, 20),
+        "gyro_bias_in_motion",
+        "gyro bias in motion",
+        "dw_i = k_i while the table turns",
+        per_axis_columns(GYRO, _moving),
+        ("rad/s", "deg/h"),
+        (0.1, 1, 20),
         excitation=frozenset({Excitation.BOTH_SENSES}),
         typical="0.01-0.2 deg/h",
         description="Vibration and electromagnetic interference of the drive. Needs turns of both signs.",
         confused_with=("gyro_scale", "gyro_scale_asymmetry"),
     )
-)  # fmt: skip
+)
 
 ACCEL_BIAS_IN_MOTION = register(
     family(
-        "accel_bias_in_motion", "accelerometer bias in motion (vibration rectification)",
-        "df_i = k_i while the "
-        "table turns",
-        per_axis_columns(ACCEL, _moving), ("m/s^2", "ug"), (20, 100, 1000),
+        "accel_bias_in_motion",
+        "accelerometer bias in motion (vibration rectification)",
+        "df_i = k_i while the table turns",
+        per_axis_columns(ACCEL, _moving),
+        ("m/s^2", "ug"),
+        (20, 100, 1000),
         typical="10-50 ug/g^2rms times the level",
         description="Vibration of the drive rectified by the nonlinearity of the accelerometer.",
         confused_with=("accel_size", "accel_rate_sensitivity"),
     )
-)  # fmt: skip
+)

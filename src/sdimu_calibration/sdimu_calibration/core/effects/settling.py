@@ -29,9 +29,12 @@ def settling(stem: str, tau: float, ratio: float = 2.0) -> Effect:
         return decay[:, None].repeat(3, axis=1)
 
     return family(
-        f"{stem}_bias_settling", f"{word} bias settling after each turn",
+        f"{stem}_bias_settling",
+        f"{word} bias settling after each turn",
         f"d{letter}_i = k_i exp(-s/tau), s: time since the turn ended",
-        per_axis_columns(triad, column), units, prior,
+        per_axis_columns(triad, column),
+        units,
+        prior,
         wander_like=True,
         typical="gyro 0.01-0.1 deg/h with 5-100 s, accelerometer 1-20 ug",
         description="Torquers heated by the rate (DTG), charge and stress that decay once the table stands.",
@@ -42,7 +45,7 @@ def settling(stem: str, tau: float, ratio: float = 2.0) -> Effect:
         nearer=(lambda: tuple(settling(stem, float(f"{tau * ratio**k:.3g}"), ratio**0.5) for k in (-0.5, 0.0, 0.5)))
         if ratio > 1.1
         else None,
-    )  # fmt: skip
+    )
 
 
 for _stem in _TRIADS:

@@ -19,10 +19,14 @@ def relaxation(tau: float, ratio: float = 2.0) -> Effect:
     The standard linear solid: a spring beside a spring with a dashpot (Zener).
     """
     return family(
-        "accel_relaxation", "accelerometer relaxation (viscoelastic suspension)",
+        "accel_relaxation",
+        "accelerometer relaxation (viscoelastic suspension)",
         "df_i = k_i (a_i - y_i), tau dy_i/dt = a_i - y_i",
-        per_axis_columns(ACCEL, lambda m: m.a - low_pass(m, tau)), ("m/s^2/g", "ug/g"), (20, 100, 1000),
-        needs_table=True, wander_like=True,
+        per_axis_columns(ACCEL, lambda m: m.a - low_pass(m, tau)),
+        ("m/s^2/g", "ug/g"),
+        (20, 100, 1000),
+        needs_table=True,
+        wander_like=True,
         typical="navigation 1-20, MEMS 50-1000 ug/g with 10-1000 s",
         description="Stress in glue and flexures that gives way after each change of the force. In proportion to that "
         "change, as settling after each turn is not.",
@@ -33,15 +37,18 @@ def relaxation(tau: float, ratio: float = 2.0) -> Effect:
         nearer=(lambda: tuple(relaxation(float(f"{tau * ratio**k:.3g}"), ratio**0.5) for k in (-0.5, 0.0, 0.5)))
         if ratio > 1.1
         else None,
-    )  # fmt: skip
+    )
 
 
 def backlash(band: float) -> Effect:
     """Play of half-width `band` (g)."""
     return family(
-        "accel_play", "accelerometer play (hysteresis with memory)",
+        "accel_play",
+        "accelerometer play (hysteresis with memory)",
         "df_i = h_i (a_i - y_i)/r, y_i: play of half-width r that follows a_i",
-        per_axis_columns(ACCEL, lambda m: (m.a - play(m, band)) / band), ("m/s^2", "ug"), (20, 50, 500),
+        per_axis_columns(ACCEL, lambda m: (m.a - play(m, band)) / band),
+        ("m/s^2", "ug"),
+        (20, 50, 500),
         needs_table=True,
         typical="navigation 5-50, MEMS 50-1000 ug",
         description="Dry friction in the suspension: the output lags by as much as the friction holds. A sweep of more "
@@ -50,7 +57,7 @@ def backlash(band: float) -> Effect:
         options={"r": f"{band:g} g"},
         with_options=lambda r: backlash(float(f"{r / STANDARD_GRAVITY:.6g}")),
         scan=lambda _times: tuple(backlash(band) for band in _SCAN_BAND),
-    )  # fmt: skip
+    )
 
 
 RELAXATION = register(relaxation(120.0))

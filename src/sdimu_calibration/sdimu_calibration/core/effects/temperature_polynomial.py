@@ -30,9 +30,7 @@ from sdimu_calibration.core.effects.registry import register
 from sdimu_calibration.core.effects.scale import ACCEL_SCALE, GYRO_SCALE
 from sdimu_calibration.core.units import from_si, to_si
 
-_BASES = (
-    GYRO_BIAS, GYRO_SCALE, GYRO_MISALIGNMENT, GYRO_MASS_UNBALANCE, ACCEL_BIAS, ACCEL_SCALE, ACCEL_MISALIGNMENT,
-)  # fmt: skip
+_BASES = (GYRO_BIAS, GYRO_SCALE, GYRO_MISALIGNMENT, GYRO_MASS_UNBALANCE, ACCEL_BIAS, ACCEL_SCALE, ACCEL_MISALIGNMENT)
 _OF_ONE_SENSOR = (GYRO_BIAS, GYRO_SCALE, ACCEL_BIAS, ACCEL_SCALE)
 """Baseline effects whose heating and cooling differ: what the material of one sensor does. Angles and masses follow the
 expansion of metal, which comes back."""
@@ -66,7 +64,9 @@ def _power(base: Effect, order: int) -> Effect:
     power = "" if order == 1 else f"^{order}"
     smaller = (_BEND / _RANGE_K) ** (order - 1)
     return _multiplied(
-        base, f"_temperature{_POWERS[order]}", lambda motion: motion.temperature**order,
+        base,
+        f"_temperature{_POWERS[order]}",
+        lambda motion: motion.temperature**order,
         units=(f"/K{power}", f"/degC{power}"),
         prior={grade: smaller * size for grade, size in _linear_prior(base).items()},
         title=f"{base.title}: {_WORDS[order]}",
@@ -74,7 +74,7 @@ def _power(base: Effect, order: int) -> Effect:
         typical=_TYPICAL[order],
         description=_DESCRIPTIONS[order],
         confused_with=tuple(f"{base.name}_temperature{_POWERS[lower]}" for lower in range(1, order)),
-    )  # fmt: skip
+    )
 
 
 _TYPICAL = {
@@ -93,7 +93,9 @@ _DESCRIPTIONS = {
 def _hysteresis(base: Effect, threshold: float = _THRESHOLD) -> Effect:
     """Difference between heating and cooling, smooth below `threshold` (K/s)."""
     return _multiplied(
-        base, "_temperature_hysteresis", lambda motion: np.tanh(motion.temperature_rate / threshold),
+        base,
+        "_temperature_hysteresis",
+        lambda motion: np.tanh(motion.temperature_rate / threshold),
         units=("", ""),
         prior={grade: _LOOP * _RANGE_K * size for grade, size in _linear_prior(base).items()},
         title=f"{base.title}: hysteresis between heating and cooling",
@@ -105,13 +107,15 @@ def _hysteresis(base: Effect, threshold: float = _THRESHOLD) -> Effect:
         confused_with=(f"{base.name}_temperature_rate",),
         options={"threshold": f"{from_si(threshold, 'degC/min'):.6g} degC/min"},
         with_options=lambda threshold: _hysteresis(base, threshold),
-    )  # fmt: skip
+    )
 
 
 def _rate(base: Effect) -> Effect:
     """Coefficient of the rate of the temperature of a baseline effect that has none in `temperature`."""
     return _multiplied(
-        base, "_temperature_rate", lambda motion: motion.temperature_rate,
+        base,
+        "_temperature_rate",
+        lambda motion: motion.temperature_rate,
         units=("*s/K", "*min/degC"),
         prior={grade: _LAG_S * size for grade, size in _linear_prior(base).items()},
         title=f"{base.title}: temperature-rate coefficient",
@@ -120,7 +124,7 @@ def _rate(base: Effect) -> Effect:
         description="A sensor that lags behind the thermometer by L shows -L times its temperature coefficient.",
         confused_with=(f"{base.name}_temperature",),
         tried_in="request",
-    )  # fmt: skip
+    )
 
 
 def _rate_power(rate: Effect, order: int, word: str) -> Effect:

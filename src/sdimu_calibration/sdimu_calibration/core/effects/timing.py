@@ -12,25 +12,33 @@ from sdimu_calibration.core.units import STANDARD_GRAVITY
 
 GYRO_DELAY = register(
     family(
-        "gyro_delay", "gyro delay against the other sensors", "dw_i = -tau_i dw_i/dt",
-        per_axis_columns(GYRO, lambda m: -m.alpha), ("s", "ms"), (1, 2, 5),
+        "gyro_delay",
+        "gyro delay against the other sensors",
+        "dw_i = -tau_i dw_i/dt",
+        per_axis_columns(GYRO, lambda m: -m.alpha),
+        ("s", "ms"),
+        (1, 2, 5),
         needs_table=True,
         typical="0.01-5 ms",
         description="Transport delay or bandwidth. A delay common to all six sensors cannot be seen.",
         confused_with=("accel_delay", "gyro_acceleration_sensitivity"),
     )
-)  # fmt: skip
+)
 
 ACCEL_DELAY = register(
     family(
-        "accel_delay", "accelerometer delay against the gyros (time skew)", "df_i = -tau_i df_i/dt = tau_i (w x f)_i",
-        per_axis_columns(ACCEL, lambda m: -STANDARD_GRAVITY * m.a_rate), ("s", "ms"), (1, 2, 5),
+        "accel_delay",
+        "accelerometer delay against the gyros (time skew)",
+        "df_i = -tau_i df_i/dt = tau_i (w x f)_i",
+        per_axis_columns(ACCEL, lambda m: -STANDARD_GRAVITY * m.a_rate),
+        ("s", "ms"),
+        (1, 2, 5),
         needs_table=True,
         typical="0.01-5 ms; 1 ms makes 14 mm/s in a 90 deg turn",
         description="The force that an accelerometer reports is older than the attitude of the gyros.",
         confused_with=("gyro_delay",),
     )
-)  # fmt: skip
+)
 
 
 def _skew(motion: Motion) -> Floats:

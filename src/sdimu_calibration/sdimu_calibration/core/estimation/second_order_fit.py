@@ -184,9 +184,17 @@ class SecondOrderFit(NavigationFit):
         del end_of_fit
         setup, sensors = self.setup, self.setup.sensors
         near = motion(
-            prepared.cycles, prepared.rest, sensors, estimate, C_start.copy(), setup.site.latitude_rad, setup.gravity,
-            prepared.temperature, predicted=False, magnetic_n=setup.magnetic_n,
-        )  # fmt: skip
+            prepared.cycles,
+            prepared.rest,
+            sensors,
+            estimate,
+            C_start.copy(),
+            setup.site.latitude_rad,
+            setup.gravity,
+            prepared.temperature,
+            predicted=False,
+            magnetic_n=setup.magnetic_n,
+        )
         clean = correct_cycles(prepared.cycles, near, sensors, estimate)
         terms = spread(sensors.regressors(clean.seen), sensors.channel, sensors.parameter, clean.weight)
         return Compensated(clean.cycles, *terms)

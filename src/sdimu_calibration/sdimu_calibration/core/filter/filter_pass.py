@@ -220,19 +220,37 @@ def new_output(epochs: int, parameters: int, keep: bool, stride: int, navigation
     t, g = (NAV, 0) if navigation_only else (s, p)
     nan = np.nan
     return PassOutput(
-        np.zeros((e, p)), np.zeros((e, s)), np.full((e, MEASURED), nan), np.full((e, MEASURED), nan),
+        np.zeros((e, p)),
+        np.zeros((e, s)),
         np.full((e, MEASURED), nan),
-        np.zeros(e), np.full((e, 4), nan), np.zeros((e, 3, 3)), stride, np.zeros((-(-e // stride), p, p)),
-        np.zeros((k, NAV, NAV)), np.zeros((k, NAV, g)), np.zeros((k, MEASURED, t)), np.zeros((k, MEASURED, MEASURED)),
+        np.full((e, MEASURED), nan),
+        np.full((e, MEASURED), nan),
+        np.zeros(e),
+        np.full((e, 4), nan),
+        np.zeros((e, 3, 3)),
+        stride,
+        np.zeros((-(-e // stride), p, p)),
+        np.zeros((k, NAV, NAV)),
+        np.zeros((k, NAV, g)),
+        np.zeros((k, MEASURED, t)),
+        np.zeros((k, MEASURED, MEASURED)),
         np.zeros((k, t, MEASURED)),
-    )  # fmt: skip
+    )
 
 
 @compiled
 def _navigate_epoch(
-    data: PassInput, e: int, settings: PassSettings, state: PassState, f_n: Floats, G: Floats, D: Floats, sums: Floats,
-    C_mean: Floats, R: Floats,
-) -> float:  # fmt: skip
+    data: PassInput,
+    e: int,
+    settings: PassSettings,
+    state: PassState,
+    f_n: Floats,
+    G: Floats,
+    D: Floats,
+    sums: Floats,
+    C_mean: Floats,
+    R: Floats,
+) -> float:
     """Navigate through an epoch along a force `f_n` (n, 3) of its cycles in NED, in place; return its length (s).
 
     Filled: G (9, p), D (6, p), and sums (6,) of angle and velocity increment in b; of the cycles of the epoch the mean

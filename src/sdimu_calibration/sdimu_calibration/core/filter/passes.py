@@ -152,9 +152,7 @@ def start_state(setup: TestSetup, start: Alignment, C_nb: Floats, reference: Flo
     return PassState(x, P, C_nb.copy(), np.zeros(3), position, reference.copy())
 
 
-def pass_input(
-    prepared: PreparedData, values: Floats, channel: Ints, parameter: Ints
-) -> PassInput:
+def pass_input(prepared: PreparedData, values: Floats, channel: Ints, parameter: Ints) -> PassInput:
     """Put cycles, epochs and regressors together.
 
     Parameters
@@ -168,9 +166,22 @@ def pass_input(
     """
     c, e, b = prepared.cycles, prepared.epochs, prepared.bridges
     return PassInput(
-        c.dt, c.alpha, c.upsilon, c.coning, c.sculling, e.first, e.last, b.white, b.angle, b.velocity, prepared.kind,
-        restarts(e, prepared.phases) & (prepared.kind != SKIP), values, channel, parameter,
-    )  # fmt: skip
+        c.dt,
+        c.alpha,
+        c.upsilon,
+        c.coning,
+        c.sculling,
+        e.first,
+        e.last,
+        b.white,
+        b.angle,
+        b.velocity,
+        prepared.kind,
+        restarts(e, prepared.phases) & (prepared.kind != SKIP),
+        values,
+        channel,
+        parameter,
+    )
 
 
 def one_pass(
@@ -204,10 +215,19 @@ def one_pass(
     """
     sensors = setup.sensors
     seen = motion(
-        prepared.cycles, prepared.rest, sensors, reference, C_nb.copy(), setup.site.latitude_rad, setup.gravity,
-        prepared.temperature, predicted=not closed_loop, magnetic_n=setup.magnetic_n, near=near,
+        prepared.cycles,
+        prepared.rest,
+        sensors,
+        reference,
+        C_nb.copy(),
+        setup.site.latitude_rad,
+        setup.gravity,
+        prepared.temperature,
+        predicted=not closed_loop,
+        magnetic_n=setup.magnetic_n,
+        near=near,
         causal=closed_loop,
-    )  # fmt: skip
+    )
     values = sensors.regressors(seen)
     if not np.isfinite(values).all():
         raise DataError("a sensor effect of the model is not finite on this recording: check its expression")
@@ -263,9 +283,7 @@ def refine(
         progress("passes", min(0.95, 0.3 + 0.1 * (count - 1)))
         reference = last.estimate * (setup.sensors.decay_rate == 0.0)
         use = loose if settling else setup
-        new = one_pass(
-            prepared, use, start, last.smoothed_start, reference, closed_loop=False, near=last.data.values
-        )
+        new = one_pass(prepared, use, start, last.smoothed_start, reference, closed_loop=False, near=last.data.values)
         moved = furthest_move(new.estimate - last.estimate, new.covariance)
         last = new
         if settling:
@@ -396,9 +414,11 @@ def solve(setup: TestSetup, prepared: PreparedData, begin: StartPoint | None, pr
         converged = False
     if not converged:
         # The first dwell misled the first pass (an azimuth that may be anything): all stops together know better.
-        first = first if begin is None else one_pass(
-            prepared, setup, start, start.C_nb, np.zeros(len(setup.sensors.prior)), closed_loop=True
-        )  # fmt: skip
+        first = (
+            first
+            if begin is None
+            else one_pass(prepared, setup, start, start.C_nb, np.zeros(len(setup.sensors.prior)), closed_loop=True)
+        )
         begun = coarse_pass(prepared, setup, start)
         last, passes, converged = refine(prepared, setup, start, begun, progress)
     for _ in range(MOST_WIDENINGS):

@@ -81,9 +81,12 @@ class CommonEffect:
 
 
 def common_effects(
-    names: Sequence[str], estimates: Floats, sigmas: Floats, rate: float = FALSE_DISCOVERY,
+    names: Sequence[str],
+    estimates: Floats,
+    sigmas: Floats,
+    rate: float = FALSE_DISCOVERY,
     correlations: Bytes | None = None,
-) -> tuple[CommonEffect, ...]:  # fmt: skip
+) -> tuple[CommonEffect, ...]:
     """Test every effect over all units.
 
     Parameters
@@ -186,9 +189,13 @@ def _fit(y: Floats, s: Floats) -> tuple[float, float, float, float, float, float
     likelihood, mean, sigma = at(np.array([tau2]))
     ratio = 2.0 * float(likelihood[0] - 0.5 * (-np.log(errors).sum() - np.sum(y**2 / errors)))
     return (
-        unit * float(mean[0]), unit * float(sigma[0]), unit * float(np.sqrt(tau2)),
-        float(np.abs(y / np.sqrt(errors)).max()), boundary_tail(max(ratio, 0.0)), ratio,
-    )  # fmt: skip
+        unit * float(mean[0]),
+        unit * float(sigma[0]),
+        unit * float(np.sqrt(tau2)),
+        float(np.abs(y / np.sqrt(errors)).max()),
+        boundary_tail(max(ratio, 0.0)),
+        ratio,
+    )
 
 
 def boundary_tail(ratio: float) -> float:

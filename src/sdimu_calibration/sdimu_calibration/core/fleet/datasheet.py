@@ -114,10 +114,17 @@ def _composite(line: Line, parts: Sequence[Line]) -> Line:
     sums = (math.sqrt(sum(getattr(part, name) ** 2 for part in known)) for name in ("value", "low", "high"))
     value, low, high = sums
     return replace(
-        line, unit=parts[0].unit, value=value, low=low, high=high, of=parts[0].of, recordings=parts[0].recordings,
-        units=parts[0].units, condition=parts[0].condition,
+        line,
+        unit=parts[0].unit,
+        value=value,
+        low=low,
+        high=high,
+        of=parts[0].of,
+        recordings=parts[0].recordings,
+        units=parts[0].units,
+        condition=parts[0].condition,
         method="root sum square of " + ", ".join(part.term.partition(" ")[2] for part in known),
-    )  # fmt: skip
+    )
 
 
 def _varies(effect: Effect) -> bool:
@@ -133,12 +140,14 @@ def conditions(samples: Sequence[Sample]) -> str:
     high = [o.temperature_high_degc for o in origins if math.isfinite(o.temperature_high_degc)]
     rates = [o.rate_rad_s for o in origins if math.isfinite(o.rate_rad_s)]
     return "; ".join(
-        word for word in (
+        word
+        for word in (
             ", ".join(sites),
             f"{min(low):.0f} to {max(high):.0f} deg C" if low else "temperature not recorded",
             f"rates to {from_si(max(rates), 'deg/s'):.3g} deg/s" if rates else "",
-        ) if word
-    )  # fmt: skip
+        )
+        if word
+    )
 
 
 @dataclass(frozen=True)
@@ -197,11 +206,17 @@ def _of_effects(term: str, effects: Sequence[Effect], samples: Sequence[Sample])
     worst = int(np.argmax(size))
     once = "" if within is None else ", mean of the recordings of a unit"
     return replace(
-        empty, value=float(size[worst]), low=max(0.0, float((size - z * sigma).max())),
-        high=float((size + z * sigma).max()), rms=float(np.sqrt(np.mean(size**2))), of=names[worst],
-        recordings=rows.recordings, units=len(set(rows.unit)), condition=conditions(samples),
+        empty,
+        value=float(size[worst]),
+        low=max(0.0, float((size - z * sigma).max())),
+        high=float((size + z * sigma).max()),
+        rms=float(np.sqrt(np.mean(size**2))),
+        of=names[worst],
+        recordings=rows.recordings,
+        units=len(set(rows.unit)),
+        condition=conditions(samples),
         method=f"largest of {tests} coefficients{once}",
-    )  # fmt: skip
+    )
 
 
 def _by_group(rows: _Rows) -> tuple[list[str], Floats, Floats, RandomEffect | None]:
@@ -230,15 +245,25 @@ def _repeatability(term: str, effect: Effect, samples: Sequence[Sample]) -> Line
     parameter = effect.parameters[0]
     empty = Line(term, parameter.unit, parameter.display_unit)
     joint = [
-        (t, s.unit) for s in samples if s.result.of_set is not None
-        for t in s.result.of_set.turn_on if t.effect == effect.name
-    ]  # fmt: skip
+        (t, s.unit)
+        for s in samples
+        if s.result.of_set is not None
+        for t in s.result.of_set.turn_on
+        if t.effect == effect.name
+    ]
     if joint:
         best, unit = max(joint, key=lambda pair: pair[0].power_ons)
         return replace(
-            empty, value=best.sigma, low=best.low, high=best.high, of=unit, recordings=int(best.power_ons), units=1,
-            condition=conditions(samples), method=f"joint fit over {int(best.power_ons)} power-ons",
-        )  # fmt: skip
+            empty,
+            value=best.sigma,
+            low=best.low,
+            high=best.high,
+            of=unit,
+            recordings=int(best.power_ons),
+            units=1,
+            condition=conditions(samples),
+            method=f"joint fit over {int(best.power_ons)} power-ons",
+        )
     rows = _one_a_power_on(_rows([effect], samples))
     groups = rows.groups
     if len(set(groups)) == len(groups):
@@ -247,10 +272,15 @@ def _repeatability(term: str, effect: Effect, samples: Sequence[Sample]) -> Line
     found = random_effect(rows.value, rows.sigma, groups)
     repeated = {unit for unit, group in zip(rows.unit, groups, strict=True) if groups.count(group) > 1}
     return replace(
-        empty, value=found.spread, low=found.low, high=found.high, recordings=rows.recordings, units=len(repeated),
+        empty,
+        value=found.spread,
+        low=found.low,
+        high=found.high,
+        recordings=rows.recordings,
+        units=len(repeated),
         condition=conditions(samples),
         method=f"standard deviation from turn-on to turn-on, all axes, {found.dof} degrees of freedom",
-    )  # fmt: skip
+    )
 
 
 def _one_a_power_on(rows: _Rows) -> _Rows:
@@ -264,10 +294,13 @@ def _one_a_power_on(rows: _Rows) -> _Rows:
     weight = rows.sigma**-2.0
     total = weight @ member
     return replace(
-        rows, value=(weight * rows.value) @ member / total, sigma=1.0 / np.sqrt(total),
-        unit=tuple(rows.unit[k] for k in first), coefficient=tuple(rows.coefficient[k] for k in first),
+        rows,
+        value=(weight * rows.value) @ member / total,
+        sigma=1.0 / np.sqrt(total),
+        unit=tuple(rows.unit[k] for k in first),
+        coefficient=tuple(rows.coefficient[k] for k in first),
         power_on=tuple(rows.power_on[k] for k in first),
-    )  # fmt: skip
+    )
 
 
 _LONG_REST = f"record it at rest for hours: {Work.NOISE} BAG, and give its folder with {Option.NOISE}"
@@ -275,12 +308,10 @@ _NOISE = {
     ("gyro", "white"): Line("gyro angle random walk", "rad/s/sqrt(Hz)", "deg/sqrt(h)", missing=_LONG_REST),
     ("gyro", "instability"): Line("gyro bias in-run stability", "rad/s", "deg/h", missing=_LONG_REST),
     ("gyro", "random_walk"): Line("gyro rate random walk", "rad/s/sqrt(s)", "deg/h/sqrt(h)", missing=_LONG_REST),
-    ("accel", "white"): Line(
-        "accelerometer velocity random walk", "m/s^2/sqrt(Hz)", "m/s/sqrt(h)", missing=_LONG_REST),
+    ("accel", "white"): Line("accelerometer velocity random walk", "m/s^2/sqrt(Hz)", "m/s/sqrt(h)", missing=_LONG_REST),
     ("accel", "instability"): Line("accelerometer bias in-run stability", "m/s^2", "ug", missing=_LONG_REST),
-    ("accel", "random_walk"): Line(
-        "accelerometer bias random walk", "m/s^2/sqrt(s)", "ug/sqrt(h)", missing=_LONG_REST),
-}  # fmt: skip
+    ("accel", "random_walk"): Line("accelerometer bias random walk", "m/s^2/sqrt(s)", "ug/sqrt(h)", missing=_LONG_REST),
+}
 """Terms of the noise: triad and term of the Allan deviation (IEEE Std 952, annex C)."""
 _ALLAN = ("quantisation", "white", "instability", "random_walk")
 """Terms of an Allan deviation, in the order of `Terms`."""
@@ -288,9 +319,7 @@ _LEARNED = {"instability": "flicker", "random_walk": "random_walk"}
 """Kind of noise that a calibration learns, by term of the Allan deviation."""
 
 
-def _of_noise(
-    key: tuple[str, str], line: Line, samples: Sequence[Sample], noise: Sequence[NoiseOfUnit]
-) -> Line:
+def _of_noise(key: tuple[str, str], line: Line, samples: Sequence[Sample], noise: Sequence[NoiseOfUnit]) -> Line:
     """Take the largest size of a term of the noise: of rests, else of what calibrations learned, else of a file."""
     triad, term = key
     rests = [(n.source, channel, found) for n in noise for channel, found in n.terms.items() if channel[:-2] == triad]
@@ -302,10 +331,17 @@ def _of_noise(
     if learned:
         largest, unit = max(learned, key=lambda pair: pair[0].size)
         return replace(
-            line, value=largest.size, low=max(t.low for t, _ in learned), high=max(t.high for t, _ in learned),
-            of=unit, recordings=len(learned), units=len({u for _, u in learned}), condition=conditions(samples),
-            method="learned in the calibration, all axes", missing="",
-        )  # fmt: skip
+            line,
+            value=largest.size,
+            low=max(t.low for t, _ in learned),
+            high=max(t.high for t, _ in learned),
+            of=unit,
+            recordings=len(learned),
+            units=len({u for _, u in learned}),
+            condition=conditions(samples),
+            method="learned in the calibration, all axes",
+            missing="",
+        )
     stated = [(n.stated[key], n.source) for n in noise if n.stated.get(key, 0.0) > 0.0]
     if stated:
         size, source = max(stated)
@@ -322,8 +358,14 @@ def _of_rests(line: Line, k: int, rests: Sequence[tuple[str, str, Terms]]) -> Li
     high = np.array([max(float(t.value[k]), 0.0) for _, _, t in rests]) + half
     worst = int(np.argmax(value))
     return replace(
-        line, value=float(value[worst]), low=max(0.0, float(low.max())), high=float(high.max()),
-        rms=float(np.sqrt(np.mean(value**2))), of=f"{rests[worst][1]} in {rests[worst][0]}",
-        recordings=len({source for source, _, _ in rests}), units=0,
-        method=f"Allan deviation of rests, largest of {len(rests)} channels", missing="",
-    )  # fmt: skip
+        line,
+        value=float(value[worst]),
+        low=max(0.0, float(low.max())),
+        high=float(high.max()),
+        rms=float(np.sqrt(np.mean(value**2))),
+        of=f"{rests[worst][1]} in {rests[worst][0]}",
+        recordings=len({source for source, _, _ in rests}),
+        units=0,
+        method=f"Allan deviation of rests, largest of {len(rests)} channels",
+        missing="",
+    )

@@ -247,6 +247,7 @@ def _out(units: tuple[str, ...], found: tuple[Coefficient, ...]) -> tuple[Out, .
     tests = len(units) * len(found)
     out = [
         Out(units[k], one.name, float(one.deviates[k]), min(1.0, tests * float(one.p_values[k])))
-        for one in found for k in np.flatnonzero(tests * one.p_values < FALSE_ALARM)
-    ]  # fmt: skip
+        for one in found
+        for k in np.flatnonzero(tests * one.p_values < FALSE_ALARM)
+    ]
     return tuple(sorted(out, key=lambda o: o.p_value))

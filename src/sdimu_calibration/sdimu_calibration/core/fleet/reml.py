@@ -115,11 +115,17 @@ def random_effect(
     low, high = (_crossing(fit, chi2_limit(p, dof)) for p in (0.5 * (1.0 - LEVEL), 0.5 * (1.0 + LEVEL)))
     scale = float(found.q[0]) / dof
     return RandomEffect(
-        spread=unit * math.sqrt(tau2), low=unit * math.sqrt(low), high=unit * math.sqrt(max(high, tau2)), dof=dof,
-        q=float(none.q[0]), p_value=chi2_tail(float(none.q[0]), dof), mean=unit * float(found.mean[0]),
-        mean_sigma=unit * math.sqrt(scale * float(found.mean_variance[0])), slope=unit * float(found.slope[0]),
+        spread=unit * math.sqrt(tau2),
+        low=unit * math.sqrt(low),
+        high=unit * math.sqrt(max(high, tau2)),
+        dof=dof,
+        q=float(none.q[0]),
+        p_value=chi2_tail(float(none.q[0]), dof),
+        mean=unit * float(found.mean[0]),
+        mean_sigma=unit * math.sqrt(scale * float(found.mean_variance[0])),
+        slope=unit * float(found.slope[0]),
         slope_sigma=unit * math.sqrt(scale * float(found.slope_variance[0])),
-    )  # fmt: skip
+    )
 
 
 def spread_and_mean(values: Floats, sigmas: Floats) -> tuple[float, float]:

@@ -86,6 +86,4 @@ def _within(fleet: Measured, k: int) -> RandomEffect | None:
     spans = [np.ptp(dates[serials == unit]) for unit in fleet.units]
     if len(serials) - len(spans) < 2 or max(spans) < _SHORTEST_S:
         return None
-    return random_effect(
-        fleet.values[:, k], fleet.sigmas[:, k], fleet.serials, (dates - dates.mean()) / YEAR_S
-    )
+    return random_effect(fleet.values[:, k], fleet.sigmas[:, k], fleet.serials, (dates - dates.mean()) / YEAR_S)

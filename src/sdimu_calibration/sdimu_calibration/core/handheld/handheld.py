@@ -53,8 +53,6 @@ _SEEN = 3.0
 """Ratio of the Earth's rate to its sigma: from here on it is seen."""
 
 
-
-
 @dataclass(frozen=True)
 class PreparedRun:
     """A handheld recording, made ready: without impossible samples, its rests found, reduced.
@@ -121,10 +119,15 @@ def fit_priors(sensors: ImuModel, imu: ImuSpecification, site: Site | None, rest
         # The heading is free, so north is any way; 1e-9 rad/s is a ten-thousandth of a degree an hour.
         sigma = np.array([abs(rate[0]) / np.sqrt(2.0) + 1e-9, abs(rate[0]) / np.sqrt(2.0) + 1e-9, 1e-9])
     return FitPriors(
-        sensors, kept, prior[np.ix_(kept, kept)], gravity, mean, sigma,
+        sensors,
+        kept,
+        prior[np.ix_(kept, kept)],
+        gravity,
+        mean,
+        sigma,
         max(rests.gyro_white_noise, _LEAST_NOISE * imu.gyro_white_noise),
         max(rests.accel_white_noise, _LEAST_NOISE * imu.accel_white_noise),
-    )  # fmt: skip
+    )
 
 
 def _stated(sensors: ImuModel, imu: ImuSpecification) -> Bools:
@@ -183,8 +186,7 @@ def _whole_note(run: HandheldRun) -> list[str]:
 def _gravity_note(scene: FitPriors, site: Site | None) -> str:
     source = "standard gravity, as no site is given" if site is None else "of the site"
     return (
-        f"gravity {scene.gravity:.5f} m/s^2 ({source}); "
-        "its error is a common error of all accelerometer scale factors"
+        f"gravity {scene.gravity:.5f} m/s^2 ({source}); its error is a common error of all accelerometer scale factors"
     )
 
 

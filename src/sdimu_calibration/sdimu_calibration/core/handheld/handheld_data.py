@@ -94,10 +94,17 @@ def reduce_run(recording: Recording, rests: StaticIntervals) -> HandheldRun:
     gap = GAP_SHARE**2 * np.sum(cycles.gap_angle**2, axis=1)
     gap[cycles.lost * nominal > _UNSEEN_S] = _ANY_TURN**2
     return HandheldRun(
-        0.5 * (start[begin] + cycles.t[end - 1]), part[:, 0], part[:, 1:] / part[:, :1], cycles, first, last,
-        _sums(cycles.dt, first, last), _sums(angle, first, last), np.sqrt(_sums(gap, first, last)),
+        0.5 * (start[begin] + cycles.t[end - 1]),
+        part[:, 0],
+        part[:, 1:] / part[:, :1],
+        cycles,
+        first,
+        last,
+        _sums(cycles.dt, first, last),
+        _sums(angle, first, last),
+        np.sqrt(_sums(gap, first, last)),
         recording.temperature,
-    )  # fmt: skip
+    )
 
 
 def _sums(values: Floats, first: Ints, last: Ints) -> Floats:
@@ -125,9 +132,23 @@ def seen_at_rest(run: HandheldRun, C_nb: Floats, rate_n: Floats, gravity: float)
     none = np.zeros((k, 3))
     w = np.einsum("kij,i->kj", C_nb, rate_n)
     return Motion(
-        run.t, run.seconds, w, -gravity * C_nb[:, 2, :], C_nb, none, none, np.ones(k, dtype=bool), heat, heat_rate,
-        none, none, np.full(k, np.inf), MAGNETIC_FIELD, none, NO_PAST,
-    )  # fmt: skip
+        run.t,
+        run.seconds,
+        w,
+        -gravity * C_nb[:, 2, :],
+        C_nb,
+        none,
+        none,
+        np.ones(k, dtype=bool),
+        heat,
+        heat_rate,
+        none,
+        none,
+        np.full(k, np.inf),
+        MAGNETIC_FIELD,
+        none,
+        NO_PAST,
+    )
 
 
 @dataclass(frozen=True)
@@ -192,9 +213,7 @@ def turns(run: HandheldRun, model: ImuModel, coefficients: Floats, C_nb: Floats,
     cycles = run.cycles
     none = np.zeros(len(cycles), dtype=bool)
     # Earth rate is below what the gyros know of themselves here: the table's rate and the body's are one.
-    near = motion(
-        cycles, none, model, coefficients, C_nb[0].copy(), 0.0, gravity, run.temperature, predicted=False
-    )  # fmt: skip
+    near = motion(cycles, none, model, coefficients, C_nb[0].copy(), 0.0, gravity, run.temperature, predicted=False)
     clean = correct_cycles(cycles, near, model, coefficients)
     phi = clean.cycles.alpha + clean.cycles.coning
     middle, end = _integrate(np.ascontiguousarray(C_nb), run.first, run.last, np.ascontiguousarray(phi))

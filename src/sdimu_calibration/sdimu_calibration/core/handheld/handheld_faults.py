@@ -55,9 +55,12 @@ def without_impossible(recording: Recording) -> tuple[Recording, tuple[DataFault
     )
     keep = ~bad
     mended = replace(
-        recording, t=recording.t[keep], omega_ib_b=recording.omega_ib_b[keep], f_ib_b=recording.f_ib_b[keep],
+        recording,
+        t=recording.t[keep],
+        omega_ib_b=recording.omega_ib_b[keep],
+        f_ib_b=recording.f_ib_b[keep],
         rejected=recording.rejected + len(t),
-    )  # fmt: skip
+    )
     return mended, (DataFault("spike", text, len(t), float(t[0]), float(t[-1])),)
 
 

@@ -192,9 +192,7 @@ def _moved(point: LinearisationPoint, step: Floats, scene: FitPriors) -> Lineari
     return replace(point, coefficients=coefficients, C_nb=C_nb, earth=point.earth + step[-3:])
 
 
-def equations(
-    run: HandheldRun, scene: FitPriors, point: LinearisationPoint
-) -> tuple[Floats, Floats, Ints]:
+def equations(run: HandheldRun, scene: FitPriors, point: LinearisationPoint) -> tuple[Floats, Floats, Ints]:
     """Make the equations about a point.
 
     Unknowns in this order: turns of the rests, coefficients, Earth rate. Equations in this order: six of each rest,
@@ -245,10 +243,14 @@ def equations(
     for row, i in enumerate(run.whole, start=9 * k - 3):
         rows[row, [3 * i + 2, 3 * i + 5]] = -1.0, 1.0
         residual[row] = rotation_vector(point.C_nb[i + 1] @ point.C_nb[i].T)[2]
-    kind = np.concatenate([
-        np.tile([RATE] * 3 + [FORCE] * 3, k), np.full(3 * (k - 1), TURN), np.full(len(run.whole), WHOLE),
-        np.full(q + 4, -1),
-    ])  # fmt: skip
+    kind = np.concatenate(
+        [
+            np.tile([RATE] * 3 + [FORCE] * 3, k),
+            np.full(3 * (k - 1), TURN),
+            np.full(len(run.whole), WHOLE),
+            np.full(q + 4, -1),
+        ]
+    )
     more, left = _priors(scene, point, rows.shape[1])
     return np.vstack([rows, more]), np.concatenate([residual, left]), kind
 
@@ -290,14 +292,20 @@ def row_sigmas(run: HandheldRun, scene: FitPriors, kind: Ints, extra: Floats) ->
 def _variances(run: HandheldRun, scene: FitPriors, extra: Floats) -> tuple[Floats, Floats]:
     """Variance by white noise, and beyond it, of the rate and force at each rest and of each turn, (3 k - 1,)."""
     k = len(run.t)
-    white = np.concatenate([
-        scene.gyro_white_noise**2 / run.seconds, scene.accel_white_noise**2 / run.seconds,
-        scene.gyro_white_noise**2 * run.turn_s + run.gap**2,
-    ])  # fmt: skip
-    more = np.concatenate([
-        np.full(k, extra[RATE] ** 2), np.full(k, extra[FORCE] ** 2),
-        (extra[RATE] * run.turn_s) ** 2 + (extra[TURN] * run.path) ** 2,
-    ])  # fmt: skip
+    white = np.concatenate(
+        [
+            scene.gyro_white_noise**2 / run.seconds,
+            scene.accel_white_noise**2 / run.seconds,
+            scene.gyro_white_noise**2 * run.turn_s + run.gap**2,
+        ]
+    )
+    more = np.concatenate(
+        [
+            np.full(k, extra[RATE] ** 2),
+            np.full(k, extra[FORCE] ** 2),
+            (extra[RATE] * run.turn_s) ** 2 + (extra[TURN] * run.path) ** 2,
+        ]
+    )
     return white, more
 
 
@@ -327,13 +335,7 @@ def _solve(rows: Floats, residual: Floats, sigma: Floats) -> tuple[Floats, Float
 
 
 def _learn(
-    run: HandheldRun,
-    scene: FitPriors,
-    kind: Ints,
-    extra: Floats,
-    rows: Floats,
-    residual: Floats,
-    step: Floats,
+    run: HandheldRun, scene: FitPriors, kind: Ints, extra: Floats, rows: Floats, residual: Floats, step: Floats
 ) -> Floats:
     """Learn the sigmas beyond white noise from what the step leaves over.
 

@@ -137,9 +137,7 @@ def diagnose_set(
         again = recurrence(leftovers(found.after, run))
         word = _verdict(findings, after, found.after, again)
     test = base_fit(found.after).test
-    standing = replace(
-        found.standing, imu=test.origin.imu_file or found.standing.imu, site=test.origin.site_stated
-    )
+    standing = replace(found.standing, imu=test.origin.imu_file or found.standing.imu, site=test.origin.site_stated)
     without = _error_without(found)
     sentence = f"{_sentence(word, findings, (without, after), again)} {taken_back}".strip()
     return SetDiagnosis(

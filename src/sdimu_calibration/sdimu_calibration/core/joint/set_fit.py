@@ -354,9 +354,16 @@ def _combined(members: Sequence[Member], options: SetOptions, reports: Sequence[
     estimate, turn_on = _estimated(reports, names, varying)
     by_name = {m.name: m for m in members}
     return SetFit(
-        tuple(by_name[r.name] for r in reports), options.model, dict(options.local), varying, tuple(reports), names,
-        estimate, turn_on, asked=tuple(by_name),
-    )  # fmt: skip
+        tuple(by_name[r.name] for r in reports),
+        options.model,
+        dict(options.local),
+        varying,
+        tuple(reports),
+        names,
+        estimate,
+        turn_on,
+        asked=tuple(by_name),
+    )
 
 
 def _estimated(

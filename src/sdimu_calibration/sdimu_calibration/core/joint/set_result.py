@@ -58,19 +58,31 @@ def set_outcome(fit: SetFit) -> Calibration:
     free = tuple(name for name, variance in zip(names, np.diag(covariance), strict=True) if variance > 0.0)
     warnings = (*_warnings(fit, varied, free), *inseparable(names, covariance))
     return Calibration(
-        body_frame=base.body_frame, model=tuple(e.key for e in base.sensors.effects), names=names,
-        units=tuple(p.unit for p in parameters), display_units=tuple(p.display_unit for p in parameters),
-        values=values, covariance=covariance,
+        body_frame=base.body_frame,
+        model=tuple(e.key for e in base.sensors.effects),
+        names=names,
+        units=tuple(p.unit for p in parameters),
+        display_units=tuple(p.display_unit for p in parameters),
+        values=values,
+        covariance=covariance,
         fit={
-            "log_likelihood": fit.estimate.log_likelihood, "nis_mean": nis / max(dof, 1.0), "nis_dof": dof,
+            "log_likelihood": fit.estimate.log_likelihood,
+            "nis_mean": nis / max(dof, 1.0),
+            "nis_dof": dof,
             "held_out_rms": None if predicted is None else predicted.rms,
             "passes": max(r.statistics.passes for r in fit.reports),
         },
-        data=_data(fit.reports, base), notes=(*_notes(fit, base), *warnings), history=no_history(len(names)),
-        warnings=warnings, estimator=base.estimator, estimator_reason=fit.reports[0].reason,
-        drift_means=base.drift_means, of_set=_summary(fit, varied, names, base), origin=_origin(fit, base),
+        data=_data(fit.reports, base),
+        notes=(*_notes(fit, base), *warnings),
+        history=no_history(len(names)),
+        warnings=warnings,
+        estimator=base.estimator,
+        estimator_reason=fit.reports[0].reason,
+        drift_means=base.drift_means,
+        of_set=_summary(fit, varied, names, base),
+        origin=_origin(fit, base),
         imu_noise=base.test.imu.noise_alone,
-    )  # fmt: skip
+    )
 
 
 def base_fit(fit: SetFit) -> Fit:
@@ -112,11 +124,15 @@ def _origin(fit: SetFit, base: Fit) -> Origin:
     heat = heat[np.isfinite(heat)]
     mean, low, high = (heat.mean(), heat.min(), heat.max()) if len(heat) else (np.nan,) * 3
     return replace(
-        own, serial=serials.pop() if len(serials) == 1 else own.serial, power_on="", recording="",
-        start_ns=min(r.start_ns for r in fit.reports), temperature_degc=float(mean),
+        own,
+        serial=serials.pop() if len(serials) == 1 else own.serial,
+        power_on="",
+        recording="",
+        start_ns=min(r.start_ns for r in fit.reports),
+        temperature_degc=float(mean),
         temperature_low_degc=float(np.fmin(low, own.temperature_low_degc)),
         temperature_high_degc=float(np.fmax(high, own.temperature_high_degc)),
-    )  # fmt: skip
+    )
 
 
 def _notes(fit: SetFit, base: Fit) -> tuple[str, ...]:
@@ -144,26 +160,26 @@ def with_units(fit: SetFit, base: Fit) -> list[TurnOn]:
     """Scatter of each effect from power-on to power-on, with the units of its coefficients."""
     by_name = {p.name: p for p in base.sensors.parameters}
     first = [by_name[names[0]] for names in fit.varying.values()] if fit.turn_on else []
-    return [
-        replace(t, unit=p.unit, display_unit=p.display_unit) for t, p in zip(fit.turn_on, first, strict=True)
-    ]
+    return [replace(t, unit=p.unit, display_unit=p.display_unit) for t, p in zip(fit.turn_on, first, strict=True)]
 
 
 def _warnings(fit: SetFit, varied: Variation, names: Sequence[str]) -> tuple[str, ...]:
     """Coefficients that differ between recordings by more than chance, and what is wrong with the data."""
     odd = [
-        (p, name) for name, p in zip(varied.names, varied.p_value.tolist(), strict=True)
+        (p, name)
+        for name, p in zip(varied.names, varied.p_value.tolist(), strict=True)
         if name in names and p * len(names) < SCATTERS
-    ]  # fmt: skip
+    ]
     trends = {t.name: t for t in varied.trends if t.p_value < SCATTERS}
     lines = [
         Note(
             f"{name} is not the same in all recordings (p {p:.1g})"
             + (f"; it follows {trends[name].covariate}" if name in trends else ""),
-            Topic.DIFFERS, f"; run: {Work.DIAGNOSE}",
+            Topic.DIFFERS,
+            f"; run: {Work.DIAGNOSE}",
         )
         for p, name in sorted(odd)
-    ]  # fmt: skip
+    ]
     left_out = [f"{name} is left out: {why}" for name, why in fit.left_out]
     return (*left_out, *_misfit(fit), *lines, *_told(fit, [r.warnings for r in fit.reports]))
 
@@ -179,9 +195,10 @@ def _misfit(fit: SetFit) -> list[Note]:
         Note(
             f"the model in white noise does not fit (NIS of {told}; 1 is right): physics is missing, or the noise has "
             "a memory",
-            Topic.MISFIT, f"; run: {Work.DIAGNOSE}",
+            Topic.MISFIT,
+            f"; run: {Work.DIAGNOSE}",
         )
-    ]  # fmt: skip
+    ]
 
 
 def _summary(fit: SetFit, varied: Variation, names: Sequence[str], base: Fit) -> SetSummary:
@@ -193,12 +210,19 @@ def _summary(fit: SetFit, varied: Variation, names: Sequence[str], base: Fit) ->
     listed = [(k, fit.reports[k]) for k in fit.shown]
     recordings = tuple(
         SetRecording(
-            r.name, r.serial, r.power_on, r.start_ns, r.temperature_degc, r.data.get("duration_s", float("nan")),
-            r.data.get("samples", float("nan")), r.statistics.nis_mean,
-            *_own(r, names), in_order(varied.z[k]),
+            r.name,
+            r.serial,
+            r.power_on,
+            r.start_ns,
+            r.temperature_degc,
+            r.data.get("duration_s", float("nan")),
+            r.data.get("samples", float("nan")),
+            r.statistics.nis_mean,
+            *_own(r, names),
+            in_order(varied.z[k]),
         )
         for k, r in listed
-    )  # fmt: skip
+    )
     rows = [fit.power_ons.index(name) for name in dict.fromkeys(power_on(r) for _, r in listed)]
     deviations = tuple(
         PowerOnDeviation(fit.power_ons[row], name, float(value), float(sigma))

@@ -104,9 +104,14 @@ class SetSearch:
 
 
 def search_set(
-    members: Sequence[Member], options: SetOptions, run: Run, extra: Sequence[Effect] = (),
-    progress: Progress = silent, alpha: float = FALSE_ALARM, fitted: SetFit | None = None,
-) -> SetSearch:  # fmt: skip
+    members: Sequence[Member],
+    options: SetOptions,
+    run: Run,
+    extra: Sequence[Effect] = (),
+    progress: Progress = silent,
+    alpha: float = FALSE_ALARM,
+    fitted: SetFit | None = None,
+) -> SetSearch:
     """Find what the model of a set misses.
 
     Parameters
@@ -170,9 +175,16 @@ def search_set(
         at_end = set_evidence(full, [c for effect in effects for c in split(effect)])
         alike = _alike(at_end, kept)
     return SetSearch(
-        before, fit, tuple(kept.values()), tuple(scores.get(label, float("nan")) for label in kept), alike,
-        tuple(local), first.threshold, first, set_standing(fit, at_end, kept, alike),
-    )  # fmt: skip
+        before,
+        fit,
+        tuple(kept.values()),
+        tuple(scores.get(label, float("nan")) for label in kept),
+        alike,
+        tuple(local),
+        first.threshold,
+        first,
+        set_standing(fit, at_end, kept, alike),
+    )
 
 
 def as_given(found: SetSearch, options: SetOptions, run: Run) -> SetSearch:
@@ -241,11 +253,19 @@ def _gathered(fit: SetFit, tried: Sequence[Effect], run: Run) -> SetFit:
     effects = tuple(map(by_name, tried))
     jobs = [
         Job(
-            member, fit.model, report.estimator, tuple(fit.local.get(member.name, ())), effects, True,
-            fit.values_of(report), report.imu, report.start, report.noise,
+            member,
+            fit.model,
+            report.estimator,
+            tuple(fit.local.get(member.name, ())),
+            effects,
+            True,
+            fit.values_of(report),
+            report.imu,
+            report.start,
+            report.noise,
         )
         for member, report in zip(fit.members, fit.reports, strict=True)
-    ]  # fmt: skip
+    ]
     done = run(jobs)
     reports: list[Report] = []
     for old, fresh in zip(fit.reports, done, strict=True):
@@ -285,11 +305,12 @@ def _alike(evidence: SetEvidence, found: Mapping[str, Candidate]) -> dict[str, t
     allowed = np.union1d(_singles(open_again), chosen).astype(np.int64)
     return {
         label: tuple(
-            open_again.names[i] for i in look_alikes(problem, chosen, c, allowed, problem.scale(chosen))
+            open_again.names[i]
+            for i in look_alikes(problem, chosen, c, allowed, problem.scale(chosen))
             if not _same_effect(open_again, c, i)
         )
         for label, c in zip(found, chosen, strict=True)
-    }  # fmt: skip
+    }
 
 
 def _same_effect(evidence: SetEvidence, one: int, other: int) -> bool:
@@ -360,16 +381,21 @@ def _prior(label: str, report: Report) -> float:
 
 
 def _without_small(
-    members: Sequence[Member], options: SetOptions, run: Run, fit: SetFit, chosen: dict[str, Candidate],
+    members: Sequence[Member],
+    options: SetOptions,
+    run: Run,
+    fit: SetFit,
+    chosen: dict[str, Candidate],
     progress: Progress,
-) -> tuple[SetFit, dict[str, Candidate]]:  # fmt: skip
+) -> tuple[SetFit, dict[str, Candidate]]:
     """Drop the weakest of what was found while it is small in the joint fit."""
     while chosen:
         sigma = np.sqrt(np.diag(fit.estimate.covariance))
         size = {
             label: float(np.abs(fit.estimate.values[k]) / sigma[k])
-            for label, c in chosen.items() if (k := place_of(fit.names, c)) >= 0
-        }  # fmt: skip
+            for label, c in chosen.items()
+            if (k := place_of(fit.names, c)) >= 0
+        }
         weakest = min(size, key=lambda label: size[label])
         if size[weakest] >= _KEEP:
             break

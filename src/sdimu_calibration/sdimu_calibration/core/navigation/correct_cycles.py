@@ -107,5 +107,7 @@ def spread(values: Floats, channel: Ints, parameter: Ints, weight: Floats) -> tu
                 channels.append(target)
                 parameters.append(int(owner))
     return (
-        np.ascontiguousarray(np.column_stack(columns)), np.array(channels, np.int64), np.array(parameters, np.int64),
-    )  # fmt: skip
+        np.ascontiguousarray(np.column_stack(columns)),
+        np.array(channels, np.int64),
+        np.array(parameters, np.int64),
+    )

@@ -212,9 +212,7 @@ def responses(C_nb: Floats, f_n: Floats, dt: Floats, first: int, last: int, w_ie
 
 
 @compiled
-def add_columns(
-    values: Floats, channel: Ints, parameter: Ints, R: Floats, dt: Floats, G: Floats, D: Floats
-) -> None:
+def add_columns(values: Floats, channel: Ints, parameter: Ints, R: Floats, dt: Floats, G: Floats, D: Floats) -> None:
     """Response over an epoch to parameters whose regressors are given, in place.
 
     Parameters

@@ -186,17 +186,25 @@ class Reducer:
         """
         out = np.empty((len(t), _COLUMNS))
         n = _reduce(
-            np.ascontiguousarray(t), np.ascontiguousarray(omega_ib_b), np.ascontiguousarray(f_ib_b),
-            self.nominal_s, self._carry, out,
-        )  # fmt: skip
+            np.ascontiguousarray(t),
+            np.ascontiguousarray(omega_ib_b),
+            np.ascontiguousarray(f_ib_b),
+            self.nominal_s,
+            self._carry,
+            out,
+        )
         rows = out[:n]
         return Cycles(
-            rows[:, _T].copy(), rows[:, _DT].copy(),
-            rows[:, _ALPHA:_UPS].copy(), rows[:, _UPS:_CON].copy(),
-            rows[:, _CON:_SCUL].copy(), rows[:, _SCUL:_N].copy(),
-            rows[:, _N].astype(np.int64), rows[:, _LOST].astype(np.int64),
+            rows[:, _T].copy(),
+            rows[:, _DT].copy(),
+            rows[:, _ALPHA:_UPS].copy(),
+            rows[:, _UPS:_CON].copy(),
+            rows[:, _CON:_SCUL].copy(),
+            rows[:, _SCUL:_N].copy(),
+            rows[:, _N].astype(np.int64),
+            rows[:, _LOST].astype(np.int64),
             rows[:, _GAP:_COLUMNS].copy(),
-        )  # fmt: skip
+        )
 
 
 @compiled

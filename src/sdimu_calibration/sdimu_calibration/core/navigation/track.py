@@ -161,9 +161,23 @@ def motion(
         )
         alpha = _acceleration(w_table, rest, cycles, before, causal)
         seen = Motion(
-            cycles.t, dt, w_seen, f_seen, C_nb, w_table, alpha, rest, heat, heat_rate, turned, leant,
-            since_turn, magnetic_n, wound, past,
-        )  # fmt: skip
+            cycles.t,
+            dt,
+            w_seen,
+            f_seen,
+            C_nb,
+            w_table,
+            alpha,
+            rest,
+            heat,
+            heat_rate,
+            turned,
+            leant,
+            since_turn,
+            magnetic_n,
+            wound,
+            past,
+        )
         if done == rounds:
             break
         taken, error = error, model.errors(model.regressors(seen), coefficients)
@@ -194,9 +208,17 @@ class _AtStart(NamedTuple):
 
 @compiled
 def _seen(
-    C_nb: Floats, w: Floats, f: Floats, rest: Bools, t: Floats, dt: Floats, w_ie: Floats, gravity: float,
-    predicted: bool, before: _AtStart,
-) -> tuple[Floats, Floats, Floats, Floats, Floats, Floats, Floats]:  # fmt: skip
+    C_nb: Floats,
+    w: Floats,
+    f: Floats,
+    rest: Bools,
+    t: Floats,
+    dt: Floats,
+    w_ie: Floats,
+    gravity: float,
+    predicted: bool,
+    before: _AtStart,
+) -> tuple[Floats, Floats, Floats, Floats, Floats, Floats, Floats]:
     """Rate and force that effects see, the rate against the Earth, and what of past turns they remember.
 
     Returns
@@ -236,9 +258,7 @@ def _seen(
     return w_seen, f_seen, w_table, turned, leant, since_turn, wound
 
 
-def _acceleration(
-    w_table: Floats, rest: Bools, cycles: Cycles, before: Motion | None, causal: bool
-) -> Floats:
+def _acceleration(w_table: Floats, rest: Bools, cycles: Cycles, before: Motion | None, causal: bool) -> Floats:
     """Angular acceleration (rad/s^2), shape (n, 3): mean over each cycle, or by causal differences for a live filter.
 
     The mean is the difference of the rates at the ends of the cycle, so that it sums up to the change of the rate.

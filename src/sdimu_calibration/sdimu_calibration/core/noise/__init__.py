@@ -8,14 +8,4 @@ from sdimu_calibration.core.noise.rests import rests
 from sdimu_calibration.core.noise.terms import TERMS, Terms, fit_terms
 from sdimu_calibration.core.noise.white import WhiteNoise, white_noise, with_measured_noise
 
-__all__ = [
-    "TERMS",
-    "Allan",
-    "Terms",
-    "WhiteNoise",
-    "allan",
-    "fit_terms",
-    "rests",
-    "white_noise",
-    "with_measured_noise",
-]
+__all__ = ["TERMS", "Allan", "Terms", "WhiteNoise", "allan", "fit_terms", "rests", "white_noise", "with_measured_noise"]

@@ -58,9 +58,7 @@ def with_quantisation(imu: ImuSpecification, recording: Recording) -> tuple[ImuS
     if not asked or not _suspect(recording, [(values[name], white[name]) for name in asked]):
         return imu, ""
     first, last = runs(at_rest(recording))
-    found = {
-        name: size_of_residue(values[name], first, last, recording.interval_s, white[name]) for name in asked
-    }
+    found = {name: size_of_residue(values[name], first, last, recording.interval_s, white[name]) for name in asked}
     if not any(found.values()):
         return imu, ""
     note = (

@@ -134,9 +134,12 @@ def fit_terms(found: Allan, rng: np.random.Generator, draws: int = _DRAWS) -> Te
     ratio = found.deviation / np.maximum(np.sqrt(basis(found.tau) @ value**2), 1e-300)
     worst = int(np.argmax(ratio))
     return Terms(
-        value, np.where(seen, _scatter(again, value, seen, misfit), sigma),
-        misfit, float(found.tau[worst]), float(ratio[worst]),
-    )  # fmt: skip
+        value,
+        np.where(seen, _scatter(again, value, seen, misfit), sigma),
+        misfit,
+        float(found.tau[worst]),
+        float(ratio[worst]),
+    )
 
 
 def _misfit(found: Allan) -> float:

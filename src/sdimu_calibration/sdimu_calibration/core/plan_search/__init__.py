@@ -10,5 +10,15 @@ from sdimu_calibration.core.plan_search.next_turn import NextTurn, next_turn, un
 from sdimu_calibration.core.plan_search.search import Found, Goal, search
 
 __all__ = [
-    "Bounds", "Found", "Goal", "Known", "NextTurn", "Question", "gain", "known_of", "next_turn", "search", "untold",
-]  # fmt: skip
+    "Bounds",
+    "Found",
+    "Goal",
+    "Known",
+    "NextTurn",
+    "Question",
+    "gain",
+    "known_of",
+    "next_turn",
+    "search",
+    "untold",
+]

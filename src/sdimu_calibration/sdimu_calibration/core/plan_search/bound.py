@@ -109,6 +109,10 @@ def _bounds(sensors: ImuModel, asked: Question, covariance: Floats) -> Bounds:
     J = body_frame.frame_jacobian(sensors.names, asked.model.body_frame)
     effects = [e.family or e.name for e in sensors.effects for _ in e.parameters]
     return Bounds(
-        sensors.names, tuple(p.display_unit for p in sensors.parameters), tuple(effects), covariance,
-        np.sqrt(np.diag(J @ covariance @ J.T)), sensors.prior,
-    )  # fmt: skip
+        sensors.names,
+        tuple(p.display_unit for p in sensors.parameters),
+        tuple(effects),
+        covariance,
+        np.sqrt(np.diag(J @ covariance @ J.T)),
+        sensors.prior,
+    )

@@ -67,9 +67,10 @@ def single(plan: Plan, able: Abilities) -> Iterator[Plan]:
         if abs(turn.angle_rad) > math.radians(60.0):
             part = replace(turn, angle_rad=0.5 * turn.angle_rad)
             yield replace(
-                plan, turns=(*turns[:k], part, part, *turns[k + 1 :]),
+                plan,
+                turns=(*turns[:k], part, part, *turns[k + 1 :]),
                 dwell_s=(*dwell[: k + 1], min(able.dwells_s), *dwell[k + 1 :]),
-            )  # fmt: skip
+            )
 
 
 def _with(plan: Plan, k: int, turn: Turn) -> Plan:
@@ -82,8 +83,9 @@ def _merged(plan: Plan, k: int) -> Plan:
     angle = math.remainder(first.angle_rad + second.angle_rad, 2.0 * math.pi)
     dwell = (*plan.dwell_s[: k + 1], *plan.dwell_s[k + 2 :])
     if abs(angle) > 1e-9:
-        return replace(plan, turns=(*plan.turns[:k], replace(first, angle_rad=angle), *plan.turns[k + 2 :]),
-                       dwell_s=dwell)  # fmt: skip
+        return replace(
+            plan, turns=(*plan.turns[:k], replace(first, angle_rad=angle), *plan.turns[k + 2 :]), dwell_s=dwell
+        )
     # Back where it was: the stop before and the stop after are one.
     return replace(plan, turns=(*plan.turns[:k], *plan.turns[k + 2 :]), dwell_s=(*dwell[: k + 1], *dwell[k + 2 :]))
 

@@ -110,9 +110,8 @@ def next_turn(
     out = []
     for count, turns in enumerate(extras, start=1):
         longer = Plan(
-            plan.name, (*plan.dwell_s, *(dwell for _ in turns)), (*plan.turns, *turns),
-            plan.acceleration_rad_s2,
-        )  # fmt: skip
+            plan.name, (*plan.dwell_s, *(dwell for _ in turns)), (*plan.turns, *turns), plan.acceleration_rad_s2
+        )
         after = apart(bounds(longer, with_class), names, sizes)
         minutes = (longer.duration_s - plan.duration_s) / 60.0
         out.append(NextTurn(turns, minutes, before, after))

@@ -160,9 +160,14 @@ def predict(
     setup = nominal.setup
     sensors, frame = setup.sensors, setup.model.body_frame
     done = one_pass(
-        nominal.prepared, setup, nominal.start, nominal.start.C_nb, np.zeros(len(sensors.prior)),
-        closed_loop=False, keep=False,
-    )  # fmt: skip
+        nominal.prepared,
+        setup,
+        nominal.start,
+        nominal.start.C_nb,
+        np.zeros(len(sensors.prior)),
+        closed_loop=False,
+        keep=False,
+    )
     J = body_frame.frame_jacobian(sensors.names, frame)
     output, epochs = done.output, nominal.prepared.epochs
     rows = np.arange(0, len(epochs), output.stride)

@@ -22,9 +22,11 @@ def stated_noise(imu: ImuSpecification) -> tuple[NoiseTerm, ...]:
     imu : ImuSpecification
     """
     sizes = (
-        ("gyro", FLICKER, imu.gyro_bias_instability), ("gyro", RANDOM_WALK, imu.gyro_random_walk),
-        ("accel", FLICKER, imu.accel_bias_instability), ("accel", RANDOM_WALK, imu.accel_random_walk),
-    )  # fmt: skip
+        ("gyro", FLICKER, imu.gyro_bias_instability),
+        ("gyro", RANDOM_WALK, imu.gyro_random_walk),
+        ("accel", FLICKER, imu.accel_bias_instability),
+        ("accel", RANDOM_WALK, imu.accel_random_walk),
+    )
     return tuple(NoiseTerm(triad, kind, size=size) for triad, kind, size in sizes if size > 0.0)
 
 

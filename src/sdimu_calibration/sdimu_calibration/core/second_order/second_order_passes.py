@@ -199,9 +199,17 @@ def linearise(prepared: PreparedData, setup: TestSetup, C_nb: Floats, reference:
     """
     sensors, site, where = setup.sensors, setup.site, layout(prepared)
     near = motion(
-        prepared.cycles, prepared.rest, sensors, reference, C_nb.copy(), site.latitude_rad, setup.gravity,
-        prepared.temperature, predicted=False, magnetic_n=setup.magnetic_n,
-    )  # fmt: skip
+        prepared.cycles,
+        prepared.rest,
+        sensors,
+        reference,
+        C_nb.copy(),
+        site.latitude_rad,
+        setup.gravity,
+        prepared.temperature,
+        predicted=False,
+        magnetic_n=setup.magnetic_n,
+    )
     clean = correct_cycles(prepared.cycles, near, sensors, reference)
     C_stop, track = _stops(clean.cycles, where, C_nb, site.latitude_rad)
     seen = _predicted(clean, prepared, where, track, setup)
@@ -268,7 +276,12 @@ def _predicted(
 
 
 def run_stops(
-    data: PassInput, setup: TestSetup, begin: PassState, prepared: PreparedData, where: Layout, C_stop: Floats,
+    data: PassInput,
+    setup: TestSetup,
+    begin: PassState,
+    prepared: PreparedData,
+    where: Layout,
+    C_stop: Floats,
     keep: bool = False,
 ) -> tuple[PassState, PassOutput, Ints]:
     """Run a pass piece by piece, with each stop linearised at its own attitude.

@@ -5,6 +5,15 @@ from sdimu_calibration.core.table.gimbals import assign_turns, axes_along
 from sdimu_calibration.core.table.moves import Move, Step, Waypoint, is_possible, moves_of, plan_move, steps_of
 
 __all__ = [
-    "AxisLimits", "Move", "RateTable", "Step", "Waypoint", "assign_turns", "axes_along", "is_possible",
-    "moves_of", "plan_move", "steps_of",
-]  # fmt: skip
+    "AxisLimits",
+    "Move",
+    "RateTable",
+    "Step",
+    "Waypoint",
+    "assign_turns",
+    "axes_along",
+    "is_possible",
+    "moves_of",
+    "plan_move",
+    "steps_of",
+]

@@ -168,9 +168,7 @@ def steps_of(plan: Plan) -> tuple[Step, ...]:
         One more than the plan has turns.
     """
     turns: tuple[Turn | None, ...] = (None, *plan.turns)
-    return tuple(
-        Step(turn, dwell, plan.acceleration_rad_s2) for turn, dwell in zip(turns, plan.dwell_s, strict=True)
-    )
+    return tuple(Step(turn, dwell, plan.acceleration_rad_s2) for turn, dwell in zip(turns, plan.dwell_s, strict=True))
 
 
 def moves_of(table: RateTable, angles: Floats, plan: Plan) -> tuple[Move, ...]:

@@ -24,8 +24,9 @@ def library() -> str:
     packed = b64encode((_HERE / "plotly.min.js.gz").read_bytes()).decode("ascii")
     values = {
         "FIGURE_COLOURS": {theme: palette(theme) for theme in THEMES},
-        "FIGURE_TEMPLATES": {theme: template(theme) for theme in THEMES}, "FIGURE_CONFIG": CONFIG,
-    }  # fmt: skip
+        "FIGURE_TEMPLATES": {theme: template(theme) for theme in THEMES},
+        "FIGURE_CONFIG": CONFIG,
+    }
     stated = "".join(f"var {name} = {as_script(value)};" for name, value in values.items())
     draw = (_HERE / "figures.js").read_text(encoding="utf-8")
     return f'<script type="text/plain" id="library">{packed}</script><script>{stated}{draw}{PRINT}</script>'

@@ -53,8 +53,13 @@ _COLOURS = {
 }
 """Colour of each meaning in light and in dark."""
 
-DIVERGING = tuple(zip((0.0, 0.25, 0.5, 0.75, 1.0), (f"{ROLE}{name}" for name in (
-    "minus2", "minus1", "zero", "plus1", "plus2")), strict=True))  # fmt: skip
+DIVERGING = tuple(
+    zip(
+        (0.0, 0.25, 0.5, 0.75, 1.0),
+        (f"{ROLE}{name}" for name in ("minus2", "minus1", "zero", "plus1", "plus2")),
+        strict=True,
+    )
+)
 """Scale of signed values as roles; also tells signs to those who do not see red and green."""
 SERIES = ("@x", "@y", "@z", "@gyro", "@accel", "@doubtful")
 """Curves of one panel; each has a dash or a mark of its own besides."""

@@ -17,13 +17,15 @@ def _tokens(theme: str) -> str:
     return f"{{ color-scheme: {theme}; {colours}; }}"
 
 
-STYLE = "\n".join([
-    f":root {_tokens(LIGHT)}",
-    f"@media (prefers-color-scheme: dark) {{ :root:not([data-theme=light]) {_tokens(DARK)} }}",
-    f":root[data-theme=dark] {_tokens(DARK)}",
-    f"@media print {{ :root:root:root {_tokens(LIGHT)} }}",
-    (_HERE / "style.css").read_text(encoding="utf-8"),
-])  # fmt: skip
+STYLE = "\n".join(
+    [
+        f":root {_tokens(LIGHT)}",
+        f"@media (prefers-color-scheme: dark) {{ :root:not([data-theme=light]) {_tokens(DARK)} }}",
+        f":root[data-theme=dark] {_tokens(DARK)}",
+        f"@media print {{ :root:root:root {_tokens(LIGHT)} }}",
+        (_HERE / "style.css").read_text(encoding="utf-8"),
+    ]
+)
 """Sheet of every page; `data-theme` of the root element decides, else what the system prefers; paper is light."""
 SCRIPT = (_HERE / "page.js").read_text(encoding="utf-8")
 """Behaviour of every page. `sdimuTheme()` is the theme; the event ``sdimu-theme`` says that it changed."""
@@ -33,9 +35,14 @@ THEME_BUTTON = '<button type="button" data-switch-theme aria-pressed="false">Dar
 
 
 def document(
-    title: str, body: str, *, under: str = "", contents: Sequence[tuple[str, str]] = (), style: str = "",
+    title: str,
+    body: str,
+    *,
+    under: str = "",
+    contents: Sequence[tuple[str, str]] = (),
+    style: str = "",
     script: str = "",
-) -> str:  # fmt: skip
+) -> str:
     """Make a static page.
 
     Parameters

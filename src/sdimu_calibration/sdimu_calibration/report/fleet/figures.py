@@ -32,10 +32,18 @@ def heat_map(done: Study) -> Figure:
     figure = Figure()
     names = [one.name for one in people.coefficients]
     figure.add(
-        "heatmap", x=list(people.units), y=names, z=z, zmin=-_LARGEST, zmax=_LARGEST, xgap=1, ygap=1,
-        colorscale=list(DIVERGING), colorbar={"title": {"text": "sigma"}},
+        "heatmap",
+        x=list(people.units),
+        y=names,
+        z=z,
+        zmin=-_LARGEST,
+        zmax=_LARGEST,
+        xgap=1,
+        ygap=1,
+        colorscale=list(DIVERGING),
+        colorbar={"title": {"text": "sigma"}},
         hovertemplate="%{x}<br>%{y}<br>%{z:.2f} sigma<extra></extra>",
-    )  # fmt: skip
+    )
     for one in people.out:
         figure.annotate("<b>\N{MULTIPLICATION SIGN}</b>", x=one.unit, y=one.coefficient, font={"size": 14})
     figure.y_axes(autorange="reversed", automargin=True, type="category")
@@ -88,10 +96,16 @@ def _panel(
     figure.y_axes(range=[low - _MARGIN * (high - low), high + _MARGIN * (high - low)], **place)
     error = {"type": "data", "array": sigma, "thickness": 1, "width": 2}
     figure.add(
-        "scatter", x=list(x), y=value, mode="markers", error_y=error, text=list(fleet.serials),
-        marker={"color": INK, "size": 6}, hovertemplate="%{text}<br>%{x}<br>%{y:.4g} " + unit + "<extra></extra>",
+        "scatter",
+        x=list(x),
+        y=value,
+        mode="markers",
+        error_y=error,
+        text=list(fleet.serials),
+        marker={"color": INK, "size": 6},
+        hovertemplate="%{text}<br>%{x}<br>%{y:.4g} " + unit + "<extra></extra>",
         **place,
-    )  # fmt: skip
+    )
 
 
 def _day(seconds: float) -> str:

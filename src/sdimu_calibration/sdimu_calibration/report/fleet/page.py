@@ -79,14 +79,16 @@ def write_page(path: Path, gathered: Gathered, done: Study, candidates: Candidat
         _coefficients(done, units),
         section(
             "Units against the population of the others",
-            quiet("Deviate of each unit in sigmas of the others' spread, its own error included; a cross: out, over "
-                  "all units and coefficients together."),
+            quiet(
+                "Deviate of each unit in sigmas of the others' spread, its own error included; a cross: out, over "
+                "all units and coefficients together."
+            ),
             html(heat_map(done), 1),
         ),
         _common(done, units),
         _trends(gathered, done, units),
         _apart(gathered.apart),
-    ]  # fmt: skip
+    ]
     body = "\n".join(part for part in (told, *parts) if part)
     write_whole(path, document(title, body, under=prose(headline(gathered, done)), script=_SORT))
 
@@ -98,11 +100,13 @@ def _coefficients(done: Study, units: dict[str, str]) -> str:
     heads = [tables.HEADINGS[k].replace("+-", "\N{PLUS-MINUS SIGN}") for k in keep]
     return section(
         "Coefficients over units",
-        quiet("Mean with half its 95 % interval, spread between units (REML) with its 95 % interval"
-              + (", what results of one unit vary (within)" if repeats else "")
-              + "; p: if units differed by their errors alone. Click on a heading to sort."),
+        quiet(
+            "Mean with half its 95 % interval, spread between units (REML) with its 95 % interval"
+            + (", what results of one unit vary (within)" if repeats else "")
+            + "; p: if units differed by their errors alone. Click on a heading to sort."
+        ),
         grid(heads, lines, {0, 1, len(heads) - 1}),
-    )  # fmt: skip
+    )
 
 
 def _common(done: Study, units: dict[str, str]) -> str:
@@ -112,10 +116,12 @@ def _common(done: Study, units: dict[str, str]) -> str:
     heads = [word.replace("+-", "\N{PLUS-MINUS SIGN}") for word in tables.COMMON_HEADINGS]
     return section(
         "Effects common to the type",
-        quiet("Each effect alone beside the model of each unit; p: if neither its mean over units nor its variance "
-              "were there; q: the rate of false discoveries at which it is named (5 %)."),
+        quiet(
+            "Each effect alone beside the model of each unit; p: if neither its mean over units nor its variance "
+            "were there; q: the rate of false discoveries at which it is named (5 %)."
+        ),
         grid(heads, lines, {0, 1, 9}),
-    )  # fmt: skip
+    )
 
 
 def _trends(gathered: Gathered, done: Study, units: dict[str, str]) -> str:
@@ -133,10 +139,12 @@ def _trends(gathered: Gathered, done: Study, units: dict[str, str]) -> str:
     return section(
         "Trends and control limits",
         grid(heads, lines, {0, 1, 4, 7}) if lines else quiet("No slopes: the results are of one date, or too few."),
-        quiet("Every result with one sigma; blue: mean of the units; dashed: mean +- 3 spreads"
-              + (", without the units that are out." if done.people.out else ".")),
+        quiet(
+            "Every result with one sigma; blue: mean of the units; dashed: mean +- 3 spreads"
+            + (", without the units that are out." if done.people.out else ".")
+        ),
         *charts,
-    )  # fmt: skip
+    )
 
 
 def _apart(lines: Sequence[str]) -> str:

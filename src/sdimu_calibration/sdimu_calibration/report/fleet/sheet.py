@@ -80,10 +80,14 @@ def write_page(
 def _head(about: Certificate, entries: Sequence[Entry]) -> str:
     units = len({entry.unit for entry in entries})
     words = [
-        ("serial", about.serial), ("date", about.date), ("operator", about.operator), ("plan", about.plan),
+        ("serial", about.serial),
+        ("date", about.date),
+        ("operator", about.operator),
+        ("plan", about.plan),
         ("results", f"{len(entries)} of {units} unit{'s' if units > 1 else ''}"),
-        ("body frame", entries[0].result.body_frame.replace("_", " ")), ("program", f"sdimu {about.version}"),
-    ]  # fmt: skip
+        ("body frame", entries[0].result.body_frame.replace("_", " ")),
+        ("program", f"sdimu {about.version}"),
+    ]
     return quiet(" \N{MIDDLE DOT} ".join(f"{key} {value}" for key, value in words if value))
 
 
@@ -129,18 +133,27 @@ def _table(lines: Sequence[Line]) -> str:
         "n: recordings. Pass: the whole interval is inside the limit; undecided: it straddles it."
     )
     return section(
-        "What was measured", quiet(text),
+        "What was measured",
+        quiet(text),
         f'<table class="sheet"><thead><tr>{head}</tr></thead><tbody>{"".join(body)}</tbody></table>',
-    )  # fmt: skip
+    )
 
 
 def _line(line: Line, triad: str) -> str:
     _, value, bounds, unit, number, limit, verdict = _row(line)
     rms = _size(line.rms, line.display_unit) if math.isfinite(line.rms) else ""
     how = "; ".join(word for word in (line.of, line.method, line.condition, line.missing) if word)
-    texts = [(line.term.removeprefix(f"{triad} "), "text"), (value, "number"),
-             (bounds.replace("..", " to "), "number"), (unit, "text number"), (rms, "number"), (number, "number"),
-             (limit, "number"), (verdict, verdict.split(" ")[0]), (how, "text quiet")]  # fmt: skip
+    texts = [
+        (line.term.removeprefix(f"{triad} "), "text"),
+        (value, "number"),
+        (bounds.replace("..", " to "), "number"),
+        (unit, "text number"),
+        (rms, "number"),
+        (number, "number"),
+        (limit, "number"),
+        (verdict, verdict.split(" ")[0]),
+        (how, "text quiet"),
+    ]
     return "<tr>" + "".join(f'<td class="{kind}">{escape(text)}</td>' for text, kind in texts) + "</tr>"
 
 
@@ -157,21 +170,28 @@ def _coefficients(entries: Sequence[Entry]) -> str:
     last = entries[-1]
     table = [cells(row, list(_COEFFICIENTS)) for row in coefficient_rows(last.result)]
     return section(
-        "Coefficients", quiet(f"Of {last.name}, one sigma; what compensation takes out."),
+        "Coefficients",
+        quiet(f"Of {last.name}, one sigma; what compensation takes out."),
         grid(_COEFFICIENTS, table, {0, 3}),
-    )  # fmt: skip
+    )
 
 
 def _recordings(about: Certificate, entries: Sequence[Entry]) -> str:
     lines = [
-        [entry.name, entry.unit, origin.power_on, _date(origin.start_ns), origin.recording,
-         "" if math.isnan(origin.temperature_degc) else f"{origin.temperature_degc:.1f}"]
-        for entry in entries for origin in (entry.result.origin,)
-    ]  # fmt: skip
+        [
+            entry.name,
+            entry.unit,
+            origin.power_on,
+            _date(origin.start_ns),
+            origin.recording,
+            "" if math.isnan(origin.temperature_degc) else f"{origin.temperature_degc:.1f}",
+        ]
+        for entry in entries
+        for origin in (entry.result.origin,)
+    ]
     table = grid(("result", "unit", "power-on", "start (UTC)", "recording", "deg C"), lines, {0, 1, 2, 3, 4})
     hashes = "".join(
-        f"<li>{escape(name)}<br><code>{digest or 'not found, no hash'}</code></li>"
-        for name, digest in about.recordings
+        f"<li>{escape(name)}<br><code>{digest or 'not found, no hash'}</code></li>" for name, digest in about.recordings
     )
     return section("Results", table, f"<h2>SHA-256 of the recordings</h2><ul>{hashes}</ul>" if hashes else "")
 
@@ -181,6 +201,4 @@ def _date(start_ns: int) -> str:
 
 
 def _signatures(about: Certificate) -> str:
-    return (
-        f'<div class="sign"><div>{prose(about.operator) or "operator"}</div><div>date</div><div>checked</div></div>'
-    )
+    return f'<div class="sign"><div>{prose(about.operator) or "operator"}</div><div>date</div><div>checked</div></div>'

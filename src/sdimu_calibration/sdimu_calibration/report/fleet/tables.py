@@ -48,14 +48,22 @@ def common_rows(done: Study, units: Mapping[str, str], most: int) -> list[list[s
     """Rows of `COMMON_HEADINGS`: effects that are named, and the nearest others up to `most` in all."""
     return [
         [
-            one.name, units[one.name], str(one.units),
-            *as_far([from_si(v, units[one.name]) for v in (one.mean, one.mean_sigma)],
-                    from_si(one.mean_sigma, units[one.name])),
-            three(from_si(one.spread, units[one.name])), f"{one.largest_z:.1f}", probability(one.p_value),
-            probability(one.q_value), _named(one),
+            one.name,
+            units[one.name],
+            str(one.units),
+            *as_far(
+                [from_si(v, units[one.name]) for v in (one.mean, one.mean_sigma)],
+                from_si(one.mean_sigma, units[one.name]),
+            ),
+            three(from_si(one.spread, units[one.name])),
+            f"{one.largest_z:.1f}",
+            probability(one.p_value),
+            probability(one.q_value),
+            _named(one),
         ]
-        for k, one in enumerate(done.common) if one.named or k < most
-    ]  # fmt: skip
+        for k, one in enumerate(done.common)
+        if one.named or k < most
+    ]
 
 
 def _named(one: CommonEffect) -> str:
@@ -72,10 +80,17 @@ def trend_rows(done: Study, units: Mapping[str, str], most: int) -> list[list[st
             break
         unit = units[one.coefficient]
         slope, sigma = (from_si(value, unit) for value in (one.slope, one.slope_sigma))
-        out.append([
-            one.coefficient, one.kind, *as_far((slope, sigma), sigma), f"{unit}/year", probability(one.p_value),
-            probability(one.q_value), "yes" if one.named else "",
-        ])  # fmt: skip
+        out.append(
+            [
+                one.coefficient,
+                one.kind,
+                *as_far((slope, sigma), sigma),
+                f"{unit}/year",
+                probability(one.p_value),
+                probability(one.q_value),
+                "yes" if one.named else "",
+            ]
+        )
     return out
 
 
@@ -90,15 +105,16 @@ def sentences(done: Study, units: Mapping[str, str]) -> list[str]:
     told += [
         f"Common to the type: {one.name}, mean {from_si(one.mean, units[one.name]):+.3g} and spread "
         f"{from_si(one.spread, units[one.name]):.2g} {units[one.name]} over {one.units} units; largest in one unit "
-        f"{one.largest_z:.1f} sigma"
-        + (f"; looks the same: {', '.join(one.alike[:_ALIKE])}." if one.alike else ".")
-        for one in done.common if one.named
-    ]  # fmt: skip
+        f"{one.largest_z:.1f} sigma" + (f"; looks the same: {', '.join(one.alike[:_ALIKE])}." if one.alike else ".")
+        for one in done.common
+        if one.named
+    ]
     told += [
         f"{one.coefficient} changes {one.kind}: {from_si(one.slope, units[one.coefficient]):+.3g} +- "
         f"{from_si(one.slope_sigma, units[one.coefficient]):.2g} {units[one.coefficient]} a year."
-        for one in done.slopes if one.named
-    ]  # fmt: skip
+        for one in done.slopes
+        if one.named
+    ]
     return told
 
 

@@ -27,15 +27,32 @@ _PAGE = """<!doctype html><html lang="en"><head>{%metas%}<title>{%title%}</title
 {%css%}<style>STYLE</style></head><body>{%app_entry%}<footer>{%config%}{%scripts%}{%renderer%}
 <script>SCRIPT</script></footer></body></html>"""
 _BUTTONS = (
-    "undo", "redo", "add", "add-own", "drop", "hold", "toggle-stop", "leave-points", "take-points", "fix",
-    "set-prior", "free", "open",
-)  # fmt: skip
+    "undo",
+    "redo",
+    "add",
+    "add-own",
+    "drop",
+    "hold",
+    "toggle-stop",
+    "leave-points",
+    "take-points",
+    "fix",
+    "set-prior",
+    "free",
+    "open",
+)
 _CONTROLS = {
-    "candidate": Kept("candidate", "value"), "own": Kept("own", "value"), "held": Kept("held", "value"),
-    "added": Kept("added", "value"), "recording": Kept("recording", "value"), "stop": Kept("stop", "data"),
-    "points": Kept("residuals", "selectedData"), "coefficient": Kept("coefficient", "value"),
-    "mean": Kept("mean", "value"), "sigma": Kept("sigma", "value"),
-}  # fmt: skip
+    "candidate": Kept("candidate", "value"),
+    "own": Kept("own", "value"),
+    "held": Kept("held", "value"),
+    "added": Kept("added", "value"),
+    "recording": Kept("recording", "value"),
+    "stop": Kept("stop", "data"),
+    "points": Kept("residuals", "selectedData"),
+    "coefficient": Kept("coefficient", "value"),
+    "mean": Kept("mean", "value"),
+    "sigma": Kept("sigma", "value"),
+}
 
 Judge = Callable[[Sequence[str], Callable[[str, float], None]], SetDiagnosis]
 
@@ -51,17 +68,19 @@ def build(shelf: RecordingCache, host: str = LOOPBACK[0], judge: Judge | None = 
         Diagnoses all recordings of the shelf as one set, with some effects added.
     """
     app = Dash(
-        "sdimu workbench", title="sdimu workbench", update_title="", serve_locally=True, assets_ignore=".*",
+        "sdimu workbench",
+        title="sdimu workbench",
+        update_title="",
+        serve_locally=True,
+        assets_ignore=".*",
         on_error=tell_error,
-    )  # fmt: skip
+    )
     guard(app.server, host)
     page = _PAGE.replace("EARLY", EARLY).replace("STYLE", f"{DESIGN_STYLE}\n{view.STYLE}")
     app.index_string = page.replace("SCRIPT", f"{DESIGN_SCRIPT}\n{PRINT}\n{view.SCRIPT}")
     app.layout = lambda: view.layout("Workbench", judge is not None)
     doing = TaskProgress()
-    app.clientside_callback(
-        "function(_) { return window.benchLook(); }", Output("look", "data"), Input("page", "data")
-    )
+    app.clientside_callback("function(_) { return window.benchLook(); }", Output("look", "data"), Input("page", "data"))
     _follow_clicks(app, shelf, doing)
     showing.register(app, shelf, doing)
     looking.register(app, shelf, doing)
@@ -79,10 +98,13 @@ def _follow_clicks(app: Dash, shelf: RecordingCache, doing: TaskProgress) -> Non
         inputs={
             "clicks": [Input(name, "n_clicks") for name in _BUTTONS],
             "seen": {"cell": Input("heat", "clickData"), "channel": Input("channel", "value")},
-            "controls": _CONTROLS, "kept": Kept("state", "data"), "page": Kept("page", "data"),
+            "controls": _CONTROLS,
+            "kept": Kept("state", "data"),
+            "page": Kept("page", "data"),
         },
-        running=BUSY, prevent_initial_call=True,
-    )  # fmt: skip
+        running=BUSY,
+        prevent_initial_call=True,
+    )
     def clicked(clicks: Any, seen: Any, controls: Any, kept: Any, page: Any) -> tuple[Any, Any]:
         del clicks
         tell, what = doing.teller(str(page)), str(dash.ctx.triggered_id)

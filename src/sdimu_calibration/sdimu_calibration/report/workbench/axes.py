@@ -46,9 +46,10 @@ def axes(diagnosis: Diagnosis) -> Mapping[str, Floats]:
 def _attitude(C_nb: Floats) -> dict[str, Floats]:
     """Roll, pitch and heading (deg) of attitudes (e, 3, 3)."""
     angles = (
-        np.arctan2(C_nb[:, 2, 1], C_nb[:, 2, 2]), np.arcsin(np.clip(-C_nb[:, 2, 0], -1.0, 1.0)),
+        np.arctan2(C_nb[:, 2, 1], C_nb[:, 2, 2]),
+        np.arcsin(np.clip(-C_nb[:, 2, 0], -1.0, 1.0)),
         np.arctan2(C_nb[:, 1, 0], C_nb[:, 0, 0]),
-    )  # fmt: skip
+    )
     return {
         f"{name} (deg)": np.degrees(angle) for name, angle in zip(("roll", "pitch", "heading"), angles, strict=True)
     }

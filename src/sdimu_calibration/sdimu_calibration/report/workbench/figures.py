@@ -29,9 +29,14 @@ def heat_map(grid: data.Grid, cell: tuple[int, int]) -> Figure:
     figure = evidence_figures.heat_map(grid)
     row, column = cell[0], int(np.searchsorted(grid.stops, cell[1]))
     figure.shape(
-        "rect", x0=column - 0.5, x1=column + 0.5, y0=row - 0.5, y1=row + 0.5, fillcolor="rgba(0, 0, 0, 0)",
+        "rect",
+        x0=column - 0.5,
+        x1=column + 0.5,
+        y0=row - 0.5,
+        y1=row + 0.5,
+        fillcolor="rgba(0, 0, 0, 0)",
         line={"color": BEFORE, "width": 3},
-    )  # fmt: skip
+    )
     # Colours repeat what the numbers say: their scale would take the room of three stops.
     figure.data[0] |= {"showscale": False, "textfont": {"size": _CELL}}
     figure.layout |= {"height": HEIGHT, "margin": _SHORT | {"l": 80}}
@@ -96,10 +101,15 @@ def residuals(fitted: Fitted, curve: Curve, channel: int, stop: int | None, agai
         order = np.flatnonzero(used)[np.argsort(x[used], kind="stable")]
         broken = _gaps(x[order], curve.signature[order, channel], against)
         figure.add(
-            "scatter", x=broken[0], y=broken[1], mode="lines" if against == TIME else "markers",
-            name=f"{curve.name} would take", line={"color": BEFORE, "width": 3}, hoverinfo="skip",
+            "scatter",
+            x=broken[0],
+            y=broken[1],
+            mode="lines" if against == TIME else "markers",
+            name=f"{curve.name} would take",
+            line={"color": BEFORE, "width": 3},
+            hoverinfo="skip",
             marker={"color": BEFORE, "size": 7, "symbol": "diamond"},
-        )  # fmt: skip
+        )
     figure.x_axes(title=against)
     figure.y_axes(title="residual (sigma)", zeroline=True, zerolinecolor=PALE)
     more = {"dragmode": "select", "clickmode": "event+select", "margin": _SHORT | {"t": 30}}
@@ -117,9 +127,16 @@ def _points(
     spans = np.column_stack([fitted.begin[rows], fitted.residuals.t[rows]]).round(3).tolist()
     stops = fitted.residuals.stop[rows].tolist()
     figure.add(
-        "scatter", x=x[rows], y=y[rows], mode="markers", name=name, marker=marker, customdata=spans, text=stops,
+        "scatter",
+        x=x[rows],
+        y=y[rows],
+        mode="markers",
+        name=name,
+        marker=marker,
+        customdata=spans,
+        text=stops,
         hovertemplate="stop %{text}, %{customdata[1]:.0f} s<br>%{x:.4g}: %{y:.2f} sigma<extra></extra>",
-    )  # fmt: skip
+    )
 
 
 def _gaps(x: Floats, y: Floats, against: str) -> tuple[Floats, Floats]:
@@ -143,16 +160,29 @@ def ladder(names: Sequence[str], values: Sequence[float], at_held: Sequence[floa
     figure = Figure()
     short = [name if len(name) < 26 else f"{name[:24]}\N{HORIZONTAL ELLIPSIS}" for name in names]
     figure.add(
-        "scatter", y=short, x=list(values), mode="lines+markers+text", text=[f"{v:.3f}" for v in values],
-        name="leave one out", textposition="middle right", line={"color": AFTER}, marker={"size": 9}, cliponaxis=False,
-        customdata=list(names), hovertemplate="%{customdata}: %{x:.3f} sigma<extra></extra>",
-    )  # fmt: skip
+        "scatter",
+        y=short,
+        x=list(values),
+        mode="lines+markers+text",
+        text=[f"{v:.3f}" for v in values],
+        name="leave one out",
+        textposition="middle right",
+        line={"color": AFTER},
+        marker={"size": 9},
+        cliponaxis=False,
+        customdata=list(names),
+        hovertemplate="%{customdata}: %{x:.3f} sigma<extra></extra>",
+    )
     if any(v is not None for v in at_held):
         figure.add(
-            "scatter", y=short, x=list(at_held), mode="markers", name="what is left out",
+            "scatter",
+            y=short,
+            x=list(at_held),
+            mode="markers",
+            name="what is left out",
             marker={"symbol": "square-open", "size": 9, "color": BEFORE},
             hovertemplate="left out: %{x:.3f} sigma<extra></extra>",
-        )  # fmt: skip
+        )
     figure.shape("line", x0=1.0, x1=1.0, line={"dash": "dash", "color": PALE, "width": 1.5}, opacity=1.0)
     numbers = [v for v in (*values, *at_held, 1.0) if v is not None]
     low, high = min(numbers), max(numbers)

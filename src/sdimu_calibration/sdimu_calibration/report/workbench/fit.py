@@ -162,9 +162,13 @@ class FitSession:
             if setting not in self._missing:
                 scores = self._survey(setting, tell)
                 found = Missing(
-                    tuple(data.scored(scores)), scores.found.threshold, scores.adequate, scores.sentence,
-                    scores.free_inputs_after, scores.fit.held_out_rms(),
-                )  # fmt: skip
+                    tuple(data.scored(scores)),
+                    scores.found.threshold,
+                    scores.adequate,
+                    scores.sentence,
+                    scores.free_inputs_after,
+                    scores.fit.held_out_rms(),
+                )
                 _keep(self._missing, setting, found)
             return self._missing[setting]
 
@@ -192,9 +196,7 @@ class FitSession:
         out = list(without_advice(warnings))
         for count in range(1, len(setting.added) + 1):
             below, here = self.fit(setting.rung(count - 1), tell), self.fit(setting.rung(count), tell)
-            out += objections(
-                below.calibration, here.calibration, here.stated, (below.held_out, here.held_out)
-            )
+            out += objections(below.calibration, here.calibration, here.stated, (below.held_out, here.held_out))
         return tuple(dict.fromkeys(out))
 
     def final(self, setting: Setting, tell: Tell = silent) -> Diagnosis:
@@ -241,10 +243,19 @@ class FitSession:
         errors = _left_out(fit, self.test)
         seen = errors[np.isfinite(errors)]
         return Fitted(
-            scores.after, fit.sensors.prior, fit.sensors.mean, fit.sensors.stated, data.where(scores.consistency),
-            data.residuals(scores), scores.navigation.prepared.epochs.start, axes(scores), errors,
-            everything.held_out([], 1.0).rms, float(np.sqrt(np.mean(seen**2))) if len(seen) else None, fit.start,
-        )  # fmt: skip
+            scores.after,
+            fit.sensors.prior,
+            fit.sensors.mean,
+            fit.sensors.stated,
+            data.where(scores.consistency),
+            data.residuals(scores),
+            scores.navigation.prepared.epochs.start,
+            axes(scores),
+            errors,
+            everything.held_out([], 1.0).rms,
+            float(np.sqrt(np.mean(seen**2))) if len(seen) else None,
+            fit.start,
+        )
 
 
 def _without_history(fit: Fit) -> Calibration:

@@ -28,11 +28,19 @@ def register(app: Dash, shelf: RecordingCache, doing: TaskProgress) -> None:
 
 def _score(app: Dash, shelf: RecordingCache, doing: TaskProgress) -> None:
     @app.callback(
-        Output("verdict", "children"), Output("verdict", "className"), Output("objections", "children"),
-        Output("ranking", "figure"), Output("candidate", "options"), Output("candidate", "value"),
-        Input("shown", "data"), Kept("look", "data"), Kept("candidate", "value"), Kept("page", "data"),
-        running=LOOKING, prevent_initial_call=True,
-    )  # fmt: skip
+        Output("verdict", "children"),
+        Output("verdict", "className"),
+        Output("objections", "children"),
+        Output("ranking", "figure"),
+        Output("candidate", "options"),
+        Output("candidate", "value"),
+        Input("shown", "data"),
+        Kept("look", "data"),
+        Kept("candidate", "value"),
+        Kept("page", "data"),
+        running=LOOKING,
+        prevent_initial_call=True,
+    )
     def search(kept: Any, look: Any, chosen: Any, page: Any) -> tuple[Any, ...]:
         now, tell = from_json(kept), doing.teller(str(page))
         bench = shelf.bench(now.recording)
@@ -58,10 +66,17 @@ def _look(app: Dash, shelf: RecordingCache, doing: TaskProgress) -> None:
     """Show the candidate that is chosen, or the effect that is written, before it is added."""
 
     @app.callback(
-        Output("preview", "children"), Output("looked", "data"), Output("message", "children", allow_duplicate=True),
-        Input("candidate", "value"), Input("look-own", "n_clicks"), Input("shown", "data"),
-        Kept("own", "value"), Kept("looked", "data"), Kept("page", "data"), prevent_initial_call=True,
-    )  # fmt: skip
+        Output("preview", "children"),
+        Output("looked", "data"),
+        Output("message", "children", allow_duplicate=True),
+        Input("candidate", "value"),
+        Input("look-own", "n_clicks"),
+        Input("shown", "data"),
+        Kept("own", "value"),
+        Kept("looked", "data"),
+        Kept("page", "data"),
+        prevent_initial_call=True,
+    )
     def look(candidate: Any, _clicks: Any, kept: Any, own: Any, looked: Any, page: Any) -> tuple[Any, Any, Any]:
         now = from_json(kept)
         by_hand = dash.ctx.triggered_id == "look-own"

@@ -24,11 +24,12 @@ def options(entries: Sequence[data.Scored]) -> list[dict[str, str]]:
     return [
         {
             "label": f"{e.label}   |z| {abs(e.z):.1f}   {with_sigma(e.estimate, e.sigma, e.unit)}"
-            if np.isfinite(e.sigma) else f"{e.label}   not seen in this test",
+            if np.isfinite(e.sigma)
+            else f"{e.label}   not seen in this test",
             "value": e.label,
         }
         for e in entries
-    ]  # fmt: skip
+    ]
 
 
 def verdict(missing: Missing, objections: Sequence[str]) -> tuple[str, str]:
@@ -74,15 +75,22 @@ def candidate(found: Preview, name: str) -> list[Any]:
     tells = "" if what.tells is None else sentence(what.tells)
     alike = (
         [html.P(["Looks the same here: ", ", ".join(what.alike), "."]), html.P(["To tell them: ", tells, "."])]
-        if what.alike else [html.P("Nothing else looks the same here.")] if not what.objections else []
-    )  # fmt: skip
+        if what.alike
+        else [html.P("Nothing else looks the same here.")]
+        if not what.objections
+        else []
+    )
     against = [html.Ul([html.Li(line) for line in what.objections], className="against")] if what.objections else []
     error = " \N{RIGHTWARDS ARROW} ".join(f"{value:.3f}" for value in what.held_out)
     return [
-        head, html.P(effect.equation, className="equation"), *cause, *(html.P(line) for line in _sizes(found)),
+        head,
+        html.P(effect.equation, className="equation"),
+        *cause,
+        *(html.P(line) for line in _sizes(found)),
         html.P(f"Error with one stop left out {error} sigma, by the linear model."),
-        *alike, *against,
-    ]  # fmt: skip
+        *alike,
+        *against,
+    ]
 
 
 def _sizes(found: Preview) -> list[str]:

@@ -29,9 +29,12 @@ class RecordingCache:
     """
 
     def __init__(
-        self, names: Sequence[str], make: Callable[[str], FitSession], places: Mapping[str, Path] | None = None,
+        self,
+        names: Sequence[str],
+        make: Callable[[str], FitSession],
+        places: Mapping[str, Path] | None = None,
         options: Sequence[str] = (),
-    ) -> None:  # fmt: skip
+    ) -> None:
         self._names, self._make, self._places = tuple(names), make, places or {}
         self.options = tuple(options)
         self._open: dict[str, FitSession] = {}

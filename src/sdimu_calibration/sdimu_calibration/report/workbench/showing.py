@@ -39,16 +39,32 @@ def _show_states(app: Dash, shelf: RecordingCache, doing: TaskProgress) -> None:
     """Show what follows from a state. Heat map and residuals come with it: the search that follows takes longer."""
 
     @app.callback(
-        Output("title", "children"), Output("numbers", "children"), Output("ladder", "figure"),
-        Output("added", "options"), Output("held", "options"), Output("held", "value"), Output("cut", "children"),
-        Output("coefficients", "children"), Output("coefficient", "options"), Output("models", "children"),
-        Output("recording", "options"), Output("recording", "value"), Output("against", "options"),
-        Output("channel", "value"), Output("stop", "data"), *_DRAWN, Output("shown", "data"),
+        Output("title", "children"),
+        Output("numbers", "children"),
+        Output("ladder", "figure"),
+        Output("added", "options"),
+        Output("held", "options"),
+        Output("held", "value"),
+        Output("cut", "children"),
+        Output("coefficients", "children"),
+        Output("coefficient", "options"),
+        Output("models", "children"),
+        Output("recording", "options"),
+        Output("recording", "value"),
+        Output("against", "options"),
+        Output("channel", "value"),
+        Output("stop", "data"),
+        *_DRAWN,
+        Output("shown", "data"),
         Output("message", "children", allow_duplicate=True),
-        Input("state", "modified_timestamp"), Input("look", "data"), Kept("state", "data"), Kept("page", "data"),
+        Input("state", "modified_timestamp"),
+        Input("look", "data"),
+        Kept("state", "data"),
+        Kept("page", "data"),
         *(Kept(name, "value") for name in _CHOICES),
-        running=BUSY, prevent_initial_call="initial_duplicate",
-    )  # fmt: skip
+        running=BUSY,
+        prevent_initial_call="initial_duplicate",
+    )
     def show(_when: Any, look: Any, kept: Any, page: Any, *choices: str) -> tuple[Any, ...]:
         if not look:
             return (no_update,) * 20
@@ -65,9 +81,7 @@ def _show_states(app: Dash, shelf: RecordingCache, doing: TaskProgress) -> None:
         return (*shown, *_drawn(bench, now, choices, None, look, tell), now.as_json(), told)
 
 
-def _shown(
-    bench: FitSession, now: State, recording: str, names: list[str], look: Any, tell: Tell
-) -> tuple[Any, ...]:
+def _shown(bench: FitSession, now: State, recording: str, names: list[str], look: Any, tell: Tell) -> tuple[Any, ...]:
     setting = now.now
     rungs = [setting.rung(k) for k in range(len(setting.added) + 1)]
     fits = [bench.fit(rung, tell) for rung in rungs]
@@ -108,10 +122,13 @@ def _draw(app: Dash, shelf: RecordingCache, doing: TaskProgress) -> None:
 
     @app.callback(
         *(Output(drawn.component_id, drawn.component_property, allow_duplicate=True) for drawn in _DRAWN),
-        *(Input(name, "value") for name in _CHOICES), Input("looked", "data"),
-        Kept("shown", "data"), Kept("look", "data"), Kept("page", "data"),
+        *(Input(name, "value") for name in _CHOICES),
+        Input("looked", "data"),
+        Kept("shown", "data"),
+        Kept("look", "data"),
+        Kept("page", "data"),
         prevent_initial_call=True,
-    )  # fmt: skip
+    )
     def draw(*given: Any) -> tuple[Any, ...]:
         *choices, looked, kept, look, page = given
         if not kept:
@@ -139,9 +156,7 @@ def _drawn(
     return figures.finished(heat, look), figures.finished(residuals, look), None
 
 
-def _chosen(
-    fitted: Fitted, found: Preview | None, shows: str, name: str
-) -> tuple[data.Grid, figures.Curve]:
+def _chosen(fitted: Fitted, found: Preview | None, shows: str, name: str) -> tuple[data.Grid, figures.Curve]:
     """Heat map and residuals, with what the candidate would take out of those of the model that it joins."""
     if shows == GIVEN or found is None:
         return fitted.grid, figures.Curve(fitted.residuals.before)

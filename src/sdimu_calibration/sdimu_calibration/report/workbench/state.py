@@ -74,9 +74,7 @@ class State:
         """Go back one step."""
         if not self.past:
             return self
-        return replace(
-            self, now=self.past[-1], past=self.past[:-1], future=(*self.future, self.now), seen=self._seen()
-        )
+        return replace(self, now=self.past[-1], past=self.past[:-1], future=(*self.future, self.now), seen=self._seen())
 
     def redo(self) -> State:
         """Go forward again where an undo came from."""
@@ -102,7 +100,10 @@ def from_json(kept: Any) -> State:
         return State(
             setting_from(kept.get("now", {})),
             (int(cell[0]), int(cell[1])) if cell else None,
-            past, future, seen, str(kept.get("recording", "")),
-        )  # fmt: skip
+            past,
+            future,
+            seen,
+            str(kept.get("recording", "")),
+        )
     except (AttributeError, TypeError, ValueError, IndexError, KeyError, OverflowError):
         return State()

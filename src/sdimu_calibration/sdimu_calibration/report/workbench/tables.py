@@ -18,9 +18,14 @@ from sdimu_calibration.report.workbench.parts import span
 from sdimu_calibration.report.workbench.setting import Setting
 
 _HEADINGS = (
-    "model", "log-likelihood", "against the model as given", "NIS", "one stop left out", "what is left out",
+    "model",
+    "log-likelihood",
+    "against the model as given",
+    "NIS",
+    "one stop left out",
+    "what is left out",
     "moved most",
-)  # fmt: skip
+)
 
 
 def models(bench: FitSession, settings: Sequence[Setting], here: Setting) -> Any:
@@ -30,16 +35,20 @@ def models(bench: FitSession, settings: Sequence[Setting], here: Setting) -> Any
     """
     found = [(setting, bench.known(setting)) for setting in settings]
     rows: list[tuple[Setting, Fitted]] = [(setting, fitted) for setting, fitted in found if fitted is not None]
-    return html.Table([
-        html.Thead(html.Tr([html.Th(word) for word in _HEADINGS])),
-        html.Tbody([
-            html.Tr(
-                [html.Td(text) for text in _model(setting, fitted, bench.known(setting.given))],
-                className="here" if setting == here else "",
-            )
-            for setting, fitted in rows
-        ]),
-    ])  # fmt: skip
+    return html.Table(
+        [
+            html.Thead(html.Tr([html.Th(word) for word in _HEADINGS])),
+            html.Tbody(
+                [
+                    html.Tr(
+                        [html.Td(text) for text in _model(setting, fitted, bench.known(setting.given))],
+                        className="here" if setting == here else "",
+                    )
+                    for setting, fitted in rows
+                ]
+            ),
+        ]
+    )
 
 
 def _model(setting: Setting, fitted: Fitted, given: Fitted | None) -> list[str]:
@@ -50,10 +59,14 @@ def _model(setting: Setting, fitted: Fitted, given: Fitted | None) -> list[str]:
         sizes = moved_coefficients(given.calibration, fitted.calibration)[:2]
         most = ", ".join(f"{name} {size:+.1f} sigma" for name, size in sizes)
     return [
-        described(setting), f"{fit['log_likelihood']:.1f}", gained, f"{fit['nis_mean']:.3f}",
-        f"{fitted.held_out:.3f}", "" if fitted.at_held is None else f"{fitted.at_held:.3f}",
+        described(setting),
+        f"{fit['log_likelihood']:.1f}",
+        gained,
+        f"{fit['nis_mean']:.3f}",
+        f"{fitted.held_out:.3f}",
+        "" if fitted.at_held is None else f"{fitted.at_held:.3f}",
         most,
-    ]  # fmt: skip
+    ]
 
 
 def described(setting: Setting) -> str:

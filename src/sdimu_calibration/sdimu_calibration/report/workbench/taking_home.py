@@ -27,9 +27,12 @@ def _read_uploads(app: Dash) -> None:
     """Put the file of an own effect into the page."""
 
     @app.callback(
-        Output("own", "value"), Output("message", "children", allow_duplicate=True),
-        Input("upload", "contents"), Kept("upload", "filename"), prevent_initial_call=True,
-    )  # fmt: skip
+        Output("own", "value"),
+        Output("message", "children", allow_duplicate=True),
+        Input("upload", "contents"),
+        Kept("upload", "filename"),
+        prevent_initial_call=True,
+    )
     def upload(contents: Any, name: Any) -> tuple[Any, str]:
         try:
             text = base64.b64decode(str(contents).partition(",")[2], validate=True).decode("utf-8")
@@ -48,10 +51,14 @@ def _pack_exports(app: Dash, shelf: RecordingCache, doing: TaskProgress) -> None
     """Send what is taken home."""
 
     @app.callback(
-        Output("file", "data"), Output("message", "children", allow_duplicate=True),
-        Input("export", "n_clicks"), Kept("state", "data"), Kept("page", "data"), running=BUSY,
+        Output("file", "data"),
+        Output("message", "children", allow_duplicate=True),
+        Input("export", "n_clicks"),
+        Kept("state", "data"),
+        Kept("page", "data"),
+        running=BUSY,
         prevent_initial_call=True,
-    )  # fmt: skip
+    )
     def export(_clicks: Any, kept: Any, page: Any) -> tuple[Any, str]:
         now, tell = from_json(kept), doing.teller(str(page))
         try:

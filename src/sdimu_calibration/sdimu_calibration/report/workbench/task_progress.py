@@ -7,19 +7,34 @@ from collections.abc import Callable
 from dash import Output
 
 _WORDS = {
-    "read": "Reading the recording", "passes": "Fitting", "candidates": "Looking for what is missing",
+    "read": "Reading the recording",
+    "passes": "Fitting",
+    "candidates": "Looking for what is missing",
     "report": "Writing the report",
-}  # fmt: skip
+}
 _MOST_PAGES = 200
 _WORKING = [(Output("busy", "hidden"), False, True), (Output("tick", "disabled"), False, True)]
 BUSY = [
     *_WORKING,
     *(
         (Output(button, "disabled"), True, False)
-        for button in ("add", "undo", "redo", "add-own", "hold", "toggle-stop", "leave-points", "take-points", "drop",
-                       "fix", "set-prior", "free", "open")
+        for button in (
+            "add",
+            "undo",
+            "redo",
+            "add-own",
+            "hold",
+            "toggle-stop",
+            "leave-points",
+            "take-points",
+            "drop",
+            "fix",
+            "set-prior",
+            "free",
+            "open",
+        )
     ),
-]  # fmt: skip
+]
 """What a page shows while it is fitted for."""
 LOOKING = [*_WORKING, (Output("candidates", "className"), "stale", "")]
 """What a page shows while candidates are scored for it."""

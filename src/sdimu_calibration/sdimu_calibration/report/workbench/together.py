@@ -24,10 +24,14 @@ def register(app: Dash, judge: Judge, doing: TaskProgress) -> None:
     """Make the callback; what `judge` takes is the same as for `app.build`."""
 
     @app.callback(
-        Output("judged", "children"), Output("message", "children", allow_duplicate=True),
-        Input("judge", "n_clicks"), Kept("state", "data"), Kept("page", "data"), running=BUSY,
+        Output("judged", "children"),
+        Output("message", "children", allow_duplicate=True),
+        Input("judge", "n_clicks"),
+        Kept("state", "data"),
+        Kept("page", "data"),
+        running=BUSY,
         prevent_initial_call=True,
-    )  # fmt: skip
+    )
     def joint(_clicks: Any, kept: Any, page: Any) -> tuple[Any, str]:
         setting = from_json(kept).now
         try:
@@ -46,19 +50,24 @@ def shown(found: SetDiagnosis) -> list[Any]:
     """Show the joint verdict, every effect that was found, and the advice."""
     rows = [
         [
-            f.label, f.recording or "all",
+            f.label,
+            f.recording or "all",
             with_sigma(from_si(f.value, f.display_unit), from_si(f.sigma, f.display_unit), f.display_unit),
-            f"{f.z:+.1f}", ", ".join(f.alike) or "nothing",
+            f"{f.z:+.1f}",
+            ", ".join(f.alike) or "nothing",
         ]
         for f in found.findings
-    ]  # fmt: skip
+    ]
     heads = ("effect", "in", "size", "score", "looks the same")
-    table = html.Table([
-        html.Thead(html.Tr([html.Th(word) for word in heads])),
-        html.Tbody([html.Tr([html.Td(text) for text in row]) for row in rows]),
-    ])  # fmt: skip
+    table = html.Table(
+        [
+            html.Thead(html.Tr([html.Th(word) for word in heads])),
+            html.Tbody([html.Tr([html.Td(text) for text in row]) for row in rows]),
+        ]
+    )
     tone = "good" if found.verdict == Verdict.CONSISTENT else "bad"
     return [
-        html.P(f"{found.verdict}: {found.sentence}", className=f"verdict {tone}"), *([table] if rows else []),
+        html.P(f"{found.verdict}: {found.sentence}", className=f"verdict {tone}"),
+        *([table] if rows else []),
         *(html.P(f"Advice: {sentence(one)}") for one in found.advice),
-    ]  # fmt: skip
+    ]

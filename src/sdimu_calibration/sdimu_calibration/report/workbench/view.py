@@ -28,11 +28,17 @@ NOW, GIVEN, WITH = "now", "given", "with"
 SHOWS = {GIVEN: "as given", NOW: "now", WITH: "with the candidate"}
 """What the heat map and the residuals are of."""
 _KEYS = (
-    ("?", "this list"), ("Ctrl+Z, U", "undo"), ("Ctrl+Y, Ctrl+Shift+Z, R", "redo"),
+    ("?", "this list"),
+    ("Ctrl+Z, U", "undo"),
+    ("Ctrl+Y, Ctrl+Shift+Z, R", "redo"),
     ("J, K", "next and previous candidate"),
-    ("A", "add the candidate"), ("B", "as given, now, with the candidate"), ("S", "leave the stop out, or take it in"),
-    ("X, I", "leave selected points out, take them in"), ("E", "take home"), ("Esc", "close this list"),
-)  # fmt: skip
+    ("A", "add the candidate"),
+    ("B", "as given, now, with the candidate"),
+    ("S", "leave the stop out, or take it in"),
+    ("X, I", "leave selected points out, take them in"),
+    ("E", "take home"),
+    ("Esc", "close this list"),
+)
 
 
 def layout(title: str, together: bool = False) -> Any:
@@ -44,50 +50,86 @@ def layout(title: str, together: bool = False) -> Any:
     together : bool
         They can be judged as one set.
     """
-    return html.Div([
-        dcc.Store(id="state", storage_type="session"), dcc.Store(id="page", data=uuid4().hex),
-        dcc.Store(id="look"), dcc.Store(id="shown"), dcc.Store(id="stop"), dcc.Store(id="looked"),
-        dcc.Interval(id="tick", interval=200, disabled=True),
-        html.Div(
-            "The workbench does not answer any more. Start it again with the same command: this page then goes on "
-            "where it was; nothing that you did is lost.",
-            id="lost", className="lost", role="alert", hidden=True,
-        ),
-        _help(), _bar(title),
-        html.Main([
-            html.Div([
-                html.Div([_left(), _middle(), _right()], className="bench"),
-                html.Div([
-                    _coefficients(), _own(), _home(), *([_set()] if together else []),
-                    _card("Models of this page side by side", html.Div(id="models", className="scroll"), more="whole"),
-                ], className="below"),
-            ]),
-        ]),
-    ])  # fmt: skip
+    return html.Div(
+        [
+            dcc.Store(id="state", storage_type="session"),
+            dcc.Store(id="page", data=uuid4().hex),
+            dcc.Store(id="look"),
+            dcc.Store(id="shown"),
+            dcc.Store(id="stop"),
+            dcc.Store(id="looked"),
+            dcc.Interval(id="tick", interval=200, disabled=True),
+            html.Div(
+                "The workbench does not answer any more. Start it again with the same command: this page then goes on "
+                "where it was; nothing that you did is lost.",
+                id="lost",
+                className="lost",
+                role="alert",
+                hidden=True,
+            ),
+            _help(),
+            _bar(title),
+            html.Main(
+                [
+                    html.Div(
+                        [
+                            html.Div([_left(), _middle(), _right()], className="bench"),
+                            html.Div(
+                                [
+                                    _coefficients(),
+                                    _own(),
+                                    _home(),
+                                    *([_set()] if together else []),
+                                    _card(
+                                        "Models of this page side by side",
+                                        html.Div(id="models", className="scroll"),
+                                        more="whole",
+                                    ),
+                                ],
+                                className="below",
+                            ),
+                        ]
+                    )
+                ]
+            ),
+        ]
+    )
 
 
 def _bar(title: str) -> Any:
-    return html.Header([
-        html.Div([
-            html.H1(title, id="title"),
-            html.Div(id="numbers", className="grow"),
-            html.Div(["Working", html.Progress(value="0", max="1")], id="busy", className="busy", hidden=True),
-            html.Button("Undo", id="undo", title="Ctrl+Z"), html.Button("Redo", id="redo", title="Ctrl+Y"),
-            html.Button("Dark", id="theme", **{"data-switch-theme": "", "aria-pressed": "false"}),
-            html.Button("Keys ?", id="help-open", **{"aria-controls": "help"}),
-        ], className="line"),
-        html.Div(id="verdict", className="verdict", role="status"),
-        html.Ul(id="objections", className="objections"),
-        html.Div(id="message", className="message", role="alert"),
-    ], className="bench-bar")  # fmt: skip
+    return html.Header(
+        [
+            html.Div(
+                [
+                    html.H1(title, id="title"),
+                    html.Div(id="numbers", className="grow"),
+                    html.Div(["Working", html.Progress(value="0", max="1")], id="busy", className="busy", hidden=True),
+                    html.Button("Undo", id="undo", title="Ctrl+Z"),
+                    html.Button("Redo", id="redo", title="Ctrl+Y"),
+                    html.Button("Dark", id="theme", **{"data-switch-theme": "", "aria-pressed": "false"}),
+                    html.Button("Keys ?", id="help-open", **{"aria-controls": "help"}),
+                ],
+                className="line",
+            ),
+            html.Div(id="verdict", className="verdict", role="status"),
+            html.Ul(id="objections", className="objections"),
+            html.Div(id="message", className="message", role="alert"),
+        ],
+        className="bench-bar",
+    )
 
 
 def _help() -> Any:
     rows = [html.Tr([html.Td(_keys(keys)), html.Td(what)]) for keys, what in _KEYS]
     return html.Div(
         [html.H2("Keys"), html.Table(html.Tbody(rows)), html.Button("Close", id="help-close")],
-        id="help", className="help", role="dialog", hidden=True, tabIndex="-1", **{"aria-label": "Keys"},
-    )  # fmt: skip
+        id="help",
+        className="help",
+        role="dialog",
+        hidden=True,
+        tabIndex="-1",
+        **{"aria-label": "Keys"},
+    )
 
 
 def _keys(keys: str) -> list[Any]:
@@ -95,113 +137,174 @@ def _keys(keys: str) -> list[Any]:
 
 
 def _left() -> Any:
-    return html.Div([
-        _card(
-            "Where does it fail? Click a cell",
-            html.Div([
-                dcc.RadioItems(
-                    id="shows", options=[{"label": words, "value": key} for key, words in SHOWS.items()], value=NOW,
-                    inline=True, className="choices",
+    return html.Div(
+        [
+            _card(
+                "Where does it fail? Click a cell",
+                html.Div(
+                    [
+                        dcc.RadioItems(
+                            id="shows",
+                            options=[{"label": words, "value": key} for key, words in SHOWS.items()],
+                            value=NOW,
+                            inline=True,
+                            className="choices",
+                        ),
+                        html.Button("Leave stop out / take in", id="toggle-stop", title="S"),
+                    ],
+                    className="controls",
                 ),
-                html.Button("Leave stop out / take in", id="toggle-stop", title="S"),
-            ], className="controls"),
-            _graph("heat", "Normalised mean of every channel at every stop"),
-        ),
-        _card(
-            "Residuals: click points, or draw a box",
-            html.Div([
-                _picker("channel", "channel", [
-                    {"label": name.replace("_", " "), "value": k} for k, name in enumerate(CHANNEL_NAMES)
-                ], None),
-                _picker("against", "against", [TIME, STOP], TIME),
-                dcc.RadioItems(
-                    id="which", options=[{"label": "this stop", "value": "one"}, {"label": "all", "value": "all"}],
-                    value="one", inline=True, className="choices",
+                _graph("heat", "Normalised mean of every channel at every stop"),
+            ),
+            _card(
+                "Residuals: click points, or draw a box",
+                html.Div(
+                    [
+                        _picker(
+                            "channel",
+                            "channel",
+                            [{"label": name.replace("_", " "), "value": k} for k, name in enumerate(CHANNEL_NAMES)],
+                            None,
+                        ),
+                        _picker("against", "against", [TIME, STOP], TIME),
+                        dcc.RadioItems(
+                            id="which",
+                            options=[{"label": "this stop", "value": "one"}, {"label": "all", "value": "all"}],
+                            value="one",
+                            inline=True,
+                            className="choices",
+                        ),
+                        html.Button("Leave out", id="leave-points", title="X"),
+                        html.Button("Take in", id="take-points", title="I"),
+                    ],
+                    className="controls",
                 ),
-                html.Button("Leave out", id="leave-points", title="X"),
-                html.Button("Take in", id="take-points", title="I"),
-            ], className="controls"),
-            _graph("residuals", "Residuals of the channel that is looked at"),
-        ),
-    ], className="column")  # fmt: skip
+                _graph("residuals", "Residuals of the channel that is looked at"),
+            ),
+        ],
+        className="column",
+    )
 
 
 def _middle() -> Any:
-    return html.Div([
-        _card(
-            "What is missing? Click a bar",
-            dcc.Dropdown(id="candidate", placeholder="or search the catalogue"),
-            html.Div(_graph("ranking", "Score of every candidate"), id="candidates"),
-        ),
-        _card("How far the error fell", _graph("ladder", "Held-out error of each model")),
-    ], className="column")  # fmt: skip
+    return html.Div(
+        [
+            _card(
+                "What is missing? Click a bar",
+                dcc.Dropdown(id="candidate", placeholder="or search the catalogue"),
+                html.Div(_graph("ranking", "Score of every candidate"), id="candidates"),
+            ),
+            _card("How far the error fell", _graph("ladder", "Held-out error of each model")),
+        ],
+        className="column",
+    )
 
 
 def _right() -> Any:
-    return html.Div([
-        html.Section([
-            html.H2("The candidate"),
-            html.Div("Click a bar, or press J.", id="preview", className="candidate"),
-            html.Div(html.Button("Add it and fit", id="add", className="main-action", title="A"), className="controls"),
-        ], className="card"),
-        html.Section([
-            html.H2("Added to the model"),
-            dcc.Dropdown(id="added", placeholder="choose one to take out"),
-            html.Div(html.Button("Take out", id="drop"), className="controls"),
-        ], className="card control"),
-        html.Section([
-            html.H2("Left out of the fit"),
-            dcc.Dropdown(id="held", options=[], multi=True, placeholder="no stop"),
-            html.Div([html.Button("Leave these stops out", id="hold"), html.Span(id="cut")], className="controls"),
-        ], className="card control"),
-        html.Section([
-            html.H2("Recording"),
-            dcc.Dropdown(id="recording", options=[], clearable=False),
-            html.Div(html.Button("Open", id="open"), className="controls"),
-        ], className="card control"),
-    ], className="column")  # fmt: skip
+    return html.Div(
+        [
+            html.Section(
+                [
+                    html.H2("The candidate"),
+                    html.Div("Click a bar, or press J.", id="preview", className="candidate"),
+                    html.Div(
+                        html.Button("Add it and fit", id="add", className="main-action", title="A"),
+                        className="controls",
+                    ),
+                ],
+                className="card",
+            ),
+            html.Section(
+                [
+                    html.H2("Added to the model"),
+                    dcc.Dropdown(id="added", placeholder="choose one to take out"),
+                    html.Div(html.Button("Take out", id="drop"), className="controls"),
+                ],
+                className="card control",
+            ),
+            html.Section(
+                [
+                    html.H2("Left out of the fit"),
+                    dcc.Dropdown(id="held", options=[], multi=True, placeholder="no stop"),
+                    html.Div(
+                        [html.Button("Leave these stops out", id="hold"), html.Span(id="cut")], className="controls"
+                    ),
+                ],
+                className="card control",
+            ),
+            html.Section(
+                [
+                    html.H2("Recording"),
+                    dcc.Dropdown(id="recording", options=[], clearable=False),
+                    html.Div(html.Button("Open", id="open"), className="controls"),
+                ],
+                className="card control",
+            ),
+        ],
+        className="column",
+    )
 
 
 def _coefficients() -> Any:
     return _card(
         "Coefficients",
-        html.Div([
-            dcc.Dropdown(id="coefficient", placeholder="choose one to fix, free or give a prior", className="pick"),
-            html.Label(["value ", dcc.Input(id="mean", type="text", value="", debounce=False)]),
-            html.Label(["sigma ", dcc.Input(id="sigma", type="text", value="", debounce=False)]),
-            html.Button("Fix at this value", id="fix"), html.Button("Take this prior", id="set-prior"),
-            html.Button("Free again", id="free"),
-        ], className="controls control"),
-        html.Div(id="coefficients", className="scroll"), more="whole",
-    )  # fmt: skip
+        html.Div(
+            [
+                dcc.Dropdown(id="coefficient", placeholder="choose one to fix, free or give a prior", className="pick"),
+                html.Label(["value ", dcc.Input(id="mean", type="text", value="", debounce=False)]),
+                html.Label(["sigma ", dcc.Input(id="sigma", type="text", value="", debounce=False)]),
+                html.Button("Fix at this value", id="fix"),
+                html.Button("Take this prior", id="set-prior"),
+                html.Button("Free again", id="free"),
+            ],
+            className="controls control",
+        ),
+        html.Div(id="coefficients", className="scroll"),
+        more="whole",
+    )
 
 
 def _own() -> Any:
-    return html.Section([
-        html.H2("An effect of your own, as an expression"),
-        html.Label("Effect file", htmlFor="own", className="switch"),
-        dcc.Textarea(id="own", value=TEMPLATE, rows=8, persistence=True, persistence_type="session"),
-        html.Div([
-            html.Button("Look at it", id="look-own"), html.Button("Add this", id="add-own"),
-            dcc.Upload(html.Button("Read a file"), id="upload", accept=".yaml,.yml"),
-        ], className="controls"),
-    ], className="card control")  # fmt: skip
+    return html.Section(
+        [
+            html.H2("An effect of your own, as an expression"),
+            html.Label("Effect file", htmlFor="own", className="switch"),
+            dcc.Textarea(id="own", value=TEMPLATE, rows=8, persistence=True, persistence_type="session"),
+            html.Div(
+                [
+                    html.Button("Look at it", id="look-own"),
+                    html.Button("Add this", id="add-own"),
+                    dcc.Upload(html.Button("Read a file"), id="upload", accept=".yaml,.yml"),
+                ],
+                className="controls",
+            ),
+        ],
+        className="card control",
+    )
 
 
 def _home() -> Any:
-    return html.Section([
-        html.H2("Take home"),
-        html.P("Model, calibration, report, the session and the command that gives the same numbers."),
-        html.Button("Model, calibration and report", id="export", title="E"), dcc.Download(id="file"),
-    ], className="card control")  # fmt: skip
+    return html.Section(
+        [
+            html.H2("Take home"),
+            html.P("Model, calibration, report, the session and the command that gives the same numbers."),
+            html.Button("Model, calibration and report", id="export", title="E"),
+            dcc.Download(id="file"),
+        ],
+        className="card control",
+    )
 
 
 def _set() -> Any:
-    return html.Section([
-        html.H2("All recordings together"),
-        html.P("One fit of the recordings as one unit, with the effects that are added here."),
-        html.Button("Judge them together", id="judge"), html.Div(id="judged", className="scroll"),
-    ], className="card")  # fmt: skip
+    return html.Section(
+        [
+            html.H2("All recordings together"),
+            html.P("One fit of the recordings as one unit, with the effects that are added here."),
+            html.Button("Judge them together", id="judge"),
+            html.Div(id="judged", className="scroll"),
+        ],
+        className="card",
+    )
 
 
 def _card(title: str, *parts: Any, more: str = "") -> Any:
@@ -209,9 +312,9 @@ def _card(title: str, *parts: Any, more: str = "") -> Any:
 
 
 def _picker(name: str, words: str, options: Sequence[Any], value: Any) -> Any:
-    return html.Label([
-        words, dcc.Dropdown(id=name, options=list(options), value=value, clearable=False, className="pick"),
-    ])  # fmt: skip
+    return html.Label(
+        [words, dcc.Dropdown(id=name, options=list(options), value=value, clearable=False, className="pick")]
+    )
 
 
 def _graph(name: str, words: str) -> Any:

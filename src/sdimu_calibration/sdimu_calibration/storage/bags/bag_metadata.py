@@ -56,9 +56,7 @@ def write_metadata(
         What the user says of the recording.
     """
     filled = [file for file in files if file.count] or list(files)
-    whole = FileEntry(
-        "", min(f.first_ns for f in filled), max(f.last_ns for f in filled), sum(f.count for f in files)
-    )
+    whole = FileEntry("", min(f.first_ns for f in filled), max(f.last_ns for f in filled), sum(f.count for f in files))
     content = {
         "version": 9,
         "storage_identifier": "mcap",

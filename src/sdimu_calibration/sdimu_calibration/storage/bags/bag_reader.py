@@ -51,12 +51,16 @@ def read_recording(path: Path, topics: Topics | TopicChoice | None = None) -> Re
     ns, omega_ib_b, f_ib_b = _imu(raw[topics.imu], imu_topic)
     recording = in_order(
         RawTest(
-            ns, omega_ib_b, f_ib_b,
+            ns,
+            omega_ib_b,
+            f_ib_b,
             _status(raw.get(topics.status, []), topics.status, notes),
             _temperature(raw.get(topics.temperature, []), f"{path}: {topics.temperature}"),
-            imu_topic, topics.status, topics.temperature,
+            imu_topic,
+            topics.status,
+            topics.temperature,
         )
-    )  # fmt: skip
+    )
     table = _table(raw.get(topics.joint_states, []), recording.start_ns, topics.joint_states, notes)
     return replace(recording, table=table, notes=(*notes, *recording.notes))
 

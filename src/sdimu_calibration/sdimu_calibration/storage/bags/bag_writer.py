@@ -79,9 +79,7 @@ class _Stream:
         self.encoded = encoded
 
 
-def _write(
-    path: Path, streams: list[_Stream], start_ns: int, replace: bool, custom: Mapping[str, str] | None
-) -> None:
+def _write(path: Path, streams: list[_Stream], start_ns: int, replace: bool, custom: Mapping[str, str] | None) -> None:
     with McapBag(path, replace=replace, custom=custom) as bag:
         for stream in streams:
             bag.topic(stream.topic, stream.type_name)

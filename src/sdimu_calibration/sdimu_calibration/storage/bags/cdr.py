@@ -163,9 +163,12 @@ def _order(message: bytes) -> Literal["little", "big"]:
 
 
 def encode_imu(
-    stamp_ns: Stamps, omega_ib_b: Floats, f_ib_b: Floats, frame_id: str = "imu_link",
+    stamp_ns: Stamps,
+    omega_ib_b: Floats,
+    f_ib_b: Floats,
+    frame_id: str = "imu_link",
     covariances: tuple[Floats, Floats] | None = None,
-) -> list[bytes]:  # fmt: skip
+) -> list[bytes]:
     """Encode sensor_msgs/Imu without an orientation.
 
     Parameters
@@ -228,9 +231,7 @@ def encode_joint_states(
     return as_bytes(messages)
 
 
-def encode_status(
-    stamp_ns: Stamps, dwell: Bools, stop: Ints, frame_id: str = "rate_table"
-) -> list[bytes]:
+def encode_status(stamp_ns: Stamps, dwell: Bools, stop: Ints, frame_id: str = "rate_table") -> list[bytes]:
     """Encode the table's status as diagnostic_msgs/DiagnosticArray, shapes (n,); list of n messages."""
     encoded = np.empty(len(stamp_ns), dtype=object)
     kinds = np.stack([np.asarray(dwell, np.int64), np.asarray(stop, np.int64)], axis=1)

@@ -77,9 +77,13 @@ def write_compensated(
         for block, first in enumerate(range(0, len(stamps), _BLOCK)):
             rows = slice(first, first + _BLOCK)
             done = compensate(
-                using, recording.t[rows], interval, recording.omega_ib_b[rows], recording.f_ib_b[rows],
+                using,
+                recording.t[rows],
+                interval,
+                recording.omega_ib_b[rows],
+                recording.f_ib_b[rows],
                 (heat[0][rows], heat[1][rows]),
-            )  # fmt: skip
+            )
             change = np.hstack([done.omega_ib_b - recording.omega_ib_b[rows], done.f_ib_b - recording.f_ib_b[rows]])
             largest = np.maximum(largest, np.abs(change).max(axis=0))
             encoded = encode_compensated(stamps[rows], done, frame_id)

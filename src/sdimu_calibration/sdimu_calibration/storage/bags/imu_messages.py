@@ -94,9 +94,7 @@ class ImuMessages(RawMessages):
             Reads the messages of blocks that have no layout in common.
         """
         self._close()
-        found = [
-            one_by_one(list(_messages_of(part))) if isinstance(part, Block) else part for part in self._decoded
-        ]
+        found = [one_by_one(list(_messages_of(part))) if isinstance(part, Block) else part for part in self._decoded]
         self._decoded = []
         if self._file is not None:
             self._file.append(found)
@@ -104,9 +102,10 @@ class ImuMessages(RawMessages):
         ns, omega, force = zip(*found, strict=True) if found else ((), (), ())
         empty = np.empty((0, 3))
         return (
-            np.concatenate([np.empty(0, np.int64), *ns]), np.concatenate([empty, *omega]),
+            np.concatenate([np.empty(0, np.int64), *ns]),
+            np.concatenate([empty, *omega]),
             np.concatenate([empty, *force]),
-        )  # fmt: skip
+        )
 
     def _add(self, block: Block) -> None:
         if not len(block.start):

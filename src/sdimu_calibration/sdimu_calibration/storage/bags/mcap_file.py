@@ -73,9 +73,7 @@ class McapFile:
         sequence = self._counts[channel - 1]
         self._counts[channel - 1] = sequence + 1
         self._index.append((channel, time_ns, self._size))
-        self._add(
-            _MESSAGE.pack(Opcode.MESSAGE, _MESSAGE_HEAD + len(data), channel, sequence, time_ns, time_ns) + data
-        )
+        self._add(_MESSAGE.pack(Opcode.MESSAGE, _MESSAGE_HEAD + len(data), channel, sequence, time_ns, time_ns) + data)
         if self._size > _CHUNK_BYTES:
             self._close_chunk()
 

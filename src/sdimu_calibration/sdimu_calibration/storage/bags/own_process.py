@@ -42,9 +42,15 @@ def run(program: Path, source: Path, target: Path, most: int, patience_s: float,
 
     try:
         done = subprocess.run(
-            command, capture_output=True, text=True, errors="replace", check=False, timeout=patience_s,
-            env=os.environ | {"OPENBLAS_NUM_THREADS": "1"}, preexec_fn=bound,
-        )  # fmt: skip
+            command,
+            capture_output=True,
+            text=True,
+            errors="replace",
+            check=False,
+            timeout=patience_s,
+            env=os.environ | {"OPENBLAS_NUM_THREADS": "1"},
+            preexec_fn=bound,
+        )
     except subprocess.TimeoutExpired as error:
         raise DataError(f"{source}: {failure} in {patience_s:.0f} s") from error
     if done.returncode:

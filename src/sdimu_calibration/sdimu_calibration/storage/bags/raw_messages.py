@@ -46,7 +46,6 @@ class Block:
         fields = np.ndarray((len(self.buffer) - size + 1,), f"V{size}", self.buffer, strides=(1,))
         return np.asarray(fields[self.start + place].view(dtype).reshape(-1, count))
 
-
     def alone(self) -> Block:
         """Return the same messages in a buffer of their own: this one keeps that of a whole chunk alive."""
         if (self.length == self.length[0]).all():

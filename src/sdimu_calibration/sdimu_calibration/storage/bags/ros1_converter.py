@@ -9,8 +9,12 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-KINDS = ("sensor_msgs/msg/Imu", "sensor_msgs/msg/JointState", "sensor_msgs/msg/Temperature",
-         "diagnostic_msgs/msg/DiagnosticArray")  # fmt: skip
+KINDS = (
+    "sensor_msgs/msg/Imu",
+    "sensor_msgs/msg/JointState",
+    "sensor_msgs/msg/Temperature",
+    "diagnostic_msgs/msg/DiagnosticArray",
+)
 
 
 def main() -> None:

@@ -38,12 +38,7 @@ class Topics:
 
 
 _OWN = Topics()
-KINDS = {
-    "imu": cdr.IMU,
-    "status": cdr.STATUS,
-    "joint_states": cdr.JOINT_STATE,
-    "temperature": cdr.TEMPERATURE,
-}
+KINDS = {"imu": cdr.IMU, "status": cdr.STATUS, "joint_states": cdr.JOINT_STATE, "temperature": cdr.TEMPERATURE}
 """Type of the messages of each topic of a test."""
 _OPTION = {"imu": "--imu-topic", "status": "--status-topic"}
 _LOOKED_AT = 200

@@ -82,9 +82,13 @@ def _each(name: str, shape: str, rows: Sequence[str]) -> list[str]:
 
 
 _C_FACTORS = {
-    Factor(1, 0): "x", Factor(2, 0): "x * x", Factor(3, 0): "x * x * x", Factor(0, 1): "temperature_rate",
-    Factor(1, 1): "x * temperature_rate", Factor(2, 1): "x * x * temperature_rate",
-}  # fmt: skip
+    Factor(1, 0): "x",
+    Factor(2, 0): "x * x",
+    Factor(3, 0): "x * x * x",
+    Factor(0, 1): "temperature_rate",
+    Factor(1, 1): "x * temperature_rate",
+    Factor(2, 1): "x * x * temperature_rate",
+}
 _FUNCTION_AT = """
 /* Solve m x = v by Cramer's rule. */
 static inline void sdimu_solve(double m[3][3], const double v[3], double x[3])

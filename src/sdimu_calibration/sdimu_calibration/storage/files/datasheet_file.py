@@ -50,13 +50,16 @@ def write_datasheet(path: Path, lines: Sequence[Line], about: Certificate, entri
     entries : sequence of Entry
         The results that it is made of.
     """
-    write_json(path, {
-        "format": FORMAT,
-        **{key: value for key, value in asdict(about).items() if key != "recordings"},
-        "recordings": [{"file": name, "sha256": digest} for name, digest in about.recordings],
-        "results": [{"name": entry.name, "unit": entry.unit} for entry in entries],
-        "lines": [_line(line) for line in lines],
-    })  # fmt: skip
+    write_json(
+        path,
+        {
+            "format": FORMAT,
+            **{key: value for key, value in asdict(about).items() if key != "recordings"},
+            "recordings": [{"file": name, "sha256": digest} for name, digest in about.recordings],
+            "results": [{"name": entry.name, "unit": entry.unit} for entry in entries],
+            "lines": [_line(line) for line in lines],
+        },
+    )
 
 
 def _line(line: Line) -> dict[str, Any]:

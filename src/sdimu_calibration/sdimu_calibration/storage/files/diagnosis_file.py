@@ -200,7 +200,8 @@ def alone(evidence: LinearEvidence, before: Scan, free: Sequence[int] = ()) -> A
     J = evidence.information.given(evidence.model, evidence.weight).J
     p = len(evidence.weight)
     shown = [
-        (evidence.candidates[k - p], k) for k in range(p, len(evidence.names))
+        (evidence.candidates[k - p], k)
+        for k in range(p, len(evidence.names))
         if k not in free and np.isfinite(first.sigma[k]) and evidence.candidates[k - p].family != "own"
     ]
     return Alone.model_construct(
@@ -219,12 +220,16 @@ def _plan(plan: PlanSeen | None) -> dict[str, Any] | None:
         return None
     return {
         "turns": [
-            {"after_stop": t.after_stop, "axis": None if t.axis is None else "xyz"[t.axis],
-             "angle": t.angle, "rate": t.rate}
+            {
+                "after_stop": t.after_stop,
+                "axis": None if t.axis is None else "xyz"[t.axis],
+                "angle": t.angle,
+                "rate": t.rate,
+            }
             for t in plan.turns
         ],
         "oblique_stops": plan.oblique,
-    }  # fmt: skip
+    }
 
 
 def candidate(f: Found, own: bool) -> dict[str, Any]:
@@ -234,8 +239,13 @@ def candidate(f: Found, own: bool) -> dict[str, Any]:
         "effect": f.candidate.label if own else f.candidate.family,
         "label": f.candidate.label,
         "parameters": [
-            {"name": parameter.name, "value": f.value, "sigma": f.sigma, "unit": parameter.unit,
-             "display_unit": parameter.display_unit}
+            {
+                "name": parameter.name,
+                "value": f.value,
+                "sigma": f.sigma,
+                "unit": parameter.unit,
+                "display_unit": parameter.display_unit,
+            }
         ],
         "z": f.z,
         "delta_log_likelihood": f.log_likelihood_gain,
@@ -248,7 +258,7 @@ def candidate(f: Found, own: bool) -> dict[str, Any]:
         "depends_on_choice": [
             {"instead": s.other, "coefficient": s.coefficient, "sigmas": s.sigmas} for s in f.coefficient_shifts
         ],
-    }  # fmt: skip
+    }
 
 
 def _unexplained_fraction(d: Diagnosis) -> float:
@@ -261,9 +271,7 @@ def _unexplained_fraction(d: Diagnosis) -> float:
 
 
 def _noise(noise: Noise) -> dict[str, Any]:
-    return {
-        "ratio": noise.ratio, "sigma": noise.sigma, "kurtosis": noise.kurtosis, "outliers": len(noise.outliers),
-    }  # fmt: skip
+    return {"ratio": noise.ratio, "sigma": noise.sigma, "kurtosis": noise.kurtosis, "outliers": len(noise.outliers)}
 
 
 def fit_of(calibration: Calibration) -> dict[str, Any]:
@@ -274,42 +282,67 @@ def fit_of(calibration: Calibration) -> dict[str, Any]:
 def step_of(s: Step) -> dict[str, Any]:
     """Give a step of the search as plain data."""
     return {
-        "label": s.label, "effect": s.family, "accepted": s.accepted, "reason": s.reason,
-        "taken_out": s.taken_out, "z": s.z,
-        "threshold": s.threshold, "estimate": s.estimate, "sigma": s.sigma, "unit": s.unit,
-        "log_likelihood_gain": s.log_likelihood_gain, "log_bayes_factor": s.log_bayes_factor,
-        "one_stop_out_before": s.held_out_before.rms, "one_stop_out_after": s.held_out_after.rms,
-        "held_out_gain": s.held_out_gain, "held_out_error": s.held_out_error,
+        "label": s.label,
+        "effect": s.family,
+        "accepted": s.accepted,
+        "reason": s.reason,
+        "taken_out": s.taken_out,
+        "z": s.z,
+        "threshold": s.threshold,
+        "estimate": s.estimate,
+        "sigma": s.sigma,
+        "unit": s.unit,
+        "log_likelihood_gain": s.log_likelihood_gain,
+        "log_bayes_factor": s.log_bayes_factor,
+        "one_stop_out_before": s.held_out_before.rms,
+        "one_stop_out_after": s.held_out_after.rms,
+        "held_out_gain": s.held_out_gain,
+        "held_out_error": s.held_out_error,
         "indistinguishable_from": list(s.alike),
         "moved": [{"name": name, "sigmas": size} for name, size in s.moved],
-    }  # fmt: skip
+    }
 
 
 def _null(null: Null) -> dict[str, Any]:
     return {
-        "draws": null.draws, "false_finds": null.false_finds, "threshold": null.threshold, "rms_z": null.rms_z,
-        "largest": null.largest, "remainder_p": null.free_input_p,
-    }  # fmt: skip
+        "draws": null.draws,
+        "false_finds": null.false_finds,
+        "threshold": null.threshold,
+        "rms_z": null.rms_z,
+        "largest": null.largest,
+        "remainder_p": null.free_input_p,
+    }
 
 
 def _rung(r: Rung) -> dict[str, Any]:
     return {
-        "added": r.added, "accepted": r.accepted, "reason": r.reason, "log_likelihood": r.log_likelihood,
-        "log_bayes_factor": r.log_bayes_factor, "nis_mean": r.nis_mean, "held_out_rms": r.held_out_rms,
-        "jump": r.jump, "jump_velocity": r.jump_velocity,
+        "added": r.added,
+        "accepted": r.accepted,
+        "reason": r.reason,
+        "log_likelihood": r.log_likelihood,
+        "log_bayes_factor": r.log_bayes_factor,
+        "nis_mean": r.nis_mean,
+        "held_out_rms": r.held_out_rms,
+        "jump": r.jump,
+        "jump_velocity": r.jump_velocity,
         "moved": [{"name": name, "sigmas": size} for name, size in r.moved],
-        "beyond_white_noise": None if r.scatter is None else {
-            "force_m_s2": r.scatter[FORCE], "rate_rad_s": r.scatter[RATE], "turn_share": r.scatter[TURN],
-        },
-    }  # fmt: skip
+        "beyond_white_noise": None
+        if r.scatter is None
+        else {"force_m_s2": r.scatter[FORCE], "rate_rad_s": r.scatter[RATE], "turn_share": r.scatter[TURN]},
+    }
 
 
 def reach_of(r: DetectableSize) -> dict[str, Any]:
     """Give what could have been seen of one effect as plain data."""
     return {
-        "label": r.label, "effect": r.family, "retention": r.retention, "smallest": r.smallest, "unit": r.unit,
-        "display_unit": r.display_unit, "taken_by": list(r.partners),
-    }  # fmt: skip
+        "label": r.label,
+        "effect": r.family,
+        "retention": r.retention,
+        "smallest": r.smallest,
+        "unit": r.unit,
+        "display_unit": r.display_unit,
+        "taken_by": list(r.partners),
+    }
 
 
 def _reason(summary: DiagnosisSummary, r: DetectableSize) -> str:

@@ -122,10 +122,14 @@ def _equation(sensor: str, formula: str) -> Effect:
         dimension = about.dimension(VARIABLE_UNITS)
         below = reciprocal_unit(dimension)
         usual = USUAL_TURN ** max(0, -int(dimension.get("s", 0))) if "m" not in dimension else 1.0
-        file = EffectFile.model_validate({
-            "format": FORMAT, "name": "equation", "expressions": {sensor: f"k * ({about.text})"},
-            "parameters": {"k": {"unit": shown + below, "prior": f"1 {shown}{below}"}},
-        })  # fmt: skip
+        file = EffectFile.model_validate(
+            {
+                "format": FORMAT,
+                "name": "equation",
+                "expressions": {sensor: f"k * ({about.text})"},
+                "parameters": {"k": {"unit": shown + below, "prior": f"1 {shown}{below}"}},
+            }
+        )
         (effect,) = _effects(file)
     except (DataError, UnitError) as error:
         raise DataError(f"equation '{text}': {error}") from error
@@ -244,9 +248,7 @@ def _effects(file: EffectFile) -> tuple[Effect, ...]:
     return tuple(_one(file, name, formulas, constants) for name in file.parameters)
 
 
-def _one(
-    file: EffectFile, name: str, formulas: Mapping[str, Expression], constants: Mapping[str, float]
-) -> Effect:
+def _one(file: EffectFile, name: str, formulas: Mapping[str, Expression], constants: Mapping[str, float]) -> Effect:
     """Effect of one parameter: the formulas with it at one and the others at zero."""
     about = file.parameters[name]
     shown = about.display_unit or about.unit

@@ -39,36 +39,49 @@ def write_fleet(path: Path, gathered: Gathered, done: Study) -> None:
     """
     first = gathered.entries[0].result
     shown = dict(zip(first.names, zip(first.units, first.display_units, strict=True), strict=True))
-    write_json(path, {
-        "format": FORMAT,
-        "imu": first.origin.imu,
-        "model": list(first.model),
-        "body_frame": first.body_frame,
-        "results": [
-            {"name": e.name, "unit": e.unit, "origin": plain_origin(e.result.origin)} for e in gathered.entries
-        ],
-        "apart": list(gathered.apart),
-        "units": list(done.people.units),
-        "coefficients": [
-            _coefficient(one, inside.control_limits, *shown[one.name])
-            for one, inside in zip(done.people.coefficients, done.inside.coefficients, strict=True)
-        ],
-        "out": [asdict(one) for one in done.people.out],
-        "trends": [asdict(one) | {"per": "year", "unit": shown[one.coefficient][0]} for one in done.slopes],
-        "common_effects": [asdict(one) for one in done.common],
-    })  # fmt: skip
+    write_json(
+        path,
+        {
+            "format": FORMAT,
+            "imu": first.origin.imu,
+            "model": list(first.model),
+            "body_frame": first.body_frame,
+            "results": [
+                {"name": e.name, "unit": e.unit, "origin": plain_origin(e.result.origin)} for e in gathered.entries
+            ],
+            "apart": list(gathered.apart),
+            "units": list(done.people.units),
+            "coefficients": [
+                _coefficient(one, inside.control_limits, *shown[one.name])
+                for one, inside in zip(done.people.coefficients, done.inside.coefficients, strict=True)
+            ],
+            "out": [asdict(one) for one in done.people.out],
+            "trends": [asdict(one) | {"per": "year", "unit": shown[one.coefficient][0]} for one in done.slopes],
+            "common_effects": [asdict(one) for one in done.common],
+        },
+    )
 
 
 def _coefficient(one: Coefficient, limits: tuple[float, float], unit: str, display_unit: str) -> dict[str, Any]:
     low, high = one.between.mean_interval
     return {
-        "name": one.name, "unit": unit, "display_unit": display_unit,
-        "mean": one.between.mean, "mean_low": low, "mean_high": high,
-        **_spread("spread", one.between), **({} if one.within is None else _spread("within", one.within)),
-        "q": one.between.q, "dof": one.between.dof, "p_value": one.between.p_value,
-        "control_low": limits[0], "control_high": limits[1],
-        "values": one.values, "sigmas": one.sigmas, "deviates": one.deviates,
-    }  # fmt: skip
+        "name": one.name,
+        "unit": unit,
+        "display_unit": display_unit,
+        "mean": one.between.mean,
+        "mean_low": low,
+        "mean_high": high,
+        **_spread("spread", one.between),
+        **({} if one.within is None else _spread("within", one.within)),
+        "q": one.between.q,
+        "dof": one.between.dof,
+        "p_value": one.between.p_value,
+        "control_low": limits[0],
+        "control_high": limits[1],
+        "values": one.values,
+        "sigmas": one.sigmas,
+        "deviates": one.deviates,
+    }
 
 
 def _spread(name: str, found: RandomEffect) -> dict[str, float]:

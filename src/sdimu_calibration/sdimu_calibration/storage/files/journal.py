@@ -107,9 +107,7 @@ class Journal:
         self.set_aside = self._put_aside() if lasting else None
         # Unbuffered: a record is with the system when the call returns.
         self._file = (
-            path.open("a+b", buffering=0)
-            if lasting
-            else tempfile.TemporaryFile("a+b", buffering=0, dir=path.parent)  # noqa: SIM115 (open as long as the node)
+            path.open("a+b", buffering=0) if lasting else tempfile.TemporaryFile("a+b", buffering=0, dir=path.parent)  # noqa: SIM115 (open as long as the node)
         )
         self.before, self.cut_bytes = Counts(0, 0, 0), 0
         self._before_end = len(self._header)

@@ -90,9 +90,7 @@ def _walk(content: Bytes, at: int) -> tuple[int, int, int, int]:
 
 
 @compiled
-def _collect(
-    content: Bytes, at: int, ns: Bytes, omega: Bytes, force: Bytes, status: Bytes, temperature: Bytes
-) -> None:
+def _collect(content: Bytes, at: int, ns: Bytes, omega: Bytes, force: Bytes, status: Bytes, temperature: Bytes) -> None:
     """Copy the records from `at` on, each kind into a table of bytes of its own, one row a sample or message."""
     i, j, k = 0, 0, 0
     while i < ns.shape[0] or j < status.shape[0] or k < temperature.shape[0]:
@@ -144,7 +142,9 @@ def raw_test(content: Bytes, at: int) -> RawTest:
     _collect(content, at, ns, omega, force, status, temperature)
     said, warm = status.view("<i8"), temperature.view("<i8")
     return RawTest(
-        ns.view("<i8")[:, 0], omega.view("<f8"), force.view("<f8"),
+        ns.view("<i8")[:, 0],
+        omega.view("<f8"),
+        force.view("<f8"),
         RawStatus(said[:, 0].copy(), said[:, 1] != 0, said[:, 2].copy()) if len(said) else None,
         RawTemperature(warm[:, 0].copy(), temperature.view("<f8")[:, 1].copy()) if len(warm) else None,
-    )  # fmt: skip
+    )

@@ -56,12 +56,15 @@ def write_noise_terms(path: Path, recording: str, duration_s: float, terms: Mapp
         By channel.
     """
     NoiseTermsFile.model_construct(
-        format=FORMAT, recording=recording, duration_s=duration_s, terms=TERMS,
+        format=FORMAT,
+        recording=recording,
+        duration_s=duration_s,
+        terms=TERMS,
         channels={
             channel: Channel.model_construct(value=one.value, sigma=one.sigma, misfit=one.misfit)
             for channel, one in terms.items()
         },
-    ).write(path)  # fmt: skip
+    ).write(path)
 
 
 def read_noise_terms(path: Path) -> NoiseOfUnit:
@@ -77,8 +80,14 @@ def read_noise_terms(path: Path) -> NoiseOfUnit:
 
 def _stated(path: Path) -> NoiseOfUnit:
     imu = load_imu(path)
-    return NoiseOfUnit(path.name, stated={
-        ("gyro", "white"): imu.gyro_white_noise, ("accel", "white"): imu.accel_white_noise,
-        ("gyro", "instability"): imu.gyro_bias_instability, ("accel", "instability"): imu.accel_bias_instability,
-        ("gyro", "random_walk"): imu.gyro_random_walk, ("accel", "random_walk"): imu.accel_random_walk,
-    })  # fmt: skip
+    return NoiseOfUnit(
+        path.name,
+        stated={
+            ("gyro", "white"): imu.gyro_white_noise,
+            ("accel", "white"): imu.accel_white_noise,
+            ("gyro", "instability"): imu.gyro_bias_instability,
+            ("accel", "instability"): imu.accel_bias_instability,
+            ("gyro", "random_walk"): imu.gyro_random_walk,
+            ("accel", "random_walk"): imu.accel_random_walk,
+        },
+    )

@@ -20,9 +20,7 @@ def write_plan(path: Path, plan: Plan, remarks: Sequence[str] = ()) -> None:
     lines.append("turns:" if plan.turns else "turns: []")
     for turn, dwell in zip(plan.turns, plan.dwell_s[1:], strict=True):
         angle, speed = deg[turn]
-        lines.append(
-            f"  - {{axis: {turn.axis}, angle: {angle} deg, rate: {speed} deg/s, dwell: {_number(dwell)} s}}"
-        )
+        lines.append(f"  - {{axis: {turn.axis}, angle: {angle} deg, rate: {speed} deg/s, dwell: {_number(dwell)} s}}")
     write_whole(path, "\n".join(lines) + "\n")
 
 

@@ -15,9 +15,14 @@ FORMAT = "sdimu-prediction/1"
 def prediction_content(prediction: Prediction, about: Mapping[str, Any]) -> dict[str, Any]:
     """Put a prediction into plain data, SI; `about` says of what (plan, IMU, site, mount, noise)."""
     columns = zip(
-        prediction.names, prediction.sigma, prediction.in_noise, prediction.bound, prediction.prior, prediction.units,
+        prediction.names,
+        prediction.sigma,
+        prediction.in_noise,
+        prediction.bound,
+        prediction.prior,
+        prediction.units,
         strict=True,
-    )  # fmt: skip
+    )
     return {
         "format": FORMAT,
         **about,

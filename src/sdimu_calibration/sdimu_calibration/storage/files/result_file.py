@@ -183,9 +183,12 @@ def _noise_of(imu: ImuSpecification) -> ImuNoise:
 
 def _coefficients(c: Calibration) -> tuple[Coefficient, ...]:
     columns: dict[str, Any] = {
-        "name": c.names, "value": c.values.tolist(), "sigma": np.sqrt(np.diag(c.covariance)).tolist(), "unit": c.units,
+        "name": c.names,
+        "value": c.values.tolist(),
+        "sigma": np.sqrt(np.diag(c.covariance)).tolist(),
+        "unit": c.units,
         "display_unit": c.display_units,
-    }  # fmt: skip
+    }
     if c.conditional_sigma is not None:
         columns["conditional_sigma"] = c.conditional_sigma.tolist()
     rows = zip(*columns.values(), strict=True)

@@ -36,9 +36,15 @@ class KnownEntry(ResultModel):
         """Make the entry of what is known."""
         known = standing.known
         return cls.model_construct(
-            names=known.names, information=known.J, prior=known.prior, scatter=known.scatter, added=standing.added,
-            open=standing.open, imu=standing.imu, site=standing.site,
-        )  # fmt: skip
+            names=known.names,
+            information=known.J,
+            prior=known.prior,
+            scatter=known.scatter,
+            added=standing.added,
+            open=standing.open,
+            imu=standing.imu,
+            site=standing.site,
+        )
 
     @property
     def standing(self) -> Standing:
@@ -99,9 +105,12 @@ def standing_of_result(path: Path, imu: str | None) -> Standing:
         sensors.names, result.covariance, sensors.prior, body_frame.frame_jacobian(sensors.names, result.body_frame)
     )
     scatter = {
-        p.name: prior for e in sensors.effects if e.scope == "power-on" for p in e.parameters
+        p.name: prior
+        for e in sensors.effects
+        if e.scope == "power-on"
+        for p in e.parameters
         for prior in [float(sensors.prior[sensors.names.index(p.name)])]
-    }  # fmt: skip
+    }
     for t in result.of_set.turn_on if result.of_set else ():
         scatter |= {n: min(t.sigma, size) for n, size in scatter.items() if n.startswith(f"{t.effect}_")}
     anew = np.array([scatter.get(n, 0.0) for n in known.names])

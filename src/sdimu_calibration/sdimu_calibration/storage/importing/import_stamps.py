@@ -30,9 +30,7 @@ _LARGEST_NS = 4e18
 """Times beyond this (the year 2096) do not fit a stamp."""
 
 
-def read_stamps(
-    table: Table, column: int | str | None, time: TimeMap, samples: int
-) -> tuple[Stamps, tuple[str, ...]]:
+def read_stamps(table: Table, column: int | str | None, time: TimeMap, samples: int) -> tuple[Stamps, tuple[str, ...]]:
     """Read the stamps of a table.
 
     Parameters
@@ -79,9 +77,7 @@ def _proposed(ns: Stamps) -> tuple[str, ...]:
     return (f"{bursts}; {more}",)
 
 
-def counted(
-    table: Table, column: int | str, ns: Stamps, rate_hz: float | None
-) -> tuple[Stamps, tuple[str, ...]]:
+def counted(table: Table, column: int | str, ns: Stamps, rate_hz: float | None) -> tuple[Stamps, tuple[str, ...]]:
     """Make stamps of a counter of the samples.
 
     Parameters

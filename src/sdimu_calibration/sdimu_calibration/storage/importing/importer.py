@@ -97,11 +97,12 @@ def _in_a_row(parts: Sequence[Imported], paths: Sequence[Path]) -> Imported:
         notes += part.notes
     heat = [part.temperature for part in moved if part.temperature is not None]
     return Imported(
-        np.concatenate([part.ns for part in moved]), np.concatenate([part.omega_ib_b for part in moved]),
+        np.concatenate([part.ns for part in moved]),
+        np.concatenate([part.omega_ib_b for part in moved]),
         np.concatenate([part.f_ib_b for part in moved]),
         (np.concatenate([ns for ns, _ in heat]), np.concatenate([value for _, value in heat])) if heat else None,
         tuple(notes),
-    )  # fmt: skip
+    )
 
 
 def write_imported(path: Path, found: Imported, replace: bool = False) -> None:

@@ -158,9 +158,11 @@ class TextTable:
         forms = np.array([self._form(k) for k in _spread(rest)])
         whole, real = (forms == _WHOLE).all(axis=0), (forms == _REAL).all(axis=0)
         headings = [
-            k for k in first if (np.array(self._form(k)) == _REAL)[whole].any()
+            k
+            for k in first
+            if (np.array(self._form(k)) == _REAL)[whole].any()
             or (real.all() and (np.array(self._form(k)) == _WHOLE).all())
-        ]  # fmt: skip
+        ]
         if not headings:
             return
         self._begin = rows[rows.index(headings[-1]) + 1]
@@ -223,9 +225,7 @@ def _is_number(cell: str, decimal: str) -> bool:
     return True
 
 
-_NOVATEL = (
-    "week", "seconds", "status", "accel_z", "-accel_y", "accel_x", "gyro_z", "-gyro_y", "gyro_x", "gps",
-)  # fmt: skip
+_NOVATEL = ("week", "seconds", "status", "accel_z", "-accel_y", "accel_x", "gyro_z", "-gyro_y", "gyro_x", "gps")
 """Names of the columns: those of the log, and `gps`, seconds of GPS time since its beginning on 1980-01-06."""
 _NOVATEL_LOG = re.compile(r"[#%]RAWIMUS?A,[^;]*;(\d+),(\d+)(\.\d+)?,([0-9a-fA-F]+)((?:,-?\d+){6})\*[0-9a-fA-F]{8}\s*")
 _WEEK_S = 604_800
