@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from tiers import QUICK_ROS, THOROUGH, is_thorough
+from tiers import LONG, QUICK_ROS, THOROUGH, is_thorough
 
 ROOT = Path(__file__).resolve().parents[1]
 
 
 def test_every_row_of_the_table_names_a_test_that_is_there():
-    for row in (*THOROUGH, *QUICK_ROS):
+    single = [f"{file}::{name.partition('[')[0]}" for file, names in LONG.items() for name in names]
+    for row in (*THOROUGH, *LONG, *single, *QUICK_ROS):
         file, _, name = row.partition("::")
         assert (ROOT / file).exists(), row
         assert f"def {name}" in (ROOT / file).read_text() if name else True, row

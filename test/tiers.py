@@ -18,6 +18,157 @@ THOROUGH = {
 }
 """Files and folders, with the reason."""
 
+LONG = {
+    "test/sdimu_calibration/api/test_api.py": (
+        "test_a_coefficient_knows_its_units",
+        "test_a_handheld_fit_takes_no_assumed_site",
+        "test_words_for_estimators_and_models_are_those_of_the_shell",
+    ),
+    "test/sdimu_calibration/api/test_recording_set.py": (
+        "test_a_diagnosis_of_a_set_says_what_is_known_and_what_to_record",
+        "test_a_joint_fit_is_a_table_with_units",
+    ),
+    "test/sdimu_calibration/cli/test_diagnose.py": (
+        "test_a_coefficient_that_is_another_one_is_told_by_a_diagnosis",
+        "test_a_run_by_hand_is_diagnosed_by_its_own_fit",
+    ),
+    "test/sdimu_calibration/cli/test_exit_status.py": (
+        "test_diagnose_ends_as_its_verdict_says[2-one effect]",
+        "test_diagnose_ends_as_its_verdict_says[2-unexplained]",
+    ),
+    "test/sdimu_calibration/cli/test_noise.py": ("test_pulses_and_wandering_bias_go_into_the_file",),
+    "test/sdimu_calibration/cli/test_plan.py": ("test_what_only_a_change_of_temperature_tells_is_said_so",),
+    "test/sdimu_calibration/core/batch/test_batch.py": (
+        "test_coefficients_are_honest_near_and_at_the_poles[-80.0]",
+        "test_coefficients_are_honest_near_and_at_the_poles[-90.0]",
+        "test_coefficients_are_honest_near_and_at_the_poles[80.0]",
+        "test_coefficients_are_honest_near_and_at_the_poles[90.0]",
+        "test_errors_of_percents_are_found_with_honest_sigmas",
+        "test_errors_of_the_batch_are_as_large_as_it_says",
+    ),
+    "test/sdimu_calibration/core/batch/test_classical.py": ("test_without_mount_the_errors_are_those_of_the_noise",),
+    "test/sdimu_calibration/core/data/test_latitude_check.py": (
+        "test_the_vertical_rate_of_the_earth_is_right_within_its_sigma",
+    ),
+    "test/sdimu_calibration/core/diagnosis/test_diagnose.py": (
+        "test_a_bias_that_settles_after_each_turn_is_named_and_its_time_constant_found",
+        "test_a_drift_that_takes_many_steps_is_called_a_wander",
+        "test_a_sine_of_any_phase_and_period_is_one_equation",
+        "test_a_wrong_density_ends_as_a_wrong_noise_model_and_is_measured",
+        "test_a_wrong_latitude_is_measured_and_sent_back_to_the_site_file",
+        "test_an_effect_far_beyond_its_class_is_measured_at_its_size_without_companions",
+        "test_noise_with_a_memory_is_told_with_its_size",
+        "test_outliers_are_told_as_wrong_samples_and_end_as_no_effect",
+        "test_the_ladder_of_refits_says_how_far_the_error_falls_and_refuses_what_does_not_lower_it",
+        "test_what_only_the_nis_shows_is_not_called_explained",
+    ),
+    "test/sdimu_calibration/core/diagnosis/test_families.py": (
+        "test_an_effect_that_is_not_to_be_tried_is_not_named_and_something_is_missing_all_the_same",
+    ),
+    "test/sdimu_calibration/core/diagnosis/test_handheld_diagnosis.py": (
+        "test_a_swing_in_time_is_told_with_its_period",
+    ),
+    "test/sdimu_calibration/core/diagnosis/test_late_accelerometers.py": (),
+    "test/sdimu_calibration/core/diagnosis/test_noise_search.py": (
+        "test_a_calibration_in_coloured_noise_has_the_sigma_that_its_errors_have",
+        "test_an_effect_in_flicker_noise_is_named_and_the_noise_is_not",
+    ),
+    "test/sdimu_calibration/core/diagnosis/test_pairs.py": ("test_noise_makes_no_pairs",),
+    "test/sdimu_calibration/core/diagnosis/test_strong_effects.py": (
+        "test_a_weaker_effect_beside_strong_ones_is_named_and_nothing_without_a_cause",
+    ),
+    "test/sdimu_calibration/core/estimation/test_every_estimator.py": (
+        "test_a_result_is_written_read_compensated_and_exported[mems_industrial second-order]",
+        "test_every_caller_gives_the_same_digits[fog_tactical]",
+        "test_every_caller_gives_the_same_digits[mems_consumer]",
+        "test_every_caller_gives_the_same_digits[rlg_navigation]",
+    ),
+    "test/sdimu_calibration/core/estimation/test_free_azimuth.py": (
+        "test_a_filter_that_loses_the_azimuth_gives_way_to_passes_that_do_without_one",
+        "test_a_navigation_without_aid_drifts_as_promised_in_the_noise_that_was_learned",
+        "test_a_set_takes_each_recording_without_its_azimuth",
+    ),
+    "test/sdimu_calibration/core/estimation/test_reference_temperature.py": (
+        "test_another_reference_moves_the_biases_by_the_coefficient_and_no_prediction[mems_industrial-table_test-second-order]",
+    ),
+    "test/sdimu_calibration/core/evidence/test_learned_noise.py": (
+        "test_the_size_of_a_term_is_inside_its_interval[markov-3.0]",
+        "test_the_size_of_a_term_is_inside_its_interval[random_walk-0.2]",
+        "test_the_size_of_a_term_is_inside_its_interval[shift-3.0]",
+        "test_the_size_of_a_term_is_inside_its_interval[stop-3.0]",
+        "test_the_size_of_a_term_is_inside_its_interval[turn-3.0]",
+        "test_white_noise_has_no_memory",
+    ),
+    "test/sdimu_calibration/core/fleet/test_datasheet.py": (
+        "test_repeatability_is_in_its_interval_as_often_as_stated[8]",
+        "test_the_largest_size_is_in_its_interval_as_often_as_stated[8]",
+    ),
+    "test/sdimu_calibration/core/joint/test_combine.py": (
+        "test_errors_are_as_large_as_their_sigmas[8]",
+        "test_intervals_of_the_scatter_hold_it",
+    ),
+    "test/sdimu_calibration/core/joint/test_held_out.py": (
+        "test_two_recordings_that_lack_an_effect_show_it_in_the_noise_of_those_that_have_it",
+        "test_what_chance_reaches_is_known_for_two_recordings",
+    ),
+    "test/sdimu_calibration/core/joint/test_recurrence.py": (
+        "test_recordings_in_the_same_order_do_not_tell_attitude_from_time",
+    ),
+    "test/sdimu_calibration/core/joint/test_set_fit.py": (
+        "test_a_clean_set_scatters_as_chance_does",
+        "test_errors_of_a_set_are_those_its_sigmas_say",
+        "test_recordings_that_the_model_does_not_fit_are_named_though_learned_noise_takes_it_in",
+    ),
+    "test/sdimu_calibration/core/joint/test_set_search.py": (
+        "test_a_fault_of_one_recording_is_told_of_that_one",
+        "test_a_weak_effect_is_found_in_all_recordings_together",
+        "test_what_two_recordings_leave_open_the_advised_third_one_closes",
+    ),
+    "test/sdimu_calibration/core/noise/test_quantisation.py": ("test_what_a_counter_hides_is_found",),
+    "test/sdimu_calibration/core/planning/test_stated_noise.py": (
+        "test_the_prediction_is_the_covariance_of_a_test_in_that_noise[fog_tactical]",
+        "test_the_prediction_is_the_covariance_of_a_test_in_that_noise[rlg_navigation]",
+    ),
+    "test/sdimu_calibration/core/second_order/test_second_order.py": (
+        "test_gyros_that_lose_the_attitude_over_the_test_take_the_same_path",
+        "test_what_speaks_against_a_result_is_in_it",
+    ),
+    "test/sdimu_calibration/core/test_live_growth.py": ("test_neither_memory_nor_work_grow_with_the_test",),
+    "test/sdimu_calibration/report/test_data.py": ("test_residuals_are_the_whitened_innovations_coloured_again",),
+    "test/sdimu_calibration/report/test_learned_noise.py": (
+        "test_the_figure_that_judges_is_in_the_noise_that_was_learned_where_any_was",
+    ),
+    "test/sdimu_calibration/report/test_pictures.py": (
+        "test_every_picture_is_small_and_opens",
+        "test_pictures_of_one_diagnosis_are_the_same_bytes",
+    ),
+    "test/sdimu_calibration/report/workbench/test_workbench.py": (
+        "test_a_candidate_is_shown_with_what_it_would_take_before_it_is_added",
+        "test_a_coefficient_is_fixed_given_a_prior_and_freed",
+        "test_a_degenerate_addition_is_objected_to_before_and_after_and_gets_no_tick",
+        "test_a_prior_that_the_data_contradict_gets_no_tick_and_is_named",
+        "test_held_out_stops_are_predicted_not_fitted",
+        "test_points_that_are_selected_are_left_out_and_taken_in_again",
+        "test_two_pages_do_not_disturb_each_other_and_a_restart_loses_nothing",
+        "test_what_is_taken_home_names_what_was_left_out_and_fixed",
+    ),
+    "test/sdimu_calibration/storage/test_diagnosis_file.py": ("test_the_file_has_every_name_of_the_interface",),
+    "test/sdimu_calibration/storage/test_equations.py": (
+        "test_every_equation_that_a_diagnosis_can_propose_is_found_by_its_label",
+    ),
+    "test/sdimu_calibration/storage/test_recording_set.py": (
+        "test_processes_give_the_same_digits",
+        "test_two_dask_workers_give_bitwise_what_this_process_gives",
+    ),
+    "test/sdimu_sim/core/test_generator.py": (
+        "test_samples_are_the_same_to_the_last_bit_however_the_motion_is_cut[1-100.0]",
+        "test_samples_are_the_same_to_the_last_bit_however_the_motion_is_cut[1-333.0]",
+    ),
+    "test/sdimu_sim/core/test_truth.py": ("test_draws_have_the_spread_of_the_specification",),
+}
+"""Single tests of 4 s and more of a processor, where others of their file hold the claims of `make test`; an empty
+row is the whole file."""
+
 QUICK_ROS = (
     "test/ros/test_whole_run.py",
     "test/ros/test_robustness.py::test_a_killed_calibration_is_not_waited_for_and_its_successor_goes_on",
@@ -39,4 +190,7 @@ def is_thorough(name: str, over_dds: bool) -> bool:
     """
     if over_dds:
         return not name.startswith(QUICK_ROS)
-    return name.startswith(tuple(THOROUGH))
+    if name.startswith(tuple(THOROUGH)):
+        return True
+    file, _, test = name.partition("::")
+    return file in LONG and (not LONG[file] or test.startswith(LONG[file]))
