@@ -35,6 +35,7 @@ import sys
 from pathlib import Path
 
 from sdimu_calibration.nodes.recorder_node import RecorderNode
+from sdimu_calibration.nodes.spinning import run_node
 
 
 def full():

@@ -73,6 +73,7 @@ if __name__ == "__main__":
     print(*TOLD)
 """
 KERNEL = """
+from sdimu_calibration.core.compiled import compiled
 {imported}
 
 @compiled

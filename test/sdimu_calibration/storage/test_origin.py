@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -35,7 +36,8 @@ def bag(tmp_path):
 
 
 def test_the_bag_says_of_which_unit_and_power_on_it_is(bag):
-    assert said_of(bag, "config/site/daejeon.yaml") == Origin("SN 17", "3", recording="bag", site="daejeon")
+    file = str(Path("config/site/daejeon.yaml").resolve())
+    assert said_of(bag, file) == Origin("SN 17", "3", recording="bag", site="daejeon", site_file=file)
 
 
 def test_a_serial_of_digits_keeps_its_zeros(bag):
