@@ -55,10 +55,11 @@ def test_flicker_as_large_as_earth_rate_hides_the_azimuth_and_says_so(hidden):
 
 def test_a_misfit_is_told_of_white_noise_and_right_at_one_is_the_other(hidden):
     fit, _ = hidden[0]
-    (told,) = (line for line in fit.warnings(fit.statistics() | {"held_out_rms": 7.0}) if "the model" in line)
+    (told,) = (line for line in fit.warnings(replace(fit.statistics(), held_out_rms=7.0)) if "the model" in line)
     assert told.startswith("the model in white noise does not fit (NIS ")
     assert f"held-out error {fit.noise.held_out_rms:.3f}, 1 is right" in told
-    (white,) = (line for line in fit.with_noise(None).warnings({"nis_mean": 2.0}) if "the model" in line)
+    bare = fit.with_noise(None)
+    (white,) = (line for line in bare.warnings(replace(bare.statistics(), nis_mean=2.0)) if "the model" in line)
     assert white.startswith("the model does not fit (NIS 2.000; 1 is right)")
 
 
