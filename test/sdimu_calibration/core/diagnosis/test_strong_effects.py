@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,7 +11,6 @@ from rate_table_sim.core import TableSpecification
 from sdimu_calibration.core.diagnosis.diagnose import climb
 from sdimu_calibration.core.diagnosis.ground import Ground, Request, fresh_ground
 from sdimu_calibration.core.diagnosis.problem import Problem
-from sdimu_calibration.core.diagnosis.rounds import prefer
 from sdimu_calibration.core.diagnosis.search import FALSE_ALARM
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.estimation.solve import solve
@@ -79,20 +77,3 @@ def test_the_variants_of_a_cause_share_its_odds(fit):
     faults = [c.effect.scope == "recording" for c in evidence.candidates]
     assert (against[faults] > problem.log_variants[faults]).all()
     assert (against[np.logical_not(faults)] == problem.log_variants[np.logical_not(faults)]).all()
-
-
-def look(chosen: int, chi2: float, net: float) -> SimpleNamespace:
-    """A round that chose some effects without noise, with what is left."""
-    return SimpleNamespace(
-        found=SimpleNamespace(chosen=range(chosen), noise=(), net=net),
-        free=range(9),
-        left_after=SimpleNamespace(chi2=chi2, dof=250, p_value=0.4),
-    )
-
-
-def test_an_equation_must_be_likelier_than_the_effects_it_stands_for():
-    catalogue = look(4, 250.0, 100.0)
-    assert prefer(look(1, 252.0, 110.0), catalogue)
-    assert not prefer(look(1, 252.0, 90.0), catalogue)
-    # As likely, and nothing else speaks for it: neither fewer terms nor less left.
-    assert not prefer(look(4, 252.0, 110.0), catalogue)

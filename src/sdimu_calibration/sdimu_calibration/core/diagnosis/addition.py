@@ -17,11 +17,11 @@ from sdimu_calibration.core.diagnosis.found import DetectableSize
 from sdimu_calibration.core.diagnosis.plan_seen import plan_seen
 from sdimu_calibration.core.diagnosis.problem import Problem
 from sdimu_calibration.core.diagnosis.rounds import LEAST_SIGMAS
-from sdimu_calibration.core.diagnosis.scan import TESTABLE
 from sdimu_calibration.core.diagnosis.search import look_alikes
 from sdimu_calibration.core.estimation.fit import Fit
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.evidence.navigation_evidence import NavigationEvidence
+from sdimu_calibration.core.evidence.testable import TESTABLE
 from sdimu_calibration.core.results import Calibration
 
 RAISED = 10.0

@@ -12,16 +12,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sdimu_calibration.core.arrays import Ints
+from sdimu_calibration.core.diagnosis.averaged import over_all_models
 from sdimu_calibration.core.diagnosis.free_input_test import FreeInputTest
 from sdimu_calibration.core.diagnosis.ground import Request
 from sdimu_calibration.core.diagnosis.ladder import Rung, ladder
-from sdimu_calibration.core.diagnosis.model_doubt import in_doubt
 from sdimu_calibration.core.diagnosis.problem import Problem
 from sdimu_calibration.core.diagnosis.rounds import UNEXPLAINED_P, Round, in_found_noise, search_until_stable
 from sdimu_calibration.core.diagnosis.screen import Finding, screen
 from sdimu_calibration.core.diagnosis.search import FALSE_ALARM, MOST_STEPS, Search, look_alikes, patchwork
 from sdimu_calibration.core.diagnosis.verdict import Facts, sentence, verdict
 from sdimu_calibration.core.diagnosis.white_noise import without_memory
+from sdimu_calibration.core.diagnosis.window_search import alike_in_window
 from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.error_figures import degrees_of_freedom, held_out_judged, nis_judged
 from sdimu_calibration.core.estimation.fit import NOT_CONVERGED, Fit
@@ -203,7 +204,7 @@ def climb(
     wander = None if base.learns_scatter else base.wander
     request = Request(base, tuple(extra), alpha, wander, frozenset(without))
     done = search_until_stable(request, progress)
-    widened = in_doubt(base, done.fit, done.evidence, done.found.chosen, done.free, done.found.scale)
+    widened = over_all_models(base, done)
     # Beside what was found a prior may no longer stand against the data: the fit of the model as given tells it.
     odd = [*base.contradicted_priors(), *widened.beyond_specification()]
     findings = (*screen(base), *(Finding(text, grave=False) for text in odd))
@@ -299,6 +300,8 @@ def alike_first(of: Round | Diagnosis) -> tuple[str, ...]:
     if not len(chosen):
         return ()
     allowed = np.setdiff1d(np.arange(len(evidence.weight), len(evidence.names)), of.free)
+    if of.found.posterior is not None:
+        return alike_in_window(of.found.posterior, int(chosen[0]))
     found = look_alikes(Problem(evidence), chosen.tolist(), int(chosen[0]), allowed, of.found.scale)
     return tuple(evidence.names[i] for i in found)
 

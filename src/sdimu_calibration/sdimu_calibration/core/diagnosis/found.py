@@ -42,6 +42,10 @@ class Found:
         Candidates that the data cannot tell from it, all others found being in the model.
     coefficient_shifts : tuple of CoefficientShift
         Coefficients of the model that hang on which of these it is.
+    probability : float
+        That it or something of its class is missing in the model; NaN where no probabilities were worked out.
+    shares : tuple of float
+        Probability of it alone, then of each of `alike`.
     """
 
     candidate: Candidate
@@ -56,6 +60,8 @@ class Found:
     held_out_after: float
     alike: tuple[str, ...]
     coefficient_shifts: tuple[CoefficientShift, ...]
+    probability: float = float("nan")
+    shares: tuple[float, ...] = ()
 
 
 def found_effects(d: Diagnosis) -> tuple[Found, ...]:
@@ -83,7 +89,7 @@ def found_effects(d: Diagnosis) -> tuple[Found, ...]:
         scores = problem.scores(scanned, d.found.scale)
         z = float(scanned.z[column])
         count = int(np.isfinite(scanned.sigma[allowed]).sum())
-        others = look_alikes(problem, chosen, column, allowed, d.found.scale)
+        others = _alike(d, problem, column, allowed)
         out.append(
             Found(
                 candidate=d.chosen[k],
@@ -98,9 +104,30 @@ def found_effects(d: Diagnosis) -> tuple[Found, ...]:
                 held_out_after=held_out[k + 1],
                 alike=tuple(d.evidence.names[i] for i in others),
                 coefficient_shifts=coefficient_shifts(problem, chosen, column, others, d.found.scale),
+                probability=_probability(d, column)[0],
+                shares=_probability(d, column)[1],
             )
         )
     return tuple(out)
+
+
+def _alike(d: Diagnosis, problem: Problem[LinearEvidence], column: int, allowed: Ints) -> list[int]:
+    """Columns that the data cannot tell from a chosen one, the likeliest first."""
+    window = d.found.posterior
+    if window is None:
+        return look_alikes(problem, d.found.chosen.tolist(), column, allowed, d.found.scale)
+    place = window.board.columns(window.best.members).index(column)
+    return [int(window.board.use[number]) for number in window.classes[place]]
+
+
+def _probability(d: Diagnosis, column: int) -> tuple[float, tuple[float, ...]]:
+    """Probability of the class of a chosen column, of the column itself, and of each of its class."""
+    window = d.found.posterior
+    if window is None:
+        return float("nan"), ()
+    place = window.board.columns(window.best.members).index(column)
+    members = (window.best.members[place][0], *window.classes[place])
+    return window.of_class(place), tuple(float(window.of_candidates[number]) for number in members)
 
 
 def _held_out(d: Diagnosis, count: int) -> list[float]:

@@ -16,9 +16,9 @@ import numpy as np
 
 from sdimu_calibration.core.arrays import Bools, Floats, Ints
 from sdimu_calibration.core.diagnosis.problem import WIDE, Problem
-from sdimu_calibration.core.diagnosis.scan import TESTABLE
 from sdimu_calibration.core.evidence.information import Information
 from sdimu_calibration.core.evidence.linear import E
+from sdimu_calibration.core.evidence.testable import TESTABLE
 
 _ALPHA = 0.02
 """Probability (1) that pure noise makes one of all pairs worth its cost: that of a whole scan of single effects. Pairs

@@ -18,8 +18,9 @@ import numpy as np
 from sdimu_calibration.core.arrays import Ints
 from sdimu_calibration.core.diagnosis.free_input_test import FreeInputTest, free_input_test
 from sdimu_calibration.core.diagnosis.ground import Ground, Request, extended, fresh_ground, next_ground
-from sdimu_calibration.core.diagnosis.noise_search import imitated, search_with_noise
+from sdimu_calibration.core.diagnosis.noise_search import imitated
 from sdimu_calibration.core.diagnosis.search import MOST_STEPS, Search, Step, search
+from sdimu_calibration.core.diagnosis.window_search import search_window, with_steps
 from sdimu_calibration.core.estimation.fit import Fit
 from sdimu_calibration.core.estimation.noise_learning import in_noise
 from sdimu_calibration.core.evidence.candidate import Candidate
@@ -36,9 +37,6 @@ MOST_GROWING_ROUNDS = 8
 """Number of rounds at most, where a round adds one effect: more than a run by hand can tell apart."""
 LEAST_SIGMAS = 3.0
 """Size of an effect in the fit (sigma) below which it is dropped: chance ends there."""
-_OWN_GAIN = 3.0
-"""Log-likelihood (1) by which equations must be better than the catalogue where noise takes what is left: odds of 20
-to 1."""
 _MANY = 3
 """Number of chosen catalogue terms from which one equation is tried in their place: so many may be the parts of one
 cause."""
@@ -100,12 +98,12 @@ def search_until_stable(request: Request, progress: Progress) -> Round:
     for turn in range(MOST_GROWING_ROUNDS if growing else MOST_ROUNDS):
         progress("candidates", min(0.8, 0.4 + 0.1 * turn))
         # Noise is a rival from the start; once effects were preferred to all of it, it need not be asked again.
-        done = run_round(request, ground, own, limits, done, done is None or bool(done.found.noise))
+        done = run_round(request, ground, own, limits, done)
         if done.wants_equations and not own and not asked:
             asked = True
             progress("equations", min(0.8, 0.45 + 0.1 * turn))
             wider = next_ground(request, ground.fit, ground.tried, True, done.found, ground.free)
-            wide = run_round(request, wider, True, limits, done, turn == 0 or bool(done.found.noise))
+            wide = run_round(request, wider, True, limits, done)
             if prefer(wide, done):
                 done, own = wide, True
         labels = frozenset(c.label for c in done.chosen)
@@ -123,6 +121,9 @@ def search_until_stable(request: Request, progress: Progress) -> Round:
         done = None if done is None else replace(done, found=replace(done.found, stood=False))
     if done is None:
         raise AssertionError("a search has one round at least")
+    if done.found.posterior is not None:
+        fit = in_found_noise(request, _with_chosen(request, done, progress), done.found.noise)
+        return replace(done, fit=fit, found=with_steps(done.found))
     return drop_companions(request, replace(done, found=replace(done.found, steps=steps)), progress)
 
 
@@ -206,28 +207,14 @@ def mark_dropped(steps: Sequence[Step], kept: set[str], small: set[str]) -> tupl
 def prefer(wide: Round, done: Round) -> bool:
     """Whether equations tell more than the catalogue.
 
-    They do when they leave less by more than chance, or as little with fewer terms, and are no less likely with what
-    each term costs; and where nothing can be left, when they found something and the catalogue did not.
+    Of a posterior they are in the model then; a run by hand is asked for them where the catalogue has nothing.
     """
-    many, few = len(done.found.chosen), len(wide.found.chosen)
-    if not len(done.free):
-        return few > 0 and not many
-    if done.found.noise or wide.found.noise:
-        # Noise that is drawn anew leaves nothing in any dwell or turn: what explains more of it is better.
-        return wide.found.net > done.found.net + _OWN_GAIN
-    if wide.found.net < done.found.net:
-        return False
-    chance = 3.0 * np.sqrt(2.0 * done.left_after.dof)
-    if few > max(1, many) and done.left_after.p_value > UNEXPLAINED_P:
-        return False
-    fewer = 0 < few < many
-    with_equations, without = wide.left_after.chi2, done.left_after.chi2
-    return bool(with_equations < without - chance or (fewer and with_equations < without + chance))
+    if wide.found.posterior is not None:
+        return any(c.family == "own" for c in wide.chosen)
+    return len(wide.found.chosen) > 0 and not len(done.found.chosen)
 
 
-def run_round(
-    request: Request, ground: Ground, own: bool, limits: dict[bool, float], earlier: Round | None, doubted: bool
-) -> Round:
+def run_round(request: Request, ground: Ground, own: bool, limits: dict[bool, float], earlier: Round | None) -> Round:
     """Search the evidence about a fit.
 
     Parameters
@@ -241,22 +228,14 @@ def run_round(
         same but for finer variants, and so is the threshold.
     earlier : Round, optional
         The round before.
-    doubted : bool
-        Ask whether noise alone explains what effects explain.
     """
     evidence, allowed = ground.evidence, ground.allowed
     if request.wander is None:
         if not request.base.learns_scatter:
             return _round(ground, search(evidence, allowed, request.alpha, MOST_STEPS))
         return _round(ground, _without_wander(evidence, allowed, request.alpha, len(ground.tried) + 1))
-    found = search_with_noise(
-        evidence,
-        allowed,
-        request.wander,
-        request.alpha,
-        limits.get(own),
-        doubted,
-        earlier.found.joint if earlier else None,
+    found = search_window(
+        evidence, allowed, request.wander, request.alpha, limits.get(own), earlier.found if earlier else None
     )
     limits.setdefault(own, found.threshold)
     return _round(ground, found)

@@ -12,10 +12,8 @@ import numpy as np
 
 from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.evidence.information import Information
+from sdimu_calibration.core.evidence.testable import TESTABLE
 
-TESTABLE = 0.02
-"""Share of a signature's length that the model's coefficients must leave: with less they make the sigma of the effect
-more than fifty times larger."""
 POWER_80 = 4.84
 """Size of an effect (sigma) that is found with 80 % power: 0.84 above the usual threshold of a whole scan, 4.0."""
 INDISTINGUISHABLE = 3.0

@@ -21,11 +21,12 @@ from sdimu_calibration.core.diagnosis.pairs import best_pair
 from sdimu_calibration.core.diagnosis.problem import Problem
 from sdimu_calibration.core.diagnosis.scan import Scan, alike
 from sdimu_calibration.core.effects.effect import Effect
-from sdimu_calibration.core.evidence.candidate import Candidate
+from sdimu_calibration.core.evidence.candidate import Candidate, of_the_sensor
 from sdimu_calibration.core.evidence.held_out import HeldOut, gain
 from sdimu_calibration.core.evidence.joint_information import Joint
 from sdimu_calibration.core.evidence.linear import E
 from sdimu_calibration.core.noise_term import NoiseTerm
+from sdimu_calibration.core.posterior.posterior import Posterior
 
 FALSE_ALARM = 0.02
 """Probability that pure noise puts one of all candidates over the threshold: what is bearable (5 %) with room for what
@@ -128,6 +129,8 @@ class Search(Generic[E]):
         Log-likelihood less what effects and noise terms cost; NaN where no noise was learned.
     stood : bool
         The choice stood at the end; False where the search went to and fro and the likeliest choice was taken.
+    posterior : Posterior or None
+        The models that the data leave probable; None where none was worked out.
     """
 
     steps: tuple[Step, ...]
@@ -141,6 +144,7 @@ class Search(Generic[E]):
     white: E | None = None
     joint: Joint | None = None
     stood: bool = True
+    posterior: Posterior[E] | None = None
 
 
 def search(
@@ -268,7 +272,7 @@ def sharpen(problem: Problem[E], chosen: Sequence[int], best: int) -> Effect | N
     others = list(range(p, p + len(chosen)))
     first = score = -np.inf
     while effect.nearer:
-        variants = [variant.only((_of_the_sensor(variant, name),)) for variant in effect.nearer()]
+        variants = [variant.only((of_the_sensor(variant, name),)) for variant in effect.nearer()]
         trial = Problem(small.with_effects(variants))
         scores = trial.scores(trial.scan(others))[p + len(chosen) :]
         # The middle one is the candidate itself.
@@ -276,13 +280,6 @@ def sharpen(problem: Problem[E], chosen: Sequence[int], best: int) -> Effect | N
         score = float(np.max(scores))
         effect = variants[int(np.argmax(scores))]
     return effect if score > first + _SHARPER else None
-
-
-def _of_the_sensor(variant: Effect, name: str) -> str:
-    """Name of the variant's parameter for the sensor of `name`: that of an equation holds its numbers too."""
-    names = [p.name for p in variant.parameters]
-    sensor, _, _ = name.partition(":")
-    return name if name in names else next(n for n in names if n.startswith(sensor + ":"))
 
 
 def _polish(problem: Problem[E], chosen: list[int]) -> list[int]:

@@ -95,6 +95,8 @@ class Fit(ABC):
     doubt : ndarray, shape (q, q), or None
         What models that the data leave open add to the covariance of the estimator's coefficients (SI); None where
         nobody asked which they are.
+    moved : ndarray, shape (q,), or None
+        What these models add to the coefficients (SI).
     """
 
     test: PreparedTest
@@ -102,6 +104,7 @@ class Fit(ABC):
     sensors: ImuModel
     reason: str = field(default="", kw_only=True)
     doubt: Floats | None = field(default=None, kw_only=True)
+    moved: Floats | None = field(default=None, kw_only=True)
 
     estimator = ""
     """Name of the estimator."""
@@ -269,15 +272,17 @@ class Fit(ABC):
         """
         return np.zeros(len(effect.terms))
 
-    def with_doubt(self, doubt: Floats | None) -> Self:
+    def with_doubt(self, doubt: Floats | None, moved: Floats | None = None) -> Self:
         """Return the fit with another covariance that open models add.
 
         Parameters
         ----------
         doubt : ndarray, shape (q, q), or None
             As the attribute `doubt`.
+        moved : ndarray, shape (q,), or None
+            As the attribute `moved`.
         """
-        return replace(self, doubt=doubt)
+        return replace(self, doubt=doubt, moved=moved)
 
     @cached_property
     def wander(self) -> Wander:

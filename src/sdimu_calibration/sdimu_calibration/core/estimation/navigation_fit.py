@@ -152,7 +152,8 @@ class NavigationFit(Fit):
 
         What is reported follows from these.
         """
-        return self.centring @ (self.estimate if self.noise is None else self.estimate + self.noise.deviation)
+        best = self.centring @ (self.estimate if self.noise is None else self.estimate + self.noise.deviation)
+        return best if self.moved is None else best + self.moved
 
     @property
     def settled_covariance(self) -> Floats:
@@ -212,17 +213,22 @@ class NavigationFit(Fit):
         """
         return np.asarray(self._share_of_rest @ effect.regressors(self.known.seen))
 
-    def with_doubt(self, doubt: Floats | None) -> Self:
+    def with_doubt(self, doubt: Floats | None, moved: Floats | None = None) -> Self:
         """Return the fit with another covariance that open models add.
 
         Parameters
         ----------
         doubt : ndarray, shape (k, k), or None
             As the attribute `doubt` (SI), of the first k coefficients: those behind them only serve.
+        moved : ndarray, shape (k,), or None
+            As the attribute `moved` (SI).
         """
+        more = len(self.setup.sensors.names)
         if doubt is not None:
-            doubt = np.pad(doubt, (0, len(self.setup.sensors.names) - len(doubt)))
-        return replace(self, doubt=doubt, carried=self._of_the_passes())
+            doubt = np.pad(doubt, (0, more - len(doubt)))
+        if moved is not None:
+            moved = np.pad(moved, (0, more - len(moved)))
+        return replace(self, doubt=doubt, moved=moved, carried=self._of_the_passes())
 
     def with_noise(self, noise: NoiseEstimate | None) -> Self:
         """Return the fit in other noise; None is white noise."""

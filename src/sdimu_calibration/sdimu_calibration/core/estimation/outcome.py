@@ -119,7 +119,13 @@ def doubted(result: Calibration, fit: Fit) -> Calibration:
         f"{result.names[worst]} is {ratio[worst]:.1f} times what it would be if this model were known to be right"
     )
     told = (note,) if ratio[worst] > _TOLD else ()
-    return replace(result, covariance=fit.covariance, conditional_sigma=conditional, notes=(*result.notes, *told))
+    return replace(
+        result,
+        values=fit.values,
+        covariance=fit.covariance,
+        conditional_sigma=conditional,
+        notes=(*result.notes, *told),
+    )
 
 
 def calibrate(

@@ -49,3 +49,10 @@ def split(effect: Effect) -> list[Candidate]:
         family = "own" if effect.title == OWN else effect.family or effect.name
         out.append(Candidate(one, family, label))
     return out
+
+
+def of_the_sensor(variant: Effect, name: str) -> str:
+    """Name of a variant's parameter for the sensor of another one: that of an equation holds its numbers too."""
+    names = [p.name for p in variant.parameters]
+    sensor, _, _ = name.partition(":")
+    return name if name in names else next(n for n in names if n.startswith(sensor + ":"))

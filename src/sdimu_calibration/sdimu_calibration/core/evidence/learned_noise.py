@@ -207,9 +207,9 @@ def learn(information: NoiseInformation, cut: Stretches, start: Sequence[NoiseTe
         Terms to begin with.
     """
     terms = refined(information, cut, start)
-    tried = _kinds(cut)
+    tried = kinds(cut)
     while True:
-        given = {triad: _given(information, cut, terms, triad) for triad in TRIADS}
+        given = {triad: given_terms(information, cut, terms, triad) for triad in TRIADS}
         options = [
             size
             for triad in TRIADS
@@ -227,7 +227,7 @@ def _tuned(information: NoiseInformation, cut: Stretches, terms: Sequence[NoiseT
     for place, term in enumerate(terms):
         if not term.tau:
             continue
-        given = _given(information, cut, [t for t in out if t is not term], term.triad)
+        given = given_terms(information, cut, [t for t in out if t is not term], term.triad)
         tried = [replace(term, tau=float(f"{term.tau * k:.3g}")) for k in _TUNING]
         near = _best_sizes(*given, cut, tried)
         best = max(near, key=lambda t: t.gain)
@@ -240,11 +240,20 @@ def with_alike(information: NoiseInformation, cut: Stretches, terms: Sequence[No
     """Say of each term which kinds in its place are as likely, within odds of 20 to 1."""
     out = []
     for term in terms:
-        given = _given(information, cut, [t for t in terms if t is not term], term.triad)
-        tried = [t for t in _kinds(cut) if t.triad == term.triad and t.kind != term.kind]
+        given = given_terms(information, cut, [t for t in terms if t is not term], term.triad)
+        tried = [t for t in kinds(cut) if t.triad == term.triad and t.kind != term.kind]
         others = _best_sizes(*given, cut, tried)
         near = {t.kind for t in others if t.gain > term.gain - _INDISTINGUISHABLE}
         out.append(replace(term, alike=tuple(kind for kind in KINDS if kind in near)))
+    return tuple(out)
+
+
+def with_intervals(information: NoiseInformation, cut: Stretches, terms: Sequence[NoiseTerm]) -> tuple[NoiseTerm, ...]:
+    """Put 95 % intervals to the sizes of terms, and what each adds to the log-likelihood; the sizes stay."""
+    out = []
+    for term in terms:
+        best = _alone(information, cut, [t for t in terms if t is not term], term)
+        out.append(replace(term, low=min(best.low, term.size), high=max(best.high, term.size), gain=best.gain))
     return tuple(out)
 
 
@@ -253,7 +262,8 @@ def _room(terms: Sequence[NoiseTerm], term: NoiseTerm) -> bool:
     return len(of_triad) < _MOST_TERMS and term.kind not in {t.kind for t in of_triad}
 
 
-def _kinds(cut: Stretches) -> list[NoiseTerm]:
+def kinds(cut: Stretches) -> list[NoiseTerm]:
+    """List the terms that are tried: every kind in each triad, Markov noise with several time constants."""
     shortest = _SHORTEST_TAU * float(np.median(cut.end - cut.start))
     longest = max(float(cut.end[-1]) / 3.0, 2.0 * shortest)
     taus = [float(f"{tau:.3g}") for tau in np.geomspace(shortest, longest, _TAUS)]
@@ -289,7 +299,7 @@ def likelihood(information: NoiseInformation, cut: Stretches, terms: Sequence[No
 
 def _alone(information: NoiseInformation, cut: Stretches, others: Sequence[NoiseTerm], term: NoiseTerm) -> NoiseTerm:
     """Best size of one term, the others standing; with its interval, and the gain over doing without it."""
-    return _best_size(*_given(information, cut, others, term.triad), cut, term)
+    return _best_size(*given_terms(information, cut, others, term.triad), cut, term)
 
 
 def _best_sizes(J: Floats, d: Floats, cut: Stretches, terms: Sequence[NoiseTerm]) -> list[NoiseTerm]:
@@ -299,10 +309,7 @@ def _best_sizes(J: Floats, d: Floats, cut: Stretches, terms: Sequence[NoiseTerm]
 
 def _best_size(J: Floats, d: Floats, cut: Stretches, term: NoiseTerm) -> NoiseTerm:
     """Best size of a term, J (3 n, 3 n) and d (3 n,) the information on the wander of its triad."""
-    root = cut.mode(term.kind, term.tau)
-    values, vectors = np.linalg.eigh(_projected(J, root))
-    values = np.maximum(values, 0.0)
-    y2 = (vectors.T @ (root.T @ d.reshape(len(cut), 3)).ravel()) ** 2
+    values, y2 = _modes(J, d, cut, term)
     largest = float(values.max(initial=0.0))
     if largest <= 0.0:
         return replace(term, size=0.0, low=0.0, high=0.0, gain=0.0)
@@ -325,6 +332,39 @@ def _best_size(J: Floats, d: Floats, cut: Stretches, term: NoiseTerm) -> NoiseTe
     return replace(term, size=float(np.sqrt(fine[best])), low=low, high=high, gain=float(near[best]))
 
 
+def sizes_on_grid(J: Floats, d: Floats, cut: Stretches, term: NoiseTerm) -> tuple[Floats, Floats]:
+    """Log-likelihood of a term by its size.
+
+    Parameters
+    ----------
+    J : ndarray, shape (3 n, 3 n)
+        Information on the wander of its triad, as of `given_terms`.
+    d : ndarray, shape (3 n,)
+    cut : Stretches
+    term : NoiseTerm
+        Its size is not read.
+
+    Returns
+    -------
+    size : ndarray, shape (s,)
+        SI, ascending; empty where the data say nothing of such noise.
+    gain : ndarray, shape (s,)
+        Log-likelihood over that without the term (1).
+    """
+    values, y2 = _modes(J, d, cut, term)
+    largest = float(values.max(initial=0.0))
+    variance = _GRID / largest if largest > 0.0 else np.empty(0)
+    return np.sqrt(variance), _gain(variance, values, y2)
+
+
+def _modes(J: Floats, d: Floats, cut: Stretches, term: NoiseTerm) -> tuple[Floats, Floats]:
+    """Information on the modes of a term of unit size (m,), and their squared projections (m,)."""
+    root = cut.mode(term.kind, term.tau)
+    values, vectors = np.linalg.eigh(_projected(J, root))
+    y2 = (vectors.T @ (root.T @ d.reshape(len(cut), 3)).ravel()) ** 2
+    return np.maximum(values, 0.0), y2
+
+
 def _projected(J: Floats, root: Floats) -> Floats:
     """Information on the modes of a triad, ``R'JR`` with the root (n, r) for each of the three sensors; (3 r, 3 r)."""
     n, r = root.shape
@@ -339,10 +379,27 @@ def _gain(variance: Floats, values: Floats, y2: Floats) -> Floats:
     return np.asarray(0.5 * np.sum(variance[:, None] * y2 / grown - np.log(grown), axis=1))
 
 
-def _given(
+def given_terms(
     information: NoiseInformation, cut: Stretches, terms: Sequence[NoiseTerm], triad: str
 ) -> tuple[Floats, Floats]:
-    """Information on further wander of a triad when that of `terms` is in the model: J (3 n, 3 n) and d (3 n,)."""
+    """Information on further wander of a triad when that of some terms is in the model.
+
+    Parameters
+    ----------
+    information : NoiseInformation
+    cut : Stretches
+        n stretches.
+    terms : sequence of NoiseTerm
+        With their sizes.
+    triad : str
+
+    Returns
+    -------
+    J : ndarray, shape (3 n, 3 n)
+        Inverse squares of the units (SI) of the errors.
+    d : ndarray, shape (3 n,)
+        Inverse units.
+    """
     blocks = {(a, b): information.block(a, b) for a in TRIADS for b in TRIADS}
     J, d = blocks[triad, triad], information.part(triad)
     roots = {name: _triad_root(terms, cut, name) for name in TRIADS}

@@ -1,0 +1,44 @@
+"""The calibration over all models that the data leave probable, in the place of that of the likeliest one."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sdimu_calibration.core.arrays import Floats
+from sdimu_calibration.core.diagnosis.model_doubt import in_doubt
+from sdimu_calibration.core.diagnosis.rounds import Round
+from sdimu_calibration.core.estimation.fit import Fit
+from sdimu_calibration.core.posterior.coefficients import Averages
+from sdimu_calibration.core.posterior.noise_models import NoiseModel
+
+
+def over_all_models(base: Fit, done: Round) -> Fit:
+    """Return the fit with what was found, its coefficients and their covariance those of all probable models.
+
+    Parameters
+    ----------
+    base : Fit
+        With the model as given.
+    done : Round
+    """
+    found = done.found.posterior
+    if found is None:
+        return in_doubt(base, done.fit, done.evidence, done.found.chosen, done.free, done.found.scale)
+    averages = Averages(found.board, base.dwell_means)
+    places = {column: k for k, column in enumerate(found.board.columns(found.best.members))}
+    told = tuple(sorted(found.best.members[places[int(c)]] for c in done.found.chosen))
+    one, all_ = averages.of_model(told, NoiseModel(done.found.noise)), averages.of(found)
+    q, count = len(one.mean), len(done.found.chosen)
+    added = done.fit.added_columns(count)
+    own = np.setdiff1d(np.arange(q + count), added)
+    moved, doubt = np.zeros(q + count), np.zeros((q + count, q + count))
+    moved[own] = all_.mean - one.mean
+    doubt[np.ix_(own, own)] = _positive(all_.covariance - one.covariance, np.sqrt(np.diag(one.covariance)))
+    return done.fit.with_doubt(doubt, moved)
+
+
+def _positive(difference: Floats, sigma: Floats) -> Floats:
+    """Part of a difference of covariances (q, q) that is none below zero, in units of `sigma` (q,)."""
+    unit = np.where(sigma > 0.0, sigma, 1.0)
+    values, vectors = np.linalg.eigh(difference / np.outer(unit, unit))
+    return np.asarray((vectors * np.maximum(values, 0.0)) @ vectors.T * np.outer(unit, unit))

@@ -1,0 +1,135 @@
+"""The search of one recording: the posterior over models, and what is told of it.
+
+What is chosen are the members of the likeliest model whose class is more probable than not; noise is told where it is
+nearly certain. Everything else stays in the window of models, and in the sigmas.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from sdimu_calibration.core.arrays import Ints
+from sdimu_calibration.core.diagnosis.problem import Problem
+from sdimu_calibration.core.diagnosis.search import FALSE_ALARM, Search, judged
+from sdimu_calibration.core.evidence.learned_noise import Wander, with_alike, with_intervals
+from sdimu_calibration.core.evidence.linear import E
+from sdimu_calibration.core.noise_term import TRIADS, NoiseTerm
+from sdimu_calibration.core.posterior.board import Board
+from sdimu_calibration.core.posterior.posterior import Posterior, posterior
+
+PROBABLE = 0.5
+"""Probability from which a class of effects is told as found: more likely there than not."""
+CERTAIN_NOISE = 0.95
+"""Probability from which noise with a memory of a triad is told and stated with an interval: weaker noise is in every
+sensor, and moves nothing."""
+
+
+def search_window(
+    evidence: E,
+    allowed: Ints,
+    wander: Wander | None,
+    alpha: float = FALSE_ALARM,
+    limit: float | None = None,
+    earlier: Search[E] | None = None,
+) -> Search[E]:
+    """Find the models that the data leave probable, and choose of them what is told.
+
+    Parameters
+    ----------
+    evidence : LinearEvidence
+        In white noise.
+    allowed : ndarray of int, shape (a,)
+        Columns that may be in a model.
+    wander : Wander or None
+        Of the same test.
+    alpha : float
+        False-alarm probability of the threshold of a scan, which is shown.
+    limit : float, optional
+        That threshold, where it is known.
+    earlier : Search, optional
+        About a point that differs little, with the same signatures or the first ones of them.
+    """
+    joint = earlier.joint if earlier else None
+    found = posterior(evidence, allowed, wander, joint, earlier.posterior if earlier else None)
+    board = found.board
+    terms = told_noise(found)
+    noisy = in_noise(board, terms)
+    problem = Problem(noisy)
+    first = problem.scan([], 1.0)
+    barred = np.setdiff1d(np.arange(problem.p, len(first.z)), board.allowed)
+    first.z[barred], first.sigma[barred] = 0.0, np.inf
+    limit = problem.threshold(first, alpha) if limit is None else limit
+    return Search(
+        (),
+        np.array(told_effects(found), dtype=np.int64),
+        first,
+        limit,
+        1.0,
+        noisy,
+        terms,
+        white=board.evidence,
+        joint=board.joint,
+        posterior=found,
+    )
+
+
+def with_steps(found: Search[E]) -> Search[E]:
+    """Say of each effect what it adds to those before it, and of the noise how well its sizes are known.
+
+    Parameters
+    ----------
+    found : Search
+        Of the last round: what it says costs more than what it finds.
+    """
+    problem, chosen = Problem(found.evidence), found.chosen.tolist()
+    steps = []
+    before = problem.held_out([], 1.0)
+    for k, column in enumerate(chosen):
+        scanned = problem.scan(chosen[:k], 1.0)
+        after = problem.held_out(chosen[: k + 1], 1.0)
+        scores = problem.scores(scanned, beside=chosen[:k])
+        step = judged(problem, scanned, scores, chosen[:k], column, found.threshold, before, after)
+        steps.append(replace(step, accepted=True, reason=""))
+        before = after
+    return replace(found, steps=tuple(steps), noise=_stated(found))
+
+
+def _stated(found: Search[E]) -> tuple[NoiseTerm, ...]:
+    """Noise with intervals of its sizes, and the kinds that look the same."""
+    window = found.posterior
+    if not found.noise or window is None or window.board.joint is None or window.board.wander is None:
+        return found.noise
+    information = window.board.joint.given(*window.board.parameters(window.best.members)).noise
+    cut = window.board.wander.cut
+    return with_alike(information, cut, with_intervals(information, cut, found.noise))
+
+
+def told_effects(found: Posterior[E]) -> list[int]:
+    """Columns of what is told: members of the best model whose class is probable, the largest share of misfit first."""
+    members = found.best.members
+    worth = -found.board.data(found.best.noise)[1].at(members).drops()
+    order = [int(k) for k in np.argsort(-worth) if found.of_class(int(k)) > PROBABLE]
+    columns = found.board.columns(members)
+    return [columns[k] for k in order]
+
+
+def told_noise(found: Posterior[E]) -> tuple[NoiseTerm, ...]:
+    """Noise that is told: of triads where it is nearly certain, as the best model has it."""
+    terms = [t for t in found.best.noise.terms if found.of_noise(t.triad) > CERTAIN_NOISE]
+    return tuple(sorted(terms, key=lambda t: TRIADS.index(t.triad)))
+
+
+def in_noise(board: Board[E], terms: Sequence[NoiseTerm]) -> E:
+    """Return the evidence of a board in a noise."""
+    if not terms or board.joint is None or board.wander is None:
+        return board.evidence
+    return board.evidence.with_noise(board.wander.modes(terms).columns, board.joint.in_noise(terms))
+
+
+def alike_in_window(found: Posterior[E], column: int) -> tuple[str, ...]:
+    """Labels of what the data cannot tell from a column that was chosen, the likeliest first."""
+    place = found.board.columns(found.best.members).index(column)
+    return tuple(found.candidate(number).label for number in found.classes[place])

@@ -1,0 +1,210 @@
+"""Evidence with everything that scores a model on it: its candidates in any noise, and the noises beside any choice."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Generic
+
+import numpy as np
+
+from sdimu_calibration.core.arrays import Floats, Ints
+from sdimu_calibration.core.effects.effect import Effect
+from sdimu_calibration.core.evidence.candidate import of_the_sensor
+from sdimu_calibration.core.evidence.information import Information, solved
+from sdimu_calibration.core.evidence.joint_information import Joint
+from sdimu_calibration.core.evidence.learned_noise import Wander, likelihood, root_of
+from sdimu_calibration.core.evidence.linear import E
+from sdimu_calibration.core.evidence.testable import TESTABLE
+from sdimu_calibration.core.noise_term import NoiseTerm
+from sdimu_calibration.core.posterior.models import Data, Members, gains
+from sdimu_calibration.core.posterior.noise_models import NoiseModel, explored, usual_sizes
+from sdimu_calibration.core.posterior.prior import UNKNOWN_SIZE, WIDTHS, Prior, prior_of
+
+_SHARPER = 1.0
+"""Gain of the log Bayes factor (1) from which a time or time constant between those of the scan is taken: less is not
+worth its digits."""
+
+
+@dataclass(frozen=True)
+class InNoise:
+    """Information on p coefficients and u candidates in a noise of r modes, and what they say of the modes.
+
+    Attributes
+    ----------
+    J : ndarray, shape (p + u, p + u)
+    d : ndarray, shape (p + u,)
+        Without the pull of the white residuals that the modes take.
+    R : ndarray, shape (6 n, r)
+        Mean errors in all stretches of each mode.
+    X : ndarray, shape (r, p + u)
+        Modes that one unit of each parameter takes the place of.
+    u : ndarray, shape (r,)
+        Modes with all parameters at zero.
+    inverse : ndarray, shape (r, r)
+        Their covariance with the parameters known.
+    """
+
+    J: Floats
+    d: Floats
+    R: Floats
+    X: Floats
+    u: Floats
+    inverse: Floats
+
+
+class Board(Generic[E]):
+    """Evidence in white noise, and what may be in a model.
+
+    Parameters
+    ----------
+    evidence : LinearEvidence
+        In white noise.
+    allowed : ndarray of int, shape (a,)
+        Columns that may be in a model.
+    finer : frozenset of int
+        Those of them that were made between those of a scan.
+    wander : Wander or None
+        Of the same test; None where no noise with a memory is looked for.
+    earlier : Joint, optional
+        Of the same signatures, or of the first ones of them.
+    """
+
+    def __init__(
+        self, evidence: E, allowed: Ints, finer: frozenset[int], wander: Wander | None, earlier: Joint | None = None
+    ) -> None:
+        self.evidence, self.allowed, self.finer, self.wander = evidence, allowed, finer, wander
+        self.joint = None if wander is None else Joint.of(evidence, wander, earlier)
+        self._data: dict[NoiseModel, tuple[float, Data]] = {}
+        self._in_noise: dict[NoiseModel, InNoise] = {}
+
+    @cached_property
+    def use(self) -> Ints:
+        """Columns of the evidence that the coefficients do not take up, in the order of the candidates of `data`."""
+        full = self.evidence.information
+        J, _ = full.diagonal_given(self.evidence.model, self.evidence.weight)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            left = np.sqrt(np.maximum(J, 0.0) / np.diag(full.J))
+        return np.array([k for k in self.allowed.tolist() if left[k] > TESTABLE], dtype=np.int64)
+
+    @cached_property
+    def prior(self) -> Prior:
+        """Prior of the candidates at `use`."""
+        first = len(self.evidence.weight)
+        candidates = [self.evidence.candidates[k - first] for k in self.use.tolist()]
+        return prior_of(candidates, [i for i, k in enumerate(self.use.tolist()) if k in self.finer])
+
+    @cached_property
+    def size(self) -> Floats:
+        """One-sigma size of each candidate at `use` (SI)."""
+        size = self.evidence.prior[self.use - len(self.evidence.weight)].copy()
+        J = np.diag(self.evidence.information.J)[self.use]
+        unknown = ~np.isfinite(size)
+        size[unknown] = UNKNOWN_SIZE / np.sqrt(J[unknown])
+        return np.asarray(size)
+
+    @cached_property
+    def keep(self) -> Ints:
+        """Columns of the coefficients, then `use`; shape (p + u,)."""
+        return np.concatenate([self.evidence.model, self.use]).astype(np.int64)
+
+    def in_noise(self, noise: NoiseModel) -> InNoise:
+        """Information on coefficients and candidates in a noise."""
+        if noise not in self._in_noise:
+            self._in_noise[noise] = self._worked_out(noise)
+        return self._in_noise[noise]
+
+    def _worked_out(self, noise: NoiseModel) -> InNoise:
+        keep, full = self.keep, self.evidence.information
+        J, d = full.J[np.ix_(keep, keep)], full.d[keep]
+        if not noise.terms or self.joint is None or self.wander is None:
+            return InNoise(J, d, np.zeros((0, 0)), np.zeros((0, len(keep))), np.zeros(0), np.zeros((0, 0)))
+        joint, n = self.joint.information, len(self.evidence.names)
+        R = root_of(noise.terms, self.wander.cut)
+        B, y = R.T @ joint.J[n:, keep], R.T @ joint.d[n:]
+        M = np.eye(R.shape[1]) + R.T @ (joint.J[n:, n:] @ R)
+        inverse: Floats = np.asarray(np.linalg.inv(M))
+        X = inverse @ B
+        return InNoise(J - B.T @ X, d - X.T @ y, R, X, inverse @ y, inverse)
+
+    def data(self, noise: NoiseModel) -> tuple[float, Data]:
+        """Log posterior of no effect in a noise, over that in white noise; and the candidates in it."""
+        if noise not in self._data:
+            evidence, p, one = self.evidence, len(self.evidence.weight), self.in_noise(noise)
+            offset = noise.log_prior
+            if noise.terms and self.joint is not None and self.wander is not None:
+                nothing = self.joint.given(evidence.model, evidence.weight).noise
+                offset += likelihood(nothing, self.wander.cut, noise.terms) - nothing.fitted
+            given = Information(one.J, one.d).given(np.arange(p), evidence.weight)
+            scaled = np.ascontiguousarray(given.J[p:, p:] * np.outer(self.size, self.size))
+            self._data[noise] = offset, Data(scaled, given.d[p:] * self.size, self.prior)
+        return self._data[noise]
+
+    def columns(self, members: Members) -> list[int]:
+        """Columns of the evidence of the members of a model."""
+        return [int(self.use[k]) for k, _ in members]
+
+    def parameters(self, members: Members) -> tuple[Ints, Floats]:
+        """Columns of the coefficients and of a model's members, and the prior information of each (1/SI^2)."""
+        known = np.concatenate([self.evidence.model, self.columns(members)]).astype(np.int64)
+        own = [1.0 / (WIDTHS[width] * self.size[k]) ** 2 for k, width in members]
+        return known, np.concatenate([self.evidence.weight, own])
+
+    def noises(
+        self, members: Members, tried: Sequence[NoiseTerm] | None = None, rival: float = -np.inf
+    ) -> list[tuple[float, NoiseModel]]:
+        """Noises that are probable beside a set of effects, each with the log posterior of both (1).
+
+        Kinds that are `tried` alone are looked for; all without any. `rival` is the log posterior of the best model
+        known.
+        """
+        if self.joint is None or self.wander is None:
+            return [(self.data(NoiseModel())[1].at(members).score, NoiseModel())]
+        known, weight = self.parameters(members)
+        information = self.joint.given(known, weight).noise
+        alone = self.data(NoiseModel())[1].at(members).score
+        found = explored(information, self.wander.cut, usual_sizes(self.evidence.imu), tried, max(rival - alone, 0.0))
+        return [(alone + score, noise) for score, noise in found]
+
+    def finer_variant(self, members: Members, place: int, noise: NoiseModel) -> Effect | None:
+        """Make the scan finer about a member of a model; None where no variant gains as much as `_SHARPER`."""
+        first = len(self.evidence.weight)
+        number, _ = members[place]
+        candidate = self.evidence.candidates[int(self.use[number]) - first]
+        others = tuple(m for k, m in enumerate(members) if k != place)
+        effect, name = candidate.effect, candidate.parameter.name
+        begin = score = -np.inf
+        while effect.nearer:
+            variants = [variant.only((of_the_sensor(variant, name),)) for variant in effect.nearer()]
+            gains = self._gains(variants, others, noise, float(self.size[number]))
+            # The middle one is the candidate itself.
+            begin = gains[len(variants) // 2] if np.isinf(begin) else begin
+            score = float(np.max(gains))
+            effect = variants[int(np.argmax(gains))]
+        return effect if score > begin + _SHARPER else None
+
+    def _gains(self, variants: Sequence[Effect], others: Members, noise: NoiseModel, size: float) -> Floats:
+        """Log Bayes factor of each variant beside other members, by its better width; shape (variants,)."""
+        one, evidence = self.in_noise(noise), self.evidence
+        p = len(evidence.weight)
+        W = evidence.signature(variants)
+        at = np.array([*range(p), *(p + k for k, _ in others)], dtype=np.int64)
+        _, weight = self.parameters(others)
+        own, across, d = np.einsum("ij,ij->j", W, W), W.T @ evidence.W[:, self.keep[at]], W.T @ evidence.e
+        if noise.terms and self.wander is not None:
+            B = self.wander.across(W) @ one.R
+            own = own - np.einsum("ir,rs,is->i", B, one.inverse, B)
+            across, d = across - B @ one.X[:, at], d - B @ one.u
+        X = solved(one.J[np.ix_(at, at)] + np.diag(weight), np.column_stack([across.T, one.d[at]]))
+        c = (own - np.einsum("ik,ki->i", across, X[:, :-1])) * size**2
+        r = (d - across @ X[:, -1]) * size
+        return np.asarray(gains(np.maximum(c, 0.0), r, np.zeros(len(c), dtype=bool)).max(axis=1))
+
+
+def same_noise(one: NoiseModel, other: NoiseModel, ratio: float = 1.35) -> bool:
+    """Whether two noises have the same terms, of sizes within a factor."""
+    if one.kinds != other.kinds:
+        return False
+    sizes = {(t.triad, t.kind, t.tau): t.size for t in other.terms}
+    return all(1.0 / ratio < t.size / sizes[t.triad, t.kind, t.tau] < ratio for t in one.terms)

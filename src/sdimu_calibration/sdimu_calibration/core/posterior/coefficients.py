@@ -1,0 +1,133 @@
+"""Coefficients of the sensors over all models that the data leave probable: their mean and covariance.
+
+    mean = sum_m w_m theta_m,   C = sum_m w_m (C_m + (theta_m - mean)(theta_m - mean)')
+
+Each coefficient means the same in all models: a bias is that in the mean over the dwells, with whatever drifts or
+wanders there. Source: J. Hoeting et al., "Bayesian model averaging: a tutorial", Statistical Science 14 (1999).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from sdimu_calibration.core.arrays import Floats
+from sdimu_calibration.core.effects import bias
+from sdimu_calibration.core.effects.effect import Effect
+from sdimu_calibration.core.evidence.information import solved
+from sdimu_calibration.core.evidence.linear import E
+from sdimu_calibration.core.posterior.board import Board
+from sdimu_calibration.core.posterior.models import Members
+from sdimu_calibration.core.posterior.noise_models import NoiseModel
+from sdimu_calibration.core.posterior.posterior import Posterior
+
+_MOST = 400
+"""Number of models that are averaged at most, the likeliest first."""
+
+
+@dataclass(frozen=True)
+class Moments:
+    """Deviation of the q coefficients from the calibration about which all is linear.
+
+    Attributes
+    ----------
+    mean : ndarray, shape (q,)
+        SI.
+    covariance : ndarray, shape (q, q)
+    """
+
+    mean: Floats
+    covariance: Floats
+
+
+@dataclass(frozen=True)
+class _Mean:
+    """What a noise adds to the biases in the mean over the dwells.
+
+    Attributes
+    ----------
+    moved : ndarray, shape (6, p + u)
+        What it takes off per unit of each parameter (SI).
+    mean : ndarray, shape (6,)
+    covariance : ndarray, shape (6, 6)
+    """
+
+    moved: Floats
+    mean: Floats
+    covariance: Floats
+
+
+class Averages:
+    """Moments of the coefficients in the models of a posterior.
+
+    Parameters
+    ----------
+    board : Board
+    dwell_means : callable
+        Mean of the regressors of an effect over all dwells (SI), shape (terms,).
+    """
+
+    def __init__(self, board: Board[E], dwell_means: Callable[[Effect], Floats]) -> None:
+        self.board = board
+        self._dwell_means = dwell_means
+        self._means: dict[int, Floats] = {}
+        self._noises: dict[NoiseModel, _Mean] = {}
+
+    def of_model(self, members: Members, noise: NoiseModel) -> Moments:
+        """Moments in one model."""
+        evidence, data, one = self.board.evidence, self.board.in_noise(noise), self._mean(noise)
+        p, q = len(evidence.weight), evidence.coefficients
+        _, weight = self.board.parameters(members)
+        at = np.array([*range(p), *(p + k for k, _ in members)], dtype=np.int64)
+        covariance = solved(data.J[np.ix_(at, at)] + np.diag(weight), np.eye(len(at)))
+        estimate = covariance @ data.d[at]
+        T = np.eye(q, len(at))
+        constant, own = np.zeros(q), np.zeros((q, q))
+        rows = {c: evidence.names.index(name) for c, name in enumerate(bias.NAMES) if name in evidence.names[:q]}
+        for channel, row in rows.items():
+            T[row] -= one.moved[channel, at]
+            constant[row] = one.mean[channel]
+            for other, column in rows.items():
+                own[row, column] = one.covariance[channel, other]
+        for place, (number, _) in enumerate(members, start=p):
+            T[:, place] += self._shift(number, rows, q)
+        return Moments(T @ estimate + constant, T @ covariance @ T.T + own)
+
+    def of(self, found: Posterior[E]) -> Moments:
+        """Moments over all models."""
+        models = found.models[:_MOST]
+        weight = np.array([m.probability for m in models])
+        weight = weight / weight.sum()
+        each = [self.of_model(m.members, m.noise) for m in models]
+        means = np.array([one.mean for one in each])
+        mean = weight @ means
+        apart = means - mean
+        within = np.einsum("m,mij->ij", weight, np.array([one.covariance for one in each]))
+        return Moments(mean, within + (weight[:, None] * apart).T @ apart)
+
+    def _shift(self, number: int, rows: dict[int, int], q: int) -> Floats:
+        """Mean over the dwells that a drift of a bias adds to it, per unit; shape (q,)."""
+        if number not in self._means:
+            out = np.zeros(q)
+            first = len(self.board.evidence.weight)
+            effect = self.board.evidence.candidates[int(self.board.use[number]) - first].effect
+            if effect.bias_drift:
+                for mean, term in zip(self._dwell_means(effect).tolist(), effect.terms, strict=True):
+                    if term.channel in rows:
+                        out[rows[term.channel]] += mean
+            self._means[number] = out
+        return self._means[number]
+
+    def _mean(self, noise: NoiseModel) -> _Mean:
+        if noise not in self._noises:
+            one, wander = self.board.in_noise(noise), self.board.wander
+            if wander is None or not one.R.size:
+                self._noises[noise] = _Mean(np.zeros((6, len(self.board.keep))), np.zeros(6), np.zeros((6, 6)))
+            else:
+                cut = wander.cut
+                share = np.where(cut.turning, 0.0, cut.end - cut.start)
+                G = np.einsum("s,scr->cr", share / share.sum(), one.R.reshape(len(cut), 6, -1))
+                self._noises[noise] = _Mean(G @ one.X, G @ one.u, G @ one.inverse @ G.T)
+        return self._noises[noise]

@@ -1,0 +1,201 @@
+"""The score of a model and of all its neighbours, in closed form.
+
+With the coefficients taken out, and in units of the prior sizes, the data hold the information J, d on the candidates.
+For a set S of them with sizes N(0, w^2) the log posterior over that of the empty set is
+
+    1/2 d_S'(J_S + L)^-1 d_S - 1/2 log det(I + L^-1 J_S) + log pi(S),   L = diag(w^-2)
+
+One inverse of k x k, A = J_S + L, gives every neighbour: what is added, dropped or exchanged changes it by a rank of
+one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from sdimu_calibration.core.arrays import Bools, Floats, Ints
+from sdimu_calibration.core.posterior.prior import KIN, WIDTH_SHARES, WIDTHS, Prior
+
+Member = tuple[int, int]
+"""A candidate in a model, and which of `WIDTHS` its size has."""
+Members = tuple[Member, ...]
+"""Of a model, in ascending order."""
+_PRECISION = np.array(WIDTHS) ** -2.0
+_LOG_SHARE = np.log(WIDTH_SHARES)
+
+
+@dataclass(frozen=True)
+class Data:
+    """Information on q candidates in one noise, the coefficients taken out, in units of the prior sizes.
+
+    Attributes
+    ----------
+    J : ndarray, shape (q, q)
+    d : ndarray, shape (q,)
+    prior : Prior
+    """
+
+    J: Floats
+    d: Floats
+    prior: Prior
+
+    def at(self, members: Members) -> Expansion:
+        """Score a model and its neighbours."""
+        return Expansion(self, members)
+
+
+class Expansion:
+    """A model, and what it takes to score its neighbours.
+
+    Attributes
+    ----------
+    score : float
+        Log posterior over that of the empty set in the same noise.
+    c, r : ndarray, shape (q,)
+        Information on each candidate beside the model, and its pull.
+    """
+
+    def __init__(self, data: Data, members: Members) -> None:
+        self.data, self.members = data, members
+        self.columns = [column for column, _ in members]
+        J, d = data.J, data.d
+        loading = _PRECISION[[width for _, width in members]] if members else np.empty(0)
+        self._loading = loading
+        B = J[:, self.columns]
+        A = B[self.columns] + np.diag(loading)
+        self._inverse = np.linalg.inv(A) if members else np.zeros((0, 0))
+        self._m = self._inverse @ d[self.columns]
+        self._V = B @ self._inverse
+        self.c = np.maximum(np.diag(J) - np.einsum("qk,qk->q", self._V, B), 0.0)
+        self.r = d - B @ self._m
+        log_det = float(np.linalg.slogdet(A)[1]) if members else 0.0
+        widths = float(sum(_LOG_SHARE[width] for _, width in members))
+        self.score = (
+            0.5 * float(d[self.columns] @ self._m)
+            - 0.5 * (log_det - float(np.log(loading).sum()))
+            + widths
+            + data.prior.log_of(self.columns)
+        )
+
+    @property
+    def sizes(self) -> Floats:
+        """Posterior means of the sizes, in units of the prior sizes; shape (k,)."""
+        return self._m
+
+    def gains(self) -> Floats:
+        """Log posterior that each candidate adds, by width; shape (q, widths)."""
+        return gains(self.c, self.r, self.data.prior.positive) + self.data.prior.log_more(self.columns)[:, None]
+
+    def drops(self) -> Floats:
+        """Log posterior that the model gains without each of its members; shape (k,)."""
+        a = np.diag(self._inverse)
+        out = -0.5 * self._m**2 / a - 0.5 * np.log(a * self._loading)
+        for k, (column, width) in enumerate(self.members):
+            out[k] -= _LOG_SHARE[width] + self.data.prior.log_more(self._without(k))[column]
+        return np.asarray(out)
+
+    def exchanges(self) -> Iterator[tuple[int, Floats]]:
+        """Log posterior that another candidate gains in the place of each member: its place, and shape (q, widths)."""
+        drops = self.drops()
+        for k in range(len(self.members)):
+            a, v = self._inverse[k, k], self._V[:, k]
+            table = gains(self.c + v * v / a, self.r + v * (self._m[k] / a), self.data.prior.positive)
+            yield k, table + (self.data.prior.log_more(self._without(k)) + drops[k])[:, None]
+
+    def neighbours(self, least: float) -> Iterator[tuple[float, Members]]:
+        """Give the models one move away whose log posterior exceeds `least`: what is added, dropped, exchanged."""
+        for column, width, gain in _above(self.gains(), least - self.score):
+            yield self.score + gain, _with(self.members, column, width)
+        for k, gain in enumerate(self.drops().tolist()):
+            if self.score + gain > least:
+                yield self.score + gain, self.members[:k] + self.members[k + 1 :]
+        for k, table in self.exchanges():
+            others = self.members[:k] + self.members[k + 1 :]
+            for column, width, gain in _above(table, least - self.score):
+                yield self.score + gain, _with(others, column, width)
+
+    def merged(self) -> tuple[float, Members]:
+        """Put the best candidate in the place of two members: log posterior of the model, and the model."""
+        best, at = -np.inf, self.members
+        for i, j in combinations(range(len(self.members)), 2):
+            others = tuple(m for k, m in enumerate(self.members) if k not in (i, j))
+            near = self.data.at(others)
+            table = near.gains()
+            column, width = np.unravel_index(int(np.argmax(table)), table.shape)
+            if near.score + table[column, width] > best:
+                best, at = near.score + float(table[column, width]), _with(others, int(column), int(width))
+        return best, at
+
+    def paired(self) -> tuple[float, Members]:
+        """Add the best two candidates at once: log posterior of the model, and the model."""
+        J, prior = self.data.J, self.data.prior
+        more = prior.log_more(self.columns)
+        # Odds of the second beside the first: k + 2 over k + 1, and its kin; at most one variant of a parameter.
+        step = np.log((len(self.members) + 2.0) / (len(self.members) + 1.0))
+        use = np.flatnonzero(np.isfinite(more) & (self.c > 0.0))
+        if len(use) < 2:
+            return -np.inf, self.members
+        X = J[np.ix_(use, use)] - self._V[use] @ J[self.columns][:, use]
+        c, r, odds = self.c[use], self.r[use], more[use]
+        kin = prior.cause[use][:, None] == prior.cause[use][None, :]
+        same = (prior.parameter[use][:, None] == prior.parameter[use][None, :]) & ~prior.repeats[use][:, None]
+        log_prior = odds[:, None] + odds[None, :] + step + np.where(kin, _kin(prior, self.columns, use), 0.0)
+        log_prior[same] = -np.inf
+        np.fill_diagonal(log_prior, -np.inf)
+        best, at = -np.inf, self.members
+        for width, loading in enumerate(_PRECISION.tolist()):
+            a = c + loading
+            det = np.outer(a, a) - X**2
+            with np.errstate(divide="ignore", invalid="ignore"):
+                fall = (np.outer(r**2, a) + np.outer(a, r**2) - 2.0 * X * np.outer(r, r)) / det
+                total = 0.5 * fall - 0.5 * np.log(det / loading**2) + log_prior + 2.0 * _LOG_SHARE[width]
+            total[~(det > 1e-9 * np.outer(a, a))] = -np.inf
+            i, j = np.unravel_index(int(np.nanargmax(total)), total.shape)
+            if self.score + total[i, j] > best:
+                best = self.score + float(total[i, j])
+                at = _with(_with(self.members, int(use[i]), width), int(use[j]), width)
+        return best, at
+
+    def _without(self, place: int) -> list[int]:
+        return [column for k, column in enumerate(self.columns) if k != place]
+
+
+def _kin(prior: Prior, columns: Sequence[int], use: Ints) -> Floats:
+    """Log odds of kin of the first of a pair, which `log_more` has not counted; shape (u, u)."""
+    counted = np.isin(prior.cause[use], prior.cause[np.asarray(columns, dtype=np.int64)])
+    return np.where(counted[:, None], 0.0, KIN) * np.ones((len(use), len(use)))
+
+
+def gains(c: Floats, r: Floats, positive: Bools) -> Floats:
+    """Log Bayes factor of each candidate, by the width of its size.
+
+    Parameters
+    ----------
+    c, r : ndarray, shape (q,)
+        Information on each candidate beside a model, and its pull, in units of the prior sizes.
+    positive : ndarray of bool, shape (q,)
+        Whose size cannot be negative.
+
+    Returns
+    -------
+    ndarray, shape (q, widths)
+        With the share of each width (1); -inf for a size of the wrong sign.
+    """
+    a = c[:, None] + _PRECISION
+    out = 0.5 * (r * r)[:, None] / a - 0.5 * np.log(a / _PRECISION) + _LOG_SHARE
+    out[positive & (r < 0.0)] = -np.inf
+    return np.asarray(out)
+
+
+def _above(table: Floats, least: float) -> Iterator[tuple[int, int, float]]:
+    """Entries of a table (q, widths) above a limit."""
+    for column, width in zip(*np.nonzero(table > least), strict=True):
+        yield int(column), int(width), float(table[column, width])
+
+
+def _with(members: Members, column: int, width: int) -> Members:
+    return tuple(sorted((*members, (column, width))))

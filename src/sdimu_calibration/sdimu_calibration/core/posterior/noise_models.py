@@ -1,0 +1,248 @@
+"""Noise with a memory as part of a model: which terms, of which sizes, each with its probability before the data.
+
+A term's size is not known: its logarithm is normal about what a data sheet states, or what is usual. The integral of
+the likelihood over it is taken on a grid. The noise of the model is that of the best size, and its prior holds the
+share of the prior that lies where the likelihood does: so the best size stands for the integral.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import chain, repeat
+
+import numpy as np
+
+from sdimu_calibration.core.arrays import Floats
+from sdimu_calibration.core.evidence.learned_noise import (
+    NoiseInformation,
+    given_terms,
+    kinds,
+    likelihood,
+    sizes_on_grid,
+)
+from sdimu_calibration.core.evidence.noise_kernels import Stretches
+from sdimu_calibration.core.noise_term import DRAWN, FLICKER, MARKOV, RANDOM_WALK, SHIFT, STOP, TRIADS, TURN, NoiseTerm
+from sdimu_calibration.core.side_by_side import side_by_side
+from sdimu_calibration.core.specification import ImuSpecification
+from sdimu_calibration.core.units import to_si
+
+ODDS: Mapping[str, float] = {RANDOM_WALK: 0.3, FLICKER: 0.5, MARKOV: 0.15, STOP: 0.03, TURN: 0.03, SHIFT: 0.02}
+"""Odds of each kind of noise in a triad beside none (1): every sensor has bias instability and a rate random walk of
+some size, IEEE Std 952; what is drawn anew at stops or turns has a cause that nobody knows."""
+STATED_SPREAD = 1.0
+"""Standard deviation of the log of a size about that of a data sheet (1): a factor of 2.7."""
+USUAL_SPREAD = 2.3
+"""Standard deviation of the log of a size where no data sheet states one (1): a factor of ten."""
+INSTABILITY: Mapping[str, Mapping[str, float]] = {
+    "gyro": {grade: to_si(size, "deg/h") for grade, size in (("navigation", 0.01), ("tactical", 1.0), ("mems", 20.0))},
+    "accel": {grade: to_si(size, "ug") for grade, size in (("navigation", 2.0), ("tactical", 30.0), ("mems", 100.0))},
+}
+"""Bias instability (rad/s, m/s^2) of a grade where the IMU file states none: data sheets of the grade."""
+SHARE: Mapping[str, float] = {
+    FLICKER: 1.0,
+    RANDOM_WALK: 0.664 * float(np.sqrt(3.0 / 1000.0)),
+    MARKOV: 0.664,
+    STOP: 0.664,
+    TURN: 0.664,
+    SHIFT: 0.3,
+}
+"""Usual size of each kind over the bias instability (SI): a random walk has the Allan deviation of it at 1000 s."""
+_NEAR = 6.0
+"""Log posterior (1) behind the best noise up to which another one is kept."""
+_MOST = 10
+"""Number of noises that are kept at most."""
+_HOPELESS = 12.0
+"""Log posterior (1) behind the best term of a triad alone from which a term is not tried beside noise of the other."""
+_SHARES = (0.3, 0.7)
+"""Share of what effects explain that one term, and two terms, must explain for more of them to be looked for (1)."""
+_BEHIND = 30.0
+"""Log posterior (1) that noise may be behind effects in its place: effects beside it may make up for it."""
+_SEEN = 0.5
+"""Log-likelihood (1) that a term must gain to be told from none: less is its prior."""
+_MOST_TERMS = 2
+"""Number of terms of a triad at most: a test of an hour tells no more apart."""
+
+
+@dataclass(frozen=True)
+class NoiseModel:
+    """Noise of a model.
+
+    Attributes
+    ----------
+    terms : tuple of NoiseTerm
+        With their sizes.
+    log_prior : float
+        Log of its odds beside white noise, of the share of its sizes too (1).
+    """
+
+    terms: tuple[NoiseTerm, ...] = ()
+    log_prior: float = 0.0
+
+    @property
+    def kinds(self) -> frozenset[tuple[str, str, float]]:
+        """Triad, kind and time constant of each term."""
+        return frozenset((t.triad, t.kind, t.tau) for t in self.terms)
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """Usual size of each kind of noise in each triad (SI), and the spread of its log."""
+
+    centre: Mapping[tuple[str, str], float]
+    spread: Mapping[tuple[str, str], float]
+
+    def log_density(self, term: NoiseTerm, size: Floats) -> Floats:
+        """Log density of the log of a size (SI); shape of `size`."""
+        key = (term.triad, term.kind)
+        centre, spread = self.centre[key], self.spread[key]
+        return np.asarray(-0.5 * (np.log(size / centre) / spread) ** 2 - np.log(spread * np.sqrt(2.0 * np.pi)))
+
+
+def usual_sizes(imu: ImuSpecification) -> Sizes:
+    """State usual sizes of noise by the data sheet of an IMU, else by its grade."""
+    centre: dict[tuple[str, str], float] = {}
+    spread: dict[tuple[str, str], float] = {}
+    stated = {"gyro": imu.gyro_bias_instability, "accel": imu.accel_bias_instability}
+    for triad in TRIADS:
+        level = stated[triad] or INSTABILITY[triad][imu.grade]
+        for kind in ODDS:
+            centre[triad, kind] = level * SHARE[kind]
+            narrow = stated[triad] and kind not in DRAWN
+            spread[triad, kind] = STATED_SPREAD if narrow else USUAL_SPREAD
+    walk = {"gyro": imu.gyro_random_walk, "accel": imu.accel_random_walk}
+    for triad in TRIADS:
+        if walk[triad]:
+            centre[triad, RANDOM_WALK], spread[triad, RANDOM_WALK] = walk[triad], STATED_SPREAD
+    return Sizes(centre, spread)
+
+
+@dataclass(frozen=True)
+class _Found:
+    """A noise, and its log-likelihood over white noise."""
+
+    noise: NoiseModel
+    gain: float
+
+    @property
+    def score(self) -> float:
+        return self.gain + self.noise.log_prior
+
+
+class _Search:
+    """The noises beside one set of effects."""
+
+    def __init__(
+        self, information: NoiseInformation, cut: Stretches, usual: Sizes, tried: Sequence[NoiseTerm] | None
+    ) -> None:
+        self.information, self.cut, self.usual = information, cut, usual
+        every = kinds(cut)
+        self.tried = every if tried is None else list(tried)
+        markov = sum(t.kind == MARKOV for t in every) // len(TRIADS)
+        self.log_odds = {kind: float(np.log(odds / (markov if kind == MARKOV else 1))) for kind, odds in ODDS.items()}
+        self.seen: dict[frozenset[tuple[str, str, float]], _Found] = {}
+
+    def keep(self, found: _Found) -> _Found:
+        """Remember a noise."""
+        old = self.seen.get(found.noise.kinds)
+        if old is None or found.score > old.score:
+            self.seen[found.noise.kinds] = found
+        return found
+
+    def one_more(self, base: _Found) -> list[_Found]:
+        """Add each kind of noise to a noise, at its best size, where that is seen at all."""
+        terms = base.noise.terms
+        room = []
+        for term in self.tried:
+            own = [t.kind for t in terms if t.triad == term.triad]
+            if len(own) < _MOST_TERMS and term.kind not in own and not (terms and not own and self._hopeless(term)):
+                room.append(term)
+        given = {name: given_terms(self.information, self.cut, terms, name) for name in {t.triad for t in room}}
+        sized = side_by_side(lambda term: self.sized(*given[term.triad], term), room)
+        return [
+            self.keep(_Found(NoiseModel((*terms, term), base.noise.log_prior + share), base.gain + term.gain))
+            for term, share in filter(None, sized)
+        ]
+
+    def _hopeless(self, term: NoiseTerm) -> bool:
+        """Whether a term was far behind the best one of its triad alone: the other triad changes little of that."""
+        alone = {next(iter(kinds)): found.score for kinds, found in self.seen.items() if len(kinds) == 1}
+        best = max((score for (triad, _, _), score in alone.items() if triad == term.triad), default=-np.inf)
+        return alone.get((term.triad, term.kind, term.tau), -np.inf) < best - _HOPELESS
+
+    def sized(self, J: Floats, d: Floats, term: NoiseTerm) -> tuple[NoiseTerm, float] | None:
+        """Best size of a term, and the log of its odds with the share of the sizes that the likelihood leaves."""
+        size, gain = sizes_on_grid(J, d, self.cut, term)
+        if not len(size):
+            return None
+        log_posterior = gain + self.usual.log_density(term, size)
+        best = int(np.argmax(log_posterior))
+        if gain[best] < _SEEN:
+            return None
+        step = np.gradient(np.log(size))
+        log_mass = float(log_posterior[best] + np.log(np.sum(np.exp(log_posterior - log_posterior[best]) * step)))
+        found = replace(term, size=float(size[best]), gain=float(gain[best]))
+        return found, self.log_odds[term.kind] + log_mass - float(gain[best])
+
+    def settled(self, terms: Sequence[NoiseTerm]) -> _Found:
+        """Find the sizes of several terms together, each in turn; what is no longer seen is left out."""
+        sized: dict[int, tuple[NoiseTerm, float]] = {k: (term, 0.0) for k, term in enumerate(terms)}
+        for place in list(sized):
+            others = [found[0] for k, found in sized.items() if k != place]
+            term = sized[place][0]
+            again = self.sized(*given_terms(self.information, self.cut, others, term.triad), term)
+            if again is None:
+                del sized[place]
+            else:
+                sized[place] = again
+        noise = NoiseModel(tuple(found[0] for found in sized.values()), sum(found[1] for found in sized.values()))
+        gain = noise.terms[0].gain if len(noise.terms) == 1 else self._likelihood(noise)
+        return self.keep(_Found(noise, gain))
+
+    def _likelihood(self, noise: NoiseModel) -> float:
+        return likelihood(self.information, self.cut, noise.terms) - self.information.fitted
+
+
+def explored(
+    information: NoiseInformation,
+    cut: Stretches,
+    usual: Sizes,
+    tried: Sequence[NoiseTerm] | None = None,
+    rival: float = 0.0,
+) -> list[tuple[float, NoiseModel]]:
+    """Find the noises that are probable beside one set of effects.
+
+    Parameters
+    ----------
+    information : NoiseInformation
+        Coefficients and effects are estimated along.
+    cut : Stretches
+    usual : Sizes
+    tried : sequence of NoiseTerm, optional
+        Kinds and time constants to look for; all of them without.
+    rival : float
+        Log posterior (1), over white noise, that effects reach in its place: noise that stays far behind is given up.
+
+    Returns
+    -------
+    list of (float, NoiseModel)
+        Log posterior of each over white noise (1), the likeliest first.
+    """
+    search = _Search(information, cut, usual, tried)
+    best = search.keep(_Found(NoiseModel(), 0.0))
+    for share in chain(_SHARES, repeat(1.0)):
+        option = max(search.one_more(best), key=lambda found: found.score, default=best)
+        if not option.score > best.score:
+            break
+        if option.score < share * rival - _BEHIND:
+            return []
+        best = (
+            option
+            if len(option.noise.terms) < 2
+            else max(search.settled(option.noise.terms), option, key=lambda found: found.score)
+        )
+    for place in range(len(best.noise.terms)):
+        if len(best.noise.terms) > 1:
+            search.one_more(search.settled([t for k, t in enumerate(best.noise.terms) if k != place]))
+    ranked = sorted(search.seen.values(), key=lambda found: -found.score)
+    return [(found.score, found.noise) for found in ranked if found.score > ranked[0].score - _NEAR][:_MOST]

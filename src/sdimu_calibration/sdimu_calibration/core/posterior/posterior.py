@@ -1,0 +1,278 @@
+"""The diagnosis as one posterior: every model near the best one, with its probability."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Generic
+
+import numpy as np
+
+from sdimu_calibration.core.arrays import Floats, Ints
+from sdimu_calibration.core.evidence.candidate import Candidate
+from sdimu_calibration.core.evidence.joint_information import Joint
+from sdimu_calibration.core.evidence.learned_noise import Wander
+from sdimu_calibration.core.evidence.linear import E
+from sdimu_calibration.core.noise_term import KINDS, NoiseTerm
+from sdimu_calibration.core.posterior.board import Board, same_noise
+from sdimu_calibration.core.posterior.models import Members
+from sdimu_calibration.core.posterior.noise_models import NoiseModel
+from sdimu_calibration.core.posterior.search import WINDOW, climb, window
+
+INDISTINGUISHABLE = 3.0
+"""Log posterior (1) by which an exchange may be behind for two candidates to be called alike: odds of 20 to 1."""
+_ROUNDS = 4
+"""Number of times that noises and effects are looked for in turn: each beside the best of the other."""
+_TIE = 0.5
+"""Log posterior (1) by which another model must beat the one that a search begins with: fits about two that look the
+same would go to and fro."""
+_HOPEFUL = 15.0
+"""Log posterior (1) behind the best model up to which effects are looked for in a noise: more do not make up for it."""
+_NOISES = 6
+"""Number of noises in which effects are looked for, the likeliest first."""
+
+
+@dataclass(frozen=True)
+class Weighed:
+    """One model of the window.
+
+    Attributes
+    ----------
+    members : tuple of (int, int)
+    noise : NoiseModel
+    probability : float
+    """
+
+    members: Members
+    noise: NoiseModel
+    probability: float
+
+
+@dataclass(frozen=True)
+class Posterior(Generic[E]):
+    """The models that the data leave probable.
+
+    Attributes
+    ----------
+    board : Board
+    models : tuple of Weighed
+        The likeliest first.
+    """
+
+    board: Board[E]
+    models: tuple[Weighed, ...]
+
+    @property
+    def best(self) -> Weighed:
+        """The likeliest model."""
+        return self.models[0]
+
+    def candidate(self, number: int) -> Candidate:
+        """Candidate of a member."""
+        column = int(self.board.use[number])
+        return self.board.evidence.candidates[column - len(self.board.evidence.weight)]
+
+    def probability(self, holds: Callable[[Weighed], bool]) -> float:
+        """Probability of the models for which something holds."""
+        return float(sum(m.probability for m in self.models if holds(m)))
+
+    @cached_property
+    def of_candidates(self) -> Floats:
+        """Probability that each candidate is in the model; shape (q,)."""
+        out = np.zeros(len(self.board.use))
+        for model in self.models:
+            for number, _ in model.members:
+                out[number] += model.probability
+        return out
+
+    @property
+    def tried(self) -> list[NoiseTerm]:
+        """Kinds of noise of all models, each once."""
+        kinds = {(t.triad, t.kind, t.tau): t for m in self.models for t in m.noise.terms}
+        return list(kinds.values())
+
+    def labels(self) -> dict[str, tuple[int, bool]]:
+        """Width of each member of the best model, and whether it was made between those of a scan; by label."""
+        return {
+            self.candidate(number).label: (width, int(self.board.use[number]) in self.board.finer)
+            for number, width in self.best.members
+        }
+
+    @cached_property
+    def classes(self) -> tuple[tuple[int, ...], ...]:
+        """What the data cannot tell from each member of the best model: candidates, the likeliest first."""
+        near = self.board.data(self.best.noise)[1].at(self.best.members)
+        out = []
+        for place, table in near.exchanges():
+            score = table.max(axis=1)
+            score[self.best.members[place][0]] = -np.inf
+            order = [int(k) for k in np.argsort(-score) if score[k] > -INDISTINGUISHABLE]
+            out.append(tuple(order))
+        return tuple(out)
+
+    def of_class(self, place: int) -> float:
+        """Probability that a member of the best model, or something of its class, is present."""
+        alike = {self.best.members[place][0], *self.classes[place]}
+        return self.probability(lambda m: any(number in alike for number, _ in m.members))
+
+    def of_noise(self, triad: str, kinds: Collection[str] = KINDS) -> float:
+        """Probability that a triad has noise of one of some kinds."""
+        return self.probability(lambda m: any(t.triad == triad and t.kind in kinds for t in m.noise.terms))
+
+    @cached_property
+    def nothing(self) -> float:
+        """Probability that no effect is missing."""
+        return self.probability(lambda m: not m.members)
+
+
+def posterior(
+    evidence: E, allowed: Ints, wander: Wander | None, earlier: Joint | None = None, before: Posterior[E] | None = None
+) -> Posterior[E]:
+    """Find the models that an evidence leaves probable.
+
+    Parameters
+    ----------
+    evidence : LinearEvidence
+        In white noise.
+    allowed : ndarray of int, shape (a,)
+        Columns that may be in a model.
+    wander : Wander or None
+        Of the same test; None where no noise with a memory is looked for.
+    earlier : Joint, optional
+        Of an evidence with the same signatures, or the first ones of them.
+    before : Posterior, optional
+        About a point that differs little: the search begins with its best model, and with its kinds of noise.
+    """
+    labels = {} if before is None else before.labels()
+    first = len(evidence.weight)
+    finer = {c for c in allowed.tolist() if labels.get(evidence.candidates[c - first].label, (0, False))[1]}
+    board = Board(evidence, allowed, frozenset(finer), wander, earlier)
+    start = tuple(
+        (number, labels[evidence.candidates[column - first].label][0])
+        for number, column in enumerate(board.use.tolist())
+        if evidence.candidates[column - first].label in labels
+    )
+    tried = None if before is None else before.tried
+    noises, members = _climbed(board, [start], tried)
+    while True:
+        sharper = _sharpened(board, members, noises[0])
+        if sharper is None:
+            break
+        board, starts = sharper
+        noises, members = _climbed(board, starts, tried)
+    data = [board.data(noise) for noise in noises]
+    found = window([d for _, d in data], [offset for offset, _ in data], [members])
+    return Posterior(board, _weighed(found, noises))
+
+
+def _weighed(found: dict[tuple[int, Members], float], noises: Sequence[NoiseModel]) -> tuple[Weighed, ...]:
+    best = max(found.values())
+    total = sum(np.exp(score - best) for score in found.values())
+    ranked = sorted(found.items(), key=lambda item: (-item[1], item[0]))
+    return tuple(Weighed(m, noises[k], float(np.exp(score - best) / total)) for (k, m), score in ranked)
+
+
+def _climbed(
+    board: Board[E], starts: Sequence[Members], tried: Sequence[NoiseTerm] | None = None
+) -> tuple[list[NoiseModel], Members]:
+    """Look for noises beside the best effects, and for effects in each noise, until neither changes.
+
+    Kinds of noise that were `tried` alone are looked for, and beside the best effects alone, where a search about
+    nearly the same point has looked for all of them.
+
+    Returns
+    -------
+    noises : list of NoiseModel
+        That of the best model first.
+    members : tuple of (int, int)
+        The best model.
+    """
+    asked: set[Members] = set()
+    known: list[tuple[float, NoiseModel, Members]] = []
+    start = starts[0]
+    white = board.data(NoiseModel())[1]
+    best, members = max((climb(white, one) for one in starts), key=lambda found: found[0])
+    for _ in range(_ROUNDS):
+        if members in asked:
+            break
+        beside = [members] if tried is not None else [members, _without_drifts(board, members), ()]
+        for one in dict.fromkeys(beside):
+            if one in asked:
+                continue
+            asked.add(one)
+            for score, noise in board.noises(one, tried, best):
+                _add(known, score, noise, one)
+                best = max(best, score)
+        near = [found for found in known if found[0] > best - _HOPEFUL]
+        known = []
+        for _, noise, one in sorted(near, key=lambda found: -found[0])[:_NOISES]:
+            offset, data = board.data(noise)
+            trials = [climb(data, begin, of_two=False) for begin in dict.fromkeys([members, one, *starts])]
+            gain, found = max(trials, key=lambda t: t[0])
+            known.append((offset + gain, noise, found))
+        known.sort(key=lambda found: -found[0])
+        offset, data = board.data(known[0][1])
+        score, members = climb(data, known[0][2])
+        if start and data.at(start).score > score - _TIE:
+            members = start
+        best = max(best, offset + score)
+    return [noise for score, noise, _ in known if score > known[0][0] - WINDOW], members
+
+
+def _add(known: list[tuple[float, NoiseModel, Members]], score: float, noise: NoiseModel, members: Members) -> None:
+    """Add a noise to those that are known; of two that are nearly the same the likelier one stays."""
+    for place, (old, other, _) in enumerate(known):
+        if same_noise(noise, other):
+            if score > old:
+                known[place] = (score, noise, members)
+            return
+    known.append((score, noise, members))
+
+
+def _without_drifts(board: Board[E], members: Members) -> Members:
+    """Leave out what noise with a memory may imitate."""
+    first = len(board.evidence.weight)
+    effects = [board.evidence.candidates[column - first].effect for column in board.columns(members)]
+    drifts = [e.bias_drift or e.wander_like or e.scope == "recording" for e in effects]
+    return tuple(m for m, drift in zip(members, drifts, strict=True) if not drift)
+
+
+def _sharpened(board: Board[E], members: Members, noise: NoiseModel) -> tuple[Board[E], list[Members]] | None:
+    """Put a time or time constant between those of the scan into a model; None where none is worth it.
+
+    Returns
+    -------
+    board : Board
+        With the finer variant.
+    starts : list of tuple of (int, int)
+        The model with it in the place of the one that it is a variant of; and without others on the same sensor that
+        have variants, too: beside a wrong time constant they stand for the difference.
+    """
+    columns = board.columns(members)
+    first = len(board.evidence.weight)
+    effects = [board.evidence.candidates[column - first].effect for column in columns]
+    worth = -board.data(noise)[1].at(members).drops()
+    for place in [int(k) for k in np.argsort(-worth)]:
+        if columns[place] in board.finer or effects[place].nearer is None:
+            continue
+        sensors = {term.channel for term in effects[place].terms}
+        apart = [
+            k
+            for k, effect in enumerate(effects)
+            if k == place or effect.nearer is None or not sensors & {term.channel for term in effect.terms}
+        ]
+        beside = tuple(members[k] for k in apart)
+        effect = board.finer_variant(beside, apart.index(place), noise)
+        if effect is None:
+            continue
+        evidence = board.evidence.with_effects([effect])
+        added = len(evidence.names) - 1
+        finer = Board(evidence, np.append(board.allowed, added), board.finer | {added}, board.wander, board.joint)
+        places = {int(k): i for i, k in enumerate(finer.use.tolist())}
+        if added not in places:
+            continue
+        columns[place] = added
+        both = [range(len(members)), apart] if len(apart) < len(members) else [range(len(members))]
+        return finer, [tuple(sorted((places[columns[k]], members[k][1]) for k in kept)) for kept in both]
+    return None

@@ -1,0 +1,131 @@
+"""What is believed of the candidates before the data: how usual each is, and how large.
+
+The number of effects that a model lacks is unknown: their rate is exponentially distributed with mean `MEAN_NUMBER`,
+and each candidate has its share of it. Integrated over the rate,
+
+    log pi(S) = sum_j log u_j + log k! - (k + 1) log(1 + b) + log b,   k = |S|,  b = 1 / MEAN_NUMBER,  sum u_j = 1
+
+so that a sensor with k effects is likelier to have one more (k + 1 times the odds of the first one). Source: J. Scott,
+J. Berger, "Bayes and empirical-Bayes multiplicity adjustment", Annals of Statistics 38 (2010).
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from sdimu_calibration.core.arrays import Bools, Floats, Ints
+from sdimu_calibration.core.effects.effect import OF_ONE_TIME
+from sdimu_calibration.core.effects.usual import usual
+from sdimu_calibration.core.evidence.candidate import Candidate
+
+MEAN_NUMBER = 2.0
+"""Number of effects that a model lacks, in the mean over sensors that somebody calibrates (1)."""
+KIN = 2.0
+"""Log odds (1) of an effect that acts on one axis as one that is present acts on another: they have one cause."""
+_FAULT = 0.05
+"""Odds of a fault of one recording beside an effect of the sensor (1)."""
+_OWN = 0.002
+"""Odds of an equation that no physics names beside an effect of the catalogue (1): there are a thousand of them."""
+WIDTHS = (1.0, 5.0, 50.0)
+"""Sizes of an effect over the one-sigma size that physics gives it (1): of its class, out of it, broken."""
+WIDTH_SHARES = (0.74, 0.24, 0.02)
+"""Probability of each of `WIDTHS` (1)."""
+UNKNOWN_SIZE = 30.0
+"""Size of an effect that physics gives none, in the sigma that the data give it (1)."""
+
+
+@dataclass(frozen=True)
+class Prior:
+    """Prior of q candidates.
+
+    Attributes
+    ----------
+    log_share : ndarray, shape (q,)
+        Log of the share u of each (1); variants of a parameter share its odds.
+    cause : ndarray of int, shape (q,)
+        Candidates of one effect with the same time constant or the like share a number.
+    parameter : ndarray of int, shape (q,)
+        Variants of one parameter share a number: a model has one of them.
+    repeats : ndarray of bool, shape (q,)
+        What happens at one time may happen at several.
+    positive : ndarray of bool, shape (q,)
+        The size cannot be negative.
+    """
+
+    log_share: Floats
+    cause: Ints
+    parameter: Ints
+    repeats: Bools
+    positive: Bools
+
+    def log_more(self, base: Sequence[int]) -> Floats:
+        """Log odds of each candidate beside those of a model.
+
+        Parameters
+        ----------
+        base : sequence of int
+            Candidates of the model.
+
+        Returns
+        -------
+        ndarray, shape (q,)
+            Log (1); -inf for those that the model has already.
+        """
+        out = self.log_share + (np.log(len(base) + 1.0) - np.log1p(1.0 / MEAN_NUMBER))
+        if len(base):
+            at = np.asarray(base, dtype=np.int64)
+            present, taken = np.zeros(len(out)), np.zeros(len(out), dtype=bool)
+            present[self.cause[at]] = KIN
+            taken[self.parameter[at[~self.repeats[at]]]] = True
+            out = out + present[self.cause]
+            out[taken[self.parameter]] = -np.inf
+            out[at] = -np.inf
+        return np.asarray(out)
+
+    def log_of(self, chosen: Sequence[int]) -> float:
+        """Log of the prior of a set of candidates, over that of none (1)."""
+        total = 0.0
+        for k, column in enumerate(chosen):
+            total += float(self.log_more(chosen[:k])[column])
+        return total
+
+
+def prior_of(candidates: Sequence[Candidate], shared: Sequence[int] = ()) -> Prior:
+    """State the prior of candidates.
+
+    Parameters
+    ----------
+    candidates : sequence of Candidate, length q
+    shared : sequence of int
+        Places of candidates that were made from another one between those of a scan: they have its odds, and do not
+        lower those of the others.
+    """
+    names = [c.label if c.family == "own" else c.parameter.name for c in candidates]
+    made = set(shared)
+    count = Counter(name for k, name in enumerate(names) if k not in made)
+    weight = np.array([_odds(c) / max(count[name], 1) for c, name in zip(candidates, names, strict=True)])
+    total = float(sum(w for k, w in enumerate(weight.tolist()) if k not in made and candidates[k].family != "own"))
+    return Prior(
+        np.log(weight / max(total, 1e-300)),
+        _numbers(
+            [(c.family, c.label) if c.family == "own" else (c.family, *c.effect.options.values()) for c in candidates]
+        ),
+        _numbers([(name,) for name in names]),
+        np.array([bool(OF_ONE_TIME & c.effect.options.keys()) for c in candidates], dtype=bool),
+        np.array([c.effect.positive for c in candidates], dtype=bool),
+    )
+
+
+def _odds(candidate: Candidate) -> float:
+    if candidate.family == "own":
+        return _OWN
+    return usual(candidate.family) * (_FAULT if candidate.effect.scope == "recording" else 1.0)
+
+
+def _numbers(keys: Sequence[tuple[str, ...]]) -> Ints:
+    known: dict[tuple[str, ...], int] = {}
+    return np.array([known.setdefault(key, len(known)) for key in keys], dtype=np.int64)
