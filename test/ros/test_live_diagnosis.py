@@ -21,11 +21,10 @@ from rclpy.node import Node
 from std_msgs.msg import Float64MultiArray
 
 from sdimu_calibration.core.data.arrival import RawStatus, RawTest, until
-from sdimu_calibration.core.diagnosis import noise_search
+from sdimu_calibration.core.diagnosis import rounds
 from sdimu_calibration.core.diagnosis.diagnose import climb
 from sdimu_calibration.core.diagnosis.live_diagnosis import LiveDiagnosis
-from sdimu_calibration.core.diagnosis.problem import Problem
-from sdimu_calibration.core.diagnosis.search import FALSE_ALARM, search
+from sdimu_calibration.core.diagnosis.window_search import search_window
 from sdimu_calibration.core.estimation.solve import solve
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.nodes.credits import HISTORY
@@ -90,19 +89,24 @@ def test_all_data_are_ranked_as_the_first_scan_of_a_diagnosis_of_the_bag(raw, wh
     )
     searches = []
 
-    def seen(evidence, allowed, *arguments):
-        searches.append((evidence.only(allowed), search(evidence, allowed, *arguments)))
-        return searches[-1][1]
+    def seen(*arguments):
+        searches.append(search_window(*arguments))
+        return searches[-1]
 
-    monkeypatch.setattr(noise_search, "search", seen)
+    monkeypatch.setattr(rounds, "search_window", seen)
     climb(solve(open_test(tmp_path / "bag", "daejeon", load_imu("dtg")), load_model("baseline")))
-    evidence, first = searches[0][0], searches[0][1].first
-    assert {r.label: (r.z, r.estimate, r.sigma) for r in whole.ranking} == {
+    evidence, first, limit = searches[0].evidence, searches[0].first, searches[0].threshold
+    scanned = {
         evidence.names[k]: (first.z[k], first.estimate[k], first.sigma[k])
         for k in range(len(evidence.weight), len(first.z))
         if np.isfinite(first.sigma[k])
     }
-    assert whole.threshold == Problem(evidence).threshold(first, FALSE_ALARM)
+    assert {r.label: (r.z, r.estimate, r.sigma) for r in whole.ranking} == {
+        r.label: scanned[r.label] for r in whole.ranking
+    }
+    # Beyond those there are the times and time constants between those of the scan.
+    assert len(scanned) <= len(whole.ranking) + len(searches[0].chosen)
+    assert whole.threshold == pytest.approx(limit, rel=0.01)
 
 
 def test_what_is_missing_stands_out_and_leaves_when_it_is_added(job, whole):

@@ -98,7 +98,8 @@ def test_what_was_found_is_added_and_the_error_falls(fit, found):
     better = fit.add(found.best)
     assert better.result.fit["held_out_rms"] < fit.result.fit["held_out_rms"]
     # A warm start ends where a cold one does.
-    cold, sigma = found.extended, np.sqrt(np.diag(found.extended.covariance))
+    cold = sdimu.calibrate(fit.test, add=[found.best.label])
+    sigma = np.sqrt(np.diag(cold.covariance))
     assert np.max(np.abs(better.values - cold.values)[sigma > 0] / sigma[sigma > 0]) < 0.05
     ladder = sdimu.compare(fit, better)
     assert f"+ {found.best.label}" in repr(ladder)

@@ -25,8 +25,8 @@ def over_all_models(base: Fit, done: Round) -> Fit:
     if found is None:
         return in_doubt(base, done.fit, done.evidence, done.found.chosen, done.free, done.found.scale)
     averages = Averages(found.board, base.dwell_means)
-    places = {column: k for k, column in enumerate(found.board.columns(found.best.members))}
-    told = tuple(sorted(found.best.members[places[int(c)]] for c in done.found.chosen))
+    places = {column: k for k, column in enumerate(found.board.columns(found.told.members))}
+    told = tuple(sorted(found.told.members[places[int(c)]] for c in done.found.chosen))
     one, all_ = averages.of_model(told, NoiseModel(done.found.noise)), averages.of(found)
     q, count = len(one.mean), len(done.found.chosen)
     added = done.fit.added_columns(count)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from sdimu_calibration.core.diagnosis.scan import POWER_80, scan
 from sdimu_calibration.core.diagnosis.search import look_alikes
 from sdimu_calibration.core.evidence.candidate import Candidate
 from sdimu_calibration.core.evidence.linear import LinearEvidence
+from sdimu_calibration.core.posterior.told import Share, may_be
 from sdimu_calibration.core.probability import normal_tail
 
 
@@ -44,8 +46,8 @@ class Found:
         Coefficients of the model that hang on which of these it is.
     probability : float
         That it or something of its class is missing in the model; NaN where no probabilities were worked out.
-    shares : tuple of float
-        Probability of it alone, then of each of `alike`.
+    may_be : tuple of Share
+        Coefficients of that class with the probability of each, the likeliest first.
     """
 
     candidate: Candidate
@@ -61,7 +63,7 @@ class Found:
     alike: tuple[str, ...]
     coefficient_shifts: tuple[CoefficientShift, ...]
     probability: float = float("nan")
-    shares: tuple[float, ...] = ()
+    may_be: tuple[Share, ...] = ()
 
 
 def found_effects(d: Diagnosis) -> tuple[Found, ...]:
@@ -104,8 +106,7 @@ def found_effects(d: Diagnosis) -> tuple[Found, ...]:
                 held_out_after=held_out[k + 1],
                 alike=tuple(d.evidence.names[i] for i in others),
                 coefficient_shifts=coefficient_shifts(problem, chosen, column, others, d.found.scale),
-                probability=_probability(d, column)[0],
-                shares=_probability(d, column)[1],
+                **_probability(d, column),
             )
         )
     return tuple(out)
@@ -116,18 +117,16 @@ def _alike(d: Diagnosis, problem: Problem[LinearEvidence], column: int, allowed:
     window = d.found.posterior
     if window is None:
         return look_alikes(problem, d.found.chosen.tolist(), column, allowed, d.found.scale)
-    place = window.board.columns(window.best.members).index(column)
-    return [int(window.board.use[number]) for number in window.classes[place]]
+    return [int(window.board.use[number]) for number in window.classes[window.place_of(column)]]
 
 
-def _probability(d: Diagnosis, column: int) -> tuple[float, tuple[float, ...]]:
-    """Probability of the class of a chosen column, of the column itself, and of each of its class."""
+def _probability(d: Diagnosis, column: int) -> dict[str, Any]:
+    """Probability of the class of a chosen column, and of each coefficient of it."""
     window = d.found.posterior
     if window is None:
-        return float("nan"), ()
-    place = window.board.columns(window.best.members).index(column)
-    members = (window.best.members[place][0], *window.classes[place])
-    return window.of_class(place), tuple(float(window.of_candidates[number]) for number in members)
+        return {}
+    place = window.place_of(column)
+    return {"probability": window.of_class(place), "may_be": may_be(window, place)}
 
 
 def _held_out(d: Diagnosis, count: int) -> list[float]:

@@ -70,7 +70,6 @@ def survey(fit: Fit, result: Calibration, with_candidates: bool = True) -> Diagn
 
 def _nothing_added(evidence: LinearEvidence, columns: Ints) -> Search[LinearEvidence]:
     problem = Problem(evidence.only(columns))
-    scale = problem.scale([])
-    first = problem.scan([], scale)
+    first = problem.scan([], 1.0)
     none = np.empty(0, dtype=np.int64)
-    return Search((), none, first, problem.threshold(first, FALSE_ALARM), scale, evidence)
+    return Search((), none, first, problem.threshold(first, FALSE_ALARM), 1.0, evidence)

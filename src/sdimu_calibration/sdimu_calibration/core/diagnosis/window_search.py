@@ -1,6 +1,6 @@
 """The search of one recording: the posterior over models, and what is told of it.
 
-What is chosen are the members of the likeliest model whose class is more probable than not; noise is told where it is
+What is chosen are the members of the told model whose class is more probable than not; noise is told where it is
 nearly certain. Everything else stays in the window of models, and in the sigmas.
 """
 
@@ -18,10 +18,8 @@ from sdimu_calibration.core.evidence.learned_noise import Wander, with_alike, wi
 from sdimu_calibration.core.evidence.linear import E
 from sdimu_calibration.core.noise_term import TRIADS, NoiseTerm
 from sdimu_calibration.core.posterior.board import Board
-from sdimu_calibration.core.posterior.posterior import Posterior, posterior
+from sdimu_calibration.core.posterior.posterior import PROBABLE, Posterior, posterior
 
-PROBABLE = 0.5
-"""Probability from which a class of effects is told as found: more likely there than not."""
 CERTAIN_NOISE = 0.95
 """Probability from which noise with a memory of a triad is told and stated with an interval: weaker noise is in every
 sensor, and moves nothing."""
@@ -102,23 +100,23 @@ def _stated(found: Search[E]) -> tuple[NoiseTerm, ...]:
     window = found.posterior
     if not found.noise or window is None or window.board.joint is None or window.board.wander is None:
         return found.noise
-    information = window.board.joint.given(*window.board.parameters(window.best.members)).noise
+    information = window.board.joint.given(*window.board.parameters(window.told.members)).noise
     cut = window.board.wander.cut
     return with_alike(information, cut, with_intervals(information, cut, found.noise))
 
 
 def told_effects(found: Posterior[E]) -> list[int]:
-    """Columns of what is told: members of the best model whose class is probable, the largest share of misfit first."""
-    members = found.best.members
-    worth = -found.board.data(found.best.noise)[1].at(members).drops()
+    """Columns of what is told: members of the told model whose class is probable, the largest share of misfit first."""
+    members = found.told.members
+    worth = -found.board.data(found.told.noise)[1].at(members).drops()
     order = [int(k) for k in np.argsort(-worth) if found.of_class(int(k)) > PROBABLE]
     columns = found.board.columns(members)
     return [columns[k] for k in order]
 
 
 def told_noise(found: Posterior[E]) -> tuple[NoiseTerm, ...]:
-    """Noise that is told: of triads where it is nearly certain, as the best model has it."""
-    terms = [t for t in found.best.noise.terms if found.of_noise(t.triad) > CERTAIN_NOISE]
+    """Noise that is told: of triads where it is nearly certain, as the told model has it."""
+    terms = [t for t in found.told.noise.terms if found.of_noise(t.triad) > CERTAIN_NOISE]
     return tuple(sorted(terms, key=lambda t: TRIADS.index(t.triad)))
 
 
@@ -131,5 +129,4 @@ def in_noise(board: Board[E], terms: Sequence[NoiseTerm]) -> E:
 
 def alike_in_window(found: Posterior[E], column: int) -> tuple[str, ...]:
     """Labels of what the data cannot tell from a column that was chosen, the likeliest first."""
-    place = found.board.columns(found.best.members).index(column)
-    return tuple(found.candidate(number).label for number in found.classes[place])
+    return tuple(found.candidate(number).label for number in found.classes[found.place_of(column)])

@@ -81,7 +81,12 @@ class Board(Generic[E]):
 
     @cached_property
     def use(self) -> Ints:
-        """Columns of the evidence that the coefficients do not take up, in the order of the candidates of `data`."""
+        """Columns of the evidence that the coefficients do not take up, in the order of the candidates of `data`.
+
+        Returns
+        -------
+        ndarray of int, shape (u,)
+        """
         full = self.evidence.information
         J, _ = full.diagonal_given(self.evidence.model, self.evidence.weight)
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -97,7 +102,13 @@ class Board(Generic[E]):
 
     @cached_property
     def size(self) -> Floats:
-        """One-sigma size of each candidate at `use` (SI)."""
+        """One-sigma size of each candidate at `use`.
+
+        Returns
+        -------
+        ndarray, shape (u,)
+            SI.
+        """
         size = self.evidence.prior[self.use - len(self.evidence.weight)].copy()
         J = np.diag(self.evidence.information.J)[self.use]
         unknown = ~np.isfinite(size)
@@ -106,7 +117,12 @@ class Board(Generic[E]):
 
     @cached_property
     def keep(self) -> Ints:
-        """Columns of the coefficients, then `use`; shape (p + u,)."""
+        """Columns of the coefficients, then `use`.
+
+        Returns
+        -------
+        ndarray of int, shape (p + u,)
+        """
         return np.concatenate([self.evidence.model, self.use]).astype(np.int64)
 
     def in_noise(self, noise: NoiseModel) -> InNoise:
@@ -146,7 +162,14 @@ class Board(Generic[E]):
         return [int(self.use[k]) for k, _ in members]
 
     def parameters(self, members: Members) -> tuple[Ints, Floats]:
-        """Columns of the coefficients and of a model's members, and the prior information of each (1/SI^2)."""
+        """Columns of the coefficients and of a model's members, and what is known of each before the data.
+
+        Returns
+        -------
+        columns : ndarray of int, shape (p + k,)
+        weight : ndarray, shape (p + k,)
+            Prior information (1/SI^2).
+        """
         known = np.concatenate([self.evidence.model, self.columns(members)]).astype(np.int64)
         own = [1.0 / (WIDTHS[width] * self.size[k]) ** 2 for k, width in members]
         return known, np.concatenate([self.evidence.weight, own])

@@ -25,6 +25,7 @@ Member = tuple[int, int]
 Members = tuple[Member, ...]
 """Of a model, in ascending order."""
 _PRECISION = np.array(WIDTHS) ** -2.0
+"""Prior information (1) on a size of each width: sizes are in units of the prior's."""
 _LOG_SHARE = np.log(WIDTH_SHARES)
 
 
@@ -87,11 +88,23 @@ class Expansion:
         return self._m
 
     def gains(self) -> Floats:
-        """Log posterior that each candidate adds, by width; shape (q, widths)."""
+        """Log posterior that each candidate adds, by width.
+
+        Returns
+        -------
+        ndarray, shape (q, widths)
+            (1).
+        """
         return gains(self.c, self.r, self.data.prior.positive) + self.data.prior.log_more(self.columns)[:, None]
 
     def drops(self) -> Floats:
-        """Log posterior that the model gains without each of its members; shape (k,)."""
+        """Log posterior that the model gains without each of its members.
+
+        Returns
+        -------
+        ndarray, shape (k,)
+            (1).
+        """
         a = np.diag(self._inverse)
         out = -0.5 * self._m**2 / a - 0.5 * np.log(a * self._loading)
         for k, (column, width) in enumerate(self.members):
@@ -99,7 +112,13 @@ class Expansion:
         return np.asarray(out)
 
     def exchanges(self) -> Iterator[tuple[int, Floats]]:
-        """Log posterior that another candidate gains in the place of each member: its place, and shape (q, widths)."""
+        """Log posterior that another candidate gains in the place of each member.
+
+        Returns
+        -------
+        iterator of (int, ndarray)
+            Place of the member, and the gains, shape (q, widths) (1).
+        """
         drops = self.drops()
         for k in range(len(self.members)):
             a, v = self._inverse[k, k], self._V[:, k]

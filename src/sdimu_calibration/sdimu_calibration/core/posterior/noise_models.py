@@ -49,13 +49,15 @@ SHARE: Mapping[str, float] = {
 }
 """Usual size of each kind over the bias instability (SI): a random walk has the Allan deviation of it at 1000 s."""
 _NEAR = 6.0
-"""Log posterior (1) behind the best noise up to which another one is kept."""
+"""Log posterior (1) behind the best noise up to which another one is kept: effects beside it may change that much."""
 _MOST = 10
-"""Number of noises that are kept at most."""
+"""Number of noises that are kept at most: each is searched for effects."""
 _HOPELESS = 12.0
-"""Log posterior (1) behind the best term of a triad alone from which a term is not tried beside noise of the other."""
+"""Log posterior (1) behind the best term of a triad alone from which a term is not tried again beside noise of the
+other triad: that changes little of it."""
 _SHARES = (0.3, 0.7)
-"""Share of what effects explain that one term, and two terms, must explain for more of them to be looked for (1)."""
+"""Share (1) of what effects explain that one term, and two terms, must explain for more to be looked for: a third adds
+less than the second."""
 _BEHIND = 30.0
 """Log posterior (1) that noise may be behind effects in its place: effects beside it may make up for it."""
 _SEEN = 0.5
@@ -93,7 +95,20 @@ class Sizes:
     spread: Mapping[tuple[str, str], float]
 
     def log_density(self, term: NoiseTerm, size: Floats) -> Floats:
-        """Log density of the log of a size (SI); shape of `size`."""
+        """Log density of the log of a size.
+
+        Parameters
+        ----------
+        term : NoiseTerm
+            Its triad and kind.
+        size : ndarray, shape (n,)
+            SI.
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            (1).
+        """
         key = (term.triad, term.kind)
         centre, spread = self.centre[key], self.spread[key]
         return np.asarray(-0.5 * (np.log(size / centre) / spread) ** 2 - np.log(spread * np.sqrt(2.0 * np.pi)))

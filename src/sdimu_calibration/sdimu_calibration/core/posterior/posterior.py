@@ -22,6 +22,8 @@ from sdimu_calibration.core.posterior.search import WINDOW, climb, window
 
 INDISTINGUISHABLE = 3.0
 """Log posterior (1) by which an exchange may be behind for two candidates to be called alike: odds of 20 to 1."""
+PROBABLE = 0.5
+"""Probability from which a class of effects is told as found: more likely there than not."""
 _ROUNDS = 4
 """Number of times that noises and effects are looked for in turn: each beside the best of the other."""
 _TIE = 0.5
@@ -30,7 +32,7 @@ same would go to and fro."""
 _HOPEFUL = 15.0
 """Log posterior (1) behind the best model up to which effects are looked for in a noise: more do not make up for it."""
 _NOISES = 6
-"""Number of noises in which effects are looked for, the likeliest first."""
+"""Number of noises in which effects are looked for, the likeliest first: each takes a climb."""
 
 
 @dataclass(frozen=True)
@@ -68,10 +70,42 @@ class Posterior(Generic[E]):
         """The likeliest model."""
         return self.models[0]
 
+    @cached_property
+    def told(self) -> Weighed:
+        """The model that is told: the likeliest one that has of each class the likeliest family.
+
+        A family of many variants (a warm-up, of any time constant) shares its probability out; another one with a
+        single variant is then ahead of each, and behind all of them together.
+        """
+        wanted = [self._likeliest(alike) for alike in self._classes_of(self.best)]
+        for model in self.models:
+            have = {number for number, _ in model.members}
+            if all(numbers & have for numbers in wanted):
+                return model
+        return self.best
+
+    def _likeliest(self, alike: Collection[int]) -> frozenset[int]:
+        """Those of a class that are of its likeliest family; the whole class where it is improbable."""
+        of_family: dict[str, set[int]] = {}
+        for number in alike:
+            of_family.setdefault(self.candidate(number).family, set()).add(number)
+        if len(of_family) == 1 or self._any_of(alike) < PROBABLE:
+            return frozenset(alike)
+        return frozenset(max(of_family.values(), key=self._any_of))
+
+    def _any_of(self, numbers: Collection[int]) -> float:
+        have = frozenset(numbers)
+        return self.probability(lambda m: any(number in have for number, _ in m.members))
+
     def candidate(self, number: int) -> Candidate:
         """Candidate of a member."""
         column = int(self.board.use[number])
         return self.board.evidence.candidates[column - len(self.board.evidence.weight)]
+
+    def parameter(self, number: int) -> str:
+        """Coefficient of a candidate; an equation by its label."""
+        candidate = self.candidate(number)
+        return candidate.label if candidate.family == "own" else candidate.parameter.name
 
     def probability(self, holds: Callable[[Weighed], bool]) -> float:
         """Probability of the models for which something holds."""
@@ -79,7 +113,13 @@ class Posterior(Generic[E]):
 
     @cached_property
     def of_candidates(self) -> Floats:
-        """Probability that each candidate is in the model; shape (q,)."""
+        """Probability that each candidate is in the model.
+
+        Returns
+        -------
+        ndarray, shape (q,)
+            (1).
+        """
         out = np.zeros(len(self.board.use))
         for model in self.models:
             for number, _ in model.members:
@@ -93,28 +133,35 @@ class Posterior(Generic[E]):
         return list(kinds.values())
 
     def labels(self) -> dict[str, tuple[int, bool]]:
-        """Width of each member of the best model, and whether it was made between those of a scan; by label."""
+        """Width of each member of the told model, and whether it was made between those of a scan; by label."""
         return {
             self.candidate(number).label: (width, int(self.board.use[number]) in self.board.finer)
-            for number, width in self.best.members
+            for number, width in self.told.members
         }
 
     @cached_property
     def classes(self) -> tuple[tuple[int, ...], ...]:
-        """What the data cannot tell from each member of the best model: candidates, the likeliest first."""
-        near = self.board.data(self.best.noise)[1].at(self.best.members)
+        """What the data cannot tell from each member of the told model: candidates, the likeliest first."""
+        return tuple(alike[1:] for alike in self._classes_of(self.told))
+
+    def _classes_of(self, model: Weighed) -> list[tuple[int, ...]]:
+        """Each member of a model, then what may stand in its place, the likeliest first."""
+        near = self.board.data(model.noise)[1].at(model.members)
         out = []
         for place, table in near.exchanges():
+            own = model.members[place][0]
             score = table.max(axis=1)
-            score[self.best.members[place][0]] = -np.inf
-            order = [int(k) for k in np.argsort(-score) if score[k] > -INDISTINGUISHABLE]
-            out.append(tuple(order))
-        return tuple(out)
+            score[own] = -np.inf
+            out.append((own, *(int(k) for k in np.argsort(-score) if score[k] > -INDISTINGUISHABLE)))
+        return out
 
     def of_class(self, place: int) -> float:
-        """Probability that a member of the best model, or something of its class, is present."""
-        alike = {self.best.members[place][0], *self.classes[place]}
-        return self.probability(lambda m: any(number in alike for number, _ in m.members))
+        """Probability that a member of the told model, or something of its class, is present."""
+        return self._any_of((self.told.members[place][0], *self.classes[place]))
+
+    def place_of(self, column: int) -> int:
+        """Place in the told model of a column of the evidence."""
+        return self.board.columns(self.told.members).index(column)
 
     def of_noise(self, triad: str, kinds: Collection[str] = KINDS) -> float:
         """Probability that a triad has noise of one of some kinds."""

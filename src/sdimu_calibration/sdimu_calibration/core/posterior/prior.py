@@ -23,19 +23,20 @@ from sdimu_calibration.core.effects.usual import usual
 from sdimu_calibration.core.evidence.candidate import Candidate
 
 MEAN_NUMBER = 2.0
-"""Number of effects that a model lacks, in the mean over sensors that somebody calibrates (1)."""
+"""Number of effects (1) that a model lacks, in the mean over sensors: real recordings showed between none and ten."""
 KIN = 2.0
 """Log odds (1) of an effect that acts on one axis as one that is present acts on another: they have one cause."""
 _FAULT = 0.05
-"""Odds of a fault of one recording beside an effect of the sensor (1)."""
+"""Odds of a fault of one recording beside an effect of the sensor (1): one test in twenty has one."""
 _OWN = 0.002
 """Odds of an equation that no physics names beside an effect of the catalogue (1): there are a thousand of them."""
 WIDTHS = (1.0, 5.0, 50.0)
 """Sizes of an effect over the one-sigma size that physics gives it (1): of its class, out of it, broken."""
 WIDTH_SHARES = (0.74, 0.24, 0.02)
-"""Probability of each of `WIDTHS` (1)."""
+"""Probability (1) of each of `WIDTHS`: one part in fifty is broken, one in four is out of its class."""
 UNKNOWN_SIZE = 30.0
-"""Size of an effect that physics gives none, in the sigma that the data give it (1)."""
+"""Size of an effect in the sigma that the data give it (1), where physics gives none: 3 to 300 is looked
+for."""
 
 
 @dataclass(frozen=True)
