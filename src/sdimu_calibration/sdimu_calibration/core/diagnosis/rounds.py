@@ -24,6 +24,7 @@ from sdimu_calibration.core.diagnosis.window_search import search_window, with_s
 from sdimu_calibration.core.estimation.fit import Fit
 from sdimu_calibration.core.estimation.noise_learning import in_noise
 from sdimu_calibration.core.evidence.candidate import Candidate
+from sdimu_calibration.core.evidence.learned_noise import Wander
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.noise_term import NoiseTerm
 from sdimu_calibration.core.progress import Progress
@@ -229,13 +230,16 @@ def run_round(request: Request, ground: Ground, own: bool, limits: dict[bool, fl
     earlier : Round, optional
         The round before.
     """
-    evidence, allowed = ground.evidence, ground.allowed
-    if request.wander is None:
-        if not request.base.learns_scatter:
-            return _round(ground, search(evidence, allowed, request.alpha, MOST_STEPS))
-        return _round(ground, _without_wander(evidence, allowed, request.alpha, len(ground.tried) + 1))
+    learns = request.wander is None
     found = search_window(
-        evidence, allowed, request.wander, request.alpha, limits.get(own), earlier.found if earlier else None
+        ground.evidence,
+        ground.allowed,
+        Wander.of(ground.evidence) if request.wander is None else request.wander,
+        request.alpha,
+        limits.get(own),
+        # A fit that learns its scatter has signatures of its own each time.
+        None if learns or earlier is None else earlier.found,
+        tell_noise=not learns,
     )
     limits.setdefault(own, found.threshold)
     return _round(ground, found)

@@ -32,6 +32,7 @@ def search_window(
     alpha: float = FALSE_ALARM,
     limit: float | None = None,
     earlier: Search[E] | None = None,
+    tell_noise: bool = True,
 ) -> Search[E]:
     """Find the models that the data leave probable, and choose of them what is told.
 
@@ -49,11 +50,13 @@ def search_window(
         That threshold, where it is known.
     earlier : Search, optional
         About a point that differs little, with the same signatures or the first ones of them.
+    tell_noise : bool
+        Noise with a memory is told; without it is a rival of effects alone, for a fit that learns its scatter as white.
     """
     joint = earlier.joint if earlier else None
     found = posterior(evidence, allowed, wander, joint, earlier.posterior if earlier else None)
     board = found.board
-    terms = told_noise(found)
+    terms = told_noise(found) if tell_noise else ()
     noisy = in_noise(board, terms)
     problem = Problem(noisy)
     first = problem.scan([], 1.0)

@@ -10,6 +10,7 @@ from typing import Generic
 import numpy as np
 
 from sdimu_calibration.core.arrays import Floats, Ints
+from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.evidence.candidate import Candidate
 from sdimu_calibration.core.evidence.joint_information import Joint
 from sdimu_calibration.core.evidence.learned_noise import Wander
@@ -31,6 +32,11 @@ _TIE = 0.5
 same would go to and fro."""
 _HOPEFUL = 15.0
 """Log posterior (1) behind the best model up to which effects are looked for in a noise: more do not make up for it."""
+_HOPED = 8.0
+"""Log posterior (1) that a candidate may be short of a place in the model for its time constant to be sharpened: between
+two of a scan it may gain as much."""
+_MOST_HOPED = 3
+"""Number of candidates outside the model that are sharpened at most: each takes signatures of its own."""
 _NOISES = 6
 """Number of noises in which effects are looked for, the likeliest first: each takes a climb."""
 
@@ -202,8 +208,9 @@ def posterior(
     )
     tried = None if before is None else before.tried
     noises, members = _climbed(board, [start], tried)
+    asked: set[str] = set()
     while True:
-        sharper = _sharpened(board, members, noises[0])
+        sharper = _sharpened(board, members, noises[0]) or _hoped(board, members, noises[0], asked)
         if sharper is None:
             break
         board, starts = sharper
@@ -313,9 +320,7 @@ def _sharpened(board: Board[E], members: Members, noise: NoiseModel) -> tuple[Bo
         effect = board.finer_variant(beside, apart.index(place), noise)
         if effect is None:
             continue
-        evidence = board.evidence.with_effects([effect])
-        added = len(evidence.names) - 1
-        finer = Board(evidence, np.append(board.allowed, added), board.finer | {added}, board.wander, board.joint)
+        finer, added = _with_finer(board, effect)
         places = {int(k): i for i, k in enumerate(finer.use.tolist())}
         if added not in places:
             continue
@@ -323,3 +328,40 @@ def _sharpened(board: Board[E], members: Members, noise: NoiseModel) -> tuple[Bo
         both = [range(len(members)), apart] if len(apart) < len(members) else [range(len(members))]
         return finer, [tuple(sorted((places[columns[k]], members[k][1]) for k in kept)) for kept in both]
     return None
+
+
+def _hoped(
+    board: Board[E], members: Members, noise: NoiseModel, asked: set[str]
+) -> tuple[Board[E], list[Members]] | None:
+    """Put a time or time constant between those of the scan beside a model that its neighbours nearly enter.
+
+    `asked` are the labels of those that were looked at; board and starts as of `_sharpened`, None where none is worth
+    it.
+    """
+    gains = board.data(noise)[1].at(members).gains()
+    first = len(board.evidence.weight)
+    for number in np.argsort(-gains.max(axis=1)).tolist():
+        if not gains[number].max() > -_HOPED or len(asked) >= _MOST_HOPED:
+            break
+        column = int(board.use[number])
+        candidate = board.evidence.candidates[column - first]
+        if candidate.effect.nearer is None or column in board.finer or candidate.label in asked:
+            continue
+        asked.add(candidate.label)
+        own = (number, int(np.argmax(gains[number])))
+        effect = board.finer_variant((*members, own), len(members), noise)
+        if effect is None:
+            continue
+        finer, added = _with_finer(board, effect)
+        places = {int(k): i for i, k in enumerate(finer.use.tolist())}
+        if added in places:
+            kept = [(places[c], m[1]) for c, m in zip(board.columns(members), members, strict=True)]
+            return finer, [tuple(sorted((*kept, (places[added], own[1])))), tuple(sorted(kept))]
+    return None
+
+
+def _with_finer(board: Board[E], effect: Effect) -> tuple[Board[E], int]:
+    """Add a variant between those of the scan: the board with it, and its column."""
+    evidence = board.evidence.with_effects([effect])
+    added = len(evidence.names) - 1
+    return Board(evidence, np.append(board.allowed, added), board.finer | {added}, board.wander, board.joint), added
