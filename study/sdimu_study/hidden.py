@@ -113,7 +113,7 @@ def score(world: Hidden, found: Diagnosis) -> dict[str, Any]:
     drawn, sensor = world.drawn, world.sensor
     scanned = scan(found.evidence.information, found.evidence.model, found.evidence.weight)
     named = classes(found)
-    accepted = [s for s in found.found.steps if s.accepted]
+    accepted = found.found.steps
     catalogue = [k for k in range(len(found.evidence.weight), int(found.free[0])) if np.isfinite(scanned.sigma[k])]
     return {
         "kind": drawn.kind,
@@ -134,8 +134,6 @@ def score(world: Hidden, found: Diagnosis) -> dict[str, Any]:
             {
                 "label": s.label,
                 "z": s.z,
-                "accepted": s.accepted,
-                "reason": s.reason,
                 "log_bayes": s.log_bayes_factor,
                 "gain": s.held_out_gain,
                 "error": s.held_out_error,

@@ -24,7 +24,7 @@ from sdimu_calibration.core.data.arrival import RawStatus, RawTest, until
 from sdimu_calibration.core.diagnosis import rounds
 from sdimu_calibration.core.diagnosis.diagnose import climb
 from sdimu_calibration.core.diagnosis.live_diagnosis import LiveDiagnosis
-from sdimu_calibration.core.diagnosis.window_search import search_window
+from sdimu_calibration.core.diagnosis.search import search
 from sdimu_calibration.core.estimation.solve import solve
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.nodes.credits import HISTORY
@@ -89,11 +89,11 @@ def test_all_data_are_ranked_as_the_first_scan_of_a_diagnosis_of_the_bag(raw, wh
     )
     searches = []
 
-    def seen(*arguments):
-        searches.append(search_window(*arguments))
+    def seen(*arguments, **more):
+        searches.append(search(*arguments, **more))
         return searches[-1]
 
-    monkeypatch.setattr(rounds, "search_window", seen)
+    monkeypatch.setattr(rounds, "search", seen)
     climb(solve(open_test(tmp_path / "bag", "daejeon", load_imu("dtg")), load_model("baseline")))
     evidence, first, limit = searches[0].evidence, searches[0].first, searches[0].threshold
     scanned = {

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
     from sdimu_calibration.core.diagnosis.found import DetectableSize, Found
     from sdimu_calibration.core.diagnosis.ladder import Rung
-    from sdimu_calibration.core.diagnosis.search import Step
+    from sdimu_calibration.core.diagnosis.step import Step
     from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary
 
 _TOP = 5
@@ -110,22 +110,17 @@ def _fall(f: Found) -> str:
 
 
 def step_lines(steps: Sequence[Step]) -> list[str]:
-    """Say what was added, or refused, a line each; then together what was taken out again, with the reason."""
+    """Say of each effect what it adds to those before it, and which coefficients were wrong without it."""
     lines: list[str] = []
-    out: dict[str, list[str]] = {}
     for number, s in enumerate(steps, start=1):
-        if s.taken_out:
-            out.setdefault(s.fate, []).append(f"{s.label} (step {number}, z {s.z:+.1f})")
-            continue
-        end = f"log score of stops left out {s.held_out_gain:+.0f} +- {s.held_out_error:.0f}"
         lines.append(
-            f"step {number}: {s.label} (z {s.z:+.1f}, threshold {s.threshold:.1f}, "
-            f"log Bayes factor {s.log_bayes_factor:.0f}; {end}) {s.fate}"
+            f"step {number}: {s.label} (z {s.z:+.1f}, threshold {s.threshold:.1f}, log Bayes factor "
+            f"{s.log_bayes_factor:.0f}; log score of stops left out {s.held_out_gain:+.0f} +- {s.held_out_error:.0f})"
         )
         moved = ", ".join(f"{name} {size:+.1f} sigma" for name, size in s.moved if abs(size) > 1.0)
-        if s.accepted and moved:
+        if moved:
             lines.append(f"  without it these were wrong: {moved}")
-    return lines + [f"{fate}: {', '.join(labels)}" for fate, labels in out.items()]
+    return lines
 
 
 def print_out_of_sight(console: Console, summary: DiagnosisSummary) -> None:

@@ -49,7 +49,7 @@ def _ladder(summary: DiagnosisSummary) -> str:
         ]
         for name, size, r in zip(names, sizes, d.rungs, strict=True)
     ]
-    tried = [grid(STEP_COLUMNS, [step_row(step) for step in d.found.steps], {0, 6})] if d.found.steps else []
+    tried = [grid(STEP_COLUMNS, [step_row(step) for step in d.found.steps], {0})] if d.found.steps else []
     return section(
         "Ladder of models",
         grid(_RUNGS, rows, {0}),

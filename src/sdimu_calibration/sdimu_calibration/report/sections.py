@@ -10,7 +10,7 @@ import numpy as np
 from sdimu_calibration.core.advice import Kind
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.diagnosis.ladder import Rung
-from sdimu_calibration.core.diagnosis.search import Step
+from sdimu_calibration.core.diagnosis.step import Step
 from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary
 from sdimu_calibration.core.evidence.consistency import Consistency
 from sdimu_calibration.core.results import Calibration
@@ -51,18 +51,17 @@ STEP_COLUMNS = (
     "log-likelihood gain",
     "log Bayes factor",
     "held-out log score",
-    "verdict",
 )
 
 
 def ladder(diagnosis: Diagnosis) -> str:
-    """Return the steps of the search: what each gains, which coefficients it moves, why the last was refused."""
+    """Return what was found, one at a time: what each gains, which coefficients it moves."""
     steps = diagnosis.found.steps
     if not steps:
         return sentence(_no_step(diagnosis))
     told = [item for step in steps for item in _told(step)]
     return (
-        grid(STEP_COLUMNS, [step_row(step) for step in steps], {0, 6})
+        grid(STEP_COLUMNS, [step_row(step) for step in steps], {0})
         + "<ul>"
         + "".join(f"<li>{prose(text)}</li>" for text in told)
         + "</ul>"
@@ -126,13 +125,12 @@ def step_row(step: Step) -> list[str]:
         f"{step.log_likelihood_gain:.1f}",
         f"{step.log_bayes_factor:.1f}",
         f"{step.held_out_gain:+.0f} \u00b1 {step.held_out_error:.0f}",
-        step.fate,
     ]
 
 
 def _told(step: Step) -> list[str]:
     moved = ", ".join(f"{name} by {size:+.1f} sigma" for name, size in step.moved if abs(size) >= 0.5)
-    out = [f"{step.label}, while missing, pulled {moved}."] if moved and step.accepted and not step.taken_out else []
+    out = [f"{step.label}, while missing, pulled {moved}."] if moved else []
     if step.alike:
         out.append(f"These data cannot separate {step.label} from {', '.join(step.alike[:6])}.")
     return out

@@ -11,9 +11,7 @@ import pytest
 from rate_table_sim.core import TableSpecification
 from sdimu_calibration.core.diagnosis.diagnose import climb
 from sdimu_calibration.core.diagnosis.ground import Request, fresh_ground
-from sdimu_calibration.core.diagnosis.pairs import best_pair
-from sdimu_calibration.core.diagnosis.problem import Problem
-from sdimu_calibration.core.diagnosis.search import FALSE_ALARM
+from sdimu_calibration.core.diagnosis.search import FALSE_ALARM, search
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.estimation.solve import solve
 from sdimu_calibration.core.specification import Site
@@ -53,70 +51,28 @@ def evidence():
     return whole.evidence.only(whole.allowed)
 
 
+def drawn(evidence, e):
+    """Evidence with other measurements, and nothing known of its coefficients."""
+    known = replace(evidence.information, d=evidence.W.T @ e)
+    return replace(evidence, e=e, shift=np.zeros(len(evidence.shift)), worked_out=known)
+
+
 def test_noise_makes_no_pairs(evidence):
     """Two of a hundred are bearable; six and more are chance in one trial of sixty."""
     rng = np.random.default_rng(7)
-    made = 0
-    for _ in range(100):
-        problem = Problem(replace(evidence, e=rng.standard_normal(len(evidence.e))))
-        problem.evidence.__dict__["information"] = replace(evidence.information, d=evidence.W.T @ problem.evidence.e)
-        columns = np.arange(problem.p, len(evidence.names))
-        made += best_pair(problem, [], columns, LIMIT) is not None
-    assert made < 6
+    columns = np.arange(len(evidence.weight), len(evidence.names))
+    told = [
+        len(search(drawn(evidence, rng.standard_normal(len(evidence.e))), columns, limit=LIMIT).chosen)
+        for _ in range(100)
+    ]
+    assert sum(count > 1 for count in told) < 6
+    assert sum(count > 0 for count in told) < 6
 
 
-def test_a_pair_takes_the_place_of_what_stood_for_both(evidence):
+def test_a_pair_takes_the_place_of_what_stands_for_both(evidence):
     first, second = (evidence.names.index(name) for name in HIDDEN)
     rng = np.random.default_rng(8)
-    size = np.array([-3.3e-3, 1.2e-4])
-    e = evidence.W[:, [first, second]] @ size + rng.standard_normal(len(evidence.e))
-    changed = replace(evidence, e=e)
-    changed.__dict__["information"] = replace(evidence.information, d=evidence.W.T @ e)
-    problem = Problem(changed)
-    stands_for_both = evidence.names.index("gyro_misalignment_asymmetry_yx")
-    columns = np.arange(problem.p, len(evidence.names))
-    found = best_pair(problem, [stands_for_both], columns, LIMIT)
-    assert found is not None
-    assert found.others == ()
-    assert set(found.pair) == {first, second}
-    assert found.worth > 0.0
-
-
-def fall_of_chi_square(problem: Problem, columns: list[int]) -> float:
-    """By least squares with and without columns, priors as rows."""
-    evidence = problem.evidence
-    known, weight, _ = problem.known(columns)
-    left = []
-    for keep in (slice(0, problem.p), slice(0, problem.p + len(columns))):
-        W = np.vstack([evidence.W[:, known[keep]], np.diag(np.sqrt(weight[keep]))])
-        e = np.concatenate([evidence.e, np.zeros(W.shape[1])])
-        unit = np.linalg.norm(W, axis=0)
-        left.append(np.sum((e - W @ (np.linalg.lstsq(W / unit, e, rcond=None)[0] / unit)) ** 2))
-    return float(left[0] - left[1])
-
-
-@pytest.mark.parametrize("scale", [1.0, 1.5])
-def test_a_pair_is_worth_the_likelihood_it_gains_less_the_cost_of_all_pairs(evidence, scale):
-    """A hundred to three hundred effects of motion make pairs that cost ln(m / 0.02) of 12.4 to 14.6."""
-    first, second = (evidence.names.index(name) for name in HIDDEN)
-    rng = np.random.default_rng(9)
-    e = evidence.W[:, [first, second]] @ np.array([-6.6e-3, 2.4e-4]) + rng.standard_normal(len(evidence.e))
-    changed = replace(evidence, e=e, shift=np.zeros(len(evidence.shift)))
-    changed.__dict__["information"] = replace(evidence.information, d=evidence.W.T @ e)
-    problem = Problem(changed)
-    found = best_pair(problem, [], np.arange(problem.p, len(evidence.names)), LIMIT, scale)
-    assert found is not None
-    gain = 0.5 * fall_of_chi_square(problem, list(found.pair)) / scale**2
-    assert gain > 20.0
-    assert 12.4 < gain - found.worth < 14.6
-
-
-def test_what_the_scale_of_the_noise_explains_is_no_pair(evidence):
-    first, second = (evidence.names.index(name) for name in HIDDEN)
-    e = evidence.W[:, [first, second]] @ np.array([-3.3e-3, 1.2e-4])
-    changed = replace(evidence, e=e)
-    changed.__dict__["information"] = replace(evidence.information, d=evidence.W.T @ e)
-    problem = Problem(changed)
-    columns = np.arange(problem.p, len(evidence.names))
-    assert best_pair(problem, [], columns, LIMIT) is not None
-    assert best_pair(problem, [], columns, LIMIT, scale=5.0) is None
+    e = evidence.W[:, [first, second]] @ np.array([-3.3e-3, 1.2e-4]) + rng.standard_normal(len(evidence.e))
+    columns = np.arange(len(evidence.weight), len(evidence.names))
+    found = search(drawn(evidence, e), columns, limit=LIMIT)
+    assert {found.evidence.names[c] for c in found.chosen} == set(HIDDEN)

@@ -12,9 +12,8 @@ from sdimu_calibration.core.adaptive.so_far import SoFar, so_far
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.diagnosis.found import looked_at
-from sdimu_calibration.core.diagnosis.problem import Problem
+from sdimu_calibration.core.diagnosis.problem import Problem, look_alikes
 from sdimu_calibration.core.diagnosis.scan import INDISTINGUISHABLE
-from sdimu_calibration.core.diagnosis.search import look_alikes
 from sdimu_calibration.core.effects import body_frame
 from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.estimation.fit import Fit

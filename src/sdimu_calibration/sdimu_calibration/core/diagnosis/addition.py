@@ -15,9 +15,7 @@ from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.diagnosis.advice import reason, telling_turn
 from sdimu_calibration.core.diagnosis.found import DetectableSize
 from sdimu_calibration.core.diagnosis.plan_seen import plan_seen
-from sdimu_calibration.core.diagnosis.problem import Problem
-from sdimu_calibration.core.diagnosis.rounds import LEAST_SIGMAS
-from sdimu_calibration.core.diagnosis.search import look_alikes
+from sdimu_calibration.core.diagnosis.problem import Problem, look_alikes
 from sdimu_calibration.core.estimation.fit import Fit
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.evidence.navigation_evidence import NavigationEvidence
@@ -31,6 +29,8 @@ _CONTRADICTED = 4.5
 000 there."""
 _FALLS = 1e-4
 """Share (1) by which an error must fall: less is the rounding of the passes."""
+LEAST_SIGMAS = 3.0
+"""Size of an effect in the fit (sigma) below which nothing says that it is there: chance ends there."""
 _MOST = 5
 """Number of look-alikes that are named: more do not fit into a line."""
 

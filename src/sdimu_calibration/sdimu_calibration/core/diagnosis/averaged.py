@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from sdimu_calibration.core.arrays import Floats
-from sdimu_calibration.core.diagnosis.model_doubt import in_doubt
 from sdimu_calibration.core.diagnosis.rounds import Round
 from sdimu_calibration.core.estimation.fit import Fit
 from sdimu_calibration.core.posterior.coefficients import Averages
@@ -23,7 +22,7 @@ def over_all_models(base: Fit, done: Round) -> Fit:
     """
     found = done.found.posterior
     if found is None:
-        return in_doubt(base, done.fit, done.evidence, done.found.chosen, done.free, done.found.scale)
+        return done.fit
     averages = Averages(found.board, base.dwell_means)
     places = {column: k for k, column in enumerate(found.board.columns(found.told.members))}
     told = tuple(sorted(found.told.members[places[int(c)]] for c in done.found.chosen))

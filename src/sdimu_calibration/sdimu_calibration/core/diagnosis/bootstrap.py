@@ -14,7 +14,7 @@ from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.diagnosis.found import looked_at
 from sdimu_calibration.core.diagnosis.free_input_test import free_input_test
-from sdimu_calibration.core.diagnosis.search import FALSE_ALARM, search
+from sdimu_calibration.core.diagnosis.search import search
 from sdimu_calibration.core.evidence.information import Information
 from sdimu_calibration.core.progress import Progress
 
@@ -82,7 +82,7 @@ def bootstrap(d: Diagnosis, draws: int, seed: int = 1, progress: Progress | None
             e = e + evidence.noise @ rng.standard_normal(evidence.noise.shape[1])
         known = Information(J, evidence.W.T @ evidence.weighed(e[:, None])[:, 0])
         part = replace(evidence, e=e, shift=np.zeros(len(evidence.weight)), worked_out=known)
-        found = search(part, columns, FALSE_ALARM)
+        found = search(part, columns, limit=d.found.threshold)
         finds += int(len(found.chosen) > 0)
         z = found.first.z[np.isfinite(found.first.sigma)]
         largest.append(float(np.max(np.abs(z), initial=0.0)))

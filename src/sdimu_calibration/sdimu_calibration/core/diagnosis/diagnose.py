@@ -6,7 +6,7 @@ free-input test; equations outside the catalogue; refit of what was found. Desig
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,13 +16,11 @@ from sdimu_calibration.core.diagnosis.averaged import over_all_models
 from sdimu_calibration.core.diagnosis.free_input_test import FreeInputTest
 from sdimu_calibration.core.diagnosis.ground import Request
 from sdimu_calibration.core.diagnosis.ladder import Rung, ladder
-from sdimu_calibration.core.diagnosis.problem import Problem
 from sdimu_calibration.core.diagnosis.rounds import UNEXPLAINED_P, Round, in_found_noise, search_until_stable
 from sdimu_calibration.core.diagnosis.screen import Finding, screen
-from sdimu_calibration.core.diagnosis.search import FALSE_ALARM, MOST_STEPS, Search, look_alikes, patchwork
+from sdimu_calibration.core.diagnosis.search import FALSE_ALARM, Search, alike_in_window
 from sdimu_calibration.core.diagnosis.verdict import Facts, sentence, verdict
 from sdimu_calibration.core.diagnosis.white_noise import without_memory
-from sdimu_calibration.core.diagnosis.window_search import alike_in_window
 from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.error_figures import degrees_of_freedom, held_out_judged, nis_judged
 from sdimu_calibration.core.estimation.fit import NOT_CONVERGED, Fit
@@ -57,6 +55,8 @@ _MISFIT = 0.05
 _MISFIT_SIGMAS = 5.0
 """Excess of the NIS (standard deviations of it) up to which a model fits: in a short test chance goes beyond
 `_MISFIT`."""
+_PATCHES = 3
+"""Number of drifts of one bias from which they are a patchwork: together they follow any wander."""
 _TO_AND_FRO = (
     "the search for missing effects went to and fro between choices that explain about the same, and was ended: of "
     "these one is named, and another may be right"
@@ -233,7 +233,7 @@ def climb(
     # Wrong samples in turns leave noise that looks drawn anew in each turn.
     spoilt = any(finding.kind == "spike" for finding in findings)
     drawn = not spoilt and any(term.is_drawn for term in done.found.noise)
-    unexplained = done.left_after.p_value < UNEXPLAINED_P or still or loud or drawn or patched(done)
+    unexplained = done.left_after.p_value < UNEXPLAINED_P or still or loud or drawn or patchwork(done.chosen)
     noise += tuple(term_in_words(term) for term in done.found.noise)
     rungs = ladder(as_given, widened, done, progress) if refits or base.learns_scatter else ()
     facts = Facts(done.found, done.chosen, alike_first(done), findings, noise, own, unexplained)
@@ -296,14 +296,10 @@ def in_measured_noise(fit: Fit, progress: Progress = silent) -> tuple[Fit, Consi
 
 def alike_first(of: Round | Diagnosis) -> tuple[str, ...]:
     """Labels of what the data cannot tell from the first effect of a choice, the others being in the model."""
-    chosen, evidence = of.found.chosen, of.evidence
+    chosen = of.found.chosen
     if not len(chosen):
         return ()
-    allowed = np.setdiff1d(np.arange(len(evidence.weight), len(evidence.names)), of.free)
-    if of.found.posterior is not None:
-        return alike_in_window(of.found.posterior, int(chosen[0]))
-    found = look_alikes(Problem(evidence), chosen.tolist(), int(chosen[0]), allowed, of.found.scale)
-    return tuple(evidence.names[i] for i in found)
+    return alike_in_window(of.found.posterior, int(chosen[0])) if of.found.posterior else ()
 
 
 def misfit(final: Calibration, consistency: Consistency, stated: ImuSpecification, taken: ImuSpecification) -> float:
@@ -333,10 +329,11 @@ def largest_misfit(dof: float) -> float:
     return max(_MISFIT, _MISFIT_SIGMAS / float(np.sqrt(dof)))
 
 
-def patched(done: Round) -> bool:
-    """Whether the choice is a patchwork: the search ran out of steps, or one bias drifts by three effects at once."""
-    steps = done.found.steps
-    return patchwork(done.chosen) or (len(steps) >= MOST_STEPS and steps[-1].accepted)
+def patchwork(chosen: Iterable[Candidate]) -> bool:
+    """Whether one bias drifts by so many effects at once that they follow any wander and say nothing of its cause."""
+    drifts = {(c.family, c.effect.variant, c.effect.terms[0].channel) for c in chosen if c.effect.bias_drift}
+    of_sensor = [sensor for _, _, sensor in drifts]
+    return any(of_sensor.count(sensor) >= _PATCHES for sensor in of_sensor)
 
 
 def measured_noise(consistency: Consistency, fit: Fit) -> tuple[tuple[str, ...], ImuSpecification]:

@@ -14,7 +14,6 @@ from sdimu_calibration.core.diagnosis.free_input_test import free_input_test
 from sdimu_calibration.core.diagnosis.ladder import error_ladder
 from sdimu_calibration.core.diagnosis.problem import Problem
 from sdimu_calibration.core.diagnosis.scan import POWER_80, scan
-from sdimu_calibration.core.diagnosis.search import look_alikes
 from sdimu_calibration.core.evidence.candidate import Candidate
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.posterior.told import Share, may_be
@@ -91,7 +90,7 @@ def found_effects(d: Diagnosis) -> tuple[Found, ...]:
         scores = problem.scores(scanned, d.found.scale)
         z = float(scanned.z[column])
         count = int(np.isfinite(scanned.sigma[allowed]).sum())
-        others = _alike(d, problem, column, allowed)
+        others = _alike(d, column)
         out.append(
             Found(
                 candidate=d.chosen[k],
@@ -112,11 +111,11 @@ def found_effects(d: Diagnosis) -> tuple[Found, ...]:
     return tuple(out)
 
 
-def _alike(d: Diagnosis, problem: Problem[LinearEvidence], column: int, allowed: Ints) -> list[int]:
+def _alike(d: Diagnosis, column: int) -> list[int]:
     """Columns that the data cannot tell from a chosen one, the likeliest first."""
     window = d.found.posterior
     if window is None:
-        return look_alikes(problem, d.found.chosen.tolist(), column, allowed, d.found.scale)
+        return []
     return [int(window.board.use[number]) for number in window.classes[window.place_of(column)]]
 
 

@@ -10,7 +10,7 @@ from typing import Generic
 import numpy as np
 
 from sdimu_calibration.core.arrays import Floats, Ints
-from sdimu_calibration.core.diagnosis.scan import Scan, scan, threshold
+from sdimu_calibration.core.diagnosis.scan import Scan, alike, scan, threshold
 from sdimu_calibration.core.evidence.candidate import Candidate
 from sdimu_calibration.core.evidence.held_out import HeldOut, predict
 from sdimu_calibration.core.evidence.linear import E
@@ -175,3 +175,33 @@ class Problem(Generic[E]):
         """Predict each stop from the others with the chosen columns in the model; `scale` as for `scan`."""
         known, weight, shift = self.known(chosen)
         return predict(self.evidence, known, weight, shift, scale)
+
+
+def look_alikes(problem: Problem[E], chosen: Sequence[int], column: int, allowed: Ints, scale: float) -> list[int]:
+    """Columns that the data cannot tell from a chosen one, all others chosen being in the model.
+
+    Parameters
+    ----------
+    problem : Problem
+    chosen : sequence of int
+        Columns of everything that was chosen.
+    column : int
+        The one of them.
+    allowed : ndarray of int, shape (a,)
+        Columns among which they are looked for.
+    scale : float
+        Residual noise over specified noise.
+
+    Returns
+    -------
+    list of int
+        Columns, the highest score first.
+    """
+    others = [c for c in chosen if c != column]
+    # What else was found says which is the likelier cause, not what the data tell apart.
+    scores = problem.scores(problem.scan(others, scale), scale)
+    outside = np.ones(len(scores), dtype=bool)
+    outside[allowed] = False
+    outside[column] = False
+    scores[outside] = -np.inf
+    return alike(scores, column)

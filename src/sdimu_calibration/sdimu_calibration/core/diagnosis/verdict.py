@@ -75,8 +75,7 @@ def verdict(facts: Facts) -> Verdict:
         return Verdict.CLASS_OF_EFFECTS if facts.alike else Verdict.ONE_EFFECT
     if facts.noise:
         return Verdict.NOISE_MODEL_WRONG
-    # Something stood out of the noise and was refused or did not last.
-    return Verdict.UNEXPLAINED if facts.found.steps else Verdict.CONSISTENT
+    return Verdict.CONSISTENT
 
 
 def sentence(d: Diagnosis) -> str:
@@ -136,7 +135,7 @@ def _consistent(d: Diagnosis) -> str:
 
 def _unexplained(d: Diagnosis, names: str) -> str:
     if d.rungs and d.rungs[-1].scatter is not None:
-        most = f", {d.found.steps[0].label} most, but adding it does not help" if d.found.steps else ""
+        most = f", {d.found.steps[0].label} most" if d.found.steps else ""
         left = beyond(d.rungs[-1].scatter)
         return f"Something stands out of the scatter{most}; beyond white noise: {left}."
     drawn = [term_in_words(term) for term in d.found.noise]

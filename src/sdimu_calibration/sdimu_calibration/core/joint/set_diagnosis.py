@@ -54,6 +54,8 @@ class SetFinding:
     unit, display_unit : str
     alike : tuple of str
         What the set cannot tell from it.
+    probability : float
+        That it or one of these is in all recordings; NaN of an effect of one recording.
     """
 
     label: str
@@ -65,6 +67,7 @@ class SetFinding:
     unit: str
     display_unit: str
     alike: tuple[str, ...]
+    probability: float = float("nan")
 
 
 @dataclass(frozen=True)
@@ -168,7 +171,10 @@ def _findings(found: SetSearch) -> tuple[SetFinding, ...]:
     values, sigma = found.after.estimate.values, np.sqrt(np.diag(found.after.estimate.covariance))
     names = list(found.after.names)
     shared = [
-        (c.label, c.effect.title, "", place_of(names, c), z, c.parameter, found.alike.get(c.label, ()))
+        (
+            *(c.label, c.effect.title, "", place_of(names, c), z, c.parameter),
+            *(found.alike.get(c.label, ()), found.probability.get(c.label, float("nan"))),
+        )
         for c, z in zip(found.chosen, found.z, strict=True)
     ]
     own = []
@@ -177,12 +183,13 @@ def _findings(found: SetSearch) -> tuple[SetFinding, ...]:
         parameter = effect.parameters[0]
         called = (tagged(name, find.recording) for name in (find.key, parameter.name))
         place = next(names.index(name) for name in called if name in names)
-        own.append((find.key, effect.title, find.recording, place, find.z, parameter, ()))
+        own.append((find.key, effect.title, find.recording, place, find.z, parameter, (), float("nan")))
     return tuple(
         SetFinding(
-            label, title, recording, float(values[k]), float(sigma[k]), float(z), p.unit, p.display_unit, tuple(alike)
+            *(label, title, recording, float(values[k]), float(sigma[k]), float(z), p.unit, p.display_unit),
+            *(tuple(alike), probability),
         )
-        for label, title, recording, k, z, p, alike in (*shared, *own)
+        for label, title, recording, k, z, p, alike, probability in (*shared, *own)
     )
 
 

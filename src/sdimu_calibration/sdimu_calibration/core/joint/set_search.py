@@ -15,7 +15,7 @@ import numpy as np
 from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.diagnosis.candidates import catalogue, without
 from sdimu_calibration.core.diagnosis.problem import Problem
-from sdimu_calibration.core.diagnosis.search import FALSE_ALARM, LOG_BAYES, Search, look_alikes, search
+from sdimu_calibration.core.diagnosis.search import FALSE_ALARM, Search, search, with_steps
 from sdimu_calibration.core.effects import selection
 from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.effects.imu_model import prior_size
@@ -28,6 +28,8 @@ from sdimu_calibration.core.joint.scope import by_name, is_shared, split_tag
 from sdimu_calibration.core.joint.set_evidence import SetEvidence, set_evidence, white_power_on
 from sdimu_calibration.core.joint.set_fit import Run, SetFit, SetOptions, fit_set, power_on, with_own, with_reports
 from sdimu_calibration.core.joint.set_standing import set_standing
+from sdimu_calibration.core.posterior.posterior import Posterior, posterior
+from sdimu_calibration.core.posterior.told import of_coefficients
 from sdimu_calibration.core.probability import normal_limit
 from sdimu_calibration.core.progress import Progress, silent
 from sdimu_calibration.core.recording import DataError
@@ -48,6 +50,8 @@ length."""
 _ACCUSED = 1e-3
 """Probability that noise puts one candidate of one recording over its threshold: a recording that is accused is looked
 at again, and no other recording can speak for it."""
+_LOG_BAYES = 3.0
+"""Least log Bayes factor (1) of an effect of one recording: odds of 20 to 1, "strong" on Jeffreys' scale."""
 _WIDE = 3.0
 """Factor on the physical prior of a candidate (1): a sensor may be out of its class, as in the search of one
 recording."""
@@ -83,13 +87,17 @@ class SetSearch:
         Score of each when it was found.
     alike : mapping
         By label, what the set cannot tell from it.
+    probability : mapping
+        By label, that it or one of these is in all recordings (1).
     local : tuple of LocalFind
     threshold : float
         Score that noise reaches in a scan of the joint evidence.
     first : Search
-        Of the first round: its scan and its refused step, if there is one.
+        Of the first round: its scan.
     standing : Standing
         What the set knows of the unit.
+    posterior : Posterior or None
+        The models that all recordings together leave probable.
     """
 
     before: SetFit
@@ -97,10 +105,12 @@ class SetSearch:
     chosen: tuple[Candidate, ...]
     z: tuple[float, ...]
     alike: dict[str, tuple[str, ...]]
+    probability: dict[str, float]
     local: tuple[LocalFind, ...]
     threshold: float
     first: Search[SetEvidence]
     standing: Standing
+    posterior: Posterior[SetEvidence] | None = None
 
 
 def search_set(
@@ -141,9 +151,9 @@ def search_set(
         full = _gathered(fit, effects, run)
         evidence = set_evidence(full, [c for effect in effects for c in split(effect)])
         p, single = len(evidence.weight), _singles(evidence)
-        found = search(evidence, single, alpha)
+        found = with_steps(search(evidence, single, alpha=alpha))
         if len(found.steps) > 1 and _far_off(full, found):
-            found = search(evidence, single, alpha, most=1)
+            found = replace(found, chosen=found.chosen[:1], steps=found.steps[:1])
         first = first or found
         new = [evidence.candidates[i - p] for i in found.chosen]
         nearer = _nearer(new, finer)
@@ -155,7 +165,7 @@ def search_set(
         odd = None if new else _odd_one(full, evidence, found.chosen)
         if not new and not odd:
             break
-        scores |= {s.label: s.z for s in found.steps if s.accepted}
+        scores |= {s.label: s.z for s in found.steps}
         if odd:
             local.append(odd)
             own = {**options.local, odd.recording: (*options.local.get(odd.recording, ()), odd.key)}
@@ -168,22 +178,28 @@ def search_set(
         raise AssertionError("a search has one round at least")
     fit, kept = _without_small(members, options, run, fit, chosen, progress)
     alike: dict[str, tuple[str, ...]] = {}
+    probability: dict[str, float] = {}
+    window = first.posterior
     at_end = set_evidence(fit, ())
     if kept:
         effects = _candidates(fit, extra, [])
         full = _gathered(fit, effects, run)
         at_end = set_evidence(full, [c for effect in effects for c in split(effect)])
-        alike = _alike(at_end, kept)
+        window = _weighed(at_end, kept)
+        for label in kept:
+            alike[label], probability[label] = _class(window, label)
     return SetSearch(
         before,
         fit,
         tuple(kept.values()),
         tuple(scores.get(label, float("nan")) for label in kept),
         alike,
+        probability,
         tuple(local),
         first.threshold,
         first,
         set_standing(fit, at_end, kept, alike),
+        window,
     )
 
 
@@ -206,7 +222,7 @@ def as_given(found: SetSearch, options: SetOptions, run: Run) -> SetSearch:
             local[find.recording] = (*local.get(find.recording, ()), find.key)
         fit = fit_set(fit.members, replace(options, local=local), run, fit)
     standing = set_standing(fit, set_evidence(fit, ()), {}, {})
-    return replace(found, after=fit, chosen=(), z=(), alike={}, standing=standing)
+    return replace(found, after=fit, chosen=(), z=(), alike={}, probability={}, standing=standing)
 
 
 def _singles(evidence: SetEvidence) -> Ints:
@@ -292,32 +308,28 @@ def _nearer(new: Sequence[Candidate], tried: Sequence[Effect]) -> list[Effect]:
     return variants
 
 
-def _alike(evidence: SetEvidence, found: Mapping[str, Candidate]) -> dict[str, tuple[str, ...]]:
-    """Name what the set cannot tell from each effect that was found, all others being in the model.
+def _weighed(evidence: SetEvidence, found: Mapping[str, Candidate]) -> Posterior[SetEvidence]:
+    """Weigh what was found, and all else, about the fit that has all of it.
 
-    It is asked where the model has all of them: before, a strong effect hides what tells another one apart.
+    Before, a strong effect hides what tells another one apart.
     """
     tried = [replace(c, effect=replace(c.effect, nearer=None)) for c in found.values()]
     columns = np.array([place_of(evidence.names, c) for c in tried], dtype=np.int64)
     open_again = evidence.as_candidates(columns, tried)
-    problem = Problem(open_again)
-    chosen = list(range(problem.p, problem.p + len(tried)))
-    allowed = np.union1d(_singles(open_again), chosen).astype(np.int64)
-    return {
-        label: tuple(
-            open_again.names[i]
-            for i in look_alikes(problem, chosen, c, allowed, problem.scale(chosen))
-            if not _same_effect(open_again, c, i)
-        )
-        for label, c in zip(found, chosen, strict=True)
-    }
+    first = len(open_again.weight)
+    allowed = np.union1d(_singles(open_again), np.arange(first, first + len(tried))).astype(np.int64)
+    return posterior(open_again, allowed, None)
 
 
-def _same_effect(evidence: SetEvidence, one: int, other: int) -> bool:
-    """Whether two columns are one coefficient with another time constant."""
-    p = len(evidence.weight)
-    first, second = evidence.candidates[one - p], evidence.candidates[other - p]
-    return first.family == second.family and first.parameter.name == second.parameter.name
+def _class(found: Posterior[SetEvidence], label: str) -> tuple[tuple[str, ...], float]:
+    """Say what the set cannot tell from a candidate, and the probability that it or any of them is there."""
+    for place, (number, _) in enumerate(found.told.members):
+        together = [found.candidate(k) for k in (number, *found.classes[place])]
+        own = next((c for c in together if c.label == label), None)
+        if own is not None:
+            others = (c for c in together if (c.family, c.parameter.name) != (own.family, own.parameter.name))
+            return tuple(c.label for c in others), found.of_class(place)
+    return (), next((s.probability for s in of_coefficients(found) if s.name == label), 0.0)
 
 
 def _odd_one(fit: SetFit, evidence: SetEvidence, chosen: Ints) -> LocalFind | None:
@@ -335,8 +347,8 @@ def _odd_one(fit: SetFit, evidence: SetEvidence, chosen: Ints) -> LocalFind | No
         members = [k for k, r in enumerate(fit.reports) if power_on(r) == name]
         for k, z, odds in _local_scores(fit, members, names, values, covariance):
             report = fit.reports[k]
-            top = int(np.argmax(np.where((np.abs(z) > limit) & (odds > LOG_BAYES), odds, -np.inf)))
-            if np.abs(z[top]) > limit and odds[top] > LOG_BAYES and (best is None or odds[top] > best[0]):
+            top = int(np.argmax(np.where((np.abs(z) > limit) & (odds > _LOG_BAYES), odds, -np.inf)))
+            if np.abs(z[top]) > limit and odds[top] > _LOG_BAYES and (best is None or odds[top] > best[0]):
                 key, recording = split_tag(_local_labels(report)[top])
                 best = (float(odds[top]), LocalFind(recording, key, float(z[top])))
     return None if best is None else best[1]

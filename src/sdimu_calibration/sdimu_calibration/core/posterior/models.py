@@ -87,6 +87,17 @@ class Expansion:
         """Posterior means of the sizes, in units of the prior sizes; shape (k,)."""
         return self._m
 
+    @property
+    def variances(self) -> Floats:
+        """Posterior variances of the sizes, in squares of the prior sizes.
+
+        Returns
+        -------
+        ndarray, shape (k,)
+            (1).
+        """
+        return np.diag(self._inverse)
+
     def gains(self) -> Floats:
         """Log posterior that each candidate adds, by width.
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Generic
@@ -33,8 +33,8 @@ same would go to and fro."""
 _HOPEFUL = 15.0
 """Log posterior (1) behind the best model up to which effects are looked for in a noise: more do not make up for it."""
 _HOPED = 8.0
-"""Log posterior (1) that a candidate may be short of a place in the model for its time constant to be sharpened: between
-two of a scan it may gain as much."""
+"""Log posterior (1) that a candidate may be short of a place in the model for its time constant to be sharpened:
+between two of a scan it may gain as much."""
 _MOST_HOPED = 3
 """Number of candidates outside the model that are sharpened at most: each takes signatures of its own."""
 _NOISES = 6
@@ -99,7 +99,7 @@ class Posterior(Generic[E]):
             return frozenset(alike)
         return frozenset(max(of_family.values(), key=self._any_of))
 
-    def _any_of(self, numbers: Collection[int]) -> float:
+    def _any_of(self, numbers: Iterable[int]) -> float:
         have = frozenset(numbers)
         return self.probability(lambda m: any(number in have for number, _ in m.members))
 

@@ -1,15 +1,26 @@
-"""What a window of models says in words and numbers: the probability of each effect, family, noise, and of nothing."""
+"""What a window of models says in numbers: the probability of nothing, of each family of effects, of each noise.
+
+A family holds what one error of one sensor may come from: every drift of a bias, else one effect of the registry with
+any time constant. Which of its members it is may be open while the family is certain.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
+from sdimu_calibration.core.effects.effect import CHANNELS
+from sdimu_calibration.core.evidence.candidate import Candidate
 from sdimu_calibration.core.evidence.linear import E
+from sdimu_calibration.core.noise_term import NoiseTerm
 from sdimu_calibration.core.posterior.posterior import Posterior, Weighed
 
-LEAST = 0.005
-"""Probability below which something is not told (1): it is one in two hundred."""
+LEAST = 0.01
+"""Probability below which something is not told (1): it is one in a hundred."""
+_MOST = 200
+"""Number of models whose sizes are worked out, the likeliest first: they hold nearly all of the probability."""
 
 
 @dataclass(frozen=True)
@@ -27,50 +38,186 @@ class Share:
 
 
 @dataclass(frozen=True)
+class MemberShare:
+    """A member of a family.
+
+    Attributes
+    ----------
+    label : str
+    probability : float
+        Of the models that hold it.
+    value, sigma : float
+        Its size over these models (SI).
+    unit, display_unit : str
+    """
+
+    label: str
+    probability: float
+    value: float
+    sigma: float
+    unit: str
+    display_unit: str
+
+
+@dataclass(frozen=True)
+class FamilyShare:
+    """A family of effects on a sensor.
+
+    Attributes
+    ----------
+    family : str
+        ``gyro_bias_drift`` for all that lets a bias drift, else the registry name of the effect; ``own`` of an
+        equation.
+    sensor : str
+        Such as ``gyro_y``; the triad where it acts on several axes of one, empty where on both.
+    probability : float
+        Of the models that hold a member of it.
+    members : tuple of MemberShare
+        The likeliest first; those of less than `LEAST` are left out.
+    """
+
+    family: str
+    sensor: str
+    probability: float
+    members: tuple[MemberShare, ...]
+
+
+@dataclass(frozen=True)
+class NoiseShare:
+    """A kind of noise with a memory.
+
+    Attributes
+    ----------
+    triad, kind : str
+    probability : float
+        Of the models that hold it.
+    size : float
+        Geometric mean over these models (SI, `unit`).
+    low, high : float
+        Ends of the interval of 95 % where the noise is told; NaN elsewhere.
+    unit : str
+    """
+
+    triad: str
+    kind: str
+    probability: float
+    size: float
+    low: float
+    high: float
+    unit: str
+
+
+@dataclass(frozen=True)
 class Probabilities:
-    """What the data say of all that may be missing in a model, the likeliest first; below `LEAST` nothing is told.
+    """What the data say of all that may be missing in a model, the likeliest first.
 
     Attributes
     ----------
     nothing : float
         Probability that no effect is missing.
-    families : tuple of Share
-        By registry name of the effect: on any axis, with any time constant.
-    effects : tuple of Share
-        By name of the coefficient: with any time constant.
-    noise : tuple of Share
-        Noise with a memory, by triad and kind.
+    families : tuple of FamilyShare
+    noise : tuple of NoiseShare
     """
 
     nothing: float
-    families: tuple[Share, ...]
-    effects: tuple[Share, ...]
-    noise: tuple[Share, ...]
+    families: tuple[FamilyShare, ...]
+    noise: tuple[NoiseShare, ...]
 
 
-def probabilities(found: Posterior[E]) -> Probabilities:
-    """Sum the weights of the models that hold each effect, family and kind of noise."""
-    q = len(found.board.use)
-    family = [found.candidate(k).family for k in range(q)]
-    name = [found.parameter(k) for k in range(q)]
-    return Probabilities(
-        found.nothing,
-        _summed(found, lambda m: (family[k] for k, _ in m.members)),
-        _summed(found, lambda m: (name[k] for k, _ in m.members)),
-        _summed(found, lambda m: (f"{t.triad} {t.kind}" for t in m.noise.terms)),
-    )
+def family_of(candidate: Candidate) -> tuple[str, str]:
+    """Name the family of a candidate, and its sensor, as `FamilyShare` has them."""
+    effect = candidate.effect
+    channels = sorted({term.channel for term in effect.terms})
+    triads = {CHANNELS[c].partition("_")[0] for c in channels}
+    sensor = CHANNELS[channels[0]] if len(channels) == 1 else triads.pop() if len(triads) == 1 else ""
+    drifts = effect.bias_drift and len(channels) == 1
+    return (f"{sensor[:-2]}_bias_drift" if drifts else candidate.family), sensor
+
+
+def probabilities(found: Posterior[E], told: Sequence[NoiseTerm] = ()) -> Probabilities:
+    """Sum the weights of the models that hold each family, each of its members, each kind of noise.
+
+    Parameters
+    ----------
+    found : Posterior
+    told : sequence of NoiseTerm
+        Noise with its intervals.
+    """
+    numbers = sorted({number for model in found.models for number, _ in model.members})
+    family = {k: family_of(found.candidate(k)) for k in numbers}
+    label = {k: found.candidate(k).label for k in numbers}
+    of_label = _summed(found, lambda m: (label[k] for k, _ in m.members))
+    of_family = _summed(found, lambda m: ("/".join(family[k]) for k, _ in m.members))
+    members: dict[str, list[MemberShare]] = {}
+    sizes = _sizes(found)
+    for k in numbers:
+        share = of_label[label[k]]
+        if share >= LEAST:
+            p = found.candidate(k).parameter
+            one = MemberShare(label[k], share, *sizes.get(k, (np.nan, np.nan)), p.unit, p.display_unit)
+            members.setdefault("/".join(family[k]), []).append(one)
+    families = []
+    for name, share in of_family.items():
+        if share >= LEAST:
+            word, _, sensor = name.partition("/")
+            ranked = sorted(members.get(name, ()), key=lambda m: -m.probability)
+            families.append(FamilyShare(word, sensor, share, tuple(ranked)))
+    return Probabilities(found.nothing, tuple(families), _noise(found, told))
+
+
+def of_coefficients(found: Posterior[E]) -> tuple[Share, ...]:
+    """Probability of each coefficient of an effect, with any time constant; those of less than `LEAST` are left out."""
+    name = {k: found.parameter(k) for m in found.models for k, _ in m.members}
+    return _shares(_summed(found, lambda m: (name[k] for k, _ in m.members)))
 
 
 def may_be(found: Posterior[E], place: int) -> tuple[Share, ...]:
     """Say what a member of the told model may be: each coefficient of its class, the likeliest first."""
     names = {k: found.parameter(k) for k in (found.told.members[place][0], *found.classes[place])}
-    return _summed(found, lambda m: (names[k] for k, _ in m.members if k in names))
+    return _shares(_summed(found, lambda m: (names[k] for k, _ in m.members if k in names)))
 
 
-def _summed(found: Posterior[E], names: Callable[[Weighed], Iterable[Hashable]]) -> tuple[Share, ...]:
+def _shares(total: dict[str, float]) -> tuple[Share, ...]:
+    return tuple(Share(name, p) for name, p in total.items() if p >= LEAST)
+
+
+def _summed(found: Posterior[E], names: Callable[[Weighed], Iterable[str]]) -> dict[str, float]:
+    """Probability of the models that have each name, the likeliest first."""
     total: dict[str, float] = {}
     for model in found.models:
-        for name in {str(one) for one in names(model)}:
-            total[name] = total.get(name, 0.0) + model.probability
-    ranked = sorted(total.items(), key=lambda item: (-item[1], item[0]))
-    return tuple(Share(name, min(p, 1.0)) for name, p in ranked if p >= LEAST)
+        for name in set(names(model)):
+            total[name] = min(total.get(name, 0.0) + model.probability, 1.0)
+    return dict(sorted(total.items(), key=lambda item: (-item[1], item[0])))
+
+
+def _sizes(found: Posterior[E]) -> dict[int, tuple[float, float]]:
+    """Mean and sigma of each member (SI) over the models that hold it."""
+    weight: dict[int, float] = {}
+    first: dict[int, float] = {}
+    second: dict[int, float] = {}
+    for model in found.models[:_MOST]:
+        near = found.board.data(model.noise)[1].at(model.members)
+        for (k, _), mean, variance in zip(model.members, near.sizes.tolist(), near.variances.tolist(), strict=True):
+            weight[k] = weight.get(k, 0.0) + model.probability
+            first[k] = first.get(k, 0.0) + model.probability * mean
+            second[k] = second.get(k, 0.0) + model.probability * (variance + mean**2)
+    out = {}
+    for k, w in weight.items():
+        mean, unit = first[k] / w, float(found.board.size[k])
+        out[k] = (mean * unit, float(np.sqrt(max(second[k] / w - mean**2, 0.0))) * unit)
+    return out
+
+
+def _noise(found: Posterior[E], told: Sequence[NoiseTerm]) -> tuple[NoiseShare, ...]:
+    total = _summed(found, lambda m: (f"{t.triad} {t.kind}" for t in m.noise.terms))
+    interval = {f"{t.triad} {t.kind}": (t.low, t.high) for t in told}
+    out = []
+    for name, share in total.items():
+        if share < LEAST:
+            continue
+        have = [(m.probability, t) for m in found.models for t in m.noise.terms if f"{t.triad} {t.kind}" == name]
+        size = float(np.exp(sum(p * np.log(t.size) for p, t in have) / sum(p for p, _ in have)))
+        term = have[0][1]
+        low, high = interval.get(name, (float("nan"), float("nan")))
+        out.append(NoiseShare(term.triad, term.kind, share, size, low, high, term.unit))
+    return tuple(out)

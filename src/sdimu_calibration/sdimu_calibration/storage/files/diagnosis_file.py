@@ -19,8 +19,8 @@ from sdimu_calibration.core.diagnosis.free_input_test import FreeInputTest
 from sdimu_calibration.core.diagnosis.ladder import Rung
 from sdimu_calibration.core.diagnosis.plan_seen import PlanSeen
 from sdimu_calibration.core.diagnosis.scan import Scan, scale_of, scan
-from sdimu_calibration.core.diagnosis.search import Step
 from sdimu_calibration.core.diagnosis.standing import standing
+from sdimu_calibration.core.diagnosis.step import Step
 from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary
 from sdimu_calibration.core.evidence.consistency import Noise
 from sdimu_calibration.core.evidence.linear import LinearEvidence
@@ -284,9 +284,6 @@ def step_of(s: Step) -> dict[str, Any]:
     return {
         "label": s.label,
         "effect": s.family,
-        "accepted": s.accepted,
-        "reason": s.reason,
-        "taken_out": s.taken_out,
         "z": s.z,
         "threshold": s.threshold,
         "estimate": s.estimate,

@@ -1,0 +1,122 @@
+"""What each effect that was found adds to those before it: score, size, prediction of stops left out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from sdimu_calibration.core.arrays import Floats
+from sdimu_calibration.core.diagnosis.problem import Problem
+from sdimu_calibration.core.diagnosis.scan import Scan, alike
+from sdimu_calibration.core.evidence.held_out import HeldOut, gain
+from sdimu_calibration.core.evidence.linear import E
+
+
+@dataclass(frozen=True)
+class Step:
+    """One rung of the ladder.
+
+    Attributes
+    ----------
+    label, family, unit, display_unit : str
+    z, threshold : float
+        Score beside those before it, and what noise reaches.
+    estimate, sigma : float
+        SI, with everything chosen up to this step.
+    log_likelihood_gain, log_bayes_factor : float
+    held_out_before, held_out_after : HeldOut
+    held_out_gain, held_out_error : float
+        Log score over all stops, and its standard error.
+    alike : tuple of str
+        Labels of candidates that the data cannot tell from it.
+    moved : tuple of (str, float)
+        Coefficients of the model that were most wrong while it was missing: their errors, in their own sigmas.
+    """
+
+    label: str
+    family: str
+    unit: str
+    display_unit: str
+    z: float
+    threshold: float
+    estimate: float
+    sigma: float
+    log_likelihood_gain: float
+    log_bayes_factor: float
+    held_out_before: HeldOut
+    held_out_after: HeldOut
+    held_out_gain: float
+    held_out_error: float
+    alike: tuple[str, ...]
+    moved: tuple[tuple[str, float], ...] = field(default=())
+
+
+def step_of(
+    problem: Problem[E],
+    scanned: Scan,
+    scores: Floats,
+    chosen: Sequence[int],
+    best: int,
+    limit: float,
+    before: HeldOut,
+    after: HeldOut,
+) -> Step:
+    """Say what a column adds to a choice.
+
+    Parameters
+    ----------
+    problem : Problem
+    scanned : Scan
+        With the choice in the model, the column not.
+    scores : ndarray, shape (p + q,)
+        Log posterior odds by that scan (1), as of `Problem.scores`.
+    chosen : sequence of int
+        Columns of the choice.
+    best : int
+        The column.
+    limit : float
+        Threshold of the scan.
+    before, after : HeldOut
+        Prediction of stops left out without and with the column.
+    """
+    evidence, p = problem.evidence, problem.p
+    candidate = evidence.candidates[best - p]
+    J, d = scanned.J[best], scanned.d[best]
+    bayes = float(scores[best])
+    # A fault of one turn is nowhere to be seen once the stop after it is left out; all others must gain by it.
+    apart = int(candidate.effect.options["turn"]) if "turn" in candidate.effect.options else None
+    won, error = gain(before, after, apart)
+    return Step(
+        label=candidate.label,
+        family=candidate.family,
+        unit=candidate.parameter.unit,
+        display_unit=candidate.parameter.display_unit,
+        z=float(scanned.z[best]),
+        threshold=limit,
+        estimate=float(scanned.estimate[best]),
+        sigma=float(scanned.sigma[best]),
+        log_likelihood_gain=0.5 * d * d / J,
+        log_bayes_factor=bayes,
+        held_out_before=before,
+        held_out_after=after,
+        held_out_gain=won,
+        held_out_error=error,
+        alike=tuple(evidence.names[i] for i in alike(scores, best)),
+        moved=_moved(problem, chosen, best, float(scanned.estimate[best])),
+    )
+
+
+def _moved(problem: Problem[E], chosen: Sequence[int], best: int, size: float) -> tuple[tuple[str, float], ...]:
+    """Errors of the coefficients, in their own sigmas, while the effect was missing: the largest."""
+    known, weight, _ = problem.known(chosen)
+    J = problem.evidence.information.J
+    A = J[np.ix_(known, known)] + np.diag(weight)
+    unit = 1.0 / np.sqrt(np.diag(A))
+    inverse = np.linalg.inv(A * np.outer(unit, unit)) * np.outer(unit, unit)
+    change = inverse @ J[known, best] * size / np.sqrt(np.diag(inverse))
+    # Neither attitudes nor the like, which only serve: coefficients of the model, and what was chosen before.
+    told = [*range(problem.evidence.coefficients), *range(problem.p, len(known))]
+    order = sorted(told, key=lambda i: -abs(change[i]))[:4]
+    return tuple((problem.evidence.names[known[i]], float(change[i])) for i in order)
