@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from sdimu_calibration.cli.console import plain
+from sdimu_calibration.cli.opened import warn
 from sdimu_calibration.cli.options import OwnEffectOption
 
 
@@ -27,13 +28,16 @@ def export(
     ] = None,
     effect: OwnEffectOption = None,
 ) -> None:
-    """Write a result as matrices, Kalibr YAML, imu_tk files, a C header, YAML or CSV."""
+    """Write a result as matrices, Kalibr YAML, imu_tk files, a C header, YAML or CSV.
+
+    A result that is not to be trusted is written all the same; stderr says why it is not.
+    """
     from sdimu_calibration.storage.export import FORMS
     from sdimu_calibration.storage.export import export as write
     from sdimu_calibration.storage.files.effect_file import effects_of_result
-    from sdimu_calibration.storage.files.result_file import noise_for, read_result
+    from sdimu_calibration.storage.files.result_file import noise_for, read_judged_result
 
-    calibration = read_result(result)
+    calibration, doubts = read_judged_result(result)
     own = effects_of_result(calibration.model, effect or [])
     folder = result if result.is_dir() else result.parent
     name = FORMS[form].file_name if form in FORMS else ""
@@ -45,3 +49,4 @@ def export(
     if form == "kalibr":
         console.print(f"noise densities are those of {whose}", soft_wrap=True, markup=False, highlight=False)
     console.print(f"body frame: {calibration.body_frame}; {' '.join(map(str, done.files))}", soft_wrap=True)
+    warn(doubts)

@@ -28,7 +28,10 @@ class Playing:
 
 @with_options
 def replay(bag: BagArgument, playing: Playing, opening: Recorded) -> None:
-    """Play a recording into the live calibration node; leaves result.json."""
+    """Play a recording into the live calibration node; leaves result.json.
+
+    Exit status 3: done, but the estimate is not to be trusted; stderr says why.
+    """
     import time
 
     from sdimu_calibration.report.table import rich_table, rows

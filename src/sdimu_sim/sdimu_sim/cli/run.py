@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from sdimu_calibration.cli.opened import NOT_TRUSTED
+from sdimu_calibration.cli.opened import NOT_TRUSTED, leave
 from sdimu_calibration.cli.option_groups import with_options
 from sdimu_calibration.cli.options import DomainOption, EachStopOption, Fitted, Place
 from sdimu_sim.cli.options import SeedOption, World
@@ -64,7 +64,10 @@ def run(
     domain: DomainOption = None,
     out: Annotated[Path, typer.Option(file_okay=False, help="Folder of the results.")] = Path("out/run"),
 ) -> None:
-    """Run a whole simulated test over ROS 2: table, IMU, calibration and recorder, each its own process."""
+    """Run a whole simulated test over ROS 2: table, IMU, calibration and recorder, each its own process.
+
+    Exit status 3: done, but the estimate is not to be trusted, or --adaptive did not reach its limits; stderr says why.
+    """
     import time
 
     from sdimu_calibration.cli.console import console as make_console
@@ -91,7 +94,7 @@ def run(
         end = _tell_choices(console, out / "choices.json") if test.adaptive is not None else None
         result = _report(console, out, world.site, test)
         _say_measured(console, out, result, streamed, wall)
-    _leave(test.adaptive, end)
+    _leave(result, test.adaptive, end)
 
 
 def _parameters(test: LiveTest, world: World, out: Path) -> dict[str, dict[str, Any]]:
@@ -124,10 +127,13 @@ def _parameters(test: LiveTest, world: World, out: Path) -> dict[str, dict[str, 
     }
 
 
-def _leave(goals: str | None, end: dict[str, Any] | None) -> None:
-    """End with exit status 3 and a line on stderr when an adaptive test has not reached its limits."""
-    if end is not None and not end["reached"]:
+def _leave(result: Calibration, goals: str | None, end: dict[str, Any] | None) -> None:
+    """End with exit status 3 and lines on stderr where the result is not to be trusted, or goals were not reached."""
+    short = end is not None and not end["reached"]
+    if end is not None and short:
         typer.echo(f"sdimu: the limits of {goals} were not reached: {end['text']}", err=True)
+    leave(result)
+    if short:
         raise typer.Exit(NOT_TRUSTED)
 
 
