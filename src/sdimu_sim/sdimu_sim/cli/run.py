@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
     from sdimu_calibration.cli.processes import Children
     from sdimu_calibration.cli.watch import Outline
+    from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary
     from sdimu_calibration.core.results import Calibration
 
 STALL_S = 180.0
@@ -83,7 +84,7 @@ def run(
     with own_folder(out):
         begun = time.monotonic()
         with own_domain(out / "log", domain) as used, Children(out / "log") as children:
-            replace = _clear(out)
+            replace = _clear(out, test.followed)
             console.print(f"ROS domain {used}", highlight=False)
             if never_compiled():
                 console.print("compiling the numerical loops, once on this machine: about a minute without samples")
@@ -147,8 +148,12 @@ def _check_choosing(adaptive: str | None, ask: bool, plan: str | None) -> None:
         raise DataError(f"--plan {plan} and --adaptive {adaptive}: a test follows a plan or chooses; state one")
 
 
-def _clear(out: Path) -> bool:
-    """Remove the results of an earlier run, once nothing refuses this one; whether its bag may be replaced."""
+def _clear(out: Path, plan: str = DEFAULT_PLAN) -> bool:
+    """Remove the results of an earlier run, once nothing refuses this one; whether its bag may be replaced.
+
+    The file of the plan that is to be followed stays.
+    """
+    from sdimu_calibration.cli.next_commands import PLAN
     from sdimu_calibration.core.recording import DataError
     from sdimu_calibration.storage.bags.bag_folder import check_room
     from sdimu_calibration.storage.bags.bag_metadata import METADATA
@@ -159,6 +164,8 @@ def _clear(out: Path) -> bool:
     check_room(bag, replace)
     for stale in ("result.json", "report.html", "diagnosis.json", "calibration.journal", "choices.json"):
         (out / stale).unlink(missing_ok=True)
+    if replace and not _is_file(plan, out / PLAN):
+        (out / PLAN).unlink(missing_ok=True)
     return replace
 
 
@@ -297,6 +304,7 @@ def _report(console: Console, out: Path, site: str, test: LiveTest) -> Calibrati
     asked = Asked.of((out / "bag",), out, Place(site, imu), Fitted(None if model == DEFAULT_MODEL else model))
     with written_together(out) as part:
         write_diagnosis(part / "diagnosis.json", summary)
+        _write_plan(part, out, test, summary)
         write_report(
             part / "report.html",
             result,
@@ -314,6 +322,38 @@ def _report(console: Console, out: Path, site: str, test: LiveTest) -> Calibrati
     print_out_of_sight(console, summary)
     print_advice(console, summary.advice, asked)
     return result
+
+
+def _write_plan(part: Path, out: Path, test: LiveTest, summary: DiagnosisSummary) -> None:
+    """Leave the plan that was run, to which the advice of the diagnosis refers; chosen turns as the motion showed them.
+
+    Parameters
+    ----------
+    part : Path
+        Where files are written that then go to `out` together.
+    out : Path
+    test : LiveTest
+    summary : DiagnosisSummary
+    """
+    from sdimu_calibration.cli.next_commands import PLAN, as_plan
+    from sdimu_calibration.storage.files.config import load_plan
+    from sdimu_calibration.storage.files.plan_file import write_plan
+
+    if test.adaptive is not None:
+        plan, remark = (
+            as_plan(summary.plan),
+            f"The turns chosen for {test.adaptive}, as the motion showed them",
+        )
+    else:
+        plan, remark = load_plan(test.followed), f"The plan that was run: {test.followed}"
+    # A plan of the user's own in this place stays as it is written.
+    if plan is not None and not _is_file(test.followed, out / PLAN):
+        write_plan(part / PLAN, plan, [remark])
+
+
+def _is_file(name: str, file: Path) -> bool:
+    """Tell whether a plan is named by the path of a file."""
+    return Path(name).resolve() == file.resolve()
 
 
 def _tell_choices(console: Console, path: Path) -> dict[str, Any]:
