@@ -40,9 +40,8 @@ def test_a_run_loses_nothing(twins: Twins) -> None:
 def test_a_run_leaves_bag_result_report_and_truth(twins: Twins) -> None:
     left = {path.name for path in twins.folders[0].iterdir()}
     assert {"bag", "result.json", "report.html", "truth.yaml", "plan.yaml"} <= left
-    ran, written = (
-        load_plan(str(path)) for path in (twins.folders[0].parent / "plan.yaml", twins.folders[0] / "plan.yaml")
-    )
+    first = twins.folders[0]
+    ran, written = (load_plan(str(folder / "plan.yaml")) for folder in (first.parent, first))
     assert (written.dwell_s, written.turns) == (ran.dwell_s, ran.turns)
 
 

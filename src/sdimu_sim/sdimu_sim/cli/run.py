@@ -340,10 +340,7 @@ def _write_plan(part: Path, out: Path, test: LiveTest, summary: DiagnosisSummary
     from sdimu_calibration.storage.files.plan_file import write_plan
 
     if test.adaptive is not None:
-        plan, remark = (
-            as_plan(summary.plan),
-            f"The turns chosen for {test.adaptive}, as the motion showed them",
-        )
+        plan, remark = (as_plan(summary.plan), f"The turns chosen for {test.adaptive}, as the motion showed them")
     else:
         plan, remark = load_plan(test.followed), f"The plan that was run: {test.followed}"
     # A plan of the user's own in this place stays as it is written.
