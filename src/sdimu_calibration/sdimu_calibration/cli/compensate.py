@@ -11,7 +11,7 @@ import typer
 from sdimu_calibration.cli.console import plain
 from sdimu_calibration.cli.opened import warn
 from sdimu_calibration.cli.option_groups import with_options
-from sdimu_calibration.cli.options import BagArgument, OwnEffectOption, ReplaceOption
+from sdimu_calibration.cli.options import BagArgument, OwnEffectOption, ReplaceOption, checked_degc
 
 
 @dataclass(frozen=True)
@@ -54,6 +54,7 @@ def compensate(
     from sdimu_calibration.storage.files.result_file import noise_for, read_judged_result
 
     console = plain()
+    at = None if taken.start_temperature is None else checked_degc("--start-temperature", taken.start_temperature)
     calibration, doubts = read_judged_result(result)
     own = effects_of_result(calibration.model, taken.effect or [])
     specification, whose = noise_for(calibration, taken.imu)
@@ -64,7 +65,7 @@ def compensate(
         own=own,
         has_temperature=recording.temperature is not None,
         same_start=taken.same_start,
-        start_temperature=taken.start_temperature,
+        start_temperature=at,
     )
     frame = taken.frame_id or frame_of(calibration.body_frame)
     with bar(console) as progress:

@@ -9,7 +9,11 @@ import typer
 
 from sdimu_calibration.cli.console import plain
 from sdimu_calibration.cli.opened import warn
-from sdimu_calibration.cli.options import OwnEffectOption
+from sdimu_calibration.cli.options import OwnEffectOption, checked_degc
+from sdimu_calibration.core.data_error import DataError
+
+_MOST_HZ = 1e6
+"""Highest sample rate (Hz): no IMU sends faster."""
 
 
 def export(
@@ -37,6 +41,10 @@ def export(
     from sdimu_calibration.storage.files.effect_file import effects_of_result
     from sdimu_calibration.storage.files.result_file import noise_for, read_judged_result
 
+    if not 0.0 < rate <= _MOST_HZ:
+        raise DataError(f"--rate {rate:g}: expected a sample rate above 0 to {_MOST_HZ:g} Hz")
+    if temperature is not None:
+        checked_degc("--temperature", temperature)
     calibration, doubts = read_judged_result(result)
     own = effects_of_result(calibration.model, effect or [])
     folder = result if result.is_dir() else result.parent

@@ -19,10 +19,12 @@ class Playing:
     """How a recording is played into the node."""
 
     model: ModelOption = "baseline"
-    speed: Annotated[float, typer.Option(help="Times real time; 0 is as fast as the calibration allows.")] = 0.0
+    speed: Annotated[
+        float, typer.Option(min=0.0, max=1e6, help="Times real time; 0 is as fast as the calibration allows.")
+    ] = 0.0
     out: Annotated[Path | None, results_in("results; BAG_replay")] = None
     domain: DomainOption = None
-    patience: Annotated[float, typer.Option(help="Longest time without an end (s); 0 waits for ever.")] = 0.0
+    patience: Annotated[float, typer.Option(min=0.0, help="Longest time without an end (s); 0 waits for ever.")] = 0.0
     diagnose: EachStopOption = False
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from contextlib import nullcontext
 from dataclasses import dataclass
@@ -189,7 +190,7 @@ def _check(options: dict[str, dict[str, Any]]) -> float:
         mount_rad(imu["mount"])
     if imu["temperature"]:
         load_temperature(imu["temperature"])
-    if table["speed"] < 0:
+    if not 0.0 <= table["speed"] < math.inf:
         raise DataError(f"--speed {table['speed']:g}: expected 0 or more")
     if not 10.0 <= imu["rate_hz"] <= 1000.0:
         raise DataError(f"--rate {imu['rate_hz']:g}: expected 10 to 1000 Hz")

@@ -99,6 +99,8 @@ def next_turn(
     names = tuple(p.name for e in effects for p in e.parameters)
     if len(names) < 2:
         raise DataError("nothing to tell apart: name two coefficients or more")
+    if len(set(names)) < len(names):
+        raise DataError(f"{next(n for n in names if names.count(n) > 1)}: named twice; name each coefficient once")
     have = {p for name in asked.model.effects for p in _parameters(name)}
     more = [e for e in effects if not {p.name for p in e.parameters} <= have]
     # A model names its effects; `imu_model.build` takes an effect itself as well.
