@@ -67,7 +67,8 @@ NUMERICAL := $(addprefix test/sdimu_calibration/core/,alignment batch/test_chain
 
 other-blas: setup
 	for core in Haswell Nehalem; do \
-	    OPENBLAS_CORETYPE=$$core $(BIN)/python -m pytest -m "not slow and not bench" $(NUMERICAL) || exit 1; done
+	    OPENBLAS_CORETYPE=$$core $(BIN)/python -m pytest -n 2 --dist loadfile -m "not slow and not bench" \
+	        $(NUMERICAL) || exit 1; done
 
 # As a user of ROS would: build the three packages, test what was installed, and run a launch file of it outside the
 # repository (by the stand-in for ros2/launch, which is no wheel).

@@ -173,7 +173,7 @@ QUICK_ROS = (
     "test/ros/test_whole_run.py",
     "test/ros/test_robustness.py::test_a_killed_calibration_is_not_waited_for_and_its_successor_goes_on",
     "test/ros/test_robustness.py::test_a_node_that_fails_is_reported_in_one_line",
-    "test/ros/test_sockets.py::test_the_sockets_of_a_domain",
+    "test/ros/test_sockets.py::test_the_sockets_of_a_domain_are_bound_to_the_loopback_interface",
 )
 """Tests over DDS that `make test` keeps; all others marked `ros` start nodes and wait for them in `.ci/run`."""
 
@@ -189,8 +189,19 @@ def is_thorough(name: str, over_dds: bool) -> bool:
         Whether it starts nodes (marker `ros`).
     """
     if over_dds:
-        return not name.startswith(QUICK_ROS)
-    if name.startswith(tuple(THOROUGH)):
+        return not any(names(row, name) for row in QUICK_ROS)
+    if any(names(row, name) for row in THOROUGH):
         return True
     file, _, test = name.partition("::")
-    return file in LONG and (not LONG[file] or test.startswith(LONG[file]))
+    return file in LONG and (not LONG[file] or any(names(row, test) for row in LONG[file]))
+
+
+def names(row: str, test: str) -> bool:
+    """Say whether a row names a test: itself, its folder or file, or the function of its parameters.
+
+    Parameters
+    ----------
+    row, test : str
+        From the same place: the root of the repository, or a file.
+    """
+    return test == row or test.startswith((f"{row}/", f"{row}::", f"{row}["))

@@ -19,7 +19,7 @@ setup(
     license="Apache-2.0",
     license_files=["LICENSE"],
     platforms=["Linux x86_64"],
-    python_requires=">=3.10",
+    python_requires=">=3.11",
     packages=find_packages(),
     package_data={NAME: ["py.typed"]},
     install_requires=["numpy>=2.0", "pydantic>=2", "scipy", f"sdimu_calibration=={VERSION}"],

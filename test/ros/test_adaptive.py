@@ -37,7 +37,9 @@ def done(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Goals, str]:
         out, err = process.communicate(timeout=DEADLINE_S)
     finally:
         process.kill()
-    assert process.returncode == 0, err
+    result = read_result(folder / "run" / "result.json")
+    assert process.returncode == (3 if result.misfits or result.not_to_be_trusted else 0), err
+    assert "were not reached" not in err
     return folder / "run", load_goals(goals), out
 
 

@@ -12,7 +12,7 @@ from sdimu_calibration.core.estimation.outcome import calibrate
 from sdimu_calibration.nodes.recorder_node import message_class
 from sdimu_calibration.storage.bags.bag_file import raw_messages
 from sdimu_calibration.storage.bags.bag_reader import read_recording
-from sdimu_calibration.storage.files.config import load_imu, load_model, load_site
+from sdimu_calibration.storage.files.config import load_imu, load_model, load_plan, load_site
 from sdimu_calibration.storage.files.result_file import read_result
 
 from .conftest import DEADLINE_S, DWELL_S, RATE_HZ, Twins, imu_stamps, samples_of, sdimu
@@ -39,7 +39,10 @@ def test_a_run_loses_nothing(twins: Twins) -> None:
 
 def test_a_run_leaves_bag_result_report_and_truth(twins: Twins) -> None:
     left = {path.name for path in twins.folders[0].iterdir()}
-    assert {"bag", "result.json", "report.html", "truth.yaml"} <= left
+    assert {"bag", "result.json", "report.html", "truth.yaml", "plan.yaml"} <= left
+    first = twins.folders[0]
+    ran, written = (load_plan(str(folder / "plan.yaml")) for folder in (first.parent, first))
+    assert (written.dwell_s, written.turns) == (ran.dwell_s, ran.turns)
 
 
 def test_two_runs_at_once_with_one_seed_record_the_same(twins: Twins) -> None:

@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from sdimu_calibration.core.recording import DataError
-from sdimu_calibration.core.units import UnitError, parse_quantity
+from sdimu_calibration.core.units import ABSOLUTE_ZERO_DEGC, UnitError, parse_quantity
 from sdimu_calibration.storage.files.config import Schema, find_config, quantity, read_yaml
 from sdimu_sim.core.temperature import TemperatureProfile
 
@@ -27,7 +27,7 @@ class _Segment(Schema):
 
     hold: Annotated[float, quantity("s"), Field(gt=0)] | None = None
     ramp: Annotated[float, quantity("degC/min"), Field(gt=0)] | None = None
-    to: Annotated[float, quantity("degC")] | None = None
+    to: Annotated[float, quantity("degC"), Field(ge=ABSOLUTE_ZERO_DEGC)] | None = None
 
     @model_validator(mode="after")
     def _one_of_two(self) -> _Segment:
@@ -39,7 +39,7 @@ class _Segment(Schema):
 class _TemperatureFile(Schema):
     format: Literal["sdimu-temperature/1"] = "sdimu-temperature/1"
     name: str | None = None
-    start: Annotated[float, quantity("degC")]
+    start: Annotated[float, quantity("degC"), Field(ge=ABSOLUTE_ZERO_DEGC)]
     rise: Annotated[float, quantity("degC")] = 0.0
     tau: Annotated[float, quantity("s"), Field(gt=0)] = 1200.0
     ripple: Annotated[float, quantity("degC")] = 0.0
@@ -63,9 +63,12 @@ def load_temperature(text: str | Path) -> TemperatureProfile:
     """
     if _NUMBER.fullmatch(str(text)):
         try:
-            return TemperatureProfile(parse_quantity(str(text), "degC"), reference_degc=ROOM_DEGC)
+            soak = parse_quantity(str(text), "degC")
         except UnitError as error:
             raise DataError(f"temperature '{text}': {error}") from error
+        if soak < ABSOLUTE_ZERO_DEGC:
+            raise DataError(f"temperature '{text}': expected {ABSOLUTE_ZERO_DEGC:g} degC or more")
+        return TemperatureProfile(soak, reference_degc=ROOM_DEGC)
     file = read_yaml(find_config("temperature", text), _TemperatureFile)
     return TemperatureProfile(
         file.start,

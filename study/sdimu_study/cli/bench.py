@@ -15,7 +15,7 @@ from sdimu_calibration.cli.console import plain
 def bench(
     plan: Annotated[str, typer.Option(help="Test plan: name in config/plan or path.")] = "kim18",
     rate: Annotated[float, typer.Option(help="Sample rate of the IMU (Hz), 10 to 1000.")] = 100.0,
-    repeats: Annotated[int, typer.Option(help="Each time is the best of so many.")] = 3,
+    repeats: Annotated[int, typer.Option(min=1, help="Each time is the best of so many.")] = 3,
 ) -> None:
     """Time the parts of a calibration on a simulated test, after a first run that compiles."""
     from rich.box import SIMPLE_HEAD

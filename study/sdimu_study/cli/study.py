@@ -13,7 +13,9 @@ from sdimu_study.cli.conduct import check_kinds, conduct, imu_files, leave
 if TYPE_CHECKING:
     from sdimu_study.study import Key, Row
 
-app = typer.Typer(help="Put a claim of the method to the test, by simulation.", no_args_is_help=True)
+app = typer.Typer(
+    help="Put a claim of the method to the test, by simulation.", no_args_is_help=True, add_completion=False
+)
 
 Seed = Annotated[int, typer.Option(help="First seed.")]
 Workers = Annotated[int, typer.Option(min=1, help="Processes.")]

@@ -11,12 +11,17 @@ import pytest
 import typer
 
 from sdimu_calibration.cli import main as cli
+from sdimu_calibration.cli.compensate import compensate
+from sdimu_calibration.cli.export import export
 from sdimu_calibration.cli.opened import leave
 from sdimu_calibration.core.diagnosis import diagnose as of_one
 from sdimu_calibration.core.joint import set_diagnosis as of_set
 from sdimu_calibration.core.recording import DataFault
 from sdimu_calibration.core.results import Calibration, no_history
-from sdimu_calibration.storage.files.result_file import as_note
+from sdimu_calibration.core.verdict import Verdict
+from sdimu_calibration.storage.files.result_file import as_note, read_judged_result, write_result
+from sdimu_sim.cli.run import _leave as leave_run
+from sdimu_sim.cli.simulate import simulate
 
 FITS = Calibration(
     "prior",
@@ -89,6 +94,43 @@ def test_a_diagnosis_that_ends_in_a_right_model_judges_the_misfit(capsys, verdic
     assert left(capsys, replace(FITS, warnings=MISFITS), (verdict, "It is found.")) == (0, "")
 
 
+@pytest.mark.parametrize("warning", MISFITS)
+def test_a_run_whose_result_does_not_fit_ends_with_3(capsys, warning):
+    with pytest.raises(typer.Exit) as ending:
+        leave_run(replace(FITS, warnings=(warning,)), None, None)
+    assert ending.value.exit_code == 3
+    assert capsys.readouterr().err == f"sdimu: not to be trusted: {warning}\n"
+    leave_run(FITS, "table33", {"reached": True, "text": "done"})
+
+
+def test_a_run_says_both_that_it_missed_its_limits_and_that_it_does_not_fit(capsys):
+    with pytest.raises(typer.Exit) as ending:
+        leave_run(replace(FITS, warnings=MISFITS[:1]), "table33", {"reached": False, "text": "time is up"})
+    err = capsys.readouterr().err
+    assert ending.value.exit_code == 3
+    assert "the limits of table33 were not reached: time is up" in err
+    assert f"not to be trusted: {MISFITS[0]}" in err
+
+
+@pytest.mark.parametrize("verdict", [None, *UNTRUSTED, *TRUSTED])
+def test_a_result_tells_those_who_use_it_that_it_is_not_to_be_trusted(tmp_path, verdict):
+    write_result(tmp_path / "result.json", replace(FITS, warnings=MISFITS), verdict and Verdict(verdict))
+    _, reasons = read_judged_result(tmp_path)
+    path = tmp_path / "result.json"
+    if verdict is None:
+        assert reasons == tuple(f"{path}: {line}" for line in MISFITS)
+    elif verdict in UNTRUSTED:
+        assert len(reasons) == 1
+        assert reasons[0].startswith(f"{path}: its diagnosis ended as '{verdict}'")
+    else:
+        assert reasons == ()
+
+
+def test_a_result_that_fits_is_used_without_a_word(tmp_path):
+    write_result(tmp_path / "result.json", FITS)
+    assert read_judged_result(tmp_path)[1] == ()
+
+
 def test_a_fault_of_the_data_is_said_once(capsys):
     fault = DataFault("spike", "12 spikes", grave=True)
     status, err = left(capsys, replace(FITS, faults=(fault,)), ("data fault", "The data have a fault: 12 spikes."))
@@ -100,8 +142,6 @@ def bags(tmp_path_factory):
     """Two short recordings of one unit, with the same hidden effect."""
     folder = tmp_path_factory.mktemp("status")
     (folder / "small.yaml").write_text(PLAN)
-    from sdimu_sim.cli.simulate import simulate
-
     for number in (1, 2):
         simulate(
             plan=str(folder / "small.yaml"),
@@ -137,6 +177,24 @@ def test_calibrate_without_the_effect_ends_with_3_and_with_it_with_0(sdimu, bags
     assert "not to be trusted: the model" in err
     status, _, err = sdimu("calibrate", *bags[:number], "--add", "gyro_scale_asymmetry_y")
     assert status == 0, err
+
+
+def test_a_batch_that_does_not_explain_its_data_ends_with_3(sdimu, bags):
+    status, _, err = sdimu("calibrate", bags[0], "--estimator", "batch")
+    assert (status, "not to be trusted: the model does not fit" in err) == (3, True)
+    sound = bags[0].with_name("sound")
+    simulate(plan=str(bags[0].with_name("small.yaml")), rate=20.0, seed=1, out=sound)
+    status, _, err = sdimu("calibrate", sound, "--estimator", "batch")
+    assert status == 0, err
+
+
+def test_a_result_that_does_not_fit_is_compensated_and_exported_with_a_warning(sdimu, bags, tmp_path, capsys):
+    sdimu("calibrate", bags[0])
+    capsys.readouterr()
+    export(tmp_path / "out", out=tmp_path / "matrices.txt")
+    compensate(bags[0], result=tmp_path / "out", out=tmp_path / "clean")
+    err = capsys.readouterr().err
+    assert err.count(f"not to be trusted: {tmp_path / 'out' / 'result.json'}: the model") == 2
 
 
 @pytest.mark.parametrize("verdict", ["unexplained", "one effect"])

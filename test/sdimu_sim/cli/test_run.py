@@ -1,12 +1,14 @@
 """The verb run: what it refuses, and that a refused run leaves everything as it was."""
 
+import numpy as np
 import pytest
 import typer
 from typer.testing import CliRunner
 
 from sdimu_calibration.cli.processes import own_domain, own_folder
 from sdimu_calibration.core.recording import DataError
-from sdimu_sim.cli.run import _clear, run
+from sdimu_calibration.storage.files.config import load_plan
+from sdimu_sim.cli.run import LiveTest, _clear, _write_plan, run
 
 
 @pytest.fixture
@@ -51,6 +53,23 @@ def test_a_negative_seed_is_wrong_usage(invoke):
     refused = invoke("--seed", "-1")
     assert refused.exit_code == 2
     assert "--seed" in refused.output
+
+
+@pytest.mark.parametrize(("own", "left"), [(False, False), (True, True)])
+def test_the_plan_of_an_earlier_run_goes_and_the_one_that_is_followed_stays(tmp_path, own, left):
+    out = tmp_path / "again"
+    (out / "log").mkdir(parents=True)
+    (out / "log" / "rate_table.yaml").touch()
+    (out / "plan.yaml").touch()
+    _clear(out, str(out / "plan.yaml") if own else "kim18")
+    assert (out / "plan.yaml").exists() == left
+
+
+def test_the_plan_that_was_run_is_left_with_the_results(tmp_path):
+    _write_plan(tmp_path, tmp_path, LiveTest(plan="kim18_signed"), None)
+    written, ran = load_plan(str(tmp_path / "plan.yaml")), load_plan("kim18_signed")
+    assert written.dwell_s == ran.dwell_s
+    np.testing.assert_allclose([t.angle_rad for t in written.turns], [t.angle_rad for t in ran.turns])
 
 
 @pytest.mark.usefixtures("invoke")

@@ -14,7 +14,6 @@ from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.joint.member import Member
 from sdimu_calibration.core.joint.set_diagnosis import SetDiagnosis, SetFinding, diagnose_set
 from sdimu_calibration.core.joint.set_fit import SetFit, SetOptions, fit_set
-from sdimu_calibration.core.joint.set_result import set_outcome
 from sdimu_calibration.core.progress import Progress
 from sdimu_calibration.core.results import Calibration, SetSummary
 from sdimu_calibration.core.verdict import Verdict
@@ -24,7 +23,7 @@ from sdimu_calibration.storage.files.diagnosis_file import write_set_diagnosis
 from sdimu_calibration.storage.files.result_file import write_result
 from sdimu_calibration.storage.files.whole_file import written_together
 from sdimu_calibration.storage.recording_set import RecordingSet
-from sdimu_calibration.storage.set_work import set_runner
+from sdimu_calibration.storage.set_work import judged_outcome, set_runner
 
 if TYPE_CHECKING:
     from sdimu_calibration.core.evidence.known import Standing
@@ -103,7 +102,7 @@ class JointFit(Fitted):
     @cached_property
     def result(self) -> Calibration:
         """Coefficients of the unit, covariance, fit figures, notes; what differs between recordings in `of_set`."""
-        return _of_unit(set_outcome(self.core), self.of)
+        return _of_unit(judged_outcome(self.core), self.of)
 
     @property
     def of_set(self) -> SetSummary:

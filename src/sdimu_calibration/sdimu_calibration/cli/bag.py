@@ -42,7 +42,7 @@ def info(bag: BagArgument, as_json: JsonOption = False) -> None:
 def cut(
     bag: BagArgument,
     out: Annotated[Path, typer.Option(help="Bag to write.")],
-    first: Annotated[float, typer.Option("--from", help="Seconds since the first sample.")] = 0.0,
+    first: Annotated[float, typer.Option("--from", min=0.0, help="Seconds since the first sample.")] = 0.0,
     last: Annotated[float, typer.Option("--to", help="Seconds since the first sample; the end without it.")] = math.inf,
     replace: Annotated[bool, typer.Option(help="Delete what is there.")] = False,
 ) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Annotated
@@ -28,10 +28,13 @@ class CalibrationRequest(Request):
 
 @with_options
 def calibrate(bags: BagsArgument = None, *, request: CalibrationRequest, opening: Opening) -> None:
-    """Estimate the coefficients from a recording; leaves result.json and report.html."""
+    """Estimate the coefficients from a recording; leaves result.json and report.html.
+
+    Exit status 3: done, but the estimate is not to be trusted; stderr says why.
+    """
     from sdimu_calibration.cli.progress import bar
     from sdimu_calibration.core.estimation.outcome import outcome
-    from sdimu_calibration.core.estimation.solve import solve
+    from sdimu_calibration.core.estimation.solve import AUTO, solve
     from sdimu_calibration.core.units import STANDARD_GRAVITY
     from sdimu_calibration.report.page import write_report
     from sdimu_calibration.report.table import rich_table, rows
@@ -79,7 +82,8 @@ def calibrate(bags: BagsArgument = None, *, request: CalibrationRequest, opening
     tell(console, (*notes, *(note for note in result.notes if note not in notes)))
     if any(topic_of(note) in MISFITS for note in result.notes):
         say(console, "To learn what the model misses:")
-        command(console, about.command("diagnose"))
+        able = request if fit.diagnosable else replace(request, estimator=AUTO)
+        command(console, Asked.of((bag,), folder, opening, able).command("diagnose"))
     say(console, f"results in {folder}")
     answer(folder / "result.json", request.as_json)
     leave(result)

@@ -9,8 +9,9 @@ from typing import Annotated
 import typer
 
 from sdimu_calibration.cli.console import plain
+from sdimu_calibration.cli.opened import warn
 from sdimu_calibration.cli.option_groups import with_options
-from sdimu_calibration.cli.options import BagArgument, OwnEffectOption, ReplaceOption
+from sdimu_calibration.cli.options import BagArgument, OwnEffectOption, ReplaceOption, checked_degc
 
 
 @dataclass(frozen=True)
@@ -39,7 +40,10 @@ def compensate(
     taken: Taken,
     replace: ReplaceOption = False,
 ) -> None:
-    """Take the errors out of a recording: /imu/data_raw to /imu/data with covariances."""
+    """Take the errors out of a recording: /imu/data_raw to /imu/data with covariances.
+
+    A result that is not to be trusted is applied all the same; stderr says why it is not.
+    """
     from sdimu_calibration.cli.progress import bar
     from sdimu_calibration.core.compensation import compensator
     from sdimu_calibration.core.units import from_si
@@ -47,10 +51,11 @@ def compensate(
     from sdimu_calibration.storage.bags.compensated_bag import write_compensated
     from sdimu_calibration.storage.bags.compensated_imu import frame_of
     from sdimu_calibration.storage.files.effect_file import effects_of_result
-    from sdimu_calibration.storage.files.result_file import noise_for, read_result
+    from sdimu_calibration.storage.files.result_file import noise_for, read_judged_result
 
     console = plain()
-    calibration = read_result(result)
+    at = None if taken.start_temperature is None else checked_degc("--start-temperature", taken.start_temperature)
+    calibration, doubts = read_judged_result(result)
     own = effects_of_result(calibration.model, taken.effect or [])
     specification, whose = noise_for(calibration, taken.imu)
     recording = read_recording(bag)
@@ -60,7 +65,7 @@ def compensate(
         own=own,
         has_temperature=recording.temperature is not None,
         same_start=taken.same_start,
-        start_temperature=taken.start_temperature,
+        start_temperature=at,
     )
     frame = taken.frame_id or frame_of(calibration.body_frame)
     with bar(console) as progress:
@@ -77,3 +82,4 @@ def compensate(
         highlight=False,
     )
     console.print(f"noise in the covariances is that of {whose}", soft_wrap=True, markup=False, highlight=False)
+    warn(doubts)

@@ -46,7 +46,10 @@ class DiagnosisRequest(Request):
 
 @with_options
 def diagnose(bags: BagsArgument = None, *, request: DiagnosisRequest, opening: Opening) -> None:
-    """Find what the model is missing; leaves diagnosis.json and report.html, and result.json of the model found."""
+    """Find what the model is missing; leaves diagnosis.json and report.html, and result.json of the model found.
+
+    Exit status 3: done, but the estimate is not to be trusted; stderr says why.
+    """
     from sdimu_calibration.cli.diagnosis_text import notes_of_diagnosis, print_summary
     from sdimu_calibration.cli.next_commands import Asked
     from sdimu_calibration.cli.progress import bar

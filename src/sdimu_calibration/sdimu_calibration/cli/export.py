@@ -8,7 +8,12 @@ from typing import Annotated
 import typer
 
 from sdimu_calibration.cli.console import plain
-from sdimu_calibration.cli.options import OwnEffectOption
+from sdimu_calibration.cli.opened import warn
+from sdimu_calibration.cli.options import OwnEffectOption, checked_degc
+from sdimu_calibration.core.data_error import DataError
+
+_MOST_HZ = 1e6
+"""Highest sample rate (Hz): no IMU sends faster."""
 
 
 def export(
@@ -27,13 +32,20 @@ def export(
     ] = None,
     effect: OwnEffectOption = None,
 ) -> None:
-    """Write a result as matrices, Kalibr YAML, imu_tk files, a C header, YAML or CSV."""
+    """Write a result as matrices, Kalibr YAML, imu_tk files, a C header, YAML or CSV.
+
+    A result that is not to be trusted is written all the same; stderr says why it is not.
+    """
     from sdimu_calibration.storage.export import FORMS
     from sdimu_calibration.storage.export import export as write
     from sdimu_calibration.storage.files.effect_file import effects_of_result
-    from sdimu_calibration.storage.files.result_file import noise_for, read_result
+    from sdimu_calibration.storage.files.result_file import noise_for, read_judged_result
 
-    calibration = read_result(result)
+    if not 0.0 < rate <= _MOST_HZ:
+        raise DataError(f"--rate {rate:g}: expected a sample rate above 0 to {_MOST_HZ:g} Hz")
+    if temperature is not None:
+        checked_degc("--temperature", temperature)
+    calibration, doubts = read_judged_result(result)
     own = effects_of_result(calibration.model, effect or [])
     folder = result if result.is_dir() else result.parent
     name = FORMS[form].file_name if form in FORMS else ""
@@ -45,3 +57,4 @@ def export(
     if form == "kalibr":
         console.print(f"noise densities are those of {whose}", soft_wrap=True, markup=False, highlight=False)
     console.print(f"body frame: {calibration.body_frame}; {' '.join(map(str, done.files))}", soft_wrap=True)
+    warn(doubts)

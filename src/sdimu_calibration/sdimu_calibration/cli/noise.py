@@ -16,7 +16,7 @@ def noise(
     bag: BagArgument,
     imu: Annotated[str, typer.Option(help="IMU whose grade and priors go into the new file: name or path.")] = "dtg",
     longest: Annotated[bool, typer.Option("--longest", help="The longest rest alone, not all of them.")] = False,
-    seed: Annotated[int, typer.Option(help="Of the draws behind the standard errors.")] = 1,
+    seed: Annotated[int, typer.Option(min=0, help="Of the draws behind the standard errors.")] = 1,
     out: Annotated[Path | None, results_in("results; BAG_noise")] = None,
     as_json: JsonOption = False,
 ) -> None:

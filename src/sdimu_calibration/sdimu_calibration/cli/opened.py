@@ -70,10 +70,20 @@ def leave(result: Calibration, diagnosed: tuple[Verdict, str] | None = None) -> 
     for line in result.inseparable:
         typer.echo(f"sdimu: {line}", err=True)
     reasons = _reasons(result, diagnosed)
-    for line in reasons:
-        typer.echo(f"sdimu: not to be trusted: {line}", err=True)
+    warn(reasons)
     if reasons:
         raise typer.Exit(NOT_TRUSTED)
+
+
+def warn(reasons: Iterable[str]) -> None:
+    """Say on stderr why a result is not to be trusted, one line each.
+
+    Parameters
+    ----------
+    reasons : iterable of str
+    """
+    for line in reasons:
+        typer.echo(f"sdimu: not to be trusted: {line}", err=True)
 
 
 def _reasons(result: Calibration, diagnosed: tuple[Verdict, str] | None) -> list[str]:

@@ -11,6 +11,7 @@ import typer
 from typer.models import OptionInfo
 
 from sdimu_calibration.core.data_error import DataError
+from sdimu_calibration.core.units import ABSOLUTE_ZERO_DEGC
 
 if TYPE_CHECKING:
     from sdimu_calibration.core.specification import ImuSpecification
@@ -19,6 +20,8 @@ if TYPE_CHECKING:
 
 _OF_SETS = "Several recordings of one unit"
 _SPAN = re.compile(r"\s*(\d+(?:\.\d+)?)\s*-\s*(\d+(?:\.\d+)?)\s*")
+_MOST_DEGC = 1e4
+"""Highest temperature (degC) that is taken for one: nothing that measures is as hot."""
 WORKERS = 2
 """Number of processes by default: the cores of a small machine."""
 
@@ -156,11 +159,11 @@ class Stated(Place):
     @property
     def whole_turns_rad(self) -> float:
         """How well turns by hand are whole (rad); 0 where nobody says it."""
-        from sdimu_calibration.core.units import parse_quantity
+        from sdimu_calibration.core.effect_key import read_quantity
 
         if self.whole_turns is None:
             return 0.0
-        whole = parse_quantity(self.whole_turns, "deg")
+        whole = read_quantity("--whole-turns", self.whole_turns, "deg")
         if whole <= 0.0:
             raise DataError(f"--whole-turns {self.whole_turns}: expected an angle above zero")
         return whole
@@ -168,9 +171,13 @@ class Stated(Place):
     @property
     def reference_degc(self) -> float | None:
         """Temperature from which effects count (deg C); None is that at the start."""
-        from sdimu_calibration.core.units import parse_quantity
+        from sdimu_calibration.core.effect_key import read_quantity
 
-        return None if self.reference_temperature is None else parse_quantity(self.reference_temperature, "degC")
+        if self.reference_temperature is None:
+            return None
+        return checked_degc(
+            "--reference-temperature", read_quantity("--reference-temperature", self.reference_temperature, "degC")
+        )
 
 
 @dataclass(frozen=True)
@@ -256,6 +263,21 @@ class Request(Fitted):
     ] = None
     out: Annotated[Path | None, results_in("results; BAG_calibration")] = None
     as_json: JsonOption = False
+
+
+def checked_degc(option: str, value: float) -> float:
+    """Refuse what is no temperature.
+
+    Parameters
+    ----------
+    option : str
+        For the message.
+    value : float
+        Degrees Celsius.
+    """
+    if not ABSOLUTE_ZERO_DEGC <= value <= _MOST_DEGC:
+        raise DataError(f"{option} {value:g}: expected a temperature in degC from {ABSOLUTE_ZERO_DEGC:g}")
+    return value
 
 
 def read_stops(text: str) -> tuple[int, ...]:

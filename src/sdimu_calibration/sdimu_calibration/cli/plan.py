@@ -22,6 +22,9 @@ if TYPE_CHECKING:
     from sdimu_calibration.core.plan_search import Bounds, Found, NextTurn
     from sdimu_calibration.core.plan_search.moves import Abilities
 
+_MOST_RATE, _MOST_ACCELERATION, _MOST_DWELL = 1e4, 1e6, 1e6
+"""Fastest turn (deg/s), acceleration (deg/s^2) and longest stop (s) of a plan's file."""
+
 
 @dataclass(frozen=True)
 class Planned:
@@ -62,17 +65,26 @@ class Allowed:
     tries: Annotated[int, typer.Option(min=1, help="Most plans to evaluate.")] = 150
 
     @property
+    def acceleration_rad_s2(self) -> float:
+        """Acceleration in SI."""
+        from sdimu_calibration.core.recording import DataError
+
+        if not 0.0 < self.acceleration <= _MOST_ACCELERATION:
+            raise DataError(f"--acceleration {self.acceleration:g}: expected above 0 to {_MOST_ACCELERATION:g} deg/s^2")
+        return math.radians(self.acceleration)
+
+    @property
     def rates_rad_s(self) -> tuple[float, ...]:
         """Mean rates in SI."""
-        return tuple(math.radians(v) for v in _numbers("--rates", self.rates))
+        return tuple(math.radians(v) for v in _numbers("--rates", self.rates, _MOST_RATE))
 
     @property
     def abilities(self) -> Abilities:
         """Of the table, in SI."""
         from sdimu_calibration.core.plan_search.moves import Abilities
 
-        rates, dwells = self.rates_rad_s, tuple(_numbers("--dwells", self.dwells))
-        return Abilities(rates, math.radians(self.acceleration), dwells)
+        rates, dwells = self.rates_rad_s, tuple(_numbers("--dwells", self.dwells, _MOST_DWELL))
+        return Abilities(rates, self.acceleration_rad_s2, dwells)
 
 
 @dataclass(frozen=True)
@@ -224,9 +236,9 @@ def _ranking(start: Plan, tell: Sequence[str], ranked: Sequence[NextTurn]) -> di
 
 def _limits(texts: Sequence[str]) -> dict[str, float]:
     """Read ``EFFECT=SIGMA`` into SI."""
+    from sdimu_calibration.core.effect_key import read_quantity
     from sdimu_calibration.core.effects import selection
     from sdimu_calibration.core.recording import DataError
-    from sdimu_calibration.core.units import parse_quantity
 
     out = {}
     for text in texts:
@@ -234,20 +246,20 @@ def _limits(texts: Sequence[str]) -> dict[str, float]:
         if not equals:
             raise DataError(f"--limit '{text}': expected EFFECT=SIGMA such as gyro_bias='0.005 deg/h'")
         effect = selection.resolve(name.strip())
-        out[effect.family or effect.name] = parse_quantity(value, effect.parameters[0].display_unit)
+        out[effect.family or effect.name] = read_quantity(f"--limit '{text}'", value, effect.parameters[0].display_unit)
         if not out[effect.family or effect.name] > 0.0:
             raise DataError(f"--limit '{text}': expected more than zero")
     return out
 
 
-def _numbers(option: str, text: str) -> list[float]:
-    """Read numbers with commas between them, all above zero."""
+def _numbers(option: str, text: str, most: float) -> list[float]:
+    """Read numbers with commas between them, all above zero and none above `most`."""
     from sdimu_calibration.core.recording import DataError
 
     try:
         values = [float(part) for part in text.split(",")]
     except ValueError:
         values = []
-    if not values or not all(math.isfinite(v) and v > 0.0 for v in values):
-        raise DataError(f"{option} '{text}': expected numbers above zero, such as '2,10'")
+    if not values or not all(0.0 < v <= most for v in values):
+        raise DataError(f"{option} '{text}': expected numbers above zero to {most:g}, such as '2,10'")
     return values

@@ -84,7 +84,7 @@ def tell_gain(
     """
     from sdimu_calibration.core.effects.selection import resolve
     from sdimu_calibration.core.plan_search import gain
-    from sdimu_calibration.core.plan_search.next_turn import apart
+    from sdimu_calibration.core.plan_search.next_turn import apart, in_sigmas
 
     known, first, last = sigmas
     tells = [gain(known.covariance, b.covariance) for b in (first, last)]
@@ -95,9 +95,9 @@ def tell_gain(
     )
     for labels in classes:
         names = [p.name for label in labels for p in resolve(label).parameters]
-        sizes = [apart(b, names, None) for b in sigmas]
+        sizes = in_sigmas(*(apart(b, names, None) for b in sigmas))
         say(
             console,
-            f"{labels[0]} from {', '.join(labels[1:])}, each as large as its prior: apart by {sizes[0]:.1f} sigma now, "
-            f"{sizes[1]:.1f} after {start.name}, {sizes[2]:.1f} after the plan found",
+            f"{labels[0]} from {', '.join(labels[1:])}, each as large as its prior: apart by {sizes[0]} sigma now, "
+            f"{sizes[1]} after {start.name}, {sizes[2]} after the plan found",
         )

@@ -104,6 +104,6 @@ def _radians(text: str) -> Any:
         values = [math.radians(float(part)) for part in text.split(",")]
     except ValueError:
         values = []
-    if len(values) not in (1, 3) or not all(map(math.isfinite, values)):
-        raise DataError(f"--mount '{text}': expected an angle in degrees, or three such as '1,2,3'")
+    if len(values) not in (1, 3) or not all(abs(value) <= math.tau for value in values):
+        raise DataError(f"--mount '{text}': expected an angle in degrees up to 360, or three such as '1,2,3'")
     return np.array(values * 3 if len(values) == 1 else values)

@@ -19,16 +19,21 @@ class Playing:
     """How a recording is played into the node."""
 
     model: ModelOption = "baseline"
-    speed: Annotated[float, typer.Option(help="Times real time; 0 is as fast as the calibration allows.")] = 0.0
+    speed: Annotated[
+        float, typer.Option(min=0.0, max=1e6, help="Times real time; 0 is as fast as the calibration allows.")
+    ] = 0.0
     out: Annotated[Path | None, results_in("results; BAG_replay")] = None
     domain: DomainOption = None
-    patience: Annotated[float, typer.Option(help="Longest time without an end (s); 0 waits for ever.")] = 0.0
+    patience: Annotated[float, typer.Option(min=0.0, help="Longest time without an end (s); 0 waits for ever.")] = 0.0
     diagnose: EachStopOption = False
 
 
 @with_options
 def replay(bag: BagArgument, playing: Playing, opening: Recorded) -> None:
-    """Play a recording into the live calibration node; leaves result.json."""
+    """Play a recording into the live calibration node; leaves result.json.
+
+    Exit status 3: done, but the estimate is not to be trusted; stderr says why.
+    """
     import time
 
     from sdimu_calibration.report.table import rich_table, rows

@@ -89,14 +89,14 @@ def refuse_for_sets(opening: Opening, **options: object) -> None:
 def calibrate_together(asked: SetRequest) -> None:
     """Fit all recordings together; leaves result.json and report.html."""
     from sdimu_calibration.core.joint.set_fit import fit_set
-    from sdimu_calibration.core.joint.set_result import set_outcome
     from sdimu_calibration.report.page import write_report
     from sdimu_calibration.storage.files.result_file import write_result
     from sdimu_calibration.storage.files.whole_file import written_together
+    from sdimu_calibration.storage.set_work import judged_outcome
 
     console = plain(stderr=asked.request.as_json)
     with _begun(console, asked) as (members, options, run, progress):
-        result = _with_serial(set_outcome(fit_set(members, options, run, progress=progress)), members)
+        result = _with_serial(judged_outcome(fit_set(members, options, run, progress=progress)), members)
         progress("done", 1.0)
     folder = _folder(asked, "calibration")
     with written_together(folder) as part:

@@ -54,7 +54,11 @@ def workbench(bags: BagsArgument = None, *, served: Served, opening: Recorded) -
 
     host, port, set_file = served.host, served.port, served.set_file
     with socket.socket() as probe:
-        if probe.connect_ex((host, port)) == 0:
+        try:
+            taken = probe.connect_ex((host, port)) == 0
+        except OSError as error:
+            raise DataError(f"--host {host}: {error.strerror or error}; name an address of this machine") from error
+        if taken:
             raise DataError(f"port {port} is taken (choose another with --port)")
     specification, wanted = opening.specification, named_model(served.model, [])
     if opening.site is not None:

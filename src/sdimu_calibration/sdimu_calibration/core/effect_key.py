@@ -17,7 +17,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.data_error import DataError
 from sdimu_calibration.core.units import UnitError, from_si, parse_quantity
 
 SENSORS = ("gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z")
@@ -69,6 +69,10 @@ class EffectKey:
 def variant(options: Mapping[str, str]) -> str:
     """Write options as they stand behind a name, e.g. ``(tau=1200 s)``; empty without options."""
     return "(" + ", ".join(f"{k}={v}" for k, v in options.items()) + ")" if options else ""
+
+
+_FROM_ZERO = frozenset({"t0", "at", "turn"})
+"""Options that may be zero: a place in the test, and no size."""
 
 
 def parse_key(text: str) -> EffectKey:
@@ -130,7 +134,13 @@ def read_options(key: EffectKey, expected: Mapping[str, str]) -> dict[str, float
         example = variant({name: f"1 {unit}".removesuffix(" 1") for name, unit in expected.items()})
         wanted = f"expected {key.name}{example}" if expected else "it takes no options"
         raise DataError(f"effect '{key.name}': {wanted}, not '{variant(key.options)}'")
-    return {name: read_quantity(f"effect '{key.name}': {name}", key.options[name], expected[name]) for name in expected}
+    values = {
+        name: read_quantity(f"effect '{key.name}': {name}", key.options[name], expected[name]) for name in expected
+    }
+    for name, value in values.items():
+        if value < 0.0 or (value == 0.0 and name not in _FROM_ZERO):
+            raise DataError(f"effect '{key.name}': {name} must be positive, not '{key.options[name]}'")
+    return values
 
 
 def read_quantity(what: str, text: str, unit: str) -> float:

@@ -23,6 +23,8 @@ STANDARD_GRAVITY = 9.80665
 
 _DEG = math.pi / 180.0
 """Degree (rad): definition."""
+ABSOLUTE_ZERO_DEGC = -273.15
+"""Lowest temperature (degC): nothing is colder."""
 LARGEST = 1e20
 """Largest number of a quantity (SI): beyond all that is measured, and its square and products stay numbers."""
 _G = STANDARD_GRAVITY

@@ -22,14 +22,20 @@ import numpy as np
 
 from sdimu_calibration.core.effects.effect import Timetable
 from sdimu_calibration.core.estimation.fit import Start
+from sdimu_calibration.core.estimation.navigation_fit import MISFIT
 from sdimu_calibration.core.fit_statistics import FitStatistics
 from sdimu_calibration.core.joint.member import Job, Report, tried
 from sdimu_calibration.core.joint.reduction import Reduction
-from sdimu_calibration.core.joint.set_fit import Run
+from sdimu_calibration.core.joint.set_evidence import held_out_chance
+from sdimu_calibration.core.joint.set_fit import Run, SetFit
+from sdimu_calibration.core.joint.set_result import SCATTERS, set_outcome
 from sdimu_calibration.core.joint.stretch_rows import Places
 from sdimu_calibration.core.noise_term import NoiseTerm
+from sdimu_calibration.core.note import Note, Topic
 from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.specification import ImuSpecification
+from sdimu_calibration.core.wording import Work
 from sdimu_calibration.storage.files.config import load_imu, load_site
 from sdimu_calibration.storage.files.result_file import as_note
 from sdimu_calibration.storage.files.whole_file import beside
@@ -48,6 +54,28 @@ _SOURCES = Path(__file__).resolve().parents[1]
 """Folder of the package."""
 
 Told = Callable[[int, int], None]
+
+
+def judged_outcome(fit: SetFit) -> Calibration:
+    """Put the result of a joint fit together, with a warning where its recordings do not predict each other.
+
+    As the fit of one recording is judged by stops that it has not seen; that chance does not reach the error is asked,
+    too, as two recordings leave much to chance.
+
+    Parameters
+    ----------
+    fit : SetFit
+    """
+    result = set_outcome(fit)
+    error = result.fit["held_out_rms"]
+    if error is None or error <= MISFIT or held_out_chance(fit, error) >= SCATTERS:
+        return result
+    told = (
+        f"the model does not fit: the recordings do not predict each other (held-out error {error:.3f}; 1 is right): "
+        "physics is missing, or they are not of one unit in one state"
+    )
+    note = Note(told, Topic.MISFIT, f"; run: {Work.DIAGNOSE}")
+    return replace(result, notes=(*result.notes, note), warnings=(*result.warnings, note))
 
 
 @contextmanager

@@ -25,7 +25,9 @@ class World:
     table: Annotated[str, typer.Option(help="Rate table.")] = "ideal"
     rate: Annotated[float, typer.Option(help="Sample rate of the IMU (Hz), 10 to 1000.")] = 100.0
     mount: Annotated[str | None, typer.Option(help="Rotation of the IMU on the table: 'X,Y,Z' (deg).")] = None
-    mount_max: Annotated[float, typer.Option(help="Without --mount: drawn up to this about every axis (deg).")] = 3.0
+    mount_max: Annotated[
+        float, typer.Option(min=0.0, max=180.0, help="Without --mount: drawn up to this about every axis (deg).")
+    ] = 3.0
     effect: Annotated[
         list[str] | None,
         typer.Option(
@@ -78,6 +80,6 @@ def mount_rad(text: str) -> tuple[float, float, float]:
         x, y, z = (math.radians(float(part)) for part in text.split(","))
     except ValueError as error:
         raise DataError(f"--mount '{text}': expected three angles in degrees, such as '1,2,3'") from error
-    if not all(map(math.isfinite, (x, y, z))):
-        raise DataError(f"--mount '{text}': expected three finite angles in degrees")
+    if not all(abs(angle) <= math.tau for angle in (x, y, z)):
+        raise DataError(f"--mount '{text}': expected three finite angles in degrees, up to 360")
     return x, y, z

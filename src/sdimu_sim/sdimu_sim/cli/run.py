@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from contextlib import nullcontext
 from dataclasses import dataclass
@@ -11,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from sdimu_calibration.cli.opened import NOT_TRUSTED
+from sdimu_calibration.cli.opened import NOT_TRUSTED, leave
 from sdimu_calibration.cli.option_groups import with_options
 from sdimu_calibration.cli.options import DomainOption, EachStopOption, Fitted, Place
 from sdimu_sim.cli.options import SeedOption, World
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 
     from sdimu_calibration.cli.processes import Children
     from sdimu_calibration.cli.watch import Outline
+    from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary
     from sdimu_calibration.core.results import Calibration
 
 STALL_S = 180.0
@@ -64,7 +66,10 @@ def run(
     domain: DomainOption = None,
     out: Annotated[Path, typer.Option(file_okay=False, help="Folder of the results.")] = Path("out/run"),
 ) -> None:
-    """Run a whole simulated test over ROS 2: table, IMU, calibration and recorder, each its own process."""
+    """Run a whole simulated test over ROS 2: table, IMU, calibration and recorder, each its own process.
+
+    Exit status 3: done, but the estimate is not to be trusted, or --adaptive did not reach its limits; stderr says why.
+    """
     import time
 
     from sdimu_calibration.cli.console import console as make_console
@@ -80,7 +85,7 @@ def run(
     with own_folder(out):
         begun = time.monotonic()
         with own_domain(out / "log", domain) as used, Children(out / "log") as children:
-            replace = _clear(out)
+            replace = _clear(out, test.followed)
             console.print(f"ROS domain {used}", highlight=False)
             if never_compiled():
                 console.print("compiling the numerical loops, once on this machine: about a minute without samples")
@@ -91,7 +96,7 @@ def run(
         end = _tell_choices(console, out / "choices.json") if test.adaptive is not None else None
         result = _report(console, out, world.site, test)
         _say_measured(console, out, result, streamed, wall)
-    _leave(test.adaptive, end)
+    _leave(result, test.adaptive, end)
 
 
 def _parameters(test: LiveTest, world: World, out: Path) -> dict[str, dict[str, Any]]:
@@ -124,10 +129,13 @@ def _parameters(test: LiveTest, world: World, out: Path) -> dict[str, dict[str, 
     }
 
 
-def _leave(goals: str | None, end: dict[str, Any] | None) -> None:
-    """End with exit status 3 and a line on stderr when an adaptive test has not reached its limits."""
-    if end is not None and not end["reached"]:
+def _leave(result: Calibration, goals: str | None, end: dict[str, Any] | None) -> None:
+    """End with exit status 3 and lines on stderr where the result is not to be trusted, or goals were not reached."""
+    short = end is not None and not end["reached"]
+    if end is not None and short:
         typer.echo(f"sdimu: the limits of {goals} were not reached: {end['text']}", err=True)
+    leave(result)
+    if short:
         raise typer.Exit(NOT_TRUSTED)
 
 
@@ -141,8 +149,12 @@ def _check_choosing(adaptive: str | None, ask: bool, plan: str | None) -> None:
         raise DataError(f"--plan {plan} and --adaptive {adaptive}: a test follows a plan or chooses; state one")
 
 
-def _clear(out: Path) -> bool:
-    """Remove the results of an earlier run, once nothing refuses this one; whether its bag may be replaced."""
+def _clear(out: Path, plan: str = DEFAULT_PLAN) -> bool:
+    """Remove the results of an earlier run, once nothing refuses this one; whether its bag may be replaced.
+
+    The file of the plan that is to be followed stays.
+    """
+    from sdimu_calibration.cli.next_commands import PLAN
     from sdimu_calibration.core.recording import DataError
     from sdimu_calibration.storage.bags.bag_folder import check_room
     from sdimu_calibration.storage.bags.bag_metadata import METADATA
@@ -153,6 +165,8 @@ def _clear(out: Path) -> bool:
     check_room(bag, replace)
     for stale in ("result.json", "report.html", "diagnosis.json", "calibration.journal", "choices.json"):
         (out / stale).unlink(missing_ok=True)
+    if replace and not _is_file(plan, out / PLAN):
+        (out / PLAN).unlink(missing_ok=True)
     return replace
 
 
@@ -176,7 +190,7 @@ def _check(options: dict[str, dict[str, Any]]) -> float:
         mount_rad(imu["mount"])
     if imu["temperature"]:
         load_temperature(imu["temperature"])
-    if table["speed"] < 0:
+    if not 0.0 <= table["speed"] < math.inf:
         raise DataError(f"--speed {table['speed']:g}: expected 0 or more")
     if not 10.0 <= imu["rate_hz"] <= 1000.0:
         raise DataError(f"--rate {imu['rate_hz']:g}: expected 10 to 1000 Hz")
@@ -291,6 +305,7 @@ def _report(console: Console, out: Path, site: str, test: LiveTest) -> Calibrati
     asked = Asked.of((out / "bag",), out, Place(site, imu), Fitted(None if model == DEFAULT_MODEL else model))
     with written_together(out) as part:
         write_diagnosis(part / "diagnosis.json", summary)
+        _write_plan(part, out, test, summary)
         write_report(
             part / "report.html",
             result,
@@ -308,6 +323,35 @@ def _report(console: Console, out: Path, site: str, test: LiveTest) -> Calibrati
     print_out_of_sight(console, summary)
     print_advice(console, summary.advice, asked)
     return result
+
+
+def _write_plan(part: Path, out: Path, test: LiveTest, summary: DiagnosisSummary) -> None:
+    """Leave the plan that was run, to which the advice of the diagnosis refers; chosen turns as the motion showed them.
+
+    Parameters
+    ----------
+    part : Path
+        Where files are written that then go to `out` together.
+    out : Path
+    test : LiveTest
+    summary : DiagnosisSummary
+    """
+    from sdimu_calibration.cli.next_commands import PLAN, as_plan
+    from sdimu_calibration.storage.files.config import load_plan
+    from sdimu_calibration.storage.files.plan_file import write_plan
+
+    if test.adaptive is not None:
+        plan, remark = (as_plan(summary.plan), f"The turns chosen for {test.adaptive}, as the motion showed them")
+    else:
+        plan, remark = load_plan(test.followed), f"The plan that was run: {test.followed}"
+    # A plan of the user's own in this place stays as it is written.
+    if plan is not None and not _is_file(test.followed, out / PLAN):
+        write_plan(part / PLAN, plan, [remark])
+
+
+def _is_file(name: str, file: Path) -> bool:
+    """Tell whether a plan is named by the path of a file."""
+    return Path(name).resolve() == file.resolve()
 
 
 def _tell_choices(console: Console, path: Path) -> dict[str, Any]:

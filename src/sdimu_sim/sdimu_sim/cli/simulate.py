@@ -13,7 +13,7 @@ from sdimu_calibration.cli.console import plain
 from sdimu_calibration.cli.option_groups import with_options
 from sdimu_calibration.cli.options import ReplaceOption
 from sdimu_calibration.core.data_error import DataError
-from sdimu_calibration.core.units import parse_quantity
+from sdimu_calibration.core.effect_key import read_quantity
 from sdimu_sim.cli.options import PlanOption, SeedOption, World
 
 if TYPE_CHECKING:
@@ -129,5 +129,7 @@ def turn_on_sigmas(texts: Sequence[str]) -> dict[str, float]:
         group, equals, size = text.partition("=")
         if not equals or group not in units:
             raise DataError(f"--turn-on '{text}': expected gyro_bias='0.01 deg/h' or accel_bias='20 ug'")
-        out[group] = parse_quantity(size, units[group])
+        out[group] = read_quantity(f"--turn-on '{text}'", size, units[group])
+        if out[group] < 0.0:
+            raise DataError(f"--turn-on '{text}': expected a sigma of zero or more")
     return out

@@ -28,6 +28,8 @@ _SWAY_RAD, _TREMOR_RAD = np.radians(3.0), np.radians(0.15)
 """Amplitudes: at most 30 and 10 deg/s."""
 _NUDGE_S, _NUDGE = 0.4, 0.1
 """Length of a nudge (s), and its amplitudes as a share of those of a turn: tenths of a degree."""
+_MOST_RESTS = 10_000
+"""Number of attitudes at most: a day and a half by hand."""
 
 
 @dataclass(frozen=True)
@@ -75,8 +77,8 @@ class ByHand:
 
 def simulate_by_hand(run: ByHand) -> tuple[ImuSamples, Truth]:
     """Simulate a run."""
-    if run.rests < 2:
-        raise DataError(f"{run.rests} attitudes by hand: expected 2 and more")
+    if not 2 <= run.rests <= _MOST_RESTS:
+        raise DataError(f"{run.rests} attitudes by hand: expected 2 to {_MOST_RESTS}")
     if not 10.0 <= run.rate_hz <= 1000.0:
         raise DataError(f"sample rate {run.rate_hz:g} Hz: expected 10 to 1000 Hz")
     imu = with_hidden(

@@ -63,6 +63,7 @@ def test_no_residual_of_what_is_left_out_reaches_the_fit(whole, prepared):
         ((99,), (), "stop 99 has no measurements"),
         ((), ((5.0, 8.0),), "give the attitude"),
         ((), ((500.0, 400.0),), "ends before it begins"),
+        ((), ((1e6, 2e6),), "begins after the recording"),
     ],
 )
 def test_what_cannot_be_left_out_is_told(prepared, stops, spans, word):

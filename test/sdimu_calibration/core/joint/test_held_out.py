@@ -12,6 +12,7 @@ from sdimu_calibration.core.joint.set_evidence import held_out, held_out_chance
 from sdimu_calibration.core.joint.set_fit import SetFit, SetOptions, fit_set, prior_weight, with_reports
 from sdimu_calibration.report import first_screen
 from sdimu_calibration.storage.files.config import load_model
+from sdimu_calibration.storage.set_work import judged_outcome
 
 from .conftest import here, short, unit_set
 
@@ -48,6 +49,15 @@ def test_what_chance_reaches_is_known_for_two_recordings(two):
 def test_power_ons_that_differ_are_beyond_chance(two):
     # Their biases were switched on anew, which this model denies.
     assert held_out_chance(two, held_out(two).rms) < 1e-6
+
+
+def test_a_set_is_judged_by_its_prediction_of_recordings_held_out(two):
+    """That recordings do not predict each other is a misfit, whatever their innovations are; chance is none."""
+    told = judged_outcome(two)
+    assert any("do not predict each other" in line for line in told.misfits)
+    assert set(told.misfits) <= set(told.notes)
+    right = judged_outcome(drawn(two, np.random.default_rng(3)))
+    assert not any("do not predict each other" in line for line in right.warnings)
 
 
 def test_two_recordings_that_lack_an_effect_show_it_in_the_noise_of_those_that_have_it(options):

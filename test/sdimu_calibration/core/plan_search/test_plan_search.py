@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from sdimu_calibration.core.plan import Plan, Turn
-from sdimu_calibration.core.plan_search import Goal, Question, next_turn, search
+from sdimu_calibration.core.plan_search import Goal, NextTurn, Question, next_turn, search
 from sdimu_calibration.core.plan_search.bound import bounds
 from sdimu_calibration.core.plan_search.moves import Abilities, single, whole
 from sdimu_calibration.core.recording import DataError
@@ -29,6 +29,21 @@ def attitudes(plan: Plan) -> list[np.ndarray]:
     for turn in plan.turns:
         out.append(out[-1] @ rotation_matrix(turn.angle_rad * np.eye(3)["XYZ".index(turn.axis)]))
     return out
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "words"),
+    [
+        (0.0, 12.34, "apart by 12.3 sigma instead of 0.0"),
+        (0.0, 0.0, "apart by 0.0 sigma with it and without: nothing changes"),
+        (5.0, 5.00001, "apart by 5.0 sigma with it and without: nothing changes"),
+        (0.01, 0.04, "apart by 0.04 sigma instead of 0.01"),
+        (5.001, 5.003, "apart by 5.003 sigma instead of 5.001"),
+    ],
+)
+def test_a_turn_says_what_it_changes_in_digits_that_show_it(before, after, words):
+    turn = NextTurn((Turn("Y", math.pi, math.radians(10.0)),), 4.0, before, after)
+    assert turn.text == f"turn Y +180 deg at 10 deg/s (4.0 min): {words}"
 
 
 @pytest.mark.parametrize("moves", [whole, single])

@@ -49,6 +49,10 @@ def _touched(prepared: PreparedData, spans: Sequence[tuple[float, float]]) -> Bo
                 f"times left out: {begin:g}-{end:g} s begins in the first {ALIGN_S:.0f} s of the first stop, which "
                 "give the attitude: leave out later ones"
             )
+        if begin >= epochs.end[-1]:
+            raise DataError(
+                f"times left out: {begin:g}-{end:g} s begins after the recording, which is {epochs.end[-1]:.0f} s long"
+            )
         out |= (epochs.end > begin) & (epochs.start < end)
     return out
 

@@ -8,18 +8,20 @@ priors make squares count.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.effects.effect import Effect, Timetable
 from sdimu_calibration.core.estimation.fit import Fit, Start
 from sdimu_calibration.core.estimation.free_inertial import FreeInertialRun
-from sdimu_calibration.core.estimation.navigation_fit import NavigationFit
+from sdimu_calibration.core.estimation.navigation_fit import MISFIT, NavigationFit
 from sdimu_calibration.core.evidence.consistency import Consistency
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.evidence.navigation_evidence import NavigationEvidence
 from sdimu_calibration.core.fit_statistics import FitStatistics
+from sdimu_calibration.core.note import Note, Topic
 from sdimu_calibration.core.recording import DataFault
+from sdimu_calibration.core.wording import Work
 
 
 @dataclass(frozen=True)
@@ -142,6 +144,27 @@ class ReferenceFit(Fit):
         # Not those of the passes: the passes only answer questions about these coefficients.
         return NavigationFit.notes(self.about)
 
+    def warnings(self, statistics: FitStatistics) -> tuple[str, ...]:
+        """Misfit of the least squares, and at the stops of the navigation about it; what is outside the specification.
+
+        Parameters
+        ----------
+        statistics : FitStatistics
+        """
+        return self.about.warnings(statistics)
+
+    def contradiction(self, statistics: FitStatistics) -> str:
+        """Say that the navigation about the coefficients does not fit at all; empty where it does.
+
+        The squares of a least squares over whole stops and turns are larger than innovations where physics is missing,
+        and no measure of absurdity.
+
+        Parameters
+        ----------
+        statistics : FitStatistics
+        """
+        return self.about.contradiction(replace(self.about.statistics(), held_out_rms=statistics.held_out_rms))
+
     def free_inertial(self, rivals: Sequence[tuple[str, Fit]]) -> tuple[FreeInertialRun, ...]:
         """Navigate without aid on parts that no fit has seen; each is fitted again by navigation."""
         return self.about.free_inertial(rivals)
@@ -158,3 +181,20 @@ class ClassicalFit(ReferenceFit):
 
     estimator = "classical"
     diagnosable = False
+
+    def warnings(self, statistics: FitStatistics) -> tuple[str, ...]:
+        """Say where the angles of the table leave over more than noise; then what the navigation says.
+
+        Parameters
+        ----------
+        statistics : FitStatistics
+        """
+        nis = statistics.nis_mean
+        # The navigation knows no angle of the table, and is judged by its own innovations.
+        about = replace(self.about.statistics(), held_out_rms=statistics.held_out_rms)
+        told = (
+            f"the angles of the table do not explain the samples (NIS {nis:.3f}; 1 is right): the IMU stands askew on "
+            "the table, its angles are wrong, or physics is missing"
+        )
+        own = [Note(told, Topic.MISFIT, f"; run: {Work.DIAGNOSE}")] if nis > MISFIT else []
+        return (*own, *self.about.warnings(about))

@@ -60,7 +60,9 @@ class NextTurn:
         """In words."""
         degrees = [(t.axis, math.degrees(t.angle_rad), math.degrees(t.rate_rad_s)) for t in self.turns]
         words = [f"{axis} {angle:+.0f} deg at {rate:g} deg/s" for axis, angle, rate in degrees]
-        apart = f"apart by {self.after:.1f} sigma instead of {self.before:.1f}"
+        after, before = in_sigmas(self.after, self.before)
+        changed = f"sigma instead of {before}" if after != before else "sigma with it and without: nothing changes"
+        apart = f"apart by {after} {changed}"
         return f"turn {' and '.join(words)} ({self.minutes:.1f} min): {apart}"
 
 
@@ -97,6 +99,8 @@ def next_turn(
     names = tuple(p.name for e in effects for p in e.parameters)
     if len(names) < 2:
         raise DataError("nothing to tell apart: name two coefficients or more")
+    if len(set(names)) < len(names):
+        raise DataError(f"{next(n for n in names if names.count(n) > 1)}: named twice; name each coefficient once")
     have = {p for name in asked.model.effects for p in _parameters(name)}
     more = [e for e in effects if not {p.name for p in e.parameters} <= have]
     # A model names its effects; `imu_model.build` takes an effect itself as well.
@@ -163,6 +167,21 @@ def apart(told: Bounds, names: Sequence[str], sizes: Mapping[str, float] | None)
         for i, j in permutations(range(len(rows)), 2)
     )
     return float(np.sqrt(max(worst, 0.0)))
+
+
+def in_sigmas(*values: float) -> list[str]:
+    """Write significances in as many digits as show that they differ; in one where three do not.
+
+    Parameters
+    ----------
+    *values : float
+        In sigmas (1).
+    """
+    for digits in (1, 2, 3):
+        out = [f"{value:.{digits}f}" for value in values]
+        if len(set(out)) > 1:
+            return out
+    return [f"{value:.1f}" for value in values]
 
 
 def _parameters(effect: str | Effect) -> tuple[str, ...]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -56,19 +55,19 @@ def cut_bag(source: Path, target: Path, first_s: float, last_s: float, *, replac
     if not imu:
         raise DataError(f"{source}: no message of {cdr.IMU} is in it")
     start, end = min(int(ns[0]) for ns in imu), max(int(ns[-1]) for ns in imu)
-    low = start + round(first_s * 1e9)
-    high = start + round(last_s * 1e9) if math.isfinite(last_s) else np.iinfo(np.int64).max
+    # Times beyond both ends, however far, are those of the ends.
+    whole_s = (end - start) * 1e-9
+    low = start + round(min(max(first_s, 0.0), whole_s + 1.0) * 1e9)
+    high = start + round(last_s * 1e9) if last_s <= whole_s else np.iinfo(np.int64).max
     kept = {topic: _between(*stamped[topic], low, high, found[topic].type_name == cdr.STATUS) for topic in ranked}
     if not any(len(kept[topic][0]) for topic in ranked if found[topic].type_name == cdr.IMU):
-        raise DataError(
-            f"{source}: no sample between {first_s:g} and {last_s:g} s; it is {(end - start) * 1e-9:.1f} s long"
-        )
+        raise DataError(f"{source}: no sample between {first_s:g} and {last_s:g} s; it is {whole_s:.1f} s long")
     with McapBag(target, replace=replace, custom=custom_data(source)) as bag:
         for topic, content in found.items():
             bag.topic(topic, content.type_name)
         bag.write_merged(kept)
         counts = dict(bag.counts)
-    return Part(counts, (end - start) * 1e-9)
+    return Part(counts, whole_s)
 
 
 def _between(ns: Ints, messages: list[bytes], low: int, high: int, holds: bool) -> tuple[Ints, list[bytes]]:

@@ -49,7 +49,9 @@ def read_effect_file(path: Path) -> EffectFile:
     """Read an effect of one's own and check it."""
     path = Path(path)
     if not path.is_file():
-        raise DataError(f"{path}: no such effect file")
+        raise DataError(
+            f"{path}: is a folder; name an effect file" if path.is_dir() else f"{path}: no such effect file"
+        )
     file = read_yaml(path, EffectFile)
     try:
         formulas_of(file)

@@ -18,6 +18,7 @@ from sdimu_calibration.core.recording import DataFault
 from sdimu_calibration.core.results import (
     INSEPARABLE,
     NOT_TRUSTED,
+    UNTRUSTED_VERDICTS,
     Calibration,
     History,
     PowerOnDeviation,
@@ -203,10 +204,34 @@ def _of_set(of_set: SetSummary) -> dict[str, Any]:
 
 def read_result(path: Path) -> Calibration:
     """Read result.json, or the result.json in a folder."""
+    return read_judged_result(path)[0]
+
+
+def read_judged_result(path: Path) -> tuple[Calibration, tuple[str, ...]]:
+    """Read result.json, and why it is not to be trusted, for those who go on to use it.
+
+    Parameters
+    ----------
+    path : Path
+        File, or a folder with a result.json.
+
+    Returns
+    -------
+    result : Calibration
+    reasons : tuple of str
+        One line each; empty where nothing speaks against it.
+    """
     path = Path(path) / "result.json" if Path(path).is_dir() else Path(path)
     file = read_model(path, ResultFile)
     with complete(path, FORMAT):
-        return _calibration(file)
+        result = _calibration(file)
+    judged = (
+        [f"its diagnosis ended as '{file.verdict}': the model is wrong or the data are, and no effect mends it"]
+        if file.verdict in UNTRUSTED_VERDICTS
+        else []
+    )
+    reasons = dict.fromkeys([*judged, *result.not_to_be_trusted, *result.misfits])
+    return result, tuple(f"{path}: {line}" for line in reasons)
 
 
 def _calibration(file: ResultFile) -> Calibration:

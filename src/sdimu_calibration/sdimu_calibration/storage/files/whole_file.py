@@ -12,6 +12,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+from sdimu_calibration.core.data_error import DataError
+
 RESULT = "result.json"
 COMPANIONS = ("report.html", "diagnosis.json", "set.json")
 """Files that speak of the result.json beside them: those of an earlier run go when a new one comes."""
@@ -32,6 +34,8 @@ def write_whole(path: Path, text: str) -> None:
     text : str
     """
     path = Path(path)
+    if path.is_dir():
+        raise DataError(f"{path}: is a folder; name a file to write")
     path.parent.mkdir(parents=True, exist_ok=True)
     temporary = beside(path)
     try:
