@@ -166,7 +166,8 @@ class Expansion:
         more = prior.log_more(self.columns)
         # Odds of the second beside the first: k + 2 over k + 1, and its kin; at most one variant of a parameter.
         step = np.log((len(self.members) + 2.0) / (len(self.members) + 1.0))
-        use = np.flatnonzero(np.isfinite(more) & (self.c > 0.0))
+        # Two equations that no physics names are too many.
+        use = np.flatnonzero(np.isfinite(more) & (self.c > 0.0) & ~prior.own)
         if len(use) < 2:
             return -np.inf, self.members
         X = J[np.ix_(use, use)] - self._V[use] @ J[self.columns][:, use]

@@ -22,7 +22,8 @@ from sdimu_calibration.core.posterior.noise_models import NoiseModel
 from sdimu_calibration.core.posterior.search import WINDOW, climb, window
 
 INDISTINGUISHABLE = 3.0
-"""Log posterior (1) by which an exchange may be behind for two candidates to be called alike: odds of 20 to 1."""
+"""Log Bayes factor (1) by which an exchange may be behind for two candidates to be called alike: odds of 20 to 1 by the
+data; what is known before them says which is likelier."""
 PROBABLE = 0.5
 """Probability from which a class of effects is told as found: more likely there than not."""
 _ROUNDS = 4
@@ -37,6 +38,8 @@ _HOPED = 8.0
 between two of a scan it may gain as much."""
 _MOST_HOPED = 3
 """Number of candidates outside the model that are sharpened at most: each takes signatures of its own."""
+_MOST_SHARPENED = 20
+"""Number of times or time constants that are put between those of the scan at most: each takes a climb."""
 _NOISES = 6
 """Number of noises in which effects are looked for, the likeliest first: each takes a climb."""
 
@@ -152,13 +155,17 @@ class Posterior(Generic[E]):
 
     def _classes_of(self, model: Weighed) -> list[tuple[int, ...]]:
         """Each member of a model, then what may stand in its place, the likeliest first."""
-        near = self.board.data(model.noise)[1].at(model.members)
+        near, prior = self.board.data(model.noise)[1].at(model.members), self.board.prior
         out = []
         for place, table in near.exchanges():
             own = model.members[place][0]
+            odds = prior.log_more([k for k, _ in model.members[:place] + model.members[place + 1 :]])
             score = table.max(axis=1)
-            score[own] = -np.inf
-            out.append((own, *(int(k) for k in np.argsort(-score) if score[k] > -INDISTINGUISHABLE)))
+            fit = np.full(len(score), -np.inf)
+            np.subtract(score, odds - odds[own], out=fit, where=np.isfinite(odds))
+            alike = (score > -WINDOW) & (fit > -INDISTINGUISHABLE)
+            alike[own] = False
+            out.append((own, *(int(k) for k in np.argsort(-score) if alike[k])))
         return out
 
     def of_class(self, place: int) -> float:
@@ -209,12 +216,16 @@ def posterior(
     tried = None if before is None else before.tried
     noises, members = _climbed(board, [start], tried)
     asked: set[str] = set()
-    while True:
+    sharpened = 0
+    while sharpened < _MOST_SHARPENED:
         sharper = _sharpened(board, members, noises[0]) or _hoped(board, members, noises[0], asked)
         if sharper is None:
             break
         board, starts = sharper
-        noises, members = _climbed(board, starts, tried)
+        noises, members = _climbed(board, starts, tried, of_two=False)
+        sharpened += 1
+    if sharpened:
+        noises, members = _climbed(board, [members], tried)
     data = [board.data(noise) for noise in noises]
     found = window([d for _, d in data], [offset for offset, _ in data], [members])
     return Posterior(board, _weighed(found, noises))
@@ -228,12 +239,12 @@ def _weighed(found: dict[tuple[int, Members], float], noises: Sequence[NoiseMode
 
 
 def _climbed(
-    board: Board[E], starts: Sequence[Members], tried: Sequence[NoiseTerm] | None = None
+    board: Board[E], starts: Sequence[Members], tried: Sequence[NoiseTerm] | None = None, of_two: bool = True
 ) -> tuple[list[NoiseModel], Members]:
     """Look for noises beside the best effects, and for effects in each noise, until neither changes.
 
-    Kinds of noise that were `tried` alone are looked for, and beside the best effects alone, where a search about
-    nearly the same point has looked for all of them.
+    Kinds of noise that were `tried` alone are looked for, beside the best effects and those of the start, where a
+    search about nearly the same point has looked for all of them. `of_two` allows moves of two effects at once.
 
     Returns
     -------
@@ -246,11 +257,11 @@ def _climbed(
     known: list[tuple[float, NoiseModel, Members]] = []
     start = starts[0]
     white = board.data(NoiseModel())[1]
-    best, members = max((climb(white, one) for one in starts), key=lambda found: found[0])
+    best, members = max((climb(white, one, of_two) for one in starts), key=lambda found: found[0])
     for _ in range(_ROUNDS):
         if members in asked:
             break
-        beside = [members] if tried is not None else [members, _without_drifts(board, members), ()]
+        beside = [members, *starts] if tried is not None else [members, _without_drifts(board, members), ()]
         for one in dict.fromkeys(beside):
             if one in asked:
                 continue
@@ -267,7 +278,7 @@ def _climbed(
             known.append((offset + gain, noise, found))
         known.sort(key=lambda found: -found[0])
         offset, data = board.data(known[0][1])
-        score, members = climb(data, known[0][2])
+        score, members = climb(data, known[0][2], of_two)
         if start and data.at(start).score > score - _TIE:
             members = start
         best = max(best, offset + score)

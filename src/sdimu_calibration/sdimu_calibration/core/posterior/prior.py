@@ -55,6 +55,8 @@ class Prior:
         What happens at one time may happen at several.
     positive : ndarray of bool, shape (q,)
         The size cannot be negative.
+    own : ndarray of bool, shape (q,)
+        An equation that no physics names.
     """
 
     log_share: Floats
@@ -62,6 +64,7 @@ class Prior:
     parameter: Ints
     repeats: Bools
     positive: Bools
+    own: Bools
 
     def log_more(self, base: Sequence[int]) -> Floats:
         """Log odds of each candidate beside those of a model.
@@ -118,6 +121,7 @@ def prior_of(candidates: Sequence[Candidate], shared: Sequence[int] = ()) -> Pri
         _numbers([(name,) for name in names]),
         np.array([bool(OF_ONE_TIME & c.effect.options.keys()) for c in candidates], dtype=bool),
         np.array([c.effect.positive for c in candidates], dtype=bool),
+        np.array([c.family == "own" for c in candidates], dtype=bool),
     )
 
 
