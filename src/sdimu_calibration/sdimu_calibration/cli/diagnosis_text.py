@@ -8,6 +8,7 @@ from sdimu_calibration.cli.console import say as line
 from sdimu_calibration.cli.next_commands import print_advice
 from sdimu_calibration.cli.wide_table import print_table
 from sdimu_calibration.core.diagnosis.verdict import beyond
+from sdimu_calibration.core.probability import in_percent
 from sdimu_calibration.core.units import UnitError, from_si
 
 if TYPE_CHECKING:
@@ -23,6 +24,8 @@ if TYPE_CHECKING:
     from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary
 
 _TOP = 5
+POSSIBLE = 0.1
+"""Probability (1) from which something that is not told is listed as possible: less is one of many."""
 
 
 def print_summary(console: Console, summary: DiagnosisSummary, asked: Asked) -> None:
@@ -37,6 +40,7 @@ def print_summary(console: Console, summary: DiagnosisSummary, asked: Asked) -> 
     line(console, f"p of the model as given{noise}: {f'{d.p_value:.2g}' if d.p_value > 1e-300 else 'below 1e-300'}")
     _where(console, summary)
     _candidates(console, summary)
+    _possible(console, summary)
     for text in step_lines(d.found.steps):
         line(console, text)
     print_ladder(console, d.rungs)
@@ -89,18 +93,44 @@ def _candidates(console: Console, summary: DiagnosisSummary) -> None:
                 amount(f.value, unit, 4),
                 amount(f.sigma, unit, 2),
                 unit,
+                in_percent(f.probability) if f.probability == f.probability else "",
                 f"{f.z:+.1f}",
                 f"{100 * f.explained:.0f} %",
             ]
         )
-    headings = ("effect", "estimate", "+-", "unit", "z", "explains")
+    headings = ("effect", "estimate", "+-", "unit", "probability", "z", "explains")
     title = "found" if summary.candidates else "tried, but not enough to explain the misfit"
     print_table(console, headings, lines, title)
     for f in shown:
         alike = f"looks here like {', '.join(f.alike[:4])}" if f.alike else ""
+        if len(f.may_be) > 1:
+            alike = f"may be {', '.join(f'{s.name} {in_percent(s.probability)}' for s in f.may_be[:_TOP])}"
         words = "; ".join(part for part in (_fall(f), alike) if part)
         if words:
             line(console, f"{f.candidate.label}: {words}")
+
+
+def _possible(console: Console, summary: DiagnosisSummary) -> None:
+    """Print what is open: families of effects and noise that are neither told nor ruled out."""
+    told = summary.diagnosis.probabilities
+    if told is None:
+        return
+    named = {share.name for f in summary.found for share in f.may_be}
+    possible = [
+        f"{one.members[0].label} {in_percent(one.probability)}"
+        for one in told.families
+        if one.probability >= POSSIBLE and one.members and one.members[0].label.partition("(")[0] not in named
+    ]
+    if possible:
+        line(console, f"possible, and not told: {', '.join(possible[:_TOP])}")
+    known = {(term.triad, term.kind) for term in summary.diagnosis.found.noise}
+    noise = [
+        f"{n.triad} {n.kind.replace('_', ' ')} {in_percent(n.probability)}"
+        for n in told.noise
+        if n.probability >= POSSIBLE and (n.triad, n.kind) not in known
+    ]
+    if noise:
+        line(console, f"noise with a memory that is possible: {', '.join(noise[:_TOP])}")
 
 
 def _fall(f: Found) -> str:

@@ -11,6 +11,11 @@ from statistics import NormalDist
 from sdimu_calibration.core.arrays import Floats
 
 
+def in_percent(p: float) -> str:
+    """Write a probability for people: ``87 %``; beyond what two digits can say ``< 1 %`` and ``> 99 %``."""
+    return "> 99 %" if p > 0.995 else "< 1 %" if p < 0.005 else f"{100.0 * p:.0f} %"
+
+
 def normal_tail(z: float) -> float:
     """Probability that a standard normal variable exceeds `z`."""
     return 0.5 * math.erfc(z / math.sqrt(2.0))

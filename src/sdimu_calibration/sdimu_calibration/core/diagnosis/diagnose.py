@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -33,6 +34,7 @@ from sdimu_calibration.core.evidence.candidate import Candidate
 from sdimu_calibration.core.evidence.consistency import Consistency
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.evidence.navigation_evidence import NavigationEvidence
+from sdimu_calibration.core.posterior.told import Probabilities, Share, may_be, probabilities
 from sdimu_calibration.core.probability import normal_tail
 from sdimu_calibration.core.progress import Progress, silent
 from sdimu_calibration.core.recording import DataError, Recording
@@ -135,6 +137,19 @@ class Diagnosis:
     def alike(self) -> tuple[str, ...]:
         """What the data cannot tell from the first of `chosen`."""
         return alike_first(self)
+
+    @cached_property
+    def probabilities(self) -> Probabilities | None:
+        """Probability of nothing, of each family of effects, of each noise; None of a `survey`."""
+        return None if self.found.posterior is None else probabilities(self.found.posterior, self.found.noise)
+
+    def may_be(self, column: int) -> tuple[float, tuple[Share, ...]]:
+        """Probability that a chosen column or something of its class is missing; coefficients that it may be."""
+        window = self.found.posterior
+        if window is None:
+            return float("nan"), ()
+        place = window.place_of(column)
+        return window.of_class(place), may_be(window, place)
 
     @property
     def navigation(self) -> NavigationEvidence:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -16,7 +15,7 @@ from sdimu_calibration.core.diagnosis.problem import Problem
 from sdimu_calibration.core.diagnosis.scan import POWER_80, scan
 from sdimu_calibration.core.evidence.candidate import Candidate
 from sdimu_calibration.core.evidence.linear import LinearEvidence
-from sdimu_calibration.core.posterior.told import Share, may_be
+from sdimu_calibration.core.posterior.told import Share
 from sdimu_calibration.core.probability import normal_tail
 
 
@@ -91,6 +90,7 @@ def found_effects(d: Diagnosis) -> tuple[Found, ...]:
         z = float(scanned.z[column])
         count = int(np.isfinite(scanned.sigma[allowed]).sum())
         others = _alike(d, column)
+        probability, shares = d.may_be(column)
         out.append(
             Found(
                 candidate=d.chosen[k],
@@ -105,7 +105,8 @@ def found_effects(d: Diagnosis) -> tuple[Found, ...]:
                 held_out_after=held_out[k + 1],
                 alike=tuple(d.evidence.names[i] for i in others),
                 coefficient_shifts=coefficient_shifts(problem, chosen, column, others, d.found.scale),
-                **_probability(d, column),
+                probability=probability,
+                may_be=shares,
             )
         )
     return tuple(out)
@@ -117,15 +118,6 @@ def _alike(d: Diagnosis, column: int) -> list[int]:
     if window is None:
         return []
     return [int(window.board.use[number]) for number in window.classes[window.place_of(column)]]
-
-
-def _probability(d: Diagnosis, column: int) -> dict[str, Any]:
-    """Probability of the class of a chosen column, and of each coefficient of it."""
-    window = d.found.posterior
-    if window is None:
-        return {}
-    place = window.place_of(column)
-    return {"probability": window.of_class(place), "may_be": may_be(window, place)}
 
 
 def _held_out(d: Diagnosis, count: int) -> list[float]:

@@ -17,6 +17,7 @@ from sdimu_calibration.core.evidence.candidate import Candidate
 from sdimu_calibration.core.evidence.consistency import SLOW_S, Consistency
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.handheld.handheld_fit import FORCE, RATE, TURN
+from sdimu_calibration.core.probability import in_percent
 from sdimu_calibration.core.units import from_si
 from sdimu_calibration.core.verdict import Verdict
 
@@ -91,14 +92,31 @@ def sentence(d: Diagnosis) -> str:
     if d.verdict == Verdict.UNEXPLAINED:
         return _unexplained(d, names)
     rest = error_falls(d)
+    sure = _sure(d)
     if d.verdict == Verdict.OWN_EQUATION:
-        return f"Something is missing that is not in the catalogue; it follows {names}; {rest}."
+        return f"Something is missing that is not in the catalogue{sure}; it follows {names}; {rest}."
     if d.verdict == Verdict.CLASS_OF_EFFECTS:
-        others = ", ".join(d.alike[:_LISTED])
-        return f"One effect is missing: {names}, or what looks the same here ({others}); {rest}."
+        return f"One effect is missing{sure}: {names}, or what looks the same here ({_others(d)}); {rest}."
     if len(d.chosen) > 1 and len(_families(d)) == 1:
-        return f"One effect is missing on {len(d.chosen)} axes: {names}; {rest}."
-    return f"{'One effect is' if d.verdict == Verdict.ONE_EFFECT else 'Several effects are'} missing: {names}; {rest}."
+        return f"One effect is missing on {len(d.chosen)} axes{sure}: {names}; {rest}."
+    one = "One effect is" if d.verdict == Verdict.ONE_EFFECT else "Several effects are"
+    return f"{one} missing{sure}: {names}; {rest}."
+
+
+def _sure(d: Diagnosis) -> str:
+    """Say how probable what was found is; of several the least."""
+    told = [d.may_be(int(column))[0] for column in d.found.chosen]
+    if not told or not np.isfinite(min(told)):
+        return ""
+    return f" ({in_percent(min(told))})" if len(told) == 1 else f" (each {in_percent(min(told))} or more)"
+
+
+def _others(d: Diagnosis) -> str:
+    """Name what looks like the one effect that was found, each with its probability."""
+    own = d.chosen[0].parameter.name
+    _, shares = d.may_be(int(d.found.chosen[0]))
+    told = [f"{share.name} {in_percent(share.probability)}" for share in shares if share.name != own]
+    return ", ".join((told or list(d.alike))[:_LISTED])
 
 
 def _families(d: Diagnosis) -> list[list[Candidate]]:
@@ -130,7 +148,9 @@ def _consistent(d: Diagnosis) -> str:
         left = beyond(d.rungs[0].scatter)
         return f"No effect of the catalogue stands out of the scatter of this run; beyond white noise: {left}."
     odd = "; ".join(f.text for f in d.findings)
-    return "The model explains the recording: nothing stands out of the noise" + (f"; but {odd}." if odd else ".")
+    nothing = "" if d.probabilities is None else f" (nothing is missing: {in_percent(d.probabilities.nothing)})"
+    clean = f"The model explains the recording: nothing stands out of the noise{nothing}"
+    return f"{clean}; but {odd}." if odd else f"{clean}."
 
 
 def _unexplained(d: Diagnosis, names: str) -> str:

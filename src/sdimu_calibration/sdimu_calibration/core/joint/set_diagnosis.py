@@ -24,6 +24,8 @@ from sdimu_calibration.core.joint.set_search import SetSearch, as_given, place_o
 from sdimu_calibration.core.joint.set_standing import next_recording
 from sdimu_calibration.core.note import Topic, topic_of, without_advice
 from sdimu_calibration.core.plan_search import NextTurn
+from sdimu_calibration.core.posterior.told import Probabilities, probabilities
+from sdimu_calibration.core.probability import in_percent
 from sdimu_calibration.core.progress import Progress, silent
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.results import Calibration
@@ -92,6 +94,8 @@ class SetDiagnosis:
         What comes back of that what the model leaves in the stops; None where it leaves nothing.
     refused : tuple of SetFinding
         Effects that were found and taken back, as recordings held out fit worse with them.
+    probabilities : Probabilities or None
+        Of nothing, and of each family of effects in all recordings, at the end of the search.
     error_without : float or None
         Held-out error (sigma) without the effects that were found in all recordings, in the noise of the model with
         them. By itself that model learns in each recording what it lacks as noise, and its own error hides it.
@@ -109,6 +113,7 @@ class SetDiagnosis:
     recurrence: Recurrence | None
     refused: tuple[SetFinding, ...] = ()
     error_without: float | None = None
+    probabilities: Probabilities | None = None
 
 
 def diagnose_set(
@@ -156,6 +161,7 @@ def diagnose_set(
         again,
         refused,
         without,
+        None if found.posterior is None else probabilities(found.posterior),
     )
 
 
@@ -247,8 +253,18 @@ def _found(
     falls = f"error at recordings held out, in one noise: {_shown(without)} -> {_rms(after)}"
     if word == Verdict.CLASS_OF_EFFECTS:
         others = ", ".join(findings[0].alike[:_LISTED])
-        return f"One effect is missing: {names}, or what looks the same in these recordings ({others}); {falls}."
-    return f"{'One effect is' if word == Verdict.ONE_EFFECT else 'Several effects are'} missing: {names}; {falls}."
+        same = f"or what looks the same in these recordings ({others})"
+        return f"One effect is missing{_sure(findings)}: {names}, {same}; {falls}."
+    one = "One effect is" if word == Verdict.ONE_EFFECT else "Several effects are"
+    return f"{one} missing{_sure(findings)}: {names}; {falls}."
+
+
+def _sure(findings: Sequence[SetFinding]) -> str:
+    """Say how probable the effects of all recordings are; of several the least."""
+    told = [f.probability for f in findings if np.isfinite(f.probability)]
+    if not told:
+        return ""
+    return f" ({in_percent(told[0])})" if len(told) == 1 else f" (each {in_percent(min(told))} or more)"
 
 
 def _named(f: SetFinding) -> str:

@@ -26,6 +26,7 @@ from sdimu_calibration.core.evidence.consistency import Noise
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.fleet.common import STEPS, Bytes
 from sdimu_calibration.core.handheld.handheld_fit import FORCE, RATE, TURN
+from sdimu_calibration.core.posterior.told import Probabilities
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.verdict import Verdict
 from sdimu_calibration.storage.files.advice_words import sentence
@@ -67,6 +68,7 @@ class DiagnosisFile(ResultModel):
     verdict: Line = ""
     sentence: Said = ""
     where: Rows = ()
+    probabilities: Row = None
     candidates: Rows = ()
     partial: Rows = ()
     unexplained: Row = None
@@ -124,6 +126,7 @@ def _file(summary: DiagnosisSummary, **more: Any) -> DiagnosisFile:
         where=[
             {"channel": w.channel, "stop": w.stop, "normalised_mean": w.normalised_mean} for w in d.consistency.where
         ],
+        probabilities=odds(d.probabilities),
         candidates=[candidate(f, d.own) for f in summary.candidates],
         partial=[candidate(f, d.own) for f in summary.found] if is_unexplained else [],
         unexplained={
@@ -232,6 +235,46 @@ def _plan(plan: PlanSeen | None) -> dict[str, Any] | None:
     }
 
 
+def odds(told: Probabilities | None) -> Row:
+    """Give the probabilities of a diagnosis as plain data (SI); None where there are none."""
+    if told is None:
+        return None
+    return {
+        "nothing_missing": told.nothing,
+        "families": [
+            {
+                "family": family.family,
+                "sensor": family.sensor,
+                "p": family.probability,
+                "members": [
+                    {
+                        "label": one.label,
+                        "p": one.probability,
+                        "value": one.value,
+                        "sigma": one.sigma,
+                        "unit": one.unit,
+                        "display_unit": one.display_unit,
+                    }
+                    for one in family.members
+                ],
+            }
+            for family in told.families
+        ],
+        "noise": [
+            {
+                "triad": noise.triad,
+                "kind": noise.kind,
+                "p": noise.probability,
+                "size": noise.size,
+                "low": noise.low,
+                "high": noise.high,
+                "unit": noise.unit,
+            }
+            for noise in told.noise
+        ],
+    }
+
+
 def candidate(f: Found, own: bool) -> dict[str, Any]:
     """Give an effect that was found as plain data."""
     parameter = f.candidate.parameter
@@ -247,6 +290,8 @@ def candidate(f: Found, own: bool) -> dict[str, Any]:
                 "display_unit": parameter.display_unit,
             }
         ],
+        "probability": f.probability,
+        "may_be": [{"name": share.name, "p": share.probability} for share in f.may_be],
         "z": f.z,
         "delta_log_likelihood": f.log_likelihood_gain,
         "log_bayes_factor": f.log_bayes_factor,
@@ -357,6 +402,7 @@ class SetDiagnosisFile(ResultModel):
     verdict: Line = ""
     sentence: Said = ""
     threshold: Number = np.nan
+    probabilities: Row = None
     findings: Rows = ()
     refused: tuple[Line, ...] = ()
     held_out_before: Number = np.nan
@@ -375,6 +421,7 @@ def write_set_diagnosis(path: Path, found: SetDiagnosis) -> None:
         verdict=found.verdict,
         sentence=found.sentence,
         threshold=found.threshold,
+        probabilities=odds(found.probabilities),
         findings=[asdict(f) | {"alike": list(f.alike)} for f in found.findings],
         refused=[f.label for f in found.refused],
         held_out_before=found.error_without,
