@@ -194,6 +194,31 @@ def grades(
 
 
 @app.command()
+def reliability(
+    out: Annotated[Path, typer.Option(help="Folder of runs, reliability.json, .md and .svg.")] = Path(
+        "out/study-reliability"
+    ),
+    runs: Annotated[int, typer.Option("-n", min=1, help="Tests of each IMU file and kind of worlds.")] = 10,
+    seed: Seed = 81_001,
+    imu: Imus = None,
+    kind: Annotated[
+        list[str] | None, typer.Option(help="clean, noise, one, many, mixed; repeatable. All by default.")
+    ] = None,
+    workers: Workers = 2,
+) -> None:
+    """Hold the probabilities of diagnoses against the truth, and draw them."""
+    from sdimu_study.reliability import KINDS, STUDY, ReliabilityCase, kinds_of, page, picture
+
+    check_kinds(kind, KINDS)
+    cases = {
+        (name, one): ReliabilityCase(name, one) for name in imu_files(imu) for one in kinds_of(name, kind or KINDS)
+    }
+    results = conduct(STUDY, cases, range(seed, seed + runs), out, workers)
+    (out / "reliability.svg").write_text(picture(results), encoding="utf-8")
+    leave(out / "reliability", results, page(results, seed))
+
+
+@app.command()
 def clean(
     out: Annotated[Path, typer.Option(help="Folder of runs, clean.json, clean.md.")] = Path("out/study-clean"),
     runs: Annotated[int, typer.Option("-n", min=1, help="Tests of each IMU file and plan.")] = 17,

@@ -108,7 +108,7 @@ def _sure(d: Diagnosis) -> str:
     told = [d.may_be(int(column))[0] for column in d.found.chosen]
     if not told or not np.isfinite(min(told)):
         return ""
-    return f" ({in_percent(min(told))})" if len(told) == 1 else f" (each {in_percent(min(told))} or more)"
+    return f" ({in_percent(min(told))})" if len(told) == 1 else f" (the least sure of them {in_percent(min(told))})"
 
 
 def _others(d: Diagnosis) -> str:

@@ -264,7 +264,7 @@ def _sure(findings: Sequence[SetFinding]) -> str:
     told = [f.probability for f in findings if np.isfinite(f.probability)]
     if not told:
         return ""
-    return f" ({in_percent(told[0])})" if len(told) == 1 else f" (each {in_percent(min(told))} or more)"
+    return f" ({in_percent(told[0])})" if len(told) == 1 else f" (the least sure of them {in_percent(min(told))})"
 
 
 def _named(f: SetFinding) -> str:
