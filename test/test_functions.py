@@ -11,6 +11,7 @@ import pytest
 SRC = Path(__file__).resolve().parents[1] / "src"
 MOST_ARGUMENTS = 8
 DEEPEST = 4
+LONGEST = 60
 BLOCKS = (ast.For, ast.While, ast.If, ast.With, ast.Try, ast.Match, ast.AsyncFor, ast.AsyncWith)
 Function = ast.FunctionDef | ast.AsyncFunctionDef
 Place = tuple[str, str]
@@ -29,6 +30,15 @@ MANY_ARGUMENTS: dict[Place, str] = {
 """Functions with more arguments, and why."""
 DEEP: dict[Place, str] = {}
 """Functions that nest deeper, and why."""
+LONG: dict[Place, str] = {
+    ("sdimu_calibration/core/diagnosis/diagnose.py", "climb"): "not yet split: the search is being designed anew",
+    ("sdimu_calibration/core/joint/set_search.py", "search_set"): "not yet split: the search is being designed anew",
+    ("sdimu_calibration/core/filter/filter_pass.py", "run_pass"): "compiled: one loop",
+    ("sdimu_calibration/core/navigation/strapdown.py", "_reduce"): "compiled: one loop",
+    ("launch/driver_launch.py", "generate_launch_description"): "a list of nodes and arguments",
+    ("launch/simulation_launch.py", "generate_launch_description"): "a list of nodes and arguments",
+}
+"""Functions with more lines, and why."""
 
 
 def functions() -> Iterator[tuple[str, Function]]:
@@ -43,6 +53,14 @@ def count_arguments(function: Function) -> int:
     a = function.args
     named = [one.arg for one in (*a.posonlyargs, *a.args, *a.kwonlyargs, a.vararg, a.kwarg) if one is not None]
     return sum(name not in {"self", "cls"} for name in named)
+
+
+def lines(function: Function) -> int:
+    """Lines of a function without its docstring."""
+    first = function.body[0]
+    documented = isinstance(first, ast.Expr) and isinstance(first.value, ast.Constant)
+    told = (first.end_lineno or 0) - first.lineno + 1 if documented else 0
+    return (function.end_lineno or 0) - function.lineno + 1 - told
 
 
 def depth(node: ast.AST) -> int:
@@ -62,8 +80,8 @@ def depth(node: ast.AST) -> int:
 
 @pytest.mark.parametrize(
     ("measure", "most", "exempt"),
-    [(count_arguments, MOST_ARGUMENTS, MANY_ARGUMENTS), (depth, DEEPEST, DEEP)],
-    ids=["arguments", "nesting"],
+    [(count_arguments, MOST_ARGUMENTS, MANY_ARGUMENTS), (depth, DEEPEST, DEEP), (lines, LONGEST, LONG)],
+    ids=["arguments", "nesting", "lines"],
 )
 def test_functions_stay_within_the_limits(measure, most, exempt):
     found = {(name, one.name, one.lineno): measure(one) for name, one in functions()}

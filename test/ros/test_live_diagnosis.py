@@ -29,7 +29,7 @@ from sdimu_calibration.core.estimation.solve import solve
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.nodes.credits import HISTORY
 from sdimu_calibration.nodes.diagnosis_messages import diagnosis, heat_map
-from sdimu_calibration.nodes.diagnosis_worker import Answer, Diagnoser, Job, Picture, Request
+from sdimu_calibration.nodes.diagnosis_worker import Answer, Diagnoser, Job, Picture, WorkerRequest
 from sdimu_calibration.nodes.live_diagnosis import Worker
 from sdimu_calibration.storage.bags.bag_writer import write_recording
 from sdimu_calibration.storage.files.config import load_imu, load_model, load_plan
@@ -71,7 +71,7 @@ def job(raw: RawTest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Job]
 
 @pytest.fixture(scope="module")
 def whole(job: Job) -> LiveDiagnosis:
-    return Diagnoser(job).answer(Request(5, None)).diagnosis
+    return Diagnoser(job).answer(WorkerRequest(5, None)).diagnosis
 
 
 def stop_end(raw: RawTest, stop: int) -> int:
@@ -112,7 +112,7 @@ def test_all_data_are_ranked_as_the_first_scan_of_a_diagnosis_of_the_bag(raw, wh
 def test_what_is_missing_stands_out_and_leaves_when_it_is_added(job, whole):
     assert whole.verdict == "misfit"
     assert EFFECT in {r.label for r in whole.standing}
-    added = Diagnoser(job).answer(Request(5, None, ((), (EFFECT,)))).diagnosis
+    added = Diagnoser(job).answer(WorkerRequest(5, None, ((), (EFFECT,)))).diagnosis
     assert added.verdict == "consistent"
     assert [rung.added for rung in added.ladder] == [(), (EFFECT,)]
     # One is of evidence with every candidate, the other of evidence with none: other shapes round otherwise.
@@ -130,14 +130,14 @@ def test_a_stop_is_diagnosed_by_what_had_come_by_its_end(raw, job, tmp_path):
     for entry in zip(*short.status, strict=True):
         journal.status(*map(int, entry))
     journal.samples(short.ns, short.omega_ib_b, short.f_ib_b)
-    alone = Diagnoser(replace(job, journal=journal.place)).answer(Request(2, None)).diagnosis
-    assert Diagnoser(job).answer(Request(2, end)).diagnosis == alone
+    alone = Diagnoser(replace(job, journal=journal.place)).answer(WorkerRequest(2, None)).diagnosis
+    assert Diagnoser(job).answer(WorkerRequest(2, end)).diagnosis == alone
     assert alone.stop == 2
     assert {place.stop for place in alone.where} == {0, 1, 2}
 
 
 def test_a_stop_that_cannot_be_fitted_says_what_it_waits_for(job):
-    answer = Diagnoser(job).answer(Request(0, START + 10**9))
+    answer = Diagnoser(job).answer(WorkerRequest(0, START + 10**9))
     assert answer.diagnosis.verdict == "waiting"
     assert "too few samples" in answer.diagnosis.sentence
 
@@ -170,8 +170,8 @@ def test_of_the_requests_that_wait_the_newest_alone_is_answered(raw, job, whole,
     worker = Worker(replace(job, question=question))
     try:
         for stop in (1, 2, 3, 4):
-            worker.ask(Request(stop, stop_end(raw, stop), about=f"stop {stop}"))
-        worker.ask(Request(5, None, about="the end"))
+            worker.ask(WorkerRequest(stop, stop_end(raw, stop), about=f"stop {stop}"))
+        worker.ask(WorkerRequest(5, None, about="the end"))
         answers, pictures = wait_for(worker)
     finally:
         worker.close()
@@ -187,7 +187,7 @@ def test_a_worker_that_has_ended_is_told_once(job):
     worker = Worker(job)
     worker._process.kill()
     worker._process.wait()
-    worker.ask(Request(1, None))
+    worker.ask(WorkerRequest(1, None))
     with pytest.raises(DataError, match="goes on without it"):
         wait_for(worker)
     assert worker.idle
@@ -201,7 +201,7 @@ def test_a_worker_ends_with_its_node(job):
 
 
 def test_a_folder_is_no_journal(job, tmp_path):
-    answer = Diagnoser(replace(job, journal=Path(tmp_path))).answer(Request(0, None))
+    answer = Diagnoser(replace(job, journal=Path(tmp_path))).answer(WorkerRequest(0, None))
     assert answer.diagnosis.verdict == "waiting"
     assert "cannot be read" in answer.diagnosis.sentence
 

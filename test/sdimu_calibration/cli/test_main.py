@@ -44,6 +44,12 @@ def test_help_lists_the_verbs_of_all_packages(sdimu):
         assert verb in out
 
 
+@pytest.mark.parametrize("verb", [(), ("calibrate",), ("diagnose",), ("run",), ("replay",)])
+def test_help_says_where_the_exit_status_can_be_3(sdimu, verb):
+    _, out, _ = sdimu(*verb, "--help")
+    assert "not to be trusted" in " ".join(out.split())
+
+
 def test_the_version_is_that_of_the_package(sdimu):
     assert sdimu("--version") == (0, f"sdimu {version('sdimu_calibration')}\n", "")
 

@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 
 from sdimu_calibration.cli import options as shared
 from sdimu_calibration.cli.option_groups import with_options, words_of
-from sdimu_calibration.cli.options import Fitted, Opening, Recorded, Request
+from sdimu_calibration.cli.options import FitRequest, Fitted, Recorded, StatedOpening
 from sdimu_calibration.cli.set_run import SetRequest, calibrate_together
 from sdimu_calibration.core.recording import DataError
 
@@ -79,13 +79,18 @@ def test_options_stand_where_their_group_stands():
 def test_what_nobody_stated_is_in_no_command():
     assert words_of(Size(2.0), Size) == ["--width", "2.0"]
     assert words_of(Size(2.0, ["x", "y"], True), Size) == ["--width", "2.0", "--name", "x", "--name", "y", "--deep"]
-    assert words_of(Opening(), Opening) == words_of(Recorded(), Recorded) == words_of(Request(), Fitted) == []
+    assert (
+        words_of(StatedOpening(), StatedOpening)
+        == words_of(Recorded(), Recorded)
+        == words_of(FitRequest(), Fitted)
+        == []
+    )
 
 
 def test_a_command_repeats_all_that_was_stated_of_a_recording():
-    names = list(signature(Opening).parameters)
-    stated = Opening(**{name: f"a {name}" for name in names})
-    assert words_of(stated, Opening) == [w for n in names for w in (f"--{n.replace('_', '-')}", f"a {n}")]
+    names = list(signature(StatedOpening).parameters)
+    stated = StatedOpening(**{name: f"a {name}" for name in names})
+    assert words_of(stated, StatedOpening) == [w for n in names for w in (f"--{n.replace('_', '-')}", f"a {n}")]
 
 
 @pytest.mark.parametrize(
@@ -101,11 +106,11 @@ def test_a_command_repeats_all_that_was_stated_of_a_recording():
 )
 def test_a_wrong_option_is_told_before_the_recording_is_read(stated, told):
     with pytest.raises(DataError, match=told):
-        Opening(**stated).read(None)
+        StatedOpening(**stated).read(None)
 
 
 def test_a_set_refuses_noise_that_is_not_estimated(tmp_path):
-    asked = SetRequest([tmp_path / "a", tmp_path / "b"], Opening(noise="paper"), Request(out=tmp_path / "out"))
+    asked = SetRequest([tmp_path / "a", tmp_path / "b"], StatedOpening(noise="paper"), FitRequest(out=tmp_path / "out"))
     with pytest.raises(DataError, match="--noise paper: expected 'estimated'"):
         calibrate_together(asked)
 

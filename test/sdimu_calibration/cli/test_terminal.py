@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from sdimu_calibration.cli.next_commands import Asked, spelled
-from sdimu_calibration.cli.options import Opening, Request
+from sdimu_calibration.cli.options import FitRequest, StatedOpening
 from sdimu_calibration.core.advice import Advice, Kind, Verb
 from sdimu_calibration.storage.files.advice_words import sentence
 
@@ -178,8 +178,8 @@ def test_advice_can_be_pasted(sdimu):
 
 
 def test_advice_repeats_what_was_asked_for():
-    request = Request(add=["lever_arm"], out=Path("out"), workers=3)
-    asked = Asked.of((Path("a bag"),), Path("out"), Opening("my site.yaml", "dtg", gyro_sign=-1), request)
+    request = FitRequest(add=["lever_arm"], out=Path("out"), workers=3)
+    asked = Asked.of((Path("a bag"),), Path("out"), StatedOpening("my site.yaml", "dtg", gyro_sign=-1), request)
     kept = Advice(Kind.KEEP, ("lever",), Verb.ADD, ("coupling.yaml:k1", "x(tau=3 s)"))
     command = spelled(kept, asked)
     assert sentence(kept) == "Keep lever in the model: --add 'coupling.yaml:k1' --add 'x(tau=3 s)'."
@@ -200,8 +200,8 @@ def test_advice_repeats_what_was_asked_for():
         "--add",
         "x(tau=3 s)",
     ]
-    request = Request("m", "filter", hand=True, add=["x"])
-    full = Asked.of((), Path(), Opening("s", noise="estimated", serial="7"), request)
+    request = FitRequest("m", "filter", hand=True, add=["x"])
+    full = Asked.of((), Path(), StatedOpening("s", noise="estimated", serial="7"), request)
     words = shlex.join(full.options)
     assert words == "--site s --model m --noise estimated --estimator filter --serial 7 --hand --add x"
     ranked = Advice(Kind.RANK_TURNS, (), Verb.RANK_TURNS, ("a", "b"))

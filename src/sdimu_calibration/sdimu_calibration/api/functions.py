@@ -75,14 +75,14 @@ def open(  # noqa: A001 (as every library of files has it)
         Spans of time (s) in which no fit takes a measurement.
     """
     return Opening(
-        site,
-        load_imu(imu) if isinstance(imu, str) else imu,
-        source or Source(),
-        handheld,
-        measured_noise,
-        0.0 if whole_turns is None else parse_quantity(whole_turns, "deg"),
-        tuple(exclude_stops),
-        tuple(exclude_times),
+        site=site,
+        imu=load_imu(imu) if isinstance(imu, str) else imu,
+        source=source or Source(),
+        handheld=handheld,
+        measured_noise=measured_noise,
+        whole_turns=0.0 if whole_turns is None else parse_quantity(whole_turns, "deg"),
+        exclude_stops=tuple(exclude_stops),
+        exclude_times=tuple(exclude_times),
         imu_file=imu if isinstance(imu, str) else None,
     ).test(Path(bag))
 

@@ -14,20 +14,20 @@ from sdimu_calibration.cli.console import answer, command, plain, say
 from sdimu_calibration.cli.next_commands import Asked, spelled
 from sdimu_calibration.cli.opened import default_folder, explained, leave, opened, tell
 from sdimu_calibration.cli.option_groups import with_options
-from sdimu_calibration.cli.options import BagsArgument, Opening, Request
+from sdimu_calibration.cli.options import BagsArgument, FitRequest, StatedOpening
 from sdimu_calibration.cli.set_run import SetRequest, calibrate_together, refuse_for_sets, single
 from sdimu_calibration.core.note import MISFITS, topic_of
 
 
 @dataclass(frozen=True)
-class CalibrationRequest(Request):
+class CalibrationRequest(FitRequest):
     """What `sdimu calibrate` is asked."""
 
     truth: Annotated[Path | None, typer.Option(help="Truth of a simulation, to show the errors.")] = None
 
 
 @with_options
-def calibrate(bags: BagsArgument = None, *, request: CalibrationRequest, opening: Opening) -> None:
+def calibrate(bags: BagsArgument = None, *, request: CalibrationRequest, opening: StatedOpening) -> None:
     """Estimate the coefficients from a recording; leaves result.json and report.html.
 
     Exit status 3: done, but the estimate is not to be trusted; stderr says why.

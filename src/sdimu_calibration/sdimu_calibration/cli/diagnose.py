@@ -13,7 +13,7 @@ import typer
 from sdimu_calibration.cli.console import answer, plain, say
 from sdimu_calibration.cli.opened import default_folder, explained, leave, opened, tell
 from sdimu_calibration.cli.option_groups import with_options
-from sdimu_calibration.cli.options import BagsArgument, Opening, Request, results_in
+from sdimu_calibration.cli.options import BagsArgument, FitRequest, StatedOpening, results_in
 from sdimu_calibration.cli.set_run import SetRequest, diagnose_together, refuse_for_sets, single
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ NO_BOOTSTRAP = "--bootstrap: a handheld run learns its scatter, so there is no n
 
 
 @dataclass(frozen=True)
-class DiagnosisRequest(Request):
+class DiagnosisRequest(FitRequest):
     """What `sdimu diagnose` is asked."""
 
     add: Annotated[
@@ -45,7 +45,7 @@ class DiagnosisRequest(Request):
 
 
 @with_options
-def diagnose(bags: BagsArgument = None, *, request: DiagnosisRequest, opening: Opening) -> None:
+def diagnose(bags: BagsArgument = None, *, request: DiagnosisRequest, opening: StatedOpening) -> None:
     """Find what the model is missing; leaves diagnosis.json and report.html, and result.json of the model found.
 
     Exit status 3: done, but the estimate is not to be trusted; stderr says why.

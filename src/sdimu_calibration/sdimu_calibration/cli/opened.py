@@ -14,7 +14,7 @@ from sdimu_calibration.cli.console import say
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from sdimu_calibration.cli.options import Fitted, Opening
+    from sdimu_calibration.cli.options import Fitted, StatedOpening
     from sdimu_calibration.core.estimation.prepared_test import PreparedTest
     from sdimu_calibration.core.results import Calibration
     from sdimu_calibration.core.specification import Model
@@ -25,7 +25,7 @@ NOT_TRUSTED = 3
 HANDHELD_CHOSEN = "handheld: {why}, so nothing is navigated (--estimator filter forces navigation)"
 
 
-def opened(console: Console, bag: Path, opening: Opening, request: Fitted) -> tuple[PreparedTest, Model, str]:
+def opened(console: Console, bag: Path, opening: StatedOpening, request: Fitted) -> tuple[PreparedTest, Model, str]:
     """Open the test of a bag, read its model and check its estimator.
 
     Returns

@@ -1,4 +1,4 @@
-"""Options that several verbs have, each declared once: `Opening` and `Request` are what the user states with them."""
+"""Options that several verbs have, each declared once: with them a user states a `StatedOpening` and a `FitRequest`."""
 
 from __future__ import annotations
 
@@ -15,8 +15,7 @@ from sdimu_calibration.core.units import ABSOLUTE_ZERO_DEGC
 
 if TYPE_CHECKING:
     from sdimu_calibration.core.specification import ImuSpecification
-    from sdimu_calibration.storage import opening
-    from sdimu_calibration.storage.opening import Source
+    from sdimu_calibration.storage.opening import Opening, Source
 
 _OF_SETS = "Several recordings of one unit"
 _SPAN = re.compile(r"\s*(\d+(?:\.\d+)?)\s*-\s*(\d+(?:\.\d+)?)\s*")
@@ -181,35 +180,35 @@ class Stated(Place):
 
 
 @dataclass(frozen=True)
-class Opening(Reading, Stated):
+class StatedOpening(Reading, Stated):
     """How a recording is opened, as the options state it."""
 
-    def read(self, handheld: bool | None) -> opening.Opening:
+    def read(self, handheld: bool | None) -> Opening:
         """Read all of it, so that a wrong option is told before a long recording is read.
 
         Parameters
         ----------
         handheld : bool or None
-            As `Request.handheld`.
+            As `FitRequest.handheld`.
         """
         from sdimu_calibration.storage.files.config import load_site
-        from sdimu_calibration.storage.opening import Opening as Read
+        from sdimu_calibration.storage.opening import Opening
 
         if self.site is not None:
             load_site(self.site)
-        return Read(
-            self.site,
-            self.specification,
-            self.source,
-            handheld,
-            self.measured_noise,
-            self.whole_turns_rad,
-            () if self.exclude_stops is None else read_stops(self.exclude_stops),
-            () if self.exclude_times is None else read_spans(self.exclude_times),
-            self.serial,
-            self.power_on,
-            self.reference_degc,
-            self.imu,
+        return Opening(
+            site=self.site,
+            imu=self.specification,
+            source=self.source,
+            handheld=handheld,
+            measured_noise=self.measured_noise,
+            whole_turns=self.whole_turns_rad,
+            exclude_stops=() if self.exclude_stops is None else read_stops(self.exclude_stops),
+            exclude_times=() if self.exclude_times is None else read_spans(self.exclude_times),
+            serial=self.serial,
+            power_on=self.power_on,
+            reference_degc=self.reference_degc,
+            imu_file=self.imu,
         )
 
 
@@ -250,7 +249,7 @@ class Fitted:
 
 
 @dataclass(frozen=True)
-class Request(Fitted):
+class FitRequest(Fitted):
     """What is asked of a recording, or of a set."""
 
     set_file: SetOption = None

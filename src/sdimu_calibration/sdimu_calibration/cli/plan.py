@@ -18,8 +18,9 @@ from sdimu_calibration.cli.options import JsonOption, ModelOption
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from sdimu_calibration.core.evidence.known import Standing
     from sdimu_calibration.core.plan import Plan
-    from sdimu_calibration.core.plan_search import Bounds, Found, NextTurn
+    from sdimu_calibration.core.plan_search import Bounds, Found, NextTurn, Question
     from sdimu_calibration.core.plan_search.moves import Abilities
 
 _MOST_RATE, _MOST_ACCELERATION, _MOST_DWELL = 1e4, 1e6, 1e6
@@ -121,20 +122,16 @@ def plan(
     request: PlanRequest,
 ) -> None:
     """Search for a plan with the bound of the data; leaves a plan file for --plan."""
-    from sdimu_calibration.cli.plan_after import After, standing_of, tell_gain
-    from sdimu_calibration.cli.progress import bar
-    from sdimu_calibration.cli.wide_table import print_table
-    from sdimu_calibration.core.plan_search import Goal, Question, next_turn, search, untold
-    from sdimu_calibration.core.plan_search.bound import already, bounds
+    from sdimu_calibration.cli.plan_after import After, standing_of
+    from sdimu_calibration.core.plan_search import Question
     from sdimu_calibration.storage.files.config import load_imu, load_plan, load_site
     from sdimu_calibration.storage.files.model_choice import named_model
-    from sdimu_calibration.storage.files.plan_file import write_plan
 
-    console, out, as_json = plain(stderr=request.as_json), request.out, request.as_json
+    console = plain(stderr=request.as_json)
     start = load_plan(planned.plan)
     if request.backwards:
-        _write_backwards(console, start, out)
-        answer({"plan": str(out), "minutes": start.duration_s / 60.0}, as_json)
+        _write_backwards(console, start, request.out)
+        answer({"plan": str(request.out), "minutes": start.duration_s / 60.0}, request.as_json)
         return
     if more and not request.after:
         raise typer.BadParameter("recordings stand behind --after", param_hint="BAG")
@@ -143,45 +140,78 @@ def plan(
     imu = planned.imu or (before and before.imu) or "dtg"
     site = planned.site or (before and before.site) or "daejeon"
     wanted = named_model(planned.model, [*(before.added if before else ()), *(planned.add or [])])
-    asked = Question(load_site(site), load_imu(imu), wanted, before.known if before else None)
+    question = Question(load_site(site), load_imu(imu), wanted, before.known if before else None)
+    asked = _Begun(start, question, before, imu, site)
     if request.tell:
-        # The next recording is one of its own: the shortest that tells these apart.
-        onto = replace(start, dwell_s=start.dwell_s[:1], turns=()) if before else start
-        speeds = allowed.rates_rad_s
-        with bar(console) as progress:
-            ranked = next_turn(onto, asked, request.tell, rates_rad_s=speeds, progress=progress)
-        none = untold(ranked, request.tell)
-        for text in [none] if none else [one.text for one in ranked[:5]]:
-            say(console, text)
-        answer(_ranking(start, request.tell, ranked) | ({"none": none} if none else {}), as_json)
-        return
+        _tell(console, asked, request.tell, allowed, request.as_json)
+    else:
+        _search(console, asked, allowed, request)
+
+
+@dataclass(frozen=True)
+class _Begun:
+    """What a search begins with: a plan, the question, what is known, and the names of IMU and site."""
+
+    start: Plan
+    question: Question
+    before: Standing | None
+    imu: str
+    site: str
+
+
+def _tell(console: Console, asked: _Begun, coefficients: Sequence[str], allowed: Allowed, as_json: bool) -> None:
+    """Rank extra turns that tell coefficients apart."""
+    from sdimu_calibration.cli.progress import bar
+    from sdimu_calibration.core.plan_search import next_turn, untold
+
+    # The next recording is one of its own: the shortest that tells these apart.
+    onto = replace(asked.start, dwell_s=asked.start.dwell_s[:1], turns=()) if asked.before else asked.start
+    speeds = allowed.rates_rad_s
+    with bar(console) as progress:
+        ranked = next_turn(onto, asked.question, coefficients, rates_rad_s=speeds, progress=progress)
+    none = untold(ranked, coefficients)
+    for text in [none] if none else [one.text for one in ranked[:5]]:
+        say(console, text)
+    answer(_ranking(asked.start, coefficients, ranked) | ({"none": none} if none else {}), as_json)
+
+
+def _search(console: Console, asked: _Begun, allowed: Allowed, request: PlanRequest) -> None:
+    """Search a plan, show what it brings and write it where it is better."""
+    from sdimu_calibration.cli.plan_after import tell_gain
+    from sdimu_calibration.cli.progress import bar
+    from sdimu_calibration.cli.wide_table import print_table
+    from sdimu_calibration.core.plan_search import Goal, search
+    from sdimu_calibration.core.plan_search.bound import already, bounds
+    from sdimu_calibration.storage.files.plan_file import write_plan
+
+    start, before, out = asked.start, asked.before, request.out
     able, minutes = allowed.abilities, allowed.minutes
     with bar(console) as progress:
-        first = bounds(start, asked)
+        first = bounds(start, asked.question)
         usual = {} if before else {e: allowed.slack * sigma for e, sigma in first.largest().items()}
         limits = usual | _limits(allowed.limit or [])
         if not limits and minutes is None:
             minutes = start.duration_s / 60.0
-        found = search(start, asked, able, Goal(limits, minutes), allowed.tries, progress)
+        found = search(start, asked.question, able, Goal(limits, minutes), allowed.tries, progress)
     title = f"sigma, the largest of the axes: {start.name} and {out.stem}"
-    known = already(asked) if before else None
+    known = already(asked.question) if before else None
     print_table(console, *_table(start, known, first, found, limits), title)
     if before:
-        tell_gain(console, start, found, before.open, (already(asked), first, found.bounds))
+        tell_gain(console, start, found, before.open, (already(asked.question), first, found.bounds))
     if found.plan is start:
         say(console, f"nothing better than {start.name} among {found.tried} plans; no file written")
-        answer(_content(start, known, first, found, limits, None), as_json)
+        answer(_content(start, known, first, found, limits, None), request.as_json)
         return
     about = f"Found by sdimu plan from {start.name} among {found.tried} plans: {found.minutes:.1f} min."
     reached = f"worst sigma {found.worst:.3f} of its limit" if limits else "tells most beyond what was known"
-    write_plan(out, found.plan, [about, f"IMU {imu}, site {site}, {reached}."])
+    write_plan(out, found.plan, [about, f"IMU {asked.imu}, site {asked.site}, {reached}."])
     say(
         console,
         f"{start.name} {start.duration_s / 60.0:.1f} min; found {found.minutes:.1f} min, {reached}, {found.tried} "
         f"plans tried; in {out}. To look at it:",
     )
-    command(console, shlex.join(["sdimu", "predict", "--plan", str(out), "--imu", imu, "--site", site]))
-    answer(_content(start, known, first, found, limits, out), as_json)
+    command(console, shlex.join(["sdimu", "predict", "--plan", str(out), "--imu", asked.imu, "--site", asked.site]))
+    answer(_content(start, known, first, found, limits, out), request.as_json)
 
 
 def _write_backwards(console: Console, start: Plan, out: Path) -> None:

@@ -44,7 +44,7 @@ def standing_of(console: Console, asked: After) -> Standing:
 
 
 def _diagnosed(console: Console, asked: After) -> Standing:
-    from sdimu_calibration.cli.options import Opening, Request
+    from sdimu_calibration.cli.options import FitRequest, StatedOpening
     from sdimu_calibration.cli.progress import bar
     from sdimu_calibration.cli.set_run import SetRequest, diagnosed_set
     from sdimu_calibration.core.diagnosis.diagnose import climb
@@ -56,7 +56,7 @@ def _diagnosed(console: Console, asked: After) -> Standing:
     from sdimu_calibration.storage.opening import open_test
 
     if len(asked.paths) > 1:
-        request = SetRequest(asked.paths, Opening(asked.site, asked.imu), Request(asked.model))
+        request = SetRequest(asked.paths, StatedOpening(asked.site, asked.imu), FitRequest(asked.model))
         found = diagnosed_set(console, request, ())[0]
         say(console, f"{found.verdict}: {found.sentence}")
         return found.standing

@@ -15,7 +15,7 @@ import typer
 from sdimu_calibration.cli.console import answer, plain, say
 from sdimu_calibration.cli.next_commands import Asked, print_advice, spelled
 from sdimu_calibration.cli.opened import leave, tell
-from sdimu_calibration.cli.options import Opening, Place, Request
+from sdimu_calibration.cli.options import FitRequest, Place, StatedOpening
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -37,14 +37,14 @@ class SetRequest:
     ----------
     bags : sequence of Path
         None where a set file names them.
-    opening : Opening
+    opening : StatedOpening
         Of all recordings; what a set file says of one comes first.
-    request : Request
+    request : FitRequest
     """
 
     bags: Sequence[Path]
-    opening: Opening
-    request: Request
+    opening: StatedOpening
+    request: FitRequest
 
     @property
     def file(self) -> Path | None:
@@ -67,7 +67,7 @@ def single(bags: list[Path] | None, file: Path | None) -> Path | None:
     return bags[0] if file is None and bags is not None and len(bags) == 1 else None
 
 
-def refuse_for_sets(opening: Opening, **options: object) -> None:
+def refuse_for_sets(opening: StatedOpening, **options: object) -> None:
     """Refuse options that are of one recording: those of an opening, and others by name.
 
     Raises

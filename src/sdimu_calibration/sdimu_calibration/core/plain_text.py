@@ -51,3 +51,17 @@ def counted(number: int, one: str, many: str = "") -> str:
     str
     """
     return f"{number} {one if number == 1 else many or one + 's'}"
+
+
+def capital(text: str) -> str:
+    """Begin a text with a capital letter, and leave the rest as it is: units keep their spelling.
+
+    Parameters
+    ----------
+    text : str
+
+    Returns
+    -------
+    str
+    """
+    return text[:1].upper() + text[1:]

@@ -28,7 +28,7 @@ from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.table import Step
 from sdimu_calibration.nodes.calibration_node import JOURNAL
 from sdimu_calibration.nodes.credits import HISTORY, NS, header
-from sdimu_calibration.nodes.diagnosis_worker import Answer, Job, Request
+from sdimu_calibration.nodes.diagnosis_worker import Answer, Job, WorkerRequest
 from sdimu_calibration.nodes.driving import PATIENCE_S, Driving
 from sdimu_calibration.nodes.live_diagnosis import Worker
 from sdimu_calibration.nodes.opening_parameters import declare_opening
@@ -109,7 +109,7 @@ class AdaptiveNode:
                 spent_s = (self._end_ns - self._begin_ns) / NS
                 about = Asked(self._goals, self._menu, self._driving.table, angles, spent_s)
                 # The worker keeps what it has read up to a stamp: another stamp lets it read the journal again.
-                self._worker.ask(Request(self._stop, self._end_ns + self._tries, self._models, about))
+                self._worker.ask(WorkerRequest(self._stop, self._end_ns + self._tries, self._models, about))
                 self._tries += 1
             return
         lacking = (self._end_ns - answer.reached_ns) / NS

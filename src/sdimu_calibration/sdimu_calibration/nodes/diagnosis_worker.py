@@ -58,7 +58,7 @@ class Job:
 
 
 @dataclass(frozen=True)
-class Request:
+class WorkerRequest:
     """Diagnose what there is.
 
     Attributes
@@ -87,7 +87,7 @@ class Answer:
 
     Attributes
     ----------
-    request : Request
+    request : WorkerRequest
     diagnosis : LiveDiagnosis
     more : object
         Answer to the question; None without question or fit.
@@ -97,7 +97,7 @@ class Answer:
         Stamp of the last sample that was looked at (ns); 0 where there was none.
     """
 
-    request: Request
+    request: WorkerRequest
     diagnosis: LiveDiagnosis
     more: Any
     seconds: float
@@ -110,12 +110,12 @@ class Picture:
 
     Attributes
     ----------
-    request : Request
+    request : WorkerRequest
     png : bytes
         Of the diagnosis; empty where it waits.
     """
 
-    request: Request
+    request: WorkerRequest
     png: bytes
 
 
@@ -134,7 +134,7 @@ class Diagnoser:
         self._reached_ns = 0
         self._errors: dict[tuple[str, ...], ModelError] = {}
 
-    def answer(self, request: Request) -> Answer:
+    def answer(self, request: WorkerRequest) -> Answer:
         """Diagnose what there is; a diagnosis that waits where that is not possible yet."""
         more, added = None, request.models[-1]
         try:
@@ -174,7 +174,7 @@ def work(pipe: Connection) -> None:
     Parameters
     ----------
     pipe : Connection
-        Brings a `Job`, then each `Request`; takes each `Answer`, and where the job wants it a `Picture`,
+        Brings a `Job`, then each `WorkerRequest`; takes each `Answer`, and where the job wants it a `Picture`,
         which need not be waited for.
     """
     # Ctrl-C reaches every process of a terminal; this one ends with its node.

@@ -11,7 +11,7 @@ from typing import Any
 
 from sdimu_calibration.core.live import EpochEstimate
 from sdimu_calibration.core.recording import DataError
-from sdimu_calibration.nodes.diagnosis_worker import Answer, Job, Picture, Request
+from sdimu_calibration.nodes.diagnosis_worker import Answer, Job, Picture, WorkerRequest
 
 _PROGRAM = "from sdimu_calibration.nodes.diagnosis_worker import main; main()"
 """Not ``-m``: what goes through the pipe is of the classes of a module by its real name."""
@@ -38,15 +38,15 @@ class Worker:
         far.close()
         self._pipe.send(job)
         self._last = Picture if job.pictures else Answer
-        self._busy: Request | None = None
-        self._next: Request | None = None
+        self._busy: WorkerRequest | None = None
+        self._next: WorkerRequest | None = None
 
     @property
     def idle(self) -> bool:
         """Whether every request that still counts is answered."""
         return self._busy is None and self._next is None
 
-    def ask(self, request: Request) -> None:
+    def ask(self, request: WorkerRequest) -> None:
         """Take a request in place of the one that waits."""
         self._next = request
         self._send()
@@ -132,7 +132,7 @@ class StopDiagnosis:
 
     def _ask(self, stop: int, until_ns: int | None) -> None:
         self._last = stop, until_ns
-        self._worker.ask(Request(stop, until_ns, tuple(self._models), self.about))
+        self._worker.ask(WorkerRequest(stop, until_ns, tuple(self._models), self.about))
 
     def answer(self) -> Answer | Picture | None:
         """Return a diagnosis once it is there, then its picture; raises as `Worker.answer`."""

@@ -17,6 +17,7 @@ from sdimu_calibration.core.error_figures import by_hand, held_out, held_out_jud
 from sdimu_calibration.core.estimation.second_order_fit import NO_AZIMUTH
 from sdimu_calibration.core.joint.set_diagnosis import SetDiagnosis
 from sdimu_calibration.core.note import without_advice
+from sdimu_calibration.core.plain_text import capital
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.units import from_si
 from sdimu_calibration.core.verdict import Verdict
@@ -85,7 +86,7 @@ def of_diagnosis(summary: DiagnosisSummary, spell: Spell | None = None) -> First
 
 def _remarks(calibration: Calibration) -> tuple[str, ...]:
     """Repeat the note that a fit knows no headings, if it has it."""
-    return tuple(prose(_capital(note)) + "." for note in calibration.notes if note == NO_AZIMUTH)
+    return tuple(prose(capital(note)) + "." for note in calibration.notes if note == NO_AZIMUTH)
 
 
 def _unseen(summary: DiagnosisSummary) -> str:
@@ -147,9 +148,9 @@ def of_fit(calibration: Calibration, spell: Spell | None = None) -> FirstScreen:
     if grave:
         tone, head = BAD, f"Not to be trusted: {prose(grave[0])}."
     elif misfit := without_advice(calibration.misfits):
-        tone, head = BAD, prose(_capital(misfit[0])) + "."
+        tone, head = BAD, prose(capital(misfit[0])) + "."
     elif doubts:
-        tone, head = DOUBTFUL, prose(_capital(doubts[0])) + "."
+        tone, head = DOUBTFUL, prose(capital(doubts[0])) + "."
     else:
         tone, head = GOOD, "The model explains the recording as a whole."
     kind = Kind.FIND_EFFECT if tone == BAD else Kind.FIND_SMALLER
@@ -205,7 +206,3 @@ def render(first: FirstScreen, *pictures: str) -> str:
         f'<section class="card"><h2>What to do next</h2><ol>{shown}</ol>{more}</section></div>'
         f'<div class="pictures">{"".join(picture for picture in pictures if picture)}</div></section>'
     )
-
-
-def _capital(text: str) -> str:
-    return text[:1].upper() + text[1:]

@@ -74,9 +74,10 @@ class Raster:
 
     def frame(self, left: float, top: float, right: float, bottom: float, ink: Colour) -> None:
         """Draw the edges of a rectangle, one point wide."""
-        for edge in ((left, top, right, top), (left, bottom, right, bottom), (left, top, left, bottom),
-                     (right, top, right, bottom)):  # fmt: skip
-            self.box(edge[0], edge[1], edge[2] + (edge[0] != edge[2]), edge[3] + (edge[1] != edge[3]), ink)
+        for y in (top, bottom):
+            self.box(left, y, right + 1, y, ink)
+        for x in (left, right):
+            self.box(x, top, x, bottom + 1, ink)
 
     def dashed(self, x: float, top: float, bottom: float, ink: Colour, dash: int = 5, gap: int = 3) -> None:
         """Draw an upright dashed line."""

@@ -129,7 +129,7 @@ def open_test(
     return PreparedTest(*opened, assumed_site=assumed, origin=origin)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Opening:
     """How a recording is opened: what is stated of it, read; what is left out is recognised, assumed or in the bag.
 

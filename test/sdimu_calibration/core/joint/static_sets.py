@@ -16,7 +16,9 @@ from sdimu_calibration.core.recording import PhaseLog, Recording
 from sdimu_calibration.core.specification import ImuSpecification, Site
 from sdimu_calibration.core.units import STANDARD_GRAVITY
 from sdimu_calibration.storage.files.config import load_imu
+from sdimu_sim.core.mean_bias import mean_bias
 from sdimu_sim.core.scenario import Scenario, imu_truth
+from sdimu_sim.core.truth import in_body_frame
 from sdimu_study.worlds import simulate
 
 GRADES = ("dtg", "fog_tactical", "mems_by_hand", "mems_consumer", "mems_industrial", "rlg_navigation")
@@ -71,14 +73,44 @@ def cut(recording: Recording, start_s: float, end_s: float, stop: int) -> Record
     )
 
 
-def rests(grade: str, seed: int, turns: Sequence[Turn] = CUBE) -> tuple[Member, ...]:
-    """Static recordings of a unit: the rests between some turns."""
+def beyond_prior(grade: str) -> tuple[str, ...]:
+    """Coefficients whose noise walks in a rest by more than their prior: no file foresees it, and no rest shows it.
+
+    The gyros of the finest grades: 4 and 43 of their priors.
+    """
+    imu, dwell_s = load_imu(grade), _DWELL_S[grade]
+    walk = _WANDER * imu.gyro_white_noise / math.sqrt(dwell_s)
+    return tuple(f"gyro_bias_{axis}" for axis in "xyz") if walk > imu.prior["gyro_bias"] else ()
+
+
+def _scenario(grade: str, seed: int, turns: Sequence[Turn]) -> Scenario:
     imu, dwell_s = load_imu(grade), _DWELL_S[grade]
     plan = Plan("cube", (dwell_s,) * (len(turns) + 1), tuple(turns), math.radians(20.0))
-    scenario = Scenario(plan, imu, SITE, rate_hz=_RATE_HZ, seed=seed, noise=wander(imu, dwell_s))
-    whole = simulate(scenario, imu_truth(scenario))
+    return Scenario(plan, imu, SITE, rate_hz=_RATE_HZ, seed=seed, noise=wander(imu, dwell_s))
+
+
+def _kept(grade: str, turns: Sequence[Turn]) -> list[tuple[float, float]]:
+    """Begin and end (s) of what is kept of each rest."""
+    dwell_s = _DWELL_S[grade]
     begin = np.cumsum([0.0, *(dwell_s + turn.duration_s for turn in turns)]).tolist()
-    parts = [cut(whole, t + _EDGE_S, t + dwell_s - _EDGE_S, k) for k, t in enumerate(begin)]
+    return [(t + _EDGE_S, t + dwell_s - _EDGE_S) for t in begin]
+
+
+def truth(grade: str, seed: int, turns: Sequence[Turn], frame: str) -> dict[str, float]:
+    """Coefficients of the unit (SI) in a body frame, biases in the mean over what is kept of the rests."""
+    scenario = _scenario(grade, seed, turns)
+    unit, interval = imu_truth(scenario), 1.0 / _RATE_HZ
+    ends = np.ravel(_kept(grade, turns))
+    spans = PhaseLog(ends, np.arange(len(ends)) % 2 == 0, np.arange(len(ends)) // 2)
+    t = interval * np.arange(1, round(ends[-1] / interval) + 1)
+    return in_body_frame(unit.coefficients | mean_bias(unit, t, spans, interval, seed), frame)
+
+
+def rests(grade: str, seed: int, turns: Sequence[Turn] = CUBE) -> tuple[Member, ...]:
+    """Static recordings of a unit: the rests between some turns."""
+    scenario = _scenario(grade, seed, turns)
+    imu, whole = scenario.imu, simulate(scenario, imu_truth(scenario))
+    parts = [cut(whole, begin, end, k) for k, (begin, end) in enumerate(_kept(grade, turns))]
     return tuple(
         Member(f"r{k}", Opened(PreparedTest(*open_test(part, OpeningOptions(imu, SITE, "")))))
         for k, part in enumerate(parts)

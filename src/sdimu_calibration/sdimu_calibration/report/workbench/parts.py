@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from dash import html
 
+from sdimu_calibration.core.plain_text import capital
 from sdimu_calibration.core.units import from_si
 from sdimu_calibration.report import data
 from sdimu_calibration.report.table import with_sigma
@@ -70,7 +71,7 @@ def span(one: tuple[float, float]) -> str:
 def candidate(found: Preview, name: str) -> list[Any]:
     """Say what a candidate is, what it would take, what it cannot be told from, and what speaks against it."""
     effect, what = found.effect, found.what
-    head = html.P(html.B(_capital(effect.title)), id="candidate-name", **{"data-name": name})
+    head = html.P(html.B(capital(effect.title)), id="candidate-name", **{"data-name": name})
     cause = [html.P(effect.description)] if effect.description else []
     tells = "" if what.tells is None else sentence(what.tells)
     alike = (
@@ -104,7 +105,3 @@ def _sizes(found: Preview) -> list[str]:
         size = with_sigma(from_si(float(value), unit), from_si(float(sigma), unit), unit)
         out.append(f"{label}: {size}, {value / sigma if sigma else 0.0:+.1f} sigma")
     return out
-
-
-def _capital(text: str) -> str:
-    return text[:1].upper() + text[1:]

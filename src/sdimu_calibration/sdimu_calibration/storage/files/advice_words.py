@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 
 from sdimu_calibration.core.advice import Advice, Kind, Verb
+from sdimu_calibration.core.plain_text import capital
 
 
 def sentence(advice: Advice) -> str:
@@ -77,10 +78,6 @@ def _matters(label: str, stakes: Sequence[tuple[str, str, float]]) -> str:
     return f"Which it is matters: {label} is taken; {'; '.join(parts)}."
 
 
-def _capital(text: str) -> str:
-    return text[:1].upper() + text[1:]
-
-
 _WORDS: dict[Kind, Callable[..., str]] = {
     Kind.MEND_RECORDING: lambda text: f"Mend the recording first: {text}.",
     Kind.REPEAT_STOPS: lambda: (
@@ -113,11 +110,11 @@ _WORDS: dict[Kind, Callable[..., str]] = {
         f"Which it is matters: with {other} instead of {label}, {name} moves by {sigmas:+.0f} of its sigmas."
     ),
     Kind.SIGNED_TURNS: lambda seen: (
-        f"{_capital(seen)}, so scale-factor asymmetry of the gyros cannot be seen: drive the second turn "
+        f"{capital(seen)}, so scale-factor asymmetry of the gyros cannot be seen: drive the second turn "
         "of each 180 deg pair negative (0 min more; the plan 'kim18_signed')."
     ),
     Kind.TWO_RATES: lambda seen: (
-        f"{_capital(seen)}, so the shape of the scale factor cannot be seen: alternate 2 and 10 deg/s "
+        f"{capital(seen)}, so the shape of the scale factor cannot be seen: alternate 2 and 10 deg/s "
         "(shorter; the plan 'recommended')."
     ),
     Kind.TURN_FASTER: lambda minutes: (
