@@ -8,6 +8,7 @@ from sdimu_calibration.cli.console import say as line
 from sdimu_calibration.cli.next_commands import print_advice
 from sdimu_calibration.cli.wide_table import print_table
 from sdimu_calibration.core.diagnosis.verdict import beyond
+from sdimu_calibration.core.noise_term import NoiseTerm
 from sdimu_calibration.core.probability import in_percent
 from sdimu_calibration.core.units import UnitError, from_si
 
@@ -125,7 +126,7 @@ def _possible(console: Console, summary: DiagnosisSummary) -> None:
         line(console, f"possible, and not told: {', '.join(possible[:_TOP])}")
     known = {(term.triad, term.kind) for term in summary.diagnosis.found.noise}
     noise = [
-        f"{n.triad} {n.kind.replace('_', ' ')} {in_percent(n.probability)}"
+        f"{NoiseTerm(n.triad, n.kind).words} {in_percent(n.probability)}"
         for n in told.noise
         if n.probability >= POSSIBLE and (n.triad, n.kind) not in known
     ]

@@ -23,6 +23,7 @@ from sdimu_calibration.report.coefficients import coefficients_section
 from sdimu_calibration.report.design.sheet import document
 from sdimu_calibration.report.drawing import html
 from sdimu_calibration.report.markup import Draw, prose, quiet, section
+from sdimu_calibration.report.odds_section import odds_section
 from sdimu_calibration.report.report_extras import ReportExtras
 from sdimu_calibration.report.rests_section import rests_section
 from sdimu_calibration.report.set_sections import recurrence_section, set_sections
@@ -117,6 +118,7 @@ def page(calibration: Calibration, contents: Contents) -> str:
     parts = [
         _first(calibration, summary, fit, of_set, spell, draw),
         coefficients_section(calibration, fit, contents.truth, contents.reference, _lacks(calibration, summary), draw),
+        odds_section(of_set.probabilities, "in these recordings") if of_set is not None else "",
         recurrence_section(of_set.recurrence) if of_set is not None and of_set.recurrence else "",
         *([] if calibration.of_set is None else set_sections(calibration, calibration.of_set, draw)),
         *([] if summary is None else _evidence(summary, more, spell, draw)),
@@ -180,9 +182,11 @@ def _evidence(summary: DiagnosisSummary, more: ReportExtras, spell: Spell | None
     """Tell what is missing, what it would be confused with, what it does in use, and where it shows."""
     diagnosis = summary.diagnosis
     if diagnosis.fit.learns_scatter:
-        return [*handheld_sections.evidence(summary, draw), sections.confused(summary, spell)]
+        odds = odds_section(diagnosis.probabilities, "in this run")
+        return [odds, *handheld_sections.evidence(summary, draw), sections.confused(summary, spell)]
     candidates, residuals = data.scored(diagnosis), data.residuals(diagnosis)
     return [
+        odds_section(diagnosis.probabilities),
         sections.effects(summary, candidates, draw),
         sections.confused(summary, spell),
         sections.smallest(candidates),

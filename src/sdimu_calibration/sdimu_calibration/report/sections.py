@@ -13,6 +13,7 @@ from sdimu_calibration.core.diagnosis.ladder import Rung
 from sdimu_calibration.core.diagnosis.step import Step
 from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary
 from sdimu_calibration.core.evidence.consistency import Consistency
+from sdimu_calibration.core.probability import in_percent
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.units import from_si
 from sdimu_calibration.report import data, evidence_figures, measured, measured_figures, residual_figures
@@ -167,7 +168,7 @@ def effects(summary: DiagnosisSummary, entries: Sequence[data.Scored], draw: Dra
     )
 
 
-_FOUND = ("effect", "coefficient", "size", "z", "explains", "log Bayes factor", "held-out error")
+_FOUND = ("effect", "coefficient", "size", "probability", "z", "explains", "log Bayes factor", "held-out error")
 
 
 def found_table(summary: DiagnosisSummary) -> str:
@@ -182,6 +183,7 @@ def found_table(summary: DiagnosisSummary) -> str:
             fall = (one.held_out_before, one.held_out_after)
             cells = (
                 size,
+                in_percent(one.probability) if np.isfinite(one.probability) else "",
                 f"{one.z:+.1f}",
                 f"{100 * one.explained:.0f} %",
                 f"{one.log_bayes_factor:.0f}",
@@ -202,7 +204,11 @@ def confused(summary: DiagnosisSummary, spell: Spell | None = None) -> str:
     for one in summary.found:
         if not one.alike:
             continue
-        others = "; ".join(tip(title_of(name), effect_of_key(name), [name]) for name in one.alike[:6])
+        shares = {share.name: f" {in_percent(share.probability)}" for share in one.may_be}
+        others = "; ".join(
+            tip(title_of(name), effect_of_key(name), [name]) + shares.get(name.partition("(")[0], "")
+            for name in one.alike[:6]
+        )
         stake = "; ".join(
             f"with {s.other} instead, {s.coefficient} moves by {s.sigmas:+.1f} of its sigmas"
             for s in one.coefficient_shifts[:3]

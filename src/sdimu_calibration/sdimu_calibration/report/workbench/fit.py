@@ -15,7 +15,7 @@ import numpy as np
 
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.diagnosis.addition import Addition, addition, objections
-from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
+from sdimu_calibration.core.diagnosis.diagnose import Diagnosis, climb
 from sdimu_calibration.core.diagnosis.found import looked_at
 from sdimu_calibration.core.diagnosis.free_input_test import FreeInputTest
 from sdimu_calibration.core.diagnosis.problem import Problem
@@ -28,6 +28,7 @@ from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.estimation.solve import solve, with_effects
 from sdimu_calibration.core.measurement_kind import SKIP
 from sdimu_calibration.core.note import without_advice
+from sdimu_calibration.core.posterior.told import Probabilities
 from sdimu_calibration.core.progress import silent
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.results import Calibration, no_history
@@ -101,6 +102,8 @@ class Missing:
         Of the free inputs.
     held_out : float or None
         Error at stops or rests held out (sigma), as `sdimu calibrate` has it.
+    probabilities : Probabilities or None
+        Of nothing, and of each family of effects, as `sdimu diagnose` has them.
     """
 
     entries: tuple[data.Scored, ...]
@@ -109,6 +112,7 @@ class Missing:
     sentence: str
     left: FreeInputTest
     held_out: float | None
+    probabilities: Probabilities | None = None
 
 
 @dataclass(frozen=True)
@@ -157,17 +161,19 @@ class FitSession:
             return self._fits[setting]
 
     def missing(self, setting: Setting, tell: Tell = silent) -> Missing:
-        """Score all candidates against a fit, without adding any."""
+        """Score all candidates against a fit, and diagnose it as `sdimu diagnose` does."""
         with self._lock:
             if setting not in self._missing:
                 scores = self._survey(setting, tell)
+                told = climb(scores.fit, progress=tell)
                 found = Missing(
                     tuple(data.scored(scores)),
                     scores.found.threshold,
-                    scores.adequate,
-                    scores.sentence,
+                    told.adequate,
+                    told.sentence,
                     scores.free_inputs_after,
                     scores.fit.held_out_rms(),
+                    told.probabilities,
                 )
                 _keep(self._missing, setting, found)
             return self._missing[setting]

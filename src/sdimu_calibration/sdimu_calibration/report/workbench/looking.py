@@ -30,6 +30,7 @@ def _score(app: Dash, shelf: RecordingCache, doing: TaskProgress) -> None:
     @app.callback(
         Output("verdict", "children"),
         Output("verdict", "className"),
+        Output("odds", "children"),
         Output("objections", "children"),
         Output("ranking", "figure"),
         Output("candidate", "options"),
@@ -49,7 +50,8 @@ def _score(app: Dash, shelf: RecordingCache, doing: TaskProgress) -> None:
         told, tone = parts.verdict(missing, against)
         picture = figures.finished(figures.ranking(missing.entries, missing.threshold), look)
         still = chosen if chosen in {entry.label for entry in missing.entries} else None
-        return told, tone, [html.Li(line) for line in against], picture, parts.options(missing.entries), still
+        lines = [html.Li(line) for line in against]
+        return told, tone, parts.odds(missing), lines, picture, parts.options(missing.entries), still
 
 
 def _choose(app: Dash) -> None:

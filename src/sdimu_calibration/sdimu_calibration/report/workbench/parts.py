@@ -9,13 +9,17 @@ import numpy as np
 from dash import html
 
 from sdimu_calibration.core.plain_text import capital
+from sdimu_calibration.core.probability import in_percent
 from sdimu_calibration.core.units import from_si
 from sdimu_calibration.report import data
+from sdimu_calibration.report.odds_section import family_in_words
 from sdimu_calibration.report.table import with_sigma
 from sdimu_calibration.report.workbench.fit import Fitted, Missing, Preview
 from sdimu_calibration.report.workbench.setting import Setting
 from sdimu_calibration.storage.files.advice_words import sentence
 
+_LEAST, _MOST_FAMILIES = 0.05, 6
+"""Probability (1) from which a family is listed, and how many are at most: less is one of many."""
 _MOST_PARAMETERS = 9
 """Number of parameters of a candidate that are listed: a whole matrix of them."""
 
@@ -43,6 +47,28 @@ def verdict(missing: Missing, objections: Sequence[str]) -> tuple[str, str]:
     return (
         f"{mark} {missing.sentence}{held} Left by stops: chi-square {left.chi2:.0f}, {left.dof} dof."
     ), f"verdict {tone}"
+
+
+def odds(missing: Missing) -> list[Any]:
+    """List what may be missing, the likeliest first, each with its probability; its members in a tip."""
+    told = missing.probabilities
+    if told is None:
+        return []
+    rows = [("no effect is missing", told.nothing, "")]
+    rows += [
+        (
+            family_in_words(one),
+            one.probability,
+            "; ".join(f"{m.label} {in_percent(m.probability)}" for m in one.members),
+        )
+        for one in told.families
+        if one.probability >= _LEAST
+    ][:_MOST_FAMILIES]
+    lines = [
+        html.Tr([html.Td(name, title=members), html.Td(html.Meter(min=0, max=1, value=p)), html.Td(in_percent(p))])
+        for name, p, members in rows
+    ]
+    return [html.Table(html.Tbody(lines), className="odds")]
 
 
 def numbers(fitted: Fitted, given: Fitted) -> str:

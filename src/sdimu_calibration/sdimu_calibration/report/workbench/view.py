@@ -112,6 +112,7 @@ def _bar(title: str) -> Any:
                 className="line",
             ),
             html.Div(id="verdict", className="verdict", role="status"),
+            html.Div(id="odds"),
             html.Ul(id="objections", className="objections"),
             html.Div(id="message", className="message", role="alert"),
         ],

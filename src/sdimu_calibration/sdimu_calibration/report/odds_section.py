@@ -1,0 +1,86 @@
+"""What may be missing and how probable it is: each family of effects with its members, each noise, as HTML text."""
+
+from __future__ import annotations
+
+from html import escape
+
+import numpy as np
+
+from sdimu_calibration.core.noise_term import NoiseTerm
+from sdimu_calibration.core.posterior.told import FamilyShare, MemberShare, NoiseShare, Probabilities
+from sdimu_calibration.core.probability import in_percent
+from sdimu_calibration.core.units import from_si
+from sdimu_calibration.report.effect_words import title_of
+from sdimu_calibration.report.markup import quiet, section
+from sdimu_calibration.report.table import with_sigma
+
+_LEAST = 0.05
+"""Probability (1) from which a family or a noise has a line of its own: less is one of many."""
+_MOST = 12
+"""Number of families at most, and of members of one: the file has them all."""
+_HEAD = ("", "probability", "", "size if it is this")
+
+
+def odds_section(told: Probabilities | None, where: str = "in this test") -> str:
+    """Return the section; empty where there are no probabilities."""
+    if told is None:
+        return ""
+    lines = [_line("No effect is missing", told.nothing)]
+    families = [one for one in told.families if one.probability >= _LEAST][:_MOST]
+    for family in families:
+        lines.append(_line(family_in_words(family), family.probability, size=_only(family)))
+        if len(family.members) > 1:
+            lines += [_line(m.label, m.probability, True, _size(m)) for m in family.members[:_MOST]]
+    lines += [_line(_noise(n), n.probability) for n in told.noise if n.probability >= _LEAST]
+    head = "".join(f'<th scope="col"{" class=text" if k == 0 else ""}>{word}</th>' for k, word in enumerate(_HEAD))
+    rest = (
+        ""
+        if families or told.nothing > 0.5
+        else "No family of effects is more probable than 5 %: many explain about the same. "
+    )
+    return section(
+        "How probable each cause is",
+        f'<div class="wide"><table class="odds"><thead><tr>{head}</tr></thead><tbody>{"".join(lines)}</tbody></table>'
+        "</div>",
+        quiet(
+            f"{rest}Summed over all models that the data leave probable {where}, weighed with how usual each is. "
+            "Of a family, each member is listed; several effects may be missing at once. Coefficients and sigmas of "
+            "this page are means over these models."
+        ),
+    )
+
+
+def family_in_words(family: FamilyShare) -> str:
+    """Name a family and its sensor: ``slow change of the bias, gyro y``."""
+    sensor = family.sensor.replace("_", " ")
+    if family.family == "own":
+        return f"An equation that the catalogue lacks, {sensor}"
+    if family.family.endswith("_bias_drift"):
+        return f"Slow change of the bias, {sensor}"
+    words = title_of(family.members[0].label.partition("(")[0]) if family.members else family.family
+    return f"{words[:1].upper()}{words[1:]}{f', {sensor}' if sensor else ''}"
+
+
+def _only(family: FamilyShare) -> str:
+    return _size(family.members[0]) if len(family.members) == 1 else ""
+
+
+def _size(member: MemberShare) -> str:
+    if not np.isfinite(member.value):
+        return ""
+    unit = member.display_unit
+    return with_sigma(from_si(member.value, unit), from_si(member.sigma, unit), unit)
+
+
+def _noise(noise: NoiseShare) -> str:
+    size = NoiseTerm(noise.triad, noise.kind, 0.0, noise.size)
+    amount = f"{from_si(noise.size, size.display_unit):.3g} {size.display_unit}"
+    return f"Noise: {size.words}, {amount}"
+
+
+def _line(name: str, p: float, inner: bool = False, size: str = "") -> str:
+    words = f'<td class="text{" inner" * inner}">{f"<code>{escape(name)}</code>" if inner else escape(name)}</td>'
+    return (
+        f'<tr>{words}<td><meter min="0" max="1" value="{p:.3f}">{in_percent(p)}</meter></td>'
+        f"<td>{escape(in_percent(p))}</td><td>{escape(size)}</td></tr>"
+    )
