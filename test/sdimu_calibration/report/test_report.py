@@ -165,7 +165,7 @@ def test_a_diagnosis_of_a_right_model_makes_a_page_too(diagnosis):
     empty = type(diagnosis.found)(
         (), diagnosis.found.chosen[:0], diagnosis.found.first, diagnosis.found.threshold, 1.0, diagnosis.evidence
     )
-    quiet = type(diagnosis)(**{**vars(diagnosis), "found": empty, "adequate": True, "verdict": "consistent"})
+    quiet = replace(diagnosis, found=empty, adequate=True, verdict="consistent")
     text = page(diagnosis.before, Contents("x", summary=summarise(quiet)))
     assert "No candidate stands out" in text
     assert 'class="verdict good"' in text

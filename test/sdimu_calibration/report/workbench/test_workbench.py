@@ -132,7 +132,7 @@ def test_the_loop_finds_adds_and_takes_home_the_hidden_effect(app, recording, tm
     chosen = page.post("candidate.value", "ranking.clickData", ranking_at_clickData={"points": [{"y": bars[0]}]})
     page.add(chosen["candidate"]["value"])
     after = page.shown()
-    assert "Nothing stands out" in after["verdict"]["children"]
+    assert "nothing stands out" in after["verdict"]["children"]
     rungs = after["ladder"]["figure"]["data"][0]["x"]
     assert rungs[1] < rungs[0]
     # A right model predicts left-out stops to one sigma; 11,000 numbers scatter by 0.7 %.
