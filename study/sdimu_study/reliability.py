@@ -141,9 +141,7 @@ def score(world: OneTest, outcome: tuple[Diagnosis, float]) -> dict[str, Any]:
 
 def _family(truth: Truth) -> tuple[str, str]:
     """Family and sensor of a hidden effect."""
-    key, value = truth.option or ("", 0.0)
-    option = f"({key}={value:g}{'' if key == 'turn' else ' s'})" if key else ""
-    effect = resolve(truth.name + option)
+    effect = resolve(truth.text.rpartition("=")[0])
     return family_of(next(c for c in split(effect) if c.parameter.name == truth.name))
 
 

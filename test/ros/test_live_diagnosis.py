@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import json
 import os
 import sys
 import time
@@ -20,6 +21,7 @@ from rclpy.context import Context
 from rclpy.node import Node
 from std_msgs.msg import Float64MultiArray
 
+import sdimu_calibration
 from sdimu_calibration.core.data.arrival import RawStatus, RawTest, until
 from sdimu_calibration.core.diagnosis import rounds
 from sdimu_calibration.core.diagnosis.diagnose import climb
@@ -31,8 +33,11 @@ from sdimu_calibration.nodes.credits import HISTORY
 from sdimu_calibration.nodes.diagnosis_messages import diagnosis, heat_map
 from sdimu_calibration.nodes.diagnosis_worker import Answer, Diagnoser, Job, Picture, WorkerRequest
 from sdimu_calibration.nodes.live_diagnosis import Worker
+from sdimu_calibration.report.workbench.fit import FitSession
+from sdimu_calibration.report.workbench.setting import Setting
 from sdimu_calibration.storage.bags.bag_writer import write_recording
 from sdimu_calibration.storage.files.config import load_imu, load_model, load_plan
+from sdimu_calibration.storage.files.diagnosis_file import odds
 from sdimu_calibration.storage.files.journal import Journal, digest
 from sdimu_calibration.storage.opening import Source, open_test, opening_options
 from sdimu_sim.core.scenario import Scenario, generate
@@ -78,15 +83,21 @@ def stop_end(raw: RawTest, stop: int) -> int:
     return int(raw.status.ns[(raw.status.stop == stop) & raw.status.dwell].max())
 
 
-def test_all_data_are_ranked_as_the_first_scan_of_a_diagnosis_of_the_bag(raw, whole, tmp_path, monkeypatch):
+@pytest.fixture(scope="module")
+def bag(raw: RawTest, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    bag = tmp_path_factory.mktemp("bag") / "bag"
     write_recording(
-        tmp_path / "bag",
+        bag,
         start_ns=START,
         imu_ns=raw.ns - START,
         omega_ib_b=raw.omega_ib_b,
         f_ib_b=raw.f_ib_b,
         status=(raw.status.ns - START, raw.status.dwell, raw.status.stop),
     )
+    return bag
+
+
+def test_all_data_are_ranked_as_the_first_scan_of_a_diagnosis_of_the_bag(whole, bag, monkeypatch):
     searches = []
 
     def seen(*arguments, **more):
@@ -94,7 +105,7 @@ def test_all_data_are_ranked_as_the_first_scan_of_a_diagnosis_of_the_bag(raw, wh
         return searches[-1]
 
     monkeypatch.setattr(rounds, "search", seen)
-    climb(solve(open_test(tmp_path / "bag", "daejeon", load_imu("dtg")), load_model("baseline")))
+    climb(solve(open_test(bag, "daejeon", load_imu("dtg")), load_model("baseline")))
     evidence, first, limit = searches[0].evidence, searches[0].first, searches[0].threshold
     scanned = {
         evidence.names[k]: (first.z[k], first.estimate[k], first.sigma[k])
@@ -109,8 +120,26 @@ def test_all_data_are_ranked_as_the_first_scan_of_a_diagnosis_of_the_bag(raw, wh
     assert whole.threshold == pytest.approx(limit, rel=0.01)
 
 
+def test_shell_notebook_workbench_and_the_live_end_tell_the_same_probabilities(whole, bag, tmp_path):
+    """To the last digit."""
+    shell = sdimu("diagnose", bag, "--site", "daejeon", "--imu", "dtg", "--out", tmp_path / "out")
+    shell.communicate(timeout=DEADLINE_S)
+    told = json.loads((tmp_path / "out" / "diagnosis.json").read_text())["probabilities"]
+    assert told["families"][0]["p"] > 0.99
+    opened = sdimu_calibration.open(bag, site="daejeon", imu="dtg")
+    notebook = sdimu_calibration.diagnose(sdimu_calibration.calibrate(opened)).core
+    workbench = FitSession(opened, load_model("baseline")).missing(Setting())
+    for other in (notebook, workbench, whole):
+        assert json.loads(json.dumps(odds(other.probabilities), default=str).replace("NaN", "null")) == told
+    live = {v.key: v.value for s in diagnosis(START, whole).status if s.name == "probabilities" for v in s.values}
+    assert float(live["nothing_missing"]) == told["nothing_missing"]
+    for family in told["families"]:
+        assert float(live[f"{family['family']} {family['sensor']}".strip()]) == family["p"]
+
+
 def test_what_is_missing_stands_out_and_leaves_when_it_is_added(job, whole):
-    assert whole.verdict == "misfit"
+    assert whole.verdict in {"one effect", "class of effects"}
+    assert EFFECT in whole.sentence
     assert EFFECT in {r.label for r in whole.standing}
     added = Diagnoser(job).answer(WorkerRequest(5, None, ((), (EFFECT,)))).diagnosis
     assert added.verdict == "consistent"
@@ -130,7 +159,7 @@ def test_a_stop_is_diagnosed_by_what_had_come_by_its_end(raw, job, tmp_path):
     for entry in zip(*short.status, strict=True):
         journal.status(*map(int, entry))
     journal.samples(short.ns, short.omega_ib_b, short.f_ib_b)
-    alone = Diagnoser(replace(job, journal=journal.place)).answer(WorkerRequest(2, None)).diagnosis
+    alone = Diagnoser(replace(job, journal=journal.place)).answer(WorkerRequest(2, end)).diagnosis
     assert Diagnoser(job).answer(WorkerRequest(2, end)).diagnosis == alone
     assert alone.stop == 2
     assert {place.stop for place in alone.where} == {0, 1, 2}
@@ -225,7 +254,7 @@ def test_a_running_test_is_watched(whole: LiveDiagnosis) -> None:
         context.try_shutdown()
     assert watching.returncode == 0, err
     assert out.startswith("watching ROS domain ")
-    (line,) = (line for line in out.splitlines() if line.startswith("diagnosis of stop 5: misfit"))
+    (line,) = (line for line in out.splitlines() if line.startswith(f"diagnosis of stop 5: {whole.verdict}"))
     assert EFFECT in line
 
 

@@ -28,7 +28,7 @@ def picture(seen: SeenDiagnosis) -> RenderableType:
 
     if seen.stop < 0:
         return Text("no diagnosis yet", style="dim")
-    style = "bold yellow" if seen.verdict == Verdict.MISFIT else "green" if seen.ladder else "dim"
+    style = "dim" if not seen.ladder else "green" if seen.verdict == Verdict.CONSISTENT else "bold yellow"
     head = Text(f"diagnosis of stop {seen.stop}: {seen.sentence}", style=style)
     return Group(head, _heat_map(seen), _tables(seen)) if seen.ladder else head
 

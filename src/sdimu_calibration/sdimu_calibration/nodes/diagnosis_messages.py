@@ -12,6 +12,7 @@ from sensor_msgs.msg import CompressedImage, JointState
 from std_msgs.msg import Float64MultiArray, MultiArrayDimension, MultiArrayLayout
 
 from sdimu_calibration.core.diagnosis.live_diagnosis import LiveDiagnosis, Ranked
+from sdimu_calibration.core.posterior.told import Probabilities
 from sdimu_calibration.core.verdict import Verdict
 from sdimu_calibration.nodes.credits import header
 from sdimu_calibration.report.data import places
@@ -22,7 +23,7 @@ _MOST_RANKED = 12
 
 
 def diagnosis(stamp_ns: int, found: LiveDiagnosis) -> DiagnosticArray:
-    """Return verdict, where the last stop fails, ranking and ladder, one status each; all but the first are tables."""
+    """Return verdict, where the last stop fails, ranking, ladder, probabilities; all but the first are tables."""
     level = DiagnosticStatus.OK if found.verdict == Verdict.CONSISTENT else DiagnosticStatus.WARN
     parts = [_status("verdict", found.sentence, _verdict(found), level)]
     if found.verdict != Verdict.WAITING:
@@ -32,6 +33,8 @@ def diagnosis(stamp_ns: int, found: LiveDiagnosis) -> DiagnosticArray:
             _status("ranking", reaches, ((r.label, f"{r.z:+.1f} sigma, {size(r)}") for r in _first(found))),
             _status("ladder", "error with one stop left out, 1 is right", ladder_rows(found.ladder)),
         ]
+    if found.probabilities is not None:
+        parts.append(_status("probabilities", "of what the model misses, all data", _odds(found.probabilities)))
     return DiagnosticArray(header=header(stamp_ns), status=parts)
 
 
@@ -101,6 +104,17 @@ def _verdict(found: LiveDiagnosis) -> Iterable[tuple[str, str]]:
     yield "nis", f"{found.ladder[-1].nis:.6g}"
     for number, text in enumerate(found.noise, start=1):
         yield f"noise_{number}", text
+
+
+def _odds(told: Probabilities) -> Iterable[tuple[str, str]]:
+    """Probabilities with all their digits: of nothing, of families on a sensor, of their members."""
+    yield "nothing_missing", repr(told.nothing)
+    for family in told.families:
+        yield f"{family.family} {family.sensor}".strip(), repr(family.probability)
+        for member in family.members:
+            yield member.label, repr(member.probability)
+    for noise in told.noise:
+        yield f"noise {noise.triad} {noise.kind}", repr(noise.probability)
 
 
 def _last_stop(found: LiveDiagnosis) -> list[tuple[str, str]]:

@@ -140,7 +140,7 @@ class Diagnoser:
         try:
             test = self._opened(request.until_ns)
             earlier = [self._error(test, models) for models in request.models[:-1]]
-            found, fit = so_far(test, extended_model(self._job.model, added), added, earlier)
+            found, fit = so_far(test, extended_model(self._job.model, added), added, earlier, request.until_ns is None)
             self._errors[added] = found.ladder[-1]
             if self._job.question is not None:
                 more = self._job.question(fit, found, request.about)

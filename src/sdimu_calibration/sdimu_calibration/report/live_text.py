@@ -17,6 +17,8 @@ from sdimu_calibration.report.table import with_sigma
 Rows = tuple[tuple[str, str], ...]
 
 AS_GIVEN = "as given"
+_QUIET = frozenset({Verdict.CONSISTENT, Verdict.WAITING})
+"""Verdicts beside which no candidate is named."""
 _NAMED = 2
 """Number of candidates that a line names."""
 
@@ -56,7 +58,7 @@ class SeenDiagnosis:
         errors = ", ".join(f"{name} {error}" for name, error in self.ladder)
         parts = (
             f"diagnosis of stop {self.stop}: {self.verdict}: {self.sentence}",
-            f"{named} ({self.reaches})" if named and self.verdict == Verdict.MISFIT else "",
+            f"{named} ({self.reaches})" if named and self.verdict not in _QUIET else "",
             f"error with one stop left out: {errors}" if errors else "",
         )
         return "; ".join(part.rstrip(".") for part in parts if part)

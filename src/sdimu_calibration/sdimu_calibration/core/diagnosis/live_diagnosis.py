@@ -1,7 +1,7 @@
 """The diagnosis of a test that still runs: where the model fails so far, what would explain it, how far the error fell.
 
-No search: one scan of all candidates, as `climb` begins. What it says of all data is therefore the first scan of the
-diagnosis of the recording, to the last digit.
+While it runs there is no search: one scan of all candidates, as `climb` begins. Once the test has ended, verdict and
+probabilities are those of the diagnosis of its recording, to the last digit.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sdimu_calibration.core.arrays import Floats
-from sdimu_calibration.core.diagnosis.diagnose import NOT_DIAGNOSABLE, Diagnosis, in_measured_noise
+from sdimu_calibration.core.diagnosis.diagnose import NOT_DIAGNOSABLE, Diagnosis, climb, in_measured_noise
 from sdimu_calibration.core.diagnosis.problem import Problem
 from sdimu_calibration.core.diagnosis.survey import survey
 from sdimu_calibration.core.estimation.fit import Fit
@@ -21,6 +21,7 @@ from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.estimation.solve import solve
 from sdimu_calibration.core.evidence.consistency import StopMean
 from sdimu_calibration.core.evidence.linear import LinearEvidence
+from sdimu_calibration.core.posterior.told import Probabilities
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.specification import Model
 from sdimu_calibration.core.verdict import Verdict
@@ -81,7 +82,7 @@ class LiveDiagnosis:
     until_s : float
         Length of the data (s).
     verdict : Verdict
-        ``consistent``, ``misfit``, or ``waiting`` where nothing could be fitted.
+        ``consistent``, ``misfit``, or ``waiting`` where nothing could be fitted; of a whole test that of `climb`.
     sentence : str
         The verdict for people; while it waits, for what.
     added : tuple of str
@@ -98,6 +99,8 @@ class LiveDiagnosis:
         Every model that this test has had, on the same data, the one in use last.
     noise : tuple of str
         What is wrong with the white noise of the IMU file, one line each.
+    probabilities : Probabilities or None
+        Of nothing, and of each family of effects; None before the test ends.
     """
 
     stop: int
@@ -111,6 +114,7 @@ class LiveDiagnosis:
     ranking: tuple[Ranked, ...] = ()
     ladder: tuple[ModelError, ...] = ()
     noise: tuple[str, ...] = ()
+    probabilities: Probabilities | None = None
 
     @property
     def standing(self) -> tuple[Ranked, ...]:
@@ -124,7 +128,7 @@ def waiting(stop: int, until_s: float, added: Sequence[str], why: str) -> LiveDi
 
 
 def so_far(
-    test: PreparedTest, model: Model, added: Sequence[str] = (), ladder: Sequence[ModelError] = ()
+    test: PreparedTest, model: Model, added: Sequence[str] = (), ladder: Sequence[ModelError] = (), whole: bool = False
 ) -> tuple[LiveDiagnosis, Fit]:
     """Diagnose what there is of a test.
 
@@ -137,6 +141,8 @@ def so_far(
         What `model` has beyond the model that the test began with.
     ladder : sequence of ModelError
         Of other models on the same data.
+    whole : bool
+        The test has ended: its verdict and probabilities are those of `sdimu diagnose`.
 
     Returns
     -------
@@ -146,11 +152,12 @@ def so_far(
     """
     fit, noise = _fit(test, model)
     done = survey(fit, outcome(fit, held_out=False))
+    told = climb(fit) if whole else done
     return LiveDiagnosis(
         stop=max(done.evidence.stop.tolist(), default=0),
         until_s=float(test.recording.t[-1]),
-        verdict=done.verdict,
-        sentence=done.sentence,
+        verdict=told.verdict,
+        sentence=told.sentence,
         added=tuple(added),
         threshold=done.found.threshold,
         p_value=done.p_value,
@@ -158,6 +165,7 @@ def so_far(
         ranking=_ranked(done),
         ladder=(*ladder, _error(fit, done.evidence.only(np.empty(0, dtype=np.int64)), added)),
         noise=noise,
+        probabilities=told.probabilities,
     ), fit
 
 

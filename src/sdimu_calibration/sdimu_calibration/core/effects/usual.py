@@ -8,9 +8,9 @@ g-sensitivity). What a mount or a cable does, and what needs a strong field, is 
 
 from __future__ import annotations
 
-_IN_DATA_SHEETS = 3.0
+_IN_DATA_SHEETS = 2.0
 """Odds (1) of physics that data sheets quote: makers test for it because it is there."""
-_SELDOM = 0.3
+_SELDOM = 0.5
 """Odds (1) of physics of a mount, a cable, a strong field: few tests find it."""
 _NOISE = 0.05
 """Odds (1) of modes of a random walk: noise with a memory is a part of the model by itself, and these are the same."""

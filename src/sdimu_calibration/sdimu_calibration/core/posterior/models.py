@@ -184,7 +184,9 @@ class Expansion:
             with np.errstate(divide="ignore", invalid="ignore"):
                 fall = (np.outer(r**2, a) + np.outer(a, r**2) - 2.0 * X * np.outer(r, r)) / det
                 total = 0.5 * fall - 0.5 * np.log(det / loading**2) + log_prior + 2.0 * _LOG_SHARE[width]
-            total[~(det > 1e-9 * np.outer(a, a))] = -np.inf
+            # Size of the first of a pair beside the second: of the wrong sign where that cannot be.
+            wrong = prior.positive[use][:, None] & (r[:, None] * a[None, :] < X * r[None, :])
+            total[wrong | wrong.T | ~(det > 1e-9 * np.outer(a, a))] = -np.inf
             i, j = np.unravel_index(int(np.nanargmax(total)), total.shape)
             if self.score + total[i, j] > best:
                 best = self.score + float(total[i, j])

@@ -9,7 +9,7 @@ from typing import Generic
 
 import numpy as np
 
-from sdimu_calibration.core.arrays import Floats, Ints
+from sdimu_calibration.core.arrays import Bools, Floats, Ints
 from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.evidence.candidate import Candidate
 from sdimu_calibration.core.evidence.joint_information import Joint
@@ -103,8 +103,20 @@ class Posterior(Generic[E]):
         return frozenset(max(of_family.values(), key=self._any_of))
 
     def _any_of(self, numbers: Iterable[int]) -> float:
-        have = frozenset(numbers)
-        return self.probability(lambda m: any(number in have for number, _ in m.members))
+        """Probability that one of some candidates is in the model."""
+        return float(self._weights @ self._holds[:, list(numbers)].any(axis=1))
+
+    @cached_property
+    def _weights(self) -> Floats:
+        return np.array([m.probability for m in self.models])
+
+    @cached_property
+    def _holds(self) -> Bools:
+        """Whether each model holds each candidate; shape (models, q)."""
+        out = np.zeros((len(self.models), len(self.board.use)), dtype=bool)
+        for row, model in zip(out, self.models, strict=True):
+            row[[number for number, _ in model.members]] = True
+        return out
 
     def candidate(self, number: int) -> Candidate:
         """Candidate of a member."""
@@ -129,11 +141,7 @@ class Posterior(Generic[E]):
         ndarray, shape (q,)
             (1).
         """
-        out = np.zeros(len(self.board.use))
-        for model in self.models:
-            for number, _ in model.members:
-                out[number] += model.probability
-        return out
+        return np.asarray(self._weights @ self._holds)
 
     @property
     def tried(self) -> list[NoiseTerm]:

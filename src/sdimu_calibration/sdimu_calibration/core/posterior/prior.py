@@ -24,7 +24,7 @@ from sdimu_calibration.core.evidence.candidate import Candidate
 
 MEAN_NUMBER = 2.0
 """Number of effects (1) that a model lacks, in the mean over sensors: real recordings showed between none and ten."""
-KIN = 2.0
+KIN = 1.0
 """Log odds (1) of an effect that acts on one axis as one that is present acts on another: they have one cause."""
 _FAULT = 0.05
 """Odds of a fault of one recording beside an effect of the sensor (1): one test in twenty has one."""

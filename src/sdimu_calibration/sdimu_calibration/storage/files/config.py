@@ -121,7 +121,9 @@ def find_config(kind: str, name_or_path: str | Path) -> Path:
     if isinstance(name_or_path, Path) or _is_path(text):
         if path.is_file():
             return path
-        raise DataError(f"{path}: is a folder; name a {kind} file" if path.is_dir() else f"{path}: no such {kind} file")
+        raise DataError(
+            f"{path}: is a folder, and no {kind} file: name one" if path.is_dir() else f"{path}: no such {kind} file"
+        )
     folder = config_folder() / kind
     for suffix in _SUFFIXES:
         if (folder / f"{text}{suffix}").is_file():

@@ -1,0 +1,164 @@
+"""Scores in closed form against determinants written out; the climb and the window against all models there are."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+from scipy.stats import multivariate_normal
+
+from sdimu_calibration.core.posterior.models import Data
+from sdimu_calibration.core.posterior.prior import KIN, MEAN_NUMBER, WIDTH_SHARES, WIDTHS, Prior
+from sdimu_calibration.core.posterior.search import WINDOW, climb, window
+
+ROWS = 40
+
+
+def prior(q: int, **changes) -> Prior:
+    """Candidates that have nothing to do with each other, the first two but for their cause."""
+    usual = np.log(np.linspace(1.0, 2.0, q) / np.linspace(1.0, 2.0, q).sum())
+    kept = {
+        "log_share": usual,
+        "cause": np.array([0, 0, *range(1, q - 1)]),
+        "parameter": np.arange(q),
+        "repeats": np.zeros(q, dtype=bool),
+        "positive": np.zeros(q, dtype=bool),
+        "own": np.zeros(q, dtype=bool),
+    }
+    return Prior(**(kept | changes))
+
+
+def drawn(q: int, rng: np.random.Generator, alike: float = 0.9) -> np.ndarray:
+    """Signatures of which neighbours resemble each other, in units of the prior sizes; shape (ROWS, q)."""
+    W = rng.standard_normal((ROWS, q))
+    for k in range(1, q):
+        W[:, k] = alike * W[:, k - 1] + np.sqrt(1.0 - alike**2) * W[:, k]
+    return W
+
+
+def data_of(W: np.ndarray, e: np.ndarray, known: Prior) -> Data:
+    return Data(W.T @ W, W.T @ e, known)
+
+
+def log_posterior(W: np.ndarray, e: np.ndarray, known: Prior, members: tuple[tuple[int, int], ...]) -> float:
+    """Log posterior over that of no effect, from the density of the measurements themselves."""
+    covariance = np.eye(len(e))
+    for k, width in members:
+        covariance += WIDTHS[width] ** 2 * np.outer(W[:, k], W[:, k])
+    nothing = np.zeros(len(e))
+    density = multivariate_normal.logpdf(e, nothing, covariance) - multivariate_normal.logpdf(
+        e, nothing, np.eye(len(e))
+    )
+    columns = [k for k, _ in members]
+    share = sum(np.log(WIDTH_SHARES[width]) for _, width in members)
+    count = len(columns)
+    number = np.sum(np.log(np.arange(1, count + 1))) - count * np.log1p(1.0 / MEAN_NUMBER)
+    kin = sum(KIN for k in range(count) if known.cause[columns[k]] in known.cause[columns[:k]])
+    return float(density + share + known.log_share[columns].sum() + number + kin)
+
+
+@pytest.mark.parametrize("members", [(), ((1, 0),), ((0, 1), (3, 0)), ((0, 0), (1, 2), (4, 1))])
+def test_a_score_is_the_log_posterior(members):
+    rng, known = np.random.default_rng(1), prior(6)
+    W = drawn(6, rng)
+    e = W[:, 3] * 2.0 + rng.standard_normal(ROWS)
+    assert data_of(W, e, known).at(members).score == pytest.approx(log_posterior(W, e, known, members), abs=1e-9)
+
+
+def test_every_move_has_the_score_of_the_model_that_it_leads_to():
+    rng, known = np.random.default_rng(2), prior(6)
+    W = drawn(6, rng)
+    data = data_of(W, W[:, 1] - 2.0 * W[:, 4] + rng.standard_normal(ROWS), known)
+    here = data.at(((1, 0), (4, 1)))
+    moves = list(here.neighbours(-np.inf))
+    # Two are dropped; four of three widths are added, and in each of two places there are those and its own widths.
+    assert len(moves) == 2 + 4 * 3 + 2 * (4 + 1) * 3
+    for score, members in moves:
+        assert score == pytest.approx(data.at(members).score, abs=1e-9)
+    score, members = here.paired()
+    assert score == pytest.approx(data.at(members).score, abs=1e-9)
+    score, members = here.merged()
+    assert score == pytest.approx(data.at(members).score, abs=1e-9)
+
+
+def test_the_best_pair_is_that_of_all_pairs():
+    rng, known = np.random.default_rng(3), prior(7)
+    W = drawn(7, rng)
+    data = data_of(W, 3.0 * (W[:, 2] - W[:, 3]) + rng.standard_normal(ROWS), known)
+    best = max(
+        data.at(((i, width), (j, width))).score
+        for i, j in itertools.combinations(range(7), 2)
+        for width in range(len(WIDTHS))
+    )
+    assert data.at(()).paired()[0] == pytest.approx(best, abs=1e-9)
+
+
+def test_variants_of_a_parameter_exclude_each_other_unless_they_happen_at_one_time():
+    rng = np.random.default_rng(4)
+    W = drawn(4, rng, alike=0.0)
+    e = 5.0 * (W[:, 0] + W[:, 1]) + rng.standard_normal(ROWS)
+    same = np.array([0, 0, 1, 2])
+    _, members = climb(data_of(W, e, prior(4, parameter=same)), ())
+    assert len({k for k, _ in members} & {0, 1}) == 1
+    _, members = climb(data_of(W, e, prior(4, parameter=same, repeats=np.ones(4, dtype=bool))), ())
+    assert {0, 1} <= {k for k, _ in members}
+
+
+def test_what_cannot_be_negative_is_not():
+    rng = np.random.default_rng(5)
+    W = drawn(3, rng, alike=0.0)
+    e = -5.0 * W[:, 0] + rng.standard_normal(ROWS)
+    assert climb(data_of(W, e, prior(3)), ())[1]
+    assert not climb(data_of(W, e, prior(3, positive=np.ones(3, dtype=bool))), ())[1]
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_climb_and_window_find_what_a_look_at_all_models_finds(seed):
+    """All 4^6 models of six candidates of three widths."""
+    rng, known = np.random.default_rng(seed), prior(6)
+    W = drawn(6, rng, alike=0.8)
+    e = W @ (rng.standard_normal(6) * np.array([1.5, 0.0, 0.0, 2.0, 0.0, 0.0])) + rng.standard_normal(ROWS)
+    data = data_of(W, e, known)
+    every = {}
+    for widths in itertools.product((None, 0, 1, 2), repeat=6):
+        members = tuple((k, w) for k, w in enumerate(widths) if w is not None)
+        every[members] = data.at(members).score
+    score, best = climb(data, ())
+    assert score == pytest.approx(max(every.values()), abs=1e-9)
+    found = {members: s for (_, members), s in window([data], [0.0], [best]).items()}
+    near = {members: s for members, s in every.items() if s > score - WINDOW}
+    weight = np.exp(np.array(list(near.values())) - score)
+    seen = np.exp(np.array([s for m, s in near.items() if m in found]) - score)
+    assert seen.sum() > 0.999 * weight.sum()
+    assert all(found[m] == pytest.approx(s, abs=1e-9) for m, s in near.items() if m in found)
+
+
+def test_probabilities_come_true_where_the_world_is_as_the_prior_says():
+    """Of 400 worlds drawn from the prior, the shares that are true are those told, a fifth of probability at a time."""
+    rng, q = np.random.default_rng(6), 8
+    known = prior(q, cause=np.arange(q))
+    told, true = [], []
+    for _ in range(400):
+        W = drawn(q, rng, alike=0.7)
+        rate = rng.exponential(MEAN_NUMBER)
+        while True:
+            # The prior has each candidate once at most.
+            members = rng.choice(q, rng.poisson(rate), p=np.exp(known.log_share))
+            if len(set(members)) == len(members):
+                break
+        size = rng.choice(WIDTHS, q, p=WIDTH_SHARES) * rng.standard_normal(q)
+        data = data_of(W, W[:, members] @ size[members] + rng.standard_normal(ROWS), known)
+        found = window([data], [0.0], [climb(data, ())[1]])
+        weight = np.exp(np.array(list(found.values())) - max(found.values()))
+        for k in range(q):
+            told.append(
+                sum(w for w, (_, m) in zip(weight, found, strict=True) if any(j == k for j, _ in m)) / weight.sum()
+            )
+            true.append(k in members)
+    p, right = np.array(told), np.array(true)
+    for low in np.arange(0.0, 1.0, 0.2):
+        inside = (p >= low) & (p <= low + 0.2)
+        assert inside.sum() > 30
+        spread = np.sqrt(np.sum(p[inside] * (1.0 - p[inside]))) / inside.sum()
+        assert abs(right[inside].mean() - p[inside].mean()) < 3.0 * spread + 0.02
