@@ -55,7 +55,7 @@ class Search(Generic[E]):
     joint : Joint or None
         Information on its columns and on wandering biases; None where noise was not learned.
     stood : bool
-        The choice stood at the end; False where the search went to and fro and the likeliest choice was taken.
+        The choice stood at the end; False where the search went to and fro and the last choice was taken.
     posterior : Posterior or None
         The models that the data leave probable; None where none was worked out.
     """
