@@ -62,6 +62,10 @@ LONG = {
         "test_the_ladder_of_refits_says_how_far_the_error_falls_and_refuses_what_does_not_lower_it",
         "test_what_only_the_nis_shows_is_not_called_explained",
     ),
+    "test/sdimu_calibration/core/diagnosis/test_effects_in_noise.py": (
+        "test_a_calibration_in_coloured_noise_has_the_sigma_that_its_errors_have",
+        "test_an_effect_in_flicker_noise_is_named_and_the_noise_is_not",
+    ),
     "test/sdimu_calibration/core/diagnosis/test_families.py": (
         "test_an_effect_that_is_not_to_be_tried_is_not_named_and_something_is_missing_all_the_same",
     ),
@@ -69,10 +73,6 @@ LONG = {
         "test_a_swing_in_time_is_told_with_its_period",
     ),
     "test/sdimu_calibration/core/diagnosis/test_late_accelerometers.py": (),
-    "test/sdimu_calibration/core/diagnosis/test_noise_search.py": (
-        "test_a_calibration_in_coloured_noise_has_the_sigma_that_its_errors_have",
-        "test_an_effect_in_flicker_noise_is_named_and_the_noise_is_not",
-    ),
     "test/sdimu_calibration/core/diagnosis/test_pairs.py": ("test_noise_makes_no_pairs",),
     "test/sdimu_calibration/core/diagnosis/test_strong_effects.py": (
         "test_a_weaker_effect_beside_strong_ones_is_named_and_nothing_without_a_cause",

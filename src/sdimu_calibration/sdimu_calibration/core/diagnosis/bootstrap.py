@@ -1,7 +1,7 @@
 """How often does the whole search err? Repeat it on draws of pure noise.
 
 Under a right model the whitened innovations are standard normal, whatever the test: a draw of them in place of the
-recorded ones goes through scan, search with held-out score and free-input remainder as the recording did.
+recorded ones goes through scan, search and free-input remainder as the recording did.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ class Null:
     ----------
     draws : int
     false_finds : int
-        Draws in which the search accepted something.
+        Draws in which the search told an effect as found.
     largest : ndarray, shape (draws,)
         Largest ``|z|`` of the first scan of each draw (1).
     threshold : float

@@ -1,7 +1,7 @@
 """Is the model adequate, where does it fail, which effect is missing? The order of work is that of the files here.
 
-Screen of the data; noise scale; consistency; one scan over all candidates; search step by step with held-out score;
-free-input test; equations outside the catalogue; refit of what was found. Design: doc/diagnosis.md.
+Screen of the data; noise scale; consistency; posterior over models of effects and noise; free-input test; equations
+outside the catalogue; refit of what was found; coefficients over all probable models. Design: doc/diagnosis.md.
 """
 
 from __future__ import annotations
@@ -129,7 +129,7 @@ class Diagnosis:
 
     @property
     def chosen(self) -> tuple[Candidate, ...]:
-        """What was found, accepted and kept, in the order of the search."""
+        """What was found: the largest share of the misfit first."""
         p = len(self.evidence.weight)
         return tuple(self.evidence.candidates[i - p] for i in self.found.chosen)
 

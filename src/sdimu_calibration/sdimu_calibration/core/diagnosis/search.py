@@ -24,7 +24,8 @@ from sdimu_calibration.core.posterior.board import Board
 from sdimu_calibration.core.posterior.posterior import PROBABLE, Posterior, posterior
 
 FALSE_ALARM = 0.02
-"""Probability (1) that pure noise puts one of all candidates over the threshold that is drawn beside a scan."""
+"""Probability (1) that pure noise puts one of all candidates over the threshold that is drawn beside a scan: one scan in
+fifty."""
 CERTAIN_NOISE = 0.95
 """Probability from which noise with a memory of a triad is told and stated with an interval: weaker noise is in every
 sensor, and moves nothing."""
@@ -55,7 +56,7 @@ class Search(Generic[E]):
     joint : Joint or None
         Information on its columns and on wandering biases; None where noise was not learned.
     stood : bool
-        The choice stood at the end; False where the search went to and fro and the likeliest choice was taken.
+        The choice stood at the end; False where the search went to and fro and the last choice was taken.
     posterior : Posterior or None
         The models that the data leave probable; None where none was worked out.
     """
