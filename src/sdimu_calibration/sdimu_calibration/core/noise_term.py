@@ -10,9 +10,10 @@ MARKOV = "markov"
 STOP = "stop"
 TURN = "turn"
 SHIFT = "shift"
-KINDS = (RANDOM_WALK, FLICKER, MARKOV, STOP, TURN, SHIFT)
+ATTITUDE = "attitude"
+KINDS = (RANDOM_WALK, FLICKER, MARKOV, STOP, TURN, SHIFT, ATTITUDE)
 """Kinds of noise with a memory."""
-DRAWN = frozenset({STOP, TURN, SHIFT})
+DRAWN = frozenset({STOP, TURN, SHIFT, ATTITUDE})
 """Kinds of noise that any cause may hide behind that depends on attitude or rate."""
 WORDS = {
     RANDOM_WALK: "rate random walk",
@@ -21,6 +22,7 @@ WORDS = {
     STOP: "bias drawn anew at each stop",
     TURN: "bias drawn anew in each turn",
     SHIFT: "bias shifted in each turn for good",
+    ATTITUDE: "error that follows the attitude",
 }
 _ACCEL_WALK = "acceleration random walk"
 TRIADS = ("gyro", "accel")

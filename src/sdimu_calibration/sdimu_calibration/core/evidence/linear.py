@@ -96,6 +96,22 @@ class LinearEvidence(ABC):
             Change of each whitened residual per SI unit of each parameter, effect by effect.
         """
 
+    def mean_force(self, cut: Stretches) -> Floats | None:
+        """Mean direction of the specific force in each stretch; None where nobody knows it.
+
+        Parameters
+        ----------
+        cut : Stretches
+            s stretches.
+
+        Returns
+        -------
+        ndarray, shape (s, 3), or None
+            In b, of unit length where the IMU stands (1).
+        """
+        del cut
+        return None
+
     def constant_signature(self, cut: Stretches) -> Floats:
         """Signatures of a constant error of each sensor axis in each stretch.
 
