@@ -40,6 +40,8 @@ _MOST_HOPED = 3
 """Number of candidates outside the model that are sharpened at most: each takes signatures of its own."""
 _MOST_SHARPENED = 20
 """Number of times or time constants that are put between those of the scan at most: each takes a climb."""
+_FEW = 2
+"""Number of noises in which effects are looked for again when a time constant was sharpened: the likeliest."""
 _NOISES = 6
 """Number of noises in which effects are looked for, the likeliest first: each takes a climb."""
 
@@ -222,7 +224,7 @@ def posterior(
         if evidence.candidates[column - first].label in labels
     )
     tried = None if before is None else before.tried
-    noises, members = _climbed(board, [start], tried)
+    noises, members = _climbed(board, [start], tried, settled=before is not None)
     asked: set[str] = set()
     sharpened = 0
     while sharpened < _MOST_SHARPENED:
@@ -230,10 +232,10 @@ def posterior(
         if sharper is None:
             break
         board, starts = sharper
-        noises, members = _climbed(board, starts, tried, of_two=False)
+        noises, members = _in_same_noise(board, starts, noises)
         sharpened += 1
     if sharpened:
-        noises, members = _climbed(board, [members], tried)
+        noises, members = _climbed(board, [members], tried, settled=True)
     data = [board.data(noise) for noise in noises]
     found = window([d for _, d in data], [offset for offset, _ in data], [members])
     return Posterior(board, _weighed(found, noises))
@@ -247,12 +249,13 @@ def _weighed(found: dict[tuple[int, Members], float], noises: Sequence[NoiseMode
 
 
 def _climbed(
-    board: Board[E], starts: Sequence[Members], tried: Sequence[NoiseTerm] | None = None, of_two: bool = True
+    board: Board[E], starts: Sequence[Members], tried: Sequence[NoiseTerm] | None = None, settled: bool = False
 ) -> tuple[list[NoiseModel], Members]:
     """Look for noises beside the best effects, and for effects in each noise, until neither changes.
 
-    Kinds of noise that were `tried` alone are looked for, beside the best effects and those of the start, where a
-    search about nearly the same point has looked for all of them. `of_two` allows moves of two effects at once.
+    Where a search about nearly the same point has looked for noises beside no effects, too, it is `settled`: they are
+    looked for beside the best effects and those of the start alone, and only the kinds that were `tried`; all kinds
+    without any.
 
     Returns
     -------
@@ -265,11 +268,11 @@ def _climbed(
     known: list[tuple[float, NoiseModel, Members]] = []
     start = starts[0]
     white = board.data(NoiseModel())[1]
-    best, members = max((climb(white, one, of_two) for one in starts), key=lambda found: found[0])
+    best, members = max((climb(white, one) for one in starts), key=lambda found: found[0])
     for _ in range(_ROUNDS):
         if members in asked:
             break
-        beside = [members, *starts] if tried is not None else [members, _without_drifts(board, members), ()]
+        beside = [members, *starts] if settled else [members, _without_drifts(board, members), ()]
         for one in dict.fromkeys(beside):
             if one in asked:
                 continue
@@ -286,11 +289,25 @@ def _climbed(
             known.append((offset + gain, noise, found))
         known.sort(key=lambda found: -found[0])
         offset, data = board.data(known[0][1])
-        score, members = climb(data, known[0][2], of_two)
+        score, members = climb(data, known[0][2])
         if start and data.at(start).score > score - _TIE:
             members = start
         best = max(best, offset + score)
     return [noise for score, noise, _ in known if score > known[0][0] - WINDOW], members
+
+
+def _in_same_noise(
+    board: Board[E], starts: Sequence[Members], noises: Sequence[NoiseModel]
+) -> tuple[list[NoiseModel], Members]:
+    """Climb again in the likeliest noises that are known: a finer time constant changes little of them."""
+    found = []
+    for place, noise in enumerate(noises[:_FEW]):
+        offset, data = board.data(noise)
+        score, members = max((climb(data, one, of_two=False) for one in starts), key=lambda t: t[0])
+        found.append((offset + score, -place, members))
+    found.sort(reverse=True)
+    order = [-place for _, place, _ in found]
+    return [*(noises[k] for k in order), *noises[_FEW:]], found[0][2]
 
 
 def _add(known: list[tuple[float, NoiseModel, Members]], score: float, noise: NoiseModel, members: Members) -> None:
