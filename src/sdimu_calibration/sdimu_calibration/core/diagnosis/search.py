@@ -24,8 +24,8 @@ from sdimu_calibration.core.posterior.board import Board
 from sdimu_calibration.core.posterior.posterior import PROBABLE, Posterior, posterior
 
 FALSE_ALARM = 0.02
-"""Probability (1) that pure noise puts one of all candidates over the threshold that is drawn beside a scan: one scan in
-fifty."""
+"""Probability (1) that pure noise puts one of all candidates over the threshold that is drawn beside a scan: one
+scan in fifty."""
 CERTAIN_NOISE = 0.95
 """Probability from which noise with a memory of a triad is told and stated with an interval: weaker noise is in every
 sensor, and moves nothing."""
