@@ -142,7 +142,7 @@ def so_far(
     ladder : sequence of ModelError
         Of other models on the same data.
     whole : bool
-        The test has ended: its verdict and probabilities are those of `sdimu diagnose`.
+        The test has ended: its verdict and probabilities are those of `climb`.
 
     Returns
     -------

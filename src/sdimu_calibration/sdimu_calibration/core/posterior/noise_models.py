@@ -22,12 +22,31 @@ from sdimu_calibration.core.evidence.learned_noise import (
     sizes_on_grid,
 )
 from sdimu_calibration.core.evidence.noise_kernels import Stretches
-from sdimu_calibration.core.noise_term import ATTITUDE, DRAWN, FLICKER, MARKOV, RANDOM_WALK, SHIFT, STOP, TRIADS, TURN, NoiseTerm
+from sdimu_calibration.core.noise_term import (
+    ATTITUDE,
+    DRAWN,
+    FLICKER,
+    MARKOV,
+    RANDOM_WALK,
+    SHIFT,
+    STOP,
+    TRIADS,
+    TURN,
+    NoiseTerm,
+)
 from sdimu_calibration.core.side_by_side import side_by_side
 from sdimu_calibration.core.specification import ImuSpecification
 from sdimu_calibration.core.units import to_si
 
-ODDS: Mapping[str, float] = {RANDOM_WALK: 0.35, FLICKER: 0.4, MARKOV: 0.4, STOP: 0.1, TURN: 0.1, SHIFT: 0.15, ATTITUDE: 0.02}
+ODDS: Mapping[str, float] = {
+    RANDOM_WALK: 0.35,
+    FLICKER: 0.4,
+    MARKOV: 0.4,
+    STOP: 0.1,
+    TURN: 0.1,
+    SHIFT: 0.15,
+    ATTITUDE: 0.02,
+}
 """Odds of each kind of noise in a triad beside none (1): every sensor has bias instability and a rate random walk of
 some size, IEEE Std 952; what is drawn anew at stops or turns has a cause that nobody knows."""
 STATED_SPREAD = 1.0
