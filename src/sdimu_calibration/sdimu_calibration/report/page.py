@@ -29,6 +29,7 @@ from sdimu_calibration.report.rests_section import rests_section
 from sdimu_calibration.report.set_sections import recurrence_section, set_sections
 from sdimu_calibration.report.statistics_section import noise_section
 from sdimu_calibration.report.traceability import recorded, traceability
+from sdimu_calibration.report.unknown_section import unknown_section
 from sdimu_calibration.report.use_section import in_use
 from sdimu_calibration.storage.files.whole_file import write_whole
 from sdimu_calibration.storage.trace import Trace
@@ -187,6 +188,7 @@ def _evidence(summary: DiagnosisSummary, more: ReportExtras, spell: Spell | None
     candidates, residuals = data.scored(diagnosis), data.residuals(diagnosis)
     return [
         odds_section(diagnosis.probabilities),
+        unknown_section(diagnosis, draw),
         sections.effects(summary, candidates, draw),
         sections.confused(summary, spell),
         sections.smallest(candidates),

@@ -162,7 +162,9 @@ def _unexplained(d: Diagnosis, names: str) -> str:
         return f"Something stands out of the scatter{most}; beyond white noise: {left}."
     drawn = [term_in_words(term) for term in d.found.noise]
     if any(term.kind == ATTITUDE for term in d.found.noise):
-        begun = f"Found, but not all: {names}. What is left is" if names else "No effect of the catalogue explains"
+        begun = (
+            f"Found, but not all: {names}. What is left is the" if names else "No effect of the catalogue explains the"
+        )
         return f"{begun} {' and '.join(drawn)}; the sigmas take it into account."
     if drawn:
         begun = f"Found, but not all: {names}. What is left" if names else "Something is missing that"

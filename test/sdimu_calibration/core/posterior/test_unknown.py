@@ -1,0 +1,57 @@
+"""An error that no effect of the catalogue is comes out as a function of the attitude."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sdimu_calibration.core.diagnosis.ground import Request, fresh_ground
+from sdimu_calibration.core.diagnosis.search import FALSE_ALARM, search
+from sdimu_calibration.core.noise_term import ATTITUDE
+from sdimu_calibration.core.posterior.unknown import unknown_functions
+
+UG = 9.80665e-6
+
+
+@pytest.fixture(scope="module")
+def drawn(bench):
+    """White noise, and a smooth function of the attitude in each accelerometer of 15 ug, on the signatures of a fit."""
+    fit = bench.fit(5, (), "recommended")
+    ground = fresh_ground(Request(fit, (), FALSE_ALARM), fit, (), False)
+    evidence, wander, rng = ground.evidence, fit.wander, np.random.default_rng(1)
+    root = wander.cut.mode(ATTITUDE, 0.0)
+    error = np.zeros((len(wander.cut), 6))
+    error[:, 3:] = 15.0 * UG * root @ rng.standard_normal((root.shape[1], 3))
+    e = rng.standard_normal(len(evidence.e)) + wander.U @ error.ravel()
+    known = replace(evidence.information, d=evidence.W.T @ e)
+    seen = replace(evidence, e=e, shift=np.zeros(len(evidence.shift)), worked_out=known)
+    return search(seen, ground.allowed, wander), error[:, 3:], wander.cut
+
+
+def test_it_is_told_as_noise_that_follows_the_attitude_and_not_as_effects(drawn):
+    found, _, _ = drawn
+    assert [(term.triad, term.kind) for term in found.noise] == [("accel", ATTITUDE)]
+    assert not len(found.chosen)
+    assert found.noise[0].size == pytest.approx(15.0 * UG, rel=0.4)
+
+
+def test_the_function_that_is_drawn_is_the_hidden_one_within_its_band(drawn):
+    found, error, cut = drawn
+    (one,) = unknown_functions(found.posterior, found.noise)
+    rest = ~one.turning
+    # Bias, scale factor and misalignment take their share of a function.
+    columns = np.column_stack([np.ones(rest.sum()), cut.force[rest]])
+    for axis in range(3):
+        told, hidden = (
+            v - columns @ np.linalg.lstsq(columns, v, rcond=None)[0] for v in (one.mean[rest, axis], error[rest, axis])
+        )
+        assert np.corrcoef(told, hidden)[0, 1] > 0.9
+        z = (told - hidden) / one.sigma[rest, axis]
+        assert float(np.sqrt(np.mean(z**2))) < 1.5
+
+
+def test_white_noise_has_none(bench):
+    clean = bench.diagnosis()
+    assert unknown_functions(clean.found.posterior, clean.found.noise) == ()
