@@ -25,7 +25,7 @@ def odds_section(told: Probabilities | None, where: str = "in this test") -> str
     """Return the section; empty where there are no probabilities."""
     if told is None:
         return ""
-    lines = [_line("No effect is missing", told.nothing)]
+    lines = [_line("No effect of the catalogue is missing", told.nothing)]
     families = [one for one in told.families if one.probability >= _LEAST][:_MOST]
     for family in families:
         lines.append(_line(family_in_words(family), family.probability, size=_only(family)))

@@ -9,7 +9,7 @@ import pytest
 from scipy.stats import multivariate_normal
 
 from sdimu_calibration.core.posterior.models import Data
-from sdimu_calibration.core.posterior.prior import KIN, MEAN_NUMBER, WIDTH_SHARES, WIDTHS, Prior
+from sdimu_calibration.core.posterior.prior import KIN, MEAN_NUMBER, MOST_DRIFTS, WIDTH_SHARES, WIDTHS, Prior
 from sdimu_calibration.core.posterior.search import WINDOW, climb, window
 
 ROWS = 40
@@ -25,6 +25,7 @@ def prior(q: int, **changes) -> Prior:
         "repeats": np.zeros(q, dtype=bool),
         "positive": np.zeros(q, dtype=bool),
         "own": np.zeros(q, dtype=bool),
+        "drift": np.full(q, -1),
     }
     return Prior(**(kept | changes))
 
@@ -103,6 +104,15 @@ def test_variants_of_a_parameter_exclude_each_other_unless_they_happen_at_one_ti
     assert len({k for k, _ in members} & {0, 1}) == 1
     _, members = climb(data_of(W, e, prior(4, parameter=same, repeats=np.ones(4, dtype=bool))), ())
     assert {0, 1} <= {k for k, _ in members}
+
+
+def test_a_bias_has_four_drifts_at_most():
+    rng = np.random.default_rng(7)
+    W = drawn(7, rng, alike=0.0)
+    data = data_of(W, 9.0 * W.sum(axis=1) + rng.standard_normal(ROWS), prior(7, drift=np.array([3] * 6 + [-1])))
+    members = climb(data, (), of_two=False)[1]
+    assert len(members) == MOST_DRIFTS + 1
+    assert 6 in {k for k, _ in members}
 
 
 def test_what_cannot_be_negative_is_not():

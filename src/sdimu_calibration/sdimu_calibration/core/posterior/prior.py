@@ -34,6 +34,9 @@ WIDTHS = (1.0, 5.0, 50.0)
 """Sizes of an effect over the one-sigma size that physics gives it (1): of its class, out of it, broken."""
 WIDTH_SHARES = (0.74, 0.24, 0.02)
 """Probability (1) of each of `WIDTHS`: one part in fifty is broken, one in four is out of its class."""
+MOST_DRIFTS = 4
+"""Number of drifts of one bias (1) that a model has at most: more of them follow any wander, and noise is that."""
+_SENSORS = 6
 UNKNOWN_SIZE = 30.0
 """Size of an effect in the sigma that the data give it (1), where physics gives none: 3 to 300 is looked
 for."""
@@ -57,6 +60,8 @@ class Prior:
         The size cannot be negative.
     own : ndarray of bool, shape (q,)
         An equation that no physics names.
+    drift : ndarray of int, shape (q,)
+        Sensor axis whose bias a candidate lets drift; -1 of all others.
     """
 
     log_share: Floats
@@ -65,6 +70,7 @@ class Prior:
     repeats: Bools
     positive: Bools
     own: Bools
+    drift: Ints
 
     def log_more(self, base: Sequence[int]) -> Floats:
         """Log odds of each candidate beside those of a model.
@@ -87,6 +93,9 @@ class Prior:
             taken[self.parameter[at[~self.repeats[at]]]] = True
             out = out + present[self.cause]
             out[taken[self.parameter]] = -np.inf
+            drifts = np.bincount(self.drift[at] + 1, minlength=_SENSORS + 1)[1:]
+            if drifts.max() >= MOST_DRIFTS:
+                out[np.isin(self.drift, np.flatnonzero(drifts >= MOST_DRIFTS))] = -np.inf
             out[at] = -np.inf
         return np.asarray(out)
 
@@ -122,6 +131,7 @@ def prior_of(candidates: Sequence[Candidate], shared: Sequence[int] = ()) -> Pri
         np.array([bool(OF_ONE_TIME & c.effect.options.keys()) for c in candidates], dtype=bool),
         np.array([c.effect.positive for c in candidates], dtype=bool),
         np.array([c.family == "own" for c in candidates], dtype=bool),
+        np.array([c.effect.terms[0].channel if c.effect.bias_drift else -1 for c in candidates], dtype=np.int64),
     )
 
 

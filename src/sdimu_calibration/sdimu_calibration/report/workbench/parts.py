@@ -54,7 +54,7 @@ def odds(missing: Missing) -> list[Any]:
     told = missing.probabilities
     if told is None:
         return []
-    rows = [("no effect is missing", told.nothing, "")]
+    rows = [("no effect of the catalogue is missing", told.nothing, "")]
     rows += [
         (
             family_in_words(one),
