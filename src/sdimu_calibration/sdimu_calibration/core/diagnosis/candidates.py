@@ -75,8 +75,8 @@ def free_inputs(times: Timetable) -> list[Effect]:
 def equations(has_temperature: bool) -> list[Effect]:
     """Monomials of the physical variables on every sensor: the alphabet of equations that no effect has.
 
-    Forces to third order, rates to second, their products, each also growing with time (and temperature); with |x| for
-    even terms. What a registered effect already is comes twice; the catalogue then has the word.
+    Forces to third order, rates to second, their products, each also growing with time (and temperature), forces in
+    turns alone; with |x| for even terms. What a registered effect already is comes twice; the catalogue then has the word.
     """
 
     def powers(total: int, kinds: int) -> list[tuple[int, ...]]:
@@ -96,6 +96,9 @@ def equations(has_temperature: bool) -> list[Effect]:
             if j > i:
                 out += _plain(f"e{AXES[i]} e{AXES[j]}", product(_east, i, _east, j))
             out += _plain(f"e{AXES[i]} a{AXES[j]}", product(_east, i, lambda m: m.a, j))
+    # A sensitivity to force that is another one while the table turns.
+    for force in powers(1, 3):
+        out += _monomial(force, (0, 0, 0), "moving")
     out += _monomial((0, 0, 0), (0, 0, 0), "t^2")
     out += _monomial((0, 0, 0), (0, 0, 0), "T^2") if has_temperature else []
     return out
@@ -219,8 +222,9 @@ _TIME: dict[str, Column] = {
     "t^2": lambda m: (m.t - 0.5 * m.dt) ** 2,
     "T": lambda m: m.temperature,
     "T^2": lambda m: m.temperature**2,
+    "moving": lambda m: m.moving,
 }
-_TIME_UNIT = {"": "", "t": "/h", "t^2": "/h^2", "T": "/degC", "T^2": "/degC^2"}
+_TIME_UNIT = {"": "", "t": "/h", "t^2": "/h^2", "T": "/degC", "T^2": "/degC^2", "moving": ""}
 
 
 def _monomial(pa: tuple[int, ...], pw: tuple[int, ...], factor: str) -> list[Effect]:
