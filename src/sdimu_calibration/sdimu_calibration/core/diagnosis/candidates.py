@@ -76,7 +76,8 @@ def equations(has_temperature: bool) -> list[Effect]:
     """Monomials of the physical variables on every sensor: the alphabet of equations that no effect has.
 
     Forces to third order, rates to second, their products, each also growing with time (and temperature), forces in
-    turns alone; with |x| for even terms. What a registered effect already is comes twice; the catalogue then has the word.
+    turns alone; with |x| for even terms. What a registered effect already is comes twice; the catalogue then has the
+    word.
     """
 
     def powers(total: int, kinds: int) -> list[tuple[int, ...]]:
