@@ -354,7 +354,7 @@ def _sharpened(board: Board[E], members: Members, noise: NoiseModel) -> tuple[Bo
         ]
         beside = tuple(members[k] for k in apart)
         effect = board.finer_variant(beside, apart.index(place), noise)
-        if effect is None:
+        if effect is None or effect.labels[0] in board.evidence.names:
             continue
         finer, added = _with_finer(board, effect)
         places = {int(k): i for i, k in enumerate(finer.use.tolist())}
@@ -386,7 +386,7 @@ def _hoped(
         asked.add(candidate.label)
         own = (number, int(np.argmax(gains[number])))
         effect = board.finer_variant((*members, own), len(members), noise)
-        if effect is None:
+        if effect is None or effect.labels[0] in board.evidence.names:
             continue
         finer, added = _with_finer(board, effect)
         places = {int(k): i for i, k in enumerate(finer.use.tolist())}
