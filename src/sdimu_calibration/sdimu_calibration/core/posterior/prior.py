@@ -37,6 +37,7 @@ WIDTH_SHARES = (0.74, 0.24, 0.02)
 MOST_DRIFTS = 4
 """Number of drifts of one bias (1) that a model has at most: more of them follow any wander, and noise is that."""
 _SENSORS = 6
+"""Number of sensor axes (1): three gyros, three accelerometers."""
 UNKNOWN_SIZE = 30.0
 """Size of an effect in the sigma that the data give it (1), where physics gives none: 3 to 300 is looked
 for."""
