@@ -98,8 +98,8 @@ def equations(has_temperature: bool) -> list[Effect]:
                 out += _plain(f"e{AXES[i]} e{AXES[j]}", product(_east, i, _east, j))
             out += _plain(f"e{AXES[i]} a{AXES[j]}", product(_east, i, lambda m: m.a, j))
     # A sensitivity to force that is another one while the table turns.
-    for force in powers(1, 3):
-        out += _monomial(force, (0, 0, 0), "moving")
+    for along in powers(1, 3):
+        out += _monomial(along, (0, 0, 0), "moving")
     out += _monomial((0, 0, 0), (0, 0, 0), "t^2")
     out += _monomial((0, 0, 0), (0, 0, 0), "T^2") if has_temperature else []
     return out
