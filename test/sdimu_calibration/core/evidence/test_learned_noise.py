@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from sdimu_calibration.core.effects.effect import Timetable
 from sdimu_calibration.core.evidence.learned_noise import LEAST_GAIN, NoiseInformation, Wander, learn, likelihood
 from sdimu_calibration.core.evidence.noise_kernels import kernel, stretches
-from sdimu_calibration.core.noise_term import KINDS, MARKOV, TRIADS, NoiseTerm
+from sdimu_calibration.core.noise_term import ATTITUDE, KINDS, MARKOV, TRIADS, NoiseTerm
 
 STOPS = 12
+WANDERING = [k for k in KINDS if k != ATTITUDE]
+"""Kinds that `learn` tries; an error that follows the attitude is weighed by the posterior alone."""
 
 
 @pytest.fixture(scope="module")
@@ -41,7 +45,7 @@ def test_stretches_cover_dwells_and_turns(cut):
     assert (cut.end - cut.start).max() <= 30.0
 
 
-@pytest.mark.parametrize("kind", [k for k in KINDS if k != "flicker"])
+@pytest.mark.parametrize("kind", [k for k in WANDERING if k != "flicker"])
 def test_a_kernel_is_the_mean_of_the_covariance_of_seconds(cut, kind):
     """Against brute force: the covariance second by second, averaged over the stretches."""
     t = np.arange(0.5, cut.end[-1])
@@ -59,6 +63,19 @@ def test_a_kernel_is_the_mean_of_the_covariance_of_seconds(cut, kind):
     mean = np.array([((t > a) & (t < b)) / ((t > a) & (t < b)).sum() for a, b in zip(cut.start, cut.end, strict=True)])
     K = kernel(kind, 100.0 if kind == MARKOV else 0.0, cut)
     np.testing.assert_allclose(K, mean @ C @ mean.T, atol=2e-3, rtol=1e-3)
+
+
+def test_an_error_that_follows_the_attitude_is_one_where_the_force_points_the_same_way(cut):
+    """Two stretches 17 deg apart share exp(-1/2) of the variance, opposite ones nothing, at any time between them."""
+    tilt = np.where(cut.interval % 4 == 0, 0.0, np.where(cut.interval % 4 == 2, 2.0 * np.arcsin(0.15), np.pi))
+    force = np.column_stack([np.sin(tilt), np.zeros(len(cut)), np.cos(tilt)])
+    K = kernel(ATTITUDE, 0.0, replace(cut, force=force))
+    apart = np.abs(np.subtract.outer(tilt, tilt))
+    same, near = apart < 1e-9, np.isclose(apart, 2.0 * np.arcsin(0.15))
+    np.testing.assert_allclose(K[same], 1.0)
+    np.testing.assert_allclose(K[near], np.exp(-0.5))
+    assert K[~same & ~near].max() < 1e-8
+    np.testing.assert_array_equal(kernel(ATTITUDE, 0.0, cut), 1.0)
 
 
 def test_flicker_has_the_allan_deviation_of_its_name():
@@ -85,7 +102,7 @@ def test_noise_far_above_white_noise_keeps_its_name(cut, kind):
         assert 7.0 < of_kind[0].size < 14.0
 
 
-@pytest.mark.parametrize(("kind", "size"), [(k, 0.2 if k == "random_walk" else 3.0) for k in KINDS])
+@pytest.mark.parametrize(("kind", "size"), [(k, 0.2 if k == "random_walk" else 3.0) for k in WANDERING])
 def test_the_size_of_a_term_is_inside_its_interval(cut, kind, size):
     true = NoiseTerm("gyro", kind, 100.0 if kind == MARKOV else 0.0, size)
     inside = named = 0

@@ -24,6 +24,9 @@ class Ideal:
     def __init__(self) -> None:
         self.times = Timetable(1200.0, tuple((k, 120.0 * k, 120.0 * k + 120.0) for k in range(10)), ())
 
+    def mean_force(self, _cut):
+        return None
+
     def constant_signature(self, cut):
         t = np.arange(0.5, 1200.0)
         inside = (t[:, None] > cut.start) & (t[:, None] < cut.end)
