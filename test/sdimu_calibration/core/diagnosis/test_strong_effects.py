@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
 import pytest
 
 from rate_table_sim.core import TableSpecification
@@ -63,17 +62,3 @@ def test_a_weaker_effect_beside_strong_ones_is_named_and_nothing_without_a_cause
     assert {"accel_quadratic_z", "accel_delay_z", "gyro_magnetic_yz"} <= labels
     assert not any(c.family == "own" for c in found.chosen)
     assert len(labels) == len(HIDDEN)
-
-
-def test_the_variants_of_a_cause_share_its_odds(fit):
-    evidence = fresh_ground(Request(fit, (), FALSE_ALARM), fit, (), False).evidence
-    problem = Problem(evidence)
-    odds: dict[str, float] = {}
-    for candidate, share in zip(evidence.candidates, np.exp(-problem.log_variants), strict=True):
-        odds[candidate.parameter.name] = odds.get(candidate.parameter.name, 0.0) + float(share)
-    assert max(odds.values()) == pytest.approx(1.0)
-    assert min(odds.values()) == pytest.approx(1.0)
-    against = problem.odds_against[problem.p :]
-    faults = [c.effect.scope == "recording" for c in evidence.candidates]
-    assert (against[faults] > problem.log_variants[faults]).all()
-    assert (against[np.logical_not(faults)] == problem.log_variants[np.logical_not(faults)]).all()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Sequence
 from functools import cached_property
 from typing import Generic
@@ -22,8 +21,6 @@ _PROVEN = 30.0
 looks like companions."""
 _OWN_ODDS = 6.0
 """Log odds (1) that a registered effect has before an equation: physics says nothing of the equation."""
-_FAULT_ODDS = 3.0
-"""Log odds (1) against a fault of one recording beside an effect of the sensor: 1 to 20."""
 _KIN = 2.0
 """Log odds (1) of an effect that acts on one axis as one that was found acts on another: they have one cause."""
 
@@ -92,34 +89,6 @@ class Problem(Generic[E]):
         known: dict[tuple[str, ...], int] = {}
         keys = [(c.family, *c.effect.options.values()) for c in self.evidence.candidates]
         return np.array([known.setdefault(key, len(known)) for key in keys], dtype=np.int64)
-
-    @cached_property
-    def odds_against(self) -> Floats:
-        """Log odds against each column beside one that has no variants: which is taken of two that explain as much.
-
-        A cause has its odds once, however many times, time constants or turns are tried of it: its variants share them.
-        A fault of one recording is rarer than an effect of the sensor.
-
-        Returns
-        -------
-        ndarray, shape (p + q,)
-            Log (1); 0 for the model's columns.
-        """
-        faults = np.array([c.effect.scope == "recording" for c in self.evidence.candidates], dtype=bool)
-        return np.concatenate([np.zeros(self.p), self.log_variants + _FAULT_ODDS * faults])
-
-    @cached_property
-    def log_variants(self) -> Floats:
-        """Log of the number of variants of each candidate's parameter.
-
-        Returns
-        -------
-        ndarray, shape (q,)
-            Log (1).
-        """
-        names = [c.label if c.family == "own" else c.parameter.name for c in self.evidence.candidates]
-        count = Counter(names)
-        return np.log([count[name] for name in names])
 
     def log_odds(self, beside: Sequence[int]) -> Floats:
         """Log odds of each candidate before the data: of registered effects, and of kin of what was chosen.

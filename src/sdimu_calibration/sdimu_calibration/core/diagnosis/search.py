@@ -151,7 +151,7 @@ def _stated(found: Search[E]) -> tuple[NoiseTerm, ...]:
     window = found.posterior
     if not found.noise or window is None or window.board.joint is None or window.board.wander is None:
         return found.noise
-    information = window.board.joint.given(*window.board.parameters(window.told.members)).noise
+    information = window.board.joint.on_wander(*window.board.parameters(window.told.members))
     cut = window.board.wander.cut
     return with_alike(information, cut, with_intervals(information, cut, found.noise))
 

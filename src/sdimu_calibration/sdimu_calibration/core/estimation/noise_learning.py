@@ -16,8 +16,8 @@ from sdimu_calibration.core.estimation.noise_estimate import NoiseEstimate
 from sdimu_calibration.core.evidence.consistency import stop_means
 from sdimu_calibration.core.evidence.held_out import predict
 from sdimu_calibration.core.evidence.information import Information
-from sdimu_calibration.core.evidence.joint_information import Joint, balance
-from sdimu_calibration.core.evidence.learned_noise import Modes, Wander
+from sdimu_calibration.core.evidence.joint_information import Joint
+from sdimu_calibration.core.evidence.learned_noise import Modes, Wander, learn, likelihood
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.noise_term import NoiseTerm
 from sdimu_calibration.core.probability import chi2_tail
@@ -77,7 +77,7 @@ def noise_of(fit: Fit) -> FoundNoise:
     if not isinstance(fit, NavigationFit) or not suspected(fit):
         return FoundNoise()
     evidence, wander = fit.evidence(), fit.wander
-    terms = balance(Joint.of(evidence, wander).given(evidence.model, evidence.weight).noise, wander).terms
+    terms = learn(Joint.of(evidence, wander).on_wander(evidence.model, evidence.weight), wander.cut)
     return FoundNoise(terms, evidence)
 
 
@@ -112,8 +112,8 @@ def in_noise(fit: F, evidence: LinearEvidence, wander: Wander, terms: Sequence[N
     residual = noisy.e - noisy.W @ noisy.information.estimate(noisy.model, noisy.weight)[0]
     squared = float(residual @ noisy.weighed(residual[:, None])[:, 0])
     rms = predict(noisy, noisy.model, noisy.weight, noisy.shift).rms
-    joint = Joint.of(bare, wander).given(evidence.model, evidence.weight)
-    gain = joint.likelihood(terms) - joint.fitted
+    information = Joint.of(bare, wander).on_wander(evidence.model, evidence.weight)
+    gain = likelihood(information, wander.cut, terms) - information.fitted
     estimate = NoiseEstimate(
         tuple(terms), deviation, covariance, gain, squared / max(1, len(residual) - len(deviation)), rms
     )

@@ -10,15 +10,7 @@ import numpy as np
 
 from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.evidence.information import Information, solved
-from sdimu_calibration.core.evidence.learned_noise import (
-    LEAST_GAIN,
-    NoiseInformation,
-    Wander,
-    learn,
-    likelihood,
-    refined,
-    root_of,
-)
+from sdimu_calibration.core.evidence.learned_noise import NoiseInformation, Wander, root_of
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.noise_term import NoiseTerm
 
@@ -58,8 +50,8 @@ class Joint:
         J = np.block([[own.J, across], [across.T, self.wander.square]])
         return Information(J, np.concatenate([own.d, U.T @ e]))
 
-    def given(self, known: Ints, weight: Floats) -> Given:
-        """Estimate some parameters along with the rest.
+    def on_wander(self, known: Ints, weight: Floats) -> NoiseInformation:
+        """Information on the wandering biases with some parameters estimated along.
 
         Parameters
         ----------
@@ -69,17 +61,10 @@ class Joint:
             Prior information of each (inverse square of its unit, SI).
         """
         full, q = self.information, len(self.evidence.names)
-        B, d = full.J[:, known], full.d
-        X = solved(B[known] + np.diag(weight), np.column_stack([B.T, d[known]]))
-        left = d - B @ X[:, -1]
-        J = np.diag(full.J)[:q] - np.einsum("qk,kq->q", B[:q], X[:, :q])
-        J[known] = left[known] = 0.0
-        across = full.J[:q, q:] - B[:q] @ X[:, q:-1]
-        across[known] = 0.0
-        square = full.J[q:, q:] - B[q:] @ X[:, q:-1]
-        fitted = 0.5 * float(d[known] @ X[:, -1])
-        noise = NoiseInformation(0.5 * (square + square.T), left[q:], fitted)
-        return Given(J, left[:q], across, noise, self.wander)
+        B, d = full.J[known, q:], full.d[known]
+        X = solved(full.J[np.ix_(known, known)] + np.diag(weight), np.column_stack([B, d]))
+        J = full.J[q:, q:] - B.T @ X[:, :-1]
+        return NoiseInformation(0.5 * (J + J.T), full.d[q:] - B.T @ X[:, -1], 0.5 * float(d @ X[:, -1]))
 
     def in_noise(self, terms: Sequence[NoiseTerm]) -> Information:
         """Information on the columns of the evidence in noise of these terms."""
@@ -89,96 +74,3 @@ class Joint:
         M = np.eye(R.shape[1]) + R.T @ full.J[q:, q:] @ R
         X = np.linalg.solve(M, np.column_stack([B.T, R.T @ full.d[q:]]))
         return Information(full.J[:q, :q] - B @ X[:, :-1], full.d[:q] - B @ X[:, -1])
-
-
-@dataclass(frozen=True)
-class Given:
-    """Information on everything else when some parameters are in the model.
-
-    Attributes
-    ----------
-    J, d : ndarray, shape (q,)
-        On each column of the evidence, in white noise.
-    across : ndarray, shape (q, m)
-        Of the columns with the wandering biases.
-    noise : NoiseInformation
-        On the wandering biases.
-    wander : Wander
-    """
-
-    J: Floats
-    d: Floats
-    across: Floats
-    noise: NoiseInformation
-    wander: Wander
-
-    @property
-    def fitted(self) -> float:
-        """Log-likelihood that the parameters in the model add, in white noise."""
-        return self.noise.fitted
-
-    def likelihood(self, terms: Sequence[NoiseTerm]) -> float:
-        """Log-likelihood of the parameters in the model and of noise terms, against neither."""
-        return likelihood(self.noise, self.wander.cut, terms)
-
-    def with_column(self, column: int, weight: float) -> NoiseInformation:
-        """Information on the wander with one column more in the model, of prior information `weight`."""
-        u, j, d = self.across[column], self.J[column] + weight, self.d[column]
-        return NoiseInformation(
-            self.noise.J - np.outer(u, u / j), self.noise.d - u * (d / j), self.fitted + 0.5 * d * d / j
-        )
-
-    def in_noise(self, terms: Sequence[NoiseTerm]) -> tuple[Floats, Floats]:
-        """Information on each column, and its pull, in noise of these terms.
-
-        Returns
-        -------
-        J, d : ndarray, shape (q,)
-            Inverse squares of the units (SI) of the parameters; inverse units.
-        """
-        if not terms:
-            return self.J.copy(), self.d.copy()
-        R = root_of(terms, self.wander.cut)
-        B = self.across @ R
-        M = np.eye(R.shape[1]) + R.T @ self.noise.J @ R
-        X = np.linalg.solve(M, np.column_stack([B.T, R.T @ self.noise.d]))
-        return self.J - np.einsum("qr,rq->q", B, X[:, :-1]), self.d - B @ X[:, -1]
-
-
-@dataclass(frozen=True)
-class Balance:
-    """Noise terms, and the likelihood of the model that has them.
-
-    Attributes
-    ----------
-    terms : tuple of NoiseTerm
-    likelihood : float
-        Log-likelihood against no parameters and white noise.
-    """
-
-    terms: tuple[NoiseTerm, ...]
-    likelihood: float
-
-    @property
-    def net(self) -> float:
-        """Log-likelihood less what the noise terms cost."""
-        return self.likelihood - LEAST_GAIN * len(self.terms)
-
-
-def balance(
-    information: NoiseInformation, wander: Wander, start: Sequence[NoiseTerm] = (), more: bool = True
-) -> Balance:
-    """Learn the noise of a model.
-
-    Parameters
-    ----------
-    information : NoiseInformation
-        With the parameters of the model estimated along.
-    wander : Wander
-    start : sequence of NoiseTerm
-        Terms to begin with.
-    more : bool
-        Look for further terms; else only the sizes are optimised.
-    """
-    terms = (learn if more else refined)(information, wander.cut, start)
-    return Balance(terms, likelihood(information, wander.cut, terms))

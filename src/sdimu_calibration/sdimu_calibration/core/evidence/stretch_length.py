@@ -41,7 +41,7 @@ def wander_of(evidence: LinearEvidence) -> Wander:
     ratio = np.where(at_rest, scatter / np.where(at_rest, seen, 1.0), np.nan).reshape(-1, 2, 3)
     if not at_rest.any() or np.nanmax(np.nanmean(ratio, axis=(0, 2))) < _STRONG:
         return wander
-    terms = learn(Joint.of(evidence, wander).given(evidence.model, evidence.weight).noise, wander.cut)
+    terms = learn(Joint.of(evidence, wander).on_wander(evidence.model, evidence.weight), wander.cut)
     return _halved(evidence, wander, terms)
 
 

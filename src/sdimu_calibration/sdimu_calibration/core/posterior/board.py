@@ -150,7 +150,7 @@ class Board(Generic[E]):
             evidence, p, one = self.evidence, len(self.evidence.weight), self.in_noise(noise)
             offset = noise.log_prior
             if noise.terms and self.joint is not None and self.wander is not None:
-                nothing = self.joint.given(evidence.model, evidence.weight).noise
+                nothing = self.joint.on_wander(evidence.model, evidence.weight)
                 offset += likelihood(nothing, self.wander.cut, noise.terms) - nothing.fitted
             given = Information(one.J, one.d).given(np.arange(p), evidence.weight)
             scaled = np.ascontiguousarray(given.J[p:, p:] * np.outer(self.size, self.size))
@@ -185,7 +185,7 @@ class Board(Generic[E]):
         if self.joint is None or self.wander is None:
             return [(self.data(NoiseModel())[1].at(members).score, NoiseModel())]
         known, weight = self.parameters(members)
-        information = self.joint.given(known, weight).noise
+        information = self.joint.on_wander(known, weight)
         alone = self.data(NoiseModel())[1].at(members).score
         found = explored(information, self.wander.cut, usual_sizes(self.evidence.imu), tried, max(rival - alone, 0.0))
         return [(alone + score, noise) for score, noise in found]

@@ -134,17 +134,6 @@ class Posterior(Generic[E]):
         """Probability of the models for which something holds."""
         return float(sum(m.probability for m in self.models if holds(m)))
 
-    @cached_property
-    def of_candidates(self) -> Floats:
-        """Probability that each candidate is in the model.
-
-        Returns
-        -------
-        ndarray, shape (q,)
-            (1).
-        """
-        return np.asarray(self._weights @ self._holds)
-
     @property
     def tried(self) -> list[NoiseTerm]:
         """Kinds of noise of all models, each once."""
