@@ -162,9 +162,8 @@ def test_no_size_of_a_candidate_is_written_over_the_line_of_the_noise(diagnosis,
 
 
 def test_a_diagnosis_of_a_right_model_makes_a_page_too(diagnosis):
-    empty = type(diagnosis.found)(
-        (), diagnosis.found.chosen[:0], diagnosis.found.first, diagnosis.found.threshold, 1.0, diagnosis.evidence
-    )
+    found = diagnosis.found
+    empty = type(found)((), found.chosen[:0], found.first, found.threshold, diagnosis.evidence)
     quiet = replace(diagnosis, found=empty, adequate=True, verdict="consistent")
     text = page(diagnosis.before, Contents("x", summary=summarise(quiet)))
     assert "No candidate stands out" in text

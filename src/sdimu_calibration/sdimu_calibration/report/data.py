@@ -9,7 +9,7 @@ import numpy as np
 
 from sdimu_calibration.core.arrays import Bools, Floats, Ints
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
-from sdimu_calibration.core.diagnosis.scan import Scan, scale_of, scan
+from sdimu_calibration.core.diagnosis.scan import Scan, scan
 from sdimu_calibration.core.evidence.consistency import CHANNEL_NAMES, Consistency, StopMean
 from sdimu_calibration.core.evidence.handheld_evidence import CHANNELS as HANDHELD_CHANNELS
 from sdimu_calibration.core.evidence.linear import LinearEvidence
@@ -178,12 +178,8 @@ def scored(diagnosis: Diagnosis) -> list[Scored]:
     """Every candidate of catalogue and own equations that was tried, largest score first."""
     evidence = diagnosis.navigation
     p, free = len(evidence.weight), set(diagnosis.free.tolist())
-    first = scan(evidence.information, evidence.model, evidence.weight, scale_of(diagnosis.found.first))
-    last = (
-        first
-        if not len(diagnosis.found.chosen)
-        else scan(evidence.information, *added(diagnosis), diagnosis.found.scale)
-    )
+    first = scan(evidence.information, evidence.model, evidence.weight)
+    last = first if not len(diagnosis.found.chosen) else scan(evidence.information, *added(diagnosis))
     looked_at = [i for i in range(p, len(evidence.names)) if i not in free]
     return scores(evidence, first, last, looked_at, diagnosis.found.chosen)
 

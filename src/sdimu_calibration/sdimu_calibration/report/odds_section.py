@@ -21,8 +21,17 @@ _MOST = 12
 _HEAD = ("", "probability", "", "size if it is this")
 
 
-def odds_section(told: Probabilities | None, where: str = "in this test") -> str:
-    """Return the section; empty where there are no probabilities."""
+def odds_section(told: Probabilities | None, where: str = "in this test", averaged: bool = True) -> str:
+    """Return the section; empty where there are no probabilities.
+
+    Parameters
+    ----------
+    told : Probabilities or None
+    where : str
+        What the data are of, as it ends a sentence.
+    averaged : bool
+        Coefficients and sigmas of the page are means over the models.
+    """
     if told is None:
         return ""
     lines = [_line("No effect of the catalogue is missing", told.nothing)]
@@ -38,14 +47,14 @@ def odds_section(told: Probabilities | None, where: str = "in this test") -> str
         if families or told.nothing > 0.5
         else "No family of effects is more probable than 5 %: many explain about the same. "
     )
+    means = "Coefficients and sigmas of this page are means over these models." if averaged else ""
     return section(
         "How probable each cause is",
         f'<div class="wide"><table class="odds"><thead><tr>{head}</tr></thead><tbody>{"".join(lines)}</tbody></table>'
         "</div>",
         quiet(
             f"{rest}Summed over all models that the data leave probable {where}, weighed with how usual each is. "
-            "Of a family, each member is listed; several effects may be missing at once. Coefficients and sigmas of "
-            "this page are means over these models."
+            f"Of a family, each member is listed; several effects may be missing at once. {means}"
         ),
     )
 

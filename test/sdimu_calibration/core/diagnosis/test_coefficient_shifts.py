@@ -23,7 +23,7 @@ def test_a_stake_is_the_difference_of_two_calibrations(bench):
     diagnosis = bench.diagnosis(effects=_HIDDEN)
     (column,) = (int(i) for i in diagnosis.found.chosen)
     other = diagnosis.evidence.names.index("accel_quadratic_z")
-    (stake,) = coefficient_shifts(Problem(diagnosis.evidence), [column], column, [other], diagnosis.found.scale)
+    (stake,) = coefficient_shifts(Problem(diagnosis.evidence), [column], column, [other])
     named, sigma = _refit(bench, diagnosis, "accel_scale_asymmetry_z")
     instead, _ = _refit(bench, diagnosis, "accel_quadratic_z")
     k = diagnosis.evidence.names.index(stake.coefficient)

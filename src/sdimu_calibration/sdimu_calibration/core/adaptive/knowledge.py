@@ -174,9 +174,9 @@ def nearest_other(found: Diagnosis) -> float | None:
     chosen = found.found.chosen.tolist()
     if not chosen:
         return None
-    problem, scale = Problem(found.evidence), found.found.scale
+    problem = Problem(found.evidence)
     name = problem.candidate(chosen[0]).parameter.name
-    scores = problem.scores(problem.scan(chosen[1:], scale), scale)
+    scores = problem.scores(problem.scan(chosen[1:]))
     others = [i for i in looked_at(found) if problem.candidate(int(i)).parameter.name != name and i not in chosen]
     best = float(np.max(scores[others], initial=-np.inf))
     return float(scores[chosen[0]]) - best if np.isfinite(best) else None
@@ -185,19 +185,17 @@ def nearest_other(found: Diagnosis) -> float | None:
 def _class(found: Diagnosis) -> tuple[tuple[Candidate, ...], Floats, Floats, int]:
     """Look-alikes of the first class that is open, with sizes, what is lacking, and the place of the class."""
     problem = Problem(found.evidence)
-    chosen, scale, allowed = found.found.chosen.tolist(), found.found.scale, looked_at(found)
+    chosen, allowed = found.found.chosen.tolist(), looked_at(found)
     for place, column in enumerate(chosen):
         name = problem.candidate(column).parameter.name
         near = [
-            i
-            for i in look_alikes(problem, chosen, column, allowed, scale)
-            if problem.candidate(i).parameter.name != name
+            i for i in look_alikes(problem, chosen, column, allowed) if problem.candidate(i).parameter.name != name
         ][:_MOST_ALIKE]
         if not near:
             continue
         others = [c for c in chosen if c != column]
-        scanned = problem.scan(others, scale)
-        scores = problem.scores(scanned, scale)
+        scanned = problem.scan(others)
+        scores = problem.scores(scanned)
         needed = INDISTINGUISHABLE + CLEAR - (scores[column] - scores[near])
         return tuple(problem.candidate(i) for i in near), scanned.estimate[[column, *near]], needed, place
     return (), np.empty(0), np.empty(0), 0

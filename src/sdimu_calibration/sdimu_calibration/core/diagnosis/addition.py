@@ -70,7 +70,7 @@ class Addition:
     objections: tuple[str, ...]
 
 
-def addition(fit: Fit, evidence: LinearEvidence, columns: Sequence[int], allowed: Ints, scale: float) -> Addition:
+def addition(fit: Fit, evidence: LinearEvidence, columns: Sequence[int], allowed: Ints) -> Addition:
     """Work out what follows when candidates of the evidence about a fit are added together.
 
     Parameters
@@ -82,8 +82,6 @@ def addition(fit: Fit, evidence: LinearEvidence, columns: Sequence[int], allowed
         The candidates.
     allowed : ndarray of int, shape (a,)
         Columns among which look-alikes are sought.
-    scale : float
-        Residual noise over specified noise.
     """
     problem, p, q = Problem(evidence), len(evidence.weight), evidence.coefficients
     chosen = [int(c) for c in columns]
@@ -92,12 +90,12 @@ def addition(fit: Fit, evidence: LinearEvidence, columns: Sequence[int], allowed
     bare = evidence.information.estimate(evidence.model, evidence.weight)[1]
     before, after = (np.sqrt(np.diag(fit.reported_covariance(C[:q, :q]))) for C in (bare, covariance))
     labels = tuple(evidence.names[c] for c in chosen)
-    sigma = scale * np.sqrt(np.diag(covariance))[p:]
-    error = (problem.held_out([], 1.0).rms, problem.held_out(chosen, 1.0).rms)
+    sigma = np.sqrt(np.diag(covariance))[p:]
+    error = (problem.held_out([]).rms, problem.held_out(chosen).rms)
     raised = _raised(fit.names, before, after)
-    retention = problem.scan([], scale).retention
+    retention = problem.scan([]).retention
     hidden = [k for k in chosen if not retention[k] > TESTABLE]
-    others = [] if chosen[0] in hidden else look_alikes(problem, chosen, chosen[0], allowed, scale)
+    others = [] if chosen[0] in hidden else look_alikes(problem, chosen, chosen[0], allowed)
     alike = tuple(evidence.names[k] for k in others if k not in chosen)[:_MOST]
     taken = "cannot be told from the coefficients of the model"
     against = [f"{evidence.names[k]} {taken}: {_why(evidence, k)}" for k in hidden]

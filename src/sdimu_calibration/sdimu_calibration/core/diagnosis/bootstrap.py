@@ -87,5 +87,5 @@ def bootstrap(d: Diagnosis, draws: int, seed: int = 1, progress: Progress | None
         z = found.first.z[np.isfinite(found.first.sigma)]
         largest.append(float(np.max(np.abs(z), initial=0.0)))
         squares.append(float(np.mean(z**2)))
-        tails.append(free_input_test(part.information, evidence.model, evidence.weight, d.free, found.scale).p_value)
+        tails.append(free_input_test(part.information, evidence.model, evidence.weight, d.free).p_value)
     return Null(draws, finds, np.array(largest), d.found.threshold, float(np.sqrt(np.mean(squares))), np.array(tails))

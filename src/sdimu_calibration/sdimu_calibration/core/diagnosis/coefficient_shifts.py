@@ -35,7 +35,7 @@ class CoefficientShift:
 
 
 def coefficient_shifts(
-    problem: Problem[E], chosen: Sequence[int], column: int, others: Sequence[int], scale: float
+    problem: Problem[E], chosen: Sequence[int], column: int, others: Sequence[int]
 ) -> tuple[CoefficientShift, ...]:
     """Exchange a chosen effect for every other member of its class and see what moves.
 
@@ -50,8 +50,6 @@ def coefficient_shifts(
         The one of them that is exchanged.
     others : sequence of int
         Columns that the data cannot tell from it.
-    scale : float
-        Residual noise over specified noise.
 
     Returns
     -------
@@ -62,7 +60,7 @@ def coefficient_shifts(
     names = problem.evidence.names
     known, weight, _ = problem.known(chosen)
     named, covariance = problem.evidence.information.estimate(known, weight)
-    sigma = scale * np.sqrt(np.diag(covariance)[:p])
+    sigma = np.sqrt(np.diag(covariance)[:p])
     out = []
     for other in others:
         known, weight, _ = problem.known([other if c == column else c for c in chosen])

@@ -85,8 +85,8 @@ def found_effects(d: Diagnosis) -> tuple[Found, ...]:
     held_out = _held_out(d, len(chosen))
     out = []
     for k, column in enumerate(chosen):
-        scanned = problem.scan(chosen[:k], d.found.scale)
-        scores = problem.scores(scanned, d.found.scale)
+        scanned = problem.scan(chosen[:k])
+        scores = problem.scores(scanned)
         z = float(scanned.z[column])
         count = int(np.isfinite(scanned.sigma[allowed]).sum())
         others = _alike(d, column)
@@ -104,7 +104,7 @@ def found_effects(d: Diagnosis) -> tuple[Found, ...]:
                 held_out_before=held_out[k],
                 held_out_after=held_out[k + 1],
                 alike=tuple(d.evidence.names[i] for i in others),
-                coefficient_shifts=coefficient_shifts(problem, chosen, column, others, d.found.scale),
+                coefficient_shifts=coefficient_shifts(problem, chosen, column, others),
                 probability=probability,
                 may_be=shares,
             )
@@ -185,11 +185,11 @@ def reach(d: Diagnosis) -> tuple[DetectableSize, ...]:
     evidence = d.evidence.only(catalogue_columns(d))
     p = len(evidence.weight)
     full = evidence.information
-    scanned = scan(full, evidence.model, evidence.weight, d.found.scale)
+    scanned = scan(full, evidence.model, evidence.weight)
     J = scanned.J
     left = np.greater(J, _ROUNDING * np.diag(full.J))
     with np.errstate(divide="ignore", invalid="ignore"):
-        smallest = np.where(left, POWER_80 * d.found.scale / np.sqrt(np.abs(J)), np.inf)
+        smallest = np.where(left, POWER_80 / np.sqrt(np.abs(J)), np.inf)
     out = []
     for k, candidate in enumerate(evidence.candidates, start=p):
         testable = bool(np.isfinite(scanned.sigma[k]))
@@ -235,7 +235,7 @@ def _misfits(d: Diagnosis, problem: Problem[LinearEvidence], chosen: list[int]) 
         known, weight, _ = problem.known(chosen[:k])
         if len(d.free):
             weight = np.concatenate([problem.evidence.weight, np.zeros(k)])
-            left = free_input_test(d.evidence.information, known, weight, d.free, d.found.scale)
+            left = free_input_test(d.evidence.information, known, weight, d.free)
             out.append(max(left.chi2 - left.dof, 0.0))
         else:
             estimate, _ = problem.evidence.information.estimate(known, weight)
@@ -249,7 +249,7 @@ def _estimates(d: Diagnosis, problem: Problem[LinearEvidence], chosen: list[int]
     known, weight, _ = problem.known(chosen)
     estimate, covariance = d.evidence.information.estimate(known, weight)
     p = len(d.evidence.weight)
-    values, sigmas = estimate[p:].copy(), d.found.scale * np.sqrt(np.diag(covariance))[p:]
+    values, sigmas = estimate[p:].copy(), np.sqrt(np.diag(covariance))[p:]
     if d.extended is not d.fit:
         last = slice(len(d.after.names) - len(chosen), None)
         return d.after.values[last], np.sqrt(np.diag(d.after.covariance)[last])

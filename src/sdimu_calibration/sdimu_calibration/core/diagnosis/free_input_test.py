@@ -38,7 +38,7 @@ class FreeInputTest:
     z: Floats
 
 
-def free_input_test(full: Information, known: Ints, weight: Floats, free: Ints, scale: float) -> FreeInputTest:
+def free_input_test(full: Information, known: Ints, weight: Floats, free: Ints) -> FreeInputTest:
     """Test whether a constant sensor error of its own in every dwell and turn explains more than chance.
 
     Parameters
@@ -51,8 +51,6 @@ def free_input_test(full: Information, known: Ints, weight: Floats, free: Ints, 
         Prior information of each (1/sigma^2, SI).
     free : ndarray of int, shape (f,)
         Columns of the free inputs.
-    scale : float
-        Residual noise over specified noise.
 
     Returns
     -------
@@ -65,10 +63,10 @@ def free_input_test(full: Information, known: Ints, weight: Floats, free: Ints, 
     values, vectors = np.linalg.eigh(J * np.outer(unit, unit))
     keep = values > _TESTABLE
     y = vectors[:, keep].T @ (unit * d)
-    fall = float(np.sum(y**2 / values[keep])) / scale**2
+    fall = float(np.sum(y**2 / values[keep]))
     estimate = unit * (vectors[:, keep] @ (y / values[keep]))
     with np.errstate(divide="ignore", invalid="ignore"):
         own = np.diag(J)
-        z = np.where(own > (0.02 / unit) ** 2, d / np.sqrt(own) / scale, 0.0)
+        z = np.where(own > (0.02 / unit) ** 2, d / np.sqrt(own), 0.0)
     dof = int(keep.sum())
     return FreeInputTest(fall, dof, chi2_tail(fall, dof) if dof else 1.0, estimate, np.nan_to_num(z))

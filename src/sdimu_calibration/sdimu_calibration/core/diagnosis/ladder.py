@@ -82,7 +82,7 @@ def ladder(fit: Fit, final: Fit, done: Round, progress: Progress) -> tuple[Rung,
     problem, chosen = Problem(done.evidence), [int(c) for c in done.found.chosen]
     rungs: list[Rung] = []
     for k, (one, result) in enumerate(zip(fits, results, strict=True)):
-        error = problem.held_out(chosen[:k], 1.0).rms if one.learns_scatter else held_out(result)
+        error = problem.held_out(chosen[:k]).rms if one.learns_scatter else held_out(result)
         added = done.chosen[k - 1].label if k else ""
         rungs.append(_rung(added, one, result, error, results[k - 1] if k else None, rungs[-1] if rungs else None))
     return tuple(rungs)

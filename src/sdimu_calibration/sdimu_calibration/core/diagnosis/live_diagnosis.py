@@ -186,7 +186,7 @@ def _fit(test: PreparedTest, model: Model) -> tuple[Fit, tuple[str, ...]]:
 def _error(fit: Fit, evidence: LinearEvidence, added: Sequence[str]) -> ModelError:
     """Error of the model of a fit; `evidence` about it, without candidates."""
     stops = np.unique(evidence.stop)
-    held_out = Problem(evidence).held_out([], 1.0).rms if len(stops) >= _FEWEST_STOPS else float("nan")
+    held_out = Problem(evidence).held_out([]).rms if len(stops) >= _FEWEST_STOPS else float("nan")
     return ModelError(tuple(added), held_out, fit.statistics().nis_mean or float("nan"))
 
 

@@ -59,19 +59,10 @@ class Problem(Generic[E]):
         """Return the candidate at a column."""
         return self.evidence.candidates[column - self.p]
 
-    def scale(self, chosen: Sequence[int]) -> float:
-        """Residual noise over specified noise, at least 1."""
+    def scan(self, chosen: Sequence[int]) -> Scan:
+        """Score all columns with the chosen ones in the model."""
         known, weight, _ = self.known(chosen)
-        information = self.evidence.information
-        estimate, _ = information.estimate(known, weight)
-        residual = self.evidence.e - self.evidence.W[:, known] @ estimate
-        misfit = float(residual @ self.evidence.weighed(residual[:, None])[:, 0])
-        return float(np.sqrt(max(1.0, misfit / max(1, len(residual) - len(known)))))
-
-    def scan(self, chosen: Sequence[int], scale: float = 1.0) -> Scan:
-        """Score all columns with the chosen ones in the model; `scale` is the residual noise over the specified one."""
-        known, weight, _ = self.known(chosen)
-        return scan(self.evidence.information, known, weight, scale)
+        return scan(self.evidence.information, known, weight)
 
     def threshold(self, scanned: Scan, alpha: float) -> float:
         """Size of the largest score of a scan with nothing chosen that pure noise exceeds with probability `alpha`."""
@@ -107,7 +98,7 @@ class Problem(Generic[E]):
         kin = np.isin(self.kin, self.kin[np.array(beside, dtype=int) - self.p]) & ~own
         return np.asarray(_KIN * kin - _OWN_ODDS * own)
 
-    def scores(self, scanned: Scan, scale: float = 1.0, beside: Sequence[int] = (), ratio: float = WIDE) -> Floats:
+    def scores(self, scanned: Scan, beside: Sequence[int] = (), ratio: float = WIDE) -> Floats:
         """Log posterior odds of every column against the model without it.
 
         The Bayes factor of an effect of size N(0, s^2), with information J on it and information vector d, is
@@ -117,8 +108,6 @@ class Problem(Generic[E]):
         ----------
         scanned : Scan
             Of p + q columns.
-        scale : float
-            Residual noise over specified noise.
         beside : sequence of int
             Columns that were chosen: their kin have better odds.
         ratio : float
@@ -130,7 +119,7 @@ class Problem(Generic[E]):
             Log odds (1); -inf for the model's columns, for what is not testable, and for a size of the wrong sign.
         """
         p = self.p
-        J, d = scanned.J[p:] / scale**2, scanned.d[p:] / scale**2
+        J, d = scanned.J[p:], scanned.d[p:]
         wide = 1.0 / (ratio * self.evidence.prior) ** 2
         with np.errstate(divide="ignore", invalid="ignore"):
             occam = np.where(wide > 0.0, 0.5 * np.log1p(J / wide), 0.0)
@@ -140,13 +129,13 @@ class Problem(Generic[E]):
         score = np.where(wrong, -np.inf, score)
         return np.concatenate([np.full(p, -np.inf), np.where(np.isfinite(scanned.sigma[p:]), score, -np.inf)])
 
-    def held_out(self, chosen: Sequence[int], scale: float) -> HeldOut:
-        """Predict each stop from the others with the chosen columns in the model; `scale` as for `scan`."""
+    def held_out(self, chosen: Sequence[int]) -> HeldOut:
+        """Predict each stop from the others with the chosen columns in the model."""
         known, weight, shift = self.known(chosen)
-        return predict(self.evidence, known, weight, shift, scale)
+        return predict(self.evidence, known, weight, shift)
 
 
-def look_alikes(problem: Problem[E], chosen: Sequence[int], column: int, allowed: Ints, scale: float) -> list[int]:
+def look_alikes(problem: Problem[E], chosen: Sequence[int], column: int, allowed: Ints) -> list[int]:
     """Columns that the data cannot tell from a chosen one, all others chosen being in the model.
 
     Parameters
@@ -158,8 +147,6 @@ def look_alikes(problem: Problem[E], chosen: Sequence[int], column: int, allowed
         The one of them.
     allowed : ndarray of int, shape (a,)
         Columns among which they are looked for.
-    scale : float
-        Residual noise over specified noise.
 
     Returns
     -------
@@ -168,7 +155,7 @@ def look_alikes(problem: Problem[E], chosen: Sequence[int], column: int, allowed
     """
     others = [c for c in chosen if c != column]
     # What else was found says which is the likelier cause, not what the data tell apart.
-    scores = problem.scores(problem.scan(others, scale), scale)
+    scores = problem.scores(problem.scan(others))
     outside = np.ones(len(scores), dtype=bool)
     outside[allowed] = False
     outside[column] = False

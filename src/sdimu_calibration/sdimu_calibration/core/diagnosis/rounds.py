@@ -174,17 +174,10 @@ def run_round(request: Request, ground: Ground, own: bool, limits: dict[bool, fl
 def _round(ground: Ground, found: Search[LinearEvidence]) -> Round:
     fit, free = ground.fit, ground.free
     evidence, nothing = found.evidence, np.empty(0, dtype=np.int64)
-    return Round(
-        fit,
-        evidence,
-        free,
-        found,
-        left(evidence, nothing, free, found.scale),
-        left(evidence, found.chosen, free, found.scale),
-    )
+    return Round(fit, evidence, free, found, left(evidence, nothing, free), left(evidence, found.chosen, free))
 
 
-def left(evidence: LinearEvidence, chosen: Ints, free: Ints, scale: float) -> FreeInputTest:
+def left(evidence: LinearEvidence, chosen: Ints, free: Ints) -> FreeInputTest:
     """Free-input test with some candidates in the model.
 
     Parameters
@@ -194,9 +187,7 @@ def left(evidence: LinearEvidence, chosen: Ints, free: Ints, scale: float) -> Fr
         Columns of the candidates.
     free : ndarray of int, shape (f,)
         Columns of the free inputs.
-    scale : float
-        Residual noise over specified noise.
     """
     known = np.concatenate([evidence.model, chosen]).astype(np.int64)
     weight = np.concatenate([evidence.weight, np.zeros(len(chosen))])
-    return free_input_test(evidence.information, known, weight, free, scale)
+    return free_input_test(evidence.information, known, weight, free)

@@ -53,7 +53,7 @@ class Scan:
     d: Floats
 
 
-def scan(full: Information, known: Ints, weight: Floats, scale: float = 1.0) -> Scan:
+def scan(full: Information, known: Ints, weight: Floats) -> Scan:
     """Score every parameter given those at `known`.
 
     Parameters
@@ -63,43 +63,16 @@ def scan(full: Information, known: Ints, weight: Floats, scale: float = 1.0) -> 
         Model and effects already added.
     weight : ndarray, shape (k,)
         Prior information of each (1/sigma^2, SI).
-    scale : float
-        Residual noise over specified noise.
     """
-    return scored(*full.diagonal_given(known, weight), np.diag(full.J), known, scale)
-
-
-def scored(J: Floats, d: Floats, J0: Floats, known: Ints, scale: float) -> Scan:
-    """Score every parameter by the information on it.
-
-    Parameters
-    ----------
-    J, d : ndarray, shape (q,)
-        Information on each (1/sigma^2, SI) and its information vector, the parameters at `known` estimated along.
-    J0 : ndarray, shape (q,)
-        Information on each parameter alone, in the unit of J.
-    known : ndarray of int, shape (k,)
-        Parameters that are in the model, and hence not scored.
-    scale : float
-        Residual noise over specified noise.
-    """
+    (J, d), J0 = full.diagonal_given(known, weight), np.diag(full.J)
     with np.errstate(divide="ignore", invalid="ignore"):
         retention = np.sqrt(np.maximum(J, 0.0) / J0)
         testable = (retention > TESTABLE) & (J0 > 0.0)
         testable[known] = False
-        sigma = np.where(testable, scale / np.sqrt(J), np.inf)
+        sigma = np.where(testable, 1.0 / np.sqrt(J), np.inf)
         estimate = np.where(testable, d / J, 0.0)
     z = np.where(testable, estimate / sigma, 0.0)
     return Scan(z, estimate, sigma, np.nan_to_num(retention), POWER_80 * sigma, J, d)
-
-
-def scale_of(done: Scan) -> float:
-    """Residual noise over specified noise that a scan took, misfit and all."""
-    testable = np.flatnonzero(np.isfinite(done.sigma))
-    if not len(testable):
-        return 1.0
-    one = testable[0]
-    return float(done.sigma[one] * np.sqrt(done.J[one]))
 
 
 def threshold(full: Information, known: Ints, weight: Floats, tested: Ints, alpha: float, seed: int = 1) -> float:

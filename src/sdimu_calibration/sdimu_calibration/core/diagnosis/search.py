@@ -45,8 +45,6 @@ class Search(Generic[E]):
         Before anything was added, of all columns.
     threshold : float
         Of the first scan.
-    scale : float
-        Residual noise over specified noise at the end.
     evidence : LinearEvidence
         With the finer variants that were chosen behind the candidates it had, in the noise that was learned.
     noise : tuple of NoiseTerm
@@ -65,7 +63,6 @@ class Search(Generic[E]):
     chosen: Ints
     first: Scan
     threshold: float
-    scale: float
     evidence: E
     noise: tuple[NoiseTerm, ...] = ()
     white: E | None = None
@@ -108,7 +105,7 @@ def search(
     terms = told_noise(found) if tell_noise else ()
     noisy = in_noise(board, terms)
     problem = Problem(noisy)
-    first = problem.scan([], 1.0)
+    first = problem.scan([])
     barred = np.setdiff1d(np.arange(problem.p, len(first.z)), board.allowed)
     first.z[barred], first.sigma[barred] = 0.0, np.inf
     limit = problem.threshold(first, alpha) if limit is None else limit
@@ -117,7 +114,6 @@ def search(
         np.array(told_effects(found), dtype=np.int64),
         first,
         limit,
-        1.0,
         noisy,
         terms,
         white=board.evidence,
@@ -136,10 +132,10 @@ def with_steps(found: Search[E]) -> Search[E]:
     """
     problem, chosen = Problem(found.evidence), found.chosen.tolist()
     steps: list[Step] = []
-    before = problem.held_out([], 1.0)
+    before = problem.held_out([])
     for k, column in enumerate(chosen):
-        scanned = problem.scan(chosen[:k], 1.0)
-        after = problem.held_out(chosen[: k + 1], 1.0)
+        scanned = problem.scan(chosen[:k])
+        after = problem.held_out(chosen[: k + 1])
         scores = problem.scores(scanned, beside=chosen[:k])
         steps.append(step_of(problem, scanned, scores, chosen[:k], column, found.threshold, before, after))
         before = after

@@ -35,7 +35,7 @@ def survey(fit: Fit, result: Calibration, with_candidates: bool = True) -> Diagn
     border = p + sum(len(effect.parameters) for effect in known)
     free_columns = np.arange(border, len(evidence.names))
     found = _nothing_added(evidence, np.arange(p, border))
-    rest = left(evidence, found.chosen, free_columns, found.scale)
+    rest = left(evidence, found.chosen, free_columns)
     standing = int(np.sum(np.abs(found.first.z) > found.threshold))
     adequate = with_candidates and standing == 0 and rest.p_value > UNEXPLAINED_P
     best = evidence.names[int(np.argmax(np.abs(found.first.z)))]
@@ -70,6 +70,6 @@ def survey(fit: Fit, result: Calibration, with_candidates: bool = True) -> Diagn
 
 def _nothing_added(evidence: LinearEvidence, columns: Ints) -> Search[LinearEvidence]:
     problem = Problem(evidence.only(columns))
-    first = problem.scan([], 1.0)
+    first = problem.scan([])
     none = np.empty(0, dtype=np.int64)
-    return Search((), none, first, problem.threshold(first, FALSE_ALARM), 1.0, evidence)
+    return Search((), none, first, problem.threshold(first, FALSE_ALARM), evidence)

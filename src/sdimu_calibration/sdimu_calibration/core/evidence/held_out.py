@@ -32,7 +32,7 @@ class HeldOut:
     rms: float
 
 
-def predict(evidence: LinearEvidence, chosen: Ints, weight: Floats, shift: Floats, scale: float = 1.0) -> HeldOut:
+def predict(evidence: LinearEvidence, chosen: Ints, weight: Floats, shift: Floats) -> HeldOut:
     """Leave one stop out.
 
     Parameters
@@ -42,8 +42,6 @@ def predict(evidence: LinearEvidence, chosen: Ints, weight: Floats, shift: Float
         Parameters of the model under test.
     weight, shift : ndarray, shape (k,)
         Prior information and prior mean of each, about the calibration's values.
-    scale : float
-        Residual noise over specified noise.
     """
     W, e = evidence.W[:, chosen], evidence.e
     if evidence.noise.size:
@@ -67,11 +65,11 @@ def predict(evidence: LinearEvidence, chosen: Ints, weight: Floats, shift: Float
         X = Ws @ root
         M = np.eye(len(weight)) + X.T @ X
         y = X.T @ error
-        chi2 = (error @ error - y @ np.linalg.solve(M, y)) / scale**2
-        score[k] = -0.5 * (chi2 + np.linalg.slogdet(M)[1] + 2.0 * len(es) * np.log(scale))
+        chi2 = error @ error - y @ np.linalg.solve(M, y)
+        score[k] = -0.5 * (chi2 + np.linalg.slogdet(M)[1])
         spread = 1.0 + np.sum(X**2, axis=1)
         told = spread < evidence.unpredictable
-        total += float(np.sum(error[told] ** 2 / spread[told])) / scale**2
+        total += float(np.sum(error[told] ** 2 / spread[told]))
         count += int(told.sum())
     return HeldOut(stops.astype(np.int64), score, float(np.sqrt(total / max(count, 1))))
 

@@ -163,7 +163,7 @@ def _needed(left: Leftovers, main: Sequence[int], found: Sequence[str]) -> tuple
 def _chance(left: Leftovers, group: int) -> FreeInputTest:
     """Test whether one sensor has leftovers that a right model does not leave."""
     mine, none = np.flatnonzero(left.sensor == group), np.empty(0, dtype=np.int64)
-    return free_input_test(Information(left.gram, left.score), none, np.empty(0), mine, 1.0)
+    return free_input_test(Information(left.gram, left.score), none, np.empty(0), mine)
 
 
 @dataclass(frozen=True)

@@ -106,7 +106,7 @@ class Posterior(Generic[E]):
 
     def _any_of(self, numbers: Iterable[int]) -> float:
         """Probability that one of some candidates is in the model."""
-        return float(self._weights @ self._holds[:, list(numbers)].any(axis=1))
+        return min(1.0, float(self._weights @ self._holds[:, list(numbers)].any(axis=1)))
 
     @cached_property
     def _weights(self) -> Floats:
@@ -132,7 +132,7 @@ class Posterior(Generic[E]):
 
     def probability(self, holds: Callable[[Weighed], bool]) -> float:
         """Probability of the models for which something holds."""
-        return float(sum(m.probability for m in self.models if holds(m)))
+        return min(1.0, float(sum(m.probability for m in self.models if holds(m))))
 
     @property
     def tried(self) -> list[NoiseTerm]:

@@ -1,7 +1,7 @@
 """What a window of models says in numbers: the probability of nothing, of each family of effects, of each noise.
 
-A family holds what one error of one sensor may come from: every drift of a bias, else one effect of the registry with
-any time constant. Which of its members it is may be open while the family is certain.
+A family holds what one error of one sensor may come from: every slow change of a bias, else one effect of the
+registry with any time constant. Which of its members it is may be open while the family is certain.
 """
 
 from __future__ import annotations
@@ -66,8 +66,8 @@ class FamilyShare:
     Attributes
     ----------
     family : str
-        ``gyro_bias_drift`` for all that lets a bias drift, else the registry name of the effect; ``own`` of an
-        equation.
+        ``gyro_bias_drift`` for all that changes a bias slowly, cable wrap with it, else the registry name of the
+        effect; ``own`` of an equation.
     sensor : str
         Such as ``gyro_y``; the triad where it acts on several axes of one, empty where on both.
     probability : float
@@ -130,8 +130,9 @@ def family_of(candidate: Candidate) -> tuple[str, str]:
     channels = sorted({term.channel for term in effect.terms})
     triads = {CHANNELS[c].partition("_")[0] for c in channels}
     sensor = CHANNELS[channels[0]] if len(channels) == 1 else triads.pop() if len(triads) == 1 else ""
-    drifts = effect.bias_drift and len(channels) == 1
-    return (f"{sensor[:-2]}_bias_drift" if drifts else candidate.family), sensor
+    # A bias that the turns add up to (cable wrap) is a slow change of it, too.
+    slow = effect.bias_drift or (effect.wander_like and effect.shifts_bias)
+    return (f"{sensor[:-2]}_bias_drift" if slow and len(channels) == 1 else candidate.family), sensor
 
 
 def probabilities(found: Posterior[E], told: Sequence[NoiseTerm] = ()) -> Probabilities:

@@ -188,7 +188,7 @@ class FitSession:
                 scores = replace(scores, evidence=scores.evidence.with_effects(effects))
                 names = list(scores.evidence.names)
             columns = np.array([names.index(label) for label in labels], dtype=np.int64)
-            what = addition(scores.fit, scores.evidence, columns.tolist(), looked_at(scores), scores.found.scale)
+            what = addition(scores.fit, scores.evidence, columns.tolist(), looked_at(scores))
             chosen = replace(scores, found=replace(scores.found, chosen=columns))
             return Preview(effects[0], what, data.residuals(chosen))
 
@@ -258,7 +258,7 @@ class FitSession:
             scores.navigation.prepared.epochs.start,
             axes(scores),
             errors,
-            everything.held_out([], 1.0).rms,
+            everything.held_out([]).rms,
             float(np.sqrt(np.mean(seen**2))) if len(seen) else None,
             fit.start,
         )

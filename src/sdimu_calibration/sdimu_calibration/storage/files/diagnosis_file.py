@@ -18,7 +18,7 @@ from sdimu_calibration.core.diagnosis.found import DetectableSize, Found
 from sdimu_calibration.core.diagnosis.free_input_test import FreeInputTest
 from sdimu_calibration.core.diagnosis.ladder import Rung
 from sdimu_calibration.core.diagnosis.plan_seen import PlanSeen
-from sdimu_calibration.core.diagnosis.scan import Scan, scale_of, scan
+from sdimu_calibration.core.diagnosis.scan import scan
 from sdimu_calibration.core.diagnosis.standing import standing
 from sdimu_calibration.core.diagnosis.step import Step
 from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary
@@ -150,7 +150,7 @@ def _file(summary: DiagnosisSummary, **more: Any) -> DiagnosisFile:
             "threshold": d.found.threshold,
         },
         free_inputs={"before": _free_inputs(d.free_inputs_before), "after": _free_inputs(d.free_inputs_after)},
-        alone=alone(d.evidence, d.found.first, d.free.tolist()),
+        alone=alone(d.evidence, d.free.tolist()),
         known=KnownEntry.of(standing(d, summary.found)),
         fit={"before": fit_of(d.before), "after": fit_of(d.after)},
         ladder=[step_of(s) for s in d.found.steps],
@@ -187,19 +187,17 @@ def unpacked(text: str, k: int) -> Bytes | None:
     return out
 
 
-def alone(evidence: LinearEvidence, before: Scan, free: Sequence[int] = ()) -> Alone:
+def alone(evidence: LinearEvidence, free: Sequence[int] = ()) -> Alone:
     """Give every candidate of the catalogue alone beside the given model, however small: many units make it large.
 
     Parameters
     ----------
     evidence : LinearEvidence
         Of a recording, or of a set.
-    before : Scan
-        Of the search, before anything was added: says how large the noise is.
     free : sequence of int
         Columns of the evidence that are no candidates.
     """
-    first = scan(evidence.information, evidence.model, evidence.weight, scale_of(before))
+    first = scan(evidence.information, evidence.model, evidence.weight)
     J = evidence.information.given(evidence.model, evidence.weight).J
     p = len(evidence.weight)
     shown = [
@@ -429,7 +427,7 @@ def write_set_diagnosis(path: Path, found: SetDiagnosis) -> None:
         advice=tuple(map(sentence, found.advice)),
         known=KnownEntry.of(found.standing),
         fit={"before": {"model": list(found.before.model)}},
-        alone=alone(found.first.evidence, found.first.first),
+        alone=alone(found.first.evidence),
         # None where the model leaves nothing in the stops.
         recurrence=None if found.recurrence is None else asdict(found.recurrence),
     ).write(Path(path))
