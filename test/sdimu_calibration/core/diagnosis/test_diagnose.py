@@ -52,6 +52,8 @@ def test_a_hidden_effect_is_named_measured_and_lowers_the_held_out_error(bench):
     assert one.held_out_after < one.held_out_before
     assert one.p_value_adjusted < 1e-6
     assert one.explained > 0.8
+    # One class, wherever it is told.
+    assert [step.alike for step in diagnosis.found.steps] == [one.alike]
 
 
 def test_the_free_input_shares_of_what_was_found_sum_to_what_was_explained(bench):

@@ -9,7 +9,7 @@ import numpy as np
 
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.diagnosis.problem import Problem
-from sdimu_calibration.core.diagnosis.scan import Scan, alike
+from sdimu_calibration.core.diagnosis.scan import Scan
 from sdimu_calibration.core.evidence.held_out import HeldOut, gain
 from sdimu_calibration.core.evidence.linear import E
 
@@ -62,6 +62,7 @@ def step_of(
     limit: float,
     before: HeldOut,
     after: HeldOut,
+    alike: tuple[str, ...],
 ) -> Step:
     """Say what a column adds to a choice.
 
@@ -80,6 +81,8 @@ def step_of(
         Threshold of the scan.
     before, after : HeldOut
         Prediction of stops left out without and with the column.
+    alike : tuple of str
+        Labels of its class: what the data cannot tell from it.
     """
     evidence, p = problem.evidence, problem.p
     candidate = evidence.candidates[best - p]
@@ -103,7 +106,7 @@ def step_of(
         held_out_after=after,
         held_out_gain=won,
         held_out_error=error,
-        alike=tuple(evidence.names[i] for i in alike(scores, best)),
+        alike=alike,
         moved=_moved(problem, chosen, best, float(scanned.estimate[best])),
     )
 
