@@ -88,7 +88,6 @@ def search_until_stable(request: Request, progress: Progress) -> Round:
     done: Round | None = None
     for turn in range(MOST_ROUNDS):
         progress("candidates", min(0.8, 0.4 + 0.1 * turn))
-        # Noise is a rival from the start; once effects were preferred to all of it, it need not be asked again.
         done = run_round(request, ground, own, limits, done)
         if done.wants_equations and not own and not asked:
             asked = True
