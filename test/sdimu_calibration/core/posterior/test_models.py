@@ -115,6 +115,21 @@ def test_a_bias_has_four_drifts_at_most():
     assert 6 in {k for k, _ in members}
 
 
+def test_a_pair_beside_three_drifts_of_a_bias_is_one_that_a_model_may_hold():
+    """Each of two more drifts may come alone, both not: a climb that took them went to and fro without an end."""
+    rng, known = np.random.default_rng(12), prior(7, drift=np.array([2, 2, 2, 2, 2, 3, -1]))
+    W = drawn(7, rng, alike=0.3)
+    e = 20.0 * W[:, :5].sum(axis=1) + 3.0 * W[:, 5] + 3.0 * W[:, 6] + rng.standard_normal(ROWS)
+    data = data_of(W, e, known)
+    here = data.at(tuple((k, 1) for k in range(MOST_DRIFTS - 1)))
+    score, members = here.paired()
+    assert score == pytest.approx(data.at(members).score, abs=1e-9)
+    assert len([k for k, _ in members if known.drift[k] == 2]) == MOST_DRIFTS
+    score, members = climb(data, ())
+    assert np.isfinite(score)
+    assert score == pytest.approx(data.at(members).score, abs=1e-9)
+
+
 def test_what_cannot_be_negative_is_not():
     rng = np.random.default_rng(5)
     W = drawn(3, rng, alike=0.0)

@@ -164,7 +164,7 @@ class Expansion:
         """Add the best two candidates at once: log posterior of the model, and the model."""
         J, prior = self.data.J, self.data.prior
         more = prior.log_more(self.columns)
-        # Odds of the second beside the first: k + 2 over k + 1, and its kin; at most one variant of a parameter.
+        # Odds of the second beside the first: k + 2 over k + 1, and its kin.
         step = np.log((len(self.members) + 2.0) / (len(self.members) + 1.0))
         # Two equations that no physics names are too many.
         use = np.flatnonzero(np.isfinite(more) & (self.c > 0.0) & ~prior.own)
@@ -173,9 +173,8 @@ class Expansion:
         X = J[np.ix_(use, use)] - self._V[use] @ J[self.columns][:, use]
         c, r, odds = self.c[use], self.r[use], more[use]
         kin = prior.cause[use][:, None] == prior.cause[use][None, :]
-        same = (prior.parameter[use][:, None] == prior.parameter[use][None, :]) & ~prior.repeats[use][:, None]
         log_prior = odds[:, None] + odds[None, :] + step + np.where(kin, _kin(prior, self.columns, use), 0.0)
-        log_prior[same] = -np.inf
+        log_prior[prior.apart(self.columns, use)] = -np.inf
         np.fill_diagonal(log_prior, -np.inf)
         best, at = -np.inf, self.members
         for width, loading in enumerate(_PRECISION.tolist()):

@@ -100,6 +100,26 @@ class Prior:
             out[at] = -np.inf
         return np.asarray(out)
 
+    def apart(self, base: Sequence[int], use: Ints) -> Bools:
+        """Say which pairs of candidates no model may hold: variants of one parameter, more drifts of a bias than allowed.
+
+        Parameters
+        ----------
+        base : sequence of int
+            Candidates of the model.
+        use : ndarray of int, shape (u,)
+            Candidates of which each alone may stand beside it.
+
+        Returns
+        -------
+        ndarray of bool, shape (u, u)
+        """
+        parameter, drift = self.parameter[use], self.drift[use]
+        one = (parameter[:, None] == parameter[None, :]) & ~self.repeats[use][:, None]
+        counted = np.bincount(self.drift[np.asarray(base, dtype=np.int64)] + 1, minlength=_SENSORS + 1)
+        full = counted[drift + 1] == MOST_DRIFTS - 1
+        return np.asarray(one | (full & (drift >= 0))[:, None] & (drift[:, None] == drift[None, :]))
+
     def log_of(self, chosen: Sequence[int]) -> float:
         """Log of the prior of a set of candidates, over that of none (1)."""
         total = 0.0

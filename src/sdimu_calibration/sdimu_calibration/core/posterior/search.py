@@ -51,7 +51,11 @@ def climb(data: Data, start: Members, of_two: bool = True) -> tuple[float, Membe
             score, members = _of_two(here)
         if not score > here.score + _LEAST_GAIN:
             break
-        here = data.at(members)
+        there = data.at(members)
+        # Columns that are nearly one another's combination leave a difference of large numbers: no move on rounding.
+        if not there.score > here.score:
+            break
+        here = there
     return here.score, here.members
 
 
