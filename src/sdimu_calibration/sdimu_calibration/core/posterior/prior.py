@@ -101,7 +101,7 @@ class Prior:
         return np.asarray(out)
 
     def apart(self, base: Sequence[int], use: Ints) -> Bools:
-        """Say which pairs of candidates no model may hold: variants of one parameter, more drifts of a bias than allowed.
+        """Say which pairs no model may hold: variants of one parameter, more drifts of a bias than allowed.
 
         Parameters
         ----------
