@@ -39,21 +39,19 @@ def options(entries: Sequence[data.Scored]) -> list[dict[str, str]]:
 
 def verdict(missing: Missing, objections: Sequence[str]) -> tuple[str, str]:
     """Return the verdict in one line, and its class: a tick only where nothing speaks against the model."""
-    left = missing.left
     mark, tone = ("\N{CHECK MARK}", "good") if missing.adequate else ("\N{HEAVY BALLOT X}", "bad")
     if missing.adequate and objections:
         mark, tone = "\N{WARNING SIGN}", "doubtful"
-    held = "" if missing.held_out is None else f" Held-out error of a result: {missing.held_out:.3f} sigma."
-    return (
-        f"{mark} {missing.sentence}{held} Left by stops: chi-square {left.chi2:.0f}, {left.dof} dof."
-    ), f"verdict {tone}"
+    return f"{mark} {missing.sentence}", f"verdict {tone}"
 
 
 def odds(missing: Missing) -> list[Any]:
-    """List what may be missing, the likeliest first, each with its probability; its members in a tip."""
-    told = missing.probabilities
+    """List what may be missing, the likeliest first, each with its probability, its members in a tip; what is left."""
+    told, left = missing.probabilities, missing.left
+    held = "" if missing.held_out is None else f"Held-out error of a result: {missing.held_out:.3f} sigma. "
+    rest = html.P(f"{held}Left by stops: chi-square {left.chi2:.0f}, {left.dof} dof.")
     if told is None:
-        return []
+        return [rest]
     rows = [("no effect of the catalogue is missing", told.nothing, "")]
     rows += [
         (
@@ -68,7 +66,7 @@ def odds(missing: Missing) -> list[Any]:
         html.Tr([html.Td(name, title=members), html.Td(html.Meter(min=0, max=1, value=p)), html.Td(in_percent(p))])
         for name, p, members in rows
     ]
-    return [html.Table(html.Tbody(lines), className="odds")]
+    return [html.Table(html.Tbody(lines), className="odds"), rest]
 
 
 def numbers(fitted: Fitted, given: Fitted) -> str:

@@ -112,7 +112,6 @@ def _bar(title: str) -> Any:
                 className="line",
             ),
             html.Div(id="verdict", className="verdict", role="status"),
-            html.Div(id="odds"),
             html.Ul(id="objections", className="objections"),
             html.Div(id="message", className="message", role="alert"),
         ],
@@ -204,6 +203,7 @@ def _middle() -> Any:
 def _right() -> Any:
     return html.Div(
         [
+            _card("How probable each cause is", html.Div(id="odds")),
             html.Section(
                 [
                     html.H2("The candidate"),
