@@ -136,9 +136,8 @@ def with_steps(found: Search[E]) -> Search[E]:
     for k, column in enumerate(chosen):
         scanned = problem.scan(chosen[:k])
         after = problem.held_out(chosen[: k + 1])
-        scores = problem.scores(scanned, beside=chosen[:k])
         alike = () if found.posterior is None else alike_in_window(found.posterior, column)
-        steps.append(step_of(problem, scanned, scores, chosen[:k], column, found.threshold, before, after, alike))
+        steps.append(step_of(problem, scanned, chosen[:k], column, found.threshold, before, after, alike))
         before = after
     return replace(found, steps=tuple(steps), noise=_stated(found))
 

@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.diagnosis.problem import Problem
 from sdimu_calibration.core.diagnosis.scan import Scan
 from sdimu_calibration.core.evidence.held_out import HeldOut, gain
@@ -56,7 +55,6 @@ class Step:
 def step_of(
     problem: Problem[E],
     scanned: Scan,
-    scores: Floats,
     chosen: Sequence[int],
     best: int,
     limit: float,
@@ -71,8 +69,6 @@ def step_of(
     problem : Problem
     scanned : Scan
         With the choice in the model, the column not.
-    scores : ndarray, shape (p + q,)
-        Log posterior odds by that scan (1), as of `Problem.scores`.
     chosen : sequence of int
         Columns of the choice.
     best : int
@@ -87,7 +83,7 @@ def step_of(
     evidence, p = problem.evidence, problem.p
     candidate = evidence.candidates[best - p]
     J, d = scanned.J[best], scanned.d[best]
-    bayes = float(scores[best])
+    bayes = float(problem.scores(scanned, beside=chosen)[best])
     # A fault of one turn is nowhere to be seen once the stop after it is left out; all others must gain by it.
     apart = int(candidate.effect.options["turn"]) if "turn" in candidate.effect.options else None
     won, error = gain(before, after, apart)
