@@ -20,7 +20,8 @@ from sdimu_calibration.core.effects.selection import resolve
 from sdimu_calibration.core.estimation.fit import Fit
 from sdimu_calibration.core.evidence.candidate import split
 from sdimu_calibration.core.noise_term import NoiseTerm
-from sdimu_calibration.core.posterior.told import family_of, of_coefficients
+from sdimu_calibration.core.posterior.family import family_of
+from sdimu_calibration.core.posterior.told import of_coefficients
 from sdimu_calibration.storage.files.config import load_imu
 from sdimu_sim.core.coloured import KINDS as NOISES
 from sdimu_sim.core.coloured import parse_noise

@@ -38,6 +38,8 @@ class Kind(StrEnum):
     """Labels of what fits best."""
     KEEP = auto()
     """Label, None for several."""
+    TRY = auto()
+    """Label of what is likely and not certain, None for several."""
     CORRECT_LATITUDE = auto()
     """Angle that the latitude of the site is too far North, and its sigma (rad)."""
     RECORD_AGAIN = auto()

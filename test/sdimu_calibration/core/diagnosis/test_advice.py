@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import shlex
+from dataclasses import replace
 
 import pytest
 
 from sdimu_calibration.core.advice import Advice, Kind
-from sdimu_calibration.core.diagnosis.advice import keep, together
+from sdimu_calibration.core.diagnosis.advice import add, others, together
 from sdimu_calibration.core.diagnosis.found import Found
 from sdimu_calibration.core.effects import registry
+from sdimu_calibration.core.effects.selection import resolve
 from sdimu_calibration.core.evidence.candidate import split
 from sdimu_calibration.storage.files.advice_words import _WORDS, sentence
 from sdimu_calibration.storage.files.effect_file import find_effects
@@ -38,13 +40,13 @@ def added(advice):
 @pytest.mark.parametrize("name", registry.names())
 def test_every_effect_of_the_catalogue_can_be_added_as_the_advice_says(name):
     for candidate in split(registry.get(name)):
-        (text,) = added(keep([found(candidate)])[0])
+        (text,) = added(add([found(candidate)])[0])
         assert [e.labels for e in find_effects(text)] == [candidate.effect.labels]
 
 
 def test_equations_can_be_added_as_the_advice_says():
     (candidate,) = split(find_effects("gyro_x: ey^2")[0])
-    (text,) = added(keep([found(candidate)])[0])
+    (text,) = added(add([found(candidate)])[0])
     assert find_effects(text)[0].labels == candidate.effect.labels
 
 
@@ -52,7 +54,7 @@ def test_effects_of_a_file_can_be_added_as_the_advice_says(tmp_path):
     path = tmp_path / "odd mix.yaml"
     path.write_text(MIX)
     candidates = [candidate for effect in find_effects(str(path)) for candidate in split(effect)]
-    (advice,) = keep([found(candidate) for candidate in candidates])
+    (advice,) = add([found(candidate) for candidate in candidates])
     assert sentence(advice).startswith("Keep what was found in the model: ")
     assert [find_effects(text)[0].labels for text in added(advice)] == [c.effect.labels for c in candidates]
 
@@ -68,9 +70,26 @@ def test_what_is_to_be_done_for_several_finds_is_said_once():
 
 
 def test_nothing_found_gives_no_advice():
-    assert keep([]) == []
+    assert add([]) == []
     assert together([]) == []
 
 
 def test_every_kind_of_advice_has_words():
     assert set(_WORDS) == set(Kind)
+
+
+def test_what_is_likely_is_tried_and_not_kept():
+    certain, likely = (found(candidate) for candidate in split(registry.get("accel_quadratic"))[:2])
+    sure = replace(certain, of_family=0.999)
+    open_ = replace(likely, of_family=0.7)
+    assert [one.kind for one in add([sure, open_])] == [Kind.KEEP, Kind.TRY]
+    kept, tried = (sentence(one) for one in add([sure, open_]))
+    assert kept == "Keep accel_quadratic_x in the model: --add 'accel_quadratic_x'."
+    assert tried.startswith("accel_quadratic_y is likely, not certain")
+    assert added(add([sure, open_])[1]) == ["accel_quadratic_x", "accel_quadratic_y"]
+
+
+def test_another_time_constant_of_the_same_effect_is_not_to_be_told_apart():
+    (candidate,) = split(resolve("gyro_bias_warm_up_x(tau=600 s)"))
+    rivals = ["gyro_bias_warm_up_x(tau=1200 s)", "gyro_bias_ramp_x", "gyro_bias_warm_up_y(tau=600 s)"]
+    assert others(found(candidate, rivals)) == ("gyro_bias_ramp_x", "gyro_bias_warm_up_y(tau=600 s)")

@@ -95,15 +95,16 @@ def _about_data(d: Diagnosis) -> list[Advice]:
 def _about_found(d: Diagnosis, found: tuple[Found, ...], plan: PlanSeen) -> list[Advice]:
     if d.verdict == Verdict.UNEXPLAINED:
         return _about_unknown(d, found)
-    out = keep([one for one in found if _belongs(one)])
+    out = add([one for one in found if _belongs(one)])
     for one in found:
         if one.candidate.family == references.LATITUDE.name:
             out.append(Advice(Kind.CORRECT_LATITUDE, (one.value, one.sigma)))
         elif one.candidate.effect.scope == "recording":
             out.append(Advice(Kind.RECORD_AGAIN, (one.candidate.label,)))
-    out += together([(one, telling_turn(one.candidate.effect, plan)) for one in found if one.alike])
+    out += together([(one, telling_turn(one.candidate.effect, plan)) for one in found if others(one)])
     for one in found:
-        if one.alike and all(map(_in_catalogue, names := (one.candidate.label, one.alike[0]))):
+        rivals = others(one)
+        if rivals and all(map(_in_catalogue, names := (one.candidate.label, rivals[0]))):
             out.append(Advice(Kind.RANK_TURNS, (), Verb.RANK_TURNS, names))
         if one.coefficient_shifts:
             out.append(_at_stake(one))
@@ -117,12 +118,22 @@ def _about_unknown(d: Diagnosis, found: tuple[Found, ...]) -> list[Advice]:
     return out + ([Advice(Kind.TRY_EQUATION, tuple(f.candidate.label for f in found))] if found else [])
 
 
-def keep(found: Sequence[Found]) -> list[Advice]:
-    """Advise how what was found gets into the model, all at once; nothing for nothing."""
-    if not found:
-        return []
-    label = found[0].candidate.label if len(found) == 1 else None
-    return [Advice(Kind.KEEP, (label,), Verb.ADD, tuple(one.candidate.added for one in found))]
+def add(found: Sequence[Found]) -> list[Advice]:
+    """Advise how what was found gets into the model: what is decided to stay, what is open to be tried."""
+    decided, doubtful = [one for one in found if one.decided], [one for one in found if not one.decided]
+    out = [_adding(Kind.KEEP, decided, decided)] if decided else []
+    return [*out, _adding(Kind.TRY, doubtful, found)] if doubtful else out
+
+
+def _adding(kind: Kind, named: Sequence[Found], added: Sequence[Found]) -> Advice:
+    label = named[0].candidate.label if len(named) == 1 else None
+    return Advice(kind, (label,), Verb.ADD, tuple(one.candidate.added for one in added))
+
+
+def others(one: Found) -> tuple[str, ...]:
+    """Labels of what looks the same as an effect and is another coefficient: no other time constant of its own."""
+    own = one.candidate.label.partition("(")[0]
+    return tuple(label for label in one.alike if label.partition("(")[0] != own)
 
 
 def together(asked: Sequence[tuple[Found, Advice]]) -> list[Advice]:
@@ -135,7 +146,7 @@ def together(asked: Sequence[tuple[Found, Advice]]) -> list[Advice]:
     """
     groups: dict[Advice, list[tuple[str, tuple[str, ...]]]] = {}
     for one, what in asked:
-        groups.setdefault(what, []).append((one.candidate.label, one.alike[:3]))
+        groups.setdefault(what, []).append((one.candidate.label, others(one)[:3]))
     return [Advice(Kind.TELL_APART, (tuple(pairs), what)) for what, pairs in groups.items()]
 
 
@@ -201,11 +212,11 @@ def _rates(plan: PlanSeen) -> str:
 
 def handheld_advice(d: Diagnosis, found: tuple[Found, ...]) -> tuple[Advice, ...]:
     """Advise, the most useful first."""
-    out = [*mend(d), *keep(found), *together([(one, _more_by_hand(one)) for one in found if one.alike])]
+    out = [*mend(d), *add(found), *together([(one, _more_by_hand(one)) for one in found if others(one)])]
     out += [
         Advice(Kind.CHOICE_MATTERS_BY_HAND, (one.candidate.label, s.other, s.coefficient, s.sigmas))
         for one in found
-        if one.alike
+        if others(one)
         for s in one.coefficient_shifts[:3]
     ]
     if d.verdict == Verdict.UNEXPLAINED:

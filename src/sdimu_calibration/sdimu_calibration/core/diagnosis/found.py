@@ -15,8 +15,12 @@ from sdimu_calibration.core.diagnosis.problem import Problem
 from sdimu_calibration.core.diagnosis.scan import POWER_80, scan
 from sdimu_calibration.core.evidence.candidate import Candidate
 from sdimu_calibration.core.evidence.linear import LinearEvidence
+from sdimu_calibration.core.posterior.family import family_of
 from sdimu_calibration.core.posterior.told import Share
 from sdimu_calibration.core.probability import normal_tail
+
+DECIDED = 0.95
+"""Probability of a family (1) from which a member of it is advised to be kept: one in twenty is wrong then."""
 
 
 @dataclass(frozen=True)
@@ -46,6 +50,8 @@ class Found:
         That it or something of its class is missing in the model; NaN where no probabilities were worked out.
     may_be : tuple of Share
         Coefficients of that class with the probability of each, the likeliest first.
+    of_family : float
+        Probability that its family is missing on its sensor; NaN where no probabilities were worked out.
     """
 
     candidate: Candidate
@@ -62,6 +68,12 @@ class Found:
     coefficient_shifts: tuple[CoefficientShift, ...]
     probability: float = float("nan")
     may_be: tuple[Share, ...] = ()
+    of_family: float = float("nan")
+
+    @property
+    def decided(self) -> bool:
+        """Whether it is sure that something of its family is missing."""
+        return not self.of_family < DECIDED
 
 
 def found_effects(d: Diagnosis) -> tuple[Found, ...]:
@@ -107,6 +119,7 @@ def found_effects(d: Diagnosis) -> tuple[Found, ...]:
                 coefficient_shifts=coefficient_shifts(problem, chosen, column, others),
                 probability=probability,
                 may_be=shares,
+                of_family=_of_family(d, d.chosen[k]),
             )
         )
     return tuple(out)
@@ -118,6 +131,14 @@ def _alike(d: Diagnosis, column: int) -> list[int]:
     if window is None:
         return []
     return [int(window.board.use[number]) for number in window.classes[window.place_of(column)]]
+
+
+def _of_family(d: Diagnosis, candidate: Candidate) -> float:
+    """Probability that a candidate's family is missing on its sensor; NaN where no probabilities were worked out."""
+    if d.probabilities is None:
+        return float("nan")
+    own = family_of(candidate)
+    return next((f.probability for f in d.probabilities.families if (f.family, f.sensor) == own), 0.0)
 
 
 def _held_out(d: Diagnosis, count: int) -> list[float]:

@@ -18,6 +18,7 @@ from sdimu_calibration.core.evidence.consistency import SLOW_S, Consistency
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.handheld.handheld_fit import FORCE, RATE, TURN
 from sdimu_calibration.core.noise_term import ATTITUDE
+from sdimu_calibration.core.posterior.posterior import PROBABLE
 from sdimu_calibration.core.probability import in_percent
 from sdimu_calibration.core.units import from_si
 from sdimu_calibration.core.verdict import Verdict
@@ -150,7 +151,13 @@ def _consistent(d: Diagnosis) -> str:
         left = beyond(d.rungs[0].scatter)
         return f"No effect of the catalogue stands out of the scatter of this run; beyond white noise: {left}."
     odd = "; ".join(f.text for f in d.findings)
-    nothing = "" if d.probabilities is None else f" (nothing is missing: {in_percent(d.probabilities.nothing)})"
+    told = d.probabilities
+    if told is not None and told.nothing < PROBABLE:
+        likely = ", ".join(
+            f"{f.members[0].label} {in_percent(f.probability)}" for f in told.families[:_LISTED] if f.members
+        )
+        return f"Something is missing ({in_percent(1.0 - told.nothing)}), but no effect is probable: {likely}."
+    nothing = "" if told is None else f" (nothing is missing: {in_percent(told.nothing)})"
     clean = f"The model explains the recording: nothing stands out of the noise{nothing}"
     return f"{clean}; but {odd}." if odd else f"{clean}."
 

@@ -17,6 +17,7 @@ from sdimu_calibration.core.evidence.learned_noise import Wander
 from sdimu_calibration.core.evidence.linear import E
 from sdimu_calibration.core.noise_term import KINDS, NoiseTerm
 from sdimu_calibration.core.posterior.board import Board, same_noise
+from sdimu_calibration.core.posterior.family import family_of
 from sdimu_calibration.core.posterior.models import Members
 from sdimu_calibration.core.posterior.noise_models import NoiseModel
 from sdimu_calibration.core.posterior.search import WINDOW, climb, window
@@ -28,6 +29,8 @@ PROBABLE = 0.5
 """Probability from which a class of effects is told as found: more likely there than not."""
 _ROUNDS = 4
 """Number of times that noises and effects are looked for in turn: each beside the best of the other."""
+_OPEN = 0.02
+"""Probability of a noise (1) from which the effects beside it are begun with when the point has moved."""
 _TIE = 0.5
 """Log posterior (1) by which another model must beat the one that a search begins with: fits about two that look the
 same would go to and fro."""
@@ -83,17 +86,26 @@ class Posterior(Generic[E]):
 
     @cached_property
     def told(self) -> Weighed:
-        """The model that is told: the likeliest one that has of each class the likeliest family.
+        """The model that is told: the likeliest one that has of each class the likeliest family, and what is probable.
 
         A family of many variants (a warm-up, of any time constant) shares its probability out; another one with a
-        single variant is then ahead of each, and behind all of them together.
+        single variant, or no effect at all, is then ahead of each, and behind all of them together.
         """
         wanted = [self._likeliest(alike) for alike in self._classes_of(self.best)]
-        for model in self.models:
-            have = {number for number, _ in model.members}
-            if all(numbers & have for numbers in wanted):
-                return model
-        return self.best
+        for numbers in self._families.values():
+            if self._any_of(numbers) > PROBABLE and not any(numbers & have for have in wanted):
+                wanted.append(numbers)
+        held = [{number for number, _ in model.members} for model in self.models]
+        most = [sum(bool(numbers & have) for numbers in wanted) for have in held]
+        return self.models[int(np.argmax(most))]
+
+    @cached_property
+    def _families(self) -> dict[tuple[str, str], frozenset[int]]:
+        """Candidates of each family that some model holds."""
+        out: dict[tuple[str, str], set[int]] = {}
+        for number in np.flatnonzero(self._holds.any(axis=0)).tolist():
+            out.setdefault(family_of(self.candidate(number)), set()).add(number)
+        return {family: frozenset(numbers) for family, numbers in out.items()}
 
     def _likeliest(self, alike: Collection[int]) -> frozenset[int]:
         """Those of a class that are of its likeliest family; the whole class where it is improbable."""
@@ -140,17 +152,43 @@ class Posterior(Generic[E]):
         kinds = {(t.triad, t.kind, t.tau): t for m in self.models for t in m.noise.terms}
         return list(kinds.values())
 
-    def labels(self) -> dict[str, tuple[int, bool]]:
-        """Width of each member of the told model, and whether it was made between those of a scan; by label."""
-        return {
-            self.candidate(number).label: (width, int(self.board.use[number]) in self.board.finer)
-            for number, width in self.told.members
-        }
+    def starts(self) -> list[dict[str, tuple[int, bool]]]:
+        """Models from which a search about another point begins: what is told, and the likeliest in each noise.
+
+        Returns
+        -------
+        list of dict of str to (int, bool)
+            Of each the width of each member, and whether it was made between those of a scan; by label.
+        """
+        likeliest: dict[frozenset[tuple[str, str, float]], Weighed] = {}
+        share: dict[frozenset[tuple[str, str, float]], float] = {}
+        for model in self.models:
+            likeliest.setdefault(model.noise.kinds, model)
+            share[model.noise.kinds] = share.get(model.noise.kinds, 0.0) + model.probability
+        others = [likeliest[kinds] for kinds, p in share.items() if p > _OPEN]
+        return [self._labels(model) for model in (self.told, *others)]
+
+    def _labels(self, model: Weighed) -> dict[str, tuple[int, bool]]:
+        finer = self.board.finer
+        return {self.candidate(k).label: (width, int(self.board.use[k]) in finer) for k, width in model.members}
 
     @cached_property
     def classes(self) -> tuple[tuple[int, ...], ...]:
-        """What the data cannot tell from each member of the told model: candidates, the likeliest first."""
-        return tuple(alike[1:] for alike in self._classes_of(self.told))
+        """What the data cannot tell from each member of the told model, and what of its family stands in its place.
+
+        Candidates; those that fit as well come first, the likeliest before the others.
+        """
+        alike = self._classes_of(self.told)
+        return tuple((*own[1:], *self._in_place_of(own)) for own in alike)
+
+    def _in_place_of(self, alike: tuple[int, ...]) -> list[int]:
+        """Members of the family of a class's first candidate that models hold instead of it, rather than beside it."""
+        family = self._families[family_of(self.candidate(alike[0]))]
+        if len(family & {number for number, _ in self.told.members}) > 1:
+            return []
+        beside = self._holds[:, list(alike)].any(axis=1)
+        share = {k: float(self._weights @ (self._holds[:, k] * np.where(beside, -1.0, 1.0))) for k in family}
+        return sorted((k for k in family - set(alike) if share[k] > 0.0), key=lambda k: -share[k])
 
     def _classes_of(self, model: Weighed) -> list[tuple[int, ...]]:
         """Each member of a model, then what may stand in its place, the likeliest first."""
@@ -201,19 +239,17 @@ def posterior(
     earlier : Joint, optional
         Of an evidence with the same signatures, or the first ones of them.
     before : Posterior, optional
-        About a point that differs little: the search begins with its best model, and with its kinds of noise.
+        About a point that differs little: the search begins with its likeliest models, and with its kinds of noise.
     """
-    labels = {} if before is None else before.labels()
+    begun: list[dict[str, tuple[int, bool]]] = [{}] if before is None else before.starts()
+    labels = {label: own for one in begun for label, own in one.items()}
     first = len(evidence.weight)
     finer = {c for c in allowed.tolist() if labels.get(evidence.candidates[c - first].label, (0, False))[1]}
     board = Board(evidence, allowed, frozenset(finer), wander, earlier)
-    start = tuple(
-        (number, labels[evidence.candidates[column - first].label][0])
-        for number, column in enumerate(board.use.tolist())
-        if evidence.candidates[column - first].label in labels
-    )
+    number = {evidence.candidates[c - first].label: k for k, c in enumerate(board.use.tolist())}
+    starts = [tuple(sorted((number[name], own[0]) for name, own in one.items() if name in number)) for one in begun]
     tried = None if before is None else before.tried
-    noises, members = _climbed(board, [start], tried, settled=before is not None)
+    noises, members = _climbed(board, list(dict.fromkeys(starts)), tried, settled=before is not None)
     asked: set[str] = set()
     sharpened = 0
     while sharpened < _MOST_SHARPENED:

@@ -11,10 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sdimu_calibration.core.effects.effect import CHANNELS
-from sdimu_calibration.core.evidence.candidate import Candidate
 from sdimu_calibration.core.evidence.linear import E
 from sdimu_calibration.core.noise_term import NoiseTerm
+from sdimu_calibration.core.posterior.family import family_of
 from sdimu_calibration.core.posterior.posterior import Posterior, Weighed
 
 LEAST = 0.01
@@ -66,10 +65,8 @@ class FamilyShare:
     Attributes
     ----------
     family : str
-        ``gyro_bias_drift`` for all that changes a bias slowly, cable wrap with it, else the registry name of the
-        effect; ``own`` of an equation.
     sensor : str
-        Such as ``gyro_y``; the triad where it acts on several axes of one, empty where on both.
+        As of `family_of`.
     probability : float
         Of the models that hold a member of it.
     members : tuple of MemberShare
@@ -122,17 +119,6 @@ class Probabilities:
     nothing: float
     families: tuple[FamilyShare, ...]
     noise: tuple[NoiseShare, ...]
-
-
-def family_of(candidate: Candidate) -> tuple[str, str]:
-    """Name the family of a candidate, and its sensor, as `FamilyShare` has them."""
-    effect = candidate.effect
-    channels = sorted({term.channel for term in effect.terms})
-    triads = {CHANNELS[c].partition("_")[0] for c in channels}
-    sensor = CHANNELS[channels[0]] if len(channels) == 1 else triads.pop() if len(triads) == 1 else ""
-    # A bias that the turns add up to (cable wrap) is a slow change of it, too.
-    slow = effect.bias_drift or (effect.wander_like and effect.shifts_bias)
-    return (f"{sensor[:-2]}_bias_drift" if slow and len(channels) == 1 else candidate.family), sensor
 
 
 def probabilities(found: Posterior[E], told: Sequence[NoiseTerm] = ()) -> Probabilities:

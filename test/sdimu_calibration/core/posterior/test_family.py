@@ -6,7 +6,7 @@ import pytest
 
 from sdimu_calibration.core.effects.selection import resolve
 from sdimu_calibration.core.evidence.candidate import split
-from sdimu_calibration.core.posterior.told import family_of
+from sdimu_calibration.core.posterior.family import family_of
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,80 @@
+"""What is told of a window: families whose members share their probability out, and nothing that is improbable."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from sdimu_calibration.core.effects.selection import resolve
+from sdimu_calibration.core.evidence.candidate import split
+from sdimu_calibration.core.noise_term import NoiseTerm
+from sdimu_calibration.core.posterior.models import Data
+from sdimu_calibration.core.posterior.noise_models import NoiseModel
+from sdimu_calibration.core.posterior.posterior import Posterior, Weighed
+from sdimu_calibration.core.posterior.prior import prior_of
+
+KEYS = (
+    "gyro_bias_warm_up_y(tau=600 s)",
+    "gyro_bias_warm_up_y(tau=1200 s)",
+    "gyro_bias_ramp_y",
+    "accel_quadratic_x",
+    "accel_quadratic_z",
+)
+SHORT, LONG, RAMP, QUADRATIC, OTHER = range(5)
+
+
+def window(*models: tuple[tuple[int, ...], float], noises: tuple[NoiseModel, ...] = ()) -> Posterior:
+    """Models and their probabilities, about data in which the slow changes of a bias look the same."""
+    candidates = [split(resolve(key))[0] for key in KEYS]
+    W = np.random.default_rng(3).standard_normal((40, len(KEYS)))
+    W[:, LONG] = W[:, SHORT] + 0.01 * W[:, LONG]
+    W[:, RAMP] = W[:, SHORT] + 0.02 * W[:, RAMP]
+    e = 4.0 * W[:, SHORT] + 6.0 * W[:, QUADRATIC]
+    prior = prior_of(candidates)
+    board = SimpleNamespace(
+        use=np.arange(len(KEYS)),
+        evidence=SimpleNamespace(candidates=candidates, weight=()),
+        prior=prior,
+        finer=frozenset(),
+        data=lambda _: (0.0, Data(W.T @ W, W.T @ e, prior)),
+    )
+    kinds = noises or (NoiseModel(),) * len(models)
+    weighed = [Weighed(tuple((k, 0) for k in m), n, p) for (m, p), n in zip(models, kinds, strict=True)]
+    return Posterior(board, tuple(weighed))
+
+
+def told(found: Posterior) -> set[str]:
+    return {KEYS[number] for place, (number, _) in enumerate(found.told.members) if found.of_class(place) > 0.5}
+
+
+def test_a_family_is_told_though_no_effect_is_likelier_than_each_of_its_members():
+    found = window(((), 0.35), ((SHORT,), 0.25), ((LONG,), 0.2), ((RAMP,), 0.2))
+    assert found.best.members == ()
+    assert told(found) == {KEYS[SHORT]}
+    assert found.of_class(0) == pytest.approx(0.65)
+
+
+def test_a_family_is_told_beside_what_is_sure():
+    found = window(((QUADRATIC,), 0.4), ((SHORT, QUADRATIC), 0.25), ((LONG, QUADRATIC), 0.2), ((RAMP, QUADRATIC), 0.15))
+    assert told(found) == {KEYS[SHORT], KEYS[QUADRATIC]}
+
+
+def test_nothing_is_told_that_is_less_than_probable():
+    found = window(((), 0.55), ((SHORT,), 0.2), ((LONG,), 0.1), ((OTHER,), 0.15))
+    assert told(found) == set()
+
+
+def test_an_effect_beside_another_of_its_family_does_not_stand_in_its_place():
+    # A warm-up is certain; in some models a ramp is present, too.
+    found = window(((SHORT,), 0.7), ((SHORT, RAMP), 0.3))
+    assert RAMP not in found._in_place_of((SHORT,))
+    assert found._in_place_of((SHORT,)) == []
+
+
+def test_the_next_search_begins_with_the_likeliest_model_in_each_noise():
+    # Noise with a memory makes the effect unnecessary: about the next point that must be asked again.
+    walk = NoiseModel((NoiseTerm("gyro", "random_walk", size=1e-6),), -1.0)
+    found = window(((SHORT,), 0.6), ((), 0.39), ((OTHER,), 0.01), noises=(NoiseModel(), walk, NoiseModel(())))
+    assert found.starts() == [{KEYS[SHORT]: (0, False)}, {KEYS[SHORT]: (0, False)}, {}]
