@@ -8,6 +8,8 @@ from sdimu_calibration.core.effects.effect import Effect, Parameter
 
 OWN = "own equation"
 """Title of an equation that no registered effect has."""
+OF_RECORDING = "@"
+"""Stands between a coefficient of one recording alone and the name of the recording."""
 
 
 @dataclass(frozen=True)
@@ -21,17 +23,26 @@ class Candidate:
     family : str
         Registry name of the effect, or ``own`` for an equation that no registered effect has.
     label : str
-        Canonical key of the parameter.
+        Canonical key of the parameter; with the name of the recording behind it where it is of one alone.
+    recording : str
+        The only recording of a set in which it acts; empty where it acts in all.
     """
 
     effect: Effect
     family: str
     label: str
+    recording: str = ""
 
     @property
     def parameter(self) -> Parameter:
         """The parameter."""
         return self.effect.parameters[0]
+
+    @property
+    def coefficient(self) -> str:
+        """Name of the parameter, whatever its variant; an equation's is its label."""
+        name = self.label if self.family == "own" else self.parameter.name
+        return f"{name}{OF_RECORDING}{self.recording}" if self.recording else name
 
     @property
     def added(self) -> str:

@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 from sdimu_calibration.core.effects.effect import OF_ONE_TIME, Effect
-from sdimu_calibration.core.evidence.candidate import OWN
-
-OF_RECORDING = "@"
-"""Stands between a coefficient of one recording alone and the name of the recording."""
+from sdimu_calibration.core.evidence.candidate import OF_RECORDING, OWN
 
 
 def tagged(label: str, recording: str) -> str:

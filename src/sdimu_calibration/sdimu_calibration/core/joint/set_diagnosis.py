@@ -52,12 +52,12 @@ class SetFinding:
     value, sigma : float
         SI, of the joint fit with everything that was found.
     z : float
-        Score when it was found.
+        Score beside what was found before it.
     unit, display_unit : str
     alike : tuple of str
         What the set cannot tell from it.
     probability : float
-        That it or one of these is in all recordings; NaN of an effect of one recording.
+        That it or one of these is in all recordings, or in this one.
     """
 
     label: str
@@ -161,7 +161,7 @@ def diagnose_set(
         again,
         refused,
         without,
-        None if found.posterior is None else probabilities(found.posterior),
+        probabilities(found.posterior),
     )
 
 
@@ -189,7 +189,7 @@ def _findings(found: SetSearch) -> tuple[SetFinding, ...]:
         parameter = effect.parameters[0]
         called = (tagged(name, find.recording) for name in (find.key, parameter.name))
         place = next(names.index(name) for name in called if name in names)
-        own.append((find.key, effect.title, find.recording, place, find.z, parameter, (), float("nan")))
+        own.append((find.key, effect.title, find.recording, place, find.z, parameter, (), find.probability))
     return tuple(
         SetFinding(
             *(label, title, recording, float(values[k]), float(sigma[k]), float(z), p.unit, p.display_unit),

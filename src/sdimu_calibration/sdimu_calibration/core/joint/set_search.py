@@ -1,40 +1,36 @@
 """What does the model of a set miss? The search of one recording, on the evidence of all of them.
 
-An effect that is the same in all recordings is sought in the joint evidence: what each of them shows adds up. A fault
-of the data, or a drift of one power-on, is also sought in every recording by itself, given the joint estimate, with a
-threshold that counts all recordings.
+An effect that is the same in all recordings, a fault of the data of one, a drift of one power-on: each is a candidate,
+and all are weighed in one posterior. What was chosen is a candidate again in the next round, about the fit that has it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sdimu_calibration.core.arrays import Floats, Ints
+from sdimu_calibration.core.arrays import Ints
 from sdimu_calibration.core.diagnosis.candidates import catalogue, without
-from sdimu_calibration.core.diagnosis.problem import Problem
 from sdimu_calibration.core.diagnosis.search import FALSE_ALARM, Search, search, with_steps
 from sdimu_calibration.core.effects import selection
 from sdimu_calibration.core.effects.effect import Effect
-from sdimu_calibration.core.effects.imu_model import prior_size
 from sdimu_calibration.core.estimation.handheld_fit import HandheldFit
 from sdimu_calibration.core.estimation.solve import with_effects
 from sdimu_calibration.core.evidence.candidate import Candidate, split
 from sdimu_calibration.core.evidence.known import Standing
 from sdimu_calibration.core.joint.member import Job, Member, Report
-from sdimu_calibration.core.joint.scope import by_name, is_shared, split_tag
-from sdimu_calibration.core.joint.set_evidence import SetEvidence, set_evidence, white_power_on
-from sdimu_calibration.core.joint.set_fit import Run, SetFit, SetOptions, fit_set, power_on, with_own, with_reports
+from sdimu_calibration.core.joint.scope import by_name, is_shared, split_tag, tagged
+from sdimu_calibration.core.joint.set_evidence import SetEvidence, set_evidence
+from sdimu_calibration.core.joint.set_fit import Run, SetFit, SetOptions, fit_set, with_own, with_reports
 from sdimu_calibration.core.joint.set_standing import set_standing
-from sdimu_calibration.core.posterior.posterior import Posterior, posterior
+from sdimu_calibration.core.posterior.posterior import Posterior
 from sdimu_calibration.core.posterior.told import of_coefficients
-from sdimu_calibration.core.probability import normal_limit
 from sdimu_calibration.core.progress import Progress, silent
 from sdimu_calibration.core.recording import DataError
 
-_MOST_ROUNDS = 20
+_MOST_ROUNDS = 12
 """Number of rounds at most: strong effects take one each, with one more that sharpens it; the others come together."""
 _STRONG = 20.0
 """Score (1) from which an effect is put into the fit before others are sought: what its linear model leaves of it, some
@@ -42,19 +38,9 @@ percent, would be taken for them."""
 _FAILS = 1.3
 """Mean squared innovation of a recording over that of noise (1) from which the same holds: deviations of the power-ons
 take up so much of a strong effect that its score is small."""
-_KEEP = 3.0
-"""Size of an effect in the joint fit (sigma) below which it is dropped: chance ends there."""
 _DOUBLE = 0.995
 """Correlation of two columns (1) from which one of them already is the other: they differ by a tenth of their
 length."""
-_ACCUSED = 1e-3
-"""Probability that noise puts one candidate of one recording over its threshold: a recording that is accused is looked
-at again, and no other recording can speak for it."""
-_LOG_BAYES = 3.0
-"""Least log Bayes factor (1) of an effect of one recording: odds of 20 to 1, "strong" on Jeffreys' scale."""
-_WIDE = 3.0
-"""Factor on the physical prior of a candidate (1): a sensor may be out of its class, as in the search of one
-recording."""
 
 
 @dataclass(frozen=True)
@@ -65,12 +51,15 @@ class LocalFind:
     ----------
     recording, key : str
     z : float
-        Score given the joint estimate.
+        Score beside what was found before it.
+    probability : float
+        That it or something of its class is there (1).
     """
 
     recording: str
     key: str
     z: float
+    probability: float
 
 
 @dataclass(frozen=True)
@@ -82,9 +71,9 @@ class SetSearch:
     before, after : SetFit
         With the model as given, and with what was found.
     chosen : tuple of Candidate
-        Effects in all recordings, in the order in which they were found.
+        Effects in all recordings, the largest share of the misfit first.
     z : tuple of float
-        Score of each when it was found.
+        Score of each beside those before it.
     alike : mapping
         By label, what the set cannot tell from it.
     probability : mapping
@@ -96,7 +85,7 @@ class SetSearch:
         Of the first round: its scan.
     standing : Standing
         What the set knows of the unit.
-    posterior : Posterior or None
+    posterior : Posterior
         The models that all recordings together leave probable.
     """
 
@@ -110,7 +99,7 @@ class SetSearch:
     threshold: float
     first: Search[SetEvidence]
     standing: Standing
-    posterior: Posterior[SetEvidence] | None = None
+    posterior: Posterior[SetEvidence]
 
 
 def search_set(
@@ -140,67 +129,114 @@ def search_set(
         The set with the model as given, where it was fitted already.
     """
     before = fit = fitted or fit_set(members, options, run, progress=progress)
-    chosen: dict[str, Candidate] = {}
-    scores: dict[str, float] = {}
-    local: list[LocalFind] = []
-    finer: list[Effect] = []
+    told: tuple[Candidate, ...] = ()
+    finer: tuple[Effect, ...] = ()
+    seen: set[frozenset[str]] = set()
+    found: Search[SetEvidence] | None = None
     first: Search[SetEvidence] | None = None
     for turn in range(_MOST_ROUNDS):
         progress("candidates", min(0.9, 0.4 + 0.1 * turn))
-        effects = _candidates(fit, extra, finer)
-        full = _gathered(fit, effects, run)
-        evidence = set_evidence(full, [c for effect in effects for c in split(effect)])
-        p, single = len(evidence.weight), _singles(evidence)
-        found = with_steps(search(evidence, single, alpha=alpha))
-        if len(found.steps) > 1 and _far_off(full, found):
-            found = replace(found, chosen=found.chosen[:1], steps=found.steps[:1])
+        evidence = _evidence(fit, extra, finer, run)
+        again = evidence.as_candidates(*_reopened(evidence, told))
+        found = with_steps(search(again, _singles(again), alpha=alpha, earlier=found))
         first = first or found
-        new = [evidence.candidates[i - p] for i in found.chosen]
-        nearer = _nearer(new, finer)
+        chosen = _first_ones(fit, found, told)
+        nearer = _nearer(chosen, told, finer)
         if nearer:
-            finer = nearer
+            finer = (*finer, *nearer)
             continue
-        finer = []
-        # What all recordings show comes first: in one of them alone a drift may look the same.
-        odd = None if new else _odd_one(full, evidence, found.chosen)
-        if not new and not odd:
+        labels = frozenset(c.label for c in chosen)
+        if labels == {c.label for c in told} or labels in seen:
             break
-        scores |= {s.label: s.z for s in found.steps}
-        if odd:
-            local.append(odd)
-            own = {**options.local, odd.recording: (*options.local.get(odd.recording, ()), odd.key)}
-            options = replace(options, local=own)
-        else:
-            chosen |= {c.label: c for c in new}
-            options = replace(options, model=with_effects(options.model, [by_name(c.effect) for c in new]))
-        fit = fit_set(members, options, run, fit, progress)
-    if first is None:
+        seen.add(labels)
+        told = chosen
+        fit = fit_set(members, _with(options, told), run, fit, progress)
+    if first is None or found is None:
         raise AssertionError("a search has one round at least")
-    fit, kept = _without_small(members, options, run, fit, chosen, progress)
-    alike: dict[str, tuple[str, ...]] = {}
-    probability: dict[str, float] = {}
-    window = first.posterior
-    at_end = set_evidence(fit, ())
-    if kept:
-        effects = _candidates(fit, extra, [])
-        full = _gathered(fit, effects, run)
-        at_end = set_evidence(full, [c for effect in effects for c in split(effect)])
-        window = _weighed(at_end, kept)
-        for label in kept:
-            alike[label], probability[label] = _class(window, label)
+    return _result(before, fit, told, evidence, (first, found))
+
+
+def _result(
+    before: SetFit,
+    fit: SetFit,
+    told: Sequence[Candidate],
+    evidence: SetEvidence,
+    searches: tuple[Search[SetEvidence], Search[SetEvidence]],
+) -> SetSearch:
+    """Put the result together of the fit with what is told, and of the first and the last search."""
+    first, last = searches
+    window = last.posterior
+    if window is None:
+        raise AssertionError("a search weighs models")
+    z = {step.label: step.z for step in last.steps}
+    classes = {c.label: _class(window, c.label) for c in told}
+    shared = {c.label: c for c in told if not c.recording}
+    alike = {label: classes[label][0] for label in shared}
+    local = tuple(
+        LocalFind(c.recording, split_tag(c.label)[0], z.get(c.label, float("nan")), classes[c.label][1])
+        for c in told
+        if c.recording
+    )
     return SetSearch(
         before,
         fit,
-        tuple(kept.values()),
-        tuple(scores.get(label, float("nan")) for label in kept),
+        tuple(shared.values()),
+        tuple(z.get(label, float("nan")) for label in shared),
         alike,
-        probability,
-        tuple(local),
+        {label: classes[label][1] for label in shared},
+        local,
         first.threshold,
         first,
-        set_standing(fit, at_end, kept, alike),
+        set_standing(fit, evidence if shared else set_evidence(fit, ()), shared, alike),
         window,
     )
+
+
+def _with(options: SetOptions, told: Sequence[Candidate]) -> SetOptions:
+    """Return the options with what is told, in all recordings or in one."""
+    local = dict(options.local)
+    for one in told:
+        if one.recording:
+            local[one.recording] = (*local.get(one.recording, ()), split_tag(one.label)[0])
+    shared = [by_name(c.effect) for c in told if not c.recording]
+    return replace(options, model=with_effects(options.model, shared), local=local)
+
+
+def _evidence(fit: SetFit, extra: Sequence[Effect], finer: Sequence[Effect], run: Run) -> SetEvidence:
+    """Take the evidence about a fit, with all that its model may lack in all recordings or in one."""
+    effects = _candidates(fit, extra, finer)
+    full = _gathered(fit, effects, run)
+    local = [_of_one(label) for report in full.reports for label in report.reduction.labels if split_tag(label)[1]]
+    return set_evidence(full, [c for effect in effects for c in split(effect)], local)
+
+
+def _of_one(label: str) -> Candidate:
+    """Candidate of one recording, by its label."""
+    key, recording = split_tag(label)
+    (one,) = split(selection.resolve(key))
+    return replace(one, label=label, recording=recording)
+
+
+def _reopened(evidence: SetEvidence, told: Sequence[Candidate]) -> tuple[Ints, list[Candidate]]:
+    """Columns of what is told in the model of a fit, and the same as candidates."""
+    columns = np.array([place_of(evidence.names, c) for c in told], dtype=np.int64)
+    return columns, [replace(c, effect=replace(c.effect, nearer=None)) for c in told]
+
+
+def _first_ones(fit: SetFit, found: Search[SetEvidence], told: Sequence[Candidate]) -> tuple[Candidate, ...]:
+    """Take what was found; of what is new the first alone where it is so strong that the linear model fails.
+
+    The others may be what the linear model leaves of it.
+    """
+    p, known = len(found.evidence.weight), {c.label: c for c in told}
+    chosen = [found.evidence.candidates[i - p] for i in found.chosen]
+    chosen = [known.get(c.label, c) for c in chosen]
+    new = [c.label for c in chosen if c.label not in known]
+    worst = max(r.statistics.nis_mean for r in fit.reports)
+    z = {step.label: abs(step.z) for step in found.steps}
+    if len(new) > 1 and (z[new[0]] > _STRONG or worst > _FAILS):
+        chosen = [c for c in chosen if c.label not in new[1:]]
+    return tuple(chosen)
 
 
 def as_given(found: SetSearch, options: SetOptions, run: Run) -> SetSearch:
@@ -239,12 +275,6 @@ def _singles(evidence: SetEvidence) -> Ints:
         if not of_sets[k] or not kept or likeness[k, kept].max() < _DOUBLE:
             kept.append(k)
     return np.array(sorted(kept), dtype=np.int64) + p
-
-
-def _far_off(fit: SetFit, found: Search[SetEvidence]) -> bool:
-    """Whether what was found first is so strong that the others may be what its linear model leaves."""
-    worst = max(r.statistics.nis_mean for r in fit.reports)
-    return abs(found.steps[0].z) > _STRONG or worst > _FAILS
 
 
 def _candidates(fit: SetFit, extra: Sequence[Effect], finer: Sequence[Effect]) -> list[Effect]:
@@ -292,12 +322,14 @@ def _gathered(fit: SetFit, tried: Sequence[Effect], run: Run) -> SetFit:
     return with_reports(fit, reports)
 
 
-def _nearer(new: Sequence[Candidate], tried: Sequence[Effect]) -> list[Effect]:
-    """Variants between those of the scan, about what was found; none where they were tried."""
-    if tried:
-        return []
+def _nearer(chosen: Sequence[Candidate], told: Sequence[Candidate], tried: Sequence[Effect]) -> list[Effect]:
+    """Variants between those of the scan, about what is new in all recordings; those that were tried are left out."""
+    have = {label for effect in tried for label in effect.labels}
+    old = {c.coefficient for c in told}
     variants: list[Effect] = []
-    for candidate in new:
+    for candidate in chosen:
+        if candidate.recording or candidate.coefficient in old or candidate.label in have:
+            continue
         effect = selection.resolve(candidate.label) if not candidate.effect.file else candidate.effect
         for _ in range(2):
             if effect.nearer is None:
@@ -305,20 +337,7 @@ def _nearer(new: Sequence[Candidate], tried: Sequence[Effect]) -> list[Effect]:
             around = effect.nearer()
             variants += [v.only((candidate.parameter.name,)) for v in around if v.variant != effect.variant]
             effect = around[len(around) // 2]
-    return variants
-
-
-def _weighed(evidence: SetEvidence, found: Mapping[str, Candidate]) -> Posterior[SetEvidence]:
-    """Weigh what was found, and all else, about the fit that has all of it.
-
-    Before, a strong effect hides what tells another one apart.
-    """
-    tried = [replace(c, effect=replace(c.effect, nearer=None)) for c in found.values()]
-    columns = np.array([place_of(evidence.names, c) for c in tried], dtype=np.int64)
-    open_again = evidence.as_candidates(columns, tried)
-    first = len(open_again.weight)
-    allowed = np.union1d(_singles(open_again), np.arange(first, first + len(tried))).astype(np.int64)
-    return posterior(open_again, allowed, None)
+    return [v for v in variants if have.isdisjoint(v.labels)]
 
 
 def _class(found: Posterior[SetEvidence], label: str) -> tuple[tuple[str, ...], float]:
@@ -327,102 +346,15 @@ def _class(found: Posterior[SetEvidence], label: str) -> tuple[tuple[str, ...], 
         together = [found.candidate(k) for k in (number, *found.classes[place])]
         own = next((c for c in together if c.label == label), None)
         if own is not None:
-            others = (c for c in together if (c.family, c.parameter.name) != (own.family, own.parameter.name))
-            return tuple(c.label for c in others), found.of_class(place)
+            return tuple(c.label for c in together if c.coefficient != own.coefficient), found.of_class(place)
     return (), next((s.probability for s in of_coefficients(found) if s.name == label), 0.0)
-
-
-def _odd_one(fit: SetFit, evidence: SetEvidence, chosen: Ints) -> LocalFind | None:
-    """Find the effect of one recording that stands out most, given the joint estimate with what was chosen."""
-    known, weight, _ = Problem(evidence).known([int(c) for c in chosen])
-    estimate, covariance = evidence.information.estimate(known, weight)
-    names = [evidence.names[k] for k in known]
-    values = estimate + np.concatenate([fit.estimate.values, np.zeros(len(chosen))])
-    count = sum(len(_local_labels(r)) for r in fit.reports)
-    if not count:
-        return None
-    limit = normal_limit(0.5 * _ACCUSED / count)
-    best: tuple[float, LocalFind] | None = None
-    for name in fit.power_ons:
-        members = [k for k, r in enumerate(fit.reports) if power_on(r) == name]
-        for k, z, odds in _local_scores(fit, members, names, values, covariance):
-            report = fit.reports[k]
-            top = int(np.argmax(np.where((np.abs(z) > limit) & (odds > _LOG_BAYES), odds, -np.inf)))
-            if np.abs(z[top]) > limit and odds[top] > _LOG_BAYES and (best is None or odds[top] > best[0]):
-                key, recording = split_tag(_local_labels(report)[top])
-                best = (float(odds[top]), LocalFind(recording, key, float(z[top])))
-    return None if best is None else best[1]
-
-
-def _local_labels(report: Report) -> list[str]:
-    return [label for label in report.reduction.labels if split_tag(label)[1]]
-
-
-def _local_scores(
-    fit: SetFit, members: Sequence[int], names: Sequence[str], values: Floats, covariance: Floats
-) -> list[tuple[int, Floats, Floats]]:
-    """Score and log Bayes factor of every local candidate of the recordings of a power-on."""
-    own = []
-    for k in members:
-        r = fit.reports[k].reduction
-        places = [len(r.names) + i for i, label in enumerate(r.labels) if split_tag(label)[1]]
-        own.append(r.A[:, places])
-    rows, columns = white_power_on(fit, members, names, own)
-    left = rows.y - rows.A @ values
-    out = []
-    for k, a in zip(members, columns, strict=True):
-        if not a.shape[1]:
-            continue
-        across = a.T @ rows.A
-        alone = np.sum(a**2, axis=0)
-        J = alone - np.einsum("mp,pq,mq->m", across, covariance, across)
-        d = a.T @ left
-        seen = np.greater(J, 1e-3 * alone) & (alone > 0.0)
-        prior = np.array([_prior(label, fit.reports[k]) for label in _local_labels(fit.reports[k])])
-        with np.errstate(divide="ignore", invalid="ignore"):
-            wide = 1.0 / (_WIDE * prior) ** 2
-            z = np.where(seen, d / np.sqrt(J), 0.0)
-            odds = np.where(seen, 0.5 * d**2 / (J + wide) - 0.5 * np.log1p(J / wide), -np.inf)
-        out.append((k, z, odds))
-    return out
-
-
-def _prior(label: str, report: Report) -> float:
-    size = prior_size(selection.resolve(split_tag(label)[0]), report.imu)
-    return float("inf") if size is None else size
-
-
-def _without_small(
-    members: Sequence[Member],
-    options: SetOptions,
-    run: Run,
-    fit: SetFit,
-    chosen: dict[str, Candidate],
-    progress: Progress,
-) -> tuple[SetFit, dict[str, Candidate]]:
-    """Drop the weakest of what was found while it is small in the joint fit."""
-    while chosen:
-        sigma = np.sqrt(np.diag(fit.estimate.covariance))
-        size = {
-            label: float(np.abs(fit.estimate.values[k]) / sigma[k])
-            for label, c in chosen.items()
-            if (k := place_of(fit.names, c)) >= 0
-        }
-        weakest = min(size, key=lambda label: size[label])
-        if size[weakest] >= _KEEP:
-            break
-        dropped = chosen[weakest]
-        chosen = {label: c for label, c in chosen.items() if label != weakest}
-        effects = tuple(e for e in options.model.effects if e != by_name(dropped.effect))
-        options = replace(options, model=replace(options.model, effects=effects))
-        fit = fit_set(members, options, run, fit, progress)
-    return fit, chosen
 
 
 def place_of(names: Sequence[str], candidate: Candidate) -> int:
     """Place of a coefficient that was found among those of a fit; -1 where it is not there."""
     # Beside another variant it is called by its label: the plain name is then that of the other one.
-    for name in (candidate.label, candidate.parameter.name):
+    own = candidate.parameter.name
+    for name in (candidate.label, tagged(own, candidate.recording) if candidate.recording else own):
         if name in names:
             return list(names).index(name)
     return -1

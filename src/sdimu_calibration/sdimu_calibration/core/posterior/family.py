@@ -19,7 +19,8 @@ def family_of(candidate: Candidate) -> tuple[str, str]:
         ``gyro_bias_drift`` for all that changes a bias slowly, cable wrap with it, else the registry name of the
         effect; ``own`` of an equation.
     sensor : str
-        Such as ``gyro_y``; the triad where it acts on several axes of one, empty where on both.
+        Such as ``gyro_y``; the triad where it acts on several axes of one, empty where on both. Behind it the
+        recording, where it acts in one of a set alone.
     """
     effect = candidate.effect
     channels = sorted({term.channel for term in effect.terms})
@@ -27,4 +28,5 @@ def family_of(candidate: Candidate) -> tuple[str, str]:
     sensor = CHANNELS[channels[0]] if len(channels) == 1 else triads.pop() if len(triads) == 1 else ""
     # A bias that the turns add up to (cable wrap) is a slow change of it, too.
     slow = effect.bias_drift or (effect.wander_like and effect.shifts_bias)
-    return (f"{sensor[:-2]}_bias_drift" if slow and len(channels) == 1 else candidate.family), sensor
+    family = f"{sensor[:-2]}_bias_drift" if slow and len(channels) == 1 else candidate.family
+    return family, f"{sensor} in {candidate.recording}".strip() if candidate.recording else sensor

@@ -137,11 +137,6 @@ class Posterior(Generic[E]):
         column = int(self.board.use[number])
         return self.board.evidence.candidates[column - len(self.board.evidence.weight)]
 
-    def parameter(self, number: int) -> str:
-        """Coefficient of a candidate; an equation by its label."""
-        candidate = self.candidate(number)
-        return candidate.label if candidate.family == "own" else candidate.parameter.name
-
     def probability(self, holds: Callable[[Weighed], bool]) -> float:
         """Probability of the models for which something holds."""
         return min(1.0, float(sum(m.probability for m in self.models if holds(m))))

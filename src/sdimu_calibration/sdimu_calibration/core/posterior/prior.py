@@ -14,6 +14,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -36,8 +37,6 @@ WIDTH_SHARES = (0.74, 0.24, 0.02)
 """Probability (1) of each of `WIDTHS`: one part in fifty is broken, one in four is out of its class."""
 MOST_DRIFTS = 4
 """Number of drifts of one bias (1) that a model has at most: more of them follow any wander, and noise is that."""
-_SENSORS = 6
-"""Number of sensor axes (1): three gyros, three accelerometers."""
 UNKNOWN_SIZE = 30.0
 """Size of an effect in the sigma that the data give it (1), where physics gives none: 3 to 300 is looked
 for."""
@@ -62,7 +61,7 @@ class Prior:
     own : ndarray of bool, shape (q,)
         An equation that no physics names.
     drift : ndarray of int, shape (q,)
-        Sensor axis whose bias a candidate lets drift; -1 of all others.
+        Sensor axis whose bias a candidate lets drift, in all recordings or in one; -1 of all others.
     """
 
     log_share: Floats
@@ -72,6 +71,11 @@ class Prior:
     positive: Bools
     own: Bools
     drift: Ints
+
+    @cached_property
+    def _bins(self) -> int:
+        """Number of axes whose drifts are counted, and one for all that is no drift."""
+        return int(self.drift.max(initial=-1)) + 2
 
     def log_more(self, base: Sequence[int]) -> Floats:
         """Log odds of each candidate beside those of a model.
@@ -94,8 +98,8 @@ class Prior:
             taken[self.parameter[at[~self.repeats[at]]]] = True
             out = out + present[self.cause]
             out[taken[self.parameter]] = -np.inf
-            drifts = np.bincount(self.drift[at] + 1, minlength=_SENSORS + 1)[1:]
-            if drifts.max() >= MOST_DRIFTS:
+            drifts = np.bincount(self.drift[at] + 1, minlength=self._bins)[1:]
+            if drifts.max(initial=0) >= MOST_DRIFTS:
                 out[np.isin(self.drift, np.flatnonzero(drifts >= MOST_DRIFTS))] = -np.inf
             out[at] = -np.inf
         return np.asarray(out)
@@ -116,7 +120,7 @@ class Prior:
         """
         parameter, drift = self.parameter[use], self.drift[use]
         one = (parameter[:, None] == parameter[None, :]) & ~self.repeats[use][:, None]
-        counted = np.bincount(self.drift[np.asarray(base, dtype=np.int64)] + 1, minlength=_SENSORS + 1)
+        counted = np.bincount(self.drift[np.asarray(base, dtype=np.int64)] + 1, minlength=self._bins)
         full = counted[drift + 1] == MOST_DRIFTS - 1
         return np.asarray(one | (full & (drift >= 0))[:, None] & (drift[:, None] == drift[None, :]))
 
@@ -138,21 +142,21 @@ def prior_of(candidates: Sequence[Candidate], shared: Sequence[int] = ()) -> Pri
         Places of candidates that were made from another one between those of a scan: they have its odds, and do not
         lower those of the others.
     """
-    names = [c.label if c.family == "own" else c.parameter.name for c in candidates]
+    names = [c.coefficient for c in candidates]
     made = set(shared)
     count = Counter(name for k, name in enumerate(names) if k not in made)
     weight = np.array([_odds(c) / max(count[name], 1) for c, name in zip(candidates, names, strict=True)])
     total = float(sum(w for k, w in enumerate(weight.tolist()) if k not in made and candidates[k].family != "own"))
+    causes = [(c.label,) if c.family == "own" else tuple(c.effect.options.values()) for c in candidates]
+    axes = _numbers([(c.recording, str(c.effect.terms[0].channel)) for c in candidates])
     return Prior(
         np.log(weight / max(total, 1e-300)),
-        _numbers(
-            [(c.family, c.label) if c.family == "own" else (c.family, *c.effect.options.values()) for c in candidates]
-        ),
+        _numbers([(c.recording, c.family, *cause) for c, cause in zip(candidates, causes, strict=True)]),
         _numbers([(name,) for name in names]),
         np.array([bool(OF_ONE_TIME & c.effect.options.keys()) for c in candidates], dtype=bool),
         np.array([c.effect.positive for c in candidates], dtype=bool),
         np.array([c.family == "own" for c in candidates], dtype=bool),
-        np.array([c.effect.terms[0].channel if c.effect.bias_drift else -1 for c in candidates], dtype=np.int64),
+        np.where([c.effect.bias_drift for c in candidates], axes, -1).astype(np.int64),
     )
 
 

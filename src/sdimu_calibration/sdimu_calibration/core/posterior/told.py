@@ -154,13 +154,13 @@ def probabilities(found: Posterior[E], told: Sequence[NoiseTerm] = ()) -> Probab
 
 def of_coefficients(found: Posterior[E]) -> tuple[Share, ...]:
     """Probability of each coefficient of an effect, with any time constant; those of less than `LEAST` are left out."""
-    name = {k: found.parameter(k) for m in found.models for k, _ in m.members}
+    name = {k: found.candidate(k).coefficient for m in found.models for k, _ in m.members}
     return _shares(_summed(found, lambda m: (name[k] for k, _ in m.members)))
 
 
 def may_be(found: Posterior[E], place: int) -> tuple[Share, ...]:
     """Say what a member of the told model may be: each coefficient of its class, the likeliest first."""
-    names = {k: found.parameter(k) for k in (found.told.members[place][0], *found.classes[place])}
+    names = {k: found.candidate(k).coefficient for k in (found.told.members[place][0], *found.classes[place])}
     return _shares(_summed(found, lambda m: (names[k] for k, _ in m.members if k in names)))
 
 
