@@ -56,7 +56,9 @@ def driver(path: Path, status: bool) -> np.ndarray:
 def test_foreign_units_and_stamps_give_the_same_digits_live_and_from_the_bag(bench: FitSession, status: bool) -> None:
     stamps = driver(bench.folder / "driver", status)
     bag = bench.folder / "bag"
-    bench.children.start("recorder", RECORDER, {"out": str(bag), "wait_for": ["/imu/data_raw", "/calibration/coefficients"]})
+    bench.children.start(
+        "recorder", RECORDER, {"out": str(bag), "wait_for": ["/imu/data_raw", "/calibration/coefficients"]}
+    )
     bench.children.start("calibration", CALIBRATION, {"out": str(bench.folder), "site": "daejeon"})
     bench.children.start("replay", REPLAY, {"bag": str(bench.folder / "driver"), "consumers": 2})
     bench.wait_for_end(120.0)
