@@ -30,7 +30,8 @@ PROBABLE = 0.5
 _ROUNDS = 4
 """Number of times that noises and effects are looked for in turn: each beside the best of the other."""
 _OPEN = 0.02
-"""Probability of a noise (1) from which the effects beside it are begun with when the point has moved."""
+"""Probability of a noise (1) from which the effects beside it are begun with when the point has moved: less would not
+change what is told."""
 _TIE = 0.5
 """Log posterior (1) by which another model must beat the one that a search begins with: fits about two that look the
 same would go to and fro."""
