@@ -11,9 +11,13 @@ STOP = "stop"
 TURN = "turn"
 SHIFT = "shift"
 ATTITUDE = "attitude"
-KINDS = (RANDOM_WALK, FLICKER, MARKOV, STOP, TURN, SHIFT, ATTITUDE)
+RATE = "rate"
+TEMPERATURE = "temperature"
+FOLLOWS = (ATTITUDE, RATE, TEMPERATURE)
+"""Kinds that are an unknown function: the same where what it follows is the same."""
+KINDS = (RANDOM_WALK, FLICKER, MARKOV, STOP, TURN, SHIFT, *FOLLOWS)
 """Kinds of noise with a memory."""
-DRAWN = frozenset({STOP, TURN, SHIFT, ATTITUDE})
+DRAWN = frozenset({STOP, TURN, SHIFT, *FOLLOWS})
 """Kinds of noise that any cause may hide behind that depends on attitude or rate."""
 WORDS = {
     RANDOM_WALK: "rate random walk",
@@ -23,6 +27,8 @@ WORDS = {
     TURN: "bias drawn anew in each turn",
     SHIFT: "bias shifted in each turn for good",
     ATTITUDE: "error that follows the attitude",
+    RATE: "error that follows the rate",
+    TEMPERATURE: "error that follows the temperature",
 }
 _ACCEL_WALK = "acceleration random walk"
 TRIADS = ("gyro", "accel")

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
+from sdimu_calibration.core.noise_term import ATTITUDE, RATE, TEMPERATURE
 from sdimu_calibration.core.posterior.unknown import UnknownFunction, unknown_functions
 from sdimu_calibration.core.units import from_si
 from sdimu_calibration.report.drawing import MUTED, Figure, lay_out
@@ -10,37 +13,50 @@ from sdimu_calibration.report.markup import Draw, quiet, section
 
 _AXES = "xyz"
 _NAMES = {"gyro": ("Gyros", "deg/h"), "accel": ("Accelerometers", "ug")}
+_FOLLOWED = {
+    ATTITUDE: ("force along {} (g)", 1.0, "at rest, against the share of gravity along each body axis"),
+    RATE: ("rate about {} (deg/s)", float(np.degrees(1.0)), "in turns, against the rate about each body axis"),
+    TEMPERATURE: ("temperature over T0 (K)", 1.0, "at rest, against the temperature"),
+}
+"""Title of an axis, its unit in SI, and what is drawn, by what the error follows."""
 
 
 def unknown_section(diagnosis: Diagnosis, draw: Draw) -> str:
-    """Return the section; empty where nothing follows the attitude."""
-    window = diagnosis.found.posterior
-    found = () if window is None else unknown_functions(window, diagnosis.found.noise)
+    """Return the section; empty where nothing unknown follows attitude, rate or temperature."""
+    found = unknown_of(diagnosis)
     if not found:
         return ""
+    drawn = "; ".join(dict.fromkeys(_FOLLOWED[one.follows][2] for one in found))
     return section(
-        "An error that follows the attitude",
+        f"An error that follows the {' and the '.join(dict.fromkeys(one.follows for one in found))}",
         quiet(
-            "No effect of the catalogue explains it. Error of each sensor at rest (95 % bands) against the share of "
-            "gravity along each body axis: what bends here is a term of that force, what scatters hangs on another "
-            "axis or on the way there."
+            f"No effect of the catalogue explains it. Error of each sensor with 95 % bands, {drawn}: what bends here "
+            "is a term of that axis, what scatters hangs on another axis or on the way there."
         ),
         *(draw(followed(one)) for one in found),
     )
 
 
+def unknown_of(diagnosis: Diagnosis) -> tuple[UnknownFunction, ...]:
+    """Errors that no effect explains and that follow something, in the noise that is told."""
+    window = diagnosis.found.posterior
+    return () if window is None else unknown_functions(window, diagnosis.found.noise)
+
+
 def followed(found: UnknownFunction) -> Figure:
-    """Error of each axis of a triad against the force along each body axis, a panel each."""
+    """Error of each axis of a triad against each component of what it follows, a panel each."""
     name, unit = _NAMES[found.triad]
-    rest = ~found.turning
-    figure = Figure(rows=3, cols=3, share_x=True, share_y=True, gap_x=0.03, gap_y=0.05)
+    title, factor, _ = _FOLLOWED[found.follows]
+    at = found.turning if found.follows == RATE else ~found.turning
+    columns = found.variable.shape[1]
+    figure = Figure(rows=3, cols=columns, share_x=True, share_y=True, gap_x=0.03, gap_y=0.05)
     for row in range(3):
-        value = from_si(1.0, unit) * found.mean[rest, row]
-        band = 1.96 * from_si(1.0, unit) * found.sigma[rest, row]
-        for col in range(3):
+        value = from_si(1.0, unit) * found.mean[at, row]
+        band = 1.96 * from_si(1.0, unit) * found.sigma[at, row]
+        for col in range(columns):
             figure.add(
                 "scatter",
-                x=found.force[rest, col],
+                x=factor * found.variable[at, col],
                 y=value,
                 mode="markers",
                 showlegend=False,
@@ -51,6 +67,6 @@ def followed(found: UnknownFunction) -> Figure:
                 col=col + 1,
             )
             if row == 2:
-                figure.x_axes(title=f"force along {_AXES[col]} (g)", row=3, col=col + 1)
+                figure.x_axes(title=title.format(_AXES[col]), row=3, col=col + 1)
         figure.y_axes(title=f"{_AXES[row]} ({unit})", row=row + 1, col=1)
     return lay_out(figure, 620, title=name, margin={"l": 70, "r": 20, "t": 50, "b": 55})

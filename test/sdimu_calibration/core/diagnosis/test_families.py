@@ -38,3 +38,14 @@ def test_a_triad_that_turns_is_told_as_one_effect_on_two_axes(bench):
     found = bench.diagnosis(7, TURNED)
     assert {c.label for c in found.chosen} == {"accel_triad_ramp_x", "accel_triad_ramp_y"}
     assert found.sentence.startswith("One effect is missing on 2 axes (the least sure of them > 99 %): turn of the ")
+
+
+def test_a_delay_of_a_gyro_and_its_sensitivity_to_angular_acceleration_are_one_find(bench):
+    """``w(t - tau) = w - tau dw/dt``: no data tell them apart, so one of them is told, and the other as what it may be."""
+    found = bench.diagnosis(3, ("gyro_delay_x=0.15 ms",), "recommended")
+    names = {"gyro_delay_x", "gyro_acceleration_sensitivity_xx"}
+    (told,) = [c for c in found.chosen if c.coefficient in names]
+    probability, shares = found.may_be(int(found.found.chosen[list(found.chosen).index(told)]))
+    assert probability > 0.95
+    assert names <= {share.name for share in shares}
+    assert sum(share.probability for share in shares if share.name in names) <= 1.0 + 1e-9

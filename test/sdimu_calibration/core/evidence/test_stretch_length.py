@@ -24,7 +24,7 @@ class Ideal:
     def __init__(self) -> None:
         self.times = Timetable(1200.0, tuple((k, 120.0 * k, 120.0 * k + 120.0) for k in range(10)), ())
 
-    def mean_force(self, _cut):
+    def conditions(self, _cut):
         return None
 
     def constant_signature(self, cut):

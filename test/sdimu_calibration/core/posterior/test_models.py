@@ -9,7 +9,7 @@ import pytest
 from scipy.stats import multivariate_normal
 
 from sdimu_calibration.core.posterior.models import Data
-from sdimu_calibration.core.posterior.prior import KIN, MEAN_NUMBER, MOST_DRIFTS, WIDTH_SHARES, WIDTHS, Prior
+from sdimu_calibration.core.posterior.prior import KIN, MEAN_NUMBER, MOST_DRIFTS, WIDTH_SHARES, WIDTHS, Prior, twins
 from sdimu_calibration.core.posterior.search import WINDOW, climb, window
 
 ROWS = 40
@@ -26,6 +26,7 @@ def prior(q: int, **changes) -> Prior:
         "positive": np.zeros(q, dtype=bool),
         "own": np.zeros(q, dtype=bool),
         "drift": np.full(q, -1),
+        "twin": np.arange(q),
     }
     return Prior(**(kept | changes))
 
@@ -187,3 +188,20 @@ def test_probabilities_come_true_where_the_world_is_as_the_prior_says():
         assert inside.sum() > 30
         spread = np.sqrt(np.sum(p[inside] * (1.0 - p[inside]))) / inside.sum()
         assert abs(right[inside].mean() - p[inside].mean()) < 3.0 * spread + 0.02
+
+
+def test_what_no_data_tell_apart_is_in_a_model_once():
+    rng = np.random.default_rng(2)
+    W = drawn(6, rng)
+    W[:, 4] = -3.0 * W[:, 1]
+    number = twins(W.T @ W)
+    assert number[4] == number[1]
+    assert len(set(number.tolist())) == 5
+    known = prior(6, twin=number)
+    data = data_of(W, 6.0 * W[:, 1] / np.linalg.norm(W[:, 1]) + rng.standard_normal(ROWS), known)
+    found = {m for _, m in window([data], [0.0], [climb(data, ())[1]])}
+    held = [{k for k, _ in m} for m in found]
+    assert any(1 in have for have in held)
+    assert any(4 in have for have in held)
+    assert not any({1, 4} <= have for have in held)
+    assert known.apart((), np.arange(6))[1, 4]

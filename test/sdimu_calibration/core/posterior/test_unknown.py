@@ -9,25 +9,31 @@ import pytest
 
 from sdimu_calibration.core.diagnosis.ground import Request, fresh_ground
 from sdimu_calibration.core.diagnosis.search import FALSE_ALARM, search
-from sdimu_calibration.core.noise_term import ATTITUDE
+from sdimu_calibration.core.noise_term import ATTITUDE, RATE
 from sdimu_calibration.core.posterior.unknown import unknown_functions
 
 UG = 9.80665e-6
+DEG_H = float(np.radians(1.0)) / 3600.0
 
 
 @pytest.fixture(scope="module")
 def drawn(bench):
-    """White noise, and a smooth function of the attitude in each accelerometer of 15 ug, on the signatures of a fit."""
+    """A smooth function of the attitude in each accelerometer of 15 ug."""
+    return with_function(bench, ATTITUDE, slice(3, 6), 15.0 * UG)
+
+
+def with_function(bench, kind, axes, size):
+    """White noise and a smooth function of what a kind follows in each sensor of a triad, on signatures of a fit."""
     fit = bench.fit(5, (), "recommended")
     ground = fresh_ground(Request(fit, (), FALSE_ALARM), fit, (), False)
     evidence, wander, rng = ground.evidence, fit.wander, np.random.default_rng(1)
-    root = wander.cut.mode(ATTITUDE, 0.0)
+    root = wander.cut.mode(kind, 0.0)
     error = np.zeros((len(wander.cut), 6))
-    error[:, 3:] = 15.0 * UG * root @ rng.standard_normal((root.shape[1], 3))
+    error[:, axes] = size * root @ rng.standard_normal((root.shape[1], 3))
     e = rng.standard_normal(len(evidence.e)) + wander.U @ error.ravel()
     known = replace(evidence.information, d=evidence.W.T @ e)
     seen = replace(evidence, e=e, shift=np.zeros(len(evidence.shift)), worked_out=known)
-    return search(seen, ground.allowed, wander), error[:, 3:], wander.cut
+    return search(seen, ground.allowed, wander), error[:, axes], wander.cut
 
 
 def test_it_is_told_as_noise_that_follows_the_attitude_and_not_as_effects(drawn):
@@ -38,11 +44,12 @@ def test_it_is_told_as_noise_that_follows_the_attitude_and_not_as_effects(drawn)
 
 
 def test_the_function_that_is_drawn_is_the_hidden_one_within_its_band(drawn):
-    found, error, cut = drawn
+    found, error, _ = drawn
     (one,) = unknown_functions(found.posterior, found.noise)
     rest = ~one.turning
     # Bias, scale factor and misalignment take their share of a function.
-    columns = np.column_stack([np.ones(rest.sum()), cut.force[rest]])
+    assert one.follows == ATTITUDE
+    columns = np.column_stack([np.ones(rest.sum()), one.variable[rest]])
     for axis in range(3):
         told, hidden = (
             v - columns @ np.linalg.lstsq(columns, v, rcond=None)[0] for v in (one.mean[rest, axis], error[rest, axis])
@@ -55,3 +62,16 @@ def test_the_function_that_is_drawn_is_the_hidden_one_within_its_band(drawn):
 def test_white_noise_has_none(bench):
     clean = bench.diagnosis()
     assert unknown_functions(clean.found.posterior, clean.found.noise) == ()
+
+
+def test_an_error_in_turns_that_is_a_function_of_the_rate_is_told_and_drawn_against_the_rate(bench):
+    found, error, cut = with_function(bench, RATE, slice(0, 3), DEG_H)
+    assert ("gyro", RATE) in {(term.triad, term.kind) for term in found.noise}
+    one = next(one for one in unknown_functions(found.posterior, found.noise) if one.follows == RATE)
+    np.testing.assert_array_equal(one.variable, cut.conditions.rate)
+    turns = cut.turning
+    np.testing.assert_allclose(one.mean[~turns], 0.0, atol=1e-3 * DEG_H)
+    # Scale factor and misalignment take their share of a function.
+    columns = np.column_stack([np.ones(turns.sum()), one.variable[turns]])
+    told, hidden = (v - columns @ np.linalg.lstsq(columns, v, rcond=None)[0] for v in (one.mean[turns], error[turns]))
+    assert np.corrcoef(told.ravel(), hidden.ravel())[0, 1] > 0.9

@@ -255,7 +255,6 @@ def _misfits(d: Diagnosis, problem: Problem[LinearEvidence], chosen: list[int]) 
     for k in range(len(chosen) + 1):
         known, weight, _ = problem.known(chosen[:k])
         if len(d.free):
-            weight = np.concatenate([problem.evidence.weight, np.zeros(k)])
             left = free_input_test(d.evidence.information, known, weight, d.free)
             out.append(max(left.chi2 - left.dof, 0.0))
         else:

@@ -18,6 +18,7 @@ import numpy as np
 from sdimu_calibration.core.arrays import Ints
 from sdimu_calibration.core.diagnosis.free_input_test import FreeInputTest, free_input_test
 from sdimu_calibration.core.diagnosis.ground import Ground, Request, extended, fresh_ground, next_ground
+from sdimu_calibration.core.diagnosis.problem import Problem
 from sdimu_calibration.core.diagnosis.search import Search, search, with_steps
 from sdimu_calibration.core.estimation.fit import Fit
 from sdimu_calibration.core.estimation.noise_learning import in_noise
@@ -187,6 +188,6 @@ def left(evidence: LinearEvidence, chosen: Ints, free: Ints) -> FreeInputTest:
     free : ndarray of int, shape (f,)
         Columns of the free inputs.
     """
-    known = np.concatenate([evidence.model, chosen]).astype(np.int64)
-    weight = np.concatenate([evidence.weight, np.zeros(len(chosen))])
+    # With their priors: what was chosen may have a combination that the data do not see.
+    known, weight, _ = Problem(evidence).known(chosen.tolist())
     return free_input_test(evidence.information, known, weight, free)

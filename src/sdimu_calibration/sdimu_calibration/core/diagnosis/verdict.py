@@ -17,7 +17,7 @@ from sdimu_calibration.core.evidence.candidate import Candidate
 from sdimu_calibration.core.evidence.consistency import SLOW_S, Consistency
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.handheld.handheld_fit import FORCE, RATE, TURN
-from sdimu_calibration.core.noise_term import ATTITUDE
+from sdimu_calibration.core.noise_term import FOLLOWS
 from sdimu_calibration.core.posterior.posterior import PROBABLE
 from sdimu_calibration.core.probability import in_percent
 from sdimu_calibration.core.units import from_si
@@ -168,7 +168,7 @@ def _unexplained(d: Diagnosis, names: str) -> str:
         left = beyond(d.rungs[-1].scatter)
         return f"Something stands out of the scatter{most}; beyond white noise: {left}."
     drawn = [term_in_words(term) for term in d.found.noise]
-    if any(term.kind == ATTITUDE for term in d.found.noise):
+    if any(term.kind in FOLLOWS for term in d.found.noise):
         begun = (
             f"Found, but not all: {names}. What is left is the" if names else "No effect of the catalogue explains the"
         )

@@ -141,7 +141,7 @@ class Wander:
     def of(cls, evidence: LinearEvidence, share: float = 1.0) -> Wander:
         """Work out the signatures for the test of an evidence, in stretches of this share of the usual length."""
         cut = stretches(evidence.times, share)
-        cut = replace(cut, force=evidence.mean_force(cut))
+        cut = replace(cut, conditions=evidence.conditions(cut))
         return cls(cut, evidence.constant_signature(cut))
 
     def modes(self, terms: Sequence[NoiseTerm]) -> Modes:

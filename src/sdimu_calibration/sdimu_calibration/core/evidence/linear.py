@@ -18,6 +18,7 @@ from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.effects.effect import Effect, Timetable
 from sdimu_calibration.core.effects.imu_model import prior_size
 from sdimu_calibration.core.evidence.candidate import Candidate, split
+from sdimu_calibration.core.evidence.conditions import Conditions
 from sdimu_calibration.core.evidence.information import Information
 from sdimu_calibration.core.evidence.noise_kernels import Stretches, stretch_effects
 from sdimu_calibration.core.specification import ImuSpecification
@@ -96,19 +97,8 @@ class LinearEvidence(ABC):
             Change of each whitened residual per SI unit of each parameter, effect by effect.
         """
 
-    def mean_force(self, cut: Stretches) -> Floats | None:
-        """Mean direction of the specific force in each stretch; None where nobody knows it.
-
-        Parameters
-        ----------
-        cut : Stretches
-            s stretches.
-
-        Returns
-        -------
-        ndarray, shape (s, 3), or None
-            In b, of unit length where the IMU stands (1).
-        """
+    def conditions(self, cut: Stretches) -> Conditions | None:
+        """Give what an unknown error may follow in each stretch; None where nobody knows it."""
         del cut
         return None
 

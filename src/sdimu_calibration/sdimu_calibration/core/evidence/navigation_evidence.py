@@ -19,6 +19,7 @@ from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.effects import earth_rate
 from sdimu_calibration.core.effects.effect import Effect, Timetable
 from sdimu_calibration.core.effects.motion import Motion
+from sdimu_calibration.core.evidence.conditions import Conditions, conditions
 from sdimu_calibration.core.evidence.linear import LinearEvidence, candidate_priors
 from sdimu_calibration.core.evidence.noise_kernels import Stretches
 from sdimu_calibration.core.evidence.signatures import (
@@ -124,28 +125,9 @@ class NavigationEvidence(LinearEvidence):
         """
         return constant_columns(self.prepared, self.known, self.latitude, cut)
 
-    def mean_force(self, cut: Stretches) -> Floats:
-        """Mean direction of the specific force in each stretch.
-
-        Parameters
-        ----------
-        cut : Stretches
-            s stretches.
-
-        Returns
-        -------
-        ndarray, shape (s, 3)
-            In b, of unit length where the IMU stands (1).
-        """
-        seen = self.seen
-        direction = seen.f / np.linalg.norm(seen.f, axis=1)[:, None]
-        middle = seen.t - 0.5 * seen.dt
-        out = np.zeros((len(cut), 3))
-        for k, (begin, end) in enumerate(zip(cut.start.tolist(), cut.end.tolist(), strict=True)):
-            first, last = np.searchsorted(middle, (begin, end))
-            # A stretch shorter than a cycle has that of the cycle it lies in.
-            out[k] = direction[min(first, len(direction) - 1) : max(last, first + 1)].mean(axis=0)
-        return out
+    def conditions(self, cut: Stretches) -> Conditions:
+        """Give what an unknown error may follow in each stretch."""
+        return conditions(self.seen, cut.start, cut.end)
 
 
 def timetable(prepared: PreparedData) -> Timetable:

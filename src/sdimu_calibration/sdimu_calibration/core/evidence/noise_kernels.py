@@ -16,7 +16,8 @@ import numpy as np
 from sdimu_calibration.core.arrays import Bools, Floats, Ints
 from sdimu_calibration.core.effects.effect import CHANNELS, Effect, Parameter, Term, Timetable
 from sdimu_calibration.core.effects.motion import Motion
-from sdimu_calibration.core.noise_term import ATTITUDE, FLICKER, MARKOV, RANDOM_WALK, SHIFT, TURN
+from sdimu_calibration.core.evidence.conditions import Conditions
+from sdimu_calibration.core.noise_term import FLICKER, FOLLOWS, MARKOV, RANDOM_WALK, SHIFT, TURN
 
 _LONGEST_S = 30.0
 """Longest stretch (s): flicker of data-sheet size moves within it by less than a tenth of the variance of white noise
@@ -28,9 +29,6 @@ _KEPT = 1e-9
 random walk and flicker smoother than they are, and Gauss-Markov noise is named in their place."""
 _RATIO = 4.0
 """Ratio of neighbouring time constants of flicker noise: the density then ripples by 2 %."""
-_SMOOTH = 0.3
-"""Distance of two directions of force (1) over which an unknown function of them changes: 17 deg, less than what lies
-between two attitudes of a plan."""
 _SHORTEST_TAU_S = 2.0
 """Shortest time constant of flicker noise (s): below it white noise hides it."""
 
@@ -46,15 +44,15 @@ class Stretches:
     interval : ndarray of int, shape (n,)
         Number of the dwell or turn that a stretch is part of.
     turning : ndarray of bool, shape (n,)
-    force : ndarray, shape (n, 3), or None
-        Mean direction of the specific force, in b; None where nobody knows it, or it is one.
+    conditions : Conditions or None
+        What an unknown error may follow; None where nobody knows it.
     """
 
     start: Floats
     end: Floats
     interval: Ints
     turning: Bools
-    force: Floats | None = None
+    conditions: Conditions | None = None
     _modes: dict[tuple[str, float], Floats] = field(default_factory=dict, repr=False, compare=False)
 
     def __len__(self) -> int:
@@ -159,22 +157,12 @@ def kernel(kind: str, tau: float, cut: Stretches) -> Floats:
         passed = np.cumsum(np.concatenate([[0.0], (cut.turning[1:] & ~cut.turning[:-1]).astype(float)]))
         passed = passed - 0.5 * cut.turning
         return np.asarray(np.minimum.outer(passed, passed))
-    if kind == ATTITUDE:
-        return _attitude(cut)
+    if kind in FOLLOWS:
+        # Where nobody knows what it follows, that is one in all stretches.
+        return np.ones((len(cut), len(cut))) if cut.conditions is None else cut.conditions.kernel(kind)
     of_kind = cut.turning if kind == TURN else ~cut.turning
     same = cut.interval[:, None] == cut.interval[None, :]
     return np.asarray((same & of_kind[:, None]).astype(np.float64))
-
-
-def _attitude(cut: Stretches) -> Floats:
-    """Covariance (n, n) of an unknown smooth function of the direction of the force, of unit variance.
-
-    Where nobody knows the force, the stretches are those of one attitude.
-    """
-    if cut.force is None:
-        return np.ones((len(cut), len(cut)))
-    apart = np.sum((cut.force[:, None, :] - cut.force[None, :, :]) ** 2, axis=2)
-    return np.asarray(np.exp(-0.5 * apart / _SMOOTH**2))
 
 
 def _walk(start: Floats, end: Floats) -> Floats:

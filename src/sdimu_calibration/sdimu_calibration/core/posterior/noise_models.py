@@ -23,9 +23,9 @@ from sdimu_calibration.core.evidence.learned_noise import (
 )
 from sdimu_calibration.core.evidence.noise_kernels import Stretches
 from sdimu_calibration.core.noise_term import (
-    ATTITUDE,
     DRAWN,
     FLICKER,
+    FOLLOWS,
     MARKOV,
     RANDOM_WALK,
     SHIFT,
@@ -45,7 +45,7 @@ ODDS: Mapping[str, float] = {
     STOP: 0.1,
     TURN: 0.1,
     SHIFT: 0.15,
-    ATTITUDE: 0.02,
+    **dict.fromkeys(FOLLOWS, 0.02),
 }
 """Odds of each kind of noise in a triad beside none (1): every sensor has bias instability and a rate random walk of
 some size, IEEE Std 952; what is drawn anew at stops or turns has a cause that nobody knows."""
@@ -65,7 +65,7 @@ SHARE: Mapping[str, float] = {
     STOP: 0.664,
     TURN: 0.664,
     SHIFT: 0.3,
-    ATTITUDE: 3.0,
+    **dict.fromkeys(FOLLOWS, 3.0),
 }
 """Usual size of each kind over the bias instability (SI): a random walk has the Allan deviation of it at 1000 s."""
 _NEAR = 6.0
@@ -171,7 +171,8 @@ class _Search:
         self, information: NoiseInformation, cut: Stretches, usual: Sizes, tried: Sequence[NoiseTerm] | None
     ) -> None:
         self.information, self.cut, self.usual = information, cut, usual
-        every = [*kinds(cut), *(NoiseTerm(triad, ATTITUDE) for triad in TRIADS if cut.force is not None)]
+        follows = () if cut.conditions is None else cut.conditions.followed
+        every = [*kinds(cut), *(NoiseTerm(triad, kind) for triad in TRIADS for kind in follows)]
         self.tried = every if tried is None else list(tried)
         markov = sum(t.kind == MARKOV for t in every) // len(TRIADS)
         self.log_odds = {kind: float(np.log(odds / (markov if kind == MARKOV else 1))) for kind, odds in ODDS.items()}

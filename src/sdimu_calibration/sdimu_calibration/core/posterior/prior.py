@@ -37,6 +37,8 @@ WIDTH_SHARES = (0.74, 0.24, 0.02)
 """Probability (1) of each of `WIDTHS`: one part in fifty is broken, one in four is out of its class."""
 MOST_DRIFTS = 4
 """Number of drifts of one bias (1) that a model has at most: more of them follow any wander, and noise is that."""
+_TWINS = 1e-8
+"""Share (1) by which two signatures differ at most to be one: rounding; a difference of this size needs 5000 sigma."""
 UNKNOWN_SIZE = 30.0
 """Size of an effect in the sigma that the data give it (1), where physics gives none: 3 to 300 is looked
 for."""
@@ -62,6 +64,8 @@ class Prior:
         An equation that no physics names.
     drift : ndarray of int, shape (q,)
         Sensor axis whose bias a candidate lets drift, in all recordings or in one; -1 of all others.
+    twin : ndarray of int, shape (q,)
+        Candidates that no data of this plan tell apart share a number: a model has one of them.
     """
 
     log_share: Floats
@@ -71,6 +75,7 @@ class Prior:
     positive: Bools
     own: Bools
     drift: Ints
+    twin: Ints
 
     @cached_property
     def _bins(self) -> int:
@@ -93,11 +98,12 @@ class Prior:
         out = self.log_share + (np.log(len(base) + 1.0) - np.log1p(1.0 / MEAN_NUMBER))
         if len(base):
             at = np.asarray(base, dtype=np.int64)
-            present, taken = np.zeros(len(out)), np.zeros(len(out), dtype=bool)
+            present, taken, twin = np.zeros(len(out)), np.zeros(len(out), dtype=bool), np.zeros(len(out), dtype=bool)
             present[self.cause[at]] = KIN
             taken[self.parameter[at[~self.repeats[at]]]] = True
+            twin[self.twin[at]] = True
             out = out + present[self.cause]
-            out[taken[self.parameter]] = -np.inf
+            out[taken[self.parameter] | twin[self.twin]] = -np.inf
             drifts = np.bincount(self.drift[at] + 1, minlength=self._bins)[1:]
             if drifts.max(initial=0) >= MOST_DRIFTS:
                 out[np.isin(self.drift, np.flatnonzero(drifts >= MOST_DRIFTS))] = -np.inf
@@ -105,7 +111,7 @@ class Prior:
         return np.asarray(out)
 
     def apart(self, base: Sequence[int], use: Ints) -> Bools:
-        """Say which pairs no model may hold: variants of one parameter, more drifts of a bias than allowed.
+        """Say which pairs no model may hold: variants of one parameter, twins, more drifts of a bias than allowed.
 
         Parameters
         ----------
@@ -120,6 +126,7 @@ class Prior:
         """
         parameter, drift = self.parameter[use], self.drift[use]
         one = (parameter[:, None] == parameter[None, :]) & ~self.repeats[use][:, None]
+        one |= self.twin[use][:, None] == self.twin[use][None, :]
         counted = np.bincount(self.drift[np.asarray(base, dtype=np.int64)] + 1, minlength=self._bins)
         full = counted[drift + 1] == MOST_DRIFTS - 1
         return np.asarray(one | (full & (drift >= 0))[:, None] & (drift[:, None] == drift[None, :]))
@@ -132,7 +139,7 @@ class Prior:
         return total
 
 
-def prior_of(candidates: Sequence[Candidate], shared: Sequence[int] = ()) -> Prior:
+def prior_of(candidates: Sequence[Candidate], shared: Sequence[int] = (), J: Floats | None = None) -> Prior:
     """State the prior of candidates.
 
     Parameters
@@ -141,6 +148,8 @@ def prior_of(candidates: Sequence[Candidate], shared: Sequence[int] = ()) -> Pri
     shared : sequence of int
         Places of candidates that were made from another one between those of a scan: they have its odds, and do not
         lower those of the others.
+    J : ndarray, shape (q, q), optional
+        Information on the candidates, the coefficients taken out, in any units: tells which are twins.
     """
     names = [c.coefficient for c in candidates]
     made = set(shared)
@@ -157,7 +166,28 @@ def prior_of(candidates: Sequence[Candidate], shared: Sequence[int] = ()) -> Pri
         np.array([c.effect.positive for c in candidates], dtype=bool),
         np.array([c.family == "own" for c in candidates], dtype=bool),
         np.where([c.effect.bias_drift for c in candidates], axes, -1).astype(np.int64),
+        np.arange(len(names)) if J is None else twins(J),
     )
+
+
+def twins(J: Floats) -> Ints:
+    """Give candidates of one signature the same number.
+
+    A delay of a gyro and its sensitivity to angular acceleration are one: ``w(t - tau) = w - tau dw/dt``.
+
+    Parameters
+    ----------
+    J : ndarray, shape (q, q)
+        Information on the candidates, the coefficients taken out, in any units.
+
+    Returns
+    -------
+    ndarray of int, shape (q,)
+        The first of each group.
+    """
+    size = np.sqrt(np.maximum(np.diag(J), 1e-300))
+    same = np.abs(J) > (1.0 - _TWINS) * np.outer(size, size)
+    return np.asarray(np.argmax(same, axis=1))
 
 
 def _odds(candidate: Candidate) -> float:

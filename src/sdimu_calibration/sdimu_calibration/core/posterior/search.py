@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import heapq
 from collections.abc import Sequence
+from math import exp
 
 import numpy as np
 
@@ -21,6 +22,9 @@ WINDOW = 7.0
 MOST_EXPANDED = 300
 """Number of models of a window whose neighbours are looked at, the likeliest first: beyond, a class of ten effects
 with three members each gives the same shares."""
+_EXPANDED = 0.999
+"""Share of the probability of all models found (1) whose neighbours are looked at: those of the rest
+weigh less still."""
 MOST_EFFECTS = 40
 """Number of effects of a model at most: more than any sensor that is worth a calibration has."""
 _LEAST_GAIN = 1e-6
@@ -111,15 +115,19 @@ def window(
     waiting = [(-score, key) for key, score in found.items()]
     heapq.heapify(waiting)
     best, expanded = max(found.values()), 0
-    while waiting and expanded < MOST_EXPANDED:
+    first, done = best, 0.0
+    total = sum(exp(score - first) for score in found.values())
+    while waiting and expanded < MOST_EXPANDED and done < _EXPANDED * total:
         score, (number, members) = heapq.heappop(waiting)
         if -score < best - WINDOW:
             break
         expanded += 1
+        done += exp(-score - first)
         for other, near in data[number].at(members).neighbours(best - WINDOW - offset[number]):
             key = (number, near)
             if key not in found:
                 found[key] = offset[number] + other
+                total += exp(found[key] - first)
                 heapq.heappush(waiting, (-found[key], key))
                 best = max(best, found[key])
     return {key: score for key, score in found.items() if score > best - WINDOW}

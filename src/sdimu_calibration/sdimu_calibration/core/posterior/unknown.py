@@ -1,4 +1,4 @@
-"""What an error that follows the attitude looks like: its posterior mean in each stretch, with its band."""
+"""What an error looks like that follows attitude, rate or temperature: its mean in each stretch, with its band."""
 
 from __future__ import annotations
 
@@ -10,34 +10,37 @@ import numpy as np
 from sdimu_calibration.core.arrays import Bools, Floats
 from sdimu_calibration.core.evidence.information import solved
 from sdimu_calibration.core.evidence.linear import E
-from sdimu_calibration.core.noise_term import ATTITUDE, TRIADS, NoiseTerm
+from sdimu_calibration.core.noise_term import FOLLOWS, TRIADS, NoiseTerm
 from sdimu_calibration.core.posterior.noise_models import NoiseModel
 from sdimu_calibration.core.posterior.posterior import Posterior
 
 
 @dataclass(frozen=True)
 class UnknownFunction:
-    """Error of the three sensors of a triad that follows the attitude, in n stretches.
+    """Error of the three sensors of a triad as a function of what it follows, in n stretches.
 
     Attributes
     ----------
     triad : str
-    force : ndarray, shape (n, 3)
-        Mean direction of the specific force, in b (1).
+    follows : str
+        One of `FOLLOWS`.
+    variable : ndarray, shape (n, k)
+        What it follows: mean direction of the specific force in b (1), body rate (rad/s), or temperature (K).
     turning : ndarray of bool, shape (n,)
     mean, sigma : ndarray, shape (n, 3)
         Error of each axis and its sigma (SI); about its mean over the dwells, which is a bias.
     """
 
     triad: str
-    force: Floats
+    follows: str
+    variable: Floats
     turning: Bools
     mean: Floats
     sigma: Floats
 
 
 def unknown_functions(found: Posterior[E], terms: Sequence[NoiseTerm]) -> tuple[UnknownFunction, ...]:
-    """Estimate each error that follows the attitude among the terms of a noise, beside what is told.
+    """Estimate each unknown function among the terms of a noise, beside what is told.
 
     Parameters
     ----------
@@ -47,8 +50,8 @@ def unknown_functions(found: Posterior[E], terms: Sequence[NoiseTerm]) -> tuple[
     """
     board = found.board
     wander = board.wander
-    force = None if wander is None else wander.cut.force
-    if wander is None or force is None or not any(t.kind == ATTITUDE for t in terms):
+    known = None if wander is None else wander.cut.conditions
+    if wander is None or known is None or not any(t.kind in FOLLOWS for t in terms):
         return ()
     cut, one = wander.cut, board.in_noise(NoiseModel(tuple(terms)))
     p = len(board.evidence.weight)
@@ -62,12 +65,13 @@ def unknown_functions(found: Posterior[E], terms: Sequence[NoiseTerm]) -> tuple[
     share = share / share.sum()
     out = []
     for term, columns in zip(terms, _columns(terms, [cut.mode(t.kind, t.tau).shape[1] for t in terms]), strict=True):
-        if term.kind != ATTITUDE:
+        if term.kind not in FOLLOWS:
             continue
         R = one.R[:, columns].reshape(len(cut), 6, -1)[:, 3 * TRIADS.index(term.triad) :][:, :3]
         R = R - np.einsum("s,scr->cr", share, R)[None]
         variance = np.einsum("scr,rq,scq->sc", R, spread[np.ix_(columns, columns)], R)
-        out.append(UnknownFunction(term.triad, force, cut.turning, R @ mode[columns], np.sqrt(variance)))
+        x, mean = known.variable(term.kind), R @ mode[columns]
+        out.append(UnknownFunction(term.triad, term.kind, x, cut.turning, mean, np.sqrt(variance)))
     return tuple(out)
 
 
