@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from sdimu_calibration.core.adaptive import Goals
-from sdimu_calibration.core.diagnosis.scan import INDISTINGUISHABLE
+from sdimu_calibration.core.evidence.testable import INDISTINGUISHABLE
 from sdimu_calibration.report.design.palette import LIGHT, palette
 from sdimu_sim.core.truth import ImuTruth
 from sdimu_study.adaptive import limit_errors

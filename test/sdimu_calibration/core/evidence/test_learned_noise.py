@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 
 from sdimu_calibration.core.effects.effect import Timetable
+from sdimu_calibration.core.evidence.conditions import Conditions
 from sdimu_calibration.core.evidence.learned_noise import NoiseInformation, Wander, learn, likelihood
 from sdimu_calibration.core.evidence.noise_kernels import kernel, stretches
-from sdimu_calibration.core.noise_term import ATTITUDE, KINDS, MARKOV, TRIADS, NoiseTerm
+from sdimu_calibration.core.noise_term import ATTITUDE, FOLLOWS, KINDS, MARKOV, RATE, TEMPERATURE, TRIADS, NoiseTerm
 
 STOPS = 12
-WANDERING = [k for k in KINDS if k != ATTITUDE]
-"""Kinds that `learn` tries; an error that follows the attitude is weighed by the posterior alone."""
+WANDERING = [k for k in KINDS if k not in FOLLOWS]
+"""Kinds that `learn` tries; an error that follows something is weighed by the posterior alone."""
 
 
 @pytest.fixture(scope="module")
@@ -69,13 +70,35 @@ def test_an_error_that_follows_the_attitude_is_one_where_the_force_points_the_sa
     """Two stretches 17 deg apart share exp(-1/2) of the variance, opposite ones nothing, at any time between them."""
     tilt = np.where(cut.interval % 4 == 0, 0.0, np.where(cut.interval % 4 == 2, 2.0 * np.arcsin(0.15), np.pi))
     force = np.column_stack([np.sin(tilt), np.zeros(len(cut)), np.cos(tilt)])
-    K = kernel(ATTITUDE, 0.0, replace(cut, force=force))
+    seen = Conditions(force, np.zeros_like(force), np.zeros(len(cut)))
+    K = kernel(ATTITUDE, 0.0, replace(cut, conditions=seen))
     apart = np.abs(np.subtract.outer(tilt, tilt))
     same, near = apart < 1e-9, np.isclose(apart, 2.0 * np.arcsin(0.15))
     np.testing.assert_allclose(K[same], 1.0)
     np.testing.assert_allclose(K[near], np.exp(-0.5))
     assert K[~same & ~near].max() < 1e-8
     np.testing.assert_array_equal(kernel(ATTITUDE, 0.0, cut), 1.0)
+
+
+def test_an_error_that_follows_the_rate_is_zero_at_rest_and_one_in_turns_of_the_same_rate(cut):
+    rate = np.where(cut.turning, np.where(cut.interval % 4 == 1, 0.1, -0.1), 0.0)[:, None] * np.array([0.0, 0.0, 1.0])
+    K = kernel(RATE, 0.0, replace(cut, conditions=Conditions(np.ones_like(rate), rate, np.zeros(len(cut)))))
+    assert not K[~cut.turning].any()
+    same = np.equal.outer(rate[:, 2], rate[:, 2]) & np.logical_and.outer(cut.turning, cut.turning)
+    np.testing.assert_allclose(K[same], 1.0, atol=1e-4)
+    other = np.less.outer(rate[:, 2], rate[:, 2]) & np.logical_and.outer(cut.turning, cut.turning)
+    np.testing.assert_allclose(K[other], 0.0, atol=1e-4)
+
+
+def test_an_error_follows_a_temperature_that_changes(cut):
+    heat = np.linspace(20.0, 30.0, len(cut))
+    seen = Conditions(np.ones((len(cut), 3)), np.zeros((len(cut), 3)), heat)
+    assert seen.followed == (ATTITUDE, TEMPERATURE)
+    assert replace(seen, temperature=np.full(len(cut), 20.0)).followed == (ATTITUDE,)
+    K = kernel(TEMPERATURE, 0.0, replace(cut, conditions=seen))
+    # Over a quarter of the span it falls to exp(-1/2).
+    apart = np.subtract.outer(heat, heat)
+    np.testing.assert_allclose(K, np.exp(-0.5 * (apart / 2.5) ** 2))
 
 
 def test_flicker_has_the_allan_deviation_of_its_name():

@@ -13,12 +13,12 @@ from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.diagnosis.found import looked_at
 from sdimu_calibration.core.diagnosis.problem import Problem, look_alikes
-from sdimu_calibration.core.diagnosis.scan import INDISTINGUISHABLE
 from sdimu_calibration.core.effects import body_frame
 from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.estimation.fit import Fit
 from sdimu_calibration.core.estimation.navigation_fit import NavigationFit
 from sdimu_calibration.core.evidence.candidate import Candidate
+from sdimu_calibration.core.evidence.testable import INDISTINGUISHABLE
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.verdict import Verdict
 from sdimu_calibration.core.wording import Option

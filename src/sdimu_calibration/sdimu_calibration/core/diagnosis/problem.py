@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cached_property
 from typing import Generic
 
 import numpy as np
@@ -13,16 +12,12 @@ from sdimu_calibration.core.diagnosis.scan import Scan, alike, scan, threshold
 from sdimu_calibration.core.evidence.candidate import Candidate
 from sdimu_calibration.core.evidence.held_out import HeldOut, predict
 from sdimu_calibration.core.evidence.linear import E
+from sdimu_calibration.core.posterior.models import gains
+from sdimu_calibration.core.posterior.prior import UNKNOWN_SIZE
 
-WIDE = 3.0
-"""Factor on the physical prior of a candidate: a sensor may be out of its class."""
 _PROVEN = 30.0
 """Factor on the physical prior of a chosen effect: its size is the data's to say, and what a prior holds back of it
 looks like companions."""
-_OWN_ODDS = 6.0
-"""Log odds (1) that a registered effect has before an equation: physics says nothing of the equation."""
-_KIN = 2.0
-"""Log odds (1) of an effect that acts on one axis as one that was found acts on another: they have one cause."""
 
 
 class Problem(Generic[E]):
@@ -69,65 +64,26 @@ class Problem(Generic[E]):
         tested = np.flatnonzero(np.isfinite(scanned.sigma))
         return threshold(self.evidence.information, self.evidence.model, self.evidence.weight, tested, alpha)
 
-    @cached_property
-    def kin(self) -> Ints:
-        """Cause of each candidate: candidates of one effect, with the same time constant or the like, share a number.
-
-        Returns
-        -------
-        ndarray of int, shape (q,)
-        """
-        known: dict[tuple[str, ...], int] = {}
-        keys = [(c.family, *c.effect.options.values()) for c in self.evidence.candidates]
-        return np.array([known.setdefault(key, len(known)) for key in keys], dtype=np.int64)
-
-    def log_odds(self, beside: Sequence[int]) -> Floats:
-        """Log odds of each candidate before the data: of registered effects, and of kin of what was chosen.
-
-        Parameters
-        ----------
-        beside : sequence of int
-            Columns that were chosen.
-
-        Returns
-        -------
-        ndarray, shape (q,)
-            Log (1).
-        """
-        own = np.array([c.family == "own" for c in self.evidence.candidates], dtype=bool)
-        kin = np.isin(self.kin, self.kin[np.array(beside, dtype=int) - self.p]) & ~own
-        return np.asarray(_KIN * kin - _OWN_ODDS * own)
-
-    def scores(self, scanned: Scan, beside: Sequence[int] = (), ratio: float = WIDE) -> Floats:
-        """Log posterior odds of every column against the model without it.
-
-        The Bayes factor of an effect of size N(0, s^2), with information J on it and information vector d, is
-        ``d^2 / (2 (J + s^-2)) - log(1 + J s^2) / 2``. To it come the odds of `log_odds`.
+    def scores(self, scanned: Scan) -> Floats:
+        """Log Bayes factor of every column against the model without it, by the prior of the posterior.
 
         Parameters
         ----------
         scanned : Scan
             Of p + q columns.
-        beside : sequence of int
-            Columns that were chosen: their kin have better odds.
-        ratio : float
-            s over the one-sigma size that physics gives the effect.
 
         Returns
         -------
         ndarray, shape (p + q,)
-            Log odds (1); -inf for the model's columns, for what is not testable, and for a size of the wrong sign.
+            Log (1); -inf for the model's columns, for what is not testable, and for a size of the wrong sign.
         """
-        p = self.p
-        J, d = scanned.J[p:], scanned.d[p:]
-        wide = 1.0 / (ratio * self.evidence.prior) ** 2
-        with np.errstate(divide="ignore", invalid="ignore"):
-            occam = np.where(wide > 0.0, 0.5 * np.log1p(J / wide), 0.0)
-            score = 0.5 * d**2 / (J + wide) - occam
-        score = score + self.log_odds(beside)
-        wrong = (d < 0.0) & np.array([c.effect.positive for c in self.evidence.candidates], dtype=bool)
-        score = np.where(wrong, -np.inf, score)
-        return np.concatenate([np.full(p, -np.inf), np.where(np.isfinite(scanned.sigma[p:]), score, -np.inf)])
+        evidence, p = self.evidence, self.p
+        own = np.diag(evidence.information.J)[p:]
+        size = np.where(np.isfinite(evidence.prior), evidence.prior, UNKNOWN_SIZE / np.sqrt(np.maximum(own, 1e-300)))
+        positive = np.array([c.effect.positive for c in evidence.candidates], dtype=bool)
+        by_width = gains(np.maximum(scanned.J[p:], 0.0) * size**2, scanned.d[p:] * size, positive)
+        score = np.where(np.isfinite(scanned.sigma[p:]), np.logaddexp.reduce(by_width, axis=1), -np.inf)
+        return np.concatenate([np.full(p, -np.inf), score])
 
     def held_out(self, chosen: Sequence[int]) -> HeldOut:
         """Predict each stop from the others with the chosen columns in the model."""
@@ -154,7 +110,6 @@ def look_alikes(problem: Problem[E], chosen: Sequence[int], column: int, allowed
         Columns, the highest score first.
     """
     others = [c for c in chosen if c != column]
-    # What else was found says which is the likelier cause, not what the data tell apart.
     scores = problem.scores(problem.scan(others))
     outside = np.ones(len(scores), dtype=bool)
     outside[allowed] = False

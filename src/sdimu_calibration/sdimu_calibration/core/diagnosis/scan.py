@@ -12,12 +12,10 @@ import numpy as np
 
 from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.evidence.information import Information
-from sdimu_calibration.core.evidence.testable import TESTABLE
+from sdimu_calibration.core.evidence.testable import INDISTINGUISHABLE, TESTABLE
 
 POWER_80 = 4.84
 """Size of an effect (sigma) that is found with 80 % power: 0.84 above the usual threshold of a whole scan, 4.0."""
-INDISTINGUISHABLE = 3.0
-"""Difference of log Bayes factors (1) up to which two candidates are not told apart: odds of 20 to 1."""
 _DRAWS = 4000
 """Number of draws of noise: at a false-alarm probability of 0.02, 80 of them are beyond the threshold, which is then
 right to a tenth of that probability."""

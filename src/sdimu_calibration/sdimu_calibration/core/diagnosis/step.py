@@ -83,7 +83,7 @@ def step_of(
     evidence, p = problem.evidence, problem.p
     candidate = evidence.candidates[best - p]
     J, d = scanned.J[best], scanned.d[best]
-    bayes = float(problem.scores(scanned, beside=chosen)[best])
+    bayes = float(problem.scores(scanned)[best])
     # A fault of one turn is nowhere to be seen once the stop after it is left out; all others must gain by it.
     apart = int(candidate.effect.options["turn"]) if "turn" in candidate.effect.options else None
     won, error = gain(before, after, apart)

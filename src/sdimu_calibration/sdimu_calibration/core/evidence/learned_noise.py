@@ -25,6 +25,7 @@ import numpy as np
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.evidence.noise_kernels import Stretches, stretches
+from sdimu_calibration.core.evidence.testable import INDISTINGUISHABLE
 from sdimu_calibration.core.noise_term import FLICKER, KINDS, MARKOV, RANDOM_WALK, SHIFT, STOP, TRIADS, TURN, NoiseTerm
 from sdimu_calibration.core.side_by_side import side_by_side
 
@@ -33,8 +34,6 @@ LEAST_GAIN = 5.0
 reaches it."""
 _TUNING = tuple(1.25**k for k in range(-4, 5))
 """Ratios of time constants to the one that was found: half way to its neighbours, and a quarter beyond."""
-_INDISTINGUISHABLE = 3.0
-"""Log-likelihood (1) within which kinds of noise are not told apart: odds of 20 to 1."""
 _MOST_TERMS = 2
 """Number of noise terms of a triad at most: a test of an hour tells no more apart."""
 _SWEEPS = 3
@@ -244,7 +243,7 @@ def with_alike(information: NoiseInformation, cut: Stretches, terms: Sequence[No
         given = given_terms(information, cut, [t for t in terms if t is not term], term.triad)
         tried = [t for t in kinds(cut) if t.triad == term.triad and t.kind != term.kind]
         others = _best_sizes(*given, cut, tried)
-        near = {t.kind for t in others if t.gain > term.gain - _INDISTINGUISHABLE}
+        near = {t.kind for t in others if t.gain > term.gain - INDISTINGUISHABLE}
         out.append(replace(term, alike=tuple(kind for kind in KINDS if kind in near)))
     return tuple(out)
 

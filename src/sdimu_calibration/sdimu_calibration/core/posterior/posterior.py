@@ -15,6 +15,7 @@ from sdimu_calibration.core.evidence.candidate import Candidate
 from sdimu_calibration.core.evidence.joint_information import Joint
 from sdimu_calibration.core.evidence.learned_noise import Wander
 from sdimu_calibration.core.evidence.linear import E
+from sdimu_calibration.core.evidence.testable import INDISTINGUISHABLE
 from sdimu_calibration.core.noise_term import KINDS, NoiseTerm
 from sdimu_calibration.core.posterior.board import Board, same_noise
 from sdimu_calibration.core.posterior.family import family_of
@@ -22,9 +23,6 @@ from sdimu_calibration.core.posterior.models import Members
 from sdimu_calibration.core.posterior.noise_models import NoiseModel
 from sdimu_calibration.core.posterior.search import WINDOW, climb, window
 
-INDISTINGUISHABLE = 3.0
-"""Log Bayes factor (1) by which an exchange may be behind for two candidates to be called alike: odds of 20 to 1 by the
-data; what is known before them says which is likelier."""
 PROBABLE = 0.5
 """Probability from which a class of effects is told as found: more likely there than not."""
 _ROUNDS = 4
