@@ -15,6 +15,7 @@ from sdimu_calibration.core.estimation.second_order_fit import SecondOrderFit
 from sdimu_calibration.core.estimation.solve import AUTO, with_effects
 from sdimu_calibration.core.joint.combine import Combination, Component, JointEstimate, Rows, spread_out, stacked
 from sdimu_calibration.core.joint.member import Job, Member, Report
+from sdimu_calibration.core.joint.same_unit import check_one_unit
 from sdimu_calibration.core.joint.scope import by_name, split_tag
 from sdimu_calibration.core.joint.set_order import check_different, check_members, check_one_grade, in_order
 from sdimu_calibration.core.joint.turn_on import in_scatter, turn_on_scatter
@@ -175,6 +176,8 @@ def fit_set(
     reports = in_order(reports)
     check_different(reports)
     check_one_grade(reports)
+    if before is None:
+        check_one_unit(reports)
     reports = _one_estimator(members, options, reports, run)
     firm, late = [r for r in reports if r.stands_alone], {}
     if firm and before is None:
