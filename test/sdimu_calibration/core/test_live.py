@@ -93,6 +93,19 @@ def test_the_end_of_a_live_test_is_the_offline_answer(recording, site, imu, opti
     assert ended.fit == offline.fit
 
 
+@pytest.mark.parametrize(("name", "size"), [("f_ib_b", 1e5), ("omega_ib_b", -1e4)])
+def test_one_corrupt_sample_costs_neither_the_filter_on_the_way_nor_the_end(name, size, recording, options, model):
+    values = getattr(recording, name).copy()
+    values[1234, 1] = size
+    live, estimates = feed(replace(recording, **{name: values}), options, model, [997] * 3)
+    keep = np.arange(len(recording.t)) != 1234
+    columns = {n: getattr(recording, n)[keep] for n in ("t", "omega_ib_b", "f_ib_b")}
+    without, expected = feed(replace(recording, **columns), options, model, [997] * 3)
+    np.testing.assert_array_equal([e.coefficients for e in estimates], [e.coefficients for e in expected])
+    assert estimates[-1].counts["rejected"] == 1
+    np.testing.assert_array_equal(live.finish().values, without.finish().values)
+
+
 def test_stepping_is_the_first_pass_of_the_offline_answer(recording, site, imu, options, model):
     _, estimates = feed(recording, options, model, [333] * 20)
     history = calibrate(recording, site, imu, model, held_out=False).history

@@ -1,11 +1,16 @@
 """The calibration node without its topics: what a request does to the model in use."""
 
 import math
+import time
 from types import SimpleNamespace
 
+import pytest
+from rclpy.parameter import Parameter
 from std_srvs.srv import Trigger
 
+from sdimu_calibration.core.front_door import OpeningOptions
 from sdimu_calibration.nodes.calibration_node import CalibrationNode
+from sdimu_calibration.storage.files.config import load_imu, load_site
 
 
 def test_a_save_right_after_an_add_writes_the_new_model(tmp_path):
@@ -18,3 +23,51 @@ def test_a_save_right_after_an_add_writes_the_new_model(tmp_path):
     )
     assert CalibrationNode._answer_save(node, Trigger.Request(), Trigger.Response()).success
     assert done == [("model", math.inf), ("result", 0)]
+
+
+def setting(*effects):
+    """The node's answer to `ros2 param set /calibration add`, and the node."""
+    options = OpeningOptions(load_imu("dtg"), load_site("daejeon"))
+    node = SimpleNamespace(_options=options, _base="baseline", _checked=None)
+    parameter = Parameter("add", Parameter.Type.STRING_ARRAY, list(effects))
+    return CalibrationNode._check_added(node, [parameter]), node
+
+
+def test_an_effect_that_fits_is_taken_as_it_was_checked():
+    answer, node = setting("gyro_scale_asymmetry_y")
+    assert answer.successful
+    assert "gyro_scale_asymmetry_y" in [getattr(effect, "key", effect) for effect in node._checked.effects]
+
+
+@pytest.mark.parametrize(
+    "effect",
+    [
+        "gyro_x: " + "*".join(["t"] * 800),
+        "gyro_x: " + "+".join(["t"] * 900),
+        "gyro_x: " + "-" * 1500 + "t",
+        "gyro_x: " + "(" * 900 + "t" + ")" * 900,
+        "gyro_x: ((2**9)**9)**9",
+        "no\0such.yaml",
+        "a\ud800.yaml",
+        "gyro_bias_warm_up_x(tau=1 furlong)",
+        "x" * 4096 + ".yaml",
+        "\n",
+    ],
+    ids=lambda text: ascii(text[:16]),
+)
+def test_whatever_is_added_live_the_node_goes_on_and_says_in_one_line_why_not(effect):
+    answer, node = setting(effect)
+    assert not answer.successful
+    assert answer.reason
+    assert "\n" not in answer.reason
+    assert node._checked is None
+
+
+def test_a_huge_effect_file_is_refused_before_it_is_read(tmp_path):
+    path = tmp_path / "huge.yaml"
+    path.write_text("format: sdimu-effect/1\n" + "".join(f"k{i}: 1\n" for i in range(90_000)))
+    start = time.monotonic()
+    answer, _ = setting(str(path))
+    assert not answer.successful
+    assert f"{path}: longer than" in answer.reason
+    assert time.monotonic() - start < 0.5

@@ -25,6 +25,7 @@ from sdimu_calibration.storage.files.journal import Journal
 from sdimu_calibration.storage.files.reference_file import read_truth
 from sdimu_calibration.storage.files.result_file import read_result, write_result
 from sdimu_calibration.storage.importing.array_table import read_mat, read_npz
+from sdimu_sim.core.expression import parse_expression as parse_simulated
 
 ESCAPE = "\x1b]0;owned\x07\r\n\x9b2J\u202e"
 
@@ -95,12 +96,29 @@ EFFECT = {
 
 @pytest.mark.parametrize(
     "formula",
-    ["k * fx**(1/0)", "k * fx**(0/0)", "k * fx**1e9", "k * " + "9" * 400, "k * ax * 1e301", "k * fx**" + "9" * 400],
+    [
+        "k * ax * ((2**9)**9)**9",
+        "k * fx**(1/0)",
+        "k * fx**(0/0)",
+        "k * fx**1e9",
+        "k * " + "9" * 400,
+        "k * ax * 1e301",
+        "k * fx**" + "9" * 400,
+    ],
     ids=lambda text: text[:16],
 )
 def test_a_formula_without_a_finite_value_is_one_line(tmp_path, formula):
     text = yaml.safe_dump(EFFECT | {"expressions": {"accel_x": formula}})
     assert "accel_x" in refusal(read_effect_file, written(tmp_path / "e.yaml", text))
+
+
+@pytest.mark.parametrize("formula", ["k" + "*t" * 800, "k*t" + "+k*t" * 450])
+def test_a_formula_that_would_fill_the_stack_is_one_line(tmp_path, formula):
+    """Both are shorter than the longest formula, and each operation stands in the next one."""
+    assert len(formula) < 2000
+    text = yaml.safe_dump(EFFECT | {"expressions": {"accel_x": formula}})
+    assert "joins more than 100 terms" in refusal(read_effect_file, written(tmp_path / "e.yaml", text))
+    assert "joins more than" in refusal(parse_simulated, formula, ("k", "t"))
 
 
 def test_units_and_numbers_beyond_all_measure_are_one_line(tmp_path):

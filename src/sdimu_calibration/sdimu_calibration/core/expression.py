@@ -41,6 +41,8 @@ _ONE: dict[str, Callable[[Any], Any]] = {**_OF_NUMBERS, "abs": np.abs, "sqrt": n
 _TWO: dict[str, Callable[[Any, Any], Any]] = {"min": np.minimum, "max": np.maximum}
 _LONGEST = 2000
 """Number of characters of a formula at most: a longer one is no formula, and would nest too deep for the parser."""
+DEEPEST = 100
+"""Number of operations in one another, as those of a sum are: each is a call in a call when a formula is read."""
 _LARGEST = 1e300
 """Size (1) of a number in a formula at most: one beyond it overflows at the first product."""
 _LARGEST_POWER = 12
@@ -141,11 +143,19 @@ def parse_expression(text: str, known: frozenset[str]) -> Expression:
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
         raise DataError(f"cannot read '{text}' (expected a formula such as 'k1 * ax * wz')") from error
     names: set[str] = set()
-    try:
-        _check(tree, text, known, names)
-    except RecursionError as error:
-        raise DataError("expression is nested too deeply") from error
+    refuse_nested(tree)
+    _check(tree, text, known, names)
     return Expression(text, tree, frozenset(names))
+
+
+def refuse_nested(tree: ast.expr, deepest: int = DEEPEST) -> None:
+    """Refuse a formula whose operations stand more than `deepest` in one another; it is walked without recursion."""
+    level: list[ast.AST] = [tree]
+    for _ in range(deepest + 1):
+        level = [child for node in level for child in ast.iter_child_nodes(node) if isinstance(child, ast.expr)]
+        if not level:
+            return
+    raise DataError(f"expression joins more than {deepest} terms, factors or brackets (shorten it)")
 
 
 def _check(node: ast.expr, text: str, known: frozenset[str], names: set[str]) -> None:

@@ -36,8 +36,10 @@ from std_srvs.srv import Trigger
 
 from sdimu_calibration.core.arrays import Ints
 from sdimu_calibration.core.data.axes_and_units import Stated
+from sdimu_calibration.core.effect_key import parse_key
 from sdimu_calibration.core.front_door import OpeningOptions
 from sdimu_calibration.core.live import NS, EpochEstimate, LiveCalibration
+from sdimu_calibration.core.plain_text import one_line
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.specification import Model
@@ -56,7 +58,7 @@ from sdimu_calibration.report.live_text import model_name
 from sdimu_calibration.report.progress_text import falling, light, sigma_words
 from sdimu_calibration.storage.bags.status_message import first_entry, phase_entry, stamp_ns
 from sdimu_calibration.storage.files.config import load_model
-from sdimu_calibration.storage.files.effect_file import SUFFIXES, extended_model
+from sdimu_calibration.storage.files.effect_file import extended_model
 from sdimu_calibration.storage.files.journal import Journal, digest
 from sdimu_calibration.storage.files.result_file import write_result
 from sdimu_calibration.storage.files.whole_file import written_together
@@ -84,12 +86,12 @@ class CalibrationNode:
         self._options, self._topics = declare_opening(self.node)
         self._base = model = declare.text("model", "baseline", "model to estimate: name in config/model or path")
         added = tuple(declare.texts("add", [], "effects beyond the model's: names, equations or files", live=True))
-        self._model = extended_model(model, added)
+        self._model = self._checked = extended_model(model, added)
         self._out = Path(declare.text("out", ".", "folder of result.json and of the journal"))
         self._stay = declare.flag("stay", False, "do not leave at the end of the stream")
         _warm_up(self._options, self._model)
         # The text of an effect file too: its name says little of what it computes.
-        texts = [path.read_text() for path in map(Path, added) if path.suffix in SUFFIXES]
+        texts = [Path(file[0]).read_text() for text in added if (file := parse_key(text).file)]
         options = digest(self._options, load_model(model), added, texts)
         checkpoint = declare.flag("checkpoint", True, "keep a journal with which a successor goes on")
         self._frames = declare_frames(declare)
@@ -155,9 +157,13 @@ class CalibrationNode:
         try:
             for parameter in parameters:
                 if parameter.name == "add":
-                    LiveCalibration(self._options, extended_model(self._base, _effects(parameter)))
-        except DataError as error:
-            return SetParametersResult(successful=False, reason=str(error))
+                    model = extended_model(self._base, _effects(parameter))
+                    LiveCalibration(self._options, model)
+                    self._checked = model
+        except Exception as error:
+            # Whatever is asked, the test goes on.
+            what = str(error) if isinstance(error, DataError) else f"add: {type(error).__name__}: {error}"
+            return SetParametersResult(successful=False, reason=one_line(what))
         return SetParametersResult(successful=True)
 
     def _take_added(self, parameters: list[Parameter]) -> None:
@@ -165,7 +171,8 @@ class CalibrationNode:
         for parameter in parameters:
             if parameter.name == "add":
                 added = _effects(parameter)
-                self._model = extended_model(self._base, added)
+                # As it was checked: its files may have changed since.
+                self._model = self._checked
                 self._feed.begin_again()
                 self._diagnosing.change_model(added)
                 self.node.get_logger().info(f"model {model_name(added)}: the filter begins again from the journal")

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from sdimu_calibration.core.arrays import Floats
+from sdimu_calibration.core.expression import DEEPEST, refuse_nested
 from sdimu_calibration.core.recording import DataError
 
 _OPERATORS: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
@@ -34,6 +35,8 @@ _FUNCTIONS: dict[str, tuple[int, Callable[..., Any]]] = {
     "max": (2, np.maximum),
 }
 _LONGEST = 2000
+_AROUND = 20
+"""Operations that are put around a formula of the user at most: its coefficient, numbers in the place of names."""
 
 
 @dataclass(frozen=True)
@@ -78,6 +81,7 @@ def parse_expression(text: str, known: Collection[str]) -> Expression:
             f"cannot read expression '{text}' (expected SI numbers, powers as **, such as "
             "'1e-6*ax*ay**2 + 1e-7*sin(t/400)')"
         ) from error
+    refuse_nested(tree, DEEPEST + _AROUND)
     names: set[str] = set()
     _check(tree, text, known, names)
     return Expression(text, tree, frozenset(names))

@@ -67,3 +67,10 @@ def test_a_wide_prior_that_the_filter_bears_is_not_refused(bench):
     (own,) = find_effects("gyro_x: 1")
     wide = replace(own, prior=dict.fromkeys(own.prior, to_si(1e5, "deg/h")))
     assert extend(bench.fit(), [wide]).names[-1] == "gyro_x: 1"
+
+
+@pytest.mark.filterwarnings("error::RuntimeWarning")
+def test_what_is_too_large_to_be_squared_is_told_without_a_warning(bench):
+    fit = bench.fit()
+    values = fit.solution.last.data.values * 1e200
+    assert "no sensor has" in impossible_prior(fit.setup.sensors, values, "mine.yaml")

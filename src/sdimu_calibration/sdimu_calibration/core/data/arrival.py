@@ -14,6 +14,7 @@ import numpy as np
 from sdimu_calibration.core.arrays import Bools, Floats, Ints
 from sdimu_calibration.core.data.blocks import all_finite, ascending
 from sdimu_calibration.core.data.bursts import Bursts, find_bursts
+from sdimu_calibration.core.data.far_samples import TRIADS, far_samples, far_text
 from sdimu_calibration.core.data.strays import stamp_text, strays
 from sdimu_calibration.core.plain_text import counted
 from sdimu_calibration.core.recording import (
@@ -37,6 +38,8 @@ _OVERLAP = 3
 """Number of samples in a row that mean a clock set back, when they arrive late and find their time taken by other
 readings: one or two may be stragglers."""
 
+_COUNTS = ("not_finite", "far", "out_of_order", "repeated")
+"""Kinds of samples that are not used, or not in their place: those repeated have a stamp that was there before."""
 _COPIES = 0.5
 """Share of the readings with one stamp that are those before once more, from which messages come twice: noise does not
 repeat itself."""
@@ -142,7 +145,7 @@ class Arranged:
     rows : ndarray of int, shape (m,)
         Indices in the order of their stamps.
     counts : dict of str to int
-        ``not_finite``, ``out_of_order``, ``repeated`` (stamps that were there before).
+        By kind, as in `_COUNTS`.
     notes : tuple of str
         The same for people, one line each.
     """
@@ -164,14 +167,15 @@ def arrange(ns: Stamps, omega_ib_b: Floats, f_ib_b: Floats, where: str) -> Arran
     where : str
         Named in errors.
     """
-    if len(ns) >= _MINIMUM_SAMPLES and ascending(ns) and all_finite(omega_ib_b) and all_finite(f_ib_b):
-        return Arranged(np.arange(len(ns)), dict.fromkeys(("not_finite", "out_of_order", "repeated"), 0), ())
+    far, notes = _far(ns, omega_ib_b, f_ib_b)
+    away = int(np.count_nonzero(far))
+    if len(ns) >= _MINIMUM_SAMPLES and not away and ascending(ns) and all_finite(omega_ib_b) and all_finite(f_ib_b):
+        return Arranged(np.arange(len(ns)), dict.fromkeys(_COUNTS, 0), ())
     finite = np.isfinite(omega_ib_b).all(axis=1) & np.isfinite(f_ib_b).all(axis=1)
     if not finite.any():
         raise DataError(f"{where}: all {len(ns)} samples are NaN or infinite; check the driver of the IMU")
-    notes: list[str] = []
-    rows: Stamps = np.flatnonzero(finite)
-    bad = len(ns) - len(rows)
+    rows: Stamps = np.flatnonzero(finite & ~far)
+    bad = len(ns) - int(np.count_nonzero(finite))
     if bad:
         notes.append(f"{counted(bad, 'sample was', 'samples were')} not finite and dropped")
     late = int(np.count_nonzero(np.diff(ns[rows]) < 0))
@@ -193,7 +197,22 @@ def arrange(ns: Stamps, omega_ib_b: Floats, f_ib_b: Floats, where: str) -> Arran
     rows = rows[new]
     if len(rows) < _MINIMUM_SAMPLES:
         raise DataError(f"{where}: only one stamp in {len(ns)} samples; check header.stamp of the driver")
-    return Arranged(rows, {"not_finite": bad, "out_of_order": late, "repeated": repeated}, tuple(notes))
+    return Arranged(rows, dict(zip(_COUNTS, (bad, away, late, repeated), strict=True)), tuple(notes))
+
+
+def _far(ns: Stamps, omega_ib_b: Floats, f_ib_b: Floats) -> tuple[Bools, list[str]]:
+    """Find samples far beyond all others, and say where they are."""
+    interval_s = float(np.median(np.diff(ns))) * 1e-9 if len(ns) > 1 else 0.0
+    found = far_samples(interval_s, omega_ib_b, f_ib_b)
+    far = found[0] | found[1]
+    if not far.any():
+        return far, []
+    t = (ns - ns[0]) * 1e-9
+    first = [
+        far_text(name, one, t, x) for name, one, x in zip(TRIADS, found, (omega_ib_b, f_ib_b), strict=True) if one.any()
+    ]
+    what = counted(int(np.count_nonzero(far)), "sample was", "samples were")
+    return far, [f"{what} far beyond all others and dropped ({'; '.join(first)})"]
 
 
 def _refuse_clock_set_back(ns: Stamps, omega_ib_b: Floats, f_ib_b: Floats, where: str) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from sdimu_calibration.core.arrays import Bools, Floats, Ints
+from sdimu_calibration.core.data.far_samples import far_samples, largest
 from sdimu_calibration.core.data.recent_log import RecentLog
 from sdimu_calibration.core.recording import (
     NOMINAL_FROM,
@@ -46,6 +47,7 @@ class Intake:
         self.has_status = False
         self._queue: list[tuple[Ints, Floats, Floats]] = []
         self._newest_ns = NEVER
+        self._largest = (0.0, 0.0)
         self._status, self._status_full = RecentLog(2), 2 * _REPEATED
         self._temperature = RecentLog(1)
 
@@ -108,7 +110,9 @@ class Intake:
         self._queue, self._status, self._temperature = [], RecentLog(2), RecentLog(1)
 
     def due(self, until_ns: int) -> tuple[Ints, Floats, Floats]:
-        """Hand over the samples up to a stamp: finite, each later than the one before; the others are counted.
+        """Hand over the samples up to a stamp: finite, not far beyond all others, each later than the one before.
+
+        The others are counted.
 
         Returns
         -------
@@ -127,18 +131,24 @@ class Intake:
         if not parts:
             return np.empty(0, dtype=np.int64), np.empty((0, 3)), np.empty((0, 3))
         ns, omega, force = (np.concatenate(part) for part in zip(*parts, strict=True))
-        finite = _finite(omega, force)
-        keep = finite & _later(ns, finite, self._newest_ns)
+        sound = _finite(omega, force) & ~self._far(omega, force)
+        keep = sound & _later(ns, sound, self._newest_ns)
         self.taken += int(keep.sum())
-        self._count(finite, keep)
+        self._count(sound, keep)
         if keep.any():
             self._newest_ns = int(ns[keep][-1])
+            self._largest = max(self._largest[0], largest(omega[keep])), max(self._largest[1], largest(force[keep]))
         return ns[keep], omega[keep], force[keep]
 
-    def _count(self, finite: Bools, keep: Bools) -> None:
+    def _far(self, omega: Floats, force: Floats) -> Bools:
+        """Find samples far beyond all that have come; the end of the test knows all others, too."""
+        far = far_samples(self.interval_s, omega, force, self._largest)
+        return np.asarray(far[0] | far[1])
+
+    def _count(self, sound: Bools, keep: Bools) -> None:
         """Count samples that are not kept."""
         self.rejected += int(np.sum(~keep))
-        self.late += int(np.sum(finite & ~keep))
+        self.late += int(np.sum(sound & ~keep))
 
     def phase_log(self) -> PhaseLog | None:
         """Phases so far, by their stamps; of those that were forgotten, the changes."""

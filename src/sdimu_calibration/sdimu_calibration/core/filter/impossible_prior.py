@@ -26,7 +26,9 @@ def impossible_prior(sensors: ImuModel, values: Floats, place: str) -> str:
     place : str
         Of the IMU's specification.
     """
-    typical = np.sqrt(np.mean(values**2, axis=0))
+    # As shares of the largest: the squares of what made a filter diverge may be no numbers.
+    largest = np.maximum(np.max(np.abs(values), axis=0), np.finfo(float).tiny)
+    typical = largest * np.sqrt(np.mean((values / largest) ** 2, axis=0))
     error = sensors.prior[sensors.parameter] * typical
     worst = int(np.argmax(error / _NO_ERROR[sensors.channel]))
     if error[worst] <= _NO_ERROR[sensors.channel[worst]]:
@@ -34,7 +36,7 @@ def impossible_prior(sensors: ImuModel, values: Floats, place: str) -> str:
     k = int(sensors.parameter[worst])
     one = sensors.parameters[k]
     prior, unit = from_si(float(sensors.prior[k]), one.display_unit), "rad/s" if sensors.channel[worst] < 3 else "m/s^2"
-    same = _same(sensors, values, k)
+    same = _same(sensors, values / np.max(largest), k)
     told = f"; {one.name} cannot be told from {', '.join(same)}: leave it out" if same else ""
     return (
         f"{_place(sensors, k, place)}: {prior:.3g} {one.display_unit} allows errors of {error[worst]:.2g} {unit}, "

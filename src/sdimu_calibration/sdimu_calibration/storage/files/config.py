@@ -169,11 +169,11 @@ class _UniqueKeys(yaml.SafeLoader):
         return super().construct_mapping(node, deep)
 
 
-def read_mapping(path: Path) -> dict[str, Any]:
-    """Content of a YAML file that holds keys and values; DataError with file and line otherwise."""
+def read_mapping(path: Path, longest: int = LONGEST_FILE) -> dict[str, Any]:
+    """Content of a YAML file of `longest` bytes at most, keys and values; DataError with file and line otherwise."""
     try:
-        if path.stat().st_size > LONGEST_FILE:
-            raise DataError(f"{path}: longer than {LONGEST_FILE} bytes, which no configuration is")
+        if path.stat().st_size > longest:
+            raise DataError(f"{path}: longer than {longest} bytes, which no file of this kind is")
         data = yaml.load(path.read_text(encoding="utf-8"), Loader=_UniqueKeys)
     except DataError:
         raise
@@ -194,9 +194,9 @@ def read_mapping(path: Path) -> dict[str, Any]:
     return data
 
 
-def read_yaml(path: Path, schema: type[S]) -> S:
-    """Read a YAML file into a schema."""
-    return check(read_mapping(path), schema, str(path))
+def read_yaml(path: Path, schema: type[S], longest: int = LONGEST_FILE) -> S:
+    """Read a YAML file of `longest` bytes at most into a schema."""
+    return check(read_mapping(path, longest), schema, str(path))
 
 
 def check(data: Mapping[str, Any], schema: type[S], source: str) -> S:

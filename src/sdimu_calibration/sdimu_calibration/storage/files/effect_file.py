@@ -33,7 +33,7 @@ from sdimu_calibration.core.expression import (
 )
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.specification import Model
-from sdimu_calibration.core.units import UnitError, parse_quantity, parse_unit
+from sdimu_calibration.core.units import UnitError, parse_unit
 from sdimu_calibration.storage.files.config import find_config, load_model
 from sdimu_calibration.storage.files.effect_schema import (
     FORMAT,
@@ -41,13 +41,13 @@ from sdimu_calibration.storage.files.effect_schema import (
     EffectFile,
     constants_of,
     formulas_of,
+    prior_of,
     read_effect_file,
     si_unit,
 )
 
 ENTRY_POINTS = "sdimu_calibration.effects"
 """Group of entry points that name callables without arguments, each returning an `Effect`."""
-SUFFIXES = (".yaml", ".yml")
 _GRADES = ("navigation", "tactical", "mems")
 
 
@@ -254,12 +254,7 @@ def _one(file: EffectFile, name: str, formulas: Mapping[str, Expression], consta
     shown = about.display_unit or about.unit
     if dict(parse_unit(shown).dimension) != dict(parse_unit(about.unit).dimension):
         raise DataError(f"parameters.{name}: display_unit '{shown}' is not of the kind of '{about.unit}'")
-    try:
-        prior = parse_quantity(about.prior, about.unit)
-    except UnitError as error:
-        raise DataError(f"parameters.{name}.prior: {error}") from error
-    if not prior > 0.0:
-        raise DataError(f"parameters.{name}.prior: expected more than zero")
+    prior = prior_of(file, name)
     sensors = [s for s in CHANNELS if s in formulas and name in formulas[s].names]
     chosen = {p: float(p == name) for p in file.parameters}
     own = f"{file.name}_{name}"

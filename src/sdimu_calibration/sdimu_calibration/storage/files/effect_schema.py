@@ -16,12 +16,16 @@ from pydantic import Field
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.expression import VARIABLES, Expression, dimension_of, parse_expression, written
 from sdimu_calibration.core.recording import DataError
-from sdimu_calibration.core.units import UnitError, parse_quantity, parse_unit
+from sdimu_calibration.core.units import LARGEST, UnitError, parse_quantity, parse_unit
 from sdimu_calibration.storage.files.config import Schema, read_yaml
 
 FORMAT = "sdimu-effect/1"
 VARIABLE_UNITS = {name: dimension_of(variable.unit) for name, variable in VARIABLES.items()}
 _SENSOR_UNIT = {"gyro": "rad/s", "accel": "m/s^2"}
+LONGEST_EFFECT = 1 << 16
+"""Bytes of an effect file at most: six of the longest formulas fill a fifth, and a live test waits while it is read."""
+_MOST_PARAMETERS = 100
+"""Parameters of an effect file at most: three times a whole model; the time of the filter grows with their square."""
 _NAME = r"^[A-Za-z][A-Za-z0-9_]*$"
 
 
@@ -41,7 +45,7 @@ class EffectFile(Schema):
     title: str | None = None
     description: str = ""
     expressions: dict[Literal["gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z"], str] = Field(min_length=1)
-    parameters: dict[str, ParameterFile] = Field(min_length=1)
+    parameters: dict[str, ParameterFile] = Field(min_length=1, max_length=_MOST_PARAMETERS)
     constants: dict[str, str | float] = Field(default_factory=dict)
 
 
@@ -52,7 +56,7 @@ def read_effect_file(path: Path) -> EffectFile:
         raise DataError(
             f"{path}: is a folder; name an effect file" if path.is_dir() else f"{path}: no such effect file"
         )
-    file = read_yaml(path, EffectFile)
+    file = read_yaml(path, EffectFile, LONGEST_EFFECT)
     try:
         formulas_of(file)
     except (DataError, UnitError) as error:
@@ -65,23 +69,23 @@ def formulas_of(file: EffectFile) -> dict[str, Expression]:
     _check_names(file)
     constants = constants_of(file)
     known = frozenset({*VARIABLES, *file.parameters, *constants})
+    usual = {**constants, **{name: prior_of(file, name) for name in file.parameters}}
     formulas: dict[str, Expression] = {}
     for sensor, text in file.expressions.items():
-        formulas[sensor] = _formula(file, sensor, text, known, constants)
+        formulas[sensor] = _formula(file, sensor, text, known, usual)
     for name in file.parameters:
         if not any(name in formula.names for formula in formulas.values()):
             raise DataError(f"parameters.{name}: no expression has it")
     return formulas
 
 
-def _formula(
-    file: EffectFile, sensor: str, text: str, known: frozenset[str], constants: Mapping[str, float]
-) -> Expression:
-    """Read one formula and hold it to its unit and to linearity."""
+def _formula(file: EffectFile, sensor: str, text: str, known: frozenset[str], usual: Mapping[str, float]) -> Expression:
+    """Read one formula and hold it to its unit and to linearity; `usual`: constants, priors of parameters."""
     try:
         formula = parse_expression(text, known)
         _check_unit(sensor, formula, file)
-        _check_linear(formula, tuple(file.parameters), constants)
+        _check_linear(formula, tuple(file.parameters), usual)
+        _check_size(formula, usual)
     except DataError as error:
         raise DataError(f"expressions.{sensor}: {error}") from error
     return formula
@@ -97,6 +101,18 @@ def _check_names(file: EffectFile) -> None:
 def constants_of(file: EffectFile) -> dict[str, float]:
     """Constants of a user's own effect (SI)."""
     return {name: _constant(name, text) for name, text in file.constants.items()}
+
+
+def prior_of(file: EffectFile, name: str) -> float:
+    """Sigma (SI) of a parameter before the test."""
+    about = file.parameters[name]
+    try:
+        prior = parse_quantity(about.prior, about.unit)
+    except UnitError as error:
+        raise DataError(f"parameters.{name}.prior: {error}") from error
+    if not prior > 0.0:
+        raise DataError(f"parameters.{name}.prior: expected more than zero")
+    return prior
 
 
 def _constant(name: str, text: str | float) -> float:
@@ -117,10 +133,19 @@ def _check_unit(sensor: str, formula: Expression, file: EffectFile) -> None:
         raise DataError(f"'{formula.text}' comes to {written(found)}, but an error of {sensor} is in {expected}")
 
 
-def _check_linear(formula: Expression, parameters: tuple[str, ...], constants: Mapping[str, float]) -> None:
+def _check_size(formula: Expression, usual: Mapping[str, float]) -> None:
+    """Refuse an error that is beyond all numbers where variables are one and parameters as large as their priors."""
+    error = abs(float(formula.evaluate({**dict.fromkeys(VARIABLES, 1.0), **usual})))
+    if error > LARGEST:
+        raise DataError(
+            f"'{formula.text}' comes to {error:.2g} at ordinary values of its variables (check its numbers)"
+        )
+
+
+def _check_linear(formula: Expression, parameters: tuple[str, ...], usual: Mapping[str, float]) -> None:
     """Superposition at random values: f(a + b) = f(a) + f(b), f(3 a) = 3 f(a), so f(0) = 0."""
     rng = np.random.default_rng(7)
-    at = {name: rng.uniform(0.5, 1.5, 16) for name in VARIABLES} | dict(constants)
+    at = {name: rng.uniform(0.5, 1.5, 16) for name in VARIABLES} | dict(usual)
     # Of both signs, or |k| would pass.
     a, b = ({name: sign * rng.uniform(0.5, 1.5) for name in parameters} for sign in (1.0, -1.0))
 
