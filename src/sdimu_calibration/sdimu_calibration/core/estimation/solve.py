@@ -350,6 +350,7 @@ def fit_about(
         its place, and this fit does without one, too.
     """
     begun = _reduced(test, model, silent)
+    asked = begun.setup.sensors
     here = {} if start is None else dict(zip(start.names, start.coefficients.tolist(), strict=True))
     frame_model, azimuth_free = None, here.keys() >= set(EARTH_RATE)
     if estimator == SecondOrderFit.estimator:
@@ -369,7 +370,7 @@ def fit_about(
     if start is None and frame_model is None:
         C_nb = attitude_about(known.prepared, known.setup, known.alignment, C_nb, values)
     fit = _navigation_about(test, model, known, frame_model, C_nb, values)
-    return replace(fit, setup=begun.setup)
+    return replace(fit, setup=begun.setup, sensors=asked)
 
 
 def _navigation_about(

@@ -16,7 +16,13 @@ from sdimu_calibration.core.estimation.solve import AUTO, with_effects
 from sdimu_calibration.core.joint.combine import Combination, Component, JointEstimate, Rows, spread_out, stacked
 from sdimu_calibration.core.joint.member import Job, Member, Report
 from sdimu_calibration.core.joint.scope import by_name, split_tag
-from sdimu_calibration.core.joint.set_order import check_different, check_members, check_one_grade, in_order
+from sdimu_calibration.core.joint.set_order import (
+    check_different,
+    check_members,
+    check_one_grade,
+    check_one_site,
+    in_order,
+)
 from sdimu_calibration.core.joint.turn_on import in_scatter, turn_on_scatter
 from sdimu_calibration.core.progress import Progress, silent
 from sdimu_calibration.core.recording import DataError
@@ -175,6 +181,7 @@ def fit_set(
     reports = in_order(reports)
     check_different(reports)
     check_one_grade(reports)
+    check_one_site(reports)
     reports = _one_estimator(members, options, reports, run)
     firm, late = [r for r in reports if r.stands_alone], {}
     if firm and before is None:
