@@ -91,6 +91,10 @@ LONG = {
     "test/sdimu_calibration/core/estimation/test_reference_temperature.py": (
         "test_another_reference_moves_the_biases_by_the_coefficient_and_no_prediction[mems_industrial-table_test-second-order]",
     ),
+    "test/sdimu_calibration/core/estimation/test_uncertain_site.py": (
+        "test_a_run_by_hand_takes_the_gravity_of_its_site_with_its_sigma",
+        "test_coefficients_are_honest_at_a_site_that_is_off_by_what_it_states[second-order]",
+    ),
     "test/sdimu_calibration/core/evidence/test_learned_noise.py": (
         "test_the_size_of_a_term_is_inside_its_interval[markov-3.0]",
         "test_the_size_of_a_term_is_inside_its_interval[random_walk-0.2]",

@@ -85,9 +85,29 @@ def test_a_site_without_format_or_azimuth_is_enough(tmp_path):
 
 
 @pytest.mark.parametrize(
+    ("key", "name", "text", "expected"),
+    [
+        ("latitude_sigma", "latitude_sigma_rad", "0.1 deg", math.radians(0.1)),
+        ("latitude_sigma", "latitude_sigma_rad", "10 arcmin", math.radians(1.0 / 6.0)),
+        ("gravity_sigma", "gravity_sigma_m_s2", "100 mgal", 1e-3),
+        ("gravity_sigma", "gravity_sigma_m_s2", "30 ug", 30e-6 * 9.80665),
+        ("gravity_sigma", "gravity_sigma_m_s2", "1e-4 m/s^2", 1e-4),
+    ],
+)
+def test_a_site_states_how_well_it_is_known(tmp_path, key, name, text, expected):
+    plain = load_site(written(tmp_path, SITE))
+    assert getattr(plain, name) == 0.0
+    assert getattr(load_site(written(tmp_path, SITE + f"{key}: {text}\n")), name) == pytest.approx(expected)
+
+
+@pytest.mark.parametrize(
     ("kind", "old", "new", "message"),
     [
         ("plan", "rate: 2 deg/s", "rate: 2 deg", "rate: '2 deg' has the wrong unit"),
+        ("site", "height_m: 0", "height_m: 0\nlatitude_sigma: 0.1 m", "latitude_sigma: '0.1 m' has the wrong unit"),
+        ("site", "height_m: 0", "height_m: 0\nlatitude_sigma: 0.1", "latitude_sigma: '0.1' has no unit"),
+        ("site", "height_m: 0", "height_m: 0\nlatitude_sigma: 9 deg", "'9 deg' is no sigma from 0 to 2 deg"),
+        ("site", "height_m: 0", "height_m: 0\ngravity_sigma: -1 mgal", "'-1 mgal' is no sigma from 0 to 5000 mgal"),
         ("plan", "dwell: 100 s", "dwell: 100", "dwell: '100' has no unit"),
         ("plan", "axis: Y", "axis: Q", r"turns\.0\.axis: .*'X', 'Y' or 'Z'"),
         ("plan", "angle: 90 deg", "angel: 90 deg", r"turns\.0\.ang"),

@@ -35,6 +35,7 @@ def calibrate(bags: BagsArgument = None, *, request: CalibrationRequest, opening
     from sdimu_calibration.cli.progress import bar
     from sdimu_calibration.core.estimation.outcome import outcome
     from sdimu_calibration.core.estimation.solve import AUTO, solve
+    from sdimu_calibration.core.site_reference import relative_line
     from sdimu_calibration.core.units import STANDARD_GRAVITY
     from sdimu_calibration.report.page import write_report
     from sdimu_calibration.report.table import rich_table, rows
@@ -79,7 +80,8 @@ def calibrate(bags: BagsArgument = None, *, request: CalibrationRequest, opening
             spell=partial(spelled, asked=about),
         )
     console.print(rich_table(rows(result, true), f"body frame: {result.body_frame}"), soft_wrap=True)
-    tell(console, (*notes, *(note for note in result.notes if note not in notes)))
+    at = relative_line(result.references)
+    tell(console, (*((at,) if at else ()), *notes, *(note for note in result.notes if note not in notes)))
     if any(topic_of(note) in MISFITS for note in result.notes):
         say(console, "To learn what the model misses:")
         able = request if fit.diagnosable else replace(request, estimator=AUTO)

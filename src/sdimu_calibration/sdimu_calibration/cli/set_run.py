@@ -228,7 +228,9 @@ def _with_serial(result: Calibration, members: Sequence[Member]) -> Calibration:
 def _show(console: Console, result: Calibration, diagnosed: bool = False) -> None:
     """Print the table, the power-ons and what the user should know."""
     from sdimu_calibration.core.note import without_advice
+    from sdimu_calibration.core.site_reference import relative_line
     from sdimu_calibration.report.table import rich_table, rows
 
     console.print(rich_table(rows(result), table_heading(result)), soft_wrap=True)
-    tell(console, without_advice(result.notes) if diagnosed else result.notes)
+    at = relative_line(result.references)
+    tell(console, (*((at,) if at else ()), *(without_advice(result.notes) if diagnosed else result.notes)))

@@ -8,7 +8,7 @@ samples decide (`early_reading`), without a status the rests so far (`GrowingDwe
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -24,7 +24,9 @@ from sdimu_calibration.core.data.intake import Intake
 from sdimu_calibration.core.data.kept_test import KeptTest
 from sdimu_calibration.core.data.phases import Phases, PhaseState, classify
 from sdimu_calibration.core.effects import body_frame
+from sdimu_calibration.core.effects.imu_model import with_references
 from sdimu_calibration.core.effects.motion import Motion
+from sdimu_calibration.core.effects.references import stated_references
 from sdimu_calibration.core.estimation.outcome import calibrate
 from sdimu_calibration.core.filter.filter_pass import NAV, PassInput, PassState, new_output, run_pass
 from sdimu_calibration.core.filter.passes import pass_settings, start_state
@@ -111,7 +113,9 @@ class LiveCalibration:
 
     def __init__(self, options: OpeningOptions, model: Model) -> None:
         self.options = options
-        self.setup = set_up(options.site, options.imu, model, EPOCH_S)
+        asked = set_up(options.site, options.imu, model, EPOCH_S)
+        self._asked = asked.sensors
+        self.setup = replace(asked, sensors=with_references(asked.sensors, stated_references(options.site)))
         self.notes: list[str] = []
         """What the caller should publish, such as what the filter waits for; the caller empties the list."""
         self._intake = Intake()
@@ -132,7 +136,7 @@ class LiveCalibration:
         self._track = np.eye(3)
         self._before: Motion | None = None
         self._settings = pass_settings(self.setup, closed_loop=True)
-        self._J = body_frame.frame_jacobian(self.setup.sensors.names, model.body_frame)
+        self._J = body_frame.frame_jacobian(self._asked.names, model.body_frame)
         self._nis_sum = np.zeros(4)
         self._nis_count = np.zeros(4)
         self._stop_nis = np.zeros((2, 4))  # sum and degrees of freedom at the present stop
@@ -371,7 +375,7 @@ class LiveCalibration:
         assert self._state is not None
         origin_ns = self._intake.origin_ns
         assert origin_ns is not None
-        sensors, frame, state = self.setup.sensors, self.setup.model.body_frame, self._state
+        sensors, frame, state = self._asked, self.setup.model.body_frame, self._state
         p = len(sensors.prior)
         site = self.setup.site
         radius = 6.371e6 + site.height_m
@@ -385,7 +389,7 @@ class LiveCalibration:
             names=sensors.names,
             units=tuple(q.unit for q in sensors.parameters),
             display_units=tuple(q.display_unit for q in sensors.parameters),
-            coefficients=body_frame.values_in_frame(sensors.names, estimate, frame),
+            coefficients=body_frame.values_in_frame(sensors.names, estimate[:p], frame),
             covariance=self._J @ state.P[NAV : NAV + p, NAV : NAV + p] @ self._J.T,
             position_error_m=np.array(
                 [

@@ -12,6 +12,7 @@ from sdimu_calibration.core.noise_term import NoiseTerm
 from sdimu_calibration.core.note import MISFITS, Topic, topic_of
 from sdimu_calibration.core.origin import Origin
 from sdimu_calibration.core.recording import DataFault
+from sdimu_calibration.core.site_reference import Reference
 from sdimu_calibration.core.specification import ImuSpecification
 from sdimu_calibration.core.verdict import Verdict
 
@@ -258,6 +259,8 @@ class Calibration:
     imu_noise : ImuSpecification or None
         Name, grade and noise of the specification with which samples were weighed, without its priors; None in older
         results and those of others.
+    references : tuple of Reference
+        Latitude and gravity of the site as told, and what the data made of them; empty in older results.
     """
 
     body_frame: str
@@ -282,6 +285,7 @@ class Calibration:
     of_set: SetSummary | None = None
     origin: Origin = field(default_factory=Origin)
     imu_noise: ImuSpecification | None = None
+    references: tuple[Reference, ...] = ()
 
     def with_serial(self, serial: str) -> Calibration:
         """Return the result as one of the unit with this serial number."""

@@ -33,6 +33,8 @@ class Site:
         Its standard deviation; used only with an azimuth.
     magnetic_field_t : tuple of float, or None
         North, East, Down (T), for the effects of magnetism; None takes that of mid-northern latitudes.
+    latitude_sigma_rad, gravity_sigma_m_s2 : float
+        Standard deviation of latitude and gravity as they are told; zero takes them at their word.
     """
 
     latitude_rad: float
@@ -41,6 +43,8 @@ class Site:
     initial_azimuth_rad: float | None = None
     initial_azimuth_sigma_rad: float = np.radians(3.0)
     magnetic_field_t: tuple[float, float, float] | None = None
+    latitude_sigma_rad: float = 0.0
+    gravity_sigma_m_s2: float = 0.0
 
 
 @dataclass(frozen=True)

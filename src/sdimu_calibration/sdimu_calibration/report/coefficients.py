@@ -12,6 +12,7 @@ from sdimu_calibration.core.effects.effect import ACCEL, GYRO
 from sdimu_calibration.core.estimation.fit import Fit
 from sdimu_calibration.core.estimation.navigation_fit import NavigationFit
 from sdimu_calibration.core.results import Calibration
+from sdimu_calibration.core.site_reference import relative_line
 from sdimu_calibration.core.units import from_si
 from sdimu_calibration.report import table
 from sdimu_calibration.report.drawing import AFTER, BAND, Figure, lay_out
@@ -65,6 +66,7 @@ def coefficients_section(
             f"One sigma; body frame: {calibration.body_frame.replace('_', ' ')}. Fixed: zero by the choice of that "
             "frame. Prior: one sigma of the IMU's file. A heading shows its equation under the mouse."
         ),
+        *((quiet(f"These {at}."),) if (at := relative_line(calibration.references)) else ()),
         *drawn,
     )
 

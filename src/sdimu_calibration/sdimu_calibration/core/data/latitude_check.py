@@ -74,7 +74,8 @@ class EarthRate:
         """Whether the data were not taken at the latitude of a site, the force times `sign` pointing up."""
         expected = earth.RATE * float(np.sin(site.latitude_rad))
         limit = student_limit(normal_tail(_SIGMAS), self.up_dof) * self.up_sigma
-        return self.seen and abs(sign * self.up_rate - expected) > limit
+        told = _SIGMAS * earth.RATE * float(np.cos(site.latitude_rad)) * site.latitude_sigma_rad
+        return self.seen and abs(sign * self.up_rate - expected) > float(np.hypot(limit, told))
 
 
 def observe_earth_rate(t: Floats, omega_ib_b: Floats, f_ib_b: Floats, imu: ImuSpecification) -> EarthRate | None:
@@ -114,7 +115,7 @@ def contradictions(seen: EarthRate, site: Site) -> tuple[str, ...]:
         what = f"check {Option.SITE}{or_sign(seen, site)}"
         lines.append(f"{latitude_in_data(seen)}, the site is at {_latitude(site)}: {what}")
     gravity = site.gravity_m_s2 or float(earth.normal_gravity(site.latitude_rad, site.height_m))
-    if abs(seen.gravity - gravity) > _SIGMAS * seen.gravity_sigma:
+    if abs(seen.gravity - gravity) > _SIGMAS * float(np.hypot(seen.gravity_sigma, site.gravity_sigma_m_s2)):
         lines.append(
             f"|f| at rest is {seen.gravity:.4f} m/s^2, gravity at the site {gravity:.4f}: they differ by more than the "
             f"IMU's specification allows; check {Option.SITE} (latitude, height) and {Option.IMU}"

@@ -157,7 +157,8 @@ def accelerometer_frame_model(
     own = np.flatnonzero(asked.restated & (place >= 0))
     prior, mean, restated = stated.copy(), inner.mean.copy(), inner.restated.copy()
     prior[place[own]], mean[place[own]], restated[place[own]] = asked.prior[own], asked.mean[own], True
-    inner = replace(inner, prior=prior, mean=mean, restated=restated, stated=stated)
+    serving = sum(len(effect.parameters) for effect in more)
+    inner = replace(inner, prior=prior, mean=mean, restated=restated, stated=stated, serving=serving)
     return AccelerometerFrameModel(asked, inner, place)
 
 

@@ -42,6 +42,9 @@ class ImuModel:
         1/s; zero for constants and random walks.
     drive : ndarray, shape (p,)
         Variance that a random walk adds per second (SI^2/s); zero for all other parameters.
+    serving : int
+        How many of the parameters, the last ones, are no coefficients of a sensor: they are estimated along, as
+        attitudes are, and not reported.
     """
 
     effects: tuple[Effect, ...]
@@ -54,6 +57,7 @@ class ImuModel:
     stated: Floats
     decay_rate: Floats
     drive: Floats
+    serving: int = 0
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -193,6 +197,38 @@ def restate(sensors: ImuModel, priors: Sequence[StatedPrior]) -> ImuModel:
             raise DataError(f"priors.{one.name}: stands twice (state it once)")
         prior[k], mean[k], restated[k] = one.sigma, one.mean, True
     return replace(sensors, prior=prior, mean=mean, restated=restated)
+
+
+def with_references(sensors: ImuModel, references: Sequence[tuple[Effect, float]]) -> ImuModel:
+    """Put what the test believes of its site behind the coefficients, as parameters that serve.
+
+    Parameters
+    ----------
+    sensors : ImuModel
+    references : sequence of (Effect, float)
+        Of one parameter each, with the sigma that is stated of it (SI); those that the model has are passed over.
+    """
+    new = [(effect, sigma) for effect, sigma in references if effect.parameters[0].name not in sensors.names]
+    if not new:
+        return sensors
+    effects, sigmas = [effect for effect, _ in new], np.array([sigma for _, sigma in new])
+    p, count = len(sensors.parameters), len(new)
+    terms = [(term.channel, p + place) for place, effect in enumerate(effects) for term in effect.terms]
+    channel, parameter = np.array(terms, dtype=np.int64).T
+    none = np.zeros(count)
+    return ImuModel(
+        (*sensors.effects, *effects),
+        (*sensors.parameters, *(effect.parameters[0] for effect in effects)),
+        np.concatenate([sensors.channel, channel]),
+        np.concatenate([sensors.parameter, parameter]),
+        np.concatenate([sensors.prior, sigmas]),
+        np.concatenate([sensors.mean, none]),
+        np.concatenate([sensors.restated, np.ones(count, dtype=bool)]),
+        np.concatenate([sensors.stated, sigmas]),
+        np.concatenate([sensors.decay_rate, none]),
+        np.concatenate([sensors.drive, none]),
+        sensors.serving + count,
+    )
 
 
 def prior_size(effect: Effect, imu: ImuSpecification) -> float | None:

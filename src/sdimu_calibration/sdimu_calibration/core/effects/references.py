@@ -6,13 +6,20 @@ d``, in navigation as in Zw and Zf.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
+from sdimu_calibration.core import earth
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.effects.effect import ACCEL, GYRO, REFERENCES, Effect, Parameter, Term
 from sdimu_calibration.core.effects.motion import Motion
 from sdimu_calibration.core.effects.registry import register
+from sdimu_calibration.core.specification import Site
 from sdimu_calibration.core.units import STANDARD_GRAVITY
+
+_STEP = 1e-4
+"""Step of the latitude (rad) over which normal gravity is differentiated: its cubes are a part in 10^8."""
 
 
 def _along(motion: Motion, direction: int) -> Floats:
@@ -81,3 +88,57 @@ LATITUDE = register(
         description="A wrong Earth rate in the meridian plane. Visible from some minutes of arc on.",
     )
 )
+
+
+def stated_references(site: Site) -> tuple[tuple[Effect, float], ...]:
+    """Make the references of a site that are not taken at their word.
+
+    Parameters
+    ----------
+    site : Site
+
+    Returns
+    -------
+    tuple of (Effect, float)
+        Each with the sigma of its parameter, told minus true (rad, m/s^2). Where gravity is that of the latitude, a
+        wrong latitude is a wrong gravity, too.
+    """
+    latitude = LATITUDE if site.gravity_m_s2 else _with_its_gravity(site)
+    both = (latitude, site.latitude_sigma_rad), (GRAVITY, site.gravity_sigma_m_s2)
+    return tuple((effect, sigma) for effect, sigma in both if sigma > 0.0)
+
+
+def stated_gravity(site: Site | None) -> tuple[tuple[Effect, float], ...]:
+    """Make the reference of a run by hand, where latitude shows in nothing but gravity and the Earth's rate.
+
+    Parameters
+    ----------
+    site : Site or None
+
+    Returns
+    -------
+    tuple of (Effect, float)
+        With the sigma of gravity (m/s^2); none where it is taken at its word.
+    """
+    if site is None:
+        return ()
+    by_latitude = 0.0 if site.gravity_m_s2 else _slope(site) * site.latitude_sigma_rad
+    sigma = float(np.hypot(site.gravity_sigma_m_s2, by_latitude))
+    return ((GRAVITY, sigma),) if sigma > 0.0 else ()
+
+
+def _slope(site: Site) -> float:
+    """Change of normal gravity with latitude (m/s^2/rad); one-sided at a pole."""
+    at, height = site.latitude_rad, site.height_m
+    low, high = max(at - _STEP, -0.5 * np.pi), min(at + _STEP, 0.5 * np.pi)
+    return float(earth.normal_gravity(high, height) - earth.normal_gravity(low, height)) / (high - low)
+
+
+def _with_its_gravity(site: Site) -> Effect:
+    """Make the effect of a latitude by which gravity was worked out."""
+    slope = _slope(site)
+    return replace(
+        LATITUDE,
+        terms=tuple(Term(channel, 0) for channel in (*GYRO, *ACCEL)),
+        regressors=lambda m: np.hstack([_latitude(m), slope * _along(m, 2)]),
+    )

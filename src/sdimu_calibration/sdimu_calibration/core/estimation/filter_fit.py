@@ -92,7 +92,7 @@ class FilterFit(NavigationFit):
         ndarray, shape (p,)
             In the order of `names` (SI).
         """
-        return body_frame.values_in_frame(self.names, settled, self.body_frame)
+        return body_frame.values_in_frame(self.names, settled[: len(self.names)], self.body_frame)
 
     def reported_covariance(self, settled: Floats) -> Floats:
         """Bring a covariance of coefficients into `body_frame`.
@@ -107,8 +107,8 @@ class FilterFit(NavigationFit):
         ndarray, shape (p, p)
             Of the coefficients of `names` (SI).
         """
-        J = body_frame.frame_jacobian(self.names, self.body_frame)
-        return np.asarray(J @ settled @ J.T)
+        J, p = body_frame.frame_jacobian(self.names, self.body_frame), len(self.names)
+        return np.asarray(J @ settled[:p, :p] @ J.T)
 
     @cached_property
     def known(self) -> KnownPass:
@@ -189,8 +189,9 @@ class FilterFit(NavigationFit):
         out = self.solution.first.output
         J = body_frame.frame_jacobian(self.names, self.body_frame)
         rows = np.arange(0, len(self.prepared.epochs), out.stride)
-        values = body_frame.values_in_frame(self.names, out.estimate[rows] @ self.centring.T, self.body_frame)
-        J = J @ self.centring
+        centring = self.centring[: len(self.names)]
+        values = body_frame.values_in_frame(self.names, out.estimate[rows] @ centring.T, self.body_frame)
+        J = J @ centring
         return self._rows_of_history(rows, out, values, J @ out.covariance[: len(rows)] @ J.T)
 
     def notes(self) -> tuple[str, ...]:

@@ -24,6 +24,7 @@ from sdimu_calibration.core.noise_term import NoiseTerm
 from sdimu_calibration.core.note import Note, Topic
 from sdimu_calibration.core.recording import DataFault, TemperatureLog
 from sdimu_calibration.core.results import NOT_TRUSTED, START_TEMPERATURE, History, Rest, no_history
+from sdimu_calibration.core.site_reference import Reference, told_of
 from sdimu_calibration.core.specification import Model
 from sdimu_calibration.core.wording import Option
 
@@ -236,6 +237,15 @@ class Fit(ABC):
     def history(self) -> History:
         """Estimate as the test went on; empty where the estimator knows only the end."""
         return no_history(len(self.names))
+
+    def references(self) -> tuple[Reference, ...]:
+        """List latitude and gravity of the site as told, and what the data made of them."""
+        return told_of(self.test.site, self.names)
+
+    @property
+    def covariance_at_site(self) -> Floats:
+        """Covariance of `values` if latitude and gravity were those of the site, shape (p, p)."""
+        return self.covariance
 
     def notes(self) -> tuple[str, ...]:
         """Say what was assumed, learned and not determined, one line each."""

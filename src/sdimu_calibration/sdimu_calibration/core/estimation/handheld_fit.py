@@ -16,6 +16,7 @@ from sdimu_calibration.core.estimation.free_inertial import FreeInertialRun
 from sdimu_calibration.core.estimation.navigation_fit import checksum
 from sdimu_calibration.core.evidence.consistency import NO_NOISE, Consistency
 from sdimu_calibration.core.evidence.handheld_evidence import HandheldEvidence, handheld_evidence, places, timetable
+from sdimu_calibration.core.evidence.information import conditioned
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.fit_statistics import FitStatistics
 from sdimu_calibration.core.handheld.handheld import PreparedRun, handheld_notes
@@ -23,6 +24,7 @@ from sdimu_calibration.core.handheld.handheld_faults import data_faults
 from sdimu_calibration.core.handheld.handheld_fit import FitPriors, HandheldSolution, rests_with_residuals
 from sdimu_calibration.core.recording import DataError, DataFault
 from sdimu_calibration.core.results import Rest
+from sdimu_calibration.core.site_reference import Reference, found
 
 
 @dataclass(frozen=True)
@@ -47,18 +49,44 @@ class HandheldFit(Fit):
     @property
     def body_frame(self) -> str:
         """Frame of the accelerometers, where the model lets it turn."""
-        return FRAME if len(self.priors.kept) < len(self.names) else self.model.body_frame
+        return FRAME if len(self._kept) < len(self.names) else self.model.body_frame
+
+    @property
+    def _kept(self) -> Ints:
+        """Coefficients that are fitted, shape (q,); what serves stands behind them in `priors.kept`."""
+        kept = self.priors.kept
+        return kept[: len(kept) - self.priors.model.serving]
 
     @property
     def values(self) -> Floats:
         """Coefficients (SI), shape (p,)."""
-        return self.solution.point.coefficients
+        return self.solution.point.coefficients[: len(self.names)]
 
     @property
     def covariance(self) -> Floats:
         """Covariance of `values`, shape (p, p); zero for what the frame pins."""
-        C = self.solution.covariance
+        C = self._own(self.solution.covariance)
         return self.reported_covariance(C if self.doubt is None else C + self.doubt)
+
+    def _own(self, covariance: Floats) -> Floats:
+        """Take the coefficients' part of a covariance of all that is fitted; shape (q, q)."""
+        q = len(self._kept)
+        return covariance[:q, :q]
+
+    @property
+    def covariance_at_site(self) -> Floats:
+        """Covariance of `values` if gravity were that of the site, shape (p, p)."""
+        C, q = self.solution.covariance, len(self._kept)
+        if q == len(C):
+            return self.covariance
+        return self.reported_covariance(self._own(conditioned(C, np.arange(q, len(C)))))
+
+    def references(self) -> tuple[Reference, ...]:
+        """List gravity and latitude of the site as told, and what the data made of gravity."""
+        model, q = self.priors.model, len(self._kept)
+        sigma = np.sqrt(np.diag(self.solution.covariance)[q:]).tolist()
+        off = zip(self.solution.point.coefficients[len(self.names) :].tolist(), sigma, strict=True)
+        return found(super().references(), dict(zip(model.names[len(self.names) :], off, strict=True)))
 
     def reported_values(self, settled: Floats) -> Floats:
         """Put the coefficients that are fitted among all; zero for what is pinned.
@@ -74,7 +102,7 @@ class HandheldFit(Fit):
             In the order of `names` (SI).
         """
         out = np.zeros(len(self.names))
-        out[self.priors.kept] = settled
+        out[self._kept] = settled
         return out
 
     def reported_covariance(self, settled: Floats) -> Floats:
@@ -91,7 +119,7 @@ class HandheldFit(Fit):
             Of the coefficients of `names` (SI).
         """
         out = np.zeros((len(self.names), len(self.names)))
-        out[np.ix_(self.priors.kept, self.priors.kept)] = settled
+        out[np.ix_(self._kept, self._kept)] = settled
         return out
 
     @property
@@ -108,7 +136,9 @@ class HandheldFit(Fit):
     def start(self) -> Start:
         """Where a fit of nearly the same model begins."""
         point = self.solution.point
-        return Start(self.names, point.coefficients, point.C_nb, np.concatenate([point.earth, point.extra]))
+        return Start(
+            self.priors.model.names, point.coefficients, point.C_nb, np.concatenate([point.earth, point.extra])
+        )
 
     def statistics(self) -> FitStatistics:
         """Marginal log-likelihood, mean squared residual over its redundancy, steps."""
@@ -130,7 +160,7 @@ class HandheldFit(Fit):
         -------
         ndarray of int, shape (count,)
         """
-        q = len(self.priors.kept)
+        q = len(self._kept)
         return np.arange(q - count, q)
 
     def consistency(self, evidence: LinearEvidence | None = None) -> Consistency:
@@ -175,7 +205,8 @@ class HandheldFit(Fit):
 
     def notes(self) -> tuple[str, ...]:
         """Say what was assumed, learned and not determined."""
-        return tuple(handheld_notes(self.ready.run, self.priors, self.solution, self.test.site))
+        places = (r.note for r in self.references() if r.name in self.priors.model.names)
+        return (*handheld_notes(self.ready.run, self.priors, self.solution, self.test.site), *places)
 
     def rests(self) -> tuple[Rest, ...]:
         """Rests with their residuals."""

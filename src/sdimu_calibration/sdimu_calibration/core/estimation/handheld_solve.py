@@ -10,6 +10,7 @@ import numpy as np
 from sdimu_calibration.core.alignment.prepared import check_priors
 from sdimu_calibration.core.effects import imu_model
 from sdimu_calibration.core.effects.imu_model import ImuModel
+from sdimu_calibration.core.effects.references import stated_gravity
 from sdimu_calibration.core.estimation.fit import Start
 from sdimu_calibration.core.estimation.handheld_fit import HandheldFit
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
@@ -81,13 +82,13 @@ def _told(roomy: PreparedTest, test: PreparedTest, sensors: ImuModel, wider: Map
 
 def _fit(test: PreparedTest, model: Model, start: Start | None, progress: Progress) -> HandheldFit:
     sensors = imu_model.build(model.effects, test.imu)
-    ready = test.run
-    priors = fit_priors(sensors, test.imu, test.site, ready.rests)
+    inner, ready = imu_model.with_references(sensors, stated_gravity(test.site)), test.run
+    priors = fit_priors(inner, test.imu, test.site, ready.rests)
     progress("least squares", 0.3)
     if start is None:
-        point = first_linearisation(ready.run, sensors, priors.gravity)
+        point = first_linearisation(ready.run, inner, priors.gravity)
     else:
         point = LinearisationPoint(
-            start.coefficients_of(sensors.names), start.C_nb, start.more[:3].copy(), start.more[3:].copy()
+            start.coefficients_of(inner.names), start.C_nb, start.more[:3].copy(), start.more[3:].copy()
         )
     return HandheldFit(test, model, sensors, ready, priors, fit_run(ready.run, priors, point))

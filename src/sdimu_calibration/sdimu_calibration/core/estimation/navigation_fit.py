@@ -21,6 +21,7 @@ from sdimu_calibration.core.estimation.fit import NOT_CONVERGED, Fit, Start, tem
 from sdimu_calibration.core.estimation.free_inertial import Compensated, FreeInertialRun, Navigator, free_inertial_runs
 from sdimu_calibration.core.estimation.noise_estimate import NoiseEstimate
 from sdimu_calibration.core.estimation.prior_check import contradicted, outside
+from sdimu_calibration.core.estimation.site_rows import at_site, with_found
 from sdimu_calibration.core.evidence.consistency import Consistency, check
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.evidence.navigation_evidence import (
@@ -41,6 +42,7 @@ from sdimu_calibration.core.recording import DataFault
 from sdimu_calibration.core.results import History
 from sdimu_calibration.core.second_order.second_order_passes import SecondOrderPass
 from sdimu_calibration.core.side_by_side import side_by_side
+from sdimu_calibration.core.site_reference import Reference
 from sdimu_calibration.core.wording import Option, Work
 
 HELD_OUT_FOLDS = 3
@@ -161,6 +163,15 @@ class NavigationFit(Fit):
         T = self.centring
         C = self.estimate_covariance if self.noise is None else self.noise.covariance
         return np.asarray(T @ (C if self.doubt is None else C + self.doubt) @ T.T)
+
+    @property
+    def covariance_at_site(self) -> Floats:
+        """Covariance of `values` if latitude and gravity were those of the site, shape (p, p)."""
+        return self.reported_covariance(at_site(self.setup.sensors, self.settled_covariance))
+
+    def references(self) -> tuple[Reference, ...]:
+        """List latitude and gravity of the site as told, and what the data made of them."""
+        return with_found(super().references(), self.setup.sensors, self.settled, self.settled_covariance)
 
     @cached_property
     def centring(self) -> Floats:
@@ -323,6 +334,11 @@ class NavigationFit(Fit):
         return check(self.last.output, self.prepared, self.setup.imu)
 
     @cached_property
+    def labels(self) -> frozenset[str]:
+        """Labels of all parameters that the model, or the estimator for it, has."""
+        return super().labels | {label for effect in self.setup.sensors.effects for label in effect.labels}
+
+    @cached_property
     def timetable(self) -> Timetable:
         """When the recording stood and turned."""
         return timetable(self.prepared)
@@ -355,7 +371,8 @@ class NavigationFit(Fit):
         noise = () if self.noise is None else (self.noise.note,)
         magnetic = any(effect.needs == "magnetic" for effect in self.sensors.effects)
         field = (NO_FIELD,) if magnetic and self.setup.site.magnetic_field_t is None else ()
-        return (*stops_line(self.test.recording, self.prepared), *told, *noise, *field)
+        places = (r.note for r in self.references() if r.sigma)
+        return (*stops_line(self.test.recording, self.prepared), *told, *places, *noise, *field)
 
     def _stated_priors(self) -> tuple[str, ...]:
         """Say which coefficients are fixed, and which have a prior of their own."""
@@ -436,7 +453,8 @@ def checksum(*arrays: Floats) -> float:
 def conditions(setup: TestSetup) -> float:
     """Give a number that another site or other noise densities do not have: they change what a likelihood means."""
     site, imu = setup.site, setup.imu
-    place = (site.latitude_rad, site.height_m, setup.gravity)
+    sigmas = tuple(v for v in (site.latitude_sigma_rad, site.gravity_sigma_m_s2) if v)
+    place = (site.latitude_rad, site.height_m, setup.gravity, *sigmas)
     return checksum(np.array([*place, imu.gyro_white_noise, imu.accel_white_noise]))
 
 

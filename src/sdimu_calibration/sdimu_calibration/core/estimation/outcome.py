@@ -44,7 +44,7 @@ def outcome(fit: Fit, held_out: bool = True, refuse: bool = True) -> Calibration
     if against and refuse:
         raise DataError(against)
     absurd = (against,) if against else ()
-    warnings = (*grave, *absurd, *fit.warnings(statistics), *inseparable(fit.names, covariance))
+    warnings = (*grave, *absurd, *fit.warnings(statistics), *inseparable(fit.names, fit.covariance_at_site))
     light = tuple(f.text for f in fit.faults if not f.grave)
     return Calibration(
         body_frame=fit.body_frame,
@@ -67,6 +67,7 @@ def outcome(fit: Fit, held_out: bool = True, refuse: bool = True) -> Calibration
         rests=fit.rests(),
         origin=_origin(fit),
         imu_noise=fit.test.imu.noise_alone,
+        references=fit.references(),
     )
 
 

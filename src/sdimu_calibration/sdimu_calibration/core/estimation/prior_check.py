@@ -6,6 +6,7 @@ import numpy as np
 
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.effects.imu_model import ImuModel
+from sdimu_calibration.core.site_reference import NAMES as SITE_REFERENCES
 from sdimu_calibration.core.units import from_si
 
 _FAR = 4.5
@@ -42,6 +43,13 @@ def contradicted(sensors: ImuModel, estimate: Floats, covariance: Floats) -> lis
         if pull[k] > _FAR:
             unit = sensors.parameters[k].display_unit
             mean, sigma, found = (from_si(float(v[k]), unit) for v in (sensors.mean, prior, estimate))
+            if sensors.names[k] in SITE_REFERENCES:
+                kind = sensors.names[k].removeprefix("reference_")
+                out.append(
+                    f"{kind}_sigma of the site ({sigma:.3g} {unit}) contradicts the data: they say that the {kind} "
+                    f"told is too large by {found:.4g} {unit}, {pull[k]:.0f} sigma; correct the {kind}, or its sigma"
+                )
+                continue
             out.append(
                 f"the stated prior of {sensors.names[k]} ({mean:.4g} +- {sigma:.3g} {unit}) contradicts the data: they "
                 f"say {found:.4g} {unit}, {pull[k]:.0f} sigma away; correct that prior, or leave it out"
@@ -59,7 +67,8 @@ def outside(sensors: ImuModel, estimate: Floats) -> list[str]:
     estimate : ndarray, shape (q,)
         SI.
     """
-    size = np.abs(estimate) / sensors.stated
+    count = len(sensors.names) - sensors.serving
+    size = np.abs(estimate[:count]) / sensors.stated[:count]
     return [
         f"{sensors.names[i]} is {size[i]:.1f} times the sigma of the specification"
         for i in np.argsort(-size)

@@ -124,11 +124,6 @@ class SecondOrderFit(NavigationFit):
         """Navigation with the coefficients known at their final values."""
         return known_second_order_pass(self.prepared, self.setup, self.alignment, self.last)
 
-    @cached_property
-    def labels(self) -> frozenset[str]:
-        """Labels of all parameters that the model, or the estimator for it, has."""
-        return super().labels | {label for effect in self.setup.sensors.effects for label in effect.labels}
-
     def added_columns(self, count: int) -> Ints:
         """Columns in `evidence`, which is that of the inner model, of the last `count` parameters of the model.
 

@@ -35,7 +35,8 @@ from sdimu_calibration.core.effects.accelerometer_frame import (
 from sdimu_calibration.core.effects.earth_rate import NAMES as EARTH_RATE
 from sdimu_calibration.core.effects.earth_rate import horizontal_earth_rate, of_any_direction
 from sdimu_calibration.core.effects.effect import Effect
-from sdimu_calibration.core.effects.imu_model import ImuModel
+from sdimu_calibration.core.effects.imu_model import ImuModel, with_references
+from sdimu_calibration.core.effects.references import stated_references
 from sdimu_calibration.core.estimation.filter_fit import FilterFit
 from sdimu_calibration.core.estimation.fit import Fit, Start
 from sdimu_calibration.core.estimation.free_azimuth import azimuth_is_lost
@@ -130,6 +131,13 @@ def _check(test: PreparedTest, model: Model, estimator: str) -> None:
             f"the estimator '{estimator}' takes every stop: cut the recording instead ({Work.CUT}), or use one of "
             f"{', '.join(_TAKES_PRIORS)}"
         )
+    site = test.site
+    if site is not None and estimator != HandheldFit.estimator and stated_references(site):
+        key = "latitude_sigma" if site.latitude_sigma_rad else "gravity_sigma"
+        raise DataError(
+            f"the estimator '{estimator}' takes the site at its word: leave {key} out of its file, or use one of "
+            f"{', '.join(_TAKES_PRIORS)}"
+        )
 
 
 @dataclass(frozen=True)
@@ -214,7 +222,8 @@ def _filter(test: PreparedTest, model: Model, start: Start | None, progress: Pro
     setup = _setup(test, model)
     progress("reduce", 0.0)
     prepared = test.data(setup)
-    solution = solve_filter(setup, prepared, _begin(start, setup.sensors), progress)
+    inner = replace(setup, sensors=_with_references(setup.sensors, setup))
+    solution = solve_filter(inner, prepared, _begin(start, inner.sensors), progress)
     return FilterFit(test, model, setup.sensors, solution.setup, prepared, solution.alignment, solution)
 
 
@@ -260,7 +269,13 @@ def _in_accelerometer_frame(setup: TestSetup, azimuth_free: bool) -> Acceleromet
     found = accelerometer_frame_model(setup.sensors, setup.imu, along)
     if found is None:
         raise DataError(NO_FRAME)
-    return replace(found, inner=of_any_direction(found.inner, latitude)) if azimuth_free else found
+    inner = of_any_direction(found.inner, latitude) if azimuth_free else found.inner
+    return replace(found, inner=_with_references(inner, setup))
+
+
+def _with_references(sensors: ImuModel, setup: TestSetup) -> ImuModel:
+    """Put behind a model what the site says of itself that it is not certain of."""
+    return with_references(sensors, stated_references(setup.site))
 
 
 def _does_without_azimuth(fit: Fit) -> bool:
@@ -335,11 +350,14 @@ def fit_about(
         its place, and this fit does without one, too.
     """
     begun = _reduced(test, model, silent)
+    asked = begun.setup.sensors
     here = {} if start is None else dict(zip(start.names, start.coefficients.tolist(), strict=True))
     frame_model, azimuth_free = None, here.keys() >= set(EARTH_RATE)
     if estimator == SecondOrderFit.estimator:
         frame_model = _in_accelerometer_frame(begun.setup, azimuth_free)
         begun = replace(begun, setup=replace(begun.setup, sensors=frame_model.inner))
+    else:
+        begun = replace(begun, setup=replace(begun.setup, sensors=_with_references(begun.setup.sensors, begun.setup)))
     C_nb = begun.alignment.C_nb if start is None else start.C_nb
     sensors = begun.setup.sensors
     known_here = dict(coefficients)
@@ -352,7 +370,7 @@ def fit_about(
     if start is None and frame_model is None:
         C_nb = attitude_about(known.prepared, known.setup, known.alignment, C_nb, values)
     fit = _navigation_about(test, model, known, frame_model, C_nb, values)
-    return replace(fit, setup=begun.setup)
+    return replace(fit, setup=begun.setup, sensors=asked)
 
 
 def _navigation_about(

@@ -119,7 +119,7 @@ def handheld_evidence(
         prior=np.zeros(0),
         imu=imu,
         times=timetable(run),
-        coefficients=q,
+        coefficients=q - scene.model.serving,
         channel=np.concatenate(
             [np.tile(np.arange(6), k), np.tile(np.arange(6, 9), k - 1), np.full(len(run.whole), _DOWN)]
         ),

@@ -114,3 +114,22 @@ def solved(A: Floats, right: Floats) -> Floats:
     """
     scale = 1.0 / np.sqrt(np.diag(A))
     return np.asarray(scale[:, None] * np.linalg.solve(A * np.outer(scale, scale), scale[:, None] * right))
+
+
+def conditioned(covariance: Floats, known: Ints) -> Floats:
+    """Covariance when some of the unknowns are known, ``C - C[:, known] C[known, known]^-1 C[known, :]``.
+
+    Parameters
+    ----------
+    covariance : ndarray, shape (k, k)
+        In any units.
+    known : ndarray of int, shape (r,)
+        Positive variances.
+
+    Returns
+    -------
+    ndarray, shape (k, k)
+        In the same units; zero in the rows and columns of what is known, to rounding.
+    """
+    across = covariance[:, known]
+    return np.asarray(covariance - across @ solved(covariance[np.ix_(known, known)], across.T))

@@ -16,7 +16,6 @@ import numpy as np
 from sdimu_calibration.core.alignment.alignment import Alignment
 from sdimu_calibration.core.alignment.prepared import PreparedData, TestSetup
 from sdimu_calibration.core.arrays import Floats, Ints
-from sdimu_calibration.core.effects import earth_rate
 from sdimu_calibration.core.effects.effect import Effect, Timetable
 from sdimu_calibration.core.effects.motion import Motion
 from sdimu_calibration.core.evidence.conditions import Conditions, conditions
@@ -217,18 +216,13 @@ def navigation_evidence(
         prior=prior,
         imu=setup.imu,
         times=timetable(prepared),
-        coefficients=len(sensors.prior) - _serving(sensors.names),
+        coefficients=len(sensors.prior) - sensors.serving,
         epoch=epoch,
         channel=channel,
         known=known,
         prepared=prepared,
         latitude=latitude,
     )
-
-
-def _serving(names: Sequence[str]) -> int:
-    """Count the parameters that only serve, as attitudes do: they are behind all others, and nobody is told of them."""
-    return sum(name in earth_rate.NAMES for name in names)
 
 
 def columns(prepared: PreparedData, known: KnownPass, latitude: float, effects: Sequence[Effect]) -> Floats:

@@ -108,7 +108,7 @@ def fit_priors(sensors: ImuModel, imu: ImuSpecification, site: Site | None, rest
         raise DataError(f"a handheld run takes constants only, and '{name}' changes at random: leave it out")
     # The prior holds in a frame of its own; the three turns that lead to the accelerometers' frame go with it.
     J = body_frame.frame_jacobian(sensors.names, "accelerometer_triad")
-    size = sensors.prior * np.where(_stated(sensors, imu), 1.0, _ROOM)
+    size = sensors.prior * np.where(_stated(sensors, imu) | sensors.restated, 1.0, _ROOM)
     prior = J @ np.diag(size**2) @ J.T
     kept = np.flatnonzero(np.diag(prior) > 1e-12 * size**2)
     gravity, mean, sigma = STANDARD_GRAVITY, np.zeros(3), np.full(3, earth.RATE / np.sqrt(3.0))
@@ -117,7 +117,8 @@ def fit_priors(sensors: ImuModel, imu: ImuSpecification, site: Site | None, rest
         rate = earth.earth_rate(site.latitude_rad)
         mean[2] = rate[2]
         # The heading is free, so north is any way; 1e-9 rad/s is a ten-thousandth of a degree an hour.
-        sigma = np.array([abs(rate[0]) / np.sqrt(2.0) + 1e-9, abs(rate[0]) / np.sqrt(2.0) + 1e-9, 1e-9])
+        down = max(1e-9, abs(rate[0]) * site.latitude_sigma_rad)
+        sigma = np.array([abs(rate[0]) / np.sqrt(2.0) + 1e-9, abs(rate[0]) / np.sqrt(2.0) + 1e-9, down])
     return FitPriors(
         sensors,
         kept,
@@ -162,8 +163,9 @@ def handheld_notes(run: HandheldRun, scene: FitPriors, found: HandheldSolution, 
     ]
     out += _whole_note(run)
     sigma = np.sqrt(np.diag(found.covariance))
-    names = [scene.model.names[i] for i in scene.kept]
-    unknown = [n for n, s, q in zip(names, sigma, np.sqrt(np.diag(scene.prior)), strict=True) if s > _UNKNOWN * q]
+    names = [scene.model.names[i] for i in scene.kept][: len(scene.kept) - scene.model.serving]
+    known = np.sqrt(np.diag(scene.prior))[: len(names)]
+    unknown = [n for n, s, q in zip(names, sigma[: len(names)], known, strict=True) if s > _UNKNOWN * q]
     if unknown:
         out.append(f"not determined by this recording: {', '.join(unknown)}")
     return out

@@ -29,7 +29,7 @@ from sdimu_calibration.core.joint.scope import by_name, is_local, tagged
 from sdimu_calibration.core.joint.stretch_rows import Places, stretch_rows
 from sdimu_calibration.core.noise_term import NoiseTerm
 from sdimu_calibration.core.recording import DataError
-from sdimu_calibration.core.specification import ImuSpecification, Model
+from sdimu_calibration.core.specification import ImuSpecification, Model, Site
 
 _HEADING = 1e-3
 """Heading sigma (rad) from which a recording alone does not know its heading: five sigmas of it change how a
@@ -135,6 +135,7 @@ class Report:
         The recording alone contradicts priors of the IMU file.
     places : Places or None
         Of its dwells and turns, where they were asked for.
+    site : Site or None
     """
 
     name: str
@@ -159,6 +160,7 @@ class Report:
     noise: tuple[NoiseTerm, ...] = ()
     widened: bool = False
     places: Places | None = None
+    site: Site | None = None
 
     @property
     def stands_alone(self) -> bool:
@@ -261,6 +263,7 @@ def _report(job: Job, fit: Fit) -> Report:
         fit.noise_terms,
         _widened(fit),
         places,
+        fit.test.site,
     )
 
 

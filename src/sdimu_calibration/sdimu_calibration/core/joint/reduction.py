@@ -17,6 +17,7 @@ from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.evidence.stretch_length import wander_in
 from sdimu_calibration.core.noise_term import NoiseTerm
+from sdimu_calibration.core.site_reference import NAMES as SITE_REFERENCES
 
 _ROUNDING = 1e-12
 """Ratio of an eigenvalue of the information, in units of the columns, to the largest from which it counts: below is
@@ -63,24 +64,28 @@ def reduced(evidence: LinearEvidence, terms: tuple[NoiseTerm, ...] = ()) -> Redu
     Parameters
     ----------
     evidence : LinearEvidence
-        N rows, in white noise; parameters behind its first `coefficients` are eliminated with their priors.
+        N rows, in white noise; parameters behind its first `coefficients` are eliminated with their priors, but for the
+        references of the site, which all recordings share.
     terms : tuple of NoiseTerm
         Noise with a memory that was learned in the recording.
     """
-    p, own = evidence.coefficients, len(evidence.weight)
-    columns = whitened(np.column_stack([evidence.W, evidence.e]), evidence, terms)
+    own = len(evidence.weight)
+    apart = [k < evidence.coefficients or name in SITE_REFERENCES for k, name in enumerate(evidence.names[:own])]
+    kept, others = np.flatnonzero(apart), np.flatnonzero(np.logical_not(apart))
+    order, p = np.concatenate([kept, others, np.arange(own, evidence.W.shape[1])]), len(kept)
+    columns = whitened(np.column_stack([evidence.W[:, order], evidence.e]), evidence, terms)
     if own > p:
-        columns = _without(columns, p, evidence.weight[p:], evidence.shift[p:])
+        columns = _without(columns, p, evidence.weight[others], evidence.shift[others])
     W, e = columns[:, :-1], columns[:, -1]
     A, y = compressed(W, e)
-    point = -evidence.shift[:p]
+    point = -evidence.shift[kept]
     return Reduction(
-        evidence.names[:p],
+        tuple(evidence.names[k] for k in kept),
         evidence.names[own:],
         A,
         y + A[:, :p] @ point,
         point,
-        evidence.weight[:p],
+        evidence.weight[kept],
         len(evidence.e),
         float(e @ e - y @ y),
     )

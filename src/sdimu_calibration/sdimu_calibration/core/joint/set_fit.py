@@ -17,7 +17,13 @@ from sdimu_calibration.core.joint.combine import Combination, Component, JointEs
 from sdimu_calibration.core.joint.member import Job, Member, Report
 from sdimu_calibration.core.joint.same_unit import check_one_unit
 from sdimu_calibration.core.joint.scope import by_name, split_tag
-from sdimu_calibration.core.joint.set_order import check_different, check_members, check_one_grade, in_order
+from sdimu_calibration.core.joint.set_order import (
+    check_different,
+    check_members,
+    check_one_grade,
+    check_one_site,
+    in_order,
+)
 from sdimu_calibration.core.joint.turn_on import in_scatter, turn_on_scatter
 from sdimu_calibration.core.progress import Progress, silent
 from sdimu_calibration.core.recording import DataError
@@ -176,6 +182,7 @@ def fit_set(
     reports = in_order(reports)
     check_different(reports)
     check_one_grade(reports)
+    check_one_site(reports)
     if before is None:
         check_one_unit(reports)
     reports = _one_estimator(members, options, reports, run)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from sdimu_calibration.core.effects.references import stated_references
 from sdimu_calibration.core.joint.member import Member, Report
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.wording import Option, Work
@@ -55,4 +56,15 @@ def check_one_grade(reports: Sequence[Report]) -> None:
         raise DataError(
             f"the recordings are of IMUs of different grades ({told}): a joint fit is of one unit; state its "
             f"{Option.IMU} if it is one, else calibrate each by itself"
+        )
+
+
+def check_one_site(reports: Sequence[Report]) -> None:
+    """Refuse different sites where one of them states a sigma: what it is off by is one number for all recordings."""
+    sites = {report.site: report for report in reports}
+    if len(sites) > 1 and any(stated_references(site) for site in sites if site is not None):
+        first, other = list(sites.values())[:2]
+        raise DataError(
+            f"{first.name} and {other.name} are at different sites, and latitude_sigma or gravity_sigma is stated: a "
+            "joint fit knows one site that is off; leave the sigmas out of the files, or calibrate each site by itself"
         )

@@ -11,6 +11,7 @@ from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.estimation.fit import Fit
 from sdimu_calibration.core.estimation.navigation_fit import MISFIT, NavigationFit
 from sdimu_calibration.core.estimation.outcome import inseparable
+from sdimu_calibration.core.evidence.information import conditioned
 from sdimu_calibration.core.joint.member import Report, fitted
 from sdimu_calibration.core.joint.set_evidence import held_out
 from sdimu_calibration.core.joint.set_fit import SetFit, SetOptions, job_of, power_on
@@ -26,6 +27,8 @@ from sdimu_calibration.core.results import (
     TurnOn,
     no_history,
 )
+from sdimu_calibration.core.site_reference import NAMES as SITE_REFERENCES
+from sdimu_calibration.core.site_reference import found, told_of
 from sdimu_calibration.core.units import from_si
 from sdimu_calibration.core.wording import Work
 
@@ -47,7 +50,8 @@ def set_outcome(fit: SetFit) -> Calibration:
     fit : SetFit
     """
     base = base_fit(fit)
-    values, covariance = _reported(fit, base)
+    values, covariance = _reported(fit, base, fit.estimate.covariance)
+    places = [k for k, name in enumerate(fit.names) if name in SITE_REFERENCES]
     varied = variation(fit)
     predicted = held_out(fit)
     dof = sum(r.statistics.nis_dof for r in fit.reports)
@@ -56,7 +60,11 @@ def set_outcome(fit: SetFit) -> Calibration:
     names = tuple(p.name for p in parameters)
     # What the frame of the report pins differs in no recording.
     free = tuple(name for name, variance in zip(names, np.diag(covariance), strict=True) if variance > 0.0)
-    warnings = (*_warnings(fit, varied, free), *inseparable(names, covariance))
+    at_site = conditioned(fit.estimate.covariance, np.array(places)) if places else fit.estimate.covariance
+    warnings = (*_warnings(fit, varied, free), *inseparable(names, _reported(fit, base, at_site)[1]))
+    sigma = np.sqrt(np.diag(fit.estimate.covariance))
+    off = {fit.names[k]: (float(fit.estimate.values[k]), float(sigma[k])) for k in places}
+    references = found(told_of(base.test.site, names), off)
     return Calibration(
         body_frame=base.body_frame,
         model=tuple(e.key for e in base.sensors.effects),
@@ -73,7 +81,7 @@ def set_outcome(fit: SetFit) -> Calibration:
             "passes": max(r.statistics.passes for r in fit.reports),
         },
         data=_data(fit.reports, base),
-        notes=(*_notes(fit, base), *warnings),
+        notes=(*_notes(fit, base), *(r.note for r in references if r.name in off), *warnings),
         history=no_history(len(names)),
         warnings=warnings,
         estimator=base.estimator,
@@ -82,6 +90,7 @@ def set_outcome(fit: SetFit) -> Calibration:
         of_set=_summary(fit, varied, names, base),
         origin=_origin(fit, base),
         imu_noise=base.test.imu.noise_alone,
+        references=references,
     )
 
 
@@ -94,11 +103,11 @@ def base_fit(fit: SetFit) -> Fit:
     return fitted(job)
 
 
-def _reported(fit: SetFit, base: Fit) -> tuple[Floats, Floats]:
-    """Values and covariance of what all recordings share, in the frame of the report."""
+def _reported(fit: SetFit, base: Fit, covariance: Floats) -> tuple[Floats, Floats]:
+    """Values and covariance of what all recordings share, in the frame of the report; `covariance` (P, P) of all."""
     names = base.evidence().names[: base.evidence().coefficients]
     places = [fit.names.index(n) for n in names]
-    values, covariance = fit.estimate.values[places], fit.estimate.covariance[np.ix_(places, places)]
+    values, covariance = fit.estimate.values[places], covariance[np.ix_(places, places)]
     if isinstance(base, NavigationFit):
         # What only serves the fit of this recording, as the Earth rate in the place of its azimuth, is behind them.
         T = base.centring[: len(names), : len(names)]

@@ -34,6 +34,12 @@ LONGEST_FILE = 1 << 20
 DEEPEST = 32
 """Lists in lists and keys under keys at most: a configuration needs five."""
 
+LARGEST_LATITUDE_SIGMA = math.radians(2.0)
+"""Largest sigma of a latitude (rad): beyond it the square of the error counts, and a map knows better."""
+
+LARGEST_GRAVITY_SIGMA = 0.05
+"""Largest sigma of gravity (m/s^2): from the equator to a pole it changes by as much."""
+
 _PACKAGE = Path(__file__).resolve().parents[2]
 _REPOSITORY = _PACKAGE.parents[2]
 
@@ -52,6 +58,18 @@ S = TypeVar("S", bound=Schema)
 def quantity(expected: str) -> BeforeValidator:
     """Read text such as ``"2 deg/s"`` into SI, refusing every dimension but that of `expected`."""
     return BeforeValidator(lambda value: parse_quantity(_as_text(value, expected), expected))
+
+
+def _sigma_up_to(most: float, unit: str) -> BeforeValidator:
+    """Read a sigma with a unit into SI, refusing one below zero or above `most` (SI)."""
+
+    def read(value: Any) -> float:
+        size = parse_quantity(_as_text(value, unit), unit)
+        if not 0.0 <= size <= most:
+            raise ValueError(f"'{value}' is no sigma from 0 to {from_si(most, unit):g} {unit}")
+        return size
+
+    return BeforeValidator(read)
 
 
 def _number_of(unit: str) -> BeforeValidator:
@@ -311,6 +329,8 @@ class _SiteFile(Schema):
     initial_azimuth_sigma_deg: Annotated[float, _number_of("deg"), Field(gt=0.0, le=360.0)] = math.degrees(
         Site.initial_azimuth_sigma_rad
     )
+    latitude_sigma: Annotated[float, _sigma_up_to(LARGEST_LATITUDE_SIGMA, "deg")] = 0.0
+    gravity_sigma: Annotated[float, _sigma_up_to(LARGEST_GRAVITY_SIGMA, "mgal")] = 0.0
 
 
 def load_plan(name_or_path: str | Path) -> Plan:
@@ -394,4 +414,6 @@ def load_site(name_or_path: str | Path) -> Site:
         initial_azimuth_rad=None if azimuth is None else math.radians(azimuth),
         initial_azimuth_sigma_rad=math.radians(file.initial_azimuth_sigma_deg),
         magnetic_field_t=None if field is None else (1e-9 * field[0], 1e-9 * field[1], 1e-9 * field[2]),
+        latitude_sigma_rad=file.latitude_sigma,
+        gravity_sigma_m_s2=file.gravity_sigma,
     )

@@ -29,6 +29,7 @@ from sdimu_calibration.core.results import (
     TurnOn,
     no_history,
 )
+from sdimu_calibration.core.site_reference import Reference
 from sdimu_calibration.core.specification import ImuSpecification
 from sdimu_calibration.core.verdict import Verdict
 from sdimu_calibration.storage.files.config import config_folder, load_imu
@@ -131,6 +132,7 @@ class ResultFile(ResultModel):
     covariance: Array
     fit: dict[str, Any]
     data: Data
+    references: tuple[Annotated[Reference, Entry()], ...] = ()
     noise: tuple[Annotated[NoiseTerm, Entry({"unit": lambda term: term.unit})], ...] = ()
     rests: tuple[Annotated[Rest, Entry()], ...] = ()
     turn_on: tuple[Annotated[TurnOn, Entry({"triad": lambda one: one.effect.partition("_")[0]})], ...] = ()
@@ -156,7 +158,12 @@ def write_result(path: Path, calibration: Calibration, verdict: Verdict | None =
         Of a diagnosis, where one was made; no note then advises one.
     """
     c, told = calibration, without_advice if verdict else tuple
-    seldom: dict[str, Any] = {"verdict": verdict, "rests": c.rests, "imu_noise": c.imu_noise and _noise_of(c.imu_noise)}
+    seldom: dict[str, Any] = {
+        "verdict": verdict,
+        "references": c.references,
+        "rests": c.rests,
+        "imu_noise": c.imu_noise and _noise_of(c.imu_noise),
+    }
     ResultFile.model_construct(
         format=FORMAT,
         **{key: value for key, value in seldom.items() if value},
@@ -258,6 +265,7 @@ def _calibration(file: ResultFile) -> Calibration:
         rests=file.rests,
         origin=file.origin,
         imu_noise=None if file.imu_noise is None else file.imu_noise.specification,
+        references=file.references,
         of_set=_set_summary(file, p) if file.recordings else None,
         drift_means=file.drift_means,
     )

@@ -1,0 +1,64 @@
+"""References of the site among the parameters of an estimator that serve."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from sdimu_calibration.core.arrays import Floats, Ints
+from sdimu_calibration.core.effects.imu_model import ImuModel
+from sdimu_calibration.core.evidence.information import conditioned
+from sdimu_calibration.core.site_reference import NAMES, Reference, found
+
+
+def site_rows(sensors: ImuModel) -> Ints:
+    """Places of the references of the site among the parameters of a model.
+
+    Parameters
+    ----------
+    sensors : ImuModel
+        q parameters.
+
+    Returns
+    -------
+    ndarray of int, shape (r,)
+    """
+    behind = range(len(sensors.names) - sensors.serving, len(sensors.names))
+    return np.array([k for k in behind if sensors.names[k] in NAMES], dtype=np.int64)
+
+
+def at_site(sensors: ImuModel, covariance: Floats) -> Floats:
+    """Covariance if the site were as told.
+
+    Parameters
+    ----------
+    sensors : ImuModel
+    covariance : ndarray, shape (q, q)
+        SI.
+
+    Returns
+    -------
+    ndarray, shape (q, q)
+        SI; zero in the rows of the references.
+    """
+    rows = site_rows(sensors)
+    return conditioned(covariance, rows) if len(rows) else covariance
+
+
+def with_found(
+    references: Sequence[Reference], sensors: ImuModel, estimate: Floats, covariance: Floats
+) -> tuple[Reference, ...]:
+    """Put into references what a fit found of those that it estimated along.
+
+    Parameters
+    ----------
+    references : sequence of Reference
+    sensors : ImuModel
+    estimate : ndarray, shape (q,)
+        SI.
+    covariance : ndarray, shape (q, q)
+        SI.
+    """
+    rows, sigma = site_rows(sensors), np.sqrt(np.diag(covariance))
+    return found(references, {sensors.names[k]: (float(estimate[k]), float(sigma[k])) for k in rows})
