@@ -17,6 +17,7 @@ from typing import Annotated, Any, Literal, TypeVar, get_args
 import yaml
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
+from sdimu_calibration.core.plain_text import one_line
 from sdimu_calibration.core.plan import Plan, Turn
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.specification import ImuSpecification, Model, Site, StatedPrior
@@ -223,12 +224,14 @@ def check(data: Mapping[str, Any], schema: type[S], source: str) -> S:
         return schema.model_validate(data)
     except ValidationError as error:
         first = min(error.errors(), key=_rank)
-        key = ".".join(str(part) for part in first["loc"])
+        key = one_line(".".join(str(part) for part in first["loc"]), _LONGEST_KEY)
         raise DataError(
             f"{source}: {key}: {_message(first, schema)}" if key else f"{source}: {first['msg']}"
         ) from error
 
 
+_LONGEST_KEY = 300
+"""Number of characters of a key that a message shows (1): what is wrong with it stands behind."""
 _SHAPES = {"dict_type": "write one line `name: value` for each, below the key", "list_type": "write a list [a, b, ...]"}
 """What to write where a file has something else in the place of a mapping or list."""
 
