@@ -230,7 +230,7 @@ def check(data: Mapping[str, Any], schema: type[S], source: str) -> S:
         ) from error
 
 
-_LONGEST_KEY = 300
+_LONGEST_KEY = 200
 """Number of characters of a key that a message shows (1): what is wrong with it stands behind."""
 _SHAPES = {"dict_type": "write one line `name: value` for each, below the key", "list_type": "write a list [a, b, ...]"}
 """What to write where a file has something else in the place of a mapping or list."""
