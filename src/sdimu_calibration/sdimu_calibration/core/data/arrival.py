@@ -14,6 +14,7 @@ import numpy as np
 from sdimu_calibration.core.arrays import Bools, Floats, Ints
 from sdimu_calibration.core.data.blocks import all_finite, ascending
 from sdimu_calibration.core.data.bursts import Bursts, find_bursts
+from sdimu_calibration.core.data.clock_steps import Step, as_recorded, find_steps, undone
 from sdimu_calibration.core.data.far_samples import TRIADS, far_samples, far_text
 from sdimu_calibration.core.data.strays import stamp_text, strays
 from sdimu_calibration.core.plain_text import counted
@@ -248,6 +249,8 @@ def _refuse_clock_set_back(ns: Stamps, omega_ib_b: Floats, f_ib_b: Floats, where
 def in_order(raw: RawTest) -> Recording:
     """Order samples and logs by their stamps and count seconds from one nominal interval before the first sample."""
     bursts = _bursts(raw)
+    steps = find_steps(raw.ns, raw.omega_ib_b, raw.f_ib_b) if bursts is None else ()
+    raw = _without_steps(raw, steps)
     stamps = raw.ns if bursts is None else bursts.ns
     arranged = arrange(stamps, raw.omega_ib_b, raw.f_ib_b, raw.where)
     notes = [*([] if bursts is None else [str(bursts)]), *arranged.notes]
@@ -264,6 +267,20 @@ def in_order(raw: RawTest) -> Recording:
         temperature=_temperature(raw, ns, start_ns, notes),
         rejected=len(raw.ns) - len(ns),
         notes=tuple(notes),
+        clock_steps=as_recorded(steps, raw.ns, start_ns),
+    )
+
+
+def _without_steps(raw: RawTest, steps: tuple[Step, ...]) -> RawTest:
+    """Take steps of the clock out of the stamps of all topics, which one computer wrote."""
+    if not steps:
+        return raw
+    status, temperature = raw.status, raw.temperature
+    return replace(
+        raw,
+        ns=undone(raw.ns, raw.ns, steps),
+        status=status and status._replace(ns=undone(status.ns, raw.ns, steps)),
+        temperature=temperature and temperature._replace(ns=undone(temperature.ns, raw.ns, steps)),
     )
 
 
