@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -140,6 +141,26 @@ class TableLog:
     angle: Floats
 
 
+class ClockStep(NamedTuple):
+    """A step of the clock of the stamps, taken out of them.
+
+    Attributes
+    ----------
+    t : float
+        Time of the first sample after it (s after the start of the recording).
+    size_s : float
+        How far the clock was set on; below zero: back (s).
+    """
+
+    t: float
+    size_s: float
+
+    def __str__(self) -> str:
+        """Say it in a few words."""
+        how = "on" if self.size_s > 0.0 else "back"
+        return f"the clock of the stamps was set {how} by {abs(self.size_s) * 1e3:.3g} ms at {self.t:.1f} s"
+
+
 @dataclass(frozen=True)
 class Recording:
     """Samples of an IMU and what came with them.
@@ -161,6 +182,8 @@ class Recording:
         Samples dropped when the recording was made into arrays (not finite, repeated stamp).
     notes : tuple of str
         What was mended or ignored, one line each.
+    clock_steps : tuple of ClockStep
+        Across which samples are taken as even.
     """
 
     start_ns: int
@@ -172,6 +195,7 @@ class Recording:
     table: TableLog | None = None
     rejected: int = 0
     notes: tuple[str, ...] = field(default=())
+    clock_steps: tuple[ClockStep, ...] = ()
 
     @cached_property
     def interval_s(self) -> float:

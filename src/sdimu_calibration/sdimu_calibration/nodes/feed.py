@@ -17,6 +17,7 @@ from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.nodes.gate import Companion
 from sdimu_calibration.nodes.remembered import Remembered
 from sdimu_calibration.storage.bags.cdr import LayoutError, decode_imu
+from sdimu_calibration.storage.bags.frames import frames_of
 from sdimu_calibration.storage.files.journal import Journal, Record, Samples, Status, Temperature
 
 AWAY_S = 600.0
@@ -24,6 +25,10 @@ AWAY_S = 600.0
 _SINCE = 100_000
 """Number of messages that are kept until samples say of which test they are, the last ones: four minutes of status and
 temperature at 200 Hz each, which repeat what held before them."""
+
+
+_RENAMED = 500
+"""Number of messages without one of the IMU's frame from which it has another name: its driver was started again."""
 
 
 class Feed:
@@ -53,6 +58,8 @@ class Feed:
         self._live = make()
         self._successor: Feed | None = None
         self._records: Iterator[Record] = iter(())
+        self._frame: bytes | None = None
+        self._told_frames, self._without = False, 0
         self._told_ns = NEVER
         self._born = time.monotonic()
         self._first_ns: int | None = None
@@ -146,8 +153,12 @@ class Feed:
             return 0
         if not self._raw:
             return self.imu_ns
+        raw = self._of_one_frame(self._raw)
+        if not raw:
+            self._raw = []
+            return self.imu_ns
         try:
-            ns, omega, force = decode_imu(self._raw)
+            ns, omega, force = decode_imu(raw)
         except LayoutError as error:
             raise DataError(f"the IMU topic carries something else than sensor_msgs/Imu ({error})") from error
         samples = Samples(ns, omega, force)
@@ -164,6 +175,21 @@ class Feed:
             self._journal.samples(samples.ns, samples.omega_ib_b, samples.f_ib_b)
         self._keep(samples)
         return self.imu_ns
+
+    def _of_one_frame(self, raw: list[bytes]) -> list[bytes]:
+        """Leave out messages of another `frame_id` than most of the first ones, and say so once."""
+        frames = frames_of(raw)
+        self._without = 0 if self._frame is None or frames.has(self._frame) else self._without + len(raw)
+        if self._frame is None or self._without >= _RENAMED:
+            self._frame, self._without = frames.main(), 0
+        chosen = frames.chosen(self._frame)
+        if chosen is None:
+            return raw
+        kept, words = chosen
+        if not self._told_frames:
+            self._told_frames = True
+            self._live.notes.append(f"the IMU topic: {words}")
+        return [message for message, taken in zip(raw, kept, strict=True) if taken]
 
     def _keep(self, samples: Samples) -> None:
         if self._first_ns is None:

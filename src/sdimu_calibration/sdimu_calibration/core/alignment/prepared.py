@@ -12,7 +12,7 @@ from sdimu_calibration.core.arrays import Bools, Floats, Ints
 from sdimu_calibration.core.data.blocks import let_go, pieces
 from sdimu_calibration.core.data.dwell_detection import specification_is_wide
 from sdimu_calibration.core.data.epochs import Epochs, cut
-from sdimu_calibration.core.data.gaps import Bridges, bridges, judge, largest_acceleration, weighed
+from sdimu_calibration.core.data.gaps import Bridges, bridges, judge, largest_acceleration, stepped, weighed
 from sdimu_calibration.core.data.long_epochs import long_epochs
 from sdimu_calibration.core.data.phases import (
     Phases,
@@ -191,10 +191,11 @@ def reduce(recording: Recording, setup: TestSetup, screened: bool = True) -> Pre
     phases = without_early_motion(epochs, recording.phase, phases, setup.imu.gyro_white_noise)
     cycles = cycles[: int(epochs.last[-1])]
     found = bridges(cycles, epochs, phases.dwell, nominal, largest_acceleration(cycles), setup.gravity)
+    found, steps = stepped(found, cycles, epochs, phases.dwell, recording.clock_steps, setup.gravity)
     at, excess, rough = wild(recording)
     let_go(recording.omega_ib_b, recording.f_ib_b)
     found = weighed(found, epochs, at, excess)
-    unsound = (*unsound, *rough)
+    unsound = (*unsound, *steps, *rough)
     noise = (setup.imu.gyro_white_noise, setup.imu.accel_white_noise)
     lost = judge(cycles, epochs, phases, nominal, found, noise, unsound)
     faults = (*unsound, *lost, *contradictions(epochs, phases, recording.phase, not specification_is_wide(setup.imu)))

@@ -14,6 +14,7 @@ import numpy as np
 from sdimu_calibration.core.arrays import Bools, Floats, Ints
 from sdimu_calibration.core.data.blocks import all_finite, ascending
 from sdimu_calibration.core.data.bursts import Bursts, find_bursts
+from sdimu_calibration.core.data.clock_steps import Step, as_recorded, find_steps, undone
 from sdimu_calibration.core.data.far_samples import TRIADS, far_samples, far_text
 from sdimu_calibration.core.data.strays import stamp_text, strays
 from sdimu_calibration.core.plain_text import counted
@@ -38,6 +39,8 @@ _OVERLAP = 3
 """Number of samples in a row that mean a clock set back, when they arrive late and find their time taken by other
 readings: one or two may be stragglers."""
 
+_STREAMS = 100
+"""Number of places where stamps go back from which two streams are mixed: a clock is not set so often."""
 _COUNTS = ("not_finite", "far", "out_of_order", "repeated")
 """Kinds of samples that are not used, or not in their place: those repeated have a stamp that was there before."""
 _COPIES = 0.5
@@ -237,6 +240,11 @@ def _refuse_clock_set_back(ns: Stamps, omega_ib_b: Floats, f_ib_b: Floats, where
     run = np.flatnonzero(late[_OVERLAP - 1 :] - late[: 1 - _OVERLAP] == _OVERLAP - 1)
     if len(run):
         first = int(late[run[0]])
+        if len(run) > _STREAMS:
+            raise DataError(
+                f"{where}: the stamps go back {len(run)} times, and other samples have these times already: two "
+                "publishers write to one topic; give each a topic of its own, or stop one"
+            )
         back = (newest[first] - ns[first]) * 1e-9 + interval * 1e-9
         raise DataError(
             f"{where}: the clock of the stamps was set back by {back:.3g} s at sample {first} "
@@ -248,6 +256,8 @@ def _refuse_clock_set_back(ns: Stamps, omega_ib_b: Floats, f_ib_b: Floats, where
 def in_order(raw: RawTest) -> Recording:
     """Order samples and logs by their stamps and count seconds from one nominal interval before the first sample."""
     bursts = _bursts(raw)
+    steps = find_steps(raw.ns, raw.omega_ib_b, raw.f_ib_b) if bursts is None else ()
+    raw = _without_steps(raw, steps)
     stamps = raw.ns if bursts is None else bursts.ns
     arranged = arrange(stamps, raw.omega_ib_b, raw.f_ib_b, raw.where)
     notes = [*([] if bursts is None else [str(bursts)]), *arranged.notes]
@@ -264,6 +274,20 @@ def in_order(raw: RawTest) -> Recording:
         temperature=_temperature(raw, ns, start_ns, notes),
         rejected=len(raw.ns) - len(ns),
         notes=tuple(notes),
+        clock_steps=as_recorded(steps, raw.ns, start_ns),
+    )
+
+
+def _without_steps(raw: RawTest, steps: tuple[Step, ...]) -> RawTest:
+    """Take steps of the clock out of the stamps of all topics, which one computer wrote."""
+    if not steps:
+        return raw
+    status, temperature = raw.status, raw.temperature
+    return replace(
+        raw,
+        ns=undone(raw.ns, raw.ns, steps),
+        status=status and status._replace(ns=undone(status.ns, raw.ns, steps)),
+        temperature=temperature and temperature._replace(ns=undone(temperature.ns, raw.ns, steps)),
     )
 
 

@@ -29,7 +29,7 @@ from sdimu_calibration.core.data.phases import Phases
 from sdimu_calibration.core.navigation.strapdown import Cycles
 from sdimu_calibration.core.note import Note, Topic
 from sdimu_calibration.core.plain_text import counted
-from sdimu_calibration.core.recording import DataError, DataFault
+from sdimu_calibration.core.recording import ClockStep, DataError, DataFault
 from sdimu_calibration.core.results import NOT_TRUSTED
 from sdimu_calibration.core.wording import Work
 
@@ -138,6 +138,39 @@ def bridges(
     return Bridges(white, angle, velocity)
 
 
+def stepped(
+    found: Bridges, cycles: Cycles, epochs: Epochs, dwell: Bools, steps: tuple[ClockStep, ...], gravity: float
+) -> tuple[Bridges, tuple[DataFault, ...]]:
+    """Add what steps of the clock leave uncertain, and tell them.
+
+    Where stamps go on, the angle that was turned in the length of the step is that between the samples or nothing, as
+    the driver paused or the clock was set: the sigma is that angle over the root of three. No pause sets stamps back.
+
+    Parameters
+    ----------
+    found : Bridges
+    cycles, epochs : Cycles, Epochs
+    dwell : ndarray of bool, shape (e,)
+    steps : tuple of ClockStep
+    gravity : float
+        m/s^2.
+    """
+    angle, velocity, faults = found.angle.copy(), found.velocity.copy(), []
+    for step in steps:
+        cycle = min(int(np.searchsorted(cycles.t, step.t)), len(cycles) - 1)
+        epoch = min(int(np.searchsorted(epochs.last, cycle, side="right")), len(epochs) - 1)
+        resting = bool(_rests(dwell, np.array([epoch]))[0])
+        if not resting and step.size_s > 0.0:
+            rate = float(np.linalg.norm(cycles.alpha[cycle])) / cycles.dt[cycle]
+            error = rate * abs(step.size_s) / math.sqrt(3.0)
+            angle[epoch] = math.hypot(angle[epoch], error)
+            velocity[epoch] = math.hypot(velocity[epoch], gravity * abs(step.size_s) * error)
+        pause = ", or the driver paused" if step.size_s > 0.0 else ""
+        text = f"{step} {'at rest' if resting else 'while the IMU turned'}{pause}: samples are taken as even"
+        faults.append(DataFault("clock", text, 1, step.t, step.t))
+    return Bridges(found.white, angle, velocity), tuple(faults)
+
+
 def weighed(found: Bridges, epochs: Epochs, t: Floats, excess: Floats) -> Bridges:
     """Add noise beyond the usual to the epochs it falls into.
 
@@ -193,7 +226,8 @@ def judge(
         missing = cycles.lost[epochs.first[worst] : epochs.last[worst]].sum() * nominal_s
         because = f" ({'; '.join(fault.text for fault in unsound)})" if unsound else ""
         where = "at rest" if phases.dwell[worst] else "while the IMU turned"
-        what = f"{missing:.2f} s of samples are missing" if missing else "readings are wild"
+        usual = "stamps are uncertain" if found.angle[worst] > 0.0 else "readings are wild"
+        what = f"{missing:.2f} s of samples are missing" if missing else usual
         raise DataError(
             f"/imu/data_raw: {what} {where} at {epochs.start[worst]:.1f} s (stop "
             f"{phases.stop[worst]}): the attitude after them is known only to {np.degrees(drift[worst]) * 60.0:.3g} "

@@ -48,7 +48,7 @@ def read_recording(path: Path, topics: Topics | TopicChoice | None = None) -> Re
     notes: list[str] = []
     topics, raw = read_messages(path, topics, notes, _kept)
     imu_topic = f"{path}: {topics.imu}"
-    ns, omega_ib_b, f_ib_b = _imu(raw[topics.imu], imu_topic)
+    ns, omega_ib_b, f_ib_b = _imu(raw[topics.imu], imu_topic, notes)
     recording = in_order(
         RawTest(
             ns,
@@ -153,13 +153,16 @@ def _kept(type_name: str) -> RawMessages:
     return ImuMessages() if type_name == cdr.IMU else RawMessages()
 
 
-def _imu(raw: RawMessages, where: str) -> tuple[Stamps, Floats, Floats]:
+def _imu(raw: RawMessages, where: str, notes: list[str]) -> tuple[Stamps, Floats, Floats]:
     def one_by_one(messages: Sequence[bytes]) -> tuple[Stamps, Floats, Floats]:
         ns, values = _one_by_one(messages, cdr.IMU, _imu_values, where)
         return ns, values[:, :3], values[:, 3:]
 
     assert isinstance(raw, ImuMessages)
-    return raw.samples(one_by_one)
+    samples = raw.samples(one_by_one)
+    if raw.left_out:
+        notes.append(f"{where}: {raw.left_out}")
+    return samples
 
 
 def _imu_values(message: Any) -> list[float]:

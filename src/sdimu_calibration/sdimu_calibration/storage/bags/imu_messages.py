@@ -12,6 +12,7 @@ import numpy as np
 from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage.bags.cdr import LayoutError, decode_imu_block
+from sdimu_calibration.storage.bags.frames import Frames
 from sdimu_calibration.storage.bags.raw_messages import Block, RawMessages
 
 Samples = tuple[Ints, Floats, Floats]
@@ -69,6 +70,9 @@ class ImuMessages(RawMessages):
         self._waiting = 0
         self._number = 0
         self._ends: list[bytes] = []
+        self._frames = Frames()
+        self.left_out = ""
+        """What is no part of the samples, once they were asked for: messages of another `frame_id`."""
 
     def append(self, message: bytes) -> None:
         """Append one message."""
@@ -86,7 +90,7 @@ class ImuMessages(RawMessages):
         return self._ends[0], self._ends[-1]
 
     def samples(self, one_by_one: Callable[[Sequence[bytes]], Samples]) -> Samples:
-        """Return stamps (n,) (ns), rates (n, 3) (rad/s) and specific forces (n, 3) (m/s^2).
+        """Return stamps (n,) (ns), rates (n, 3) (rad/s) and specific forces (n, 3) (m/s^2) of the main `frame_id`.
 
         Parameters
         ----------
@@ -94,6 +98,14 @@ class ImuMessages(RawMessages):
             Reads the messages of blocks that have no layout in common.
         """
         self._close()
+        ns, omega, force = self._all(one_by_one)
+        chosen = self._frames.chosen()
+        if chosen is None:
+            return ns, omega, force
+        kept, self.left_out = chosen
+        return ns[kept], omega[kept], force[kept]
+
+    def _all(self, one_by_one: Callable[[Sequence[bytes]], Samples]) -> Samples:
         found = [one_by_one(list(_messages_of(part))) if isinstance(part, Block) else part for part in self._decoded]
         self._decoded = []
         if self._file is not None:
@@ -113,6 +125,7 @@ class ImuMessages(RawMessages):
         first, last = (block.buffer[block.start[k] : block.start[k] + block.length[k]] for k in (0, -1))
         self._ends = [self._ends[0] if self._ends else first, last]
         self._number += len(block.start)
+        self._frames.add(block)
         try:
             self._decoded.append(decode_imu_block(block))
         except LayoutError:
