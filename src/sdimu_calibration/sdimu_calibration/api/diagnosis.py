@@ -16,11 +16,14 @@ from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary, summarise
 from sdimu_calibration.core.evidence.candidate import Candidate
 from sdimu_calibration.core.evidence.known import Standing
 from sdimu_calibration.core.evidence.navigation_evidence import NavigationEvidence
+from sdimu_calibration.core.posterior.told import Probabilities
+from sdimu_calibration.core.posterior.unknown import UnknownFunction
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.report import data, evidence_figures
 from sdimu_calibration.report.drawing import Figure
 from sdimu_calibration.report.page import write_report
 from sdimu_calibration.report.report_extras import report_extras
+from sdimu_calibration.report.unknown_section import followed, unknown_of
 from sdimu_calibration.storage.files.advice_words import sentence
 from sdimu_calibration.storage.files.diagnosis_file import write_diagnosis
 from sdimu_calibration.storage.files.result_file import write_result
@@ -81,6 +84,20 @@ class FitDiagnosis:
     def known(self) -> Standing:
         """What the recording knows of the unit: what a plan for the next one begins with."""
         return standing(self.core, self.summary.found)
+
+    @property
+    def probabilities(self) -> Probabilities | None:
+        """Probability of nothing missing, of each family of effects, of each kind of noise."""
+        return self.core.probabilities
+
+    @property
+    def unknown(self) -> tuple[UnknownFunction, ...]:
+        """Errors that no effect explains and that follow attitude, rate or temperature: mean and sigma by stretch."""
+        return unknown_of(self.core)
+
+    def plot_unknown(self) -> tuple[Any, ...]:
+        """Each error of `unknown` against what it follows, with its 95 % band (plotly figures)."""
+        return tuple(followed(one).as_plotly() for one in self.unknown)
 
     def plot_ranking(self) -> Any:
         """Scores of the candidates against what noise reaches (a plotly figure)."""

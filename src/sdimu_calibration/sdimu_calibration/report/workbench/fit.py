@@ -29,11 +29,13 @@ from sdimu_calibration.core.estimation.solve import solve, with_effects
 from sdimu_calibration.core.measurement_kind import SKIP
 from sdimu_calibration.core.note import without_advice
 from sdimu_calibration.core.posterior.told import Probabilities
+from sdimu_calibration.core.posterior.unknown import UnknownFunction
 from sdimu_calibration.core.progress import silent
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.results import Calibration, no_history
 from sdimu_calibration.core.specification import Model
 from sdimu_calibration.report import data
+from sdimu_calibration.report.unknown_section import unknown_of
 from sdimu_calibration.report.workbench.axes import axes
 from sdimu_calibration.report.workbench.own_effect import added_effects, stated_priors
 from sdimu_calibration.report.workbench.setting import Setting
@@ -104,6 +106,8 @@ class Missing:
         Error at stops or rests held out (sigma), as `sdimu calibrate` has it.
     probabilities : Probabilities or None
         Of nothing, and of each family of effects, as `sdimu diagnose` has them.
+    unknown : tuple of UnknownFunction
+        Errors that no effect explains, by what they follow.
     """
 
     entries: tuple[data.Scored, ...]
@@ -113,6 +117,7 @@ class Missing:
     left: FreeInputTest
     held_out: float | None
     probabilities: Probabilities | None = None
+    unknown: tuple[UnknownFunction, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -174,6 +179,7 @@ class FitSession:
                     scores.free_inputs_after,
                     scores.fit.held_out_rms(),
                     told.probabilities,
+                    unknown_of(told),
                 )
                 _keep(self._missing, setting, found)
             return self._missing[setting]

@@ -5,12 +5,14 @@ from __future__ import annotations
 from typing import Any
 
 import dash
-from dash import Dash, Input, Output, html, no_update
+from dash import Dash, Input, Output, dcc, html, no_update
 from dash import State as Kept
 
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.units import UnitError
+from sdimu_calibration.report.unknown_section import followed
 from sdimu_calibration.report.workbench import figures, parts
+from sdimu_calibration.report.workbench.fit import Missing
 from sdimu_calibration.report.workbench.own_effect import named
 from sdimu_calibration.report.workbench.recording_cache import RecordingCache
 from sdimu_calibration.report.workbench.state import from_json
@@ -51,7 +53,15 @@ def _score(app: Dash, shelf: RecordingCache, doing: TaskProgress) -> None:
         picture = figures.finished(figures.ranking(missing.entries, missing.threshold), look)
         still = chosen if chosen in {entry.label for entry in missing.entries} else None
         lines = [html.Li(line) for line in against]
-        return told, tone, parts.odds(missing), lines, picture, parts.options(missing.entries), still
+        return (
+            told,
+            tone,
+            [*parts.odds(missing), *_unknown(missing, look)],
+            lines,
+            picture,
+            parts.options(missing.entries),
+            still,
+        )
 
 
 def _choose(app: Dash) -> None:
@@ -92,3 +102,8 @@ def _look(app: Dash, shelf: RecordingCache, doing: TaskProgress) -> None:
             why = f"Not shown: {' '.join(str(error).split())}"
             return "Click a bar, or press J.", None, why if by_hand else no_update
         return parts.candidate(found, named(str(text))), str(text), ""
+
+
+def _unknown(missing: Missing, look: Any) -> list[Any]:
+    """Draw each error that no effect explains against what it follows, with its band."""
+    return [dcc.Graph(figure=figures.finished(followed(one), look)) for one in missing.unknown]

@@ -1,0 +1,35 @@
+"""An error that no effect explains is drawn against what it follows, where it acts, with its band."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from sdimu_calibration.core.noise_term import ATTITUDE, RATE, TEMPERATURE
+from sdimu_calibration.core.posterior.unknown import UnknownFunction
+from sdimu_calibration.report.unknown_section import followed
+
+TURNING = np.array([False, True, False, True])
+VARIABLE = {
+    ATTITUDE: np.arange(12.0).reshape(4, 3) / 12.0,
+    RATE: np.radians(np.arange(12.0)).reshape(4, 3),
+    TEMPERATURE: np.arange(4.0)[:, None],
+}
+SHOWN = {
+    ATTITUDE: VARIABLE[ATTITUDE][~TURNING],
+    RATE: np.arange(12.0).reshape(4, 3)[TURNING],
+    TEMPERATURE: [[0.0], [2.0]],
+}
+
+
+@pytest.mark.parametrize("kind", [ATTITUDE, RATE, TEMPERATURE])
+def test_each_axis_is_drawn_against_each_component_in_customary_units(kind):
+    mean = np.arange(12.0).reshape(4, 3)
+    figure = followed(UnknownFunction("gyro", kind, VARIABLE[kind], TURNING, np.radians(mean) / 3600.0, 0.0 * mean))
+    traces = figure.as_plotly().data
+    at = TURNING if kind == RATE else ~TURNING
+    columns = VARIABLE[kind].shape[1]
+    assert len(traces) == 3 * columns
+    for k, trace in enumerate(traces):
+        np.testing.assert_allclose(trace.x, np.asarray(SHOWN[kind])[:, k % columns])
+        np.testing.assert_allclose(trace.y, mean[at, k // columns])
