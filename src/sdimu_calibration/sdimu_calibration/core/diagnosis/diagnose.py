@@ -57,6 +57,8 @@ _MISFIT = 0.05
 _MISFIT_SIGMAS = 5.0
 """Excess of the NIS (standard deviations of it) up to which a model fits: in a short test chance goes beyond
 `_MISFIT`."""
+_OPEN = 0.05
+"""Probability (1) from which something that looks the same is named in the sentence: one in twenty."""
 _PATCHES = 3
 """Number of drifts of one bias from which they are a patchwork: together they follow any wander."""
 _TO_AND_FRO = (
@@ -150,6 +152,11 @@ class Diagnosis:
             return float("nan"), ()
         place = window.place_of(column)
         return window.of_class(place), may_be(window, place)
+
+    def is_open(self, candidate: Candidate) -> bool:
+        """Whether something that looks the same may well be there in the place of a chosen candidate."""
+        _, shares = self.may_be(int(self.found.chosen[self.chosen.index(candidate)]))
+        return any(s.probability > _OPEN for s in shares if s.name != candidate.coefficient)
 
     @property
     def navigation(self) -> NavigationEvidence:

@@ -33,6 +33,8 @@ _ROUNDING = 1e-6
 """Size of a learned sigma (customary unit) up to which it is written as zero: rounding leaves as much."""
 _LARGEST = 3
 """Number of effects that a sentence names where there are more than it lists: the table has the rest."""
+CERTAIN = 0.99
+"""Probability (1) from which an effect is called certain: one in a hundred is wrong then."""
 _LISTED = 4
 """Number of effects, or of those that look the same as one, that a sentence lists: more do not fit into one."""
 
@@ -102,8 +104,9 @@ def sentence(d: Diagnosis) -> str:
         return f"One effect is missing{sure}: {names}, or what looks the same here ({_others(d)}); {rest}."
     if len(d.chosen) > 1 and len(_families(d)) == 1:
         return f"One effect is missing on {len(d.chosen)} axes{sure}: {names}; {rest}."
-    one = "One effect is" if d.verdict == Verdict.ONE_EFFECT else "Several effects are"
-    return f"{one} missing{sure}: {names}; {rest}."
+    if d.verdict == Verdict.ONE_EFFECT:
+        return f"One effect is missing{sure}: {names}; {rest}."
+    return f"Several effects are missing{_graded(d) or f'{sure}: {names}'}; {rest}."
 
 
 def _sure(d: Diagnosis) -> str:
@@ -114,12 +117,33 @@ def _sure(d: Diagnosis) -> str:
     return f" ({in_percent(min(told))})" if len(told) == 1 else f" (the least sure of them {in_percent(min(told))})"
 
 
-def _others(d: Diagnosis) -> str:
-    """Name what looks like the one effect that was found, each with its probability."""
-    own = d.chosen[0].parameter.name
-    _, shares = d.may_be(int(d.found.chosen[0]))
+def _graded(d: Diagnosis) -> str:
+    """Name what is certain, and what is likely or open with its probability; empty where all is certain, or unknown."""
+    p = {c.label: d.may_be(int(column))[0] for c, column in zip(d.chosen, d.found.chosen, strict=True)}
+    families = _families(d)
+    every = [c for group in families for c in group]
+    others = {c.label: _others(d, list(d.chosen).index(c)) if d.is_open(c) else "" for c in every}
+    firm = [[c for c in group if p[c.label] >= CERTAIN and not others[c.label]] for group in families]
+    firm = [group for group in firm if group]
+    if not all(np.isfinite(value) for value in p.values()) or sum(map(len, firm)) == len(every):
+        return ""
+    together = {label: "" if share >= CERTAIN else f"together {in_percent(share)}, " for label, share in p.items()}
+    open_ = [
+        f"{c.label} or what looks the same ({together[c.label]}{others[c.label]})" for c in every if others[c.label]
+    ]
+    likely = [f"{c.label} ({in_percent(p[c.label])})" for c in every if p[c.label] < CERTAIN and not others[c.label]]
+    told = [f"certain {_in_words(firm)}"] if firm else []
+    told += [f"likely {' and '.join(likely[:_LISTED])}"] if likely else []
+    told += [f"open {' and '.join(open_[:_LISTED])}"] if open_ else []
+    return f": {', '.join(told)}"
+
+
+def _others(d: Diagnosis, place: int = 0) -> str:
+    """Name what looks like an effect that was found, each with its probability."""
+    own = d.chosen[place].parameter.name
+    _, shares = d.may_be(int(d.found.chosen[place]))
     told = [f"{share.name} {in_percent(share.probability)}" for share in shares if share.name != own]
-    return ", ".join((told or list(d.alike))[:_LISTED])
+    return ", ".join((told or (list(d.alike) if place == 0 else []))[:_LISTED])
 
 
 def _families(d: Diagnosis) -> list[list[Candidate]]:
@@ -135,7 +159,11 @@ def _families(d: Diagnosis) -> list[list[Candidate]]:
 
 def _named(d: Diagnosis) -> str:
     """Name what was found by families; of many the ones with the largest scores, and how many more."""
-    families = _families(d)
+    return _in_words(_families(d))
+
+
+def _in_words(families: Sequence[Sequence[Candidate]]) -> str:
+    """Name families of effects; of many the first ones, and how many more."""
     words = [
         group[0].label if len(group) == 1 else f"{group[0].effect.title} ({', '.join(c.label for c in group)})"
         for group in families
