@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from pathlib import Path
 from typing import Any, Literal
 
@@ -16,6 +17,7 @@ from sdimu_calibration.storage.files.whole_file import write_whole
 from sdimu_sim.core.true_coefficients import true_coefficients
 from sdimu_sim.core.truth import ImuTruth, Truth
 
+_FORMAT = "sdimu-truth/1"
 _Vector = tuple[float, float, float]
 
 
@@ -72,7 +74,7 @@ def write_truth(path: Path, truth: Truth) -> None:
     """
     imu = truth.imu
     content: dict[str, Any] = {
-        "format": "sdimu-truth/1",
+        "format": _FORMAT,
         "plan": truth.plan,
         "rate_hz": float(truth.rate_hz),
         "seed": int(truth.seed),
@@ -103,6 +105,41 @@ def write_truth(path: Path, truth: Truth) -> None:
         },
     }
     write_whole(path, yaml.dump(content, Dumper=_Exact, sort_keys=False, allow_unicode=True))
+
+
+def check_truth_room(path: Path, bag: Path, replace: bool) -> None:
+    """Raise DataError unless a truth can be written to `path`: nothing is there, or a truth that may be replaced.
+
+    The truth of a bag that is gone, in its usual place, may always go too.
+
+    Parameters
+    ----------
+    path, bag : Path
+        Of the truth, and of the bag that is made.
+    replace : bool
+        What is there may be replaced.
+    """
+    if path.is_dir() or path == bag:
+        raise DataError(f"{path}: is a folder; name a file for --truth")
+    if not os.path.lexists(path):
+        return
+    if not _is_truth(path):
+        raise DataError(f"{path}: is there already, and no truth file; name another one with --truth")
+    if not replace and (path != usual_truth(bag) or bag.exists()):
+        raise DataError(f"{path}: a truth file is already there; --replace replaces it, or name another with --truth")
+
+
+def usual_truth(bag: Path) -> Path:
+    """Place of the truth file of a bag where none is stated."""
+    return bag.with_name(f"{bag.name}.truth.yaml")
+
+
+def _is_truth(path: Path) -> bool:
+    try:
+        with path.open("rb") as file:
+            return file.readline(100).strip() == f"format: {_FORMAT}".encode()
+    except OSError:
+        return False
 
 
 def read_truth(path: Path) -> Truth:

@@ -25,6 +25,7 @@ from sdimu_calibration.storage.files.journal import Journal
 from sdimu_calibration.storage.files.reference_file import read_truth
 from sdimu_calibration.storage.files.result_file import read_result, write_result
 from sdimu_calibration.storage.importing.array_table import read_mat, read_npz
+from sdimu_calibration.storage.recording_set import BagSource, load_set
 from sdimu_sim.core.expression import parse_expression as parse_simulated
 
 ESCAPE = "\x1b]0;owned\x07\r\n\x9b2J\u202e"
@@ -84,6 +85,17 @@ def test_keys_written_twice_are_found_among_many(tmp_path):
     lines = [f"k{i}: 1" for i in range(3_000)]
     assert len(read_mapping(written(tmp_path / "x.yaml", "\n".join(lines)))) == 3_000
     assert "'k7' is there twice" in refusal(read_mapping, written(tmp_path / "y.yaml", "\n".join([*lines, "k7: 2"])))
+
+
+@pytest.mark.parametrize("mean", ["0x10 deg", "[1, 2]", "7"])
+def test_a_mean_bias_that_is_no_list_of_numbers_is_one_line(tmp_path, mean):
+    truth = f"format: sdimu-truth/1\ncoefficients: {{gyro_bias_x: 0.0}}\nmean_bias: {mean}"
+    assert "mean_bias" in refusal(read_truth, written(tmp_path / "t.yaml", truth), "prior")
+
+
+def test_a_nul_in_the_path_of_a_bag_is_one_line(tmp_path):
+    path = written(tmp_path / "set.yaml", 'format: sdimu-set/1\nrecordings: [{bag: "a\\0b"}]')
+    assert "recordings.0.bag: a path has no NUL" in refusal(load_set, path, BagSource(tmp_path))
 
 
 EFFECT = {

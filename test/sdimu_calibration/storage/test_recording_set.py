@@ -2,7 +2,13 @@
 
 from __future__ import annotations
 
+import io
+import os
 import shutil
+import subprocess
+import sys
+import time
+import zipfile
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,8 +22,9 @@ from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage.files.config import load_imu, load_plan, load_site
 from sdimu_calibration.storage.files.model_choice import named_model
 from sdimu_calibration.storage.files.result_file import read_result, write_result
+from sdimu_calibration.storage.kept_report import LONGEST, read_report, write_report
 from sdimu_calibration.storage.recording_set import BagSource, bags_below, load_set, set_of, write_set
-from sdimu_calibration.storage.set_work import job_number, read_report, set_runner, write_report
+from sdimu_calibration.storage.set_work import bag_checksum, job_number, set_runner
 from sdimu_sim.bag_file import write_test
 from sdimu_sim.core.scenario import Scenario, simulate_test
 
@@ -90,7 +97,7 @@ def test_what_was_done_is_not_done_again(bags, tmp_path):
     np.testing.assert_array_equal(first.estimate.values, again.estimate.values)
     np.testing.assert_array_equal(first.estimate.covariance, again.estimate.covariance)
     # A file that was damaged is made again.
-    for path in tmp_path.glob("*.npz"):
+    for path in tmp_path.glob("*.reduction"):
         path.write_bytes(path.read_bytes()[:1000])
     with set_runner(2, 1, tmp_path, told=lambda k, n: done.append((k, n))) as work:
         fit_set(members, OPTIONS, work)
@@ -111,15 +118,87 @@ def test_other_bytes_are_another_job(bags, tmp_path):
 
 def test_a_report_is_read_back(bags, tmp_path):
     report = run(job_of(set_of([bags / "run1"], LIKE).members[0], OPTIONS, None))
-    write_report(tmp_path / "one.npz", report)
-    back = read_report(tmp_path / "one.npz")
+    write_report(tmp_path / "one", report, "7")
+    back = read_report(tmp_path / "one", "7")
     assert back is not None
     for name in ("A", "y", "point", "weight"):
         np.testing.assert_array_equal(getattr(back.reduction, name), getattr(report.reduction, name))
     assert back.times == report.times
     assert back.imu == report.imu
     assert (back.names, back.estimator, back.heading_rad) == (report.names, report.estimator, report.heading_rad)
-    assert read_report(tmp_path / "none.npz") is None
+    assert read_report(tmp_path / "none", "7") is None
+
+
+def test_a_report_of_another_job_or_of_other_numbers_is_not_believed(bags, tmp_path):
+    report = run(job_of(set_of([bags / "run1"], LIKE).members[0], OPTIONS, None))
+    path = tmp_path / "one"
+    write_report(path, report, "7")
+    whole = path.read_bytes()
+    assert read_report(path, "8") is None
+    line, content = whole.split(b"\n", 1)
+    stuffed = io.BytesIO(content)
+    with zipfile.ZipFile(stuffed, "a", zipfile.ZIP_DEFLATED) as members:
+        members.writestr("dwell_start.npy", bytes(50 << 20))
+    one_bit = bytearray(whole)
+    one_bit[len(whole) // 2] ^= 1
+    for other in (
+        bytes(one_bit),
+        content,
+        line,
+        b"",
+        b"text",
+        whole.replace(b" 7 ", b" 8 ", 1),
+        whole + b"\0",
+        line + b"\n" + stuffed.getvalue(),
+    ):
+        path.write_bytes(other)
+        assert read_report(path, "7") is None
+    with path.open("wb") as file:
+        file.truncate(LONGEST + 1)
+    assert read_report(path, "7") is None
+    path.write_bytes(whole)
+    assert read_report(path, "7") is not None
+
+
+def test_a_bag_that_changes_in_place_is_another_one(bags, tmp_path):
+    copy = tmp_path / "run1"
+    shutil.copytree(bags / "run1", copy)
+    before = bag_checksum(copy)
+    (mcap,) = copy.glob("*.mcap")
+    with mcap.open("r+b") as file:
+        file.seek(1000)
+        byte = file.read(1)
+        file.seek(1000)
+        file.write(bytes([byte[0] ^ 1]))
+    assert bag_checksum(copy) != before
+
+
+def test_workers_end_with_the_process_that_started_them():
+    code = (
+        "import os, time\nfrom concurrent.futures import ProcessPoolExecutor\n"
+        "from multiprocessing import get_context\nfrom sdimu_calibration.storage.parent import end_with\n"
+        "if __name__ == '__main__':\n"
+        "    pool = ProcessPoolExecutor(1, get_context('spawn'), initializer=end_with, initargs=(os.getpid(),))\n"
+        "    print(pool.submit(os.getpid).result(), flush=True)\n"
+        "    time.sleep(60)\n"
+    )
+    with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True) as parent:
+        assert parent.stdout is not None
+        worker = int(parent.stdout.readline())
+        os.kill(worker, 0)
+        parent.kill()
+    until = time.monotonic() + 10.0
+    while _alive(worker) and time.monotonic() < until:
+        time.sleep(0.05)
+    assert not _alive(worker)
+
+
+def _alive(process: int) -> bool:
+    try:
+        state = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0]
+    except FileNotFoundError:
+        return False
+    return state != "Z"
 
 
 def test_processes_give_the_same_digits(bags):

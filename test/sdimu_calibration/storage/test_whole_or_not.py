@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import os
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,12 +13,13 @@ from sdimu_calibration.api import fit as api_fit
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.results import Calibration, no_history
 from sdimu_calibration.storage.bags import cdr
+from sdimu_calibration.storage.bags.bag_folder import check_apart
 from sdimu_calibration.storage.bags.bag_reader import read_recording
 from sdimu_calibration.storage.bags.bag_writer import write_recording
 from sdimu_calibration.storage.bags.cut_bag import cut_bag
 from sdimu_calibration.storage.bags.mcap_bag import McapBag
 from sdimu_calibration.storage.bags.recover import recover
-from sdimu_calibration.storage.files.whole_file import write_whole, written_together
+from sdimu_calibration.storage.files.whole_file import same_file, write_whole, written_together
 
 
 def names(folder):
@@ -192,3 +195,23 @@ def test_a_file_that_cannot_be_written_leaves_the_old_one(tmp_path, monkeypatch)
     monkeypatch.undo()
     assert content_of_files(tmp_path) == {"x.json": "old"}
     assert names(tmp_path) == ["x.json"]
+
+
+def test_links_of_any_kind_lead_to_the_same_file(tmp_path):
+    one, other = tmp_path / "one", tmp_path / "other"
+    one.write_text("")
+    other.write_text("")
+    (tmp_path / "soft").symlink_to(one)
+    (tmp_path / "hard").hardlink_to(one)
+    for link in ("soft", "hard", "one"):
+        assert same_file(tmp_path / link, one)
+        with pytest.raises(DataError, match="is where"):
+            check_apart(one, tmp_path / link)
+    assert not same_file(other, one)
+    assert not same_file(tmp_path / "none", one)
+
+
+def test_a_text_with_the_bytes_of_a_path_is_written_and_json_gives_them_back(tmp_path):
+    name = os.fsdecode(b"r\xff\xe9cording")
+    write_whole(tmp_path / "x.json", json.dumps({"recording": name}, ensure_ascii=False))
+    assert json.loads((tmp_path / "x.json").read_text(encoding="utf-8")) == {"recording": name}

@@ -1,5 +1,7 @@
 """The verb simulate: a bag and a truth file that agree with each other."""
 
+import shutil
+
 import numpy as np
 import pytest
 import typer
@@ -77,3 +79,29 @@ def test_a_negative_seed_is_wrong_usage(run, option):
     refused = run(option, "-1")
     assert refused.exit_code == 2
     assert option in refused.output
+
+
+def test_a_truth_replaces_no_other_file_and_a_truth_only_where_asked(run, tmp_path):
+    plan = tmp_path / "short.yaml"
+    assert run("--rate", "20", "--truth", str(tmp_path / "t.yaml")).exit_code == 0
+    (mcap,) = (tmp_path / "bag").glob("*.mcap")
+    for path, words in ((plan, "no truth file"), (mcap, "no truth file"), (tmp_path / "bag", "is a folder")):
+        before = path.read_bytes() if path.is_file() else b""
+        with pytest.raises(DataError, match=words):
+            run("--replace", "--truth", str(path))
+        assert before == (path.read_bytes() if path.is_file() else b"")
+    with pytest.raises(DataError, match="a bag is already there"):
+        run("--truth", str(tmp_path / "u.yaml"))
+    assert not (tmp_path / "u.yaml").exists()
+    with pytest.raises(DataError, match=r"t\.yaml: a truth file is already there; --replace"):
+        run("--truth", str(tmp_path / "t.yaml"), "--out", str(tmp_path / "other"))
+    assert not (tmp_path / "other").exists()
+    assert run("--rate", "20", "--seed", "4", "--replace", "--truth", str(tmp_path / "t.yaml")).exit_code == 0
+    assert read_truth(tmp_path / "t.yaml").seed == 4
+
+
+def test_the_truth_of_a_bag_that_is_gone_may_go(run, tmp_path):
+    assert run("--rate", "20").exit_code == 0
+    shutil.rmtree(tmp_path / "bag")
+    assert run("--rate", "20", "--seed", "5").exit_code == 0
+    assert read_truth(tmp_path / "bag.truth.yaml").seed == 5

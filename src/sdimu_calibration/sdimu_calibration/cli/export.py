@@ -40,12 +40,15 @@ def export(
     from sdimu_calibration.storage.export import export as write
     from sdimu_calibration.storage.files.effect_file import effects_of_result
     from sdimu_calibration.storage.files.result_file import noise_for, read_judged_result
+    from sdimu_calibration.storage.files.whole_file import same_file
 
     if not 0.0 < rate <= _MOST_HZ:
         raise DataError(f"--rate {rate:g}: expected a sample rate above 0 to {_MOST_HZ:g} Hz")
     if temperature is not None:
         checked_degc("--temperature", temperature)
     calibration, doubts = read_judged_result(result)
+    if out is not None and same_file(out, result / "result.json" if result.is_dir() else result):
+        raise DataError(f"--out {out}: is the result that is read; name another file")
     own = effects_of_result(calibration.model, effect or [])
     folder = result if result.is_dir() else result.parent
     name = FORMS[form].file_name if form in FORMS else ""

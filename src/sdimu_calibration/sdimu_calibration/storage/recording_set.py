@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import yaml
-from pydantic import Field
+from pydantic import AfterValidator, Field
 
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.estimation.solve import AUTO
@@ -83,8 +83,15 @@ class RecordingSet:
     scopes: Mapping[str, str] = field(default_factory=dict)
 
 
+def _path(text: str) -> str:
+    """Refuse what is no path on any system."""
+    if "\0" in text:
+        raise ValueError("a path has no NUL in it")
+    return text
+
+
 class _Entry(Schema):
-    bag: str
+    bag: Annotated[str, AfterValidator(_path)]
     name: str = ""
     serial: str | int = ""
     power_on: str | int = ""

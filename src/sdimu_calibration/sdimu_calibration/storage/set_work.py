@@ -7,10 +7,10 @@ tenth recording costs one, and a run that was killed goes on where it was.
 from __future__ import annotations
 
 import hashlib
-import json
-import math
+import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from functools import lru_cache
@@ -18,32 +18,21 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from sdimu_calibration.core.effects.effect import Timetable
-from sdimu_calibration.core.estimation.fit import Start
 from sdimu_calibration.core.estimation.navigation_fit import MISFIT
-from sdimu_calibration.core.fit_statistics import FitStatistics
 from sdimu_calibration.core.joint.member import Job, Report, tried
-from sdimu_calibration.core.joint.reduction import Reduction
 from sdimu_calibration.core.joint.set_evidence import held_out_chance
 from sdimu_calibration.core.joint.set_fit import Run, SetFit
 from sdimu_calibration.core.joint.set_result import SCATTERS, set_outcome
-from sdimu_calibration.core.joint.stretch_rows import Places
-from sdimu_calibration.core.noise_term import NoiseTerm
 from sdimu_calibration.core.note import Note, Topic
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.results import Calibration
-from sdimu_calibration.core.specification import ImuSpecification
 from sdimu_calibration.core.wording import Work
 from sdimu_calibration.storage.files.config import load_imu, load_site
-from sdimu_calibration.storage.files.result_file import as_note
-from sdimu_calibration.storage.files.whole_file import beside
+from sdimu_calibration.storage.kept_report import SUFFIX, read_report, write_report
 from sdimu_calibration.storage.opening import CLASSES, DEFAULT_SITE
+from sdimu_calibration.storage.parent import end_with
 from sdimu_calibration.storage.recording_set import BagSource
 
-REPORT_FORMAT = "sdimu-reduction/1"
-"""What a recording says, as an NPZ file of plain arrays: no code is loaded from it."""
 FEW = 3
 """Number of recordings up to which one process is faster: starting another takes as long as two recordings."""
 _PART = 16
@@ -106,7 +95,7 @@ def set_runner(
     if workers < 2 or count <= FEW:
         yield _kept(lambda jobs: _here(jobs, told), kept)
         return
-    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+    with ProcessPoolExecutor(workers, get_context("spawn"), initializer=end_with, initargs=(os.getpid(),)) as pool:
         yield _kept(lambda jobs: _in_pool(pool, jobs, told), kept)
 
 
@@ -126,7 +115,13 @@ def _in_pool(pool: ProcessPoolExecutor, jobs: Sequence[Job], told: Told | None) 
     places = {pool.submit(tried, job): k for k, job in enumerate(jobs)}
     found: dict[int, Report | DataError] = {}
     for future in as_completed(places):
-        found[places[future]] = future.result()
+        try:
+            found[places[future]] = future.result()
+        except BrokenProcessPool as error:
+            raise DataError(
+                "a process of --workers was ended by the system, as where memory is short: take fewer; what is done stays in "
+                "the folder evidence of --out"
+            ) from error
         if told:
             told(len(found), len(jobs))
     return [found[k] for k in range(len(jobs))]
@@ -148,11 +143,13 @@ def _kept(work: Callable[[Sequence[Job]], Sequence[Report | DataError]], folder:
         return work
 
     def do(jobs: Sequence[Job]) -> list[Report | DataError]:
-        places = [folder / f"{number}.npz" if (number := job_number(job)) else None for job in jobs]
-        found: list[Report | DataError | None] = [None if place is None else read_report(place) for place in places]
+        numbers = [job_number(job) for job in jobs]
+        found: list[Report | DataError | None] = [
+            read_report(folder / f"{number}{SUFFIX}", number) if number else None for number in numbers
+        ]
         for part in _parts([k for k, report in enumerate(found) if report is None]):
             for k, fresh in zip(part, work([jobs[k] for k in part]), strict=True):
-                _keep(places[k], fresh)
+                _keep(folder, numbers[k], fresh)
                 found[k] = fresh
         return [
             replace(done, serial=job.member.serial, power_on=job.member.power_on) if isinstance(done, Report) else done
@@ -163,11 +160,11 @@ def _kept(work: Callable[[Sequence[Job]], Sequence[Report | DataError]], folder:
     return do
 
 
-def _keep(place: Path | None, fresh: Report | DataError) -> None:
+def _keep(folder: Path, number: str, fresh: Report | DataError) -> None:
     """Write a report; a folder that cannot be written (a mounted archive) costs the time of another run, no result."""
-    if place is not None and not isinstance(fresh, DataError):
+    if number and not isinstance(fresh, DataError):
         with suppress(OSError):
-            write_report(place, fresh)
+            write_report(folder / f"{number}{SUFFIX}", fresh, number)
 
 
 def _parts(places: Sequence[int]) -> list[Sequence[int]]:
@@ -222,138 +219,25 @@ def _program() -> str:
     return total.hexdigest()
 
 
-@lru_cache(maxsize=4096)
 def bag_checksum(bag: Path) -> str:
-    """SHA-256 of all files of a bag."""
-    total = hashlib.sha256()
+    """SHA-256 of all files of a bag; read again when one of them has changed."""
     files = sorted(p for p in bag.iterdir() if p.is_file()) if bag.is_dir() else [bag]
-    for path in files:
-        total.update(path.name.encode())
+    return _checksum(tuple((path, *_state(path)) for path in files))
+
+
+def _state(path: Path) -> tuple[int, int, int]:
+    """Return what changes with the content of a file: size, time of the change (ns), place on the disk."""
+    found = path.stat()
+    return found.st_size, found.st_mtime_ns, found.st_ino
+
+
+@lru_cache(maxsize=4096)
+def _checksum(files: tuple[tuple[Path, int, int, int], ...]) -> str:
+    total = hashlib.sha256()
+    for path, size, *_ in files:
+        total.update(f"{len(path.name.encode(errors='surrogateescape'))} {size} ".encode())
+        total.update(path.name.encode(errors="surrogateescape"))
         with path.open("rb") as file:
             while block := file.read(_BLOCK):
                 total.update(block)
     return total.hexdigest()
-
-
-def write_report(path: Path, report: Report) -> None:
-    """Write a report beside its place and rename it; the folder is made too."""
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    found, start = report.reduction, report.start
-    words = {
-        "format": REPORT_FORMAT,
-        "name": report.name,
-        "estimator": report.estimator,
-        "reason": report.reason,
-        "names": found.names,
-        "labels": found.labels,
-        "rows": found.rows,
-        "unexplained": found.unexplained,
-        "imu": vars(report.imu) | {"prior": dict(report.imu.prior), "prior_units": dict(report.imu.prior_units)},
-        "start_names": start.names,
-        "start_ns": report.start_ns,
-        "temperature_degc": report.temperature_degc,
-        "duration": report.times.duration,
-        "stops": report.times.stops,
-        "turns": report.times.turns,
-        "data": dict(report.data),
-        "statistics": report.statistics.entries(),
-        "reported": report.names,
-        "notes": report.notes,
-        "warnings": report.warnings,
-        "heading_rad": report.heading_rad,
-        "noise": [vars(term) for term in report.noise],
-        "widened": report.widened,
-    }
-    places = {} if report.places is None else {f"dwell_{key}": value for key, value in vars(report.places).items()}
-    part = beside(path)
-    try:
-        with part.open("wb") as file:
-            np.savez(
-                file,
-                words=np.frombuffer(json.dumps(words).encode(), dtype=np.uint8),
-                A=found.A,
-                y=found.y,
-                point=found.point,
-                weight=found.weight,
-                start=start.coefficients,
-                C_nb=start.C_nb,
-                more=start.more,
-                values=report.values,
-                sigma=report.sigma,
-                **places,
-            )
-        part.replace(path)
-    finally:
-        part.unlink(missing_ok=True)
-
-
-def read_report(path: Path) -> Report | None:
-    """Read a report; None where there is none, or the file is damaged: it is then made again."""
-    path = Path(path)
-    if not path.is_file():
-        return None
-    try:
-        with np.load(path, allow_pickle=False) as file:
-            words = json.loads(file["words"].tobytes())
-            return _report(words, {key: file[key] for key in file.files if key != "words"})
-    except Exception:
-        # Damage shows as errors of zipfile (a member that seems encrypted), of NumPy's headers and of the tokenizer.
-        return None
-
-
-def _report(words: dict[str, Any], arrays: dict[str, Any]) -> Report | None:
-    if words["format"] != REPORT_FORMAT:
-        return None
-    reduction = Reduction(
-        tuple(words["names"]),
-        tuple(words["labels"]),
-        arrays["A"],
-        arrays["y"],
-        arrays["point"],
-        arrays["weight"],
-        int(words["rows"]),
-        float(words["unexplained"]),
-    )
-    if reduction.A.shape != (len(reduction.y), len(reduction.names) + len(reduction.labels)):
-        return None
-    start = Start(tuple(words["start_names"]), arrays["start"], arrays["C_nb"], arrays["more"])
-    times = Timetable(words["duration"], _spans(words["stops"]), _spans(words["turns"]))
-    heat = words["temperature_degc"]
-    return Report(
-        words["name"],
-        "",
-        "",
-        reduction,
-        words["estimator"],
-        words["reason"],
-        ImuSpecification(**words["imu"]),
-        start,
-        int(words["start_ns"]),
-        times,
-        math.nan if heat is None else float(heat),
-        words["data"],
-        FitStatistics(**words["statistics"]),
-        tuple(words["reported"]),
-        arrays["values"],
-        arrays["sigma"],
-        tuple(words["notes"]),
-        tuple(map(as_note, words["warnings"])),
-        float(words["heading_rad"]),
-        tuple(_term(entry) for entry in words["noise"]),
-        bool(words["widened"]),
-        _places(arrays),
-    )
-
-
-def _places(arrays: dict[str, Any]) -> Places | None:
-    own = {key.removeprefix("dwell_"): value for key, value in arrays.items() if key.startswith("dwell_")}
-    return Places(**own) if own else None
-
-
-def _term(entry: dict[str, Any]) -> NoiseTerm:
-    return NoiseTerm(**(entry | {"alike": tuple(entry["alike"])}))
-
-
-def _spans(rows: list[list[float]]) -> tuple[tuple[int, float, float], ...]:
-    return tuple((int(k), float(a), float(b)) for k, a, b in rows)

@@ -351,7 +351,9 @@ def _write_plan(part: Path, out: Path, test: LiveTest, summary: DiagnosisSummary
 
 def _is_file(name: str, file: Path) -> bool:
     """Tell whether a plan is named by the path of a file."""
-    return Path(name).resolve() == file.resolve()
+    from sdimu_calibration.storage.files.whole_file import same_file
+
+    return same_file(Path(name), file)
 
 
 def _tell_choices(console: Console, path: Path) -> dict[str, Any]:

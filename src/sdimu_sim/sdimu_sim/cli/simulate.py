@@ -77,11 +77,14 @@ def simulate(
 ) -> None:
     """Simulate a whole test into a bag, with the truth in a separate file."""
     # Inside the function: the help of `sdimu` must not wait for numerical libraries.
+    from sdimu_calibration.storage.bags.bag_folder import check_room
     from sdimu_sim.bag_file import write_test
     from sdimu_sim.core.scenario import simulate_test
-    from sdimu_sim.truth_file import write_truth
+    from sdimu_sim.truth_file import check_truth_room, usual_truth, write_truth
 
-    truth_path = kept.truth or out.with_name(f"{out.name}.truth.yaml")
+    truth_path = kept.truth or usual_truth(out)
+    check_room(out, kept.replace)
+    check_truth_room(truth_path, out, kept.replace)
     if by_hand is not None:
         from sdimu_calibration.storage.files.config import load_imu, load_site
         from sdimu_sim.core.by_hand import ByHand

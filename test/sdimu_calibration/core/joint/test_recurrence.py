@@ -20,7 +20,7 @@ from sdimu_calibration.storage.files.advice_words import sentence
 from sdimu_calibration.storage.files.config import load_model
 from sdimu_calibration.storage.files.diagnosis_file import SET_FORMAT, write_set_diagnosis
 from sdimu_calibration.storage.files.json_file import read_json
-from sdimu_calibration.storage.set_work import read_report, write_report
+from sdimu_calibration.storage.kept_report import read_report, write_report
 from sdimu_sim.core.temperature import TemperatureProfile
 
 from .conftest import here, short, unit_set
@@ -195,8 +195,8 @@ def test_places_are_kept(tmp_path):
     def run(jobs):
         done = here(jobs)
         for report in done:
-            write_report(tmp_path / "one.npz", report)
-            kept.append((report, read_report(tmp_path / "one.npz")))
+            write_report(tmp_path / "one", report, "1")
+            kept.append((report, read_report(tmp_path / "one", "1")))
         return done
 
     leftovers(fit_set(unit_set(41, [FORTH, BACK]).members, OPTIONS, here), run)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage.bags.bag_metadata import METADATA, named_files, read_metadata
-from sdimu_calibration.storage.files.whole_file import beside, uninterrupted
+from sdimu_calibration.storage.files.whole_file import beside, same_file, uninterrupted
 
 DAMAGED_SUFFIX = ".damaged"
 """At the name of a file that was mended: the cut one, kept."""
@@ -42,9 +42,9 @@ def check_apart(source: Path | Iterable[Path], target: Path) -> None:
     target : Path
         Folder to make.
     """
-    folder = Path(target).resolve()
+    folder = Path(target)
     for path in [source] if isinstance(source, Path) else source:
-        if folder in {path.resolve(), *path.resolve().parents}:
+        if any(same_file(folder, place) for place in (path, *path.resolve().parents)):
             raise DataError(f"{target}: is where {path} is read from; choose another folder for --out")
 
 

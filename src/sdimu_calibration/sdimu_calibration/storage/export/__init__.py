@@ -70,6 +70,8 @@ def export(
     """
     if form not in FORMS:
         raise DataError(f"--format {form}: expected one of {', '.join(FORMS)}")
+    if path.is_dir():
+        raise DataError(f"{path}: is a folder; name a file to write")
     linear = linear_model(calibration, own)
     if temperature_degc is not None:
         linear = linear.at(temperature_degc)

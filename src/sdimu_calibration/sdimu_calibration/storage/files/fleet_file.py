@@ -20,7 +20,7 @@ from sdimu_calibration.storage.files.config import find_config, read_mapping
 from sdimu_calibration.storage.files.fleet_folder import Gathered
 from sdimu_calibration.storage.files.json_file import write_json
 from sdimu_calibration.storage.files.result_file import plain_origin
-from sdimu_calibration.storage.files.whole_file import write_whole
+from sdimu_calibration.storage.files.whole_file import same_file, write_whole
 
 FORMAT = "sdimu-fleet/1"
 
@@ -106,7 +106,7 @@ def write_priors(path: Path, base: str, gathered: Gathered, done: Study) -> Mapp
         The priors written, as in the file, by effect.
     """
     source = find_config("imu", base)
-    if path.exists() and path.resolve() == source.resolve():
+    if same_file(path, source):
         raise DataError(f"{path}: is the IMU file that the priors are added to; write them to another one")
     first = gathered.entries[0].result
     of = {name: effect_of(name, first.model) for name in first.names}

@@ -91,7 +91,10 @@ def read_truth(path: Path, body_frame: str, gravity: float | None = None) -> dic
     if not isinstance(values, Mapping):
         raise DataError(f"{path}: no '{key}': the truth is not given in the body frame '{body_frame}'")
     # Biases that drift or wander are estimated in the mean over the dwells.
-    values = {**values, **(content.get("mean_bias") or {})}
+    mean = content.get("mean_bias") or {}
+    if not isinstance(mean, Mapping):
+        raise DataError(f"{path}: mean_bias: expected 'NAME: number' lines in SI")
+    values = {**values, **mean}
     true = {str(name): _number(path, str(name), value) for name, value in values.items()}
     return true if gravity is None else _restated(true, _gravity(path, content) / gravity)
 

@@ -19,6 +19,16 @@ COMPANIONS = ("report.html", "diagnosis.json", "set.json")
 """Files that speak of the result.json beside them: those of an earlier run go when a new one comes."""
 
 
+def same_file(one: Path, other: Path) -> bool:
+    """Whether two paths lead to one file or folder, by links of any kind too."""
+    if one.resolve() == other.resolve():
+        return True
+    try:
+        return one.samefile(other)
+    except OSError:
+        return False
+
+
 def beside(path: Path) -> Path:
     """Name of a hidden file or folder beside `path` that nobody else takes, on the same file system."""
     return path.with_name(f".{path.name}.{os.getpid()}-{secrets.token_hex(4)}.part")
@@ -39,7 +49,8 @@ def write_whole(path: Path, text: str) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     temporary = beside(path)
     try:
-        temporary.write_text(text, encoding="utf-8")
+        # A path may hold bytes that are no text; written so, JSON gives them back.
+        temporary.write_text(text, encoding="utf-8", errors="backslashreplace")
         temporary.replace(path)
     finally:
         temporary.unlink(missing_ok=True)
