@@ -31,7 +31,6 @@ MANY_ARGUMENTS: dict[Place, str] = {
 DEEP: dict[Place, str] = {}
 """Functions that nest deeper, and why."""
 LONG: dict[Place, str] = {
-    ("sdimu_calibration/core/diagnosis/diagnose.py", "climb"): "not yet split: the search is being designed anew",
     ("sdimu_calibration/core/joint/set_search.py", "search_set"): "not yet split: the search is being designed anew",
     ("sdimu_calibration/core/filter/filter_pass.py", "run_pass"): "compiled: one loop",
     ("sdimu_calibration/core/navigation/strapdown.py", "_reduce"): "compiled: one loop",

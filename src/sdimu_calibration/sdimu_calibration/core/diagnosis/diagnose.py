@@ -6,27 +6,27 @@ outside the catalogue; refit of what was found; coefficients over all probable m
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from sdimu_calibration.core.arrays import Ints
+from sdimu_calibration.core.diagnosis.alarms import Alarm, alarms
 from sdimu_calibration.core.diagnosis.averaged import over_all_models
 from sdimu_calibration.core.diagnosis.free_input_test import FreeInputTest
 from sdimu_calibration.core.diagnosis.ground import Request
 from sdimu_calibration.core.diagnosis.ladder import Rung, ladder
-from sdimu_calibration.core.diagnosis.rounds import UNEXPLAINED_P, Round, in_found_noise, search_until_stable
+from sdimu_calibration.core.diagnosis.measured_noise import in_measured_noise, measured_noise
+from sdimu_calibration.core.diagnosis.rounds import Round, in_found_noise, search_until_stable
 from sdimu_calibration.core.diagnosis.screen import Finding, screen
 from sdimu_calibration.core.diagnosis.search import FALSE_ALARM, Search, alike_in_window
 from sdimu_calibration.core.diagnosis.verdict import Facts, sentence, verdict
 from sdimu_calibration.core.diagnosis.white_noise import without_memory
 from sdimu_calibration.core.effects.effect import Effect
-from sdimu_calibration.core.error_figures import degrees_of_freedom, held_out_judged, nis_judged
 from sdimu_calibration.core.estimation.fit import NOT_CONVERGED, Fit
 from sdimu_calibration.core.estimation.noise_estimate import term_in_words
-from sdimu_calibration.core.estimation.noise_learning import in_white_noise
 from sdimu_calibration.core.estimation.outcome import doubted, outcome
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.estimation.solve import AUTO, solve
@@ -39,28 +39,12 @@ from sdimu_calibration.core.probability import normal_tail
 from sdimu_calibration.core.progress import Progress, silent
 from sdimu_calibration.core.recording import DataError, Recording
 from sdimu_calibration.core.results import Calibration
-from sdimu_calibration.core.specification import EPOCH_S, ImuSpecification, Model, Site
+from sdimu_calibration.core.specification import ImuSpecification, Model, Site
 from sdimu_calibration.core.verdict import Verdict
 from sdimu_calibration.core.wording import Option
 
-STILL_WRONG = 1.25
-"""Held-out error (sigma) from which a model is not called explained: 1 is right, and an effect that only imitates the
-cause fits here and fails elsewhere."""
-NOISE_OFF = 0.05
-"""Deviation of the white noise from its specification, as a share, from which it is reported and corrected: all sigmas
-go with it."""
-_KURTOSIS = 4.0
-"""Kurtosis of the differences of neighbouring seconds (1) from which tails are heavy: Gaussian noise in a test of an
-hour stays below 3.3."""
-_MISFIT = 0.05
-"""Excess of the NIS per degree of freedom (1) up to which a model fits: its sigmas are then right to 2.5 %."""
-_MISFIT_SIGMAS = 5.0
-"""Excess of the NIS (standard deviations of it) up to which a model fits: in a short test chance goes beyond
-`_MISFIT`."""
 _OPEN = 0.05
 """Probability (1) from which something that looks the same is named in the sentence: one in twenty."""
-_PATCHES = 3
-"""Number of drifts of one bias from which they are a patchwork: together they follow any wander."""
 _TO_AND_FRO = (
     "the search for missing effects went to and fro between choices that explain about the same, and was ended: of "
     "these one is named, and another may be right"
@@ -104,7 +88,8 @@ class Diagnosis:
         Columns of the free inputs in `evidence`.
     own : bool
         What was found are own equations, not registered effects.
-    unexplained : bool
+    alarms : frozenset of Alarm
+        What speaks against a model that has all of this.
     rungs : tuple of Rung
         The fit as given and with each found effect added; empty where it was not asked for.
     """
@@ -126,7 +111,7 @@ class Diagnosis:
     free_inputs_after: FreeInputTest
     free: Ints
     own: bool
-    unexplained: bool
+    alarms: frozenset[Alarm]
     rungs: tuple[Rung, ...] = ()
 
     @property
@@ -134,6 +119,11 @@ class Diagnosis:
         """What was found: the largest share of the misfit first."""
         p = len(self.evidence.weight)
         return tuple(self.evidence.candidates[i - p] for i in self.found.chosen)
+
+    @property
+    def unexplained(self) -> bool:
+        """Whether an alarm speaks against a model that has what was found."""
+        return bool(self.alarms)
 
     @property
     def alike(self) -> tuple[str, ...]:
@@ -227,11 +217,7 @@ def climb(
     request = Request(base, tuple(extra), alpha, wander, frozenset(without))
     done = search_until_stable(request, progress)
     widened = over_all_models(base, done)
-    # Beside what was found a prior may no longer stand against the data: the fit of the model as given tells it.
-    odd = [*base.contradicted_priors(), *widened.beyond_specification()]
-    findings = (*screen(base), *(Finding(text, grave=False) for text in odd))
-    findings += () if done.found.stood else (Finding(_TO_AND_FRO, grave=False),)
-    findings += () if widened.converged else (Finding(NOT_CONVERGED, grave=True),)
+    findings = _findings(base, widened, done)
     progress("report", 0.9)
     if base.learns_scatter:
         consistency = base.consistency(done.evidence)
@@ -244,28 +230,17 @@ def climb(
     before = outcome(as_given, refuse=not done.chosen)
     after = doubted(outcome(done.fit) if done.chosen else before, widened)
     own = any(c.family == "own" for c in done.chosen)
-    # What was added must also predict: an effect that only mimics the missing one fits here and fails elsewhere.
-    # The free inputs are constant in a dwell and in a turn; what changes within one shows in the NIS alone.
-    # Noise that is faster than a stretch is learned by what it leaves from stretch to stretch; within, it stays.
-    # Neighbouring epochs say what the noise is, but for a sensor that counts pulses.
-    judged = not (base.learns_scatter or done.found.noise or stated.epoch_s > EPOCH_S)
-    excess = misfit(after, consistency, stated, base.test.imu) if judged else 0.0
-    loud = excess > largest_misfit(float(np.fmax(degrees_of_freedom(after), 1.0)))
-    still = not base.learns_scatter and held_out_judged(after) > STILL_WRONG
-    # Wrong samples in turns leave noise that looks drawn anew in each turn.
-    spoilt = any(finding.kind == "spike" for finding in findings)
-    drawn = not spoilt and any(term.is_drawn for term in done.found.noise)
-    unexplained = done.left_after.p_value < UNEXPLAINED_P or still or loud or drawn or patchwork(done.chosen)
+    raised = alarms(done, after, consistency, base, stated, findings)
     noise += tuple(term_in_words(term) for term in done.found.noise)
     rungs = ladder(as_given, widened, done, progress) if refits or base.learns_scatter else ()
-    facts = Facts(done.found, done.chosen, alike_first(done), findings, noise, own, unexplained)
+    facts = Facts(done.found, done.chosen, alike_first(done), findings, noise, own, bool(raised))
     word = verdict(facts)
     progress("done", 1.0)
     unspoken = Diagnosis(
         word,
         "",
         word == Verdict.CONSISTENT,
-        p_value(done, consistency, bool(noise) or loud),
+        p_value(done, consistency, bool(noise) or Alarm.NIS in raised),
         findings,
         noise,
         consistency,
@@ -279,41 +254,19 @@ def climb(
         done.left_after,
         done.free,
         own,
-        unexplained,
+        raised,
         rungs,
     )
     return replace(unspoken, sentence=sentence(unspoken))
 
 
-def in_measured_noise(fit: Fit, progress: Progress = silent) -> tuple[Fit, Consistency, tuple[str, ...]]:
-    """Fit in white noise, of the size that the recording shows where the IMU file is wrong about it.
-
-    Parameters
-    ----------
-    fit : Fit
-    progress : callable
-
-    Returns
-    -------
-    fit : Fit
-    consistency : Consistency
-        Of the fit as it was given.
-    noise : tuple of str
-        What is wrong in the IMU file, one line each.
-    """
-    consistency = fit.consistency()
-    noise, imu = measured_noise(consistency, fit)
-    if noise:
-        again = solve(
-            fit.test.with_imu(imu),
-            fit.model,
-            fit.estimator,
-            progress=progress,
-            learn=False,
-            azimuth_free=fit.azimuth_free,
-        )
-        fit = replace(again, reason=fit.reason)
-    return in_white_noise(fit), consistency, noise
+def _findings(base: Fit, widened: Fit, done: Round) -> tuple[Finding, ...]:
+    """Faults of the data, and what else is odd, of the fits as given and with what was found."""
+    # Beside what was found a prior may no longer stand against the data: the fit of the model as given tells it.
+    odd = [*base.contradicted_priors(), *widened.beyond_specification()]
+    findings = (*screen(base), *(Finding(text, grave=False) for text in odd))
+    findings += () if done.found.stood else (Finding(_TO_AND_FRO, grave=False),)
+    return findings if widened.converged else (*findings, Finding(NOT_CONVERGED, grave=True))
 
 
 def alike_first(of: Round | Diagnosis) -> tuple[str, ...]:
@@ -322,63 +275,6 @@ def alike_first(of: Round | Diagnosis) -> tuple[str, ...]:
     if not len(chosen):
         return ()
     return alike_in_window(of.found.posterior, int(chosen[0])) if of.found.posterior else ()
-
-
-def misfit(final: Calibration, consistency: Consistency, stated: ImuSpecification, taken: ImuSpecification) -> float:
-    """Excess of the NIS over what the noise of the recording itself explains, outliers and all.
-
-    Differences of neighbouring seconds say what that noise is, whatever is slow.
-
-    Parameters
-    ----------
-    final : Calibration
-    consistency : Consistency
-        Measured against `stated`.
-    stated, taken : ImuSpecification
-        Noise of the IMU file, and noise that the fit took.
-    """
-    gyro = consistency.gyro.spread * stated.gyro_white_noise / taken.gyro_white_noise
-    accel = consistency.accel.spread * stated.accel_white_noise / taken.accel_white_noise
-    return float(nis_judged(final) / (0.5 * (gyro**2 + accel**2)) - 1.0)
-
-
-def largest_misfit(dof: float) -> float:
-    """Excess of the NIS that a right model stays below.
-
-    The NIS and the differences of neighbours are two estimates of one variance, the second with an efficiency of 2/3
-    (Rice, Ann. Stat. 12, 1984): their ratio scatters by ``1/sqrt(dof)``.
-    """
-    return max(_MISFIT, _MISFIT_SIGMAS / float(np.sqrt(dof)))
-
-
-def patchwork(chosen: Iterable[Candidate]) -> bool:
-    """Whether one bias drifts by so many effects at once that they follow any wander and say nothing of its cause."""
-    drifts = {(c.family, c.effect.variant, c.effect.terms[0].channel) for c in chosen if c.effect.bias_drift}
-    of_sensor = [sensor for _, _, sensor in drifts]
-    return any(of_sensor.count(sensor) >= _PATCHES for sensor in of_sensor)
-
-
-def measured_noise(consistency: Consistency, fit: Fit) -> tuple[tuple[str, ...], ImuSpecification]:
-    """Say where the white noise is not as specified, and put the measured one in its place.
-
-    Noise with heavy tails is taken at its standard deviation, outliers and all. To leave the outliers out of the
-    measurements instead would be wrong: the same samples drive the navigation, and it is the measurement that
-    tells the filter what they did to it.
-    """
-    told: list[str] = []
-    scales = {"gyro": 1.0, "accel": 1.0}
-    for triad, noise in (("gyro", consistency.gyro), ("accel", consistency.accel)):
-        if abs(noise.ratio - 1.0) > max(NOISE_OFF, 4.0 * noise.sigma):
-            scales[triad] = noise.ratio
-            told.append(f"{triad} white noise is {noise.ratio:.2f} +- {noise.sigma:.2f} times the specification")
-        if noise.kurtosis > _KURTOSIS:
-            scales[triad] = noise.spread
-            share = 100 * len(noise.outliers) / max(1, consistency.seconds)
-            told.append(
-                f"{triad} noise has heavy tails: kurtosis {noise.kurtosis:.1f} (3 is Gaussian), {share:.1f} % of the "
-                f"seconds are outliers, with them it is {noise.spread:.2f} times the specification"
-            )
-    return tuple(told), fit.test.imu.with_noise_times(**scales)
 
 
 def p_value(done: Round, consistency: Consistency, noise: bool) -> float:

@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from sdimu_calibration.core.arrays import Floats
-from sdimu_calibration.core.diagnosis.diagnose import NOT_DIAGNOSABLE, Diagnosis, climb, in_measured_noise
+from sdimu_calibration.core.diagnosis.diagnose import NOT_DIAGNOSABLE, Diagnosis, climb
+from sdimu_calibration.core.diagnosis.measured_noise import in_measured_noise
 from sdimu_calibration.core.diagnosis.problem import Problem
 from sdimu_calibration.core.diagnosis.survey import survey
 from sdimu_calibration.core.estimation.fit import Fit

@@ -64,7 +64,7 @@ def survey(fit: Fit, result: Calibration, with_candidates: bool = True) -> Diagn
         rest,
         free_columns,
         own=False,
-        unexplained=False,
+        alarms=frozenset(),
     )
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.diagnosis.candidates import catalogue, without
-from sdimu_calibration.core.diagnosis.diagnose import measured_noise
+from sdimu_calibration.core.diagnosis.measured_noise import measured_noise
 from sdimu_calibration.core.effects import selection
 from sdimu_calibration.core.effects.effect import Effect, Timetable
 from sdimu_calibration.core.effects.imu_model import told_apart
