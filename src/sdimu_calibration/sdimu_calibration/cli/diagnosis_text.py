@@ -106,7 +106,9 @@ def _candidates(console: Console, summary: DiagnosisSummary) -> None:
         alike = f"looks here like {', '.join(f.alike[:4])}" if f.alike else ""
         if len(f.may_be) > 1:
             alike = f"may be {', '.join(f'{s.name} {in_percent(s.probability)}' for s in f.may_be[:_TOP])}"
-        words = "; ".join(part for part in (_fall(f), alike) if part)
+        pairs = [f"{one} with {other} ({in_percent(p)})" for one, other, p in f.together[:_TOP]]
+        same = f"the same by two effects together: {', '.join(pairs)}" if pairs else ""
+        words = "; ".join(part for part in (_fall(f), alike, same) if part)
         if words:
             line(console, f"{f.candidate.label}: {words}")
 

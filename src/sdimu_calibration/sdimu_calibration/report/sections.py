@@ -202,13 +202,18 @@ def confused(summary: DiagnosisSummary, spell: Spell | None = None) -> str:
     """Return what each found effect would be confused with, what hangs on it, and what would tell; empty if nothing."""
     rows = []
     for one in summary.found:
-        if not one.alike:
+        if not one.alike and not one.together:
             continue
         shares = {share.name: f" {in_percent(share.probability)}" for share in one.may_be}
         others = "; ".join(
             tip(title_of(name), effect_of_key(name), [name]) + shares.get(name.partition("(")[0], "")
             for name in one.alike[:6]
         )
+        pairs = "; ".join(
+            f"<code>{escape(first)}</code> with <code>{escape(second)}</code>, as large together {in_percent(p)}"
+            for first, second, p in one.together[:3]
+        )
+        others = "; ".join(part for part in (others, pairs) if part)
         stake = "; ".join(
             f"with {s.other} instead, {s.coefficient} moves by {s.sigmas:+.1f} of its sigmas"
             for s in one.coefficient_shifts[:3]

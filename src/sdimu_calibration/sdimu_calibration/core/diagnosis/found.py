@@ -50,6 +50,9 @@ class Found:
         That it or something of its class is missing in the model; NaN where no probabilities were worked out.
     may_be : tuple of Share
         Coefficients of that class with the probability of each, the likeliest first.
+    together : tuple of (str, str, float)
+        Labels of two effects that together show as this one does, to rounding, and the probability that both are
+        there.
     of_family : float
         Probability that its family is missing on its sensor; NaN where no probabilities were worked out.
     """
@@ -69,6 +72,7 @@ class Found:
     probability: float = float("nan")
     may_be: tuple[Share, ...] = ()
     of_family: float = float("nan")
+    together: tuple[tuple[str, str, float], ...] = ()
 
     @property
     def decided(self) -> bool:
@@ -120,6 +124,7 @@ def found_effects(d: Diagnosis) -> tuple[Found, ...]:
                 probability=probability,
                 may_be=shares,
                 of_family=_of_family(d, d.chosen[k]),
+                together=_together(d, column),
             )
         )
     return tuple(out)
@@ -131,6 +136,15 @@ def _alike(d: Diagnosis, column: int) -> list[int]:
     if window is None:
         return []
     return [int(window.board.use[number]) for number in window.classes[window.place_of(column)]]
+
+
+def _together(d: Diagnosis, column: int) -> tuple[tuple[str, str, float], ...]:
+    """Pairs of effects that show as a chosen column does, each with its probability."""
+    window = d.found.posterior
+    if window is None:
+        return ()
+    pairs = window.together(window.place_of(column))
+    return tuple((window.candidate(p.first).label, window.candidate(p.second).label, share) for p, share in pairs)
 
 
 def _of_family(d: Diagnosis, candidate: Candidate) -> float:

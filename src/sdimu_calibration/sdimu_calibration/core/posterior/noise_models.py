@@ -44,7 +44,7 @@ ODDS: Mapping[str, float] = {
     MARKOV: 0.4,
     STOP: 0.1,
     TURN: 0.1,
-    SHIFT: 0.15,
+    SHIFT: 0.25,
     **dict.fromkeys(FOLLOWS, 0.02),
 }
 """Odds of each kind of noise in a triad beside none (1): every sensor has bias instability and a rate random walk of

@@ -18,6 +18,7 @@ from sdimu_calibration.core.evidence.linear import E
 from sdimu_calibration.core.evidence.testable import INDISTINGUISHABLE
 from sdimu_calibration.core.noise_term import KINDS, NoiseTerm
 from sdimu_calibration.core.posterior.board import Board, same_noise
+from sdimu_calibration.core.posterior.combinations import Combination, combinations_of, crossed
 from sdimu_calibration.core.posterior.family import family_of
 from sdimu_calibration.core.posterior.models import Members
 from sdimu_calibration.core.posterior.noise_models import NoiseModel
@@ -199,6 +200,12 @@ class Posterior(Generic[E]):
             out.append((own, *(int(k) for k in np.argsort(-score) if alike[k])))
         return out
 
+    def together(self, place: int) -> list[tuple[Combination, float]]:
+        """Pairs of effects that show as a member of the told model does, and the probability that they are there."""
+        number, _ = self.told.members[place]
+        pairs = combinations_of(self.board.data(self.told.noise)[1], number)
+        return [(pair, float(self._weights @ self._holds[:, [pair.first, pair.second]].all(axis=1))) for pair in pairs]
+
     def of_class(self, place: int) -> float:
         """Probability that a member of the told model, or something of its class, is present."""
         return self._any_of((self.told.members[place][0], *self.classes[place]))
@@ -256,7 +263,8 @@ def posterior(
     if sharpened:
         noises, members = _climbed(board, [members], tried, settled=True)
     data = [board.data(noise) for noise in noises]
-    found = window([d for _, d in data], [offset for offset, _ in data], [members])
+    starts = [members, *crossed(data[0][1], members)]
+    found = window([d for _, d in data], [offset for offset, _ in data], starts)
     return Posterior(board, _weighed(found, noises))
 
 

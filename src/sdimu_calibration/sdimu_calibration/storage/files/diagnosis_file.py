@@ -290,6 +290,7 @@ def candidate(f: Found, own: bool) -> dict[str, Any]:
         ],
         "probability": f.probability,
         "may_be": [{"name": share.name, "p": share.probability} for share in f.may_be],
+        "same_together": [{"labels": [one, other], "p": p} for one, other, p in f.together],
         "z": f.z,
         "delta_log_likelihood": f.log_likelihood_gain,
         "log_bayes_factor": f.log_bayes_factor,

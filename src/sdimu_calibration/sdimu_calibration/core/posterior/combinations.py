@@ -1,0 +1,94 @@
+"""Two effects that together are a third one.
+
+By ``|a| = 1`` at rest a quadratic term and a cross term are another cross term beside a bias. A search that exchanges
+one at a time does not cross from one side to the other.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from sdimu_calibration.core.arrays import Floats
+from sdimu_calibration.core.posterior.models import Data, Members
+from sdimu_calibration.core.posterior.prior import WIDTHS
+
+_SAME = 1e-3
+"""Share of a signature (1) that two others together may leave for them to be it: of an effect of 30 sigma less than one
+sigma; what is no identity leaves some percent."""
+_ONE = 1e-2
+"""Share of a signature (1) that one other must leave: with less that one alone is a look-alike."""
+_MOST = 6
+"""Number of pairs of an effect that are kept, the closest first."""
+
+
+@dataclass(frozen=True)
+class Combination:
+    """A pair of candidates that shows as a third one does.
+
+    Attributes
+    ----------
+    first, second : int
+        Candidates.
+    share : ndarray, shape (2,)
+        Size of each per unit size of the third, in units of the prior sizes.
+    """
+
+    first: int
+    second: int
+    share: Floats
+
+
+def combinations_of(data: Data, number: int) -> list[Combination]:
+    """Find the pairs of candidates that show as one does, to rounding.
+
+    Parameters
+    ----------
+    data : Data
+    number : int
+        The candidate.
+    """
+    J = data.J
+    size = np.sqrt(np.maximum(np.diag(J), 1e-300))
+    C = J / np.outer(size, size)
+    c = C[number].copy()
+    fit = 1.0 - C**2
+    usable = (c * c < 1.0 - _ONE) & ~np.isin(np.arange(len(c)), number)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        left = 1.0 - (c[:, None] ** 2 + c[None, :] ** 2 - 2.0 * np.outer(c, c) * C) / fit
+    left[~(usable[:, None] & usable[None, :] & (fit > _ONE))] = 1.0
+    left[data.prior.own, :] = left[:, data.prior.own] = 1.0
+    rows, columns = np.nonzero(np.triu(left < _SAME))
+    order = np.argsort(left[rows, columns])[:_MOST]
+    out = []
+    for i, j in zip(rows[order].tolist(), columns[order].tolist(), strict=True):
+        at = [i, j]
+        share = np.linalg.solve(C[np.ix_(at, at)], c[at]) * size[number] / size[at]
+        out.append(Combination(i, j, share))
+    return out
+
+
+def crossed(data: Data, members: Members) -> list[Members]:
+    """Give the models that have a pair in the place of a member that it shows as, each with its best widths.
+
+    Parameters
+    ----------
+    data : Data
+    members : tuple of (int, int)
+        A model.
+    """
+    have = {number for number, _ in members}
+    widths = range(len(WIDTHS))
+    out: list[Members] = []
+    for place, (number, _) in enumerate(members):
+        others = members[:place] + members[place + 1 :]
+        for pair in combinations_of(data, number):
+            if {pair.first, pair.second} & have:
+                continue
+            trials = [tuple(sorted((*others, (pair.first, a), (pair.second, b)))) for a in widths for b in widths]
+            scored = [(data.at(one).score, one) for one in trials]
+            score, best = max(scored)
+            if np.isfinite(score):
+                out.append(best)
+    return out
