@@ -20,7 +20,7 @@ sigma; what is no identity leaves some percent."""
 _ONE = 1e-2
 """Share of a signature (1) that one other must leave: with less that one alone is a look-alike."""
 _MOST = 6
-"""Number of pairs of an effect that are kept, the closest first."""
+"""Number of pairs of an effect that are kept, the closest first: more than an identity or two has none."""
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class Combination:
     first, second : int
         Candidates.
     share : ndarray, shape (2,)
-        Size of each per unit size of the third, in units of the prior sizes.
+        Size of each per unit size of the third, in units of the prior sizes (1).
     """
 
     first: int
