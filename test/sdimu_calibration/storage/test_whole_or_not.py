@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
+import signal
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from sdimu_calibration.api import fit as api_fit
+from sdimu_calibration.cli import main
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.results import Calibration, no_history
 from sdimu_calibration.storage.bags import cdr
@@ -215,3 +219,35 @@ def test_a_text_with_the_bytes_of_a_path_is_written_and_json_gives_them_back(tmp
     name = os.fsdecode(b"r\xff\xe9cording")
     write_whole(tmp_path / "x.json", json.dumps({"recording": name}, ensure_ascii=False))
     assert json.loads((tmp_path / "x.json").read_text(encoding="utf-8")) == {"recording": name}
+
+
+def test_a_request_to_end_leaves_no_half_of_a_file(tmp_path, monkeypatch):
+    def verb():
+        with written_together(tmp_path) as part:
+            (part / "result.json").write_text("half")
+            os.kill(os.getpid(), signal.SIGTERM)
+            pytest.fail("goes on")
+
+    monkeypatch.setattr(main, "app", verb)
+    with pytest.raises(SystemExit) as ending:
+        main.main()
+    assert ending.value.code == 128 + signal.SIGTERM
+    assert names(tmp_path) == []
+    assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
+
+
+def test_a_full_disk_is_told_with_the_file_that_was_to_be_written(tmp_path, monkeypatch, capsys):
+    def full(*_, **__):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    def verb():
+        with written_together(tmp_path) as part:
+            write_whole(part / "result.json", "{}")
+
+    monkeypatch.setattr(Path, "write_text", full)
+    monkeypatch.setattr(main, "app", verb)
+    with pytest.raises(SystemExit) as ending:
+        main.main()
+    assert ending.value.code == 1
+    assert capsys.readouterr().err == f"sdimu: {tmp_path / 'result.json'}: No space left on device\n"
+    assert names(tmp_path) == []

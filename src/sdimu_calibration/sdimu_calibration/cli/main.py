@@ -6,10 +6,14 @@ verbs harms no other.
 
 from __future__ import annotations
 
+import signal
 import sys
-from collections.abc import Callable
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from importlib import import_module
 from importlib.metadata import entry_points
+from types import FrameType
 from typing import Annotated, Any
 
 import typer
@@ -112,7 +116,8 @@ def main() -> None:
     `options.leave` ends with 3 when all is done and the estimate is not to be trusted.
     """
     try:
-        app()
+        with _ending_tidily():
+            app()
     except (DataError, UnitError) as error:
         sys.exit(_complain(str(error)))
     except ModuleNotFoundError as error:
@@ -128,6 +133,23 @@ def main() -> None:
         sys.exit(_complain("not enough memory for this recording; take a part of it with: sdimu bag cut"))
     except KeyboardInterrupt:
         sys.exit(130)
+
+
+@contextmanager
+def _ending_tidily() -> Iterator[None]:
+    """Let a request to end (SIGTERM) pass through what takes half-written files away."""
+
+    def end(number: int, _: FrameType | None) -> None:
+        raise SystemExit(128 + number)
+
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGTERM, end)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 def _complain(text: str) -> int:

@@ -156,3 +156,13 @@ def test_a_click_that_means_nothing_is_told(bench, changed, values):  # noqa: F8
     told = answer["response"].get("message", {}) | answer.get("sideUpdate", {}).get("message", {})
     assert told["children"].startswith("Not done")
     assert "state" not in answer["response"]
+
+
+@pytest.mark.parametrize(("path", "host"), [("/", "localhost"), ("/_dash-layout", "localhost"), ("/", "evil.example")])
+def test_every_answer_stands_in_no_other_page_and_talks_to_this_server_alone(server, path, host):
+    headers = server.test_client().get(path, headers={"Host": host}).headers
+    policy = dict(rule.strip().split(" ", 1) for rule in headers["Content-Security-Policy"].split(";"))
+    assert policy["default-src"] == "'self'"
+    assert policy["frame-ancestors"] == policy["object-src"] == "'none'"
+    assert headers["X-Frame-Options"] == "DENY"
+    assert not [word for rule in policy.values() for word in rule.split() if word == "*" or word.startswith("http")]

@@ -20,6 +20,14 @@ LOOPBACK = ("127.0.0.1", "localhost", "::1")
 LARGEST = 1_000_000
 """Largest body of a request (bytes): a hundred effects of one's own, each with all that was tried before it."""
 
+POLICY = (
+    "default-src 'self'; script-src 'self' 'unsafe-inline' 'unsafe-eval'; style-src 'self' 'unsafe-inline'; "
+    "img-src 'self' data: blob:; font-src 'self' data:; worker-src 'self' blob:; object-src 'none'; base-uri 'self'; "
+    "form-action 'self'; frame-ancestors 'none'"
+)
+"""Content-Security-Policy of every answer: the page talks to this server alone, and stands in no other page. Dash and
+plotly need scripts in the page, and make some while they run."""
+
 
 def guard(server: Flask, host: str) -> None:
     """Answer only what is asked of this machine, by name, and what can be understood.
@@ -39,6 +47,13 @@ def guard(server: Flask, host: str) -> None:
         asked = [f"//{request.headers.get('Host', '')}", *([origin] if origin else [])]
         if not all(_name(address) in names for address in asked):
             abort(403, "The workbench answers this machine only.")
+
+    @server.after_request
+    def keep_to_itself(response: Response) -> Response:
+        response.headers["Content-Security-Policy"] = POLICY
+        response.headers["X-Frame-Options"] = "DENY"
+        response.headers["X-Content-Type-Options"] = "nosniff"
+        return response
 
     @server.get("/alive")
     def alive() -> Response:

@@ -19,6 +19,11 @@ COMPANIONS = ("report.html", "diagnosis.json", "set.json")
 """Files that speak of the result.json beside them: those of an earlier run go when a new one comes."""
 
 
+def _named(error: OSError, path: Path) -> OSError:
+    """Return the same error of the file that was to be written."""
+    return type(error)(error.errno, error.strerror or str(error), str(path))
+
+
 def same_file(one: Path, other: Path) -> bool:
     """Whether two paths lead to one file or folder, by links of any kind too."""
     if one.resolve() == other.resolve():
@@ -52,6 +57,9 @@ def write_whole(path: Path, text: str) -> None:
         # A path may hold bytes that are no text; written so, JSON gives them back.
         temporary.write_text(text, encoding="utf-8", errors="backslashreplace")
         temporary.replace(path)
+    except OSError as error:
+        # A full disk names no file, and the hidden one says nothing to a reader.
+        raise _named(error, path) from None
     finally:
         temporary.unlink(missing_ok=True)
 
@@ -83,8 +91,13 @@ def written_together(folder: Path) -> Iterator[Path]:
             # First what speaks of the old result: a kill in between leaves a result alone, never a foreign report.
             for name in COMPANIONS if (part / RESULT).is_file() else ():
                 (folder / name).unlink(missing_ok=True)
-            for file in files:
-                file.replace(folder / file.name)
+            for made in files:
+                made.replace(folder / made.name)
+    except OSError as error:
+        file = Path(str(error.filename or part))
+        if part not in (file, *file.parents):
+            raise
+        raise _named(error, folder / file.relative_to(part)) from None
     finally:
         shutil.rmtree(part, ignore_errors=True)
 
@@ -104,15 +117,17 @@ def _locked(folder: Path) -> Iterator[None]:
 
 @contextmanager
 def uninterrupted() -> Iterator[None]:
-    """Keep Ctrl-C waiting until some renames are done."""
+    """Keep Ctrl-C and the request to end waiting until some renames are done."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
     came: list[int] = []
-    before = signal.signal(signal.SIGINT, lambda number, _: came.append(number))
+    asked = (signal.SIGINT, signal.SIGTERM)
+    before = [signal.signal(number, lambda number, _: came.append(number)) for number in asked]
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, before)
+        for number, handler in zip(asked, before, strict=True):
+            signal.signal(number, handler)
         if came:
-            signal.raise_signal(signal.SIGINT)
+            signal.raise_signal(came[0])
