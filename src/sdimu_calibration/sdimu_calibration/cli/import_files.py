@@ -19,6 +19,11 @@ def import_files(
     ],
     out: Annotated[Path, typer.Option(metavar="BAG", help="Folder of the bag to make.")],
     replace: Annotated[bool, typer.Option("--replace", help="Replace a bag that is already there.")] = False,
+    serial: Annotated[str | None, typer.Option(metavar="NUMBER", help="Serial number of the unit.")] = None,
+    power_on: Annotated[
+        str | None,
+        typer.Option(metavar="NAME", help="Which switch-on of the unit: recordings of one name share their biases."),
+    ] = None,
 ) -> None:
     """Turn files of others into a recording, as a map of their columns says (doc/recordings.md)."""
     from contextlib import nullcontext
@@ -32,7 +37,8 @@ def import_files(
     described = load_import_map(chart)
     with console.status("importing") if console.is_terminal else nullcontext():
         found = read_files(files, described)
-        write_imported(out, found, replace)
+        said = {"serial": serial, "power_on": power_on}
+        write_imported(out, found, replace, {key: word for key, word in said.items() if word is not None})
     seconds = (int(found.ns.max()) - int(found.ns.min())) * 1e-9
     force = float(np.nanmedian(np.linalg.norm(found.f_ib_b, axis=1)))
     rate = np.degrees(np.nanmedian(np.linalg.norm(found.omega_ib_b, axis=1)))

@@ -75,7 +75,9 @@ def refuse_for_sets(opening: StatedOpening, **options: object) -> None:
     BadParameter
         When one of them is stated.
     """
-    own = {name: getattr(opening, name) for name in ("whole_turns", "power_on", "exclude_stops", "exclude_times")}
+    own = {
+        name: getattr(opening, name) for name in ("whole_turns", "rests", "power_on", "exclude_stops", "exclude_times")
+    }
     for name, value in (options | own).items():
         if value:
             raise typer.BadParameter(

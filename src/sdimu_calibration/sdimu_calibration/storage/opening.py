@@ -139,6 +139,8 @@ class Opening:
         As for `open_test`.
     whole_turns : float
         By hand: how well turns of about 360 deg about the vertical are whole ones (rad); 0 for none.
+    rests : tuple of (float, float)
+        By hand: begin and end of every rest (s after the first sample); without any they are found.
     exclude_stops : tuple of int
         Stops that no fit sees.
     exclude_times : tuple of (float, float)
@@ -157,6 +159,7 @@ class Opening:
     handheld: bool | None = None
     measured_noise: bool = False
     whole_turns: float = 0.0
+    rests: tuple[tuple[float, float], ...] = ()
     exclude_stops: tuple[int, ...] = ()
     exclude_times: tuple[tuple[float, float], ...] = ()
     serial: str | None = None
@@ -169,7 +172,8 @@ class Opening:
         test = open_test(path, self.site, self.imu, self.source, self.handheld, self.measured_noise)
         test = with_imu_file(test, self.imu_file)
         origin = test.origin.stated(self.serial, self.power_on)
-        test = replace(test, whole_turns=self.whole_turns, origin=origin).counted_from(self.reference_degc)
+        test = replace(test, whole_turns=self.whole_turns, rests=self.rests, origin=origin)
+        test = test.counted_from(self.reference_degc)
         return test.without_stops(self.exclude_stops).without_times(self.exclude_times)
 
 
