@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -33,7 +34,7 @@ class Source:
     ----------
     topics : TopicChoice
     accel_unit, gyro_unit : str or None
-        Such as ``g`` and ``deg/s``.
+        Such as ``g`` and ``deg/s``, or a multiple such as ``2 deg/s``.
     accel_sign, gyro_sign : int or None
         -1 when the negative of the specific force, or of the rate, was recorded.
     """
@@ -61,13 +62,19 @@ class Source:
 def _factor(option: str, unit: str | None, expected: str) -> float | None:
     if unit is None:
         return None
+    match = _MULTIPLE.fullmatch(unit)
+    assert match is not None  # both parts may be anything or empty
     try:
-        parsed = parse_unit(unit)
+        parsed = parse_unit(match[2])
     except UnitError as error:
         raise DataError(f"{option}: {error}") from error
     if parsed.dimension != parse_unit(expected).dimension:
         raise DataError(f"{option} {unit}: expected a unit such as {expected}")
-    return parsed.factor
+    return float(match[1] or 1.0) * parsed.factor
+
+
+_MULTIPLE = re.compile(r"\s*(\d+\.?\d*(?:[eE][-+]?\d+)?)?\s*\*?\s*(.*)")
+"""A unit, or a multiple of one such as ``2 deg/s``."""
 
 
 def opening_options(

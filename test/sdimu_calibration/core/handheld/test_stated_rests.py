@@ -83,5 +83,5 @@ def test_rests_beyond_the_recording_or_twice_are_refused(recording, times):
 
 
 def test_numbers_of_stops_are_refused_with_the_option_that_does_it(recording):
-    with pytest.raises(DataError, match="exclude_times"):
+    with pytest.raises(DataError, match=r"exclude.times"):
         solve(PreparedTest(recording, IMU).without_stops((3,)), MODEL, "handheld")
