@@ -144,7 +144,10 @@ class Stated(Place):
     ] = None
     power_on: Annotated[
         str | None,
-        typer.Option(metavar="NAME", help="Which switch-on of the unit; taken from the bag where it says it."),
+        typer.Option(
+            metavar="NAME",
+            help="Which switch-on of the unit, of all recordings of a set; taken from the bag where it says it.",
+        ),
     ] = None
     reference_temperature: Annotated[
         str | None,

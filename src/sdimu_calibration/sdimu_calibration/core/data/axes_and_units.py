@@ -17,6 +17,7 @@ Multisensor Integrated Navigation Systems*, 2nd ed., section 2.3); Earth rate in
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import permutations, product
 
@@ -322,6 +323,35 @@ def _reading_notes(reading: float, stated: Stated) -> tuple[str, ...]:
             "sense, or left-handed axes)"
         )
     return tuple(notes)
+
+
+def fitting_scale(t: Floats, w: Floats, f: Floats, factors: Sequence[float]) -> tuple[float | None, float]:
+    """Find the factor on the rates with which the turns agree best with the change of gravity's direction.
+
+    Parameters
+    ----------
+    t : ndarray, shape (n,)
+        Seconds, ascending.
+    w, f : ndarray, shape (n, 3)
+        Body rate in any unit, specific force in any unit.
+    factors : sequence of float
+        rad/s of one unit of `w`.
+
+    Returns
+    -------
+    factor : float or None
+        None where no turn tells it.
+    left : float
+        Share of the change of direction that is left.
+    """
+    for length_s in _LENGTHS_S:
+        windows = cut_windows(t, w, f, length_s)
+        turns = _turning(windows, _FAR)
+        if len(turns):
+            left = {k: Turns(windows, turns, {k: turned(w, windows, turns, k)}, w).misfit(k) for k in factors}
+            best = min(left, key=lambda k: left[k])
+            return (best if left[best] < _FITS else None), left[best]
+    return None, 1.0
 
 
 def _signed_permutations() -> tuple[Floats, ...]:

@@ -78,8 +78,20 @@ def read_files(paths: Sequence[Path], chart: ImportMap) -> Imported:
 
 
 def _read(paths: Sequence[Path], chart: ImportMap) -> Imported:
-    """Read the files that hold one stretch of time together."""
+    """Read the files that hold one stretch of time together; a few broken lines are left out."""
     tables = [_open(Path(path), chart) for path in paths]
+    try:
+        return _together(tables, chart)
+    except DataError:
+        texts = [table for table in tables if isinstance(table, TextTable)]
+        clock = chart.time.column is None and chart.time.counter is None
+        if not [table for table in texts if table.leave_out_broken(as_nan=clock)]:
+            raise
+    return _together(tables, chart)
+
+
+def _together(tables: list[Table], chart: ImportMap) -> Imported:
+    """Read what one stretch of time holds."""
     accel_ns, f_ib_b, told = _sensor(tables, chart, chart.accel, "accel")
     gyro_ns, omega_ib_b, more = _sensor(tables, chart, chart.gyro, "gyro")
     notes = [note for table in tables if isinstance(table, TextTable) for note in table.notes]
