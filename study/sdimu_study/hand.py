@@ -42,7 +42,7 @@ def world(case: Key, seed: int) -> OneTest:
     rng = rng_of(seed, "by hand")
     name, rate, rests = str(rng.choice(IMUS)), float(rng.choice(_RATES_HZ)), int(rng.integers(*_RESTS))
     imu = load_imu(name)
-    run = ByHand(rests, imu, drawn_site(rng), seed=seed, rate_hz=rate, noise=_stated_instability(imu), nudges=_NUDGES)
+    run = ByHand(rests, imu, drawn_site(rng), seed=seed, rate_hz=rate, noise=stated_instability(imu), nudges=_NUDGES)
     packet = int(rng.integers(*_PACKET)) if rng.random() < _BURSTS else 1
     return with_effects(
         lambda effects: _opened(run.with_effects(*effects) if effects else run, packet),
@@ -63,7 +63,7 @@ def score(world: OneTest, outcome: tuple[Diagnosis, int]) -> dict[str, Any]:
     return scored(world, outcome[0]) | {"rests": outcome[1]}
 
 
-def _stated_instability(imu: ImuSpecification) -> tuple[str, ...]:
+def stated_instability(imu: ImuSpecification) -> tuple[str, ...]:
     """Bias instability of an IMU file, as the simulator takes it."""
     sizes = (("gyro", imu.gyro_bias_instability, "deg/h"), ("accel", imu.accel_bias_instability, "ug"))
     return tuple(f"{triad}_noise_flicker={from_si(size, unit):.6g} {unit}" for triad, size, unit in sizes if size)
@@ -75,7 +75,7 @@ def _opened(run: ByHand, packet: int) -> tuple[PreparedTest, ImuTruth]:
     ns = recording.start_ns + np.rint(1e9 * _arrival(recording.t, packet, run.seed)).astype(np.int64)
     arrived = in_order(RawTest(ns, recording.omega_ib_b, recording.f_ib_b))
     test = opened(arrived, run.imu, run.site, "any")
-    return test, in_the_mean(felt(truth, run.site), replace(recording, phase=_true_phases(run)), run.seed)
+    return test, in_the_mean(felt(truth, run.site), replace(recording, phase=true_phases(run)), run.seed)
 
 
 def _arrival(t: Floats, packet: int, seed: int) -> Floats:
@@ -87,7 +87,7 @@ def _arrival(t: Floats, packet: int, seed: int) -> Floats:
     return np.asarray(np.maximum.accumulate(last + np.repeat(late, packet)[: len(t)]))
 
 
-def _true_phases(run: ByHand) -> PhaseLog:
+def true_phases(run: ByHand) -> PhaseLog:
     """When the hand let go: over these times a bias that wanders is stated in the mean."""
     motion = by_hand_motion(run)
     still = np.asarray(~motion.omega_nt_t.any(axis=1), dtype=bool)

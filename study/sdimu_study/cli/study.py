@@ -338,3 +338,17 @@ def hand(
     leave(out / "hand", results, table(results))
     why = refused(results)
     plain().print(f"refused: {len(why)}", *sorted(set(why))[:5], sep="\n", markup=False)
+
+
+@app.command()
+def trembling(
+    out: Annotated[Path, typer.Option(help="Folder of runs and trembling.json.")] = Path("out/study-trembling"),
+    runs: Annotated[int, typer.Option("-n", min=1, help="Runs of each IMU file.")] = 50,
+    seed: Seed = 93_001,
+    workers: Workers = 2,
+) -> None:
+    """Calibrate runs by hand of which up to half of the rests tremble, and with the rests known beside it."""
+    from sdimu_study.trembling import CASES, STUDY
+
+    results = conduct(STUDY, CASES, range(seed, seed + runs), out, workers)
+    leave(out / "trembling", results, STUDY.table(results, ("all",)))

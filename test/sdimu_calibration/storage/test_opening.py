@@ -175,3 +175,16 @@ def test_by_hand_no_place_is_needed_and_a_stated_one_is_kept(tmp_path):
     noisy = replace(DTG, gyro_white_noise=np.radians(0.1))
     assert open_test(path, None, noisy).site is None
     assert open_test(path, None, noisy, handheld=False).site == load_site("daejeon")
+
+
+@pytest.mark.parametrize(
+    ("text", "times"), [("2 deg/s", 2.0), ("0.25*deg/s", 0.25), ("deg/s", 1.0), ("1e-3 deg/s", 1e-3)]
+)
+def test_a_unit_may_be_a_multiple(text, times):
+    assert Source(gyro_unit=text).stated.gyro == pytest.approx(times * np.pi / 180.0)
+
+
+@pytest.mark.parametrize("text", ["2", "2 furlong", "2 m", "-2 deg/s"])
+def test_a_multiple_without_a_unit_of_the_kind_is_refused(text):
+    with pytest.raises(DataError, match="--gyro-unit"):
+        _ = Source(gyro_unit=text).stated

@@ -48,6 +48,7 @@ def open(  # noqa: A001 (as every library of files has it)
     whole_turns: str | None = None,
     exclude_stops: Sequence[int] = (),
     exclude_times: Sequence[tuple[float, float]] = (),
+    rests: Sequence[tuple[float, float]] = (),
 ) -> PreparedTest:
     """Open a recording: read, brought to SI and one clock, with its site and the IMU's file.
 
@@ -73,6 +74,8 @@ def open(  # noqa: A001 (as every library of files has it)
         Stops that no fit sees.
     exclude_times : sequence of (float, float)
         Spans of time (s) in which no fit takes a measurement.
+    rests : sequence of (float, float)
+        By hand: begin and end (s after the first sample) of every rest; without any they are found.
     """
     return Opening(
         site=site,
@@ -83,6 +86,7 @@ def open(  # noqa: A001 (as every library of files has it)
         whole_turns=0.0 if whole_turns is None else parse_quantity(whole_turns, "deg"),
         exclude_stops=tuple(exclude_stops),
         exclude_times=tuple(exclude_times),
+        rests=tuple(rests),
         imu_file=imu if isinstance(imu, str) else None,
     ).test(Path(bag))
 

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from sdimu_calibration.cli.console import plain
+from sdimu_calibration.cli.console import command, plain, say
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from sdimu_calibration.storage.importing.importer import Imported
 
 
 def import_files(
@@ -15,33 +21,102 @@ def import_files(
         list[Path], typer.Argument(metavar="FILE ...", help="CSV or other columns in text, MAT up to v7, NPZ.")
     ],
     chart: Annotated[
-        str, typer.Option("--map", metavar="MAP", help="What the columns are: name in config/import or path.")
-    ],
-    out: Annotated[Path, typer.Option(metavar="BAG", help="Folder of the bag to make.")],
+        str | None,
+        typer.Option(
+            "--map",
+            metavar="MAP",
+            help="What the columns are: name in config/import or path; left out, one is proposed.",
+        ),
+    ] = None,
+    out: Annotated[Path | None, typer.Option(metavar="BAG", help="Folder of the bag to make.")] = None,
+    each: Annotated[
+        bool, typer.Option("--each", help="A bag of each file in the folder BAG, and a set file: single attitudes.")
+    ] = False,
     replace: Annotated[bool, typer.Option("--replace", help="Replace a bag that is already there.")] = False,
+    serial: Annotated[str | None, typer.Option(metavar="NUMBER", help="Serial number of the unit.")] = None,
+    power_on: Annotated[
+        str | None,
+        typer.Option(metavar="NAME", help="Which switch-on of the unit: recordings of one name share their biases."),
+    ] = None,
 ) -> None:
     """Turn files of others into a recording, as a map of their columns says (doc/recordings.md)."""
     from contextlib import nullcontext
 
-    import numpy as np
-
+    from sdimu_calibration.core.recording import DataError
     from sdimu_calibration.storage.importing.import_map import load_import_map
     from sdimu_calibration.storage.importing.importer import read_files, write_imported
 
     console = plain()
+    if chart is None:
+        _propose(console, files, out, replace)
+        return
+    if out is None:
+        raise typer.BadParameter("name the folder of the bag to make", param_hint="--out")
     described = load_import_map(chart)
+    stated = {"serial": serial, "power_on": power_on}
+    said = {key: word for key, word in stated.items() if word is not None}
+    if each:
+        bags = [out / path.stem for path in files]
+        if len(set(bags)) < len(bags):
+            raise DataError("import --each: two of the files have one name: import them by themselves")
+        for path, bag in zip(files, bags, strict=True):
+            found = read_files([path], described)
+            write_imported(bag, found, replace, said)
+            _tell(console, bag, found)
+        _set_of(console, out, bags, replace)
+        return
     with console.status("importing") if console.is_terminal else nullcontext():
         found = read_files(files, described)
-        write_imported(out, found, replace)
+        write_imported(out, found, replace, said)
+    _tell(console, out, found)
+
+
+def _tell(console: Console, out: Path, found: Imported) -> None:
+    """Print what is in a bag."""
+    import numpy as np
+
     seconds = (int(found.ns.max()) - int(found.ns.min())) * 1e-9
     force = float(np.nanmedian(np.linalg.norm(found.f_ib_b, axis=1)))
     rate = np.degrees(np.nanmedian(np.linalg.norm(found.omega_ib_b, axis=1)))
     for note in found.notes:
-        console.print(f"note: {note}", soft_wrap=True, markup=False, highlight=False)
-    console.print(
+        say(console, f"note: {note}")
+    say(
+        console,
         f"{out}: {len(found.ns)} samples, {seconds:.1f} s; half of the time |f| is below {force:.3f} m/s^2 "
         f"and |w| below {rate:.3f} deg/s",
-        soft_wrap=True,
-        markup=False,
-        highlight=False,
     )
+
+
+def _set_of(console: Console, folder: Path, bags: Sequence[Path], replace: bool) -> None:
+    """Write the set file of the bags, and say how to go on."""
+    from sdimu_calibration.storage.recording_set import write_set
+
+    path = folder / "set.yaml"
+    if replace:
+        path.unlink(missing_ok=True)
+    write_set(path, bags)
+    say(console, f"{path}: {len(bags)} recordings; to calibrate them together:")
+    command(console, f"sdimu calibrate --set {path}")
+
+
+def _propose(console: Console, files: Sequence[Path], out: Path | None, replace: bool) -> None:
+    """Write maps that probably fit, and say how to go on."""
+    import shlex
+
+    from sdimu_calibration.core.recording import DataError
+    from sdimu_calibration.storage.files.whole_file import write_whole
+    from sdimu_calibration.storage.importing.map_proposal import propose_maps
+
+    folder = Path() if out is None else out.parent
+    for proposal in propose_maps(files):
+        path = folder / f"{files[0].stem}{proposal.suffix}_map.yaml"
+        if path.exists() and not replace:
+            raise DataError(f"{path}: is there already: import with --map {path}, or propose anew with --replace")
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write_whole(path, proposal.text)
+        for line in proposal.words:
+            say(console, f"note: {line}")
+        bag = out or Path(f"{files[0].stem}{proposal.suffix}_bag")
+        say(console, f"{path}: the map that is proposed; look at it, then:")
+        words = ["sdimu", "import", *map(str, files), "--map", str(path), "--out", str(bag)]
+        command(console, shlex.join(words))

@@ -52,6 +52,8 @@ def opened(console: Console, bag: Path, opening: StatedOpening, request: Fitted)
         console.print(HANDHELD_CHOSEN.format(why=test.why_handheld), soft_wrap=True)
     if stated.whole_turns and not handheld:
         raise DataError("--whole-turns is of runs by hand, and this one is navigated: leave it out, or state --hand")
+    if stated.rests and not handheld:
+        raise DataError("--rests is of runs by hand, and this one is navigated: leave it out, or state --hand")
     return test, named_model(request.model, added, handheld=handheld), wanted
 
 

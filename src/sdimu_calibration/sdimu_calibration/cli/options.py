@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -10,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from typer.models import OptionInfo
 
+from sdimu_calibration.cli.spans import read_rests, read_spans
 from sdimu_calibration.core.data_error import DataError
 from sdimu_calibration.core.units import ABSOLUTE_ZERO_DEGC
 
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from sdimu_calibration.storage.opening import Opening, Source
 
 _OF_SETS = "Several recordings of one unit"
-_SPAN = re.compile(r"\s*(\d+(?:\.\d+)?)\s*-\s*(\d+(?:\.\d+)?)\s*")
 _MOST_DEGC = 1e4
 """Highest temperature (degC) that is taken for one: nothing that measures is as hot."""
 WORKERS = 2
@@ -127,6 +126,12 @@ class Stated(Place):
             metavar="ANGLE", help="By hand: turns of about 360 deg about the vertical are whole to this, such as 1 deg."
         ),
     ] = None
+    rests: Annotated[
+        str | None,
+        typer.Option(
+            metavar="SPANS", help="By hand: when the IMU rested, in s: 10-13,15.5-18 or a file of begin and end a line."
+        ),
+    ] = None
     exclude_stops: Annotated[
         str | None, typer.Option(metavar="STOPS", help="Stops the fit does not see, such as 4,7; not the first.")
     ] = None
@@ -139,7 +144,10 @@ class Stated(Place):
     ] = None
     power_on: Annotated[
         str | None,
-        typer.Option(metavar="NAME", help="Which switch-on of the unit; taken from the bag where it says it."),
+        typer.Option(
+            metavar="NAME",
+            help="Which switch-on of the unit, of all recordings of a set; taken from the bag where it says it.",
+        ),
     ] = None
     reference_temperature: Annotated[
         str | None,
@@ -204,6 +212,7 @@ class StatedOpening(Reading, Stated):
             measured_noise=self.measured_noise,
             whole_turns=self.whole_turns_rad,
             exclude_stops=() if self.exclude_stops is None else read_stops(self.exclude_stops),
+            rests=() if self.rests is None else read_rests(self.rests),
             exclude_times=() if self.exclude_times is None else read_spans(self.exclude_times),
             serial=self.serial,
             power_on=self.power_on,
@@ -285,11 +294,3 @@ def read_stops(text: str) -> tuple[int, ...]:
     if not all(word.isdecimal() for word in words):
         raise DataError(f"--exclude-stops {text}: expected numbers of stops such as 4,7")
     return tuple(sorted({int(word) for word in words}))
-
-
-def read_spans(text: str) -> tuple[tuple[float, float], ...]:
-    """Read spans of time (s), such as ``812-815,900-910``."""
-    found = [_SPAN.fullmatch(word) for word in text.split(",")]
-    if not all(found):
-        raise DataError(f"--exclude-times {text}: expected spans of seconds such as 812-815,900-910")
-    return tuple(sorted((float(match[1]), float(match[2])) for match in found if match))

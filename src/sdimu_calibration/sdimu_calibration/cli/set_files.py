@@ -19,16 +19,25 @@ def about() -> None:
 
 @app.command()
 def init(
-    folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="Folder with the bags.")],
-    out: Annotated[Path | None, typer.Option(help="Set file to write; FOLDER/set.yaml by default.")] = None,
+    places: Annotated[
+        list[Path], typer.Argument(metavar="FOLDER|BAG ...", help="Folders with bags, bags, .mcap and .db3 files.")
+    ],
+    out: Annotated[
+        Path | None,
+        typer.Option(help="Set file to write; set.yaml in the folder, or beside the first bag, by default."),
+    ] = None,
+    serial: Annotated[str | None, typer.Option(metavar="NUMBER", help="Serial number of the unit.")] = None,
+    power_on: Annotated[
+        str | None, typer.Option(metavar="NAME", help="Switch-on that all recordings share: they share their biases.")
+    ] = None,
 ) -> None:
-    """Write a first set file of the bags in a folder."""
-    from sdimu_calibration.storage.recording_set import bags_below, write_set
+    """Write a first set file of bags, or of the bags in folders."""
+    from sdimu_calibration.storage.recording_set import Said, bags_of, is_bag, write_set
 
-    found = bags_below(folder)
-    path = out or folder / "set.yaml"
-    write_set(path, found)
-    plain().print(
-        f"{path}: {len(found)} recordings; complete serial and power_on, then: sdimu calibrate --set {path}",
-        soft_wrap=True,
-    )
+    found = bags_of(places)
+    first = places[0].resolve()
+    path = out or (first.parent if is_bag(first) else first) / "set.yaml"
+    write_set(path, found, Said(serial or "", power_on or ""))
+    missing = " and ".join(word for word, said in (("serial", serial), ("power_on", power_on)) if said is None)
+    then = f"complete {missing}, then" if missing else "now"
+    plain().print(f"{path}: {len(found)} recordings; {then}: sdimu calibrate --set {path}", soft_wrap=True)

@@ -75,13 +75,11 @@ def refuse_for_sets(opening: StatedOpening, **options: object) -> None:
     BadParameter
         When one of them is stated.
     """
-    own = {name: getattr(opening, name) for name in ("whole_turns", "power_on", "exclude_stops", "exclude_times")}
+    own = {name: getattr(opening, name) for name in ("whole_turns", "rests", "exclude_stops", "exclude_times")}
     for name, value in (options | own).items():
         if value:
             raise typer.BadParameter(
-                "is of one recording: state it for each in the set file (--set)"
-                if name == "power_on"
-                else "is of one recording: run it with that bag alone, or leave it out",
+                "is of one recording: run it with that bag alone, or leave it out",
                 param_hint=f"--{name.replace('_', '-')}",
             )
 
@@ -170,7 +168,9 @@ def _begun(console: Console, asked: SetRequest) -> Iterator[tuple[tuple[Member, 
     )
     wanted = set_of(asked.bags, like) if asked.file is None else load_set(asked.file, like)
     serial = opening.serial
-    members = tuple(m if serial is None else replace(m, serial=serial) for m in wanted.members)
+    members = tuple(
+        replace(m, serial=serial or m.serial, power_on=opening.power_on or m.power_on) for m in wanted.members
+    )
     options = set_options(replace(wanted, members=members), request.model, request.add or [], request.asked_estimator)
     with bar(console) as progress:
 

@@ -74,11 +74,14 @@ class PhaseLog:
         True for ``dwell``, False for ``rotating``.
     stop : ndarray of int, shape (m,)
         Index of the stop; `UNNUMBERED` where nobody says it.
+    stated : bool
+        Somebody says it; else it was detected from the samples.
     """
 
     t: Floats
     dwell: Bools
     stop: Ints
+    stated: bool = True
 
     def usual_dwell_s(self, until_s: float) -> float | None:
         """Median length of a dwell (s) in a recording that ends at `until_s`; None where there is no dwell."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -33,7 +34,7 @@ class Source:
     ----------
     topics : TopicChoice
     accel_unit, gyro_unit : str or None
-        Such as ``g`` and ``deg/s``.
+        Such as ``g`` and ``deg/s``, or a multiple such as ``2 deg/s``.
     accel_sign, gyro_sign : int or None
         -1 when the negative of the specific force, or of the rate, was recorded.
     """
@@ -61,13 +62,19 @@ class Source:
 def _factor(option: str, unit: str | None, expected: str) -> float | None:
     if unit is None:
         return None
+    match = _MULTIPLE.fullmatch(unit)
+    assert match is not None  # both parts may be anything or empty
     try:
-        parsed = parse_unit(unit)
+        parsed = parse_unit(match[2])
     except UnitError as error:
         raise DataError(f"{option}: {error}") from error
     if parsed.dimension != parse_unit(expected).dimension:
         raise DataError(f"{option} {unit}: expected a unit such as {expected}")
-    return parsed.factor
+    return float(match[1] or 1.0) * parsed.factor
+
+
+_MULTIPLE = re.compile(r"\s*(\d+\.?\d*(?:[eE][-+]?\d+)?)?\s*\*?\s*(.*)")
+"""A unit, or a multiple of one such as ``2 deg/s``."""
 
 
 def opening_options(
@@ -139,6 +146,8 @@ class Opening:
         As for `open_test`.
     whole_turns : float
         By hand: how well turns of about 360 deg about the vertical are whole ones (rad); 0 for none.
+    rests : tuple of (float, float)
+        By hand: begin and end of every rest (s after the first sample); without any they are found.
     exclude_stops : tuple of int
         Stops that no fit sees.
     exclude_times : tuple of (float, float)
@@ -157,6 +166,7 @@ class Opening:
     handheld: bool | None = None
     measured_noise: bool = False
     whole_turns: float = 0.0
+    rests: tuple[tuple[float, float], ...] = ()
     exclude_stops: tuple[int, ...] = ()
     exclude_times: tuple[tuple[float, float], ...] = ()
     serial: str | None = None
@@ -169,7 +179,8 @@ class Opening:
         test = open_test(path, self.site, self.imu, self.source, self.handheld, self.measured_noise)
         test = with_imu_file(test, self.imu_file)
         origin = test.origin.stated(self.serial, self.power_on)
-        test = replace(test, whole_turns=self.whole_turns, origin=origin).counted_from(self.reference_degc)
+        test = replace(test, whole_turns=self.whole_turns, rests=self.rests, origin=origin)
+        test = test.counted_from(self.reference_degc)
         return test.without_stops(self.exclude_stops).without_times(self.exclude_times)
 
 

@@ -213,6 +213,36 @@ def _member(source: BagSource, name: str, serial: str, power_on: str) -> Member:
     return Member(name, source, serial or said.get("serial", ""), power_on or said.get("power_on", ""))
 
 
+@dataclass(frozen=True)
+class Said:
+    """What the user says of all recordings of a set; empty: what each bag says.
+
+    Attributes
+    ----------
+    serial, power_on : str
+    """
+
+    serial: str = ""
+    power_on: str = ""
+
+
+def is_bag(path: Path) -> bool:
+    """Whether a path is a bag: a folder with its metadata, or a file of messages."""
+    return (path / METADATA).is_file() or (path.is_file() and path.suffix in {".mcap", ".db3", ".bag"})
+
+
+def bags_of(places: Sequence[Path]) -> list[Path]:
+    """Bags among some paths as they come, and those in folders in the order of their names; each once."""
+    found: list[Path] = []
+    for place in map(Path, places):
+        if not place.exists():
+            raise DataError(f"{place}: no such bag or folder")
+        if place.is_file() and not is_bag(place):
+            raise DataError(f"{place}: no bag (a folder with {METADATA}, or an .mcap or .db3 file); import it first")
+        found += [place] if is_bag(place) else bags_below(place)
+    return list(dict.fromkeys(found))
+
+
 def bags_below(folder: Path) -> list[Path]:
     """Bags in a folder and the folders in it, in the order of their names."""
     folder = Path(folder)
@@ -223,14 +253,18 @@ def bags_below(folder: Path) -> list[Path]:
     return sorted(found)
 
 
-def write_set(path: Path, bags: Sequence[Path]) -> None:
-    """Write a first set file of bags, with what they say of unit and power-on, for the user to complete.
+_UNSAID = Said()
+
+
+def write_set(path: Path, bags: Sequence[Path], stated: Said = _UNSAID) -> None:
+    """Write a first set file of bags, with what they or the user say of unit and power-on, for the user to complete.
 
     Parameters
     ----------
     path : Path
         File to make; bags are named from its folder.
     bags : sequence of Path
+    stated : Said
     """
     path = Path(path)
     if path.exists():
@@ -243,7 +277,10 @@ def write_set(path: Path, bags: Sequence[Path]) -> None:
         place = bag.resolve()
         shown = place.relative_to(base) if place.is_relative_to(base) else place
         called = {"name": str(shown)} if names.count(name) > 1 else {}
-        known = {"power_on": said.get("power_on", ""), "serial": said.get("serial", "")}
+        known = {
+            "power_on": stated.power_on or said.get("power_on", ""),
+            "serial": stated.serial or said.get("serial", ""),
+        }
         entries.append({"bag": str(shown), **called, **known})
     content = {"format": "sdimu-set/1", "recordings": entries}
     write_whole(path, _HEADER + yaml.safe_dump(content, sort_keys=False))

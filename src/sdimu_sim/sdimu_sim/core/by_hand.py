@@ -15,6 +15,7 @@ from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.recording import DataError, Recording
 from sdimu_calibration.core.rotation import quaternion_matrix, rotation_vector
 from sdimu_calibration.core.specification import ImuSpecification, Site
+from sdimu_calibration.core.units import STANDARD_GRAVITY
 from sdimu_sim.core.generator import ImuSamples, simulate_imu
 from sdimu_sim.core.platform import PlatformMotion
 from sdimu_sim.core.scenario import DEFAULT_START_NS, with_hidden
@@ -28,6 +29,8 @@ _SWAY_RAD, _TREMOR_RAD = np.radians(3.0), np.radians(0.15)
 """Amplitudes: at most 30 and 10 deg/s."""
 _NUDGE_S, _NUDGE = 0.4, 0.1
 """Length of a nudge (s), and its amplitudes as a share of those of a turn: tenths of a degree."""
+_TREMBLE_FADE_S = 0.15
+"""Time in which the tremble of a rest begins and ends (s): a hand trembles to the end, and the motion stays smooth."""
 _MOST_RESTS = 10_000
 """Number of attitudes at most: a day and a half by hand."""
 
@@ -56,6 +59,10 @@ class ByHand:
         Noise with a memory, as of `Scenario`.
     nudges : float
         Share of the rests in which somebody nudges the IMU: it wobbles for a moment and comes back.
+    trembling : int
+        Number of rests in which the hand holds the IMU and trembles.
+    tremble : tuple of float
+        Least and largest scatter (1 sigma) of a trembling rest, as a multiple of that of a quiet one.
     """
 
     rests: int
@@ -69,6 +76,8 @@ class ByHand:
     effects: tuple[str, ...] = ()
     noise: tuple[str, ...] = ()
     nudges: float = 0.0
+    trembling: int = 0
+    tremble: tuple[float, float] = (2.0, 6.0)
 
     def with_effects(self, *effects: str) -> ByHand:
         """Return the same run by a hand that holds an IMU with these hidden effects."""
@@ -81,6 +90,8 @@ def simulate_by_hand(run: ByHand) -> tuple[ImuSamples, Truth]:
         raise DataError(f"{run.rests} attitudes by hand: expected 2 to {_MOST_RESTS}")
     if not 10.0 <= run.rate_hz <= 1000.0:
         raise DataError(f"sample rate {run.rate_hz:g} Hz: expected 10 to 1000 Hz")
+    if not 0 <= run.trembling <= run.rests:
+        raise DataError(f"{run.trembling} trembling rests: expected 0 to {run.rests}, the number of rests")
     imu = with_hidden(
         ImuTruth(
             coefficients=draw_coefficients(run.imu, run.seed),
@@ -111,6 +122,8 @@ def by_hand_motion(run: ByHand) -> PlatformMotion:
     """Make the motion of the IMU, its own axes against NED."""
     rng = child_rng(run.seed, "by hand")
     attitudes = _random_quaternions(rng, run.rests)
+    trembles = child_rng(run.seed, "trembling")
+    trembling = set(trembles.permutation(run.rests)[: run.trembling].tolist())
     t0 = 0.0
     times: list[Floats] = []
     turned: list[Floats] = []
@@ -120,10 +133,11 @@ def by_hand_motion(run: ByHand) -> PlatformMotion:
         nudged = run.nudges > 0.0 and rng.random() < run.nudges
         # A rest needs its two ends only: between equal attitudes at rate zero the motion stands still.
         for part in (0.5 * rest, 0.5 * rest) if nudged else (rest,):
-            times.append(np.array([t0, t0 + _grid(part)]))
-            turned.append(np.repeat(attitudes[k][None], 2, axis=0))
-            rates.append(np.zeros((2, 3)))
-            t0 = times[-1][1]
+            t, q, w = _held(run, attitudes[k], _grid(part), trembles if k in trembling else None)
+            times.append(t0 + t)
+            turned.append(q)
+            rates.append(w)
+            t0 = times[-1][-1]
             if nudged:
                 nudged = False
                 tau = np.arange(1, round(_NUDGE_S * _MOTION_HZ)) / round(_NUDGE_S * _MOTION_HZ)
@@ -141,6 +155,29 @@ def by_hand_motion(run: ByHand) -> PlatformMotion:
             rates.append(w)
             t0 += length
     return PlatformMotion(np.concatenate(times), np.concatenate(turned), np.concatenate(rates))
+
+
+def _held(
+    run: ByHand, attitude: Floats, length: float, rng: np.random.Generator | None
+) -> tuple[Floats, Floats, Floats]:
+    """Make times (n,) from zero, attitudes (n, 4) and body rates (n, 3) of a rest: still, or trembling with an `rng`.
+
+    The triad in which the tremble shows more scatters as many times its noise as drawn.
+    """
+    if rng is None:
+        return np.array([0.0, length]), np.repeat(attitude[None], 2, axis=0), np.zeros((2, 3))
+    tau = np.arange(round(length * _MOTION_HZ) + 1) / round(length * _MOTION_HZ)
+    sway, sway_rate = _sway(tau, length, rng, _TREMBLE_FADE_S)
+    arm = np.cross(np.gradient(sway_rate, tau * length, axis=0), np.array(run.lever_arm_m))
+    down = quaternion_matrix(attitude).T[:, 2] * STANDARD_GRAVITY
+    seen = (
+        np.sqrt(np.sum(sway_rate**2) / len(tau) / 3.0),
+        np.sqrt(np.sum((arm + np.cross(down, sway)) ** 2) / len(tau) / 3.0),
+    )
+    noise = np.sqrt(run.rate_hz) * np.array([run.imu.gyro_white_noise, run.imu.accel_white_noise])
+    share = np.sqrt(rng.uniform(*run.tremble) ** 2 - 1.0) * float(np.min(noise / np.array(seen)))
+    q = _product(attitude[None], _exponential(share * sway))
+    return tau * length, q, _body_rate(share * sway, share * sway_rate)
 
 
 def _grid(seconds: float) -> float:
@@ -167,10 +204,17 @@ def _turn(
     return q, _turned_back(speed[:, None] * way, sway) + _body_rate(sway, sway_rate)
 
 
-def _sway(tau: Floats, length: float, rng: np.random.Generator) -> tuple[Floats, Floats]:
-    """Rotation vector of sway and tremor and its derivative (rad, rad/s), (n, 3) each, zero at both ends."""
+def _sway(tau: Floats, length: float, rng: np.random.Generator, fade_s: float | None = None) -> tuple[Floats, Floats]:
+    """Rotation vector of sway and tremor and its derivative (rad, rad/s), (n, 3) each, zero at both ends.
+
+    It grows to the middle, or within `fade_s` from both ends.
+    """
     t = tau * length
-    fade, fading = np.sin(np.pi * tau) ** 2, np.pi / length * np.sin(2.0 * np.pi * tau)
+    short = 0.5 * length if fade_s is None else min(fade_s, 0.5 * length)
+    near = np.minimum(np.minimum(t, length - t), short)
+    side = np.where(near < short, np.where(tau < 0.5, 1.0, -1.0), 0.0)
+    rise = 0.5 * np.pi / short
+    fade, fading = np.sin(rise * near)[:, None] ** 2, (rise * np.sin(2.0 * rise * near) * side)[:, None]
     value, rate = np.zeros((len(t), 3)), np.zeros((len(t), 3))
     for band, size in ((_SWAY_HZ, _SWAY_RAD), (_TREMOR_HZ, _TREMOR_RAD)):
         omega = 2.0 * np.pi * rng.uniform(*band, 3)
@@ -178,7 +222,7 @@ def _sway(tau: Floats, length: float, rng: np.random.Generator) -> tuple[Floats,
         angle = t[:, None] * omega + phase
         value += amplitude * np.sin(angle)
         rate += amplitude * omega * np.cos(angle)
-    return fade[:, None] * value, fading[:, None] * value + fade[:, None] * rate
+    return fade * value, fading * value + fade * rate
 
 
 def _product(p: Floats, q: Floats) -> Floats:

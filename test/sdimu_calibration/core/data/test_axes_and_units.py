@@ -159,3 +159,20 @@ def test_rates_beyond_measure_are_named_with_place_and_size():
     assert f"angular_velocity.y is -1e+30 at {t[4000]:.1f} s" in refusal(t, wild, f)
     assert "e+30 at" in refusal(t, 1e31 * w, f)
     assert "do not agree" in refusal(t, w[:, [1, 0, 2]] * 3.0, f)
+
+
+@pytest.mark.parametrize("source", [SOURCES[0], SOURCES[4], SOURCES[5]])
+@pytest.mark.parametrize(("true", "unit"), [(0.5, 1.0), (2.0, 1.0), (4.0, DEGREE), (0.25, DEGREE)])
+def test_a_wrong_range_of_the_gyros_is_told_with_the_factor_that_closes_the_turns(source, true, unit):
+    t, w, f = samples(*source)
+    said = refusal(t, w / (true * unit), f)
+    assert f"the turns close with {true:g} times the rates" in said
+    name = "rad/s" if unit == 1.0 else "deg/s"
+    assert f"gyro-unit '{true:g} {name}'" in said.replace("_", "-")
+    # Stated so, the turns agree.
+    assert recognise(t, w / (true * unit), f, Stated(gyro=true * unit)).gyro == pytest.approx(true * unit)
+
+
+def test_a_wrong_range_beside_a_stated_unit_is_told():
+    t, w, f = samples("hand", 33)
+    assert "close with 2 times the rates" in refusal(t, np.degrees(w) / 2.0, f, Stated(gyro=DEGREE))

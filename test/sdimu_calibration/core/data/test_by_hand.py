@@ -127,9 +127,9 @@ def test_attitudes_without_the_turns_between_them_are_not_navigated():
 
 def test_two_attitudes_without_their_turn_are_refused_with_what_would_help():
     with pytest.raises(DataError, match=r"2 rests in different attitudes, and no turn.*sdimu calibrate A B"):
-        prepare_run(pieces([0, 90]))
+        prepare_run(pieces([0, 90]), load_imu("mems_by_hand"))
     with pytest.raises(DataError, match="1 rest; a handheld calibration needs 6 and more"):
-        prepare_run(pieces([0]))
+        prepare_run(pieces([0]), load_imu("mems_by_hand"))
 
 
 def test_one_attitude_is_told_from_a_turn_about_the_vertical():

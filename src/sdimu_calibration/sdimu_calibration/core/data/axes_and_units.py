@@ -17,7 +17,8 @@ Multisensor Integrated Navigation Systems*, 2nd ed., section 2.3); Earth rate in
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from itertools import permutations, product
 
 import numpy as np
@@ -53,6 +54,8 @@ _MOST = 200_000
 _NO_RATE = 1e9
 """Reading of a gyro (any unit) from which it is no rate: a thousand times what the fastest give in deg/s, and more than
 counters of 24 bits have."""
+_RANGES = (0.125, 0.25, 0.5, 2.0, 4.0, 8.0)
+"""Factors on the rates that a wrong setting of the range makes: ranges of gyros go by powers of two."""
 _FITS, _FAILS = 0.4, 2.0
 """Share of the swing, and multiple of it: the right reading leaves less than the one, every other one more than the
 other times as much."""
@@ -164,7 +167,7 @@ def _gyro_reading(t: Floats, w: Floats, f: Floats, stated: Stated) -> tuple[floa
         if not len(turns):
             continue
         # A table at an even rate may turn a wrong unit by whole turns more: windows of another length tell.
-        now = Turns(windows, turns, {reading: turned(w, windows, turns, reading) for reading in readings})
+        now = Turns(windows, turns, {reading: turned(w, windows, turns, reading) for reading in readings}, w)
         best = now.best()
         if best is not None:
             now.check_axes(best)
@@ -214,11 +217,14 @@ class Turns:
     chosen : ndarray of int, shape (k,)
     C : dict of float to ndarray, shape (k, 3, 3)
         By factor.
+    w : ndarray, shape (n, 3)
+        Body rate as recorded.
     """
 
     windows: Windows
     chosen: Ints
     C: dict[float, Floats]
+    w: Floats
 
     def misfit(self, reading: float, axes: Floats | None = None, share: float = 0.5) -> float:
         """Return what a reading leaves of the change of direction, as a share of it.
@@ -259,10 +265,40 @@ class Turns:
         least = min(map(self.misfit, self.C))
         if best < _FITS and least > _FAILS * best:
             return _wrong_axes(axes * np.sign(reading))
+        other = self._other_range(least)
+        if other:
+            return other
         options = "" if stated.gyro is not None else f"; state the unit, such as {Option.GYRO_UNIT} deg/s"
         return (
             f"angular_velocity: the turns do not agree with the change of gravity's direction ({least:.0%} of it is "
             f"left){options}; check that rate and force are of one rigid IMU and no axis is wrong"
+        )
+
+    def _other_range(self, least: float) -> str:
+        """Say by what factor the rates are wrong, as after a wrong setting of the range; empty where none closes turns.
+
+        Parameters
+        ----------
+        least : float
+            What the readings without a factor leave.
+        """
+        scaled = {
+            (factor, reading): replace(
+                self, C={reading: turned(self.w, self.windows, self.chosen, factor * reading)}
+            ).misfit(reading)
+            for reading in self.C
+            for factor in _RANGES
+        }
+        (factor, reading), second = sorted(scaled, key=lambda one: scaled[one])[:2]
+        left = scaled[factor, reading]
+        if left >= _FITS or min(scaled[second], least) <= _FAILS * left:
+            return ""
+        unit = "deg/s" if abs(abs(reading) - DEGREE) < 1e-9 else "rad/s"
+        back = " of the opposite sign" if reading < 0.0 else ""
+        return (
+            f"angular_velocity: the turns close with {factor:g} times the rates{back} ({left:.0%} of the change of "
+            f"gravity's direction is left, {least:.0%} as recorded): the range of the gyros is probably set wrong; "
+            f"state {Option.GYRO_UNIT} '{factor:g} {unit}', or correct counts_per_unit in the map of {Work.IMPORT}"
         )
 
     def _other_axes(self, share: float) -> tuple[float, float, Floats]:
@@ -287,6 +323,35 @@ def _reading_notes(reading: float, stated: Stated) -> tuple[str, ...]:
             "sense, or left-handed axes)"
         )
     return tuple(notes)
+
+
+def fitting_scale(t: Floats, w: Floats, f: Floats, factors: Sequence[float]) -> tuple[float | None, float]:
+    """Find the factor on the rates with which the turns agree best with the change of gravity's direction.
+
+    Parameters
+    ----------
+    t : ndarray, shape (n,)
+        Seconds, ascending.
+    w, f : ndarray, shape (n, 3)
+        Body rate in any unit, specific force in any unit.
+    factors : sequence of float
+        rad/s of one unit of `w`.
+
+    Returns
+    -------
+    factor : float or None
+        None where no turn tells it.
+    left : float
+        Share of the change of direction that is left.
+    """
+    for length_s in _LENGTHS_S:
+        windows = cut_windows(t, w, f, length_s)
+        turns = _turning(windows, _FAR)
+        if len(turns):
+            left = {k: Turns(windows, turns, {k: turned(w, windows, turns, k)}, w).misfit(k) for k in factors}
+            best = min(left, key=lambda k: left[k])
+            return (best if left[best] < _FITS else None), left[best]
+    return None, 1.0
 
 
 def _signed_permutations() -> tuple[Floats, ...]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sdimu_calibration.core.data.attitudes import turned_unseen
+from sdimu_calibration.core.data.attitudes import one_attitude, turned_unseen
 from sdimu_calibration.core.data.static_detection import hides_earth_rate
 from sdimu_calibration.core.data.windows import cut_windows
 from sdimu_calibration.core.recording import Recording
@@ -42,6 +42,9 @@ def why_handheld(recording: Recording, imu: ImuSpecification) -> str:
     if turned_unseen(recording):
         return "no turn between its attitudes is in the recording"
     if hides_earth_rate(recording, imu):
+        # One rest is no run by hand: navigated, it is a part of a set of single attitudes.
+        if one_attitude(recording):
+            return ""
         return "the gyros' white noise in the usual rest hides the Earth's rate"
     if moved_by_hand(recording):
         return "the axis of its turns moves as in a hand, and no table says otherwise"

@@ -78,7 +78,7 @@ def _dwells(windows: Windows, still: Bools) -> PhaseLog:
             dwell[first:last] = True
             stop[first:] = count
             count += 1
-    return PhaseLog(windows.start, dwell, stop)
+    return PhaseLog(windows.start, dwell, stop, stated=False)
 
 
 class GrowingDwells:
@@ -142,7 +142,9 @@ class GrowingDwells:
         new = (found.t >= self._decided_s) & (found.t < decided_s)
         self._calm[new] = found.dwell[new]
         self._decided_s = decided_s
-        return PhaseLog(found.t, self._calm | (found.dwell & (found.t >= decided_s)), _unnumbered(found)), decided_s
+        return PhaseLog(
+            found.t, self._calm | (found.dwell & (found.t >= decided_s)), _unnumbered(found), False
+        ), decided_s
 
 
 def _unnumbered(log: PhaseLog) -> Ints:

@@ -27,7 +27,7 @@ SHORTEST_S = 0.4
 """Shortest rest that is used (s): what half a window at both ends leaves of one that is worth having."""
 _QUIETEST = 0.1
 """Share of all windows from which the noise is learned: the quietest ones are rests."""
-_SCATTER = 4.0
+SCATTER = 4.0
 """Scatter (variance) of rest, as a multiple of that of the quietest windows: a hand makes more."""
 _DRIFT = np.radians(1.0)
 """Mean rates at rest may differ by so much (rad/s): what gravity and warmth do to the bias of a cheap gyro."""
@@ -37,7 +37,7 @@ five thousand is as far off, and cuts one sample of a rest."""
 _NEAR_S = 10.0
 """Length of the neighbourhood (s): a table of 0.5 deg/s^2 runs up to what is taken for rest in 2 s of them, and the
 bias of a cheap gyro does not leave its noise."""
-_HOLE = 3.0
+HOLE = 3.0
 """Distance of two samples (intervals): in a longer one a hand may have moved."""
 _EARTH_SEEN = 3.0
 """Ratio of the Earth's rate to the gyros' white noise in a rest: from here on it is seen."""
@@ -76,19 +76,38 @@ class StaticIntervals:
         return len(self.first)
 
 
-def detect_static(recording: Recording) -> StaticIntervals:
-    """Find where the IMU rests."""
+def detect_static(recording: Recording, scatter: float = SCATTER) -> StaticIntervals:
+    """Find where the IMU rests.
+
+    Parameters
+    ----------
+    recording : Recording
+    scatter : float
+        Scatter (variance) of a window at rest at most, as a multiple of that of the quietest windows.
+    """
     dt = recording.interval_s
     width = max(round(WINDOW_S / dt), 4)
     if len(recording.t) < 10 * width:
         raise DataError(f"/imu/data_raw: {recording.t[-1]:.1f} s are too short to find rests in")
-    first, last = runs(still_samples(recording, width, _DRIFT, _HOLE))
+    first, last = runs(still_samples(recording, width, _DRIFT, HOLE, scatter))
     long = last - first >= max(round(SHORTEST_S / dt), 3)
     if not long.any():
         raise DataError("/imu/data_raw: no rest of half a second was found: put the IMU down between the turns")
     first, last = _without_ramps(recording, first[long], last[long], width)
-    gyro, accel = _density(recording.omega_ib_b, first, last, dt), _density(recording.f_ib_b, first, last, dt)
-    return StaticIntervals(*joined(recording, first, last, _FRAGMENT_S), gyro, accel)
+    return StaticIntervals(*joined(recording, first, last, _FRAGMENT_S), *noise_at(recording, first, last))
+
+
+def noise_at(recording: Recording, first: Ints, last: Ints) -> tuple[float, float]:
+    """White noise of the gyros (rad/s/sqrt(Hz)) and of the accelerometers (m/s^2/sqrt(Hz)) at rests.
+
+    Parameters
+    ----------
+    recording : Recording
+    first, last : ndarray of int, shape (k,)
+        Samples ``first:last`` of each rest.
+    """
+    dt = recording.interval_s
+    return _density(recording.omega_ib_b, first, last, dt), _density(recording.f_ib_b, first, last, dt)
 
 
 def _without_ramps(recording: Recording, first: Ints, last: Ints, width: int) -> tuple[Ints, Ints]:
@@ -188,7 +207,7 @@ def _usual_rest(recording: Recording, rests: StaticIntervals) -> float:
     return float(np.median(recording.t[rests.last - 1] - recording.t[rests.first]))
 
 
-def still_samples(recording: Recording, width: int, turning: float, hole: float) -> Bools:
+def still_samples(recording: Recording, width: int, turning: float, hole: float, scatter: float = SCATTER) -> Bools:
     """Find the samples about which the IMU rests.
 
     Parameters
@@ -201,6 +220,8 @@ def still_samples(recording: Recording, width: int, turning: float, hole: float)
         Deviation of the mean rate that is a turn (rad/s).
     hole : float
         Sample intervals between two samples from which nobody knows what happened between them.
+    scatter : float
+        Scatter (variance) of a window at rest at most, as a multiple of that of the quietest windows.
 
     Returns
     -------
@@ -209,7 +230,8 @@ def still_samples(recording: Recording, width: int, turning: float, hole: float)
     """
     mean, rate_scatter = _moving(recording.omega_ib_b, width)
     _, force_scatter = _moving(recording.f_ib_b, width)
-    still = _like_the_quietest(rate_scatter, recording.omega_ib_b) & _like_the_quietest(force_scatter, recording.f_ib_b)
+    still = _like_the_quietest(rate_scatter, recording.omega_ib_b, scatter)
+    still &= _like_the_quietest(force_scatter, recording.f_ib_b, scatter)
     if still.any():
         still &= np.max(np.abs(mean - np.median(mean[still], axis=0)), axis=1) < turning
     apart = np.diff(recording.t, prepend=0.0) > hole * recording.interval_s
@@ -232,10 +254,10 @@ def _moving(values: Floats, width: int) -> tuple[Floats, Floats]:
     return mean, scatter
 
 
-def _like_the_quietest(scatter: Floats, values: Floats) -> Bools:
+def _like_the_quietest(scatter: Floats, values: Floats, most: float) -> Bools:
     """Windows that scatter as the quietest do, or less than the resolution of the sensor."""
     floor = float(np.sum(resolution(values) ** 2) / 12.0)
-    return np.asarray(scatter <= max(_SCATTER * float(np.quantile(scatter, _QUIETEST)), floor))
+    return np.asarray(scatter <= max(most * float(np.quantile(scatter, _QUIETEST)), floor))
 
 
 def resolution(values: Floats) -> Floats:

@@ -206,7 +206,8 @@ class HandheldFit(Fit):
     def notes(self) -> tuple[str, ...]:
         """Say what was assumed, learned and not determined."""
         places = (r.note for r in self.references() if r.name in self.priors.model.names)
-        return (*handheld_notes(self.ready.run, self.priors, self.solution, self.test.site), *places)
+        told = handheld_notes(self.ready.run, self.priors, self.solution, self.test.site)
+        return (told[0], *self.ready.notes, *told[1:], *places)
 
     def rests(self) -> tuple[Rest, ...]:
         """Rests with their residuals."""

@@ -15,8 +15,8 @@ from sdimu_calibration.core.estimation.fit import Start
 from sdimu_calibration.core.estimation.handheld_fit import HandheldFit
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.handheld.contradicted_priors import GAIN, contradicted, widest_priors
-from sdimu_calibration.core.handheld.handheld import first_linearisation, fit_priors
 from sdimu_calibration.core.handheld.handheld_fit import LinearisationPoint, fit_run
+from sdimu_calibration.core.handheld.handheld_scene import first_linearisation, fit_priors
 from sdimu_calibration.core.progress import Progress
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.specification import Model

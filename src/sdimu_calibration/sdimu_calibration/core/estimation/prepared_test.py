@@ -12,7 +12,7 @@ from sdimu_calibration.core.alignment.prepared import PreparedData, TestSetup, r
 from sdimu_calibration.core.alignment.without import without
 from sdimu_calibration.core.data.blocks import let_go
 from sdimu_calibration.core.data.by_hand import why_handheld
-from sdimu_calibration.core.handheld.handheld import PreparedRun, prepare_run
+from sdimu_calibration.core.handheld.handheld import PreparedRun, Told, prepare_run
 from sdimu_calibration.core.origin import Origin
 from sdimu_calibration.core.recording import Recording
 from sdimu_calibration.core.specification import EPOCH_S, LONGEST_EPOCH_S, MOST_EPOCHS, ImuSpecification, Site
@@ -37,6 +37,8 @@ class PreparedTest:
         Name of the site where nobody stated one.
     whole_turns : float
         Of a run by hand: how well the IMU was put back after whole turns about the vertical (rad); 0 for none.
+    rests : tuple of (float, float)
+        Of a run by hand: when the IMU rested (s), as stated; without any the rests are found.
     origin : Origin
         What the bag and the user say of the unit; an outcome adds what the recording says.
     """
@@ -48,6 +50,7 @@ class PreparedTest:
     excluded: tuple[tuple[float, float], ...] = ()
     assumed_site: str = ""
     whole_turns: float = 0.0
+    rests: tuple[tuple[float, float], ...] = ()
     origin: Origin = field(default_factory=Origin)
     _prepared: dict[Any, Any] = field(default_factory=dict, repr=False, compare=False)
 
@@ -126,9 +129,11 @@ class PreparedTest:
     @property
     def run(self) -> PreparedRun:
         """Rests and turns of a handheld run, made once."""
-        if "run" not in self._prepared:
-            self._prepared["run"] = prepare_run(self.recording, self.whole_turns)
-        done: PreparedRun = self._prepared["run"]
+        key = ("run", self.excluded)
+        if key not in self._prepared:
+            told = Told(self.whole_turns, self.rests, self.excluded)
+            self._prepared[key] = prepare_run(self.recording, self.imu, self.site, told)
+        done: PreparedRun = self._prepared[key]
         return done
 
 

@@ -126,7 +126,11 @@ def _check(test: PreparedTest, model: Model, estimator: str) -> None:
             f"priors.{model.priors[0].name}: the estimator '{estimator}' takes the priors of the IMU's file alone: "
             f"leave them out of the model, or use one of {', '.join(_TAKES_PRIORS)}"
         )
-    if test.held_out or test.excluded:
+    if estimator == HandheldFit.estimator and test.held_out:
+        raise DataError(
+            f"a run by hand has rests and no numbered stops: name their times ({Option.EXCLUDE_TIMES}) instead of stops"
+        )
+    if (test.held_out or test.excluded) and estimator != HandheldFit.estimator:
         raise DataError(
             f"the estimator '{estimator}' takes every stop: cut the recording instead ({Work.CUT}), or use one of "
             f"{', '.join(_TAKES_PRIORS)}"

@@ -16,41 +16,44 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sdimu_calibration.core import earth
-from sdimu_calibration.core.alignment.alignment import levelled
-from sdimu_calibration.core.arrays import Bools
 from sdimu_calibration.core.data.attitudes import turned_unseen
-from sdimu_calibration.core.data.static_detection import StaticIntervals, detect_static
-from sdimu_calibration.core.effects import body_frame
-from sdimu_calibration.core.effects.bias import GYRO_BIAS
-from sdimu_calibration.core.effects.imu_model import ImuModel
-from sdimu_calibration.core.handheld.handheld_data import HandheldRun, reduce_run, turns
+from sdimu_calibration.core.data.stated_rests import dwells_of, stated_rests, without_spans
+from sdimu_calibration.core.data.static_detection import StaticIntervals
+from sdimu_calibration.core.data.trembling_rests import STEPS
+from sdimu_calibration.core.handheld.handheld_data import HandheldRun, reduce_run
 from sdimu_calibration.core.handheld.handheld_faults import without_impossible
-from sdimu_calibration.core.handheld.handheld_fit import (
-    FORCE,
-    RATE,
-    TURN,
-    FitPriors,
-    HandheldSolution,
-    LinearisationPoint,
-)
+from sdimu_calibration.core.handheld.handheld_fit import FORCE, RATE, TURN, FitPriors, HandheldSolution
+from sdimu_calibration.core.handheld.rest_choice import FEWEST_RESTS, ChosenRests, choose_rests
 from sdimu_calibration.core.handheld.whole_turns import whole_turns, with_whole_turns
+from sdimu_calibration.core.plain_text import counted
 from sdimu_calibration.core.recording import DataError, DataFault, Recording
 from sdimu_calibration.core.specification import ImuSpecification, Site
-from sdimu_calibration.core.units import STANDARD_GRAVITY, from_si
+from sdimu_calibration.core.units import from_si
 from sdimu_calibration.core.wording import Option, Work
 
-FEWEST_RESTS = 6
-"""Number of rests at least: scale and bias of three accelerometers need as many attitudes."""
 _UNKNOWN = 0.5
 """Share of the prior sigma above which a coefficient is called unknown: the recording has hardly told it."""
-_LEAST_NOISE = 0.01
-"""Share of the specification's noise below which learned noise is not believed: a few rests may agree by chance."""
-_ROOM = 30.0
-"""Factor on the prior of the class where the IMU's file gives none: held back by a prior, an added effect would be
-learned as scatter."""
 _SEEN = 3.0
 """Ratio of the Earth's rate to its sigma: from here on it is seen."""
+
+
+@dataclass(frozen=True)
+class Told:
+    """What the user says of a run by hand.
+
+    Attributes
+    ----------
+    whole_sigma : float
+        How well the IMU was put back after whole turns about the vertical (rad); 0 where none is stated.
+    rests : tuple of (float, float)
+        Begin and end of every rest (s after the first sample); without any they are found.
+    excluded : tuple of (float, float)
+        Spans (s) of which no rest takes anything; the turns in them count.
+    """
+
+    whole_sigma: float = 0.0
+    rests: tuple[tuple[float, float], ...] = ()
+    excluded: tuple[tuple[float, float], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -64,90 +67,62 @@ class PreparedRun:
     run : HandheldRun
     impossible : tuple of DataFault
         What was taken out.
+    notes : tuple of str
+        Which rests tremble, and which were left out.
     """
 
     recording: Recording
     rests: StaticIntervals
     run: HandheldRun
     impossible: tuple[DataFault, ...]
+    notes: tuple[str, ...] = ()
 
 
-def prepare_run(recording: Recording, whole_sigma: float = 0.0) -> PreparedRun:
+_NOTHING = Told()
+
+
+def prepare_run(
+    recording: Recording, imu: ImuSpecification, site: Site | None = None, told: Told = _NOTHING
+) -> PreparedRun:
     """Find the rests and reduce the recording to them and the turns between.
 
     Parameters
     ----------
     recording : Recording
-    whole_sigma : float
-        How well the IMU was put back after whole turns about the vertical (rad); 0 where none is stated.
+    imu : ImuSpecification
+    site : Site or None
+    told : Told
     """
     recording, impossible = without_impossible(recording)
-    rests = detect_static(recording)
-    if len(rests) < FEWEST_RESTS:
-        raise DataError(_too_few(recording, len(rests)))
-    run = reduce_run(recording, rests)
-    return PreparedRun(recording, rests, with_whole_turns(run, whole_sigma) if whole_sigma else run, impossible)
+    dwells = dwells_of(recording.phase, float(recording.t[-1]))
+    if told.rests or len(dwells) >= FEWEST_RESTS:
+        rests = stated_rests(recording, told.rests or dwells, by_user=bool(told.rests))
+        rests = without_spans(recording, rests, told.excluded)
+        note = f"{len(rests)} rests as {'stated' if told.rests else 'the phase of the recording says'}"
+        chosen = ChosenRests(rests, reduce_run(recording, rests), (note,))
+    else:
+        chosen = choose_rests(recording, imu, site, told.excluded)
+    if len(chosen.rests) < FEWEST_RESTS:
+        raise DataError(_too_few(recording, len(chosen.rests), told))
+    run = with_whole_turns(chosen.run, told.whole_sigma) if told.whole_sigma else chosen.run
+    return PreparedRun(recording, chosen.rests, run, impossible, chosen.notes)
 
 
-def _too_few(recording: Recording, count: int) -> str:
-    rests = f"/imu/data_raw: {count} rest{'s' if count > 1 else ''}"
+def _too_few(recording: Recording, count: int, told: Told) -> str:
+    rests = f"/imu/data_raw: {counted(count, 'rest')}"
+    if told.rests or told.excluded:
+        rests += f" with {Option.RESTS if told.rests else Option.EXCLUDE_TIMES} as stated"
     if not turned_unseen(recording):
-        return f"{rests}; a handheld calibration needs {FEWEST_RESTS} and more, in different attitudes"
+        return (
+            f"{rests}; a handheld calibration needs {FEWEST_RESTS} and more, in different attitudes: put the IMU down "
+            f"for a second and more in each, or, where it trembles by more than {np.sqrt(STEPS[-1]):.0f} times its "
+            f"quietest scatter, say when it rested ({Option.RESTS} 10-13,15.5-18,...)"
+        )
     return (
         f"{rests} in different attitudes, and no turn between them is recorded: a handheld calibration needs "
         f"{FEWEST_RESTS} rests and more, a navigated one the turns. Record on while the IMU is turned, add attitudes, "
         f"or part the attitudes ({Work.CUT}) and calibrate them as a set: {Work.CALIBRATE} A B ..."
     )
-
-
-def fit_priors(sensors: ImuModel, imu: ImuSpecification, site: Site | None, rests: StaticIntervals) -> FitPriors:
-    """Say what is known before the fit."""
-    changing = (sensors.decay_rate > 0) | (sensors.drive > 0)
-    if changing.any():
-        name = sensors.names[int(np.argmax(changing))]
-        raise DataError(f"a handheld run takes constants only, and '{name}' changes at random: leave it out")
-    # The prior holds in a frame of its own; the three turns that lead to the accelerometers' frame go with it.
-    J = body_frame.frame_jacobian(sensors.names, "accelerometer_triad")
-    size = sensors.prior * np.where(_stated(sensors, imu) | sensors.restated, 1.0, _ROOM)
-    prior = J @ np.diag(size**2) @ J.T
-    kept = np.flatnonzero(np.diag(prior) > 1e-12 * size**2)
-    gravity, mean, sigma = STANDARD_GRAVITY, np.zeros(3), np.full(3, earth.RATE / np.sqrt(3.0))
-    if site is not None:
-        gravity = site.gravity_m_s2 or float(earth.normal_gravity(site.latitude_rad, site.height_m))
-        rate = earth.earth_rate(site.latitude_rad)
-        mean[2] = rate[2]
-        # The heading is free, so north is any way; 1e-9 rad/s is a ten-thousandth of a degree an hour.
-        down = max(1e-9, abs(rate[0]) * site.latitude_sigma_rad)
-        sigma = np.array([abs(rate[0]) / np.sqrt(2.0) + 1e-9, abs(rate[0]) / np.sqrt(2.0) + 1e-9, down])
-    return FitPriors(
-        sensors,
-        kept,
-        prior[np.ix_(kept, kept)],
-        gravity,
-        mean,
-        sigma,
-        max(rests.gyro_white_noise, _LEAST_NOISE * imu.gyro_white_noise),
-        max(rests.accel_white_noise, _LEAST_NOISE * imu.accel_white_noise),
-    )
-
-
-def _stated(sensors: ImuModel, imu: ImuSpecification) -> Bools:
-    """Which coefficients have a prior in the IMU's own file."""
-    return np.array([(e.family or e.name) in imu.prior for e in sensors.effects for _ in e.parameters])
-
-
-def first_linearisation(run: HandheldRun, sensors: ImuModel, gravity: float) -> LinearisationPoint:
-    """Begin with the mean rate at rest as bias; gyros lead from rest to rest, and every rest is levelled."""
-    coefficients = np.zeros(len(sensors.prior))
-    for name, value in zip(GYRO_BIAS.labels, np.median(run.mean[:, :3], axis=0), strict=True):
-        if name in sensors.names:
-            coefficients[sensors.names.index(name)] = value
-    k = len(run.t)
-    turned = turns(run, sensors, coefficients, np.repeat(np.eye(3)[None], k, axis=0), gravity).C_nb
-    C_nb = [levelled(np.eye(3), run.mean[0, 3:])]
-    for i in range(k - 1):
-        C_nb.append(levelled(C_nb[-1] @ turned[i], run.mean[i + 1, 3:]))
-    return LinearisationPoint(coefficients, np.array(C_nb), np.zeros(3), np.zeros(3))
 
 
 def handheld_notes(run: HandheldRun, scene: FitPriors, found: HandheldSolution, site: Site | None) -> list[str]:

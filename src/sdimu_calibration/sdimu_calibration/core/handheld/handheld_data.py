@@ -17,6 +17,7 @@ from sdimu_calibration.core.arrays import Bools, Floats, Ints
 from sdimu_calibration.core.compiled import compiled
 from sdimu_calibration.core.data.gaps import GAP_SHARE
 from sdimu_calibration.core.data.static_detection import StaticIntervals
+from sdimu_calibration.core.data.trembling_rests import Sway, sway
 from sdimu_calibration.core.effects.imu_model import ImuModel
 from sdimu_calibration.core.effects.motion import NO_PAST, Motion
 from sdimu_calibration.core.matrix3 import elements, multiplied, orthonormal3, rotation3, store
@@ -52,6 +53,8 @@ class HandheldRun:
         Turns that are stated to be whole ones about the vertical: `whole_turns`.
     whole_sigma : float
         How well the IMU was put back after them (rad, one sigma).
+    sway : Sway
+        How far the IMU moves about its mean at each rest.
     """
 
     t: Floats
@@ -64,6 +67,7 @@ class HandheldRun:
     path: Floats
     gap: Floats
     temperature: TemperatureLog | None
+    sway: Sway
     whole: Ints = field(default_factory=lambda: np.empty(0, dtype=np.int64))
     whole_sigma: float = 0.0
 
@@ -104,6 +108,7 @@ def reduce_run(recording: Recording, rests: StaticIntervals) -> HandheldRun:
         _sums(angle, first, last),
         np.sqrt(_sums(gap, first, last)),
         recording.temperature,
+        sway(recording, rests),
     )
 
 

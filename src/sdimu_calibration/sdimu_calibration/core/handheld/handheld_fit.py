@@ -290,13 +290,15 @@ def row_sigmas(run: HandheldRun, scene: FitPriors, kind: Ints, extra: Floats) ->
 
 
 def _variances(run: HandheldRun, scene: FitPriors, extra: Floats) -> tuple[Floats, Floats]:
-    """Variance by white noise, and beyond it, of the rate and force at each rest and of each turn, (3 k - 1,)."""
+    """Variance of the rate and force at each rest and of each turn, (3 k - 1,): by white noise and sway, and beyond."""
     k = len(run.t)
+    angle, speed = run.sway.angle**2, run.sway.speed**2
+    # What a rest begins with and what it ends with are two draws of its sway, and a turn begins and ends with one.
     white = np.concatenate(
         [
-            scene.gyro_white_noise**2 / run.seconds,
-            scene.accel_white_noise**2 / run.seconds,
-            scene.gyro_white_noise**2 * run.turn_s + run.gap**2,
+            scene.gyro_white_noise**2 / run.seconds + 2.0 * angle / run.seconds**2,
+            scene.accel_white_noise**2 / run.seconds + 2.0 * speed / run.seconds**2,
+            scene.gyro_white_noise**2 * run.turn_s + run.gap**2 + angle[:-1] + angle[1:],
         ]
     )
     more = np.concatenate(

@@ -162,6 +162,33 @@ class TemperatureMap(Schema):
     bias: float = 0.0
 
 
+def _words(value: Any) -> Any:
+    """Let one word stand for a list of one, and a number for its word."""
+    return tuple(f"{one:g}" if isinstance(one, int | float) else one for one in _each(value))
+
+
+def _each(value: Any) -> list[Any]:
+    return value if isinstance(value, list) else [value]
+
+
+class PhaseMap(Schema):
+    """Which rows are at rest.
+
+    Attributes
+    ----------
+    column : int or str
+        Holds a word or a number.
+    rest : tuple of str
+        What it says at rest; ``*`` stands for anything (``pos*``). Another word of them begins another rest.
+    file : str, optional
+        As of a sensor.
+    """
+
+    column: Column
+    rest: Annotated[tuple[str, ...], BeforeValidator(_words)] = ("rest", "dwell", "static", "still", "true", "1")
+    file: str | None = None
+
+
 class BinaryMap(Schema):
     """Numbers of one kind in a file, row after row, without anything else.
 
@@ -189,6 +216,7 @@ class ImportMap(Schema):
     time : TimeMap
     accel, gyro : SensorMap
     temperature : TemperatureMap, optional
+    phase : PhaseMap, optional
     delimiter : str, optional
         Between the columns of a text file; recognised when left out.
     decimal : str
@@ -205,6 +233,7 @@ class ImportMap(Schema):
     accel: AccelMap
     gyro: GyroMap
     temperature: TemperatureMap | None = None
+    phase: PhaseMap | None = None
     delimiter: str | None = Field(default=None, min_length=1)
     decimal: Literal[".", ","] = "."
     skip_lines: int | None = Field(default=None, ge=0)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from fnmatch import fnmatch
 from pathlib import Path
@@ -14,7 +14,8 @@ from sdimu_calibration.core.data.resample import mean_over, same_stamps
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage.bags.bag_writer import write_recording
 from sdimu_calibration.storage.importing.array_table import BinaryTable, read_mat, read_npz
-from sdimu_calibration.storage.importing.import_map import ImportMap, SensorMap, TemperatureMap
+from sdimu_calibration.storage.importing.import_map import ImportMap, PhaseMap, SensorMap, TemperatureMap
+from sdimu_calibration.storage.importing.import_phase import Status, read_phase
 from sdimu_calibration.storage.importing.import_stamps import Stamps, Table, read_stamps
 from sdimu_calibration.storage.importing.text_table import TextTable
 
@@ -37,6 +38,8 @@ class Imported:
         Stamps (ns), deg C.
     notes : tuple of str
         What was done beyond copying.
+    status : Status or None
+        Where a column says what is a rest.
     """
 
     ns: Stamps
@@ -44,11 +47,13 @@ class Imported:
     f_ib_b: Floats
     temperature: tuple[Stamps, Floats] | None
     notes: tuple[str, ...]
+    status: Status | None = None
 
     def later(self, by_ns: int) -> Imported:
         """Return the same samples at later times."""
         heat = self.temperature and (self.temperature[0] + by_ns, self.temperature[1])
-        return replace(self, ns=self.ns + by_ns, temperature=heat)
+        status = self.status and (self.status[0] + by_ns, *self.status[1:])
+        return replace(self, ns=self.ns + by_ns, temperature=heat, status=status)
 
 
 def read_files(paths: Sequence[Path], chart: ImportMap) -> Imported:
@@ -61,15 +66,32 @@ def read_files(paths: Sequence[Path], chart: ImportMap) -> Imported:
         names, or, where it names none, one stretch of time each, in this order.
     chart : ImportMap
     """
-    named = (chart.accel.file, chart.gyro.file, chart.temperature.file if chart.temperature else None)
+    named = (
+        chart.accel.file,
+        chart.gyro.file,
+        chart.temperature.file if chart.temperature else None,
+        chart.phase.file if chart.phase else None,
+    )
     if len(paths) > 1 and not any(named):
         return _in_a_row([_read([path], chart) for path in paths], [Path(path) for path in paths])
     return _read(paths, chart)
 
 
 def _read(paths: Sequence[Path], chart: ImportMap) -> Imported:
-    """Read the files that hold one stretch of time together."""
+    """Read the files that hold one stretch of time together; a few broken lines are left out."""
     tables = [_open(Path(path), chart) for path in paths]
+    try:
+        return _together(tables, chart)
+    except DataError:
+        texts = [table for table in tables if isinstance(table, TextTable)]
+        clock = chart.time.column is None and chart.time.counter is None
+        if not [table for table in texts if table.leave_out_broken(as_nan=clock)]:
+            raise
+    return _together(tables, chart)
+
+
+def _together(tables: list[Table], chart: ImportMap) -> Imported:
+    """Read what one stretch of time holds."""
     accel_ns, f_ib_b, told = _sensor(tables, chart, chart.accel, "accel")
     gyro_ns, omega_ib_b, more = _sensor(tables, chart, chart.gyro, "gyro")
     notes = [note for table in tables if isinstance(table, TextTable) for note in table.notes]
@@ -78,7 +100,8 @@ def _read(paths: Sequence[Path], chart: ImportMap) -> Imported:
         gyro_ns, omega_ib_b, f_ib_b, note = _joined(gyro_ns, omega_ib_b, accel_ns, f_ib_b)
         notes.append(note)
     temperature = None if chart.temperature is None else _temperature(tables, chart, chart.temperature)
-    return Imported(gyro_ns, omega_ib_b, f_ib_b, temperature, tuple(notes))
+    status = None if chart.phase is None else _status(tables, chart, chart.phase)
+    return Imported(gyro_ns, omega_ib_b, f_ib_b, temperature, tuple(notes), status)
 
 
 def _in_a_row(parts: Sequence[Imported], paths: Sequence[Path]) -> Imported:
@@ -102,11 +125,31 @@ def _in_a_row(parts: Sequence[Imported], paths: Sequence[Path]) -> Imported:
         np.concatenate([part.f_ib_b for part in moved]),
         (np.concatenate([ns for ns, _ in heat]), np.concatenate([value for _, value in heat])) if heat else None,
         tuple(notes),
+        _one_status([part.status for part in moved if part.status is not None]),
     )
 
 
-def write_imported(path: Path, found: Imported, replace: bool = False) -> None:
-    """Write imported samples to a rosbag2 folder."""
+def _one_status(parts: Sequence[Status]) -> Status | None:
+    """Put the phases of several files one after the other, and count the stops on."""
+    if not parts:
+        return None
+    ns, dwell, stop = (np.concatenate(column) for column in zip(*parts, strict=True))
+    edges = dwell & np.concatenate([[True], ~dwell[:-1] | (np.diff(stop) != 0)])
+    return ns, dwell, np.maximum(np.cumsum(edges) - 1, 0).astype(np.int64)
+
+
+def write_imported(path: Path, found: Imported, replace: bool = False, custom: Mapping[str, str] | None = None) -> None:
+    """Write imported samples to a rosbag2 folder.
+
+    Parameters
+    ----------
+    path : Path
+    found : Imported
+    replace : bool
+        Replace a bag that is there.
+    custom : mapping of str to str, optional
+        What the user says of the unit: ``serial``, ``power_on``.
+    """
     write_recording(
         path,
         start_ns=0,
@@ -114,7 +157,9 @@ def write_imported(path: Path, found: Imported, replace: bool = False) -> None:
         omega_ib_b=found.omega_ib_b,
         f_ib_b=found.f_ib_b,
         temperature=found.temperature,
+        status=found.status,
         replace=replace,
+        custom=custom,
     )
 
 
@@ -173,6 +218,13 @@ def _temperature(tables: list[Table], chart: ImportMap, part: TemperatureMap) ->
     ns, _ = read_stamps(table, part.time if part.time is not None else chart.time.column, chart.time, len(raw))
     value = (raw - part.bias) / part.counts_per_unit
     return ns, value - (_KELVIN if part.unit == "K" else 0.0)
+
+
+def _status(tables: list[Table], chart: ImportMap, part: PhaseMap) -> Status:
+    table = _chosen(tables, part.file, "phase")
+    rows = len(table.floats([part.column])) if not isinstance(table, TextTable) else len(table.texts(part.column))
+    ns, _ = read_stamps(table, chart.time.column, chart.time, rows)
+    return read_phase(table, part, ns)
 
 
 def _joined(

@@ -29,6 +29,8 @@ _SHOWN = 12
 _LOOKED_AT = 200
 """Number of lines that say how many columns there are and how their numbers are written: a line more or less is no
 matter."""
+_MOST_BROKEN = 0.01
+"""Share of broken lines at most: a link that loses more loses numbers inside the lines, too."""
 _MOST_HEADINGS = 10
 """Number of numeric heading lines at most: what is longer is a table of its own."""
 
@@ -78,6 +80,49 @@ class TextTable:
             self._leave_out_numeric_headings()
         self.headings = list(_NOVATEL) if logged else self._find_headings()
         self._width = len(self._cells(self._lines[self._begin]))
+
+    @property
+    def width(self) -> int:
+        """Number of columns."""
+        return self._width
+
+    @property
+    def above(self) -> list[str]:
+        """Lines above the data."""
+        return self._lines[: self._begin]
+
+    def leave_out_broken(self, as_nan: bool = False) -> bool:
+        """Leave out lines that a serial link or a full disk broke, while they are few; whether there were any.
+
+        Parameters
+        ----------
+        as_nan : bool
+            Where the lines are the clock: they count as samples without numbers.
+        """
+        rows = [k for k in range(self._begin, len(self._lines)) if not _skipped(self._lines[k])]
+        sample = [self._cells(self._lines[k]) for k in _spread(rows)]
+        whole = [cells for cells in sample if len(cells) == self._width]
+        numeric = [
+            c
+            for c in range(self._width)
+            if 2 * sum(_is_number(cells[c], self._decimal) for cells in whole) > len(whole)
+        ]
+        broken = [k for k in rows if self._is_broken(self._cells(self._lines[k]), numeric)]
+        if not broken or len(broken) > _MOST_BROKEN * len(rows):
+            return False
+        instead = (self._delimiter or " ").join(["nan"] * self._width) if as_nan else ""
+        for k in broken:
+            self._lines[k] = instead
+        shown = ", ".join(str(k + 1) for k in broken[:_SHOWN]) + (", ..." if len(broken) > _SHOWN else "")
+        what = "line is" if len(broken) == 1 else "lines are"
+        note = f"{self.path}: {len(broken)} of {len(rows)} {what} broken and left out (line {shown})"
+        self.notes = (*self.notes, note)
+        return True
+
+    def _is_broken(self, cells: Sequence[str], numeric: Sequence[int]) -> bool:
+        if len(cells) != self._width:
+            return True
+        return not all(_is_number(cells[c], self._decimal) for c in numeric)
 
     def floats(self, columns: Sequence[int | str]) -> Floats:
         """Read columns as numbers, shape (n, k); a cell ``nan`` is NaN."""
