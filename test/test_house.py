@@ -92,8 +92,8 @@ def test_a_manifest_names_every_ros_package_that_is_imported(manifest):
     assert imported <= set(re.findall(r"<exec_depend>(\w+)</exec_depend>", manifest.read_text()))
 
 
-_NAMED_IN = ("core/effects/", "core/hidden.py", "core/truth.py", "core/true_coefficients.py")
-"""Where effects have their names: the registry, and the truth of the simulator."""
+_NAMED_IN = ("core/effects/", "core/site_reference.py", "core/hidden.py", "core/truth.py", "core/true_coefficients.py")
+"""Where effects have their names: the registry, what a site file may state of them, and the truth of the simulator."""
 _OTHER_WORDS = {"temperature_rate", "random_walk"}
 """A field of `Motion`, and a term of the Allan deviation."""
 

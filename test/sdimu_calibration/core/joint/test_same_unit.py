@@ -29,7 +29,9 @@ def test_one_unit_passes(reports):
 
 
 def test_the_recording_of_another_unit_is_named(reports):
-    with pytest.raises(DataError, match=r"'strange' is of another unit than the others.*(ppm|arcmin) \(\d+ sigma\)"):
+    with pytest.raises(
+        DataError, match=r"'strange' is of another unit than the others.*(ppm|arcmin|deg/h/g) \(\d+ sigma\)"
+    ):
         check_one_unit(reports)
 
 

@@ -16,6 +16,7 @@ from sdimu_calibration.core.data.stated_rests import Spans, without_spans
 from sdimu_calibration.core.data.static_detection import StaticIntervals
 from sdimu_calibration.core.data.trembling_rests import relaxed, usual_scatter
 from sdimu_calibration.core.effects import imu_model
+from sdimu_calibration.core.effects.linear_errors import LINEAR_ERRORS
 from sdimu_calibration.core.handheld.contradicted_priors import widest_priors
 from sdimu_calibration.core.handheld.handheld_data import HandheldRun, reduce_run
 from sdimu_calibration.core.handheld.handheld_fit import fit_run
@@ -32,16 +33,6 @@ _ENOUGH = 100
 _TREMBLES = 1.7
 """Ratio of the scatter of a rest to that of the quiet ones from which it trembles: its square is 3, that of quiet rests
 of a whole recording is below 2."""
-_EFFECTS = (
-    "gyro_bias",
-    "gyro_scale",
-    "gyro_misalignment",
-    "gyro_g_sensitivity",
-    "accel_bias",
-    "accel_scale",
-    "accel_misalignment",
-)
-"""What the fits take: the linear errors, whatever model is asked for, so that all its fits have the same rests."""
 
 
 @dataclass(frozen=True)
@@ -84,9 +75,9 @@ def choose_rests(recording: Recording, imu: ImuSpecification, site: Site | None,
 
 def _mean_sigma(one: ChosenRests, imu: ImuSpecification, site: Site | None) -> float:
     """Mean logarithm of the sigmas of all coefficients; infinite where the rests fit no IMU."""
-    sensors = imu_model.build(_EFFECTS, imu)
+    sensors = imu_model.build(LINEAR_ERRORS, imu)
     wide = widest_priors(imu, sensors)
-    sensors = imu_model.build(_EFFECTS, wide)
+    sensors = imu_model.build(LINEAR_ERRORS, wide)
     priors = fit_priors(sensors, wide, site, one.rests)
     try:
         found = fit_run(one.run, priors, first_linearisation(one.run, sensors, priors.gravity))

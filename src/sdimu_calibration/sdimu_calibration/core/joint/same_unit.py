@@ -1,4 +1,4 @@
-"""Are the recordings of a set those of one unit? Scale factors and misalignments stay with a unit.
+"""Are the recordings of a set those of one unit? Scale factors, misalignments and the like stay with a unit.
 
 Two units differ in them by what the IMU file allows, s of each coefficient; one unit by a fraction of it from recording
 to recording. With d the difference of a recording from the others and v the variance of d by the noise, the log odds
@@ -13,13 +13,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from sdimu_calibration.core.effects.registry import get, names
 from sdimu_calibration.core.joint.member import Report
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.units import from_si
 from sdimu_calibration.core.wording import Option
 
-_STABLE = ("gyro_scale", "gyro_misalignment", "accel_scale", "accel_misalignment")
-"""What stays with a unit: a bias differs from power-on to power-on, mass unbalance with years."""
 _SHARE = 0.3
 """What one unit differs by from recording to recording (share of the size that the IMU file gives): data sheets state a
 repeatability of a tenth and less."""
@@ -30,7 +29,7 @@ _APART_K = 10.0
 
 
 def check_one_unit(reports: Sequence[Report]) -> None:
-    """Refuse a recording whose scale factors and misalignments are those of another unit.
+    """Refuse a recording whose coefficients are those of another unit; biases, which are new each time, do not count.
 
     Parameters
     ----------
@@ -48,7 +47,7 @@ def check_one_unit(reports: Sequence[Report]) -> None:
         which = f"'{alone[worst].name}' is" if len(alone) > 2 else " and ".join(f"'{r.name}'" for r in alone) + " are"
         other = "another unit than the others" if len(alone) > 2 else "two units"
         raise DataError(
-            f"{which} of {other}, or the axes are mapped otherwise: scale factors and misalignments differ as from "
+            f"{which} of {other}, or the axes are mapped otherwise: its coefficients differ as from "
             f"unit to unit, most {name}, by {told}; calibrate each by itself, or state the {Option.IMU} whose spread "
             "is as wide"
         )
@@ -57,11 +56,12 @@ def check_one_unit(reports: Sequence[Report]) -> None:
 def _log_odds(report: Report, others: Sequence[Report]) -> tuple[float, str, str]:
     """Log odds that a recording is of another unit than others; the coefficient that says most, and its difference."""
     spread = dict(zip(report.reduction.names, report.reduction.weight.tolist(), strict=True))
+    stable = {p.name: p.display_unit for e in map(get, names()) if e.scope == "unit" for p in e.parameters}
     total, most, name, told = 0.0, -np.inf, "", ""
     for place, coefficient in enumerate(report.names):
         known = [(o.values[i], o.sigma[i]) for o in others for i in _places(o, coefficient) if o.sigma[i] > 0.0]
         weight = spread.get(coefficient, 0.0)
-        if not coefficient.startswith(_STABLE) or not known or weight <= 0.0 or report.sigma[place] <= 0.0:
+        if coefficient not in stable or not known or weight <= 0.0 or report.sigma[place] <= 0.0:
             continue
         values, sigma = np.array(known).T
         mean, variance = np.average(values, weights=sigma**-2), 1.0 / np.sum(sigma**-2)
@@ -71,14 +71,10 @@ def _log_odds(report: Report, others: Sequence[Report]) -> tuple[float, str, str
         total += odds
         if odds > most:
             most, name = odds, coefficient
-            unit = _shown_unit(coefficient)
+            unit = stable[coefficient]
             told = f"{abs(from_si(d, unit)):.3g} {unit} ({abs(d) / np.sqrt(v):.0f} sigma)"
     return total, name, told
 
 
 def _places(report: Report, name: str) -> list[int]:
     return [report.names.index(name)] if name in report.names else []
-
-
-def _shown_unit(name: str) -> str:
-    return "ppm" if "scale" in name else "arcmin"
