@@ -160,7 +160,7 @@ def lay_out(figure: Figure, height: int, **more: Any) -> Figure:
 
 
 def literal(text: str) -> str:
-    """Write a text of the user's so that plotly shows it as it is: it reads marks like ``<b>`` and ``<a>`` in labels."""
+    """Write a text of the user's so that plotly shows it as it is: labels may hold marks like ``<b>`` and ``<a>``."""
     return escape(text, quote=False)
 
 
