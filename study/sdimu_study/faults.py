@@ -9,11 +9,12 @@ from dataclasses import asdict, dataclass, replace
 import numpy as np
 
 from rate_table_sim.core import phase_changes
-from sdimu_calibration.core.data.arrival import arrange
+from sdimu_calibration.core.arrays import Floats, Ints
+from sdimu_calibration.core.data.arrival import RawStatus, RawTemperature, RawTest, in_order
 from sdimu_calibration.core.data.gaps import LINEAR_RAD
 from sdimu_calibration.core.estimation.outcome import calibrate
 from sdimu_calibration.core.plan import Plan
-from sdimu_calibration.core.recording import DataError, PhaseLog, Recording, origin_ns, seconds
+from sdimu_calibration.core.recording import DataError, PhaseLog, Recording
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.specification import Model
 from sdimu_sim.core.faults import FAULTS, Fault
@@ -162,21 +163,19 @@ def spoilt(scenario: Scenario, fault: Fault, size: float) -> Recording:
 
 def as_read(arrived: Recording) -> Recording:
     """Put a recording in the order of arrival through what the reader of bags does."""
-    ns = arrived.start_ns + np.rint(arrived.t * 1e9).astype(np.int64)
-    done = arrange(ns, arrived.omega_ib_b, arrived.f_ib_b, "/imu/data_raw")
-    start = origin_ns(ns[done.rows])
-    phase = arrived.phase
-    if phase is not None:
-        phase = replace(phase, t=phase.t + (arrived.start_ns - start) * 1e-9)
-    return replace(
-        arrived,
-        start_ns=start,
-        t=seconds(ns[done.rows], start),
-        omega_ib_b=arrived.omega_ib_b[done.rows],
-        f_ib_b=arrived.f_ib_b[done.rows],
-        phase=phase,
-        rejected=len(ns) - len(done.rows),
-        notes=done.notes,
+
+    def stamps(t: Floats) -> Ints:
+        return arrived.start_ns + np.rint(t * 1e9).astype(np.int64)
+
+    phase, heat = arrived.phase, arrived.temperature
+    return in_order(
+        RawTest(
+            stamps(arrived.t),
+            arrived.omega_ib_b,
+            arrived.f_ib_b,
+            None if phase is None else RawStatus(stamps(phase.t), phase.dwell, phase.stop),
+            None if heat is None else RawTemperature(stamps(heat.t), heat.value),
+        )
     )
 
 

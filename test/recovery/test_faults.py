@@ -147,6 +147,14 @@ def test_a_clock_set_back_is_refused_wherever_it_falls_on_the_raster():
             as_read(replace(recording, t=t))
 
 
+@pytest.mark.parametrize("name", ["clock_forward_turn", "clock_back_turn"])
+def test_a_short_step_of_the_clock_in_a_turn_is_told_and_harms_nothing(name):
+    outcome = run_fault(SCENARIO, MODEL, FAULT[name], 0.004, 1)
+    assert outcome.verdict == NOTED
+    assert outcome.worst < 5.0
+    assert any("the clock of the stamps was set" in text and "by 4 ms" in text for text in outcome.said)
+
+
 def test_stamps_that_many_readings_share_are_no_times():
     n = 400
     values = np.random.default_rng(1).standard_normal((n, 3))

@@ -7,6 +7,8 @@ import json
 import re
 import subprocess
 import sys
+from html import unescape
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,6 +16,7 @@ from plotly.subplots import make_subplots
 
 from sdimu_calibration.report.design.palette import LIGHT, palette
 from sdimu_calibration.report.drawing import Figure, html, lay_out
+from sdimu_calibration.report.fleet.figures import _panel
 
 
 @pytest.mark.parametrize(("rows", "cols"), [(1, 1), (4, 3), (6, 2)])
@@ -84,3 +87,15 @@ def test_a_page_does_without_the_objects_of_the_python_package():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
+
+
+def test_a_serial_number_is_shown_as_it_is_and_not_as_markup():
+    """Plotly reads `<b>` and links in labels."""
+    one = SimpleNamespace(name="gyro_bias_x", control_limits=(-1.0, 1.0), between=SimpleNamespace(mean=0.0))
+    serials = ("<b>7</b>", '<a href="https://evil.example">8</a>', "9 & 10")
+    measured = SimpleNamespace(names=("gyro_bias_x",), values=np.zeros((3, 1)), sigmas=np.ones((3, 1)), serials=serials)
+    figure = Figure()
+    _panel(figure, measured, one, "rad/s", [1, 2, 3], {})
+    shown = figure.data[0]["text"]
+    assert not [text for text in shown if "<" in text]
+    assert tuple(unescape(text) for text in shown) == serials

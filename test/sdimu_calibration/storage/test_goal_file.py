@@ -13,3 +13,11 @@ def test_a_wrong_unit_names_file_and_key(tmp_path, text):
     with pytest.raises(DataError) as refused:
         load_goals(path)
     assert str(refused.value).startswith(f"{path}: limits.gyro_bias: '{text}'")
+
+
+@pytest.mark.parametrize("minutes", ["1e300", "20160", ".inf", "0"])
+def test_a_test_that_would_not_end_is_refused(tmp_path, minutes):
+    path = tmp_path / "goal.yaml"
+    path.write_text(f"format: sdimu-goal/1\nminutes: {minutes}\nlimits: {{gyro_bias: 0.016 deg/h}}\n")
+    with pytest.raises(DataError, match="minutes: "):
+        load_goals(path)

@@ -163,7 +163,9 @@ def test_a_report_of_another_job_or_of_other_numbers_is_not_believed(bags, tmp_p
 def test_a_bag_that_changes_in_place_is_another_one(bags, tmp_path):
     copy = tmp_path / "run1"
     shutil.copytree(bags / "run1", copy)
-    before = bag_checksum(copy)
+    before, source = bag_checksum(copy), replace(LIKE, bag=copy)
+    opened = source()
+    assert source() is opened
     (mcap,) = copy.glob("*.mcap")
     with mcap.open("r+b") as file:
         file.seek(1000)
@@ -171,6 +173,9 @@ def test_a_bag_that_changes_in_place_is_another_one(bags, tmp_path):
         file.seek(1000)
         file.write(bytes([byte[0] ^ 1]))
     assert bag_checksum(copy) != before
+    shutil.rmtree(copy)
+    shutil.copytree(bags / "run2", copy)
+    assert source().recording.f_ib_b[0, 0] != opened.recording.f_ib_b[0, 0]
 
 
 def test_workers_end_with_the_process_that_started_them():

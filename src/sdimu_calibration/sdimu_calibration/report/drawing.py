@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from base64 import b64encode
 from collections.abc import Iterator, Mapping, Sequence
+from html import escape
 from typing import Any
 
 import numpy as np
@@ -156,6 +157,11 @@ def lay_out(figure: Figure, height: int, **more: Any) -> Figure:
         **more,
     }
     return figure
+
+
+def literal(text: str) -> str:
+    """Write a text of the user's so that plotly shows it as it is: labels may hold marks like ``<b>`` and ``<a>``."""
+    return escape(text, quote=False)
 
 
 def html(figure: Figure, number: int) -> str:

@@ -17,8 +17,9 @@ from sdimu_calibration.core.estimation.solve import AUTO
 from sdimu_calibration.core.joint.member import Member
 from sdimu_calibration.core.joint.set_fit import SetOptions
 from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.storage.bags.bag_folder import FileState, file_states
 from sdimu_calibration.storage.bags.bag_metadata import METADATA, custom_data, read_metadata
-from sdimu_calibration.storage.files.config import Schema, load_imu, quantity, read_yaml
+from sdimu_calibration.storage.files.config import Schema, find_config, load_imu, quantity, read_yaml
 from sdimu_calibration.storage.files.model_choice import HANDHELD, named_estimator, named_model
 from sdimu_calibration.storage.files.whole_file import write_whole
 from sdimu_calibration.storage.opening import Source, open_test, with_imu_file
@@ -53,11 +54,14 @@ class BagSource:
 
     def __call__(self) -> PreparedTest:
         """Open the bag."""
-        return _opened(self)
+        stated = (("imu", self.imu), ("site", self.site))
+        files = (self.bag, *(find_config(kind, name) for kind, name in stated if name is not None))
+        return _opened(self, tuple(state for file in files for state in file_states(file)))
 
 
 @lru_cache(maxsize=_KEPT_OPEN)
-def _opened(of: BagSource) -> PreparedTest:
+def _opened(of: BagSource, _: tuple[FileState, ...]) -> PreparedTest:
+    """Open a bag whose files, and those of its IMU and site, are as they are now."""
     imu = None if of.imu is None else load_imu(of.imu)
     test = open_test(of.bag, of.site, imu, of.source, of.handheld, of.measured_noise)
     return with_imu_file(test, of.imu).counted_from(of.reference_degc)

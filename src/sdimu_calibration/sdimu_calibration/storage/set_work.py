@@ -27,6 +27,7 @@ from sdimu_calibration.core.note import Note, Topic
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.wording import Work
+from sdimu_calibration.storage.bags.bag_folder import FileState, file_states
 from sdimu_calibration.storage.files.config import load_imu, load_site
 from sdimu_calibration.storage.kept_report import SUFFIX, read_report, write_report
 from sdimu_calibration.storage.opening import CLASSES, DEFAULT_SITE
@@ -221,18 +222,11 @@ def _program() -> str:
 
 def bag_checksum(bag: Path) -> str:
     """SHA-256 of all files of a bag; read again when one of them has changed."""
-    files = sorted(p for p in bag.iterdir() if p.is_file()) if bag.is_dir() else [bag]
-    return _checksum(tuple((path, *_state(path)) for path in files))
-
-
-def _state(path: Path) -> tuple[int, int, int]:
-    """Return what changes with the content of a file: size, time of the change (ns), place on the disk."""
-    found = path.stat()
-    return found.st_size, found.st_mtime_ns, found.st_ino
+    return _checksum(file_states(bag))
 
 
 @lru_cache(maxsize=4096)
-def _checksum(files: tuple[tuple[Path, int, int, int], ...]) -> str:
+def _checksum(files: tuple[FileState, ...]) -> str:
     total = hashlib.sha256()
     for path, size, *_ in files:
         total.update(f"{len(path.name.encode(errors='surrogateescape'))} {size} ".encode())

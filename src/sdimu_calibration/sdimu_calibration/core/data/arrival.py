@@ -39,7 +39,7 @@ _OVERLAP = 3
 """Number of samples in a row that mean a clock set back, when they arrive late and find their time taken by other
 readings: one or two may be stragglers."""
 
-_STREAMS = 100
+_STREAMS = 20
 """Number of places where stamps go back from which two streams are mixed: a clock is not set so often."""
 _COUNTS = ("not_finite", "far", "out_of_order", "repeated")
 """Kinds of samples that are not used, or not in their place: those repeated have a stamp that was there before."""
@@ -240,9 +240,10 @@ def _refuse_clock_set_back(ns: Stamps, omega_ib_b: Floats, f_ib_b: Floats, where
     run = np.flatnonzero(late[_OVERLAP - 1 :] - late[: 1 - _OVERLAP] == _OVERLAP - 1)
     if len(run):
         first = int(late[run[0]])
-        if len(run) > _STREAMS:
+        back_times = int(np.count_nonzero(np.diff(ns) < 0))
+        if back_times > _STREAMS:
             raise DataError(
-                f"{where}: the stamps go back {len(run)} times, and other samples have these times already: two "
+                f"{where}: the stamps go back {back_times} times, and other samples have these times already: two "
                 "publishers write to one topic; give each a topic of its own, or stop one"
             )
         back = (newest[first] - ns[first]) * 1e-9 + interval * 1e-9

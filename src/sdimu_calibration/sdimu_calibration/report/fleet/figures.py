@@ -12,7 +12,7 @@ from sdimu_calibration.core.fleet.population import Coefficient, Measured
 from sdimu_calibration.core.fleet.study import Study
 from sdimu_calibration.core.units import from_si
 from sdimu_calibration.report.design.palette import DIVERGING
-from sdimu_calibration.report.drawing import AFTER, BEFORE, INK, Figure, lay_out
+from sdimu_calibration.report.drawing import AFTER, BEFORE, INK, Figure, lay_out, literal
 
 _ROW, _FEWEST_PX = 24, 260
 """Height of a row of the heat map and of the least figure (px): names stay readable."""
@@ -101,7 +101,7 @@ def _panel(
         y=value,
         mode="markers",
         error_y=error,
-        text=list(fleet.serials),
+        text=[literal(serial) for serial in fleet.serials],
         marker={"color": INK, "size": 6},
         hovertemplate="%{text}<br>%{x}<br>%{y:.4g} " + unit + "<extra></extra>",
         **place,

@@ -11,13 +11,13 @@ from sdimu_calibration.core.adaptive.goals import Goals
 from sdimu_calibration.core.effects import registry
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.units import UnitError, parse_quantity
-from sdimu_calibration.storage.files.config import Schema, find_config, read_yaml
+from sdimu_calibration.storage.files.config import LONGEST_PLAN_S, Schema, find_config, read_yaml
 
 
 class _GoalFile(Schema):
     format: Literal["sdimu-goal/1"] = "sdimu-goal/1"
     name: str | None = None
-    minutes: Annotated[float, Field(gt=0)] = 60.0
+    minutes: Annotated[float, Field(gt=0, le=LONGEST_PLAN_S / 60.0)] = 60.0
     limits: dict[str, str]
 
 
