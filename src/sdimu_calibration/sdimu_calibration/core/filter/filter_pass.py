@@ -118,6 +118,8 @@ class PassSettings(NamedTuple):
         Feed attitude and coefficients back too, not only position and velocity.
     shared_noise : bool
         Model the cross-covariance M.
+    shaken : bool
+        The table vibrates at rest: the force of an epoch is that of its mean attitude, not of the one at its end.
     """
 
     reference: Floats
@@ -132,6 +134,7 @@ class PassSettings(NamedTuple):
     drive: Floats
     closed_loop: bool
     shared_noise: bool
+    shaken: bool = False
 
 
 class PassState(NamedTuple):
@@ -284,6 +287,18 @@ def _navigate_epoch(
     responses(C_mean, f_n, dts, 0, count, earth.earth_rate(settings.reference[0]), R)
     add_columns(data.values[first : data.last[e]], data.channel, data.parameter, R, dts, G, D)
     return T
+
+
+@compiled
+def _at_the_end(dts: Floats, C_mean: Floats, C_nb: Floats, gravity: float, north: float, sums: Floats) -> None:
+    """Bring the velocity increment of an epoch at rest, in `sums`, from its mean attitude to the one at its end.
+
+    The mean attitude of a cycle is that against the axes at its begin: half of its Earth rate (`north`) is in it.
+    """
+    for k in range(dts.shape[0]):
+        for i in range(3):
+            mean = C_mean[k, 2, i] - 0.5 * dts[k] * north * C_mean[k, 1, i]
+            sums[3 + i] += dts[k] * gravity * (mean - C_nb[2, i])
 
 
 @compiled
@@ -440,6 +455,9 @@ def run_pass(data: PassInput, settings: PassSettings, state: PassState, out: Pas
             out.G[e] = G[:, :g]
         if kind != SKIP:
             low = 0 if abs(kind) == ALL else 6
+            if settings.shaken:
+                north = earth.earth_rate(settings.reference[0])[0]
+                _at_the_end(data.dt[data.first[e] : data.last[e]], C_mean, state.C_nb, -f_n[2], north, sums)
             z, H, R, M = _measurement(settings, state, D, sums, T, p, data.white[e])
             Hl = np.ascontiguousarray(H[low:])
             Ml = np.ascontiguousarray(M[:, low:])
