@@ -31,7 +31,7 @@ _ROOM = 2.0
 _FEWEST = 20
 """Number of seconds at rest at least: fewer tell nothing usual."""
 _LOUD = 3.0
-"""Ratio of the scatter of cycles to that of the stated noise from which they are asked whether they vibrate."""
+"""Ratio of the scatter of cycles to that of the stated noise (1): below it a vibration is lost in the noise."""
 _BOUNDED = 0.3
 """Ratio of the variance of the angle over a second to that of white noise with the scatter of the cycles, below which
 it is bounded: white noise has 1, known to a third by twenty seconds."""
@@ -104,7 +104,7 @@ def _bounded(cycles: Cycles, epochs: Epochs, calm: Bools, density: float) -> boo
 
 
 _MEDIAN_OF_THREE = 2.366
-"""Median of a chi-square of three degrees of freedom (1)."""
+"""Median of a chi-square (1): of three degrees of freedom."""
 
 
 def scatter_of_seconds(epochs: Epochs, phases: Phases, gyro_white_noise: float) -> float:

@@ -35,6 +35,7 @@ from sdimu_calibration.core import earth
 from sdimu_calibration.core.arrays import Bools, Floats, Ints
 from sdimu_calibration.core.compiled import compiled
 from sdimu_calibration.core.filter.kalman import cholesky, propagate, update, whiten
+from sdimu_calibration.core.filter.shaken import at_the_end
 from sdimu_calibration.core.matrix3 import applied, elements, sparse_product, transposed
 from sdimu_calibration.core.measurement_kind import ALL, SKIP
 from sdimu_calibration.core.navigation.ins_errors import (
@@ -290,18 +291,6 @@ def _navigate_epoch(
 
 
 @compiled
-def _at_the_end(dts: Floats, C_mean: Floats, C_nb: Floats, gravity: float, north: float, sums: Floats) -> None:
-    """Bring the velocity increment of an epoch at rest, in `sums`, from its mean attitude to the one at its end.
-
-    The mean attitude of a cycle is that against the axes at its begin: half of its Earth rate (`north`) is in it.
-    """
-    for k in range(dts.shape[0]):
-        for i in range(3):
-            mean = C_mean[k, 2, i] - 0.5 * dts[k] * north * C_mean[k, 1, i]
-            sums[3 + i] += dts[k] * gravity * (mean - C_nb[2, i])
-
-
-@compiled
 def _measurement(
     settings: PassSettings, state: PassState, D: Floats, sums: Floats, T: float, p: int, white: float
 ) -> tuple[Floats, Floats, Floats, Floats]:
@@ -456,8 +445,7 @@ def run_pass(data: PassInput, settings: PassSettings, state: PassState, out: Pas
         if kind != SKIP:
             low = 0 if abs(kind) == ALL else 6
             if settings.shaken:
-                north = earth.earth_rate(settings.reference[0])[0]
-                _at_the_end(data.dt[data.first[e] : data.last[e]], C_mean, state.C_nb, -f_n[2], north, sums)
+                at_the_end(settings.reference[0], f_n, data.dt[data.first[e] : data.last[e]], C_mean, state.C_nb, sums)
             z, H, R, M = _measurement(settings, state, D, sums, T, p, data.white[e])
             Hl = np.ascontiguousarray(H[low:])
             Ml = np.ascontiguousarray(M[:, low:])
