@@ -4,7 +4,7 @@ An IMU samples evenly and integrates continuously; a driver that stamps messages
 computer. A rate times a jittering interval is a wrong angle. The count of the samples is the better clock, as long as
 the jitter is below a quarter of an interval; slow drift of the one clock against the other is kept.
 
-Beyond that the samples are asked. Where the rate changes, a sample that was taken late shows the rate of that later
+Beyond that the samples are asked. Where rate or force changes, a sample that was taken late shows that of the later
 time. If the values follow an even clock and not their stamps, and the deviations are white, the jitter is the host's.
 """
 
@@ -73,7 +73,7 @@ def dejittered(recording: Recording) -> Recording:
             note = f"{measured}: too much to tell even sampling from missing samples; the stamps stay as they are"
             return replace(recording, notes=(*recording.notes, note))
         measured = _in_words(float(np.sqrt(np.mean(found**2))), interval)
-        note = f"{measured}: rates that change follow an even clock and not the stamps, so their count is the clock"
+        note = f"{measured}: samples of turns follow an even clock and not the stamps, so their count is the clock"
         return replace(recording, t=t - found, notes=(*recording.notes, note))
     even = t - jitter
     note = f"{measured}: samples are taken as even, and their count as the clock"
@@ -109,8 +109,9 @@ def _told_by_samples(recording: Recording) -> Floats | None:
         return None
     if abs(float(jitter[1:] @ jitter[:-1])) > _WHITE * float(jitter @ jitter):
         return None
-    share, sigma = _share_followed(recording.omega_ib_b, jitter, interval)
-    if not (sigma < _DECIDED and share < 0.5 - 2.0 * sigma):
+    both = [_share_followed(values, jitter, interval) for values in (recording.omega_ib_b, recording.f_ib_b)]
+    share, weight = (np.array(v) for v in zip(*((s, sigma**-2.0) for s, sigma in both), strict=True))
+    if not weight.sum() > _DECIDED**-2.0 or share @ weight / weight.sum() > 0.5 - 2.0 * _DECIDED:
         return None
     return np.asarray(jitter)
 
@@ -135,12 +136,12 @@ def _counted(t: Floats, interval: float) -> Floats:
 def _share_followed(values: Floats, jitter: Floats, interval: float) -> tuple[float, float]:
     """Share of the jitter that the samples follow: 1 where the stamps say when they were taken, 0 for an even clock.
 
-    A sample between two others is off their mean by the change of the rate times what its interval is off theirs.
+    A sample between two others is off their mean by the slope of the values times what its interval is off theirs.
 
     Returns
     -------
     share, sigma : float
-        1; sigma is infinite where the rate hardly changes.
+        1; sigma is infinite where the values hardly change.
     """
     middle = 0.5 * (jitter[1:] + jitter[:-1])
     apart = middle[1:-1] - 0.5 * (middle[:-2] + middle[2:])
@@ -148,7 +149,7 @@ def _share_followed(values: Floats, jitter: Floats, interval: float) -> tuple[fl
     change = np.zeros_like(off)
     change[_SIDE:-_SIDE] = (values[2 + 2 * _SIDE : -1] - values[2 : -1 - 2 * _SIDE]) / (2 * _SIDE * interval)
     expected = change * apart[:, None]
-    # Where the rate does not change the product is noise times jitter and says nothing.
+    # Where nothing changes the product is noise times jitter and says nothing.
     large = np.abs(change) > _CHANGES * float(np.abs(change).max(initial=0.0))
     x, y = expected[large], off[large]
     total = float(x @ x)
