@@ -50,6 +50,9 @@ LONG = {
     "test/sdimu_calibration/core/data/test_latitude_check.py": (
         "test_the_vertical_rate_of_the_earth_is_right_within_its_sigma",
     ),
+    "test/sdimu_calibration/core/data/test_vibration.py": (
+        "test_a_table_that_vibrates_is_calibrated_with_honest_sigmas[17.0]",
+    ),
     "test/sdimu_calibration/core/diagnosis/test_diagnose.py": (
         "test_a_bias_that_settles_after_each_turn_is_named_and_its_time_constant_found",
         "test_a_drift_that_takes_many_steps_is_called_a_wander",

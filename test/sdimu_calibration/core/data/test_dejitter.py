@@ -46,3 +46,49 @@ def test_jitter_that_hides_missing_samples_is_told_and_left():
     found = dejittered(r)
     assert np.array_equal(found.t, r.t)
     assert "stay as they are" in found.notes[0]
+
+
+def turning(t, sampled_at) -> Recording:
+    """A recording of turns that begin and end every ten seconds, with noise of a hundredth of a degree a second."""
+    rate = np.radians(10.0) * np.clip(5.0 * np.sin(0.2 * np.pi * sampled_at), -1.0, 1.0)
+    noise = np.radians(0.01) * np.random.default_rng(3).standard_normal((len(t), 3))
+    omega = np.outer(rate, [0.6, -0.48, 0.64]) + noise
+    return replace(recording(t), omega_ib_b=omega)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_jitter_beyond_a_quarter_is_taken_away_where_rates_follow_an_even_clock(seed):
+    rng = np.random.default_rng(seed)
+    true = np.delete(np.arange(1, N + 1) * DT, slice(5000, 5003))
+    jitter = rng.normal(0.0, 0.075 * DT, len(true))
+    assert np.abs(jitter).max() > 0.25 * DT
+    found = dejittered(turning(true + jitter, true))
+    assert "follow an even clock" in found.notes[0]
+    error = (found.t - true)[3000:-3000]
+    # A mean over 4000 samples leaves a sixtieth of the jitter; neighbours share it.
+    assert np.sqrt(np.mean(error**2)) < 0.075 * DT / 10.0
+    assert np.diff(found.t)[4999] == pytest.approx(4.0 * DT, abs=0.1 * DT)
+
+
+def test_stamps_that_the_rates_follow_are_kept():
+    t = np.arange(1, N + 1) * DT + np.random.default_rng(4).normal(0.0, 0.075 * DT, N)
+    uneven = turning(t, t)
+    found = dejittered(uneven)
+    assert np.array_equal(found.t, t)
+    assert "stay as they are" in found.notes[0]
+
+
+def test_large_jitter_without_turns_is_left_alone():
+    t = np.arange(1, N + 1) * DT + np.random.default_rng(5).normal(0.0, 0.075 * DT, N)
+    found = dejittered(recording(t))
+    assert np.array_equal(found.t, t)
+    assert "stay as they are" in found.notes[0]
+
+
+def test_jitter_that_comes_in_waves_is_no_delay_of_a_host():
+    rng = np.random.default_rng(6)
+    true = np.arange(1, N + 1) * DT
+    wave = np.convolve(rng.normal(0.0, 0.2 * DT, N + 9), np.ones(10) / 10.0, mode="valid")
+    found = dejittered(turning(true + np.clip(wave, -0.45 * DT, 0.45 * DT), true))
+    assert np.abs(wave).max() > 0.25 * DT or "samples are taken as even" in found.notes[0]
+    assert "follow an even clock" not in found.notes[0]

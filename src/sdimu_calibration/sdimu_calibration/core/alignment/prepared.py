@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -25,6 +25,7 @@ from sdimu_calibration.core.data.phases import (
 )
 from sdimu_calibration.core.data.resting_cycles import join, standing
 from sdimu_calibration.core.data.sample_screening import sound, wild
+from sdimu_calibration.core.data.vibration import scatter_of_seconds, with_vibration
 from sdimu_calibration.core.effects import body_frame, imu_model
 from sdimu_calibration.core.effects.imu_model import ImuModel
 from sdimu_calibration.core.measurement_kind import ALL, SENSORS, SKIP
@@ -56,6 +57,8 @@ class TestSetup:
         Length of an epoch at rest (s).
     counted : bool
         A sensor counts pulses: what a second scatters then says nothing of the noise.
+    shaken : bool
+        The table vibrates at rest.
     """
 
     site: Site
@@ -66,6 +69,7 @@ class TestSetup:
     gravity: float
     epoch_s: float = EPOCH_S
     counted: bool = False
+    shaken: bool = False
 
     @property
     def magnetic_n(self) -> Floats:
@@ -91,6 +95,8 @@ class PreparedData:
     faults : tuple of DataFault
     seconds : tuple of Epochs and Phases, or None
         Those of single seconds, where the epochs are longer only because the test is long.
+    shaking : float or None
+        Sigma of the mean rate of an epoch beyond white noise (rad/s) on a table that vibrates at rest; None on others.
     """
 
     cycles: Cycles
@@ -101,6 +107,7 @@ class PreparedData:
     bridges: Bridges
     faults: tuple[DataFault, ...] = ()
     seconds: tuple[Epochs, Phases] | None = None
+    shaking: float | None = None
 
     @property
     def rest(self) -> Bools:
@@ -187,7 +194,9 @@ def reduce(recording: Recording, setup: TestSetup, screened: bool = True) -> Pre
     epochs = cut(cycles, nominal)
     if not len(epochs):
         raise DataError("/imu/data_raw: the recording is shorter than one second")
-    phases = classify(epochs, recording.phase, setup.limits, setup.gravity, setup.model.settle_s, PhaseState())
+    density = None if setup.counted else setup.imu.gyro_white_noise
+    limits, vibrating = with_vibration(cycles, epochs, recording.phase, setup.limits, setup.gravity, density)
+    phases = classify(epochs, recording.phase, limits, setup.gravity, setup.model.settle_s, PhaseState())
     phases = without_early_motion(epochs, recording.phase, phases, setup.imu.gyro_white_noise)
     cycles = cycles[: int(epochs.last[-1])]
     found = bridges(cycles, epochs, phases.dwell, nominal, largest_acceleration(cycles), setup.gravity)
@@ -198,14 +207,28 @@ def reduce(recording: Recording, setup: TestSetup, screened: bool = True) -> Pre
     unsound = (*unsound, *steps, *rough)
     noise = (setup.imu.gyro_white_noise, setup.imu.accel_white_noise)
     lost = judge(cycles, epochs, phases, nominal, found, noise, unsound)
-    faults = (*unsound, *lost, *contradictions(epochs, phases, recording.phase, not specification_is_wide(setup.imu)))
+    faults = (
+        *unsound,
+        *lost,
+        *vibrating,
+        *contradictions(epochs, phases, recording.phase, not specification_is_wide(setup.imu)),
+    )
     if len(epochs) > MOST_EPOCHS:
         cycles, epochs = join(cycles, epochs, standing(phases))
     seconds = (epochs, phases) if setup.epoch_s > EPOCH_S and not setup.counted else None
     if setup.epoch_s > EPOCH_S:
         epochs, phases, found = long_epochs(epochs, phases, found, setup.epoch_s)
     kind = measurement_kinds(phases, setup.model.zero_velocity == "every_epoch")
-    return PreparedData(cycles, epochs, phases, kind, recording.temperature, found, faults, seconds)
+    shaken = scatter_of_seconds(epochs, phases, setup.imu.gyro_white_noise) if vibrating else None
+    return PreparedData(cycles, epochs, phases, kind, recording.temperature, found, faults, seconds, shaken)
+
+
+def weighed_for(setup: TestSetup, prepared: PreparedData) -> TestSetup:
+    """Weigh the measurements by the vibration that the table shows at rest; the same object where it shows none."""
+    if prepared.shaking is None:
+        return setup
+    rate = float(np.hypot(setup.model.extra_rate_sigma, prepared.shaking))
+    return replace(setup, model=replace(setup.model, extra_rate_sigma=rate), shaken=True)
 
 
 def first_attitude(epochs: Epochs, phases: Phases, setup: TestSetup) -> Alignment:

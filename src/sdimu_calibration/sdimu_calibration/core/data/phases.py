@@ -43,10 +43,21 @@ it."""
 
 @dataclass(frozen=True)
 class RestLimits:
-    """What an IMU at rest can show at most: body rate (rad/s), deviation of |f| from gravity (m/s^2)."""
+    """What an IMU at rest can show at most.
+
+    Attributes
+    ----------
+    rate : float
+        Body rate (rad/s).
+    force : float
+        Deviation of |f| from gravity (m/s^2).
+    shaken : float
+        Rate of a cycle (rad/s) where the table says dwell and vibrates; 0 where it does not.
+    """
 
     rate: float
     force: float
+    shaken: float = 0.0
 
 
 def rest_limits(imu: ImuSpecification) -> RestLimits:
@@ -152,9 +163,9 @@ def classify(
         Carried from block to block, changed in place.
     """
     said, said_stop = table_says(epochs, log)
-    still = (epochs.peak_rate < limits.rate) & (
-        np.abs(np.sqrt(np.sum(epochs.f_mean**2, axis=1)) - gravity) < limits.force
-    )
+    calm = (said == 1) & (np.sqrt(np.sum(epochs.w_mean**2, axis=1)) < limits.rate)
+    quiet = (epochs.peak_rate < limits.rate) | (calm & (epochs.peak_rate < limits.shaken))
+    still = quiet & (np.abs(np.sqrt(np.sum(epochs.f_mean**2, axis=1)) - gravity) < limits.force)
     m = len(epochs)
     dwell = still & (said != 0)
     whole = epochs.end - epochs.start < _WHOLE_S

@@ -6,6 +6,7 @@ d``, in navigation as in Zw and Zf.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -13,8 +14,11 @@ import numpy as np
 from sdimu_calibration.core import earth
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.effects.effect import ACCEL, GYRO, REFERENCES, Effect, Parameter, Term
+from sdimu_calibration.core.effects.mass_unbalance import GYRO_MASS_UNBALANCE
 from sdimu_calibration.core.effects.motion import Motion
 from sdimu_calibration.core.effects.registry import register
+from sdimu_calibration.core.effects.scale import ACCEL_SCALE
+from sdimu_calibration.core.site_reference import Reference
 from sdimu_calibration.core.specification import Site
 from sdimu_calibration.core.units import STANDARD_GRAVITY
 
@@ -88,6 +92,43 @@ LATITUDE = register(
         description="A wrong Earth rate in the meridian plane. Visible from some minutes of arc on.",
     )
 )
+
+
+SITE_REFERENCES = (LATITUDE.name, GRAVITY.name)
+"""Names of the parameters of what a site tells."""
+_RELATIVE = {
+    LATITUDE.name: tuple(p.name for p in GYRO_MASS_UNBALANCE.parameters if p.name.rpartition("_")[2][0] == "d"),
+    GRAVITY.name: ACCEL_SCALE.labels,
+}
+"""Coefficients that have a part in common which is the reference, whatever the plan: a gyro sees the Earth's rate along
+the vertical as it sees force along its input axis, an accelerometer gravity as its scale factor."""
+
+
+def told_of(site: Site | None, names: Sequence[str]) -> tuple[Reference, ...]:
+    """List what a calibration takes from its site, as told.
+
+    Parameters
+    ----------
+    site : Site or None
+        None for a run by hand without one: gravity is then standard gravity.
+    names : sequence of str
+        Coefficients of the result.
+    """
+
+    def one(effect: Effect, told: float, sigma: float, origin: str) -> Reference:
+        (parameter,) = effect.parameters
+        relative = tuple(name for name in _RELATIVE[effect.name] if name in names)
+        units = parameter.unit, "arcmin" if effect is LATITUDE else "mgal"
+        return Reference(parameter.name, told, sigma, told, sigma, *units, origin, relative)
+
+    if site is None:
+        return (one(GRAVITY, STANDARD_GRAVITY, 0.0, "standard"),)
+    normal = float(earth.normal_gravity(site.latitude_rad, site.height_m))
+    gravity, origin = (site.gravity_m_s2, "stated") if site.gravity_m_s2 else (normal, "normal")
+    return (
+        one(LATITUDE, site.latitude_rad, site.latitude_sigma_rad, "stated"),
+        one(GRAVITY, gravity, site.gravity_sigma_m_s2, origin),
+    )
 
 
 def stated_references(site: Site) -> tuple[tuple[Effect, float], ...]:

@@ -13,6 +13,7 @@ import numpy as np
 from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.effects.effect import Effect, Timetable
 from sdimu_calibration.core.effects.imu_model import ImuModel
+from sdimu_calibration.core.effects.references import told_of
 from sdimu_calibration.core.estimation.free_inertial import FreeInertialRun
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.evidence.consistency import Consistency
@@ -24,7 +25,7 @@ from sdimu_calibration.core.noise_term import NoiseTerm
 from sdimu_calibration.core.note import Note, Topic
 from sdimu_calibration.core.recording import DataFault, TemperatureLog
 from sdimu_calibration.core.results import NOT_TRUSTED, START_TEMPERATURE, History, Rest, no_history
-from sdimu_calibration.core.site_reference import Reference, told_of
+from sdimu_calibration.core.site_reference import Reference
 from sdimu_calibration.core.specification import Model
 from sdimu_calibration.core.wording import Option
 

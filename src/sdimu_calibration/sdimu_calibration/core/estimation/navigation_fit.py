@@ -331,7 +331,11 @@ class NavigationFit(Fit):
     def consistency(self, evidence: LinearEvidence | None = None) -> Consistency:
         """Check noise and innovations; say where the model fails."""
         del evidence
-        return check(self.last.output, self.prepared, self.setup.imu)
+        imu, shaken = self.setup.imu, self.prepared.shaking
+        if shaken is not None:
+            scatter = float(np.hypot(imu.gyro_white_noise, shaken * np.sqrt(self.setup.epoch_s)))
+            imu = replace(imu, gyro_white_noise=scatter)
+        return check(self.last.output, self.prepared, imu)
 
     @cached_property
     def labels(self) -> frozenset[str]:

@@ -6,7 +6,7 @@ import numpy as np
 
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.effects.imu_model import ImuModel
-from sdimu_calibration.core.site_reference import NAMES as SITE_REFERENCES
+from sdimu_calibration.core.effects.references import SITE_REFERENCES
 from sdimu_calibration.core.units import from_si
 
 _FAR = 4.5

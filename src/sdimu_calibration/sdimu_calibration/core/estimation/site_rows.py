@@ -8,8 +8,9 @@ import numpy as np
 
 from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.effects.imu_model import ImuModel
+from sdimu_calibration.core.effects.references import SITE_REFERENCES
 from sdimu_calibration.core.evidence.information import conditioned
-from sdimu_calibration.core.site_reference import NAMES, Reference, found
+from sdimu_calibration.core.site_reference import Reference, found
 
 
 def site_rows(sensors: ImuModel) -> Ints:
@@ -25,7 +26,7 @@ def site_rows(sensors: ImuModel) -> Ints:
     ndarray of int, shape (r,)
     """
     behind = range(len(sensors.names) - sensors.serving, len(sensors.names))
-    return np.array([k for k in behind if sensors.names[k] in NAMES], dtype=np.int64)
+    return np.array([k for k in behind if sensors.names[k] in SITE_REFERENCES], dtype=np.int64)
 
 
 def at_site(sensors: ImuModel, covariance: Floats) -> Floats:

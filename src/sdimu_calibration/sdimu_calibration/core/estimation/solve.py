@@ -20,7 +20,7 @@ import numpy as np
 
 from sdimu_calibration.core.alignment.alignment import Alignment
 from sdimu_calibration.core.alignment.coarse_alignment import StartPoint, coarse_start
-from sdimu_calibration.core.alignment.prepared import PreparedData, TestSetup, first_attitude, set_up
+from sdimu_calibration.core.alignment.prepared import PreparedData, TestSetup, first_attitude, set_up, weighed_for
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.batch.batch import solve_batch
 from sdimu_calibration.core.batch.classical import TABLE_FRAME, solve_classical
@@ -226,6 +226,7 @@ def _filter(test: PreparedTest, model: Model, start: Start | None, progress: Pro
     setup = _setup(test, model)
     progress("reduce", 0.0)
     prepared = test.data(setup)
+    setup = weighed_for(setup, prepared)
     inner = replace(setup, sensors=_with_references(setup.sensors, setup))
     solution = solve_filter(inner, prepared, _begin(start, inner.sensors), progress)
     return FilterFit(test, model, setup.sensors, solution.setup, prepared, solution.alignment, solution)
@@ -244,6 +245,7 @@ def _second_order(
     frame_model = _in_accelerometer_frame(setup, azimuth_free)
     progress("reduce", 0.0)
     prepared = test.data(setup)
+    setup = weighed_for(setup, prepared)
     inner = replace(setup, sensors=frame_model.inner)
     alignment = first_attitude(prepared.epochs, prepared.phases, inner)
     begin = _begin(start, inner.sensors)
@@ -302,6 +304,7 @@ def _reduced(test: PreparedTest, model: Model, progress: Progress) -> _Reduced:
     setup = _setup(test, model)
     progress("reduce", 0.0)
     prepared = test.data(setup)
+    setup = weighed_for(setup, prepared)
     return _Reduced(setup, prepared, first_attitude(prepared.epochs, prepared.phases, setup))
 
 

@@ -35,6 +35,7 @@ from sdimu_calibration.core import earth
 from sdimu_calibration.core.arrays import Bools, Floats, Ints
 from sdimu_calibration.core.compiled import compiled
 from sdimu_calibration.core.filter.kalman import cholesky, propagate, update, whiten
+from sdimu_calibration.core.filter.shaken import at_the_end
 from sdimu_calibration.core.matrix3 import applied, elements, sparse_product, transposed
 from sdimu_calibration.core.measurement_kind import ALL, SKIP
 from sdimu_calibration.core.navigation.ins_errors import (
@@ -118,6 +119,8 @@ class PassSettings(NamedTuple):
         Feed attitude and coefficients back too, not only position and velocity.
     shared_noise : bool
         Model the cross-covariance M.
+    shaken : bool
+        The table vibrates at rest: the force of an epoch is that of its mean attitude, not of the one at its end.
     """
 
     reference: Floats
@@ -132,6 +135,7 @@ class PassSettings(NamedTuple):
     drive: Floats
     closed_loop: bool
     shared_noise: bool
+    shaken: bool = False
 
 
 class PassState(NamedTuple):
@@ -440,6 +444,8 @@ def run_pass(data: PassInput, settings: PassSettings, state: PassState, out: Pas
             out.G[e] = G[:, :g]
         if kind != SKIP:
             low = 0 if abs(kind) == ALL else 6
+            if settings.shaken:
+                at_the_end(settings.reference[0], f_n, data.dt[data.first[e] : data.last[e]], C_mean, state.C_nb, sums)
             z, H, R, M = _measurement(settings, state, D, sums, T, p, data.white[e])
             Hl = np.ascontiguousarray(H[low:])
             Ml = np.ascontiguousarray(M[:, low:])

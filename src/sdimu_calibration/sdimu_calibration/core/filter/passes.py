@@ -116,6 +116,7 @@ def pass_settings(setup: TestSetup, closed_loop: bool) -> PassSettings:
         drive=setup.sensors.drive,
         closed_loop=closed_loop,
         shared_noise=model.shared_noise,
+        shaken=setup.shaken,
     )
 
 

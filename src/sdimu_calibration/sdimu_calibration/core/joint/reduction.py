@@ -14,10 +14,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from sdimu_calibration.core.arrays import Floats
+from sdimu_calibration.core.effects.references import SITE_REFERENCES
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.evidence.stretch_length import wander_in
 from sdimu_calibration.core.noise_term import NoiseTerm
-from sdimu_calibration.core.site_reference import NAMES as SITE_REFERENCES
 
 _ROUNDING = 1e-12
 """Ratio of an eigenvalue of the information, in units of the columns, to the largest from which it counts: below is

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from sdimu_calibration.core.arrays import Floats
+from sdimu_calibration.core.effects.references import SITE_REFERENCES, told_of
 from sdimu_calibration.core.estimation.fit import Fit
 from sdimu_calibration.core.estimation.navigation_fit import MISFIT, NavigationFit
 from sdimu_calibration.core.estimation.outcome import inseparable
@@ -27,8 +28,7 @@ from sdimu_calibration.core.results import (
     TurnOn,
     no_history,
 )
-from sdimu_calibration.core.site_reference import NAMES as SITE_REFERENCES
-from sdimu_calibration.core.site_reference import found, told_of
+from sdimu_calibration.core.site_reference import found
 from sdimu_calibration.core.units import from_si
 from sdimu_calibration.core.wording import Work
 
