@@ -1,35 +1,75 @@
-"""`sdimu noise` of a bare static recording: the grade that its rests show, the site beside it."""
+"""`sdimu noise` and ``--noise estimated``."""
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
-import yaml
-from typer.testing import CliRunner
 
-from sdimu_calibration.cli.main import app
+from sdimu_calibration.cli.noise import noise
+from sdimu_calibration.core.noise import with_measured_noise
+from sdimu_calibration.core.units import to_si
+from sdimu_calibration.storage.bags.bag_reader import read_recording
 from sdimu_calibration.storage.bags.bag_writer import write_recording
+from sdimu_calibration.storage.files.config import load_imu
+
+DT = 0.02
+GYRO, ACCEL = to_si(3.0, "deg/h/sqrt(Hz)"), to_si(50.0, "ug/sqrt(Hz)")
 
 
 @pytest.fixture
-def static(tmp_path):
-    """A consumer IMU that lies 60 s at 50 Hz, in g and deg/s."""
-    rng = np.random.default_rng(2)
-    ns = np.arange(1, 3001, dtype=np.int64) * 20_000_000
-    rate = [0.02, -0.03, 0.05] + 0.05 * rng.standard_normal((3000, 3))
-    force = [0.0, 0.0, 1.003] + 0.002 * rng.standard_normal((3000, 3))
-    write_recording(tmp_path / "bag", start_ns=0, imu_ns=ns, omega_ib_b=rate, f_ib_b=force)
-    return tmp_path
+def still(tmp_path: Path) -> Path:
+    """A bag of five minutes at rest with white noise."""
+    rng = np.random.default_rng(6)
+    n = round(300.0 / DT)
+    force = ACCEL / np.sqrt(DT) * rng.standard_normal((n, 3)) + np.array([0.0, 0.0, -9.8])
+    write_recording(
+        tmp_path / "still",
+        start_ns=10**18,
+        imu_ns=np.arange(1, n + 1) * round(DT * 1e9),
+        omega_ib_b=GYRO / np.sqrt(DT) * rng.standard_normal((n, 3)),
+        f_ib_b=force,
+    )
+    return tmp_path / "still"
 
 
-def test_the_grade_is_that_of_the_rests_and_the_site_is_held_against_gravity(static):
-    words = ["noise", str(static / "bag"), "--site", "daejeon", "--gyro-unit", "deg/s", "--out", str(static / "out")]
-    result = CliRunner().invoke(app, words)
-    assert result.exit_code == 0, result.output
-    said = " ".join(result.output.split())
-    # 1.003 g against 9.79853 m/s^2: 9.83607 - 9.79853 m/s^2 is 3.83 mg.
-    assert "+3.83 mg from gravity of the site" in said
-    assert "those of 'mems_by_hand' (proposed by the rests" in said
-    assert "--site daejeon" in said
-    written = yaml.safe_load((static / "out" / "imu.yaml").read_text())
-    assert written["grade"] == "mems"
+def test_the_file_written_is_an_imu_with_the_noise_of_the_recording(still: Path, tmp_path: Path) -> None:
+    noise(still, imu="dtg", out=tmp_path / "out")
+    found, base = load_imu(tmp_path / "out" / "imu.yaml"), load_imu("dtg")
+    # 298 s at 1 s of three axes: 1 / sqrt(2 * 3 * 298) = 2.4 %; four of them.
+    assert found.gyro_white_noise == pytest.approx(GYRO, rel=0.1)
+    assert found.accel_white_noise == pytest.approx(ACCEL, rel=0.1)
+    assert found.prior == base.prior
+    page = (tmp_path / "out" / "noise.html").read_text()
+    assert "white noise" in page
+    assert "plotly" in page
+
+
+def test_pulses_and_wandering_bias_go_into_the_file(tmp_path: Path) -> None:
+    rng = np.random.default_rng(7)
+    n = round(2000.0 / DT)
+    pulse, walk = to_si(1.0, "arcsec"), to_si(20.0, "deg/h/sqrt(h)")
+    rate = GYRO / np.sqrt(DT) * rng.standard_normal((n, 3))
+    rate += to_si(10.0, "deg/h") + walk * np.sqrt(DT) * np.cumsum(rng.standard_normal((n, 3)), axis=0)
+    counted = np.diff(pulse * np.round(np.cumsum(rate * DT, axis=0) / pulse), axis=0, prepend=0.0) / DT
+    force = ACCEL / np.sqrt(DT) * rng.standard_normal((n, 3)) + np.array([0.0, 0.0, -9.8])
+    write_recording(
+        tmp_path / "still",
+        start_ns=10**18,
+        imu_ns=np.arange(1, n + 1) * round(DT * 1e9),
+        omega_ib_b=counted,
+        f_ib_b=force,
+    )
+    noise(tmp_path / "still", out=tmp_path / "out")
+    found = load_imu(tmp_path / "out" / "imu.yaml")
+    assert found.gyro_quantisation == pytest.approx(pulse / np.sqrt(12.0), rel=0.1)
+    assert found.gyro_random_walk == pytest.approx(walk, rel=0.4)
+    assert found.accel_quantisation == 0.0
+
+
+def test_estimated_noise_replaces_that_of_the_specification_and_says_so(still: Path) -> None:
+    recording = read_recording(still)
+    imu, note = with_measured_noise(load_imu("dtg"), recording)
+    assert imu.gyro_white_noise == pytest.approx(GYRO, rel=0.1)
+    assert "0.1 as specified" in note

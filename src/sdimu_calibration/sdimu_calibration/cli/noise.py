@@ -14,6 +14,9 @@ from sdimu_calibration.cli.option_groups import with_options
 from sdimu_calibration.cli.options import BagArgument, JsonOption, Recorded, results_in
 
 if TYPE_CHECKING:
+    from rich.console import Console
+
+    from sdimu_calibration.core.noise import Allan, Terms
     from sdimu_calibration.core.recording import Recording
     from sdimu_calibration.core.specification import Site
 
@@ -28,13 +31,10 @@ def noise(
     as_json: JsonOption = False,
 ) -> None:
     """Find the noise terms from the rests of a recording; leaves noise.html, noise.json, imu.yaml for --imu."""
-    import numpy as np
-
     from sdimu_calibration.cli.opened import default_folder
-    from sdimu_calibration.cli.progress import bar
     from sdimu_calibration.cli.wide_table import print_table
-    from sdimu_calibration.core.noise import allan, fit_terms, rests, white_noise
-    from sdimu_calibration.report.noise import CHANNELS, HEAD, misfits, write_page
+    from sdimu_calibration.core.noise import rests, white_noise
+    from sdimu_calibration.report.noise import HEAD, misfits, write_page
     from sdimu_calibration.report.noise import rows as listed
     from sdimu_calibration.storage.files.config import find_config, load_site
     from sdimu_calibration.storage.files.imu_file import write_measured_imu
@@ -51,15 +51,8 @@ def noise(
     rows = rests(recording)
     if longest:
         rows = (max(rows, key=lambda r: r.stop - r.start),)
-    data = np.hstack([recording.omega_ib_b, recording.f_ib_b])
-    rng = np.random.default_rng(seed)
     console = plain(stderr=as_json)
-    deviations, terms = {}, {}
-    with bar(console) as progress:
-        for k, channel in enumerate(CHANNELS):
-            deviations[channel] = allan([data[r, k] for r in rows], recording.interval_s)
-            terms[channel] = fit_terms(deviations[channel], rng)
-            progress(channel, (k + 1) / 6)
+    deviations, terms = _terms(console, recording, rows, seed)
     measured = white_noise(recording, rows)
     seconds = sum(r.stop - r.start for r in rows) * recording.interval_s
     most = max(one.tau[-1] for one in deviations.values())
@@ -83,6 +76,27 @@ def noise(
     say(console, f"results in {folder}; to use them:")
     command(console, shlex.join(["sdimu", "calibrate", str(bag), "--imu", str(folder / "imu.yaml"), *place]))
     answer(folder / "noise.json", as_json)
+
+
+def _terms(
+    console: Console, recording: Recording, rows: Sequence[slice], seed: int
+) -> tuple[dict[str, Allan], dict[str, Terms]]:
+    """Allan deviation and noise terms of each channel."""
+    import numpy as np
+
+    from sdimu_calibration.cli.progress import bar
+    from sdimu_calibration.core.noise import allan, fit_terms
+    from sdimu_calibration.report.noise import CHANNELS
+
+    data = np.hstack([recording.omega_ib_b, recording.f_ib_b])
+    rng = np.random.default_rng(seed)
+    deviations, terms = {}, {}
+    with bar(console) as progress:
+        for k, channel in enumerate(CHANNELS):
+            deviations[channel] = allan([data[r, k] for r in rows], recording.interval_s)
+            terms[channel] = fit_terms(deviations[channel], rng)
+            progress(channel, (k + 1) / 6)
+    return deviations, terms
 
 
 def grade_of(recording: Recording) -> str:
