@@ -35,7 +35,7 @@ def still(tmp_path: Path) -> Path:
 
 
 def test_the_file_written_is_an_imu_with_the_noise_of_the_recording(still: Path, tmp_path: Path) -> None:
-    noise(still, out=tmp_path / "out")
+    noise(still, imu="dtg", out=tmp_path / "out")
     found, base = load_imu(tmp_path / "out" / "imu.yaml"), load_imu("dtg")
     # 298 s at 1 s of three axes: 1 / sqrt(2 * 3 * 298) = 2.4 %; four of them.
     assert found.gyro_white_noise == pytest.approx(GYRO, rel=0.1)

@@ -55,7 +55,7 @@ def open(  # noqa: A001 (as every library of files has it)
     Parameters
     ----------
     bag : str or Path
-        rosbag2 folder or .mcap file.
+        rosbag2 folder, .mcap or .db3 file, ROS 1 .bag.
     site : str, optional
         Name in config/site or path; left out it is assumed, and a note says so; refused where the latitude in the
         data excludes it. A handheld run needs none.

@@ -23,10 +23,13 @@ _MOST_DEGC = 1e4
 WORKERS = 2
 """Number of processes by default: the cores of a small machine."""
 
-BagArgument = Annotated[Path, typer.Argument(metavar="BAG", help="rosbag2 folder or .mcap file.")]
+BagArgument = Annotated[Path, typer.Argument(metavar="BAG", help="rosbag2 folder, .mcap or .db3 file, ROS 1 .bag.")]
 BagsArgument = Annotated[
     list[Path] | None,
-    typer.Argument(metavar="BAG...", help="rosbag2 folder or .mcap file; several are fitted together as one unit."),
+    typer.Argument(
+        metavar="BAG...",
+        help="rosbag2 folder, .mcap or .db3 file, ROS 1 .bag; several are fitted together as one unit.",
+    ),
 ]
 FoldersArgument = Annotated[list[Path], typer.Argument(metavar="FOLDER ...", help="Every result.json below is taken.")]
 ModelOption = Annotated[str, typer.Option(help="Model to estimate: name in config/model or path.")]

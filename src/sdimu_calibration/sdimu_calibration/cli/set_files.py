@@ -26,7 +26,9 @@ def init(
         Path | None,
         typer.Option(help="Set file to write; set.yaml in the folder, or beside the first bag, by default."),
     ] = None,
-    serial: Annotated[str | None, typer.Option(metavar="NUMBER", help="Serial number of the unit.")] = None,
+    serial: Annotated[
+        str | None, typer.Option(metavar="NUMBER", help="Serial number of the unit, for all recordings.")
+    ] = None,
     power_on: Annotated[
         str | None, typer.Option(metavar="NAME", help="Switch-on that all recordings share: they share their biases.")
     ] = None,

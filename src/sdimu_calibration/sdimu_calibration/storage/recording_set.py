@@ -17,6 +17,7 @@ from sdimu_calibration.core.estimation.solve import AUTO
 from sdimu_calibration.core.joint.member import Member
 from sdimu_calibration.core.joint.set_fit import SetOptions
 from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.wording import Work
 from sdimu_calibration.storage.bags.bag_folder import FileState, file_states
 from sdimu_calibration.storage.bags.bag_metadata import METADATA, custom_data, read_metadata
 from sdimu_calibration.storage.files.config import Schema, find_config, load_imu, quantity, read_yaml
@@ -24,6 +25,8 @@ from sdimu_calibration.storage.files.model_choice import HANDHELD, named_estimat
 from sdimu_calibration.storage.files.whole_file import write_whole
 from sdimu_calibration.storage.opening import Source, open_test, with_imu_file
 
+_FILES = frozenset({".mcap", ".db3", ".bag"})
+"""Endings of files that are bags by themselves."""
 _KEPT_OPEN = 2
 """Number of recordings that a process keeps in memory: linearising again follows soon in small sets."""
 
@@ -232,7 +235,7 @@ class Said:
 
 def is_bag(path: Path) -> bool:
     """Whether a path is a bag: a folder with its metadata, or a file of messages."""
-    return (path / METADATA).is_file() or (path.is_file() and path.suffix in {".mcap", ".db3", ".bag"})
+    return (path / METADATA).is_file() or (path.is_file() and path.suffix in _FILES)
 
 
 def bags_of(places: Sequence[Path]) -> list[Path]:
@@ -242,7 +245,9 @@ def bags_of(places: Sequence[Path]) -> list[Path]:
         if not place.exists():
             raise DataError(f"{place}: no such bag or folder")
         if place.is_file() and not is_bag(place):
-            raise DataError(f"{place}: no bag (a folder with {METADATA}, or an .mcap or .db3 file); import it first")
+            raise DataError(
+                f"{place}: no bag (a folder with {METADATA}, an .mcap or .db3 file, or a ROS 1 .bag); import it first"
+            )
         found += [place] if is_bag(place) else bags_below(place)
     return list(dict.fromkeys(found))
 
@@ -251,9 +256,13 @@ def bags_below(folder: Path) -> list[Path]:
     """Bags in a folder and the folders in it, in the order of their names."""
     folder = Path(folder)
     found = {path.parent for path in folder.rglob(METADATA)}
-    found |= {path for path in folder.rglob("*.mcap") if path.parent not in found}
+    loose = {path for path in folder.rglob("*") if path.suffix in _FILES and path.is_file()}
+    found |= {path for path in loose if path.parent not in found}
     if not found:
-        raise DataError(f"{folder}: no bag in it (a folder with {METADATA}, or an .mcap file)")
+        raise DataError(
+            f"{folder}: no bag in it (a folder with {METADATA}, an .mcap or .db3 file, or a ROS 1 .bag); columns are "
+            f"imported first ({Work.IMPORT})"
+        )
     return sorted(found)
 
 

@@ -171,8 +171,8 @@ def bag_parts(path: Path) -> list[Path]:
     if path.is_file():
         if path.suffix not in _SUFFIXES:
             raise DataError(
-                f"{path}: not a bag (expected a rosbag2 folder or a .mcap file; sdimu import makes one of columns in "
-                "text, MAT and NPZ files)"
+                f"{path}: not a bag (expected a rosbag2 folder, an .mcap or .db3 file, or a ROS 1 .bag; sdimu import "
+                "makes one of columns in text, MAT and NPZ files)"
             )
         return [path]
     information = read_metadata(path)

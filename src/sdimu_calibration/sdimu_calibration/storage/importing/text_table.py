@@ -29,7 +29,7 @@ _SHOWN = 12
 _LOOKED_AT = 200
 """Number of lines that say how many columns there are and how their numbers are written: a line more or less is no
 matter."""
-_MOST_BROKEN = 0.01
+_MOST_BROKEN = 0.005
 """Share of broken lines at most: a link that loses more loses numbers inside the lines, too."""
 _MOST_HEADINGS = 10
 """Number of numeric heading lines at most: what is longer is a table of its own."""
