@@ -176,3 +176,11 @@ def test_the_mean_of_the_noise_counts_the_modes_that_no_measurement_sees(cut):
         variance = term.size**2 * share @ kernel(term.kind, term.tau, cut) @ share
         np.testing.assert_allclose(np.diag(total)[first : first + 3], variance, rtol=1e-9)
     assert np.diag(modes.unseen).min() > 0.0
+
+
+def test_a_test_that_begins_in_a_turn_shifts_by_it(cut):
+    begun = replace(cut, turning=~cut.turning)
+    assert begun.turning[0]
+    K = kernel("shift", 0.0, begun)
+    assert np.linalg.eigvalsh(K)[0] > -1e-9
+    assert K[0, 0] == 0.5

@@ -205,3 +205,13 @@ def test_what_no_data_tell_apart_is_in_a_model_once():
     assert any(4 in have for have in held)
     assert not any({1, 4} <= have for have in held)
     assert known.apart((), np.arange(6))[1, 4]
+
+
+def test_a_size_that_another_effect_turns_negative_makes_no_model():
+    """True sizes are -1 and 3 of two effects that look alike, and the first cannot be negative."""
+    J = 100.0 * np.array([[1.0, 0.9], [0.9, 1.0]])
+    data = Data(J, J @ np.array([-1.0, 3.0]), prior(2, positive=np.array([True, False]), cause=np.arange(2)))
+    found = window([data], [0.0], [((0, 0),)])
+    assert {number for number, _ in max(found, key=found.get)[1]} == {1}
+    assert all(len(members) < 2 for _, members in found)
+    assert data.at(((0, 0), (1, 0))).score == -np.inf

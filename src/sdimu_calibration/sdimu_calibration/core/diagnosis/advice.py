@@ -16,6 +16,7 @@ from sdimu_calibration.core.diagnosis.found import DetectableSize, Found
 from sdimu_calibration.core.diagnosis.plan_seen import PlanSeen
 from sdimu_calibration.core.effects import references, registry, selection
 from sdimu_calibration.core.effects.effect import Effect, Excitation
+from sdimu_calibration.core.noise_term import FOLLOWS
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.verdict import Verdict
 
@@ -85,7 +86,8 @@ def mend(d: Diagnosis) -> list[Advice]:
 
 def _about_data(d: Diagnosis) -> list[Advice]:
     out = mend(d)
-    if d.found.noise:
+    # What follows attitude, rate or temperature is the same in every repetition.
+    if any(term.kind not in FOLLOWS for term in d.found.noise):
         out.append(Advice(Kind.REPEAT_STOPS))
     if len(d.noise) > len(d.found.noise):
         out.append(Advice(Kind.CORRECT_NOISE, (d.consistency.gyro.ratio, d.consistency.accel.ratio)))

@@ -33,6 +33,10 @@ class Candidate:
     label: str
     recording: str = ""
 
+    def __repr__(self) -> str:
+        """Label: the equation of an effect is long, and is printed by the catalogue."""
+        return self.label
+
     @property
     def parameter(self) -> Parameter:
         """The parameter."""

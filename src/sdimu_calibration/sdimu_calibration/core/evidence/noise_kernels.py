@@ -148,13 +148,14 @@ def kernel(kind: str, tau: float, cut: Stretches) -> Floats:
     if kind == MARKOV:
         return _markov(cut.start, cut.end, tau)
     if kind == FLICKER:
-        # One- and two-sided density B^2/(2 pi f): a Markov term of every time constant, variance B^2 ln(ratio)/pi.
+        # Density B^2/(2 pi f), of both signs of f: a Markov term of every time constant, variance B^2 ln(ratio)/pi.
         longest = 10.0 * float(cut.end[-1])
         count = int(np.ceil(np.log(longest / _SHORTEST_TAU_S) / np.log(_RATIO))) + 1
         parts = [_markov(cut.start, cut.end, _SHORTEST_TAU_S * _RATIO**k) for k in range(count)]
         return np.asarray(np.log(_RATIO) / np.pi * np.sum(parts, axis=0))
     if kind == SHIFT:
-        passed = np.cumsum(np.concatenate([[0.0], (cut.turning[1:] & ~cut.turning[:-1]).astype(float)]))
+        begun = cut.turning & ~np.concatenate([[False], cut.turning[:-1]])
+        passed = np.cumsum(begun.astype(float))
         passed = passed - 0.5 * cut.turning
         return np.asarray(np.minimum.outer(passed, passed))
     if kind in FOLLOWS:

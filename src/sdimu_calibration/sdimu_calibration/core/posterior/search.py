@@ -20,11 +20,13 @@ from sdimu_calibration.core.posterior.models import Data, Expansion, Members
 WINDOW = 7.0
 """Log posterior (1) behind the best model up to which a model is in the window: a thousandth of its probability."""
 MOST_EXPANDED = 300
-"""Number of models of a window whose neighbours are looked at, the likeliest first: beyond, a class of ten effects
-with three members each gives the same shares."""
+"""Number of models of a window whose neighbours are looked at, the likeliest first: beyond, each weighs so
+little that shares stay the same to a hundredth."""
 _EXPANDED = 0.999
 """Share of the probability of all models found (1) whose neighbours are looked at: those of the rest
 weigh less still."""
+_LARGEST = 600.0
+"""Log of a weight (1) from which it counts no further: e to the 709 is the largest number."""
 MOST_EFFECTS = 40
 """Number of effects of a model at most: more than any sensor that is worth a calibration has."""
 _LEAST_GAIN = 1e-6
@@ -116,18 +118,36 @@ def window(
     heapq.heapify(waiting)
     best, expanded = max(found.values()), 0
     first, done = best, 0.0
-    total = sum(exp(score - first) for score in found.values())
+    total = sum(_weight(score - first) for score in found.values())
     while waiting and expanded < MOST_EXPANDED and done < _EXPANDED * total:
         score, (number, members) = heapq.heappop(waiting)
         if -score < best - WINDOW:
             break
+        if not _holds(data[number], members):
+            continue
         expanded += 1
-        done += exp(-score - first)
+        done += _weight(-score - first)
         for other, near in data[number].at(members).neighbours(best - WINDOW - offset[number]):
             key = (number, near)
             if key not in found:
                 found[key] = offset[number] + other
-                total += exp(found[key] - first)
+                total += _weight(found[key] - first)
                 heapq.heappush(waiting, (-found[key], key))
                 best = max(best, found[key])
+    found = {key: score for key, score in found.items() if _holds(data[key[0]], key[1])}
+    best = max(found.values())
     return {key: score for key, score in found.items() if score > best - WINDOW}
+
+
+def _weight(score: float) -> float:
+    """Weight of a model over that of the first one, as far as a number can hold it."""
+    return exp(min(score, _LARGEST))
+
+
+def _holds(data: Data, members: Members) -> bool:
+    """Whether a model is one: of the sizes that cannot be negative none is.
+
+    What enters a model may turn the sign of what is in it already; the closed form of the neighbours does not see that.
+    """
+    columns = [number for number, _ in members]
+    return not data.prior.positive[columns].any() or bool(np.isfinite(data.at(members).score))
