@@ -210,7 +210,7 @@ def confused(summary: DiagnosisSummary, spell: Spell | None = None) -> str:
             for name in one.alike[:6]
         )
         pairs = "; ".join(
-            f"<code>{escape(first)}</code> with <code>{escape(second)}</code>, as large together {in_percent(p)}"
+            f"<code>{escape(first)}</code> with <code>{escape(second)}</code> together {in_percent(p)}"
             for first, second, p in one.together[:3]
         )
         others = "; ".join(part for part in (others, pairs) if part)

@@ -144,7 +144,7 @@ def _together(d: Diagnosis, column: int) -> tuple[tuple[str, str, float], ...]:
     if window is None:
         return ()
     pairs = window.together(window.place_of(column))
-    return tuple((window.candidate(p.first).label, window.candidate(p.second).label, share) for p, share in pairs)
+    return tuple((window.candidate(one).label, window.candidate(other).label, p) for one, other, p in pairs)
 
 
 def _of_family(d: Diagnosis, candidate: Candidate) -> float:

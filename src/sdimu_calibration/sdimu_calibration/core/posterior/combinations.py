@@ -6,11 +6,8 @@ one at a time does not cross from one side to the other.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
-from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.posterior.models import Data, Members
 from sdimu_calibration.core.posterior.prior import WIDTHS
 
@@ -23,24 +20,7 @@ _MOST = 6
 """Number of pairs of an effect that are kept, the closest first: more than an identity or two has none."""
 
 
-@dataclass(frozen=True)
-class Combination:
-    """A pair of candidates that shows as a third one does.
-
-    Attributes
-    ----------
-    first, second : int
-        Candidates.
-    share : ndarray, shape (2,)
-        Size of each per unit size of the third, in units of the prior sizes (1).
-    """
-
-    first: int
-    second: int
-    share: Floats
-
-
-def combinations_of(data: Data, number: int) -> list[Combination]:
+def combinations_of(data: Data, number: int) -> list[tuple[int, int]]:
     """Find the pairs of candidates that show as one does, to rounding.
 
     Parameters
@@ -52,21 +32,15 @@ def combinations_of(data: Data, number: int) -> list[Combination]:
     J = data.J
     size = np.sqrt(np.maximum(np.diag(J), 1e-300))
     C = J / np.outer(size, size)
-    c = C[number].copy()
-    fit = 1.0 - C**2
-    usable = (c * c < 1.0 - _ONE) & ~np.isin(np.arange(len(c)), number)
+    c, fit = C[number], 1.0 - C**2
+    usable = c * c < 1.0 - _ONE
     with np.errstate(divide="ignore", invalid="ignore"):
         left = 1.0 - (c[:, None] ** 2 + c[None, :] ** 2 - 2.0 * np.outer(c, c) * C) / fit
     left[~(usable[:, None] & usable[None, :] & (fit > _ONE))] = 1.0
     left[data.prior.own, :] = left[:, data.prior.own] = 1.0
     rows, columns = np.nonzero(np.triu(left < _SAME))
     order = np.argsort(left[rows, columns])[:_MOST]
-    out = []
-    for i, j in zip(rows[order].tolist(), columns[order].tolist(), strict=True):
-        at = [i, j]
-        share = np.linalg.solve(C[np.ix_(at, at)], c[at]) * size[number] / size[at]
-        out.append(Combination(i, j, share))
-    return out
+    return list(zip(rows[order].tolist(), columns[order].tolist(), strict=True))
 
 
 def crossed(data: Data, members: Members) -> list[Members]:
@@ -83,12 +57,11 @@ def crossed(data: Data, members: Members) -> list[Members]:
     out: list[Members] = []
     for place, (number, _) in enumerate(members):
         others = members[:place] + members[place + 1 :]
-        for pair in combinations_of(data, number):
-            if {pair.first, pair.second} & have:
+        for first, second in combinations_of(data, number):
+            if {first, second} & have:
                 continue
-            trials = [tuple(sorted((*others, (pair.first, a), (pair.second, b)))) for a in widths for b in widths]
-            scored = [(data.at(one).score, one) for one in trials]
-            score, best = max(scored)
+            trials = [tuple(sorted((*others, (first, a), (second, b)))) for a in widths for b in widths]
+            score, best = max((data.at(one).score, one) for one in trials)
             if np.isfinite(score):
                 out.append(best)
     return out

@@ -73,8 +73,6 @@ class Expansion:
         self._V = B @ self._inverse
         self.c = np.maximum(np.diag(J) - np.einsum("qk,qk->q", self._V, B), 0.0)
         self.r = d - B @ self._m
-        # A size that cannot be negative and comes out negative: no model.
-        self._wrong = bool(np.any(data.prior.positive[self.columns] & (self._m < 0.0)))
         log_det = float(np.linalg.slogdet(A)[1]) if members else 0.0
         widths = float(sum(_LOG_SHARE[width] for _, width in members))
         self.score = (
@@ -83,7 +81,8 @@ class Expansion:
             + widths
             + data.prior.log_of(self.columns)
         )
-        if self._wrong:
+        # A size that cannot be negative and comes out negative: no model.
+        if np.any(data.prior.positive[self.columns] & (self._m < 0.0)):
             self.score = -np.inf
 
     @property

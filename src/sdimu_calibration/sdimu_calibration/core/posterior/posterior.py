@@ -18,7 +18,7 @@ from sdimu_calibration.core.evidence.linear import E
 from sdimu_calibration.core.evidence.testable import INDISTINGUISHABLE
 from sdimu_calibration.core.noise_term import KINDS, NoiseTerm
 from sdimu_calibration.core.posterior.board import Board, same_noise
-from sdimu_calibration.core.posterior.combinations import Combination, combinations_of, crossed
+from sdimu_calibration.core.posterior.combinations import combinations_of, crossed
 from sdimu_calibration.core.posterior.family import family_of
 from sdimu_calibration.core.posterior.models import Members
 from sdimu_calibration.core.posterior.noise_models import NoiseModel
@@ -200,11 +200,12 @@ class Posterior(Generic[E]):
             out.append((own, *(int(k) for k in np.argsort(-score) if alike[k])))
         return out
 
-    def together(self, place: int) -> list[tuple[Combination, float]]:
-        """Pairs of effects that show as a member of the told model does, and the probability that they are there."""
+    def together(self, place: int) -> list[tuple[int, int, float]]:
+        """Pairs of candidates that show as a member of the told model does, each with its probability in its place."""
         number, _ = self.told.members[place]
         pairs = combinations_of(self.board.data(self.told.noise)[1], number)
-        return [(pair, float(self._weights @ self._holds[:, [pair.first, pair.second]].all(axis=1))) for pair in pairs]
+        without = self._weights * ~self._holds[:, number]
+        return [(*pair, float(without @ self._holds[:, list(pair)].all(axis=1))) for pair in pairs]
 
     def of_class(self, place: int) -> float:
         """Probability that a member of the told model, or something of its class, is present."""
