@@ -24,11 +24,11 @@ from sdimu_calibration.core.joint.member import Report
 from sdimu_calibration.core.joint.reduction import Reduction
 from sdimu_calibration.core.joint.stretch_rows import Places
 from sdimu_calibration.core.noise_term import NoiseTerm
-from sdimu_calibration.core.specification import ImuSpecification
+from sdimu_calibration.core.specification import ImuSpecification, Site
 from sdimu_calibration.storage.files.result_file import as_note
 from sdimu_calibration.storage.files.whole_file import beside
 
-REPORT_FORMAT = "sdimu-reduction/2"
+REPORT_FORMAT = "sdimu-reduction/3"
 """What a recording says: a line, then an NPZ file of plain arrays; no code is loaded from it."""
 SUFFIX = ".reduction"
 LONGEST = 1 << 28
@@ -72,6 +72,7 @@ def write_report(path: Path, report: Report, number: str) -> None:
         "heading_rad": report.heading_rad,
         "noise": [vars(term) for term in report.noise],
         "widened": report.widened,
+        "site": None if report.site is None else vars(report.site),
     }
     places = {} if report.places is None else {f"dwell_{key}": value for key, value in vars(report.places).items()}
     content = io.BytesIO()
@@ -177,12 +178,20 @@ def _report(words: dict[str, Any], arrays: dict[str, Any]) -> Report | None:
         tuple(_term(entry) for entry in words["noise"]),
         bool(words["widened"]),
         _places(arrays),
+        _site(words["site"]),
     )
 
 
 def _places(arrays: dict[str, Any]) -> Places | None:
     own = {key.removeprefix("dwell_"): value for key, value in arrays.items() if key.startswith("dwell_")}
     return Places(**own) if own else None
+
+
+def _site(entry: dict[str, Any] | None) -> Site | None:
+    if entry is None:
+        return None
+    field = entry["magnetic_field_t"]
+    return Site(**(entry | {"magnetic_field_t": None if field is None else tuple(field)}))
 
 
 def _term(entry: dict[str, Any]) -> NoiseTerm:
