@@ -274,7 +274,7 @@ def picture(results: Results) -> str:
 
 
 def page(results: Results, first: int) -> str:
-    """Make the page, doc/reliability.md, of results by IMU file and kind of worlds; `first` is the first seed."""
+    """Make the page, reliability.md, of results by IMU file and kind of worlds; `first` is the first seed."""
     rows = _rows(results)
     number = sum(len(row[what]) for row in rows for what in WHATS)
     top = head("reliability", runs=len(rows), first=first, statements=number)
