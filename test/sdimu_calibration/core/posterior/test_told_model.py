@@ -42,7 +42,7 @@ def window(*models: tuple[tuple[int, ...], float], noises: tuple[NoiseModel, ...
     )
     kinds = noises or (NoiseModel(),) * len(models)
     weighed = [Weighed(tuple((k, 0) for k in m), n, p) for (m, p), n in zip(models, kinds, strict=True)]
-    return Posterior(board, tuple(weighed))
+    return Posterior(board, tuple(weighed), tuple((one.noise, one.probability) for one in weighed))
 
 
 def told(found: Posterior) -> set[str]:

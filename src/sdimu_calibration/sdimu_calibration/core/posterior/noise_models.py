@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import chain, repeat
+from itertools import chain, product, repeat
 
 import numpy as np
 
@@ -70,8 +70,8 @@ SHARE: Mapping[str, float] = {
 """Usual size of each kind over the bias instability (SI): a random walk has the Allan deviation of it at 1000 s."""
 _NEAR = 6.0
 """Log posterior (1) behind the best noise up to which another one is kept: effects beside it may change that much."""
-_MOST = 10
-"""Number of noises that are kept at most: each is searched for effects."""
+_MOST = 40
+"""Number of noises that are kept at most: with eight kinds of each triad, those behind weigh a thousandth together."""
 _HOPELESS = 12.0
 """Log posterior (1) behind the best term of a triad alone from which a term is not tried again beside noise of the
 other triad: that changes little of it."""
@@ -220,6 +220,23 @@ class _Search:
         found = replace(term, size=float(size[best]), gain=float(gain[best]))
         return found, self.log_odds[term.kind] + log_mass - float(gain[best])
 
+    def crossed(self, best: _Found) -> None:
+        """Combine what may stand in the place of the terms of each triad: the triads are nearly independent.
+
+        What each alternative costs beside the other triad's best terms adds.
+        """
+        parts = {triad: _of_triad(best.noise, triad) for triad in TRIADS}
+        instead: dict[str, list[_Found]] = {triad: [] for triad in TRIADS}
+        for found in self.seen.values():
+            apart = [triad for triad in TRIADS if _kinds(_of_triad(found.noise, triad)) != _kinds(parts[triad])]
+            if len(apart) == 1 and found.score > best.score - _NEAR:
+                instead[apart[0]].append(found)
+        gyro, accel = TRIADS
+        for one, other in product(instead[gyro], instead[accel]):
+            terms = (*_of_triad(one.noise, gyro), *_of_triad(other.noise, accel))
+            log_prior = one.noise.log_prior + other.noise.log_prior - best.noise.log_prior
+            self.keep(_Found(NoiseModel(terms, log_prior), one.gain + other.gain - best.gain))
+
     def settled(self, terms: Sequence[NoiseTerm]) -> _Found:
         """Find the sizes of several terms together, each in turn; what is no longer seen is left out."""
         sized: dict[int, tuple[NoiseTerm, float]] = {k: (term, 0.0) for k, term in enumerate(terms)}
@@ -237,6 +254,14 @@ class _Search:
 
     def _likelihood(self, noise: NoiseModel) -> float:
         return likelihood(self.information, self.cut, noise.terms) - self.information.fitted
+
+
+def _of_triad(noise: NoiseModel, triad: str) -> tuple[NoiseTerm, ...]:
+    return tuple(t for t in noise.terms if t.triad == triad)
+
+
+def _kinds(terms: Sequence[NoiseTerm]) -> frozenset[tuple[str, float]]:
+    return frozenset((t.kind, t.tau) for t in terms)
 
 
 def explored(
@@ -280,5 +305,6 @@ def explored(
     for place in range(len(best.noise.terms)):
         if len(best.noise.terms) > 1:
             search.one_more(search.settled([t for k, t in enumerate(best.noise.terms) if k != place]))
+    search.crossed(max(search.seen.values(), key=lambda found: found.score))
     ranked = sorted(search.seen.values(), key=lambda found: -found.score)
     return [(found.score, found.noise) for found in ranked if found.score > ranked[0].score - _NEAR][:_MOST]

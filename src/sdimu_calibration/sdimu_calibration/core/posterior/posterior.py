@@ -31,6 +31,9 @@ _ROUNDS = 4
 _OPEN = 0.02
 """Probability of a noise (1) from which the effects beside it are begun with when the point has moved: less would not
 change what is told."""
+_SEEN = 0.003
+"""Probability of a noise (1) from which its kinds are looked for when the point has moved: those below it together are
+less than is told."""
 _TIE = 0.5
 """Log posterior (1) by which another model must beat the one that a search begins with: fits about two that look the
 same would go to and fro."""
@@ -74,10 +77,14 @@ class Posterior(Generic[E]):
     board : Board
     models : tuple of Weighed
         The likeliest first.
+    noises : tuple of (NoiseModel, float)
+        Every noise that is probable, each with its probability, the likeliest first: those of the models, and those in
+        which no effects were looked for because they differ little from one of these.
     """
 
     board: Board[E]
     models: tuple[Weighed, ...]
+    noises: tuple[tuple[NoiseModel, float], ...]
 
     @property
     def best(self) -> Weighed:
@@ -143,8 +150,8 @@ class Posterior(Generic[E]):
 
     @property
     def tried(self) -> list[NoiseTerm]:
-        """Kinds of noise of all models, each once."""
-        kinds = {(t.triad, t.kind, t.tau): t for m in self.models for t in m.noise.terms}
+        """Kinds of noise that are probable, each once."""
+        kinds = {(t.triad, t.kind, t.tau): t for noise, p in self.noises if p > _SEEN for t in noise.terms}
         return list(kinds.values())
 
     def starts(self) -> list[dict[str, tuple[int, bool]]]:
@@ -217,7 +224,8 @@ class Posterior(Generic[E]):
 
     def of_noise(self, triad: str, kinds: Collection[str] = KINDS) -> float:
         """Probability that a triad has noise of one of some kinds."""
-        return self.probability(lambda m: any(t.triad == triad and t.kind in kinds for t in m.noise.terms))
+        have = [any(t.triad == triad and t.kind in kinds for t in noise.terms) for noise, _ in self.noises]
+        return min(1.0, float(sum(p for (_, p), one in zip(self.noises, have, strict=True) if one)))
 
     @cached_property
     def nothing(self) -> float:
@@ -251,7 +259,7 @@ def posterior(
     number = {evidence.candidates[c - first].label: k for k, c in enumerate(board.use.tolist())}
     starts = [tuple(sorted((number[name], own[0]) for name, own in one.items() if name in number)) for one in begun]
     tried = None if before is None else before.tried
-    noises, members = _climbed(board, list(dict.fromkeys(starts)), tried, settled=before is not None)
+    noises, members, beside = _climbed(board, list(dict.fromkeys(starts)), tried, settled=before is not None)
     asked: set[str] = set()
     sharpened = 0
     while sharpened < _MOST_SHARPENED:
@@ -262,11 +270,38 @@ def posterior(
         noises, members = _in_same_noise(board, starts, noises)
         sharpened += 1
     if sharpened:
-        noises, members = _climbed(board, [members], tried, settled=True)
+        noises, members, beside = _climbed(board, [members], tried, settled=True)
     data = [board.data(noise) for noise in noises]
     starts = [members, *crossed(data[0][1], members)]
     found = window([d for _, d in data], [offset for offset, _ in data], starts)
-    return Posterior(board, _weighed(found, noises))
+    models = _weighed(found, noises)
+    return Posterior(board, models, _noises(models, beside))
+
+
+def _noises(
+    models: Sequence[Weighed], beside: Sequence[tuple[float, NoiseModel]]
+) -> tuple[tuple[NoiseModel, float], ...]:
+    """Weigh every noise: one in which no effects were looked for stands beside that of the models it is most like.
+
+    Parameters
+    ----------
+    models : sequence of Weighed
+    beside : sequence of (float, NoiseModel)
+        Noises beside the best effects, with the log posterior of both (1).
+    """
+    weight: dict[NoiseModel, float] = {}
+    for model in models:
+        weight[model.noise] = weight.get(model.noise, 0.0) + model.probability
+    kinds = {noise.kinds for noise in weight}
+    score = {noise.kinds: score for score, noise in reversed(beside)}
+    known = [noise for noise in weight if noise.kinds in score]
+    out = dict(weight)
+    for _, noise in beside:
+        if noise.kinds not in kinds and known:
+            like = min(known, key=lambda one: (len(one.kinds ^ noise.kinds), -score[one.kinds]))
+            out[noise] = weight[like] * float(np.exp(score[noise.kinds] - score[like.kinds]))
+    total = sum(out.values())
+    return tuple(sorted(((noise, w / total) for noise, w in out.items()), key=lambda one: -one[1]))
 
 
 def _weighed(found: dict[tuple[int, Members], float], noises: Sequence[NoiseModel]) -> tuple[Weighed, ...]:
@@ -278,7 +313,7 @@ def _weighed(found: dict[tuple[int, Members], float], noises: Sequence[NoiseMode
 
 def _climbed(
     board: Board[E], starts: Sequence[Members], tried: Sequence[NoiseTerm] | None = None, settled: bool = False
-) -> tuple[list[NoiseModel], Members]:
+) -> tuple[list[NoiseModel], Members, list[tuple[float, NoiseModel]]]:
     """Look for noises beside the best effects, and for effects in each noise, until neither changes.
 
     Where a search about nearly the same point has looked for noises beside no effects, too, it is `settled`: they are
@@ -291,8 +326,10 @@ def _climbed(
         That of the best model first.
     members : tuple of (int, int)
         The best model.
+    beside : list of (float, NoiseModel)
+        Noises beside its effects, with the log posterior of both (1).
     """
-    asked: set[Members] = set()
+    asked: dict[Members, list[tuple[float, NoiseModel]]] = {}
     known: list[tuple[float, NoiseModel, Members]] = []
     start = starts[0]
     white = board.data(NoiseModel())[1]
@@ -304,8 +341,8 @@ def _climbed(
         for one in dict.fromkeys(beside):
             if one in asked:
                 continue
-            asked.add(one)
-            for score, noise in board.noises(one, tried, best):
+            asked[one] = board.noises(one, tried, best)
+            for score, noise in asked[one]:
                 _add(known, score, noise, one)
                 best = max(best, score)
         near = [found for found in known if found[0] > best - _HOPEFUL]
@@ -321,7 +358,9 @@ def _climbed(
         if start and data.at(start).score > score - _TIE:
             members = start
         best = max(best, offset + score)
-    return [noise for score, noise, _ in known if score > known[0][0] - WINDOW], members
+    if members not in asked:
+        asked[members] = board.noises(members, tried, best)
+    return [noise for score, noise, _ in known if score > known[0][0] - WINDOW], members, asked[members]
 
 
 def _in_same_noise(

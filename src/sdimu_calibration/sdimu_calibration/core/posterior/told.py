@@ -196,13 +196,16 @@ def _sizes(found: Posterior[E]) -> dict[int, tuple[float, float]]:
 
 
 def _noise(found: Posterior[E], told: Sequence[NoiseTerm]) -> tuple[NoiseShare, ...]:
-    total = _summed(found, lambda m: (f"{t.triad} {t.kind}" for t in m.noise.terms))
+    total: dict[str, float] = {}
+    for noise, p in found.noises:
+        for name in {f"{t.triad} {t.kind}" for t in noise.terms}:
+            total[name] = min(total.get(name, 0.0) + p, 1.0)
     interval = {f"{t.triad} {t.kind}": (t.low, t.high) for t in told}
     out = []
-    for name, share in total.items():
+    for name, share in sorted(total.items(), key=lambda item: (-item[1], item[0])):
         if share < LEAST:
             continue
-        have = [(m.probability, t) for m in found.models for t in m.noise.terms if f"{t.triad} {t.kind}" == name]
+        have = [(p, t) for noise, p in found.noises for t in noise.terms if f"{t.triad} {t.kind}" == name]
         size = float(np.exp(sum(p * np.log(t.size) for p, t in have) / sum(p for p, _ in have)))
         term = have[0][1]
         low, high = interval.get(name, (float("nan"), float("nan")))

@@ -1,0 +1,94 @@
+"""Probabilities of kinds of noise come true where each triad has its own, whatever the other one has."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from sdimu_calibration.core.effects.effect import Timetable
+from sdimu_calibration.core.evidence.learned_noise import NoiseInformation
+from sdimu_calibration.core.evidence.noise_kernels import kernel, stretches
+from sdimu_calibration.core.noise_term import FLICKER, RANDOM_WALK, SHIFT, STOP, TRIADS, TURN, NoiseTerm
+from sdimu_calibration.core.posterior.noise_models import ODDS, SHARE, explored, usual_sizes
+from sdimu_calibration.storage.files.config import load_imu
+
+TRIED = tuple(NoiseTerm(triad, kind) for triad in TRIADS for kind in (RANDOM_WALK, FLICKER, STOP, TURN, SHIFT))
+DWELL_S, TURN_S, STOPS = 60.0, 12.0, 12
+
+
+@pytest.fixture(scope="module")
+def cut():
+    starts = [k * (DWELL_S + TURN_S) for k in range(STOPS)]
+    stops = tuple((k, t, t + DWELL_S) for k, t in enumerate(starts))
+    turns = tuple((k, t + DWELL_S, t + DWELL_S + TURN_S) for k, t in enumerate(starts[:-1]))
+    return stretches(Timetable(stops=stops, turns=turns, duration=starts[-1] + DWELL_S))
+
+
+@pytest.fixture(scope="module")
+def usual():
+    return usual_sizes(load_imu("dtg"))
+
+
+def drawn(rng, cut, usual):
+    """Draw a kind of noise, or none, and its size for each triad by the prior; measure the mean of each stretch."""
+    kinds = [kind for kind in ODDS if any(t.kind == kind for t in TRIED)]
+    odds = np.array([1.0, *(ODDS[kind] for kind in kinds)])
+    J, error, there = np.zeros(6 * len(cut)), np.zeros((len(cut), 6)), set()
+    for place, triad in enumerate(TRIADS):
+        axes = slice(3 * place, 3 * place + 3)
+        level = usual.centre[triad, FLICKER] / SHARE[FLICKER]
+        J.reshape(-1, 6)[:, axes] = 1.0 / (0.5 * level) ** 2
+        choice = int(rng.choice(len(odds), p=odds / odds.sum()))
+        if choice:
+            kind = kinds[choice - 1]
+            there.add((triad, kind))
+            size = usual.centre[triad, kind] * np.exp(usual.spread[triad, kind] * rng.standard_normal())
+            root = np.linalg.cholesky(kernel(kind, 0.0, cut) + 1e-12 * np.eye(len(cut)))
+            error[:, axes] = size * root @ rng.standard_normal((len(cut), 3))
+    d = J * error.ravel() + np.sqrt(J) * rng.standard_normal(len(J))
+    return NoiseInformation(np.diag(J), d, 0.0), there
+
+
+def told(information, cut, usual):
+    """Probability of each kind of noise in each triad, and that both triads have what they have."""
+    found = explored(information, cut, usual, TRIED)
+    weight = np.exp(np.array([score for score, _ in found]) - found[0][0])
+    out = {(t.triad, t.kind): 0.0 for t in TRIED}
+    for w, (_, noise) in zip(weight / weight.sum(), found, strict=True):
+        for triad, kind, _ in noise.kinds:
+            out[triad, kind] += w
+    return out
+
+
+def test_probabilities_of_kinds_come_true(cut, usual):
+    # Where a triad has noise that is seen: a size that is too small for that is told as none.
+    rng = np.random.default_rng(20261124)
+    p, right = [], []
+    for _ in range(40):
+        information, there = drawn(rng, cut, usual)
+        found = told(information, cut, usual)
+        for triad in TRIADS:
+            if sum(found[triad, t.kind] for t in TRIED if t.triad == triad) > 0.9:
+                p += [found[triad, t.kind] for t in TRIED if t.triad == triad]
+                right += [(triad, t.kind) in there for t in TRIED if t.triad == triad]
+    assert len(p) > 100
+    p, right = np.minimum(p, 1.0), np.array(right)
+    for low, high in ((0.0, 0.05), (0.05, 0.3), (0.3, 0.7), (0.7, 0.95), (0.95, 1.01)):
+        inside = (p >= low) & (p < high)
+        spread = np.sqrt(np.sum(p[inside] * (1.0 - p[inside])))
+        assert abs(p[inside].sum() - right[inside].sum()) < 3.0 * spread + 0.5, (low, p[inside].mean())
+
+
+def test_what_is_told_of_a_triad_does_not_hang_on_the_noise_of_the_other(cut, usual):
+    # Each of the two alone leaves several kinds open; together they leave as many open in each.
+    rng = np.random.default_rng(7)
+    for _ in range(5):
+        information, _ = drawn(rng, cut, usual)
+        both = told(information, cut, usual)
+        for place, triad in enumerate(TRIADS):
+            d = information.d.reshape(-1, 6).copy()
+            d[:, 3 - 3 * place : 6 - 3 * place] = 0.0
+            alone = told(NoiseInformation(information.J, d.ravel(), 0.0), cut, usual)
+            for term in TRIED:
+                if term.triad == triad:
+                    assert both[triad, term.kind] == pytest.approx(alone[triad, term.kind], abs=0.04)
