@@ -11,13 +11,14 @@ one.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
 
-from sdimu_calibration.core.arrays import Bools, Floats, Ints
+from sdimu_calibration.core.arrays import Bools, Floats
+from sdimu_calibration.core.posterior.pairs import best_pair
 from sdimu_calibration.core.posterior.prior import KIN, WIDTH_SHARES, WIDTHS, Prior
 
 Member = tuple[int, int]
@@ -27,6 +28,9 @@ Members = tuple[Member, ...]
 _PRECISION = np.array(WIDTHS) ** -2.0
 """Prior information (1) on a size of each width: sizes are in units of the prior's."""
 _LOG_SHARE = np.log(WIDTH_SHARES)
+_ROUNDING = 1e-9
+"""Size (1), in units of the prior's, below which a negative one is zero."""
+_WIDTHS = np.column_stack([_PRECISION, _LOG_SHARE])
 
 
 @dataclass(frozen=True)
@@ -74,12 +78,10 @@ class Expansion:
         self.c = np.maximum(np.diag(J) - np.einsum("qk,qk->q", self._V, B), 0.0)
         self.r = d - B @ self._m
         log_det = float(np.linalg.slogdet(A)[1]) if members else 0.0
-        widths = float(sum(_LOG_SHARE[width] for _, width in members))
         self.score = (
             0.5 * float(d[self.columns] @ self._m)
             - 0.5 * (log_det - float(np.log(loading).sum()))
-            + widths
-            + data.prior.log_of(self.columns)
+            + self._log_prior(members)
         )
         # A size that cannot be negative and comes out negative: no model.
         if np.any(data.prior.positive[self.columns] & (self._m < 0.0)):
@@ -153,15 +155,25 @@ class Expansion:
 
     def merged(self) -> tuple[float, Members]:
         """Put the best candidate in the place of two members: log posterior of the model, and the model."""
-        best, at = -np.inf, self.members
+        best, at, positive = -np.inf, self.members, self.data.prior.positive
         for i, j in combinations(range(len(self.members)), 2):
-            others = tuple(m for k, m in enumerate(self.members) if k not in (i, j))
-            near = self.data.at(others)
-            table = near.gains()
+            pair, others = [i, j], tuple(m for k, m in enumerate(self.members) if k not in (i, j))
+            inverse, V, m = self._inverse[np.ix_(pair, pair)], self._V[:, pair], self._m[pair]
+            own = np.linalg.inv(inverse)
+            if np.any(positive[self.columns] & (self._m - self._inverse[:, pair] @ (own @ m) < -_ROUNDING)):
+                continue
+            table = gains(self.c + np.einsum("qa,ab,qb->q", V, own, V), self.r + V @ (own @ m), positive)
+            table += self.data.prior.log_more([column for column, _ in others])[:, None]
             column, width = np.unravel_index(int(np.argmax(table)), table.shape)
-            if near.score + table[column, width] > best:
-                best, at = near.score + float(table[column, width]), _with(others, int(column), int(width))
+            there = -0.5 * float(m @ own @ m) - 0.5 * float(np.log(np.linalg.det(inverse) * self._loading[pair].prod()))
+            there += self._log_prior(others) - self._log_prior(self.members)
+            if self.score + there + table[column, width] > best:
+                best, at = self.score + there + float(table[column, width]), _with(others, int(column), int(width))
         return best, at
+
+    def _log_prior(self, members: Members) -> float:
+        columns = [column for column, _ in members]
+        return float(sum(_LOG_SHARE[width] for _, width in members)) + self.data.prior.log_of(columns)
 
     def paired(self) -> tuple[float, Members]:
         """Add the best two candidates at once: log posterior of the model, and the model."""
@@ -174,35 +186,14 @@ class Expansion:
         if len(use) < 2:
             return -np.inf, self.members
         X = J[np.ix_(use, use)] - self._V[use] @ J[self.columns][:, use]
-        c, r, odds = self.c[use], self.r[use], more[use]
-        kin = prior.cause[use][:, None] == prior.cause[use][None, :]
-        log_prior = odds[:, None] + odds[None, :] + step + np.where(kin, _kin(prior, self.columns, use), 0.0)
-        log_prior[prior.apart(self.columns, use)] = -np.inf
-        np.fill_diagonal(log_prior, -np.inf)
-        best, at = -np.inf, self.members
-        for width, loading in enumerate(_PRECISION.tolist()):
-            a = c + loading
-            det = np.outer(a, a) - X**2
-            with np.errstate(divide="ignore", invalid="ignore"):
-                fall = (np.outer(r**2, a) + np.outer(a, r**2) - 2.0 * X * np.outer(r, r)) / det
-                total = 0.5 * fall - 0.5 * np.log(det / loading**2) + log_prior + 2.0 * _LOG_SHARE[width]
-            # Size of the first of a pair beside the second: of the wrong sign where that cannot be.
-            wrong = prior.positive[use][:, None] & (r[:, None] * a[None, :] < X * r[None, :])
-            total[wrong | wrong.T | ~(det > 1e-9 * np.outer(a, a))] = -np.inf
-            i, j = np.unravel_index(int(np.nanargmax(total)), total.shape)
-            if self.score + total[i, j] > best:
-                best = self.score + float(total[i, j])
-                at = _with(_with(self.members, int(use[i]), width), int(use[j]), width)
-        return best, at
+        table = np.column_stack([self.c[use], self.r[use], more[use], prior.positive[use]])
+        apart, kin = prior.apart(self.columns, use)
+        gain, i, j, width = best_pair(np.ascontiguousarray(X), table, apart, kin, _WIDTHS, KIN)
+        members = _with(_with(self.members, int(use[i]), width), int(use[j]), width)
+        return self.score + gain + float(step), members
 
     def _without(self, place: int) -> list[int]:
         return [column for k, column in enumerate(self.columns) if k != place]
-
-
-def _kin(prior: Prior, columns: Sequence[int], use: Ints) -> Floats:
-    """Log odds of kin of the first of a pair, which `log_more` has not counted; shape (u, u)."""
-    counted = np.isin(prior.cause[use], prior.cause[np.asarray(columns, dtype=np.int64)])
-    return np.where(counted[:, None], 0.0, KIN) * np.ones((len(use), len(use)))
 
 
 def gains(c: Floats, r: Floats, positive: Bools) -> Floats:

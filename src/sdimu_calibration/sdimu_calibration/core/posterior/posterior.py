@@ -333,7 +333,7 @@ def _climbed(
     known: list[tuple[float, NoiseModel, Members]] = []
     start = starts[0]
     white = board.data(NoiseModel())[1]
-    best, members = max((climb(white, one) for one in starts), key=lambda found: found[0])
+    best, members = max((climb(white, one, of_two=board.wander is None) for one in starts), key=lambda found: found[0])
     for _ in range(_ROUNDS):
         if members in asked:
             break

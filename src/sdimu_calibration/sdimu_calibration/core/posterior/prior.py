@@ -110,7 +110,7 @@ class Prior:
             out[at] = -np.inf
         return np.asarray(out)
 
-    def apart(self, base: Sequence[int], use: Ints) -> Bools:
+    def apart(self, base: Sequence[int], use: Ints) -> tuple[Ints, Ints]:
         """Say which pairs no model may hold: variants of one parameter, twins, more drifts of a bias than allowed.
 
         Parameters
@@ -122,21 +122,36 @@ class Prior:
 
         Returns
         -------
-        ndarray of bool, shape (u, u)
+        apart : ndarray of int, shape (u, 3)
+            Two that share a number in one column exclude each other.
+        kin : ndarray of int, shape (u,)
+            Two that share a number have one cause that the model has not: they have the odds of kin.
         """
-        parameter, drift = self.parameter[use], self.drift[use]
-        one = (parameter[:, None] == parameter[None, :]) & ~self.repeats[use][:, None]
-        one |= self.twin[use][:, None] == self.twin[use][None, :]
-        counted = np.bincount(self.drift[np.asarray(base, dtype=np.int64)] + 1, minlength=self._bins)
-        full = counted[drift + 1] == MOST_DRIFTS - 1
-        return np.asarray(one | (full & (drift >= 0))[:, None] & (drift[:, None] == drift[None, :]))
+        at = np.asarray(base, dtype=np.int64)
+        counted = np.bincount(self.drift[at] + 1, minlength=self._bins)
+        full = (counted[self.drift[use] + 1] == MOST_DRIFTS - 1) & (self.drift[use] >= 0)
+        nobody = -1 - np.arange(len(use))
+        apart = [
+            np.where(self.repeats[use], nobody, self.parameter[use]),
+            self.twin[use],
+            np.where(full, self.drift[use], nobody),
+        ]
+        kin = np.where(np.isin(self.cause[use], self.cause[at]), nobody, self.cause[use])
+        return np.column_stack(apart), kin
 
     def log_of(self, chosen: Sequence[int]) -> float:
-        """Log of the prior of a set of candidates, over that of none (1)."""
-        total = 0.0
-        for k, column in enumerate(chosen):
-            total += float(self.log_more(chosen[:k])[column])
-        return total
+        """Log of the prior of a set of candidates, over that of none (1); -inf for a set that no model may be."""
+        at, count = np.asarray(chosen, dtype=np.int64), len(chosen)
+        if not count:
+            return 0.0
+        own = at[~self.repeats[at]]
+        drifts = np.bincount(self.drift[at] + 1, minlength=self._bins)[1:]
+        distinct = [len(set(one.tolist())) == len(one) for one in (at, self.parameter[own], self.twin[at])]
+        if not all(distinct) or drifts.max(initial=0) > MOST_DRIFTS:
+            return -np.inf
+        kin = count - len(set(self.cause[at].tolist()))
+        number = float(np.log(np.arange(1.0, count + 1.0)).sum()) - count * float(np.log1p(1.0 / MEAN_NUMBER))
+        return float(self.log_share[at].sum()) + number + KIN * kin
 
 
 def prior_of(candidates: Sequence[Candidate], shared: Sequence[int] = (), J: Floats | None = None) -> Prior:
