@@ -1,4 +1,8 @@
-"""Docstrings: shape and unit of every array that goes in or out; quantity, unit and reason of every constant."""
+"""Docstrings: shape and unit of every array that goes in or out; quantity, unit and reason of every constant.
+
+What the signature says is not said again: an entry has a shape or a description, and a method that overrides another
+inherits its sections.
+"""
 
 from __future__ import annotations
 
@@ -6,26 +10,29 @@ import ast
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 import pytest
 from numpydoc.docscrape import NumpyDocString, Parameter
 
-SOURCE = Path(__file__).resolve().parents[1] / "src" / "sdimu_calibration" / "sdimu_calibration"
+ROOT = Path(__file__).resolve().parents[1]
+SOURCE = ROOT / "src" / "sdimu_calibration" / "sdimu_calibration"
 ARRAY = re.compile(r"\b(Floats|Ints|Bools|NDArray|Stamps)\b")
 FLOATING = re.compile(r"\b(Floats|NDArray\[np\.float64\])")
-SHAPE = re.compile(r"\bshapes? \(|\blength [a-z]\b")
+SHAPE = re.compile(r"\bshapes? \(|\blength [a-zA-Z]\b")
 PURE_NUMBER = re.compile(r"(?i)\b(share|ratio|factor|multiple|number|percentile|weight|probability|count)s?\b")
 UNIT = re.compile(r"\b(rad|m/s|deg|degC|Hz|SI|units?|dimensionless|whitened|normalised|customary)\b|\((s|m|g|1)\)")
 
 
 @dataclass(frozen=True)
 class Documented:
-    """A public function, method or class, and where its units may be declared."""
+    """A public function, method or class, where its units may be declared, and the bases of a method's class."""
 
     name: str
     node: ast.FunctionDef | ast.ClassDef
     module_doc: str
+    bases: tuple[str, ...] = ()
 
     @property
     def doc(self) -> str:
@@ -54,13 +61,39 @@ def public(path: Path) -> Iterator[Documented]:
                 whole = f"{above}\n{ast.get_docstring(node) or ''}"
                 for part in node.body:
                     if isinstance(part, ast.FunctionDef) and not part.name.startswith("_"):
-                        yield Documented(f"{node.name}.{part.name}", part, whole)
+                        yield Documented(f"{node.name}.{part.name}", part, whole, names_of_bases(node))
+
+
+def names_of_bases(node: ast.ClassDef) -> tuple[str, ...]:
+    return tuple(ast.unparse(base).split("[")[0].split(".")[-1] for base in node.bases)
+
+
+@cache
+def classes() -> dict[str, tuple[set[str], tuple[str, ...]]]:
+    """Methods with a docstring, and names of the bases, of every class of the core, by name."""
+    nodes = [node for path in modules().values() for node in ast.walk(ast.parse(path.read_text()))]
+    return {
+        node.name: (
+            {part.name for part in node.body if isinstance(part, ast.FunctionDef) and ast.get_docstring(part)},
+            names_of_bases(node),
+        )
+        for node in nodes
+        if isinstance(node, ast.ClassDef)
+    }
+
+
+def inherits(method: str, bases: tuple[str, ...]) -> bool:
+    """Whether a base, or a base of it, documents the method."""
+    known = [classes()[base] for base in bases if base in classes()]
+    return any(method in methods or inherits(method, above) for methods, above in known)
 
 
 def faults(one: Documented) -> Iterator[str]:
     """What is missing in one docstring."""
     if isinstance(one.node, ast.ClassDef):
         yield from faults_of_entries(one, "Attributes", array_fields(one.node))
+        return
+    if inherits(one.node.name, one.bases):
         return
     yield from faults_of_entries(one, "Parameters", array_arguments(one.node))
     given = ast.unparse(one.node.returns) if one.node.returns else ""
@@ -93,6 +126,16 @@ def faults_of_entries(one: Documented, section: str, arrays: dict[str, str]) -> 
             yield f"{section}: '{name}' has no shape"
         elif FLOATING.search(annotation) and not UNIT.search(f"{entries[name]}\n{one.doc}\n{one.module_doc}"):
             yield f"{section}: '{name}' has no unit, and neither the module nor the package declares one"
+
+
+def empty_entries(path: Path) -> Iterator[str]:
+    """Entries without a shape and without a description."""
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.FunctionDef | ast.ClassDef) and "\n---" in (doc := ast.get_docstring(node) or ""):
+            sections = NumpyDocString(doc)
+            for entry in [*sections["Parameters"], *sections["Attributes"]]:
+                if not entry.desc and not SHAPE.search(text(entry)) and "ndarray" not in entry.type:
+                    yield f"{node.name}: '{entry.name}' says no more than the signature: describe it, or leave it out"
 
 
 def text(entry: Parameter) -> str:
@@ -152,6 +195,30 @@ def faults_of(path: Path) -> list[str]:
 @pytest.mark.parametrize("module", sorted(modules()))
 def test_arrays_have_shape_and_unit_and_constants_a_reason(module):
     assert faults_of(modules()[module]) == []
+
+
+@pytest.mark.parametrize("path", sorted((ROOT / "src").iterdir()), ids=lambda path: path.name)
+def test_an_entry_says_more_than_the_signature(path):
+    assert [f"{file.name}: {fault}" for file in sorted(path.glob("*/**/*.py")) for fault in empty_entries(file)] == []
+
+
+def test_an_entry_that_says_no_more_than_the_signature_is_found(tmp_path):
+    path = tmp_path / "core.py"
+    path.write_text(
+        'def change(a: Floats, b: int, c: int) -> None:\n    """Change.\n\n    Parameters\n    ----------\n'
+        '    a : ndarray, shape (n,)\n    b : int\n    c : int\n        Hz.\n    """\n'
+    )
+    assert list(empty_entries(path)) == ["change: 'b' says no more than the signature: describe it, or leave it out"]
+
+
+def test_a_method_inherits_the_sections_of_the_one_it_overrides(tmp_path):
+    (tmp_path / "__init__.py").touch()
+    (tmp_path / "core.py").write_text(
+        "class Other(LinearEvidence):\n"
+        '    def signature(self) -> Ints:\n        """Give none."""\n'
+        '    def own(self) -> Ints:\n        """Give another."""\n'
+    )
+    assert faults_of(tmp_path / "core.py") == ["Other.own: no Returns section"]
 
 
 def test_what_is_missing_is_found(tmp_path):

@@ -75,7 +75,6 @@ class Goal:
         To answer with.
     start_s : float or None
         Time of the table at which it starts; None is now.
-    points : tuple of GoalPoint
     """
 
     name: str
@@ -92,7 +91,6 @@ def goal_samples(
     ----------
     points : sequence of GoalPoint
         Times count from the state `at`.
-    at : AxisState
     limits : sequence of AxisLimits
         One an axis; every sample of the motion keeps them.
     names : sequence of str

@@ -39,8 +39,6 @@ class TableMotion:
         True orientation of the platform against NED, scalar first.
     omega_nt_t : ndarray, shape (n, 3)
         True rate of the platform against NED, in t (rad/s).
-    names : tuple of str
-        Of the three axes.
     """
 
     t: Floats
@@ -59,8 +57,6 @@ def table_motion(plan: Plan, table: TableSpecification, seed: int = 0) -> TableM
 
     Parameters
     ----------
-    plan : Plan
-    table : TableSpecification
     seed : int
         Of the encoder noise; nothing else is random.
     """
@@ -100,7 +96,6 @@ def reported_samples(motion: TableMotion, before: TableMotion | None = None) -> 
 
     Parameters
     ----------
-    motion : TableMotion
     before : TableMotion, optional
         The stretch before this one; its last sample was reported, or held what was.
 
@@ -151,14 +146,7 @@ def _axis_motion(
 
 
 class Encoder:
-    """Reads the angles of the axes, block by block with the digits of one block.
-
-    Parameters
-    ----------
-    errors : Imperfections
-    seed : int
-        Of the noise.
-    """
+    """Reads the angles of the axes, block by block with the digits of one block."""
 
     def __init__(self, errors: Imperfections, seed: int) -> None:
         self._errors = errors

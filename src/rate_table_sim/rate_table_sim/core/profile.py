@@ -68,11 +68,8 @@ def trapezoid(turn: Turn, acceleration_rad_s2: float, sample_rate_hz: float, num
 
     Parameters
     ----------
-    turn : Turn
     acceleration_rad_s2 : float
         Limit.
-    sample_rate_hz : float
-        The grid.
     number : int
         Of the turn in the plan, from 1, for the error message.
     """

@@ -96,14 +96,7 @@ class _Ahead:
 
 
 class GoalProgramme:
-    """Goals as they come: the table plays a goal to its last point, and stands still in time and place until the next.
-
-    Parameters
-    ----------
-    table : TableSpecification
-    seed : int
-        Of the encoder noise.
-    """
+    """Goals as they come: the table plays one to its last point, and stands still in time and place until the next."""
 
     def __init__(self, table: TableSpecification, seed: int) -> None:
         self._table, self._attitude, self._encoder = table, attitude_of(table), Encoder(table.imperfections, seed)

@@ -45,13 +45,11 @@ class TableSpecification:
 
     Attributes
     ----------
-    name : str
     axes : tuple of str or None
         IMU axis letters about which outer, middle and inner axis turn when all angles are zero;
         None is a table that turns about any body axis.
     sample_rate_hz : float
         Rate of the motion samples and grid of all profile breakpoints.
-    imperfections : Imperfections
     limits : tuple of AxisLimits
         What goals may ask of each axis; a plan states its own acceleration.
     joints : tuple of str

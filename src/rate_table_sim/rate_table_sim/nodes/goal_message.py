@@ -23,7 +23,6 @@ def goal_of(
 
     Parameters
     ----------
-    message : JointTrajectory
     names : sequence of str
         Joints of the table.
     here : ndarray, shape (3,)

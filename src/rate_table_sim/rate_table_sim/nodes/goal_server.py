@@ -21,9 +21,6 @@ class GoalServer:
 
     Parameters
     ----------
-    node : rclpy.node.Node
-    programme : GoalProgramme
-    table : TableSpecification
     start_ns : int
         Stamp at which the table's time begins.
     allow_partial : bool

@@ -27,13 +27,7 @@ _AT_REST = 10
 
 
 class TableFrames:
-    """Publish the frames; nothing is published where the type TFMessage cannot be had.
-
-    Parameters
-    ----------
-    node : rclpy.node.Node
-    table : TableSpecification
-    """
+    """Publish the frames; nothing is published where the type TFMessage cannot be had."""
 
     def __init__(self, node: Node, table: TableSpecification) -> None:
         self._axes = None if table.axes is None else [unit(letter) for letter in table.axes]

@@ -15,7 +15,6 @@ class Coefficient:
 
     Attributes
     ----------
-    name : str
     value, sigma : float
         SI.
     unit, display_unit : str

@@ -91,10 +91,6 @@ class CalibrationFit(Fitted):
     def compensate(self, test: PreparedTest) -> Compensated:
         """Take the sensor errors out of the samples of a test.
 
-        Parameters
-        ----------
-        test : PreparedTest
-
         Returns
         -------
         Compensated

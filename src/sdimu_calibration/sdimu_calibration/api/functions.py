@@ -195,7 +195,6 @@ def diagnose(
 
     Parameters
     ----------
-    fit : CalibrationFit or JointFit
     attempt : sequence of str
         Effects of your own that are tried with the catalogue, as for `sdimu diagnose --try`.
     refits : bool

@@ -35,7 +35,6 @@ class OpenedSet:
 
     Attributes
     ----------
-    core : RecordingSet
     workers : int
         Processes that read them.
     kept : Path or None
@@ -88,8 +87,6 @@ class JointFit(Fitted):
 
     Attributes
     ----------
-    of : OpenedSet
-    options : SetOptions
     core : SetFit
         With the reduced rows of every recording.
     """
@@ -123,13 +120,7 @@ class JointFit(Fitted):
 
 
 class JointDiagnosis:
-    """What the model of a set misses.
-
-    Attributes
-    ----------
-    of : OpenedSet
-    core : SetDiagnosis
-    """
+    """What the model of a set misses."""
 
     def __init__(self, of: OpenedSet, core: SetDiagnosis) -> None:
         self.of = of

@@ -35,13 +35,10 @@ class Asked:
 
     Attributes
     ----------
-    bags : sequence of Path
     options : sequence of str
         As words of a command.
     place : sequence of str
         Site and IMU alone, likewise.
-    folder : Path
-        Of the results.
     """
 
     bags: Sequence[Path]

@@ -78,12 +78,7 @@ def leave(result: Calibration, diagnosed: tuple[Verdict, str] | None = None) -> 
 
 
 def warn(reasons: Iterable[str]) -> None:
-    """Say on stderr why a result is not to be trusted, one line each.
-
-    Parameters
-    ----------
-    reasons : iterable of str
-    """
+    """Say on stderr why a result is not to be trusted, one line each."""
     for line in reasons:
         typer.echo(f"sdimu: not to be trusted: {line}", err=True)
 

@@ -55,7 +55,6 @@ def words_by_option(stated: Any, group: Any) -> dict[str, list[str]]:
     ----------
     stated : dataclass
         The group itself, or one with more options.
-    group : dataclass type
 
     Returns
     -------

@@ -74,9 +74,6 @@ def tell_gain(
 
     Parameters
     ----------
-    console : Console
-    start : Plan
-    found : Found
     classes : sequence of sequence of str
         What is open, by coefficients.
     sigmas : tuple of Bounds

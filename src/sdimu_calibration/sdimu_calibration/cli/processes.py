@@ -67,12 +67,7 @@ def own_domain(log: Path, domain: int | None = None) -> Iterator[int]:
 
 @contextmanager
 def own_folder(out: Path) -> Iterator[None]:
-    """Hold a folder of results, so that no other run writes into it; it is made where it is missing.
-
-    Parameters
-    ----------
-    out : Path
-    """
+    """Hold a folder of results, so that no other run writes into it; it is made where it is missing."""
     (out / "log").mkdir(parents=True, exist_ok=True)
     lock = _lock(out / "log" / "run.lock")
     if lock is None:
@@ -161,8 +156,6 @@ class Children:
 
         Parameters
         ----------
-        name : str
-            Of the ROS node.
         module : str
             Python module to run.
         parameters : mapping of str to value

@@ -25,12 +25,10 @@ def bench_of_set(
 
     Parameters
     ----------
-    bags : sequence of Path
     file : Path or None
         Set file, in the place of bags.
     model : str or None
         As the option of the same name.
-    opening : Recorded
 
     Returns
     -------

@@ -39,7 +39,6 @@ class SetRequest:
         None where a set file names them.
     opening : StatedOpening
         Of all recordings; what a set file says of one comes first.
-    request : FitRequest
     """
 
     bags: Sequence[Path]

@@ -42,7 +42,6 @@ class Outline:
         0 where nobody knows.
     stops : int
         0 where nobody knows.
-    effects : sequence of str
     units : mapping of str to str
         Customary unit by coefficient.
     """
@@ -80,7 +79,6 @@ class Watch:
 
         Parameters
         ----------
-        seen : Seen
         streaming : bool
             Samples still come; False while the whole test is calibrated once more.
         wall_s : float

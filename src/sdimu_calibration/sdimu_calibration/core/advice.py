@@ -92,7 +92,6 @@ class Advice:
 
     Attributes
     ----------
-    kind : Kind
     arguments : tuple
         As `kind` says.
     verb : Verb or None

@@ -121,7 +121,6 @@ def read_options(key: EffectKey, expected: Mapping[str, str]) -> dict[str, float
 
     Parameters
     ----------
-    key : EffectKey
     expected : mapping of str to str
         Unit of each option.
 

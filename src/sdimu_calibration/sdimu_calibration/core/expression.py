@@ -85,14 +85,7 @@ TEMPERATURE_NAMES = frozenset({"T", "dTdt"})
 
 @dataclass(frozen=True)
 class Expression:
-    """A formula that has been read: nothing in it but what is allowed.
-
-    Attributes
-    ----------
-    text : str
-    tree : ast.expr
-    names : frozenset of str
-    """
+    """A formula that has been read: nothing in it but what is allowed."""
 
     text: str
     tree: ast.expr

@@ -47,8 +47,6 @@ class OpeningOptions:
 
     Attributes
     ----------
-    imu : ImuSpecification
-    site : Site
     assumed_site : str
         Name of the default site where the user states none; empty for a stated site.
     stated : Stated
@@ -85,7 +83,6 @@ def in_si(recording: Recording, stated: Stated, where: str = IMU_TOPIC) -> Recor
     ----------
     recording : Recording
         As `in_order` returns it.
-    stated : Stated
     where : str
         File or topic, for errors.
 
@@ -146,7 +143,6 @@ def open_test(recording: Recording, options: OpeningOptions, where: str = IMU_TO
     ----------
     recording : Recording
         As `in_order` returns it.
-    options : OpeningOptions
     where : str
         File or topic, for errors.
 

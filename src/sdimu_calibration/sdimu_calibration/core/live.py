@@ -59,8 +59,6 @@ class EpochEstimate:
         The same in seconds after the origin of the recording.
     dwell, used : bool
         At rest; a measurement was taken.
-    stop : int
-    body_frame : str
     names, units, display_units : tuple of str, length p
     coefficients, covariance : ndarray, shapes (p,) and (p, p)
         SI, in `body_frame`.
@@ -108,7 +106,6 @@ class LiveCalibration:
     ----------
     options : OpeningOptions
         IMU, site, and what the user states of units and signs.
-    model : Model
     """
 
     def __init__(self, options: OpeningOptions, model: Model) -> None:

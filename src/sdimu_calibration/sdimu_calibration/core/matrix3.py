@@ -53,7 +53,6 @@ def store(m: Matrix3, out: Floats) -> None:
 
     Parameters
     ----------
-    m : tuple of float, length 9
     out : ndarray, shape (3, 3)
         Filled in place.
     """

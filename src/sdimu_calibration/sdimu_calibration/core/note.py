@@ -30,7 +30,6 @@ class Note(str):
     ----------
     bare : str
         The line of a fit that was diagnosed: without the end.
-    topic : Topic or None
     """
 
     bare: str

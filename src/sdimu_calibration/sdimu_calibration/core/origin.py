@@ -91,8 +91,6 @@ def measured(origin: Origin, recording: Recording, imu: str) -> Origin:
 
     Parameters
     ----------
-    origin : Origin
-    recording : Recording
     imu : str
         Name of the specification.
     """

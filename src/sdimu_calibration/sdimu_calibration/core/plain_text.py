@@ -20,13 +20,8 @@ def one_line(text: str, longest: int | None = LONGEST_LINE) -> str:
 
     Parameters
     ----------
-    text : str
     longest : int or None
         Characters beyond which the middle is left out; None keeps all.
-
-    Returns
-    -------
-    str
     """
     # A text of megabytes is cut before its characters are looked at.
     if longest is not None and len(text) > 8 * longest:
@@ -42,26 +37,12 @@ def counted(number: int, one: str, many: str = "") -> str:
 
     Parameters
     ----------
-    number : int
     one, many : str
         What stands behind one, and behind any other number; `one` with an s by default.
-
-    Returns
-    -------
-    str
     """
     return f"{number} {one if number == 1 else many or one + 's'}"
 
 
 def capital(text: str) -> str:
-    """Begin a text with a capital letter, and leave the rest as it is: units keep their spelling.
-
-    Parameters
-    ----------
-    text : str
-
-    Returns
-    -------
-    str
-    """
+    """Begin a text with a capital letter, and leave the rest as it is: units keep their spelling."""
     return text[:1].upper() + text[1:]

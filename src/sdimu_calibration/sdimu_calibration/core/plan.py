@@ -35,10 +35,8 @@ class Plan:
 
     Attributes
     ----------
-    name : str
     dwell_s : tuple of float
         Length of each stop (s), one more than turns.
-    turns : tuple of Turn
     acceleration_rad_s2 : float
         Limit of the angular acceleration.
     """

@@ -178,9 +178,6 @@ class Recording:
         Mean body rate against inertial space over the interval, as measured (rad/s).
     f_ib_b : ndarray, shape (n, 3)
         Mean specific force over the interval, as measured (m/s^2).
-    phase : PhaseLog or None
-    temperature : TemperatureLog or None
-    table : TableLog or None
     rejected : int
         Samples dropped when the recording was made into arrays (not finite, repeated stamp).
     notes : tuple of str
@@ -234,7 +231,6 @@ def seconds(stamps_ns: Ints, start_ns: int) -> Floats:
     Parameters
     ----------
     stamps_ns : ndarray of int, shape (n,)
-    start_ns : int
 
     Returns
     -------

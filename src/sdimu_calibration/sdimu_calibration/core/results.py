@@ -102,12 +102,10 @@ class TurnOn:
 
     Attributes
     ----------
-    effect : str
     sigma, low, high : float
         Standard deviation and bounds of its 95 % interval (SI); `low` is 0 where the data do not show any scatter.
     power_ons : int
         Number of power-ons that were seen.
-    unit, display_unit : str
     """
 
     effect: str
@@ -125,7 +123,6 @@ class SetRecording:
 
     Attributes
     ----------
-    name, serial, power_on : str
     start_ns : int
         Stamp of its start.
     temperature_degc : float
@@ -157,7 +154,6 @@ class PowerOnDeviation:
 
     Attributes
     ----------
-    power_on, name : str
     value, sigma : float
         SI.
     """
@@ -174,7 +170,6 @@ class SetTrend:
 
     Attributes
     ----------
-    name, covariate : str
     slope, sigma : float
         SI per unit of the covariate.
     p_value : float
@@ -194,9 +189,6 @@ class SetSummary:
 
     Attributes
     ----------
-    recordings : tuple of SetRecording
-    turn_on : tuple of TurnOn
-    deviations : tuple of PowerOnDeviation
     scatter_p : ndarray, shape (p,)
         Probability that a constant coefficient scatters as far from recording to recording; NaN where none sees it.
     trends : tuple of SetTrend
@@ -219,7 +211,6 @@ class Calibration:
 
     Attributes
     ----------
-    body_frame : str
     model : tuple of str
         Effects.
     names, units, display_units : tuple of str, length p

@@ -17,11 +17,6 @@ def side_by_side(work: Callable[[A], B], pieces: Iterable[A]) -> list[B]:
     """Do the same work on each of several pieces; the results are in the order of the pieces.
 
     The work of one piece must not change what another one reads. Each gives the digits that it gives alone.
-
-    Parameters
-    ----------
-    work : callable
-    pieces : iterable
     """
     with ThreadPoolExecutor(_THREADS) as pool:
         return list(pool.map(work, pieces))

@@ -23,7 +23,6 @@ class Reference:
         As the site tells it (rad, m/s^2); a sigma of zero takes it at its word.
     value, value_sigma : float
         With what the data say of it.
-    unit, display_unit : str
     origin : str
         ``stated``; of gravity also ``normal`` or ``standard``.
     relative : tuple of str
@@ -70,7 +69,6 @@ def found(references: Sequence[Reference], off: Mapping[str, tuple[float, float]
 
     Parameters
     ----------
-    references : sequence of Reference
     off : mapping of str to (float, float)
         Told less true, and its sigma (SI), of those that were estimated along, by name.
     """

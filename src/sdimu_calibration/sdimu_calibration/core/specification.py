@@ -53,7 +53,6 @@ class ImuSpecification:
 
     Attributes
     ----------
-    name : str
     gyro_white_noise : float
         Angle random walk as a density (rad/s/sqrt(Hz)): the sigma of a 1 s mean.
     accel_white_noise : float
@@ -144,8 +143,6 @@ class StatedPrior:
 
     Attributes
     ----------
-    name : str
-        Of the coefficient.
     mean, sigma : float
         In the frame of the report (SI); a sigma of zero fixes the coefficient at the mean.
     unit : str

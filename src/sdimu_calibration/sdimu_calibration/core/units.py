@@ -100,10 +100,6 @@ def parse_unit(text: str) -> Unit:
     text : str
         Products with ``*`` or ``/`` of named units with ``^power``; ``sqrt(unit)`` halves the powers.
 
-    Returns
-    -------
-    Unit
-
     Raises
     ------
     UnitError

@@ -23,7 +23,6 @@ def encode_imu(
     stamp_ns : ndarray of int, shape (n,)
     omega_ib_b, f_ib_b : ndarray, shape (n, 3)
         Body rate (rad/s) and specific force (m/s^2).
-    frame_id : str
     omega_variance, f_variance : float
         Variance of one sample, (rad/s)^2 and (m/s^2)^2, for the diagonals of the covariances.
 

@@ -73,17 +73,12 @@ class Producer:
 
     Parameters
     ----------
-    node : rclpy.node.Node
-    ticker : Ticker
-        Of this node.
     message_type : type
         ROS message class of the topic.
-    topic : str
     window_ns : int
         How far (ns of stamps) the producer may be ahead; `NO_LIMIT` only does the end of stream.
     on_credit : callable or None
         Called after each credit: time to send more.
-    qos : QoSProfile
     patience_s : float
         A consumer that vanished is waited for so long: it may be started again and go on.
     """
@@ -202,9 +197,6 @@ class Consumer:
 
     Parameters
     ----------
-    node : rclpy.node.Node
-    ticker : Ticker
-        Of this node.
     topic : str
         The data topic; the data subscription itself belongs to the caller.
     every : int

@@ -28,7 +28,6 @@ class Diagnosing:
 
     Parameters
     ----------
-    node : Node
     job : Job or None
         None where nothing is to be diagnosed.
     added : tuple of str

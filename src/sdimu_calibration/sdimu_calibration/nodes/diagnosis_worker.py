@@ -40,7 +40,6 @@ class Job:
     ----------
     journal : Path
         As `Journal.place`.
-    options : OpeningOptions
     model : str
         Name or path.
     question : callable, optional
@@ -63,7 +62,6 @@ class WorkerRequest:
 
     Attributes
     ----------
-    stop : int
     until_ns : int or None
         The last stamp that counts; None for everything.
     models : tuple of tuple of str
@@ -87,8 +85,6 @@ class Answer:
 
     Attributes
     ----------
-    request : WorkerRequest
-    diagnosis : LiveDiagnosis
     more : object
         Answer to the question; None without question or fit.
     seconds : float
@@ -110,7 +106,6 @@ class Picture:
 
     Attributes
     ----------
-    request : WorkerRequest
     png : bytes
         Of the diagnosis; empty where it waits.
     """

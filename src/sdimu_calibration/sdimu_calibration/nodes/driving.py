@@ -37,8 +37,6 @@ class Driving:
     ----------
     done : Future
         Of the node.
-    table : RateTable
-    driver : TableDriver
     """
 
     def __init__(self, node: Node, act: Callable[[Floats], None]) -> None:

@@ -27,9 +27,6 @@ class Heartbeat:
 
     Parameters
     ----------
-    node : rclpy.node.Node
-    ticker : Ticker
-        Of this node.
     publisher : Publisher
         Of diagnostic_msgs/DiagnosticArray.
     period_s : float

@@ -29,14 +29,8 @@ class Listener:
 
     Parameters
     ----------
-    node : rclpy.node.Node
-    ticker : Ticker
-        Of this node.
-    message_type : type
-    topic : str
     callback : callable
         Takes the message, as CDR bytes when `raw`.
-    raw : bool
     late : bool
         Ask first for what was sent before this subscription (a node that goes on where it was killed).
     """

@@ -18,12 +18,7 @@ _PROGRAM = "from sdimu_calibration.nodes.diagnosis_worker import main; main()"
 
 
 class Worker:
-    """A process that answers one request at a time; the newest one waits, those before it are forgotten.
-
-    Parameters
-    ----------
-    job : Job
-    """
+    """A process that answers one request at a time; the newest one waits, those before it are forgotten."""
 
     def __init__(self, job: Job) -> None:
         self._pipe, far = Pipe()
@@ -89,7 +84,6 @@ class StopDiagnosis:
 
     Parameters
     ----------
-    worker : Worker
     added : tuple of str
         Effects beyond the model that the test begins with.
     """

@@ -30,8 +30,6 @@ class Progress:
 
     Attributes
     ----------
-    stop : int
-    phase : str
     table_s, filter_s : float
         Data time that table and filter have reached (s after the first status).
     sigmas : dict of str to float
@@ -40,8 +38,6 @@ class Progress:
         The first sigma published.
     nis : dict of str to float
         Mean squared innovation per degree of freedom at the present stop, by channel.
-    verdict : str
-        Of the same stop.
     diagnosis : SeenDiagnosis
         The newest one; of stop -1 before the first.
     heard : bool

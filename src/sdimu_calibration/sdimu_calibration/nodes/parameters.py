@@ -21,10 +21,6 @@ _LARGE, _LARGEST = 2**62, 1e300
 class Declare:
     """Declares parameters of a node and returns their values.
 
-    Parameters
-    ----------
-    node : rclpy.node.Node
-
     Every method raises DataError, one line, when a value that was given is of another type or outside its range.
     """
 

@@ -85,9 +85,6 @@ class TableDriver:
     ----------
     node : rclpy.node.Node
         Gets the parameters `allow_motion`, `ask`, `tolerance_deg`, `rest_deg_s` and the service ``~/confirm``.
-    ticker : Ticker
-        Of this node.
-    table : RateTable
     """
 
     def __init__(self, node: Node, ticker: Ticker, table: RateTable) -> None:
@@ -148,7 +145,6 @@ class TableDriver:
 
         Parameters
         ----------
-        step : Step
         why : str
             The reason of the choice, for log, question and ``~/moves``.
         axis : (int, float), optional

@@ -68,9 +68,6 @@ class MoveProgress:
 
     Parameters
     ----------
-    goal : str
-        Its name.
-    move : Move
     seen : Seen
         The joint states before it was sent.
     tolerance_rad, rest_rad_s : float

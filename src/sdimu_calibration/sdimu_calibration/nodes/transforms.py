@@ -59,7 +59,6 @@ class TransformMessage:
 
         Parameters
         ----------
-        stamp_ns : int
         rotations : sequence of quaternions (w, x, y, z), one a transform
             Child against parent: maps vectors of the child to the parent.
         """

@@ -44,7 +44,6 @@ def comparison(names: Sequence[str], results: Sequence[Calibration]) -> list[lis
 
     Parameters
     ----------
-    names : sequence of str
     results : sequence of Calibration
         Of one recording, the simplest model first.
     """

@@ -150,15 +150,12 @@ class Scored:
 
     Attributes
     ----------
-    label, family, unit : str
     z, left : float
         Score with the model as given, and with what was found added.
-    estimate, sigma : float
     smallest, prior : float
         Minimal detectable size, and the size that physics gives it (inf where unknown).
     retention : float
         Share of its signature that the model leaves.
-    chosen : bool
     """
 
     label: str

@@ -27,7 +27,6 @@ class Figure:
 
     Parameters
     ----------
-    rows, cols : int
     titles : sequence of str
         Above the panels, row by row.
     share_x : bool
@@ -41,7 +40,6 @@ class Figure:
     ----------
     data : list of dict
         Traces; arrays of numbers are kept in single precision.
-    layout : dict
     """
 
     def __init__(

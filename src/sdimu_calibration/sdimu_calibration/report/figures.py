@@ -24,14 +24,6 @@ def sigma_history(calibration: Calibration) -> Figure:
     """Sigma of every coefficient against time (as Fig. 3.1 of Kim, Song & Lyou), one panel an effect.
 
     Grey bands are rotations. A coefficient that the body frame makes zero by definition has no line.
-
-    Parameters
-    ----------
-    calibration : Calibration
-
-    Returns
-    -------
-    Figure
     """
     history = calibration.history
     panels = groups(calibration.names, calibration.model)
@@ -103,7 +95,6 @@ def spread(heights: Floats, gap: float) -> Floats:
     Parameters
     ----------
     heights : ndarray, shape (k,)
-    gap : float
 
     Returns
     -------

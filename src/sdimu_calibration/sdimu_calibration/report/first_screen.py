@@ -50,7 +50,6 @@ class FirstScreen:
         A figure, and what it is.
     advice : tuple of str
         What to do next, the most useful first.
-    cost_title : str
     remarks : tuple of str
         What a reader must know before the numbers, besides the verdict.
     """

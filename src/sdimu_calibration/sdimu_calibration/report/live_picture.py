@@ -100,11 +100,8 @@ class _Bars:
 
     Attributes
     ----------
-    drawn : Raster
     top : int
         Upper edge of the first bar (px).
-    values : sequence of float
-    words, names : sequence of str
     line : float
         Where the dashed line is; not finite leaves it out.
     ink : tuple of int

@@ -29,8 +29,6 @@ class SeenDiagnosis:
 
     Attributes
     ----------
-    stop : int
-    verdict, sentence : str
     reaches : str
         Size of the score that noise reaches, in words.
     ranking, ladder : tuple of (str, str)

@@ -26,7 +26,6 @@ def odds_section(told: Probabilities | None, where: str = "in this test", averag
 
     Parameters
     ----------
-    told : Probabilities or None
     where : str
         What the data are of, as it ends a sentence.
     averaged : bool

@@ -56,10 +56,6 @@ def write_pictures(folder: Path, diagnosis: Diagnosis, trials: Sequence[FreeIner
         Best of a recording with something missing: else there is no "after", and no ladder.
     trials : sequence of FreeInertialRun
         Free navigations; none leaves the picture of the drift out.
-
-    Returns
-    -------
-    list of Path
     """
     folder.mkdir(parents=True, exist_ok=True)
     with mpl.rc_context(STYLE):

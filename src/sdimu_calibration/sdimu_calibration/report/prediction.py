@@ -81,8 +81,6 @@ def write_page(
 
     Parameters
     ----------
-    path : Path
-    prediction : Prediction
     about : mapping
         Of what: shown in the heading.
     published : (columns, rows), optional

@@ -34,8 +34,6 @@ def falling(
         Sigma (SI) by coefficient at the start and now.
     units : mapping of str to str
         Customary unit by coefficient.
-    effects : sequence of str
-        Of the model.
     """
     names = [name for name in now if first.get(name, 0.0) > 0.0]
     out = []

@@ -93,7 +93,6 @@ class Raster:
         ----------
         x, y : float
             The point that is named (px).
-        words : str
         ink : tuple of int
             Red, green and blue.
         size : int

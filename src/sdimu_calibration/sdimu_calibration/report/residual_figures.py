@@ -33,7 +33,6 @@ def innovations(found: data.Residuals, two: bool) -> Figure:
 
     Parameters
     ----------
-    found : Residuals
     two : bool
         Draw both the model as given and with what was found.
     """
@@ -146,7 +145,6 @@ def against_variables(
 
     Parameters
     ----------
-    found : Residuals
     variables : ndarray, shape (e, v)
     names : sequence of (str, str)
         Name and unit of each variable.

@@ -24,7 +24,6 @@ class Row:
 
     Attributes
     ----------
-    name, effect, unit : str
     value, sigma : float
         Both zero when the body frame makes the coefficient zero by definition.
     truth, error, error_sigmas : float or None
@@ -57,7 +56,6 @@ def rows(
 
     Parameters
     ----------
-    calibration : Calibration
     truth : mapping of str to float, optional
         True value (SI) by coefficient name, in the body frame of the calibration.
     reference : mapping of str to float, optional

@@ -40,8 +40,6 @@ def write_report(path: Path, report: Report, number: str) -> None:
 
     Parameters
     ----------
-    path : Path
-    report : Report
     number : str
         Of the job that it answers.
     """
@@ -99,14 +97,7 @@ def write_report(path: Path, report: Report, number: str) -> None:
 
 
 def read_report(path: Path, number: str) -> Report | None:
-    """Read the report of a job; None where there is none, or the file is damaged or of another: it is made again.
-
-    Parameters
-    ----------
-    path : Path
-    number : str
-        Of the job.
-    """
+    """Read the report of a job; None where there is none, or the file is damaged or of another: it is made again."""
     path = Path(path)
     try:
         if not path.is_file() or path.stat().st_size > LONGEST:

@@ -32,7 +32,6 @@ class Source:
 
     Attributes
     ----------
-    topics : TopicChoice
     accel_unit, gyro_unit : str or None
         Such as ``g`` and ``deg/s``, or a multiple such as ``2 deg/s``.
     accel_sign, gyro_sign : int or None
@@ -92,7 +91,6 @@ def opening_options(
         Name or path; None takes `DEFAULT_SITE`, which a note then says.
     imu : ImuSpecification or None
         None proposes one of `CLASSES` from the rests, which a note then says.
-    source : Source
     handheld : bool, optional
         Moved by hand; None decides by the turns and the noise of the gyros.
     measured_noise : bool
@@ -117,7 +115,6 @@ def open_test(
 
     Parameters
     ----------
-    path : Path
     site, imu, handheld, measured_noise
         As for `opening_options`.
     source : Source, optional

@@ -37,12 +37,8 @@ class BagSource:
 
     Attributes
     ----------
-    bag : Path
     site, imu : str or None
         As the options of the same names.
-    source : Source
-    handheld : bool or None
-    measured_noise : bool
     reference_degc : float or None
         Temperature from which temperature effects count (deg C); None is that at the start of the recording.
     """
@@ -80,8 +76,6 @@ class RecordingSet:
         Each opens a `BagSource`.
     model : str or None
         Name or path.
-    estimator : str
-    scopes : mapping of str to str
     """
 
     members: tuple[Member, ...]
@@ -153,7 +147,6 @@ def set_of(bags: Sequence[Path], like: BagSource) -> RecordingSet:
 
     Parameters
     ----------
-    bags : sequence of Path
     like : BagSource
         What the user states for all of them.
     """
@@ -171,7 +164,6 @@ def set_options(wanted: RecordingSet, model: str | None, add: Sequence[str], est
 
     Parameters
     ----------
-    wanted : RecordingSet
     model : str or None
         Name or path.
     add : sequence of str
@@ -222,12 +214,7 @@ def _member(source: BagSource, name: str, serial: str, power_on: str) -> Member:
 
 @dataclass(frozen=True)
 class Said:
-    """What the user says of all recordings of a set; empty: what each bag says.
-
-    Attributes
-    ----------
-    serial, power_on : str
-    """
+    """What the user says of all recordings of a set; empty: what each bag says."""
 
     serial: str = ""
     power_on: str = ""
@@ -276,8 +263,6 @@ def write_set(path: Path, bags: Sequence[Path], stated: Said = _UNSAID) -> None:
     ----------
     path : Path
         File to make; bags are named from its folder.
-    bags : sequence of Path
-    stated : Said
     """
     path = Path(path)
     if path.exists():

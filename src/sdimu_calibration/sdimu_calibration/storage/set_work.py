@@ -51,10 +51,6 @@ def judged_outcome(fit: SetFit) -> Calibration:
 
     As the fit of one recording is judged by stops that it has not seen; that chance does not reach the error is asked,
     too, as two recordings leave much to chance.
-
-    Parameters
-    ----------
-    fit : SetFit
     """
     result = set_outcome(fit)
     error = result.fit["held_out_rms"]

@@ -332,9 +332,6 @@ def _write_plan(part: Path, out: Path, test: LiveTest, summary: DiagnosisSummary
     ----------
     part : Path
         Where files are written that then go to `out` together.
-    out : Path
-    test : LiveTest
-    summary : DiagnosisSummary
     """
     from sdimu_calibration.cli.next_commands import PLAN, as_plan
     from sdimu_calibration.storage.files.config import load_plan

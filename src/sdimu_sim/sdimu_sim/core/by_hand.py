@@ -47,8 +47,6 @@ class ByHand:
         The site makes the truth; no estimator knows it.
     seed : int
         Of everything random: attitudes, times, sway, coefficients, noise.
-    rate_hz : float
-        Of the IMU.
     rest_s, turn_s : tuple of float
         Shortest and longest rest and turn.
     lever_arm_m : tuple of float

@@ -43,7 +43,6 @@ def read_equation(key: EffectKey, sensor: str, formula: str) -> tuple[str, Expre
     ----------
     key : EffectKey
         With its size; its option `name` says of which coefficient of an effect file it is a part.
-    sensor, formula : str
 
     Returns
     -------

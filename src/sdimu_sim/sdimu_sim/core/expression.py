@@ -45,8 +45,6 @@ class Expression:
 
     Attributes
     ----------
-    text : str
-    tree : ast.expr
     names : frozenset of str
         Variables it reads.
     """

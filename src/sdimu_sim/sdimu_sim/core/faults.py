@@ -27,7 +27,6 @@ class Fault:
 
     Attributes
     ----------
-    name : str
     what : str
         In a few words, for people.
     unit : str

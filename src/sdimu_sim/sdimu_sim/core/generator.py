@@ -177,13 +177,8 @@ def simulate_imu(
     ----------
     motion : PlatformMotion
         From t = 0; before that the platform rests.
-    truth : ImuTruth
-    site : Site
     rate_hz : float
         Sample k = 1, 2, ... ends at k / rate.
-    seed : int
-        Of the noise.
-    temperature : TemperatureProfile, optional
     """
     generator = ImuGenerator(truth, site, rate_hz, seed, temperature)
     parts = [

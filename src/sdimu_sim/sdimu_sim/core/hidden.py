@@ -205,8 +205,6 @@ class Term:
 
     Attributes
     ----------
-    name : str
-        Of the effect.
     sensor : int
         Index in `SENSORS`.
     expression : Expression
@@ -249,11 +247,8 @@ class Hidden:
 
     Attributes
     ----------
-    terms : tuple of Term
     delay_s : tuple of float
         Of each of the six sensors (>= 0).
-    lost : tuple of Lost
-    site : SiteError
     lever_arm_m : mapping of int to float
         Components of the lever arm that are given.
     coefficients : mapping of str to float

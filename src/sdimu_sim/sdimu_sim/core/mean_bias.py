@@ -22,14 +22,10 @@ def mean_bias(truth: ImuTruth, t: Floats, phase: PhaseLog, interval_s: float, se
 
     Parameters
     ----------
-    truth : ImuTruth
     t : ndarray, shape (m,)
         Stamps of the samples (s).
     phase : PhaseLog
         When the table stands.
-    interval_s : float
-    seed : int
-        Of the test.
 
     Returns
     -------

@@ -29,8 +29,6 @@ class Scenario:
 
     Attributes
     ----------
-    plan, imu, site : Plan, ImuSpecification, Site
-    table : TableSpecification
     rate_hz : float
         Of the IMU, 10 to 1000.
     seed : int
@@ -41,7 +39,6 @@ class Scenario:
         Hidden effects, canonical keys with sizes.
     noise : tuple of str
         Noise with a memory, keys with sizes (`sdimu_sim.core.coloured`).
-    temperature : TemperatureProfile or None
     coefficients : mapping of str to float or None
         As built, SI; None draws them from the IMU's specification.
     unit : int or None

@@ -41,7 +41,6 @@ def true_coefficients(truth: ImuTruth, frame: str) -> dict[str, float]:
 
     Parameters
     ----------
-    truth : ImuTruth
     frame : str
         ``prior`` or ``accelerometer_triad``.
 
@@ -66,7 +65,6 @@ def with_lag(truth: ImuTruth, frame: str, lag_s: float) -> dict[str, float]:
 
     Parameters
     ----------
-    truth : ImuTruth
     frame : str
         ``prior`` or ``accelerometer_triad``.
     lag_s : float
@@ -116,7 +114,6 @@ def accelerometer_frames(truth: ImuTruth, above_k: Floats) -> Floats:
 
     Parameters
     ----------
-    truth : ImuTruth
     above_k : ndarray, shape (k,)
         Temperatures of the sensors above T0 (K).
 

@@ -130,8 +130,6 @@ def turned_on(coefficients: Mapping[str, float], sigma: Mapping[str, float], see
         Of the unit (SI).
     sigma : mapping of str to float
         By group, such as ``gyro_bias``, how far each of its coefficients differs (SI).
-    seed : int
-        Of the power-on.
     """
     out = dict(coefficients)
     for group, size in sigma.items():

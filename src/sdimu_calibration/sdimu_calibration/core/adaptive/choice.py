@@ -40,7 +40,6 @@ class Menu:
         Mean rate.
     slow_rad_s : float
         A second rate, for what is to be told apart: functions of the rate differ between two.
-    acceleration_rad_s2 : float
     shortest_s, longest_s : float
         Stops.
     """
@@ -62,10 +61,6 @@ class Menu:
             Something is to be told apart.
         square : bool
             The test stands along the axes; between them it only goes back, or on.
-
-        Returns
-        -------
-        tuple of Turn
         """
         angles = (*(self.angles_rad if square else ()), *(self.oblique_rad if apart or not square else ()))
         rates = (self.rate_rad_s, self.slow_rad_s) if apart else (self.rate_rad_s,)
@@ -80,8 +75,6 @@ class Choice:
     ----------
     step : Step
         Turn and stop, for the table.
-    minutes : float
-        Of turn and stop.
     gain : float
         What it brings (nat).
     reason : str
@@ -117,8 +110,6 @@ class End:
 
     Attributes
     ----------
-    reason : str
-        In words.
     reached : bool
         All limits hold, and no class is open.
     """
@@ -151,8 +142,6 @@ def choose(
     ----------
     known : Knowledge
         At the last stop that was looked at.
-    goals : Goals
-    menu : Menu
     minutes_left : float
         No move is longer.
     possible : callable

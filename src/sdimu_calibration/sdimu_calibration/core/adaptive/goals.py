@@ -18,7 +18,6 @@ class Goals:
 
     Attributes
     ----------
-    name : str
     limits : mapping of str to float
         Largest sigma allowed, by effect (SI).
     minutes : float

@@ -62,7 +62,6 @@ class Knowledge:
 
     Attributes
     ----------
-    at : SoFar
     limited : tuple of str, length c
         Coefficients with a limit.
     ratio : ndarray, shape (c,)
@@ -73,8 +72,6 @@ class Knowledge:
         The class to be told apart; None where none is open.
     named : tuple of str
         Labels of everything that was found.
-    verdict : Verdict
-        Of the diagnosis.
     """
 
     at: SoFar
@@ -98,7 +95,6 @@ def knowledge(found: Diagnosis, goals: Goals) -> Knowledge:
     ----------
     found : Diagnosis
         Of what was recorded so far.
-    goals : Goals
     """
     alike, sizes, needed, place = _class(found)
     named = tuple(c.label for c in found.chosen)
@@ -116,8 +112,6 @@ def fitted(fit: Fit, goals: Goals, alike: Sequence[Effect] = (), named: tuple[st
 
     Parameters
     ----------
-    fit : Fit
-    goals : Goals
     alike : sequence of Effect
         Candidates that are estimated along in `Knowledge.at`.
     named : tuple of str
@@ -141,8 +135,6 @@ def ratios(at: SoFar, goals: Goals, covariance: Floats) -> Floats:
 
     Parameters
     ----------
-    at : SoFar
-    goals : Goals
     covariance : ndarray, shape (..., p, p)
         Of its parameters (SI).
 
@@ -161,10 +153,6 @@ def nearest_other(found: Diagnosis) -> float | None:
     """Difference of log Bayes factors between the first effect that was found and the next likely one.
 
     Time constants of the same effect are no other one.
-
-    Parameters
-    ----------
-    found : Diagnosis
 
     Returns
     -------

@@ -27,9 +27,6 @@ class Asked:
 
     Attributes
     ----------
-    goals : Goals
-    menu : Menu
-    table : RateTable
     angles : tuple of float
         Of its joints (rad).
     elapsed_s : float
@@ -84,9 +81,6 @@ def next_move(fit: Fit, diagnosis: LiveDiagnosis, about: Asked) -> Decision:
     ----------
     fit : Fit
         Of what was recorded so far.
-    diagnosis : LiveDiagnosis
-        About it.
-    about : Asked
     """
     left = about.goals.minutes - about.elapsed_s / 60.0
     searched = diagnosis.verdict != Verdict.CONSISTENT

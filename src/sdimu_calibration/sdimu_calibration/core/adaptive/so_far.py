@@ -46,8 +46,6 @@ class SoFar:
         Its sensor model has p parameters: those of the fit, then candidates that the data leave open.
     state : PassState
         Of the filter at the last epoch.
-    seen : Motion
-        Of the last cycles.
     temperature : TemperatureLog or None
         It stays as it was last.
     first : ndarray, shape (3, 3)
@@ -144,12 +142,10 @@ def ahead(at: SoFar, turn: Turn | None, dwell_s: float, acceleration_rad_s2: flo
 
     Parameters
     ----------
-    at : SoFar
     turn : Turn or None
         None stays where it is.
     dwell_s : float
         Longest stop after it.
-    acceleration_rad_s2 : float
     """
     setup, sensors = at.setup, at.setup.sensors
     turns = () if turn is None else (turn,)

@@ -58,8 +58,6 @@ def worth(known: Knowledge, goals: Goals, covariance: Floats, since: Floats) -> 
 
     Parameters
     ----------
-    known : Knowledge
-    goals : Goals
     covariance : ndarray, shape (k, p, p)
         After moves (SI).
     since : ndarray, shape (p, p)
@@ -79,7 +77,6 @@ def separation(known: Knowledge, one: OpenClass, covariance: Floats) -> Floats:
 
     Parameters
     ----------
-    known : Knowledge
     one : OpenClass
         With a look-alikes.
     covariance : ndarray, shape (k, p, p)

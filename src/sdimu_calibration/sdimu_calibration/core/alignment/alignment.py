@@ -110,10 +110,6 @@ def align(w_mean: Floats, f_mean: Floats, duration_s: float, site: Site, imu: Im
         An azimuth given there replaces gyrocompassing.
     imu : ImuSpecification
         Its priors give the sigmas.
-
-    Returns
-    -------
-    Alignment
     """
     norm = float(np.linalg.norm(f_mean))
     if not norm > 1.0:

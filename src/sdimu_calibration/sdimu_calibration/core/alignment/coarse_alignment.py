@@ -64,14 +64,8 @@ def coarse_start(prepared: PreparedData, setup: TestSetup, start: Alignment) -> 
 
     Parameters
     ----------
-    prepared : PreparedData
-    setup : TestSetup
     start : Alignment
         Returned unchanged for a test of fewer than three stops.
-
-    Returns
-    -------
-    StartPoint
     """
     names, prior = setup.sensors.names, setup.sensors.prior
     coefficients = np.zeros(len(prior))

@@ -49,8 +49,6 @@ class TestSetup:
     ----------
     site, imu, model : Site, ImuSpecification, Model
         The white noise of `imu` is that of means over `epoch_s`, quantisation included.
-    sensors : ImuModel
-    limits : RestLimits
     gravity : float
         At the site (m/s^2).
     epoch_s : float
@@ -84,15 +82,10 @@ class PreparedData:
 
     Attributes
     ----------
-    cycles : Cycles
-    epochs : Epochs
-    phases : Phases
     kind : ndarray of int, shape (e,)
         What each epoch measures (`measurement_kind`).
-    temperature : TemperatureLog or None
     bridges : Bridges
         What gaps in the data add to the noise.
-    faults : tuple of DataFault
     seconds : tuple of Epochs and Phases, or None
         Those of single seconds, where the epochs are longer only because the test is long.
     shaking : float or None
@@ -120,7 +113,6 @@ def set_up(site: Site, imu: ImuSpecification, model: Model, epoch_s: float | Non
 
     Parameters
     ----------
-    site, imu, model : Site, ImuSpecification, Model
     epoch_s : float, optional
         Length of an epoch at rest (s); by default what the quantisation of the IMU asks for.
     """
@@ -173,8 +165,6 @@ def reduce(recording: Recording, setup: TestSetup, screened: bool = True) -> Pre
 
     Parameters
     ----------
-    recording : Recording
-    setup : TestSetup
     screened : bool
         Take away samples that are no measurement; not for the perfect ones of `nominal`, which stand still at rest.
     """

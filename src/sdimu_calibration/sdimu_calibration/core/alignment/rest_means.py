@@ -74,14 +74,8 @@ def rest_means(prepared: PreparedData, where: Layout, model: ImuModel, values: F
     ----------
     prepared : PreparedData
         Of n cycles.
-    where : Layout
-    model : ImuModel
     values : ndarray, shape (n, m)
         Regressors of every cycle (SI).
-
-    Returns
-    -------
-    Rest
     """
     c = prepared.cycles
     integrals = np.hstack([c.dt[:, None], c.alpha, c.upsilon, values * c.dt[:, None]])

@@ -18,7 +18,6 @@ def without(prepared: PreparedData, stops: Sequence[int], spans: Sequence[tuple[
 
     Parameters
     ----------
-    prepared : PreparedData
     stops : sequence of int
         Numbers of stops.
     spans : sequence of (float, float)

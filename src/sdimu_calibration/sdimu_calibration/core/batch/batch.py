@@ -78,10 +78,8 @@ class BatchSolution:
         Attitude of every stop.
     chi2 : float
         Sum of squares of all whitened rows, priors too.
-    dof : int
     log_evidence : float
         Logarithm of the probability density of the data.
-    steps : int
     """
 
     coefficients: Floats

@@ -44,7 +44,6 @@ def rest_weights(setup: TestSetup, seconds: Floats) -> Floats:
 
     Parameters
     ----------
-    setup : TestSetup
     seconds : ndarray, shape (b,)
         Length of each block (s).
 
@@ -65,7 +64,6 @@ def rest_residual(setup: TestSetup, mean: Floats, slope: Floats, C_nb: Floats) -
 
     Parameters
     ----------
-    setup : TestSetup
     mean : ndarray, shape (b, 6)
         Rate (rad/s) and specific force (m/s^2).
     slope : ndarray, shape (b, 6, 6)
@@ -88,7 +86,6 @@ def still(setup: TestSetup, velocity: Floats, position: Floats, p: int) -> tuple
 
     Parameters
     ----------
-    setup : TestSetup
     velocity, position : ndarray, shape (3,)
         Of the stop (m/s, m).
     p : int
@@ -110,7 +107,6 @@ def initial(start: Alignment, C_nb: Floats, p: int) -> tuple[Floats, Floats, Flo
 
     Parameters
     ----------
-    start : Alignment
     C_nb : ndarray, shape (3, 3)
         Attitude at the first stop.
     p : int
@@ -133,9 +129,6 @@ def step_rows(
 
     Parameters
     ----------
-    gone : Preintegration
-    point : LinearisationPoint
-    k : int
     resting : float
         Length of stop k (s); its unknowns are those at its start.
     prior : ndarray, shape (p,)

@@ -39,8 +39,6 @@ class ClassicalSolution:
     ----------
     values, covariance : ndarray, shapes (p,) and (p, p)
         SI, in the axes of the table.
-    chi2 : float
-    dof : int
     C_start : ndarray, shape (3, 3)
         Attitude of the platform at the start (table axes to n).
     """
@@ -59,7 +57,6 @@ def solve_classical(
 
     Parameters
     ----------
-    prepared : PreparedData
     setup : TestSetup
         Its noise weighs the means; its priors are not used.
     table : TableLog or None
@@ -87,7 +84,6 @@ def table_attitude(log: TableLog, t: Floats, gimbals: tuple[str, str, str]) -> F
 
     Parameters
     ----------
-    log : TableLog
     t : ndarray, shape (n,)
         Times (s).
     gimbals : tuple of str

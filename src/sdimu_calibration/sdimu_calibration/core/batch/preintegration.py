@@ -99,7 +99,6 @@ def preintegrate(
 
     Parameters
     ----------
-    prepared : PreparedData
     rows : slice
         Cycles of the motion.
     setup : TestSetup
@@ -112,10 +111,6 @@ def preintegrate(
         Coefficients for which the samples are corrected.
     C_nb : ndarray, shape (3, 3)
         Attitude at the start.
-
-    Returns
-    -------
-    Preintegration
     """
     model, latitude, height = setup.sensors, setup.site.latitude_rad, setup.site.height_m
     gravity_excess = setup.gravity - float(earth.normal_gravity(latitude, height))

@@ -72,7 +72,6 @@ class Compensator:
         White-noise power of each channel (SI^2/Hz).
     residue : ndarray, shape (6,)
         Variance that quantisation adds to the integral of a sample (SI^2 s^2): twice the square of the residue.
-    body_frame : str
     left_out : tuple of str
         Effects that are not compensated, each with its reason.
     start_temperature : float or None
@@ -134,13 +133,8 @@ def resolved(calibration: Calibration, own: Sequence[Effect] = ()) -> tuple[Effe
 
     Parameters
     ----------
-    calibration : Calibration
     own : sequence of Effect
         Effects that are in no catalogue, such as those read from files.
-
-    Returns
-    -------
-    tuple of Effect
     """
     given = {effect.key: effect for effect in own}
     try:
@@ -170,7 +164,6 @@ def compensator(
 
     Parameters
     ----------
-    calibration : Calibration
     imu : ImuSpecification
         Its white noise goes into the covariances.
     own : sequence of Effect
@@ -182,10 +175,6 @@ def compensator(
     start_temperature : float, optional
         Temperature from which the coefficients count (deg C), where the result does not state it: that at the start of
         the calibrated recording.
-
-    Returns
-    -------
-    Compensator
     """
     effects = resolved(calibration, own)
     start = start_temperature if start_temperature is not None else calibration.data.get(START_TEMPERATURE)
@@ -267,7 +256,6 @@ def slope_at_nought(model: ImuModel, coefficients: Floats) -> Floats:
 
     Parameters
     ----------
-    model : ImuModel
     coefficients : ndarray, shape (p,)
         SI.
 
@@ -323,7 +311,6 @@ def compensate(
 
     Parameters
     ----------
-    using : Compensator
     t : ndarray, shape (n,)
         End of each sample's interval (s since the start of the recording).
     interval_s : float
@@ -332,10 +319,6 @@ def compensate(
         As measured (rad/s, m/s^2).
     heat : (ndarray, ndarray), shape (n,) each, optional
         `heat_since` at the middle of each sample.
-
-    Returns
-    -------
-    Compensated
     """
     n = len(t)
     zero = np.zeros(n)

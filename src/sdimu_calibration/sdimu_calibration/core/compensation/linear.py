@@ -82,7 +82,6 @@ class LinearModel(Part):
 
     Attributes
     ----------
-    body_frame : str
     left : tuple of str
         Coefficients of effects that are not affine.
     parts : mapping of Factor to Part
@@ -138,13 +137,8 @@ def linear_model(calibration: Calibration, own: Sequence[Effect] = ()) -> Linear
 
     Parameters
     ----------
-    calibration : Calibration
     own : sequence of Effect
         Effects of the result that are in no catalogue.
-
-    Returns
-    -------
-    LinearModel
     """
     sums = {_CONSTANT: Part(np.eye(6), np.zeros(6))}
     left: list[str] = []

@@ -35,16 +35,7 @@ _SPAN_S = 20_000.0
 
 
 def reads(effect: Effect) -> frozenset[str]:
-    """Names of the fields of `Motion` on which the regressors of an effect depend.
-
-    Parameters
-    ----------
-    effect : Effect
-
-    Returns
-    -------
-    frozenset of str
-    """
+    """Names of the fields of `Motion` on which the regressors of an effect depend."""
     rng = np.random.default_rng(3)
     one, other = any_motion(rng), any_motion(rng)
     other = replace(other, t=0.6 * one.t + 7.0, rest=~one.rest, past=_AnyMemory(-one.past["", 0.0]))
@@ -114,10 +105,6 @@ def samples_motion(t: Floats, dt: Floats, w: Floats, f: Floats, heat: Floats, he
         Body rate (rad/s) and specific force (m/s^2).
     heat, heat_rate : ndarray, shape (n,)
         Temperature above the one from which the coefficients count (K) and its rate (K/s).
-
-    Returns
-    -------
-    Motion
     """
     n = len(t)
     none = np.broadcast_to(np.zeros(3), (n, 3))

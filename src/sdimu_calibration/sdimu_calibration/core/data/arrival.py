@@ -95,8 +95,6 @@ class RawTest:
         header.stamp of the samples (ns).
     omega_ib_b, f_ib_b : ndarray, shape (n, 3)
         Body rate and specific force, in the unit and sign of the messages.
-    status : RawStatus or None
-    temperature : RawTemperature or None
     where : str
         File and topic of the IMU, for errors.
     status_topic, temperature_topic : str
@@ -118,7 +116,6 @@ def until(raw: RawTest, ns: int) -> RawTest:
 
     Parameters
     ----------
-    raw : RawTest
     ns : int
         The last stamp that counts (ns).
     """

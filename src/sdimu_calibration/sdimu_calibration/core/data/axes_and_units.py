@@ -108,11 +108,6 @@ def recognise(t: Floats, w: Floats, f: Floats, stated: Stated) -> Reading:
         Seconds, ascending.
     w, f : ndarray, shape (n, 3)
         Body rate and specific force, as recorded.
-    stated : Stated
-
-    Returns
-    -------
-    Reading
     """
     accel, notes = _accel_unit(f, stated)
     gyro, more, turned_enough = _gyro_reading(t, w, f, stated)
@@ -213,7 +208,6 @@ class Turns:
 
     Attributes
     ----------
-    windows : Windows
     chosen : ndarray of int, shape (k,)
     C : dict of float to ndarray, shape (k, 3, 3)
         By factor.

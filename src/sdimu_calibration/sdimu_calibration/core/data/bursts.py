@@ -35,8 +35,6 @@ class Bursts:
     ----------
     ns : ndarray of int64, shape (n,)
         Even stamps by the count of the samples (ns).
-    rate_hz : float
-        Of the samples.
     wait_s : float
         Usual wait for a packet (s).
     """

@@ -55,10 +55,6 @@ def find_steps(ns: Ints, omega: Floats, force: Floats) -> tuple[Step, ...]:
         Stamps (ns) in the order of arrival.
     omega, force : ndarray, shape (n, 3)
         As recorded: a sample that was sent twice is no step.
-
-    Returns
-    -------
-    tuple of Step
     """
     if len(ns) <= max(NOMINAL_FROM, 2 * _FEWEST) or nominal_interval_ns(ns) <= 0:
         return ()
@@ -92,7 +88,6 @@ def undone(ns: Ints, samples_ns: Ints, steps: tuple[Step, ...]) -> Ints:
         Stamps of any topic (ns), as they came.
     samples_ns : ndarray of int, shape (n,)
         Those of the samples (ns), of which the rows of the steps count; for them the rows decide, not the stamps.
-    steps : tuple of Step
 
     Returns
     -------
@@ -110,7 +105,6 @@ def as_recorded(steps: tuple[Step, ...], mended_ns: Ints, start_ns: int) -> tupl
 
     Parameters
     ----------
-    steps : tuple of Step
     mended_ns : ndarray of int, shape (n,)
         Stamps of the samples without them (ns), in the order of arrival.
     start_ns : int

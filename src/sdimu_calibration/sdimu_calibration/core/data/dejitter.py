@@ -44,10 +44,6 @@ _DRIFT_S = 20.0
 def dejittered(recording: Recording) -> Recording:
     """Replace jittering stamps by even ones, with a note.
 
-    Parameters
-    ----------
-    recording : Recording
-
     Returns
     -------
     Recording

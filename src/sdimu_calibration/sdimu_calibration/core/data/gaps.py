@@ -102,7 +102,6 @@ def bridges(
 
     Parameters
     ----------
-    cycles, epochs : Cycles, Epochs
     dwell : ndarray of bool, shape (e,)
     nominal_s : float
         Sample interval (s).
@@ -148,10 +147,7 @@ def stepped(
 
     Parameters
     ----------
-    found : Bridges
-    cycles, epochs : Cycles, Epochs
     dwell : ndarray of bool, shape (e,)
-    steps : tuple of ClockStep
     gravity : float
         m/s^2.
     """
@@ -176,8 +172,6 @@ def weighed(found: Bridges, epochs: Epochs, t: Floats, excess: Floats) -> Bridge
 
     Parameters
     ----------
-    found : Bridges
-    epochs : Epochs
     t : ndarray, shape (k,)
         Times of the noise (s), as `sample_screening.wild` gives them.
     excess : ndarray, shape (k,)
@@ -210,9 +204,6 @@ def judge(
 
     Parameters
     ----------
-    cycles, epochs, phases : Cycles, Epochs, Phases
-    nominal_s : float
-    found : Bridges
     noise : tuple of float
         White noise densities of gyro (rad/s/sqrt(Hz)) and accelerometer (m/s^2/sqrt(Hz)).
     unsound : tuple of DataFault

@@ -136,10 +136,6 @@ def assumption(name: str, site: Site, seen: EarthRate | None, where: str) -> str
 
     Parameters
     ----------
-    name : str
-        Of the site.
-    site : Site
-    seen : EarthRate or None
     where : str
         File or topic, for errors.
     """

@@ -152,9 +152,6 @@ def classify(
 
     Parameters
     ----------
-    epochs : Epochs
-    log : PhaseLog or None
-    limits : RestLimits
     gravity : float
         At the site (m/s^2).
     settle_s : float
@@ -196,9 +193,6 @@ def without_early_motion(epochs: Epochs, log: PhaseLog | None, phases: Phases, g
 
     Parameters
     ----------
-    epochs : Epochs
-    log : PhaseLog or None
-    phases : Phases
     gyro_white_noise : float
         Of the specification (rad/s/sqrt(Hz)); the recording's own is taken where it is larger.
     """
@@ -254,9 +248,6 @@ def contradictions(epochs: Epochs, phases: Phases, log: PhaseLog | None, feels_t
 
     Parameters
     ----------
-    epochs, phases : Epochs, Phases
-    log : PhaseLog or None
-        The status.
     feels_turns : bool
         The specification distinguishes a slow turn from rest; without it rest is no statement against the status.
     """

@@ -37,7 +37,6 @@ def dwells_of(phase: PhaseLog | None, until_s: float) -> tuple[tuple[float, floa
 
     Parameters
     ----------
-    phase : PhaseLog or None
     until_s : float
         End of the recording (s).
     """
@@ -56,7 +55,6 @@ def stated_rests(recording: Recording, spans: Spans, by_user: bool = True) -> St
 
     Parameters
     ----------
-    recording : Recording
     spans : sequence of (float, float)
         Begin and end (s after the first sample), one a rest.
     by_user : bool
@@ -119,8 +117,6 @@ def without_spans(recording: Recording, rests: StaticIntervals, spans: Spans) ->
 
     Parameters
     ----------
-    recording : Recording
-    rests : StaticIntervals
     spans : sequence of (float, float)
         s after the first sample.
     """

@@ -81,7 +81,6 @@ def detect_static(recording: Recording, scatter: float = SCATTER) -> StaticInter
 
     Parameters
     ----------
-    recording : Recording
     scatter : float
         Scatter (variance) of a window at rest at most, as a multiple of that of the quietest windows.
     """
@@ -102,7 +101,6 @@ def noise_at(recording: Recording, first: Ints, last: Ints) -> tuple[float, floa
 
     Parameters
     ----------
-    recording : Recording
     first, last : ndarray of int, shape (k,)
         Samples ``first:last`` of each rest.
     """
@@ -119,7 +117,6 @@ def _without_ramps(recording: Recording, first: Ints, last: Ints, width: int) ->
 
     Parameters
     ----------
-    recording : Recording
     first, last : ndarray of int, shape (k,)
         Samples ``first:last`` of each rest.
     width : int
@@ -153,7 +150,6 @@ def joined(recording: Recording, first: Ints, last: Ints, longest_s: float) -> t
 
     Parameters
     ----------
-    recording : Recording
     first, last : ndarray of int, shape (k,)
         Samples ``first:last`` of each piece.
     longest_s : float
@@ -212,7 +208,6 @@ def still_samples(recording: Recording, width: int, turning: float, hole: float,
 
     Parameters
     ----------
-    recording : Recording
     width : int
         Samples of the window about each: it rests when both triads scatter as they do in the quietest windows, and the
         mean rate is that of all windows at rest.

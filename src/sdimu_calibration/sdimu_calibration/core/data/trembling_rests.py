@@ -50,10 +50,6 @@ class Sway(NamedTuple):
 def relaxed(recording: Recording) -> tuple[StaticIntervals, ...]:
     """Find the rests at every step, those of lower steps among those of higher ones; equal steps once.
 
-    Parameters
-    ----------
-    recording : Recording
-
     Returns
     -------
     tuple of StaticIntervals
@@ -96,7 +92,6 @@ def sway(recording: Recording, rests: StaticIntervals) -> Sway:
 
     Parameters
     ----------
-    recording : Recording
     rests : StaticIntervals
         k rests.
     """

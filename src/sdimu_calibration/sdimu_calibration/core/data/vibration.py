@@ -44,11 +44,8 @@ def with_vibration(
 
     Parameters
     ----------
-    cycles : Cycles
-    epochs : Epochs
     log : PhaseLog or None
         Without a status nobody says that a shaking IMU rests.
-    limits : RestLimits
     gravity : float
         At the site (m/s^2).
     density : float or None
@@ -112,8 +109,6 @@ def scatter_of_seconds(epochs: Epochs, phases: Phases, gyro_white_noise: float) 
 
     Parameters
     ----------
-    epochs : Epochs
-    phases : Phases
     gyro_white_noise : float
         Density (rad/s/sqrt(Hz)), which is taken off.
 

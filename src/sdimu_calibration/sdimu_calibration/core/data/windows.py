@@ -46,8 +46,6 @@ class Windows:
         First sample of each.
     length : int
         Samples of a window.
-    interval_s : float
-        Of the samples.
     up_first, up_last : ndarray, shape (k, 3)
         Direction of the measured force at the edges, unit vectors.
     w_mean, f_mean : ndarray, shape (k, 3)
@@ -240,7 +238,6 @@ def turned(w: Floats, windows: Windows, chosen: Ints, factor: float) -> Floats:
     ----------
     w : ndarray, shape (n, 3)
         As in the recording; `Windows.rate_offset` is taken off.
-    windows : Windows
     chosen : ndarray of int, shape (k,)
     factor : float
         rad/s of one unit of `w`, with its sign.

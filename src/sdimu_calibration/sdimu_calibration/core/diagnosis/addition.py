@@ -75,9 +75,6 @@ def addition(fit: Fit, evidence: LinearEvidence, columns: Sequence[int], allowed
 
     Parameters
     ----------
-    fit : Fit
-    evidence : LinearEvidence
-        About the fit.
     columns : sequence of int, length k
         The candidates.
     allowed : ndarray of int, shape (a,)

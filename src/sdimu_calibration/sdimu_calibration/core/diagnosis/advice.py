@@ -34,8 +34,6 @@ class Untestable:
     ----------
     reason : str
         Why not, and what would show them.
-    labels : tuple of str
-        Of candidates.
     """
 
     reason: str

@@ -58,7 +58,6 @@ def alarms(
         Measured against `stated`.
     base : Fit
         With the model as given, in the noise that the recording shows.
-    stated : ImuSpecification
     findings : sequence of Finding
         Of the screen of the data.
     """
@@ -88,7 +87,6 @@ def misfit(final: Calibration, consistency: Consistency, stated: ImuSpecificatio
 
     Parameters
     ----------
-    final : Calibration
     consistency : Consistency
         Measured against `stated`.
     stated, taken : ImuSpecification

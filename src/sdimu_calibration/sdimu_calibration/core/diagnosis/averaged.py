@@ -18,7 +18,6 @@ def over_all_models(base: Fit, done: Round) -> Fit:
     ----------
     base : Fit
         With the model as given.
-    done : Round
     """
     found = done.found.posterior
     if found is None:

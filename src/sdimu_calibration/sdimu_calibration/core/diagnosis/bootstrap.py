@@ -25,7 +25,6 @@ class Null:
 
     Attributes
     ----------
-    draws : int
     false_finds : int
         Draws in which the search told an effect as found.
     largest : ndarray, shape (draws,)
@@ -64,8 +63,6 @@ def bootstrap(d: Diagnosis, draws: int, seed: int = 1, progress: Progress | None
         Its evidence says how effects and noise show in the test; its residuals are not used.
     draws : int
         How many times the search is repeated.
-    seed : int
-        Of the random numbers.
     progress : callable, optional
         Called with a word and the fraction done.
     """

@@ -24,7 +24,6 @@ class CoefficientShift:
     ----------
     other : str
         Label of the other member.
-    coefficient : str
     sigmas : float
         Estimate with the other less estimate with the one that was named, in sigmas of the latter.
     """
@@ -43,7 +42,6 @@ def coefficient_shifts(
 
     Parameters
     ----------
-    problem : Problem
     chosen : sequence of int
         Columns of everything that was found.
     column : int

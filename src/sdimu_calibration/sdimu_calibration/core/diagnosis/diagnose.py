@@ -67,23 +67,16 @@ class Diagnosis:
         Of a `survey`: consistent or misfit.
     sentence : str
         The verdict for people.
-    adequate : bool
     p_value : float
         Probability that a right model in white noise looks like this, from scan, free inputs and NIS together.
-    findings : tuple of Finding
-        Of the data screen.
     noise : tuple of str
         What is wrong with the noise model, one line each.
     consistency : Consistency
         Of the model as given.
     fit, extended : Fit
         With the model as given, and with what was found added; the latter with doubt about its model.
-    before, after : Calibration
-        Their results.
     found : Search
         Of the catalogue, or of own equations where those explain it.
-    evidence : LinearEvidence
-    free_inputs_before, free_inputs_after : FreeInputTest
     free : ndarray of int, shape (f,)
         Columns of the free inputs in `evidence`.
     own : bool

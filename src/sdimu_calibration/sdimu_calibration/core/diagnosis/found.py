@@ -29,13 +29,10 @@ class Found:
 
     Attributes
     ----------
-    candidate : Candidate
     value, sigma : float
         SI; of the refit where the calibration was repeated with it, else with all others of the search in.
     z : float
         Score when those found before it are in the model and those after it are not.
-    log_likelihood_gain, log_bayes_factor : float
-        Likewise.
     p_value_adjusted : float
         Of `z`, times the number of candidates that were looked at.
     explained : float
@@ -82,10 +79,6 @@ class Found:
 
 def found_effects(d: Diagnosis) -> tuple[Found, ...]:
     """Take the search's result apart, in its order.
-
-    Parameters
-    ----------
-    d : Diagnosis
 
     Returns
     -------
@@ -195,12 +188,10 @@ class DetectableSize:
 
     Attributes
     ----------
-    label, family, unit, display_unit : str
     smallest : float
         Size found with 80 % power at the threshold of a whole scan (SI); inf when the model takes all of it.
     retention : float
         Share of its signature that the model's coefficients leave.
-    testable : bool
     partners : tuple of str
         Coefficients of the model that take the rest; given when it is not testable.
     """

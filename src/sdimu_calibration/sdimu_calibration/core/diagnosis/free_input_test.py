@@ -23,8 +23,6 @@ class FreeInputTest:
     ----------
     chi2 : float
         Fall of chi-square when every segment has its own constant sensor error.
-    dof : int
-    p_value : float
     estimate : ndarray, shape (f,)
         The missing sensor error of each segment and sensor that fits best (minimum norm), SI.
     z : ndarray, shape (f,)

@@ -57,7 +57,6 @@ class Ground:
     ----------
     fit : Fit
         The model as given with `tried`.
-    tried : tuple of Candidate
     evidence : LinearEvidence
         `tried` is among its candidates.
     free : ndarray of int, shape (f,)
@@ -80,10 +79,8 @@ def fresh_ground(request: Request, fit: Fit, tried: Sequence[Candidate], own: bo
 
     Parameters
     ----------
-    request : Request
     fit : Fit
         The model as given with `tried`.
-    tried : sequence of Candidate
     own : bool
         Also equations that are not in the catalogue.
     """
@@ -137,8 +134,6 @@ def candidates(request: Request, tried: Sequence[Candidate], own: bool) -> list[
 
     Parameters
     ----------
-    request : Request
-    tried : sequence of Candidate
     own : bool
         Equations and sines of time too.
     """

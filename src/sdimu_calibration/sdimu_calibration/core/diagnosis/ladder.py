@@ -33,7 +33,6 @@ class Rung:
     ----------
     added : str
         What this model has beyond the one before; empty for the first.
-    accepted : bool
     reason : str
         Why it is refused; empty when accepted.
     log_likelihood, log_bayes_factor, nis_mean, held_out_rms : float
@@ -67,8 +66,6 @@ def ladder(fit: Fit, final: Fit, done: Round, progress: Progress) -> tuple[Rung,
     ----------
     fit, final : Fit
         With the model as given, and with everything that was chosen.
-    done : Round
-    progress : callable
     """
     effects = [c.effect for c in done.chosen]
     fits = [fit]

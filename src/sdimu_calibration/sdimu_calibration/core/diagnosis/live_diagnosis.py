@@ -37,7 +37,6 @@ class Ranked:
 
     Attributes
     ----------
-    label : str
     z : float
         Estimate over sigma.
     estimate, sigma : float
@@ -137,7 +136,6 @@ def so_far(
     ----------
     test : PreparedTest
         The data up to the end of a stop.
-    model : Model
     added : sequence of str
         What `model` has beyond the model that the test began with.
     ladder : sequence of ModelError

@@ -22,11 +22,6 @@ hour stays below 3.3."""
 def in_measured_noise(fit: Fit, progress: Progress = silent) -> tuple[Fit, Consistency, tuple[str, ...]]:
     """Fit in white noise, of the size that the recording shows where the IMU file is wrong about it.
 
-    Parameters
-    ----------
-    fit : Fit
-    progress : callable
-
     Returns
     -------
     fit : Fit

@@ -25,13 +25,10 @@ class TurnSeen:
 
     Attributes
     ----------
-    after_stop : int
     axis : int or None
         Body axis, 0-2; None when it turned about several.
     angle, rate : float
         Signed angle (rad); rate in the middle of the turn (rad/s).
-    minutes : float
-        Of the turn.
     """
 
     after_stop: int
@@ -47,7 +44,6 @@ class PlanSeen:
 
     Attributes
     ----------
-    turns : tuple of TurnSeen
     oblique : int
         Stops at which gravity lies between the body axes.
     dwell_minutes : float

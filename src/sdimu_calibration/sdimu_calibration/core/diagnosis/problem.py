@@ -96,7 +96,6 @@ def look_alikes(problem: Problem[E], chosen: Sequence[int], column: int, allowed
 
     Parameters
     ----------
-    problem : Problem
     chosen : sequence of int
         Columns of everything that was chosen.
     column : int

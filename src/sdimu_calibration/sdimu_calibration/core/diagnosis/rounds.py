@@ -46,10 +46,8 @@ class Round:
     ----------
     fit : Fit
         About which this round is linear: the model with what the last round chose.
-    evidence : LinearEvidence
     free : ndarray of int, shape (f,)
         Columns of the free inputs in `evidence`.
-    found : Search
     left_before, left_after : FreeInputTest
         What is left with nothing added, and with `found` added.
     """
@@ -146,8 +144,6 @@ def run_round(request: Request, ground: Ground, own: bool, limits: dict[bool, fl
 
     Parameters
     ----------
-    request : Request
-    ground : Ground
     own : bool
         Whether equations that are not in the catalogue are among its candidates.
     limits : dict of bool to float
@@ -182,7 +178,6 @@ def left(evidence: LinearEvidence, chosen: Ints, free: Ints) -> FreeInputTest:
 
     Parameters
     ----------
-    evidence : LinearEvidence
     chosen : ndarray of int, shape (k,)
         Columns of the candidates.
     free : ndarray of int, shape (f,)

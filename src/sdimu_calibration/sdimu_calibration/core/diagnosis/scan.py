@@ -56,7 +56,6 @@ def scan(full: Information, known: Ints, weight: Floats) -> Scan:
 
     Parameters
     ----------
-    full : Information
     known : ndarray of int, shape (k,)
         Model and effects already added.
     weight : ndarray, shape (k,)
@@ -81,7 +80,6 @@ def threshold(full: Information, known: Ints, weight: Floats, tested: Ints, alph
 
     Parameters
     ----------
-    full : Information
     known : ndarray of int, shape (k,)
         Model and effects already added.
     weight : ndarray, shape (k,)
@@ -90,8 +88,6 @@ def threshold(full: Information, known: Ints, weight: Floats, tested: Ints, alph
         Columns that are tested.
     alpha : float
         False-alarm probability of the whole scan.
-    seed : int
-        Of the random numbers.
     """
     if not len(tested):
         return float("inf")

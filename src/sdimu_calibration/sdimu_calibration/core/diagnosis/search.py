@@ -43,8 +43,6 @@ class Search(Generic[E]):
         Columns of `evidence` that are told.
     first : Scan
         Before anything was added, of all columns.
-    threshold : float
-        Of the first scan.
     evidence : LinearEvidence
         With the finer variants that were chosen behind the candidates it had, in the noise that was learned.
     noise : tuple of NoiseTerm
@@ -88,8 +86,6 @@ def search(
         In white noise.
     allowed : ndarray of int, shape (a,)
         Columns that may be in a model.
-    wander : Wander or None
-        Of the same test.
     alpha : float
         False-alarm probability of the threshold of a scan, which is shown.
     limit : float, optional

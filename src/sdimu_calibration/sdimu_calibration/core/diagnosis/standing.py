@@ -20,7 +20,6 @@ def standing(d: Diagnosis, found: Sequence[Found]) -> Standing:
 
     Parameters
     ----------
-    d : Diagnosis
     found : sequence of Found
         Its found effects.
     """

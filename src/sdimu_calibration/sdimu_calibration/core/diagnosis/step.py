@@ -19,13 +19,10 @@ class Step:
 
     Attributes
     ----------
-    label, family, unit, display_unit : str
     z, threshold : float
         Score beside those before it, and what noise reaches.
     estimate, sigma : float
         SI, with everything chosen up to this step.
-    log_likelihood_gain, log_bayes_factor : float
-    held_out_before, held_out_after : HeldOut
     held_out_gain, held_out_error : float
         Log score over all stops, and its standard error.
     alike : tuple of str
@@ -66,13 +63,10 @@ def step_of(
 
     Parameters
     ----------
-    problem : Problem
     scanned : Scan
         With the choice in the model, the column not.
     chosen : sequence of int
         Columns of the choice.
-    best : int
-        The column.
     limit : float
         Threshold of the scan.
     before, after : HeldOut

@@ -19,7 +19,6 @@ class DiagnosisSummary:
 
     Attributes
     ----------
-    diagnosis : Diagnosis
     found : tuple of Found
         Chosen effects; when the verdict is ``unexplained`` they are what was tried, not what was found.
     reached : tuple of DetectableSize
@@ -28,7 +27,6 @@ class DiagnosisSummary:
         Turns and stops of the table; None for a handheld run.
     untestable : tuple of Untestable
         What could not have been seen, by reason.
-    advice : tuple of Advice
     """
 
     diagnosis: Diagnosis

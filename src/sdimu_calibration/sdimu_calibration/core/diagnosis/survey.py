@@ -22,9 +22,6 @@ def survey(fit: Fit, result: Calibration, with_candidates: bool = True) -> Diagn
 
     Parameters
     ----------
-    fit : Fit
-    result : Calibration
-        Of the fit.
     with_candidates : bool
         Without them only the residuals are worked out.
     """

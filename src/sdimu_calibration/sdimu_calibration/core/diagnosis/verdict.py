@@ -45,13 +45,8 @@ class Facts:
 
     Attributes
     ----------
-    found : Search
-    chosen : tuple of Candidate
     alike : tuple of str
         What the data cannot tell from the first of them.
-    findings : tuple of Finding
-    noise : tuple of str
-    own, unexplained : bool
     """
 
     found: Search[LinearEvidence]

@@ -28,7 +28,6 @@ def without_memory(measured: Consistency, terms: Sequence[NoiseTerm], imu: ImuSp
 
     Parameters
     ----------
-    measured : Consistency
     terms : sequence of NoiseTerm
         Noise with a memory that was learned.
     imu : ImuSpecification

@@ -108,8 +108,6 @@ def drifting(sensors: ImuModel, imu: ImuSpecification, gravity: float, duration:
 
     Parameters
     ----------
-    sensors : ImuModel
-    imu : ImuSpecification
     gravity : float
         m/s^2.
     duration : float
@@ -129,8 +127,6 @@ def accelerometer_frame_model(
 
     Parameters
     ----------
-    asked : ImuModel
-    imu : ImuSpecification
     more : sequence of Effect
         What the estimator estimates along, behind all others, and does not report.
     """

@@ -96,8 +96,6 @@ class Effect:
         Standard term.
     equation : str
         Plain text, dw = measured minus true body rate, df likewise specific force.
-    parameters : tuple of Parameter
-    terms : tuple of Term
     regressors : callable
         ``Motion -> ndarray (n, len(terms))``, in the order of `terms`; SI per SI of the parameter.
     prior : mapping of str to float

@@ -23,7 +23,6 @@ def error_slope(model: ImuModel, seen: Motion, rows: slice | Ints, coefficients:
 
     Parameters
     ----------
-    model : ImuModel
     seen : Motion
         n cycles.
     rows : slice or ndarray of int, shape (r,)

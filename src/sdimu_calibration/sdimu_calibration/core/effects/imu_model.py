@@ -26,7 +26,6 @@ class ImuModel:
 
     Attributes
     ----------
-    effects : tuple of Effect
     parameters : tuple of Parameter, length p
     channel, parameter : ndarray of int, shape (m,)
         Sensor axis (0-2 gyro, 3-5 accelerometer) and state of each regressor column.
@@ -175,13 +174,7 @@ def build(effects: Sequence[str | Effect], imu: ImuSpecification) -> ImuModel:
 
 
 def restate(sensors: ImuModel, priors: Sequence[StatedPrior]) -> ImuModel:
-    """Take the priors that a model states of single coefficients.
-
-    Parameters
-    ----------
-    sensors : ImuModel
-    priors : sequence of StatedPrior
-    """
+    """Take the priors that a model states of single coefficients."""
     prior, mean, restated = sensors.prior.copy(), sensors.mean.copy(), sensors.restated.copy()
     for one in priors:
         if one.name not in sensors.names:
@@ -204,7 +197,6 @@ def with_references(sensors: ImuModel, references: Sequence[tuple[Effect, float]
 
     Parameters
     ----------
-    sensors : ImuModel
     references : sequence of (Effect, float)
         Of one parameter each, with the sigma that is stated of it (SI); those that the model has are passed over.
     """

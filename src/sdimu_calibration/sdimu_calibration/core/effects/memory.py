@@ -17,7 +17,6 @@ def low_pass(motion: Motion, tau: float) -> Floats:
 
     Parameters
     ----------
-    motion : Motion
     tau : float
         s.
 
@@ -39,7 +38,6 @@ def play(motion: Motion, band: float) -> Floats:
 
     Parameters
     ----------
-    motion : Motion
     band : float
         g.
 

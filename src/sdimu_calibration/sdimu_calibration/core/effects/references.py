@@ -134,10 +134,6 @@ def told_of(site: Site | None, names: Sequence[str]) -> tuple[Reference, ...]:
 def stated_references(site: Site) -> tuple[tuple[Effect, float], ...]:
     """Make the references of a site that are not taken at their word.
 
-    Parameters
-    ----------
-    site : Site
-
     Returns
     -------
     tuple of (Effect, float)
@@ -151,10 +147,6 @@ def stated_references(site: Site) -> tuple[tuple[Effect, float], ...]:
 
 def stated_gravity(site: Site | None) -> tuple[tuple[Effect, float], ...]:
     """Make the reference of a run by hand, where latitude shows in nothing but gravity and the Earth's rate.
-
-    Parameters
-    ----------
-    site : Site or None
 
     Returns
     -------

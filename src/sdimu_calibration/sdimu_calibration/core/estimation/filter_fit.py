@@ -33,12 +33,7 @@ _LOST = (
 
 @dataclass(frozen=True)
 class FilterFit(NavigationFit):
-    """A fit by passes of the navigation filter.
-
-    Attributes
-    ----------
-    solution : Solution
-    """
+    """A fit by passes of the navigation filter."""
 
     solution: Solution
     estimator = "filter"
@@ -80,33 +75,11 @@ class FilterFit(NavigationFit):
         return self.reported_covariance(self.settled_covariance)
 
     def reported_values(self, settled: Floats) -> Floats:
-        """Bring coefficients into `body_frame`.
-
-        Parameters
-        ----------
-        settled : ndarray, shape (q,)
-            In the order of the coefficients of `evidence` (SI).
-
-        Returns
-        -------
-        ndarray, shape (p,)
-            In the order of `names` (SI).
-        """
+        """Bring coefficients into `body_frame`."""
         return body_frame.values_in_frame(self.names, settled[: len(self.names)], self.body_frame)
 
     def reported_covariance(self, settled: Floats) -> Floats:
-        """Bring a covariance of coefficients into `body_frame`.
-
-        Parameters
-        ----------
-        settled : ndarray, shape (q, q)
-            Of the coefficients of `evidence` (SI).
-
-        Returns
-        -------
-        ndarray, shape (p, p)
-            Of the coefficients of `names` (SI).
-        """
+        """Bring a covariance of coefficients into `body_frame`."""
         J, p = body_frame.frame_jacobian(self.names, self.body_frame), len(self.names)
         return np.asarray(J @ settled[:p, :p] @ J.T)
 
@@ -116,54 +89,25 @@ class FilterFit(NavigationFit):
         return known_pass(self.prepared, self.setup, self.last)
 
     def added_columns(self, count: int) -> Ints:
-        """Columns in `evidence` of the last `count` parameters of the model.
-
-        Returns
-        -------
-        ndarray of int, shape (count,)
-        """
+        """Columns in `evidence` of the last `count` parameters of the model."""
         return np.arange(len(self.names) - count, len(self.names))
 
     def run_kinds(self, kind: Ints) -> PassOutput:
-        """Repeat the last pass with other kinds of measurement.
-
-        Parameters
-        ----------
-        kind : ndarray of int, shape (e,)
-            As in `measurement_kind`.
-        """
+        """Repeat the last pass with other kinds of measurement."""
         state = PassState(*(v.copy() for v in self.last.start))
         output = new_output(len(kind), len(self.estimate), False, len(kind))
         run_pass(self.last.data._replace(kind=kind), pass_settings(self.setup, closed_loop=False), state, output)
         return output
 
     def on(self, prepared: PreparedData, C_nb: Floats) -> FilterFit:
-        """Fit the same model to a part of the recording.
-
-        Parameters
-        ----------
-        prepared : PreparedData
-        C_nb : ndarray, shape (3, 3)
-            Direction cosines at its start (1).
-        """
+        """Fit the same model to a part of the recording."""
         constant = self.setup.sensors.decay_rate == 0.0
         begin = StartPoint(np.ascontiguousarray(C_nb), self.estimate * constant)
         solution = solve_filter(self.setup, prepared, begin, silent)
         return replace(self, prepared=prepared, solution=solution, noise=None)
 
     def compensated(self, prepared: PreparedData, estimate: Floats, C_start: Floats, end_of_fit: float) -> Compensated:
-        """Take the errors out of all cycles, to first order.
-
-        Parameters
-        ----------
-        prepared : PreparedData
-        estimate : ndarray, shape (p,)
-            Coefficients of the estimator (SI).
-        C_start : ndarray, shape (3, 3)
-            Attitude at the start.
-        end_of_fit : float
-            s.
-        """
+        """Take the errors out of all cycles, to first order."""
         setup, sensors, cycles = self.setup, self.setup.sensors, prepared.cycles
         seen = motion(
             cycles,

@@ -36,12 +36,7 @@ NOT_CONVERGED = Note(
 
 
 def temperature_counts(log: TemperatureLog | None) -> dict[str, float]:
-    """Make the entries of a temperature in the data section of a result: who uses the result needs to know T0.
-
-    Parameters
-    ----------
-    log : TemperatureLog or None
-    """
+    """Make the entries of a temperature in the data section of a result: who uses the result needs to know T0."""
     return {} if log is None or not len(log.t) else {START_TEMPERATURE: log.origin_degc}
 
 
@@ -88,8 +83,6 @@ class Fit(ABC):
 
     Attributes
     ----------
-    test : PreparedTest
-    model : Model
     sensors : ImuModel
         The sensor model that was asked for, p parameters.
     reason : str

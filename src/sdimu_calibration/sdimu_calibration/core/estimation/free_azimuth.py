@@ -29,7 +29,6 @@ def azimuth_is_lost(fit: Fit, terms: Sequence[NoiseTerm]) -> bool:
 
     Parameters
     ----------
-    fit : Fit
     terms : sequence of NoiseTerm
         Noise with a memory that was learned.
     """
@@ -47,7 +46,6 @@ def azimuth_sigma(fit: NavigationFit, terms: Sequence[NoiseTerm]) -> float:
 
     Parameters
     ----------
-    fit : NavigationFit
     terms : sequence of NoiseTerm
         Noise with a memory, beside the white noise of the IMU file.
 

@@ -48,8 +48,6 @@ class Drift:
 
     Attributes
     ----------
-    name : str
-        Of the compensation.
     t : ndarray, shape (k,)
         Seconds of navigation.
     position, velocity : ndarray, shape (k, 2)
@@ -84,7 +82,6 @@ class FreeInertialRun:
 
     Attributes
     ----------
-    segment : Segment
     drifts : tuple of Drift
         Without compensation, then with each model.
     """
@@ -100,7 +97,6 @@ class Compensated(NamedTuple):
 
     Attributes
     ----------
-    cycles : Cycles
     values : ndarray, shape (n, m)
         Regressors of the corrected cycles (SI).
     channel, parameter : ndarray of int, shape (m,)
@@ -148,7 +144,6 @@ class Navigator(Protocol):
 
         Parameters
         ----------
-        prepared : PreparedData
         C_nb : ndarray, shape (3, 3)
             Attitude at the start of the part (dimensionless).
         """
@@ -158,7 +153,6 @@ class Navigator(Protocol):
 
         Parameters
         ----------
-        prepared : PreparedData
         estimate : ndarray, shape (q,)
             Coefficients (SI).
         C_start : ndarray, shape (3, 3)
@@ -192,7 +186,6 @@ def free_inertial_runs(
 
     Parameters
     ----------
-    prepared : PreparedData
     fits : sequence of (str, Navigator)
         Names and fits of the whole recording; each is fitted again to the rest.
     reference : PassOutput
@@ -237,10 +230,6 @@ def refit(fit: Navigator, seen: PreparedData, C_nb: Floats) -> Refit:
 
     Parameters
     ----------
-    fit : Navigator
-        Of the whole recording.
-    seen : PreparedData
-        The part.
     C_nb : ndarray, shape (3, 3)
         Attitude at the start of the part (dimensionless), by the fit of the whole.
     """
@@ -281,13 +270,10 @@ def free_navigation(
 
     Parameters
     ----------
-    name : str
     prepared : PreparedData
         Of the whole recording: some effects remember what was before the segment.
     seen : Refit or None
         Of the rest of the recording; None navigates with the samples as they are.
-    setup : TestSetup
-    segment : Segment
     reference : PassOutput
         Of a fit to the whole recording.
     """

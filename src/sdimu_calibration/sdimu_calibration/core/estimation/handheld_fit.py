@@ -29,14 +29,7 @@ from sdimu_calibration.core.site_reference import Reference, found
 
 @dataclass(frozen=True)
 class HandheldFit(Fit):
-    """A fit of a handheld run.
-
-    Attributes
-    ----------
-    ready : PreparedRun
-    priors : FitPriors
-    solution : HandheldSolution
-    """
+    """A fit of a handheld run."""
 
     ready: PreparedRun
     priors: FitPriors
@@ -89,35 +82,13 @@ class HandheldFit(Fit):
         return found(super().references(), dict(zip(model.names[len(self.names) :], off, strict=True)))
 
     def reported_values(self, settled: Floats) -> Floats:
-        """Put the coefficients that are fitted among all; zero for what is pinned.
-
-        Parameters
-        ----------
-        settled : ndarray, shape (q,)
-            In the order of the coefficients of `evidence` (SI).
-
-        Returns
-        -------
-        ndarray, shape (p,)
-            In the order of `names` (SI).
-        """
+        """Put the coefficients that are fitted among all; zero for what is pinned."""
         out = np.zeros(len(self.names))
         out[self._kept] = settled
         return out
 
     def reported_covariance(self, settled: Floats) -> Floats:
-        """Put a covariance of what is fitted among all; zero for what is pinned.
-
-        Parameters
-        ----------
-        settled : ndarray, shape (q, q)
-            Of the coefficients of `evidence` (SI).
-
-        Returns
-        -------
-        ndarray, shape (p, p)
-            Of the coefficients of `names` (SI).
-        """
+        """Put a covariance of what is fitted among all; zero for what is pinned."""
         out = np.zeros((len(self.names), len(self.names)))
         out[np.ix_(self._kept, self._kept)] = settled
         return out
@@ -154,12 +125,7 @@ class HandheldFit(Fit):
         return handheld_evidence(self.ready.run, self.priors, self.solution.point, effects, self.test.imu)
 
     def added_columns(self, count: int) -> Ints:
-        """Columns in `evidence` of the last `count` parameters of the model.
-
-        Returns
-        -------
-        ndarray of int, shape (count,)
-        """
+        """Columns in `evidence` of the last `count` parameters of the model."""
         q = len(self._kept)
         return np.arange(q - count, q)
 

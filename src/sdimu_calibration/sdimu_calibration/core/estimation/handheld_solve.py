@@ -29,11 +29,8 @@ def solve_handheld(test: PreparedTest, model: Model, start: Start | None, progre
 
     Parameters
     ----------
-    test : PreparedTest
-    model : Model
     start : Start or None
         Where a fit of nearly the same model ended: its priors stand. None tries wider ones too.
-    progress : callable
     """
     if test.assumed_site:
         raise DataError(

@@ -72,8 +72,6 @@ class NavigationFit(Fit):
     ----------
     setup : TestSetup
         With the sensor model of the estimator, q coefficients.
-    prepared : PreparedData
-    alignment : Alignment
     noise : NoiseEstimate or None
         Noise with a memory that was learned; None where white noise was taken.
     carried : mapping of str to object, or None
@@ -122,8 +120,6 @@ class NavigationFit(Fit):
 
         Parameters
         ----------
-        prepared : PreparedData
-            The part.
         C_nb : ndarray, shape (3, 3)
             Attitude at its start, b to n (dimensionless).
         """
@@ -134,7 +130,6 @@ class NavigationFit(Fit):
 
         Parameters
         ----------
-        prepared : PreparedData
         estimate : ndarray, shape (q,)
             Coefficients of the estimator (SI).
         C_start : ndarray, shape (3, 3)
@@ -215,13 +210,7 @@ class NavigationFit(Fit):
         return np.asarray(rest / rest.sum())
 
     def dwell_means(self, effect: Effect) -> Floats:
-        """Mean of the regressors of a drift of a bias over all dwells.
-
-        Returns
-        -------
-        ndarray, shape (terms,)
-            SI.
-        """
+        """Mean of the regressors of a drift of a bias over all dwells."""
         return np.asarray(self._share_of_rest @ effect.regressors(self.known.seen))
 
     def with_doubt(self, doubt: Floats | None, moved: Floats | None = None) -> Self:

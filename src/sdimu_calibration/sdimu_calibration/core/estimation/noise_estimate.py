@@ -17,7 +17,6 @@ class NoiseEstimate:
 
     Attributes
     ----------
-    terms : tuple of NoiseTerm
     deviation : ndarray, shape (q,)
         Coefficients of the estimator less those in white noise (SI).
     covariance : ndarray, shape (q, q)

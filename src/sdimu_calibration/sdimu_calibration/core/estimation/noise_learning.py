@@ -32,10 +32,6 @@ def with_noise_learned(fit: F) -> F:
     """Learn the noise of a fit where its innovations contradict white noise; else return the fit as it is.
 
     Only a fit that navigates by its own passes learns noise; a handheld one learns scatter instead.
-
-    Parameters
-    ----------
-    fit : Fit
     """
     return noise_of(fit).taken_by(fit)
 
@@ -46,7 +42,6 @@ class FoundNoise:
 
     Attributes
     ----------
-    terms : tuple of NoiseTerm
     evidence : LinearEvidence or None
         About the fit, in white noise; None where nobody looked.
     """
@@ -68,12 +63,7 @@ class FoundNoise:
 
 
 def noise_of(fit: Fit) -> FoundNoise:
-    """Learn the noise of a fit where its innovations contradict white noise.
-
-    Parameters
-    ----------
-    fit : Fit
-    """
+    """Learn the noise of a fit where its innovations contradict white noise."""
     if not isinstance(fit, NavigationFit) or not suspected(fit):
         return FoundNoise()
     evidence, wander = fit.evidence(), fit.wander
@@ -98,9 +88,6 @@ def in_noise(fit: F, evidence: LinearEvidence, wander: Wander, terms: Sequence[N
         That navigates.
     evidence : LinearEvidence
         About the fit, in white noise; candidates are not looked at.
-    wander : Wander
-        Of the same test.
-    terms : sequence of NoiseTerm
     """
     if not isinstance(fit, NavigationFit):
         return fit

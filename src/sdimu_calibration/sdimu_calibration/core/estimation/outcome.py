@@ -30,7 +30,6 @@ def outcome(fit: Fit, held_out: bool = True, refuse: bool = True) -> Calibration
 
     Parameters
     ----------
-    fit : Fit
     held_out : bool
         Also predict every stop from the others (costs some passes).
     refuse : bool
@@ -108,7 +107,6 @@ def doubted(result: Calibration, fit: Fit) -> Calibration:
     ----------
     result : Calibration
         Of the same fit without doubt.
-    fit : Fit
     """
     conditional = np.sqrt(np.diag(result.covariance))
     free = conditional > 0.0

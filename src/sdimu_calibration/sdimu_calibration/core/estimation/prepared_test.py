@@ -26,7 +26,6 @@ class PreparedTest:
     ----------
     recording : Recording
         In SI, right-handed axes and one clock, with the dwells where they are known.
-    imu : ImuSpecification
     site : Site or None
         None where no site is stated: only a handheld run does without.
     held_out : tuple of int

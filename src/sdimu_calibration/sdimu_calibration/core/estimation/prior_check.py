@@ -29,10 +29,6 @@ def contradicted(sensors: ImuModel, estimate: Floats, covariance: Floats) -> lis
         SI.
     covariance : ndarray, shape (q, q)
         Of the estimate (SI).
-
-    Returns
-    -------
-    list of str
     """
     prior, variance = sensors.prior, np.diag(covariance)
     taken = np.maximum(prior**2 - variance, _LEAST * prior**2)

@@ -30,7 +30,6 @@ class ReferenceFit(Fit):
 
     Attributes
     ----------
-    frame : str
     coefficients, coefficient_covariance : ndarray, shapes (p,) and (p, p)
         SI, in `frame`.
     summary : FitStatistics
@@ -61,33 +60,11 @@ class ReferenceFit(Fit):
         return self.coefficient_covariance
 
     def reported_values(self, settled: Floats) -> Floats:
-        """Bring coefficients of the navigation about this fit into its frame.
-
-        Parameters
-        ----------
-        settled : ndarray, shape (q,)
-            In the order of the coefficients of `evidence` (SI).
-
-        Returns
-        -------
-        ndarray, shape (p,)
-            In the order of `names` (SI).
-        """
+        """Bring coefficients of the navigation about this fit into its frame."""
         return self.about.reported_values(settled)
 
     def reported_covariance(self, settled: Floats) -> Floats:
-        """Bring a covariance of the navigation about this fit into its frame.
-
-        Parameters
-        ----------
-        settled : ndarray, shape (q, q)
-            Of the coefficients of `evidence` (SI).
-
-        Returns
-        -------
-        ndarray, shape (p, p)
-            Of the coefficients of `names` (SI).
-        """
+        """Bring a covariance of the navigation about this fit into its frame."""
         return self.about.reported_covariance(settled)
 
     @property
@@ -113,12 +90,7 @@ class ReferenceFit(Fit):
         return self.about.evidence(effects)
 
     def added_columns(self, count: int) -> Ints:
-        """Columns in `evidence` of the last `count` parameters of the model.
-
-        Returns
-        -------
-        ndarray of int, shape (count,)
-        """
+        """Columns in `evidence` of the last `count` parameters of the model."""
         return self.about.added_columns(count)
 
     def consistency(self, evidence: LinearEvidence | None = None) -> Consistency:
@@ -145,12 +117,7 @@ class ReferenceFit(Fit):
         return NavigationFit.notes(self.about)
 
     def warnings(self, statistics: FitStatistics) -> tuple[str, ...]:
-        """Misfit of the least squares, and at the stops of the navigation about it; what is outside the specification.
-
-        Parameters
-        ----------
-        statistics : FitStatistics
-        """
+        """Misfit of the least squares and at stops of the navigation about it; what is outside the specification."""
         return self.about.warnings(statistics)
 
     def contradiction(self, statistics: FitStatistics) -> str:
@@ -158,10 +125,6 @@ class ReferenceFit(Fit):
 
         The squares of a least squares over whole stops and turns are larger than innovations where physics is missing,
         and no measure of absurdity.
-
-        Parameters
-        ----------
-        statistics : FitStatistics
         """
         return self.about.contradiction(replace(self.about.statistics(), held_out_rms=statistics.held_out_rms))
 
@@ -183,12 +146,7 @@ class ClassicalFit(ReferenceFit):
     diagnosable = False
 
     def warnings(self, statistics: FitStatistics) -> tuple[str, ...]:
-        """Say where the angles of the table leave over more than noise; then what the navigation says.
-
-        Parameters
-        ----------
-        statistics : FitStatistics
-        """
+        """Say where the angles of the table leave over more than noise; then what the navigation says."""
         nis = statistics.nis_mean
         # The navigation knows no angle of the table, and is judged by its own innovations.
         about = replace(self.about.statistics(), held_out_rms=statistics.held_out_rms)

@@ -41,11 +41,8 @@ class SecondOrderFit(NavigationFit):
 
     Attributes
     ----------
-    frame_model : AccelerometerFrameModel
-    finished : SecondOrderPass
     count : int
         Number of passes.
-    stood_still : bool
     """
 
     frame_model: AccelerometerFrameModel
@@ -90,33 +87,11 @@ class SecondOrderFit(NavigationFit):
         return self.reported_covariance(self.settled_covariance)
 
     def reported_values(self, settled: Floats) -> Floats:
-        """Read the coefficients asked for out of those of the estimator.
-
-        Parameters
-        ----------
-        settled : ndarray, shape (q,)
-            In the order of the coefficients of `evidence` (SI).
-
-        Returns
-        -------
-        ndarray, shape (p,)
-            In the order of `names` (SI).
-        """
+        """Read the coefficients asked for out of those of the estimator."""
         return self.frame_model.values(settled)
 
     def reported_covariance(self, settled: Floats) -> Floats:
-        """Read a covariance out of that of the estimator.
-
-        Parameters
-        ----------
-        settled : ndarray, shape (q, q)
-            Of the coefficients of `evidence` (SI).
-
-        Returns
-        -------
-        ndarray, shape (p, p)
-            Of the coefficients of `names` (SI).
-        """
+        """Read a covariance out of that of the estimator."""
         return self.frame_model.covariance(settled, self.settled)
 
     @cached_property
@@ -125,36 +100,17 @@ class SecondOrderFit(NavigationFit):
         return known_second_order_pass(self.prepared, self.setup, self.alignment, self.last)
 
     def added_columns(self, count: int) -> Ints:
-        """Columns in `evidence`, which is that of the inner model, of the last `count` parameters of the model.
-
-        Returns
-        -------
-        ndarray of int, shape (count,)
-        """
+        """Columns in `evidence`, which is that of the inner model, of the last `count` parameters of the model."""
         return self.frame_model.place[len(self.names) - count :]
 
     def run_kinds(self, kind: Ints) -> PassOutput:
-        """Repeat the last pass with other kinds of measurement.
-
-        Parameters
-        ----------
-        kind : ndarray of int, shape (e,)
-            As in `measurement_kind`.
-        """
+        """Repeat the last pass with other kinds of measurement."""
         last = self.last
         data = last.data._replace(kind=kind)
         return run_stops(data, firm_setup(self.setup), last.start, self.prepared, last.where, last.C_stop)[1]
 
     def on(self, prepared: PreparedData, C_nb: Floats) -> SecondOrderFit:
-        """Fit the same model to a part of the recording.
-
-        Parameters
-        ----------
-        prepared : PreparedData
-            The part.
-        C_nb : ndarray, shape (3, 3)
-            Attitude at its start, b to n (dimensionless).
-        """
+        """Fit the same model to a part of the recording."""
         begin = StartPoint(np.ascontiguousarray(C_nb), self.estimate)
         alignment = first_attitude(prepared.epochs, prepared.phases, self.setup)
         alignment = alignment.with_azimuth_of(C_nb) if self.azimuth_free else alignment
@@ -164,18 +120,7 @@ class SecondOrderFit(NavigationFit):
         )
 
     def compensated(self, prepared: PreparedData, estimate: Floats, C_start: Floats, end_of_fit: float) -> Compensated:
-        """Take the errors out of all cycles, exactly.
-
-        Parameters
-        ----------
-        prepared : PreparedData
-        estimate : ndarray, shape (q,)
-            Coefficients of the estimator (SI).
-        C_start : ndarray, shape (3, 3)
-            Attitude at the start, b to n.
-        end_of_fit : float
-            s; of no consequence here, as all coefficients are constants.
-        """
+        """Take the errors out of all cycles, exactly; all coefficients are constants, wherever the fit ended."""
         del end_of_fit
         setup, sensors = self.setup, self.setup.sensors
         near = motion(

@@ -34,7 +34,6 @@ def at_site(sensors: ImuModel, covariance: Floats) -> Floats:
 
     Parameters
     ----------
-    sensors : ImuModel
     covariance : ndarray, shape (q, q)
         SI.
 
@@ -54,8 +53,6 @@ def with_found(
 
     Parameters
     ----------
-    references : sequence of Reference
-    sensors : ImuModel
     estimate : ndarray, shape (q,)
         SI.
     covariance : ndarray, shape (q, q)

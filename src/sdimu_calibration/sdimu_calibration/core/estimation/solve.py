@@ -81,7 +81,6 @@ def solve(
 
     Parameters
     ----------
-    test : PreparedTest
     model : Model
         Effects to estimate, weights of the measurements, frame of the report.
     estimator : str
@@ -183,12 +182,10 @@ def extend(
 
     Parameters
     ----------
-    fit : Fit
     effects : sequence of Effect
         They come behind those of the model.
     warm : bool
         Begin where `fit` ended; else as `solve` does, which gives the same digits from any history.
-    progress : callable
     learn : bool
         As for `solve`.
     """
@@ -346,8 +343,6 @@ def fit_about(
 
     Parameters
     ----------
-    test : PreparedTest
-    model : Model
     estimator : str
         ``filter`` or ``second-order``.
     coefficients : mapping of str to float

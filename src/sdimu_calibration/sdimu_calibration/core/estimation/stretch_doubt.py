@@ -35,9 +35,6 @@ def doubt_in_stretch(
         Of the whole test in white noise, N rows and q coefficients.
     rows : ndarray of bool, shape (N,)
         Those of the part.
-    wander : Wander
-        Of the same test.
-    terms : sequence of NoiseTerm
     at : (float, float)
         The stretch; its biases are taken as constant over it.
 

@@ -87,7 +87,6 @@ class StopMean:
     ----------
     channel : str
         One of `CHANNEL_NAMES`; of a handheld run one of `handheld_evidence.CHANNELS`.
-    stop : int
     normalised_mean : float
         Mean innovation over its sigma; standard normal when the model is right.
     """
@@ -111,7 +110,6 @@ class Consistency:
         Mean NIS per degree of freedom at the first measurement of each stop: what the turns left.
     ljung_box_p : float
         Smallest p-value of the six sensor channels, times six.
-    gyro, accel : Noise
     where : tuple of StopMean
         Every channel and stop, largest first.
     seconds : int
@@ -133,8 +131,6 @@ def check(output: PassOutput, prepared: PreparedData, imu: ImuSpecification) -> 
 
     Parameters
     ----------
-    output : PassOutput
-    prepared : PreparedData
     imu : ImuSpecification
         Whose white noise the pass took.
     """
@@ -192,7 +188,6 @@ def triad_noise(prepared: PreparedData, means: Floats, density: float) -> Noise:
 
     Parameters
     ----------
-    prepared : PreparedData
     means : ndarray, shape (e, 3)
         Mean rate (rad/s) or force (m/s^2) of each epoch, as measured; biases and slow effects cancel in the
         differences.

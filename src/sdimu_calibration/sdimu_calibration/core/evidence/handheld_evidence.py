@@ -39,10 +39,8 @@ class HandheldEvidence(LinearEvidence):
     ----------
     channel : ndarray of int, shape (N,)
         Into `CHANNELS`.
-    run : HandheldRun
     rests : Motion
         What a perfect IMU sees at the rests.
-    gone : Turns
     sigma : ndarray, shape (N,)
         Sigma of each row before it was whitened (rad/s, m/s^2, rad for turns).
     """
@@ -62,17 +60,7 @@ class HandheldEvidence(LinearEvidence):
         return 1e4
 
     def signature(self, effects: Sequence[Effect]) -> Floats:
-        """Signatures of all parameters of some effects; zero for what could not show, however bad the sensor.
-
-        Parameters
-        ----------
-        effects : sequence of Effect
-
-        Returns
-        -------
-        ndarray, shape (N, parameters)
-            Change of each whitened residual per SI unit of each parameter.
-        """
+        """Signatures of all parameters of some effects; zero for what could not show, however bad the sensor."""
         if not effects:
             return np.zeros((len(self.e), 0))
         parts = [_signature(self.run, self.rests, self.gone, effect) for effect in effects]
@@ -90,7 +78,6 @@ def handheld_evidence(
 
     Parameters
     ----------
-    run, scene : HandheldRun, FitPriors
     point : LinearisationPoint
         Where the fit ended.
     effects : sequence of Effect
@@ -186,7 +173,6 @@ def places(evidence: HandheldEvidence, chosen: Ints) -> tuple[StopMean, ...]:
 
     Parameters
     ----------
-    evidence : HandheldEvidence
     chosen : ndarray of int, shape (k,)
         Columns of the candidates that are estimated with the model.
     """

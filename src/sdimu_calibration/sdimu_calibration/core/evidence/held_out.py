@@ -37,7 +37,6 @@ def predict(evidence: LinearEvidence, chosen: Ints, weight: Floats, shift: Float
 
     Parameters
     ----------
-    evidence : LinearEvidence
     chosen : ndarray of int, shape (k,)
         Parameters of the model under test.
     weight, shift : ndarray, shape (k,)

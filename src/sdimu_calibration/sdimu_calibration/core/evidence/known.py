@@ -190,7 +190,6 @@ def class_of(found: Candidate, alike: Sequence[Candidate]) -> tuple[Candidate, .
 
     Parameters
     ----------
-    found : Candidate
     alike : sequence of Candidate
         What looks the same, the likeliest first.
     """

@@ -201,8 +201,6 @@ def learn(information: NoiseInformation, cut: Stretches, start: Sequence[NoiseTe
 
     Parameters
     ----------
-    information : NoiseInformation
-    cut : Stretches
     start : sequence of NoiseTerm
         Terms to begin with.
     """
@@ -340,7 +338,6 @@ def sizes_on_grid(J: Floats, d: Floats, cut: Stretches, term: NoiseTerm) -> tupl
     J : ndarray, shape (3 n, 3 n)
         Information on the wander of its triad, as of `given_terms`.
     d : ndarray, shape (3 n,)
-    cut : Stretches
     term : NoiseTerm
         Its size is not read.
 
@@ -386,12 +383,10 @@ def given_terms(
 
     Parameters
     ----------
-    information : NoiseInformation
     cut : Stretches
         n stretches.
     terms : sequence of NoiseTerm
         With their sizes.
-    triad : str
 
     Returns
     -------

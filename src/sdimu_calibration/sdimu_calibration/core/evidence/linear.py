@@ -87,10 +87,6 @@ class LinearEvidence(ABC):
     def signature(self, effects: Sequence[Effect]) -> Floats:
         """Signatures of all parameters of some effects.
 
-        Parameters
-        ----------
-        effects : sequence of Effect
-
         Returns
         -------
         ndarray, shape (N, parameters)
@@ -283,11 +279,6 @@ class LinearEvidence(ABC):
 
 def candidate_priors(effects: Sequence[Effect], imu: ImuSpecification) -> tuple[tuple[Candidate, ...], Floats]:
     """Split effects into candidates, one a parameter, with the size that physics gives each.
-
-    Parameters
-    ----------
-    effects : sequence of Effect
-    imu : ImuSpecification
 
     Returns
     -------

@@ -73,8 +73,6 @@ class NavigationEvidence(LinearEvidence):
     ----------
     epoch, channel : ndarray of int, shape (N,)
         Of each row; channels 0-11 are position, velocity, rate, force, three each.
-    known : KnownPass
-    prepared : PreparedData
     latitude : float
         Of the site (rad).
     """
@@ -96,32 +94,11 @@ class NavigationEvidence(LinearEvidence):
         return self.known.seen
 
     def signature(self, effects: Sequence[Effect]) -> Floats:
-        """Signatures of all parameters of some effects.
-
-        Parameters
-        ----------
-        effects : sequence of Effect
-
-        Returns
-        -------
-        ndarray, shape (N, parameters)
-            Change of each whitened innovation per SI unit of each parameter.
-        """
+        """Signatures of all parameters of some effects."""
         return columns(self.prepared, self.known, self.latitude, effects)
 
     def constant_signature(self, cut: Stretches) -> Floats:
-        """Signatures of a constant error of each sensor axis in each stretch.
-
-        Parameters
-        ----------
-        cut : Stretches
-            s stretches.
-
-        Returns
-        -------
-        ndarray, shape (N, 6 s)
-            Change of each whitened innovation per rad/s or m/s^2; column ``6 stretch + axis``.
-        """
+        """Signatures of a constant error of each sensor axis in each stretch."""
         return constant_columns(self.prepared, self.known, self.latitude, cut)
 
     def conditions(self, cut: Stretches) -> Conditions:
@@ -194,8 +171,6 @@ def navigation_evidence(
 
     Parameters
     ----------
-    prepared, setup : PreparedData, TestSetup
-    known : KnownPass
     estimate : ndarray, shape (p,)
         Coefficients of the model (SI), at which `known` ran.
     effects : sequence of Effect
@@ -230,11 +205,8 @@ def columns(prepared: PreparedData, known: KnownPass, latitude: float, effects: 
 
     Parameters
     ----------
-    prepared : PreparedData
-    known : KnownPass
     latitude : float
         Of the site (rad).
-    effects : sequence of Effect
 
     Returns
     -------
@@ -261,8 +233,6 @@ def constant_columns(prepared: PreparedData, known: KnownPass, latitude: float, 
 
     Parameters
     ----------
-    prepared : PreparedData
-    known : KnownPass
     latitude : float
         Of the site (rad).
     cut : Stretches

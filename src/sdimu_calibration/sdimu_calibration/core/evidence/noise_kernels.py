@@ -86,7 +86,6 @@ def stretches(times: Timetable, share: float = 1.0) -> Stretches:
 
     Parameters
     ----------
-    times : Timetable
     share : float
         Ratio of their length to the usual one.
     """
@@ -136,7 +135,6 @@ def kernel(kind: str, tau: float, cut: Stretches) -> Floats:
         One of `KINDS`.
     tau : float
         Time constant of Markov noise (s).
-    cut : Stretches
 
     Returns
     -------

@@ -191,7 +191,6 @@ def signatures(
     ----------
     seen : Motion
         Predicted motion, n cycles.
-    epochs : Epochs
     output : PassOutput
         Of the pass with known coefficients, with its matrices kept.
     regressors : Regressors
@@ -299,7 +298,6 @@ def constant_signatures(
     ----------
     seen : Motion
         Predicted motion, n cycles.
-    epochs : Epochs
     output : PassOutput
         Of the pass with known coefficients, with its matrices kept.
     start, end : ndarray, shape (s,)

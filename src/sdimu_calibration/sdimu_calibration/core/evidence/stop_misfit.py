@@ -25,7 +25,6 @@ def stop_misfit(normalised: Floats, prepared: PreparedData) -> Note | None:
     ----------
     normalised : ndarray, shape (e, 12)
         Whitened innovations of every epoch, NaN where nothing was measured.
-    prepared : PreparedData
 
     Returns
     -------

@@ -52,7 +52,6 @@ def wander_in(evidence: LinearEvidence, terms: Sequence[NoiseTerm]) -> Wander:
     ----------
     evidence : LinearEvidence
         In white noise.
-    terms : sequence of NoiseTerm
     """
     return _halved(evidence, Wander.of(evidence), terms)
 
@@ -63,11 +62,6 @@ def _halved(evidence: LinearEvidence, wander: Wander, terms: Sequence[NoiseTerm]
 
 def moves_within(wander: Wander, terms: Sequence[NoiseTerm]) -> float:
     """Ratio of the variance between the halves of a stretch at rest to that which white noise gives it.
-
-    Parameters
-    ----------
-    wander : Wander
-    terms : sequence of NoiseTerm
 
     Returns
     -------

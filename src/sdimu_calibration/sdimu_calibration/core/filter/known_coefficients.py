@@ -22,8 +22,6 @@ def attitude_about(
 
     Parameters
     ----------
-    prepared, setup : PreparedData, TestSetup
-    start : Alignment
     C_nb : ndarray, shape (3, 3)
         Initial attitude to begin with, b to n (dimensionless).
     reference : ndarray, shape (p,)

@@ -67,8 +67,6 @@ class Pass:
         At the first sample, and after the last epoch.
     output : PassOutput
         One row an epoch.
-    data : PassInput
-    settings : PassSettings
     """
 
     C_start: Floats
@@ -127,7 +125,6 @@ def start_state(setup: TestSetup, start: Alignment, C_nb: Floats, reference: Flo
 
     Parameters
     ----------
-    setup : TestSetup
     start : Alignment
         Mean and sigma of the initial attitude.
     C_nb : ndarray, shape (3, 3)
@@ -199,7 +196,6 @@ def one_pass(
 
     Parameters
     ----------
-    prepared, setup : PreparedData, TestSetup
     start : Alignment
         Mean and sigma of the initial attitude.
     C_nb : ndarray, shape (3, 3)
@@ -340,7 +336,6 @@ class Solution:
 
     Attributes
     ----------
-    setup, prepared, alignment : TestSetup, PreparedData, Alignment
     first, last : Pass
         The closed-loop pass (its output: no regressors are kept) and the converged one.
     passes : int
@@ -399,11 +394,9 @@ def solve(setup: TestSetup, prepared: PreparedData, begin: StartPoint | None, pr
 
     Parameters
     ----------
-    setup, prepared : TestSetup, PreparedData
     begin : StartPoint or None
         Where a fit of nearly the same model ended: the passes go on from there, without a closed-loop pass. None
         begins with the first dwell.
-    progress : callable
     """
     start = first_attitude(prepared.epochs, prepared.phases, setup)
     progress("passes", 0.2)

@@ -60,7 +60,6 @@ class CommonEffect:
         If neither mean nor variance is there.
     q_value : float
         Smallest rate of false discoveries at which it is named.
-    named : bool
     ratio : float
         Twice the log of the ratio of likelihoods.
     alike : tuple of str
@@ -137,8 +136,6 @@ def given(estimates: Floats, sigmas: Floats, correlations: Bytes, chosen: Sequen
         Of each effect alone in each unit (SI).
     correlations : ndarray of int, shape (m, k, k)
         As for `common_effects`.
-    chosen : sequence of int
-        The others.
 
     Returns
     -------

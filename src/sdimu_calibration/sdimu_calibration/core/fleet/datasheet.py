@@ -31,13 +31,7 @@ _FIXED = 1e-6
 
 @dataclass(frozen=True)
 class Sample:
-    """A result and the unit that it is of.
-
-    Attributes
-    ----------
-    unit : str
-    result : Calibration
-    """
+    """A result and the unit that it is of."""
 
     unit: str
     result: Calibration

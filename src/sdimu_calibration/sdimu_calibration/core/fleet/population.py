@@ -92,7 +92,6 @@ class Coefficient:
 
     Attributes
     ----------
-    name : str
     between : RandomEffect
         Of the unit values.
     within : RandomEffect or None
@@ -126,7 +125,6 @@ class Out:
 
     Attributes
     ----------
-    unit, coefficient : str
     deviate : float
         In sigmas.
     p_value : float
@@ -147,7 +145,6 @@ class Population:
     ----------
     units : tuple of str, length u
         Serials.
-    coefficients : tuple of Coefficient
     out : tuple of Out
         Largest deviate first.
     """
@@ -199,7 +196,6 @@ def unit_values(fleet: Measured, k: int, within: RandomEffect | None) -> tuple[F
 
     Parameters
     ----------
-    fleet : Measured
     k : int
         Coefficient.
     within : RandomEffect or None

@@ -16,7 +16,6 @@ def population_priors(people: Population, effect_of: Mapping[str, str]) -> dict[
 
     Parameters
     ----------
-    people : Population
     effect_of : mapping of str to str
         Effect of each coefficient.
 

@@ -104,10 +104,6 @@ def random_effect(
         Each group has a mean of its own; None for one group.
     x : ndarray, shape (n,), optional
         Regressor of a slope that all groups share (dimensionless, or its own unit).
-
-    Returns
-    -------
-    RandomEffect
     """
     problem = _problem(values, sigmas, groups, x)
     fit, unit, dof, tau2 = problem.fit, problem.unit, problem.dof, problem.tau2

@@ -42,8 +42,6 @@ class Study:
 
     Attributes
     ----------
-    fleet : Measured
-    people : Population
     inside : Population
         Without the units that are out: what priors and control limits are of.
     slopes : tuple of Trend
@@ -66,7 +64,6 @@ def study(fleet: Measured, model: Sequence[str], candidates: Candidates) -> Stud
 
     Parameters
     ----------
-    fleet : Measured
     model : sequence of str
         Effects that all results have.
     candidates : Candidates

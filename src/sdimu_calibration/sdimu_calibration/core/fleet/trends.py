@@ -23,7 +23,6 @@ class Trend:
 
     Attributes
     ----------
-    coefficient : str
     kind : str
         `PRODUCTION`: between units, by their mean dates; `AGE`: within units that were measured again.
     slope, slope_sigma : float
@@ -32,7 +31,6 @@ class Trend:
         If there is no slope.
     q_value : float
         Smallest rate of false discoveries at which it is named.
-    named : bool
     """
 
     coefficient: str
@@ -49,7 +47,6 @@ def trends(fleet: Measured, rate: float = FALSE_DISCOVERY) -> tuple[Trend, ...]:
 
     Parameters
     ----------
-    fleet : Measured
     rate : float
         False discoveries among the slopes that are named.
 

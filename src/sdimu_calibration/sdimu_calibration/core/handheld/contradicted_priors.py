@@ -27,13 +27,7 @@ WIDEST = "mems"
 
 
 def widest_priors(imu: ImuSpecification, sensors: ImuModel) -> ImuSpecification:
-    """Return the IMU with the priors of the widest grade for the effects of a model; the same object if none is wider.
-
-    Parameters
-    ----------
-    imu : ImuSpecification
-    sensors : ImuModel
-    """
+    """Give the IMU the priors of the widest grade for the effects of a model; the same object if none is wider."""
     wider = {
         effect.family or effect.name: effect.prior[WIDEST]
         for effect in sensors.effects
@@ -49,7 +43,6 @@ def contradicted(imu: ImuSpecification, sensors: ImuModel, values: Floats, sigma
     ----------
     imu : ImuSpecification
         With the priors in question.
-    sensors : ImuModel
     values, sigma : ndarray, shape (p,)
         Coefficients found, and their sigmas (SI).
 

@@ -39,7 +39,6 @@ def forces_ahead(Q: Floats, white: Floats, sigma: Floats, k: int) -> ForcesAhead
         Whitened residuals.
     sigma : ndarray, shape (m,)
         Of the equations (SI).
-    k : int
     """
     total, error, scatter = 0.0, np.zeros((k, 3)), np.zeros((k, 3))
     for i in range(k):

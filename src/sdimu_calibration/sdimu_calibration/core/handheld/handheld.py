@@ -62,9 +62,6 @@ class PreparedRun:
 
     Attributes
     ----------
-    recording : Recording
-    rests : StaticIntervals
-    run : HandheldRun
     impossible : tuple of DataFault
         What was taken out.
     notes : tuple of str
@@ -84,15 +81,7 @@ _NOTHING = Told()
 def prepare_run(
     recording: Recording, imu: ImuSpecification, site: Site | None = None, told: Told = _NOTHING
 ) -> PreparedRun:
-    """Find the rests and reduce the recording to them and the turns between.
-
-    Parameters
-    ----------
-    recording : Recording
-    imu : ImuSpecification
-    site : Site or None
-    told : Told
-    """
+    """Find the rests and reduce the recording to them and the turns between."""
     recording, impossible = without_impossible(recording)
     dwells = dwells_of(recording.phase, float(recording.t[-1]))
     if told.rests or len(dwells) >= FEWEST_RESTS:

@@ -42,13 +42,10 @@ class HandheldRun:
         Middle and length of each rest (s).
     mean : ndarray, shape (k, 6)
         Mean rate (rad/s) and specific force (m/s^2) at each rest, as measured.
-    cycles : Cycles
-        Of the whole recording.
     first, last : ndarray of int, shape (k - 1,)
         Cycles of each turn.
     turn_s, path, gap : ndarray, shape (k - 1,)
         Duration (s), angle summed over all ways (rad), and uncertainty of bridged angle (rad) of each turn.
-    temperature : TemperatureLog or None
     whole : ndarray of int, shape (w,)
         Turns that are stated to be whole ones about the vertical: `whole_turns`.
     whole_sigma : float
@@ -182,7 +179,6 @@ class Turns:
 
         Parameters
         ----------
-        run : HandheldRun
         values : ndarray, shape (n, m)
             Regressors of `seen` (SI).
         terms : sequence of (int, int), length m
@@ -206,8 +202,6 @@ def turns(run: HandheldRun, model: ImuModel, coefficients: Floats, C_nb: Floats,
 
     Parameters
     ----------
-    run : HandheldRun
-    model : ImuModel
     coefficients : ndarray, shape (p,)
         At which the samples are corrected (SI).
     C_nb : ndarray, shape (k, 3, 3)

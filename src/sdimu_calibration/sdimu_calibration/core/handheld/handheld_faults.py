@@ -34,10 +34,6 @@ _FORCE_MISFIT = 0.01 * STANDARD_GRAVITY
 def without_impossible(recording: Recording) -> tuple[Recording, tuple[DataFault, ...]]:
     """Take away samples of a rate far beyond all others; they count as missing.
 
-    Parameters
-    ----------
-    recording : Recording
-
     Returns
     -------
     recording : Recording

@@ -60,7 +60,6 @@ class FitPriors:
 
     Attributes
     ----------
-    model : ImuModel
     kept : ndarray of int, shape (q,)
         Coefficients that are estimated; the others stay zero (they define the body frame).
     prior : ndarray, shape (q, q)
@@ -117,13 +116,10 @@ class HandheldSolution:
         Of the kept coefficients.
     earth_sigma : ndarray, shape (3,)
         Sigma of the Earth's rate after the fit (rad/s).
-    chi2, dof, log_likelihood : float
-    ahead : ForcesAhead
     rest_residual : ndarray, shape (k, 6)
         Of the rests (SI), rates first.
     turn_residual : ndarray, shape (k - 1, 3)
         Of the turns (rad).
-    steps : int
     """
 
     point: LinearisationPoint
@@ -273,8 +269,6 @@ def row_sigmas(run: HandheldRun, scene: FitPriors, kind: Ints, extra: Floats) ->
 
     Parameters
     ----------
-    run : HandheldRun
-    scene : FitPriors
     kind : ndarray of int, shape (m,)
         As `equations` gives it.
     extra : ndarray, shape (3,)

@@ -41,8 +41,6 @@ class ChosenRests:
 
     Attributes
     ----------
-    rests : StaticIntervals
-    run : HandheldRun
     notes : tuple of str
         Rests that tremble, and rests that were left out.
     """
@@ -57,9 +55,6 @@ def choose_rests(recording: Recording, imu: ImuSpecification, site: Site | None,
 
     Parameters
     ----------
-    recording : Recording
-    imu : ImuSpecification
-    site : Site or None
     excluded : sequence of (float, float)
         Spans of time (s) of which no rest takes anything.
     """

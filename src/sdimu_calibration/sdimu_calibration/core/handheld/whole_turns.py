@@ -54,7 +54,6 @@ def with_whole_turns(run: HandheldRun, sigma: float) -> HandheldRun:
 
     Parameters
     ----------
-    run : HandheldRun
     sigma : float
         How well the IMU was put back (rad, one sigma).
     """

@@ -40,7 +40,6 @@ def spread_out(reduction: Reduction, names: Sequence[str]) -> Rows:
 
     Parameters
     ----------
-    reduction : Reduction
     names : sequence of str, length P
         Parameters of the set; those that the recording lacks are zero columns.
     """
@@ -104,7 +103,6 @@ class Combination:
         One a power-on.
     weight : ndarray, shape (P,)
         Prior information of the parameters (1/SI^2), prior mean zero.
-    components : sequence of Component
     """
 
     def __init__(self, groups: Sequence[Rows], weight: Floats, components: Sequence[Component]) -> None:

@@ -62,10 +62,8 @@ class Job:
 
     Attributes
     ----------
-    member : Member
     model : Model
         With the effects that were found in all recordings.
-    estimator : str
     local : tuple of str
         Keys of effects of this recording alone, in the model behind the others. What all have of them it has not: its
         own value stands in the place of theirs.
@@ -104,8 +102,6 @@ class Report:
 
     Attributes
     ----------
-    name, serial, power_on : str
-        Of the member.
     reduction : Reduction
         Coefficients and candidates of this recording alone have its name behind theirs.
     estimator, reason : str
@@ -114,19 +110,14 @@ class Report:
         With the noise that the recording shows.
     start : Start
         Where the fit ended.
-    start_ns : int
-    times : Timetable
     temperature_degc : float
         Mean; NaN where it is not recorded.
     data : mapping
         As in a result.
-    statistics : FitStatistics
     names : tuple of str, length p
         Coefficients as reported.
     values, sigma : ndarray, shape (p,)
         Of the recording's own fit (SI), in the frame of the report; empty for a fit about given coefficients.
-    notes : tuple of str
-    warnings : tuple of str
     heading_rad : float
         Sigma of the heading at the end of the recording's own fit (rad); 0 where none is estimated.
     noise : tuple of NoiseTerm
@@ -135,7 +126,6 @@ class Report:
         The recording alone contradicts priors of the IMU file.
     places : Places or None
         Of its dwells and turns, where they were asked for.
-    site : Site or None
     """
 
     name: str

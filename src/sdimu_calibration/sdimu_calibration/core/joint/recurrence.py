@@ -89,7 +89,6 @@ class Recurrence:
         Of `KINDS`; empty where nothing comes back.
     apart : bool
         False where the recordings cannot tell the kinds of the answer apart.
-    kinds : tuple of Kind
     limit : float
         Score that chance reaches in one set of a hundred, all kinds and sensors counted; NaN where the recordings share
         too few stops.

@@ -19,7 +19,6 @@ def answer_in_words(found: Recurrence, unexplained: bool) -> str:
 
     Parameters
     ----------
-    found : Recurrence
     unexplained : bool
         The verdict on the set.
 

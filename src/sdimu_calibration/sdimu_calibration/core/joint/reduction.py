@@ -137,7 +137,6 @@ def whitened(columns: Floats, evidence: LinearEvidence, terms: tuple[NoiseTerm, 
         In the white noise of the evidence.
     evidence : LinearEvidence
         N rows.
-    terms : tuple of NoiseTerm
 
     Returns
     -------

@@ -46,14 +46,12 @@ class SetFinding:
 
     Attributes
     ----------
-    label, title : str
     recording : str
         The only one that shows it; empty where all do.
     value, sigma : float
         SI, of the joint fit with everything that was found.
     z : float
         Score beside what was found before it.
-    unit, display_unit : str
     alike : tuple of str
         What the set cannot tell from it.
     probability : float
@@ -78,14 +76,10 @@ class SetDiagnosis:
 
     Attributes
     ----------
-    verdict : Verdict
-    sentence : str
-    findings : tuple of SetFinding
     before, after : Calibration
         With the model as given, and with what was found.
     threshold : float
         Score that noise reaches in a scan.
-    advice : tuple of Advice
     standing : Standing
         What the set knows of the unit: what a plan for the next recording begins with.
     first : Search

@@ -32,11 +32,6 @@ class SetEvidence(LinearEvidence):
     def signature(self, effects: Sequence[Effect]) -> Floats:
         """Refuse: signatures come with the reductions of the recordings.
 
-        Returns
-        -------
-        ndarray, shape (N, parameters)
-            Never: per SI unit.
-
         Raises
         ------
         NotImplementedError
@@ -108,7 +103,6 @@ def white_power_on(
 
     Parameters
     ----------
-    fit : SetFit
     members : sequence of int
         Places of its recordings among the reports.
     names : sequence of str, length P
@@ -142,7 +136,6 @@ def held_out(fit: SetFit, without: Sequence[str] = ()) -> HeldOut | None:
 
     Parameters
     ----------
-    fit : SetFit
     without : sequence of str
         Coefficients of the fit that the model lacks; the noise stays that of the fit, in which it compares.
     """

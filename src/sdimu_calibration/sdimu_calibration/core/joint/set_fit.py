@@ -53,7 +53,6 @@ class SetFit:
     ----------
     members : tuple of Member
         Those that could be used, in the order of `reports`.
-    model : Model
     local : mapping of str to tuple of str
         By recording, the keys of effects of this recording alone.
     varying : mapping of str to tuple of str
@@ -62,7 +61,6 @@ class SetFit:
         By start and samples, whatever the order in which they were named and their names: so are all digits.
     names : tuple of str, length P
         Coefficients of the estimator, then those of single recordings.
-    estimate : JointEstimate
     turn_on : tuple of TurnOn
         Empty with one power-on.
     left_out : tuple of (str, str)
@@ -132,8 +130,6 @@ class SetOptions:
 
     Attributes
     ----------
-    model : Model
-    estimator : str
     local : mapping of str to tuple of str
         By recording, keys of effects in it alone.
     scopes : mapping of str to str
@@ -155,12 +151,10 @@ def fit_set(
     ----------
     members : sequence of Member
         Recordings of one unit.
-    options : SetOptions
     run : callable
         Does the jobs.
     before : SetFit, optional
         Of the same members with nearly the same model: the recordings are linearised about it.
-    progress : callable
     """
     check_members(members)
     if options.model.priors:
@@ -234,8 +228,6 @@ def job_of(member: Member, options: SetOptions, about: SetFit | None, estimator:
 
     Parameters
     ----------
-    member : Member
-    options : SetOptions
     about : SetFit or None
         Estimate about which the recording is linearised; None is its own fit.
     estimator : str
@@ -319,7 +311,6 @@ def varying_effects(model: Model, scopes: Mapping[str, str], names: Sequence[str
 
     Parameters
     ----------
-    model : Model
     scopes : mapping of str to str
         Scopes by name of effect, in place of those of their traits.
     names : sequence of str
@@ -391,7 +382,6 @@ def with_reports(fit: SetFit, reports: Sequence[Report]) -> SetFit:
 
     Parameters
     ----------
-    fit : SetFit
     reports : sequence of Report
         In the order of its own.
     """

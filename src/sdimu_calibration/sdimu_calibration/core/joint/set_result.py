@@ -44,10 +44,6 @@ def set_outcome(fit: SetFit) -> Calibration:
 
     Coefficients are those of the unit, a bias its mean over all power-ons that might be. What differs from power-on to
     power-on and from recording to recording stands in `of_set`.
-
-    Parameters
-    ----------
-    fit : SetFit
     """
     base = base_fit(fit)
     values, covariance = _reported(fit, base, fit.estimate.covariance)

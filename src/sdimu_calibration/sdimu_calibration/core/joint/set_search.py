@@ -49,7 +49,6 @@ class LocalFind:
 
     Attributes
     ----------
-    recording, key : str
     z : float
         Score beside what was found before it.
     probability : float
@@ -78,7 +77,6 @@ class SetSearch:
         By label, what the set cannot tell from it.
     probability : mapping
         By label, that it or one of these is in all recordings (1).
-    local : tuple of LocalFind
     threshold : float
         Score that noise reaches in a scan of the joint evidence.
     first : Search
@@ -117,12 +115,10 @@ def search_set(
     ----------
     members : sequence of Member
         At least two.
-    options : SetOptions
     run : callable
         Does the jobs.
     extra : sequence of Effect
         The user's own effects, tried with the catalogue.
-    progress : callable
     alpha : float
         False-alarm probability of a whole scan.
     fitted : SetFit, optional
@@ -246,8 +242,6 @@ def as_given(found: SetSearch, options: SetOptions, run: Run) -> SetSearch:
     ----------
     found : SetSearch
         What it found in one recording alone stays.
-    options : SetOptions
-        Of the search.
     run : callable
         Does the jobs.
     """

@@ -71,9 +71,6 @@ def next_recording(fit: SetFit, standing: Standing, test: PreparedTest) -> list[
 
     Parameters
     ----------
-    fit : SetFit
-    standing : Standing
-        Of the set.
     test : PreparedTest
         One of its recordings: gives IMU and site.
 

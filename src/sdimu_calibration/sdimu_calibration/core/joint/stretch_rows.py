@@ -65,10 +65,6 @@ def stretch_rows(fit: Fit) -> tuple[Reduction, Places]:
 
     Noise with a memory that was learned is left out: it would take in what may come back.
 
-    Parameters
-    ----------
-    fit : Fit
-
     Returns
     -------
     reduction : Reduction

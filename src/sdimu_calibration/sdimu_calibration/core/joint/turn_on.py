@@ -51,12 +51,6 @@ def in_scatter(combined: Combination, found: Sequence[TurnOn]) -> JointEstimate:
     With few power-ons the scatter is known to a factor: values and covariance are the mean over the sigmas that the
     data leave open, each weighed with its likelihood (flat prior of sigma: A. Gelman, "Prior distributions for variance
     parameters in hierarchical models", Bayesian Analysis 1, 2006).
-
-    Parameters
-    ----------
-    combined : Combination
-    found : sequence of TurnOn
-        Of its components.
     """
     tau = np.array([t.sigma for t in found])
     best = combined.estimate(tau)

@@ -28,7 +28,6 @@ class CorrectedCycles:
 
     Attributes
     ----------
-    cycles : Cycles
     seen : Motion
         Its rate and force are those of the corrected cycles.
     weight : ndarray, shape (n, 6, 6)
@@ -49,12 +48,7 @@ def correct_cycles(cycles: Cycles, seen: Motion, model: ImuModel, coefficients: 
         As measured.
     seen : Motion
         Near the true motion of the same cycles.
-    model : ImuModel
     coefficients : ndarray, shape (p,)
-
-    Returns
-    -------
-    CorrectedCycles
     """
     slope = error_slope(model, seen, slice(None), coefficients)
     weight: Floats = np.asarray(np.linalg.inv(np.eye(6) + slope), dtype=np.float64)

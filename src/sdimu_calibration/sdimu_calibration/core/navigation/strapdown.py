@@ -179,10 +179,6 @@ class Reducer:
             End of each sample (s), ascending; the first interval starts at 0.
         omega_ib_b, f_ib_b : ndarray, shape (n, 3)
             Mean rate (rad/s) and specific force (m/s^2) over the interval.
-
-        Returns
-        -------
-        Cycles
         """
         out = np.empty((len(t), _COLUMNS))
         n = _reduce(

@@ -55,7 +55,6 @@ def integrate(C_nb: Floats, cycles: Cycles, latitude: float) -> Floats:
     ----------
     C_nb : ndarray, shape (3, 3)
         Attitude at the start; moved to the end of the cycles, in place.
-    cycles : Cycles
     latitude : float
         rad.
 
@@ -115,7 +114,6 @@ def motion(
 
     Parameters
     ----------
-    cycles : Cycles
     rest : ndarray of bool, shape (n,)
         Cycles in dwell.
     model, coefficients : ImuModel and ndarray, shape (p,)
@@ -124,7 +122,6 @@ def motion(
         Attitude at the start; moved to the end of the cycles, in place.
     latitude, gravity : float
         Of the site (rad, m/s^2).
-    temperature : TemperatureLog or None
     predicted : bool
         Put the rate and force that the attitude predicts in place of the measured ones at rest, so that regressors
         such as sign(w) carry no noise there. Needs a good `C_start` and coefficients.
@@ -138,10 +135,6 @@ def motion(
         Take the rate of the temperature and the angular acceleration from what came before, as a filter must that
         runs while the samples arrive. Both are then late, by 30 s and by half a cycle; whoever has the whole
         recording takes them about the cycle.
-
-    Returns
-    -------
-    Motion
     """
     dt = cycles.dt
     w_measured, f_measured = cycles.alpha / dt[:, None], cycles.upsilon / dt[:, None]

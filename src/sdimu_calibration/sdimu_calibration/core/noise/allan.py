@@ -73,10 +73,6 @@ def freedom_of(length: int, m: Floats) -> Floats:
 def factors(longest: int) -> Ints:
     """Averaging factors for stretches of at most `longest` samples: powers of the square root of two.
 
-    Parameters
-    ----------
-    longest : int
-
     Returns
     -------
     ndarray of int, shape (k,)
@@ -119,10 +115,6 @@ def allan(stretches: Sequence[Floats], interval_s: float) -> Allan:
         Samples at rest, each stretch without gaps.
     interval_s : float
         Sample interval.
-
-    Returns
-    -------
-    Allan
     """
     m = factors(max(map(len, stretches)))
     total, pairs, freedom = np.zeros(len(m)), np.zeros(len(m)), np.zeros(len(m))

@@ -39,11 +39,6 @@ _MATTERS = 0.1
 def with_quantisation(imu: ImuSpecification, recording: Recording) -> tuple[ImuSpecification, str]:
     """Add the quantisation that the rests show to a specification, for a triad of which it states none.
 
-    Parameters
-    ----------
-    imu : ImuSpecification
-    recording : Recording
-
     Returns
     -------
     imu : ImuSpecification

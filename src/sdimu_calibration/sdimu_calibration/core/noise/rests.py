@@ -31,10 +31,6 @@ def rests(recording: Recording) -> tuple[slice, ...]:
     A sample is at rest when the second about it scatters no more than the quietest do, its mean rate is theirs, no
     sample is missing, and the table (where it says anything) dwells. A second at both ends of each rest is left out.
 
-    Parameters
-    ----------
-    recording : Recording
-
     Returns
     -------
     tuple of slice
@@ -60,10 +56,6 @@ def rests(recording: Recording) -> tuple[slice, ...]:
 
 def at_rest(recording: Recording) -> Bools:
     """Find the samples about which the IMU rests for a second, and the table dwells where it says anything.
-
-    Parameters
-    ----------
-    recording : Recording
 
     Returns
     -------

@@ -109,15 +109,10 @@ def fit_terms(found: Allan, rng: np.random.Generator, draws: int = _DRAWS) -> Te
 
     Parameters
     ----------
-    found : Allan
     rng : numpy.random.Generator
         For the draws that give the standard errors.
     draws : int
         The standard errors are known to ``1 / sqrt(2 draws)``.
-
-    Returns
-    -------
-    Terms
     """
     misfit = _misfit(found)
     value = np.sqrt(_squares(found, misfit=misfit))
@@ -208,7 +203,6 @@ def drawn(value: Floats, n: int, interval_s: float, rng: np.random.Generator) ->
         Number of samples.
     interval_s : float
         Time over which each sample is a mean.
-    rng : numpy.random.Generator
 
     Returns
     -------

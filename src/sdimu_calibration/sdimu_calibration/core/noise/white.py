@@ -53,7 +53,6 @@ def white_noise(recording: Recording, rows: Sequence[slice] | None = None) -> Wh
 
     Parameters
     ----------
-    recording : Recording
     rows : sequence of slice, optional
         The rests; all that `rests` finds by default.
     """

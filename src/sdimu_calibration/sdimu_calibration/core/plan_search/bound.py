@@ -26,8 +26,6 @@ class Question:
 
     Attributes
     ----------
-    site : Site
-    imu : ImuSpecification
     model : Model
         Its effects are to be determined.
     known : Known or None
@@ -81,17 +79,7 @@ class Bounds:
 
 
 def bounds(plan: Plan, asked: Question) -> Bounds:
-    """Compute the sigmas that a plan reaches.
-
-    Parameters
-    ----------
-    plan : Plan
-    asked : Question
-
-    Returns
-    -------
-    Bounds
-    """
+    """Compute the sigmas that a plan reaches."""
     nominal = prepare(plan, asked.site, asked.imu, asked.model, None, None)
     sensors = nominal.setup.sensors
     alone = bound_covariance(nominal.prepared, nominal.setup, nominal.start)

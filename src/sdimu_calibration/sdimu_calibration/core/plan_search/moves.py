@@ -22,7 +22,6 @@ class Abilities:
     ----------
     rates_rad_s : tuple of float
         Mean rates of turns.
-    acceleration_rad_s2 : float
     dwells_s : tuple of float
         Lengths of stops.
     """

@@ -38,7 +38,6 @@ class NextTurn:
 
     Attributes
     ----------
-    turns : tuple of Turn
     minutes : float
         Turns and the stops after them.
     before, after : float
@@ -88,7 +87,6 @@ def next_turn(
         Size (SI) of coefficients, such as the estimate; one sigma of the prior by default.
     rates_rad_s : sequence of float
         Rates the table can do.
-    progress : callable, optional
 
     Returns
     -------
@@ -150,7 +148,6 @@ def apart(told: Bounds, names: Sequence[str], sizes: Mapping[str, float] | None)
 
     Parameters
     ----------
-    told : Bounds
     names : sequence of str
         Two coefficients or more.
     sizes : mapping of str to float or None

@@ -70,12 +70,8 @@ def search(
     ----------
     start : Plan
         Every change keeps the attitudes of its stops.
-    asked : Question
-    able : Abilities
-    goal : Goal
     tries : int
         Most plans to evaluate (about half a second each).
-    progress : callable, optional
 
     Returns
     -------

@@ -16,7 +16,6 @@ class NoiseSet:
 
     Attributes
     ----------
-    name : str
     gyro_density, accel_density : float
         Q: white noise that drives the navigation (rad/s/sqrt(Hz), m/s^2/sqrt(Hz)).
     rate_sigma, force_sigma : float
@@ -48,18 +47,7 @@ class NoiseSet:
 
 
 def apply(noise: NoiseSet, imu: ImuSpecification, model: Model) -> tuple[ImuSpecification, Model]:
-    """IMU and model with the noise of a set in place of their own.
-
-    Parameters
-    ----------
-    noise : NoiseSet
-    imu : ImuSpecification
-    model : Model
-
-    Returns
-    -------
-    ImuSpecification, Model
-    """
+    """IMU and model with the noise of a set in place of their own."""
     for what, sigma, density in (
         ("rate_sigma", noise.rate_sigma, noise.gyro_density),
         ("force_sigma", noise.force_sigma, noise.accel_density),

@@ -37,8 +37,6 @@ def ramp_length(turn: Turn, acceleration_rad_s2: float, number: int) -> float:
 
     Parameters
     ----------
-    turn : Turn
-    acceleration_rad_s2 : float
     number : int
         Number of the turn in the plan, for the message.
 
@@ -66,7 +64,6 @@ def turned(t: Floats, turn: Turn, ramp_s: float) -> tuple[Floats, Floats]:
     ----------
     t : ndarray, shape (m,)
         Time after the start of the turn (s); any shape.
-    turn : Turn
     ramp_s : float
         Length of each ramp.
 
@@ -95,8 +92,6 @@ def nominal_recording(
 
     Parameters
     ----------
-    plan : Plan
-    site : Site
     mount_rad : ndarray, shape (3,), optional
         Rotation vector of the IMU on the table (rad), ``C_tb = rotation_matrix(mount)``; zero by default.
     rate_hz : float

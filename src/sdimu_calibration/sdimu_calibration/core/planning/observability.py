@@ -38,8 +38,6 @@ class Combination:
 
     Attributes
     ----------
-    text : str
-        In words.
     weights : tuple of (str, float)
         Coefficients and weights, in units of their priors; empty for attitude.
     left : float

@@ -38,8 +38,6 @@ class Prediction:
 
     Attributes
     ----------
-    body_frame : str
-    duration_s : float
     model : tuple of str
         Effects.
     names, units, display_units : tuple of str, length p
@@ -58,7 +56,6 @@ class Prediction:
     attitude : ndarray, shape (m, 3)
         Attitude sigma N, E, D against time (rad).
     dwell : ndarray of bool, shape (m,)
-    unobservable : tuple of Combination
     """
 
     body_frame: str
@@ -101,18 +98,10 @@ def prepare(
 
     Parameters
     ----------
-    plan : Plan
-    site : Site
-    imu : ImuSpecification
-    model : Model
     mount_rad : ndarray, shape (3,), or None
         Rotation vector of the IMU on the table (rad); None for zero.
     noise : NoiseSet or None
         Replaces the noise of IMU and model and the initial attitude.
-
-    Returns
-    -------
-    Nominal
     """
     told, weighed = (imu, model) if noise is None else apply(noise, imu, model)
     setup = set_up(site, told, weighed)
@@ -139,8 +128,6 @@ def predict(
 
     Parameters
     ----------
-    plan : Plan
-    site : Site
     imu : ImuSpecification
         Noise and priors.
     model : Model
@@ -151,10 +138,6 @@ def predict(
         Replaces the noise of IMU and model and the initial attitude.
     bound : callable, optional
         Gives the covariance (p, p), frame of the prior, that the data hold (`batch.bound_covariance`); NaN without.
-
-    Returns
-    -------
-    Prediction
     """
     nominal = prepare(plan, site, imu, model, mount_rad, noise)
     setup = nominal.setup

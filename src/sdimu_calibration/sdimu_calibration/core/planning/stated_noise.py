@@ -15,12 +15,7 @@ from sdimu_calibration.core.specification import ImuSpecification
 
 
 def stated_noise(imu: ImuSpecification) -> tuple[NoiseTerm, ...]:
-    """Noise with a memory that an IMU file states.
-
-    Parameters
-    ----------
-    imu : ImuSpecification
-    """
+    """Noise with a memory that an IMU file states."""
     sizes = (
         ("gyro", FLICKER, imu.gyro_bias_instability),
         ("gyro", RANDOM_WALK, imu.gyro_random_walk),
@@ -32,12 +27,6 @@ def stated_noise(imu: ImuSpecification) -> tuple[NoiseTerm, ...]:
 
 def covariance_in(fit: FilterFit, terms: tuple[NoiseTerm, ...]) -> Floats:
     """Covariance of the coefficients of a fit in noise of these terms, biases as means over the test.
-
-    Parameters
-    ----------
-    fit : FilterFit
-        About a perfect recording.
-    terms : tuple of NoiseTerm
 
     Returns
     -------

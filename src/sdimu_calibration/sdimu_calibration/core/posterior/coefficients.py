@@ -64,7 +64,6 @@ class Averages:
 
     Parameters
     ----------
-    board : Board
     dwell_means : callable
         Mean of the regressors of an effect over all dwells (SI), shape (terms,).
     """

@@ -25,7 +25,6 @@ def combinations_of(data: Data, number: int) -> list[tuple[int, int]]:
 
     Parameters
     ----------
-    data : Data
     number : int
         The candidate.
     """
@@ -48,7 +47,6 @@ def crossed(data: Data, members: Members) -> list[Members]:
 
     Parameters
     ----------
-    data : Data
     members : tuple of (int, int)
         A model.
     """

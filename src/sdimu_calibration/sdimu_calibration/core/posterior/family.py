@@ -9,10 +9,6 @@ from sdimu_calibration.core.evidence.candidate import Candidate
 def family_of(candidate: Candidate) -> tuple[str, str]:
     """Name the family of a candidate, and its sensor.
 
-    Parameters
-    ----------
-    candidate : Candidate
-
     Returns
     -------
     family : str

@@ -41,7 +41,6 @@ class Data:
     ----------
     J : ndarray, shape (q, q)
     d : ndarray, shape (q,)
-    prior : Prior
     """
 
     J: Floats

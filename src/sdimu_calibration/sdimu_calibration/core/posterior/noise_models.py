@@ -277,8 +277,6 @@ def explored(
     ----------
     information : NoiseInformation
         Coefficients and effects are estimated along.
-    cut : Stretches
-    usual : Sizes
     tried : sequence of NoiseTerm, optional
         Kinds and time constants to look for; all of them without.
     rival : float

@@ -54,14 +54,7 @@ _NOISES = 6
 
 @dataclass(frozen=True)
 class Weighed:
-    """One model of the window.
-
-    Attributes
-    ----------
-    members : tuple of (int, int)
-    noise : NoiseModel
-    probability : float
-    """
+    """One model of the window."""
 
     members: Members
     noise: NoiseModel
@@ -74,7 +67,6 @@ class Posterior(Generic[E]):
 
     Attributes
     ----------
-    board : Board
     models : tuple of Weighed
         The likeliest first.
     noises : tuple of (NoiseModel, float)

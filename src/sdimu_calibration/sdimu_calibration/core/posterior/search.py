@@ -38,7 +38,6 @@ def climb(data: Data, start: Members, of_two: bool = True) -> tuple[float, Membe
 
     Parameters
     ----------
-    data : Data
     start : tuple of (int, int)
         Model to begin with.
     of_two : bool

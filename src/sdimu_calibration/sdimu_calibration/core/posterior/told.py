@@ -24,13 +24,7 @@ _MOST = 200
 
 @dataclass(frozen=True)
 class Share:
-    """Something that may be, and the probability that it is so.
-
-    Attributes
-    ----------
-    name : str
-    probability : float
-    """
+    """Something that may be, and the probability that it is so."""
 
     name: str
     probability: float
@@ -42,12 +36,10 @@ class MemberShare:
 
     Attributes
     ----------
-    label : str
     probability : float
         Of the models that hold it.
     value, sigma : float
         Its size over these models (SI).
-    unit, display_unit : str
     """
 
     label: str
@@ -64,7 +56,6 @@ class FamilyShare:
 
     Attributes
     ----------
-    family : str
     sensor : str
         As of `family_of`.
     probability : float
@@ -85,14 +76,12 @@ class NoiseShare:
 
     Attributes
     ----------
-    triad, kind : str
     probability : float
         Of the models that hold it.
     size : float
         Geometric mean over these models (SI, `unit`).
     low, high : float
         Ends of the interval of 95 % where the noise is told; NaN elsewhere.
-    unit : str
     """
 
     triad: str
@@ -112,8 +101,6 @@ class Probabilities:
     ----------
     nothing : float
         Probability that no effect is missing.
-    families : tuple of FamilyShare
-    noise : tuple of NoiseShare
     """
 
     nothing: float
@@ -126,7 +113,6 @@ def probabilities(found: Posterior[E], told: Sequence[NoiseTerm] = ()) -> Probab
 
     Parameters
     ----------
-    found : Posterior
     told : sequence of NoiseTerm
         Noise with its intervals.
     """

@@ -21,7 +21,6 @@ class UnknownFunction:
 
     Attributes
     ----------
-    triad : str
     follows : str
         One of `FOLLOWS`.
     variable : ndarray, shape (n, k)
@@ -44,7 +43,6 @@ def unknown_functions(found: Posterior[E], terms: Sequence[NoiseTerm]) -> tuple[
 
     Parameters
     ----------
-    found : Posterior
     terms : sequence of NoiseTerm
         The noise that is told.
     """

@@ -73,12 +73,8 @@ class SecondOrderPass:
         Of all epochs; its covariances are those of the epochs `rows`.
     rows : ndarray of int, shape (j,)
         First epoch of each piece of the pass (`run_stops`).
-    data : PassInput
-        Of the corrected samples.
     C_stop : ndarray, shape (k, 3, 3)
         Attitude about which each stop was linearised, b to n.
-    where : Layout
-        Of the stops.
     """
 
     reference: Floats
@@ -118,10 +114,8 @@ def solve_second_order(
     ----------
     setup : TestSetup
         With the inner model of an `accelerometer_frame.AccelerometerFrameModel`.
-    prepared, start : PreparedData, Alignment
     begin : StartPoint or None
         Attitude and coefficients of the first linearisation; None finds them from all stops.
-    progress : callable
 
     Returns
     -------
@@ -168,14 +162,12 @@ class Linearisation:
     ----------
     reference : ndarray, shape (q,)
         Coefficients (SI) at which the samples were corrected.
-    where : Layout
     C_stop : ndarray, shape (k, 3, 3)
         Attitude of every stop (b to n), levelled by its own corrected force.
     seen : Motion
         Motion along these attitudes, n cycles.
     weight : ndarray, shape (n, 6, 6)
         Change of corrected rate and force per change of the measured ones.
-    data : PassInput
     """
 
     reference: Floats
@@ -191,7 +183,6 @@ def linearise(prepared: PreparedData, setup: TestSetup, C_nb: Floats, reference:
 
     Parameters
     ----------
-    prepared, setup : PreparedData, TestSetup
     C_nb : ndarray, shape (3, 3)
         Initial attitude, b to n.
     reference : ndarray, shape (q,)
@@ -225,7 +216,6 @@ def second_order_pass(
 
     Parameters
     ----------
-    prepared, setup : PreparedData, TestSetup
     start : Alignment
         Mean and sigma of the initial attitude.
     C_nb : ndarray, shape (3, 3)
@@ -290,12 +280,8 @@ def run_stops(
 
     Parameters
     ----------
-    data : PassInput
-        Of corrected samples.
-    setup : TestSetup
     begin : PassState
         At the first sample; it is not changed.
-    prepared : PreparedData
     where : Layout
         k stops.
     C_stop : ndarray, shape (k, 3, 3)

@@ -50,7 +50,6 @@ class RateTable:
 
     Attributes
     ----------
-    name : str
     axes : tuple of str or None
         Platform axis letters about which outer, middle and inner axis turn when all angles are zero; None is a table
         that turns about any platform axis.

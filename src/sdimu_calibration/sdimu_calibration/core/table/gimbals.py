@@ -20,10 +20,6 @@ PARALLEL_RAD = 1e-9
 def unit(letter: str) -> Floats:
     """Return the unit vector of an axis letter.
 
-    Parameters
-    ----------
-    letter : str
-
     Returns
     -------
     ndarray, shape (3,)
@@ -81,7 +77,6 @@ def assign_turns(
 
     Parameters
     ----------
-    plan : Plan
     axes : tuple of str
         Axis letters of outer, middle and inner axis at zero angles.
     start : ndarray, shape (3,), optional

@@ -76,7 +76,6 @@ class Move:
 
     Attributes
     ----------
-    step : Step
     joint : str
         The joint that turns; empty when none does.
     axis : (int, float) or None
@@ -115,10 +114,8 @@ def plan_move(
 
     Parameters
     ----------
-    table : RateTable
     angles : ndarray, shape (3,)
         Where the joints are now (rad, counted through all turns).
-    step : Step
     axis : (int, float), optional
         Joint and sense that make the turn, as `assign_turns` gives them; chosen when left out: the innermost that stays
         within its limits.
@@ -146,7 +143,6 @@ def is_possible(table: RateTable, angles: Floats, step: Step) -> bool:
 
     Parameters
     ----------
-    table : RateTable
     angles : ndarray, shape (3,)
         Where the joints are (rad).
     step : Step
@@ -176,10 +172,8 @@ def moves_of(table: RateTable, angles: Floats, plan: Plan) -> tuple[Move, ...]:
 
     Parameters
     ----------
-    table : RateTable
     angles : ndarray, shape (3,)
         Where the joints are at the start (rad).
-    plan : Plan
     """
     here = np.asarray(angles, dtype=np.float64)
     axes: tuple[tuple[int, float] | None, ...] = (None,) * len(plan.dwell_s)

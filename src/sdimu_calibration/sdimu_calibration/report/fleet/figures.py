@@ -56,7 +56,6 @@ def control_chart(fleet: Measured, some: Sequence[Coefficient], units: Mapping[s
 
     Parameters
     ----------
-    fleet : Measured
     some : sequence of Coefficient
         Those of one effect.
     units : mapping of str to str

@@ -64,8 +64,6 @@ def write_page(path: Path, gathered: Gathered, done: Study, candidates: Candidat
     ----------
     path : Path
         File to make or replace; its folder is made too.
-    gathered : Gathered
-    done : Study
     candidates : Candidates
         For their units.
     title : str

@@ -57,8 +57,6 @@ def write_page(
     ----------
     path : Path
         File to make or replace; its folder is made too.
-    lines : sequence of Line
-    about : Certificate
     entries : sequence of Entry
         The results that it is made of.
     certificate : bool

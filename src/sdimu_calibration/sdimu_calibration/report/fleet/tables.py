@@ -23,7 +23,6 @@ def rows(done: Study, units: Mapping[str, str]) -> list[list[str]]:
 
     Parameters
     ----------
-    done : Study
     units : mapping of str to str
         Customary unit of each coefficient.
     """

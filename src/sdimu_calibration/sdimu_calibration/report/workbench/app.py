@@ -62,8 +62,6 @@ def build(shelf: RecordingCache, host: str = LOOPBACK[0], judge: Judge | None = 
 
     Parameters
     ----------
-    shelf : RecordingCache
-    host : str
     judge : callable, optional
         Diagnoses all recordings of the shelf as one set, with some effects added.
     """

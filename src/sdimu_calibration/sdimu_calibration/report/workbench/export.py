@@ -68,7 +68,6 @@ def command(setting: Setting, bag: str, options: Sequence[str] = ()) -> str:
 
     Parameters
     ----------
-    setting : Setting
     bag : str
         Place or name of the recording.
     options : sequence of str

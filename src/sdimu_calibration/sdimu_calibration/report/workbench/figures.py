@@ -65,8 +65,6 @@ class Curve:
         Residuals (sigma).
     signature : ndarray, shape (e, 12), or None
         What the candidate that is looked at would take out of them.
-    name : str
-        Of the candidate.
     """
 
     y: Floats
@@ -81,9 +79,6 @@ def residuals(fitted: Fitted, curve: Curve, channel: int, stop: int | None, agai
 
     Parameters
     ----------
-    fitted : Fitted
-    curve : Curve
-    channel : int
     stop : int or None
         None shows all stops.
     against : str
@@ -197,7 +192,6 @@ def finished(figure: Figure, look: Any) -> Any:
 
     Parameters
     ----------
-    figure : Figure
     look : mapping
         ``theme``, and ``scale`` of what is written.
     """

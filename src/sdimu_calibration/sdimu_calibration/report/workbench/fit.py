@@ -59,7 +59,6 @@ class Fitted:
         One-sigma (SI) that the IMU's file, or physics, gives each coefficient.
     grid : Grid
         Normalised means, channel by stop.
-    residuals : Residuals
     begin : ndarray, shape (e,)
         Start of each epoch (s).
     axes : mapping of str to ndarray, shape (e,)
@@ -98,10 +97,6 @@ class Missing:
         All candidates, largest score first.
     threshold : float
         Size of the score that pure noise reaches.
-    adequate : bool
-    sentence : str
-    left : FreeInputTest
-        Of the free inputs.
     held_out : float or None
         Error at stops or rests held out (sigma), as `sdimu calibrate` has it.
     probabilities : Probabilities or None
@@ -128,7 +123,6 @@ class Preview:
     ----------
     effect : Effect
         The first, where a text gives several.
-    what : Addition
     residuals : Residuals
         `before` and `after` it is added.
     """

@@ -34,7 +34,6 @@ def guard(server: Flask, host: str) -> None:
 
     Parameters
     ----------
-    server : Flask
     host : str
         Address that is listened on; another one than loopback is answered too, with the names of this machine.
     """

@@ -30,7 +30,6 @@ def stated_priors(given: Sequence[StatedPrior], changed: Sequence[Prior]) -> tup
 
     Parameters
     ----------
-    given : sequence of StatedPrior
     changed : sequence of (str, str, str)
         Coefficient, mean and sigma as a page holds them.
     """

@@ -20,7 +20,6 @@ def step(now: State, what: str, controls: Controls) -> State:
 
     Parameters
     ----------
-    now : State
     what : str
         What was clicked: one of `STEPS`.
     controls : mapping

@@ -46,7 +46,6 @@ def layout(title: str, together: bool = False) -> Any:
 
     Parameters
     ----------
-    title : str
     together : bool
         They can be judged as one set.
     """

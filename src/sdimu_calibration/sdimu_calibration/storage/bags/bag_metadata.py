@@ -48,10 +48,8 @@ def write_metadata(
 
     Parameters
     ----------
-    folder : Path
     files : sequence of FileEntry
         In the order in which they are to be read.
-    topics : sequence of TopicEntry
     custom : mapping of str to str, optional
         What the user says of the recording.
     """

@@ -47,7 +47,6 @@ def write_recording(
         Stamp (ns after `start_ns`), axes, angles (rad), rates (rad/s).
     temperature : (ndarray (o,), ndarray (o,)), optional
         Stamp (ns after `start_ns`), temperature (deg C).
-    topics : Topics, optional
     replace : bool
         Delete a bag that is already there.
     custom : mapping of str to str, optional

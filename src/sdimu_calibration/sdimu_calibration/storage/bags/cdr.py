@@ -177,7 +177,6 @@ def encode_imu(
         Stamps (ns).
     omega_ib_b, f_ib_b : ndarray, shape (n, 3)
         Rate (rad/s) and specific force (m/s^2), in the frame of the IMU.
-    frame_id : str
     covariances : (ndarray, ndarray), each of shape (n, 3, 3), optional
         Of rate and force; zero, which is not known, when left out.
 
@@ -214,7 +213,6 @@ def encode_joint_states(
     names : tuple of str, length k
     position, velocity : ndarray, shape (n, k)
         Angles (rad) and rates (rad/s).
-    frame_id : str
 
     Returns
     -------
@@ -272,7 +270,6 @@ def decode_doubles(raw: Sequence[bytes], number: int) -> tuple[Stamps, Floats]:
     Parameters
     ----------
     raw : sequence of bytes, length n
-    number : int
 
     Returns
     -------

@@ -48,15 +48,10 @@ def write_compensated(
     ----------
     source : Path
         Bag of the recording, from which the other topics are copied.
-    recording : Recording
-    using : Compensator
     target : Path
         Folder to make.
-    frame_id : str
-        Of the compensated samples.
     replace : bool
         Delete a bag that is already there.
-    progress : callable, optional
     """
     check_apart(source, target)
     check_room(target, replace)

@@ -21,7 +21,6 @@ def encode_compensated(stamp_ns: Stamps, samples: Compensated, frame_id: str) ->
     stamp_ns : ndarray, shape (n,)
     samples : Compensated
         n samples.
-    frame_id : str
 
     Returns
     -------

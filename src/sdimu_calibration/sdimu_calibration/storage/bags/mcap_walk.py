@@ -44,7 +44,6 @@ class Messages:
 
     Attributes
     ----------
-    content : bytes
     channel, time_ns, start, length : ndarray of int, shape (n,)
         Channel and log time of each message; where its bytes begin in `content`, and how many they are.
     """
@@ -143,7 +142,6 @@ class McapWalk:
 
     Parameters
     ----------
-    path : Path
     most : int, optional
         Bytes that its chunks may unpack to; by the size of the file when left out.
 

@@ -16,7 +16,6 @@ class Block:
 
     Attributes
     ----------
-    buffer : bytes
     start, length : ndarray of int, shape (n,)
         First byte of each message, and number of its bytes.
     """
@@ -33,7 +32,6 @@ class Block:
         ----------
         place : int or ndarray of int, shape (n,)
             Byte of the message at which the field begins; the field must end inside the message.
-        dtype : data type
         count : int
             Neighbouring numbers.
 

@@ -26,7 +26,6 @@ class Salvage:
 
     Attributes
     ----------
-    path : Path
     damage : str
         What was wrong; empty for a whole file, which is left as it is.
     counts : dict of str to int

@@ -65,8 +65,6 @@ def choose(
     ----------
     path : Path
         For the messages to the user.
-    content : mapping of str to TopicContent
-    choice : TopicChoice
     is_phase : callable
         Whether a diagnostic message says ``dwell`` or ``rotating``.
     notes : list of str

@@ -59,7 +59,6 @@ def unpacked(compression: str, data: bytes, most: int) -> bytes:
     ----------
     compression : str
         ``zstd``, ``lz4`` (frames), or nothing.
-    data : bytes
     most : int
         Bytes that may come out.
 

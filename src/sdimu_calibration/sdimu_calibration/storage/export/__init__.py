@@ -58,7 +58,6 @@ def export(
         Key of `FORMS`.
     path : Path
         File to make; forms of two files put ``-accel`` and ``-gyro`` before its suffix.
-    calibration : Calibration
     imu : ImuSpecification
         White noise, where the form has a place for it.
     own : sequence of Effect

@@ -45,8 +45,6 @@ def write_datasheet(path: Path, lines: Sequence[Line], about: Certificate, entri
     ----------
     path : Path
         File to make or replace; its folder is made too.
-    lines : sequence of Line
-    about : Certificate
     entries : sequence of Entry
         The results that it is made of.
     """

@@ -95,7 +95,6 @@ def write_diagnosis(path: Path, summary: DiagnosisSummary, null: Null | None = N
     ----------
     path : Path
         File to make or replace; its folder is made too.
-    summary : DiagnosisSummary
     null : Null, optional
         Of a bootstrap.
     """

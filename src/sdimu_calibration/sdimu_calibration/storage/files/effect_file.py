@@ -189,7 +189,6 @@ def new_parts(effects: Sequence[Effect], model: Sequence[Effect], name: str) -> 
 
     Parameters
     ----------
-    effects, model : sequence of Effect
     name : str
         Of what is added, for the error.
     """

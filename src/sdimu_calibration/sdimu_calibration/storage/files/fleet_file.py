@@ -32,8 +32,6 @@ def write_fleet(path: Path, gathered: Gathered, done: Study) -> None:
     ----------
     path : Path
         File to make or replace; its folder is made too.
-    gathered : Gathered
-        The results.
     done : Study
         What they say together.
     """
@@ -97,8 +95,6 @@ def write_priors(path: Path, base: str, gathered: Gathered, done: Study) -> Mapp
         File to make or replace.
     base : str
         IMU by name or path: grade, noise, and priors of effects that the population does not know.
-    gathered : Gathered
-    done : Study
 
     Returns
     -------

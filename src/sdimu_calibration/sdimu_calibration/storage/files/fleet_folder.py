@@ -40,7 +40,6 @@ class Entry:
         Folder of the result, as seen from the folder that was asked for.
     path : Path
         Its folder.
-    result : Calibration
     diagnosis : DiagnosisFile or SetDiagnosisFile or None
         Content of diagnosis.json or set.json beside it.
     """

@@ -83,7 +83,6 @@ class Journal:
 
     Parameters
     ----------
-    path : Path
     options : str
         Digest of the options that the data are used with.
     lasting : bool

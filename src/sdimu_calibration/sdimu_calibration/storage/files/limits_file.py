@@ -23,7 +23,6 @@ def read_limits(path: Path, terms: Mapping[str, str]) -> dict[str, float]:
 
     Parameters
     ----------
-    path : Path
     terms : mapping of str to str
         Unit of each term that a data sheet knows.
 

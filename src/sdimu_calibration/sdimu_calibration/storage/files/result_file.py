@@ -153,7 +153,6 @@ def write_result(path: Path, calibration: Calibration, verdict: Verdict | None =
     ----------
     path : Path
         File to make or replace; its folder is made too.
-    calibration : Calibration
     verdict : Verdict, optional
         Of a diagnosis, where one was made; no note then advises one.
     """
@@ -311,7 +310,6 @@ def noise_for(result: Calibration, imu: str | None) -> tuple[ImuSpecification, s
 
     Parameters
     ----------
-    result : Calibration
     imu : str or None
         Name or path of an IMU file; None or empty where nobody names one.
 

@@ -46,7 +46,6 @@ def write_whole(path: Path, text: str) -> None:
     ----------
     path : Path
         File to make or replace.
-    text : str
     """
     path = Path(path)
     if path.is_dir():

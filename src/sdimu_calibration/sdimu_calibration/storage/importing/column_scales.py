@@ -26,7 +26,6 @@ class Scale(NamedTuple):
 
     Attributes
     ----------
-    unit : str
     counts : float
         Numbers of one unit.
     bias : float
@@ -83,7 +82,6 @@ def gyro_scale(w: Floats, f_ib_b: Floats, rate_hz: float, unit: str) -> Scale:
         As in the file.
     f_ib_b : ndarray, shape (n, 3)
         m/s^2.
-    rate_hz : float
     unit : str
         By the headings; empty where they say none.
     """

@@ -48,7 +48,6 @@ class TimeColumn(NamedTuple):
     ----------
     column : str
         Heading or number; empty where there is none.
-    unit : str
     rate_hz : float
         0 where nothing says it.
     why : str
@@ -163,9 +162,7 @@ def time_of(table: TextTable, numbers: Floats, pairs: Sequence[Pair]) -> TimeCol
 
     Parameters
     ----------
-    table : TextTable
     numbers : ndarray, shape (n, k)
-    pairs : sequence of Pair
     """
     taken = {k for pair in pairs for k in (*pair.accel, *pair.gyro)}
     free = [k for k in range(numbers.shape[1]) if k not in taken]

@@ -109,7 +109,6 @@ class SensorMap(Schema):
         Column of the times, where it is not the common one.
     counts_per_unit, bias : tuple of three float
         Raw counts; the bias is the nominal one, such as half of the converter's range.
-    sign : tuple of three int
     """
 
     columns: Annotated[tuple[Column, ...], BeforeValidator(_listed)]
@@ -194,10 +193,8 @@ class BinaryMap(Schema):
 
     Attributes
     ----------
-    type : str
     columns : int
         Numbers of a row.
-    big_endian : bool
     skip_bytes : int
         Before the first number.
     """
@@ -213,10 +210,6 @@ class ImportMap(Schema):
 
     Attributes
     ----------
-    time : TimeMap
-    accel, gyro : SensorMap
-    temperature : TemperatureMap, optional
-    phase : PhaseMap, optional
     delimiter : str, optional
         Between the columns of a text file; recognised when left out.
     decimal : str

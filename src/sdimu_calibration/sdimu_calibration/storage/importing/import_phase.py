@@ -23,8 +23,6 @@ def read_phase(table: Table, part: PhaseMap, ns: Stamps) -> Status:
 
     Parameters
     ----------
-    table : TextTable or ArrayTable
-    part : PhaseMap
     ns : ndarray of int64, shape (n,)
         Stamps of the rows (ns).
 

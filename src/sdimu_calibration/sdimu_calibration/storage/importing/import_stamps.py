@@ -35,10 +35,8 @@ def read_stamps(table: Table, column: int | str | None, time: TimeMap, samples: 
 
     Parameters
     ----------
-    table : TextTable or ArrayTable
     column : int or str or None
         None makes them from the rate.
-    time : TimeMap
     samples : int
         How many there must be.
 
@@ -82,7 +80,6 @@ def counted(table: Table, column: int | str, ns: Stamps, rate_hz: float | None) 
 
     Parameters
     ----------
-    table : TextTable or ArrayTable
     column : int or str
         It may begin again at a power of two, or at its largest number, and count by more than one.
     ns : ndarray of int64, shape (n,)

@@ -64,7 +64,6 @@ def read_files(paths: Sequence[Path], chart: ImportMap) -> Imported:
     paths : sequence of Path
         CSV (or any columns in text), MAT up to version 7, NPZ, bare numbers. Several files hold the parts that the map
         names, or, where it names none, one stretch of time each, in this order.
-    chart : ImportMap
     """
     named = (
         chart.accel.file,
@@ -143,8 +142,6 @@ def write_imported(path: Path, found: Imported, replace: bool = False, custom: M
 
     Parameters
     ----------
-    path : Path
-    found : Imported
     replace : bool
         Replace a bag that is there.
     custom : mapping of str to str, optional

@@ -26,8 +26,6 @@ class Proposal:
     ----------
     suffix : str
         For the names of its file and of the bag; empty where a file holds one IMU.
-    text : str
-        The file.
     words : tuple of str
         What was recognised by what, and what is left to the user.
     """

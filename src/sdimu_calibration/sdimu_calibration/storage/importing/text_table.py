@@ -45,7 +45,6 @@ class TextTable:
 
     Parameters
     ----------
-    path : Path
     delimiter : str, optional
         Recognised from the first line of data when left out.
     decimal : str
