@@ -29,7 +29,7 @@ _PRECISION = np.array(WIDTHS) ** -2.0
 """Prior information (1) on a size of each width: sizes are in units of the prior's."""
 _LOG_SHARE = np.log(WIDTH_SHARES)
 _ROUNDING = 1e-9
-"""Size (1), in units of the prior's, below which a negative one is zero."""
+"""Size in units of the prior's (1) below which a negative one is zero: the rounding of an inverse."""
 _WIDTHS = np.column_stack([_PRECISION, _LOG_SHARE])
 
 

@@ -12,6 +12,26 @@ _SINGULAR = 1e-9
 
 
 @compiled
+def _best_width(x: float, one: Floats, other: Floats, widths: Floats, least: float) -> tuple[float, int]:
+    """Log Bayes factor of a pair by the width of its sizes that it fits best, where that exceeds `least`; the width."""
+    best, at, p, q = -np.inf, 0, one[1], other[1]
+    for width in range(len(widths)):
+        loading = widths[width, 0]
+        a, b = one[0] + loading, other[0] + loading
+        det = a * b - x * x
+        first, second = p * b - x * q, q * a - x * p
+        if not det > _SINGULAR * a * b or (one[3] and first < 0.0) or (other[3] and second < 0.0):
+            continue
+        score = 0.5 * (p * first + q * second) / det + 2.0 * widths[width, 1]
+        # The logarithm takes longer than all else: it is taken where it can matter.
+        if score - 0.5 * np.log(_SINGULAR) > least:
+            score -= 0.5 * np.log(det / loading**2)
+            if score > best:
+                best, at = score, width
+    return best, at
+
+
+@compiled
 def best_pair(
     X: Floats, table: Floats, apart: Ints, kin: Ints, widths: Floats, more: float
 ) -> tuple[float, int, int, int]:
@@ -46,19 +66,9 @@ def best_pair(
         for j in range(i + 1, len(X)):
             if apart[i, 0] == apart[j, 0] or apart[i, 1] == apart[j, 1] or apart[i, 2] == apart[j, 2]:
                 continue
-            x, p, q = X[i, j], table[i, 1], table[j, 1]
+            x = X[i, j]
             odds = table[i, 2] + table[j, 2] + (more if kin[i] == kin[j] else 0.0)
-            for width in range(len(widths)):
-                loading = widths[width, 0]
-                a, b = table[i, 0] + loading, table[j, 0] + loading
-                det = a * b - x * x
-                first, second = p * b - x * q, q * a - x * p
-                if not det > _SINGULAR * a * b or (table[i, 3] and first < 0.0) or (table[j, 3] and second < 0.0):
-                    continue
-                score = 0.5 * (p * first + q * second) / det + odds + 2.0 * widths[width, 1]
-                # The logarithm takes longer than all else: it is taken where it can matter.
-                if score - 0.5 * np.log(_SINGULAR) > best:
-                    score -= 0.5 * np.log(det / loading**2)
-                    if score > best:
-                        best, at_i, at_j, at_width = score, i, j, width
+            score, width = _best_width(x, table[i], table[j], widths, best - odds)
+            if score + odds > best:
+                best, at_i, at_j, at_width = score + odds, i, j, width
     return best, at_i, at_j, at_width

@@ -277,7 +277,6 @@ def _noises(
 
     Parameters
     ----------
-    models : sequence of Weighed
     beside : sequence of (float, NoiseModel)
         Noises beside the best effects, with the log posterior of both (1).
     """
