@@ -70,7 +70,7 @@ class CalibrationFit(Fitted):
     @cached_property
     def residuals(self) -> Floats:
         """Whitened residuals with every coefficient at its estimate, shape (N,): standard normal when all is right."""
-        evidence = self.core.evidence()
+        evidence = self.core.bare
         estimate, _ = evidence.information.estimate(evidence.model, evidence.weight)
         return np.asarray(evidence.e - evidence.W @ estimate)
 

@@ -80,7 +80,7 @@ def priors(fit: Fit | None) -> dict[str, float]:
     """One sigma (SI) that the IMU's file gives each coefficient; empty where no fit says it."""
     if fit is None:
         return {}
-    evidence = fit.evidence()
+    evidence = fit.bare
     return dict(zip(evidence.names[: evidence.coefficients], evidence.stated.tolist(), strict=False))
 
 

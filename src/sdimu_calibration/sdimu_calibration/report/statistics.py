@@ -133,7 +133,7 @@ class Influence:
 
 def influences(fit: NavigationFit) -> Influence:
     """Leave every stop out of a fit in its linear model; of what the estimator estimates, see what is reported."""
-    evidence = fit.evidence()
+    evidence = fit.bare
     stops, moved = influence(evidence)
     reported = [k for k, name in enumerate(evidence.names[: evidence.coefficients]) if name in fit.names]
     return Influence(stops, tuple(evidence.names[k] for k in reported), moved[:, reported])

@@ -109,7 +109,7 @@ def next_ground(
     if request.base.learns_scatter:
         return fresh_ground(request, fit, tried, own)
     before = found.evidence if found.white is None else found.white
-    evidence = before.about(fit.evidence(), fit.added_columns(len(tried)), tried)
+    evidence = before.about(fit.bare, fit.added_columns(len(tried)), tried)
     if own and not any(c.family == "own" for c in evidence.candidates):
         more = _untried(candidates(request, (), own), frozenset(evidence.names))
         evidence = _without_doubles(evidence, more)

@@ -171,7 +171,7 @@ def so_far(
 def error_of(test: PreparedTest, model: Model, added: Sequence[str] = ()) -> ModelError:
     """Say how large the error of a model is on a test; parameters as for `so_far`."""
     fit, _ = _fit(test, model)
-    return _error(fit, fit.evidence(), added)
+    return _error(fit, fit.bare, added)
 
 
 def _fit(test: PreparedTest, model: Model) -> tuple[Fit, tuple[str, ...]]:

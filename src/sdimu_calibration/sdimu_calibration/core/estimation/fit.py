@@ -291,7 +291,12 @@ class Fit(ABC):
     @cached_property
     def wander(self) -> Wander:
         """How wandering biases of the sensors would show in the test."""
-        return wander_of(self.evidence())
+        return wander_of(self.bare)
+
+    @cached_property
+    def bare(self) -> LinearEvidence:
+        """Evidence about this fit without candidates."""
+        return self.evidence()
 
     @property
     def has_temperature(self) -> bool:

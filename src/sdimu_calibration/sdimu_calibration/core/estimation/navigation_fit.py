@@ -55,7 +55,7 @@ within a few per cent of it."""
 _FAST = 3.0
 """NIS per degree of freedom (1) in learned noise from which sigmas are too small: in flicker errors are 1.0 of them at
 2, 1.2 at 4.5 and 3.8 at 12 (twelve tests of a FOG)."""
-_OF_THE_PASSES = ("known", "timetable", "wander", "centring", "_drifts", "_share_of_rest")
+_OF_THE_PASSES = ("known", "bare", "timetable", "wander", "centring", "_drifts", "_share_of_rest")
 """Cached properties that neither noise nor doubt changes."""
 NO_FIELD = (
     "the site states no magnetic field: that of mid-northern latitudes is assumed; state magnetic_field_nt (north, "

@@ -66,8 +66,10 @@ def noise_of(fit: Fit) -> FoundNoise:
     """Learn the noise of a fit where its innovations contradict white noise."""
     if not isinstance(fit, NavigationFit) or not suspected(fit):
         return FoundNoise()
-    evidence, wander = fit.evidence(), fit.wander
-    terms = learn(Joint.of(evidence, wander).on_wander(evidence.model, evidence.weight), wander.cut)
+    evidence, wander = fit.bare, fit.wander
+    terms = wander.learned
+    if terms is None:
+        terms = learn(Joint.of(evidence, wander).on_wander(evidence.model, evidence.weight), wander.cut)
     return FoundNoise(terms, evidence)
 
 

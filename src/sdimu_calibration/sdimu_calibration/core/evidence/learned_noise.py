@@ -84,10 +84,13 @@ class Wander:
         n stretches.
     U : ndarray, shape (N, 6 n)
         Signatures; column ``6 stretch + channel``.
+    learned : tuple of NoiseTerm or None
+        Noise that the test asks for in these stretches, where their length hung on it; None where nobody looked.
     """
 
     cut: Stretches
     U: Floats
+    learned: tuple[NoiseTerm, ...] | None = None
 
     @cached_property
     def square(self) -> Floats:

@@ -8,6 +8,7 @@ length takes three times as long.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -42,7 +43,7 @@ def wander_of(evidence: LinearEvidence) -> Wander:
     if not at_rest.any() or np.nanmax(np.nanmean(ratio, axis=(0, 2))) < _STRONG:
         return wander
     terms = learn(Joint.of(evidence, wander).on_wander(evidence.model, evidence.weight), wander.cut)
-    return _halved(evidence, wander, terms)
+    return _halved(evidence, replace(wander, learned=terms), terms)
 
 
 def wander_in(evidence: LinearEvidence, terms: Sequence[NoiseTerm]) -> Wander:

@@ -191,7 +191,7 @@ def fitted(job: Job) -> Fit:
     fit = fit_about(test, model, job.estimator, _untagged(job.about, job.member.name), job.start)
     if job.noise is None:
         return with_noise_learned(fit)
-    evidence = fit.evidence()
+    evidence = fit.bare
     return in_noise(fit, evidence, wander_in(evidence, job.noise), job.noise) if job.noise else fit
 
 

@@ -101,7 +101,7 @@ def base_fit(fit: SetFit) -> Fit:
 
 def _reported(fit: SetFit, base: Fit, covariance: Floats) -> tuple[Floats, Floats]:
     """Values and covariance of what all recordings share, in the frame of the report; `covariance` (P, P) of all."""
-    names = base.evidence().names[: base.evidence().coefficients]
+    names = base.bare.names[: base.bare.coefficients]
     places = [fit.names.index(n) for n in names]
     values, covariance = fit.estimate.values[places], covariance[np.ix_(places, places)]
     if isinstance(base, NavigationFit):

@@ -71,7 +71,7 @@ def stretch_rows(fit: Fit) -> tuple[Reduction, Places]:
         Its labels are those of the six sensors in the first dwell, in the second ...; one per rad/s or m/s^2.
     places : Places
     """
-    evidence = fit.evidence()
+    evidence = fit.bare
     cut, own = _dwells(evidence.times), len(evidence.weight)
     labels = [f"{name} in dwell {k}" for k in range(len(cut)) for name in CHANNELS]
     wide = replace(

@@ -33,5 +33,5 @@ def covariance_in(fit: FilterFit, terms: tuple[NoiseTerm, ...]) -> Floats:
     ndarray, shape (p, p)
         Frame of the prior (SI).
     """
-    evidence = fit.evidence()
+    evidence = fit.bare
     return in_noise(fit, evidence, wander_in(evidence, terms), terms).settled_covariance
