@@ -11,7 +11,7 @@ from typing import Any
 from sdimu_calibration.core.fleet.sheet import Line
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage.files.fleet_folder import Entry
-from sdimu_calibration.storage.files.json_file import write_json
+from sdimu_calibration.storage.files.json_file import entry, write_json
 
 FORMAT = "sdimu-datasheet/1"
 _READ = 1 << 20
@@ -54,7 +54,7 @@ def write_datasheet(path: Path, lines: Sequence[Line], about: Certificate, entri
             "format": FORMAT,
             **{key: value for key, value in asdict(about).items() if key != "recordings"},
             "recordings": [{"file": name, "sha256": digest} for name, digest in about.recordings],
-            "results": [{"name": entry.name, "unit": entry.unit} for entry in entries],
+            "results": [entry(one, "name unit") for one in entries],
             "lines": [_line(line) for line in lines],
         },
     )
