@@ -14,8 +14,6 @@ from sdimu_calibration.storage.files.fleet_folder import Entry
 from sdimu_calibration.storage.files.json_file import entry, write_json
 
 FORMAT = "sdimu-datasheet/1"
-_READ = 1 << 20
-"""Bytes that are read at once."""
 
 
 @dataclass(frozen=True)
@@ -110,8 +108,5 @@ def file_hashes(path: Path) -> dict[Path, tuple[str, str]]:
 
 
 def _sha256(path: Path) -> str:
-    digest = hashlib.sha256()
     with path.open("rb") as stream:
-        while block := stream.read(_READ):
-            digest.update(block)
-    return digest.hexdigest()
+        return hashlib.file_digest(stream, "sha256").hexdigest()
